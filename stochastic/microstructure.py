@@ -62,8 +62,8 @@ class MicrostructureStudy:
         lower, upper = self.limits or sample.limits(SHARE_WITHIN)
         return lower, upper if self.limits else min(upper, self.shape.reach)
 
-    def used(self, sample: AreaWeighted) -> AreaWeighted:
-        """Return the sample with r_n of discs capped at `Shape.reach`, unless limits are stated.
+    def cap_sample(self, sample: AreaWeighted) -> AreaWeighted:
+        """Copy of a sample with r_n of discs capped at `Shape.reach`, unless limits are stated.
 
         Cells of spheres that are tighter are cut off by the limits; the sample is unchanged.
 
@@ -73,22 +73,21 @@ class MicrostructureStudy:
         """
         if self.limits:
             return sample
-        shape, share = self.shape, 1 - float(sample.cdf(self.shape.reach))
-        value = f"{share:.1%} of the {shape.cells} in cells tighter than r_n = {shape.reach:g}"
+        shape, fraction = self.shape, 1 - float(sample.cdf(self.shape.reach))
+        value = f"{fraction:.1%} of the {shape.cells} in cells tighter than r_n = {shape.reach:g}"
         allowed = f"shares up to {MAX_CAPPED:.0%}, since particles touch at r_n = 1"
-        require(share <= MAX_CAPPED, "particles", value=value, allowed=allowed, cure=self._cure)
+        require(fraction <= MAX_CAPPED, "particles", value=value, allowed=allowed, cure=self._cure)
         return sample if shape == SPHERES else sample.capped(shape.reach)
 
     @property
     def _cure(self) -> str:
         """Advice in the message on particles that are too dense for cells of one particle."""
-        fraction = (
-            f"{self.source.packing.fraction:g}" if isinstance(self.source, Simulated) else "…"
-        )
-        fixed = f"set cell.fraction = {fraction} in place of [microstructure]"
+        source = self.source
+        fraction = f"{source.packing.fraction:g}" if isinstance(source, Simulated) else "…"
+        by_fraction = f"set cell.fraction = {fraction} in place of [microstructure]"
         if self.shape == SPHERES:
-            return fixed
-        return f"take an image of them as the cell (cell.image), set limits, or {fixed}"
+            return by_fraction
+        return f"take an image of them as the cell (cell.image), set limits, or {by_fraction}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +121,7 @@ class Microstructure:
     @property
     def share_within(self) -> float:
         """Share of area or volume within the limits, capped cells among it."""
-        return self.study.used(self.sample).share_within(*self.limits)
+        return self.study.cap_sample(self.sample).share_within(*self.limits)
 
     @property
     def share_capped(self) -> float:
@@ -147,9 +146,7 @@ def study(
     executor: Executor | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Microstructure:
-    """Return the fuzzy radius map of a microstructure, with the statistics that it rests on.
-
-    Cells of the particles, distribution of r_n, limits, fitted map and p-box are found in turn.
+    """Fuzzy radius map of a microstructure, with the cells, reduced radii r_n and p-box behind it.
 
     Args:
         case: The settings.
@@ -160,18 +157,18 @@ def study(
         RefusedError: Measured data are not allowed, or cells are too tight.
         FailedError: The packing is too dense, or no p-box contains the sample.
     """
-    tick = progress or (lambda share: None)
-    sections = _sections(case, executor, lambda share: tick(0.7 * share))
+    report = progress or (lambda fraction: None)
+    sections = _sections(case, executor, lambda fraction: report(0.7 * fraction))
     sample = reduced_radii(sections)
-    result = Microstructure(case, sections, sample, *fitted_map(case, sample))
-    tick(1.0)
-    return result
+    truncated, pbox, slopes, band = fit_map(case, sample)
+    report(1.0)
+    return Microstructure(case, sections, sample, truncated, pbox, slopes, band)
 
 
 def _sections(
     case: MicrostructureStudy, executor: Executor | None, progress: Callable[[float], None]
 ) -> list[ParticleCells]:
-    """Return the particles with their cells from the source: one image or file, or packings.
+    """Particles with their cells: of one image or file, or of simulated packings.
 
     Packings of spheres are repeated, at most `MAX_PACKINGS` times, with a volume fraction that is
     corrected until the fitted map has the fraction of the case.
@@ -181,22 +178,24 @@ def _sections(
         return [with_cells(source.read())]
     if case.shape != SPHERES:
         return source.sections(case.seed, executor=executor, progress=progress)
-    goal = source.packing.fraction
-    best, error, fraction = [], np.inf, goal
+    target = source.packing.fraction
+    best_sections, least_error, fraction = [], np.inf, target
     for number in range(MAX_PACKINGS):
         packing = replace(source.packing, fraction=fraction)
         sections = replace(source, packing=packing).sections(case.seed, executor=executor)
-        mapped = _mapped_fraction(case, reduced_radii(sections))
-        if abs(mapped / goal - 1) < error:
-            best, error = sections, abs(mapped / goal - 1)
+        map_fraction = _mapped_fraction(case, reduced_radii(sections))
+        error = abs(map_fraction / target - 1)
+        if error < least_error:
+            best_sections, least_error = sections, error
         progress((number + 1) / MAX_PACKINGS)
-        fraction = min(fraction * (goal / mapped) ** FRACTION_EXPONENT, case.shape.densest)
-        if error < FRACTION_TOLERANCE or fraction == packing.fraction:
+        correction = (target / map_fraction) ** FRACTION_EXPONENT
+        fraction = min(fraction * correction, case.shape.densest)
+        if least_error < FRACTION_TOLERANCE or fraction == packing.fraction:
             break
-    return best
+    return best_sections
 
 
-def fitted_map(
+def fit_map(
     case: MicrostructureStudy, sample: AreaWeighted
 ) -> tuple[AreaWeighted, PBox, SlopeBand, float]:
     """Fit the radius map to a sample of r_n and make its slopes fuzzy.
@@ -209,23 +208,16 @@ def fitted_map(
         RefusedError: All cells have one r_n.
         FailedError: No p-box contains the sample.
     """
-    streams = np.random.SeedSequence(case.seed, spawn_key=(1,)).spawn(2)
-    used = case.used(sample)
-    lower, upper = case.limits_of(used)
+    seeds = np.random.SeedSequence(case.seed, spawn_key=(1,)).spawn(2)
+    capped = case.cap_sample(sample)
+    lower, upper = case.limits_of(capped)
+    value, allowed = f"{upper:.10g} in all cells", "cells of unequal r_n"
     cure = f"set [radius] to a1 = {upper:.10g}, a2 = 0, a3 = {upper:.10g}, a4 = 0"
-    value = f"{upper:.10g} in all cells"
-    require(
-        upper - lower >= MIN_RANGE, "r_n", value=value, allowed="cells of unequal r_n", cure=cure
-    )
-    truncated, fit = used.truncated(lower, upper), HermiteFit(lower, upper)
-    band = truncated.band(CONFIDENCE, RESAMPLES, np.random.default_rng(streams[0]))
-    slopes = slope_band(
-        fit,
-        truncated,
-        level=CONFIDENCE,
-        resamples=RESAMPLES,
-        generator=np.random.default_rng(streams[1]),
-    )
+    require(upper - lower >= MIN_RANGE, "r_n", value=value, allowed=allowed, cure=cure)
+    truncated, fit = capped.truncated(lower, upper), HermiteFit(lower, upper)
+    band_rng, slope_rng = map(np.random.default_rng, seeds)
+    band = truncated.band_half_width(CONFIDENCE, RESAMPLES, band_rng)
+    slopes = slope_band(fit, truncated, level=CONFIDENCE, resamples=RESAMPLES, generator=slope_rng)
     pbox = least_pbox(fit, truncated, band, required=slopes if case.shape == DISCS else None)
     return truncated, pbox, slopes, band
 
@@ -240,4 +232,4 @@ def _mapped_fraction(case: MicrostructureStudy, sample: AreaWeighted) -> float:
 def _fraction(shape: Shape, fit: HermiteFit, slopes: tuple[float, float]) -> float:
     """Return the mean fraction of the cell that the particle fills, for slopes (a2, a4)."""
     rule = gauss_rule(fit.distribution, points=8)
-    return float(rule.mean(shape.shares(fit.map(slopes)(rule.nodes))))
+    return float(rule.mean(shape.fractions(fit.map(slopes)(rule.nodes))))

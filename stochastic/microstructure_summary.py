@@ -17,28 +17,29 @@ CRISP_TOLERANCE = 1e-6  # of a3 − a1: an end nearer to the fitted slope differ
 
 
 def summary(result: Microstructure) -> dict[str, object]:
-    """Return all numbers of a microstructure study by name, lengths in m."""
-    particles = [section.particles for section in result.sections]
-    radii = np.concatenate([packing.radii for packing in particles])
-    shape, map_ = result.study.shape, result.fraction_of_map
-    cells = float(result.sample.weights @ shape.shares(result.sample.values))  # eq. 10
+    """All numbers of a microstructure study by the keys of its JSON file, lengths in m."""
+    packings = [section.particles for section in result.sections]
+    radii = np.concatenate([packing.radii for packing in packings])
+    shape = result.study.shape
+    cell_fraction = float(result.sample.weights @ shape.fractions(result.sample.values))  # eq. 10
     numbers: dict[str, object] = {
         "particles": shape.particles,
-        "packings": len(particles),
+        "packings": len(packings),
         shape.particles: len(radii),
-        f"{shape.cells}_fraction": float(np.mean([packing.fraction for packing in particles])),
-        f"{shape.cells}_fraction_of_cells": cells,
-        f"mean_{shape.cells}_fraction_of_map": map_,
+        f"{shape.cells}_fraction": float(np.mean([packing.fraction for packing in packings])),
+        f"{shape.cells}_fraction_of_cells": cell_fraction,
+        f"mean_{shape.cells}_fraction_of_map": result.fraction_of_map,
         "fraction_of_case": result.stated_fraction,
         "smallest_radius": float(radii.min()),
         "largest_radius": float(radii.max()),
         "share_capped": result.share_capped,
     }
-    return numbers | _of_discs(result) | _of_map(result) | {"radius": radius_section(result)}
+    neighbour_numbers, map_numbers = _neighbour_numbers(result), _map_numbers(result)
+    return numbers | neighbour_numbers | map_numbers | {"radius": radius_section(result)}
 
 
-def _of_discs(result: Microstructure) -> dict[str, object]:
-    """Return number and distances of direct neighbours and the correlation of r_n across walls.
+def _neighbour_numbers(result: Microstructure) -> dict[str, object]:
+    """Number and distances of direct neighbours, and correlation of r_n across cell walls.
 
     Empty for spheres.
     """
@@ -59,8 +60,8 @@ def _of_discs(result: Microstructure) -> dict[str, object]:
     }
 
 
-def _of_map(result: Microstructure) -> dict[str, object]:
-    """Return statistics of r_n, limits, fuzzy slopes with their bands, and misfits, by name."""
+def _map_numbers(result: Microstructure) -> dict[str, object]:
+    """Statistics of r_n, limits, fuzzy slopes with their bands, and misfits, by name."""
     box, sample = result.pbox, result.sample
     return {
         "cells": len(sample.values),
@@ -83,13 +84,14 @@ def _of_map(result: Microstructure) -> dict[str, object]:
 
 
 def radius_section(result: Microstructure) -> dict[str, list[float] | float]:
-    """Return the case section [radius] as a mapping: ends of θ, a1, a3 and fuzzy a2, a4."""
+    """The case section [radius] as a mapping: ends of θ, a1, a3 and fuzzy a2, a4."""
     box, law = result.pbox, result.pbox.fit.distribution
-    near = CRISP_TOLERANCE * (box.fit.a3 - box.fit.a1)
+    tolerance = CRISP_TOLERANCE * (box.fit.a3 - box.fit.a1)
 
     def triangle(ends: tuple[float, float, float]) -> list[float]:
-        near_ends = (ends[1] if abs(end - ends[1]) <= near else end for end in ends)
-        return [float(f"{end:.8g}") for end in near_ends]
+        """Lower end, modal value and upper end; ends at the modal value but for round-off on it."""
+        snapped = (ends[1] if abs(end - ends[1]) <= tolerance else end for end in ends)
+        return [float(f"{end:.8g}") for end in snapped]
 
     return {
         "theta": [float(f"{end:g}") for end in (law.lower, law.upper)],
@@ -101,23 +103,23 @@ def radius_section(result: Microstructure) -> dict[str, list[float] | float]:
 
 
 def fragment(numbers: Mapping[str, Any]) -> str:
-    """Return the case section [radius] as TOML text, with fractions as comments.
+    """The case section [radius] as TOML text, with fractions as comments.
 
     Args:
-        numbers: Those of `summary`.
+        numbers: Numbers of a study by name, from `summary`.
     """
-    cells = "volume" if "mean_volume_fraction_of_map" in numbers else "area"
-    stated = numbers["fraction_of_case"]
-    beside = "" if stated is None else f"; of the case: {stated:g}"
+    measure = "volume" if "mean_volume_fraction_of_map" in numbers else "area"
+    stated, map_fraction = numbers["fraction_of_case"], numbers[f"mean_{measure}_fraction_of_map"]
+    case_words = "" if stated is None else f"; of the case: {stated:g}"
     lines = [
         f"[radius]  # from {numbers['cells']} cells; the limits keep"
-        f" {numbers['share_kept']:.4%} of their {cells}",
-        f"# {cells} fraction of this map at its modal values:"
-        f" {numbers[f'mean_{cells}_fraction_of_map']:.4f}{beside}",
+        f" {numbers['share_kept']:.4%} of their {measure}",
+        f"# {measure} fraction of this map at its modal values: {map_fraction:.4f}{case_words}",
     ]
     for name, value in numbers["radius"].items():
-        ends = [f"{x:.10g}" for x in (value if isinstance(value, list) else [value])]
-        lines.append(f"{name} = [{', '.join(ends)}]" if len(ends) > 1 else f"{name} = {ends[0]}")
+        is_fuzzy = isinstance(value, list)
+        ends = ", ".join(f"{x:.10g}" for x in (value if is_fuzzy else [value]))
+        lines.append(f"{name} = [{ends}]" if is_fuzzy else f"{name} = {ends}")
     return "\n".join(lines) + "\n"
 
 
@@ -134,17 +136,15 @@ def to_dataset(result: Microstructure) -> xarray.Dataset:
     law = fit.distribution
     theta = np.asarray(np.linspace(law.lower, law.upper, 5001), float)
     low, high = box.bounds(theta)
-    share = fit.distribution.cdf(theta)
+    probability = fit.distribution.cdf(theta)
     columns = {
         "cdf": result.truncated.cdf(radius),
-        "pbox_lower": np.interp(radius, high, share),
-        "pbox_upper": np.interp(radius, low, share),
-        "fitted": np.interp(radius, fit.map((box.a2[1], box.a4[1]))(theta), share),
+        "pbox_lower": np.interp(radius, high, probability),
+        "pbox_upper": np.interp(radius, low, probability),
+        "fitted": np.interp(radius, fit.map((box.a2[1], box.a4[1]))(theta), probability),
     }
-    dataset = xarray.Dataset(
-        {name: ("r_n", values, {"units": "1"}) for name, values in columns.items()},
-        {"r_n": radius},
-    )
+    variables = {name: ("r_n", values, {"units": "1"}) for name, values in columns.items()}
+    dataset = xarray.Dataset(variables, {"r_n": radius})
     name = "reduced radius: radius over half the side of a square or cube as large as the cell"
     dataset["r_n"].attrs = {"units": "1", "long_name": name}
     return dataset

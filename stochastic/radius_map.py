@@ -55,13 +55,12 @@ def require_map(radius_map: RadiusMap) -> None:
     require_support(law.lower, law.upper)
     theta = np.linspace(law.lower, law.upper, 65)
     radii = np.asarray(radius_map(theta), float)
-    alike = radii.shape == theta.shape
-    require(
-        alike, "shape of the radii", value=radii.shape, allowed=f"the shape of θ, {theta.shape}"
-    )
-    inside = (radii > 0) & (radii < 1)
-    row = int(np.argmin(inside))
-    require(inside.all(), f"r at θ = {theta[row]:.4g}", value=f"{radii[row]:.4g}", allowed=RADII)
+    allowed = f"the shape of θ, {theta.shape}"
+    has_shape = radii.shape == theta.shape
+    require(has_shape, "shape of the radii", value=radii.shape, allowed=allowed)
+    fits = (radii > 0) & (radii < 1)
+    row = int(np.argmin(fits))
+    require(fits.all(), f"r at θ = {theta[row]:.4g}", value=f"{radii[row]:.4g}", allowed=RADII)
 
 
 @dataclass(frozen=True)
@@ -114,10 +113,9 @@ class HermiteMap:
         return np.asarray(radius, float)
 
     def extremes(self) -> tuple[float, float]:
-        """Return least and greatest radius on the support of θ."""
-        turning = np.roots(np.polynomial.polynomial.polyder(self.monomials)[::-1])
-        inner = turning.real[(abs(turning.imag) < 1e-12) & (turning.real > 0) & (turning.real < 1)]
-        radii = np.polynomial.polynomial.polyval(
-            np.concatenate([[0.0, 1.0], inner]), self.monomials
-        )
+        """Least and greatest radius on the support of θ, at its ends or where dr/dξ = 0."""
+        roots = np.roots(np.polynomial.polynomial.polyder(self.monomials)[::-1])
+        inner = roots.real[(abs(roots.imag) < 1e-12) & (roots.real > 0) & (roots.real < 1)]
+        xi = np.concatenate([[0.0, 1.0], inner])
+        radii = np.polynomial.polynomial.polyval(xi, self.monomials)
         return float(radii.min()), float(radii.max())

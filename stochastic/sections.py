@@ -84,10 +84,9 @@ class Simulated:
             progress: Called with the completed fraction.
         """
         seeds = np.random.SeedSequence(seed).spawn(self.packings)
+        map_function = executor.map if executor else map
         sections: list[ParticleCells] = []
-        for section in (executor.map if executor else map)(
-            _packing_with_cells, [self.packing] * self.packings, seeds
-        ):
+        for section in map_function(_packing_with_cells, [self.packing] * self.packings, seeds):
             sections.append(section)
             if progress:
                 progress(len(sections) / self.packings)
@@ -95,31 +94,25 @@ class Simulated:
 
 
 def reduced_radii(sections: Sequence[ParticleCells]) -> AreaWeighted:
-    """Return r_n of all counted cells, weighted by area or volume, grouped for the bootstrap.
+    """Sample of r_n of all counted cells, weighted by area or volume, grouped for the bootstrap.
 
     A group is a section, or one of 5 × 5 patches if there is a single section.
 
     Raises:
         RefusedError: A cell is smaller than its particle, so that particles overlap.
     """
-    values, weights, groups = [], [], []
-    for number, section in enumerate(sections):
-        values.append(section.reduced_radii)
-        weights.append(section.cells * section.weight)
-        single = len(sections) == 1
-        groups.append(_patches(section) if single else np.full(len(section.counted), number))
+    if len(sections) == 1:
+        groups = [_patches(sections[0])]
+    else:
+        groups = [np.full(len(section.counted), k) for k, section in enumerate(sections)]
     sample = AreaWeighted.from_values(
-        np.concatenate(values), np.concatenate(weights), np.concatenate(groups)
+        np.concatenate([section.reduced_radii for section in sections]),
+        np.concatenate([section.cells * section.weight for section in sections]),
+        np.concatenate(groups),
     )
-    largest, most = sections[0].particles.shape.largest, sample.values[-1]
-    allowed = f"values up to {largest:.4g}"
-    require(
-        most <= largest,
-        "r_n of a cell",
-        value=most,
-        allowed=allowed,
-        cure="mend the overlaps in the data",
-    )
+    full, largest = sections[0].particles.shape.largest, sample.values[-1]
+    allowed, cure = f"values up to {full:.4g}", "mend the overlaps in the data"
+    require(largest <= full, "r_n of a cell", value=largest, allowed=allowed, cure=cure)
     return sample
 
 

@@ -18,7 +18,7 @@ is what a second pass would change once more, or one deviation of the noise that
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import (
@@ -64,7 +64,8 @@ class Segmentation:
         levels: Grey value of each class under mean light.
         light: What the light adds to each pixel, of mean zero, shape (rows, columns).
         noise: Standard deviation of the residuals, in grey values.
-        moved: Uncertainty of each grey value from smoothing; infinite at impulses and scratches.
+        smoothing_error: Uncertainty of each grey value from smoothing; infinite at impulses and
+            scratches.
     """
 
     grey: Array
@@ -72,7 +73,7 @@ class Segmentation:
     levels: Array
     light: Array
     noise: float
-    moved: Array | float = 0.0
+    smoothing_error: Array | float = 0.0
 
     @property
     def drift(self) -> float:
@@ -80,36 +81,34 @@ class Segmentation:
         return float(np.ptp(self.light))
 
     @property
-    def middles(self) -> tuple[float, ...]:
+    def level_midpoints(self) -> tuple[float, ...]:
         """Grey values half-way between the levels of neighbouring classes."""
         return tuple(float(value) for value in (self.levels[1:] + self.levels[:-1]) / 2)
 
     @property
     def fractions(self) -> Array:
-        """Share of each class in the area, at the thresholds."""
+        """Area fraction of each class, shape (classes,)."""
         labels = np.searchsorted(self.thresholds, self.grey, side="right")
         return np.bincount(labels.ravel(), minlength=self.levels.size) / labels.size
 
     @property
-    def open(self) -> float:
+    def open_fraction(self) -> float:
         """Fraction of the area whose pixels may be of another class."""
         first, last = self.ranges()
         return float(np.mean(first < last))
 
     def ranges(self) -> tuple[Rows, Rows]:
-        """Return least and greatest class of each pixel, two arrays of shape (rows, columns).
+        """Least and greatest class that each pixel may be of, shape (rows, columns) each.
 
         The grey value is varied by `CONFIDENT` deviations of the noise, by the light and by the
         uncertainty from smoothing.
         """
-        doubt = CONFIDENT * self.noise + np.abs(self.light) + self.moved
-        first, last = (
-            np.searchsorted(self.thresholds, self.grey + sign * doubt, side="right")
-            for sign in (-1, 1)
-        )
+        uncertainty = CONFIDENT * self.noise + np.abs(self.light) + self.smoothing_error
+        first = np.searchsorted(self.thresholds, self.grey - uncertainty, side="right")
+        last = np.searchsorted(self.thresholds, self.grey + uncertainty, side="right")
         return first, last
 
-    def require(self, most: float = MOST_OPEN) -> None:
+    def require_certain(self, most: float = MOST_OPEN) -> None:
         """Refuse a segmentation with too much uncertain area beside that of the smallest class.
 
         Args:
@@ -118,63 +117,64 @@ class Segmentation:
         Raises:
             RefusedError: It is larger.
         """
-        share = self.open / float(self.fractions.min())
-        impulses = float(np.mean(np.isinf(self.moved)))
+        fraction = self.open_fraction / float(self.fractions.min())
+        impulses = float(np.mean(np.isinf(self.smoothing_error)))
         value = (
-            f"in doubt on {share:.1%} of the smallest phase, by noise of {self.noise:.3g} and"
+            f"in doubt on {fraction:.1%} of the smallest phase, by noise of {self.noise:.3g} and"
             f" drift of light of {self.drift:.3g} grey levels"
-            + (f", and by impulses or scratches on {impulses:.1%}" if impulses else "")
         )
+        if impulses:
+            value += f", and by impulses or scratches on {impulses:.1%}"
         cure = 'remove = ["noise", "light"] takes noise and the drift of light away'
-        require(share <= most, "threshold", value=value, allowed=f"up to {most:.0%}", cure=cure)
+        require(fraction <= most, "threshold", value=value, allowed=f"up to {most:.0%}", cure=cure)
 
 
-def segmented(
+def segment(
     grey: Array, thresholds: Sequence[float], *, smooth: bool = False, level: bool = False
 ) -> Segmentation:
-    """Return the segmentation of a grey image: class, light and uncertainty of its pixels.
+    """Segment a grey image: classes, light, noise, and the uncertainty of each pixel.
 
     Args:
         grey: Grey values, shape (rows, columns).
         thresholds: Grey values between the classes, rising.
         smooth: Remove noise first.
         level: Remove the drift of the light first; the thresholds, which were read off the uneven
-            image, are replaced by the `middles` of the even one.
+            image, are replaced by the `level_midpoints` of the even one.
 
     Raises:
         RefusedError: A class has no pixel, or grey values are clipped.
     """
     values, borders = np.asarray(grey, float), tuple(map(float, thresholds))
-    impulses = _impulses(_classified(values, borders))
-    _refuse_clipped(values, borders, ~impulses)
-    moved: Array | float = 0.0
+    impulses = _impulses(_classify(values, borders))
+    _require_unclipped(values, borders, ~impulses)
+    smoothing_error: Array | float = 0.0
     if level:
-        values = values - _classified(values, borders).light
-        borders = _classified(values, borders).middles
-    if smooth and (noise := _classified(values, borders).noise):
-        rough, values = values, _smoothed(values, noise)
-        again = np.abs(values - _smoothed(values, noise))
-        moved = np.maximum(again, _remaining_noise(rough, values, noise))
-    result = _classified(values, borders)
-    moved = np.where(impulses, np.inf, moved)
-    return Segmentation(values, borders, result.levels, result.light, result.noise, moved)
+        values = values - _classify(values, borders).light
+        borders = _classify(values, borders).level_midpoints
+    if smooth and (noise := _classify(values, borders).noise):
+        noisy, values = values, _denoise(values, noise)
+        second_change = np.abs(values - _denoise(values, noise))
+        smoothing_error = np.maximum(second_change, _remaining_noise(noisy, values, noise))
+    return replace(
+        _classify(values, borders), smoothing_error=np.where(impulses, np.inf, smoothing_error)
+    )
 
 
 def _impulses(image: Segmentation) -> Mask:
-    """Return the mask of pixels that are salt, pepper or scratches, shape (rows, columns).
+    """Mask of the pixels that are salt, pepper or scratches, shape (rows, columns).
 
     Their grey values lie beyond the noise of every class and of most pixels around them, unlike
     those of a blurred border. If they are less than `MIN_IMPULSES` of the image there are none.
     """
     grey = image.grey - image.light
     band = CONFIDENT * image.noise + _EXACT * float(np.abs(grey).max())
-    strange = np.abs(grey[..., None] - image.levels).min(axis=-1) > band
+    is_outlier = np.abs(grey[..., None] - image.levels).min(axis=-1) > band
     low, high = (percentile_filter(grey, q, _AROUND, mode="wrap") for q in _MOST_AROUND)
-    impulses = strange & ((grey < low - band) | (grey > high + band))
+    impulses = is_outlier & ((grey < low - band) | (grey > high + band))
     return np.asarray(impulses & (impulses.mean() >= MIN_IMPULSES))
 
 
-def _refuse_clipped(values: Array, borders: tuple[float, ...], sound: Mask) -> None:
+def _require_unclipped(values: Array, borders: tuple[float, ...], sound: Mask) -> None:
     """Refuse an image whose grey values are clipped: a class piles up at an end of the values.
 
     Args:
@@ -186,50 +186,50 @@ def _refuse_clipped(values: Array, borders: tuple[float, ...], sound: Mask) -> N
         RefusedError: They are clipped.
     """
     labels = median_filter(np.searchsorted(borders, values, side="right"), _PATCH, mode="wrap")
-    far = _far(labels, _BORDER) & sound
-    classes = [values[far & (labels == k)] for k in range(len(borders) + 1)]
+    interior = _interior(labels, _BORDER) & sound
+    classes = [values[interior & (labels == k)] for k in range(len(borders) + 1)]
     classes = [grey for grey in classes if grey.size >= _MIN_PIXELS]
     flat = [_is_flat(grey, float(np.ptp(values[sound]))) for grey in classes]
     for end in (float(values[sound].min()), float(values[sound].max())):
-        for grey, even in zip(classes, flat, strict=True):
+        for grey, is_flat in zip(classes, flat, strict=True):
             distance, counts = np.unique(np.abs(grey - end), return_counts=True)
             pile = counts[0] / grey.size if distance[0] == 0 else 0.0
-            following = counts[1] / grey.size if len(counts) > 1 else 0.0
-            steep = pile >= _LEAST_PILE and pile > _STEEPEST * following
-            if steep and not (even and all(flat)):
+            next_value = counts[1] / grey.size if len(counts) > 1 else 0.0
+            is_clipped = pile >= _LEAST_PILE and pile > _STEEPEST * next_value
+            if is_clipped and not (is_flat and all(flat)):  # all flat: a clean image
                 what = f"{pile:.0%} of a phase at the end of the grey values, {end:g}"
                 cure = "take the image before its contrast was raised, or give cell.labels"
                 raise RefusedError("image", what, "grey values that are not clipped", cure)
 
 
 def _is_flat(grey: Array, contrast: float) -> bool:
-    """Return whether a class has one grey value, or up to three distant ones, as in a clean image.
+    """Whether a class has one grey value, or up to three distant ones, as in a clean image.
 
     Args:
         grey: Grey values of the pixels of a class, shape (n,).
         contrast: Range of the grey values of the image.
     """
-    places, counts = np.unique(grey, return_counts=True)
-    most = np.sort(places[np.argsort(-counts)[:_MAX_FLAT]])
-    shares = np.sort(counts)[::-1] / grey.size
-    far = (np.diff(most) >= _FLAT_GAP * contrast).all()
-    return bool(shares[0] >= _FLAT or (far and shares[:_MAX_FLAT].sum() >= _FLAT))
+    values, counts = np.unique(grey, return_counts=True)
+    order = np.argsort(-counts)[:_MAX_FLAT]  # of the most frequent values
+    fractions = counts[order] / grey.size
+    are_distant = (np.diff(np.sort(values[order])) >= _FLAT_GAP * contrast).all()
+    return bool(fractions[0] >= _FLAT or (are_distant and fractions.sum() >= _FLAT))
 
 
-def _classified(values: Array, borders: tuple[float, ...]) -> Segmentation:
-    """Return classes, levels, light and noise, fitted and assigned in turn until they settle."""
-    shapes, light, before = _polynomials(values.shape), np.zeros_like(values), None
+def _classify(values: Array, borders: tuple[float, ...]) -> Segmentation:
+    """Fit levels, light and noise and assign the classes in turn, until no class changes."""
+    shapes, light, last_labels = _polynomials(values.shape), np.zeros_like(values), None
     for _ in range(_MAX_ITERATIONS):
         labels = np.searchsorted(borders, values - light, side="right")
-        if before is not None and np.array_equal(labels, before):
+        if last_labels is not None and np.array_equal(labels, last_labels):
             break
-        levels, light, noise = _fitted(values, labels, shapes, len(borders) + 1)
-        before = labels
+        levels, light, noise = _fit_light(values, labels, shapes, len(borders) + 1)
+        last_labels = labels
     return Segmentation(values, borders, levels, light, noise)
 
 
-def _smoothed(grey: Array, noise: float) -> Array:
-    """Return the image without noise, by non-local means with periodic edges.
+def _denoise(grey: Array, noise: float) -> Array:
+    """Remove the noise of an image by non-local means with periodic edges.
 
     Args:
         grey: Grey values, shape (rows, columns).
@@ -238,22 +238,22 @@ def _smoothed(grey: Array, noise: float) -> Array:
     from skimage import restoration
 
     edge = _PATCH + _REACH
-    around = np.pad(grey, edge, mode="wrap")
+    padded = np.pad(grey, edge, mode="wrap")
     smooth = restoration.denoise_nl_means(
-        around, patch_size=_PATCH, patch_distance=_REACH, h=_STRENGTH * noise, sigma=noise
+        padded, patch_size=_PATCH, patch_distance=_REACH, h=_STRENGTH * noise, sigma=noise
     )
     return np.asarray(smooth[edge:-edge, edge:-edge])
 
 
-def _remaining_noise(rough: Array, smooth: Array, noise: float) -> Array:
-    """Return the standard deviation of the noise that smoothing leaves in each pixel.
+def _remaining_noise(noisy: Array, smooth: Array, noise: float) -> Array:
+    """Standard deviation of the noise that smoothing leaves in each pixel, (rows, columns).
 
     Half as much noise again is added and its effect on the smoothed image measured nearby. Near
     borders few patches are alike, so that more is left than inside the classes.
     """
     rng = np.random.default_rng(0)
     squares = [
-        (_smoothed(rough + noise / 2 * rng.normal(size=rough.shape), noise) - smooth) ** 2
+        (_denoise(noisy + noise / 2 * rng.normal(size=noisy.shape), noise) - smooth) ** 2
         for _ in range(_NOISE_SAMPLES)
     ]
     return np.asarray(2 * np.sqrt(uniform_filter(np.mean(squares, axis=0), 3, mode="wrap")))
@@ -266,8 +266,10 @@ def _polynomials(shape: tuple[int, ...]) -> Array:
     return np.asarray(columns - columns.mean(axis=0))
 
 
-def _fitted(values: Array, labels: Rows, shapes: Array, classes: int) -> tuple[Array, Array, float]:
-    """Return grey levels (classes,), light (rows, columns) and noise of a classified image.
+def _fit_light(
+    values: Array, labels: Rows, shapes: Array, classes: int
+) -> tuple[Array, Array, float]:
+    """Fit grey levels (classes,), light (rows, columns) and noise to a classified image.
 
     Least squares over pixels away from borders; outliers are left out in three passes.
 
@@ -277,22 +279,23 @@ def _fitted(values: Array, labels: Rows, shapes: Array, classes: int) -> tuple[A
         shapes: Polynomials of the light at the pixels, shape (pixels, 5).
         classes: Number of classes.
     """
-    inner = _inner(labels, classes).ravel()
+    inner = _inner_pixels(labels, classes).ravel()
     columns = np.hstack([labels.reshape(-1, 1) == np.arange(classes), shapes])
     flat, used = values.ravel(), inner
     rounding = _EXACT * float(np.abs(flat).max())
     for _ in range(3):
         fit = np.linalg.lstsq(columns[used], flat[used], rcond=None)[0]
         residual = np.abs(flat - columns @ fit)
-        middle, most = np.quantile(residual[inner], (0.5, _NOISE_QUANTILE))
-        used = inner & (residual <= max(_NEAR * _OF_NORMAL * float(middle), float(most), rounding))
+        median, high = np.quantile(residual[inner], (0.5, _NOISE_QUANTILE))
+        limit = max(_NEAR * _OF_NORMAL * float(median), float(high), rounding)
+        used = inner & (residual <= limit)
     noise, light = float(np.sqrt(np.mean(residual[used] ** 2))), shapes @ fit[classes:]
     light[np.abs(light) < rounding] = 0.0
     return fit[:classes], light.reshape(values.shape), noise if noise > rounding else 0.0
 
 
-def _inner(labels: Rows, classes: int) -> Mask:
-    """Return the mask of pixels up to 3 pixels away from other classes, as far as classes allow.
+def _inner_pixels(labels: Rows, classes: int) -> Mask:
+    """Mask of pixels farther than 3 pixels from other classes, or as far as the classes allow.
 
     The distance is reduced until a tenth of each class is left.
 
@@ -303,13 +306,13 @@ def _inner(labels: Rows, classes: int) -> Mask:
     value, allowed = "beyond the grey values of a class", "values that leave each class some pixels"
     require(counts.all(), "threshold", value=value, allowed=allowed)
     for reach in range(_BORDER, 0, -1):
-        inner = _far(labels, reach)
+        inner = _interior(labels, reach)
         if (np.bincount(labels[inner], minlength=classes) >= _ENOUGH * counts).all():
             return inner
     return np.ones(labels.shape, bool)
 
 
-def _far(labels: Rows, reach: int) -> Mask:
-    """Return the mask of pixels with no other class within `reach` pixels."""
+def _interior(labels: Rows, reach: int) -> Mask:
+    """Mask of the pixels with no other class within `reach` pixels."""
     low, high = (f(labels, 2 * reach + 1, mode="wrap") for f in (minimum_filter, maximum_filter))
     return np.asarray(low == high)

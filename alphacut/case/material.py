@@ -222,7 +222,7 @@ class RoundCell(Section):
         require(fits, "cell.inclusion_modulus", value="a plane stiffness", allowed=allowed)
         if self.fraction is not None:
             touching_radius = 1 / reach(self.outline or circle)
-            touching = float(self.shape.shares(touching_radius))
+            touching = float(self.shape.fractions(touching_radius))
             greatest = self.fraction.support.upper
             allowed = f"values below {touching:.6g}, where particles touch"
             require(greatest < touching, "cell.fraction", value=f"{greatest:g}", allowed=allowed)

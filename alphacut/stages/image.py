@@ -33,7 +33,7 @@ from alphacut.rve.phase_energies import CONSTANTS, PhaseEnergies, first_order
 from alphacut.stages.cell import AVERAGES, GPA, as_cut, isotropic_bounds
 from alphacut.stages.losses import LossCuts, loss_document
 from alphacut.stages.store import Stage, StageContext, StageResult
-from alphacut.stochastic.segmentation import segmented
+from alphacut.stochastic.segmentation import segment
 
 if TYPE_CHECKING:
     import xarray
@@ -253,10 +253,8 @@ def _study_by_thresholds(grey: Array, cell: ImageCell) -> ImageStudy:
     numbers = cell.threshold or ()
     require_phases(grey, tuple(number.cut(0.0) for number in numbers))
     modal = [number.modal for number in numbers]
-    segmentation = segmented(
-        grey, modal, smooth="noise" in cell.remove, level="light" in cell.remove
-    )
-    segmentation.require()
+    segmentation = segment(grey, modal, smooth="noise" in cell.remove, level="light" in cell.remove)
+    segmentation.require_certain()
     shifts = [new - old for new, old in zip(segmentation.thresholds, modal, strict=True)]
     is_fuzzy = any(number.support.width > 0 for number in numbers)
 
@@ -268,7 +266,7 @@ def _study_by_thresholds(grey: Array, cell: ImageCell) -> ImageStudy:
         pairs = [(low + by, high + by) for (low, high), by in zip(cuts, shifts, strict=True)]
         return threshold_ranges(segmentation.grey, pairs)
 
-    return ImageStudy(cell, phase_ranges, is_fuzzy or segmentation.open > 0)
+    return ImageStudy(cell, phase_ranges, is_fuzzy or segmentation.open_fraction > 0)
 
 
 def _study_by_labels(grey: Array, cell: ImageCell, labels: tuple[float, ...]) -> ImageStudy:

@@ -15,7 +15,7 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.rve import Ellipse, Phase, SeriesModel, SlicesModel
 from alphacut.rve.image.solve import solve_image
 from alphacut.stochastic import HermiteMap
-from alphacut.stochastic.microstructure import MicrostructureStudy, fitted_map
+from alphacut.stochastic.microstructure import MicrostructureStudy, fit_map
 from alphacut.stochastic.particles.packing import Packing
 from alphacut.stochastic.particles.particles import DISCS, SPHERES, Particles
 from alphacut.stochastic.particles.radius_laws import LogNormalRadii
@@ -117,7 +117,7 @@ def stated_of_packings(packings: Problem) -> xr.Dataset:
     """Limits, slopes and shares of the radius map of their cells."""
     particles, study = packings["particles"], MicrostructureStudy(packings["source"])
     sample = reduced_radii([with_cells(x) for x in particles])
-    _, pbox, _, band = fitted_map(study, sample)
+    _, pbox, _, band = fit_map(study, sample)
     numbers = {"a1": pbox.fit.a1, "a3": pbox.fit.a3, "band": band}
     numbers |= {f"a2[{i}]": x for i, x in enumerate(pbox.a2)}
     numbers |= {f"a4[{i}]": x for i, x in enumerate(pbox.a4)}

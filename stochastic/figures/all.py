@@ -49,15 +49,15 @@ Figures = dict[str, Callable[[], "Figure"]]
 
 def draw(result: Microstructure, folder: Path) -> dict[str, list[Path]]:
     """Write every figure of a microstructure as SVG and PNG; return the files of each name."""
-    figures = of_map(result)
+    figures = map_figures(result)
     if result.study.shape == DISCS:
-        figures |= of_discs(result)
+        figures |= disc_figures(result)
     with figure_style():
         return {name: save(draw(), folder / name) for name, draw in sorted(figures.items())}
 
 
-def of_map(result: Microstructure) -> Figures:
-    """Return functions that draw radii, cell areas, p-box and radius map, by figure name."""
+def map_figures(result: Microstructure) -> Figures:
+    """Functions that draw radii, cell areas, p-box and radius map, by figure name."""
     source = result.study.source
     law = source.packing.radii if isinstance(source, Simulated) else None
     return {
@@ -68,19 +68,19 @@ def of_map(result: Microstructure) -> Figures:
     }
 
 
-def of_discs(result: Microstructure) -> Figures:
-    """Return functions that draw the figures of discs and their cells, by figure name.
+def disc_figures(result: Microstructure) -> Figures:
+    """Functions that draw the figures of discs and their cells, by figure name.
 
     Figures of direct neighbours show discs of one size at the same area fraction, as in the paper.
     """
     first, source = result.sections[0], result.study.source
     generator = np.random.default_rng(result.study.seed)
-    equal, many = _equal_discs(result, 120), _equal_discs(result, 4000)
+    few_equal, many_equal = _equal_discs(result, 120), _equal_discs(result, 4000)
     figures: Figures = {
-        "03-04_two_point": lambda: draw_two_point(many, generator),
-        "05-08_neighbours": lambda: draw_neighbours(equal),
-        "06-07_neighbour_statistics": lambda: draw_neighbour_statistics(many),
-        "09_correlation": lambda: draw_correlation(result, apollonius(many)),
+        "03-04_two_point": lambda: draw_two_point(many_equal, generator),
+        "05-08_neighbours": lambda: draw_neighbours(few_equal),
+        "06-07_neighbour_statistics": lambda: draw_neighbour_statistics(many_equal),
+        "09_correlation": lambda: draw_correlation(result, apollonius(many_equal)),
     }
     if (diagram := first.diagram) is not None:
         figures["10_cells"] = lambda: draw_cells(diagram)
@@ -95,9 +95,8 @@ def _equal_discs(result: Microstructure, number: int) -> Particles:
     discs = [section.particles for section in result.sections]
     radius = float(np.sqrt(np.mean(np.concatenate([packing.radii for packing in discs]) ** 2)))
     fraction = float(np.mean([packing.fraction for packing in discs]))
-    return Packing(number, min(fraction, DISCS.densest), LogNormalRadii(radius, radius)).make(
-        np.random.default_rng([result.study.seed, number])
-    )
+    packing = Packing(number, min(fraction, DISCS.densest), LogNormalRadii(radius, radius))
+    return packing.make(np.random.default_rng([result.study.seed, number]))
 
 
 def draw_radii(result: Microstructure, law: RadiusLaw | None) -> Figure:
@@ -141,13 +140,12 @@ def draw_correlation(result: Microstructure, equal: Apollonius) -> Figure:
 
     figure, panels = plt.subplots(1, 2, figsize=(9.6, 4.4))
     diagrams = [section.diagram for section in result.sections if section.diagram]
-    for axes, shown, title in zip(
-        panels, (diagrams, [equal]), ("the sections", "equal discs"), strict=True
-    ):
-        pairs = np.concatenate(
-            [neighbouring_values(diagram, diagram.reduced_radii) for diagram in shown], axis=1
-        )
-        axes.hist2d(*pairs, bins=80, cmap="Blues", range=[np.quantile(pairs, (0.0005, 0.9995))] * 2)
+    titles = "the sections", "equal discs"
+    for axes, shown, title in zip(panels, (diagrams, [equal]), titles, strict=True):
+        all_pairs = [neighbouring_values(diagram, diagram.reduced_radii) for diagram in shown]
+        pairs = np.concatenate(all_pairs, axis=1)
+        limits = np.quantile(pairs, (0.0005, 0.9995))  # without outliers
+        axes.hist2d(*pairs, bins=80, cmap="Blues", range=[limits, limits])
         axes.set(xlabel="reduced radius of a cell", ylabel="that of a neighbour", aspect="equal")
         axes.set_title(f"{title}: correlation {np.corrcoef(pairs)[0, 1]:+.3f}")
         axes.grid(visible=False)
@@ -188,16 +186,15 @@ def draw_pbox(result: Microstructure) -> Figure:
         2, 1, figsize=(6.4, 5.6), height_ratios=(3, 1.4), sharex=True
     )
     table = to_dataset(result)
-    radius, share = table["r_n"].values, table["cdf"].values
-    for panel, base in ((axes, 0 * share), (residual_axes, table["fitted"].values)):
+    radius, cdf = table["r_n"].values, table["cdf"].values
+    low, high = np.maximum(cdf - result.band, 0), np.minimum(cdf + result.band, 1)
+    band_label = f"band of ± {result.band:.2g}"
+    cells_label = f"{len(result.truncated.values)} cells"
+    for panel, base in ((axes, 0 * cdf), (residual_axes, table["fitted"].values)):
         scale = 1 if panel is axes else 100
-        low, high = np.maximum(share - result.band, 0), np.minimum(share + result.band, 1)
-        label = f"band of ± {result.band:.2g}"
-        panel.fill_between(
-            radius, scale * (low - base), scale * (high - base), fc=PALE, label=label
-        )
-        label = f"{len(result.truncated.values)} cells"
-        panel.plot(radius, scale * (share - base), color=BLUE, label=label)
+        edges = scale * (low - base), scale * (high - base)
+        panel.fill_between(radius, *edges, fc=PALE, label=band_label)
+        panel.plot(radius, scale * (cdf - base), color=BLUE, label=cells_label)
         panel.plot(radius, scale * (table["pbox_upper"] - base), color=INK, lw=1, label="p-box")
         panel.plot(radius, scale * (table["pbox_lower"] - base), color=INK, lw=1)
     axes.set(ylabel=f"{result.study.shape.cells}-weighted share", ylim=(0, 1.02))

@@ -38,11 +38,11 @@ def _view(axes: Axes, low: Array, high: Array) -> None:
 
 def plot_discs(axes: Axes, discs: Particles, colour: str, view: Array | None = None) -> None:
     """Draw discs and their periodic images in the rectangle, or in its corner `view` (m), in mm."""
-    view = discs.size if view is None else view
-    centres = np.concatenate([discs.centres + shift for shift in _shifts(discs)])
-    radii = np.tile(discs.radii, len(_shifts(discs)))
-    seen = ((centres > -radii[:, None]) & (centres < view + radii[:, None])).all(axis=1)
-    _circles(axes, centres[seen], radii[seen], color=colour, lw=0)
+    view, shifts = discs.size if view is None else view, _shifts(discs)
+    centres = np.concatenate([discs.centres + shift for shift in shifts])
+    radii = np.tile(discs.radii, len(shifts))
+    is_seen = ((centres > -radii[:, None]) & (centres < view + radii[:, None])).all(axis=1)
+    _circles(axes, centres[is_seen], radii[is_seen], color=colour, lw=0)
     _view(axes, 0 * view, view)
 
 
@@ -51,12 +51,13 @@ def plot_cells(axes: Axes, diagram: Apollonius, view: Array | None = None) -> No
     from matplotlib.collections import LineCollection
 
     discs = diagram.discs
+    view = discs.size if view is None else view
     angle, rho = diagram.walls(24)
-    along = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-    points = discs.centres[diagram.cell] + rho[..., None] * along
+    direction = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    points = discs.centres[diagram.cell] + rho[..., None] * direction
     walls = np.concatenate([points + shift for shift in _shifts(discs)], axis=1)
-    inside = (walls.max(axis=0) > 0) & (walls.min(axis=0) < (discs.size if view is None else view))
-    lines = list(1e3 * walls[:, inside.all(axis=1)].swapaxes(0, 1))
+    is_seen = ((walls.max(axis=0) > 0) & (walls.min(axis=0) < view)).all(axis=1)
+    lines = list(1e3 * walls[:, is_seen].swapaxes(0, 1))
     axes.add_collection(LineCollection(lines, colors=INK, linewidths=0.8))
 
 
@@ -74,8 +75,8 @@ def draw_cells(diagram: Apollonius) -> Figure:
     title = f"one section of {width:.4g} × {height:.4g} mm with {len(discs)} discs"
     title = title if (view == discs.size).all() else f"a corner of {title}"
     figure, (left, right) = two_panels(title, "Voronoi cells", "Apollonius cells")
-    bare = apollonius(Particles(discs.centres, np.zeros(len(discs)), discs.size, discs.periodic))
-    for axes, shown, colour in ((left, bare, PALE), (right, diagram, LIGHT)):
+    points = Particles(discs.centres, np.zeros(len(discs)), discs.size, discs.periodic)
+    for axes, shown, colour in ((left, apollonius(points), PALE), (right, diagram, LIGHT)):
         plot_discs(axes, discs, colour, view)
         plot_cells(axes, shown, view)
     return figure
@@ -110,19 +111,19 @@ def draw_two_point(discs: Particles, generator: np.random.Generator) -> Figure:
     offset = discs.separation(np.full(len(discs), centre, np.intp), indices)
     near = offset[(np.hypot(*offset.T) < reach) & (indices != centre)]
     direct = neighbours(discs)
-    touching = {tuple(np.round(v, 12)) for v in direct.offset[direct.first == centre]}
-    colours = [GREEN if tuple(np.round(v, 12)) in touching else LIGHT for v in near]
-    fake = _from_pair_distances(discs, len(near), reach, generator)
+    direct_offsets = {tuple(np.round(v, 12)) for v in direct.offset[direct.first == centre]}
+    colours = [GREEN if tuple(np.round(v, 12)) in direct_offsets else LIGHT for v in near]
+    drawn = _from_pair_distances(discs, len(near), reach, generator)
     figure, panels = two_panels(
         EQUAL.format(len(discs)),
-        f"pair distances alone: {_overlaps(fake, radius)} of {len(fake)} overlap",
+        f"pair distances alone: {_overlaps(drawn, radius)} of {len(drawn)} overlap",
         f"the packing: {colours.count(GREEN)} of {len(near)} are direct neighbours",
     )
     limit = np.full(2, reach + radius)
-    for axes, places, colour in zip(panels, (fake, near), (LIGHT, colours), strict=True):
+    for axes, centres, colour in zip(panels, (drawn, near), (LIGHT, colours), strict=True):
         _circles(axes, np.zeros((1, 2)), np.array([radius]), color=ORANGE)
-        radii = np.full(len(places), radius)
-        _circles(axes, places, radii, facecolor=colour, edgecolor=GREY, alpha=0.8)
+        radii = np.full(len(centres), radius)
+        _circles(axes, centres, radii, facecolor=colour, edgecolor=GREY, alpha=0.8)
         _view(axes, -limit, limit)
     return figure
 

@@ -34,13 +34,16 @@ class AreaWeighted:
     def from_values(
         cls, values: ArrayLike, weights: ArrayLike | None = None, groups: ArrayLike | None = None
     ) -> AreaWeighted:
-        """Return the sample with values sorted and weights, by default equal, scaled to sum 1."""
+        """Sample with the values sorted, the weights scaled to the sum 1, the groups numbered.
+
+        By default weights are equal, and each value is a group.
+        """
         values = np.asarray(values, float).ravel()
         weights = np.ones_like(values) if weights is None else np.asarray(weights, float).ravel()
-        members = np.arange(len(values)) if groups is None else np.asarray(groups).ravel()
-        labels = np.unique(members, return_inverse=True)[1]
+        groups = np.arange(len(values)) if groups is None else np.asarray(groups).ravel()
+        numbers = np.unique(groups, return_inverse=True)[1]
         order = np.argsort(values, kind="stable")
-        return cls(values[order], weights[order] / weights.sum(), labels[order])
+        return cls(values[order], weights[order] / weights.sum(), numbers[order])
 
     @cached_property
     def cumulated(self) -> Array:
@@ -87,11 +90,10 @@ class AreaWeighted:
             RefusedError: Fewer than ten values lie within them.
         """
         inside = (self.values >= lower) & (self.values <= upper)
-        value = f"[{lower:g}, {upper:g}] with {int(inside.sum())} reduced radii"
-        allowed = "limits that contain ten or more"
-        require(
-            inside.sum() >= 10, "limits", value=value, allowed=allowed, cure="take more particles"
-        )
+        count = int(inside.sum())
+        value = f"[{lower:g}, {upper:g}] with {count} reduced radii"
+        allowed, cure = "limits that contain ten or more", "take more particles"
+        require(count >= 10, "limits", value=value, allowed=allowed, cure=cure)
         return AreaWeighted.from_values(
             self.values[inside], self.weights[inside], self.groups[inside]
         )
@@ -100,16 +102,19 @@ class AreaWeighted:
         """The same sample, its values above `most` taken as `most`."""
         return AreaWeighted(np.minimum(self.values, most), self.weights, self.groups)
 
-    def resampled(self, number: int, generator: np.random.Generator) -> Iterator[Array]:
-        """Yield the weights (n,) of `number` bootstrap samples; groups are drawn, the sum is 1."""
+    def bootstrap_weights(self, number: int, generator: np.random.Generator) -> Iterator[Array]:
+        """Yield the weights of the values, (n,), sum 1, in each of `number` bootstrap samples.
+
+        Groups are drawn with replacement.
+        """
         count = int(self.groups.max()) + 1
         for _ in range(number):
-            drawn = np.bincount(generator.integers(count, size=count), minlength=count)
-            weights = self.weights * drawn[self.groups]
+            repetitions = np.bincount(generator.integers(count, size=count), minlength=count)
+            weights = self.weights * repetitions[self.groups]
             yield weights / weights.sum()
 
-    def band(self, level: float, number: int, generator: np.random.Generator) -> float:
-        """Return the half width of the simultaneous bootstrap band of the distribution function F.
+    def band_half_width(self, level: float, number: int, generator: np.random.Generator) -> float:
+        """Half width of the simultaneous bootstrap band of the distribution function F.
 
         It is the `level` quantile of sup |F* − F| over the resampled distribution functions F*.
 
@@ -125,7 +130,9 @@ class AreaWeighted:
         allowed = "five packings, or cells in five of the 25 patches of a section, or more"
         cure = "take more particles, and check the size of the section"
         require(groups >= 5, "groups of the bootstrap", value=groups, allowed=allowed, cure=cure)
-        step = np.append(np.diff(self.values) > 0, True)
-        drawn = self.resampled(number, generator)
-        farthest = [np.abs((np.cumsum(w) - self.cumulated)[step]).max() for w in drawn]
-        return float(np.quantile(farthest, level))
+        is_step = np.append(np.diff(self.values) > 0, True)  # the last of equal values
+        distances = [
+            np.abs((np.cumsum(weights) - self.cumulated)[is_step]).max()
+            for weights in self.bootstrap_weights(number, generator)
+        ]
+        return float(np.quantile(distances, level))

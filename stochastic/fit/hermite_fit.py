@@ -48,7 +48,7 @@ class HermiteFit:
     distribution: ClassVar[TruncatedNormal] = TruncatedNormal()
 
     def slopes(self, sample: AreaWeighted, weights: Array | None = None) -> tuple[float, float]:
-        """Return the slopes a2, a4 of the monotone cubic nearest to the sample between the limits.
+        """Slopes a2, a4 of the monotone cubic H nearest to the sample between the limits.
 
         The distance is ∫ (Q(F_Θ(θ)) − H(θ))² f_Θ dθ, Q the quantile function of the sample.
 
@@ -60,8 +60,8 @@ class HermiteFit:
         probability = np.concatenate([[0.0], cumulated])
         probability[-1] = 1.0
         # normal equations: ∫ h_i (Q − a1 h1 − a3 h3) f_Θ dθ, Q constant between probabilities
-        right = np.diff(self._integrals(probability), axis=1) @ sample.values - self._ends
-        best = np.asarray(np.linalg.solve(self._gram, right), float)
+        right_side = np.diff(self._integrals(probability), axis=1) @ sample.values - self._ends
+        best = np.asarray(np.linalg.solve(self._gram, right_side), float)
         a2, a4 = best if self.is_monotone(best) else self._nearest_monotone(best)
         return float(max(a2, 0)), float(max(a4, 0))
 
@@ -70,7 +70,7 @@ class HermiteFit:
         return HermiteMap(self.a1, slopes[0], self.a3, slopes[1], self.distribution)
 
     def misfit(self, sample: AreaWeighted, slopes: tuple[float, float]) -> float:
-        """Return the root mean square of quantile function less map under f_Θ, in units of r_n.
+        """Root mean square over θ of the sample's quantile function less the map, in r_n.
 
         Args:
             sample: r_n within [a1, a3].
@@ -87,22 +87,21 @@ class HermiteFit:
         xi = Polynomial([-law.lower, 1.0]) / (law.upper - law.lower)
         return np.array([Polynomial(h)(xi).coef for h in SHAPES[[1, 3]]])
 
-    def _integrals(self, share: Array) -> Array:
-        """Return ∫ h_i f_Θ dθ from the lower end of θ to its quantiles, for h2 and h4, (2, n).
+    def _integrals(self, probability: Array) -> Array:
+        """Integrals ∫ h_i f_Θ dθ of h2 and h4 up to the quantiles of probabilities, shape (2, n).
 
-        The moments ∫ θ^k f_Θ dθ follow from each other by partial integration, without quadrature.
+        The moments ∫ θ^k f_Θ dθ follow from each other by partial integration, as f' = −θ f.
 
         Args:
-            share: Probabilities of the quantiles, shape (n,), rising from 0 to 1.
+            probability: Shape (n,), rising from 0 to 1.
         """
         law = self.distribution
-        theta = law.quantile(share)
+        theta = law.quantile(probability)
         density, first = law.pdf(theta), law.pdf(law.lower)
-        moments = [share, first - density]
+        moments = [probability, first - density]
         for k in (2, 3):
-            moments.append(
-                (k - 1) * moments[k - 2] - theta ** (k - 1) * density + law.lower ** (k - 1) * first
-            )
+            ends = law.lower ** (k - 1) * first - theta ** (k - 1) * density
+            moments.append((k - 1) * moments[k - 2] + ends)
         return np.asarray(self._powers @ np.array(moments))
 
     @cached_property
@@ -126,13 +125,13 @@ class HermiteFit:
         return np.asarray(shape[[1, 3]] * weights @ (self.a1 * shape[0] + self.a3 * shape[2]))
 
     @property
-    def rising(self) -> Array:
-        """Slopes at the points XI while a2 = a4 = 0, less the margin for monotony, shape (401,)."""
+    def base_slopes(self) -> Array:
+        """Slopes of the map at the points XI with a2 = a4 = 0, less a margin, shape (401,)."""
         return np.asarray(self.a1 * SLOPES[0] + self.a3 * SLOPES[2] - MARGIN * (self.a3 - self.a1))
 
     def is_monotone(self, slopes: ArrayLike) -> bool:
         """Return whether the map with slopes (a2, a4) rises at all points XI."""
-        return bool((self.rising + np.asarray(slopes) @ SLOPES[[1, 3]] >= -1e-12).all())
+        return bool((self.base_slopes + np.asarray(slopes) @ SLOPES[[1, 3]] >= -1e-12).all())
 
     @property
     def mean_shapes(self) -> tuple[float, float]:
@@ -141,20 +140,21 @@ class HermiteFit:
         return float(weights @ shape[1]), float(-weights @ shape[3])
 
     def _nearest_monotone(self, best: Array) -> Array:
-        """Return the slopes (2,) of the monotone map nearest to the map with slopes `best` (2,).
+        """Slopes (2,) of the monotone map nearest to the map with slopes `best` (2,).
 
-        Least distance programming by non-negative least squares (Lawson, Hanson 1974, chapter 23).
+        Least distance programming by non-negative least squares (Lawson, Hanson 1974, chapter 23):
+        the least |x| with G x ≥ h, x = Lᵀ (slopes − best) and L Lᵀ the Gram matrix.
         """
         from scipy.optimize import nnls
 
-        root = np.linalg.cholesky(self._gram)  # |root.T (a - best)| is the distance
-        sides = np.linalg.solve(root, SLOPES[[1, 3]])
-        short = -self.rising - SLOPES[[1, 3]].T @ best  # what each slope lacks
-        scale = np.linalg.norm(sides, axis=0)
-        system = np.vstack([sides / scale, short / scale])
+        L = np.linalg.cholesky(self._gram)
+        G_transposed = np.linalg.solve(L, SLOPES[[1, 3]])
+        h = -self.base_slopes - SLOPES[[1, 3]].T @ best  # what each slope lacks
+        scale = np.linalg.norm(G_transposed, axis=0)
+        system = np.vstack([G_transposed / scale, h / scale])
         weights, _ = nnls(system, np.array([0.0, 0.0, 1.0]))
         residual = system @ weights - (0, 0, 1)
-        return np.asarray(best + np.linalg.solve(root.T, -residual[:2] / residual[2]))
+        return np.asarray(best + np.linalg.solve(L.T, -residual[:2] / residual[2]))
 
 
 @dataclass(frozen=True)
@@ -169,8 +169,8 @@ class SlopeBand:
     a2: tuple[float, float, float]
     a4: tuple[float, float, float]
 
-    def monotone(self, fit: HermiteFit) -> SlopeBand:
-        """Return the largest part of the band around the fitted slopes with four monotone corners.
+    def monotone_part(self, fit: HermiteFit) -> SlopeBand:
+        """Largest part of the band around the fitted slopes with four monotone corners.
 
         The quantile function of a sample rises, so slopes beyond are those of no radius map. The
         ends are cut at slopes from zero to three times the chord's (Fritsch and Carlson 1980), then
@@ -179,16 +179,17 @@ class SlopeBand:
         Args:
             fit: Ends of the map and law of θ.
         """
-        rise, fitted = fit.a3 - fit.a1, np.array([self.a2[1], self.a4[1]])
-        ends = np.array([self.a2, self.a4])[:, [0, 2]]
-        square = (MARGIN * rise, (STEEPEST - 4 * MARGIN) * rise)
-        low = np.minimum(np.clip(ends[:, 0], *square), fitted)
-        high = np.maximum(np.clip(ends[:, 1], *square), fitted)
-        for share in np.linspace(1, 0, 201):
-            a, b = fitted + share * (low - fitted), fitted + share * (high - fitted)
-            if all(map(fit.is_monotone, itertools.product(*zip(a, b, strict=True)))):
+        chord = fit.a3 - fit.a1
+        least, greatest = MARGIN * chord, (STEEPEST - 4 * MARGIN) * chord
+        lower, fitted, upper = np.array([self.a2, self.a4]).T
+        lower = np.minimum(np.clip(lower, least, greatest), fitted)
+        upper = np.maximum(np.clip(upper, least, greatest), fitted)
+        for fraction in np.linspace(1, 0, 201):
+            low, high = fitted + fraction * (lower - fitted), fitted + fraction * (upper - fitted)
+            if all(map(fit.is_monotone, itertools.product(*zip(low, high, strict=True)))):
                 break
-        a2, a4 = ((float(x), float(y), float(z)) for x, y, z in zip(a, fitted, b, strict=True))
+        ends = zip(low, fitted, high, strict=True)
+        a2, a4 = ((float(x), float(y), float(z)) for x, y, z in ends)
         return SlopeBand(a2, a4)
 
 
@@ -200,7 +201,7 @@ def slope_band(
     resamples: int,
     generator: np.random.Generator,
 ) -> SlopeBand:
-    """Return the fitted slopes and their joint confidence band, by the bootstrap.
+    """Fitted slopes and their joint confidence band, by the bootstrap.
 
     The half width is a quantile of Student's t times the bootstrap standard error. The probability
     of error is halved between the two slopes (Bonferroni); t has one degree of freedom less than
@@ -215,8 +216,9 @@ def slope_band(
     """
     from scipy.special import stdtrit
 
-    fitted = fit.slopes(sample)
-    drawn = [fit.slopes(sample, weights) for weights in sample.resampled(resamples, generator)]
-    half = float(stdtrit(sample.groups.max(), 1 - (1 - level) / 4)) * np.std(drawn, axis=0, ddof=1)
-    a2, a4 = ((x - float(h), x, x + float(h)) for x, h in zip(fitted, half, strict=True))
-    return SlopeBand(a2, a4)
+    a2, a4 = fit.slopes(sample)
+    weights = sample.bootstrap_weights(resamples, generator)
+    errors = np.std([fit.slopes(sample, w) for w in weights], axis=0, ddof=1)
+    quantile = float(stdtrit(sample.groups.max(), 1 - (1 - level) / 4))
+    a2_half, a4_half = (quantile * float(error) for error in errors)
+    return SlopeBand((a2 - a2_half, a2, a2 + a2_half), (a4 - a4_half, a4, a4 + a4_half))

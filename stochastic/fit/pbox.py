@@ -47,24 +47,24 @@ class PBox:
         return (self.a2[2] - self.a2[0]) * h2 + (self.a4[2] - self.a4[0]) * h4
 
     def excess(self, sample: AreaWeighted) -> float:
-        """Return the largest distance of the sample's distribution function outside the p-box.
+        """Largest distance of the sample's distribution function outside the p-box.
 
         It is a probability; 0 if the p-box contains the function.
         """
         values, before, after = sample.steps
         law = self.fit.distribution
-        grid = np.asarray(np.linspace(law.lower, law.upper, 20_001), float)
-        low, high = self.bounds(grid)
-        share = self.fit.distribution.cdf(grid)
-        # bounds of the distribution function
-        least, greatest = (np.interp(values, high, share), np.interp(values, low, share))
-        return float(max((least - before).max(), (after - greatest).max(), 0.0))
+        theta = np.asarray(np.linspace(law.lower, law.upper, 20_001), float)
+        least_radius, greatest_radius = self.bounds(theta)
+        probability = law.cdf(theta)
+        lower_cdf = np.interp(values, greatest_radius, probability)
+        upper_cdf = np.interp(values, least_radius, probability)
+        return float(max((lower_cdf - before).max(), (after - upper_cdf).max(), 0.0))
 
 
 def least_pbox(
     fit: HermiteFit, sample: AreaWeighted, band: float, *, required: SlopeBand | None = None
 ) -> PBox:
-    """Return the p-box of least area around the fitted map that contains the sample's band.
+    """P-box of least area around the fitted map that contains the sample's band.
 
     The misfit alone gives little fuzziness where data are few and the band is wide; `required` adds
     the scatter of the slopes.
@@ -81,63 +81,64 @@ def least_pbox(
         FailedError: No p-box of monotone cubics with these ends contains the sample.
     """
     modal = fit.slopes(sample)
-    core = _core(modal, None if required is None else required.monotone(fit))
-    ends = _solve(fit, core, *_containment(fit, sample, band))
+    limits = _support_limits(modal, None if required is None else required.monotone_part(fit))
+    ends = _least_area_supports(fit, limits, *_containment(fit, sample, band))
     return PBox(fit, (ends[0], modal[0], ends[1]), (ends[2], modal[1], ends[3]))
 
 
-def _core(
+def _support_limits(
     modal: tuple[float, float], required: SlopeBand | None
 ) -> list[tuple[float, float | None]]:
-    """Return limits of the supports (a2L, a2U, a4L, a4U) with modal and required slopes inside."""
+    """Limits of the supports (a2L, a2U, a4L, a4U) that contain modal and required slopes."""
     bands = ((), ()) if required is None else (required.a2, required.a4)
     a2, a4 = ((slope, *band) for slope, band in zip(modal, bands, strict=True))
     return [(0, min(a2)), (max(a2), None), (0, min(a4)), (max(a4), None)]
 
 
 def _containment(fit: HermiteFit, sample: AreaWeighted, band: float) -> tuple[Array, Array]:
-    """Return matrix (k, 4) and right side (k,) of the linear constraints: p-box contains the band.
+    """Matrix (k, 4) and right side (k,) of the linear constraints that the p-box has the band.
 
-    They read matrix @ (a2L, a2U, a4L, a4U) ≤ right. At each step of the sample's distribution
+    They read matrix @ (a2L, a2U, a4L, a4U) ≤ right side. At each step of the sample's distribution
     function the greatest radius must reach the value where the band's lower edge rises, and the
     least radius must not pass it where the upper edge does.
     """
-    share, values, up = _steps(sample, band)
+    probability, values, is_lower_edge = _band_corners(sample, band)
     law = fit.distribution
-    xi = (law.quantile(share) - law.lower) / (law.upper - law.lower)
+    xi = (law.quantile(probability) - law.lower) / (law.upper - law.lower)
     h1, h2, h3, h4 = (polynomial.polyval(xi, h) for h in SHAPES)
-    excess, zero = values - fit.a1 * h1 - fit.a3 * h3, np.zeros_like(h2)
+    rest, zero = values - fit.a1 * h1 - fit.a3 * h3, np.zeros_like(h2)  # for a2 h2 + a4 h4
     greatest = np.stack([zero, -h2, -h4, zero], axis=1)
     least = np.stack([h2, zero, zero, h4], axis=1)
-    return np.where(up[:, None], greatest, least), np.where(up, -excess, excess)
+    matrix = np.where(is_lower_edge[:, None], greatest, least)
+    return matrix, np.where(is_lower_edge, -rest, rest)
 
 
-def _steps(sample: AreaWeighted, band: float) -> tuple[Array, Array, Array]:
-    """Return the corners of the band around the sample's distribution function, three arrays (k,).
+def _band_corners(sample: AreaWeighted, band: float) -> tuple[Array, Array, Array]:
+    """Corners of the band around the sample's distribution function, three arrays (k,).
 
     Returns:
-        Probability and value of each corner, and whether the greatest radius is constrained there;
-        the least radius otherwise.
+        Probability and value of each corner, and whether it is one of the lower edge, where the
+        greatest radius is constrained; the least radius otherwise.
     """
     values, before, after = sample.steps
-    up, down = before + band < 1, after - band > 0
+    lower, upper = before + band < 1, after - band > 0
     return (
-        np.concatenate([(before + band)[up], (after - band)[down]]),
-        np.concatenate([values[up], values[down]]),
-        np.arange(up.sum() + down.sum()) < up.sum(),
+        np.concatenate([(before + band)[lower], (after - band)[upper]]),
+        np.concatenate([values[lower], values[upper]]),
+        np.arange(lower.sum() + upper.sum()) < lower.sum(),
     )
 
 
-def _solve(
-    fit: HermiteFit, core: list[tuple[float, float | None]], matrix: Array, right: Array
+def _least_area_supports(
+    fit: HermiteFit, limits: list[tuple[float, float | None]], matrix: Array, right_side: Array
 ) -> list[float]:
-    """Return the supports (a2L, a2U, a4L, a4U) of the p-box of least area, by a linear program.
+    """Supports (a2L, a2U, a4L, a4U) of the p-box of least area, by a linear program.
 
     Args:
         fit: Ends of the map and law of θ.
-        core: Lower and upper limit of each of the four numbers.
+        limits: Lower and upper limit of each of the four numbers.
         matrix: Constraints of containment, shape (k, 4).
-        right: Their right sides, shape (k,).
+        right_side: Their right sides, shape (k,).
 
     Raises:
         FailedError: No monotone corners fulfil the constraints.
@@ -151,8 +152,8 @@ def _solve(
     result = linprog(
         [-h2, h2, -h4, h4],
         A_ub=np.concatenate([matrix, *monotone]),
-        b_ub=np.concatenate([right, np.tile(fit.rising + 1e-9, 4)]),
-        bounds=core,
+        b_ub=np.concatenate([right_side, np.tile(fit.base_slopes + 1e-9, 4)]),
+        bounds=limits,
     )
     if result.status != 0:
         raise FailedError(

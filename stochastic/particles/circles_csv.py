@@ -30,7 +30,7 @@ class CircleFile:
     size: tuple[float, float]
 
     def read(self) -> Particles:
-        """Return the circles of the file, with the origin at the corner of the section, in m.
+        """Read the circles of the file, in m, with the origin at the corner of the section.
 
         Raises:
             RefusedError: The file cannot be read, or a circle lies outside or overlaps another one.
@@ -52,13 +52,13 @@ class CircleFile:
         """Refuse the file if two circles overlap, with the rows of the worst pair."""
         first, second = close_pairs(discs, 0.0)
         smaller = np.minimum(discs.radii[first], discs.radii[second])
-        share = -surface_distance(discs, first, second) / smaller
-        if share.max(initial=0.0) > ROUNDING:
-            worst = int(np.argmax(share))
+        overlap = -surface_distance(discs, first, second) / smaller
+        if overlap.max(initial=0.0) > ROUNDING:
+            worst = int(np.argmax(overlap))
             upper, lower = sorted(int(rows[k]) for k in (first[worst], second[worst]))
             raise RefusedError(
                 f"{self.path.name}, row {lower}",
-                f"a circle that overlaps that of row {upper} by {share[worst]:.2g} of its radius",
+                f"a circle that overlaps that of row {upper} by {overlap[worst]:.2g} of its radius",
                 "circles that do not overlap",
                 "mend the row",
             )

@@ -24,11 +24,11 @@ NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 
 
 def length_columns(path: Path, columns: Sequence[str]) -> tuple[Rows, Array]:
-    """Return row numbers and columns of lengths of a CSV file; other columns are not read.
+    """Read columns of lengths from a CSV file.
 
     Args:
-        path: The file; separated by commas, semicolons or tabs; empty lines and those behind # are
-            passed over.
+        path: The file; separated by commas, semicolons or tabs; empty lines and comments behind #
+            are skipped.
         columns: Names of the columns; a column d of diameters may stand in for "r".
 
     Returns:
@@ -39,8 +39,8 @@ def length_columns(path: Path, columns: Sequence[str]) -> tuple[Rows, Array]:
             number.
     """
     (_, header), *rows = fields(path)
-    places = [_column(header, name, path) for name in columns]
-    values = [[factor * number(path, row, cells, k) for k, factor in places] for row, cells in rows]
+    found = [_column(header, name, path) for name in columns]
+    values = [[factor * number(path, row, cells, k) for k, factor in found] for row, cells in rows]
     return np.array([row for row, _ in rows]), np.array(values)
 
 
@@ -101,11 +101,13 @@ def number(path: Path, row: int, cells: Sequence[str], column: int) -> float:
 
 def _column(header: list[str], name: str, path: Path) -> tuple[int, float]:
     """Return the index of the column `name` in the header, and the factor of its unit to m."""
-    named = (*RADII, *DIAMETERS) if name == "r" else (name,)
+    is_radius = name == "r"
+    accepted = (*RADII, *DIAMETERS) if is_radius else (name,)
     for column, cell in enumerate(header):
         match = re.fullmatch(HEADER, cell)
-        if match and match[1].lower() in named and match[2] in METRES:
-            return column, METRES[match[2]] * (0.5 if match[1].lower() in DIAMETERS else 1.0)
-    needed = f"a column '{name} [mm]'" + (" or 'd [mm]'" if name == "r" else "")
+        if match and match[1].lower() in accepted and match[2] in METRES:
+            is_diameter = match[1].lower() in DIAMETERS
+            return column, METRES[match[2]] * (0.5 if is_diameter else 1.0)
+    allowed = f"a column '{name} [mm]'" + (" or 'd [mm]'" if is_radius else "")
     units = f"units are {', '.join(METRES)}"
-    raise RefusedError(f"{path.name}, header", ",".join(header)[:80], needed, units)
+    raise RefusedError(f"{path.name}, header", ",".join(header)[:80], allowed, units)

@@ -62,15 +62,17 @@ class SectionImage:
         from PIL import Image
 
         try:
-            with Image.open(self.path) as opened:
-                plain = opened.mode in ("1", "L", "I", "F") or opened.mode.startswith("I;16")
-                return np.asarray(opened if plain else opened.convert("L"), float)
+            with Image.open(self.path) as image:
+                is_grey = image.mode in ("1", "L", "I", "F") or image.mode.startswith("I;16")
+                return np.asarray(image if is_grey else image.convert("L"), float)
         except Exception as error:  # readers of damaged files raise errors of many kinds
             allowed = f"images that can be read ({error})"
             raise RefusedError("image.file", self.path, allowed) from None
 
     def circles(self, picture: Array) -> Particles:
-        """Return circles of the same area and centroid as the particles in a grey image, in m.
+        """Circles of the same area and centroid as the particles in a grey image, in m.
+
+        Particles that touch the image's edge are left out.
 
         Args:
             picture: Grey values, shape (rows, columns).
@@ -80,32 +82,33 @@ class SectionImage:
         """
         from skimage import measure
 
-        phase = self._particles(picture)
-        labels = _pieces(phase)
-        inside, odd = [], 0.0
-        for piece in measure.regionprops(labels):  # type: ignore[no-untyped-call]
+        phase = self._particle_mask(picture)
+        rows, columns = phase.shape
+        circles, not_round_area = [], 0.0
+        for piece in measure.regionprops(_label_particles(phase)):  # type: ignore[no-untyped-call]
             top, left, bottom, right = piece.bbox
-            if min(top, left) == 0 or bottom == phase.shape[0] or right == phase.shape[1]:
+            if min(top, left) == 0 or bottom == rows or right == columns:
                 continue
             if piece.area < np.pi * SMALLEST**2 or piece.solidity < ROUND:
-                odd += piece.area
+                not_round_area += piece.area
             else:
-                inside.append((*piece.centroid, piece.equivalent_diameter_area / 2))
+                circles.append((*piece.centroid, piece.equivalent_diameter_area / 2))
+        fraction = not_round_area / max(phase.sum(), 1)
         require(
-            bool(inside) and odd <= MAX_NOT_ROUND * phase.sum(),
+            bool(circles) and fraction <= MAX_NOT_ROUND,
             self.path.name,
-            value=f"{odd / max(phase.sum(), 1):.1%} of the particles' area in pieces that are not"
-            f" round, beside {len(inside)} that are",
+            value=f"{fraction:.1%} of the particles' area in pieces that are not"
+            f" round, beside {len(circles)} that are",
             allowed=f"images with round particles, up to {MAX_NOT_ROUND:.0%} of others",
             cure="take the image itself as the cell: cell.image",
         )
-        row, column, radius = np.array(inside).T
-        centres = np.stack([column + 0.5, phase.shape[0] - row - 0.5], axis=1)
-        size = np.array(phase.shape[::-1]) * self.pixel
+        row, column, radius = np.array(circles).T
+        centres = np.stack([column + 0.5, rows - row - 0.5], axis=1)  # y from the lower edge
+        size = np.array([columns, rows]) * self.pixel
         return Particles(centres * self.pixel, radius * self.pixel, size, periodic=False)
 
-    def _particles(self, picture: Array) -> Mask:
-        """Return the mask of the particles' pixels, by Otsu's threshold of the smoothed image.
+    def _particle_mask(self, picture: Array) -> Mask:
+        """Mask of the particles' pixels, by Otsu's threshold of the smoothed image.
 
         The phase whose pieces fill more of their convex hulls is that of the particles.
 
@@ -119,28 +122,22 @@ class SectionImage:
         greys = [smooth[part] for part in (bright, ~bright) if part.any()]
         contrast = float(np.ptp([np.median(grey) for grey in greys]))
         noise = float(np.sqrt(np.mean([np.var(grey) for grey in greys])))
-        clear = len(greys) == 2 and contrast >= NOISE * noise
+        is_clear = len(greys) == 2 and contrast >= NOISE * noise
         value = f"one of {len(greys)} greys, apart by {contrast / max(noise, 1e-300):.2g} noises"
         allowed = f"images of two greys, {NOISE:g} standard deviations apart"
-        require(
-            clear, self.path.name, value=value, allowed=allowed, cure="average the image before"
-        )
+        cure = "average the image before"
+        require(is_clear, self.path.name, value=value, allowed=allowed, cure=cure)
         phase: Mask = ~bright if _convexity(~bright) > _convexity(bright) else bright
         unevenness = _unevenness(smooth, ~phase) / contrast
         value = f"light that differs by {unevenness:.2g} of the contrast"
+        is_even, allowed = unevenness <= MAX_UNEVENNESS, f"values up to {MAX_UNEVENNESS:g}"
         cure = "subtract the background, for example by skimage.restoration.rolling_ball"
-        require(
-            unevenness <= MAX_UNEVENNESS,
-            self.path.name,
-            value=value,
-            allowed=f"values up to {MAX_UNEVENNESS:g}",
-            cure=cure,
-        )
+        require(is_even, self.path.name, value=value, allowed=allowed, cure=cure)
         return phase
 
 
-def _pieces(phase: Mask) -> NDArray[np.int_]:
-    """Return the label of the particle at each pixel, 0 outside, shape (rows, columns).
+def _label_particles(phase: Mask) -> NDArray[np.int_]:
+    """Number of the particle at each pixel, 0 outside, shape (rows, columns).
 
     Particles that touch are separated by a watershed of the distance to the background.
     """
@@ -160,7 +157,7 @@ def _convexity(phase: Mask) -> float:
     """Return the area of all particles of a phase over that of their convex hulls."""
     from skimage import measure
 
-    pieces = measure.regionprops(_pieces(phase))  # type: ignore[no-untyped-call]
+    pieces = measure.regionprops(_label_particles(phase))  # type: ignore[no-untyped-call]
     large = [piece for piece in pieces if piece.area >= np.pi * SMALLEST**2]
     hulls = sum(piece.area_convex for piece in large)
     return float(sum(piece.area for piece in large) / hulls) if hulls else 0.0

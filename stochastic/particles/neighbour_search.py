@@ -16,16 +16,17 @@ MAX_PAIRS = 3_000_000  # in a portion, so that it fits into memory
 
 
 def size_classes(radii: Array) -> Iterator[Rows]:
-    """Yield the indices of particles whose radii lie within a factor of two, class by class."""
-    level = np.zeros(len(radii))
-    if (top := radii.max(initial=0.0)) > 0:
-        level = np.floor(np.log2(np.maximum(radii, top * 2.0**-20) / top))
-    for value in np.unique(level):
-        yield np.flatnonzero(level == value)
+    """Yield the indices of particles by class: radii of a class lie within a factor of two."""
+    number = np.zeros(len(radii))
+    largest = radii.max(initial=0.0)
+    if largest > 0:
+        number = np.floor(np.log2(np.maximum(radii, largest * 2.0**-20) / largest))
+    for value in np.unique(number):
+        yield np.flatnonzero(number == value)
 
 
 def close_pairs(particles: Particles, gap: float) -> tuple[Rows, Rows]:
-    """Return the unordered pairs of particles with surfaces closer than `gap`, in m.
+    """Unordered pairs of particles whose surfaces are closer than a gap.
 
     Args:
         particles: In a periodic box or a window.
@@ -40,14 +41,15 @@ def close_pairs(particles: Particles, gap: float) -> tuple[Rows, Rows]:
     largest = [particles.radii[members].max() for members in classes]
     pairs = []
     for k, members in enumerate(classes):
+        # within a class, then between it and each class before
         pairs.append(members[trees[k].query_pairs(2 * largest[k] + gap, output_type="ndarray")])
         for m in range(k):
             reach = largest[k] + largest[m] + gap
             near = trees[k].sparse_distance_matrix(trees[m], reach, output_type="ndarray")
             pairs.append(np.stack([members[near["i"]], classes[m][near["j"]]], axis=1))
     first, second = np.concatenate(pairs).T
-    close = surface_distance(particles, first, second) < gap
-    return first[close], second[close]
+    is_close = surface_distance(particles, first, second) < gap
+    return first[is_close], second[is_close]
 
 
 def surface_distance(particles: Particles, first: Rows, second: Rows) -> Array:
@@ -56,8 +58,8 @@ def surface_distance(particles: Particles, first: Rows, second: Rows) -> Array:
     return np.asarray(distance - particles.radii[first] - particles.radii[second])
 
 
-def balls(tree: KDTree, centres: Array, reach: Array) -> tuple[Rows, Rows]:
-    """Return the number of points in each ball (n,), and all their indices, ball after ball."""
+def points_in_balls(tree: KDTree, centres: Array, reach: Array) -> tuple[Rows, Rows]:
+    """Number of points in each ball, shape (n,), and indices of all points, ball after ball."""
     near = tree.query_ball_point(centres, reach, return_sorted=False)
     counts = np.fromiter(map(len, near), int, len(near))
     return counts, np.fromiter((k for ball in near for k in ball), int, counts.sum())
@@ -101,23 +103,22 @@ def pairs_within(discs: Particles, reach: Array) -> Iterator[tuple[Rows, Pairs]]
     Yields:
         Indices i of a portion of the discs, of at most `MAX_PAIRS` pairs or so, and their pairs.
     """
-    image, shift = _images(discs, float(reach.max()))
-    places = discs.centres[image] + shift
-    tree = KDTree(places)
-    number = tree.query_ball_point(discs.centres, reach, return_length=True)
-    portion = np.cumsum(number) // MAX_PAIRS
-    for value in np.unique(portion):
-        part = np.flatnonzero(portion == value)
-        counts, near = balls(tree, discs.centres[part], reach[part])
-        first, second = np.repeat(part, counts), image[near]
-        # the same, with its sign, seen from j
-        offset = discs.centres[second] - discs.centres[first] + shift[near]
-        keep = (first != second) | (offset != 0).any(axis=1)
-        yield part, Pairs(first, second, offset).where(keep)
+    disc_of_image, shift = _periodic_images(discs, float(reach.max()))
+    tree = KDTree(discs.centres[disc_of_image] + shift)
+    n_pairs = tree.query_ball_point(discs.centres, reach, return_length=True)
+    portion_number = np.cumsum(n_pairs) // MAX_PAIRS
+    for value in np.unique(portion_number):
+        portion = np.flatnonzero(portion_number == value)
+        counts, images = points_in_balls(tree, discs.centres[portion], reach[portion])
+        first, second = np.repeat(portion, counts), disc_of_image[images]
+        # by the centres, so that the pair (j, i) has exactly the negative offset
+        offset = discs.centres[second] - discs.centres[first] + shift[images]
+        is_pair = (first != second) | (offset != 0).any(axis=1)
+        yield portion, Pairs(first, second, offset).where(is_pair)
 
 
-def _images(discs: Particles, margin: float) -> tuple[Rows, Array]:
-    """Return disc and shift of all periodic images within `margin` (m) of the rectangle.
+def _periodic_images(discs: Particles, margin: float) -> tuple[Rows, Array]:
+    """Disc and shift of all periodic images with centres within `margin` (m) of the rectangle.
 
     Returns:
         Index of the disc of each image, shape (m,), the discs themselves first, and the shift of
@@ -128,8 +129,10 @@ def _images(discs: Particles, margin: float) -> tuple[Rows, Array]:
     shifts: list[Array] = [np.zeros((len(discs), 2))]
     tiles = np.ceil(margin / discs.size).astype(int) if discs.periodic else (0, 0)
     for tile in itertools.product(*(range(-number, number + 1) for number in tiles)):
+        if not any(tile):  # the discs themselves
+            continue
         image = discs.centres + discs.size * tile
-        near = ((image > -margin) & (image < discs.size + margin)).all(axis=1) & any(tile)
-        indices.append(originals[near])
-        shifts.append(np.broadcast_to(discs.size * tile, (int(near.sum()), 2)))
+        is_near = ((image > -margin) & (image < discs.size + margin)).all(axis=1)
+        indices.append(originals[is_near])
+        shifts.append(np.broadcast_to(discs.size * tile, (int(is_near.sum()), 2)))
     return np.concatenate(indices), np.concatenate(shifts)

@@ -16,7 +16,11 @@ from scipy.spatial import KDTree
 
 from alphacut.fuzzy.arrays import Array, Mask, Rows
 from alphacut.fuzzy.refused import FailedError, checked_number, require
-from alphacut.stochastic.particles.neighbour_search import balls, close_pairs, size_classes
+from alphacut.stochastic.particles.neighbour_search import (
+    close_pairs,
+    points_in_balls,
+    size_classes,
+)
 from alphacut.stochastic.particles.particles import DISCS, Particles, Shape, nearest_image
 from alphacut.stochastic.particles.radius_laws import RadiusLaw
 
@@ -61,7 +65,7 @@ class Packing:
         return Particles(self._centres(radii, box, generator), radii, box)
 
     def _radii(self, generator: np.random.Generator) -> tuple[Array, float]:
-        """Draw radii until their box has room for the largest; return them and its side, in m.
+        """Draw radii until their box has room for the largest: radii (n,) and side, in m.
 
         On average this keeps the frequencies of the law (Wald's identity), as drawing all of them
         anew does not.
@@ -82,17 +86,17 @@ class Packing:
         return radii, side
 
     def _centres(self, radii: Array, box: Array, generator: np.random.Generator) -> Array:
-        """Return centres (n, d), in m: of a loose packing placed one by one, else relaxed."""
-        loose = self.fraction <= self.shape.sequential
-        placed = random_sequential(radii, box, generator) if loose else None
-        return relaxed(radii, box, generator) if placed is None else placed
+        """Centres (n, d), in m, by random sequential addition if it succeeds, else relaxation."""
+        is_loose = self.fraction <= self.shape.sequential
+        centres = random_sequential(radii, box, generator) if is_loose else None
+        return relax_random_centres(radii, box, generator) if centres is None else centres
 
 
 def random_sequential(radii: Array, box: Array, generator: np.random.Generator) -> Array | None:
-    """Return centres (n, d), in m, of particles without overlap, by random sequential addition.
+    """Centres (n, d), in m, of particles without overlap, by random sequential addition.
 
     Particles are added from the largest down, in blocks; each one that overlaps is proposed again
-    at a new place, uniform in the periodic box.
+    at a new centre, uniform in the periodic box.
 
     Args:
         radii: shape (n,), in m.
@@ -103,22 +107,22 @@ def random_sequential(radii: Array, box: Array, generator: np.random.Generator) 
         The centres; None if `MAX_PROPOSALS` proposals for a particle all overlap.
     """
     order = np.argsort(-radii, kind="stable")
-    falling = radii[order]
-    centres: Array = np.zeros((0, len(box)))
-    while len(centres) < len(order):
-        block = slice(len(centres), min(len(order), max(64, int(1.5 * len(centres)))))
-        placed_so_far = _Placed(centres, falling[: len(centres)], box)
-        added = _added(placed_so_far, falling[block], generator)
+    sorted_radii = radii[order]
+    placed: Array = np.zeros((0, len(box)))
+    while len(placed) < len(order):
+        block = slice(len(placed), min(len(order), max(64, int(1.5 * len(placed)))))
+        obstacles = _Obstacles(placed, sorted_radii[: len(placed)], box)
+        added = _add_block(obstacles, sorted_radii[block], generator)
         if added is None:
             return None
-        centres = np.concatenate([centres, added])
-    placed = np.empty_like(centres)
-    placed[order] = centres
-    return placed
+        placed = np.concatenate([placed, added])
+    centres = np.empty_like(placed)
+    centres[order] = placed
+    return centres
 
 
-class _Placed:
-    """Particles that have their places, for tests whether proposed ones overlap them.
+class _Obstacles:
+    """Particles that have been placed, for tests whether proposed ones overlap them.
 
     Args:
         centres: shape (n, d), in m.
@@ -133,64 +137,65 @@ class _Placed:
             (KDTree(centres[k] % box, boxsize=box), centres[k], radii[k]) for k in classes
         ]
 
-    def hit(self, proposal: Array, radii: Array) -> Mask:
-        """Return which proposed particles overlap a placed one, a mask (n,).
+    def overlapped_by(self, proposal: Array, radii: Array) -> Mask:
+        """Mask of the proposed particles that overlap a placed one, shape (n,).
 
         Args:
             proposal: Proposed centres, shape (n, d), in m.
             radii: Their radii, shape (n,), in m.
         """
-        hit = np.zeros(len(proposal), bool)
+        overlaps = np.zeros(len(proposal), bool)
         for tree, centres, placed_radii in self.size_classes:
-            candidates = np.flatnonzero(~hit)
+            candidates = np.flatnonzero(~overlaps)
             reach = radii[candidates] + placed_radii.max()
-            counts, placed = balls(tree, proposal[candidates], reach)
+            counts, placed = points_in_balls(tree, proposal[candidates], reach)
             proposed = np.repeat(candidates, counts)
             offset = nearest_image(proposal[proposed] - centres[placed], self.box)
             distance = np.linalg.norm(offset, axis=1)
-            hit[proposed[distance < radii[proposed] + placed_radii[placed]]] = True
-        return hit
+            overlaps[proposed[distance < radii[proposed] + placed_radii[placed]]] = True
+        return overlaps
 
 
-def _added(placed_so_far: _Placed, radii: Array, generator: np.random.Generator) -> Array | None:
-    """Return centres (n, d) of further particles that overlap neither placed ones nor each other.
+def _add_block(obstacles: _Obstacles, radii: Array, generator: np.random.Generator) -> Array | None:
+    """Centres (n, d) of further particles that overlap neither obstacles nor each other.
 
-    None if a particle found no place in `MAX_PROPOSALS` proposals.
+    None if for a particle `MAX_PROPOSALS` proposals all overlap.
     """
-    box = placed_so_far.box
-    new = np.full((len(radii), len(box)), np.nan)
-    fresh = _Placed(new[:0], radii[:0], box)
+    box = obstacles.box
+    centres = np.full((len(radii), len(box)), np.nan)
+    new_obstacles = _Obstacles(centres[:0], radii[:0], box)
     for _ in range(MAX_PROPOSALS):
-        pending = np.flatnonzero(np.isnan(new[:, 0]))
+        pending = np.flatnonzero(np.isnan(centres[:, 0]))
         if not len(pending):
-            return new
+            return centres
         proposal = box * generator.random((len(pending), len(box)))
-        free = ~placed_so_far.hit(proposal, radii[pending])
-        free[free] = ~fresh.hit(proposal[free], radii[pending[free]])
-        chosen = np.flatnonzero(free)
-        chosen = chosen[_first_come(proposal[chosen], radii[pending[chosen]], box)]
-        new[pending[chosen]] = proposal[chosen]
-        done = ~np.isnan(new[:, 0])
-        fresh = _Placed(new[done], radii[done], box)
+        is_free = ~obstacles.overlapped_by(proposal, radii[pending])
+        is_free[is_free] = ~new_obstacles.overlapped_by(proposal[is_free], radii[pending[is_free]])
+        free = np.flatnonzero(is_free)
+        accepted = free[_accepted_in_order(proposal[free], radii[pending[free]], box)]
+        centres[pending[accepted]] = proposal[accepted]
+        is_placed = ~np.isnan(centres[:, 0])
+        new_obstacles = _Obstacles(centres[is_placed], radii[is_placed], box)
     return None
 
 
-def _first_come(proposal: Array, radii: Array, box: Array) -> Mask:
-    """Return which proposals are accepted, a mask (n,): they overlap no earlier accepted one."""
-    state = np.zeros(len(proposal), int)  # 0 open, 1 stays, -1 goes
+def _accepted_in_order(proposal: Array, radii: Array, box: Array) -> Mask:
+    """Mask of the proposals that overlap no earlier accepted one, shape (n,)."""
+    OPEN, ACCEPTED, REJECTED = 0, 1, -1
+    state = np.full(len(proposal), OPEN)
     if len(proposal) < 2:
-        return np.asarray(state == 0)
-    early, late = np.sort(close_pairs(Particles(proposal, radii, box), 0.0), axis=0)
-    while (state == 0).any():
-        waits = np.zeros(len(state), bool)
-        waits[late[state[early] == 0]] = True
-        state[(state == 0) & ~waits] = 1
-        state[late[state[early] == 1]] = -1
-    return np.asarray(state == 1)
+        return np.asarray(state == OPEN)
+    earlier, later = np.sort(close_pairs(Particles(proposal, radii, box), 0.0), axis=0)
+    while (state == OPEN).any():
+        is_waiting = np.zeros(len(state), bool)  # for an earlier one that it overlaps
+        is_waiting[later[state[earlier] == OPEN]] = True
+        state[(state == OPEN) & ~is_waiting] = ACCEPTED
+        state[later[state[earlier] == ACCEPTED]] = REJECTED
+    return np.asarray(state == ACCEPTED)
 
 
-def relaxed(radii: Array, box: Array, generator: np.random.Generator) -> Array:
-    """Return centres (n, d), in m, of particles without overlap in a periodic box, by relaxation.
+def relax_random_centres(radii: Array, box: Array, generator: np.random.Generator) -> Array:
+    """Centres (n, d), in m, of particles without overlap in a periodic box, by relaxation.
 
     Random centres are pushed apart (`_push`) and then moved at random (`_shake`).
 
@@ -203,15 +208,15 @@ def relaxed(radii: Array, box: Array, generator: np.random.Generator) -> Array:
         FailedError: The particles still overlap after all steps.
     """
     start = box * generator.random((len(radii), len(box)))
-    overlapping = Particles(start, radii, box)
-    fraction = overlapping.fraction
-    grown = fraction + HEADROOM * (overlapping.shape.densest - fraction)
-    growth = max(1 + 1e-4, float((grown / fraction) ** (1 / len(box))))
-    return _shake(_push(overlapping, growth), generator)
+    particles = Particles(start, radii, box)
+    fraction = particles.fraction
+    grown_fraction = fraction + HEADROOM * (particles.shape.densest - fraction)
+    growth = max(1 + 1e-4, float((grown_fraction / fraction) ** (1 / len(box))))
+    return _shake(_push(particles, growth), generator)
 
 
 def _push(particles: Particles, growth: float) -> Particles:
-    """Return the particles moved apart until none overlap, by FIRE (Bitzek et al. 2006).
+    """Move particles apart until none overlap, by fast inertial relaxation (Bitzek et al. 2006).
 
     The energy ½ Σ overlap² of particles with radii grown by the factor `growth` is minimised.
 
@@ -219,24 +224,25 @@ def _push(particles: Particles, growth: float) -> Particles:
         FailedError: Particles overlap after `MAX_STEPS` steps.
     """
     centres, box, radii = particles.centres, particles.size, particles.radii * growth
-    velocity, step, mixing, downhill = np.zeros_like(centres), 0.1, 0.1, 0
+    velocity, step, mixing, n_downhill = np.zeros_like(centres), 0.1, 0.1, 0
+    # pairs within the skin are searched anew when a particle has moved half of it
     skin, overlap = 0.6 * float(particles.radii.mean()), 0.0
-    pairs, anchor = None, centres
+    pairs, searched_at = None, centres
     for _ in range(MAX_STEPS):
-        moved = float(np.linalg.norm(nearest_image(centres - anchor, box), axis=1).max())
-        if pairs is None or 2 * moved > skin:
-            pairs, anchor = close_pairs(Particles(centres, radii, box), skin), centres
+        path = float(np.linalg.norm(nearest_image(centres - searched_at, box), axis=1).max())
+        if pairs is None or 2 * path > skin:
+            pairs, searched_at = close_pairs(Particles(centres, radii, box), skin), centres
         force, overlap = _repulsion(centres, radii, pairs, box)
         if overlap < (growth - 1) * 2 * float(particles.radii.min()):
             return Particles(centres, particles.radii, box)
         if float((force * velocity).sum()) > 0:
-            downhill += 1
-            pull = np.sqrt((velocity**2).sum() / max((force**2).sum(), 1e-300))
-            velocity = (1 - mixing) * velocity + mixing * pull * force
-            if downhill > 5:
+            n_downhill += 1
+            speed_per_force = np.sqrt((velocity**2).sum() / max((force**2).sum(), 1e-300))
+            velocity = (1 - mixing) * velocity + mixing * speed_per_force * force
+            if n_downhill > 5:
                 step, mixing = min(1.1 * step, 0.6), 0.99 * mixing
         else:
-            velocity, mixing, downhill = np.zeros_like(velocity), 0.1, 0
+            velocity, mixing, n_downhill = np.zeros_like(velocity), 0.1, 0
             step = max(0.5 * step, 0.02)
         velocity = velocity + step * force
         centres = centres + step * velocity
@@ -250,7 +256,7 @@ def _push(particles: Particles, growth: float) -> Particles:
 def _repulsion(
     centres: Array, radii: Array, pairs: tuple[Rows, Rows], box: Array
 ) -> tuple[Array, float]:
-    """Return the force on each particle, shape (n, d), and the greatest overlap, in m.
+    """Force on each particle, shape (n, d), and the greatest overlap, both in m.
 
     Each pair repels along the line of centres with a force equal to its overlap.
     """
@@ -258,34 +264,32 @@ def _repulsion(
     offset = nearest_image(centres[second] - centres[first], box)
     distance = np.maximum(np.linalg.norm(offset, axis=1), 1e-300)
     overlap = np.maximum(radii[first] + radii[second] - distance, 0)
-    push = (overlap / distance)[:, None] * offset
+    pair_force = (overlap / distance)[:, None] * offset  # on the second of each pair
     count = len(centres)
-    force = [
-        np.bincount(second, along, count) - np.bincount(first, along, count) for along in push.T
-    ]
+    force = [np.bincount(second, x, count) - np.bincount(first, x, count) for x in pair_force.T]
     return np.stack(force, axis=1), float(overlap.max(initial=0.0))
 
 
 def _shake(particles: Particles, generator: np.random.Generator) -> Array:
-    """Return centres (n, d) after `MOVES` random moves of each particle without overlap.
+    """Centres (n, d), in m, after `MOVES` random moves of each particle without overlap.
 
-    A move is made if it keeps clear of both old and new places of the neighbours.
+    A move is made if it keeps clear of both old and new positions of the neighbours.
     """
     box, dimensions, radii = particles.size, len(particles.size), particles.radii
     reach = 0.25 * particles.spacing * (1 - particles.fraction ** (1 / dimensions))
     centres = particles.centres
     for _ in range(0, MOVES, MOVES_PER_SEARCH):
         first, second = close_pairs(Particles(centres, radii, box), 4 * MOVES_PER_SEARCH * reach)
-        limit = radii[first] + radii[second]
+        contact = radii[first] + radii[second]  # distance of centres that touch
         for _ in range(MOVES_PER_SEARCH):
             direction = generator.standard_normal(centres.shape)
             direction /= np.linalg.norm(direction, axis=1)[:, None]
             length = reach * generator.random(len(radii)) ** (1 / dimensions)
-            moved = centres + length[:, None] * direction
-            stays = np.zeros(len(radii), bool)
+            proposal = centres + length[:, None] * direction
+            is_rejected = np.zeros(len(radii), bool)
             for mover, neighbour in ((first, second), (second, first)):
-                for positions in (centres, moved):
-                    offset = nearest_image(positions[neighbour] - moved[mover], box)
-                    stays[mover[np.linalg.norm(offset, axis=1) < limit]] = True
-            centres = np.where(stays[:, None], centres, moved)
+                for positions in (centres, proposal):
+                    offset = nearest_image(positions[neighbour] - proposal[mover], box)
+                    is_rejected[mover[np.linalg.norm(offset, axis=1) < contact]] = True
+            centres = np.where(is_rejected[:, None], centres, proposal)
     return centres

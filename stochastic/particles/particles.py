@@ -39,7 +39,7 @@ class Shape:
         """r_n of a particle that fills its cell."""
         return float(self.factor ** (-1 / self.dimensions))
 
-    def shares(self, radii: ArrayLike) -> Array:
+    def fractions(self, radii: ArrayLike) -> Array:
         """Return the area or volume fraction of a cell that particles of reduced radii fill."""
         return np.asarray(self.factor * np.asarray(radii, float) ** self.dimensions)
 
@@ -49,7 +49,7 @@ class Shape:
 
     def measure(self, radii: ArrayLike) -> Array:
         """Area in m² or volume in m³ of particles, of radii in m of any shape."""
-        return self.shares(radii) * 2.0**self.dimensions
+        return self.fractions(radii) * 2.0**self.dimensions
 
 
 DISCS = Shape("discs", "area", 2, np.pi / 4, 0.99, 0.45, 0.82)
@@ -82,19 +82,20 @@ class Particles:
         size = np.array(self.size, float).ravel()
         centres: Array = np.array(self.centres, float).reshape(-1, len(size))
         radii = np.array(self.radii, float).ravel()
+        value = f"{len(radii)} numbers"
         allowed = f"{len(centres)} positions, of one particle or more"
-        require(
-            0 < len(radii) == len(centres), "radii", value=f"{len(radii)} numbers", allowed=allowed
-        )
-        _refuse(~((size > 0) & (size < np.inf)), "size", size, "positive, finite lengths in m")
-        _refuse(~np.isfinite(centres).all(axis=1), "centres", centres, "finite lengths in m")
-        _refuse(~((radii >= 0) & (radii < np.inf)), "radii", radii, "finite lengths from 0 m on")
+        require(0 < len(radii) == len(centres), "radii", value=value, allowed=allowed)
+        _require_all((size > 0) & (size < np.inf), "size", size, "positive, finite lengths in m")
+        _require_all(np.isfinite(centres).all(axis=1), "centres", centres, "finite lengths in m")
+        is_length = (radii >= 0) & (radii < np.inf)
+        _require_all(is_length, "radii", radii, "finite lengths from 0 m on")
         if self.periodic:
             wrapped = np.mod(centres, size)
             centres = np.where(wrapped < size, wrapped, 0.0)
         else:
-            outside = ((centres < 0) | (centres > size)).any(axis=1)
-            _refuse(outside, "centres", centres, f"places in the window of {size.tolist()} m")
+            is_inside = ((centres >= 0) & (centres <= size)).all(axis=1)
+            allowed = f"places in the window of {size.tolist()} m"
+            _require_all(is_inside, "centres", centres, allowed)
         for name, value in (("centres", centres), ("radii", radii), ("size", size)):
             object.__setattr__(self, name, value)
 
@@ -132,7 +133,7 @@ def nearest_image(offset: Array, size: Array) -> Array:
     return np.asarray(offset - size * np.round(offset / size))
 
 
-def _refuse(bad: Mask | np.bool_, name: str, values: Array, allowed: str) -> None:
-    """Refuse an array of values of which some are marked as bad, and name the first of them."""
-    row = int(np.argmax(bad))
-    require(not bad.any(), f"{name}[{row}]", value=values[row].tolist(), allowed=allowed)
+def _require_all(is_allowed: Mask, name: str, values: Array, allowed: str) -> None:
+    """Refuse an array of which some values are not allowed; the message names the first of them."""
+    row = int(np.argmin(is_allowed))
+    require(is_allowed.all(), f"{name}[{row}]", value=values[row].tolist(), allowed=allowed)

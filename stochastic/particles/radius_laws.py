@@ -26,9 +26,8 @@ def require_radii(key: str, radii: ArrayLike) -> None:
     """
     radii = np.atleast_1d(np.asarray(radii, float))
     wrong = radii[~((radii >= LEAST) & (radii <= MOST))]
-    value = f"{wrong[0]:.6g} m" if len(wrong) else None
-    plain = len(radii) > 0 and not len(wrong)
-    require(plain, key, value=value, allowed=f"radii from {LEAST:g} to {MOST:g} m")
+    value, are_allowed = f"{wrong[0]:.6g} m" if len(wrong) else None, len(radii) and not len(wrong)
+    require(bool(are_allowed), key, value=value, allowed=f"radii from {LEAST:g} to {MOST:g} m")
 
 
 @dataclass(frozen=True)

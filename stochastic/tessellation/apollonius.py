@@ -63,7 +63,7 @@ class Apollonius:
         return np.asarray(2 * self.discs.radii / np.sqrt(self.areas))
 
     def walls(self, count: int) -> tuple[Array, Array]:
-        """Return points along the wall of each arc in polar coordinates of its cell's centre.
+        """Points along the wall of each arc in polar coordinates around its cell's centre.
 
         Args:
             count: Number of points on each arc, its ends among them.
@@ -78,7 +78,7 @@ class Apollonius:
 
 
 def apollonius(discs: Particles) -> Apollonius:
-    """Return the Apollonius diagram of discs, of which none lies inside another one.
+    """Apollonius diagram of discs, of which none lies inside another one.
 
     Cells bounded by the discs nearby contain the true ones, and a disc j can only cut the cell of i
     if |c_j − c_i| < 2 ρ_max,i − r_i + r_j, with ρ_max,i the largest radius of that first cell; all
@@ -87,18 +87,18 @@ def apollonius(discs: Particles) -> Apollonius:
     Args:
         discs: Periodic box or open window.
     """
-    widest = float(discs.radii.max())
-    largest = np.zeros(len(discs))
-    for walls in _walls(discs, np.full(len(discs), widest + NEAR * discs.spacing)):
-        largest += walls.largest_radius()
+    largest_disc = float(discs.radii.max())
+    rho_max = np.zeros(len(discs))
+    for walls in _walls(discs, np.full(len(discs), largest_disc + NEAR * discs.spacing)):
+        rho_max += walls.largest_radius()
     areas, parts = np.zeros(len(discs)), []
-    for walls in _walls(discs, 2 * largest - discs.radii + widest):
+    for walls in _walls(discs, 2 * rho_max - discs.radii + largest_disc):
         areas += walls.areas()
         arcs, pairs = walls.arcs, walls.pairs
-        second, offset = pairs.second[arcs.function], pairs.offset[arcs.function]
-        parts.append((arcs.owner, second, offset, arcs.start, arcs.end))
-    columns = (np.concatenate(column) for column in zip(*parts, strict=True))
-    return Apollonius(discs, areas, *columns)
+        neighbour, offset = pairs.second[arcs.function], pairs.offset[arcs.function]
+        parts.append((arcs.owner, neighbour, offset, arcs.start, arcs.end))
+    cell, neighbour, offset, start, end = map(np.concatenate, zip(*parts, strict=True))
+    return Apollonius(discs, areas, cell, neighbour, offset, start, end)
 
 
 def _near_far(radii: Array, first: Rows, second: Rows, offset: Array) -> tuple[Array, Array]:
@@ -120,19 +120,15 @@ class _Walls:
     arcs: Arcs
 
     def _anomalies(self) -> tuple[Array, Array, Array, Array]:
-        """Return hyperbolic anomalies at start and end of each arc, d + Δ and d − Δ; all (m,)."""
-        wall = self.arcs.function
-        offset = self.pairs.offset[wall]
-        near, far = _near_far(
-            self.discs.radii, self.pairs.first[wall], self.pairs.second[wall], offset
-        )
-        towards = np.arctan2(offset[:, 1], offset[:, 0])
-        return (
-            anomaly(self.arcs.start - towards, near, far),
-            anomaly(self.arcs.end - towards, near, far),
-            near,
-            far,
-        )
+        """Hyperbolic anomalies at start and end of each arc, and d + Δ and d − Δ, (m,) each.
+
+        d is the distance of the centres of both discs, Δ the difference of their radii.
+        """
+        arcs, pairs = self.arcs, self.pairs.where(self.arcs.function)
+        near, far = _near_far(self.discs.radii, pairs.first, pairs.second, pairs.offset)
+        direction = np.arctan2(pairs.offset[:, 1], pairs.offset[:, 0])
+        start, end = (anomaly(angle - direction, near, far) for angle in (arcs.start, arcs.end))
+        return start, end, near, far
 
     def areas(self) -> Array:
         """Cell areas, shape (n,)."""
@@ -140,20 +136,20 @@ class _Walls:
         return np.asarray(np.bincount(self.arcs.owner, sectors, len(self.discs)), float)
 
     def largest_radius(self) -> Array:
-        """Return an upper bound of the distance from each centre to its cell's boundary, (n,).
+        """Upper bound of the distance from each centre to its cell's boundary, shape (n,), in m.
 
-        The boundary is farthest at a corner. Of its two walls the one with the smaller anomaly
-        there gives the distance; a per mille is added for round-off.
+        The boundary is farthest at a corner. Of its two walls the one with the smaller anomaly s
+        there gives the distance, (d cosh s + Δ)/2; a per mille is added for round-off.
         """
         start, end, near, far = self._anomalies()
         owner = self.arcs.owner
         following = np.append(np.arange(1, len(owner)), 0)
-        last = np.flatnonzero(np.append(owner[1:] != owner[:-1], True))
+        last = np.flatnonzero(np.append(owner[1:] != owner[:-1], True))  # arc of each cell
         following[last] = np.concatenate([[0], last[:-1] + 1])[: len(last)]
-        ahead = np.abs(start[following]) < np.abs(end)
-        on = np.where(ahead, following, np.arange(len(owner)))
-        out = np.where(ahead, start[following], end)
-        radius = (near[on] + far[on]) / 4 * np.cosh(out) + (near[on] - far[on]) / 4
+        use_following = np.abs(start[following]) < np.abs(end)
+        wall = np.where(use_following, following, np.arange(len(owner)))
+        s = np.where(use_following, start[following], end)
+        radius = (near[wall] + far[wall]) / 4 * np.cosh(s) + (near[wall] - far[wall]) / 4
         largest = np.zeros(len(self.discs))
         np.maximum.at(largest, owner, 1.001 * radius)
         return largest
@@ -162,56 +158,53 @@ class _Walls:
 def _walls(discs: Particles, reach: Array) -> Iterator[_Walls]:
     """Yield the walls of portions of the discs: envelopes of all neighbours within reach.
 
+    The wall at angle φ is 1/ρ(φ) = a cos φ + b sin φ + c, and the largest 1/ρ is the cell's.
+
     Args:
         discs: The discs.
         reach: Distance up to which other discs count as neighbours, shape (n,), in m.
     """
     for portion, neighbours in pairs_within(discs, reach):
         near, far = _near_far(discs.radii, neighbours.first, neighbours.second, neighbours.offset)
-        walls = neighbours.where((near > 0) & (far > 0))
-        pairs = Pairs.join([walls, _bounds(discs, portion)])
+        walls = neighbours.where((near > 0) & (far > 0))  # neither disc contains the other
+        pairs = Pairs.join([walls, _bounding_pairs(discs, portion)])
         near, far = _near_far(discs.radii, pairs.first, pairs.second, pairs.offset)
         direction = pairs.offset / np.hypot(pairs.offset[:, 0], pairs.offset[:, 1])[:, None]
-        amplitude = 1 / near + 1 / far
-        arcs = upper_envelopes(
-            amplitude * direction[:, 0],
-            amplitude * direction[:, 1],
-            1 / near - 1 / far,
-            np.bincount(pairs.first, minlength=len(discs)),
-        )
-        yield _Walls(discs, pairs, arcs)
+        a, b = (1 / near + 1 / far) * direction.T
+        counts = np.bincount(pairs.first, minlength=len(discs))
+        yield _Walls(discs, pairs, upper_envelopes(a, b, 1 / near - 1 / far, counts))
 
 
-def _bounds(discs: Particles, portion: Rows) -> Pairs:
-    """Return the pairs that bound every cell: a disc and its own images, or its mirror images.
+def _bounding_pairs(discs: Particles, portion: Rows) -> Pairs:
+    """Pairs that bound every cell: a disc and its own images, or its mirror images.
 
     In a periodic box these are the eight nearest images, in a window the mirror images at its four
     edges, with `second` −1.
     """
     if discs.periodic:
         shifts = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j]) * discs.size
-        return Pairs(
-            np.repeat(portion, 8), np.repeat(portion, 8), np.tile(shifts, (len(portion), 1))
-        )
+        owner = np.repeat(portion, 8)
+        return Pairs(owner, owner, np.tile(shifts, (len(portion), 1)))
     # off the edge, so that there is a mirror image
     centres = np.clip(discs.centres[portion], 1e-15 * discs.size, (1 - 1e-15) * discs.size)
-    offset = np.zeros((len(portion), 4, 2))
-    offset[:, 0, 0], offset[:, 1, 0] = -2 * centres[:, 0], 2 * (discs.size[0] - centres[:, 0])
-    offset[:, 2, 1], offset[:, 3, 1] = -2 * centres[:, 1], 2 * (discs.size[1] - centres[:, 1])
+    (x, y), (width, height) = centres.T, discs.size
+    offset = np.zeros((len(portion), 4, 2))  # to the left, right, lower and upper mirror image
+    offset[:, 0, 0], offset[:, 1, 0] = -2 * x, 2 * (width - x)
+    offset[:, 2, 1], offset[:, 3, 1] = -2 * y, 2 * (height - y)
     return Pairs(np.repeat(portion, 4), np.full(4 * len(portion), -1), offset.reshape(-1, 2))
 
 
 def counted_cells(diagram: Apollonius) -> tuple[Rows, Array]:
-    """Return the cells that no disc outside the window can change, and their weights.
+    """Cells that no disc outside the window can change, and their weights.
 
-    A disc beyond the window's edge, if none is larger than the largest one seen, shows no deeper in
-    the window than that one's radius; taking all that lies beyond for one such disc, the wall
-    towards it is a parabola, ρ = (D + r)/(1 + cos ψ), D the distance from the centre to the edge
-    less the largest radius: the cell is unchanged if ρ (1 + cos ψ) − r ≤ D all around, for all four
+    A disc beyond the window's edge, no larger than the largest one seen, cannot reach deeper into
+    the window than that one's radius. If all beyond the edge were one such disc, the wall towards
+    it would be a parabola, ρ = (D + r)/(1 + cos ψ), D the distance from the centre to the edge less
+    the largest radius: the cell is unchanged if ρ (1 + cos ψ) − r ≤ D all around, for all four
     edges. Large cells fail this more often than small ones; each counted cell therefore stands for
-    1/p cells, p the fraction of places in the window where its like would count (Miles 1974,
-    Lantuéjoul 1978). This holds for a section that looks the same everywhere, with every disc
-    listed whose centre lies in the window.
+    1/p cells, p the fraction of positions in the window where an equal cell would count (Miles
+    1974, Lantuéjoul 1978). This holds for a homogeneous section, with every disc listed whose
+    centre lies in the window.
 
     Returns:
         Indices of their discs, shape (k,), and the number of cells that each stands for, shape
@@ -225,30 +218,25 @@ def counted_cells(diagram: Apollonius) -> tuple[Rows, Array]:
         return np.arange(len(discs), dtype=np.intp), np.ones(len(discs))
     reach = _reach(diagram)
     inner, (x, y) = discs.size - 2 * discs.radii.max(), discs.centres.T - discs.radii.max()
-    room = np.stack([x, inner[0] - x, y, inner[1] - y], axis=1)
-    touching = np.isin(np.arange(len(discs)), diagram.cell[diagram.neighbour < 0])
-    disc = np.flatnonzero((reach <= room).all(axis=1) & ~touching)
-    allowed = "windows in which the edge leaves a cell whole"
-    require(
-        len(disc) > 0,
-        "size",
-        value=discs.size.tolist(),
-        allowed=allowed,
-        cure="take a larger section",
-    )
-    taken = reach[disc].reshape(-1, 2, 2).sum(axis=2)  # across and along
-    return disc, discs.measure / (inner - taken).prod(axis=1)
+    edge_distance = np.stack([x, inner[0] - x, y, inner[1] - y], axis=1)  # D of the four edges
+    is_cut = np.isin(np.arange(len(discs)), diagram.cell[diagram.neighbour < 0])
+    disc = np.flatnonzero((reach <= edge_distance).all(axis=1) & ~is_cut)
+    value, allowed = discs.size.tolist(), "windows in which the edge leaves a cell whole"
+    require(len(disc) > 0, "size", value=value, allowed=allowed, cure="take a larger section")
+    extent = reach[disc].reshape(-1, 2, 2).sum(axis=2)  # of each cell, across and along
+    return disc, discs.measure / (inner - extent).prod(axis=1)
 
 
 def _reach(diagram: Apollonius) -> Array:
-    """Return max ρ (1 + cos ψ) − r over each cell's boundary for the four edges, (n, 4), in m.
+    """Largest ρ (1 + cos ψ) − r over each cell's boundary for the four edges, (n, 4), in m.
 
-    ρ is the distance from the centre and ψ the angle from the edge's direction. The maximum over
-    `ANGLES` points of each arc is taken, whose error is of second order.
+    ρ is the distance from the centre, r the disc's radius and ψ the angle from the edge's
+    direction. It is taken over `ANGLES` points of each arc, with an error of second order.
     """
     angle, rho = diagram.walls(ANGLES)
+    is_bounded = rho.min(axis=0) > 0
     reach = np.full((len(diagram.discs), 4), -np.inf)
     for edge, direction in enumerate(EDGES):
-        out = (rho * (1 + np.cos(angle - direction))).max(axis=0)
-        np.maximum.at(reach[:, edge], diagram.cell, np.where(rho.min(axis=0) > 0, out, np.inf))
+        arc_reach = (rho * (1 + np.cos(angle - direction))).max(axis=0)
+        np.maximum.at(reach[:, edge], diagram.cell, np.where(is_bounded, arc_reach, np.inf))
     return reach - diagram.discs.radii[:, None]

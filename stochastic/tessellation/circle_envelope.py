@@ -17,7 +17,9 @@ from alphacut.fuzzy.refused import FailedError
 
 
 def anomaly(psi: Array, near: Array, far: Array) -> Array:
-    """Return the hyperbolic anomaly s of the angle ψ: tanh(s/2) = √(near/far) tan(ψ/2), shape (m,).
+    """Hyperbolic anomaly s of points on walls at angle ψ: tanh(s/2) = √(near/far) tan(ψ/2), (m,).
+
+    d is the distance of the centres of both discs, Δ the difference of their radii.
 
     Args:
         psi: Angle from the direction of the neighbour, shape (m,), brought to [−π, π] here.
@@ -25,26 +27,28 @@ def anomaly(psi: Array, near: Array, far: Array) -> Array:
         far: d − Δ, shape (m,).
     """
     psi = psi - 2 * np.pi * np.round(psi / (2 * np.pi))
-    return np.asarray(
-        2 * np.arctanh(np.clip(np.sqrt(near / far) * np.tan(psi / 2), -1 + 2**-53, 1 - 2**-53))
-    )
+    tanh = np.clip(np.sqrt(near / far) * np.tan(psi / 2), -1 + 2**-53, 1 - 2**-53)
+    return np.asarray(2 * np.arctanh(tanh))
 
 
 def sector_area(start: Array, end: Array, near: Array, far: Array) -> Array:
-    """Return the area between centre and hyperbolic wall from anomaly `start` to `end`, (m,).
+    """Area between a disc's centre and its hyperbolic wall over an arc, shape (m,).
+
+    The wall is 1/ρ = M cos ψ + C with M + C = 2/near and M − C = 2/far. d is the distance of the
+    centres of both discs, Δ the difference of their radii.
 
     Args:
-        start: Anomaly at the beginning of the arc, shape (m,).
+        start: Hyperbolic anomaly at the beginning of the arc, shape (m,).
         end: Anomaly at its end, shape (m,).
         near: d + Δ, shape (m,).
         far: d − Δ, shape (m,).
     """
     middle, half = (start + end) / 2, (end - start) / 2
-    sum_, difference = 2 / near, 2 / far  # M + C, M − C
-    bulge = 2 * np.sinh(middle / 2) ** 2 * np.sinh(half) + _sinh_less_argument(half)
-    return np.asarray(
-        ((sum_ + difference) / 2 * bulge + difference * half) / (sum_ * difference) ** 1.5
-    )
+    M_plus_C, M_minus_C = 2 / near, 2 / far
+    M = (M_plus_C + M_minus_C) / 2
+    # cosh(middle) sinh(half) − half, without cancellation
+    sinh_term = 2 * np.sinh(middle / 2) ** 2 * np.sinh(half) + _sinh_less_argument(half)
+    return np.asarray((M * sinh_term + M_minus_C * half) / (M_plus_C * M_minus_C) ** 1.5)
 
 
 def _sinh_less_argument(x: Array) -> Array:
@@ -58,6 +62,7 @@ def _sinh_less_argument(x: Array) -> Array:
 # the sweep goes this far past a crossing before it looks which function is uppermost: shorter arcs
 # are left out
 STRIDE = 1e-13
+MAX_TABLE = 60_000  # entries of a table of functions: what the cache holds
 
 
 @dataclass(frozen=True)
@@ -80,7 +85,7 @@ class Arcs:
 
 
 def upper_envelopes(a: Array, b: Array, c: Array, counts: Rows) -> Arcs:
-    """Return the arcs of the upper envelopes of groups of functions a cos φ + b sin φ + c.
+    """Arcs of the upper envelopes of groups of functions a cos φ + b sin φ + c.
 
     Args:
         a: Coefficients of cos φ, shape (k,), the groups one after the other.
@@ -92,32 +97,29 @@ def upper_envelopes(a: Array, b: Array, c: Array, counts: Rows) -> Arcs:
         FailedError: A sweep does not close; this would be an error of the program.
     """
     first = np.concatenate([[0], np.cumsum(counts)[:-1]]).astype(np.intp)
-    order = np.argsort(counts, kind="stable")
-    order = order[counts[order] > 0]
-    nothing = np.zeros(0, np.intp)
-    parts: list[tuple[Rows, Rows, Array, Array]] = [(nothing, nothing, np.zeros(0), np.zeros(0))]
-    while len(order):
-        # groups of like size share one padded table, small enough for the cache; the padding
-        # repeats the last function
-        width = int(counts[order[: max(1, len(order) // 64)]][-1])
-        width = max(width, int(counts[order[0]]) + 2)
-        take = min(
-            int(np.searchsorted(counts[order], width, side="right")), max(1, 60_000 // width)
-        )
-        group, order = order[:take], order[take:]
-        table = first[group, None] + np.minimum(
-            np.arange(counts[group].max()), counts[group, None] - 1
-        )
+    pending = np.argsort(counts, kind="stable")
+    pending = pending[counts[pending] > 0]
+    no_rows, no_angles = np.zeros(0, np.intp), np.zeros(0)
+    parts: list[tuple[Rows, Rows, Array, Array]] = [(no_rows, no_rows, no_angles, no_angles)]
+    while len(pending):
+        # groups of like size share one padded table, small enough for the cache
+        width = int(counts[pending[: max(1, len(pending) // 64)]][-1])
+        width = max(width, int(counts[pending[0]]) + 2)
+        n_fitting = int(np.searchsorted(counts[pending], width, side="right"))
+        n_groups = min(n_fitting, max(1, MAX_TABLE // width))
+        group, pending = pending[:n_groups], pending[n_groups:]
+        columns = np.arange(counts[group].max())
+        table = first[group, None] + np.minimum(columns, counts[group, None] - 1)  # last repeated
         parts.append(_sweep(a[table], b[table], c[table], table, group))
-    owner, function, start, end = (np.concatenate(column) for column in zip(*parts, strict=True))
-    rank = np.lexsort((start, owner))
-    return Arcs(owner[rank], function[rank], start[rank], end[rank])
+    owner, function, start, end = map(np.concatenate, zip(*parts, strict=True))
+    order = np.lexsort((start, owner))
+    return Arcs(owner[order], function[order], start[order], end[order])
 
 
 def _sweep(
     a: Array, b: Array, c: Array, table: Rows, group: Rows
 ) -> tuple[Rows, Rows, Array, Array]:
-    """Return the arcs of n upper envelopes by one sweep around the circle.
+    """Arcs of n upper envelopes by one sweep of all around the circle.
 
     Args:
         a: Coefficients of cos φ, shape (n, w), one row a group.
@@ -130,29 +132,30 @@ def _sweep(
         Group, function, start and end of each arc, as of `Arcs`.
     """
     row = np.arange(len(a), dtype=np.intp)
-    summit = np.argmax(np.hypot(a, b) + c, axis=1)  # the highest of all is on the envelope
-    phi = np.arctan2(b[row, summit], a[row, summit])
-    live, limit = row, phi + 2 * np.pi
-    crossings: list[tuple[Rows, Rows, Array]] = []  # row, function that takes over, angle
+    highest = np.argmax(np.hypot(a, b) + c, axis=1)  # its maximum is on the envelope
+    phi = np.arctan2(b[row, highest], a[row, highest])
+    open_rows, limit = row, phi + 2 * np.pi
+    crossings: list[tuple[Rows, Rows, Array]] = []  # row, function that becomes uppermost, angle
     for step in range(4 * a.shape[1] + 16):
         after = phi + STRIDE if step else phi
-        current, ahead = _next_crossing(a, b, c, after)
-        crossings.append((live, current, phi))
-        phi = after + ahead
-        on = phi < limit
-        if not on.all():
-            a, b, c, live, limit, phi = a[on], b[on], c[on], live[on], limit[on], phi[on]
-        if not len(live):
-            return _arcs(crossings, table, group)
+        uppermost, angle_ahead = _next_crossing(a, b, c, after)
+        crossings.append((open_rows, uppermost, phi))
+        phi = after + angle_ahead
+        is_open = phi < limit
+        if not is_open.all():
+            a, b, c, phi = a[is_open], b[is_open], c[is_open], phi[is_open]
+            open_rows, limit = open_rows[is_open], limit[is_open]
+        if not len(open_rows):
+            return _arcs_between(crossings, table, group)
     raise FailedError(
         "an envelope did not close after four times as many steps as it has functions"
     )
 
 
-def _arcs(
+def _arcs_between(
     crossings: list[tuple[Rows, Rows, Array]], table: Rows, group: Rows
 ) -> tuple[Rows, Rows, Array, Array]:
-    """Return group, function, start and end of the arcs between the crossings of a sweep.
+    """Group, function, start and end of the arcs between the crossings of a sweep.
 
     An arc across the start of the sweep is joined into one.
 
@@ -161,23 +164,23 @@ def _arcs(
         table: Index of each function among all groups, shape (n, w).
         group: Number of each group, shape (n,).
     """
-    live, function, start = (np.concatenate(column) for column in zip(*crossings, strict=True))
-    order = np.argsort(live, kind="stable")
-    live, start = live[order], start[order]
-    function = table[live, function[order]]
-    last = np.flatnonzero(np.append(live[1:] != live[:-1], True))
+    row, column, start = map(np.concatenate, zip(*crossings, strict=True))
+    order = np.argsort(row, kind="stable")
+    row, start = row[order], start[order]
+    function = table[row, column[order]]
+    last = np.flatnonzero(np.append(row[1:] != row[:-1], True))  # arc of each row
     first = np.concatenate([[0], last[:-1] + 1])
     end = np.append(start[1:], 0.0)
     end[last] = start[first] + 2 * np.pi
-    joined = (function[first] == function[last]) & (first != last)
-    start[first[joined]] = start[last[joined]] - 2 * np.pi
-    keep = np.ones(len(live), bool)
-    keep[last[joined]] = False
-    return group[live[keep]], function[keep], start[keep], end[keep]
+    is_joined = (function[first] == function[last]) & (first != last)
+    start[first[is_joined]] = start[last[is_joined]] - 2 * np.pi
+    keep = np.ones(len(row), bool)
+    keep[last[is_joined]] = False
+    return group[row[keep]], function[keep], start[keep], end[keep]
 
 
 def _next_crossing(a: Array, b: Array, c: Array, phi: Array) -> tuple[Rows, Array]:
-    """Return the uppermost function of each row at φ, and the angle to its next crossing.
+    """Uppermost function of each row at an angle φ, and the angle from there to its next crossing.
 
     The difference g ≤ 0 of another function to the uppermost one has at φ the value −h, the slope q
     and the oscillating part p; d is its constant. Ahead by δ, with t = tan(δ/2), it crosses zero
@@ -200,20 +203,19 @@ def _next_crossing(a: Array, b: Array, c: Array, phi: Array) -> tuple[Rows, Arra
     slope = b * cos - a * sin
     value, scale = wave + c, np.abs(a) + np.abs(b)
     top = np.argmax(value, axis=1)
-    level = value >= value[row, top][:, None] - 2e-15 * (scale + scale[row, top][:, None])
-    # of those that are uppermost but for round-off, the one that rises
-    current = np.argmax(np.where(level, slope, -np.inf), axis=1)
-    wave -= wave[row, current][:, None]
-    slope -= slope[row, current][:, None]
-    constant = c - c[row, current][:, None]
-    below = np.abs(np.minimum(wave + constant, 0))
-    bend = constant - wave
+    round_off = 2e-15 * (scale + scale[row, top][:, None])
+    is_top = value >= value[row, top][:, None] - round_off
+    # of those that are uppermost but for round-off, the one that rises most
+    uppermost = np.argmax(np.where(is_top, slope, -np.inf), axis=1)
+    p = wave - wave[row, uppermost][:, None]
+    q = slope - slope[row, uppermost][:, None]
+    d = c - c[row, uppermost][:, None]
+    h = np.abs(np.minimum(p + d, 0))
     with np.errstate(divide="ignore", invalid="ignore"):
-        root = np.sqrt(slope**2 + bend * below)  # nan: the two never meet
-        cotangent = np.where(slope >= 0, (slope + root) / below, bend / (root - slope))
-    tangent = (below == 0) & (slope == 0)
-    cotangent[tangent] = np.where(bend[tangent] > 0, np.inf, -np.inf)
-    # one function twice, but for round-off
-    same = np.abs(bend) + np.abs(slope) + below <= 1e-14 * scale
-    cotangent[np.isnan(cotangent) | same] = -np.inf
-    return current, 2 * np.arctan2(1.0, cotangent.max(axis=1))
+        root = np.sqrt(q**2 + (d - p) * h)  # nan: the two never meet
+        inverse_t = np.where(q >= 0, (q + root) / h, (d - p) / (root - q))
+    is_tangent = (h == 0) & (q == 0)
+    inverse_t[is_tangent] = np.where((d - p)[is_tangent] > 0, np.inf, -np.inf)
+    is_equal = np.abs(d - p) + np.abs(q) + h <= 1e-14 * scale  # the same function twice
+    inverse_t[np.isnan(inverse_t) | is_equal] = -np.inf
+    return uppermost, 2 * np.arctan2(1.0, inverse_t.max(axis=1))

@@ -34,7 +34,7 @@ class Neighbours:
 
 
 def neighbours(discs: Particles) -> Neighbours:
-    """Return the Delaunay neighbours of the disc centres.
+    """Delaunay neighbours of the disc centres: their number and the offset of each.
 
     A periodic section is triangulated with a layer of images, `LAYER` mean spacings wide: its
     triangles are those of the periodic plane if no circumcircle is wider, as in any packing. In a
@@ -45,20 +45,19 @@ def neighbours(discs: Particles) -> Neighbours:
     tiles = (0, 1, -1) if discs.periodic else (0,)
     layer = LAYER * discs.spacing
     points = np.concatenate([discs.centres + discs.size * (i, j) for i in tiles for j in tiles])
-    near = np.asarray(((points > -layer) & (points < discs.size + layer)).all(axis=1))
-    near[: len(discs)] = True
-    points = points[near]
+    is_near = np.asarray(((points > -layer) & (points < discs.size + layer)).all(axis=1))
+    is_near[: len(discs)] = True
+    points = points[is_near]
     try:
         triangulation = Delaunay(points)
     except QhullError:  # fewer than three, or all in one line
         return Neighbours(np.zeros(0, int), np.zeros(0, int), np.zeros((0, 2)))
-    counted = np.ones(len(points), bool)
-    counted[len(discs) :] = False
-    counted[triangulation.convex_hull] = False
+    is_counted = np.arange(len(points)) < len(discs)  # no images
+    is_counted[triangulation.convex_hull] = False
     start, second = triangulation.vertex_neighbor_vertices
     first = np.repeat(np.arange(len(points)), np.diff(start))
-    first, second = first[counted[first]], second[counted[first]]
-    number = np.bincount(first, minlength=len(points))[counted]
+    first, second = first[is_counted[first]], second[is_counted[first]]
+    number = np.bincount(first, minlength=len(points))[is_counted]
     return Neighbours(number, first, points[second] - points[first])
 
 

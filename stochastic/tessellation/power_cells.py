@@ -18,9 +18,7 @@ from alphacut.stochastic.particles.particles import Particles
 
 
 def cell_volumes(spheres: Particles) -> Array:
-    """Return the volumes of the power (Laguerre) cells of spheres in m³, shape (n,).
-
-    They fill the periodic cube.
+    """Volumes of the power (Laguerre) cells of spheres in a periodic cube, in m³, shape (n,).
 
     Raises:
         FailedError: Voro++ is not installed or fails, or a sphere has no cell.

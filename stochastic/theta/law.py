@@ -46,18 +46,22 @@ class ThetaLaw(Protocol):
 
 
 def require_support(lower: float, upper: float, unit: float = 0.0) -> None:
-    """Refuse a support of θ that is not finite and rising, or narrower than `MIN_WIDTH` allows.
+    """Refuse a support of θ that is not finite, not in order, or too narrow for its rounding.
+
+    Args:
+        lower: Left end.
+        upper: Right end.
+        unit: Size of θ beside which rounding counts, if larger than the ends.
 
     Raises:
-        RefusedError: It is not.
+        RefusedError: The support is none of those allowed.
     """
     least = MIN_WIDTH * max(abs(lower), abs(upper), unit)
-    ordered = np.isfinite(lower) and np.isfinite(upper) and lower < upper
-    wide = ordered and upper - lower >= 0.999 * least  # 9.999 … 10 is wide enough
-    distance = f", {least:.2g} or more apart" if ordered else ""
-    require(
-        wide, "support of θ", value=[lower, upper], allowed=f"two finite ends, rising{distance}"
-    )
+    is_ordered = np.isfinite(lower) and np.isfinite(upper) and lower < upper
+    is_wide = is_ordered and upper - lower >= 0.999 * least  # 9.999 … 10 is wide enough
+    distance = f", {least:.2g} or more apart" if is_ordered else ""
+    allowed = f"two finite ends, rising{distance}"
+    require(is_wide, "support of θ", value=[lower, upper], allowed=allowed)
 
 
 @dataclass(frozen=True)
@@ -115,16 +119,14 @@ class TruncatedNormal:
         """
         from scipy.special import ndtri
 
-        share = np.asarray(probability, float)
-        wrong = share[~((share >= 0) & (share <= 1))]
-        require(
-            not wrong.size, "probability", value=next(wrong.flat, None), allowed="values in [0, 1]"
-        )
-        theta = (
-            -ndtri(_normal(-self.lower) - share * self.mass)
-            if self.lower > 0
-            else ndtri(_normal(self.lower) + share * self.mass)
-        )
+        p = np.asarray(probability, float)
+        wrong = p[~((p >= 0) & (p <= 1))]
+        value = next(wrong.flat, None)
+        require(not wrong.size, "probability", value=value, allowed="values in [0, 1]")
+        if self.lower > 0:  # by the smaller tail
+            theta = -ndtri(_normal(-self.lower) - p * self.mass)
+        else:
+            theta = ndtri(_normal(self.lower) + p * self.mass)
         return np.asarray(np.clip(theta, self.lower, self.upper))
 
     def sample(self, number: int, generator: np.random.Generator) -> Array:

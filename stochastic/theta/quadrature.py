@@ -66,7 +66,7 @@ def level_rule(distribution: ThetaLaw, levels: Array, *, points: int) -> ThetaRu
 
 
 def _weighted(law: ThetaLaw, edges: Array, rule: tuple[Array, Array]) -> ThetaRule:
-    """Return a rule composed of `rule` on [−1, 1] in each panel, weighted by f_Θ to the sum 1."""
+    """Composite rule of `rule`, nodes and weights on [−1, 1], in panels, weighted by f_Θ."""
     x, w = rule
     half = np.diff(edges)[:, None] / 2
     nodes = (edges[:-1, None] + half * (1 + x)).ravel()
@@ -97,21 +97,22 @@ def gauss_rule(distribution: ThetaLaw, *, points: int) -> ThetaRule:
     checked_number("points", points, whole=True, least=1)
     fine = _fine_rule(distribution, 16 + 2 * points)
     relevant = fine.weights > _NEGLIGIBLE
-    at, weights = fine.nodes[relevant], fine.weights[relevant]
-    diagonal, off = np.zeros(points), np.zeros(points)
-    previous, current = np.zeros_like(at), np.ones_like(at)
+    theta, weights = fine.nodes[relevant], fine.weights[relevant]
+    alpha, beta = np.zeros(points), np.zeros(points + 1)  # of the recurrence; beta[0] = 0
+    last, current = np.zeros_like(theta), np.ones_like(theta)  # orthonormal polynomials at θ
     for k in range(points):
-        diagonal[k] = weights @ (at * current**2)
-        following = (at - diagonal[k]) * current - off[k - 1] * previous * (k > 0)
-        off[k] = np.sqrt(weights @ following**2)
-        previous, current = current, following / off[k]
-    jacobi = np.diag(diagonal) + np.diag(off[:-1], 1) + np.diag(off[:-1], -1)
+        alpha[k] = weights @ (theta * current**2)
+        following = (theta - alpha[k]) * current - beta[k] * last
+        beta[k + 1] = np.sqrt(weights @ following**2)
+        last, current = current, following / beta[k + 1]
+    off_diagonal = beta[1:-1]
+    jacobi = np.diag(alpha) + np.diag(off_diagonal, 1) + np.diag(off_diagonal, -1)
     nodes, vectors = np.linalg.eigh(jacobi)
     return ThetaRule(nodes, vectors[0] ** 2)
 
 
 def _fine_rule(law: ThetaLaw, points: int) -> ThetaRule:
-    """Return a Gauss–Legendre rule in panels of θ that integrates the density to round-off."""
+    """Gauss–Legendre rule with `points` nodes in each panel that integrates f_Θ to round-off."""
     panels = min(math.ceil(law.upper - law.lower), _FIRST_PANELS)
     edges = np.asarray(np.linspace(law.lower, law.upper, panels + 1), float)
     rule = np.polynomial.legendre.leggauss(points)
@@ -119,7 +120,7 @@ def _fine_rule(law: ThetaLaw, points: int) -> ThetaRule:
 
 
 def _panel_edges(law: ThetaLaw, edges: Array, rule: tuple[Array, Array]) -> Array:
-    """Return edges of panels on which a rule integrates the density, rising, shape (m + 1,).
+    """Edges of panels on which a rule integrates the density of θ, rising, shape (m + 1,).
 
     A panel on which the rule misses the difference of the distribution function is halved, which
     resolves corners, jumps and narrow peaks of the density.
@@ -142,13 +143,8 @@ def _panel_edges(law: ThetaLaw, edges: Array, rule: tuple[Array, Array]) -> Arra
     total = float(_mass_gaps(law, edges, rule).sum())
     key = "probability between the density of θ and its distribution function"
     cure = "pdf must be the derivative of cdf, finite everywhere on the support"
-    require(
-        total <= MASS_GAP,
-        key,
-        value=f"{total:.1e}",
-        allowed=f"differences up to {MASS_GAP:g}",
-        cure=cure,
-    )
+    allowed = f"differences up to {MASS_GAP:g}"
+    require(total <= MASS_GAP, key, value=f"{total:.1e}", allowed=allowed, cure=cure)
     return edges
 
 
@@ -161,15 +157,16 @@ def _mass_gaps(law: ThetaLaw, edges: Array, rule: tuple[Array, Array]) -> Array:
     x, w = rule
     half = np.diff(edges)[:, None] / 2
     theta = edges[:-1, None] + half * (1 + x)
-    mass, below = half * w * law.pdf(theta), law.cdf(edges)
-    even = mass.sum(axis=1) - np.diff(below)
-    odd = (mass * x).sum(axis=1) - (below[1:] + below[:-1] - (w * law.cdf(theta)).sum(axis=1))
-    gaps: Array = np.maximum(np.abs(even), np.abs(odd))
+    mass, F = half * w * law.pdf(theta), law.cdf(edges)
+    error = mass.sum(axis=1) - np.diff(F)
+    integral_of_F = (w * law.cdf(theta)).sum(axis=1)
+    moment_error = (mass * x).sum(axis=1) - (F[1:] + F[:-1] - integral_of_F)
+    gaps: Array = np.maximum(np.abs(error), np.abs(moment_error))
     return gaps
 
 
 def between_nodes(nodes: Array, values: Array, at: Array) -> Array:
-    """Interpolate values at rising nodes (n,); return the curve at `at`, of its shape.
+    """Interpolate values at rising nodes, both of shape (n,), at points `at` of any shape.
 
     The polynomial through all nodes if they are those of one Gauss rule, whose Lebesgue constant is
     small: its error falls with the number of nodes as that of the rule itself does. Otherwise
@@ -179,7 +176,8 @@ def between_nodes(nodes: Array, values: Array, at: Array) -> Array:
 
     if FEWEST <= len(nodes) <= MOST:
         # the same digits each time: SciPy takes the nodes in a random order
-        basis = BarycentricInterpolator(nodes, np.eye(len(nodes)), rng=0)(at)
-        if np.abs(basis).sum(axis=-1).max() <= LARGEST:
-            return np.asarray(basis @ values)
+        lagrange = BarycentricInterpolator(nodes, np.eye(len(nodes)), rng=0)(at)
+        lebesgue_constant = np.abs(lagrange).sum(axis=-1).max()
+        if lebesgue_constant <= LARGEST:
+            return np.asarray(lagrange @ values)
     return np.asarray(PchipInterpolator(nodes, values)(at))

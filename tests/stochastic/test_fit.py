@@ -123,13 +123,13 @@ def test_supports_hold_the_true_slopes_and_only_monotone_maps(slopes):
         sample = drawn(true, 150, seed)
         generator = np.random.default_rng(seed)
         band = slope_band(FIT, sample, level=0.95, resamples=60, generator=generator)
-        box = least_pbox(FIT, sample, sample.band(0.95, 60, generator), required=band)
+        box = least_pbox(FIT, sample, sample.band_half_width(0.95, 60, generator), required=band)
         assert all(rises(FIT.map((a2, a4))) for a2 in box.a2 for a4 in box.a4), seed
         held += all(
             low - 1e-9 <= slope <= high + 1e-9
             for slope, (low, _, high) in zip(slopes, (box.a2, box.a4), strict=True)
         )
-        cut += band.monotone(FIT) != band
+        cut += band.monotone_part(FIT) != band
     assert held >= 0.95 * 40 - 3 * np.sqrt(40 * 0.95 * 0.05)
     assert cut > 15
 
@@ -155,7 +155,9 @@ def test_bootstrap_over_groups_feels_their_likeness():
         AreaWeighted.from_values(values),
         AreaWeighted.from_values(values, groups=np.repeat(np.arange(40), 50)),
     )
-    bands = [sample.band(0.95, 300, np.random.default_rng(0)) for sample in (alone, grouped)]
+    bands = [
+        sample.band_half_width(0.95, 300, np.random.default_rng(0)) for sample in (alone, grouped)
+    ]
     assert bands[1] > 4 * bands[0]
 
 
@@ -243,7 +245,9 @@ def test_hopeless_samples_are_refused():
     with pytest.raises(FailedError, match=r"no p-box of monotone cubics from 0\.13 to 0\.87"):
         least_pbox(FIT, AreaWeighted.from_values(half), 0.01)
     with pytest.raises(RefusedError, match="five packings"):
-        AreaWeighted.from_values([0.2, 0.3], groups=[0, 0]).band(0.9, 10, np.random.default_rng(0))
+        AreaWeighted.from_values([0.2, 0.3], groups=[0, 0]).band_half_width(
+            0.9, 10, np.random.default_rng(0)
+        )
     with pytest.raises(RefusedError, match="with 0 reduced radii"):
         drawn(TRUE, 100, 0).truncated(0.5, 0.5001)
 
@@ -253,5 +257,5 @@ def test_the_bootstrap_band_has_kolmogorovs_quantile(level, limit):
     """√n sup |F* − F| tends to Kolmogorov's law, whose quantiles are tabulated."""
     count = 900
     sample = AreaWeighted.from_values(np.linspace(0.1, 0.9, count))
-    band = sample.band(level, 2000, np.random.default_rng(7))
+    band = sample.band_half_width(level, 2000, np.random.default_rng(7))
     assert np.sqrt(count) * band == pytest.approx(limit, rel=0.06)

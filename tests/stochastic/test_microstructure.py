@@ -16,7 +16,7 @@ from alphacut.stochastic import microstructure
 from alphacut.stochastic.figures.all import draw
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
 from alphacut.stochastic.fit.pbox import PBox, least_pbox
-from alphacut.stochastic.microstructure import MicrostructureStudy, fitted_map, study
+from alphacut.stochastic.microstructure import MicrostructureStudy, fit_map, study
 from alphacut.stochastic.microstructure_summary import fragment, summary
 from alphacut.stochastic.particles.circles_csv import CircleFile
 from alphacut.stochastic.particles.image import SectionImage
@@ -294,10 +294,10 @@ def test_spheres_that_lose_more_than_15_percent_of_their_cells_are_refused():
         radii = np.r_[np.linspace(0.4, 0.9, 100 - tight), np.full(tight, 1.05)]
         sample = AreaWeighted.from_values(radii, np.ones(100), groups)
         if allowed:
-            assert case.used(sample) is sample
+            assert case.cap_sample(sample) is sample
         else:
             with pytest.raises(RefusedError, match=r"16.* of the volume.*set cell.fraction = 0.4"):
-                case.used(sample)
+                case.cap_sample(sample)
 
 
 def test_equal_cells_leave_nothing_to_fit():
@@ -305,7 +305,7 @@ def test_equal_cells_leave_nothing_to_fit():
     section = with_cells(Particles(grid, np.full(36, 0.3), (6, 6)))
     assert reduced_radii([section]).values == pytest.approx(np.full(36, 0.6), rel=1e-14)
     with pytest.raises(RefusedError, match=r"0\.6 in all cells"):
-        fitted_map(replace(SMALL, limits=None), reduced_radii([section]))
+        fit_map(replace(SMALL, limits=None), reduced_radii([section]))
 
 
 def test_figures_are_drawn(result, tmp_path):

@@ -12,7 +12,7 @@ from scipy.spatial.distance import pdist
 from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.stochastic.particles import packing as packings
 from alphacut.stochastic.particles.neighbour_search import close_pairs
-from alphacut.stochastic.particles.packing import Packing, random_sequential, relaxed
+from alphacut.stochastic.particles.packing import Packing, random_sequential, relax_random_centres
 from alphacut.stochastic.particles.particles import DISCS, SPHERES, Particles
 from alphacut.stochastic.particles.radius_laws import LogNormalRadii, MeasuredRadii
 from alphacut.stochastic.sections import Simulated
@@ -85,7 +85,7 @@ def _generator():
 
 def test_what_finds_no_place_fails_with_the_numbers():
     with pytest.raises(FailedError, match="still overlap"):
-        relaxed(np.ones(40), np.full(2, 11.5), _generator())
+        relax_random_centres(np.ones(40), np.full(2, 11.5), _generator())
     assert random_sequential(np.ones(300), np.full(2, 36.0), _generator()) is None
 
 
@@ -117,7 +117,7 @@ def test_shaking_brings_discs_nearer_than_pushing_left_them(monkeypatch):
     nearest = []
     for moves in (0, packings.MOVES):
         monkeypatch.setattr(packings, "MOVES", moves)
-        centres = relaxed(np.ones(400), box, np.random.default_rng(1))
+        centres = relax_random_centres(np.ones(400), box, np.random.default_rng(1))
         nearest.append(np.sort(pdist(centres) - 2)[:40].mean())
     assert nearest[1] < 0.5 * nearest[0]
 

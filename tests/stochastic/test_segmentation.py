@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.stochastic.segmentation import CONFIDENT, segmented
+from alphacut.stochastic.segmentation import CONFIDENT, segment
 
 SIZE = 96
 
@@ -28,7 +28,7 @@ def picture(rng, *, contrast=100.0, blur=1.0, noise=0.0, drift=0.0):
 @pytest.mark.parametrize(("noise", "drift"), [(0.02, 0.0), (0.1, 0.0), (0.02, 0.3), (0.05, 0.2)])
 def test_noise_and_light_are_measured(noise, drift):
     grey, _ = picture(np.random.default_rng(4), noise=noise, drift=drift)
-    judged = segmented(grey, [110])
+    judged = segment(grey, [110])
     assert judged.noise == pytest.approx(100 * noise, rel=0.15)
     assert judged.drift == pytest.approx(100 * drift, abs=5)
     assert judged.levels[1] - judged.levels[0] == pytest.approx(100, rel=0.03)
@@ -36,8 +36,8 @@ def test_noise_and_light_are_measured(noise, drift):
 
 def test_a_clean_image_is_as_sharp_as_its_threshold():
     grey, _ = picture(np.random.default_rng(0))
-    judged = segmented(grey, [110])
-    assert judged.open == 0
+    judged = segment(grey, [110])
+    assert judged.open_fraction == 0
     assert judged.fractions[1] == np.mean(grey >= 110)
 
 
@@ -46,7 +46,7 @@ def test_a_border_is_open_by_the_deviations_of_the_noise():
     rng, noise = np.random.default_rng(1), 4.0
     plain = np.repeat([0.0, 100.0], 200)
     plain[180:220] = np.linspace(0, 100, 40)
-    judged = segmented(plain + noise * rng.normal(size=(100, 400)), [50])
+    judged = segment(plain + noise * rng.normal(size=(100, 400)), [50])
     first, last = judged.ranges()
     truly = plain >= 50
     sure = first == last
@@ -61,7 +61,7 @@ def test_a_border_is_open_by_the_deviations_of_the_noise():
 def test_what_noise_and_light_leave_too_open_is_refused(noise, drift, options):
     grey, _ = picture(np.random.default_rng(2), noise=noise, drift=drift)
     with pytest.raises(RefusedError) as error:
-        segmented(grey, [110], **options).require()
+        segment(grey, [110], **options).require_certain()
     assert error.value.key == "threshold"
 
 
@@ -71,21 +71,21 @@ def test_what_noise_and_light_leave_too_open_is_refused(noise, drift, options):
 )
 def test_smoothing_and_levelling_cure_what_was_refused(noise, drift, options):
     grey, cover = picture(np.random.default_rng(2), noise=noise, drift=drift)
-    judged = segmented(grey, [110], **options)
-    judged.require()
+    judged = segment(grey, [110], **options)
+    judged.require_certain()
     assert judged.fractions[1] == pytest.approx(np.mean(cover >= 0.5), rel=0.03)
 
 
 def test_a_threshold_beyond_the_grey_values_is_refused():
     with pytest.raises(RefusedError, match="leave each class some pixels"):
-        segmented(np.random.default_rng(0).normal(size=(9, 9)), [30])
+        segment(np.random.default_rng(0).normal(size=(9, 9)), [30])
 
 
 @pytest.mark.parametrize("ends", [(60, 255), (0, 160), (75, 255), (55, 150), (62, 158)])
 def test_clipped_grey_values_are_refused(ends):
     grey, _ = picture(np.random.default_rng(6), noise=0.05)
     with pytest.raises(RefusedError, match="not clipped"):
-        segmented(np.clip(grey, *ends), [110])
+        segment(np.clip(grey, *ends), [110])
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.002, 0.01, 0.1])
@@ -93,13 +93,13 @@ def test_clipped_grey_values_are_refused(ends):
 def test_grey_values_that_are_rounded_are_not_clipped(noise, drift):
     for seed in range(6):
         rng = np.random.default_rng([seed, 7])
-        segmented(picture(rng, noise=noise, drift=drift, blur=seed % 3)[0], [110])
+        segment(picture(rng, noise=noise, drift=drift, blur=seed % 3)[0], [110])
 
 
 def test_an_image_of_two_values_is_taken_as_it_is():
     _, cover = picture(np.random.default_rng(8))
-    judged = segmented(255 * (cover >= 0.5), [128])
-    assert judged.open == 0
+    judged = segment(255 * (cover >= 0.5), [128])
+    assert judged.open_fraction == 0
     assert judged.fractions[1] == np.mean(cover >= 0.5)
 
 
@@ -121,14 +121,14 @@ def scratches(grey, rng):
 def test_impulses_and_scratches_are_in_doubt(spoilt, noise):
     rng = np.random.default_rng(5)
     grey, _ = picture(rng, noise=noise)
-    before = segmented(grey, [110]).open
+    before = segment(grey, [110]).open_fraction
     places = spoilt(grey, rng)
-    first, last = segmented(grey, [110]).ranges()
+    first, last = segment(grey, [110]).ranges()
     assert (first < last)[places].mean() > 0.9
     assert (first < last)[~places].mean() < before + 0.02
     grey[rng.random(grey.shape) < 0.06] = 255
     with pytest.raises(RefusedError, match="impulses or scratches on"):
-        segmented(grey, [110]).require()
+        segment(grey, [110]).require_certain()
 
 
 def test_clean_lines_of_one_pixel_and_three_greys_are_not_called_clipped():
@@ -136,7 +136,7 @@ def test_clean_lines_of_one_pixel_and_three_greys_are_not_called_clipped():
     lines[::7] = lines[20:40, 20:40] = 150.0
     three[10:30, 10:40], three[40:50] = 150.0, 200.0
     for grey in (lines, three):
-        result = segmented(grey, [100])
-        result.require()
-        assert result.open == 0
+        result = segment(grey, [100])
+        result.require_certain()
+        assert result.open_fraction == 0
         assert result.fractions[1] == np.mean(grey > 100)

@@ -7,7 +7,7 @@ from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.image.moduli import ModuliInterval
 from alphacut.rve.image.phase_images import moduli_images
 from alphacut.rve.image.solve import solve_between
-from alphacut.stochastic.segmentation import segmented
+from alphacut.stochastic.segmentation import segment
 from tests.stochastic.test_segmentation import picture
 
 PHASES = [ModuliInterval.of_young((e, e), (0.3, 0.3)) for e in (3.0, 70.0)]
@@ -22,9 +22,9 @@ def judged(grey, **options):
     """The segmentation half-way between the levels that the image itself shows."""
     threshold = (grey.min() + grey.max()) / 2
     for _ in range(4):
-        (threshold,) = segmented(grey, [threshold]).middles
-    result = segmented(grey, [threshold], **options)
-    result.require()
+        (threshold,) = segment(grey, [threshold]).level_midpoints
+    result = segment(grey, [threshold], **options)
+    result.require_certain()
     return result
 
 
