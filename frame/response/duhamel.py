@@ -101,14 +101,17 @@ def walk(history: History, time: Array) -> Walk:
 
 
 def impulses(history: History, time: Array) -> Array:
-    """Bounds of ∫₀ᵗ |f| at nodes t, shape (T,)."""
+    """Return upper bounds of ∫₀ᵗ |f(τ)| dτ of a load f at nodes t, shape (T,)."""
     path = walk(history, time)
     sizes = np.cumsum(np.maximum(np.abs(path.first), np.abs(path.last)) * path.step)
     return np.asarray(sizes[path.interval])
 
 
 def absolute_moments(decay: float, history: History, time: Array) -> Array:
-    """Bounds of ∫₀ᵗ τⁿ exp(−g τ) |f(t − τ)| dτ at nodes t, n = 0 … 4, shape (5, T); g = `decay`."""
+    """Return upper bounds of ∫₀ᵗ τⁿ exp(−g τ) |f(t − τ)| dτ of a load f, shape (5, T).
+
+    n is 0 … 4, t the nodes and g the `decay`, in 1/s.
+    """
     path = walk(history, time)
     sizes = np.maximum(np.abs(path.first), np.abs(path.last))
     since = path.phases[path.phase] + path.time_rounding
@@ -121,7 +124,7 @@ def absolute_moments(decay: float, history: History, time: Array) -> Array:
 def _walk_moments(
     sizes: Array, interval: Rows, since: Array, decay: float, h: float, out: Array
 ) -> None:
-    """Write the moments of `absolute_moments` to `out` (5, T).
+    """Write bounds of ∫₀ᵗ τⁿ exp(−g τ) |f(t − τ)| dτ at nodes t, n = 0 … 4, to `out` (5, T).
 
     Args:
         sizes: Bound of |f| in each interval.
@@ -131,40 +134,50 @@ def _walk_moments(
         h: Length of an interval, in s.
         out: Written.
     """
-    state, moved, node = np.zeros(5), np.empty(5), 0
+    moments, next_moments, node = np.zeros(5), np.empty(5), 0  # at ends of an interval
     for i in range(interval[-1] + 1):
         while node < len(interval) and interval[node] == i:
-            _move_moments(state, decay, since[node], sizes[i], out[:, node])
+            _advance_moments(moments, decay, since[node], sizes[i], out[:, node])
             node += 1
-        _move_moments(state, decay, h, sizes[i], moved)
-        state[:] = moved
+        _advance_moments(moments, decay, h, sizes[i], next_moments)
+        moments[:] = next_moments
 
 
 @njit(cache=True, nogil=True)
-def _move_moments(state: Array, decay: float, h: float, size: float, out: Array) -> None:
-    """Write to `out` (5,) the moments `state` (5,) a time h later, under a load up to `size`."""
+def _advance_moments(moments: Array, decay: float, h: float, size: float, out: Array) -> None:
+    """Write bounds of the moments a time h later, under a load with |f| ≤ `size`, to `out` (5,).
+
+    The moments are ∫₀ᵗ τⁿ exp(−g τ) |f(t − τ)| dτ, n = 0 … 4, with g = `decay`.
+    """
     fade = np.exp(-decay * h)
     for n in range(5):
-        total, choices = 0.0, 1.0
-        for j in range(n, -1, -1):  # Σ C(n, j) h^(n − j) state_j
-            total += choices * h ** (n - j) * state[j]
-            choices *= j / (n - j + 1)
+        total, binomial = 0.0, 1.0
+        for j in range(n, -1, -1):  # Σ C(n, j) h^(n − j) moments_j
+            total += binomial * h ** (n - j) * moments[j]
+            binomial *= j / (n - j + 1)
         out[n] = fade * total + size * h ** (n + 1) / (n + 1)
 
 
 def responses_at_nodes(
     sigma: Array, history: History, time: Array, derivatives: int
 ) -> tuple[Array, Array]:
-    """ρ with derivatives by σ at all nodes, shape (1 + derivatives, T, S), for σ (S,).
+    """Return ρ(σ; t) = ∫₀ᵗ exp(σ τ) f(t − τ) dτ at all nodes t, with derivatives by σ.
+
+    Args:
+        sigma: Exponents σ, shape (S,), in 1/s.
+        history: The load f.
+        time: Nodes, rising, shape (T,), in s.
+        derivatives: Number of derivatives, 0 to 2.
 
     Returns:
-        The responses, and bounds of the rounding of ρ, shape (T, S).
+        ρ and its derivatives, shape (1 + derivatives, T, S), and bounds of the rounding of ρ,
+        shape (T, S).
 
     Raises:
         UnprovedError: A σ is out of the kernel's range.
     """
 
-    def walked(shifted: Array) -> tuple[Array, Array]:
+    def response_to_g(shifted: Array) -> tuple[Array, Array]:
         require_in_range(shifted, history.step, max(history.step, float(time[-1])))
         out = np.empty((1 + derivatives, len(time), len(sigma)), complex)
         error = np.empty(out.shape[1:])
@@ -172,22 +185,30 @@ def responses_at_nodes(
             _walk_to_all(shifted, walk(history, time), (0,) * derivatives, out, error)
         return out, error
 
-    return _with_sine(walked, sigma, history, time[:, None])
+    return _with_sine(response_to_g, sigma, history, time[:, None])
 
 
 def responses_at_given_nodes(
     sigma: Array, history: History, time: Array, node: Rows, derivatives: int
 ) -> tuple[Array, Array]:
-    """ρ and derivatives by σ, (1 + derivatives, S, n): σ (S, n), each row at its node of `time`.
+    """Return ρ(σ; t) = ∫₀ᵗ exp(σ τ) f(t − τ) dτ at one node for each row of σ, with derivatives.
+
+    Args:
+        sigma: Exponents σ, shape (S, n), in 1/s.
+        history: The load f.
+        time: Nodes, rising, shape (T,), in s.
+        node: Index of the node of each row, shape (S,).
+        derivatives: Number of derivatives by σ, 0 to 2.
 
     Returns:
-        The responses, and bounds of the rounding of ρ, shape (S, n).
+        ρ and its derivatives, shape (1 + derivatives, S, n), and bounds of the rounding of ρ,
+        shape (S, n).
 
     Raises:
         UnprovedError: A σ is out of the kernel's range.
     """
 
-    def walked(shifted: Array) -> tuple[Array, Array]:
+    def response_to_g(shifted: Array) -> tuple[Array, Array]:
         require_in_range(shifted, history.step, max(history.step, float(time[-1])))
         out = np.empty((1 + derivatives, *sigma.shape), complex)
         error = np.empty(sigma.shape)
@@ -195,27 +216,28 @@ def responses_at_given_nodes(
             _walk_to_given(shifted, walk(history, time), (0,) * derivatives, node, out, error)
         return out, error
 
-    return _with_sine(walked, sigma, history, time[node][:, None])
+    return _with_sine(response_to_g, sigma, history, time[node][:, None])
 
 
 def responses_in_windows(sigma: Array, history: History, time: Array, length: int) -> Array:
-    """The part of ρ at each node that arises in its window, shape (T, S), for σ (S,).
+    """Return ∫ exp(σ (t − s)) f(s) ds from the beginning of each node's window to t, shape (T, S).
 
-    Windows begin at every `length`-th node, which itself ends the one before. Exponents may grow.
+    t are the nodes, σ (S,) the exponents in 1/s, whose real parts may be positive, and f is the
+    load. Windows begin at every `length`-th node, which itself ends the window before.
 
     Raises:
         UnprovedError: A σ is out of the kernel's range within a window.
     """
     window = float(time[min(length, len(time) - 1)] - time[0])
 
-    def walked(shifted: Array) -> tuple[Array, Array]:
+    def response_to_g(shifted: Array) -> tuple[Array, Array]:
         require_in_range(shifted, history.step, max(history.step, window))
         out = np.zeros((1, len(time), len(sigma)), complex)
         with PARALLEL_LOOP:
             _walk_in_windows(shifted, walk(history, time), length, out)
         return out, np.zeros(out.shape[1:])
 
-    return np.asarray(_with_sine(walked, sigma, history, time[:, None])[0][0])
+    return np.asarray(_with_sine(response_to_g, sigma, history, time[:, None])[0][0])
 
 
 def _with_sine(
@@ -224,11 +246,11 @@ def _with_sine(
     history: History,
     time: Array,
 ) -> tuple[Array, Array]:
-    """Responses to a load g(t) sin θ(t), and their rounding, from those to g at two exponents.
+    """Return responses ρ to a load g(t) sin θ(t), and their rounding, from responses ρ_g to g.
 
-    With θ(τ) = θ(t) − ω (t − τ), ρ(σ) = [exp(iθ) ρ_g(σ − iω) − exp(−iθ) ρ_g(σ + iω)] / 2i. A load
-    without a sine is passed through. |ρ′| is at most t ∫ |g| exp(Re σ τ), by which rounding of an
-    exponent is bounded.
+    ρ(σ; t) = ∫₀ᵗ exp(σ τ) f(t − τ) dτ for a load f. The sine is a sum of two exponentials:
+    ρ(σ) = [exp(iθ) ρ_g(σ − iω) − exp(−iθ) ρ_g(σ + iω)] / 2i, θ = θ(t) of frequency ω. Without a
+    sine ρ is ρ_g. |ρ′| ≤ t ∫ |g| exp(Re σ τ) bounds what the rounding of an exponent adds.
 
     Args:
         response_to_g: Returns ρ_g with derivatives, and its rounding, for exponents.
@@ -245,15 +267,19 @@ def _with_sine(
     phasor = np.exp(1j * angle)
     response = (phasor * minus - phasor.conj() * plus) / 2j
     size = np.abs(minus[0]) + np.abs(plus[0])
-    grown = np.exp(np.maximum(sigma.real * time, 0.0)) * history.extremes[0] * time**2
-    of_exponent = (np.abs(sigma) + rate) * grown
-    rounding = UNIT_ROUNDOFF * ((8 + np.abs(angle)) * size + of_exponent)
+    derivative_bound = np.exp(np.maximum(sigma.real * time, 0.0)) * history.extremes[0] * time**2
+    exponent_rounding = (np.abs(sigma) + rate) * derivative_bound
+    rounding = UNIT_ROUNDOFF * ((8 + np.abs(angle)) * size + exponent_rounding)
     return response, (minus_rounding + plus_rounding) / 2 + rounding
 
 
 @njit(cache=True, parallel=True)
 def _walk_to_all(sigma: Array, walk: Walk, orders: Orders, out: Array, error: Array) -> None:
-    """Walks each σ (S,) to all nodes and writes `out` (derivatives, T, S) and `error` (T, S)."""
+    """Write ρ of each σ (S,) at all T nodes to `out`, and bounds of its rounding to `error` (T, S).
+
+    ρ(σ; t) = ∫₀ᵗ exp(σ τ) f(t − τ) dτ. `out` has the shape (1 + len(orders), T, S), with as many
+    derivatives by σ as `orders` has entries.
+    """
     for s in prange(len(sigma)):
         nodes = walk.interval, walk.phase, walk.time_rounding
         parts = _phase_factors(sigma[s], walk.phases)
@@ -264,7 +290,11 @@ def _walk_to_all(sigma: Array, walk: Walk, orders: Orders, out: Array, error: Ar
 def _walk_to_given(
     sigma: Array, walk: Walk, orders: Orders, node: Rows, out: Array, error: Array
 ) -> None:
-    """Walks each σ (S, n) to the node of its row and writes `out` (…, S, n) and `error`."""
+    """Write ρ of each row of σ (S, n) at the row's node to `out`, its rounding to `error` (S, n).
+
+    ρ(σ; t) = ∫₀ᵗ exp(σ τ) f(t − τ) dτ. `out` has the shape (1 + len(orders), S, n), with as many
+    derivatives by σ as `orders` has entries. `node` is the index of each row's node, shape (S,).
+    """
     for s in prange(len(sigma)):
         here, phase = slice(node[s], node[s] + 1), walk.phase[node[s]]
         nodes = walk.interval[here], np.zeros(1, np.int64), walk.time_rounding[here]
@@ -276,29 +306,32 @@ def _walk_to_given(
 
 @njit(cache=True, parallel=True)
 def _walk_in_windows(sigma: Array, walk: Walk, length: int, out: Array) -> None:
-    """Walks each σ (S,) to all nodes, from rest at each window's beginning; writes (1, T, S).
+    """Write ρ of each σ (S,) at all nodes to `out` (1, T, S), from rest at each window's beginning.
 
-    The state at the sample before a beginning is chosen so that it is at rest there.
+    Windows have `length` nodes. ρ at the sample before a window is chosen so that it is zero at the
+    window's beginning: exp(σ x) ρ + a P₀ − slope P₁ = 0 with P_n = ∫₀ˣ τⁿ exp(σ τ) dτ.
     """
     for s in prange(len(sigma)):
         parts, error = _phase_factors(sigma[s], walk.phases), np.empty(length)
         for first in range(0, len(walk.interval) - 1, length):
             inside = slice(first + 1, min(first + length + 1, len(walk.interval)))
-            begin, x, P = walk.interval[first], parts[0][walk.phase[first]], parts[2]
+            begin, phase = walk.interval[first], walk.phase[first]
+            x, turn, P = parts[0][phase], parts[1][phase], parts[2][phase]
             slope = (walk.last[begin] - walk.first[begin]) / walk.step
-            moved = (walk.first[begin] + slope * x) * P[walk.phase[first], 0]
-            moved -= slope * P[walk.phase[first], 1]
-            start = begin, -moved / parts[1][walk.phase[first]]
+            forced = (walk.first[begin] + slope * x) * P[0] - slope * P[1]
+            start = begin, -forced / turn
             nodes = walk.interval[inside], walk.phase[inside], walk.time_rounding[inside]
             _walk_along(sigma[s], walk, (), nodes, parts, start, out[:, inside, s], error)
 
 
 @njit(cache=True)
 def _phase_factors(sigma: complex, phases: Array) -> tuple[Array, Array, Array, Array]:
-    """Factors that carry ρ from the beginning of an interval to each time x in it, `phases` (P,).
+    """Return factors that carry a response from the beginning of an interval to times x in it.
+
+    ρ(t + x) = exp(σ x) ρ(t) + a J₀ − slope J₁, with the load a at t + x. `phases` (P,) are the x.
 
     Returns:
-        The times; exp(σ x), (P,); J_n = ∫₀ˣ τⁿ exp(σ τ) dτ, n = 0 … 3, (P, 4); rounding relative
+        The times x; exp(σ x), (P,); J_n = ∫₀ˣ τⁿ exp(σ τ) dτ, n = 0 … 3, (P, 4); rounding relative
         to |ρ|, rounding relative to |a|, and |exp(σ x)|, (P, 3).
     """
     factors: Array = np.empty(len(phases), np.complex128)
@@ -325,20 +358,23 @@ def _walk_along(
     out: Array,
     error: Array,
 ) -> None:
-    """Walks one σ over the record, from a state before an interval, to nodes.
+    """Write ρ(σ; t) = ∫ exp(σ τ) f(t − τ) dτ and derivatives by σ at N nodes to `out`.
+
+    An interval of length h, at whose end the load is a, advances ρ to exp(σ h) ρ + a J₀ − slope J₁
+    with J_n = ∫₀ʰ τⁿ exp(σ τ) dτ; r0, r1 and r2 are ρ and its derivatives at samples.
 
     Args:
-        sigma: σ.
-        walk: The record.
+        sigma: σ, in 1/s.
+        walk: The load f by intervals.
         orders: As many zeros as derivatives.
-        nodes: Interval, phase and rounding of each node, shape (N,).
-        of_phases: As of `_parts`.
+        nodes: Interval, index of the time in it, and rounding of that time, shape (N,) each.
+        of_phases: Times x in intervals, exp(σ x), integrals and roundings, as of `_phase_factors`.
         start: The first interval, and ρ at its beginning.
         out: Written: ρ and its derivatives, shape (derivatives, N).
         error: Written: bounds of the rounding of ρ, shape (N,).
     """
     interval, phase, time_rounding = nodes
-    phases, turns, parts, rounding = of_phases
+    phases, turns, integrals, rounding = of_phases
     h, rate = walk.step, abs(sigma.real) + abs(sigma.imag)
     J, turn = np.empty(4, np.complex128), np.exp(sigma * h)
     step_integrals(sigma, h, J)
@@ -346,23 +382,23 @@ def _walk_along(
     fade = abs(turn)
     begin, r0 = start
     r1 = r2 = 0.0 + 0.0j
-    wrong, node = 0.0, 0
+    sample_rounding, node = 0.0, 0
     for i in range(begin, interval[-1] + 1):
         slope = (walk.last[i] - walk.first[i]) / h
         while node < len(interval) and interval[node] == i:
             j = phase[node]
-            x, w, P = phases[j], turns[j], parts[j]
+            x, w, P = phases[j], turns[j], integrals[j]
             a = walk.first[i] + slope * x
-            moved = w * r0
-            value = moved + a * P[0] - slope * P[1]
-            step_rounding = rounding[j, 2] * wrong + rounding[j, 0] * (
-                abs(moved.real) + abs(moved.imag)
+            free = w * r0
+            value = free + a * P[0] - slope * P[1]
+            node_rounding = rounding[j, 2] * sample_rounding + rounding[j, 0] * (
+                abs(free.real) + abs(free.imag)
             )
-            step_rounding += rounding[j, 1] * (abs(a) + abs(slope) * x / 2)
-            step_rounding += time_rounding[node] * (
+            node_rounding += rounding[j, 1] * (abs(a) + abs(slope) * x / 2)
+            node_rounding += time_rounding[node] * (
                 rate * (abs(value.real) + abs(value.imag)) + abs(a)
             )
-            out[0, node], error[node] = value, step_rounding
+            out[0, node], error[node] = value, node_rounding
             if len(orders) > 0:
                 out[1, node] = w * (r1 + x * r0) + a * P[1] - slope * P[2]
             if len(orders) > 1:
@@ -374,6 +410,6 @@ def _walk_along(
         if len(orders) > 0:
             r1 = turn * (r1 + h * r0) + a * J[1] - slope * J[2]
         r0 = turn * r0
-        wrong = fade * wrong + of_turn * (abs(r0.real) + abs(r0.imag))
-        wrong += of_integrals * (abs(a) + abs(slope) * h / 2)
+        sample_rounding = fade * sample_rounding + of_turn * (abs(r0.real) + abs(r0.imag))
+        sample_rounding += of_integrals * (abs(a) + abs(slope) * h / 2)
         r0 += a * J[0] - slope * J[1]

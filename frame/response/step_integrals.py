@@ -40,8 +40,8 @@ def require_in_range(sigma: Array, step: float, duration: float) -> None:
         duration: Time over which they may grow, in s.
 
     Raises:
-        UnprovedError: One is not finite, |σ h| passes `LARGEST_TURN`, or it grows by more than
-            exp(`LARGEST_GROWTH`).
+        UnprovedError: An exponent is not finite, |σ h| passes `LARGEST_TURN`, or
+            exp(σ t) grows by more than exp(`LARGEST_GROWTH`).
     """
     turn = float(np.abs(sigma).max(initial=0.0)) * step
     growth = float(sigma.real.max(initial=-np.inf)) * duration
@@ -76,13 +76,13 @@ def step_integrals(sigma: complex, h: float, out: Array) -> None:
 
 @njit(cache=True)
 def error_of_integrals(sigma: complex, h: float) -> float:
-    """Bound of the rounding of J₀ and of 2 J₁ / h, in s.
+    """Return a bound of the rounding of J₀ and of 2 J₁ / h, J_n = ∫₀ʰ τⁿ exp(σ τ) dτ, in s.
 
-    At large |z| it is that of exp(z), whose phase is rounded by u |z|, and of the sums, both over
-    |z|.
+    From |σ h| = `FROM_RECURRENCE` on it is less than that at σ = 0: the rounding of exp(σ h), whose
+    phase is rounded by u |σ h|, and of the sums, both over |σ h|.
     """
-    size = abs(sigma) * h
-    share = (
-        1.0 if size < FROM_RECURRENCE else min(1.0, np.exp(min(sigma.real * h, 0.0)) / 4 + 4 / size)
-    )
-    return ERROR_OF_INTEGRALS * UNIT_ROUNDOFF * h * share * np.exp(max(sigma.real * h, 0.0))
+    size, growth = abs(sigma) * h, sigma.real * h
+    factor = 1.0
+    if size >= FROM_RECURRENCE:
+        factor = min(1.0, np.exp(min(growth, 0.0)) / 4 + 4 / size)
+    return ERROR_OF_INTEGRALS * UNIT_ROUNDOFF * h * factor * np.exp(max(growth, 0.0))

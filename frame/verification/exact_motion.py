@@ -24,12 +24,13 @@ Array = NDArray[np.float64]
 
 MAX_NORM = 2.0
 """Largest norm of the state matrix times a substep; a larger one needs a higher degree."""
-LEFT = 1e-18
-"""What the Taylor series within a substep leaves, as a share of the state; degree 24 at most."""
+TRUNCATION = 1e-18
+"""Truncation error of the Taylor series within a substep, as a share of the state; its degree is
+24 at most."""
 EPSILON = float(np.finfo(float).eps)
-FEW = 64.0
+CONSTANT_ROUNDING = 64.0
 """Roundings of a value that do not grow with time, in ε: those of the series and of the rows."""
-AT_ONCE = 4096
+CHUNK = 4096
 """Times whose outputs are evaluated together, which limits the memory."""
 
 
@@ -53,14 +54,14 @@ class Course(NamedTuple):
     phase: float
 
     def values(self, times: Array) -> Array:
-        """The force at times, after jumps, shape (T,)."""
+        """Return the force at times, shape (T,); at a jump its value after the jump."""
         since = times - self.start
         position = since / self.step
-        position = np.where(
-            np.abs(position - np.rint(position)) < 1e-9, np.rint(position), position
-        )
+        is_sample = np.abs(position - np.rint(position)) < 1e-9
+        position = np.where(is_sample, np.rint(position), position)
         value = np.interp(position, np.arange(len(self.samples)), self.samples)
-        value[(position < 0) | ((position >= len(self.samples) - 1) & (not self.is_held))] = 0.0
+        has_ended = (position >= len(self.samples) - 1) & (not self.is_held)
+        value[(position < 0) | has_ended] = 0.0
         sine = np.sin(self.frequency * since + self.phase) if self.frequency else 1.0
         return np.asarray(value * sine)
 
@@ -101,14 +102,13 @@ class LinearMotion:
     courses: tuple[Course, ...] = ()
 
     def outputs(self, times: Array) -> tuple[Array, Array]:
-        """Outputs at times from 0 on, and their round-off, both of shape (T, m).
+        """Return outputs at times ≥ 0, rising, and bounds of their round-off, (T, m) each.
 
-        Round-off: the numbers are those of a structure whose L⁻¹ K L⁻ᵀ differs by n ε of its norm
-        ω², as the inputs themselves are rounded, so that the slowest mode ω_1 turns by up to
-        n ε ω² min(t², t/ω_1) / 2 rad more or less.
+        Rounded inputs are those of a structure whose M^(−1/2) K M^(−1/2) differs by n ε of its norm
+        ω², so that the slowest mode ω_1 turns by up to n ε ω² min(t², t/ω_1) / 2 rad more or less.
         """
         state = _EnergyState.from_motion(self)
-        values, rounding = state.moved(
+        values, rounding = state.response_to_record(
             state.start, state.ground, self.record, self.record_step, times
         )
         for k, course in enumerate(self.courses):
@@ -116,9 +116,9 @@ class LinearMotion:
             if not acts.any():
                 continue
             since = np.maximum(times[acts] - course.start, 0.0)
-            driven, more = state.driven(self.forces[:, k], course, since)
-            values[acts] += driven
-            rounding[acts] += more
+            response, response_rounding = state.response_to_force(self.forces[:, k], course, since)
+            values[acts] += response
+            rounding[acts] += response_rounding
             values += self.feeds[:, k] * course.values(times)[:, None]
         return values, rounding
 
@@ -152,7 +152,7 @@ class _EnergyState:
 
     @classmethod
     def from_motion(cls, motion: LinearMotion) -> _EnergyState:
-        """Energy-scaled state space of a motion, with M = L Lᵀ."""
+        """Return a motion in states x = [Lᵀ q; Lᵀ q̇/ω], with M = L Lᵀ and ω² = ‖L⁻¹ K L⁻ᵀ‖."""
         n, lower = len(motion.mass), cholesky(motion.mass, lower=True)
 
         def reduced(matrix: Array) -> Array:
@@ -164,23 +164,29 @@ class _EnergyState:
         omega = float(np.sqrt(squared.max())) or 1.0
         matrix = np.block([[np.zeros((n, n)), omega * np.eye(n)], [-spring / omega, -damper]])
         push = -(lower.T @ motion.pattern) / omega
-        back = solve_triangular(lower, np.eye(n), lower=True)  # L⁻¹: q = L⁻ᵀ x
+        inverse = solve_triangular(lower, np.eye(n), lower=True)  # L⁻¹
         q, v = motion.start[:n], motion.start[n:]
         return cls(
-            matrix,
-            lower,
-            np.concatenate([np.zeros(n), push]),
-            np.hstack([motion.rows[:, :n] @ back.T, omega * motion.rows[:, n:] @ back.T]),
-            np.concatenate([lower.T @ q, lower.T @ v / omega]),
-            max(float(np.sqrt(squared.min())), 1e-300),
-            omega,
-            omega + float(np.linalg.norm(damper)),
+            matrix=matrix,
+            lower=lower,
+            ground=np.concatenate([np.zeros(n), push]),
+            rows=np.hstack(
+                [motion.rows[:, :n] @ inverse.T, omega * motion.rows[:, n:] @ inverse.T]
+            ),
+            start=np.concatenate([lower.T @ q, lower.T @ v / omega]),
+            lowest=max(float(np.sqrt(squared.min())), 1e-300),
+            highest=omega,
+            norm=omega + float(np.linalg.norm(damper)),
         )
 
-    def moved(
+    def response_to_record(
         self, start: Array, push: Array, record: Array, step: float, times: Array
     ) -> tuple[Array, Array]:
-        """Outputs at times and their round-off, (T, m), from a start and under b a(t)."""
+        """Return outputs of ẋ = A x + b a(t) at times and bounds of their round-off, (T, m) each.
+
+        x(0) is `start` and b is `push`, (2n,) each; a has samples (R,) every `step` seconds from
+        t = 0 on, and is zero where there are none.
+        """
         last = max(float(times.max(initial=0.0)), 1e-300)
         interval = step if len(record) else last
         parts = max(1, ceil(self.norm * interval / MAX_NORM))
@@ -188,36 +194,45 @@ class _EnergyState:
         size = float(np.linalg.norm(push)) or 1.0
         load = size * _substep_loads(record, parts, max(1, ceil(last / substep)))
         flow = self._loaded_flow(substep, np.asarray(push / size))
-        exact = expm(flow)[: len(start)]
-        states = _recursion(exact[:, :-2], start, load @ exact[:, -2:].T)
+        exact_step = expm(flow)[: len(start)]  # columns of x, of a and of its increment
+        states = _recursion(exact_step[:, :-2], start, load @ exact_step[:, -2:].T)
         degree, scaled = _degree(self.norm * substep), np.asarray(times / substep, float)
         values = _taylor(flow, degree, self.rows, np.hstack([states, load]), scaled)
         return values, self._rounding(np.abs(states).max(0), times)
 
-    def driven(self, force: Array, course: Course, times: Array) -> tuple[Array, Array]:
-        """Outputs at times since a force's start, from rest, and their round-off, (T, m) each."""
-        n, nothing = len(force), np.zeros(len(self.matrix))
-        pushed = solve_triangular(self.lower, force, lower=True) / self.highest
-        push, none = np.append(np.zeros(n), pushed), np.zeros(0)
+    def response_to_force(self, force: Array, course: Course, times: Array) -> tuple[Array, Array]:
+        """Return outputs from rest under a force b f(t), and their round-off, (T, m) each.
+
+        `times` begin with the force. A sine's response is the steady state and a free motion that
+        cancels it at the start.
+        """
+        n, zero_state = len(force), np.zeros(len(self.matrix))
+        acceleration = solve_triangular(self.lower, force, lower=True) / self.highest
+        push, no_record = np.append(np.zeros(n), acceleration), np.zeros(0)
         if not course.frequency:
             record = course.until(float(times.max(initial=0.0)))
-            return self.moved(nothing, push, record, course.step, times)
+            return self.response_to_record(zero_state, push, record, course.step, times)
         resolvent = 1j * course.frequency * np.eye(2 * n) - self.matrix
         steady = np.linalg.solve(resolvent, push) * np.exp(1j * course.phase)
-        free, rounding = self.moved(-steady.imag, nothing, none, 0.0, times)
-        waves = steady * np.exp(1j * course.frequency * times)[:, None]
+        free, free_rounding = self.response_to_record(
+            -steady.imag, zero_state, no_record, 0.0, times
+        )
+        steady_states = steady * np.exp(1j * course.frequency * times)[:, None]
         condition = float(np.linalg.cond(resolvent))
-        more = self._rounding(np.abs(steady), times)
-        return free + waves.imag @ self.rows.T, rounding + more * (1 + condition)
+        steady_rounding = self._rounding(np.abs(steady), times) * (1 + condition)
+        return free + steady_states.imag @ self.rows.T, free_rounding + steady_rounding
 
     def _rounding(self, state: Array, times: Array) -> Array:
-        """Round-off of outputs of states as large as `state` (2n,), shape (T, m)."""
+        """Return the round-off of outputs of states as large as `state` (2n,), shape (T, m)."""
         turn = self.highest**2 * np.minimum(times**2, times / self.lowest) / 2
-        rounding = len(self.lower) * EPSILON * (FEW + turn)
+        rounding = len(self.lower) * EPSILON * (CONSTANT_ROUNDING + turn)
         return np.asarray(rounding[:, None] * (np.abs(self.rows) @ state))
 
     def _loaded_flow(self, substep: float, push: Array) -> Array:
-        """Generator of (x, a, increment of a) over a substep, shape (2n + 2, 2n + 2)."""
+        """Return F with exp(F) the map of (x, a, increment of a) over a substep (Van Loan 1978).
+
+        The load is b a with b = `push`, and a is linear in the substep; shape (2n + 2, 2n + 2).
+        """
         size = len(self.matrix)
         flow = np.zeros((size + 2, size + 2))
         flow[:size, :size] = self.matrix * substep
@@ -227,32 +242,36 @@ class _EnergyState:
 
 
 def _substep_loads(record: Array, parts: int, count: int) -> Array:
-    """Acceleration at the beginning of each substep and its increment there, shape (count, 2)."""
+    """Return a record's value at the beginning of each substep and its increment, (count, 2).
+
+    The record is linear between samples, `parts` substeps apart, and zero after the last one.
+    """
     loads = np.zeros((count, 2))
     if len(record) > 1:
         rise = np.repeat(np.diff(record), parts) / parts
         begin = np.repeat(record[:-1], parts) + rise * (np.arange(len(rise)) % parts)
-        some = min(count, len(rise))
-        loads[:some] = np.column_stack([begin, rise])[:some]
+        n_loaded = min(count, len(rise))
+        loads[:n_loaded] = np.column_stack([begin, rise])[:n_loaded]
     return loads
 
 
 def _degree(norm: float) -> int:
-    """Degree of the Taylor series of exp(A τ), ‖A‖ τ ≤ `norm`, that leaves less than `LEFT`.
+    """Return the degree from which terms of exp(A τ), ‖A‖ τ ≤ `norm`, are below `TRUNCATION`.
 
-    The load enters once and its increment twice, which costs two degrees.
+    A linear load enters by two integrations, for which two degrees are added.
     """
     degree, term = 2, 1.0
-    while term > LEFT:
+    while term > TRUNCATION:
         degree += 1
         term *= norm / (degree - 2)
     return degree
 
 
 def _recursion(step: Array, start: Array, forcing: Array) -> Array:
-    """States x_k of x_{k+1} = step x_k + forcing_k, shape (count, 2n).
+    """Return the states x_0 … of x_{k+1} = step x_k + forcing_k, x_0 = `start`, (count, 2n).
 
-    Blocks of √count substeps are summed side by side from zero, then joined.
+    In blocks of √count substeps: responses of all blocks from zero at once, then the state at the
+    beginning of each block, whose free motion is added.
     """
     count, size = forcing.shape
     length = isqrt(count - 1) + 1
@@ -263,30 +282,34 @@ def _recursion(step: Array, start: Array, forcing: Array) -> Array:
     from_zero = np.zeros((length + 1, blocks, size))
     for k in range(length):
         from_zero[k + 1] = from_zero[k] @ step.T + padded[:, k]
-    across = np.linalg.matrix_power(step, length)
-    first: Array = np.zeros((blocks, size))
-    first[0] = start
+    block_step = np.linalg.matrix_power(step, length)
+    free: Array = np.zeros((blocks, size))  # at the beginnings of blocks
+    free[0] = start
     for b in range(1, blocks):
-        first[b] = across @ first[b - 1] + from_zero[length, b - 1]
+        free[b] = block_step @ free[b - 1] + from_zero[length, b - 1]
     states = np.empty((blocks, length, size))
     for k in range(length):
-        states[:, k] = first + from_zero[k]
-        first = first @ step.T
+        states[:, k] = free + from_zero[k]
+        free = free @ step.T
     return states.reshape(-1, size)[:count]
 
 
 def _taylor(flow: Array, degree: int, rows: Array, states: Array, times: Array) -> Array:
-    """Outputs at times in substeps, from the loaded states where substeps begin, shape (T, m)."""
+    """Return outputs at times (T,), in substeps, by the Taylor series of exp(F τ), shape (T, m).
+
+    F, the `flow`, moves a state with its load and the load's increment, 2n + 2 numbers; `states`
+    are those at the beginning of each substep.
+    """
     series = [np.hstack([rows, np.zeros((len(rows), 2))])]
     for i in range(1, degree + 1):
         series.append(series[-1] @ flow / i)
     terms, out = np.concatenate(series), []
-    for some in np.array_split(times, -(-len(times) // AT_ONCE)):
-        piece = np.minimum(some.astype(int), len(states) - 1)
-        within = (some - piece)[:, None]
-        coefficient = (states[piece] @ terms.T).reshape(len(some), degree + 1, len(rows))
+    for chunk in np.array_split(times, -(-len(times) // CHUNK)):
+        substep = np.minimum(chunk.astype(int), len(states) - 1)
+        fraction = (chunk - substep)[:, None]
+        coefficient = (states[substep] @ terms.T).reshape(len(chunk), degree + 1, len(rows))
         value: Array = coefficient[:, degree]
         for i in reversed(range(degree)):  # Horner's scheme
-            value = value * within + coefficient[:, i]
+            value = value * fraction + coefficient[:, i]
         out.append(value)
     return np.concatenate(out)

@@ -41,16 +41,21 @@ class ReferenceMotion:
         self._outputs = sympy.lambdify(arguments, seen, "math")
 
     def outputs(self, parameters: Mapping[str, float], times: Array) -> Array:
-        """Outputs at times, shape (T, m).
+        """Return outputs at rising times by Dormand and Prince's method of order 8, shape (T, m).
+
+        Args:
+            parameters: All parameters by name, in SI units.
+            times: The first one is that of the initial state.
 
         Raises:
-            FailedError: The method does not reach the end.
+            FailedError: The integration does not reach the last time.
         """
         from scipy.integrate import solve_ivp
 
         p = [float(parameters[name]) for name in self.names]
         start = np.array(self._start(*p), float)
         rates = np.array(self._rates(*start, *p), float)
+        # sizes of the states, for the absolute tolerance
         size = np.maximum(np.abs(start), np.abs(rates) * float(times[-1]))
         found = solve_ivp(
             lambda _, state: self._rates(*state, *p),

@@ -61,15 +61,17 @@ class ContradictionError(FailedError):
 
 
 def with_motions_tested(envelope: Envelope, system: LinearSystem) -> Envelope:
-    """The envelope with the number of exact motions that agree with it as a fact.
+    """Return a guaranteed envelope after comparing it with exact motions, which must agree.
+
+    Their number is added as the fact `motions_tested`, and their structures are stored with it.
 
     Raises:
         ContradictionError: An exact motion leaves proved bounds, strays farther between nodes than
             is proved, or differs from the attained bound that names its inputs.
     """
     trial = Trial(envelope, cuts_of(envelope))
-    count = trial.allowed(structures_at(system, envelope, trial.cuts[0, :1])[0].rows.shape[1])
-    points = trial.points(count)
+    first_structure = structures_at(system, envelope, trial.cuts[0, :1])[0]
+    points = trial.points(trial.motion_count(first_structure.rows.shape[1]))
     motions = structures_at(system, envelope, points)
     trial.require_agreement(points, motions)
     facts = {**envelope.facts, "motions_tested": len(points)}
@@ -77,7 +79,7 @@ def with_motions_tested(envelope: Envelope, system: LinearSystem) -> Envelope:
 
 
 def structures_at(system: LinearSystem, envelope: Envelope, points: Array) -> list[LinearMotion]:
-    """Structure at each of S sets of inputs of an envelope, shape (S, n), as a `LinearMotion`."""
+    """Return the structure at each of S sets of inputs of an envelope, shape (S, n)."""
     matrices, rows = evaluate(system, tuple(envelope.inputs), points, derivatives=False)
     ground, n = system.ground, matrices.mass.value.shape[-1]
     record, step = (np.zeros(0), 0.0) if ground is None else (ground.samples, ground.step)
@@ -143,49 +145,59 @@ class Trial:
         inside = time[:-1, None] + np.diff(time)[:, None] * np.arange(QUARTERS) / QUARTERS
         return np.append(inside.ravel(), time[-1])
 
-    def allowed(self, unknowns: int) -> int:
-        """Number of motions of so many unknowns that cost `SHARE` of the proof's multiplications.
+    def motion_count(self, unknowns: int) -> int:
+        """Return the number of motions to test, at a cost of `SHARE` of the proof's.
 
-        It lies between `LEAST` and `MOST`.
+        Costs are estimated multiplications; the number lies between `LEAST` and `MOST`.
+
+        Args:
+            unknowns: Size of a motion's state [q; v].
         """
         nodes, outputs = self.envelope.lower.shape[1:]
-        proof = 2 * self.envelope.lower.size * BOUND_WORK
-        motion = QUARTERS * nodes * outputs * unknowns * TERMS
-        return int(np.clip(SHARE * proof / motion, LEAST, MOST))
+        proof_cost = 2 * self.envelope.lower.size * BOUND_WORK
+        motion_cost = QUARTERS * nodes * outputs * unknowns * TERMS
+        return int(np.clip(SHARE * proof_cost / motion_cost, LEAST, MOST))
 
     def points(self, most: int) -> Array:
-        """Distinct inputs to test, at most `most` of them, shape (S, n), in the module's order."""
+        """Return distinct finite inputs to test, at most `most`, shape (S, n).
+
+        Those named at peaks come first, then nominal values, corners and points of each level.
+        """
         distinct = dict[tuple[float, ...], None]()
-        for point in islice(self._in_order(), 4 * most):
+        for point in islice(self._candidates(), 4 * most):
             if len(distinct) < most and np.isfinite(point).all():
                 distinct[tuple(map(float, point))] = None
         return np.array(list(distinct))
 
     def named(self) -> Array:
         """Inputs that the envelope names at the peaks of the lowest level, shape (P, n)."""
-        return np.array(list(dict.fromkeys(tuple(map(float, x)) for x in self._named(0))))
+        return np.array(list(dict.fromkeys(tuple(map(float, x)) for x in self._peak_inputs(0))))
 
-    def _in_order(self) -> Iterator[Array]:
-        """Yields inputs (n,) to test in the module's order, some of them more than once."""
+    def _candidates(self) -> Iterator[Array]:
+        """Yield inputs (n,) to test, without end and some of them more than once.
+
+        Order: inputs named at peaks of the lowest level, nominal values, corners of the lowest
+        level, inputs named at peaks of higher levels, points of low discrepancy in all levels.
+        """
         (low, high), levels = self.cuts, len(self.envelope.alpha)
-        yield from self._named(0)
+        yield from self._peak_inputs(0)
         yield np.array([number.modal for number in self.envelope.inputs.values()], float)
         yield from _corners(low[0], high[0])
         for level in range(1, levels):
-            yield from self._named(level)
-        for k, share in enumerate(low_discrepancy(low.shape[1])):
-            level = (k // 2) % levels if k % 2 else 0
-            yield low[level] + (high[level] - low[level]) * share
+            yield from self._peak_inputs(level)
+        for k, unit_point in enumerate(low_discrepancy(low.shape[1])):
+            level = (k // 2) % levels if k % 2 else 0  # every second point in the lowest level
+            yield low[level] + (high[level] - low[level]) * unit_point
 
-    def _named(self, level: int) -> Iterator[Array]:
-        """Inputs that the envelope names at the peaks of a level."""
+    def _peak_inputs(self, level: int) -> Iterator[Array]:
+        """Yield the inputs (n,) that the envelope names at each output's peaks on a level."""
         envelope = self.envelope
         for o in range(len(envelope.outputs)):
             yield envelope.upper_at[level, envelope.upper[level, :, o].argmax(), o]
             yield envelope.lower_at[level, envelope.lower[level, :, o].argmin(), o]
 
     def require_agreement(self, points: Array, motions: Sequence[LinearMotion]) -> None:
-        """Compare the envelope with exact motions at inputs (S, n).
+        """Refuse an envelope that exact motions at inputs (S, n) contradict.
 
         Raises:
             ContradictionError: A motion leaves the bounds of a level that holds its inputs, does
@@ -231,7 +243,7 @@ class _Check:
         return np.full(bounds.lower.shape[1:], np.inf) if bounds.between is None else bounds.between
 
     @property
-    def least(self) -> Array:
+    def tolerance(self) -> Array:
         """Distance of attained bounds from the motion that rounding explains, shape (m,)."""
         envelope = self.envelope
         return np.asarray(ROUND_OFF * np.maximum(-envelope.lower, envelope.upper).max((0, 1)))
@@ -240,20 +252,23 @@ class _Check:
     def slack(self) -> Array:
         """What the motion at named inputs may exceed attained bounds by, shape (T, m)."""
         error = self.envelope.attained_error
-        return self.least + (np.zeros_like(self.between) if error is None else error)
+        return self.tolerance + (np.zeros_like(self.between) if error is None else error)
 
     def require_inside(self, level: int) -> None:
         """Refuse proved bounds that the motion leaves, at nodes or between them."""
-        for sign, bound, words in (
+        for sign, node_bound, words in (
             (1.0, self.envelope.proved.upper[level], "above the proved upper bound"),
             (-1.0, self.envelope.proved.lower[level], "below the proved lower bound"),
         ):
-            most = sign * _within_steps(sign * bound, self.between)
-            excess = sign * (self.values - most) - self.rounding
-            self._require(excess, most, f"{words} of α = {self._alpha(level)},")
+            bound = sign * _within_steps(sign * node_bound, self.between)
+            excess = sign * (self.values - bound) - self.rounding
+            self._require(excess, bound, f"{words} of α = {self._alpha(level)},")
 
     def require_attained(self, level: int) -> None:
-        """Refuse attained bounds that the motion at the inputs they name does not equal."""
+        """Refuse attained bounds of a level that name these inputs and differ from the motion.
+
+        It may lie inside a bound by `tolerance` and outside by `slack`, both besides its rounding.
+        """
         envelope = self.envelope
         if envelope.inner is None:
             return
@@ -262,16 +277,17 @@ class _Check:
             (1.0, envelope.upper_at[level], envelope.inner.upper[level], "upper"),
             (-1.0, envelope.lower_at[level], envelope.inner.lower[level], "lower"),
         ):
-            more = sign * (self.values[::QUARTERS] - inner)
-            excess = np.maximum(-more - self.least, more - self.slack) - rounding
-            excess = np.where((at == self.point).all(-1), excess, -np.inf)
+            outside = sign * (self.values[::QUARTERS] - inner)
+            excess = np.maximum(-outside - self.tolerance, outside - self.slack) - rounding
+            names_point = (at == self.point).all(-1)
+            excess = np.where(names_point, excess, -np.inf)
             words = f"other than the attained {side} bound of α = {self._alpha(level)},"
             self._require(excess, inner, words, QUARTERS)
 
     def require_line_deviation(self) -> None:
         """Refuse a motion that strays farther from straight lines between nodes than is proved."""
-        ends, share = self.values[::QUARTERS], np.arange(QUARTERS)[:, None] / QUARTERS
-        inside = ends[:-1, None] + np.diff(ends, axis=0)[:, None] * share
+        ends, fraction = self.values[::QUARTERS], np.arange(QUARTERS)[:, None] / QUARTERS
+        inside = ends[:-1, None] + np.diff(ends, axis=0)[:, None] * fraction
         line = np.concatenate([inside.reshape(-1, ends.shape[1]), ends[-1:]])
         allowed = self.between[1:] + np.maximum(self.slack[1:], self.slack[:-1])
         allowed = np.append(np.repeat(allowed, QUARTERS, axis=0), allowed[-1:], axis=0)
@@ -282,7 +298,13 @@ class _Check:
         return f"{self.envelope.alpha[level]:g}"
 
     def _require(self, excess: Array, bound: Array, words: str, stride: int = 1) -> None:
-        """Refuse an excess (…, m) over bounds that is positive or NaN, at every `stride`-th time.
+        """Refuse an excess of the motion over a bound that is positive or not a number.
+
+        Args:
+            excess: Excess beyond rounding, shape (J, m), at every `stride`-th time.
+            bound: The bound, same shape.
+            words: Kind of the bound, for the message.
+            stride: Times from one row to the next.
 
         Raises:
             ContradictionError: There is one; the message gives the largest.
@@ -303,7 +325,7 @@ class _Check:
         raise ContradictionError(what, self._table())
 
     def _table(self) -> dict[str, Array]:
-        """Columns by name, each (T,): time, and of each output motion and attained bounds.
+        """Return columns (T,) by name: time, and each output's motion and attained bounds.
 
         The bounds are those of the lowest level.
         """
@@ -316,14 +338,17 @@ class _Check:
 
 
 def _within_steps(upper: Array, between: Array) -> Array:
-    """Upper bounds at nodes and at the quarter points between them, shape (4 (T − 1) + 1, m)."""
+    """Return upper bounds at nodes and quarter points between them, shape (4 (T − 1) + 1, m).
+
+    `between` (T, m) is what an output may exceed the bounds at both ends of a step by within it.
+    """
     inside = np.maximum(upper[1:], upper[:-1]) + between[1:]
     parts = [upper[:-1], *[inside] * (QUARTERS - 1)]
     return np.append(np.stack(parts, 1).reshape(-1, upper.shape[1]), upper[-1:], axis=0)
 
 
 def _corners(low: Array, high: Array) -> Iterator[Array]:
-    """Corners (d,) of a box: all, or of more than `CORNERS` two opposite and others at random."""
+    """Yield the corners (d,) of a box; of more than `CORNERS` two opposite and random others."""
     if 2.0 ** len(low) <= CORNERS:
         yield from map(np.array, product(*zip(low, high, strict=True)))
         return

@@ -26,35 +26,35 @@ COARSE = 0.02
 are then attained by other motions than those they name. A tenth of it is enough."""
 FINEST = 64
 """Most parts of a step that are tried to find a step which would do."""
-AT_ONCE = 16
+CHUNK = 16
 """Trajectories that are held at once."""
 FLOOR = 0.1
 """Least stray of a step, as a share of the largest of all steps."""
 
 
 def step_error(flow: UnitFlow) -> Array:
-    """Estimate of the largest time-stepping error so far, from nominal values and corners, (T, m).
+    """Return the estimated time-stepping error of each output up to each node, shape (T, m).
 
-    Of a linear structure the distance from the exact propagator, else the distance from half the
-    step, extrapolated by the scheme's order.
+    It is `MARGIN` times the largest error at nominal values and corners: of a linear structure the
+    distance from the exact propagator, else that from half the step, extrapolated by the order.
 
     Raises:
-        StepError: A scheme has left the motion.
+        StepError: The error of an output exceeds `DIVERGED` times its peak.
     """
     if flow.flow.exact:
         return np.zeros((len(flow.time), len(flow.outputs)))
     values, error = flow.flow.deviations(flow.boxes.probes)
-    so_far: Array = np.maximum.accumulate(error.max(0), axis=0)
-    peak = np.abs(values).max((0, 1))
-    for name, reached, least in zip(flow.outputs, so_far[-1], peak, strict=True):
-        if reached > DIVERGED * least > 0:
-            what = f"step: its error, {reached:.2g}, passes the peak of {name}, {least:.2g}"
+    running_error: Array = np.maximum.accumulate(error.max(0), axis=0)
+    peaks = np.abs(values).max((0, 1))
+    for name, last_error, peak in zip(flow.outputs, running_error[-1], peaks, strict=True):
+        if last_error > DIVERGED * peak > 0:
+            what = f"step: its error, {last_error:.2g}, passes the peak of {name}, {peak:.2g}"
             raise StepError(what, "take a smaller step")
-    return MARGIN * so_far
+    return MARGIN * running_error
 
 
 def with_step_error(bounds: Envelope, flow: UnitFlow, steps: Array) -> Envelope:
-    """The envelope with the time-stepping error in its errors.
+    """Return the envelope with the time-stepping error added to its errors and named as a fact.
 
     Args:
         bounds: The envelope of the scheme's trajectories.
@@ -63,17 +63,19 @@ def with_step_error(bounds: Envelope, flow: UnitFlow, steps: Array) -> Envelope:
     """
     if not flow.flow.exact:
         steps = np.maximum(steps, _error_at_optima(bounds, flow.flow))
-    alike = [unit == flow.units[flow.reference] for unit in flow.units]
+    has_reference_unit = [unit == flow.units[flow.reference] for unit in flow.units]
     error, basis = bounds.error + steps, bounds.basis
     if steps.any():
         basis = (*basis, f"{flow.flow.method} steps of {flow.time[1]:g} s")
-    facts = {"step_error": float(steps[:, alike].max()), **bounds.facts}
+    facts = {"step_error": float(steps[:, has_reference_unit].max()), **bounds.facts}
     facts["estimated_error"] = float((error / flow.scale).max())
     return replace(bounds, error=error, basis=basis, facts=facts)
 
 
 def _error_at_optima(bounds: Envelope, flow: Flow) -> Array:
-    """Estimate of the largest time-stepping error so far, from inputs that reach bounds, (T, m).
+    """Return the estimated time-stepping error of each output up to each node, shape (T, m).
+
+    It is `MARGIN` times the largest error of trajectories at inputs that attain bounds.
 
     Corners alone do not suffice: between them a structure may resonate, which the scheme does at
     other parameters than the exact motion, or a motion may pass near an unstable equilibrium. Of a
@@ -94,7 +96,7 @@ def _error_at_optima(bounds: Envelope, flow: Flow) -> Array:
 
 
 def _from_reference(bounds: Envelope, flow: LagrangianFlow, points: Array) -> Array:
-    """Largest distance of trajectories at points (S, d) from reference motions, (T, m).
+    """Return the largest distance of trajectories at points (S, d) from reference motions, (T, m).
 
     Raises:
         StepError: It passes `COARSE` of an output's peak; the message says which step would do.
@@ -108,17 +110,17 @@ def _from_reference(bounds: Envelope, flow: LagrangianFlow, points: Array) -> Ar
             for point in points
         ]
     )
-    off = np.abs(flow.values(points) - truth)
-    share = off.max(1) / np.maximum(np.abs(truth).max((0, 1)), 1e-300)
-    if (share > COARSE).any():
-        worst, output = np.unravel_index(int(share.argmax()), share.shape)
+    error = np.abs(flow.values(points) - truth)
+    relative_error = error.max(1) / np.maximum(np.abs(truth).max((0, 1)), 1e-300)
+    if (relative_error > COARSE).any():
+        worst, output = np.unravel_index(int(relative_error.argmax()), relative_error.shape)
         at = ", ".join(f"{x} = {y:.6g}" for x, y in zip(flow.names, points[worst], strict=True))
         what = f"step: {flow.step:g} s is too coarse where a bound is attained, at {at}: there"
-        what += f" {flow.outputs[output]} is off by {off[worst, :, output].max():.3g}"
+        what += f" {flow.outputs[output]} is off by {error[worst, :, output].max():.3g}"
         raise StepError(
             what, _sufficient_step(flow, points[worst : worst + 1], truth[worst : worst + 1])
         )
-    return np.asarray(off.max(0))
+    return np.asarray(error.max(0))
 
 
 def _sufficient_step(flow: LagrangianFlow, point: Array, truth: Array) -> str:
@@ -139,7 +141,7 @@ def _sufficient_step(flow: LagrangianFlow, point: Array, truth: Array) -> str:
 
 
 def with_node_deviation(bounds: Envelope, flow: UnitFlow) -> Envelope:
-    """The envelope with an estimate of what lies between its nodes; a proof is left as it is."""
+    """Return the envelope with an estimated deviation between nodes, if it has no proved one."""
     if bounds.between is not None:
         return bounds
     corners = flow.boxes.probes
@@ -149,28 +151,32 @@ def with_node_deviation(bounds: Envelope, flow: UnitFlow) -> Envelope:
 
 
 def node_deviation(flow: Flow, points: Array) -> Array:
-    """Estimate of how far outputs stray from straight lines between nodes, shape (T, m).
+    """Return the estimated distance of outputs from straight lines between nodes, shape (T, m).
 
-    Row j is that of the step that ends at node j, 0 for the first node.
+    Row j is that of the step that ends at node j, 0 for the first node. It is `MARGIN` times the
+    largest of the step and its neighbours, and of `FLOOR` times that of any step.
 
     Args:
         flow: The trajectories.
         points: Parameters of those that are looked at, shape (S, d), in SI units.
     """
-    pieces = np.array_split(points, -(-len(points) // AT_ONCE))
-    off = np.max([_chord_deviation(flow, some) for some in pieces], axis=0)
-    # where the trajectories looked at are straight, others are not
-    near = [np.roll(off, k, 0) for k in (-1, 0, 1)]
-    near.append(np.broadcast_to(FLOOR * off.max(0), off.shape))
-    return np.concatenate([np.zeros((1, off.shape[1])), MARGIN * np.max(near, 0)])
+    chunks = np.array_split(points, -(-len(points) // CHUNK))
+    deviation = np.max([_chord_deviation(flow, chunk) for chunk in chunks], axis=0)
+    # where these trajectories are straight, others may bend
+    candidates = [np.roll(deviation, k, 0) for k in (-1, 0, 1)]
+    candidates.append(np.broadcast_to(FLOOR * deviation.max(0), deviation.shape))
+    return np.concatenate([np.zeros((1, deviation.shape[1])), MARGIN * np.max(candidates, 0)])
 
 
 def _chord_deviation(flow: Flow, points: Array) -> Array:
-    """Largest distance of trajectories from straight lines in each step, shape (T − 1, m)."""
+    """Return the largest distance of trajectories at points (S, d) from chords, (T − 1, m).
+
+    A chord is the straight line between the values at both ends of a step.
+    """
     finer, parts = flow.finer()
     fine = finer.values(points)
     ends = fine[:, ::parts]
-    share = (np.arange(1, parts) / parts)[:, None]
+    fraction = (np.arange(1, parts) / parts)[:, None]
     inner = fine[:, :-1].reshape(len(fine), -1, parts, fine.shape[-1])[:, :, 1:]
-    straight = ends[:, :-1, None] * (1 - share) + ends[:, 1:, None] * share
-    return np.asarray(np.abs(inner - straight).max((0, 2)))
+    chord = ends[:, :-1, None] * (1 - fraction) + ends[:, 1:, None] * fraction
+    return np.asarray(np.abs(inner - chord).max((0, 2)))

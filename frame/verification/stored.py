@@ -50,22 +50,26 @@ def variables(points: Array, motions: Sequence[LinearMotion]) -> Variables:
 
 
 def stored_motions(data: xarray.Dataset) -> tuple[Array, list[LinearMotion]]:
-    """Inputs (S, n) and structures of the motions that a dataset holds."""
+    """Return inputs (S, n) and structures of the tested motions that a dataset holds."""
     points = data["motion_inputs"].values
     record, step = data["record"].values, float(data["record_step"])
     courses = _courses(data)
     m, n = data["motion_rows"].shape[1], data["motion_mass"].shape[1]
-    none = {"forces": np.zeros((n, 0)), "feeds": np.zeros((m, 0))}
+    no_forces = {"forces": np.zeros((n, 0)), "feeds": np.zeros((m, 0))}
     axes = AXES | (FORCES if courses else {})
     arrays = [
-        none | {name: data[f"motion_{name}"].values[s] for name in axes} for s in range(len(points))
+        no_forces | {name: data[f"motion_{name}"].values[s] for name in axes}
+        for s in range(len(points))
     ]
     fixed: dict[str, Any] = {"record": record, "record_step": step, "courses": courses}
     return points, [LinearMotion(**arrays_of_motion, **fixed) for arrays_of_motion in arrays]
 
 
 def _stored_courses(courses: Sequence[Course]) -> dict[str, tuple[tuple[str, ...], Array]]:
-    """Courses of forces: samples behind one another, and all that is one number."""
+    """Return variables with the samples of all courses, one after the other, and their numbers.
+
+    The numbers of a course are its sample count and its fields after the samples.
+    """
     if not courses:
         return {}
     numbers = [[len(x.samples), *x[1:]] for x in courses]
@@ -77,6 +81,7 @@ def _stored_courses(courses: Sequence[Course]) -> dict[str, tuple[tuple[str, ...
 
 
 def _courses(data: xarray.Dataset) -> tuple[Course, ...]:
+    """Return the courses of forces that `_stored_courses` wrote to a dataset; none without any."""
     if "course_numbers" not in data:
         return ()
     numbers = data["course_numbers"].values
