@@ -277,7 +277,7 @@ class Content(Section):
 
     @model_validator(mode="after")
     def _check_envelope(self) -> Self:
-        """Refuses two structures or none, and inputs, outputs and steps that it does not have."""
+        """Refuses two structures or none, and studies and questions that do not fit it."""
         envelope, structure = self.envelope, self.structure
         if envelope is None or "envelope" not in self.stages:
             return self
@@ -285,17 +285,10 @@ class Content(Section):
         if structure is None or len(sections) > 1:
             value = None if structure is None else f"beside {len(sections) - 1} more"
             raise RefusedError("frame", value, "one of [frame], [matrices] and [pendulum]")
-        ratio = getattr(self.structure_section, "damping_ratio", None)
-        computed = "E" if "modulus" in self.stages else "(?!)"  # which matches no name
-        if isinstance(ratio, MaterialDamping):
-            computed = r"E|zeta\d*"
         main_study = Study.model_construct(fuzzy=envelope.fuzzy, duration=envelope.duration)
-        studies = {"envelope": main_study} | {f"study[{k}]": x for k, x in enumerate(self.study)}
-        for key, study in studies.items():
-            stated = [name for name in study.fuzzy if not re.fullmatch(computed, name)]
-            structure.inputs(stated, f"{key}.fuzzy")  # refuses unknown and crisp ones
-            structure.require_outputs(f"{key}.figures", study.figures)
-            envelope.require_steps(f"{key}.duration", study.duration)
+        self._require_study("envelope", main_study, envelope, structure)
+        for number, study in enumerate(self.study):
+            self._require_study(f"study[{number}]", study, envelope, structure)
         has_modulus = self.has_stated_modulus or "modulus" in self.stages
         require(has_modulus, "frame.modulus", value=None, allowed="a modulus, or stage modulus")
         is_framed = self.identify is None or self.frame is not None
@@ -309,3 +302,16 @@ class Content(Section):
         if self.identify is not None:
             structure.inputs(self.identify.learn, "identify.learn")
         return self
+
+    def _require_study(
+        self, key: str, study: Study, envelope: EnvelopeSection, structure: Structure
+    ) -> None:
+        """Refuses inputs, outputs and a duration that a study of the structure cannot have."""
+        ratio = getattr(self.structure_section, "damping_ratio", None)
+        computed = "E" if "modulus" in self.stages else "(?!)"  # which matches no name
+        if isinstance(ratio, MaterialDamping):
+            computed = r"E|zeta\d*"
+        stated = [name for name in study.fuzzy if not re.fullmatch(computed, name)]
+        structure.inputs(stated, f"{key}.fuzzy")  # refuses unknown and crisp ones
+        structure.require_outputs(f"{key}.figures", study.figures)
+        envelope.require_steps(f"{key}.duration", study.duration)

@@ -299,7 +299,7 @@ class Frame(Section):
         Raises:
             RefusedError: Its values make no frame.
         """
-        young = modulus or self.modulus or STAND_IN
+        young: FuzzyNumber | None = modulus or self.modulus or STAND_IN
         if self.stiffness:  # which needs no modulus
             young = self.modulus
         ratios = ratios_of(self.damping_ratio, loss)
