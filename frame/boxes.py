@@ -24,7 +24,7 @@ from alphacut.fuzzy.sets.numbers import checked_levels
 ALPHA = (0.0, 0.25, 0.5, 0.75, 1.0)
 FAR_APART = 1.5
 """Ratio of an input's ends from which on their geometric mean is its middle."""
-SHARE = 1e-3
+DEFAULT_TOLERANCE = 1e-3
 """Error wanted unless one is given, as a share of each output's peak."""
 
 
@@ -70,7 +70,7 @@ class Boxes:
         return self.numbers or {name: Interval(low, high) for name, low, high in ends}
 
     def bisected(self, axis: int) -> list[tuple[Boxes, Rows]]:
-        """Return two halves along an input, each with the rows of the levels that reach it.
+        """Return two halves along an input, each with the rows of the levels that intersect it.
 
         The box is cut at the geometric mean of the ends where they are positive and far apart,
         since frequencies are powers of stiffnesses and masses; else in the middle.
@@ -79,8 +79,8 @@ class Boxes:
         middle = np.sqrt(low * high) if low > 0 and high > FAR_APART * low else (low + high) / 2
         halves = []
         for ends in ((-np.inf, middle), (middle, np.inf)):
-            reached = (self.lower[:, axis] <= ends[1]) & (self.upper[:, axis] >= ends[0])
-            levels = np.flatnonzero(reached)
+            intersects = (self.lower[:, axis] <= ends[1]) & (self.upper[:, axis] >= ends[0])
+            levels = np.flatnonzero(intersects)
             low, high = np.full((2, len(self.names)), [[-np.inf], [np.inf]])
             low[axis], high[axis] = ends
             halves.append((self.on_levels(levels).within(low, high), levels))
@@ -111,13 +111,13 @@ class Boxes:
 
     @property
     def probes(self) -> Array:
-        """Modal parameters and up to 16 corners of the widest box, shape (S, d), in SI units."""
+        """Nominal inputs and up to 16 corners of the widest box, shape (S, d), in SI units."""
         d = len(self.names)
         if 2**d <= CORNERS:
             ends = corners(-np.ones(d), np.ones(d))
-        else:  # some, two opposite ones among them
-            drawn = np.random.default_rng(7).choice([-1.0, 1.0], (CORNERS - 2, d))
-            ends = np.vstack([-np.ones(d), np.ones(d), drawn])
+        else:  # two opposite corners, others at random
+            random_corners = np.random.default_rng(7).choice([-1.0, 1.0], (CORNERS - 2, d))
+            ends = np.vstack([-np.ones(d), np.ones(d), random_corners])
         return np.asarray(np.unique(np.vstack([self.modal, self.to_physical(ends)]), axis=0))
 
     @property
@@ -139,7 +139,7 @@ class Boxes:
         return np.asarray(np.clip(self.centre + self.radius * unit, self.lower[0], self.upper[0]))
 
     def in_unit(self, jet: Jet) -> Jet:
-        """Turn derivatives of a jet by physical parameters into those by unit coordinates."""
+        """Scale a jet's derivatives, in place, to those by unit coordinates; return the jet."""
         shape, r = (1,) * jet.value.ndim, self.radius
         jet.first[:] *= r.reshape(-1, *shape)
         if len(jet.second):
@@ -204,11 +204,13 @@ class UnitFlow:
         return units_of(self.outputs)
 
     def tolerance(self, value: float | None) -> float:
-        """Return `value`, or without one the usual tolerance: `SHARE` of the peak.
+        """Return `value` if given, else the default tolerance, a fraction of the peak.
 
-        Where tolerances are not relative it is the peak of output `reference`.
+        It is in units of each output's peak or, where tolerances are not relative, in the unit of
+        output `reference`.
         """
-        return value or SHARE * (1.0 if self.relative else float(self.peak[self.reference]))
+        unit = 1.0 if self.relative else float(self.peak[self.reference])
+        return value or DEFAULT_TOLERANCE * unit
 
     @property
     def reference(self) -> int:
@@ -232,7 +234,7 @@ class UnitFlow:
     def scale(self) -> Array:
         """Factor from a tolerance to the allowed error of each output, shape (m,).
 
-        Of a relative tolerance it is the output's peak. Another tolerance is that of output
+        For a relative tolerance it is the output's peak. An absolute one is meant for output
         `reference`: the factor is 1 if all outputs have its unit, else the ratio of the peaks.
         """
         if self.relative:

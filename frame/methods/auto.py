@@ -19,7 +19,7 @@ from typing import ClassVar
 import numpy as np
 
 from alphacut.frame.box_proof import refusing
-from alphacut.frame.boxes import SHARE, UnitFlow
+from alphacut.frame.boxes import DEFAULT_TOLERANCE, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.certificate.remainder import MOST_PARAMETERS
 from alphacut.frame.dual.proof import DualProof
@@ -38,7 +38,7 @@ LOG = logging.getLogger(__name__)
 
 BOXES = 1000
 """Boxes that a proof may look at for each bound, on average."""
-FEW = 4
+FEW_INPUTS = 4
 """Inputs up to which the dual bound closes the gaps of peaks to the usual tolerance."""
 FINEST = 1e-4
 """Gap of peaks, as a share of each, below which the dual bound takes too long."""
@@ -82,9 +82,10 @@ class Auto:
             checked_number("tolerance", self.tolerance, positive=True)
 
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
-        """Return the envelope on all levels by the methods that the module's docstring lists.
+        """Return the envelope on all levels, by a proof if possible; its first note says why.
 
-        Its first note says which method gave it and why.
+        Proofs are tried first. Where their gap is too wide, a search attains larger values inside
+        the proved bounds, or estimates the envelope; without oscillating modes the follower does.
         """
         follower = ImprovedFollower(0.7 * flow.tolerance(self.tolerance), seed=self.seed)
         if not isinstance(flow.flow, LinearFlow):
@@ -101,12 +102,13 @@ class Auto:
             if self._is_close(found, flow):
                 return _noted(found, "; ".join([f"{proof.name} succeeded", *reasons]))
             reasons.append(f"{proof.name}: its gap is wider than the tolerance")
-        named = self.tolerance is not None and not self.peaks
-        if proved is not None and not named and _gap(proved) <= WIDE:
+        # a tolerance that holds for all bounds, not for the peaks alone
+        needs_tolerance = self.tolerance is not None and not self.peaks
+        if proved is not None and not needs_tolerance and _gap(proved) <= WIDE:
             return _noted(proved, "; ".join([f"{proved.method} succeeded", *reasons]))
         search = Search(self.tolerance, seed=self.seed)
         try:
-            if proved is not None and not named:
+            if proved is not None and not needs_tolerance:
                 nodes = _possible_peaks(proved)
                 searched = search.attained(flow, nodes, progress)
                 return _noted(
@@ -133,15 +135,15 @@ class Auto:
             flow: The motion and its boxes.
             reasons: Texts to which the refusals of proofs are appended.
         """
-        share, inputs = self.tolerance or SHARE, len(flow.boxes.names)
+        tolerance, inputs = self.tolerance or DEFAULT_TOLERANCE, len(flow.boxes.names)
         proof = Proof(None, self.tolerance, BOXES, workers=self.workers)
         dual = DualProof(workers=self.workers)
-        if self.magnitudes:
+        if self.magnitudes:  # nothing is read off bounds below the peaks
             dual = replace(dual, below=1.0)
         if self.tolerance and not self.peaks:
-            pass  # it leaves wide gaps below the peaks, however narrow it has them there
-        elif flow.relative and inputs <= (MOST_PARAMETERS if self.tolerance else FEW):
-            dual = replace(dual, gap=max(share, FINEST), peaks=max(share, FINEST))
+            pass  # the dual bound leaves wide gaps below the peaks in any case
+        elif flow.relative and inputs <= (MOST_PARAMETERS if self.tolerance else FEW_INPUTS):
+            dual = replace(dual, gap=max(tolerance, FINEST), peaks=max(tolerance, FINEST))
         elif self.tolerance:
             dual = replace(dual, peaks=WIDE)
         works = list[tuple[float, Proof | DualProof]]()
@@ -152,7 +154,7 @@ class Auto:
             except UnprovedError as error:
                 reasons.append(f"{method.name}: {error}")
         if self.tolerance and not self.peaks and len(works) == 2:
-            works = [(0.0, proof), works[1]]  # which bounds all nodes alike, not the peaks first
+            works = [(0.0, proof), works[1]]  # branch and bound has one gap at all nodes: first
         works.sort(key=lambda pair: pair[0])
         for _, method in works:
             yield replace(proof, parts=1) if method is proof and len(works) == 2 else method
@@ -162,12 +164,14 @@ class Auto:
     def _is_close(self, proved: Envelope, flow: UnitFlow) -> bool:
         """Return whether the gap of a proof is as narrow as asked for.
 
-        Without a tolerance, or with many inputs, only the gaps at the peaks count.
+        A tolerance for all bounds must be met by all. Else the gap at the peaks counts: at most
+        twice a tolerance that is meant for peaks and for few inputs, or `WIDE`.
         """
         if self.tolerance is not None and not self.peaks:
             return bool((proved.error <= self._allowed(flow)).all())
-        few = flow.relative and len(flow.boxes.names) <= FEW and self.tolerance is not None
-        return _gap(proved) <= (2 * (self.tolerance or 0.0) if few else WIDE)
+        if self.tolerance is not None and flow.relative and len(flow.boxes.names) <= FEW_INPUTS:
+            return _gap(proved) <= 2 * self.tolerance
+        return _gap(proved) <= WIDE
 
     def _allowed(self, flow: UnitFlow) -> Array:
         """Error allowed of each output, shape (m,), in its unit; a little more for rounding."""
@@ -192,19 +196,20 @@ def with_attained(
     assert proved.inner is not None
     physical = flow.boxes.to_physical(at)
     values = values - ROUNDING * np.abs(values).max((0, 1, 3))[:, None]
-    ends, places = [], []
-    for index, (side, name) in enumerate(((-1, "lower"), (1, "upper"))):
-        inner, where = getattr(proved.inner, name).copy(), getattr(proved, f"{name}_at").copy()
-        better = values[..., index] > side * inner[:, nodes]
-        inner[:, nodes] = np.where(better, side * values[..., index], inner[:, nodes])
-        where[:, nodes] = np.where(better[..., None], physical[..., index, :], where[:, nodes])
+    ends, inputs = [], []  # lower ones, then upper ones
+    for index, (sign, name) in enumerate(((-1, "lower"), (1, "upper"))):
+        inner, inputs_at = getattr(proved.inner, name).copy(), getattr(proved, f"{name}_at").copy()
+        better = values[..., index] > sign * inner[:, nodes]
+        inner[:, nodes] = np.where(better, sign * values[..., index], inner[:, nodes])
+        better_inputs = physical[..., index, :]
+        inputs_at[:, nodes] = np.where(better[..., None], better_inputs, inputs_at[:, nodes])
         ends.append(inner)
-        places.append(where)
+        inputs.append(inputs_at)
     combined = replace(
         proved,
         inner=Ends(*ends),
-        lower_at=places[0],
-        upper_at=places[1],
+        lower_at=inputs[0],
+        upper_at=inputs[1],
         error=np.maximum(proved.upper - ends[1], ends[0] - proved.lower),
     )
     facts = {**combined.facts, "gap_of_peaks": _gap(combined)}
@@ -223,9 +228,9 @@ def _gap(proved: Envelope) -> float:
     """Return the largest gap between proved and attained peak, as a fraction of the peak."""
     assert proved.inner is not None
     ends = ((proved.upper, proved.inner.upper), (-proved.lower, -proved.inner.lower))
-    most = np.maximum(*(outer.max(1) for outer, _ in ends))
+    peak = np.maximum(*(outer.max(1) for outer, _ in ends))  # (A, m), as of the gaps
     gaps = [outer.max(1) - inner.max(1) for outer, inner in ends]
-    return float((np.maximum(*gaps) / np.maximum(most, 1e-300)).max())
+    return float((np.maximum(*gaps) / np.maximum(peak, 1e-300)).max())
 
 
 def _noted(envelope: Envelope, why: str) -> Envelope:

@@ -109,7 +109,7 @@ class GraphFollower:
         )
 
     def follow(self, flow: UnitFlow, progress: Progress | None = None) -> Followed:
-        """Return the bounds on all levels of `flow.boxes`, from the narrowest box to the widest."""
+        """Return bounds on all levels by Taylor models, from the narrowest box to the widest."""
         storage = Storage(flow)
         storage.add(flow.boxes.to_unit(flow.boxes.modal)[None])
         levels = len(flow.boxes.alpha)
@@ -123,9 +123,9 @@ class GraphFollower:
         return out
 
     def _sweep(self, out: Followed, level: int, progress: Progress) -> None:
-        """Sweep over the nodes of a level, computing a graph where a gain is predicted.
+        """Compute graphs (trajectories) where a gain is predicted, from the first node to the last.
 
-        It sets `guess`, `new` and `left` of the level.
+        It sets `guess`, `new` and `predicted_gain` of the level in `out`.
         """
         storage, box = out.storage, out.storage.flow.boxes.unit(level)
         if not (box[1] > box[0]).any():
@@ -138,15 +138,15 @@ class GraphFollower:
         for node in range(nodes):
             progress(node / nodes)
             out.guess[level, node] = storage.best[node]
-            points = self._new(out, level, node, predicted, target)
+            points = self._new_graphs(out, level, node, predicted, target)
             if points:
-                won = storage.add(np.array(points))
-                ahead = tuple(indices[won[0] > node] for indices in won)
-                self._predict(storage, ahead, box, predicted, target)
+                improved = storage.add(np.array(points))
+                later = tuple(indices[improved[0] > node] for indices in improved)
+                self._predict(storage, later, box, predicted, target)
         limit = self.tolerance * storage.flow.scale[:, None]
         out.predicted_gain[level] = np.clip(predicted - storage.top, 0.0, limit)
 
-    def _new(
+    def _new_graphs(
         self, out: Followed, level: int, node: int, predicted: Array, target: Array
     ) -> list[Array]:
         """Return the inputs whose trajectories (graphs) are to be computed for bounds at a node.
@@ -178,7 +178,10 @@ class GraphFollower:
         predicted: Array,
         target: Array,
     ) -> None:
-        """Set the predictions of the best graphs' Taylor models at places, and their points."""
+        """Maximise the Taylor models of the best graphs at some places (node, output, side).
+
+        Predicted values and their unit coordinates are written to `predicted` and `target`.
+        """
         bend = float(self.order > 1)
         predicted[places], optima = storage.predicted(places, box, local_maximum, bend=bend)
         target[places] = np.clip(optima, *box)

@@ -44,20 +44,24 @@ class Storage:
         return bool((np.abs(self.points - point).max(1, initial=0.0) < near).any())
 
     def add(self, points: Array) -> Places:
-        """Compute and store the graphs at unit coordinates (S, d); return where one is now best."""
+        """Compute and store the graphs (trajectories) at unit coordinates (S, d).
+
+        Returns:
+            Node, output and side of each place where one of them is now the best.
+        """
         jet, top = self.flow.taylor(points), self.top.reshape(-1)
         self.steepest = np.maximum(self.steepest, np.abs(jet.first).max((0, 1, 2)))
-        holder = np.full(top.shape, -1)
+        best_new = np.full(top.shape, -1)  # which of them is the best; −1 for none
         for s, value in enumerate(jet.value):
             signed = np.stack([-value, value], -1).ravel()
             better = np.flatnonzero(signed > top)
-            top[better], holder[better] = signed[better], s
-        won = np.flatnonzero(holder >= 0)
-        places = np.unravel_index(won, self.top.shape)
-        where = holder[won], *places[:2]
-        self.best[places] = len(self) + holder[won]
-        self.first[places] = np.moveaxis(jet.first, 0, -1)[where]
-        self.second[places] = np.moveaxis(jet.second, (0, 1), (-2, -1))[where]
+            top[better], best_new[better] = signed[better], s
+        improved = np.flatnonzero(best_new >= 0)
+        places = np.unravel_index(improved, self.top.shape)
+        entries = best_new[improved], *places[:2]  # graph, node and output
+        self.best[places] = len(self) + best_new[improved]
+        self.first[places] = np.moveaxis(jet.first, 0, -1)[entries]
+        self.second[places] = np.moveaxis(jet.second, (0, 1), (-2, -1))[entries]
         self.points = np.vstack([self.points, points])
         return places
 

@@ -26,10 +26,12 @@ from alphacut.fuzzy.progress_bar import Progress, subprogress
 from alphacut.fuzzy.refused import checked_number
 from alphacut.fuzzy.result import Nature
 
-MOST = 64e6
+MAX_NUMBERS = 64e6
 """Most numbers of Taylor models computed at a time: 512 MB."""
 BATCH = 32
 """Graphs computed together."""
+MAX_GLOBAL_INPUTS = 4
+"""Inputs up to which Taylor models are maximised globally."""
 REACH = 0.6
 """Trust region of a Taylor model, as a share of the half width of the box."""
 TRIES = 40
@@ -116,11 +118,12 @@ class ImprovedFollower:
         """
         gains, limit = [first.predicted_gain, second.predicted_gain], self.tolerance * scale
         small = [np.where(gain <= limit[:, None], gain, 0.0) for gain in gains]
-        large = [np.where(gain > limit[:, None], gain, 0.0) for gain in gains]  # the budget ended
+        # gains above the tolerance remain where the budget ended a pass
+        large = [np.where(gain > limit[:, None], gain, 0.0) for gain in gains]
         predicted = np.maximum(*small) + np.maximum(*large)
-        difference = around(np.abs(second.bounds - first.bounds).max(-1))
-        missing = predicted.max(-1) + limit / 2 + difference + missed[:, None]
-        return np.asarray(SAFETY * missing)
+        difference = smoothed_maximum(np.abs(second.bounds - first.bounds).max(-1))
+        total_error = predicted.max(-1) + limit / 2 + difference + missed[:, None]
+        return np.asarray(SAFETY * total_error)
 
     def run_pass(self, flow: UnitFlow, progress: Progress) -> PassBounds:
         """Return the bounds of one pass on all levels, from the narrowest box to the widest."""
@@ -128,10 +131,11 @@ class ImprovedFollower:
         d, places = len(flow.boxes.names), storage.top.size // 2
         bounds, gains = np.zeros((2, levels, *storage.top.shape))
         out = PassBounds(bounds, np.zeros((*bounds.shape, d)), gains, storage)
-        at_once = int(np.clip(MOST / (places * (1 + d + d * d)), 1, BATCH))
+        at_once = int(np.clip(MAX_NUMBERS / (places * (1 + d + d * d)), 1, BATCH))
         for done, level in enumerate(reversed(range(levels))):
             search = _Level(storage, flow.boxes.unit(level), self.tolerance)
             tick = subprogress(progress, done / levels, (done + 1) / levels)
+            # graphs at the end of the level, at most, and at its beginning
             limit, first = self.budget * (done + 1) // levels, len(storage)
             points = self._start(storage, *search.box)[: max(1, limit - len(storage))]
             while len(points):
@@ -145,7 +149,10 @@ class ImprovedFollower:
         return out
 
     def _start(self, storage: Storage, lower: Array, upper: Array) -> Array:
-        """Return the first unit coordinates of a level, modal and spread ones, shape (S, d)."""
+        """Return the first points of a level, nominal and spread ones, in unit coordinates, (S, d).
+
+        A box without width needs the nominal point alone, once for all levels.
+        """
         boxes = storage.flow.boxes
         modal = boxes.to_unit(boxes.modal)[None]
         if not (upper > lower).any():
@@ -193,10 +200,8 @@ class _Level:
     def predict(self, places: Places) -> None:
         """Set the predictions at places from the Taylor models of the best graphs there."""
         if len(places[0]) and (self.box[1] > self.box[0]).any():
-            few = len(self.box[0]) <= 4
-            optima = self.storage.predicted(
-                places, self.box, global_maximum if few else local_maximum, reach=self.reach
-            )
+            maximise = global_maximum if len(self.box[0]) <= MAX_GLOBAL_INPUTS else local_maximum
+            optima = self.storage.predicted(places, self.box, maximise, reach=self.reach)
             self.predicted[places], self.target[places] = optima
 
     def proposals(self, count: int) -> Array:
@@ -222,8 +227,11 @@ class _Level:
         return np.array(chosen)[:count].reshape(-1, len(self.box[0]))
 
 
-def around(gap: Array) -> Array:
-    """Return the largest of values (A, T, m) at nodes nearby, at least a tenth of the largest."""
+def smoothed_maximum(gap: Array) -> Array:
+    """Return the largest of values (A, T, m) over T/20 nodes around each node, same shape.
+
+    It is at least a tenth of the largest value over all nodes.
+    """
     from scipy.ndimage import maximum_filter1d
 
     near = maximum_filter1d(gap, 2 * (gap.shape[1] // 40) + 1, axis=1)

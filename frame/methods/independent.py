@@ -29,7 +29,7 @@ def independent_excess(flow: UnitFlow, bounds: Array, progress: Progress) -> tup
     Returns:
         Largest excess of each output over time, shape (A, m), and the number of motions.
     """
-    missed, count = np.zeros((len(bounds), len(flow.outputs))), 0
+    largest, count = np.zeros((len(bounds), len(flow.outputs))), 0
     for level in range(len(bounds)):
         lower, upper = flow.boxes.unit(level)
         points = (lower + upper) / 2 + (upper - lower) / 2 * sample(len(lower), level)
@@ -38,10 +38,10 @@ def independent_excess(flow: UnitFlow, bounds: Array, progress: Progress) -> tup
         for number, chunk in enumerate(chunks, start=1):
             values = flow.values(chunk)
             above, below = bounds[level, ..., 1], bounds[level, ..., 0]
-            off = np.maximum(values.max(0) - above, -values.min(0) - below)
-            missed[level] = np.maximum(missed[level], off.max(0))
+            excess = np.maximum(values.max(0) - above, -values.min(0) - below)
+            largest[level] = np.maximum(largest[level], excess.max(0))
             progress((level + number / len(chunks)) / len(bounds))
-    return missed, count
+    return largest, count
 
 
 def sample(d: int, level: int) -> Array:

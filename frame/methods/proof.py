@@ -18,7 +18,7 @@ from typing import ClassVar
 import numpy as np
 
 from alphacut.frame.box_proof import BisectionError, Goal, PartBounds
-from alphacut.frame.boxes import SHARE, Boxes, UnitFlow
+from alphacut.frame.boxes import DEFAULT_TOLERANCE, Boxes, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.certificate.certificate import certify
 from alphacut.frame.certificate.model_error import proved_error
@@ -33,9 +33,9 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.progress_bar import Progress
 from alphacut.fuzzy.refused import checked_number
 
-PORTION = 0.2
-"""Share of the gap that the error of the modal model may take on either side."""
-USUAL = 10.0
+MAX_ERROR_FRACTION = 0.2
+"""Fraction of the gap that the error of the modal model may take on either side."""
+LEAST_PROVED_FACTOR = 10.0
 """Proved over sampled error of the model, seldom less."""
 BOXES_OF_INPUT = 4.0
 """Factor by which one more input multiplies the boxes of a branch and bound, about."""
@@ -104,7 +104,7 @@ class Proof:
     @property
     def _gaps(self) -> tuple[float, ...]:
         """Gaps that are tried on a part, in units of the tolerance."""
-        tolerance = self.tolerance or SHARE
+        tolerance = self.tolerance or DEFAULT_TOLERANCE
         return (self.gap,) if self.gap else (0.1 * tolerance, tolerance)
 
     def forecast(self, flow: LinearFlow, boxes: Boxes) -> float:
@@ -113,16 +113,17 @@ class Proof:
         Raises:
             UnprovedError: There are too many inputs, or matrices are no polynomials of them.
         """
-        d = int((boxes.upper[0] > boxes.lower[0]).sum())
-        if d > MOST_PARAMETERS:
+        n_inputs = int((boxes.upper[0] > boxes.lower[0]).sum())
+        if n_inputs > MOST_PARAMETERS:
             raise UnprovedError(
-                f"proofs are affordable up to {MOST_PARAMETERS} fuzzy inputs, and there are {d}"
+                f"proofs are affordable up to {MOST_PARAMETERS} fuzzy inputs, and there are"
+                f" {n_inputs}"
             )
         if len(flow.system.ratios) > 1:
             raise UnprovedError("damping by a ratio of each mode is no polynomial", "take dual")
         ends = zip(boxes.lower[0].tolist(), boxes.upper[0].tolist(), strict=True)
         degrees(flow.system, dict(zip(boxes.names, ends, strict=True)))
-        return float(BOXES_OF_INPUT**d)
+        return float(BOXES_OF_INPUT**n_inputs)
 
     def bounds(self, flow: LinearFlow, boxes: Boxes, goal: Goal) -> list[PartBounds]:
         """Return proved and attained bounds on each level of a part of the box.
@@ -131,7 +132,7 @@ class Proof:
             UnprovedError: The error of the modal model cannot be bounded within the tolerance.
             ModalError: The structure has no smooth oscillating modes over the part.
         """
-        model, error, gap = self._modelled(flow, boxes, goal.scale)
+        model, error, gap = self._model_with_gap(flow, boxes, goal.scale)
         proof = certify(
             model,
             gap=gap,
@@ -147,14 +148,22 @@ class Proof:
             "boxes": proof.boxes / len(boxes.alpha),
             "evaluations": model.analyses / len(boxes.alpha),
         }
-        at, off = boxes.to_physical(proof.at), proof.attained_error
-        shares = np.broadcast_to(tail_shares(model), at.shape[2:])
+        inputs = boxes.to_physical(proof.at)
+        shares = np.broadcast_to(tail_shares(model), inputs.shape[2:])
         return [
-            PartBounds(outer, inner, where, proof.between, shares, off, facts=facts)
-            for outer, inner, where in zip(proof.outer, proof.bounds, at, strict=True)
+            PartBounds(
+                outer=outer,
+                inner=inner,
+                at=at,
+                between=proof.between,
+                shares=shares,
+                attained_error=proof.attained_error,
+                facts=facts,
+            )
+            for outer, inner, at in zip(proof.outer, proof.bounds, inputs, strict=True)
         ]
 
-    def _modelled(
+    def _model_with_gap(
         self, flow: LinearFlow, boxes: Boxes, scale: Array
     ) -> tuple[ModalModel, Array, float]:
         """Return a modal model of a part, its proved error (T, m), and the gap that this allows.
@@ -168,58 +177,66 @@ class Proof:
         refusal = UnprovedError("no gap is asked for")
         for gap in self._gaps:
             try:
-                return *self._proved(flow, boxes, scale, gap), gap
-            except (GapError, BisectionError) as error:
-                refusal = error
+                model, error = self._accurate_model(flow, boxes, scale, gap)
+                return model, error, gap
+            except (GapError, BisectionError) as failure:
+                refusal = failure
         raise refusal
 
-    def _proved(
+    def _accurate_model(
         self, flow: LinearFlow, boxes: Boxes, scale: Array, gap: float
     ) -> tuple[ModalModel, Array]:
         """Return a modal model of a part and its proved error (T, m), at most a fifth of `gap`.
 
-        The proved error exceeds the sampled one some thirty times; the degree is raised until it is
-        small enough.
+        The degree is raised until the error is small enough. It is proved only where
+        `LEAST_PROVED_FACTOR` times the error at samples is, since a proof takes time.
 
         Raises:
             UnprovedError: No degree suffices.
         """
-        aim, before, largest = gap / 30, 0, np.inf
+        # a proved error is some thirty times that at samples
+        tolerance, last_degree, largest = gap / 30, 0, np.inf
+        allowed = MAX_ERROR_FRACTION * gap
         for _ in range(ATTEMPTS):
-            how = {"budget": self.budget, "scale": scale, "energy": True}
-            model = fit_modes(flow, boxes, tolerance=aim, **how)  # type: ignore[arg-type]
-            if model.degree <= before:
+            model = fit_modes(
+                flow, boxes, tolerance=tolerance, budget=self.budget, scale=scale, energy=True
+            )
+            if model.degree <= last_degree:
                 break
             sampled = float((model.error / scale).max())
-            largest = USUAL * sampled  # a bound is seldom less, and takes time
-            if largest <= PORTION * gap:
+            largest = LEAST_PROVED_FACTOR * sampled
+            if largest <= allowed:
                 error = proved_error(model)
                 largest = float((error / scale).max())
-                if largest <= PORTION * gap:
+                if largest <= allowed:
                     return model, error
-            # a degree more divides it by ten or so
-            aim, before = sampled * min(0.99, 4 * PORTION * gap / largest), model.degree
+            # one degree more divides the error by ten or so
+            tolerance, last_degree = sampled * min(0.99, 4 * allowed / largest), model.degree
         raise self._refusal(model, largest / gap)
 
-    def _refusal(self, model: ModalModel, share: float) -> UnprovedError:
-        """Return the error to raise if a model's error takes the fraction `share` of the gap.
+    def _refusal(self, model: ModalModel, fraction: float) -> UnprovedError:
+        """Return the error to raise if a model's error takes this fraction of the gap.
 
         Halving the inputs that contribute to the error divides it by 2^(degree + 1) or so. A
         `GapError` names the input to bisect; where too many bisections are needed it is a
         `BisectionError`.
         """
-        what = f"the proved error of the modes, {share:.3g} of it, takes too much of the gap"
+        what = f"the proved error of the modes, {fraction:.3g} of it, takes too much of the gap"
         cure = "narrower or fewer fuzzy inputs, or a wider gap, can be proved"
-        shares = tail_shares(model)
-        halvings = np.ceil(np.log2(share / PORTION) / (model.degree + 1))
-        if halvings / (shares**2).sum() > np.log2(self.parts):
+        input_shares = tail_shares(model)
+        halvings = np.ceil(np.log2(fraction / MAX_ERROR_FRACTION) / (model.degree + 1))
+        if halvings / (input_shares**2).sum() > np.log2(self.parts):
             return BisectionError(what, cure)
-        return GapError(what, cure, int(shares.argmax()))
+        return GapError(what, cure, int(input_shares.argmax()))
 
 
 def tail_shares(model: ModalModel) -> Array:
-    """Return each input's fraction in the terms of highest degree of a modal model, (d,)."""
-    index, top = model.eigenvalue.index, model.eigenvalue.index.sum(1) == model.degree
+    """Return each input's fraction in the terms of highest degree of a modal model, (d,).
+
+    It estimates the input's part in the model's error.
+    """
+    index = model.eigenvalue.index  # exponents of the terms, (terms, d)
+    top = index.sum(1) == model.degree
     weight = np.zeros(len(index))
     for polynomial in (model.eigenvalue, model.coefficient):
         size = np.abs(polynomial.coefficients)

@@ -15,7 +15,7 @@ from alphacut.fuzzy.progress_bar import Progress
 from alphacut.fuzzy.refused import checked_number
 from alphacut.fuzzy.result import Nature
 
-MOST = 16e6
+MAX_NUMBERS = 16e6
 """Most numbers of trajectories at a time: 128 MB."""
 
 
@@ -54,14 +54,14 @@ class Sampled:
         start_time, levels = time.perf_counter(), len(flow.boxes.alpha)
         shape = (levels, len(flow.time), len(flow.outputs), 2)
         bounds, at = np.full(shape, -np.inf), np.zeros((*shape, len(flow.boxes.names)))
-        at_once = int(np.clip(MOST / (shape[1] * shape[2]), 1, 256))
+        at_once = int(np.clip(MAX_NUMBERS / (shape[1] * shape[2]), 1, 256))
         for done, level in enumerate(reversed(range(levels))):
             if level + 1 < levels:
                 bounds[level], at[level] = bounds[level + 1], at[level + 1]
             points = self.points(*flow.boxes.unit(level))
             chunks = np.array_split(points, -(-len(points) // at_once))
             for count, chunk in enumerate(chunks, start=1):
-                take(flow.values(chunk), chunk, bounds[level], at[level])
+                update_bounds(flow.values(chunk), chunk, bounds[level], at[level])
                 if progress:
                     progress((done + count / len(chunks)) / levels)
         return flow.envelope(
@@ -74,7 +74,7 @@ class Sampled:
         )
 
 
-def take(values: Array, points: Array, bounds: Array, at: Array) -> None:
+def update_bounds(values: Array, points: Array, bounds: Array, at: Array) -> None:
     """Update attained bounds and their inputs in place by a batch of trajectories.
 
     Args:
@@ -84,7 +84,7 @@ def take(values: Array, points: Array, bounds: Array, at: Array) -> None:
         at: Unit coordinates of these, shape (T, m, 2, d).
     """
     signed = np.stack([-values, values], -1)
-    best = signed.argmax(0)
-    top = np.take_along_axis(signed, best[None], 0)[0]
-    better = top > bounds
-    bounds[better], at[better] = top[better], points[best][better]
+    best = signed.argmax(0)  # trajectory of the largest value
+    largest = np.take_along_axis(signed, best[None], 0)[0]
+    better = largest > bounds
+    bounds[better], at[better] = largest[better], points[best][better]

@@ -55,14 +55,14 @@ VALUES = 16e6
 """Most numbers of their trajectories: 128 MB."""
 DRAWN = 1024
 """Bounds that the first pass draws; each further one draws twice as many."""
-FEW = (1, 8)
-"""Fresh points out of which the best starts, beside the best of all: the best of many lies too
-often at a corner."""
+CANDIDATES = (1, 8)
+"""Numbers of fresh points out of which the best starts, beside the best of all: the best of many
+lies too often at a corner."""
 SHIFTS = (1, 2, 4, 8, 16)
 """Distances of the nodes that try each other's points."""
 ROUNDS = 6
 """Rounds in which neighbours are tried, at most."""
-MANY = 12
+MANY_INPUTS = 12
 """Inputs above which a pass takes so long that fewer are made; the error says what that costs."""
 ROUGH = 0.3
 """Error of the polynomials, as a share of an output's peak, above which they do not lead."""
@@ -76,7 +76,7 @@ class Search:
         tolerance: Error wanted, as a share of each output's peak, or in the unit of the first
             displacement (the first output without one) where the envelope is not relative; 1e-3
             unless given.
-        passes: Most passes of either search; 8 unless given, 5 of more than `MANY` inputs.
+        passes: Most passes of either search; 8 unless given, 5 of more than `MANY_INPUTS` inputs.
         seed: Of all that is drawn.
 
     Raises:
@@ -115,8 +115,8 @@ class Search:
         fitting(0.5)
         rough = _rough(model, flow)
         exact = ExactResponse.from_model(model, flow.scale, bent=not rough)
-        # what leads: polynomials where they are as good as is asked for, or the exact motions
-        enough = bool((model.error / flow.scale).max() <= SMALL * tolerance)
+        # each search works on polynomials where they are accurate enough, else on exact motions
+        is_accurate = bool((model.error / flow.scale).max() <= SMALL * tolerance)
         second = fit_modes(
             flow.flow,
             flow.boxes,
@@ -126,8 +126,10 @@ class Search:
         )
         fitting(1.0)
         searches = (
-            _IndependentSearch(exact.model if enough else exact, self.seed, 0),
-            _IndependentSearch(_leading(second, flow, enough=enough), self.seed, 1),
+            _IndependentSearch(exact.model if is_accurate else exact, self.seed, 0),
+            _IndependentSearch(
+                _second_response(second, flow, is_accurate=is_accurate), self.seed, 1
+            ),
         )
         levels, solved = len(flow.boxes.alpha), list[tuple[Optima, Array]]()
         for done, level in enumerate(reversed(range(levels))):
@@ -140,7 +142,8 @@ class Search:
         bounds = np.maximum.accumulate(np.stack(values)[::-1])[::-1].reshape(shape) * scale
         at = np.stack([optima.point for optima, _ in solved[::-1]]).reshape(*shape, -1)
         missed = np.stack([error for _, error in solved[::-1]]).reshape(shape) * scale
-        missed += 2 * enough * model.error.max(0)[:, None]
+        if is_accurate:  # the values of the polynomials were compared
+            missed += 2 * model.error.max(0)[:, None]
         error = np.maximum(missed.max(-1), _rounding(model, np.abs(bounds).max((0, 1, 3))))
         facts = {
             "degree": model.degree,
@@ -227,9 +230,9 @@ class Search:
         first, second = searches
         if not (upper > lower).any():
             return first.optima, np.zeros(len(first.optima.value))
-        most = self.passes or (8 if len(lower) <= MANY else 5)
-        for count in range(most):
-            # half of what is left to each pass: the number of passes is not known
+        max_passes = self.passes or (8 if len(lower) <= MANY_INPUTS else 5)
+        for count in range(max_passes):
+            # progress by halves of the remainder, since the number of passes is not known
             done = [1 - 0.6 * 0.5 ** (count + number / 3) for number in range(4)]
             ticks = [subprogress(tick, *ends) for ends in pairwise(done)]
             first.improve(count, ticks[0])
@@ -240,7 +243,9 @@ class Search:
             if difference.max() <= AGREEMENT * tolerance:
                 break
         outputs = len(first.response.outputs)
-        return best, best.predicted_gain + _missed(difference, outputs, AGREEMENT * tolerance)
+        return best, best.predicted_gain + _search_errors(
+            difference, outputs, AGREEMENT * tolerance
+        )
 
 
 class _IndependentSearch:
@@ -272,7 +277,7 @@ class _IndependentSearch:
         if self.number:
             rng = np.random.default_rng((self.seed, self.number))
             ends = np.ones(len(lower))
-            unit = fresh_points(rng, -ends, ends, SAMPLES)
+            unit = fresh_points(rng, -ends, ends, SAMPLES)  # the first search has its usual ones
         first_tick = subprogress(tick, 0.0, 0.3)
         self.optima = first_optima(_polynomials(self.response), *self.box, unit, first_tick)
         rows = np.arange(len(self.optima.value))
@@ -288,21 +293,21 @@ class _IndependentSearch:
             self._follow(np.ones(len(rows), bool), subprogress(tick, 0.5, 1.0))
 
     def improve(self, count: int, tick: Progress) -> None:
-        """Maximise some bounds anew from fresh points; try better points at nodes nearby.
+        """Maximise bounds at random nodes from fresh points; try better points at nodes nearby.
 
         Args:
-            count: Passes so far; each draws twice as many bounds.
+            count: Number of passes before this one; each draws twice as many bounds.
             tick: Called with the completed fraction of the pass.
         """
         optima, outputs = self.optima, len(self.response.outputs)
         rng = np.random.default_rng((self.seed, self.number, count, len(optima.value)))
         size = int(np.clip(VALUES / (len(self.grid) * outputs), 64, FRESH))
         pool = fresh_points(rng, *self.box[:2], size)
-        drawn = max(1, DRAWN * 2**count // (2 * outputs))
-        nodes = np.sort(rng.permutation(len(self.grid))[:drawn])
+        n_nodes = max(1, DRAWN * 2**count // (2 * outputs))
+        nodes = np.sort(rng.permutation(len(self.grid))[:n_nodes])
         values = trajectories(_polynomials(self.response), pool, nodes)
         rivals = [best_of(pool, values, nodes)]
-        rivals += [best_of(pool, values, nodes, few, rng) for few in FEW]
+        rivals += [best_of(pool, values, nodes, count, rng) for count in CANDIDATES]
         improved = np.zeros(len(optima.value), bool)
         for number, rival in enumerate(rivals):
             _evaluate_and_refine(
@@ -375,9 +380,9 @@ def _compared(
     return best, np.abs(improved.value - first.value)
 
 
-def _leading(model: ModalModel, flow: UnitFlow, *, enough: bool) -> Response:
-    """Return the response of the second search: its polynomials if `enough`, or exact motions."""
-    if enough:
+def _second_response(model: ModalModel, flow: UnitFlow, *, is_accurate: bool) -> Response:
+    """Return what the second search maximises: polynomials if accurate, else exact motions."""
+    if is_accurate:
         return model.in_units(flow.scale)
     return ExactResponse.from_model(
         model, flow.scale, bent=model.degree > 1 and not _rough(model, flow)
@@ -398,7 +403,7 @@ def _polynomials(response: Response) -> ModalModel:
 def _exchanged(response: Response, optima: Optima, grid: Rows, fresh: Mask, tick: Progress) -> Rows:
     """Try the optimal points of some bounds for the same bounds at nodes up to 16 steps away.
 
-    An envelope consists of segments of single motions, so that neighbours have points in common.
+    An envelope consists of pieces of single motions, so that points are optimal at several nodes.
 
     Returns:
         Rising indices of the bounds that improved.
@@ -414,14 +419,14 @@ def _exchanged(response: Response, optima: Optima, grid: Rows, fresh: Mask, tick
     for done, shift in enumerate(SHIFTS):
         tick(done / len(SHIFTS))
         count = max(len(grid) - shift, 0)
-        for here, there in ((shift, 0), (0, shift)):
-            neighbours = grid[there : there + count].ravel()
-            to = grid[here : here + count].ravel()[fresh[neighbours]]
-            better.append(optima.offer(response, optima.point[neighbours[fresh[neighbours]]], to))
+        for target_first, source_first in ((shift, 0), (0, shift)):
+            source = grid[source_first : source_first + count].ravel()
+            target = grid[target_first : target_first + count].ravel()[fresh[source]]
+            better.append(optima.offer(response, optima.point[source[fresh[source]]], target))
     return np.asarray(np.unique(np.concatenate(better)))
 
 
-def _missed(difference: Array, outputs: int, agreement: float) -> Array:
+def _search_errors(difference: Array, outputs: int, agreement: float) -> Array:
     """Return the estimated error of each bound, shape (N,), from the searches' differences.
 
     It is `UNSEEN` times the largest difference on the same output, at least the agreement.
@@ -440,7 +445,7 @@ def _missed(difference: Array, outputs: int, agreement: float) -> Array:
 
 def _rounding(model: ModalModel, peak: Array) -> Array:
     """Return the error of trajectories in double precision, shape (T, m), for peaks (m,)."""
-    rates = np.abs(model.eigenvalue.coefficients[0])
+    rates = np.abs(model.eigenvalue.coefficients[0])  # |λ| at the middle of the box
     largest = max(rates.max(), frequencies(model.flow.system).max())
-    late: Array = 64 * np.finfo(float).eps + round_off(largest**2, rates.min(), model.time)
-    return late[:, None] * peak
+    relative: Array = 64 * np.finfo(float).eps + round_off(largest**2, rates.min(), model.time)
+    return relative[:, None] * peak

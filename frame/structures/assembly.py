@@ -87,7 +87,7 @@ class Assembly(Generic[Number]):
         return self._summed(np.array([[float(force.history is None)] for force in self.loads]))
 
     def _summed(self, weight: Array) -> Number | None:
-        """Forces (F) times numbers (F, k), V = (…, n, k); None where all are zero."""
+        """Return Σ_F b_F weight_Fk over all forces, V = (…, n, k); None where all are zero."""
         return self.columns @ weight if self.columns is not None and weight.any() else None
 
 
@@ -141,7 +141,10 @@ class Matrices:
         return concatenate([q0, v0], -2)
 
     def pushes(self, *, ground: bool) -> Jet:
-        """Accelerations by a unit of each load, V = (S, n, L): of the ground first, if it moves."""
+        """Return the accelerations by a unit of each load, V = (S, n, L).
+
+        The ground's comes first where `ground` is set, then those of the forces' histories.
+        """
         shape = (*self.mass.value.shape[:-1], int(ground))
         parts = [self.mass.like(-np.broadcast_to(self.rigid[:, : int(ground)], shape))]
         if self.forces is not None:

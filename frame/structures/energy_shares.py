@@ -12,20 +12,22 @@ from alphacut.fuzzy.arrays import Array, Rows
 
 
 def modal_energy_shares(system: MatrixStructure, terms: Sequence[int] | Rows) -> Array:
-    """Σ φᵀK_i φ / φᵀK φ over some terms of the stiffness, by rising frequency, shape (modes,).
+    """Return the fraction of each mode's strain energy in some terms of K = Σ K_i, shape (modes,).
 
-    The loss factor of a mode is to first order the mean of those of its parts by these shares
-    (Johnson and Kienholz, AIAA Journal 20, 1284, 1982), with modes at nominal values.
+    It is Σ φᵀK_i φ / φᵀK φ over these terms, for the modes φ by rising frequency. The loss factor
+    of a mode is to first order the mean of those of its parts by these shares (Johnson and
+    Kienholz, AIAA Journal 20, 1284, 1982), with modes at nominal values.
 
     Args:
         system: The structure.
-        terms: Places of the terms.
+        terms: Indices of the terms in the structure's stiffness.
     """
     p = system.parameters
     mass = np.sum([float(value_of(factor, p)) * array for factor, array in system.mass], axis=0)
     parts = np.array([float(value_of(factor, p)) * array for factor, array in system.stiffness])
     stiffness, a, b = parts.sum(axis=0), system.massive, system.massless
     shapes = np.zeros((system.size, len(a)))
+    # static condensation: q_b = follow q_a
     follow = -np.linalg.solve(stiffness[np.ix_(b, b)], stiffness[np.ix_(b, a)])
     condensed = stiffness[np.ix_(a, a)] + stiffness[np.ix_(a, b)] @ follow
     shapes[a] = eigh(condensed, mass[np.ix_(a, a)])[1]

@@ -60,11 +60,12 @@ class LagrangianSystem:
     force: Function | None = None
 
     def __post_init__(self) -> None:
+        """Refuse functions and numbers that give no smooth equations of motion."""
         checked_number("coordinates", self.coordinates, whole=True, least=1)
         for name in ("parameters", "observed"):
-            named = getattr(self, name)
-            some = isinstance(named, Mapping) and bool(named)
-            require(some, name, value=named, allowed="values by name, one at least")
+            mapping = getattr(self, name)
+            has_entries = isinstance(mapping, Mapping) and bool(mapping)
+            require(has_entries, name, value=mapping, allowed="values by name, one at least")
         for name, value in self.parameters.items():
             checked_number(f"parameter {name}", value)
         eq = self.symbols
@@ -73,10 +74,13 @@ class LagrangianSystem:
         for name in self.observed:
             self.output(name, eq.v)
         start = dict(zip([*eq.q, *eq.v], [x for part in self.start() for x in part], strict=True))
-        modal = {eq.p[name]: value for name, value in self.parameters.items()}
-        inert = abs(eq.mass.subs(start).subs(modal).evalf().det()) >= 1e-300
+        nominal = {eq.p[name]: value for name, value in self.parameters.items()}
+        has_inertia = abs(eq.mass.subs(start).subs(nominal).evalf().det()) >= 1e-300
         require(
-            inert, "mass of the lagrangian", value="singular", allowed="inertia of each coordinate"
+            has_inertia,
+            "mass of the lagrangian",
+            value="singular",
+            allowed="inertia of each coordinate",
         )
 
     def start(self) -> tuple[list[Expr], list[Expr]]:
@@ -86,7 +90,7 @@ class LagrangianSystem:
         return q0, _expressions("initial", lambda: self.initial(p)[1], p, n)
 
     def output(self, name: str, velocity: Symbols) -> Expr:
-        """An observed quantity in symbols, for velocities in any symbols."""
+        """Return an output as an expression in coordinates, given velocities and parameters."""
         eq, expression = self.symbols, self.observed[name]
         value = _expressions(
             f"observed: {name}", lambda: [expression(list(eq.q), list(velocity), eq.p)], eq.p
@@ -143,7 +147,7 @@ class Equations:
 def _expressions(
     name: str, values: Callable[[], Any], parameters: Named, count: int = 1
 ) -> list[Expr]:
-    """The `count` SymPy expressions that a user's function returns.
+    """Return the `count` SymPy expressions that a user's function returns.
 
     Args:
         name: Name of the function for messages.
@@ -175,7 +179,7 @@ def pendulum(
     phi0: float = 1.5,
     omega0: float = 0.0,
 ) -> LagrangianSystem:
-    """Damped pendulum: L = m l² φ̇²/2 + m g l cos φ, moment −d φ̇.
+    """Return a damped pendulum as a system: L = m l² φ̇²/2 + m g l cos φ, moment −d φ̇.
 
     Parameters: "m", "l", "d", "g", "phi_0", "omega_0". Outputs: "force" in the bar, m l φ̇² + m g
         cos φ, and the angle "phi".

@@ -16,10 +16,10 @@ from alphacut.fuzzy.refused import require
 
 
 def require_ground(ground: object) -> None:
-    """Refuses a base excitation that is no record.
+    """Refuse a base excitation that is neither an `Accelerogram` nor None.
 
     Raises:
-        RefusedError: It is none.
+        RefusedError: It is neither.
     """
     is_record = ground is None or isinstance(ground, Accelerogram)
     require(is_record, "ground", value=type(ground).__name__, allowed="an Accelerogram, or None")
@@ -76,12 +76,12 @@ def evaluate(
     bent: bool = True,
     by_ratios: bool = True,
 ) -> tuple[Matrices, Jet]:
-    """Matrices and observation rows at parameter sets; others keep nominal values.
+    """Return a structure's matrices and observation rows at S sets of some parameters.
 
     Args:
         system: The structure.
-        names: Uncertain parameters.
-        points: Their values, shape (S, d).
+        names: These d parameters; others keep their nominal values.
+        points: Values, shape (S, d), in SI units.
         derivatives: Whether to differentiate by `names`.
         bent: Whether to differentiate twice.
         by_ratios: Whether the damping holds that by ratios, which takes all modes to compute.
@@ -91,57 +91,67 @@ def evaluate(
     """
     fixed = {name: x for name, x in system.parameters.items() if name not in names}
     values = np.hstack([points, np.tile(list(fixed.values()), (len(points), 1))])
-    p = variables(values, [*names, *fixed], names if derivatives else (), 1 + bent)
+    order = 1 + bent  # of the highest derivative
+    p = variables(values, [*names, *fixed], names if derivatives else (), order)
     return _condensed(system.assembly(p), by_ratios=by_ratios)
 
 
-def _condensed(made: Assembly[Jet], *, by_ratios: bool) -> tuple[Matrices, Jet]:
-    """Matrices and rows on the unknowns a that have mass; others are q_b = −K_bb⁻¹ K_ba q_a."""
-    n, a = len(made.pattern), made.massive
-    mass, stiffness, damping = made.mass, made.stiffness, _viscous_damping(made)
-    rows: Jet | Array = made.rows
+def _condensed(full: Assembly[Jet], *, by_ratios: bool) -> tuple[Matrices, Jet]:
+    """Return the matrices on unknowns with mass and the rows of the outputs, V = (S, m, 2n).
+
+    Unknowns b without mass follow those with mass, q_b = −K_bb⁻¹ K_ba q_a, and are condensed
+    (Guyan 1965).
+    """
+    n, a = len(full.pattern), full.massive
+    mass, stiffness, damping = full.mass, full.stiffness, _viscous_damping(full)
+    rows: Jet | Array = full.rows
     if len(a) < n:
         b, inner = np.setdiff1d(np.arange(n), a), (slice(None), a[:, None], a)
-        light = stiffness[:, b[:, None], b]
-        follow = -(inverse(light) @ stiffness[:, b[:, None], a])
+        follow = -(inverse(stiffness[:, b[:, None], b]) @ stiffness[:, b[:, None], a])
         mass, damping = mass[inner], damping[inner]
         stiffness = stiffness[inner] + stiffness[:, a[:, None], b] @ follow
-        of_state = (made.rows[:, a + k] + made.rows[:, b + k] @ follow for k in (0, n))
+        of_state = (full.rows[:, a + k] + full.rows[:, b + k] @ follow for k in (0, n))
         rows = concatenate(list(of_state), -1)
-    if made.ratios and by_ratios:
-        damping = damping + modal_damping(mass, stiffness, made.ratios)
-    forces, static, impulse = (x and x[:, a] for x in (made.forces, made.static, made.impulse))
+    if full.ratios and by_ratios:
+        damping = damping + modal_damping(mass, stiffness, full.ratios)
+    forces, static, impulse = (x and x[:, a] for x in (full.forces, full.static, full.impulse))
     matrices = Matrices(
         mass=mass,
         damping=damping,
         stiffness=stiffness,
-        q0=made.q0[:, a, None],
-        v0=made.v0[:, a, None],
-        rigid=made.pattern[a, None],
-        accelerated=made.accelerated[:, a],
+        q0=full.q0[:, a, None],
+        v0=full.v0[:, a, None],
+        rigid=full.pattern[a, None],
+        accelerated=full.accelerated[:, a],
         forces=forces,
         static=static,
         impulse=impulse,
     )
-    if made.accelerated.any():  # q̈ + ι a = −M⁻¹ (K q + D v) + M⁻¹ b f
+    if full.accelerated.any():  # q̈ + ι a = −M⁻¹ (K q + D v) + M⁻¹ b f
         reading = matrices.accelerated @ matrices.inverse_mass
         rows = rows - reading @ concatenate([stiffness, damping], -1)
-    return matrices, made.row_factors[..., None] * rows
+    return matrices, full.row_factors[..., None] * rows
 
 
-def _viscous_damping(made: Assembly[Jet]) -> Jet:
-    """Damping by dashpots and Rayleigh's factors, V = (S, n, n), in N s/m."""
-    damping = made.dashpots
-    for factor, matrix in zip(made.rayleigh, (made.mass, made.springs), strict=True):
+def _viscous_damping(full: Assembly[Jet]) -> Jet:
+    """Return the damping by dashpots and Rayleigh's factors, V = (S, n, n), in N s/m."""
+    damping = full.dashpots
+    for factor, matrix in zip(full.rayleigh, (full.mass, full.springs), strict=True):
         if factor.value.any() or factor.first.any():
             damping = damping + factor[:, None, None] * matrix
     return damping
 
 
 def round_off(largest: float, slowest: float, time: Array) -> Array:
-    """Share of a peak by which round-off of the largest ω² (1/s²) moves the slowest ω (rad/s)."""
-    late = np.minimum(time**2, time / max(slowest, 1e-300)) / 2
-    return np.asarray(np.finfo(float).eps * largest * late)
+    """Return the error of a motion by rounding of its frequencies, over its peak, at times (T,).
+
+    Args:
+        largest: Largest ω², in 1/s², whose rounding changes the slowest mode's ω² by as much.
+        slowest: ω of the slowest mode, in rad/s.
+        time: Times, in s.
+    """
+    phase_per_change = np.minimum(time**2, time / max(slowest, 1e-300)) / 2
+    return np.asarray(np.finfo(float).eps * largest * phase_per_change)
 
 
 def frequencies(system: LinearSystem) -> Array:

@@ -50,6 +50,7 @@ class History:
     key: ClassVar[str] = "history"
 
     def __post_init__(self) -> None:
+        """Store step and samples as numbers; refuse values that are not allowed."""
         allowed = "two or more finite samples, a positive step"
         try:
             samples, step = np.asarray(self.samples, float), float(self.step)
@@ -101,9 +102,11 @@ class History:
 
     @property
     def jumps(self) -> list[tuple[float, float]]:
-        """Times after 0 at which it may jump, in s, and bounds of the jumps."""
-        begin = [(self.start, abs(float(self.samples[0])))] if self.start > 0 else []
-        return begin + [(self.end, abs(float(self.samples[-1])))] * (not self.is_held)
+        """Pairs of a time after 0 at which f may jump, in s, and a bound of the jump."""
+        jumps = [(self.start, abs(float(self.samples[0])))] if self.start > 0 else []
+        if not self.is_held:
+            jumps.append((self.end, abs(float(self.samples[-1]))))
+        return jumps
 
     def values(self, time: Array) -> Array:
         """Values of f at times, the same shape."""
@@ -116,19 +119,21 @@ class History:
         return np.asarray(np.sin(self.frequency * (time - self.start) + self.phase))
 
     def envelope(self, time: Array, side: float = 1.0) -> Array:
-        """Values of g at times, after jumps (`side` 1) or before them (−1)."""
+        """Return values of g at times, same shape: after jumps (`side` 1) or before them (−1)."""
         n, position = len(self.samples), (time - self.start) / self.step
-        position = np.where(
-            np.abs(position - np.round(position)) < 1e-9, np.round(position), position
-        )
+        is_sample = np.abs(position - np.round(position)) < 1e-9
+        position = np.where(is_sample, np.round(position), position)
         inside: Array = np.interp(position, np.arange(n), self.samples)
-        has_started, ended = (
-            (position >= 0, position >= n - 1) if side > 0 else (position > 0, position > n - 1)
-        )
-        return np.asarray(np.where(has_started & ~(ended & ~np.array(self.is_held)), inside, 0.0))
+        after = np.greater_equal if side > 0 else np.greater
+        has_started, has_ended = after(position, 0), after(position, n - 1) & (not self.is_held)
+        return np.asarray(np.where(has_started & ~has_ended, inside, 0.0))
 
     def line_deviation(self, time: Array) -> Array:
-        """Bound of how far f strays from straight lines in the step to each node (T,)."""
+        """Return upper bounds of the distance of f from straight lines between nodes, shape (T,).
+
+        Row j is that of the step that ends at node j. Without a sine f deviates most at a sample,
+        just before or after it; with one by ω² h²/8 at most and by its jumps.
+        """
         h, values = np.diff(time, prepend=time[0]), self.values(time)
         if self.frequency:
             bound = np.minimum((self.frequency * h) ** 2 / 8, 2.0) * self.extremes[0]
@@ -141,9 +146,9 @@ class History:
         line = np.interp(breaks, time, values)
         bound = np.zeros(len(time))
         for side in (-1.0, 1.0):
-            off = np.abs(self.envelope(breaks, side) - line)
-            on_node = np.abs(breaks - time[node]) < 1e-9 * self.step
-            np.maximum.at(bound, node, np.where(on_node & (side > 0), 0.0, off))
+            distance = np.abs(self.envelope(breaks, side) - line)
+            is_node = np.abs(breaks - time[node]) < 1e-9 * self.step
+            np.maximum.at(bound, node, np.where(is_node & (side > 0), 0.0, distance))
         return np.where(bound > 1e-12 * self.extremes[0], bound, 0.0)
 
 
@@ -195,10 +200,10 @@ def different(forces: tuple[Force, ...]) -> tuple[History, ...]:
 
 
 def require_forces(forces: object) -> None:
-    """Refuses loads that are no forces.
+    """Refuse loads that are not a tuple of `Force`, each with a `History` or None.
 
     Raises:
-        RefusedError: One is none.
+        RefusedError: They are not.
     """
     are_forces = isinstance(forces, tuple) and all(isinstance(x, Force) for x in forces)
     fits = are_forces and all(isinstance(x.history, History | None) for x in forces)  # type: ignore[attr-defined]

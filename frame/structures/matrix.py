@@ -125,7 +125,14 @@ class MatrixStructure:
         return np.setdiff1d(np.arange(self.size), self.massive)
 
     def _require_definite(self) -> None:
-        """Refuse masses, and springs and dampers of unknowns without mass, that have no motion."""
+        """Refuse structures without a unique motion at the nominal parameters.
+
+        The masses of the unknowns that have some must be positive definite. Unknowns without mass
+        need a positive definite stiffness and no dampers.
+
+        Raises:
+            RefusedError: They are not.
+        """
         mass, stiffness = (
             np.sum([float(value_of(f, self.parameters)) * A for f, A in terms], axis=0)
             for terms in (self.mass, self.stiffness)
@@ -139,12 +146,12 @@ class MatrixStructure:
         least = np.linalg.eigvalsh(stiffness[np.ix_(b, b)]).min() / np.abs(stiffness).max()
         allowed = f"springs that hold the unknowns without mass, {b[:5].tolist()}"
         require(least > 1e-14, "stiffness", value="not positive definite there", allowed=allowed)
-        damped = [k for k in b if any(array[k].any() for _, array in self.damping)]
+        damped_massless = [k for k in b if any(array[k].any() for _, array in self.damping)]
         allowed = "dampers between unknowns that have mass"
         require(
-            not damped,
+            not damped_massless,
             "damping",
-            value=f"of unknowns {np.array(damped[:5]).tolist()} without mass",
+            value=f"of unknowns {np.array(damped_massless[:5]).tolist()} without mass",
             allowed=allowed,
         )
 
@@ -159,18 +166,20 @@ class MatrixStructure:
         return Parameter(name, range=RATIO if name in ratios else "")
 
     def _term(self, kind: str, term: Any) -> tuple[Factor | str | float, Array]:
-        """A factor that exists and has derivatives, and its array without round-off."""
-        pair = isinstance(term, Sequence) and not isinstance(term, str) and len(term) == 2
-        require(pair, f"term of {kind}", value=type(term).__name__, allowed="pairs (factor, array)")
+        """Return a checked term of a matrix: its factor, and its array made exactly symmetric."""
+        is_pair = isinstance(term, Sequence) and not isinstance(term, str) and len(term) == 2
+        require(
+            is_pair, f"term of {kind}", value=type(term).__name__, allowed="pairs (factor, array)"
+        )
         factor, array = term
         self._require_factor(kind, factor)
         return factor, self._symmetric(kind, array)
 
     def _require_factor(self, kind: str, factor: Factor | str | float) -> None:
-        """Refuses a factor that is no arithmetic of the parameters.
+        """Refuse a factor that is no number, parameter or arithmetic function of parameters.
 
         Raises:
-            RefusedError: It is not.
+            RefusedError: It is none of them; the message names the matrix `kind`.
         """
         names, values = list(self.parameters), np.array([list(self.parameters.values())], float)
         try:
@@ -178,24 +187,32 @@ class MatrixStructure:
         except (KeyError, TypeError, AttributeError, ValueError) as failure:
             value = failure
         allowed = "arithmetic to one number, of "
-        number = isinstance(value, Jet | float | int | np.number)
-        require(number, f"factor of {kind}", value=repr(value), allowed=allowed + ", ".join(names))
+        is_number = isinstance(value, Jet | float | int | np.number)
+        require(
+            is_number, f"factor of {kind}", value=repr(value), allowed=allowed + ", ".join(names)
+        )
 
     def _symmetric(self, kind: str, value: Any) -> Array:
-        """The array, also a sparse one, without the round-off that parts its triangles."""
+        """Return a dense or sparse array (n, n) as a dense one that is exactly symmetric.
+
+        Raises:
+            RefusedError: Its shape is another, or it is not symmetric up to rounding.
+        """
         array, key = np.asarray(value.toarray() if hasattr(value, "toarray") else value), "array of"
         size = np.shape(self.mass[0][1])[0]
-        square = array.shape == (size, size)
         require(
-            square, f"{key} {kind}", value=f"of shape {array.shape}", allowed=f"({size}, {size})"
+            array.shape == (size, size),
+            f"{key} {kind}",
+            value=f"of shape {array.shape}",
+            allowed=f"({size}, {size})",
         )
         require_numbers(kind, array)
-        off = np.abs(array - array.T)
-        i, j = np.unravel_index(off.argmax(), off.shape)
-        even = off[i, j] <= 1e-9 * np.abs(array).max()
+        asymmetry = np.abs(array - array.T)
+        i, j = np.unravel_index(asymmetry.argmax(), asymmetry.shape)
+        is_symmetric = asymmetry[i, j] <= 1e-9 * np.abs(array).max()
         what = f"not symmetric: [{i}, {j}] is {array[i, j]:g}, [{j}, {i}] is {array[j, i]:g}"
         require(
-            even,
+            is_symmetric,
             f"{key} {kind}",
             value=what,
             allowed="symmetric arrays",
@@ -204,6 +221,7 @@ class MatrixStructure:
         return np.asarray((array + array.T) / 2, float)
 
     def _require_vectors(self) -> None:
+        """Refuse vectors (q0, v0, ι, rows, forces) whose length does not fit the n unknowns."""
         n = self.size
         vectors: list[tuple[str, Any, tuple[int, ...]]]
         vectors = [(name, getattr(self, name), (n,)) for name in ("q0", "v0", "pattern")]
@@ -218,7 +236,7 @@ class MatrixStructure:
                 )
 
     def assembly(self, p: Mapping[str, Number]) -> Assembly[Number]:
-        """The structure with its parameters as jets or as Taylor models."""
+        """Return matrices, rows and loads at parameters `p`, jets or Taylor models."""
         n = self.size
         nothing: Number = lifted(0.0, p)
         shape = (*nothing.value.shape, n)
@@ -256,7 +274,7 @@ class MatrixStructure:
 
 
 def values_of(factors: Sequence[Factor | str | float], p: Mapping[str, Number]) -> Number:
-    """Values of e factors at parameters V = (…), V = (…, e)."""
+    """Return the values of e factors at parameters V = (…) as one number V = (…, e)."""
     if not factors:
         nothing: Number = lifted(0.0, p)
         return nothing.like(np.zeros((*nothing.value.shape, 0)))
@@ -264,7 +282,7 @@ def values_of(factors: Sequence[Factor | str | float], p: Mapping[str, Number]) 
 
 
 def lifted(factor: Factor | str | float, p: Mapping[str, Number]) -> Number:
-    """A factor's value at parameters as a number of their type, V = (…)."""
+    """Return a factor's value at parameters as a number of their type, V = (…)."""
     value = value_of(factor, p)
     like: Number = next(iter(p.values()))
     if isinstance(value, type(like)):

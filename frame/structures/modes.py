@@ -13,9 +13,9 @@ from alphacut.fuzzy.refused import FailedError, require
 
 
 def state_matrix(m: Matrices) -> Jet:
-    """A with [q; v]˙ = A [q; v], shape (S, 2n, 2n) (eq. 17, eq. 23)."""
-    light = m.inverse_mass
-    lower = concatenate([-(light @ m.stiffness), -(light @ m.damping)], -1)
+    """Return the state matrix A of [q; v]˙ = A [q; v], shape (S, 2n, 2n) (eq. 17, eq. 23)."""
+    inverse_mass = m.inverse_mass
+    lower = concatenate([-(inverse_mass @ m.stiffness), -(inverse_mass @ m.damping)], -1)
     n = m.mass.value.shape[-1]
     upper = lower.like(np.broadcast_to(np.hstack([np.zeros((n, n)), np.eye(n)]), lower.value.shape))
     return concatenate([upper, lower], -2)
@@ -50,7 +50,7 @@ class Modes:
 
 
 def joined(parts: Sequence[Modes]) -> Modes:
-    """Modes at the parameter sets of all parts, one part after the other."""
+    """Return the modes of several groups of parameter sets as those of one group, in order."""
     return Modes(
         concatenate([part.eigenvalue for part in parts], -2),
         concatenate([part.coefficient for part in parts], -3),
@@ -156,7 +156,7 @@ def eigenvectors(A: Jet) -> tuple[Jet, Jet, Jet]:
 
 
 def modal_damping(mass: Jet, stiffness: Jet, ratios: Sequence[Jet]) -> Jet:
-    """D = M Φ diag(2 ζ_k ω_k) Φ⁻¹ at S parameter sets, V = (S, n, n), in N s/m.
+    """Return the damping D = M Φ diag(2 ζ_k ω_k) Φ⁻¹ of modes Φ, V = (S, n, n), in N s/m.
 
     It follows the parameters through the modes, and is not frozen at their nominal values.
 
@@ -172,23 +172,23 @@ def modal_damping(mass: Jet, stiffness: Jet, ratios: Sequence[Jet]) -> Jet:
         return ratio_damping(mass, stiffness, ratios[0])
     squared, X, Y = (jet.map(np.real) for jet in eigenvectors(inverse(mass) @ stiffness))
     _require_stiff(squared.value)
-    rate = squared**0.5
-    rates = [2.0 * ratio * rate[:, k] for k, ratio in enumerate(ratios)]
-    scaled = [X[:, :, k] * x[:, None] for k, x in enumerate(rates)]
-    columns = concatenate([column[..., None] for column in scaled], -1)
+    omega = squared**0.5
+    rates = [2.0 * ratio * omega[:, k] for k, ratio in enumerate(ratios)]
+    scaled_shapes = [X[:, :, k] * rate[:, None] for k, rate in enumerate(rates)]
+    columns = concatenate([shape[..., None] for shape in scaled_shapes], -1)
     return mass @ (columns @ Y)
 
 
 def _require_stiff(squared: Array) -> None:
-    """Refuse squared frequencies (S, n) that rounding may hide.
+    """Refuse squared frequencies (S, n) that are not clearly positive beside the greatest.
 
     Raises:
-        RefusedError: One is that small, or negative.
+        RefusedError: One is below 1e-12 of the greatest of its set, which rounding may cause.
     """
-    share = (squared / abs(squared).max(-1, keepdims=True)).min()
-    key, what = "squared frequency of a damped mode", f"{share:.1e} of the greatest"
+    ratio = (squared / abs(squared).max(-1, keepdims=True)).min()
+    key, what = "squared frequency of a damped mode", f"{ratio:.1e} of the greatest"
     cure = "give dampers, or join storeys that are too stiff"
-    require(share > 1e-12, key, value=what, allowed="above rounding, 1e-12", cure=cure)
+    require(ratio > 1e-12, key, value=what, allowed="above rounding, 1e-12", cure=cure)
 
 
 def require_modal_order(mass: Array, stiffness: Array, ratios: Array) -> None:
@@ -202,13 +202,13 @@ def require_modal_order(mass: Array, stiffness: Array, ratios: Array) -> None:
     Raises:
         RefusedError: Shapes of one set are those of the nominal set in another order.
     """
-    below = np.linalg.inv(np.linalg.cholesky(mass))
-    U = np.linalg.eigh(below @ stiffness @ below.swapaxes(-1, -2))[1]
-    shapes = below.swapaxes(-1, -2) @ U
-    alike = np.abs(shapes[0].T @ mass[0] @ shapes)  # of modal shapes and the others'
-    first = alike.argmax(1)
-    for _, k in np.argwhere(ratios[first] != ratios):
-        pair = f"modes {min(k, first[:, k].min()) + 1} and {max(k, first[:, k].max()) + 1}"
+    inverse_root = np.linalg.inv(np.linalg.cholesky(mass))
+    U = np.linalg.eigh(inverse_root @ stiffness @ inverse_root.swapaxes(-1, -2))[1]
+    shapes = inverse_root.swapaxes(-1, -2) @ U
+    similarity = np.abs(shapes[0].T @ mass[0] @ shapes)  # of nominal shapes (rows) and others
+    nominal = similarity.argmax(1)  # the nominal mode that each mode is most like, (S, n)
+    for _, k in np.argwhere(ratios[nominal] != ratios):
+        pair = f"modes {min(k, nominal[:, k].min()) + 1} and {max(k, nominal[:, k].max()) + 1}"
         cure = "give both the same ratio, or take narrower inputs"
         require(
             False,
@@ -220,11 +220,10 @@ def require_modal_order(mass: Array, stiffness: Array, ratios: Array) -> None:
 
 
 def ratio_damping(mass: Jet, stiffness: Jet, ratio: Jet) -> Jet:
-    """D = 2 ζ M √(M⁻¹K) at S parameter sets: every mode has the ratio ζ, V = (S, n, n), in N s/m.
+    """Return D = 2 ζ M √(M⁻¹K), by which every mode has the damping ratio ζ, V = (S, n, n).
 
-    D is that of each parameter set, with its derivatives, not that of the most plausible one. The
-    root R with R R = M⁻¹K is smooth however the frequencies lie; its derivatives solve Sylvester's
-    equation.
+    D, in N s/m, is that of each of S parameter sets, with its derivatives. The root R with R R =
+    M⁻¹K is smooth however the frequencies lie; its derivatives solve Sylvester's equation.
 
     Args:
         mass: M, symmetric and positive definite, V = (S, n, n), in kg.
@@ -235,16 +234,16 @@ def ratio_damping(mass: Jet, stiffness: Jet, ratio: Jet) -> Jet:
         RefusedError: A stiffness is not positive definite.
     """
     operator, lower = inverse(mass) @ stiffness, np.linalg.cholesky(mass.value)
-    below = np.linalg.inv(lower)
+    below = np.linalg.inv(lower)  # L⁻¹ of M = L Lᵀ
     squared, U = np.linalg.eigh(below @ (mass.value @ operator.value) @ below.swapaxes(-1, -2))
     _require_stiff(squared)
     omega = np.sqrt(squared)
-    X = below.swapaxes(-1, -2) @ U
+    X = below.swapaxes(-1, -2) @ U  # right eigenvectors of M⁻¹K, Y the left ones
     Y = U.swapaxes(-1, -2) @ lower.swapaxes(-1, -2)
-    total = omega[:, :, None] + omega[:, None, :]
+    frequency_sums = omega[:, :, None] + omega[:, None, :]
 
     def sylvester(right: Array) -> Array:  # Z with R Z + Z R = right
-        return np.asarray(X @ ((Y @ right @ X) / total) @ Y)
+        return np.asarray(X @ ((Y @ right @ X) / frequency_sums) @ Y)
 
     first, value = sylvester(operator.first), (X * omega[:, None, :]) @ Y
     second = np.zeros((0, 0, *value.shape))

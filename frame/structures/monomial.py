@@ -36,18 +36,18 @@ class Monomial:
 
     @classmethod
     def parse(cls, text: str) -> Self:
-        """The monomial that a text states with ``*``, ``/`` and ``^`` (or ``**``).
+        """Return the monomial of a text such as "12*E*I/l^3", of ``*``, ``/`` and ``^`` or ``**``.
 
         Raises:
-            RefusedError: It is another kind of expression.
+            RefusedError: The text is another kind of expression.
         """
         coefficient, powers = 1.0, dict[str, int]()
-        parts = re.split(r"(?<!\*)([*/])(?!\*)", text)
-        for sign, part in zip(["*", *parts[1::2]], parts[::2], strict=True):
+        parts = re.split(r"(?<!\*)([*/])(?!\*)", text)  # factors, with single * and / between
+        for operator, part in zip(["*", *parts[1::2]], parts[::2], strict=True):
             match = FACTOR.fullmatch(part)
             if match is None:
                 raise RefusedError("factor", repr(text[:60]), ALLOWED)
-            power = int(match["power"] or 1) * (1 if sign == "*" else -1)
+            power = int(match["power"] or 1) * (1 if operator == "*" else -1)
             if name := match["name"]:
                 powers[name] = powers.get(name, 0) + power
             else:
@@ -63,7 +63,7 @@ class Monomial:
 
     @property
     def simplest(self) -> Monomial | str | float:
-        """The number or the name of one parameter where it is no more than that."""
+        """The number or the parameter's name if the monomial is one; else the monomial itself."""
         if not self.powers:
             return self.coefficient
         if self.coefficient == 1 and len(self.powers) == 1 and self.powers[0][1] == 1:

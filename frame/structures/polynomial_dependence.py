@@ -24,17 +24,18 @@ that everything is computed in.
 
 
 def degrees(system: LinearSystem, box: Box) -> dict[str, int]:
-    """Degree in each parameter of M, K, D, initial state and observation rows, to round-off.
+    """Return the polynomial degree of a linear structure in each uncertain parameter, by name.
 
-    Modal damping is no polynomial: a parameter that is a damping ratio has the degree of the
-    ratio itself, 1.
+    It is the highest one in M, K, D, initial state and observation rows, to round-off. Modal
+    damping is no polynomial: a parameter that is a damping ratio has the degree of the ratio
+    itself, 1.
 
     Args:
         system: The structure.
         box: Lower and upper end of each uncertain parameter, in SI units.
 
     Raises:
-        UnprovedError: They are no polynomials, a parameter leaves its range, or the damping may
+        UnprovedError: A quantity is no polynomial, a parameter leaves its range, or the damping may
             feed energy into the structure somewhere in the box.
     """
     if not isinstance(system, StoreyFrame | MatrixStructure):
@@ -44,7 +45,7 @@ def degrees(system: LinearSystem, box: Box) -> dict[str, int]:
             what = f"{name} reaches from {ends[0]:g} to {ends[1]:g}"
             raise UnprovedError(f"{what}, and is known to be {parameter.range or 'finite'}")
     if isinstance(system, StoreyFrame):
-        return _of_storey_frame(system, box)
+        return _storey_frame_degrees(system, box)
     if len(system.massless):
         raise UnprovedError(
             "unknowns without mass are condensed, which no polynomial is", "take the method dual"
@@ -66,7 +67,8 @@ def degrees(system: LinearSystem, box: Box) -> dict[str, int]:
     return dict.fromkeys(box, 1)
 
 
-def _of_storey_frame(system: StoreyFrame, box: Box) -> dict[str, int]:
+def _storey_frame_degrees(system: StoreyFrame, box: Box) -> dict[str, int]:
+    """Return a storey frame's degree in each parameter: 1, more in lengths and divided masses."""
     degree = dict.fromkeys(box, 1)
     degree |= {name: inverse_cube_degree(*ends) for name, ends in box.items() if name[0] == "l"}
     if accelerations(system):  # forces over masses; forces hold the masses too where weights press
@@ -85,6 +87,7 @@ def accelerations(system: LinearSystem) -> dict[int, int]:
 
 
 def _require_dissipation(factor: float, array: Array) -> None:
+    """Refuse a damping term factor · array that is not positive semidefinite."""
     eigenvalues = np.linalg.eigvalsh(array)
     if factor < 0 or eigenvalues[0] < -1e-14 * np.abs(eigenvalues).max():
         raise UnprovedError(

@@ -100,6 +100,7 @@ class StoreyFrame:
     loads: Sequence[Force] = ()
 
     def __post_init__(self) -> None:
+        """Refuse values that are not allowed, and fill empty lists with their defaults."""
         self._require_values()
         self._require_springs()
         require_ground(self.ground)
@@ -118,12 +119,12 @@ class StoreyFrame:
         object.__setattr__(self, "outputs", tuple(Output(str(name)) for name in names))
         for output in self.outputs:
             self.quantity(output)
-        once = len(set(self.outputs)) == len(self.outputs)
-        require(once, "output", value=", ".join(self.outputs), allowed="each output once")
+        are_unique = len(set(self.outputs)) == len(self.outputs)
+        require(are_unique, "output", value=", ".join(self.outputs), allowed="each output once")
         self.require_standing({})
 
     def _require_values(self) -> None:
-        """Refuse what is no number or out of range, and lists that do not fit the floors."""
+        """Refuse values that are no numbers or out of range, and lists of a wrong length."""
         n = len(self.masses)
         require(n > 0, "masses", value=None, allowed="one value a floor, from below")
         checked_number("gravity", self.gravity, least=0)
@@ -131,34 +132,37 @@ class StoreyFrame:
             values, parameter = getattr(self, name), of_storey_frame(symbol.format(""))
             if values is None:
                 continue
-            single = np.ndim(values) == 0 or name == "modulus"
-            (checked_number if single else require_numbers)(name, values)
+            is_single = np.ndim(values) == 0 or name == "modulus"
+            (checked_number if is_single else require_numbers)(name, values)
             for value in np.atleast_1d(values):
                 allowed = parameter.range or "finite numbers"
                 require(parameter.admits(value, value), name, value=f"{value:g}", allowed=allowed)
             sizes = {"second_moment": (1, n), "damping_ratio": (n,)}.get(name, (0, n))
-            free = name == "rayleigh" or (single and name not in SYMBOLS)
-            fits = free or np.size(values) in sizes
+            has_any_size = name == "rayleigh" or (is_single and name not in SYMBOLS)
+            fits = has_any_size or np.size(values) in sizes
             what, allowed = f"a list of {np.size(values)}", f"{n}, as masses has, from below"
             require(fits, name, value=what, allowed=allowed)
         require_choice("damper_placement", self.damper_placement, ("ground", "storey"))
 
     def _require_springs(self) -> None:
-        """Either stiffnesses, or all that makes them; heights where weights press."""
-        given: dict[str, object] = {"modulus": self.modulus, "second_moment": self.second_moment}
+        """Refuse frames without either stiffnesses or modulus, second moment and lengths.
+
+        Both together are refused as well, and gravity without lengths.
+        """
+        needed: dict[str, object] = {"modulus": self.modulus, "second_moment": self.second_moment}
         if len(self.stiffness):
             columns = self.columns if len(self.columns) else None
-            beside = [k for k, x in {**given, "columns": columns}.items() if x is not None]
+            beside = [k for k, x in {**needed, "columns": columns}.items() if x is not None]
             require(
                 not beside,
                 ", ".join(beside),
                 value="there",
                 allowed="either stiffness or what makes it",
             )
-            given = {}
+            needed = {}
         if not len(self.stiffness) or self.gravity:
-            given["lengths"] = self.lengths if len(self.lengths) else None
-        for name, value in given.items():
+            needed["lengths"] = self.lengths if len(self.lengths) else None
+        for name, value in needed.items():
             require(value is not None, name, value=None, allowed=SPRING_KEYS)
 
     def _require_loads(self) -> None:
@@ -207,12 +211,12 @@ class StoreyFrame:
 
     @property
     def force_names(self) -> tuple[str, ...]:
-        """Parameters of the amplitudes of all loads, in their order."""
+        """Names of the loads' amplitudes in their order: "F3", "F3_2" of a second one; "J3"."""
         names = list[str]()
         for force in self.loads:
-            name = f"{'J' if force.history is None else 'F'}{force.at}"
-            before = sum(x.partition("_")[0] == name for x in names)
-            names.append(f"{name}_{before + 1}" if before else name)
+            name = f"{'J' if force.history is None else 'F'}{force.at}"  # J of an impulse
+            n_before = sum(x.partition("_")[0] == name for x in names)
+            names.append(f"{name}_{n_before + 1}" if n_before else name)
         return tuple(names)
 
     def parameter(self, name: str) -> Parameter:
@@ -220,14 +224,14 @@ class StoreyFrame:
         return of_storey_frame(name)
 
     def group(self, name: str) -> tuple[str, ...]:
-        """Parameters of a short name: "m" is m1 … mn; any other name is itself.
+        """Return the parameters that a short name stands for: "m" for m1 … mn; else itself.
 
         Raises:
             RefusedError: The name is neither a group nor a parameter.
         """
         patterns = {"m": "m{}", "d": "d{}", "q0": "q{}_0", "v0": "v{}_0"}
-        lists = [x for x in (*"klcI", "zeta") if f"{x}1" in self.parameters]
-        patterns |= {x: x + "{}" for x in lists}
+        listed = [x for x in (*"klcI", "zeta") if f"{x}1" in self.parameters]
+        patterns |= {x: x + "{}" for x in listed}
         if name == "F" and self.loads:
             return self.force_names
         if name in patterns:
@@ -241,7 +245,7 @@ class StoreyFrame:
         return (name,)
 
     def springs(self, p: Mapping[str, Number]) -> Number:
-        """k_z of every storey, V = (…, n), in N/m: as given, or 12 c E I / l³ of its columns."""
+        """Return k_z of each storey, V = (…, n), in N/m: as given, or 12 c E I / l³ of columns."""
         if self.stiffness:
             return self._of_floors("k{}", p)
         inertia = self._of_floors("I{}", p) if len(self.moments) > 1 else p["I"][..., None]
@@ -254,7 +258,7 @@ class StoreyFrame:
         return above * self._of_floors("l{}", p) ** -1
 
     def assembly(self, p: Mapping[str, Number]) -> Assembly[Number]:
-        """The structure with its parameters as jets or as Taylor models (eq. 23)."""
+        """Return matrices, rows and loads at parameters `p`, jets or Taylor models (eq. 23)."""
         n, links, names = self.floors, self.springs(p), self.force_names
         floors, storeys = diagonal(np.eye(n)), chain_matrix(np.eye(n))
         dashpots, one = self._of_floors("d{}", p), p["rayleigh_mass"] * 0.0 + 1.0
@@ -292,7 +296,7 @@ class StoreyFrame:
         return rows
 
     def quantity(self, name: str) -> tuple[str, int]:
-        """Kind and floor, from 0, of an output.
+        """Return an output's kind, such as "drift", and its floor or storey, counted from 0.
 
         Raises:
             RefusedError: There is no such output.
