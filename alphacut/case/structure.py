@@ -169,19 +169,23 @@ class Structure:
     def model_with_outputs(
         self, key: str, outputs: tuple[str, ...]
     ) -> StoreyFrame | MatrixStructure | LagrangianSystem:
-        """The model, which observes these outputs alone if it is linear; `key` is for messages.
+        """The model reduced to some outputs; one that is not linear always computes all of them.
+
+        Args:
+            key: Key of the case that messages name.
+            outputs: The outputs.
 
         Raises:
-            RefusedError: It has no such output.
+            RefusedError: The model lacks one of the outputs.
         """
         if self.frame is None:
             self.require_outputs(key, outputs)
             if isinstance(self.model, MatrixStructure):
-                rows: dict[str, Array] = {
+                observed: dict[str, Array] = {
                     x: self.model.observed[x] for x in self.model.outputs if x in outputs
                 }
                 factors = {x: f for x, f in self.model.row_factors.items() if x in outputs}
-                return replace(self.model, observed=rows, row_factors=factors)
+                return replace(self.model, observed=observed, row_factors=factors)
             return self.model
         try:
             return replace(self.frame, outputs=outputs)
@@ -290,10 +294,11 @@ class Frame(Section):
     def structure(
         self, modulus: FuzzyNumber | None = None, loss: FuzzyNumber | None = None
     ) -> Structure:
-        """The frame with its fuzzy parameters.
+        """The frame with its fuzzy parameters, and the storey heights by the names of the drifts.
 
         Args:
-            modulus: Young's modulus in Pa; None: that of the section, or else a stand-in.
+            modulus: Young's modulus in Pa, which a frame given by stiffnesses does not take; None
+                for that of the section, or else a stand-in.
             loss: Loss factor of its material, for damping by the material; None: a stand-in.
 
         Raises:
@@ -354,15 +359,20 @@ class Frame(Section):
 
     @model_validator(mode="after")
     def _check_damping(self) -> Self:
-        """Refuses a frame that states no damping or contradictory ones, or is no frame."""
+        """Refuses a frame without damping, with contradictory damping or impossible values."""
         is_material = isinstance(self.damping_ratio, MaterialDamping)
-        has_columns, value = self.stiffness is None, "material, beside stiffness"
-        allowed = "columns of the material, or [matrices] where some storeys are of another"
-        require(has_columns or not is_material, "frame.damping_ratio", value=value, allowed=allowed)
+        is_from_columns = self.stiffness is None  # stiffness by columns of the material
+        require(
+            is_from_columns or not is_material,
+            "frame.damping_ratio",
+            value="material, beside stiffness",
+            allowed="columns of the material, or [matrices] if some storeys are of another one",
+        )
         is_placed = self.has_key("dampers") == (self.damper_placement is not None)
         allowed = "both dampers and damper_placement"
         require(is_placed, "frame.damper_placement", value=None, allowed=allowed)
-        is_damped, allowed = any(map(self.has_key, DAMPING)), " or ".join(DAMPING)
+        is_damped = any(map(self.has_key, DAMPING))
+        allowed = " or ".join(DAMPING)
         require(is_damped, "frame.dampers", value=None, allowed=allowed, cure='"0 %" for none')
         self.structure()  # refuses values that make no frame
         return self

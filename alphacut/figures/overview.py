@@ -75,26 +75,30 @@ def draw_density(axes: Axes, cell: Cell, levels: Array) -> None:
     style.title(axes, f"stochastic domain, {len(levels) - 1} layers")
 
 
-def draw_prisms(axes: Any, grid: PrismGrid, levels: Array) -> None:
-    """Product domain: faces of prisms on the front sides of the cell, and on the particle's cone.
+def draw_prisms(axes: Any, grid: PrismGrid, positions: Array) -> None:
+    """Draws the product domain: prisms on the particle's cone, two front sides and the bottom.
 
-    `levels` are positions (x1, x2, θ) of the nodes at each level of θ, (levels, nodes, 3).
+    Args:
+        axes: Axes of Matplotlib in three dimensions.
+        grid: The prisms.
+        positions: Coordinates (x1, x2, θ) of the nodes, shape (values of θ, nodes, 3).
     """
     from matplotlib.colors import to_rgb
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
     plane, edges = grid.plane.points, boundary_edges(grid)
-    cone = layer_faces(levels, edges, grid.plane.arc)  # over edges between nodes on the particle
+    cone = layer_faces(positions, edges, grid.plane.arc)  # over edges between nodes on the particle
     axes.add_collection3d(Poly3DCollection(cone, facecolor=PARTICLE, edgecolor=PURPLE, lw=0.3))
-    corners = grid.plane.triangles[~grid.plane.inside, :3]
+    matrix_triangles = grid.plane.triangles[~grid.plane.inside, :3]
     thin = {"facecolor": (*to_rgb(MATRIX), 0.15), "edgecolor": (*to_rgb(INK), 0.35), "lw": 0.2}
-    for side in (plane[:, 1] <= -1 + 1e-9, plane[:, 0] >= 1 - 1e-9):
-        axes.add_collection3d(Poly3DCollection(layer_faces(levels, edges, side), **thin))
-    axes.add_collection3d(Poly3DCollection(levels[0][corners], facecolor=MATRIX, ec=INK, lw=0.15))
+    for on_side in (plane[:, 1] <= -1 + 1e-9, plane[:, 0] >= 1 - 1e-9):
+        axes.add_collection3d(Poly3DCollection(layer_faces(positions, edges, on_side), **thin))
+    bottom = positions[0][matrix_triangles]
+    axes.add_collection3d(Poly3DCollection(bottom, facecolor=MATRIX, ec=INK, lw=0.15))
     axes.set(
         xlim=(-1, 1),
         ylim=(-1, 1),
-        zlim=(levels[0, 0, 2], levels[-1, 0, 2]),
+        zlim=(positions[0, 0, 2], positions[-1, 0, 2]),
         xlabel="x$_1$/a",
         ylabel="x$_2$/a",
         zlabel="θ",

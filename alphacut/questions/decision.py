@@ -108,7 +108,10 @@ class DecisionQuestion(Question):
 
     @staticmethod
     def number_rows(document: Document) -> tuple[Row, list[NumberRow]]:
-        """Titles of the columns, and a row for each limit."""
+        """Header and rows of the CSV: of each limit verdict, and degrees to which it is exceeded.
+
+        Margin and peaks are those of the lowest level.
+        """
         head: Row = ("limited output", "unit", "limit", "verdict", "from α", "nature")
         head += ("least possibility", "greatest possibility", "least necessity")
         head += ("greatest necessity", "least margin", "peak at most", "peak reached")

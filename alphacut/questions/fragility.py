@@ -84,7 +84,10 @@ class FragilityQuestion(Question):
 
     @staticmethod
     def rows(document: Document) -> list[Row]:
-        """Table of the report, with the columns of `head`: a row for each limit."""
+        """Rows of the fragility table: of each limit median and dispersion of critical measures.
+
+        Columns: limit, median at α = 0, nature, dispersion at α = 0, median at α = 1.
+        """
         return [
             (
                 limit_words(limit["output"], limit["limit"], limit["output_unit"]),

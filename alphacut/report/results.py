@@ -44,17 +44,20 @@ def error_text(error: float, nature: Nature) -> str:
 
 
 def material(summary: Document) -> Table:
-    """Table of the constants of the cell or of the image, and of damping ratios by the material."""
+    """Table of the elastic constants and loss factors of cell and image, and of damping ratios.
+
+    Each has its value at α = 1, the last level, its range at α = 0, the first, nature and error.
+    """
     rows: list[Row] = []
     for part in (summary.get("modulus"), summary.get("image")):
         if part is None:
             continue
         young = part["cuts"]["E_GPa"] if "cuts" in part else part["E_GPa"]
         nature, name = Nature(part["nature"]), f"E, GPa ({part['average']})"
-        error = sum(part.get("error", {}).values()) * max(young["upper"])
-        cuts = cut_text(young, -1, nature), cut_text(young, 0, nature, error)
-        has_error = part.get("particles") != "mesh"
-        error_cell = error_text(error, nature) if has_error else "not declared"
+        young_error = sum(part.get("error", {}).values()) * max(young["upper"])
+        cuts = cut_text(young, -1, nature), cut_text(young, 0, nature, young_error)
+        declares_error = part.get("particles") != "mesh"  # a mesh of one's own is not refined
+        error_cell = error_text(young_error, nature) if declares_error else "not declared"
         rows.append((name, *cuts, str(nature), error_cell))
         further = {"ν": part.get("nu_cuts"), "E_T, GPa": part.get("fibres", {}).get("E_T_GPa")}
         for label, values in further.items():
@@ -62,9 +65,9 @@ def material(summary: Document) -> Table:
                 cuts = cut_text(values, -1, nature), cut_text(values, 0, nature)
                 rows.append((label, *cuts, str(nature), ""))
         if loss := part.get("loss"):
-            nature, error = Nature(loss["nature"]), loss["error"].get("E")
+            nature, loss_error = Nature(loss["nature"]), loss["error"].get("E")
             cuts = cut_text(loss["E"], -1, nature), cut_text(loss["E"], 0, nature)
-            error_cell = "" if error is None else error_text(error, nature)
+            error_cell = "" if loss_error is None else error_text(loss_error, nature)
             rows.append(("loss factor of E", *cuts, str(nature), error_cell))
     for name, (low, modal, high) in summary.get("damping", {}).items():
         cuts = range_text(modal, modal, Nature.ATTAINED), range_text(low, high, Nature.ATTAINED)

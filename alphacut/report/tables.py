@@ -87,7 +87,10 @@ def write_csv(tables_by_name: Mapping[str, Table], folder: Path) -> list[Path]:
 
 
 def tables(summary: Document) -> dict[str, Table]:
-    """Tables of the results in a summary, by name: of stages as in `MAKERS`, then of questions."""
+    """Tables of the results in a summary, by name: of stages as in `MAKERS`, then of questions.
+
+    A stage that is absent or was refuted by its measurements has none.
+    """
     stage_tables = {
         name: make(summary[key])
         for name, (key, make) in MAKERS.items()

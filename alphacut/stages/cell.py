@@ -92,11 +92,18 @@ def model_of(cell: AnyCell, mesh: Mesh, modulus: ModulusSection, **elements: Any
 
 
 def _model_of_particle(
-    cell: RoundCell, mesh: Mesh, modulus: ModulusSection, elements: Mapping[str, Any]
+    cell: RoundCell, mesh: Mesh, modulus: ModulusSection, prism_options: Mapping[str, Any]
 ) -> Callable[..., list[HomogenisedStiffness]]:
-    """Method `solve` of the model of a cell with one particle: series, slices or prisms.
+    """Method `solve` of the model of a cell with one particle.
 
-    `elements` are options of the prisms.
+    Spheres have their series; a fibre the first of series, slices and prisms that the cell and
+    `modulus.method` allow. A method that the cell does not allow was refused with the case.
+
+    Args:
+        cell: The cell.
+        mesh: Sizes of the mesh.
+        modulus: The section [modulus].
+        prism_options: Further options of the prisms.
     """
     tolerance, method = modulus.tolerance, modulus.method
     if cell.particles == "spheres":
@@ -115,7 +122,7 @@ def _model_of_particle(
         return SlicesModel(mesh_size=mesh.size, outline=outline, energies=energies).solve
     from alphacut.rve.prism.model import PrismModel
 
-    return PrismModel(mesh.size, mesh.layers, outline=outline, **elements).solve
+    return PrismModel(mesh.size, mesh.layers, outline=outline, **prism_options).solve
 
 
 def inputs_of(radius: AnyRadius | ThetaSection, cell: AnyCell) -> dict[str, FuzzyNumber]:
@@ -303,15 +310,15 @@ def declared_errors(result: HomogenisedStiffness) -> Document | None:
 def require_bounds(
     modulus_bounds: tuple[float, float], references: Document, particles: str
 ) -> None:
-    """Requires E of spheres within the Hashin–Shtrikman bounds of the fraction that a case states.
+    """Refuses E of spheres outside the Hashin–Shtrikman bounds of the fraction that a case states.
 
-    E may lie outside: the map has another fraction where cells denser than any cube are cut off,
-    and the mean over cells with different spheres need not obey them.
+    E is outside where the radius map holds another fraction, since cells denser than any cube are
+    cut off, or because the mean over cells with different spheres need not obey the bounds.
 
     Args:
-        modulus_bounds: Lower and upper bound of E at the modal inputs, in Pa.
+        modulus_bounds: Lower and upper bound of E at the nominal inputs, in Pa.
         references: Bounds and fractions, as function `references` gives them.
-        particles: Of the cell.
+        particles: Kind of the particles, of which only "spheres" are checked.
 
     Raises:
         RefusedError: E lies outside by more than `BOUNDS_SLACK`.

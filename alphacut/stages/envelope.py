@@ -188,12 +188,13 @@ def peaks_from_document(document: Document, alpha: Sequence[float]) -> Peaks:
 def tasks(
     section: EnvelopeSection, studies: Sequence[Study], limited: tuple[str, ...] = ()
 ) -> tuple[EnvelopeTask, ...]:
-    """The envelopes of a case: its studies, or the one of [envelope].
+    """Tasks of the envelopes of a case: one for each study, or the one of [envelope], "all".
 
     Args:
         section: The section [envelope].
         studies: Studies of the case, if any.
-        limited: Outputs of the motion of [envelope] whose peaks questions compare with limits.
+        limited: Outputs whose peaks questions compare with limits; only tasks with the motion of
+            [envelope] have them.
     """
     studied = tuple(
         EnvelopeTask(study.name, study.fuzzy, study.duration, section, study.figures)

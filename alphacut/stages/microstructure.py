@@ -29,10 +29,18 @@ def stage(section: MicrostructureSection, spheres: bool, figures: bool = True) -
 def compute_map(
     section: MicrostructureSection, spheres: bool, figures: bool, context: StageContext
 ) -> StageResult:
-    """Computes the fuzzy radius map of particles; the same for any number of workers.
+    """Computes the fuzzy radius map of particles, and writes its files if there is a folder.
+
+    The result does not depend on the number of workers.
+
+    Args:
+        section: The section [microstructure].
+        spheres: Whether particles are spheres, not fibres.
+        figures: Whether figures are among the files.
+        context: Workers, folder and progress.
 
     Raises:
-        RefusedError: Measured data have no meaning.
+        RefusedError: The measured data are invalid.
         FailedError: The packing is too dense.
     """
     with pool(context.workers) as executor:

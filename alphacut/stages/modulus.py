@@ -391,13 +391,14 @@ def loss_outputs(result: HomogenisedStiffness, cuts: LossCuts) -> dict[str, Arra
 def loss_cuts(result: Bounds) -> dict[str, Array]:
     """α-cuts of the loss factors by the names of `CONSTANTS`, shape (levels, 2) each.
 
-    Each sample has bounds for the phases' cuts on every level k, as outputs loss_lower[k][…]; the
-    cut of level k spans those of its samples.
+    Outputs loss_lower[level][constant] and loss_upper of a sample bound the loss factor for the
+    phases' cuts on that level. The cut runs from the least lower to the greatest upper one.
     """
     cuts: dict[str, Array] = {name: np.empty((len(result.alpha), 2)) for name in CONSTANTS}
-    for (k, name), level in product(enumerate(CONSTANTS), range(len(result.alpha))):
-        columns = [result.column(f"loss_{end}[{level}][{k}]") for end in ("lower", "upper")]
-        cuts[name][level] = result.lower[level, columns[0]], result.upper[level, columns[1]]
+    for (constant, name), level in product(enumerate(CONSTANTS), range(len(result.alpha))):
+        lower_column = result.column(f"loss_lower[{level}][{constant}]")
+        upper_column = result.column(f"loss_upper[{level}][{constant}]")
+        cuts[name][level] = result.lower[level, lower_column], result.upper[level, upper_column]
     return cuts
 
 

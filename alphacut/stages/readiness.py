@@ -55,20 +55,25 @@ def campaign_of(content: Content, petsc: Mapping[str, str] | None = None) -> Cel
 
 
 def _require_motion(content: Content) -> None:
-    """Requires a structure of which each study and each question of the case can be computed."""
+    """Requires that identification, each study's envelope and each question can be computed.
+
+    Nothing is solved: stand-ins replace a modulus and a loss factor that are still to be computed.
+    """
     if content.structure_section is None or content.envelope is None:
         return
-    number, alpha = _stand_in_modulus(content), content.envelope.alpha
-    structure = content.structure_of(number, _stand_in_loss(content, number))
+    modulus, alpha = _stand_in_modulus(content), content.envelope.alpha
+    structure = content.structure_of(modulus, _stand_in_loss(content, modulus))
     if content.identify is not None:
         identify.require_learnable(content.identify, structure, alpha)
     if content.records is not None:
         records = suite.suite_records(content.records, content.envelope, structure)
-        structure = suite.with_record(structure, records[0])
+        structure = suite.with_record(structure, records[0])  # which stands for all
     for task in envelope.tasks(content.envelope, content.study):
         frame.require_envelope(**task.arguments(structure))
-    (task,) = envelope.tasks(content.envelope, ())  # of [envelope] itself
-    response = FuzzyResponse(structure, task.fuzzy, alpha, task.duration, task.section.step)
+    (own_task,) = envelope.tasks(content.envelope, ())  # of [envelope], which questions refer to
+    response = FuzzyResponse(
+        structure, own_task.fuzzy, alpha, own_task.duration, own_task.section.step
+    )
     for question in questions_of(content.questions):
         question.require_answerable(response)
 

@@ -96,7 +96,10 @@ def peak_shares(model: frame.StoreyFrame, structure: Structure, task: EnvelopeTa
         step = coarser_step(task.duration, step)
 
     def bounds(numbers: Mapping[str, FuzzyNumber]) -> tuple[Array, Array]:
-        """Least and greatest peak of each output on the lowest level, shape (outputs,) each."""
+        """Least and greatest peak of each output on the lowest level, shape (outputs,) each.
+
+        A guaranteed upper bound is replaced by the peak that is reached, which is nearer the truth.
+        """
         fuzzy = {name: x for name, x in numbers.items() if not isinstance(x, Crisp)}
         method = frame.Auto(ACCURACY, peaks=True)
         options: dict[str, Any] = {"alpha": task.section.alpha[:1], "duration": task.duration}
@@ -104,9 +107,9 @@ def peak_shares(model: frame.StoreyFrame, structure: Structure, task: EnvelopeTa
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)
             peak_bounds = peaks(frame.envelope(model, fuzzy, **options))
-        # what is reached is nearer the truth than a proved bound with a gap
-        proved = np.array([nature is Nature.GUARANTEED for nature in peak_bounds.natures])
-        return peak_bounds.lower[0], np.where(proved, peak_bounds.reached[0], peak_bounds.upper[0])
+        is_proved = np.array([nature is Nature.GUARANTEED for nature in peak_bounds.natures])
+        greatest = np.where(is_proved, peak_bounds.reached[0], peak_bounds.upper[0])
+        return peak_bounds.lower[0], greatest
 
     return width_shares(bounds, structure.inputs(task.fuzzy), groups=groups)
 
