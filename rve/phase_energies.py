@@ -57,13 +57,14 @@ class PhaseEnergies:
 def first_order(
     energies: PhaseEnergies, losses: Array, constants_of: Callable[[Array], Array]
 ) -> tuple[Array, Array]:
-    """Loss factors of E, G, K to first order, and their errors by those of energies, (3,) each.
+    """Loss factors of E, G, K to first order, and their errors from those of energies, (3,) each.
 
     Args:
         energies: Parts of the phases in the strain energy.
         losses: Loss factors of K and G of each phase, shape (phases, 2).
-        constants_of: E and ν from C11 + C12, C11 − C12 and C33.
+        constants_of: E and ν, from which G and K follow, of C11 + C12, C11 − C12 and C33.
     """
+    # by phase, by its K and G, and by E, G and K of the cell: (phases, 2, 3)
     fractions, errors = energies.energy_fractions(constants_of)
     # only differences of losses count in the error, since the fractions add up to 1
     differences = abs(losses - (losses.max() + losses.min()) / 2)

@@ -61,24 +61,29 @@ def _neighbour_numbers(result: Microstructure) -> dict[str, object]:
 
 
 def _map_numbers(result: Microstructure) -> dict[str, object]:
-    """Statistics of r_n, limits, fuzzy slopes with their bands, and misfits, by name."""
-    box, sample = result.pbox, result.sample
+    """Return the numbers of the radius map by name, for the summary.
+
+    They are statistics of the reduced radii r_n; the map's a1, a3 and fuzzy slopes a2, a4 (low,
+    peak, high) with their confidence bands; its p-box, and how far the sample leaves it; and the
+    misfit of the curve at the peaks of the slopes.
+    """
+    pbox, sample = result.pbox, result.sample
     return {
         "cells": len(sample.values),
         "mean_r_n": sample.mean,
         "largest_r_n": float(sample.values[-1]),
         "limits": list(result.limits),
         "share_kept": result.share_within,
-        "a1": box.fit.a1,
-        "a2": list(box.a2),
-        "a3": box.fit.a3,
-        "a4": list(box.a4),
+        "a1": pbox.fit.a1,
+        "a2": list(pbox.a2),
+        "a3": pbox.fit.a3,
+        "a4": list(pbox.a4),
         "a2_band": list(result.slopes.a2),
         "a4_band": list(result.slopes.a4),
         "band": result.band,
-        "pbox_area": box.area,
-        "pbox_breach": box.excess(result.truncated),
-        "misfit": box.fit.misfit(result.truncated, (box.a2[1], box.a4[1])),
+        "pbox_area": pbox.area,
+        "pbox_breach": pbox.excess(result.truncated),
+        "misfit": pbox.fit.misfit(result.truncated, (pbox.a2[1], pbox.a4[1])),
         "seed": result.study.seed,
     }
 

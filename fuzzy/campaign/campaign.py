@@ -165,9 +165,13 @@ class Campaign:
         return outputs if self._rows else self._reorder_columns(outputs, batch.layouts)
 
     def _reorder_columns(self, array: Array, layouts: Mapping[int, Layout]) -> Array:
-        """Outputs (n, columns) of the first batch, with columns in the order of its first row.
+        """Outputs (n, columns) of the first batch, with columns in the layout of its first row.
 
-        Workers end in any order, so that another row may have set the layout before.
+        The layout is kept. Workers end in any order, so that another row may have set it before.
+
+        Args:
+            array: Outputs with columns as in `self.layout`.
+            layouts: Layouts of the rows that succeeded, by number of the row.
         """
         values = Values(self.layout, array)
         self.layout = layouts[min(layouts)]

@@ -94,9 +94,10 @@ def _deviation_range(data: Observations) -> tuple[float, float]:
 
 @lru_cache(maxsize=64)
 def _factors(n: int, quantile: float | None) -> tuple[Array, Array]:
-    """Factors of the standard deviation for the lower and the upper ends at the `LEVELS`.
+    """Factors k with which mean + k · deviation are ends of confidence intervals, (levels,) each.
 
-    Student's t for next value, mean and median, the non-central t for other quantiles.
+    At each α of `LEVELS` the confidence is 1 − α. Student's t serves for the next value, the mean
+    and the median, the non-central t for other quantiles.
 
     Args:
         n: Number of values.

@@ -267,14 +267,14 @@ class SingleLinkage:
     def _record(self, optimum: Optimum) -> None:
         """Add an optimum to the list of every cut of which it is a local optimum.
 
-        An equal optimum in the list is replaced if its value is worse.
+        One at the same point, to within a tolerance, is replaced if its value is worse.
         """
         for cut in self.cuts:
             if not optimum.is_optimum_of(cut):
                 continue
             optima = self.states[cut.level, optimum.bound].optima
             index = self._index_of_equal(cut, optimum)
-            if index == len(optima):
+            if index == len(optima):  # none at this point
                 optima.append(optimum)
             elif optimum.value < optima[index].value:
                 optima[index] = optimum

@@ -61,12 +61,12 @@ def surfaces(
     thickness: float = 0.0,
     sizes: Sizes | None = None,
 ) -> dict[int, list[int]]:
-    """Add the cell's geometry to the current Gmsh model; tags of its surfaces by phase number.
+    """Add the cell's geometry to the current Gmsh model; return its surfaces by phase number.
 
     Args:
-        size: Edge length, in halves of the cell's side.
+        size: Edge length of elements, in halves of the cell's side.
         radius: Radius of the particle, 0 for none.
-        outline: Outline of the particle.
+        outline: Outline of the particle; with an interphase it is a circle.
         thickness: Thickness of the interphase around it, 0 for none.
         sizes: Edge length at (x1, x2) for the arcs of the interphase; `size` if left out.
 
@@ -81,6 +81,7 @@ def surfaces(
     if not thickness:
         particle, matrix = _particle(geo, size, radius, outline)
         return {1: [particle], 0: [matrix]}
+    # elements along a quarter of the circles
     steps = _quarter_steps(radius, radius + thickness, sizes or (lambda x, y: size))
     return _particle_in_ring(geo, size, (radius, radius + thickness), steps)
 

@@ -258,22 +258,24 @@ class PrismModel:
     def _basis(
         self, problem: PrismProblem, matrix: AnyPhase, inclusions: Sequence[AnyPhase]
     ) -> ModulusBasis | None:
-        """Solutions on which the samples of a map can be projected; None if each must be solved.
+        """Reduced basis for samples that differ only in the modulus of isotropic inclusions.
 
-        Samples may differ only in the modulus of isotropic inclusions, within `self.moduli`.
+        None if samples differ otherwise, a modulus lies outside the range `self.moduli`, or the
+        error of the basis exceeds `TOLERANCE`: each sample is then solved.
         """
         if not (isinstance(matrix, Phase) and self.moduli and self.interface == "conforming"):
             return None
         phases = [phase for phase in inclusions if isinstance(phase, Phase)]
-        ratios, moduli = {phase.poisson for phase in phases}, [phase.modulus for phase in phases]
-        if len(phases) < len(inclusions) or len(ratios) > 1 or self.petsc:
+        poisson_ratios = {phase.poisson for phase in phases}
+        moduli = [phase.modulus for phase in phases]
+        if len(phases) < len(inclusions) or len(poisson_ratios) > 1 or self.petsc:
             return None
         low, high = self.moduli
         is_within = low * (1 - ROUND_OFF) <= min(moduli) and max(moduli) <= high * (1 + ROUND_OFF)
         if low == high or not is_within:
             return None
         cell = Cell(matrix, inclusions[0], problem.map, self.outline)
-        basis = modulus_basis(problem, matrix, ratios.pop(), self.moduli, self.loads(cell))
+        basis = modulus_basis(problem, matrix, poisson_ratios.pop(), self.moduli, self.loads(cell))
         return basis if basis.error <= TOLERANCE else None
 
     def _solve_system(

@@ -91,10 +91,11 @@ class ProductSpace:
         function.x.array[:] = self._problem.field(vector).ravel()
 
     def preconditioner(self, matrix: PETSc.Mat) -> ThetaPreconditioner:
-        """θ-preconditioner of a reduced matrix, for `PC.setPythonContext`.
+        """Preconditioner by levels along the stochastic coordinate θ, for `PC.setPythonContext`.
 
         Args:
-            matrix: Symmetric positive definite, with f_Θ as a factor of its form.
+            matrix: Reduced matrix, symmetric positive definite, of a form with the density f_Θ(θ)
+                as a factor.
         """
         problem = self._problem
         return ThetaPreconditioner(matrix, problem.numbering, problem.map.distribution)

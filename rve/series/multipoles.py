@@ -191,20 +191,20 @@ def modulus(load: str, a: Array, radius: Array, contrast: Contrast) -> Array:
     φ + z conj(φ') + conj(ψ).
 
     Args:
-        load: "hydrostatic", "deviator" or "shear", for these moduli in their order.
+        load: "hydrostatic" for C11 + C12, "deviator" for C11 − C12 or "shear" for C33.
         a: Scaled multipoles of φ, shape (n, m, N).
         radius: Shape (n,).
         contrast: The materials.
     """
     r, kappa, mu = radius[:, None], contrast.kappa, contrast.mu
     if load == "hydrostatic":
-        jump = ZETA_PERIOD * r * _dilatation_pole(a, radius, contrast)  # of ψ
+        jump = ZETA_PERIOD * r * _dilatation_pole(a, radius, contrast)  # of ψ across the cell
         return mu * (4 + 2 * jump) / (kappa - 1 - jump)
-    jump = ZETA_PERIOD * r * a[..., 0]  # of φ
-    g = _sums().natanzon_period * r * a[..., 0]
+    jump = ZETA_PERIOD * r * a[..., 0]  # of φ across the cell
+    natanzon_jump = _sums().natanzon_period * r * a[..., 0]
     if load == "deviator":
-        return np.asarray(2 * mu * (1 + g + jump) / (1 + g - kappa * jump))
-    return np.asarray(mu * (1 + g - jump) / (1 + g + kappa * jump))
+        return np.asarray(2 * mu * (1 + natanzon_jump + jump) / (1 + natanzon_jump - kappa * jump))
+    return np.asarray(mu * (1 + natanzon_jump - jump) / (1 + natanzon_jump + kappa * jump))
 
 
 def _dilatation_pole(a: Array, radius: Array, contrast: Contrast) -> Array:

@@ -310,7 +310,19 @@ def solve_slice(
     outline: Outline = circle,
     energies: bool = False,
 ) -> Slice:
-    """Solve a cell with a round particle by elements of orders 2, 3 and 4 on one mesh."""
+    """Solve a plane cell with one particle by elements of orders 2, 3 and 4 on one mesh.
+
+    Args:
+        radius: Radius over half the cell's side.
+        matrix: Material of the matrix.
+        inclusions: Materials of the particle, m of them, each of which is solved.
+        mesh_size: Edge length, in halves of the cell's side.
+        outline: Distance of the particle's edge from its centre over the radius.
+        energies: Whether to compute the energies of the phases.
+
+    Returns:
+        The stiffnesses by order, shape (3, m, 3, 3), in Pa, with what their errors follow from.
+    """
     from alphacut.rve.mesh.curved import plane_mesh
     from alphacut.rve.slices.plane_cell import PlaneCell
 

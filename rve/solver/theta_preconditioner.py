@@ -197,11 +197,14 @@ class ThetaPreconditioner:
         return rank_hats, mass.bubble_inverse_root[list(numbering.half_levels)] @ bubbles
 
     def view(self, _pc: PETSc.PC, viewer: PETSc.Viewer) -> None:
-        """Print the solver of the first level; called by PETSc for ``-rve_ksp_view``."""
+        """Print the number of levels and the solver of the first one, for ``-rve_ksp_view``.
+
+        PETSc calls it. All levels have the same kind of solver.
+        """
         count = f"{len(self.levels)} levels and {len(self.half_levels)} half-way on the first rank"
         viewer.printfASCII(f"    preconditioner along θ, {count}, each solved by\n")
         rank_viewer = viewer.getSubViewer(PETSc.COMM_SELF)
-        if 0 in self.numbering.levels:  # like all others
+        if 0 in self.numbering.levels:  # on the rank that has it
             self.levels[0].view(rank_viewer)
         viewer.restoreSubViewer(rank_viewer)
 

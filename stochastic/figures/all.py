@@ -153,7 +153,10 @@ def draw_correlation(result: Microstructure, equal: Apollonius) -> Figure:
 
 
 def draw_areas(result: Microstructure) -> Figure:
-    """Draw area or volume of the cells over r_n, with its limits and upper bound (Fig. 12)."""
+    """Draw the area or volume of each cell over its reduced radius r_n (Fig. 12).
+
+    Lines show the limits of r_n, a hatched band where a particle would leave its cell.
+    """
     import matplotlib.pyplot as plt
 
     figure, axes = plt.subplots(figsize=(6.4, 3.8))

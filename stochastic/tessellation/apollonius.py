@@ -228,10 +228,12 @@ def counted_cells(diagram: Apollonius) -> tuple[Rows, Array]:
 
 
 def _reach(diagram: Apollonius) -> Array:
-    """Largest ρ (1 + cos ψ) − r over each cell's boundary for the four edges, (n, 4), in m.
+    """Return how far empty circles about a cell's boundary reach towards each edge, (n, 4), in m.
 
-    ρ is the distance from the centre, r the disc's radius and ψ the angle from the edge's
-    direction. It is taken over `ANGLES` points of each arc, with an error of second order.
+    The circle about a boundary point at the distance ρ from the disc's centre touches the disc of
+    radius r and a neighbour, and reaches by ρ cos ψ + ρ − r beyond the centre, ψ the angle from
+    the edge's direction. The maximum over `ANGLES` points of each arc is taken, whose error is of
+    second order. It is infinite for a cell that is not closed, of which some ρ is negative.
     """
     angle, rho = diagram.walls(ANGLES)
     is_bounded = rho.min(axis=0) > 0

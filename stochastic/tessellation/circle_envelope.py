@@ -23,8 +23,8 @@ def anomaly(psi: Array, near: Array, far: Array) -> Array:
 
     Args:
         psi: Angle from the direction of the neighbour, shape (m,), brought to [−π, π] here.
-        near: d + Δ, twice the least distance of the wall from the centre, shape (m,).
-        far: d − Δ, shape (m,).
+        near: Twice the least distance of the wall from the centre of the disc, shape (m,).
+        far: The same from the centre of the neighbour, shape (m,).
     """
     psi = psi - 2 * np.pi * np.round(psi / (2 * np.pi))
     tanh = np.clip(np.sqrt(near / far) * np.tan(psi / 2), -1 + 2**-53, 1 - 2**-53)

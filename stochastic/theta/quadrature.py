@@ -17,9 +17,11 @@ _PANEL_GAP = 1e-13
 _HALVINGS, _MOST_PANELS = 48, 400
 _FIRST_PANELS = 64
 _NEGLIGIBLE = 1e-200  # weight of nodes so far off that polynomials overflow there
-FEWEST = 10  # nodes, from which on a polynomial through those of a Gauss rule beats pieces
-LARGEST = 30.0  # Lebesgue constant of a polynomial that is trusted; rules in layers have far more
-MOST = 40  # nodes of a polynomial
+FEWEST_NODES = 10  # nodes, from which on a polynomial through those of a Gauss rule beats pieces
+LARGEST_LEBESGUE = (
+    30.0  # Lebesgue constant of a polynomial that is trusted; rules in layers have far more
+)
+MOST_NODES = 40  # nodes of a polynomial
 
 
 @dataclass(frozen=True)
@@ -168,16 +170,16 @@ def _mass_gaps(law: ThetaLaw, edges: Array, rule: tuple[Array, Array]) -> Array:
 def between_nodes(nodes: Array, values: Array, at: Array) -> Array:
     """Interpolate values at rising nodes, both of shape (n,), at points `at` of any shape.
 
-    The polynomial through all nodes if they are those of one Gauss rule, whose Lebesgue constant is
-    small: its error falls with the number of nodes as that of the rule itself does. Otherwise
-    monotone cubic pieces (PCHIP).
+    It is the polynomial through all nodes if these are few and its Lebesgue function is small at
+    the points, as for the nodes of one Gauss rule, with which it then converges. Otherwise it is
+    made of monotone cubic pieces (PCHIP).
     """
     from scipy.interpolate import BarycentricInterpolator, PchipInterpolator
 
-    if FEWEST <= len(nodes) <= MOST:
+    if FEWEST_NODES <= len(nodes) <= MOST_NODES:
         # the same digits each time: SciPy takes the nodes in a random order
         lagrange = BarycentricInterpolator(nodes, np.eye(len(nodes)), rng=0)(at)
         lebesgue_constant = np.abs(lagrange).sum(axis=-1).max()
-        if lebesgue_constant <= LARGEST:
+        if lebesgue_constant <= LARGEST_LEBESGUE:
             return np.asarray(lagrange @ values)
     return np.asarray(PchipInterpolator(nodes, values)(at))

@@ -100,8 +100,10 @@ def fourier_blocks(element: Element, constant: Reference, ky: Array, kx: Array) 
     Returns:
         Hermitian blocks, shape (len(ky), len(kx), unknowns, unknowns).
     """
+    # forms of the strain's trace and of its deviator on a pixel
     trace, deviator = (element.modes[part].T @ element.modes[part] for part in element.parts)
     matrix = constant.trace * trace + constant.deviator * deviator
+    # of each local unknown: its number in the pixel to which it belongs, rows up, columns right
     unknown, up, right = np.array(element.local).T
     # coupling of unknowns a and b of pixels whose distance in rows and columns is −1, 0 or 1
     coupling = np.zeros((3, 3, element.unknowns, element.unknowns))
