@@ -14,18 +14,19 @@ FACES_UP_TO = 6
 
 def gain(g: Array, H: Array, x: Array) -> Array:
     """Values of g·x + x·H·x/2, shape (N, …), for g (N, d), H (N, d, d) and x (N, …, d)."""
-    slope = (
-        g + 0.5 * np.matmul(H, x[..., None])[..., 0]
-        if x.ndim == 2
-        else g[:, None] + 0.5 * np.matmul(x, H)
-    )
-    return np.asarray((slope * x).sum(-1))
+    if x.ndim == 2:
+        mean_slope = g + 0.5 * np.matmul(H, x[..., None])[..., 0]
+    else:
+        mean_slope = g[:, None] + 0.5 * np.matmul(x, H)
+    return np.asarray((mean_slope * x).sum(-1))
 
 
 def local_maximum(
     g: Array, H: Array, lower: Array, upper: Array, start: Array | None = None, *, rounds: int = 6
 ) -> Array:
-    """Local maximum uphill from `start` (or 0), shape (N, d), by axis and Newton steps.
+    """Points (N, d) near local maxima of g·x + x·H·x/2 over boxes, uphill from `start` (or 0).
+
+    Each round ascends along one axis after the other, then by two Newton steps.
 
     Args:
         g: Gradients, shape (N, d).
@@ -33,19 +34,22 @@ def local_maximum(
         lower: Lower ends of the boxes, shape (N, d).
         upper: Upper ends.
         start: Where to start, inside the boxes.
-        rounds: Most repetitions.
+        rounds: Most rounds; one that gains next to nothing is a problem's last.
     """
     x = np.zeros_like(g) if start is None else np.ascontiguousarray(start, float).copy()
-    todo: Array = np.arange(len(g))
+    open_problems: Array = np.arange(len(g))
     for _ in range(rounds):
-        part = (g[todo], H[todo], lower[todo], upper[todo])
-        before = gain(*part[:2], x[todo])
-        moved = x[todo]
-        _axes_ascent(*part, moved)
-        x[todo] = _newton(*part, _newton(*part, moved))
-        grown = gain(*part[:2], x[todo]) - before
-        todo = todo[grown > 1e-10 * (1e-6 + np.abs(before))]
-        if not len(todo):
+        quadratics = g[open_problems], H[open_problems]
+        boxes = lower[open_problems], upper[open_problems]
+        trial = x[open_problems]
+        before = gain(*quadratics, trial)
+        _axes_ascent(*quadratics, *boxes, trial)
+        for _ in range(2):
+            trial = _newton(*quadratics, *boxes, trial)
+        x[open_problems] = trial
+        increase = gain(*quadratics, trial) - before
+        open_problems = open_problems[increase > 1e-10 * (1e-6 + np.abs(before))]
+        if not len(open_problems):
             break
     return x
 
@@ -85,10 +89,10 @@ def _newton(g: Array, H: Array, lower: Array, upper: Array, x: Array) -> Array:
 
 
 def global_maximum(g: Array, H: Array, lower: Array, upper: Array) -> Array:
-    """Points (N, d) of the boxes where g·x + x·H·x/2 is largest, by all faces' stationary points.
+    """Points (N, d) of boxes where g·x + x·H·x/2 is largest, among all faces' stationary points.
 
-    With more than `FACES_UP_TO` parameters the number of faces forbids this; then the best local
-    maximum from 0 and from the corner that the gradient points to.
+    With more than `FACES_UP_TO` parameters there are too many faces: then the better of the local
+    maxima from 0 and from the corner that the gradient points to.
     """
     d = g.shape[1]
     if d > FACES_UP_TO:
@@ -100,30 +104,42 @@ def global_maximum(g: Array, H: Array, lower: Array, upper: Array) -> Array:
         for free in combinations(range(d), size):
             points = _face_points(g, H, lower, upper, free)
             values = gain(g, H, points)
-            pick = values.argmax(1)
-            top = values[np.arange(len(g)), pick]
-            better = top > best_gain
-            best[better], best_gain[better] = points[np.arange(len(g)), pick][better], top[better]
+            highest = np.arange(len(g)), values.argmax(1)
+            better = values[highest] > best_gain
+            best[better], best_gain[better] = points[highest][better], values[highest][better]
     return best
 
 
 def _face_points(g: Array, H: Array, lower: Array, upper: Array, free: tuple[int, ...]) -> Array:
-    """Stationary points of faces with the same free axes, shape (N, 2^(d − free), d)."""
+    """Stationary points of g·x + x·H·x/2 on all faces of boxes with the same free axes.
+
+    On a face the other axes are at their ends. A point outside its face is clipped to it.
+
+    Args:
+        g: Gradients, shape (N, d).
+        H: Symmetric Hessians, shape (N, d, d).
+        lower: Lower ends of the boxes, shape (N, d).
+        upper: Upper ends.
+        free: The free axes.
+
+    Returns:
+        One point a face, shape (N, 2^(d − free), d).
+    """
     d = g.shape[1]
-    bound = [i for i in range(d) if i not in free]
-    corners = np.array(list(product((0, 1), repeat=len(bound))), int).reshape(
-        2 ** len(bound), len(bound)
-    )
+    fixed = [i for i in range(d) if i not in free]
+    ends = list(product((0, 1), repeat=len(fixed)))  # 0: lower, 1: upper
+    corners = np.array(ends, int).reshape(len(ends), len(fixed))
     points = np.zeros((len(g), len(corners), d))
-    for column, i in enumerate(bound):
+    for column, i in enumerate(fixed):
         points[:, :, i] = np.where(
             corners[None, :, column] == 0, lower[:, None, i], upper[:, None, i]
         )
     if free:
         f = list(free)
         block = H[:, f][:, :, f]
+        # a little more concave, so that a singular block can be solved
         block = block - 1e-13 * (np.abs(block).max((1, 2), keepdims=True) + 1e-300) * np.eye(len(f))
         slope = g[:, None, f] + np.einsum("nij,ncj->nci", H[:, f], points)
-        step = -np.linalg.solve(block, slope.swapaxes(1, 2)).swapaxes(1, 2)
-        points[:, :, f] = np.clip(step, lower[:, None, f], upper[:, None, f])
+        stationary = -np.linalg.solve(block, slope.swapaxes(1, 2)).swapaxes(1, 2)
+        points[:, :, f] = np.clip(stationary, lower[:, None, f], upper[:, None, f])
     return points

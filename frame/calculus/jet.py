@@ -159,7 +159,7 @@ def _product(a: Jet, b: Jet, bilinear: Callable[[Array, Array], Array]) -> Jet:
 def variables(
     points: Array, names: Sequence[str], selected: Sequence[str], order: int = 2
 ) -> dict[str, Jet]:
-    """Independent variables of a Taylor expansion: a jet of shape (S,) for each name.
+    """Jets of the independent variables by name, each of shape (S,), with slope 1 by itself.
 
     Args:
         points: Values, shape (S, len(names)).
@@ -169,8 +169,8 @@ def variables(
         order: Highest derivatives, 1 or 2.
     """
     d = len(selected)
-    bends = d if order > 1 else 0
-    jets = {name: Jet.constant(points[:, i], d, bends) for i, name in enumerate(names)}
+    second_derivatives = d if order > 1 else 0
+    jets = {name: Jet.constant(points[:, i], d, second_derivatives) for i, name in enumerate(names)}
     for k, name in enumerate(selected):
         jets[name].first[k] = 1.0
     return jets

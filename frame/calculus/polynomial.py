@@ -35,7 +35,7 @@ def exponents(dimension: int, degree: int) -> Index:
 
 
 def basis(u: Array, index: Index) -> Array:
-    """Monomials at points (S, d), shape (S, terms)."""
+    """Values of the monomials with exponents `index` (terms, d) at points u (S, d), (S, terms)."""
     axis, parent, starts = _parents(index.tobytes(), index.shape)
     out, points = np.ones((len(index), len(u))), np.ascontiguousarray(u.T)
     for first, last in pairwise(starts):
@@ -156,17 +156,17 @@ def fit(u: Array, data: Jet, degree: int) -> Polynomial:
         degree: Total degree.
     """
     index = exponents(u.shape[1], degree)
-    d, w = u.shape[1], 1 / max(degree, 1)
+    d, w = u.shape[1], 1 / max(degree, 1)  # w: weight of slopes, w² of second derivatives
     B = basis(u, index)
     pairs = [(i, j) for i in range(d) for j in range(i, d)]
     slopes = [_differentiated(B, index, (i,)) for i in range(d)]
     curves = [_differentiated(B, index, pair) for pair in pairs]
-    rows = np.vstack([B, *(w * x for x in slopes), *(w * w * x for x in curves)])
-    bent = [data.second[pair] for pair in pairs]
-    values = np.vstack([data.value, *(w * x for x in data.first), *(w * w * x for x in bent)])
-    scale = np.linalg.norm(rows, axis=0)
-    q, r = np.linalg.qr(rows / scale)
-    solution = np.linalg.solve(r, product(q.T, values)) / scale[:, None]
+    design = np.vstack([B, *(w * x for x in slopes), *(w * w * x for x in curves)])
+    second = [data.second[pair] for pair in pairs]
+    values = np.vstack([data.value, *(w * x for x in data.first), *(w * w * x for x in second)])
+    column_norms = np.linalg.norm(design, axis=0)
+    q, r = np.linalg.qr(design / column_norms)
+    solution = np.linalg.solve(r, product(q.T, values)) / column_norms[:, None]
     return Polynomial(index, solution)
 
 
@@ -206,11 +206,17 @@ class LowerGrid:
         return leja(max(self.degrees) + self.excess + 1)[self.index]
 
     def coefficients(self, values: Array) -> Array:
-        """Chebyshev coefficients of values (S, …), same shape, the constant first.
+        """Chebyshev coefficients c_j of the polynomials with given values at `points`.
 
-        Since no product exceeds 1 on the box, Σ ‖c_j‖ bounds ‖polynomial‖ there, for any norm.
-        The matrix of T_k at the points is L U along each axis, and so is that of all terms, since
-        with a term the set holds all of lower exponents.
+        Since no product of Chebyshev polynomials T_k exceeds 1 on the box, Σ ‖c_j‖ bounds
+        ‖polynomial‖ there, for any norm. The matrix of T_k at the points is L U along each axis;
+        so is that of all terms, since with a term the set holds all of lower exponents.
+
+        Args:
+            values: Shape (S, …).
+
+        Returns:
+            The same shape, the constant first.
         """
         out = values.reshape(len(values), -1)
         for factor in self._factors:
@@ -250,21 +256,27 @@ class LowerGrid:
 
 @lru_cache
 def leja(count: int) -> Array:
-    """Leja points on [−1, 1], each as far from those before it as it can be, shape (count,)."""
-    places = np.cos(np.linspace(0, np.pi, 4001))
-    points, distances = [0.0], np.abs(places)
+    """Leja points on [−1, 1], shape (count,), from 0 on.
+
+    Each has the greatest product of its distances from all before, among 4001 candidates.
+    """
+    candidates = np.cos(np.linspace(0, np.pi, 4001))
+    points, distance_products = [0.0], np.abs(candidates)
     while len(points) < count:
-        points.append(float(places[distances.argmax()]))
-        distances = distances * np.abs(places - points[-1])
+        points.append(float(candidates[distance_products.argmax()]))
+        distance_products = distance_products * np.abs(candidates - points[-1])
     return np.array(points)
 
 
 @lru_cache
 def _triangles(count: int) -> tuple[Array, Array]:
-    """L⁻¹ and U⁻¹, (count, count) each, where L U has entries T_k(x_j) at Leja points x_j."""
+    """L⁻¹ and U⁻¹, (count, count) each, where L U has entries T_k(x_j) at Leja points x_j.
+
+    T_k are Chebyshev's polynomials; L has ones on its diagonal.
+    """
     upper = np.polynomial.chebyshev.chebvander(leja(count), count - 1)
     lower = np.eye(count)
-    for k in range(count - 1):
+    for k in range(count - 1):  # Gaussian elimination; the order of Leja points needs no pivots
         lower[k + 1 :, k] = upper[k + 1 :, k] / upper[k, k]
         upper[k + 1 :] -= np.outer(lower[k + 1 :, k], upper[k])
     return np.tril(np.linalg.inv(lower)), np.triu(np.linalg.inv(np.triu(upper)))

@@ -47,13 +47,13 @@ def with_derivatives(
 
 
 class _Writer:
-    """A tape in the making: the place of every expression, one for those that are equal."""
+    """Writes a tape: the place of every expression, one for those that are equal."""
 
     def __init__(self, arguments: Sequence[Symbol]) -> None:
         self.places: dict[object, int] = {x: k for k, x in enumerate(arguments)}
         self.numbers: dict[float, int] = {}
         self.code: list[tuple[int, int, int]] = []
-        self.made: dict[tuple[int, int, int], int] = {}
+        self.place_of: dict[tuple[int, int, int], int] = {}
         self.arguments = len(arguments)
 
     def tape(self, expressions: Sequence[Expr]) -> Tape:
@@ -72,10 +72,11 @@ class _Writer:
         return self.places[e]
 
     def _write(self, e: Expr) -> int:
+        """Place of a compound expression, after the operations that compute it are written."""
         name = type(e).__name__
         if name in ("Add", "Mul"):
-            parts = map(self.place, e.args)
-            return reduce(lambda x, y: self._apply(name, x, y), parts)
+            operands = map(self.place, e.args)
+            return reduce(lambda x, y: self._apply(name, x, y), operands)
         if name == "Pow":
             return self._power(*e.args)
         require_choice("function of the lagrangian", name, UNARY)
@@ -93,10 +94,16 @@ class _Writer:
         return self._apply("power", self.place(base), self.place(exponent))
 
     def _apply(self, name: str, x: int, y: int | None = None) -> int:
-        """Place of an operation's result, which is one that was made before where there is one."""
+        """Place of the result of an operation on places x and y, written unless it is there.
+
+        Args:
+            name: Name in `OPERATIONS`, or sympy's "Add" or "Mul".
+            x: Place of the first operand.
+            y: Place of the second; None for an operation of one operand.
+        """
         instruction = {"Add": "add", "Mul": "multiply"}.get(name, name)
         row = (OPERATIONS.index(instruction), x, x if y is None else y)
-        if row not in self.made:
+        if row not in self.place_of:
             self.code.append(row)
-            self.made[row] = self.arguments + len(self.code) - 1
-        return self.made[row]
+            self.place_of[row] = self.arguments + len(self.code) - 1
+        return self.place_of[row]

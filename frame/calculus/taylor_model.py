@@ -142,7 +142,7 @@ class TaylorModel:
         return TaylorModel(parts, self.remainder, d, self.order)
 
     def among(self, inputs: Rows, d: int) -> TaylorModel:
-        """The model as functions of d inputs; its present ones become those at `inputs`, rising."""
+        """The same functions as functions of d inputs, of which theirs are at `inputs`, rising."""
         parts = []
         for degree, part in enumerate(self.parts):
             full = np.zeros((count(d, degree), *self.shape))
@@ -166,15 +166,15 @@ class TaylorModel:
     def within(self, low: Array, high: Array) -> TaylorModel:
         """The model over the part low ≤ u ≤ high, (d,) each, in unit coordinates of the part."""
         middle, half = (low + high) / 2, (high - low) / 2
-        moved = [np.zeros_like(part) for part in self.parts]
+        shifted = [np.zeros_like(part) for part in self.parts]  # of p(middle + v)
         for degree, part in enumerate(self.parts):
             term = part  # (middle·∇)^k p / k!
             for k in range(degree + 1):
-                moved[degree - k] = moved[degree - k] + term
+                shifted[degree - k] = shifted[degree - k] + term
                 if k < degree:
                     term = derivative(term, degree - k, middle) / (k + 1)
         parts = []
-        for degree, part in enumerate(moved):
+        for degree, part in enumerate(shifted):
             scale = half[monomials(self.inputs, degree)].prod(-1)
             parts.append(scale.reshape(-1, *[1] * self.remainder.ndim) * part)
         # sums of d terms, once for each derivative, of |middle| + half ≤ 1
@@ -187,22 +187,18 @@ class TaylorModel:
         return TaylorModel(parts, self.remainder[key], self.inputs, self.order)
 
     def __add__(self, other: TaylorModel | ArrayLike) -> TaylorModel:
+        """Sum entry by entry, with its rounding in the remainder."""
         b = other if isinstance(other, TaylorModel) else self.like(_numbers(other))
-        degrees, shape = (
-            max(len(self.parts), len(b.parts)),
-            np.broadcast_shapes(self.shape, b.shape),
-        )
+        shape = np.broadcast_shapes(self.shape, b.shape)
         parts = []
-        for degree in range(degrees):
+        for degree in range(max(len(self.parts), len(b.parts))):
             part = np.zeros((count(self.inputs, degree), *shape))
             for x in (self, b):
                 if degree < len(x.parts):
                     part += _padded(x.parts[degree], len(shape))
             parts.append(part)
-        exact = TaylorModel(
-            tuple(parts), self.remainder + b.remainder, self.inputs, max(self.order, b.order)
-        )
-        return exact.with_rounding(1)
+        remainder, order = self.remainder + b.remainder, max(self.order, b.order)
+        return TaylorModel(tuple(parts), remainder, self.inputs, order).with_rounding(1)
 
     __radd__ = __add__
 
@@ -244,7 +240,9 @@ class TaylorModel:
         return self**-1.0 * other
 
     def __pow__(self, exponent: float) -> TaylorModel:
-        """A real power of positive functions.
+        """Real power of positive functions f, by the Taylor series in f − value to the order kept.
+
+        The remainder has the rounding of the series and Lagrange's bound of what it leaves out.
 
         Raises:
             UnprovedError: A function is not known to be positive.
@@ -265,9 +263,10 @@ class TaylorModel:
             scale = factor * middle ** (exponent - k)
             out = out + term * scale
             rounding = rounding + gamma(4 * k + 4) * np.abs(scale) * term.size()
-        after, power = abs(factor * (exponent - N) / (N + 1)), exponent - N - 1
-        steep = np.maximum(least**power, (middle + spread) ** power)
-        return out.loosened(rounding + after * steep * spread ** (N + 1) * (1 + gamma(8 * N + 8)))
+        next_factor, power = abs(factor * (exponent - N) / (N + 1)), exponent - N - 1
+        largest_power = np.maximum(least**power, (middle + spread) ** power)
+        truncation = next_factor * largest_power * spread ** (N + 1) * (1 + gamma(8 * N + 8))
+        return out.loosened(rounding + truncation)
 
     def contract(self, arrays: Array) -> TaylorModel:
         """Sum of functions V = (…, e) times arrays of numbers (e, …)."""
@@ -305,7 +304,10 @@ def concatenate(models: Sequence[TaylorModel], axis: int) -> TaylorModel:
 
 
 def all_within(models: Sequence[TaylorModel], low: Array, high: Array) -> list[TaylorModel]:
-    """Each model over the part low ≤ u ≤ high, in the part's unit coordinates, all at once."""
+    """Each model over the part low ≤ u ≤ high, in the part's unit coordinates, as by `within`.
+
+    All are restricted together, as one array of functions.
+    """
     flat = [
         TaylorModel(
             tuple(part.reshape(len(part), -1) for part in x.parts),
@@ -315,34 +317,38 @@ def all_within(models: Sequence[TaylorModel], low: Array, high: Array) -> list[T
         )
         for x in models
     ]
-    moved, end, found = concatenate(flat, -1).within(low, high), 0, list[TaylorModel]()
+    restricted = concatenate(flat, -1).within(low, high)
+    end, found = 0, list[TaylorModel]()
     for x in models:
         begin, end = end, end + x.remainder.size
-        parts = tuple(part[:, begin:end].reshape(len(part), *x.shape) for part in moved.parts)
-        found.append(
-            TaylorModel(parts, moved.remainder[begin:end].reshape(x.shape), x.inputs, x.order)
-        )
+        parts = tuple(part[:, begin:end].reshape(len(part), *x.shape) for part in restricted.parts)
+        remainder = restricted.remainder[begin:end].reshape(x.shape)
+        found.append(TaylorModel(parts, remainder, x.inputs, x.order))
     return found
 
 
 def inverse_bound(matrix: TaylorModel) -> Array:
     """Bound of |A⁻¹| over the box, entry by entry, by Neumann's series, shape (n, n).
 
+    |A⁻¹| ≤ (I − R)⁻¹ |C| with C ≈ A₀⁻¹ and R a bound of |I − C A|.
+
     Raises:
         UnprovedError: The series diverges.
     """
-    first, n = np.linalg.inv(matrix.value), len(matrix.value)
-    off = np.abs(np.eye(n) - first @ matrix.value)
-    off += gamma(n + 1) * (np.abs(first) @ np.abs(matrix.value))
-    ratio = np.abs(first) @ matrix.spread() + off
+    C, n = np.linalg.inv(matrix.value), len(matrix.value)
+    in_middle = np.abs(np.eye(n) - C @ matrix.value)
+    in_middle += gamma(n + 1) * (np.abs(C) @ np.abs(matrix.value))
+    ratio = np.abs(C) @ matrix.spread() + in_middle
     if np.abs(np.linalg.eigvals(ratio)).max() >= 1:
         raise UnprovedError("a matrix may be singular in the box", "take narrower inputs")
     inverse = np.linalg.inv(np.eye(n) - ratio) * (1 + gamma(8 * n * n))
-    return np.asarray(inverse @ np.abs(first))
+    return np.asarray(inverse @ np.abs(C))
 
 
 def solve(matrix: TaylorModel, right: TaylorModel) -> TaylorModel:
-    """Solution Y of A Y = B by series in u, with what A times it leaves of B bounded.
+    """Taylor model of the solution Y of A Y = B, its coefficients found degree by degree.
+
+    Its remainder is a bound of |A⁻¹| times one of the residual |A Y − B|.
 
     Args:
         matrix: A, V = (n, n).
@@ -354,13 +360,13 @@ def solve(matrix: TaylorModel, right: TaylorModel) -> TaylorModel:
     d, order = matrix.inputs, max(matrix.order, right.order)
     if not d:
         matrix, right, order = matrix.cut(0), right.cut(0), 0
-    first, parts = np.linalg.inv(matrix.value), list[Array]()
+    middle_inverse, parts = np.linalg.inv(matrix.value), list[Array]()
     for degree in range(order + 1):
         right_side = right.part(degree)
         for k in range(1, min(degree, len(matrix.parts) - 1) + 1):
             pair = (k, degree - k)
             right_side = right_side - convolve(matrix.parts[k], parts[degree - k], pair, d, matmul)
-        parts.append(first @ right_side)
+        parts.append(middle_inverse @ right_side)
     found = TaylorModel(tuple(parts), np.zeros(right.shape), d, order)
     return found.loosened(inverse_bound(matrix) @ (matrix @ found - right).size())
 
@@ -380,23 +386,23 @@ def _product(
 ) -> TaylorModel:
     """Product a b by `bilinear` (elementwise or matrix), kept to the higher order of both.
 
-    A coefficient of degree i + j is a sum over all ways to share its monomial and over the
-    contracted axis, if any.
+    The remainder takes the products of parts above that order, and the rounding of the others: a
+    coefficient of degree i + j is a sum over all ways to split its monomial into factors of degree
+    i and j, and over the contracted axis, if any.
     """
     d, order, ndim = a.inputs, max(a.order, b.order), max(a.remainder.ndim, b.remainder.ndim)
-    s, t = a.sizes(), b.sizes()
-    remainder = bilinear(a.remainder, np.asarray(sum(t)) + b.remainder) + bilinear(
-        np.asarray(sum(s)), b.remainder
-    )
-    degrees = range(min(order, len(s) + len(t) - 2) + 1)
+    a_sizes, b_sizes = a.sizes(), b.sizes()
+    remainder = bilinear(a.remainder, np.asarray(sum(b_sizes)) + b.remainder)
+    remainder = remainder + bilinear(np.asarray(sum(a_sizes)), b.remainder)
+    degrees = range(min(order, len(a_sizes) + len(b_sizes) - 2) + 1)
     parts = [np.zeros((count(d, k), *remainder.shape)) for k in degrees]
     inner = a.shape[-1] if bilinear == matmul else 1
     for i, x in enumerate(a.parts):
         for j, y in enumerate(b.parts):
-            share = 1.0
+            omitted = 1.0  # fraction of the parts' product that the polynomial leaves out
             if i + j <= order:
                 parts[i + j] += convolve(_padded(x, ndim), _padded(y, ndim), (i, j), d, bilinear)
-                share = gamma(inner * comb(i + j, i) + i + j + 1)
-            remainder = remainder + share * bilinear(s[i], t[j])
+                omitted = gamma(inner * comb(i + j, i) + i + j + 1)
+            remainder = remainder + omitted * bilinear(a_sizes[i], b_sizes[j])
     remainder = remainder * (1 + gamma(inner + (order + 1) ** 2))
     return TaylorModel(tuple(parts), np.asarray(remainder), d, order)

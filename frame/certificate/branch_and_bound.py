@@ -44,7 +44,10 @@ def enclosed(
     workers: int = 1,
     progress: Progress | None = None,
 ) -> tuple[Array, int]:
-    """Upper bounds of all N problems of `optima` by branch and bound; its points improve.
+    """Upper bounds of side × output for all N problems of `optima`, by spatial branch and bound.
+
+    A problem is an output at a node on a side. Better points that are met replace those of
+    `optima`, in place.
 
     Args:
         model: The modal model.
@@ -52,22 +55,23 @@ def enclosed(
         upper: Upper ends.
         optima: The problems with their best points.
         gap: Wanted difference between proved and attained bound, in units of the outputs.
-        budget: Most boxes per problem on average; where it ends, the gap reported is wider.
+        budget: Most boxes per problem on average; where it ends first, gaps are wider than `gap`.
         workers: Threads; the result does not depend on their number.
         progress: Called with the fraction done.
 
     Returns:
-        Proved upper bounds of side × output, shape (N,), and the number of boxes examined, each
-        counted once for each problem that needs it.
+        Proved upper bounds, shape (N,), and the number of boxes examined, each counted once for
+        each problem that needs it.
     """
     tree = Tree(model, lower, upper, optima, gap)
-    frontier, size, used = Frontier.of_box(len(lower), tree.numbers), len(tree.numbers), 0
-    while len(frontier) and used + len(frontier) <= budget * size:
-        used += len(frontier)
+    frontier, n_problems = Frontier.of_box(len(lower), tree.numbers), len(tree.numbers)
+    examined = 0
+    while len(frontier) and examined + len(frontier) <= budget * n_problems:
+        examined += len(frontier)
         frontier = tree.next_frontier(frontier, workers)
         if progress:
-            progress(1 - len(np.unique(frontier.problem)) / size)
-    return tree.proved(frontier), used  # what the budget left open keeps its own bound
+            progress(1 - len(np.unique(frontier.problem)) / n_problems)
+    return tree.proved(frontier), examined  # boxes that are still open keep their own bounds
 
 
 class Tree:
@@ -99,14 +103,17 @@ class Tree:
         self._renew(np.arange(len(self.numbers)))
 
     def next_frontier(self, frontier: Frontier, workers: int) -> Frontier:
-        """Boxes and items that are still open after all boxes of a frontier are examined."""
+        """Halves and faces of a frontier's boxes, with the items still open after examination.
+
+        An item is a box with a problem. Best points improve where a centre has a higher value.
+        """
 
         def outcome_of(part: tuple[slice, slice]) -> tuple[Array, Array, Array]:
             return self.examine(frontier, *part)
 
         with ThreadPoolExecutor(workers) as pool:
             results = list(pool.map(outcome_of, frontier.pieces(PIECE)))
-        code, value, _ = (np.concatenate(part) for part in zip(*results, strict=True))
+        code, value, _ = (np.concatenate(arrays) for arrays in zip(*results, strict=True))
         higher = np.flatnonzero(value > self.best[frontier.problem] + HIGHER)
         if len(higher):
             self._improve(frontier, higher[np.argsort(value[higher])], value)
@@ -121,26 +128,36 @@ class Tree:
         return np.asarray(upper[self.numbers])
 
     def examine(self, frontier: Frontier, boxes: slice, items: slice) -> tuple[Array, Array, Array]:
-        """Codes, values at the centres and upper bounds of some items; see `kernel.examine`."""
-        model, over, d = self.model, self.remainder, len(self.lower)
+        """Examine the items of some boxes by `kernel.examine`.
+
+        Args:
+            frontier: The boxes and items.
+            boxes: Which boxes.
+            items: Their items, I of them, each a box with a problem.
+
+        Returns:
+            What is done next with each item (codes of `kernel.examine`), side × output at its
+            centre, and its upper bound, each (I,).
+        """
+        model, over_domain, d = self.model, self.remainder, len(self.lower)
         n, m = model.count, len(model.outputs)
         centre, radius, edges = frontier.geometry(self.lower, self.upper, boxes)
         box, problem = frontier.box[items] - boxes.start, frontier.problem[items]
         node, column = np.divmod(problem, 2 * m)
-        fresh = np.append(True, (np.diff(box) != 0) | (np.diff(node) != 0))
-        begin = np.flatnonzero(fresh)  # of rows, each a box at a node
+        is_new_row = np.append(True, (np.diff(box) != 0) | (np.diff(node) != 0))
+        begin = np.flatnonzero(is_new_row)  # of rows, each a box at a node
         row_box, row_node = box[begin], node[begin]
         jets = model.together.jets(centre).swapaxes(0, 1)  # (q, B, n + P n m)
         rate, share = jets[..., :n], jets[..., n:].reshape(*jets.shape[:2], -1, n, m)
         waves = np.stack([np.stack(w, 1) for w in model.waves(rate[0, row_box], row_node)], 1)
         starts = np.searchsorted(row_box, np.arange(len(centre) + 1)), np.append(begin, len(box))
-        flat = [x.reshape(d**order, -1) for order, x in enumerate(over.share)]
-        bounds = over.tensor, over.margin, over.rate[2].reshape(d * d, -1)
-        bounds += over.rate[3].reshape(d**3, -1), flat[0][0], *flat[1:]
-        shares, rates = _in_planes(share[0, :, 0]), _in_planes(rate[1 : 1 + d].swapaxes(0, 1))
+        flat = [x.reshape(d**order, -1) for order, x in enumerate(over_domain.share)]
+        bounds = over_domain.tensor, over_domain.margin, over_domain.rate[2].reshape(d * d, -1)
+        bounds += over_domain.rate[3].reshape(d**3, -1), flat[0][0], *flat[1:]
+        shares, slopes = _in_planes(share[0, :, 0]), _in_planes(rate[1 : 1 + d].swapaxes(0, 1))
         outcome: tuple[Array, Array, Array] = examine(
             (*starts, row_node, column),
-            (centre, radius, edges, _tables(rate, share, d), shares, rates),
+            (centre, radius, edges, _tables(rate, share, d), shares, slopes),
             _in_planes(waves).reshape(len(begin), -1),
             model.time,
             tuple(np.ascontiguousarray(x, float) for x in bounds),
@@ -155,21 +172,21 @@ class Tree:
 
         Args:
             frontier: The boxes.
-            items: Places of the higher items, by rising value.
+            items: Indices of the higher items by rising value, so that the highest is written last.
             value: Side × output at the centres of all items.
         """
-        count = np.zeros(len(self.best), np.int64)
-        count[self.numbers] = np.arange(len(self.numbers))
-        which = count[frontier.problem[items]]
+        row_of_problem = np.zeros(len(self.best), np.int64)
+        row_of_problem[self.numbers] = np.arange(len(self.numbers))
+        rows = row_of_problem[frontier.problem[items]]
         centre = frontier.geometry(self.lower, self.upper)[0]
-        self.optima.point[which] = centre[frontier.box[items]]
-        self.optima.value[which] = value[items]
-        which = np.unique(which)
+        self.optima.point[rows] = centre[frontier.box[items]]
+        self.optima.value[rows] = value[items]
+        which = np.unique(rows)
         refine(self.model, self.optima, which, self.lower, self.upper, self.gap / 100)
         self._renew(which)
 
     def _renew(self, which: Array) -> None:
-        """Take over best values, points and jets of the optima in rows `which`."""
+        """Copy value, point and derivatives there of the optima in rows `which` to the tree."""
         optima, numbers = self.optima, self.numbers[which]
         point = optima.point[which]
         f, g, H = self.model.at(point, optima.node[which], optima.output[which])
@@ -206,28 +223,39 @@ class Frontier:
     def geometry(
         self, lower: Array, upper: Array, boxes: slice = slice(None)
     ) -> tuple[Array, Array, Array]:
-        """Centres and radii (B, d) in the domain, and which faces are its own (B, 2, d)."""
-        positions = self.position[boxes]
-        inner = np.maximum(positions, 1)
-        width = 2.0 ** -np.floor(np.log2(inner + 0.5))  # share of the domain
-        begin = inner * width - 1
-        ends = [positions == LOWER, positions == UPPER]
-        share = np.select(ends, [0.0, 1.0], begin + width / 2)
-        radius = np.where(positions < 0, 0.0, (upper - lower) / 2 * width)
-        return (
-            lower + (upper - lower) * share,
-            radius,
-            np.stack([begin == 0, begin + width == 1], 1),
-        )
+        """Centres, half widths and outer faces of B boxes.
 
-    def pieces(self, most: int) -> Iterator[tuple[slice, slice]]:
-        """Yield slices of boxes and of their items, about `most` items each, in order."""
-        ends = np.append(np.searchsorted(self.box, np.arange(len(self.position))), len(self))
+        Args:
+            lower: Lower ends of the domain, shape (d,).
+            upper: Upper ends.
+            boxes: Which boxes; all unless given.
+
+        Returns:
+            Centres (B, d), half widths (B, d), and whether the lower and the upper face of each
+            axis lies on the domain's, (B, 2, d).
+        """
+        positions = self.position[boxes]
+        interval = np.maximum(positions, 1)  # 2^depth + index; ends of the domain count as all
+        width = 2.0 ** -np.floor(np.log2(interval + 0.5))  # fraction of the domain: 2^−depth
+        begin = interval * width - 1
+        at_ends = [positions == LOWER, positions == UPPER]
+        middle = np.select(at_ends, [0.0, 1.0], begin + width / 2)
+        radius = np.where(positions < 0, 0.0, (upper - lower) / 2 * width)
+        is_outer = np.stack([begin == 0, begin + width == 1], 1)
+        return lower + (upper - lower) * middle, radius, is_outer
+
+    def pieces(self, max_items: int) -> Iterator[tuple[slice, slice]]:
+        """Yield slices of boxes and of their items, in order, of at most `max_items` items.
+
+        A box with more items is a piece alone.
+        """
+        n_boxes = len(self.position)
+        first_items = np.append(np.searchsorted(self.box, np.arange(n_boxes)), len(self))
         start = 0
-        while start < len(self.position):
-            stop = int(np.searchsorted(ends, ends[start] + most, "right")) - 1
-            stop = min(max(stop, start + 1), len(self.position))
-            yield slice(start, stop), slice(int(ends[start]), int(ends[stop]))
+        while start < n_boxes:
+            stop = int(np.searchsorted(first_items, first_items[start] + max_items, "right")) - 1
+            stop = min(max(stop, start + 1), n_boxes)
+            yield slice(start, stop), slice(int(first_items[start]), int(first_items[stop]))
             start = stop
 
     def children(self, code: Array) -> Frontier:
@@ -252,15 +280,22 @@ class Frontier:
         return Frontier(positions, *np.divmod(items, most))
 
     def _places(self, keys: Array, count: int) -> Array:
-        """Positions of child boxes, shape (K, d); a key is box × count + number of half or face."""
+        """Positions of child boxes, shape (K, d), in the form of `position`.
+
+        Args:
+            keys: For each child its parent box × `count` + a number: 2 axis + (0 or 1) for the
+                lower or upper half, 2 d + a ternary code for faces, whose digit of each axis is
+                0: all of it, 1: lower end, 2: upper end.
+            count: Numbers a box, 2 d + 3^d.
+        """
         d = self.position.shape[1]
         positions: Array = self.position[keys // count].copy()
-        local = keys % count
-        rows = np.flatnonzero(local < 2 * d)
-        axis, half = np.divmod(local[rows], 2)
+        number = keys % count
+        rows = np.flatnonzero(number < 2 * d)
+        axis, half = np.divmod(number[rows], 2)
         positions[rows, axis] = 2 * positions[rows, axis] + half
-        rows = np.flatnonzero(local >= 2 * d)
-        ternary = (local[rows, None] - 2 * d) // 3 ** np.arange(d) % 3
+        rows = np.flatnonzero(number >= 2 * d)
+        ternary = (number[rows, None] - 2 * d) // 3 ** np.arange(d) % 3
         positions[rows] = np.select([ternary == 1, ternary == 2], [LOWER, UPPER], positions[rows])
         return np.asarray(positions)
 
@@ -275,15 +310,19 @@ def _distinct(rows: Array) -> tuple[Array, Array]:
 
 
 def _tables(rate: Array, C: Array, d: int) -> Array:
-    """Factors of waves in values, gradients and Hessians, shape (B, m, 6 P n, q).
+    """Factors of the waves w, w′, w″ in an output's value, gradient and Hessian, at B points.
 
-    Along the third axis are all parts, orders of the waves and modes, each with its real and its
-    imaginary part.
+    The output is 2 Re Σ_k C_k w(λ_k) over n modes and P parts (free motion and loads); q = 1 + d +
+    d (d + 1)/2 numbers are a value, a gradient and a Hessian's upper triangle.
 
     Args:
-        rate: Eigenvalues with derivatives, shape (q, B, n).
-        C: Shares of the motion's P parts likewise, shape (q, B, P, n, m).
+        rate: λ_k with derivatives, shape (q, B, n).
+        C: C_k with derivatives, shape (q, B, P, n, m).
         d: Number of parameters.
+
+    Returns:
+        Shape (B, m, 6 P n, q); the third axis runs over parts, orders of the wave's derivative and
+        modes, each with its real and imaginary part.
     """
     rate = rate[..., None, :, None]
     out = np.zeros((*C.shape[1:3], 3, *C.shape[3:], len(C)), complex)  # (B, P, 3, n, m, q)

@@ -19,7 +19,7 @@ from alphacut.fuzzy.progress_bar import Progress, subprogress
 
 LOG = logging.getLogger(__name__)
 
-LEFT = 0.02
+NEWTON_GAP = 0.02
 """Share of the gap that Newton's method may leave."""
 
 
@@ -56,7 +56,9 @@ def certify(
     budget: float = 4000,
     progress: Progress | None = None,
 ) -> Certificate:
-    """Attained and proved bounds of every output at each node and level, the narrowest level first.
+    """Attained and proved bounds of every output at each node and level, by branch and bound.
+
+    The narrowest level comes first, whose best points are good ones of the wider levels too.
 
     Args:
         model: The modal model.
@@ -71,47 +73,48 @@ def certify(
     Raises:
         ValueError: The model error alone exceeds the gap.
     """
-    model, unit, error = model.in_units(scale), scale[:, None], model_error / scale
+    model, error = model.in_units(scale), model_error / scale
     rounding = Remainder(model, *model.boxes.unit(0)).margin[..., 0]
     # so that rounding does not lift the gap above what was asked for
-    limit = float((2 * error + rounding).max())
-    slack = (1 - 1e-6) * gap - limit
-    if slack <= 0:
+    least_gap = float((2 * error + rounding).max())
+    search_gap = (1 - 1e-6) * gap - least_gap
+    if search_gap <= 0:
         raise ValueError(
-            f"certify: the gap {gap:.3g} is not above twice the model error, {limit:.3g}; ask"
+            f"certify: the gap {gap:.3g} is not above twice the model error, {least_gap:.3g}; ask"
             " for a wider gap or a lower tolerance"
         )
-    levels, done = len(model.boxes.alpha), list[tuple[Optima, Array, int]]()
+    levels, of_levels = len(model.boxes.alpha), list[tuple[Optima, Array, int]]()
     for level in reversed(range(levels)):
-        tick = subprogress(progress, len(done) / levels, (len(done) + 1) / levels)
+        tick = subprogress(progress, len(of_levels) / levels, (len(of_levels) + 1) / levels)
         lower, upper = model.boxes.unit(level)
-        optima = first_optima(model, lower, upper, LEFT * slack)
-        if done:  # what the level inside attains is attained here too
-            better = (inside := done[-1][0]).value > optima.value
+        optima = first_optima(model, lower, upper, NEWTON_GAP * search_gap)
+        if of_levels:  # what the level inside attains is attained here too
+            inside = of_levels[-1][0]
+            better = inside.value > optima.value
             optima.value[better], optima.point[better] = inside.value[better], inside.point[better]
         proved, used = enclosed(
             *(model, lower, upper, optima),
-            gap=slack,
+            gap=search_gap,
             budget=budget,
             workers=workers,
             progress=tick,
         )
         LOG.debug("branch and bound: level %g took %d boxes", model.boxes.alpha[level], used)
-        done.append((optima, proved, used))
+        of_levels.append((optima, proved, used))
     shape = (levels, *error.shape, 2)
-    inner = np.stack([optima.value for optima, *_ in done[::-1]]).reshape(shape)
-    at = np.stack([optima.point for optima, *_ in done[::-1]]).reshape(*shape, -1)
-    outer = np.stack([proved for _, proved, _ in done[::-1]]).reshape(shape)
+    inner = np.stack([optima.value for optima, *_ in of_levels[::-1]]).reshape(shape)
+    at = np.stack([optima.point for optima, *_ in of_levels[::-1]]).reshape(*shape, -1)
+    outer = np.stack([proved for _, proved, _ in of_levels[::-1]]).reshape(shape)
     # what holds on a wider box holds on those inside it
     outer = np.minimum.accumulate(outer, axis=0) + error[..., None]
     between = _between(model) + _growth(model, error)
     return Certificate(
-        (inner - (error + rounding)[..., None]) * unit,
-        at,
-        outer * unit,
-        between * scale,
-        2 * (error + rounding) * scale,
-        sum(used for *_, used in done),
+        bounds=(inner - (error + rounding)[..., None]) * scale[:, None],
+        at=at,
+        outer=outer * scale[:, None],
+        between=between * scale,
+        attained_error=2 * (error + rounding) * scale,
+        boxes=sum(used for *_, used in of_levels),
     )
 
 
