@@ -34,7 +34,10 @@ compiled = njit(cache=True, nogil=True, error_model="numpy")
 
 @compiled
 def separable(g: Array, H: Array, r: Array) -> float:
-    """Upper bound of g·x + x·H·x/2 for |x| ≤ r: mixed terms are moved to the diagonal."""
+    """Upper bound of g·x + x·H·x/2 for |x| ≤ r, as a sum of bounds along each axis.
+
+    Mixed terms are moved to the diagonal: 2 x_i x_j ≤ x_i² r_j/r_i + x_j² r_i/r_j.
+    """
     total = 0.0
     for i in range(len(r)):
         if r[i] <= 0:
@@ -54,10 +57,11 @@ def separable(g: Array, H: Array, r: Array) -> float:
 def stays_below(
     g: Array, H: Array, low: Array, high: Array, allowed: float, work: Array, L: Array
 ) -> bool:
-    """Shows by a concave function above that g·x + x·H·x/2 ≤ allowed for low ≤ x ≤ high.
+    """Whether g·x + x·H·x/2 ≤ allowed is shown for low ≤ x ≤ high; False if it stays open.
 
-    That is the same plus Σ s_i (x_i − low_i)(high_i − x_i)/2 (αBB: Adjiman, Floudas 1998). Above
-    it, where it is concave, lies each of its tangents. `work` (3, d) and `L` (d, d) are scratch.
+    The quadratic plus Σ s_i (x_i − low_i)(high_i − x_i)/2 lies above it (αBB: Adjiman, Floudas
+    1998). Where that is concave, each of its tangents is a bound; they are taken at points of an
+    ascent along the axes. `work` (3, d) and `L` (d, d) are scratch.
     """
     if allowed <= 0:
         return False
@@ -103,40 +107,42 @@ def stays_below(
             if high[i] <= low[i]:
                 continue
             bend = shift[i] - H[i, i]
-            moved = max(min(x[i] + slope[i] / bend, high[i]), low[i]) - x[i]
-            value += moved * (slope[i] - bend * moved / 2)
-            x[i] += moved
+            step = max(min(x[i] + slope[i] / bend, high[i]), low[i]) - x[i]
+            value += step * (slope[i] - bend * step / 2)
+            x[i] += step
             for j in range(d):
-                slope[j] += H[j, i] * moved
-            slope[i] -= shift[i] * moved
+                slope[j] += H[j, i] * step
+            slope[i] -= shift[i] * step
     return False
 
 
 @compiled
 def contract(bound: Array, r: Array, out: Array) -> None:
-    """Write to `out` (K,) the tensors `bound` (d^order, K) contracted with radii r on each axis."""
+    """Write Σ_ij… bound[ij…] r_i r_j … to `out` (K,), for K tensors `bound` (d^order, K)."""
     d = len(r)
     out[:] = 0.0
     for a in range(len(bound)):
-        weight, index, count = 1.0, a, len(bound)
-        while count > 1:
-            weight *= r[index % d]
-            index, count = index // d, count // d
+        weight, digits, count = 1.0, a, len(bound)
+        while count > 1:  # the digits of a to base d are the tensor's indices i, j, …
+            weight *= r[digits % d]
+            digits, count = digits // d, count // d
         for k in range(len(out)):
             out[k] += weight * bound[a, k]
 
 
 @compiled
 def linear_phase_remainder(reach: float, e: Array, c: Array) -> float:
-    """Bound, over |wave|, of the cubic remainder of a mode C exp(λ t) with a phase taken as linear.
+    """Bound of what a mode C exp(λ t) differs from one of linear phase beyond second order in x.
 
-    It is a sixth of a bound of the third derivative, by Leibniz' rule, of the difference from the
-    mode with C = C₀ and λ = λ₀ + i ω·x; infinite beyond `MAX_PHASE`.
+    The mode of linear phase has C = C₀ and λ = λ₀ + i ω·x. The bound is a sixth of one of the
+    difference's third derivative, by Leibniz' rule, divided by |exp(λ₀ t)|; infinite beyond
+    `MAX_PHASE` or `SWELL`.
 
     Args:
         reach: Largest change of phase |ω·x| t over the box.
-        e: Bounds over the box of the derivatives of λ t of order 0 to 3, order 1 of the real part.
-        c: The same of C.
+        e: Bounds over the box of the derivatives of λ t of order 0 to 3 times the radii; that of
+            order 1 is of the real part, that of order 0 is not read.
+        c: The same of C, with order 0.
     """
     z0, z1 = e[1] + e[2] / 2, e[1] + e[2]
     if not (reach < MAX_PHASE and z0 < SWELL):
@@ -151,29 +157,34 @@ def linear_phase_remainder(reach: float, e: Array, c: Array) -> float:
 
 @compiled
 def linear_phase_bound(
-    f: float, g: Array, H: Array, w: Array, t: float, side: float, modes: tuple[Array, ...], o: int
+    g: Array, H: Array, w: Array, t: float, side: float, modes: tuple[Array, ...], o: int
 ) -> float:
-    """Bound of a sum of modes A exp(i s) with linear phases s = ω·x, less its value in the centre.
+    """Make g·x + x·H·x/2 + the result an upper bound of side × (output − its central value).
 
-    With |s| ≤ S, Re A exp(i s) exceeds its quadratic Taylor model by at most |Im A| S³/24 + Im A S²
-    s/8 (Chebyshev) + max(Re A, 0) S² s²/24 + |Im A| S⁵/120 + |Re A| S⁶/720. The terms in x are
-    added to `g` and `H`, what is constant is returned.
+    With |s| ≤ S for a mode's phase s = ω·x, Re A exp(i s) exceeds its quadratic Taylor model by at
+    most |Im A| S³/24 + Im A S² s/8 (Chebyshev) + max(Re A, 0) S² s²/24 + |Im A| S⁵/120 + |Re A|
+    S⁶/720. Terms in x are added to `g` and `H`; the sum of the constant ones, with the bounds of
+    `linear_phase_remainder`, is returned.
+
+    `w` holds the waves exp(λ₀ t), real and imaginary parts in turn, (2 n,); `modes` C₀ (n, m, 2), ω
+    (n, d), bounds of |ω·x| and of |Re (λ − λ₀)| (n,), and of derivatives times radii, of λ of order
+    2 and 3, (2, n), and of C of order 0 to 3, (4, n, m).
     """
     share, slope, phase, decay, e, c = modes
     remainder, rates = 0.0, np.empty(4)
     for k in range(len(phase)):
         re, im = w[2 * k], w[2 * k + 1]
-        x = 2 * side * (share[k, o, 0] * re - share[k, o, 1] * im)
-        y = 2 * side * (share[k, o, 0] * im + share[k, o, 1] * re)
+        A_re = 2 * side * (share[k, o, 0] * re - share[k, o, 1] * im)
+        A_im = 2 * side * (share[k, o, 0] * im + share[k, o, 1] * re)
         S = phase[k] * t
         rates[1], rates[2], rates[3] = decay[k] * t, e[0, k] * t, e[1, k] * t
         remainder += 2 * sqrt(re * re + im * im) * linear_phase_remainder(S, rates, c[:, k, o])
-        remainder += abs(y) * (S**3 / 24 + S**5 / 120) + abs(x) * S**6 / 720
-        tilt, soft = y * S * S * t / 8, max(x, 0.0) * S * S * t * t / 12
+        remainder += abs(A_im) * (S**3 / 24 + S**5 / 120) + abs(A_re) * S**6 / 720
+        linear, quadratic = A_im * S * S * t / 8, max(A_re, 0.0) * S * S * t * t / 12
         for i in range(len(g)):
-            g[i] += tilt * slope[k, i]
+            g[i] += linear * slope[k, i]
             for j in range(len(g)):
-                H[i, j] += soft * slope[k, i] * slope[k, j]
+                H[i, j] += quadratic * slope[k, i] * slope[k, j]
     return remainder
 
 
@@ -213,6 +224,9 @@ def examine(
 ) -> tuple[Rows, Array, Array]:
     """Examine all items: what is done next with each, its value and its upper bound.
 
+    An item is a box with a problem, an output and side at a time node; a row is a box with a node.
+    About a box's centre side × output is f + g·x + x·S·x/2 up to `missing`, |x| ≤ r.
+
     Returns:
         Codes (0: closed; 1 + i: bisect along axis i; `FACES` and more: confine to faces), side ×
         output at the centres, and upper bounds over the boxes, each with an entry for each item.
@@ -237,7 +251,7 @@ def examine(
     (d, m), n, q = (centre.shape[1], tables.shape[1]), shares.shape[1], tables.shape[3]
     code, value = np.zeros(len(column), np.int64), np.zeros(len(column))
     bound = np.zeros(len(column))
-    J, H, g, S, pull, bent = (
+    J, H, g, S, third_change, second_change = (
         np.empty(q), np.empty((d, d)), np.empty(d), np.empty((d, d)), np.empty(d), np.empty(d),
     )  # fmt: skip
     low, high, span, work, L = (
@@ -267,38 +281,38 @@ def examine(
             for item in range(item_start[row], item_start[row + 1]):
                 o, side = column[item] // 2, 2.0 * (column[item] % 2) - 1
                 problem = node * 2 * m + column[item]
-                noise, missing = margin[node, o, 0], margin[node, o, 0]
+                noise = missing = margin[node, o, 0]  # missing: rounding and cubic terms
                 if o != before:
                     taylor(waves[row], tables[b, o], J, H)
                     before = o
-                for i in range(d):
-                    pull[i] = bent[i] = 0.0
+                for i in range(d):  # slope changes over the box: by H; twice that by third order
+                    third_change[i] = second_change[i] = 0.0
                     for j in range(d):
-                        bent[i] += abs(H[i, j]) * r[j]
+                        second_change[i] += abs(H[i, j]) * r[j]
                         for k in range(d):
-                            pull[i] += third[node, o, i, j, k] * r[j] * r[k]
-                    missing += pull[i] * r[i] / 6
+                            third_change[i] += third[node, o, i, j, k] * r[j] * r[k]
+                    missing += third_change[i] * r[i] / 6
                 f, target = side * J[0], values[problem] + gap
-                faces, stride, inner = 0, 1, False
+                faces, stride, is_monotone_inside = 0, 1, False
                 for i in range(d):
                     g[i] = side * J[1 + i]
                     for j in range(d):
                         S[i, j] = side * H[i, j]
-                    wander = pull[i] / 2 + margin[node, o, 1 + i]
-                    if r[i] > 0 and abs(g[i]) > bent[i] + wander:
+                    slope_margin = third_change[i] / 2 + margin[node, o, 1 + i]
+                    if r[i] > 0 and abs(g[i]) > second_change[i] + slope_margin:
                         up = 1 if g[i] > 0 else 0
                         if edges[b, up, i]:
                             faces += stride * (1 + up)
                         else:
-                            inner = True  # the neighbour holds higher points
+                            is_monotone_inside = True  # the neighbouring box holds higher points
                     stride *= 3
                 value[item] = f
                 bound[item] = f + separable(g, S, r) + missing
-                if inner or bound[item] <= target:
+                if is_monotone_inside or bound[item] <= target:
                     continue
-                if linear_phases:
+                if linear_phases:  # bound by modes of linear phase
                     room = target - f - noise
-                    room -= linear_phase_bound(f, g, S, waves[row], time[node], side, modes, o)
+                    room -= linear_phase_bound(g, S, waves[row], time[node], side, modes, o)
                     for i in range(d):
                         low[i], high[i] = -r[i], r[i]
                     if separable(g, S, r) <= room or stays_below(g, S, low, high, room, work, L):
@@ -310,11 +324,11 @@ def examine(
                 if faces:
                     code[item] = FACES + faces
                     continue
-                for i in range(d):
+                for i in range(d):  # bound by a concave function above the quadratic
                     low[i], high[i] = -r[i], r[i]
                 if stays_below(g, S, low, high, target - f - missing, work, L):
                     continue
-                near = True
+                near = True  # bound by the quadratic about the best point, if that is near
                 for i in range(d):
                     low[i] = centre[b, i] - r[i] - points[problem, i]
                     high[i] = centre[b, i] + r[i] - points[problem, i]
@@ -333,10 +347,10 @@ def examine(
                     room = gap - noise - (side * jet[0] - values[problem])
                     if stays_below(g, S, low, high, room, work, L):
                         continue
-                most = -1.0
+                most = -1.0  # bisect along the axis that adds most to what is not known
                 for i in range(d):
-                    wander = pull[i] / 2 + margin[node, o, 1 + i]
-                    weight = r[i] * (2 * wander + bent[i] / 2)
+                    slope_margin = third_change[i] / 2 + margin[node, o, 1 + i]
+                    weight = r[i] * (2 * slope_margin + second_change[i] / 2)
                     if r[i] > 0 and weight > most:
                         most, code[item] = weight, 1 + i
     return code, value, bound

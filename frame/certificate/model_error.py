@@ -34,7 +34,10 @@ Sample = Callable[[Array], dict[str, Array]]
 
 
 def proved_error(model: ModalModel) -> Array:
-    """Bound of |model − true motion| over the box, shape (T, m), in units of the outputs.
+    """Bound of |modal model − true motion| over the box, shape (T, m), in units of the outputs.
+
+    Defects of the model in the equations of motion push the motion off in the norm of energy; an
+    output reads a part of this deviation, and its own defects add to it.
 
     Raises:
         UnprovedError: The structure is not known to be a polynomial that loses energy, or the
@@ -43,17 +46,17 @@ def proved_error(model: ModalModel) -> Array:
     reach, m = np.ones(len(model.boxes.names)), len(model.outputs)
     ratio, growth = RatioDamping.from_model(model), largest_growth(model.eigenvalue, reach)
     states = fit_states(model)
-    samples = [
+    defects_of_parts = [
         (part, partial(_defects, model, part, states, ratio)) for part in parts(model, growth)
     ]
     grid = _grid(model)
-    for _, sample in samples:
-        _require_affordable(grid, sample)
+    for _, defects in defects_of_parts:
+        _require_affordable(grid, defects)
     structure = _expanded(grid, partial(_structure, model))
     stiffness, mass = LoewnerBounds(structure["stiffness"]), LoewnerBounds(structure["mass"])
     deviation, output_error = np.zeros(len(model.time)), np.zeros((len(model.time), m))
-    for part, sample in samples:
-        defect = _expanded(grid, sample)
+    for part, defects in defects_of_parts:
+        defect = _expanded(grid, defects)
         if isinstance(part.load, Direct):
             output_error += 2 * part.waves[0][:, :1] * np.abs(defect["outputs"][:, 0]).sum(0)
             continue
@@ -61,35 +64,41 @@ def proved_error(model: ModalModel) -> Array:
         for k in range(model.count):
             force = mass.sup_dual(defect["dynamic"][:, k])
             if ratio is not None:
-                damped = ratio.missed(defect, k, stiffness, mass)
-                force += damped
-                output_error += 2 * part.waves[0][:, k : k + 1] * damped / ratio.root_masses
-            missed = np.hypot(stiffness.sup(defect["kinematic"][:, k]), force)
-            deviation += 2 * missed * part.elapsed[:, k]
+                damping_error = ratio.damping_error(defect, k, stiffness, mass)
+                force += damping_error
+                wave = part.waves[0][:, k : k + 1]
+                output_error += 2 * wave * damping_error / ratio.root_masses
+            energy_rate = np.hypot(stiffness.sup(defect["kinematic"][:, k]), force)
+            deviation += 2 * energy_rate * part.elapsed[:, k]
         largest = suprema(part.share, reach)[0].reshape(model.count, m)
-        output_error += (
-            2
-            * part.waves[0]
-            @ (np.abs(defect["outputs"]).sum(0) + part.left_out[:, None] * largest)
-        )
-    return deviation[:, None] * _reading(structure["rows"], stiffness, mass, ratio) + output_error
+        of_modes = np.abs(defect["outputs"]).sum(0) + part.left_out[:, None] * largest
+        output_error += 2 * part.waves[0] @ of_modes
+    gain = _output_gains(structure["rows"], stiffness, mass, ratio)
+    return deviation[:, None] * gain + output_error
 
 
-def _reading(
+def _output_gains(
     rows: Array, stiffness: LoewnerBounds, mass: LoewnerBounds, ratio: RatioDamping | None
 ) -> Array:
-    """Share of a deviation of unit energy that each output reads, shape (m,)."""
+    """Bound of each output's error over the deviation √(qᵀ K q + vᵀ M v), shape (m,).
+
+    Args:
+        rows: Chebyshev coefficients of the outputs' rows on [q, v], shape (J, m, 2N).
+        stiffness: K over the box.
+        mass: M over the box.
+        ratio: Damping by one ratio, which accelerations of floors read too; None for other damping.
+    """
     size = len(stiffness.factor)
     rows = np.moveaxis(rows, 1, 0)  # (m, J, 2N)
-    moved = np.array([stiffness.sup_dual(row[:, :size]) for row in rows])
-    speeding = np.array([mass.sup_dual(row[:, size:]) for row in rows])
+    of_displacement = np.array([stiffness.sup_dual(row[:, :size]) for row in rows])
+    of_velocity = np.array([mass.sup_dual(row[:, size:]) for row in rows])
     if ratio is not None:
-        speeding = speeding + ratio.read(stiffness, mass)
-    return np.asarray(np.hypot(moved, speeding))
+        of_velocity = of_velocity + ratio.acceleration_gains(stiffness, mass)
+    return np.asarray(np.hypot(of_displacement, of_velocity))
 
 
 def _grid(model: ModalModel) -> LowerGrid:
-    """Points on which all defects are known by their values."""
+    """Grid of unit coordinates whose values determine all defects, which are polynomials."""
     ends = zip(model.boxes.lower[0].tolist(), model.boxes.upper[0].tolist(), strict=True)
     exponents = polynomial_dependence.degrees(
         model.flow.system, dict(zip(model.boxes.names, ends, strict=True))
@@ -98,10 +107,10 @@ def _grid(model: ModalModel) -> LowerGrid:
 
 
 def _require_affordable(grid: LowerGrid, sample: Sample) -> None:
-    """Refuse a grid on which the numbers of `sample` are too many.
+    """Refuse a grid on which the arrays of `sample` take more than `MOST_NUMBERS` numbers.
 
     Raises:
-        UnprovedError: They are.
+        UnprovedError: They do.
     """
     d = len(grid.degrees)
     values = sample(np.zeros((1, d))).values()
@@ -124,7 +133,7 @@ def _expanded(grid: LowerGrid, sample: Sample) -> dict[str, Array]:
 
 
 def _structure(model: ModalModel, unit: Array) -> dict[str, Array]:
-    """The matrices that measure what the motion misses."""
+    """Values of M, K and the outputs' rows at unit coordinates (S, d), by name."""
     matrices, rows = _evaluate(model, unit)
     return {"mass": matrices.mass.value, "stiffness": matrices.stiffness.value, "rows": rows.value}
 
@@ -171,7 +180,13 @@ def _start(
 def _size_of_start(
     defect: dict[str, Array], stiffness: LoewnerBounds, mass: LoewnerBounds
 ) -> float:
-    """Bound of what a start misses in the norm of energy; ‖q‖ in that of K is ‖K q‖ in K⁻¹'s."""
+    """Bound of the initial conditions' defect in the norm √(qᵀ K q + vᵀ M v).
+
+    Args:
+        defect: Chebyshev coefficients of the residuals of `_start`, of q and v or of K q and M v.
+        stiffness: K over the box.
+        mass: M over the box.
+    """
     if "start_q" in defect:
         return float(np.hypot(stiffness.sup(defect["start_q"]), mass.sup(defect["start_v"])))
     spring, momentum = defect["start_spring"], defect["start_momentum"]
@@ -194,7 +209,7 @@ def _defects(
     ratio: RatioDamping | None,
     unit: Array,
 ) -> dict[str, Array]:
-    """Defects of one part of the motion at unit coordinates (S, d), by name.
+    """Defects of one part of the modal model in the equations of motion, by name.
 
     Args:
         model: The modal model.
@@ -214,7 +229,7 @@ def _defects(
     rate = model.eigenvalue(unit)[..., None]
     column = 0 if part.load is None else 1 + part.number
     z = states[column](unit).reshape(len(unit), model.count, -1)  # (S, n, 2N)
-    shape, speed = np.split(z, 2, axis=-1)
+    shape, speed = np.split(z, 2, axis=-1)  # φ and w
     defects = {
         **_start(system, matrices, part, 2 * shape.real.sum(1), 2 * speed.real.sum(1)),
         "kinematic": rate * shape - speed,
@@ -222,8 +237,8 @@ def _defects(
         "outputs": part.share(unit).reshape(len(unit), model.count, -1) - z @ C.swapaxes(-1, -2),
     }
     if ratio is not None:
-        more, ratio_defect = ratio.defects(unit, model.boxes.to_physical(unit), speed, M, K)
-        defects |= {**ratio_defect, "dynamic": defects["dynamic"] + more}
+        damping, ratio_defect = ratio.defects(unit, model.boxes.to_physical(unit), speed, M, K)
+        defects |= {**ratio_defect, "dynamic": defects["dynamic"] + damping}
         for column, floor in polynomial_dependence.accelerations(system).items():
-            defects["outputs"][..., column] += more[..., floor] / M[:, None, floor, floor]
+            defects["outputs"][..., column] += damping[..., floor] / M[:, None, floor, floor]
     return defects

@@ -93,8 +93,8 @@ class RatioDamping:
         ratio: ζ, a number, or the place of its parameter.
         largest: Its largest value in the box.
         model: The modal model.
-        squared: μ_k, n polynomials.
-        frequency: σ_k, n polynomials.
+        squared: μ_k ≈ |λ_k|², n polynomials.
+        frequency: σ_k ≈ √μ_k, n polynomials.
     """
 
     ratio: float | int
@@ -105,28 +105,27 @@ class RatioDamping:
 
     @classmethod
     def from_model(cls, model: ModalModel) -> Self | None:
-        """Damping of a model by its ratio; None without one."""
+        """Damping by a model's one ratio, with polynomials fitted; None if it has no ratio."""
         ratio = next(iter(model.flow.system.ratios), None)
         if ratio is None:
             return None
         value = model.flow.system.parameters[ratio] if isinstance(ratio, str) else ratio
-        input_and_end: tuple[float | int, float] = float(value), float(value)
+        number_or_input: float | int = float(value)
+        largest = float(value)
         if ratio in model.flow.names:
             index = model.flow.names.index(str(ratio))
-            input_and_end = index, float(model.boxes.upper[0, index])
+            number_or_input, largest = index, float(model.boxes.upper[0, index])
         unit = fit_points(len(model.boxes.names), model.degree)
         rate = analyse(model.flow, model.boxes, unit, model.chosen).eigenvalue
         real, imaginary = rate.map(np.real), rate.map(np.imag)
         squared = real * real + imaginary * imaginary
-        polynomials = (fit(unit, part, model.degree) for part in (squared, squared**0.5))
-        return cls(*input_and_end, model, *polynomials)
+        polynomials = (fit(unit, jet, model.degree) for jet in (squared, squared**0.5))
+        return cls(number_or_input, largest, model, *polynomials)
 
     def defects(
         self, unit: Array, points: Array, speed: Array, M: Array, K: Array
     ) -> tuple[Array, dict[str, Array]]:
-        """Polynomial damping force 2 ζ σ M w on each mode (S, n, N), and its defects by name.
-
-        The defects are `own` = (K − μ M) w, `root` = μ − σ² and `speed` = w.
+        """Polynomial damping force 2 ζ σ M w on each mode, and what bounds its error.
 
         Args:
             unit: Unit coordinates, shape (S, d).
@@ -134,6 +133,10 @@ class RatioDamping:
             speed: Velocities w of the modes, shape (S, n, N).
             M: Masses, shape (S, N, N).
             K: Stiffnesses, shape (S, N, N).
+
+        Returns:
+            The force, (S, n, N), and by name "own" (K − μ M) w, (S, n, N), "root" μ − σ², (S, n),
+            and "speed" w, with μ and σ the polynomials of the squared frequency and the frequency.
         """
         zeta = (
             points[:, self.ratio] if isinstance(self.ratio, int) else np.full(len(unit), self.ratio)
@@ -143,8 +146,8 @@ class RatioDamping:
         residual = speed @ K - squared[..., None] * (speed @ M)
         return force, {"own": residual, "root": squared - frequency**2, "speed": speed}
 
-    def read(self, stiffness: LoewnerBounds, mass: LoewnerBounds) -> Array:
-        """Bound of the damping force over a floor's mass, over ‖v‖ in the norm of M, (m,)."""
+    def acceleration_gains(self, stiffness: LoewnerBounds, mass: LoewnerBounds) -> Array:
+        """Bound of a floor's acceleration by the damping force over ‖v‖ in the norm of M, (m,)."""
         fastest = np.sqrt(stiffness.most(mass))
         return np.asarray(2 * self.largest * fastest / self.root_masses)
 
@@ -161,27 +164,35 @@ class RatioDamping:
             roots[row] = np.sqrt(lower_ends.get(name, system.parameters[name]))
         return roots
 
-    def missed(
+    def damping_error(
         self, defect: dict[str, Array], mode: int, stiffness: LoewnerBounds, mass: LoewnerBounds
     ) -> float:
-        """Bound of what the polynomial force misses of a mode's damping, in the norm of M⁻¹."""
-        root = np.sqrt(_least(self.squared)[mode])
-        rounded = float(np.abs(defect["root"][:, mode]).sum()) / (
-            root + _least(self.frequency)[mode]
-        )
-        speed_error = mass.sup_dual(defect["own"][:, mode]) / (
-            np.sqrt(stiffness.least(mass)) + root
-        )
+        """Bound of the error of a mode's polynomial damping force, in the norm of M⁻¹.
+
+        2 ζ (|μ − σ²| / (√μ + σ) ‖w‖_M + ‖(K − μ M) w‖ / (√λ + √μ)), λ the least eigenvalue of K
+        against M (module docstring).
+
+        Args:
+            defect: Chebyshev coefficients of the defects by name, as of `defects`.
+            mode: Number of the mode.
+            stiffness: K over the box.
+            mass: M over the box.
+        """
+        root = np.sqrt(_lower_bounds(self.squared)[mode])
+        root_error = float(np.abs(defect["root"][:, mode]).sum())
+        root_error /= root + _lower_bounds(self.frequency)[mode]
+        residual = mass.sup_dual(defect["own"][:, mode])
+        residual /= np.sqrt(stiffness.least(mass)) + root
         return float(
-            2 * self.largest * (rounded * mass.sup(defect["speed"][:, mode]) + speed_error)
+            2 * self.largest * (root_error * mass.sup(defect["speed"][:, mode]) + residual)
         )
 
 
-def _least(polynomial: Polynomial) -> Array:
-    """Lower bounds of real polynomials over the unit box, all positive, shape (K,).
+def _lower_bounds(polynomial: Polynomial) -> Array:
+    """Lower bounds of K real polynomials over the unit box, shape (K,).
 
     Raises:
-        UnprovedError: One may vanish.
+        UnprovedError: One is not positive.
     """
     least: Array = polynomial.coefficients[0] - np.abs(polynomial.coefficients[1:]).sum(0)
     if not (least > 0).all():

@@ -27,16 +27,16 @@ ROUNDING = 1e-13
 
 
 def suprema(polynomial: Polynomial, reach: Array) -> list[Array]:
-    """Bounds of the derivatives of K polynomials over the box |u_i| ≤ reach_i, orders 0 to 3.
+    """Upper bounds of the |derivatives| of K polynomials over the box |u_i| ≤ reach_i.
 
     Returns:
-        Four arrays, of shape (d,) * order + (K,): sums of |coefficient| times its monomial's bound.
+        Of order 0 to 3, shapes (d,) * order + (K,): Σ |coefficient| times its monomial's bound.
     """
     d = polynomial.index.shape[1]
-    size = np.prod(reach**polynomial.index, axis=1)
+    monomial_bounds = np.prod(reach**polynomial.index, axis=1)
 
     def bound(coefficients: Array) -> Array:
-        return np.asarray(size @ np.abs(coefficients))
+        return np.asarray(monomial_bounds @ np.abs(coefficients))
 
     zero = bound(polynomial.coefficients)
     first = np.stack([bound(polynomial.gradient[i]) for i in range(d)])
@@ -81,7 +81,7 @@ class MotionPart:
 
 
 def parts(model: ModalModel, growth: Array) -> list[MotionPart]:
-    """The free part of a model and the part of each load, with bounds of their time functions.
+    """The free part of a model's motion, then the part of each load, with bounds over time.
 
     Args:
         model: The modal model.
@@ -89,15 +89,14 @@ def parts(model: ModalModel, growth: Array) -> list[MotionPart]:
     """
     time = model.time[:, None]
     powers = time ** np.arange(4)[:, None, None]
-    elapsed = np.where(
-        growth == 0, time, np.expm1(growth * time) / np.where(growth == 0, 1.0, growth)
-    )
+    divisor = np.where(growth == 0, 1.0, growth)
+    elapsed = np.where(growth == 0, time, np.expm1(growth * time) / divisor)
     free = MotionPart(
-        model.coefficient,
-        powers * np.exp(growth * time),
-        elapsed,
-        np.ones(len(time)),
-        np.zeros(model.count),
+        share=model.coefficient,
+        waves=powers * np.exp(growth * time),
+        elapsed=elapsed,
+        push=np.ones(len(time)),
+        left_out=np.zeros(model.count),
     )
     return [free, *(_forced_part(model, growth, k) for k in range(len(model.loads)))]
 
@@ -150,21 +149,21 @@ def _kernel_maxima(growth: Array, step: float, count: int, power: int) -> Array:
     """
     ends = (np.arange(count + 1) * step)[:, None]
     value = ends**power * np.exp(growth * ends)
-    peak = -power / np.where(growth < 0, growth, -1e-300)
-    inside = (peak > ends[:-1]) & (peak < ends[1:])
-    summit = np.where(inside, peak, 0.0) ** power * np.exp(-float(power))
-    return np.asarray(np.maximum(np.maximum(value[:-1], value[1:]), np.where(inside, summit, 0.0)))
+    peak_time = -power / np.where(growth < 0, growth, -1e-300)
+    inside = (peak_time > ends[:-1]) & (peak_time < ends[1:])
+    peak = np.where(inside, peak_time, 0.0) ** power * np.exp(-float(power))
+    return np.asarray(np.maximum(np.maximum(value[:-1], value[1:]), np.where(inside, peak, 0.0)))
 
 
 def _convolution_bounds(kernel: Array, size: Array) -> Array:
-    """Upper bounds of ∫ kernel(τ) |a(t − τ)| dτ at t = 0 and the ends of J intervals.
+    """Upper bounds of ∫ kernel(τ) |a(t − τ)| dτ at t = 0 and the ends of J equal intervals.
+
+    Args:
+        kernel: Maxima of the kernel over the intervals, shape (…, J, n).
+        size: ∫ |a| over each interval, shape (J,).
 
     Returns:
         Upper sums with the rounding of the Fourier transforms, shape (…, J + 1, n).
-
-    Args:
-        kernel: Its maxima over the intervals, shape (…, J, n).
-        size: ∫ |a| over them, shape (J,).
     """
     from scipy.signal import oaconvolve  # which takes time to import
 
@@ -219,27 +218,28 @@ class Remainder:
 def _rounding_bound(model: ModalModel, rate: Array, load: LoadTables | None) -> Array:
     """Bound of the relative rounding error of each mode's motion at each node, shape (T, n).
 
-    The rounding of λ enters exp(λ t) times |λ| t. A load's response is a Taylor series in λ, whose
-    terms may exceed its sum by the factor exp(REACH).
+    It is ε times a count of operations. The rounding of λ enters exp(λ t) times |λ| t. A load's
+    response is a Taylor series in λ, whose terms may exceed its sum by the factor exp(REACH).
 
     Args:
         model: The modal model.
         rate: Bounds of |λ_k|, shape (n,), in 1/s.
         load: The load; None for the free motion.
     """
-    count, d = model.eigenvalue.index.shape
-    polynomial = count + model.degree + 2
+    n_terms, d = model.eigenvalue.index.shape
+    of_polynomial = n_terms + model.degree + 2
     phase = rate * model.time[:, None]
-    operations = polynomial * (2 + phase) + 12 * model.count + 4 * d**3 + 50
+    operations = of_polynomial * (2 + phase) + 12 * model.count + 4 * d**3 + 50
     if load is not None:
         operations = operations + (8 * load.longest + MOST_TERMS) * np.exp(REACH)
     return np.finfo(float).eps * operations
 
 
 def _initial_third_derivatives(model: ModalModel, reach: Array) -> Array:
-    """Bounds of third derivatives of the outputs at t = 0, |u_i| ≤ reach_i, shape (m, d, d, d).
+    """Bounds of the outputs' third derivatives by u at t = 0, |u_i| ≤ reach_i, shape (m, d, d, d).
 
-    They are summed over the modes before they are bounded, since most of the sum cancels.
+    The polynomials 2 Re C_k are summed over the modes before they are bounded, since most of the
+    sum cancels.
     """
     coefficients = model.coefficient.coefficients
     mode_sum = 2 * coefficients.reshape(len(coefficients), model.count, -1).sum(1).real

@@ -114,7 +114,7 @@ class Search:
         fitting, searching = subprogress(progress, 0.0, 0.1), subprogress(progress, 0.1, 1.0)
         fitting(0.5)
         rough = _rough(model, flow)
-        exact = ExactResponse.from_model(model, flow.scale, bent=not rough)
+        exact = ExactResponse.from_model(model, flow.scale, has_hessian=not rough)
         # each search works on polynomials where they are accurate enough, else on exact motions
         is_accurate = bool((model.error / flow.scale).max() <= SMALL * tolerance)
         second = fit_modes(
@@ -184,7 +184,7 @@ class Search:
             raise ModalError("search: the system is not linear; take the Graph Follower")
         least_gain = SMALL * flow.tolerance(self.tolerance)
         model = fit_modes(flow.flow, flow.boxes, tolerance=least_gain, scale=flow.scale)
-        exact = ExactResponse.from_model(model, flow.scale, bent=not _rough(model, flow))
+        exact = ExactResponse.from_model(model, flow.scale, has_hessian=not _rough(model, flow))
         levels, solved = len(flow.boxes.alpha), list[Optima]()
         for done, level in enumerate(reversed(range(levels))):
             box = (*flow.boxes.unit(level), least_gain)
@@ -385,7 +385,7 @@ def _second_response(model: ModalModel, flow: UnitFlow, *, is_accurate: bool) ->
     if is_accurate:
         return model.in_units(flow.scale)
     return ExactResponse.from_model(
-        model, flow.scale, bent=model.degree > 1 and not _rough(model, flow)
+        model, flow.scale, has_hessian=model.degree > 1 and not _rough(model, flow)
     )
 
 

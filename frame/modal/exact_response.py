@@ -31,18 +31,20 @@ class ExactResponse:
         model: Polynomials of the same structure, in the units wanted.
         scale: What the outputs are divided by, shape (m,).
         loads: Tables of all modes' answers to the loads, and what these add at once.
-        bent: Whether the polynomials are good enough for second derivatives; else these are zero,
-            and Newton's method learns them from gradients.
+        has_hessian: Whether the polynomials are good enough for second derivatives; else these are
+            zero, and Newton's method learns them from gradients.
     """
 
     model: ModalModel
     scale: Array
     loads: tuple[LoadTables, ...]
-    bent: bool = True
+    has_hessian: bool = True
     secant: ClassVar[bool] = True
 
     @classmethod
-    def from_model(cls, model: ModalModel, scale: Array, *, bent: bool = True) -> ExactResponse:
+    def from_model(
+        cls, model: ModalModel, scale: Array, *, has_hessian: bool = True
+    ) -> ExactResponse:
         """Exact response of the structure of `model`, outputs divided by `scale` (m,).
 
         Loads are tabulated for all modes, those that the model leaves out too.
@@ -50,13 +52,13 @@ class ExactResponse:
         Raises:
             ModalError: Under a load, a mode does not oscillate.
         """
-        flow, cuts, loads = model.flow, model.boxes, model.loads
+        flow, boxes, loads = model.flow, model.boxes, model.loads
         if loads and len(model.chosen) < len(frequencies(flow.system)):
-            points = fit_points(len(cuts.names), 2)
-            rate = fit(points, analyse(flow, cuts, points).eigenvalue, 2)
+            points = fit_points(len(boxes.names), 2)
+            rate = fit(points, analyse(flow, boxes, points).eigenvalue, 2)
             zero = Polynomial(rate.index, np.zeros_like(rate.coefficients))
             loads = tuple(replace(load, rate=rate, share=zero) for load in loads)
-        return cls(model.in_units(scale), scale, loads, bent)
+        return cls(model.in_units(scale), scale, loads, has_hessian)
 
     @property
     def time(self) -> Array:
@@ -76,18 +78,21 @@ class ExactResponse:
         """One output at one node for each of N points, unit coordinates (N, d), with derivatives.
 
         Returns:
-            Exact values (N,) and gradients (N, d); Hessians (N, d, d) of the polynomials, or zero
-            where `bent` is false.
+            Exact values (N,) and gradients (N, d); Hessians (N, d, d) of the polynomials, zero
+            without `has_hessian`.
         """
         f, g = self._values_and_gradients(unit, node, output, 1)
-        if self.bent:
+        if self.has_hessian:
             return f, g, self.model.at(unit, node, output)[2]
         return f, g, np.zeros((*unit.shape, unit.shape[1]))
 
     def _values_and_gradients(
         self, unit: Array, node: Rows, output: Rows, order: int
     ) -> tuple[Array, Array]:
-        """Values (N,) and, if `order` is 1 (else undefined), gradients (N, d) at points (N, d)."""
+        """Values (N,) of one output at one node for each of N points, and gradients (N, d).
+
+        Gradients are undefined where `order`, 0 or 1, is 0.
+        """
         f, g = np.empty(len(unit)), np.empty(unit.shape)
         for rows, points, indices in point_chunks(unit):
             modes = analyse(self.model.flow, self.model.boxes, points, order=order)
@@ -99,7 +104,7 @@ class ExactResponse:
     def _at_modes(
         self, modes: Modes, indices: Rows, node: Rows, output: Rows
     ) -> tuple[Array, Array]:
-        """Output 2 Re Σ C_k w(λ_k), over free motion and loads, of one set of modes a point.
+        """Outputs 2 Re Σ C_k w(t; λ_k), over modes k, free motion and loads, with gradients.
 
         Args:
             modes: Modes with first derivatives at the distinct points.

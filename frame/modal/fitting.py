@@ -49,7 +49,7 @@ def fit_modes(
     energy: bool = False,
     degree: int | None = None,
 ) -> ModalModel:
-    """Fits modal models of rising polynomial degree until test trajectories meet `tolerance`.
+    """Fits modal models of rising polynomial degree until held-out trajectories meet `tolerance`.
 
     Args:
         flow: Flow whose trajectories the model approximates and is tested against.
@@ -69,25 +69,25 @@ def fit_modes(
     """
     d = len(flow.names)
     tests = _held_out(d)
-    truth, scale = flow.values(boxes.to_physical(tests)), np.asarray(scale)
-    allowed = tolerance / 4 * np.broadcast_to(scale, truth.shape[-1:])
+    reference, scale = flow.values(boxes.to_physical(tests)), np.asarray(scale)
+    allowed = tolerance / 4 * np.broadcast_to(scale, reference.shape[-1:])
     chosen = needed_modes(flow, boxes, allowed, energy=energy)
     best: ModalModel | None = None
-    fitted_modes, reached = list[Modes](), list[float]()
+    fitted_modes, errors = list[Modes](), list[float]()
     degrees = range(2, 13 if d <= MANY else 3) if degree is None else (degree,)
     for total in degrees:
         points = fit_points(d, total)
         if len(tests) + len(points) > budget or terms(d, total) > MOST_TERMS:
             break
-        count = sum(len(some.eigenvalue.value) for some in fitted_modes)
-        if count < len(points):  # the points of lower degrees are among them
-            fitted_modes.append(analyse(flow, boxes, points[count:], chosen))
+        n_analysed = sum(len(some.eigenvalue.value) for some in fitted_modes)
+        if n_analysed < len(points):  # the points of lower degrees are among them
+            fitted_modes.append(analyse(flow, boxes, points[n_analysed:], chosen))
         model = _model_from_modes(flow, boxes, points, joined(fitted_modes), total, chosen)
-        error = np.abs(model.values(tests) - truth).max(0)
-        reached.append(float((error / scale).max()))
-        if best is None or reached[-1] < (best.error / scale).max():
+        error = np.abs(model.values(tests) - reference).max(0)
+        errors.append(float((error / scale).max()))
+        if best is None or errors[-1] < (best.error / scale).max():
             best = replace(model, error=error, analyses=len(tests) + len(points))
-        if reached[-1] <= tolerance or hopeless(reached, tolerance, d, budget):
+        if errors[-1] <= tolerance or out_of_reach(errors, tolerance, d, budget):
             break
     if best is None:
         raise ModalError(
@@ -102,19 +102,19 @@ def fit_modes(
     return best
 
 
-def hopeless(reached: Sequence[float], tolerance: float, d: int, budget: int) -> bool:
-    """Tells whether no degree within the budget reaches the tolerance at the rate seen so far.
+def out_of_reach(errors: Sequence[float], tolerance: float, d: int, budget: int) -> bool:
+    """Whether no degree within the budget meets the tolerance at the rate of decay seen so far.
 
     Args:
-        reached: Errors of degrees 2, 3, …
+        errors: Errors of the fits of degrees 2, 3, …
         tolerance: The error needed.
         d: Number of parameters.
         budget: Most eigen-analyses.
     """
-    if len(reached) < 3 or not 0 < reached[-1] < reached[-3]:
-        return len(reached) >= 4 and reached[-1] >= reached[-3]
-    rate = (reached[-1] / reached[-3]) ** 0.5
-    degree = 1 + len(reached) + log(tolerance / reached[-1]) / log(rate)
+    if len(errors) < 3 or not 0 < errors[-1] < errors[-3]:
+        return len(errors) >= 4 and errors[-1] >= errors[-3]
+    rate = (errors[-1] / errors[-3]) ** 0.5  # factor of the error by a degree more
+    degree = 1 + len(errors) + log(tolerance / errors[-1]) / log(rate)
     needed = ceil(degree) - 1  # a degree of grace
     return (
         needed > 12
@@ -126,8 +126,8 @@ def hopeless(reached: Sequence[float], tolerance: float, d: int, budget: int) ->
 def fit_points(d: int, degree: int) -> Array:
     """Points of the unit box for a fit of total `degree` in d variables, shape (S, d).
 
-    The centre comes first, then Chebyshev points: at least 2.5 data a coefficient up to six
-    variables and 5 beyond, with value, gradient and Hessian of each point as data.
+    The centre comes first, then Chebyshev points. With value, gradient and Hessian of each point
+    there are at least 2.5 data a coefficient up to six variables, and 5 beyond.
     """
     data = 1 + d + d * (d + 1) // 2
     count = ceil((2.5 if d <= 6 else 5) * terms(d, degree) / data)
@@ -135,11 +135,11 @@ def fit_points(d: int, degree: int) -> Array:
 
 
 def fit_states(model: ModalModel) -> list[Polynomial]:
-    """Fits polynomials of the modal states z_k = [φ_k; λ_k φ_k], q(t) = 2 Re Σ φ_k exp(λ_k t).
+    """Fits polynomials to the modal states z_k = [φ_k; λ_k φ_k], q(t) = 2 Re Σ φ_k exp(λ_k t).
 
     Returns:
-        Vectors of n · 2N polynomials, mode by mode, of n modes and N unknowns: φ_k scaled by the
-        initial state, then φ_k scaled by a unit impulse of each load.
+        First with φ_k scaled by the initial state, then one entry for each load with φ_k scaled by
+        its unit impulse; each a vector of n · 2N polynomials, mode by mode, for N unknowns.
     """
     unit = fit_points(len(model.boxes.names), model.degree)
     mode_data = analyse(model.flow, model.boxes, unit, model.chosen, states=True)
@@ -149,7 +149,7 @@ def fit_states(model: ModalModel) -> list[Polynomial]:
 def _model_from_modes(
     flow: LinearFlow, boxes: Boxes, points: Array, mode_data: Modes, degree: int, chosen: Array
 ) -> ModalModel:
-    """Modal model whose eigenvalues and coefficients are fitted to eigen-analyses.
+    """Fit a modal model's eigenvalues and coefficients to eigen-analyses.
 
     Args:
         flow: The flow that was analysed.
@@ -176,12 +176,15 @@ def _model_from_modes(
 
 
 def _coefficient_polynomials(points: Array, data: Modes, degree: int) -> list[Polynomial]:
-    """Fits C_k of the free motion, then of each load, as vectors of n m polynomials.
+    """Fits polynomials to the coefficients C_k, of q(t) = 2 Re Σ C_k w(t; λ_k).
 
     Args:
         points: Unit coordinates, shape (S, d).
         data: Modes there with derivatives, n modes and m observed rows.
         degree: Total degree of the polynomials.
+
+    Returns:
+        Of the free motion, then of each load: a vector of n m polynomials.
     """
     flat = (
         jet.map(lambda x: x.reshape((*x.shape[:-2], -1))) for jet in (data.coefficient, *data.loads)
@@ -190,7 +193,7 @@ def _coefficient_polynomials(points: Array, data: Modes, degree: int) -> list[Po
 
 
 def _held_out(d: int) -> Array:
-    """Test points of the unit box, corners and inner ones that no fit uses, shape (≤ 22, d)."""
+    """Test points of the unit box, 8 random inner ones and up to 14 corners, shape (≤ 22, d)."""
     rng = np.random.default_rng(20)
     corners = np.sign(rng.uniform(-1, 1, (12, d)))
     points: Array = np.unique(
@@ -243,7 +246,7 @@ def analyse(
 
 
 def _feedthrough(feeds: Jet, count: int) -> list[Jet]:
-    """Direct feedthrough of each load as coefficients C_k, V = (S, n, m) of n = `count` modes.
+    """Direct feedthrough of each load as jets of coefficients C_k, V = (S, n, m), n = `count`.
 
     With `Direct`, where w of the first mode is a(t), 2 Re C_1 w is the feedthrough times a(t).
 
@@ -288,9 +291,10 @@ def needed_modes(flow: LinearFlow, boxes: Boxes, allowed: Array, *, energy: bool
 
 
 def _energy_amplitudes(matrices: Matrices, rows: Array, shapes: Array, state: Array) -> Array:
-    """Bounds of the amplitudes of modes in the outputs by the modes' energy, shape (n, m).
+    """Bounds of the amplitudes of n modes in m outputs by the modes' energy, shape (n, m).
 
-    An output r q + s v is at most √(r K⁻¹ rᵀ + s M⁻¹ sᵀ) times √(qᵀ K q + vᵀ M v).
+    An output r q + s v is at most √(r K⁻¹ rᵀ + s M⁻¹ sᵀ) times √(qᵀ K q + vᵀ M v), the square root
+    of twice the energy.
 
     Args:
         matrices: Mass and stiffness of N unknowns.

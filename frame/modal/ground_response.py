@@ -156,21 +156,23 @@ def left_out(phase: float, order: int) -> float:
 def _moments(
     history: History, middle: complex, time: Array, length: int, phase: float, order: int
 ) -> Array:
-    """Taylor coefficients of the window's own part of R, shape (T, order).
+    """Taylor coefficients by λ of R = ∫ exp(λ (t − s)) a(s) ds over a node's window, (T, order).
 
-    By Cauchy's integral over a circle, of radius `phase` in the series' variable, at as many points
-    as coefficients; what that mixes into them are coefficients beyond, which are left out anyway.
+    The windows cut time into parts of `length` steps, and the integral begins with the window of t.
+    Coefficients follow from Cauchy's integral over a circle of radius `phase` in the variable x =
+    (λ − middle) × window length, at as many points as coefficients; its error is made of those of
+    higher order.
 
     Args:
         history: a, the load.
-        middle: λ.
+        middle: λ about which the series is.
         time: Nodes, shape (T,), in s.
         length: Steps of a window.
         phase: Largest change of phase over the box within a window, or more.
         order: Number of coefficients.
     """
-    turns = np.exp(2j * np.pi / order * np.arange(order))
-    rate = middle + phase * turns / (length * (time[1] - time[0]))
+    unit_circle = np.exp(2j * np.pi / order * np.arange(order))
+    rate = middle + phase * unit_circle / (length * (time[1] - time[0]))
     values = responses_in_windows(rate, history, time, length)
     return np.asarray(np.fft.fft(values, axis=1) / order / phase ** np.arange(order))
 
@@ -185,10 +187,11 @@ def window_series(
     ends: Rows,
     time: Array,
 ) -> Complex:
-    """R, dR/dλ and d²R/dλ² of a mode at one node per point, shape (3, N), complex.
+    """R(t; λ) = ∫ exp(λ (t − s)) a(s) ds of a mode, dR/dλ and d²R/dλ² at N points, shape (3, N).
 
-    What windows leave behind is carried from one to the next, and from a point to the next one of
-    the same λ at a later node.
+    A point is a λ and a node t. The part of R that arises in the window of t is a Taylor series;
+    R at the end of earlier windows goes on as exp(λ τ). It is carried from window to window, and
+    from a point to the next one of the same λ at a later node.
 
     Args:
         rate: λ, shape (N,), complex.
@@ -200,15 +203,15 @@ def window_series(
         time: Nodes, shape (T,), in s.
     """
     out = np.zeros((3, len(rate)), np.complex128)
-    R, slope, curve, here, w = 0j, 0j, 0j, 0, 0
+    R, slope, curve, start, window = 0j, 0j, 0j, 0, 0
     for p in range(len(rate)):
         if p == 0 or rate[p] != rate[p - 1] or node[p] < node[p - 1]:
-            R, slope, curve, here, w = 0j, 0j, 0j, 0, 0
+            R, slope, curve, start, window = 0j, 0j, 0j, 0, 0
         x = (rate[p] - middle) / scale
         while True:
-            last = w == len(ends) or ends[w] >= node[p]
-            end = node[p] if last else ends[w]
-            tau = time[end] - time[here]
+            is_last = window == len(ends) or ends[window] >= node[p]
+            end = node[p] if is_last else ends[window]
+            tau = time[end] - time[start]
             f, g, h = 0j, 0j, 0j  # Horner's scheme, twice differentiated
             for i in range(moment.shape[1] - 1, -1, -1):
                 h = h * x + g
@@ -218,8 +221,8 @@ def window_series(
             f += wave * R
             g = g / scale + wave * (slope + tau * R)
             h = 2 * h / scale**2 + wave * (curve + 2 * tau * slope + tau * tau * R)
-            if last:
+            if is_last:
                 out[0, p], out[1, p], out[2, p] = f, g, h
                 break
-            R, slope, curve, here, w = f, g, h, end, w + 1
+            R, slope, curve, start, window = f, g, h, end, window + 1
     return out

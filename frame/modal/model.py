@@ -98,13 +98,16 @@ class ModalModel:
         return [Polynomial(index, np.hstack([rate, amplitudes[:, o::m]])) for o in range(m)]
 
     def values(self, unit: Array) -> Array:
-        """Outputs at all nodes for unit coordinates (S, d), shape (S, T, m)."""
+        """Outputs at all nodes for unit coordinates (S, d), shape (S, T, m).
+
+        They are 2 Re Σ_k C_k w(t; λ_k) over the free motion and each load.
+        """
         n, time = self.count, self.time
-        parts = self.together(unit)
-        rate = parts[:, :n]
+        variables = self.together(unit)  # λ_k, then C_k of each part
+        rate = variables[:, :n]
         waves = [np.exp(rate[:, None] * time[:, None])] if self.started else []
         waves += [load.at_nodes(rate) for load in self.loads]
-        C = parts[:, n:].reshape(len(unit), len(waves) * n, -1)
+        C = variables[:, n:].reshape(len(unit), len(waves) * n, -1)
         w = np.concatenate(waves, -1)
         return np.asarray(2 * (w.real @ C.real - w.imag @ C.imag))
 
@@ -121,26 +124,29 @@ class ModalModel:
         """
         n, d = self.count, unit.shape[1]
         row, column = np.triu_indices(d)
-        coefficients = np.zeros((len(unit), 1 + d + len(row)))
+        derivatives = np.zeros((len(unit), 1 + d + len(row)))  # value, gradient, upper triangle
         for o in np.unique(output):
             rows = np.flatnonzero(output == o)
             jets = self.of_output[o].jets(unit[rows])
             for number, wave in enumerate(self.waves(jets[:, 0, :n], node[rows]), 1):
                 amplitude = jets[..., number * n : (number + 1) * n]
-                coefficients[rows] += composed(jets[..., :n], amplitude, wave, d)
+                derivatives[rows] += composed(jets[..., :n], amplitude, wave, d)
         H = np.empty((len(unit), d, d))
-        H[:, row, column] = H[:, column, row] = coefficients[:, 1 + d :]
-        return coefficients[:, 0], coefficients[:, 1 : 1 + d], H
+        H[:, row, column] = H[:, column, row] = derivatives[:, 1 + d :]
+        return derivatives[:, 0], derivatives[:, 1 : 1 + d], H
 
     def value_at(self, unit: Array, node: Array, output: Array) -> Array:
-        """Values (N,) of one output at one node for each of N points, as in `at`."""
+        """Values (N,) of one output at one node for each of N points, as in `at`.
+
+        They are 2 Re Σ_k C_k w(t; λ_k) over the free motion and each load.
+        """
         values, n = np.zeros(len(unit)), self.count
         for o in np.unique(output):
-            columns = np.flatnonzero(output == o)
-            for rows in np.array_split(columns, -(-len(columns) // PIECE)):
-                parts = self.of_output[o](unit[rows])
-                for number, wave in enumerate(self.waves(parts[:, :n], node[rows]), 1):
-                    amplitude = parts[:, number * n : (number + 1) * n]
+            of_output = np.flatnonzero(output == o)
+            for rows in np.array_split(of_output, -(-len(of_output) // PIECE)):
+                variables = self.of_output[o](unit[rows])  # λ_k, then C_k of each part
+                for number, wave in enumerate(self.waves(variables[:, :n], node[rows]), 1):
+                    amplitude = variables[:, number * n : (number + 1) * n]
                     values[rows] += 2 * (amplitude * wave[0]).real.sum(1)
         return values
 
@@ -152,7 +158,7 @@ class ModalModel:
             node: Time node of each point, shape (N,).
 
         Returns:
-            w, dw/dλ and d²w/dλ², each of shape (N, n), of each part.
+            For the free motion (if any), then each load: w, dw/dλ and d²w/dλ², each (N, n).
         """
         parts = []
         if self.started:
@@ -178,8 +184,9 @@ def composed(rate: Array, share: Array, waves: Waves, d: int) -> Array:
     out = (share * w).real.sum(-1)
     out[:, 1:] += (share[:, :1] * dw * rate[:, 1:]).real.sum(-1)
     slope = rate[:, 1 : 1 + d]
-    half = share[:, 1 : 1 + d] * dw + slope * (share[:, :1] * ddw / 2)
-    H = (half @ slope.swapaxes(1, 2)).real
+    # ∂C ∂λ w' + C ∂λ ∂λ w''/2; with its transpose, what the Hessian has of products of slopes
+    factor = share[:, 1 : 1 + d] * dw + slope * (share[:, :1] * ddw / 2)
+    half = (factor @ slope.swapaxes(1, 2)).real
     row, column = np.triu_indices(d)
-    out[:, 1 + d :] += H[:, row, column] + H[:, column, row]
+    out[:, 1 + d :] += half[:, row, column] + half[:, column, row]
     return np.asarray(2 * out)

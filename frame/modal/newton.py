@@ -40,7 +40,9 @@ def first_optima(
     progress: Progress | None = None,
     nodes: Rows | None = None,
 ) -> Optima:
-    """Optima of nodes, all outputs and sides in the box [lower, upper], from a sample of it.
+    """Local optima of all outputs, on both sides, at nodes over the box [lower, upper].
+
+    Each begins at the best point of a sample of the box and is refined by Newton's method.
 
     Args:
         model: The modal model.
@@ -74,7 +76,8 @@ def refine(
 
     A problem ends when its quadratic model predicts a gain of at most `least_gain`.
     """
-    size = min(MAX_PIECE * 6 // max(lower.size, 6), max(MIN_PIECE, -(-len(which) // 2)))
+    half_of_all = -(-len(which) // 2)
+    size = min(MAX_PIECE * 6 // max(lower.size, 6), max(MIN_PIECE, half_of_all))
     pieces = np.array_split(which, -(-len(which) // size) or 1)
     for done, piece in enumerate(pieces):
         tick = subprogress(progress, done / len(pieces), (done + 1) / len(pieces))
@@ -95,8 +98,8 @@ def _newton(
     A problem ends when its quadratic model predicts a gain of at most `least_gain` without the
     trust region. The gain predicted last is kept in `optima.predicted_gain`.
     """
-    size = len(which)
-    radius: Array = np.full(size, FIRST_RADIUS)
+    n_problems = len(which)
+    radius: Array = np.full(n_problems, FIRST_RADIUS)
     f, g, H = _signed(model, optima, optima.point[which], which)
     correction = np.zeros_like(H)  # of H, by secants of the gradient
     for count in range(ITERATIONS):
@@ -117,7 +120,7 @@ def _newton(
             which, radius, step, predicted, g, H, correction = (
                 x[open_] for x in (which, radius, step, predicted, g, H, correction)
             )
-        tick(1 - len(which) / max(size, 1))
+        tick(1 - len(which) / max(n_problems, 1))
         if not len(which):
             return
         trial = np.clip(optima.point[which] + step, lower, upper)
@@ -128,32 +131,44 @@ def _newton(
             update = _symmetric_rank_one(H2, step, g2 - g)
             for x in (correction, H, H2):
                 x += update
-        gained = f - optima.value[which]
-        better = gained > 0
+        actual_gain = f - optima.value[which]
+        better = actual_gain > 0
         optima.point[which[better]], optima.value[which[better]] = trial[better], f[better]
         g[better], H[better] = g2[better], H2[better]
-        ratio = gained / predicted
-        radius = np.where(
-            ratio > 0.75,
-            np.minimum(np.where(np.abs(ratio - 1) < SOUND, 5, 2) * radius, BOX_WIDTH),
-            np.where(ratio < 0.25, 0.3 * np.abs(step).max(1), radius),
-        )
+        ratio = actual_gain / predicted
+        expansion = np.where(np.abs(ratio - 1) < SOUND, 5, 2)
+        wider, narrower = np.minimum(expansion * radius, BOX_WIDTH), 0.3 * np.abs(step).max(1)
+        radius = np.where(ratio > 0.75, wider, np.where(ratio < 0.25, narrower, radius))
 
 
 def _symmetric_rank_one(H: Array, step: Array, change: Array) -> Array:
-    """Symmetric rank-one updates of Hessians (N, d, d) from changes of gradients over steps."""
-    lack = change - (H @ step[..., None])[..., 0]
-    weight = (lack * step).sum(1)
-    size = np.sqrt((lack**2).sum(1) * (step**2).sum(1))
-    is_stable = np.abs(weight) > 1e-6 * size
-    scaled = lack / np.where(is_stable, weight, 1.0)[:, None] * is_stable[:, None]
-    return np.asarray(lack[:, :, None] * scaled[:, None, :])
+    """Symmetric rank-one (SR1) updates y yᵀ / (y·s) of Hessians H, y = change − H s; s the step.
+
+    An update is zero where |y·s| is so small beside |y| |s| that it would be unstable.
+
+    Args:
+        H: Hessians, shape (N, d, d).
+        step: Steps s, shape (N, d).
+        change: Changes of the gradients over them, shape (N, d).
+
+    Returns:
+        What to add to the Hessians, shape (N, d, d).
+    """
+    y = change - (H @ step[..., None])[..., 0]
+    product = (y * step).sum(1)
+    size = np.sqrt((y**2).sum(1) * (step**2).sum(1))
+    is_stable = np.abs(product) > 1e-6 * size
+    scaled = y / np.where(is_stable, product, 1.0)[:, None] * is_stable[:, None]
+    return np.asarray(y[:, :, None] * scaled[:, None, :])
 
 
 def _signed(
     model: Response, optima: Optima, points: Array, which: Array
 ) -> tuple[Array, Array, Array]:
-    """Side × output with gradient and Hessian, of problems `which` at points (W, d)."""
+    """Side × output (W,), gradients (W, d) and Hessians (W, d, d) of problems `which` (W,).
+
+    Each is taken at its own point of `points` (W, d).
+    """
     side = optima.side[which]
     f, g, H = model.at(points, optima.node[which], optima.output[which])
     H *= side[:, None, None]

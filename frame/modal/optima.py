@@ -36,7 +36,7 @@ class Optima:
     predicted_gain: Array
 
     def offer(self, model: Response, points: Array, which: Array) -> Array:
-        """Try `points` (W, d) on problems `which` (W,), keep and return the better ones."""
+        """Replace best points of problems `which` (W,) by better `points` (W, d); return which."""
         if not len(which):
             return which
         value = self.side[which] * model.value_at(points, self.node[which], self.output[which])
@@ -46,18 +46,18 @@ class Optima:
 
 
 def problems(nodes: Array, outputs: int, d: int) -> Optima:
-    """All outputs and sides at `nodes`, node by node; the sides of an output are (−1, +1)."""
-    count = 2 * outputs
-    node = np.repeat(nodes, count)
-    output = np.tile(np.repeat(np.arange(outputs), 2), len(nodes))
-    side = np.tile([-1.0, 1.0], len(nodes) * outputs)
+    """Problems of both sides of all outputs at `nodes`, with no best points yet (value −∞).
+
+    They are ordered by node, then output, then side (−1, +1). `outputs` is the number of outputs.
+    """
+    node = np.repeat(nodes, 2 * outputs)
     return Optima(
-        node,
-        output,
-        side,
-        np.zeros((len(node), d)),
-        np.full(len(node), -np.inf),
-        np.zeros(len(node)),
+        node=node,
+        output=np.tile(np.repeat(np.arange(outputs), 2), len(nodes)),
+        side=np.tile([-1.0, 1.0], len(nodes) * outputs),
+        point=np.zeros((len(node), d)),
+        value=np.full(len(node), -np.inf),
+        predicted_gain=np.zeros(len(node)),
     )
 
 
@@ -68,16 +68,16 @@ def best_of(
     few: int | None = None,
     rng: np.random.Generator | None = None,
 ) -> Optima:
-    """Best points of a pool for every problem at some nodes.
+    """Best points of a pool for each problem: output and side at a node; see `problems`.
 
-    The best of many points has a bias: corners are met exactly, an optimum inside is not, so one
-    that lies little above a corner is never begun from. Few points give each basin a chance.
+    The best of many points has a bias: corners of the box are in the pool, an optimum inside is
+    not, so that a basin inside little above a corner is missed. Few points give it a chance.
 
     Args:
         pool: Points, shape (P, d).
         values: Their trajectories at the nodes, shape (P, len(nodes), m).
         nodes: Time nodes of the problems.
-        few: Points drawn anew for every problem; all of the pool if None.
+        few: Number of points drawn anew for each problem; all of the pool if None.
         rng: Draws them.
     """
     optima = problems(nodes, values.shape[-1], pool.shape[1])
@@ -94,14 +94,15 @@ def best_of(
 
 def fresh_points(rng: np.random.Generator, lower: Array, upper: Array, size: int) -> Array:
     """Random points of a box, shape (size, d), some with coordinates on faces or near them."""
-    pool = rng.uniform(lower, upper, (size, len(lower)))
-    faces = rng.random(pool.shape) < rng.choice([0.0, 0.3, 0.6], (size, 1))
-    nearest = np.where(rng.random(pool.shape) < 0.5, lower, upper)
-    near = np.arange(size) % NEAR == 0  # where an extreme beside a face would be too thin to meet
-    away = 10.0 ** rng.uniform(-DECADES, 0, (int(near.sum()), 1))
-    pool[near] = nearest[near] + away * (pool[near] - nearest[near])
-    pool[faces] = nearest[faces]
-    return pool
+    points = rng.uniform(lower, upper, (size, len(lower)))
+    on_face = rng.random(points.shape) < rng.choice([0.0, 0.3, 0.6], (size, 1))
+    face = np.where(rng.random(points.shape) < 0.5, lower, upper)
+    # an extreme close beside a face would hardly be met otherwise
+    near_face = np.arange(size) % NEAR == 0
+    distance = 10.0 ** rng.uniform(-DECADES, 0, (int(near_face.sum()), 1))  # as a fraction
+    points[near_face] = face[near_face] + distance * (points[near_face] - face[near_face])
+    points[on_face] = face[on_face]
+    return points
 
 
 def trajectories(model: ModalModel, points: Array, nodes: Array | None = None) -> Array:

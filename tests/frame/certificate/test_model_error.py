@@ -138,7 +138,7 @@ def test_what_a_damping_ratio_leaves_out_is_bounded_tightly(squared, root) -> No
     force, own = law.defects(np.zeros((1, 1)), np.zeros((1, 1)), speed, M, K)
     missed = speed[0, 0] @ D[0] - force[0, 0]
     true = float(np.sqrt(missed @ np.linalg.solve(M[0], missed)))
-    bound = law.missed(own, 0, LoewnerBounds(K), LoewnerBounds(M))
+    bound = law.damping_error(own, 0, LoewnerBounds(K), LoewnerBounds(M))
     assert 1 - 1e-9 <= bound / true <= 1.8
 
 
