@@ -69,7 +69,7 @@ class Modal:
     accelerated: Array
 
     def output_coefficients(self, point: Rows, output: Rows) -> tuple[Array, Array]:
-        """Coefficients r of outputs (N,) at points (N,), and their rounding, each (N, n)."""
+        """Coefficients r of modes in outputs (N,) at points (N,), and their rounding, (N, n)."""
         n, order = self.shape.shape[-1], self.order[output][:, None]
         rows, shape = self.rows[point, output], self.shape[point]
         row = np.where(order == 1, rows[:, n:], rows[:, :n])
@@ -86,31 +86,39 @@ def modes_at(
     points: Array,
     unit: Array,
 ) -> Modal:
-    """Modes at inputs `points` (S, inputs) called `names`, whose unit coordinates are (S, d).
+    """Modes of a structure at S inputs, with bounds of the rounding of all that is derived.
+
+    Args:
+        system: The structure.
+        structure: The same over a box of its inputs; its damping and outputs are read.
+        names: Names of the inputs.
+        points: Their values, shape (S, inputs), in SI units.
+        unit: The same in unit coordinates of the box, shape (S, d).
 
     Raises:
         UnprovedError: A mode does not oscillate.
     """
     matrices, rows = evaluate(system, names, points, derivatives=False, by_ratios=False)
     M, K = matrices.mass.value, matrices.stiffness.value
-    below = np.linalg.inv(np.linalg.cholesky(M))
-    squared, U = np.linalg.eigh(below @ K @ below.swapaxes(-1, -2))
-    shape = below.swapaxes(-1, -2) @ U
+    inverse_factor = np.linalg.inv(np.linalg.cholesky(M))
+    transposed = inverse_factor.swapaxes(-1, -2)
+    squared, U = np.linalg.eigh(inverse_factor @ K @ transposed)
+    shape = transposed @ U
     a, b = structure.rayleigh.at(unit).T[:, :, None]
     ratio, positive = structure.ratio.at(unit), np.maximum(squared, 1e-300)
     decay = (a + b * squared) / 2 + ratio * np.sqrt(positive)
     if not (squared > decay**2).all():
         raise UnprovedError("a mode may not oscillate", "take less damping, and hold the structure")
-    omega, faster = np.sqrt(squared - decay**2), b / 2 + ratio / (2 * np.sqrt(positive))
-    turn = faster + np.abs(1 - 2 * decay * faster) / (2 * omega)
+    omega, decay_slope = np.sqrt(squared - decay**2), b / 2 + ratio / (2 * np.sqrt(positive))
+    sigma_slope = decay_slope + np.abs(1 - 2 * decay * decay_slope) / (2 * omega)
     share, share_error, n = {}, {}, M.shape[-1]
     q0, v0 = np.split(matrices.start.value[..., 0], 2, axis=-1)
-    moved, pushes = {"velocity": v0, "start": q0}, matrices.pushes(ground=False).value
+    patterns, pushes = {"velocity": v0, "start": q0}, matrices.pushes(ground=False).value
     for name, number in _numbers(system).items():
-        moved[name] = pushes[..., number]
+        patterns[name] = pushes[..., number]
     if system.ground is not None:
-        moved["load"] = np.broadcast_to(matrices.rigid[:, 0], squared.shape)
-    for name, x in moved.items():
+        patterns["load"] = np.broadcast_to(matrices.rigid[:, 0], squared.shape)
+    for name, x in patterns.items():
         share[name] = np.einsum("sik,sij,sj->sk", shape, M, x, optimize=True)
         sizes = (np.abs(part) for part in (shape, M, x))
         size = np.einsum("sik,sij,sj->sk", *sizes, optimize=True)
@@ -118,20 +126,20 @@ def modes_at(
     of_stiffness, of_mass = _residual(shape, K, squared), _residual(shape, M, np.ones_like(squared))
     of_stiffness += of_mass * squared[:, None]
     of_stiffness += gamma(8) * squared[:, None] * np.eye(n)  # of σ from λ
-    alike = (ratio == ratio[:, :1]).all(1)
     return Modal(
-        squared,
-        -decay + 1j * omega,
-        turn,
-        alike,
-        shape,
-        share,
-        share_error,
-        of_stiffness,
-        of_mass,
-        rows.value,
-        structure.order,
-        structure.rows[:, :n],  # accelerations are read of structures whose unknowns all have mass
+        squared=squared,
+        sigma=-decay + 1j * omega,
+        sigma_slope=sigma_slope,
+        is_alike=(ratio == ratio[:, :1]).all(1),
+        shape=shape,
+        share=share,
+        share_error=share_error,
+        stiffness_error=of_stiffness,
+        mass_error=of_mass,
+        rows=rows.value,
+        order=structure.order,
+        # accelerations are read of structures whose unknowns all have mass
+        accelerated=structure.rows[:, :n],
     )
 
 
@@ -219,7 +227,10 @@ def outputs_at(
     time: Array,
     loads: Mapping[str, LoadAtNodes],
 ) -> tuple[Array, Array]:
-    """Values of outputs and bounds of their rounding, each shape (N,).
+    """Exact values of outputs at points and nodes, and bounds of their rounding, (N,) each.
+
+    A value is Σ_k r_k c_k e_k over modes k and sources: r the output's coefficient of the mode, c
+    the source's participation in it, e the response of its oscillator.
 
     Args:
         modal: Modes at all points.
@@ -249,9 +260,9 @@ def outputs_at(
         share, share_error = modal.share[source][point], modal.share_error[source][point]
         total += (read * share * wave.value).sum(-1)
         total_error += _error(modal, point, (read, read_error), (share, share_error), wave)
-    longest = (np.einsum("skk->sk", modal.stiffness_error[point]) * sigma_slope * t).max(-1)
-    # what is of second order in G is a share of `longest` of what is of first
-    return total, total_error / np.maximum(1 - longest, 1e-300)
+    # terms of second order in the residuals are at most this fraction of those of first order
+    second_order = (np.einsum("skk->sk", modal.stiffness_error[point]) * sigma_slope * t).max(-1)
+    return total, total_error / np.maximum(1 - second_order, 1e-300)
 
 
 def _error(
@@ -262,6 +273,9 @@ def _error(
     wave: AttainedWaves,
 ) -> Array:
     """Bound of the rounding of Σ_k r_k c_k e_k over the modes k, shape (N,).
+
+    To the rounding of the factors it adds what the residuals of computed modes move the sum by,
+    times the difference quotients of e between modes or, where that is less, bounds of |de/dλ|.
 
     Args:
         modal: Modes at all points.
@@ -276,8 +290,9 @@ def _error(
     error += gamma(n + 6) * (r * c * e).sum(-1)
     squared, anywhere = modal.squared[point], wave.slope_anywhere
     gaps = np.abs(squared[:, :, None] - squared[:, None])
-    least = np.where(modal.is_alike[point][:, None, None], 0.0, np.inf)
-    cap = least + np.maximum(anywhere[:, :, None], anywhere[:, None])
+    # slopes hold between modes of one damping ratio alone
+    of_ratios = np.where(modal.is_alike[point][:, None, None], 0.0, np.inf)
+    cap = of_ratios + np.maximum(anywhere[:, :, None], anywhere[:, None])
     diagonal = np.eye(n, dtype=bool)
     unlimited = np.full_like(gaps, np.inf)
     quotient = np.divide(e[:, :, None] + e[:, None], gaps, out=unlimited, where=gaps > 0)

@@ -164,7 +164,7 @@ def subspace_series(
 def narrowest_block(
     block: Rows, rotation: Array, centre: CentredMatrices, tolerance: float
 ) -> Block | None:
-    """Enclosure of a block by series of the least degree whose error bound is below `tolerance`.
+    """Enclosure of a block of modes by series of the least degree that meets the tolerance.
 
     Args:
         block: Numbers of its modes from below, shape (p,).
@@ -173,7 +173,7 @@ def narrowest_block(
         tolerance: Relative error bound of L and N that suffices, clipped to [FINE, ROUGH / 2].
 
     Returns:
-        By the last degree tried if none is below it; None if the error bound exceeds `ROUGH`.
+        That of the last degree tried if none meets it; None if its error bound exceeds `ROUGH`.
     """
     series: Series | None = None
     found, tolerance = None, min(max(tolerance, FINE), ROUGH / 2)
@@ -196,27 +196,29 @@ def _max_degree(d: int) -> int:
 
 
 def _rotated(series: Series, rotation: Array) -> Series:
-    """The series of the rotated columns Rᵀ x."""
+    """Series of `subspace_series` in the basis Rᵀ x, R the `rotation`: of Lᵀ, x and M x."""
     rate, shape, mass_shape = series
-    turn = rotation.T
     return (
-        [turn @ x @ rotation for x in rate],
-        [turn @ x for x in shape],
-        [turn @ x for x in mass_shape],
+        [rotation.T @ x @ rotation for x in rate],
+        [rotation.T @ x for x in shape],
+        [rotation.T @ x for x in mass_shape],
     )
 
 
 def enclosed(block: Rows, rotation: Array, series: Series, centre: CentredMatrices) -> Block | None:
-    """Encloses a block's subspace over the box by Brouwer's theorem, as the module says.
+    """Enclose a block's invariant subspace K X = M X L over the box by Brouwer's theorem.
+
+    X = X̃ + Z and L = L̃ + D with polynomials X̃, L̃ and bounds Y of |Z| and E of |D| that the
+    equations of the module map into themselves.
 
     Args:
         block: Numbers of its modes, shape (p,).
-        rotation: R, shape (p, p).
-        series: Coefficients of L̃ᵀ, x̃ and M x̃ by degree.
-        centre: The structure.
+        rotation: Rotation R of X̃ in the rows of the block, shape (p, p).
+        series: Coefficients of L̃ᵀ, of the rows x̃ of X̃ᵀ and of M x̃, by degree.
+        centre: M and K in the coordinates of the box's middle.
 
     Returns:
-        The block with proved remainders; None if the left sides may be singular or no bounds hold.
+        The block with proved remainders; None if K − L̃_jj M may be singular or no bounds hold.
     """
     mass, stiffness = centre.mass, centre.stiffness
     n, d, N = len(centre.basis), mass.inputs, len(series[0]) - 1
@@ -277,10 +279,10 @@ def _terms(n: int, p: int, degree: int) -> int:
 
 
 def _rounding(x: TaylorModel, matrix: TaylorModel, least: int) -> Array:
-    """Rounding of the products of A's parts from degree `least` on with the series, (p, n)."""
+    """Bound of the rounding of the series x A, by parts of A from degree `least` on, (p, n)."""
     of_x, of_matrix, (p, n) = x.sizes(), matrix.sizes(), x.shape
     total: Array = np.zeros(x.shape)
-    for m in range(len(of_x)):
+    for m in range(len(of_x)):  # of the products' degree
         for b in range(least, min(m, len(of_matrix) - 1) + 1):
             total += gamma(_terms(n, p, m)) * (of_x[m - b] @ of_matrix[b])
     return total
@@ -294,37 +296,40 @@ def _residual_rounding(
     rotation: Array,
     rounding: Array,
 ) -> Array:
-    """Bound of R's parts up to degree N, which are zero but for rounding, shape (p, n).
+    """Bound of the residual K X̃ − M X̃ L̃ up to degree N, zero but for rounding, shape (p, n).
 
     Args:
         L: L̃ᵀ.
-        x: X̃.
+        x: X̃ᵀ.
         Mx: Its product with M.
         stiffness: K.
-        rotation: R, whose columns are orthogonal but for rounding.
-        rounding: Rounding of M x̃.
+        rotation: Rotation of the block's modes, orthogonal but for rounding.
+        rounding: Rounding of M X̃.
     """
     (p, n), of_L, of_Mx = x.shape, L.sizes(), Mx.sizes()
-    askew = float(np.abs(rotation.T @ rotation - np.eye(p)).sum(0).max())
+    skewness = float(np.abs(rotation.T @ rotation - np.eye(p)).sum(0).max())
     total = _rounding(x, stiffness, 0) + np.sum(of_L, 0) @ rounding
     for m in range(len(of_L)):
         for a in range(m + 1):
-            total += (gamma(_terms(n, p, m)) + askew) * (of_L[a] @ of_Mx[m - a])
+            total += (gamma(_terms(n, p, m)) + skewness) * (of_L[a] @ of_Mx[m - a])
     return total
 
 
 def _series_residual(
     pencils: list[Pencil], L: TaylorModel, x: TaylorModel, Mx: TaylorModel
 ) -> Array:
-    """Bound of R = K x̃_j − Σ_i L̃_ji M x̃_i over the box, shape (p, n)."""
+    """Bound of the residual's parts above degree N over the box, shape (p, n).
+
+    The residual is K x̃_j − Σ_i L̃_ji M x̃_i = (K − L̃_jj M) x̃_j − Σ_{i≠j} L̃_ji M x̃_i; `pencils` are
+    the K − L̃_jj M.
+    """
     of_x, N, off = x.sizes(), L.order, 1.0 - np.eye(len(pencils))
     of_L, of_Mx = [size * off for size in L.sizes()], Mx.sizes()
     residual: Array = np.zeros(x.shape)
     for j, pencil in enumerate(pencils):
-        t = pencil.sizes
-        residual[j] += t[-1] @ np.sum(of_x, 0)[j]
+        residual[j] += pencil.sizes[-1] @ np.sum(of_x, 0)[j]
         for m in range(1, N + 1):
-            residual[j] += t[m] @ np.sum(of_x[N + 1 - m :], 0)[j]
+            residual[j] += pencil.sizes[m] @ np.sum(of_x[N + 1 - m :], 0)[j]
     for a in range(N + 1):
         residual += of_L[a] @ (sum(of_Mx[N + 1 - a :], np.zeros(x.shape)) + Mx.remainder)
     return residual
@@ -364,8 +369,7 @@ class _Unknowns:
     def self_mapped_bounds(self, systems: list[Comparison]) -> tuple[Array, Array] | None:
         """Bounds Y of |Z|, (p, n), and E of |D|, (p, p), that `_images` maps into themselves.
 
-        Returns:
-            Y and E; None if none were found.
+        Found by iteration from 0, widened by 2 % a round; None if they grow too large.
         """
         Y, E = np.zeros_like(self.residual), np.zeros_like(self.coupling)
         for _ in range(ROUNDS):
@@ -380,7 +384,7 @@ class _Unknowns:
     def _images(self, systems: list[Comparison], Y: Array, E: Array) -> tuple[Array, Array]:
         """Bounds of |Z|, (p, n), and |D|, (p, p), by the module's equations from |Z| ≤ Y, |D| ≤ E.
 
-        Products of Z and D count twice, so that the map contracts.
+        `systems` bound the solutions Z. Products of Z and D count twice, so that the map contracts.
         """
         o, F = self.others, self.coupling
         right = self.residual + E @ self.mass_size + (F + 2 * E) @ Y @ self.heavy

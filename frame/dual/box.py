@@ -102,22 +102,26 @@ class Box:
         return self.attained_with_error(unit, node, output)[0]
 
     def attained_with_error(self, unit: Array, node: Rows, output: Rows) -> tuple[Array, Array]:
-        """Values of outputs at nodes for unit coordinates (S, d) and their rounding, each (S,)."""
+        """Exact values of one output at one node for each of S points, and their rounding, (S,).
+
+        Points are unit coordinates (S, d); modes are found once for each distinct one.
+        """
         points, index = np.unique(unit, axis=0, return_inverse=True)
-        found, count = np.empty((2, len(unit))), self._points_at_once
+        values_and_errors, count = np.empty((2, len(unit))), self._points_at_once
         for first in range(0, len(points), count):
             modal = self._modal(points[first : first + count])
             inside = np.flatnonzero((index >= first) & (index < first + count))
-            for some in np.array_split(inside, -(-len(inside) // count)):
-                motions = self._motions(modal, index[some] - first, node[some], output[some])
-                found[:, some] = motions
-        return found[0], found[1]
+            for rows in np.array_split(inside, -(-len(inside) // count)):
+                motions = self._motions(modal, index[rows] - first, node[rows], output[rows])
+                values_and_errors[:, rows] = motions
+        return values_and_errors[0], values_and_errors[1]
 
     def centre_motion(self) -> tuple[Array, Array, Array]:
-        """Motion at the centre, its rounding, and how far it strays from straight lines.
+        """Exact outputs at the nodes for inputs in the middle of the box.
 
         Returns:
-            Three arrays of shape (T, m), the last two bounds.
+            Values, bounds of their rounding, and bounds of how far outputs stray from a straight
+            line in the step to each node, (T, m) each.
 
         Raises:
             UnprovedError: A mode does not oscillate there.
@@ -125,8 +129,10 @@ class Box:
         modal, (total, m) = self._modal(np.zeros((1, len(self.active)))), self._shape
         sigma = modal.sigma[0]
         loads = {name: load_at_nodes(sigma, x, self.time) for name, x in self.loads.items()}
-        once = np.zeros(total, int)
-        columns = [outputs_at(modal, once, once + o, self.time, loads) for o in range(m)]
+        first_point = np.zeros(total, int)
+        columns = [
+            outputs_at(modal, first_point, np.full(total, o), self.time, loads) for o in range(m)
+        ]
         value, error = (np.stack(column, -1) for column in zip(*columns, strict=True))
         return value, error, self._line_deviation(modal)
 
@@ -179,15 +185,13 @@ class Box:
 
 
 def over_box(system: LinearSystem, names: Sequence[str], low: Array, high: Array) -> Classical:
-    """The structure over a box of its inputs."""
+    """The structure as Taylor models in those inputs `names` whose `low` is below `high`."""
     active, centre, radius = np.flatnonzero(high > low), (low + high) / 2, (high - low) / 2
     inputs, d = TaylorModel.variables(centre[active], radius[active]), len(active)
-    parameters = {name: float(x) for name, x in zip(names, centre, strict=True)}
-    p = {
-        name: TaylorModel.constant(x, d) for name, x in {**system.parameters, **parameters}.items()
-    }
-    p |= {names[int(i)]: inputs[column] for column, i in enumerate(active)}
-    return classical(system, p)
+    values = dict(system.parameters) | dict(zip(names, centre.tolist(), strict=True))
+    parameters = {name: TaylorModel.constant(x, d) for name, x in values.items()}
+    parameters |= {names[int(i)]: inputs[column] for column, i in enumerate(active)}
+    return classical(system, parameters)
 
 
 def with_outputs(structure: Classical, outputs: Rows | slice) -> Classical:

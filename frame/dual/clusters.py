@@ -56,12 +56,12 @@ class Subspaces:
 def subspaces(
     centre: CentredMatrices, used: Rows, wanted: int, tolerances: Array | None = None
 ) -> Subspaces:
-    """Blocks of the lowest modes, from below until one is not enclosed.
+    """Enclose the lowest modes over the box, in blocks, from below until one is not enclosed.
 
     Args:
-        centre: The structure in the coordinates of the middle of the box.
-        used: Inputs that it depends on, among all.
-        wanted: How many modes.
+        centre: M and K in the coordinates of the box's middle.
+        used: Inputs that they depend on, among all.
+        wanted: Number of modes to enclose.
         tolerances: Relative error of each mode's λ that suffices; 0 unless given.
 
     Raises:
@@ -78,21 +78,31 @@ def subspaces(
     tolerances = np.zeros(centre.modes) if tolerances is None else tolerances
     blocks, pair = _from_below(centre, slopes, min(wanted, centre.modes), tolerances)
     along = None if pair is None else int(used[np.abs(slopes[pair[0]] - slopes[pair[1]]).argmax()])
-    slack = gamma(100 * len(weight))  # of norms
+    slack = gamma(100 * len(weight))  # rounding of the norms
     low, high = (1 - slack) * (1 - stiff) / (1 + heavy), (1 + slack) * (1 + stiff) / (1 - heavy)
-    ends = low * centre.squared, high * centre.squared
-    return Subspaces(blocks, used, centre, *ends, (heavy, stiff), along)
+    return Subspaces(
+        blocks=blocks,
+        used=used,
+        centre=centre,
+        low=low * centre.squared,
+        high=high * centre.squared,
+        variation=(heavy, stiff),
+        along=along,
+    )
 
 
 def centred_matrices(mass: TaylorModel, stiffness: TaylorModel) -> tuple[CentredMatrices, Rows]:
-    """M and K in coordinates that make both diagonal in the middle of the box, of inputs used.
+    """M and K in coordinates that make both diagonal in the middle of the box.
+
+    Unknowns b without mass follow the others a there, x_b = −K_bb⁻¹ K_ba x_a, and have coordinates
+    of their own, in which K is as large as the greatest λ.
 
     Args:
         mass: M, V = (n, n); rows of zeros where unknowns have no mass.
         stiffness: K, V = (n, n).
 
-    Unknowns without mass follow the others there, x_b = −K_bb⁻¹ K_ba x_a, and have coordinates of
-    their own, in which K is as large as the greatest λ.
+    Returns:
+        The matrices as functions of the inputs that M or K depends on, and the numbers of these.
 
     Raises:
         UnprovedError: The structure can move rigidly, or is unstable, in the middle.
@@ -100,16 +110,17 @@ def centred_matrices(mass: TaylorModel, stiffness: TaylorModel) -> tuple[Centred
     massive = np.asarray(mass.size().any(1))
     M, K, n = mass.value, stiffness.value, len(massive)
     a, b = np.flatnonzero(massive), np.flatnonzero(~massive)
-    values, turn = np.linalg.eigh(K[np.ix_(b, b)])
-    _require_stiff(values, K)
-    follow = -(turn / values) @ turn.T @ K[np.ix_(b, a)]
-    light = np.linalg.inv(np.linalg.cholesky(M[np.ix_(a, a)]))
-    squared, turned = np.linalg.eigh(light @ (K[np.ix_(a, a)] + K[np.ix_(a, b)] @ follow) @ light.T)
+    massless_values, massless_vectors = np.linalg.eigh(K[np.ix_(b, b)])
+    _require_stiff(massless_values, K)
+    follow = -(massless_vectors / massless_values) @ massless_vectors.T @ K[np.ix_(b, a)]
+    condensed = K[np.ix_(a, a)] + K[np.ix_(a, b)] @ follow
+    inverse_factor = np.linalg.inv(np.linalg.cholesky(M[np.ix_(a, a)]))
+    squared, vectors = np.linalg.eigh(inverse_factor @ condensed @ inverse_factor.T)
     _require_stiff(squared, squared)
     basis: Array = np.zeros((n, n))
-    basis[a, : len(a)] = light.T @ turned
-    basis[b, : len(a)] = follow @ light.T @ turned
-    basis[b, len(a) :] = turn * np.sqrt(squared[-1] / values)
+    basis[a, : len(a)] = inverse_factor.T @ vectors
+    basis[b, : len(a)] = follow @ inverse_factor.T @ vectors
+    basis[b, len(a) :] = massless_vectors * np.sqrt(squared[-1] / massless_values)
     used = np.union1d(mass.present(), stiffness.present())
     used = used if len(used) else np.arange(1)
     heavy, stiff = (basis.T @ matrix.on(used) @ basis for matrix in (mass, stiffness))
@@ -148,9 +159,9 @@ def _couplings(centre: CentredMatrices, some: Rows) -> Array:
 
 
 def _nearness(centre: CentredMatrices, slopes: Array) -> Array:
-    """Bound of the change of λ_j − λ_k over the box to first order, over its size, (modes, modes).
+    """First-order change of λ_j − λ_k over the box, over |λ_j − λ_k| in its middle, (modes, modes).
 
-    From 1 on both may be equal at complex inputs of sizes up to 1, where their series diverge.
+    From 1 on two modes may meet at complex inputs of sizes up to 1, where their series diverge.
 
     Args:
         centre: M and K in the coordinates of the box's middle.
@@ -167,7 +178,9 @@ def _nearness(centre: CentredMatrices, slopes: Array) -> Array:
 def _from_below(
     centre: CentredMatrices, slopes: Array, wanted: int, tolerances: Array
 ) -> tuple[list[Block], tuple[int, int] | None]:
-    """Enclosed blocks of the lowest modes, up to the first that cannot be enclosed.
+    """Enclose the lowest modes in blocks, up to the first that cannot be enclosed.
+
+    A mode that cannot be enclosed alone is joined by the mode nearest to it, and so on.
 
     Args:
         centre: M and K in the coordinates of the box's middle.
@@ -183,17 +196,16 @@ def _from_below(
     while len(free) and free[0] < wanted:
         modes = _component(near > NEAR, free[:1], free)
         while True:
-            enough = float(tolerances[modes].min())
-            if (
-                found := narrowest_block(modes, rotation(centre, modes), centre, enough)
-            ) is not None:
+            tolerance = float(tolerances[modes].min())
+            block = narrowest_block(modes, rotation(centre, modes), centre, tolerance)
+            if block is not None:
                 break
             outside = near[np.ix_(modes, free)] * ~np.isin(free, modes)
             inner, outer = np.unravel_index(int(outside.argmax()), outside.shape)
             if outside[inner, outer] < LEAST_NEAR or len(modes) >= MAX_BLOCK:
                 return blocks, (int(modes[inner]), int(free[outer]))
             modes = _component(near > NEAR, np.append(modes, free[outer]), free)
-        blocks.append(found)
+        blocks.append(block)
         free = np.setdiff1d(free, modes)
     return blocks, None
 
@@ -207,32 +219,34 @@ def _component(linked: Mask, modes: Rows, free: Rows) -> Rows:
         free: Numbers of the modes that are in no block.
     """
     while True:
-        more = np.union1d(modes, np.intersect1d(free, np.flatnonzero(linked[modes].any(0))))
-        if len(more) == len(modes):
+        neighbours = np.intersect1d(free, np.flatnonzero(linked[modes].any(0)))
+        extended = np.union1d(modes, neighbours)
+        if len(extended) == len(modes):
             return np.sort(modes)
-        modes = more
+        modes = extended
 
 
 def rotation(centre: CentredMatrices, modes: Rows) -> Array:
-    """Rotation of modes after which K − λ M is nearly diagonal in the box, shape (p, p).
+    """Rotation R of p modes after which K − λ M is nearly diagonal over the box, shape (p, p).
 
-    Joint diagonalisation of the middle and of all first derivatives by Jacobi rotations (Cardoso,
-    Souloumiac 1996): modes that cross go on through the crossing.
+    Joint diagonalisation of K − λ M in the middle and of its derivatives by all inputs, by Jacobi
+    rotations (Cardoso, Souloumiac 1996). So modes that cross keep their shapes at the crossing.
     """
     p = len(modes)
     matrices = np.concatenate([np.diag(centre.squared[modes])[None], _couplings(centre, modes)])
-    turn, pairs = np.eye(p), [(i, j) for i in range(p) for j in range(i)]
+    total, pairs = np.eye(p), [(i, j) for i in range(p) for j in range(i)]
     for _ in range(SWEEPS):
         largest = 0.0
         for i, j in pairs:
+            # matrices' parts on which a rotation by 2 × angle acts
             h = np.stack([matrices[:, i, i] - matrices[:, j, j], 2 * matrices[:, i, j]])
             on, off = float(h[0] @ h[0] - h[1] @ h[1]), float(2 * h[0] @ h[1])
             angle = np.arctan2(off, on + np.hypot(on, off)) / 2
             step = np.eye(p)
             step[i, i] = step[j, j] = np.cos(angle)
             step[j, i], step[i, j] = np.sin(angle), -np.sin(angle)
-            matrices, turn = step.T @ matrices @ step, turn @ step
+            matrices, total = step.T @ matrices @ step, total @ step
             largest = max(largest, abs(angle))
         if largest < 1e-12:
             break
-    return turn
+    return total

@@ -45,11 +45,15 @@ class Coupling:
     decay_slope: float
 
     def bounds(self, orders: Rows, excitation: Excitation) -> tuple[Array, Array]:
-        """Bounds of what the coupling adds, and of a block's deviation between nodes, (T, m) each.
+        """Bounds of what the coupling adds to m outputs at T nodes and between them.
 
         Args:
             orders: Derivative of the motion that each output takes, shape (m,).
             excitation: The loads, the nodes and the names of the sources.
+
+        Returns:
+            Bound of what is added at the nodes, and of how far a block's motion strays from a
+            straight line in the step to each, (T, m) each.
         """
         loads, time, sources = excitation
         table = Oscillators(self._grid(float(time[-1])), loads, time)
@@ -73,18 +77,23 @@ class Coupling:
         return spanned(self.omega_range, self.quotient_range, (along, across))
 
     def _slope(self, wave: Waves, source: str) -> Array:
-        """Bound of |de/dλ| over the block's ranges, shape (T,)."""
+        """Bound of |de/dλ| over the block's ranges of ω and g/ω, shape (T,).
+
+        e is Re G + (g/ω) Im G for a start and ± Im G/ω else, with G(σ; t), σ = −g + iω.
+        """
         (low, high), q = self.omega_range, self.quotient_range[1]
-        g = self.decay_slope
-        omega = (1 + 2 * q * high * g) / (2 * low)  # ω² = λ − g²
-        value, first = wave.largest
-        if source == "start":  # Re G + q Im G
-            return np.asarray((1 + q) * first * (g + omega) + value * (g + q * omega) / low)
-        return np.asarray(first * (g + omega) / low + value * omega / low**2)
+        decay_slope = self.decay_slope
+        omega_slope = (1 + 2 * q * high * decay_slope) / (2 * low)  # ω² = λ − g²
+        G, G_slope = wave.largest
+        if source == "start":
+            by_sigma = (1 + q) * G_slope * (decay_slope + omega_slope)
+            return np.asarray(by_sigma + G * (decay_slope + q * omega_slope) / low)
+        by_sigma = G_slope * (decay_slope + omega_slope) / low
+        return np.asarray(by_sigma + G * omega_slope / low**2)
 
 
 def coupling_of(structure: Classical, shares: BlockShares, found: Subspaces) -> Coupling:
-    """The coupling of a block of several modes."""
+    """Bounds of how the modes of a block couple, by L of K X = M X L off its diagonal."""
     block = shares.block
     off = block.rate.size() * (1.0 - np.eye(len(block.modes)))
     norm = 1 + float(np.linalg.norm(block.norm.spread(), 2))
@@ -99,4 +108,6 @@ def coupling_of(structure: Classical, shares: BlockShares, found: Subspaces) -> 
     omega, quotient = damped_range(structure, least, most, block.modes)
     zeta, b = structure.ratio[block.modes].size().max(), structure.rayleigh[1].size()
     decay_slope = float(b / 2 + zeta / (2 * np.sqrt(least)))
-    return Coupling(slope, size, omega, quotient, decay_slope)
+    return Coupling(
+        slope=slope, size=size, omega_range=omega, quotient_range=quotient, decay_slope=decay_slope
+    )

@@ -88,7 +88,7 @@ def roundings(modes: int, sources: int, inputs: int) -> int:
 
 
 def require_in_range(fields: Mapping[str, Array]) -> None:
-    """Refuse models and tables out of the range in which the dual function cannot overflow.
+    """Refuse models and tables with numbers for which the dual function may overflow.
 
     Args:
         fields: Fields of `Data` by name.
@@ -110,9 +110,12 @@ loops = njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "
 def box_maximum(linear: Array, quadratic: Array, u: Array) -> float:
     """Upper bound of linear·u + Σ_{i ≤ j} q_ij u_i u_j over the box [−1, 1]^d.
 
-    The q_ij are packed by rows, i ≤ j; `u` (d,) is written: inputs near the maximum.
+    Inputs whose slope outweighs all that couples them are put to an end of the box; products of the
+    others count by magnitude. The q_ij are packed by rows, i ≤ j; `u` (d,) is written: inputs near
+    the maximum.
     """
     d = len(u)
+    # full: q_ij, symmetric; slack: Σ_j |q_ij| over the free j ≠ i
     full, slack, slope = np.empty((d, d)), np.empty(d), linear.copy()
     at = 0
     for i in range(d):
@@ -124,12 +127,12 @@ def box_maximum(linear: Array, quadratic: Array, u: Array) -> float:
         for j in range(d):
             slack[i] += abs(full[i, j])
     free = np.ones(d, np.bool_)
-    total, moved = 0.0, True
-    while moved:
-        moved = False
+    total, has_fixed = 0.0, True
+    while has_fixed:
+        has_fixed = False
         for i in range(d):
             if free[i] and abs(slope[i]) >= slack[i] + 2 * max(-full[i, i], 0.0):
-                free[i], moved = False, True
+                free[i], has_fixed = False, True
                 u[i] = 1.0 if slope[i] >= 0 else -1.0
                 total += abs(slope[i]) + full[i, i]
                 for j in range(d):
@@ -181,24 +184,25 @@ def dot(a: Array, b: Array) -> float:
 def dual(
     mu: Array, slab: Rows, node: int, side: float, data: Data, gradient: Array, u: Array
 ) -> float:
-    """D(μ) without its constants, a subgradient, and the inputs u at which its second line is met.
+    """Value D(μ) of the dual function at multipliers μ (Z,), without its constants.
 
-    Data are in the range of `require_in_range`, and so are the multipliers: |μ| ≤ `LARGEST`. `slab`
-    holds, for each mode, the first and last place along ω and along q that its table is read at,
-    shape (K, 4).
+    D(μ) = Σ_k max over mode k's table of (response − μ·z) + max over inputs u of μ·z(u) + |μ|·R,
+    z(u) ± R the Taylor models of the intervening variables. Written are a subgradient (Z,) and `u`
+    (L,), the inputs of the second maximum. `slab` (K, 4) holds the first and last place along ω and
+    along q at which each mode's table is read. |μ| and data are at most `LARGEST`.
     """
     modes, sources = data.share.shape
     gradient[:] = 0.0
     total, values = 0.0, np.empty(data.omega.shape[1])
     for k in range(modes):
-        best, at = most_of_mode(mu, k, slab[k], node, side, data, values)
-        total += best
+        highest, at = mode_maximum(mu, k, slab[k], node, side, data, values)
+        total += highest
         first = k * (2 + sources)
         gradient[first] = -data.omega[k, at]
         gradient[first + 1] = -data.decay[k, at]
         for s in range(sources):
-            off = side * data.reach[k, s] * data.table[k, s, node, at] - mu[first + 2 + s]
-            gradient[first + 2 + s] = -1.0 if off >= 0 else 1.0
+            difference = side * data.reach[k, s] * data.table[k, s, node, at] - mu[first + 2 + s]
+            gradient[first + 2 + s] = -1.0 if difference >= 0 else 1.0
     slope, bend = np.zeros(data.linear.shape[1]), np.zeros(data.quadratic.shape[1])
     for s in range(len(data.group_linear)):
         add(slope, side * data.group_wave[s, node], data.group_linear[s])
@@ -216,15 +220,15 @@ def dual(
 
 
 @loops
-def most_of_mode(
+def mode_maximum(
     mu: Array, k: int, slab: Rows, node: int, side: float, data: Data, values: Array
 ) -> tuple[float, int]:
-    """Mode k's maximum in D(μ) over a slab of its table, and the table point that attains it.
+    """Maximum of mode k's term in D(μ) over a slab of its table, and the table point of it.
 
-    Loops run over slices from 0, without which they are not compiled to vector instructions: over
-    all rows of the slab at once, then over each for the maximum of each column.
+    `slab` holds the first and last place along ω, then along q; `values` is scratch. Loops run over
+    slices from 0, without which they are not compiled to vector instructions.
     """
-    count, width = int(data.points[0]), slab[1] + 1 - slab[0]
+    count, width = int(data.points[0]), slab[1] + 1 - slab[0]  # a row has `count` points along ω
     first, end = slab[2] * count + slab[0], slab[3] * count + slab[1] + 1
     maximand(mu, k, first, node, side, data, values[first:end])
     highest = np.full(width, -1e300)
@@ -245,16 +249,20 @@ def most_of_mode(
 def maximand(
     mu: Array, k: int, first: int, node: int, side: float, data: Data, values: Array
 ) -> None:
-    """Write what is maximised at consecutive points of a mode's table, from `first` on."""
+    """Write Σ_s c_s e_s + |r_s e_s − μ_s| − μ_ω ω − μ_g g at points of mode k's table to `values`.
+
+    e_s are the responses to source s, c_s ± r_s (times side) the range of their amplitude; points
+    are consecutive, from `first` on.
+    """
     sources, end = data.share.shape[1], first + len(values)
     z = k * (2 + sources)
-    w, g, along, across = data.omega[k, first:end], data.decay[k, first:end], mu[z], mu[z + 1]
+    w, g, mu_w, mu_g = data.omega[k, first:end], data.decay[k, first:end], mu[z], mu[z + 1]
     for s in range(sources):
         e, m = data.table[k, s, node, first:end], mu[z + 2 + s]
         c, r = side * data.share[k, s], side * data.reach[k, s]
         if s == 0:
             for i in range(len(values)):
-                values[i] = c * e[i] + abs(r * e[i] - m) - along * w[i] - across * g[i]
+                values[i] = c * e[i] + abs(r * e[i] - m) - mu_w * w[i] - mu_g * g[i]
         else:
             for i in range(len(values)):
                 values[i] += c * e[i] + abs(r * e[i] - m)
@@ -283,44 +291,47 @@ def minimise(
     weight: Array,
     u: Array,
 ) -> float:
-    """The least D(μ) that a deflected subgradient method meets in `steps`, and its μ in `mu`.
+    """Minimise the dual function D(μ) by a deflected subgradient method; return an upper bound.
+
+    The bound is the least D(μ) that is met, with that of the Taylor models' cubic parts.
 
     Args:
         mu: Multipliers to begin with, and the best ones afterwards.
-        slab: As of `dual`.
+        slab: First and last place along ω and along q of each mode's table, shape (K, 4).
         node: Node.
         side: +1 or −1.
         data: Models and tables of the output.
         steps: Most evaluations of D.
-        target: Value below which no effort is made.
-        aim: A value that D cannot fall below, the model's own somewhere.
-        weight: Written: by how much each variable's two sides still differ, in units of D, (Z,).
+        target: Value at which the search ends.
+        aim: A value that D cannot fall below: the model's at some inputs.
+        weight: Written: by how much each intervening variable differs between the two maxima of D,
+            times its multiplier, shape (Z,).
         u: Written: inputs that the best multipliers name.
     """
     gradient, direction, best = np.empty(len(mu)), np.zeros(len(mu)), mu.copy()
     here = np.empty(len(u))
-    least, drop, idle = np.inf, np.inf, 0
+    least, expected_drop, idle = np.inf, np.inf, 0
     weight[:] = 0.0
     for _ in range(steps):
         value = dual(mu, slab, node, side, data, gradient, here)
         for z in range(len(mu)):
             weight[z] = 0.8 * weight[z] + abs(gradient[z] * mu[z])
         if value < least:
-            if least - value > 0.3 * drop:
+            if least - value > 0.3 * expected_drop:
                 idle = 0
             least = value
             best[:], u[:] = mu, here
         if least <= target:
             break
-        if drop == np.inf:
-            drop = 0.7 * max(least - aim, 0.0)
+        if expected_drop == np.inf:
+            expected_drop = 0.7 * max(least - aim, 0.0)
         idle += 1
         if idle > PATIENCE:
-            drop, idle = 0.5 * drop, 0
+            expected_drop, idle = 0.5 * expected_drop, 0
             mu[:], direction[:] = best, 0.0
-            if drop < 0.1 * (target - aim):
+            if expected_drop < 0.1 * (target - aim):
                 break
-        elif not deflect(mu, gradient, direction, value - least + drop, data.grain[0]):
+        elif not deflect(mu, gradient, direction, value - least + expected_drop, data.grain[0]):
             break
     mu[:] = best
     return least + remainder_bound(mu, data)
@@ -328,12 +339,15 @@ def minimise(
 
 @loops
 def deflect(mu: Array, gradient: Array, direction: Array, gain: float, grain: float) -> bool:
-    """Move μ against the gradient and what is left of the last direction, to multiples of a grain.
+    """Make a deflected subgradient step of the multipliers μ, rounded to multiples of `grain`.
 
-    Any μ gives a bound. On a grid its path is the same in all units: of rounding it would not be.
+    The direction is the gradient with a part of the last direction, where these oppose one another
+    (Camerini, Fratta, Maffioli 1975); its length aims at a fall of D by `gain` (Polyak 1969). `mu`
+    and `direction` are written. On a grid the path of μ does not depend on rounding; any μ gives a
+    bound.
 
     Returns:
-        False where there is no direction, or a multiplier leaves the range of `dual`.
+        False where the direction is zero, or a multiplier exceeds `LARGEST`.
     """
     length = along = 0.0
     for z in range(len(mu)):

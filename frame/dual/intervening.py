@@ -91,12 +91,13 @@ class BlockShares:
     def from_block(
         cls, block: Block, rows: TaylorModel, excited: TaylorModel, used: Rows
     ) -> BlockShares:
-        """Shares of a block.
+        """Products of a block's modes with the rows of the outputs and the patterns of the sources.
 
         Args:
-            block: The block, as functions of the inputs at `used`.
-            rows: Outputs in the block's coordinates, V = (m, n), constant but for rounding.
-            excited: Sources in the same, v = basis⁻¹ …, V = (sources, n), of all inputs.
+            block: The block X, as functions of the inputs at `used`.
+            rows: Rows of the outputs in the block's coordinates, V = (m, n), constant but for
+                rounding.
+            excited: Patterns v of the sources in them, V = (sources, n), of all inputs.
             used: Inputs of the block.
         """
         fixed, varying = excited.value, excited - excited.value
@@ -135,7 +136,12 @@ def degree_of_shares(inputs: int) -> int:
 
 
 def oscillators(structure: Classical, of_block: BlockShares, found: Subspaces) -> list[Oscillator]:
-    """Intervening variables of a block's columns.
+    """Intervening variables (frequency, decay, shares) of the oscillators of a block's columns.
+
+    Args:
+        structure: The structure, with its damping and the outputs' factors.
+        of_block: Rates and shares of the block.
+        found: All enclosed blocks; a block of one mode takes their proved range of λ.
 
     Raises:
         UnprovedError: They have different damping ratios.
@@ -158,12 +164,9 @@ def oscillators(structure: Classical, of_block: BlockShares, found: Subspaces) -
 
 
 def _in_all(model: TaylorModel, structure: Classical, used: Rows) -> TaylorModel:
-    """Model cut to the structure's order, as a function of all its inputs.
+    """The model cut to the structure's order, as functions of all its inputs.
 
-    Args:
-        model: Functions of the inputs at `used`, or of all.
-        structure: The structure.
-        used: Inputs that mass and stiffness depend on.
+    `model` has functions of the inputs at `used`, or of all.
     """
     d = structure.start.inputs
     model = model.cut(structure.start.order)
@@ -194,23 +197,29 @@ def _oscillator(
 
 
 def damped_range(structure: Classical, low: float, high: float, modes: Rows) -> tuple[Ends, Ends]:
-    """Ranges of ω and g/ω of modes whose λ lie in [low, high].
+    """Ranges of ω = √(λ − g²) and of g/ω for modes whose λ lie in [low, high], g their decay.
 
     Raises:
         UnprovedError: One may not oscillate.
     """
     (a_low, b_low), (a, b) = (np.maximum(x, 0.0) for x in structure.rayleigh.bounds())
-    zetas = structure.ratio[modes].bounds()
-    most = float(a / (2 * np.sqrt(low)) + b * np.sqrt(high) / 2 + max(zetas[1].max(), 0.0))
-    least = float(a_low / (2 * np.sqrt(high)) + b_low * np.sqrt(low) / 2 + max(zetas[0].min(), 0.0))
-    if most >= 1:
+    zeta_low, zeta = (np.maximum(x, 0.0) for x in structure.ratio[modes].bounds())
+    slow, fast = np.sqrt(low), np.sqrt(high)
+    # of g/√λ, which is the ratio of damping
+    greatest = float(a / (2 * slow) + b * fast / 2 + zeta.max())
+    least = float(a_low / (2 * fast) + b_low * slow / 2 + zeta_low.min())
+    if greatest >= 1:
         raise UnprovedError("a mode may not oscillate", "take less damping")
-    steep = np.sqrt(1 - most**2)
-    return (float(np.sqrt(low) * steep), float(np.sqrt(high))), (least, float(most / steep))
+    shrinkage = np.sqrt(1 - greatest**2)  # least ω/√λ
+    return (float(slow * shrinkage), float(fast)), (least, float(greatest / shrinkage))
 
 
 def sources_of(structure: Classical, sources: Sequence[str]) -> TaylorModel:
-    """Vectors that move the structure, V = (sources, n)."""
+    """Patterns of the sources in the order of their names, V = (sources, n).
+
+    Of the ground ("load") this is how it moves the unknowns, of a force M⁻¹ b, of "velocity" and
+    "start" the initial velocities and displacements.
+    """
     vectors = {
         "load": structure.start[0] * 0.0 + structure.pattern,
         "velocity": structure.start[1],

@@ -73,20 +73,25 @@ def least_peak(level: LevelModels, output: int) -> tuple[float, Array]:
 
 
 def _halves(cell: PeakCell, motion: Array) -> list[Rows]:
-    """Halves of the range over which a mode varies most at the cell's node, sharing the middle.
+    """Halves of a cell along the ω or q = g/ω over which a mode varies most at the cell's node.
+
+    Args:
+        cell: Ranges of ω and q of all modes, as places in their tables.
+        motion: Response of each mode over its table, shape (K, T, Q, W).
 
     Returns:
-        Places of both halves; none where no range has a place between its ends.
+        Places of the lower and upper half, (K, 4) each, which share the middle place; an empty list
+        where no range has a place between its ends.
     """
-    varied, chosen = -1.0, (0, 0)
+    largest, chosen = -1.0, (0, 0)
     for k in range(len(cell.places)):
         first, last, low, high = (int(place) for place in cell.places[k])
-        over = motion[k, cell.node, low : high + 1, first : last + 1]
+        response = motion[k, cell.node, low : high + 1, first : last + 1]
         for axis, length in ((0, last - first), (2, high - low)):
-            size = float(np.ptp(over, axis=1 - axis // 2).max())
-            if length > 1 and size > varied:
-                varied, chosen = size, (k, axis)
-    if varied < 0:
+            variation = float(np.ptp(response, axis=1 - axis // 2).max())
+            if length > 1 and variation > largest:
+                largest, chosen = variation, (k, axis)
+    if largest < 0:
         return []
     k, axis = chosen
     lower, upper = cell.places.copy(), cell.places.copy()
@@ -97,13 +102,24 @@ def _halves(cell: PeakCell, motion: Array) -> list[Rows]:
 def _bounded(
     sides: list[OutputBounds], motion: Array, places: Rows, number: int, known: float
 ) -> PeakCell:
-    """The cell at some places, with the largest over some nodes of the least ± output in it."""
+    """Cell of ranges of the modes' ω and q, with a lower bound of the output's peak over it.
+
+    The bound is the largest, over a few nodes where the motion in the middle of the cell peaks, of
+    a dual lower bound of + or − output.
+
+    Args:
+        sides: Models of −output and output.
+        motion: Response of each mode over its table, shape (K, T, Q, W).
+        places: First and last place of the tables along ω and q, shape (K, 4).
+        number: Number of the cell.
+        known: A bound that holds already, that of a cell around it.
+    """
     middle = [(low + high) // 2 for low, high in places.reshape(-1, 2).tolist()]
     omega, q = middle[::2], middle[1::2]
     expected: Array = motion[np.arange(len(motion)), :, q, omega].sum(0)
     size = np.abs(expected)
-    summit = np.append(True, size[1:] >= size[:-1]) & np.append(size[:-1] >= size[1:], True)
-    nodes = np.argsort(np.where(summit, size, -1.0))[-TRIED:][::-1]
+    is_peak = np.append(True, size[1:] >= size[:-1]) & np.append(size[:-1] >= size[1:], True)
+    nodes = np.argsort(np.where(is_peak, size, -1.0))[-TRIED:][::-1]
     cell = PeakCell(-np.inf, number, places, int(nodes[0]), np.zeros(sides[0].data.linear.shape[1]))
     for node in map(int, nodes):
         if size[node] <= cell.bound:

@@ -27,7 +27,7 @@ FINE = 0.07
 POINTS = (8, 80), (3, 12)
 """Least and most of them along ω and along g/ω."""
 HUGE = 1e300
-"""Less than this is no value."""
+"""Its negative stands for −∞, a value that is not known."""
 LEAST_SPREAD = 1e-30
 """Radius in SI units of a variable that does not vary, so that scaled ones stay finite."""
 AT_PEAKS = 6
@@ -72,7 +72,7 @@ class ResponseTables:
 def response_tables(
     single: Sequence[Oscillator], excitation: Excitation, orders: Rows
 ) -> ResponseTables:
-    """Tables of the responses of all oscillators, with their errors.
+    """Tables of the responses of all oscillators to all sources, with bounds of their errors.
 
     Args:
         single: The oscillators.
@@ -80,14 +80,17 @@ def response_tables(
         orders: Derivative of the motion that each output takes, shape (m,).
     """
     loads, time, sources = excitation
-    points, different = _points(single, float(time[-1])), sorted(map(int, set(orders)))
+    points, distinct = _points(single, float(time[-1])), sorted(map(int, set(orders)))
     grids = [spanned(mode.omega_range, mode.quotient_range, points) for mode in single]
-    modes = [_responses(grid, loads, time, sources, different) for grid in grids]
-    stacked = [{o: np.stack([mode[o][i] for mode in modes]) for o in different} for i in range(3)]
+    modes = [_responses(grid, loads, time, sources, distinct) for grid in grids]
+    value, error, line_deviation = (
+        {order: np.stack([mode[order][i] for mode in modes]) for order in distinct}
+        for i in range(3)
+    )
     count = roundings(len(single), len(sources), single[0].omega.inputs)
-    of_sums = {o: 2 * gamma(count) * np.abs(stacked[0][o]).max(-1) for o in different}
-    error = {o: stacked[1][o] + of_sums[o] for o in different}
-    return ResponseTables(stacked[0], error, stacked[2], grids, time)
+    for order in distinct:  # of the sums that the responses enter
+        error[order] = error[order] + 2 * gamma(count) * np.abs(value[order]).max(-1)
+    return ResponseTables(value, error, line_deviation, grids, time)
 
 
 def _responses(
@@ -113,13 +116,17 @@ def _responses(
 
 
 def _points(single: Sequence[Oscillator], duration: float) -> tuple[int, int]:
-    """Number of table points along ω and along g/ω, the same for all modes."""
-    most, slow = [2.0, 2.0], 2 / duration if duration > 0 else np.inf
+    """Numbers of table points along ω and along q = g/ω, the same for all modes.
+
+    They are so many that neighbours lie within `FINE` of a mode's decay and of 2 / duration.
+    """
+    along_omega, along_q, slowest = 2.0, 2.0, 2 / duration if duration > 0 else np.inf
     for mode in single:
-        (low, high), (least, top) = mode.omega_range, mode.quotient_range
-        reach = FINE * (max(least, 0.0) * low + slow)
-        most = [max(most[0], (high - low) / reach), max(most[1], (top - least) * high / reach)]
-    return (int(np.clip(most[0], *POINTS[0])) + 1, int(np.clip(most[1], *POINTS[1])) + 1)
+        (omega_low, omega_high), (q_low, q_high) = mode.omega_range, mode.quotient_range
+        spacing = FINE * (max(q_low, 0.0) * omega_low + slowest)
+        along_omega = max(along_omega, (omega_high - omega_low) / spacing)
+        along_q = max(along_q, (q_high - q_low) * omega_high / spacing)
+    return int(np.clip(along_omega, *POINTS[0])) + 1, int(np.clip(along_q, *POINTS[1])) + 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -290,8 +297,7 @@ class OutputBounds:
         group, constant = _group(level, o, side)
         variables = _variables(level, o)
         tables, models = _tables(level, o, variables), _models(level, variables)
-        fields = [*tables, *models, *group, _grain(level, o)]
-        data = Data(*fields)
+        data = Data(*tables, *models, *group, _grain(level, o))
         require_in_range({name: x for name, x in data._asdict().items() if name != "table"})
         out = np.stack([np.full(total, np.inf), np.full(total, -HUGE)])
         at = np.zeros((total, data.linear.shape[1]))
@@ -334,13 +340,16 @@ class OutputBounds:
         )
 
     def improve(self, nodes: Rows, effort: Effort) -> None:
-        """Improve bounds and model values at nodes (J,); those of other nodes are not read."""
-        out, at = np.empty((2, len(nodes))), np.empty((len(nodes), self.at.shape[1]))
-        bounds(nodes, self.side, effort, self.constant, self.data, out, at)
-        better = out[1] > self.out[1, nodes]
+        """Lower the bounds of side × output and raise the model's values at nodes (J,), in place.
+
+        Other nodes are not read, so that threads may work on several blocks of nodes.
+        """
+        new, at = np.empty((2, len(nodes))), np.empty((len(nodes), self.at.shape[1]))
+        bounds(nodes, self.side, effort, self.constant, self.data, new, at)
+        better = new[1] > self.out[1, nodes]
         self.at[nodes[better]] = at[better]
-        self.out[1, nodes] = np.maximum(self.out[1, nodes], out[1])
-        self.out[0, nodes] = np.minimum(self.out[0, nodes], out[0])
+        self.out[1, nodes] = np.maximum(self.out[1, nodes], new[1])
+        self.out[0, nodes] = np.minimum(self.out[0, nodes], new[0])
 
 
 def _variables(level: LevelModels, o: int) -> TaylorModel:
@@ -350,18 +359,22 @@ def _variables(level: LevelModels, o: int) -> TaylorModel:
 
 
 def _tables(level: LevelModels, o: int, variables: TaylorModel) -> list[Array]:
-    """Fields of `Data` from `table` to `reach`: tables, their points, ranges of all variables."""
+    """Fields of `Data` for output o, in their order, from `table` to `reach`.
+
+    They are the modes' tables, the tables' points, and centres and radii of all `variables`.
+    """
     grids, single = level.tables.grids, level.oscillators
     centre, radius = (x.reshape(len(single), -1) for x in (variables.value, _radii(variables)))
-    omega = np.stack([np.tile(g.omega, len(g.quotient)) for g in grids])
-    decay = np.stack([(g.quotient[:, None] * g.omega).ravel() for g in grids])
+    omega = np.stack([np.tile(grid.omega, len(grid.quotient)) for grid in grids])
+    decay = np.stack([(grid.quotient[:, None] * grid.omega).ravel() for grid in grids])
     scaled = [(x - centre[:, [i]]) / radius[:, [i]] for i, x in enumerate((omega, decay))]
-    start = np.array([[g.omega[0], g.quotient[0]] for g in grids])
-    step = np.array([[g.omega[1], g.quotient[1]] for g in grids]) - start
+    start = np.array([[grid.omega[0], grid.quotient[0]] for grid in grids])
+    step = np.array([[grid.omega[1], grid.quotient[1]] for grid in grids]) - start
     points = np.array([len(grids[0].omega), len(grids[0].quotient)], float)
     ends = np.array([mode.places(grid) for mode, grid in zip(single, grids, strict=True)], float)
     value = level.tables.value[int(level.structure.order[o])]
-    ranges = [x[:, some].copy() for some in (slice(2), slice(2, None)) for x in (centre, radius)]
+    of_exponent, of_shares = slice(2), slice(2, None)
+    ranges = [x[:, part].copy() for part in (of_exponent, of_shares) for x in (centre, radius)]
     return [value, *scaled, start, step, points, ends, *ranges]
 
 
@@ -375,11 +388,12 @@ def _models(level: LevelModels, variables: TaylorModel) -> list[Array]:
 
 
 def _group(level: LevelModels, o: int, side: float) -> tuple[list[Array], Array]:
-    """What truncated modes and errors add to the bounds of output o.
+    """Terms that truncated modes and errors add to bounds of side × output o.
 
     Returns:
-        The fields `group_wave`, `group_linear` and `group_quadratic` of `Data`; constants of the
-        motion besides its model, and of a bound besides that, at all nodes, shape (2, T).
+        The fields `group_wave`, `group_linear` and `group_quadratic` of `Data`, for what depends on
+        the inputs; constants to add to the model's value for the motion's, and to that for its
+        upper bound, at all nodes, shape (2, T).
     """
     tables, order = level.tables, int(level.structure.order[o])
     constant: Array = np.zeros((2, len(tables.time)))
@@ -421,13 +435,15 @@ def _radii(x: TaylorModel) -> Array:
 
 
 def _scaled(x: TaylorModel, radius: Array) -> tuple[Array, ...]:
-    """Linear, quadratic and cubic coefficients, V first, and the bound of the rest, over radius."""
-    # pairs by rows, as the kernel has them
-    lists = monomials(x.inputs, 2)
-    order = np.lexsort((lists[:, 1], lists[:, 0]))
+    """Linear, quadratic and cubic coefficients of models V = (Z,), and remainders, over `radius`.
+
+    Shapes are (Z, monomials), quadratic ones by rows i ≤ j as the kernel has them, and (Z,).
+    """
+    pairs = monomials(x.inputs, 2)
+    by_rows = np.lexsort((pairs[:, 1], pairs[:, 0]))
     remainder = np.asarray(x.remainder + gamma(8) * x.size())
-    parts = ((y / radius).T for y in (x.part(1), x.part(2)[order], x.part(3)))
-    return (*(np.ascontiguousarray(y) for y in parts), remainder / radius)
+    parts = ((part / radius).T for part in (x.part(1), x.part(2)[by_rows], x.part(3)))
+    return (*(np.ascontiguousarray(part) for part in parts), remainder / radius)
 
 
 def _blocks(nodes: Rows) -> list[Rows]:

@@ -41,15 +41,13 @@ class MotionModels:
         models += [
             x for truncated in self.truncated for x in (truncated.share, truncated.amplitude)
         ]
-        restricted = all_within(models, low, high)
-        count = 4 * len(self.oscillators)
+        restricted = iter(all_within(models, low, high))  # in the same order
         single = [
-            mode.on_part(restricted[4 * k : 4 * k + 4]) for k, mode in enumerate(self.oscillators)
+            mode.on_part([next(restricted) for _ in mode.models]) for mode in self.oscillators
         ]
-        pairs = zip(self.truncated, restricted[count::2], restricted[count + 1 :: 2], strict=True)
         rests = [
-            replace(truncated, share=share, amplitude=amplitude)
-            for truncated, share, amplitude in pairs
+            replace(truncated, share=next(restricted), amplitude=next(restricted))
+            for truncated in self.truncated
         ]
         return replace(self, oscillators=single, truncated=rests)
 
@@ -69,7 +67,7 @@ class MotionModels:
         """
         centre, used = centred_matrices(structure.mass, structure.stiffness)
         excited = sources_of(structure, excitation[2]) @ inverse(centre.basis, structure.start).T
-        wanted, tolerances = centre.modes, np.asarray(np.zeros(centre.modes))
+        wanted, tolerances = centre.modes, np.asarray(np.zeros(centre.modes))  # all, closely
         if allowed is not None:
             wanted, tolerances = modes_wanted(structure, centre, excited, excitation, allowed)
         found = subspaces(centre, used, wanted, tolerances)
@@ -79,16 +77,14 @@ class MotionModels:
             )
         rows = structure.start.like(structure.rows) @ centre.basis
         shares = [BlockShares.from_block(block, rows, excited, used) for block in found.blocks]
-        nothing = np.zeros((len(excitation[1]), len(structure.order)))
-        models = cls([], [], nothing, nothing)
+        zero = np.zeros((len(excitation[1]), len(structure.order)))
+        models = cls(oscillators=[], truncated=[], added=zero, line_deviation=zero)
         for of_block in shares:
             models = models.with_block(structure, of_block, found, excitation, allowed)
         truncated = rest_of_modes(structure, found, shares, (rows, excited), excitation)
-        return (
-            models
-            if truncated is None
-            else replace(models, truncated=[*models.truncated, truncated])
-        )
+        if truncated is None:
+            return models
+        return replace(models, truncated=[*models.truncated, truncated])
 
     def with_block(
         self,

@@ -25,23 +25,26 @@ SMALL = 0.1
 
 
 def form_variation(matrix: TaylorModel, scale: Array) -> float:
-    """Bound of the norm of a symmetric form's variation over the box, in scaled coordinates."""
+    """Bound over the box of ‖S (A(u) − A(0)) S‖₂, A a symmetric matrix, S = diag `scale` (n,)."""
     weight = scale[:, None] * scale
-    low = _linear_norm(matrix.part(1) * weight)
-    squares = _squares(matrix.inputs)
-    part = matrix.part(2) * weight
-    low += max(_norm_of_terms(sign * part, squares) for sign in (1.0, -1.0))
+    linear = _linear_norm(matrix.part(1) * weight)
+    squares, terms = _squares(matrix.inputs), matrix.part(2) * weight
+    quadratic = max(_norm_of_terms(sign * terms, squares) for sign in (1.0, -1.0))
     higher = sum(matrix.sizes()[3:]) + matrix.remainder
-    return low + float(np.linalg.norm(weight * higher, 2))
+    return linear + quadratic + float(np.linalg.norm(weight * higher, 2))
 
 
 def _linear_norm(terms: Array, enough: float = 0.0) -> float:
-    """Greatest norm of Σ_i u_i V_i over the box: the largest V_i at all corners, others in sum."""
-    in_sum = _norm_of_terms(terms, np.zeros(len(terms), bool))
-    if in_sum <= enough:
-        return in_sum
+    """Bound of ‖Σ_i u_i V_i‖₂ over the box |u_i| ≤ 1, for symmetric V_i = `terms` (d, n, n).
+
+    That of Σ |V_i| suffices up to `enough`; else the largest V_i are taken at all corners.
+    """
+    by_sum = _norm_of_terms(terms, np.zeros(len(terms), bool))
+    if by_sum <= enough:
+        return by_sum
     terms = terms[np.argsort(-np.linalg.norm(terms, axis=(1, 2)))]
     first, further_terms = terms[:CORNERS], terms[CORNERS:]
+    # all corners but for a common sign, which does not change the norm
     signs = 1 - 2 * (np.arange(2 ** (len(first) - 1))[:, None] >> np.arange(len(first)) & 1)
     at_corners = np.abs(np.linalg.eigvalsh(np.tensordot(signs, first, 1))).max()
     return float(at_corners) + _norm_of_terms(further_terms, np.zeros(len(further_terms), bool))
@@ -84,7 +87,7 @@ class Pencil:
 
     @classmethod
     def from_rate(cls, rate: list[Array], mass: TaylorModel, stiffness: TaylorModel) -> Pencil:
-        """The pencil T = K − ℓ M over the box, as the variation of its entries by degree.
+        """The pencil T = K − ℓ M over the box, as bounds of its entries' variation by degree.
 
         Args:
             rate: Coefficients (monomials,) of ℓ, of degree 0 to N.
@@ -92,19 +95,16 @@ class Pencil:
             stiffness: K.
         """
         N, d = len(rate) - 1, mass.inputs
-        ell, of_k, of_m = (
-            [float(np.abs(part).sum()) for part in rate],
-            [*stiffness.sizes()],
-            mass.sizes(),
-        )
-        sizes = [np.zeros_like(mass.remainder) for _ in range(N + 2)]
-        for m in range(1, len(of_k)):
-            sizes[m] = sizes[m] + of_k[m]
-        for a in range(N + 1):
-            for b in range(len(of_m)):
+        rate_sizes = [float(np.abs(part).sum()) for part in rate]
+        mass_sizes = mass.sizes()
+        sizes = [np.zeros_like(mass.remainder) for _ in range(N + 2)]  # the last above degree N
+        for m, size in enumerate(stiffness.sizes()[1:], 1):
+            sizes[m] = sizes[m] + size
+        for a, rate_size in enumerate(rate_sizes):
+            for b, mass_size in enumerate(mass_sizes):
                 if (a, b) != (0, 0):
-                    sizes[min(a + b, N + 1)] += ell[a] * of_m[b]
-        sizes[-1] = sizes[-1] + sum(ell) * mass.remainder + stiffness.remainder
+                    sizes[min(a + b, N + 1)] += rate_size * mass_size
+        sizes[-1] = sizes[-1] + sum(rate_sizes) * mass.remainder + stiffness.remainder
         parts, rounding = [], gamma(16) * np.stack(sizes[1:3])
         for m in (1, 2):
             part = stiffness.part(m)
@@ -116,22 +116,24 @@ class Pencil:
         return cls(sizes, parts[0], parts[1], rounding)
 
     def loss(self, o: Rows, distance: Array, sign: float) -> float:
-        """Bound of the fall over the box of sign × T on rows and columns o, scaled by distances.
+        """Bound of how far the least eigenvalue of sign × S T S falls below 1 over the box.
+
+        T is taken on rows and columns o, scaled to ±1 in the middle of the box.
 
         Args:
-            o: Rows and columns.
-            distance: |T_jj| of these in the middle, by the roots of which T is divided.
-            sign: −1 or 1.
+            o: Rows and columns, of one sign of T_jj.
+            distance: |T_jj| of these in the middle; S = diag(distance^−½).
+            sign: That of T_jj, −1 or 1.
         """
         if not len(o):
             return 0.0
         block, weight = np.ix_(o, o), sign / np.sqrt(np.outer(distance, distance))
         norms = [float(np.linalg.norm(size[block] * weight, 2)) for size in self.sizes[1:]]
-        line, bend = (part[:, o[:, None], o] * weight for part in (self.linear, self.quadratic))
+        linear, quadratic = (x[:, o[:, None], o] * weight for x in (self.linear, self.quadratic))
         of_rounding = [float(np.linalg.norm(x[block] * weight, 2)) for x in self.rounding]
-        norms[0] = min(norms[0], _linear_norm(line, SMALL) + of_rounding[0])
-        squares = _squares(len(line))
-        norms[1] = min(norms[1], _norm_of_terms(bend, squares) + of_rounding[1])
+        norms[0] = min(norms[0], _linear_norm(linear, SMALL) + of_rounding[0])
+        squares = _squares(len(linear))
+        norms[1] = min(norms[1], _norm_of_terms(quadratic, squares) + of_rounding[1])
         return sum(norms) + gamma(100 * len(o))
 
 
@@ -183,7 +185,11 @@ class Comparison:
         return self.inverse is not None or self.least > 0
 
     def solved(self, right: Array) -> Array:
-        """Bounds of |y| for all T y = r with |r| ≤ `right`, entry by entry, shape (n − p,)."""
+        """Bounds of |y| for all solutions of T y = r with |r| ≤ `right`, by entry, shape (n − p,).
+
+        The least of the bounds by T's least eigenvalues and by its comparison matrix is improved,
+        entry by entry, through its row: |y_j| ≤ (r_j + Σ_l |T_jl| |y_l|) / |T_jj|.
+        """
         scale = self.distance**-0.5
         y: Array = np.full(len(right), np.inf)
         if self.least > 0:
