@@ -111,19 +111,10 @@ def global_maximum(g: Array, H: Array, lower: Array, upper: Array) -> Array:
 
 
 def _face_points(g: Array, H: Array, lower: Array, upper: Array, free: tuple[int, ...]) -> Array:
-    """Stationary points of g·x + x·H·x/2 on all faces of boxes with the same free axes.
+    """Stationary points of g·x + x·H·x/2 on the faces of N boxes with the same free axes.
 
-    On a face the other axes are at their ends. A point outside its face is clipped to it.
-
-    Args:
-        g: Gradients, shape (N, d).
-        H: Symmetric Hessians, shape (N, d, d).
-        lower: Lower ends of the boxes, shape (N, d).
-        upper: Upper ends.
-        free: The free axes.
-
-    Returns:
-        One point a face, shape (N, 2^(d − free), d).
+    On a face the d − free other axes are at their ends; a point outside its face is clipped to it.
+    Shape (N, 2^(d − free), d), for g (N, d), H (N, d, d) and boxes (N, d).
     """
     d = g.shape[1]
     fixed = [i for i in range(d) if i not in free]

@@ -96,10 +96,7 @@ class _Writer:
     def _apply(self, name: str, x: int, y: int | None = None) -> int:
         """Place of the result of an operation on places x and y, written unless it is there.
 
-        Args:
-            name: Name in `OPERATIONS`, or sympy's "Add" or "Mul".
-            x: Place of the first operand.
-            y: Place of the second; None for an operation of one operand.
+        `name` is one of `OPERATIONS`, or sympy's "Add" or "Mul".
         """
         instruction = {"Add": "add", "Mul": "multiply"}.get(name, name)
         row = (OPERATIONS.index(instruction), x, x if y is None else y)

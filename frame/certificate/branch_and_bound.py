@@ -128,12 +128,7 @@ class Tree:
         return np.asarray(upper[self.numbers])
 
     def examine(self, frontier: Frontier, boxes: slice, items: slice) -> tuple[Array, Array, Array]:
-        """Examine the items of some boxes by `kernel.examine`.
-
-        Args:
-            frontier: The boxes and items.
-            boxes: Which boxes.
-            items: Their items, I of them, each a box with a problem.
+        """Examine the items of some boxes by `kernel.examine`; an item is a box with a problem.
 
         Returns:
             What is done next with each item (codes of `kernel.examine`), side × output at its
@@ -223,16 +218,9 @@ class Frontier:
     def geometry(
         self, lower: Array, upper: Array, boxes: slice = slice(None)
     ) -> tuple[Array, Array, Array]:
-        """Centres, half widths and outer faces of B boxes.
+        """Centres (B, d), half widths (B, d) and outer faces (B, 2, d) of boxes of a domain.
 
-        Args:
-            lower: Lower ends of the domain, shape (d,).
-            upper: Upper ends.
-            boxes: Which boxes; all unless given.
-
-        Returns:
-            Centres (B, d), half widths (B, d), and whether the lower and the upper face of each
-            axis lies on the domain's, (B, 2, d).
+        Outer are those lower and upper faces along each axis that lie on the domain's.
         """
         positions = self.position[boxes]
         interval = np.maximum(positions, 1)  # 2^depth + index; ends of the domain count as all

@@ -182,10 +182,7 @@ def _size_of_start(
 ) -> float:
     """Bound of the initial conditions' defect in the norm √(qᵀ K q + vᵀ M v).
 
-    Args:
-        defect: Chebyshev coefficients of the residuals of `_start`, of q and v or of K q and M v.
-        stiffness: K over the box.
-        mass: M over the box.
+    `defect` has coefficients of residuals of q and v, or of K q and M v, as of `_start`.
     """
     if "start_q" in defect:
         return float(np.hypot(stiffness.sup(defect["start_q"]), mass.sup(defect["start_v"])))

@@ -170,13 +170,7 @@ class RatioDamping:
         """Bound of the error of a mode's polynomial damping force, in the norm of M⁻¹.
 
         2 ζ (|μ − σ²| / (√μ + σ) ‖w‖_M + ‖(K − μ M) w‖ / (√λ + √μ)), λ the least eigenvalue of K
-        against M (module docstring).
-
-        Args:
-            defect: Chebyshev coefficients of the defects by name, as of `defects`.
-            mode: Number of the mode.
-            stiffness: K over the box.
-            mass: M over the box.
+        against M (module docstring); `defect` has Chebyshev coefficients of what `defects` returns.
         """
         root = np.sqrt(_lower_bounds(self.squared)[mode])
         root_error = float(np.abs(defect["root"][:, mode]).sum())

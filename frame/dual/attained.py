@@ -86,14 +86,10 @@ def modes_at(
     points: Array,
     unit: Array,
 ) -> Modal:
-    """Modes of a structure at S inputs, with bounds of the rounding of all that is derived.
+    """Modes of a structure at S values of its inputs `names`, with bounds of their rounding.
 
-    Args:
-        system: The structure.
-        structure: The same over a box of its inputs; its damping and outputs are read.
-        names: Names of the inputs.
-        points: Their values, shape (S, inputs), in SI units.
-        unit: The same in unit coordinates of the box, shape (S, d).
+    The values are `points` (S, inputs) in SI units, and `unit` (S, d) in the unit coordinates of
+    the box of `structure`, from which damping is taken.
 
     Raises:
         UnprovedError: A mode does not oscillate.

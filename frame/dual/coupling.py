@@ -45,15 +45,13 @@ class Coupling:
     decay_slope: float
 
     def bounds(self, orders: Rows, excitation: Excitation) -> tuple[Array, Array]:
-        """Bounds of what the coupling adds to m outputs at T nodes and between them.
+        """Bounds of what the coupling adds to outputs at nodes, and between nodes, (T, m) each.
+
+        The second is of how far a block's motion strays from a straight line in the step to a node.
 
         Args:
             orders: Derivative of the motion that each output takes, shape (m,).
             excitation: The loads, the nodes and the names of the sources.
-
-        Returns:
-            Bound of what is added at the nodes, and of how far a block's motion strays from a
-            straight line in the step to each, (T, m) each.
         """
         loads, time, sources = excitation
         table = Oscillators(self._grid(float(time[-1])), loads, time)

@@ -138,11 +138,6 @@ def degree_of_shares(inputs: int) -> int:
 def oscillators(structure: Classical, of_block: BlockShares, found: Subspaces) -> list[Oscillator]:
     """Intervening variables (frequency, decay, shares) of the oscillators of a block's columns.
 
-    Args:
-        structure: The structure, with its damping and the outputs' factors.
-        of_block: Rates and shares of the block.
-        found: All enclosed blocks; a block of one mode takes their proved range of λ.
-
     Raises:
         UnprovedError: They have different damping ratios.
     """
@@ -215,11 +210,7 @@ def damped_range(structure: Classical, low: float, high: float, modes: Rows) -> 
 
 
 def sources_of(structure: Classical, sources: Sequence[str]) -> TaylorModel:
-    """Patterns of the sources in the order of their names, V = (sources, n).
-
-    Of the ground ("load") this is how it moves the unknowns, of a force M⁻¹ b, of "velocity" and
-    "start" the initial velocities and displacements.
-    """
+    """Patterns of the sources on the unknowns, V = (sources, n), in their order."""
     vectors = {
         "load": structure.start[0] * 0.0 + structure.pattern,
         "velocity": structure.start[1],

@@ -75,9 +75,7 @@ def least_peak(level: LevelModels, output: int) -> tuple[float, Array]:
 def _halves(cell: PeakCell, motion: Array) -> list[Rows]:
     """Halves of a cell along the ω or q = g/ω over which a mode varies most at the cell's node.
 
-    Args:
-        cell: Ranges of ω and q of all modes, as places in their tables.
-        motion: Response of each mode over its table, shape (K, T, Q, W).
+    `motion` holds each mode's response over its table, shape (K, T, Q, W).
 
     Returns:
         Places of the lower and upper half, (K, 4) each, which share the middle place; an empty list
@@ -104,15 +102,8 @@ def _bounded(
 ) -> PeakCell:
     """Cell of ranges of the modes' ω and q, with a lower bound of the output's peak over it.
 
-    The bound is the largest, over a few nodes where the motion in the middle of the cell peaks, of
-    a dual lower bound of + or − output.
-
-    Args:
-        sides: Models of −output and output.
-        motion: Response of each mode over its table, shape (K, T, Q, W).
-        places: First and last place of the tables along ω and q, shape (K, 4).
-        number: Number of the cell.
-        known: A bound that holds already, that of a cell around it.
+    It is the largest, over a few nodes where the motion in the middle of the cell peaks, of a dual
+    lower bound of + or − output; at least `known`, that of a cell around it.
     """
     middle = [(low + high) // 2 for low, high in places.reshape(-1, 2).tolist()]
     omega, q = middle[::2], middle[1::2]

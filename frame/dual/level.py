@@ -116,10 +116,7 @@ def _responses(
 
 
 def _points(single: Sequence[Oscillator], duration: float) -> tuple[int, int]:
-    """Numbers of table points along ω and along q = g/ω, the same for all modes.
-
-    They are so many that neighbours lie within `FINE` of a mode's decay and of 2 / duration.
-    """
+    """Numbers of table points along ω and along q = g/ω, the same for all modes."""
     along_omega, along_q, slowest = 2.0, 2.0, 2 / duration if duration > 0 else np.inf
     for mode in single:
         (omega_low, omega_high), (q_low, q_high) = mode.omega_range, mode.quotient_range
@@ -340,10 +337,7 @@ class OutputBounds:
         )
 
     def improve(self, nodes: Rows, effort: Effort) -> None:
-        """Lower the bounds of side × output and raise the model's values at nodes (J,), in place.
-
-        Other nodes are not read, so that threads may work on several blocks of nodes.
-        """
+        """Lower the bounds and raise the model's values at nodes (J,), reading no others."""
         new, at = np.empty((2, len(nodes))), np.empty((len(nodes), self.at.shape[1]))
         bounds(nodes, self.side, effort, self.constant, self.data, new, at)
         better = new[1] > self.out[1, nodes]
@@ -359,10 +353,7 @@ def _variables(level: LevelModels, o: int) -> TaylorModel:
 
 
 def _tables(level: LevelModels, o: int, variables: TaylorModel) -> list[Array]:
-    """Fields of `Data` for output o, in their order, from `table` to `reach`.
-
-    They are the modes' tables, the tables' points, and centres and radii of all `variables`.
-    """
+    """Fields of `Data` from `table` to `reach`: tables, points, ranges of `variables` (Z,)."""
     grids, single = level.tables.grids, level.oscillators
     centre, radius = (x.reshape(len(single), -1) for x in (variables.value, _radii(variables)))
     omega = np.stack([np.tile(grid.omega, len(grid.quotient)) for grid in grids])

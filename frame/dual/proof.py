@@ -22,7 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import ClassVar
 
@@ -112,7 +112,9 @@ class DualProof:
         return self.peaks * peak
 
     def forecast(self, flow: LinearFlow, boxes: Boxes) -> float:
-        """Expected work on the box, in evaluations of a mode's motion at a node.
+        """Expected work on the box: evaluations of the dual function for a bound, at most.
+
+        A small part of the box is bounded first, so that what no part can mend is refused at once.
 
         Raises:
             UnprovedError: No mode of the structure can be enclosed, however narrow a part is.
@@ -132,7 +134,7 @@ class DualProof:
     def bounds(
         self, flow: LinearFlow, boxes: Boxes, goal: Goal
     ) -> list[PartBounds | UnprovedError]:
-        """Bounds on each level of a part, or the refusal of one whose modes are not enclosed."""
+        """Bounds on each level of a part of the box; for a level without, the refusal why."""
         found: list[PartBounds | UnprovedError] = []
         for k in range(len(boxes.alpha)):
             try:
@@ -149,11 +151,15 @@ class DualProof:
             return _Bounding(self, flow, box, goal, k).bounds()
         value, error, deviation = box.centre_motion()
         sides, margin = np.stack([-value, value], -1), error[..., None]
-        at = np.broadcast_to(low, (*sides.shape, len(low))).copy()
-        shares = np.zeros((*sides.shape[1:], len(low)))
-        least = Ends((np.abs(value) - error).max(0), box.peak_over_time(np.zeros(0)))
-        found = PartBounds(sides + margin, sides - margin, at, deviation, shares, 2 * error)
-        return replace(found, least_peaks=least)
+        return PartBounds(
+            outer=sides + margin,
+            inner=sides - margin,
+            at=np.broadcast_to(low, (*sides.shape, len(low))).copy(),
+            between=deviation,
+            shares=np.zeros((*sides.shape[1:], len(low))),
+            attained_error=2 * error,
+            least_peaks=Ends((np.abs(value) - error).max(0), box.peak_over_time(np.zeros(0))),
+        )
 
 
 class _Bounding:
@@ -183,12 +189,18 @@ class _Bounding:
         self.shares = np.zeros((*self.outer.shape[1:], d))
 
     def bounds(self) -> PartBounds:
-        """Bounds that are asked for, with the ends of the part that may hold a higher peak."""
+        """Proved and attained bounds that are asked for, with the part pruned near peaks."""
         if self.needed.all():
             self._require_narrow()
-            effort = self.proof.below, self.proof.slabs, self.proof.steps, self.goal.workers
-            gap, tick = self.proof.gap * self.goal.peak, self.goal.tick
-            bounds, self.unit = self.level.bounds(gap, *effort, tick)
+            proof, goal = self.proof, self.goal
+            bounds, self.unit = self.level.bounds(
+                proof.gap * goal.peak,
+                proof.below,
+                proof.slabs,
+                proof.steps,
+                goal.workers,
+                goal.tick,
+            )
             self.outer = np.minimum(self.outer, bounds)
         else:
             self._at_peaks(self._bound)
@@ -210,12 +222,12 @@ class _Bounding:
         between = np.zeros(self.outer.shape[:2])
         between[self.nodes] = self.level.line_deviation() if self.needed.all() else 0.0
         return PartBounds(
-            self.outer,
-            inner,
-            self.box.inputs(self.unit),
-            between,
-            shares,
-            attained_error,
+            outer=self.outer,
+            inner=inner,
+            at=self.box.inputs(self.unit),
+            between=between,
+            shares=shares,
+            attained_error=attained_error,
             remaining=self.remaining,
             pruned=self.pruned,
             least_peaks=least,
@@ -249,16 +261,22 @@ class _Bounding:
     def _require_narrow(self) -> None:
         """Refuse a part whose Taylor remainders exceed `WIDE` of a peak, if bisections help.
 
+        Nothing is refused where the part cannot be bisected any more.
+
         Raises:
-            UnprovedError: They are.
+            UnprovedError: They do.
         """
-        for o, s in np.ndindex(self.incumbent.shape) if not self.goal.last else ():
-            problem = self._initial_bounds(o, s, 0.0, 0.0)
-            problem.run(np.arange(len(self.nodes)), 1, 1, 0.0, 0.0)
-            node, shares = int(problem.out[1].argmax()), np.zeros(len(self.box.low))
-            least, shares[self.box.active] = remainder(problem, node)
-            if least > WIDE * self.goal.peak[o] and halvings(shares, self.proof.parts) >= 1:
-                what = f"the remainders of the modes are {least / self.goal.peak[o]:.2g} of a peak"
+        if self.goal.last:
+            return
+        for o, s in np.ndindex(self.incumbent.shape):
+            bounds = self._initial_bounds(o, s, 0.0, 0.0)
+            bounds.run(np.arange(len(self.nodes)), 1, 1, 0.0, 0.0)
+            node, shares = int(bounds.out[1].argmax()), np.zeros(len(self.box.low))
+            addition, shares[self.box.active] = remainder(bounds, node)
+            if addition > WIDE * self.goal.peak[o] and halvings(shares, self.proof.parts) >= 1:
+                what = (
+                    f"the remainders of the modes are {addition / self.goal.peak[o]:.2g} of a peak"
+                )
                 raise UnprovedError(what, "take narrower inputs", int(shares.argmax()))
 
     def _at_peaks(self, improve: Callable[[int, int], None]) -> None:
@@ -271,12 +289,11 @@ class _Bounding:
 
     def _open_bounds(self, o: int, s: int) -> tuple[OutputBounds, Rows]:
         """Bounds of output o on side s so far, and places of nodes where they do not suffice."""
-        enough, top = self.proof.peaks * float(self.goal.peak[o]), float(self.incumbent[o, s])
-        problem = self._initial_bounds(o, s, enough, top)
-        bounds = self.outer[self.nodes, o, s]
-        problem.out[0] = bounds
-        above = self.needed[self.nodes, o, s] & (bounds > top + enough)
-        return problem, np.flatnonzero(above)
+        wanted_gap, attained = self.proof.peaks * float(self.goal.peak[o]), self.incumbent[o, s]
+        bounds = self._initial_bounds(o, s, wanted_gap, float(attained))
+        bounds.out[0] = self.outer[self.nodes, o, s]
+        above = self.needed[self.nodes, o, s] & (bounds.out[0] > attained + wanted_gap)
+        return bounds, np.flatnonzero(above)
 
     def _initial_bounds(self, o: int, s: int, enough: float, top: float) -> OutputBounds:
         """Infinite bounds of output o on side s (0 for −output, 1 for the output)."""
@@ -286,20 +303,23 @@ class _Bounding:
 
     def _bound(self, o: int, s: int) -> None:
         """Improve the bounds of output o on side s at the nodes where they exceed its peak."""
-        problem, above = self._open_bounds(o, s)
-        problem.run(above, PEAK_SLABS, PEAK_STEPS, 1.0, 0.0)
+        bounds, above = self._open_bounds(o, s)
+        bounds.run(above, PEAK_SLABS, PEAK_STEPS, 1.0, 0.0)
         nodes = self.nodes[above]
-        self.outer[nodes, o, s], self.unit[nodes, o, s] = problem.out[0, above], problem.at[above]
+        self.outer[nodes, o, s], self.unit[nodes, o, s] = bounds.out[0, above], bounds.at[above]
 
     def _prune(self, o: int, s: int) -> None:
-        """Prune the ends of the part that hold no higher peak of output o on side s."""
-        problem, above = self._open_bounds(o, s)
+        """Prune the ends of the part's box that hold no higher peak of output o on side s.
+
+        Written are the inputs' shares in the gap, what remains, and bounds over what is pruned.
+        """
+        bounds, above = self._open_bounds(o, s)
         nodes = self.nodes[above]
-        problem.at[above] = self.unit[nodes, o, s]
-        worst = int(above[problem.out[0, above].argmax()])
-        self.shares[o, s] = remainder(problem, worst)[1]
+        bounds.at[above] = self.unit[nodes, o, s]
+        highest_node = int(above[bounds.out[0, above].argmax()])
+        self.shares[o, s] = remainder(bounds, highest_node)[1]
         best = self.unit[nodes, o, s][self.outer[nodes, o, s].argmax()]
         index = int(np.searchsorted(self.outputs, o)), s
-        low, high, pruned = prune_ends(self.level, problem, index, above, best)
+        low, high, pruned = prune_ends(self.level, bounds, index, above, best)
         self.remaining[:, o, s] = self.box.inputs(np.stack([low, high]))
         self.pruned[nodes, o, s] = pruned

@@ -29,27 +29,27 @@ def prune_ends(
     above: Rows,
     best: Array,
 ) -> tuple[Array, Array, Array]:
-    """Prune the ends of a box that hold no higher peak of one output and side.
+    """Prune ends of a box, quarters or halves of one input's range, that hold no higher peak.
 
     Args:
         level: Models over the box.
-        problem: Bounds over the box.
-        bound_index: Output and side.
-        above: Places of the nodes that may hold one, shape (J,).
-        best: Coordinates away from which ends lie, shape (d,).
+        problem: Bounds of one output and side over the box.
+        bound_index: Number of the output, and 0 for −output or 1 for the output.
+        above: Indices of the nodes whose bounds exceed the peak, shape (J,).
+        best: Coordinates of the best inputs found, shape (d,); ends lie away from them.
 
     Returns:
-        Lower and upper ends of what remains, (d,), and bounds at these nodes over all that is
-        pruned, (J,).
+        Lower and upper ends of what remains, (d,) each, and upper bounds at these nodes over all
+        that is pruned, (J,).
     """
     low, high = -np.ones_like(best), np.ones_like(best)
     pruned = np.full(len(above), -np.inf)
     for slabs in EFFORTS:
         for i in range(len(best)):
             away = int(best[i] <= 0)  # the upper end lies away from a best input that is low
-            for share in ENDS if high[i] - low[i] == 2.0 else ():
+            for fraction in ENDS if high[i] - low[i] == 2.0 else ():  # not pruned before
                 piece = low.copy(), high.copy()
-                piece[1 - away][i] = end = (1 - 2 * share) * (1 if away else -1)
+                piece[1 - away][i] = end = (1 - 2 * fraction) * (1 if away else -1)
                 bounds = _over_piece(level, problem, bound_index, above, piece, slabs)
                 if bounds.max() > problem.attained + problem.wanted_gap:
                     break
@@ -66,15 +66,15 @@ def _over_piece(
     piece: tuple[Array, Array],
     slabs: int,
 ) -> Array:
-    """Upper bounds over a piece of the box at the nodes `above`, shape (J,).
+    """Upper bounds of one output and side over a piece of the box at nodes `above`, shape (J,).
 
-    The largest come first; where one stays above the peak the others are left as they were.
+    The largest are improved first, until one stays above the peak; the others are those of the box.
 
     Args:
         level: Models over the box.
         problem: Bounds over the box.
-        bound_index: Output and side.
-        above: Places of the nodes, shape (J,).
+        bound_index: Number of the output, and 0 for −output or 1 for the output.
+        above: Indices of the nodes, shape (J,).
         piece: Lower and upper ends of the piece in unit coordinates, (d,) each.
         slabs: Most slabs of a bound.
     """
@@ -90,17 +90,17 @@ def _over_piece(
 
 
 def remainder(problem: OutputBounds, node: int) -> tuple[float, Array]:
-    """What the Taylor remainders add to a bound at a node at least, and the inputs' shares in it.
+    """Least addition of the Taylor remainders to a bound at a node, and each input's part in it.
 
     Returns:
-        The least addition, in the output's unit, and fractions of the inputs, shape (d,).
+        The addition, in the output's unit, and fractions of it, shape (d,), whose sum is 1.
 
     At the maximum the multipliers are the slopes of the motion by the intervening variables.
     Remainders are of fourth degree: they are shared out by the squares of what the first and second
     degree of each variable have of an input.
     """
     data, d = problem.data, problem.data.linear.shape[1]
-    slope = np.zeros(len(data.linear))
+    slope = np.zeros(len(data.linear))  # of the response by each intervening variable
     response_and_gradient(problem.at[node], node, problem.side, data, slope)
     upper = np.zeros((len(slope), d, d))
     upper[(slice(None), *np.triu_indices(d))] = np.abs(data.quadratic)

@@ -50,7 +50,11 @@ def response_ranges(
     sources: Sequence[str],
     orders: Sequence[int],
 ) -> dict[int, Ranges]:
-    """Ranges over a box of ω and g/ω, by order of the derivative that is observed."""
+    """Ranges of λ^κ e at nodes `time` (T,), for all oscillators with ω and g/ω in the ranges given.
+
+    e is the response to a source, κ one of `POWERS`. Returned by `orders`, the derivatives of the
+    motion that are observed.
+    """
     shape = (len(POWERS), len(sources), len(time))
     found = {
         order: Ranges(np.full(shape, np.inf), np.full(shape, -np.inf), np.zeros(shape))

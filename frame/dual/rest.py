@@ -89,12 +89,12 @@ def rest_of_modes(
     coordinates: tuple[TaylorModel, TaylorModel],
     excitation: Excitation,
 ) -> TruncatedModes | None:
-    """All modes that are not enclosed; None if there are none.
+    """Bounds of the motion of all modes that are not enclosed; None if there are none.
 
     Args:
         structure: The structure.
         found: Its enclosed modes.
-        shares: What they take and give.
+        shares: Their products with the rows of the outputs and the patterns of the sources.
         coordinates: Outputs, V = (m, n), and sources, (sources, n), in the coordinates of `found`.
         excitation: The loads, the nodes and the names of the sources.
     """
@@ -116,7 +116,7 @@ def rest_of_block(
     ends: tuple[Ends, Ends],
     excitation: Excitation,
 ) -> TruncatedModes:
-    """The modes of a block, known by their sums; `ends` are those of ω and g/ω."""
+    """Bounds of the motion of a block's modes by sums over them; `ends` bound ω and g/ω."""
     return _truncated_modes(_sums_over_block(of_block), ends, structure, found, excitation)
 
 
@@ -127,17 +127,20 @@ def _truncated_modes(
     found: Subspaces,
     excitation: Excitation,
 ) -> TruncatedModes:
-    """Truncated modes from their sums and from the ranges `ends` of ω and g/ω."""
+    """Bounds of the motion of modes by sums over them, and by ranges `ends` of their ω and g/ω."""
     orders = sorted({int(order) for order in structure.order})
-    (omega, quotient), (ground, time, sources) = ends, excitation
-    ranges = response_ranges(omega, quotient, ground, time, sources, orders)
+    (omega, quotient), (loads, time, sources) = ends, excitation
+    ranges = response_ranges(omega, quotient, loads, time, sources, orders)
     return _with_best_powers(structure, _amplitude_bounds(sums, structure, found), ranges)
 
 
 def _sums_over_modes(
     found: Subspaces, read: TaylorModel, excited: TaylorModel, order: int
 ) -> _Sums:
-    """Σ a β, Σ a², Σ β² over all modes, and each over λ, in closed form (module docstring).
+    """Σ a β, Σ a², Σ β² over all modes φ, and the same with each term divided by λ.
+
+    a = r·φ with the rows r of the outputs, β = φ·M v with the patterns v of the sources. The sums
+    have closed forms, such as Σ a² / λ = r·K⁻¹ r.
 
     Args:
         found: Enclosed modes, with M and K in the coordinates of the box's middle.
@@ -154,49 +157,49 @@ def _sums_over_modes(
     mass, stiffness = mass.to_order(order), stiffness.to_order(order)
     rows = stiffness.like(read.value).loosened(read.remainder)
     massive, light = slice(0, centre.modes), slice(centre.modes, None)
-    heavy, stiff = found.variation
-    forced = excited @ mass
-    of_mass = _diagonal(
-        _inverse_form(mass[massive, massive], rows[:, massive], rows[:, massive], 1 - heavy)
-    )
-    of_stiffness = _diagonal(_inverse_form(stiffness, rows, rows, 1 - stiff))
-    if centre.modes < len(centre.basis):
-        followers = rows[:, light]
-        within = _inverse_form(stiffness[light, light], followers, followers, 1 - stiff)
-        of_stiffness = of_stiffness - _diagonal(within)
-        of_mass = of_mass.loosened(np.where(followers.size().any(1), UNKNOWN, 0.0))
+    least_mass, least_stiffness = (1 - variation for variation in found.variation)
+    forces = excited @ mass
+    mass_rows = rows[:, massive]
+    of_mass = _diagonal(_inverse_form(mass[massive, massive], mass_rows, mass_rows, least_mass))
+    of_stiffness = _diagonal(_inverse_form(stiffness, rows, rows, least_stiffness))
+    if centre.modes < len(centre.basis):  # without what massless unknowns move by themselves
+        light_rows = rows[:, light]
+        massless = _inverse_form(stiffness[light, light], light_rows, light_rows, least_stiffness)
+        of_stiffness = of_stiffness - _diagonal(massless)
+        of_mass = of_mass.loosened(np.where(light_rows.size().any(1), UNKNOWN, 0.0))
+    by_stiffness = _inverse_form(stiffness, forces, forces, least_stiffness)
     return _Sums(
-        (excited @ rows.T, _inverse_form(stiffness, forced, rows, 1 - stiff)),
-        (of_mass, of_stiffness),
-        (
-            _diagonal(forced @ excited.T),
-            _diagonal(_inverse_form(stiffness, forced, forced, 1 - stiff)),
-        ),
+        shares=(excited @ rows.T, _inverse_form(stiffness, forces, rows, least_stiffness)),
+        outputs=(of_mass, of_stiffness),
+        sources=(_diagonal(forces @ excited.T), _diagonal(by_stiffness)),
     )
 
 
 def _inverse_form(
     matrix: TaylorModel, left: TaylorModel, right: TaylorModel, least: float
 ) -> TaylorModel:
-    """Form left A⁻¹ rightᵀ of rows V = (l, n) and (r, n), by series whose residuals meet in A⁻¹.
+    """Taylor model of left A⁻¹ rightᵀ, V = (l, r), with a remainder quadratic in small residuals.
+
+    With series x ≈ left A⁻¹ and y ≈ right A⁻¹ of residuals e = left − x A and f = right − y A it is
+    x rightᵀ + e yᵀ + e A⁻¹ fᵀ.
 
     Args:
         matrix: A, diagonal in the middle of the box, V = (n, n).
-        left: Rows.
-        right: Rows.
-        least: A is no less than this times its middle, in the order of forms.
+        left: Rows, V = (l, n).
+        right: Rows, V = (r, n).
+        least: A(u) ≥ least · A(0) over the box, as quadratic forms.
     """
     middle = np.diag(matrix.value)
-    x, left_missed = _row_series(matrix, left)
-    y, right_missed = _row_series(matrix, right)
-    norms = (np.sqrt((missed**2 / middle).sum(1)) for missed in (left_missed, right_missed))
-    return (x @ right.T).loosened(left_missed @ y.size().T + np.outer(*norms) / least)
+    x, left_residual = _row_series(matrix, left)
+    y, right_residual = _row_series(matrix, right)
+    norms = (np.sqrt((size**2 / middle).sum(1)) for size in (left_residual, right_residual))
+    return (x @ right.T).loosened(left_residual @ y.size().T + np.outer(*norms) / least)
 
 
 def _row_series(matrix: TaylorModel, rows: TaylorModel) -> tuple[TaylorModel, Array]:
-    """Series of rows A⁻¹, and a bound of what they times A leave of the rows.
+    """Series x of `rows` A⁻¹, degree by degree, and a bound of |rows − x A| over the box.
 
-    Up to the order of the series that is rounding alone.
+    Up to the order of the series the residual is rounding alone. A is diagonal in the middle.
     """
     middle, parts = np.diag(matrix.value), list[Array]()
     for degree in range(matrix.order + 1):
@@ -207,15 +210,16 @@ def _row_series(matrix: TaylorModel, rows: TaylorModel) -> tuple[TaylorModel, Ar
                 parts[degree - k], matrix.parts[k], pair, rows.inputs, matmul
             )
         parts.append(right_side / middle)
-    found = TaylorModel(tuple(parts), np.zeros(rows.shape), rows.inputs, matrix.order)
-    missed = rows.remainder + found.size() @ matrix.remainder
+    series = TaylorModel(tuple(parts), np.zeros(rows.shape), rows.inputs, matrix.order)
+    residual = rows.remainder + series.size() @ matrix.remainder
     for degree, size in enumerate(rows.sizes()):
-        missed = missed + gamma(_terms(matrix, degree)) * size
-    for i, size in enumerate(found.sizes()):
+        residual = residual + gamma(_terms(matrix, degree)) * size
+    for i, size in enumerate(series.sizes()):
         for k, factor in enumerate(matrix.sizes()):
             is_higher = i + k > matrix.order
-            missed = missed + (1.0 if is_higher else gamma(_terms(matrix, i + k))) * (size @ factor)
-    return found, missed * (1 + gamma(matrix.order**2 + 4 * len(middle)))
+            weight = 1.0 if is_higher else gamma(_terms(matrix, i + k))
+            residual = residual + weight * (size @ factor)
+    return series, residual * (1 + gamma(matrix.order**2 + 4 * len(middle)))
 
 
 def _terms(matrix: TaylorModel, degree: int) -> int:
@@ -224,14 +228,17 @@ def _terms(matrix: TaylorModel, degree: int) -> int:
 
 
 def _sums_over_block(of_block: BlockShares) -> _Sums:
-    """Sums over the modes of a block, whose projected stiffness is N L."""
-    projected = of_block.block.norm @ of_block.block.rate.T
-    read, driven = of_block.read, of_block.source_forces
-    flexible, pushed = solve(projected, read), solve(projected, driven)
+    """Σ a β, Σ a², Σ β² over the modes of a block, and the same with each term divided by λ.
+
+    For K X = M X L they follow from X, N = Xᵀ M X and Xᵀ K X = N L, without the modes.
+    """
+    projected_stiffness = of_block.block.norm @ of_block.block.rate.T
+    read, forces = of_block.read, of_block.source_forces
+    read_over_stiffness = solve(projected_stiffness, read)
     return _Sums(
-        (of_block.participation.T @ read, driven.T @ flexible),
-        (of_block.of_outputs, dots(read, flexible)),
-        (of_block.of_sources, dots(driven, pushed)),
+        shares=(of_block.participation.T @ read, forces.T @ read_over_stiffness),
+        outputs=(of_block.of_outputs, dots(read, read_over_stiffness)),
+        sources=(of_block.of_sources, dots(forces, solve(projected_stiffness, forces))),
     )
 
 
@@ -243,7 +250,10 @@ def _diagonal(matrix: TaylorModel) -> TaylorModel:
 def _amplitude_bounds(
     sums: _Sums, structure: Classical, found: Subspaces
 ) -> list[tuple[TaylorModel, TaylorModel]]:
-    """C and the bound of √(A B) for each power of λ, V = (sources, m), with outputs' factors."""
+    """C = Σ a β and a bound of √(Σ a² Σ β²) for each power 0, ½, 1 of λ, V = (sources, m) each.
+
+    By the power no sum, that of a² or all have terms divided by λ. Outputs' factors are in both.
+    """
     d, order = structure.start.inputs, structure.start.order
     (C0, C1), (A0, A1), (B0, B1) = (
         [x.cut(order) if x.inputs == d else x.cut(order).among(found.used, d) for x in pair]
@@ -277,7 +287,7 @@ def _with_best_powers(
         for arrays in zip(*((x.low, x.high, x.line_deviation) for x in of_outputs), strict=True)
     )
     middle, half = (low + high) / 2, (high - low) / 2
-    middle[1], half[1] = 0.0, np.abs(middle[1]) + half[1]
+    middle[1], half[1] = 0.0, np.abs(middle[1]) + half[1]  # Σ a β is not known with √λ
     amplitudes = np.stack([amplitude.size() for _, amplitude in bounds])
     best = (amplitudes * half.max(-1)).argmin(0)
     share, amplitude = bounds[0][0] * 0.0, bounds[0][1] * 0.0

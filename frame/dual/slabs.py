@@ -64,25 +64,28 @@ class Slabs(NamedTuple):
 
 @loops
 def model(u: Array, node: int, side: float, data: Data, gradient: Array) -> float:
-    """Side × the output's model at inputs u, without its constants; `gradient` (L,) is written."""
+    """Side × output in the model at inputs u (L,), without its constants; side is −1 or 1.
+
+    Its gradient by u is written to `gradient` (L,).
+    """
     bilinear, weight = np.empty(data.quadratic.shape[1]), np.zeros(len(data.linear))
     products(u, bilinear)
     total = response_and_gradient(u, node, side, data, weight)
     gradient[:] = 0.0
-    bend = np.zeros(len(bilinear))
+    quadratic = np.zeros(len(bilinear))  # of the linearised response, packed by rows i ≤ j
     for a in range(len(weight)):
         add(gradient, weight[a], data.linear[a])
-        add(bend, weight[a], data.quadratic[a])
-    for s in range(len(data.group_linear)):
-        m = side * data.group_wave[s, node]
-        total += m * (dot(data.group_linear[s], u) + dot(data.group_quadratic[s], bilinear))
-        add(gradient, m, data.group_linear[s])
-        add(bend, m, data.group_quadratic[s])
+        add(quadratic, weight[a], data.quadratic[a])
+    for s in range(len(data.group_linear)):  # truncated modes
+        wave = side * data.group_wave[s, node]
+        total += wave * (dot(data.group_linear[s], u) + dot(data.group_quadratic[s], bilinear))
+        add(gradient, wave, data.group_linear[s])
+        add(quadratic, wave, data.group_quadratic[s])
     at = 0
     for i in range(len(u)):
         for j in range(i, len(u)):
-            gradient[i] += bend[at] * u[j]
-            gradient[j] += bend[at] * u[i]
+            gradient[i] += quadratic[at] * u[j]
+            gradient[j] += quadratic[at] * u[i]
             at += 1
     return total
 
@@ -127,7 +130,7 @@ def mode_response(z: Array, k: int, node: int, side: float, data: Data, weight: 
     at, total = j * width + i, 0.0
     for s in range(sources):
         e = data.table[k, s, node]
-        a, b, c, f = e[at], e[at + 1], e[at + width], e[at + width + 1]
+        a, b, c, f = e[at], e[at + 1], e[at + width], e[at + width + 1]  # corners of the cell
         value = side * ((1 - y) * ((1 - x) * a + x * b) + y * ((1 - x) * c + x * f))
         along = side * ((1 - y) * (b - a) + y * (f - c)) / data.step[k, 0]
         across = side * ((1 - x) * (c - a) + x * (f - b)) / data.step[k, 1]
@@ -141,10 +144,13 @@ def mode_response(z: Array, k: int, node: int, side: float, data: Data, weight: 
 
 @loops
 def ascend(u: Array, node: int, side: float, data: Data) -> float:
-    """Improve u by steps to the ends of the box that its gradient names, then along the gradient.
+    """Raise the model's side × output by a local search from inputs u (L,), which are written.
+
+    Steps towards the corner of [−1, 1]^L that the gradient points to come first, then projected
+    gradient ascent.
 
     Returns:
-        The model's value at u.
+        The model's value at the inputs found.
     """
     d = len(u)
     slope, trial, trial_slope = np.empty(d), np.empty(d), np.empty(d)
@@ -167,7 +173,7 @@ def ascend(u: Array, node: int, side: float, data: Data) -> float:
 
 @loops
 def climb(u: Array, node: int, side: float, data: Data, value: float, slope: Array) -> float:
-    """Improve inputs u by projected gradient ascent with Barzilai's and Borwein's step length.
+    """Raise the model's side × output by projected gradient ascent with Barzilai–Borwein steps.
 
     Args:
         u: Inputs in [−1, 1]^d; written: the best met.
@@ -181,27 +187,27 @@ def climb(u: Array, node: int, side: float, data: Data, value: float, slope: Arr
         The model's value at the best inputs.
     """
     d = len(u)
-    here, there, slope_there = u.copy(), np.empty(d), np.empty(d)
+    point, trial, trial_slope = u.copy(), np.empty(d), np.empty(d)
     size = 0.3 / (np.abs(slope).max() + 1e-300)
     for _ in range(CLIMBS):
         for i in range(d):
-            there[i] = np.rint(GRID * min(max(here[i] + size * slope[i], -1.0), 1.0)) / GRID
-        new = model(there, node, side, data, slope_there)
+            trial[i] = np.rint(GRID * min(max(point[i] + size * slope[i], -1.0), 1.0)) / GRID
+        new = model(trial, node, side, data, trial_slope)
         along = bend = 0.0
         for i in range(d):
-            step = there[i] - here[i]
+            step = trial[i] - point[i]
             along += step * step
-            bend += step * (slope[i] - slope_there[i])
+            bend += step * (slope[i] - trial_slope[i])
         if along < 1e-8:
             break
         if new < value - 0.02 * abs(value):
             size *= 0.3
             continue
         size = along / bend if bend > 0 else 4 * size
-        here[:], slope[:] = there, slope_there
+        point[:], slope[:] = trial, trial_slope
         if new > value:
             value = new
-            u[:] = here
+            u[:] = point
     return value
 
 
@@ -247,7 +253,7 @@ def refine(
     u: Array,
     out: Array,
 ) -> None:
-    """Write the upper bound at one node, by best-first halving of the tables' ranges.
+    """Write the upper bound of side × output at one node, by best-first halving of table ranges.
 
     Args:
         node: Node.
@@ -320,7 +326,7 @@ def bound_slab(
         side: +1 or −1.
         data: Models and tables of the output.
         steps: Most evaluations of the dual function.
-        target: Value of the dual function below which no effort is made.
+        target: Value of the dual function at which its minimisation ends.
         slabs: All slabs.
         model_value: Largest model value known before.
         u: Its inputs; written where a larger one is found, shape (L,).

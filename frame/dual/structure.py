@@ -48,61 +48,61 @@ class Classical:
     forced: dict[str, TaylorModel]
 
 
-def classical(system: LinearSystem, p: Mapping[str, TaylorModel]) -> Classical:
-    """The structure with its parameters as Taylor models, each V = ().
+def classical(system: LinearSystem, parameters: Mapping[str, TaylorModel]) -> Classical:
+    """Matrices, rows and damping of a structure, of parameters by name as Taylor models V = ().
 
     Raises:
         UnprovedError: Its modes are not known to be classical.
     """
-    made = system.assembly(p)
-    _require_classical(made)
-    displaced, moving = made.q0, made.v0
-    if made.static is not None:
-        displaced = displaced + _solved(made.stiffness, made.static)[:, 0]
-    if made.impulse is not None:
-        moving = moving + _accelerations(made, made.impulse)[:, 0]
+    assembly = system.assembly(parameters)
+    _require_classical(assembly)
+    q0, v0 = assembly.q0, assembly.v0
+    if assembly.static is not None:
+        q0 = q0 + _solved(assembly.stiffness, assembly.static)[:, 0]
+    if assembly.impulse is not None:
+        v0 = v0 + _accelerations(assembly, assembly.impulse)[:, 0]
     forced, names = dict[str, TaylorModel](), [x for x in histories(system) if x != "load"]
-    if made.forces is not None:
-        accelerations = _accelerations(made, made.forces)
+    if assembly.forces is not None:
+        accelerations = _accelerations(assembly, assembly.forces)
         forced = {name: accelerations[:, k] for k, name in enumerate(names)}
-    displacements, velocities = np.split(made.rows, 2, axis=1)
-    ratios = made.ratios or [made.rayleigh[0] * 0.0]
+    displacements, velocities = np.split(assembly.rows, 2, axis=1)
+    ratios = assembly.ratios or [assembly.rayleigh[0] * 0.0]
     return Classical(
-        mass=made.mass,
-        stiffness=made.stiffness,
-        rows=displacements + velocities + made.accelerated,
-        factor=made.row_factors,
-        order=np.where(made.accelerated.any(1), 2, velocities.any(1).astype(int)),
-        start=stack([displaced, moving]).T,
-        pattern=made.pattern,
-        rayleigh=stack(list(made.rayleigh)),
-        ratio=stack(ratios * len(made.massive) if len(ratios) == 1 else ratios),
+        mass=assembly.mass,
+        stiffness=assembly.stiffness,
+        rows=displacements + velocities + assembly.accelerated,
+        factor=assembly.row_factors,
+        order=np.where(assembly.accelerated.any(1), 2, velocities.any(1).astype(int)),
+        start=stack([q0, v0]).T,
+        pattern=assembly.pattern,
+        rayleigh=stack(list(assembly.rayleigh)),
+        ratio=stack(ratios * len(assembly.massive) if len(ratios) == 1 else ratios),
         forced=forced,
     )
 
 
-def _accelerations(made: Assembly[TaylorModel], forces: TaylorModel) -> TaylorModel:
+def _accelerations(assembly: Assembly[TaylorModel], forces: TaylorModel) -> TaylorModel:
     """Accelerations M⁻¹ b by forces b, V = (n, k); zero for unknowns without mass."""
-    a, n = made.massive, len(made.pattern)
-    return np.eye(n)[:, a] @ _solved(made.mass[a[:, None], a], forces[a])
+    a, n = assembly.massive, len(assembly.pattern)
+    return np.eye(n)[:, a] @ _solved(assembly.mass[a[:, None], a], forces[a])
 
 
-def _require_classical(made: Assembly[TaylorModel]) -> None:
-    """Refuse damping that couples the modes, and outputs of more than one derivative.
+def _require_classical(assembly: Assembly[TaylorModel]) -> None:
+    """Refuse damping that couples the modes, and outputs that mix displacements and velocities.
 
     Raises:
-        UnprovedError: A structure has one of these.
+        UnprovedError: The structure has one of these.
     """
-    if made.dashpots.size().any():
+    if assembly.dashpots.size().any():
         raise UnprovedError(
             "dashpots couple the modes", "give damping ratios or Rayleigh's factors in their place"
         )
-    if made.weights is not None and made.rayleigh[1].size() > 0:
+    if assembly.weights is not None and assembly.rayleigh[1].size() > 0:
         raise UnprovedError(
             "Rayleigh's damping by the springs without the weights couples the modes",
             "give a damping ratio, or leave gravity out",
         )
-    displacements, velocities = np.split(made.rows, 2, axis=1)
+    displacements, velocities = np.split(assembly.rows, 2, axis=1)
     if (displacements.any(1) & velocities.any(1)).any():
         raise UnprovedError("an output mixes displacements and velocities", "observe them apart")
 

@@ -29,11 +29,8 @@ def modes_wanted(
 ) -> tuple[int, Array]:
     """Least number of lowest modes beside which the truncation error of the others is allowed.
 
-    The error is that of `TruncatedModes`, with sums and responses in the middle of the box.
-
-    Returns:
-        The number, and the relative error of each mode's λ that changes an output by what is
-        allowed, shape (n,).
+    It is an estimate by the bounds of `TruncatedModes`, with sums and responses in the middle of
+    the box.
 
     Args:
         structure: The structure.
@@ -41,13 +38,17 @@ def modes_wanted(
         excited: Sources in the coordinates of `centre`, V = (sources, n).
         excitation: The loads, the nodes and the names of the sources.
         allowed: Truncation error of each output that is allowed, shape (m,).
+
+    Returns:
+        The number, and the relative error of each mode's λ that changes an output by what is
+        allowed, shape (n,).
     """
     loads, time, sources = excitation
     time = time[:: -(-len(time) // MAX_NODES)]
     squared, n = centre.squared, centre.modes
     read = (structure.rows @ centre.basis)[:, :n] * structure.factor.value[:, None]
-    given = excited.value[:, :n]
-    light = np.any((structure.rows @ centre.basis)[:, n:], axis=1)
+    participation = excited.value[:, :n]
+    reads_massless = np.any((structure.rows @ centre.basis)[:, n:], axis=1)
     a, b = structure.rayleigh.value
     decay = (a + b * squared) / 2 + structure.ratio.value[:n] * np.sqrt(squared)
     omega = np.sqrt(np.maximum(squared - decay**2, 1e-6 * squared))
@@ -60,30 +61,34 @@ def modes_wanted(
             waves = waves + feedthrough(source, loads, int(order), time)
             slope = np.abs(motions[source][1]).max(1) * omega ** (order + (source == "start")) / 2
             # λ |de/dλ|, as |dσ/dλ| ≈ 1/(2 ω)
-            sensitivity[:, o] += np.abs(read[o] * given[s]) * slope
-            errors = [_truncation_error(read[o], given[s], waves, squared, x) for x in POWERS]
-            error[:, o] += np.min(errors[light[o] :], axis=0)
-    enough = np.flatnonzero((error <= allowed).all(1))
-    wanted = max(int(enough[0]), 1) if len(enough) else n
+            sensitivity[:, o] += np.abs(read[o] * participation[s]) * slope
+            errors = [
+                _truncation_error(read[o], participation[s], waves, squared, x) for x in POWERS
+            ]
+            first = int(reads_massless[o])  # Σ a² is unknown where massless unknowns are read
+            error[:, o] += np.min(errors[first:], axis=0)
+    sufficient = np.flatnonzero((error <= allowed).all(1))
+    wanted = max(int(sufficient[0]), 1) if len(sufficient) else n
     return wanted, np.min(allowed / np.maximum(sensitivity, 1e-300), axis=1)
 
 
 def _truncation_error(
-    read: Array, given: Array, waves: Array, squared: Array, power: float
+    read: Array, participation: Array, waves: Array, squared: Array, power: float
 ) -> Array:
-    """Error of an output without the modes from k on, for each k, by sums over λ^power, (n,).
+    """Error of an output without the modes from k on, for each k, shape (n,).
 
-    By Cauchy and Schwarz the root of Σ a² Σ β² over these modes times half the range of λ^power e.
+    By Cauchy and Schwarz it is the root of Σ a² Σ β² over these modes times half the range of
+    λ^power e; from power ½ on the terms a² are divided by λ, at 1 those of β² too.
 
     Args:
         read: Output's coefficients a, shape (n,).
-        given: Source's participations β, shape (n,).
+        participation: The source's participations β, shape (n,).
         waves: Responses e, shape (n, T).
         squared: λ, shape (n,).
         power: One of `POWERS`.
     """
     outputs = _above(read**2 / squared ** float(power > 0))
-    sources = _above(given**2 / squared ** float(power == 1))
+    sources = _above(participation**2 / squared ** float(power == 1))
     scaled = waves * squared[:, None] ** power
     high, low = (np.maximum.accumulate(sign * scaled[::-1])[::-1] for sign in (1, -1))
     half = np.maximum(high, low) if power == POWERS[1] else _with_below(high + low) / 2

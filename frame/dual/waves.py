@@ -95,7 +95,9 @@ class Oscillators:
         }
 
     def waves(self, source: str, order: int) -> Waves:
-        """Table of the responses to a unit amplitude of `source`.
+        """Table of the oscillators' responses e to a unit amplitude of `source`, with errors.
+
+        e is read off G = σ^order ρ(σ; t): Re G + (g/ω) Im G for a start, ± Im G / ω else.
 
         Args:
             source: Name of a load or force, "velocity" or "start".
@@ -129,27 +131,35 @@ class Oscillators:
     def _error(
         self, largest: Array, bounds: Array, order: int, *, start: bool
     ) -> tuple[Array, Array]:
-        """Bounds of what interpolation misses, (T,), and of |G| and |G'|, (2, T).
+        """Bounds of the table's interpolation error, (T,), and of |G| and |G'| over it, (2, T).
 
-        Along ω at constant q, dσ = (−q + i) dω; along q, dσ = −ω dq.
+        Along ω at constant q = g/ω, dσ = (−q + i) dω; along q, dσ = −ω dq. Between the points |G''|
+        strays by what |G''''| bounds, and so on down.
+
+        Args:
+            largest: Largest |G|, |G'| and |G''| at the points, shape (3, T); G = σ^order ρ.
+            bounds: Bounds of the derivatives of ρ by σ, orders 0 to 4, shape (5, T).
+            order: Derivative of the motion that is read.
+            start: Whether the response is Re G + q Im G; else Im G / ω.
         """
         g = self.grid
         low, high, q = g.omega[0], g.omega[-1], g.quotient[-1]
         h, k = (np.diff(x).max(initial=0.0) for x in (g.omega, g.quotient))
-        turn = 1 + q**2
+        stretch = 1 + q**2  # |dσ/dω|²
         fourth = sum(
-            comb(4, j) * perm(order, j) * (high * turn**0.5) ** (order - j) * bounds[4 - j]
+            comb(4, j) * perm(order, j) * (high * stretch**0.5) ** (order - j) * bounds[4 - j]
             for j in range(order + 1)
         )
-        between = (turn * h**2 + high**2 * k**2) / 8  # half the diagonal of a cell is √(2 between)
+        # half the diagonal of a cell is √(2 between)
+        between = (stretch * h**2 + high**2 * k**2) / 8
         second = largest[2] + between * fourth
         first = largest[1] + np.sqrt(2 * between) * second
         zero = largest[0] + between * second
         if start:  # Re G + q Im G
-            along = turn**1.5 * second
+            along = stretch**1.5 * second
             across = high**2 * (1 + q) * second + 2 * high * first
         else:  # Im G / ω
-            along = turn * second / low + 2 * turn**0.5 * first / low**2 + 2 * zero / low**3
+            along = stretch * second / low + 2 * stretch**0.5 * first / low**2 + 2 * zero / low**3
             across = high * second
         return np.asarray((h**2 * along + k**2 * across) / 8), np.stack([zero, first])
 
@@ -197,7 +207,7 @@ def _has_feedthrough(source: str, order: int) -> bool:
 
 
 def _with_power(sigma: Array, rho: Array, order: int) -> Array:
-    """G = σ^ν ρ with two derivatives, shape (3, T, S)."""
+    """G = σ^order ρ and its first two derivatives by σ, shape (3, T, S), from those of ρ."""
     first = order * sigma ** max(order - 1, 0)
     second = float(order * (order - 1))
     power = sigma**order

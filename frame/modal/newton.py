@@ -142,17 +142,10 @@ def _newton(
 
 
 def _symmetric_rank_one(H: Array, step: Array, change: Array) -> Array:
-    """Symmetric rank-one (SR1) updates y yᵀ / (y·s) of Hessians H, y = change − H s; s the step.
+    """Symmetric rank-one updates y yᵀ / (y·s) to add to Hessians H (N, d, d), y = change − H s.
 
-    An update is zero where |y·s| is so small beside |y| |s| that it would be unstable.
-
-    Args:
-        H: Hessians, shape (N, d, d).
-        step: Steps s, shape (N, d).
-        change: Changes of the gradients over them, shape (N, d).
-
-    Returns:
-        What to add to the Hessians, shape (N, d, d).
+    `change` (N, d) is that of the gradient over the step s (N, d). An update is zero where it would
+    be unstable, |y·s| being small beside |y| |s|.
     """
     y = change - (H @ step[..., None])[..., 0]
     product = (y * step).sum(1)
@@ -165,10 +158,7 @@ def _symmetric_rank_one(H: Array, step: Array, change: Array) -> Array:
 def _signed(
     model: Response, optima: Optima, points: Array, which: Array
 ) -> tuple[Array, Array, Array]:
-    """Side × output (W,), gradients (W, d) and Hessians (W, d, d) of problems `which` (W,).
-
-    Each is taken at its own point of `points` (W, d).
-    """
+    """Side × output (W,), its gradient and Hessian, of problems `which` at their points (W, d)."""
     side = optima.side[which]
     f, g, H = model.at(points, optima.node[which], optima.output[which])
     H *= side[:, None, None]
