@@ -233,8 +233,8 @@ class LowerGrid:
     def _along(self, axis: int, factor: Array) -> csr_array:
         """Sparse matrix (S, S) that applies a triangular `factor` (n, n) along one axis.
 
-        Its rows and columns are the S terms. With a term the set holds all of lower exponents, so
-        that each term with a lower degree along the axis is found by its key.
+        Its rows and columns are the S terms. With a term the set holds all of lower degree along
+        the axis; they are found by keys that have the exponents as digits.
         """
         degrees = self.index[:, axis]
         place_values = len(factor) ** np.arange(len(self.degrees))

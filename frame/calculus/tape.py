@@ -53,7 +53,7 @@ class _Writer:
         self.places: dict[object, int] = {x: k for k, x in enumerate(arguments)}
         self.numbers: dict[float, int] = {}
         self.code: list[tuple[int, int, int]] = []
-        self.place_of: dict[tuple[int, int, int], int] = {}
+        self.operation_places: dict[tuple[int, int, int], int] = {}
         self.arguments = len(arguments)
 
     def tape(self, expressions: Sequence[Expr]) -> Tape:
@@ -100,7 +100,7 @@ class _Writer:
         """
         instruction = {"Add": "add", "Mul": "multiply"}.get(name, name)
         row = (OPERATIONS.index(instruction), x, x if y is None else y)
-        if row not in self.place_of:
+        if row not in self.operation_places:
             self.code.append(row)
-            self.place_of[row] = self.arguments + len(self.code) - 1
-        return self.place_of[row]
+            self.operation_places[row] = self.arguments + len(self.code) - 1
+        return self.operation_places[row]

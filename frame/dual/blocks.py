@@ -278,12 +278,12 @@ def _terms(n: int, p: int, degree: int) -> int:
     return n * sum(comb(degree, b) for b in range(4)) + p * 2**degree + 4 * p + 8
 
 
-def _rounding(x: TaylorModel, matrix: TaylorModel, least: int) -> Array:
-    """Bound of the rounding of the series x A, by parts of A from degree `least` on, (p, n)."""
+def _rounding(x: TaylorModel, matrix: TaylorModel, first_degree: int) -> Array:
+    """Bound of the rounding of x A, series times A's parts from `first_degree` on, (p, n)."""
     of_x, of_matrix, (p, n) = x.sizes(), matrix.sizes(), x.shape
     total: Array = np.zeros(x.shape)
     for m in range(len(of_x)):  # of the products' degree
-        for b in range(least, min(m, len(of_matrix) - 1) + 1):
+        for b in range(first_degree, min(m, len(of_matrix) - 1) + 1):
             total += gamma(_terms(n, p, m)) * (of_x[m - b] @ of_matrix[b])
     return total
 

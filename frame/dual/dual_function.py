@@ -8,7 +8,7 @@ box, so that ẑ(u) = a·u + u·Q u ± R with a, Q and R of order one. For a nod
 side,
 
     D(μ) = Σ_k max over the grid of [ Σ_s c₀ e + |s e − μ_s| − μ_ω ω̂ − μ_g ĝ ]
-         + max over u of [ Σ μ (a·u + u·Q u) + the group's share ] + Σ |μ| R
+         + max over u of [ Σ μ (a·u + u·Q u) + truncated modes ] + Σ |μ| R
 
 is convex, and a bound for any μ. Its second line is bounded, not solved: inputs whose linear
 part outweighs all that couples them are at an end of the box, one after the other; products of
@@ -54,9 +54,10 @@ class Data(NamedTuple):
         cubic: Cubic parts, packed, shape (Z, monomials).
         size: Their sizes over the box, shape (Z,).
         remainder: Remainders with `EXPECTED` of `size`, shape (Z,).
-        group_wave: Middle and half range of the group's responses, shape (2 sources, T), or (0, 1).
-        group_linear: Linear parts of its shares and of their amplitude, shape (2 sources, L).
-        group_quadratic: Quadratic parts.
+        truncated_response: Middles and half ranges of truncated modes' responses, shape
+            (2 sources, T); (0, 1) if there are none.
+        truncated_linear: Linear parts of their shares and amplitudes, shape (2 sources, L).
+        truncated_quadratic: Quadratic parts.
         grain: Distance of the values that multipliers take, shape (1,).
     """
 
@@ -76,9 +77,9 @@ class Data(NamedTuple):
     cubic: Array
     size: Array
     remainder: Array
-    group_wave: Array
-    group_linear: Array
-    group_quadratic: Array
+    truncated_response: Array
+    truncated_linear: Array
+    truncated_quadratic: Array
     grain: Array
 
 
@@ -204,9 +205,9 @@ def dual(
             difference = side * data.reach[k, s] * data.table[k, s, node, at] - mu[first + 2 + s]
             gradient[first + 2 + s] = -1.0 if difference >= 0 else 1.0
     slope, bend = np.zeros(data.linear.shape[1]), np.zeros(data.quadratic.shape[1])
-    for s in range(len(data.group_linear)):
-        add(slope, side * data.group_wave[s, node], data.group_linear[s])
-        add(bend, side * data.group_wave[s, node], data.group_quadratic[s])
+    for s in range(len(data.truncated_linear)):
+        add(slope, side * data.truncated_response[s, node], data.truncated_linear[s])
+        add(bend, side * data.truncated_response[s, node], data.truncated_quadratic[s])
     for z in range(len(mu)):
         add(slope, mu[z], data.linear[z])
         add(bend, mu[z], data.quadratic[z])

@@ -291,7 +291,7 @@ class OutputBounds:
             attained: Value of side × output that is known to be attained.
         """
         side, total = (-1.0, 1.0)[s], len(level.tables.time)
-        group, constant = _group(level, o, side)
+        group, constant = _truncation_terms(level, o, side)
         variables = _variables(level, o)
         tables, models = _tables(level, o, variables), _models(level, variables)
         data = Data(*tables, *models, *group, _grain(level, o))
@@ -378,13 +378,13 @@ def _models(level: LevelModels, variables: TaylorModel) -> list[Array]:
     return [linear, quadratic, cubic, size, remainder + of_sums + EXPECTED * size]
 
 
-def _group(level: LevelModels, o: int, side: float) -> tuple[list[Array], Array]:
+def _truncation_terms(level: LevelModels, o: int, side: float) -> tuple[list[Array], Array]:
     """Terms that truncated modes and errors add to bounds of side × output o.
 
     Returns:
-        The fields `group_wave`, `group_linear` and `group_quadratic` of `Data`, for what depends on
-        the inputs; constants to add to the model's value for the motion's, and to that for its
-        upper bound, at all nodes, shape (2, T).
+        The three fields of `Data` on truncated modes, for what depends on the inputs; constants to
+        add to the model's value for the motion's, and to that for its upper bound, at all nodes,
+        shape (2, T).
     """
     tables, order = level.tables, int(level.structure.order[o])
     constant: Array = np.zeros((2, len(tables.time)))

@@ -52,7 +52,7 @@ class Slabs(NamedTuple):
     Args:
         ends: First and last place along ω and along q for each mode, shape (…, K, 4).
         mu: Multipliers, shape (…, Z).
-        weight: By how much each variable's two sides still differ, the same.
+        weight: By how much each variable differs between the two maxima of D, the same.
         value: Bounds of the dual function, shape (…,).
     """
 
@@ -76,11 +76,13 @@ def model(u: Array, node: int, side: float, data: Data, gradient: Array) -> floa
     for a in range(len(weight)):
         add(gradient, weight[a], data.linear[a])
         add(quadratic, weight[a], data.quadratic[a])
-    for s in range(len(data.group_linear)):  # truncated modes
-        wave = side * data.group_wave[s, node]
-        total += wave * (dot(data.group_linear[s], u) + dot(data.group_quadratic[s], bilinear))
-        add(gradient, wave, data.group_linear[s])
-        add(quadratic, wave, data.group_quadratic[s])
+    for s in range(len(data.truncated_linear)):  # truncated modes
+        wave = side * data.truncated_response[s, node]
+        total += wave * (
+            dot(data.truncated_linear[s], u) + dot(data.truncated_quadratic[s], bilinear)
+        )
+        add(gradient, wave, data.truncated_linear[s])
+        add(quadratic, wave, data.truncated_quadratic[s])
     at = 0
     for i in range(len(u)):
         for j in range(i, len(u)):
@@ -346,10 +348,11 @@ def bound_slab(
 
 @compiled
 def halve_widest(slabs: Slabs, halved: int, n_slabs: int) -> bool:
-    """Halve a slab along the ω or q = g/ω whose two sides differ most; its upper half is appended.
+    """Halve a slab along the ω or q = g/ω on which the maxima of the dual function differ most.
 
     Args:
-        slabs: All slabs; the lower half is written to number `halved`, the upper to `n_slabs`.
+        slabs: All slabs, with these differences as `weight`; the lower half is written to number
+            `halved`, the upper to `n_slabs`.
         halved: Number of the slab.
         n_slabs: Number of slabs before.
 

@@ -87,11 +87,11 @@ def _truncation_error(
         squared: λ, shape (n,).
         power: One of `POWERS`.
     """
-    outputs = _above(read**2 / squared ** float(power > 0))
-    sources = _above(participation**2 / squared ** float(power == 1))
+    outputs = _tail_sums(read**2 / squared ** float(power > 0))
+    sources = _tail_sums(participation**2 / squared ** float(power == 1))
     scaled = waves * squared[:, None] ** power
     high, low = (np.maximum.accumulate(sign * scaled[::-1])[::-1] for sign in (1, -1))
-    half = np.maximum(high, low) if power == POWERS[1] else _with_below(high + low) / 2
+    half = np.maximum(high, low) if power == POWERS[1] else _with_mode_below(high + low) / 2
     return np.asarray(np.sqrt(outputs * sources) * half.max(1))
 
 
@@ -112,11 +112,11 @@ def _waves(source: str, sigma: Array, motion: Array, order: int) -> Array:
     return np.asarray(side * G.imag / sigma.imag[:, None])
 
 
-def _with_below(x: Array) -> Array:
+def _with_mode_below(x: Array) -> Array:
     """Each row as the one before: ranges reach down to the mode below, as frequencies vary."""
     return np.concatenate([x[:1], x[:-1]])
 
 
-def _above(x: Array) -> Array:
-    """Sums of each entry and all that follow."""
+def _tail_sums(x: Array) -> Array:
+    """For each entry, the sum of it and of all that follow."""
     return np.asarray(np.cumsum(x[::-1])[::-1])

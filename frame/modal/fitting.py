@@ -260,7 +260,9 @@ def _feedthrough(feeds: Jet, count: int) -> list[Jet]:
 
 
 def needed_modes(flow: LinearFlow, boxes: Boxes, allowed: Array, *, energy: bool = False) -> Array:
-    """Indices (n,) of the modes at the box's centre that some output cannot do without.
+    """Indices (n,) of the modes to keep so that the amplitudes of all others sum to `allowed`.
+
+    They are those of the box's centre, by rising |λ|, one of each conjugate pair.
 
     Args:
         flow: Flow of the structure.
