@@ -254,18 +254,19 @@ class Frontier:
                 and more confine to faces. A box is halved along the axis with most votes.
         """
         d = self.position.shape[1]
-        split, faced = np.flatnonzero((code > 0) & (code < FACES)), np.flatnonzero(code >= FACES)
-        count, box = 2 * d + 3**d, self.box[split]
-        votes = np.bincount(box * d + code[split] - 1, minlength=d * len(self.position))
+        to_halve = np.flatnonzero((code > 0) & (code < FACES))
+        to_confine = np.flatnonzero(code >= FACES)
+        count, box = 2 * d + 3**d, self.box[to_halve]  # count: halves and faces of a box
+        votes = np.bincount(box * d + code[to_halve] - 1, minlength=d * len(self.position))
         halves = box * count + 2 * votes.reshape(-1, d).argmax(1)[box]
-        faces = self.box[faced] * count + 2 * d + code[faced] - FACES
-        keys = np.concatenate([halves, halves + 1, faces])
-        problem = self.problem[np.concatenate([split, split, faced])]
-        fresh = np.unique(keys)
-        positions, merged = _distinct(self._places(fresh, count))
-        most = int(problem.max(initial=0)) + 1
-        items = np.unique(merged[np.searchsorted(fresh, keys)] * most + problem)
-        return Frontier(positions, *np.divmod(items, most))
+        faces = self.box[to_confine] * count + 2 * d + code[to_confine] - FACES
+        keys = np.concatenate([halves, halves + 1, faces])  # of child boxes; see `_places`
+        problem = self.problem[np.concatenate([to_halve, to_halve, to_confine])]
+        distinct_keys = np.unique(keys)
+        positions, child = _distinct(self._places(distinct_keys, count))  # faces may coincide
+        n_problems = int(problem.max(initial=0)) + 1
+        items = np.unique(child[np.searchsorted(distinct_keys, keys)] * n_problems + problem)
+        return Frontier(positions, *np.divmod(items, n_problems))
 
     def _places(self, keys: Array, count: int) -> Array:
         """Positions of child boxes, shape (K, d), in the form of `position`.

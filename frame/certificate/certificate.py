@@ -128,33 +128,33 @@ def _between(model: ModalModel) -> Array:
     rate, growth = suprema(model.eigenvalue, reach)[0], largest_growth(model.eigenvalue, reach)
     curve = np.zeros((len(model.time), len(model.outputs)))
     kink = np.zeros_like(curve)
-    at_once = np.zeros_like(curve)
+    feedthrough = np.zeros_like(curve)
     for part in parts(model, growth):
         size = suprema(part.share, reach)[0].reshape(model.count, -1)
         if isinstance(part.load, Direct):
-            at_once += 2 * part.load.history.line_deviation(model.time)[:, None] * size.sum(0)
+            feedthrough += 2 * part.load.history.line_deviation(model.time)[:, None] * size.sum(0)
             continue
         wave = part.waves[0].copy()
         if part.load is not None:  # R'' = λ² R + λ a + a', and a' acts on Σ C_k alone
             # within a step a wave is at most exp(|g| h) times what it is at the end
             wave *= np.exp(np.maximum(-growth, 0.0) * h)
-            most, slope = part.load.history.extremes
+            largest_load, slope = part.load.history.extremes
             jump = max((x for _, x in part.load.history.jumps), default=0.0)
-            together = Polynomial(
+            coefficient_sum = Polynomial(
                 part.share.index,
                 2 * part.share.coefficients.reshape(-1, model.count, curve.shape[1]).sum(1).real,
             )
-            curve += 2 * most * rate @ size + slope * suprema(together, reach)[0]
-            kink += jump * suprema(together, reach)[0]
+            curve += 2 * largest_load * rate @ size + slope * suprema(coefficient_sum, reach)[0]
+            kink += jump * suprema(coefficient_sum, reach)[0]
         wave[1:] = np.maximum(wave[1:], wave[:-1])
         curve += 2 * (wave * rate**2) @ size
-    deviation: Array = h**2 / 8 * curve + h / 4 * kink + at_once
+    deviation: Array = h**2 / 8 * curve + h / 4 * kink + feedthrough
     deviation[0] = 0.0
     return deviation
 
 
 def _growth(model: ModalModel, margin: Array) -> Array:
-    """Bound of what the model's error inside the step to each node adds to its less end, (T, m).
+    """Bound of what the model's error inside the step to each node adds to its smaller end, (T, m).
 
     An error that decays no faster than exp(g t) is inside the step at most exp(−g h) times its
     value at the end.
@@ -165,6 +165,6 @@ def _growth(model: ModalModel, margin: Array) -> Array:
     """
     exponent = largest_growth(model.eigenvalue, np.ones(len(model.boxes.names)))
     swell = float(np.exp(np.maximum(-exponent, 0.0).max() * model.flow.step))
-    more = np.zeros_like(margin)
-    more[1:] = swell * np.maximum(margin[1:], margin[:-1]) - np.minimum(margin[1:], margin[:-1])
-    return more
+    added = np.zeros_like(margin)
+    added[1:] = swell * np.maximum(margin[1:], margin[:-1]) - np.minimum(margin[1:], margin[:-1])
+    return added

@@ -135,8 +135,8 @@ class RatioDamping:
             K: Stiffnesses, shape (S, N, N).
 
         Returns:
-            The force, (S, n, N), and by name "own" (K − μ M) w, (S, n, N), "root" μ − σ², (S, n),
-            and "speed" w, with μ and σ the polynomials of the squared frequency and the frequency.
+            The force, (S, n, N), and by name "residual" (K − μ M) w, (S, n, N), "root" μ − σ²,
+            (S, n), and "speed" w; μ and σ are polynomials of the squared frequency and its root.
         """
         zeta = (
             points[:, self.ratio] if isinstance(self.ratio, int) else np.full(len(unit), self.ratio)
@@ -144,7 +144,7 @@ class RatioDamping:
         squared, frequency = self.squared(unit), self.frequency(unit)
         force = 2 * (zeta[:, None] * frequency)[..., None] * (speed @ M)
         residual = speed @ K - squared[..., None] * (speed @ M)
-        return force, {"own": residual, "root": squared - frequency**2, "speed": speed}
+        return force, {"residual": residual, "root": squared - frequency**2, "speed": speed}
 
     def acceleration_gains(self, stiffness: LoewnerBounds, mass: LoewnerBounds) -> Array:
         """Bound of a floor's acceleration by the damping force over ‖v‖ in the norm of M, (m,)."""
@@ -175,7 +175,7 @@ class RatioDamping:
         root = np.sqrt(_lower_bounds(self.squared)[mode])
         root_error = float(np.abs(defect["root"][:, mode]).sum())
         root_error /= root + _lower_bounds(self.frequency)[mode]
-        residual = mass.sup_dual(defect["own"][:, mode])
+        residual = mass.sup_dual(defect["residual"][:, mode])
         residual /= np.sqrt(stiffness.least(mass)) + root
         return float(
             2 * self.largest * (root_error * mass.sup(defect["speed"][:, mode]) + residual)

@@ -91,7 +91,7 @@ class BlockShares:
     def from_block(
         cls, block: Block, rows: TaylorModel, excited: TaylorModel, used: Rows
     ) -> BlockShares:
-        """Products of a block's modes with the rows of the outputs and the patterns of the sources.
+        """Shares of a block: r X, Xᵀ M v and N⁻¹ Xᵀ M v, of outputs r and sources v, N = Xᵀ M X.
 
         Args:
             block: The block X, as functions of the inputs at `used`.
@@ -104,12 +104,12 @@ class BlockShares:
         block = block.cut(min(degree_of_shares(block.norm.inputs), block.norm.order))
         if len(varying.present()):
             block = block.cut(excited.order).among(used, excited.inputs)
-            driven = block.mass_shape @ fixed.T + block.mass_shape @ varying.T
+            source_forces = block.mass_shape @ fixed.T + block.mass_shape @ varying.T
         else:
             rounding = block.mass_shape.size() @ excited.remainder.T
-            driven = (block.mass_shape @ fixed.T).loosened(rounding)
+            source_forces = (block.mass_shape @ fixed.T).loosened(rounding)
         read = (block.shape @ rows.value.T).loosened(block.shape.size() @ rows.remainder.T)
-        return cls(block, read, driven, solve(block.norm, driven))
+        return cls(block, read, source_forces, solve(block.norm, source_forces))
 
     @property
     def share(self) -> TaylorModel:

@@ -107,9 +107,9 @@ class MotionModels:
             allowed: Error of each output by which both are compared, shape (m,); None for the bound
                 of the coupling.
         """
-        more = oscillators(structure, of_block, found)
-        if len(more) == 1:
-            return replace(self, oscillators=self.oscillators + more)
+        all_oscillators = self.oscillators + oscillators(structure, of_block, found)
+        if len(of_block.block.modes) == 1:
+            return replace(self, oscillators=all_oscillators)
         coupling = coupling_of(structure, of_block, found)
         added, deviation = coupling.bounds(structure.order, excitation)
         ends = coupling.omega_range, coupling.quotient_range
@@ -118,9 +118,7 @@ class MotionModels:
         if (truncated.width / scale).max() < (added.max(0) / scale).max():
             return replace(self, truncated=[*self.truncated, truncated])
         added, deviation = self.added + added, self.line_deviation + deviation
-        return replace(
-            self, oscillators=self.oscillators + more, added=added, line_deviation=deviation
-        )
+        return replace(self, oscillators=all_oscillators, added=added, line_deviation=deviation)
 
 
 def inverse(basis: Array, like: TaylorModel) -> TaylorModel:

@@ -36,7 +36,7 @@ class Optima:
     predicted_gain: Array
 
     def offer(self, model: Response, points: Array, which: Array) -> Array:
-        """Replace best points of problems `which` (W,) by better `points` (W, d); return which."""
+        """Replace best points of problems `which` (W,) by better `points` (W, d); return these."""
         if not len(which):
             return which
         value = self.side[which] * model.value_at(points, self.node[which], self.output[which])
