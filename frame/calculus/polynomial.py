@@ -206,17 +206,12 @@ class LowerGrid:
         return leja(max(self.degrees) + self.excess + 1)[self.index]
 
     def coefficients(self, values: Array) -> Array:
-        """Chebyshev coefficients c_j of the polynomials with given values at `points`.
+        """Chebyshev coefficients c_j of polynomials with `values` (S, …) at `points`, same shape.
 
-        Since no product of Chebyshev polynomials T_k exceeds 1 on the box, Σ ‖c_j‖ bounds
-        ‖polynomial‖ there, for any norm. The matrix of T_k at the points is L U along each axis;
-        so is that of all terms, since with a term the set holds all of lower exponents.
-
-        Args:
-            values: Shape (S, …).
-
-        Returns:
-            The same shape, the constant first.
+        The constant comes first. Since no product of Chebyshev polynomials T_k exceeds 1 on the
+        box, Σ ‖c_j‖ bounds ‖polynomial‖ there, for any norm. The matrix of T_k at the points is L U
+        along each axis; so is that of all terms, since with a term the set holds all of lower
+        exponents.
         """
         out = values.reshape(len(values), -1)
         for factor in self._factors:

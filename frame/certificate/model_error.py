@@ -82,11 +82,8 @@ def _output_gains(
 ) -> Array:
     """Bound of each output's error over the deviation √(qᵀ K q + vᵀ M v), shape (m,).
 
-    Args:
-        rows: Chebyshev coefficients of the outputs' rows on [q, v], shape (J, m, 2N).
-        stiffness: K over the box.
-        mass: M over the box.
-        ratio: Damping by one ratio, which accelerations of floors read too; None for other damping.
+    `rows` (J, m, 2N) are Chebyshev coefficients of the outputs' rows on [q, v]; with `ratio`, the
+    damping by one ratio, accelerations of floors read its force too.
     """
     size = len(stiffness.factor)
     rows = np.moveaxis(rows, 1, 0)  # (m, J, 2N)

@@ -296,15 +296,10 @@ def _residual_rounding(
     rotation: Array,
     rounding: Array,
 ) -> Array:
-    """Bound of the residual K X̃ − M X̃ L̃ up to degree N, zero but for rounding, shape (p, n).
+    """Bound of K X̃ − M X̃ L̃ up to degree N, zero but for rounding, shape (p, n).
 
-    Args:
-        L: L̃ᵀ.
-        x: X̃ᵀ.
-        Mx: Its product with M.
-        stiffness: K.
-        rotation: Rotation of the block's modes, orthogonal but for rounding.
-        rounding: Rounding of M X̃.
+    L and x are L̃ᵀ and X̃ᵀ, Mx is M X̃ with its `rounding`; `rotation`, the rotation of the block's
+    modes, is orthogonal but for rounding.
     """
     (p, n), of_L, of_Mx = x.shape, L.sizes(), Mx.sizes()
     skewness = float(np.abs(rotation.T @ rotation - np.eye(p)).sum(0).max())

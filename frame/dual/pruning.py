@@ -68,15 +68,9 @@ def _over_piece(
 ) -> Array:
     """Upper bounds of one output and side over a piece of the box at nodes `above`, shape (J,).
 
-    The largest are improved first, until one stays above the peak; the others are those of the box.
-
-    Args:
-        level: Models over the box.
-        problem: Bounds over the box.
-        bound_index: Number of the output, and 0 for −output or 1 for the output.
-        above: Indices of the nodes, shape (J,).
-        piece: Lower and upper ends of the piece in unit coordinates, (d,) each.
-        slabs: Most slabs of a bound.
+    `piece` are its lower and upper ends, (d,) each; `bound_index` is the output's number, and 0 for
+    −output or 1. The largest bounds are improved first, by at most `slabs` slabs each, until one
+    stays above the peak; the others are those of the box, in `problem`.
     """
     inside = OutputBounds.initial(
         level.within(*piece), *bound_index, problem.wanted_gap, problem.attained

@@ -111,15 +111,10 @@ def response_and_gradient(u: Array, node: int, side: float, data: Data, weight: 
 
 @loops
 def mode_response(z: Array, k: int, node: int, side: float, data: Data, weight: Array) -> float:
-    """Response of mode k, side × output, by bilinear interpolation in its table.
+    """Response of mode k at a node, side × output, by bilinear interpolation in its table.
 
-    Args:
-        z: Scaled intervening variables of all modes, shape (Z,): ω, g, amplitudes of each.
-        k: Mode.
-        node: Node.
-        side: +1 or −1.
-        data: Models and tables of the output.
-        weight: Written in the mode's entries: derivatives by z, shape (Z,).
+    `z` (Z,) are the scaled intervening variables of all modes: ω, g and amplitudes of each. Written
+    are the mode's entries of `weight` (Z,): derivatives by z.
     """
     width, sources = int(data.points[0]), data.share.shape[1]
     first = k * (2 + sources)
@@ -177,16 +172,8 @@ def ascend(u: Array, node: int, side: float, data: Data) -> float:
 def climb(u: Array, node: int, side: float, data: Data, value: float, slope: Array) -> float:
     """Raise the model's side × output by projected gradient ascent with Barzilai–Borwein steps.
 
-    Args:
-        u: Inputs in [−1, 1]^d; written: the best met.
-        node: Node.
-        side: +1 or −1.
-        data: Models and tables of the output.
-        value: The model's value at u.
-        slope: Its gradient there; overwritten.
-
-    Returns:
-        The model's value at the best inputs.
+    Inputs `u` in [−1, 1]^d are replaced by the best met, whose value is returned. `value` and
+    `slope` are the model's value and gradient at u; the gradient is overwritten.
     """
     d = len(u)
     point, trial, trial_slope = u.copy(), np.empty(d), np.empty(d)
@@ -320,18 +307,11 @@ def bound_slab(
     model_value: float,
     u: Array,
 ) -> float:
-    """Improve the dual bound of one slab, and return the largest model value found so far.
+    """Improve the dual bound of slab number `slab`; return the largest model value so far.
 
-    Args:
-        slab: Number of the slab; its `value`, `mu` and `weight` in `slabs` are written.
-        node: Node.
-        side: +1 or −1.
-        data: Models and tables of the output.
-        steps: Most evaluations of the dual function.
-        target: Value of the dual function at which its minimisation ends.
-        slabs: All slabs.
-        model_value: Largest model value known before.
-        u: Its inputs; written where a larger one is found, shape (L,).
+    Written are the slab's entries of `slabs`, and `u` (L,), the inputs of the largest value, where
+    it exceeds `model_value`, that before. The dual function is evaluated at most `steps` times,
+    until it is below `target`.
     """
     here, mu, weight = np.empty(len(u)), slabs.mu[slab], slabs.weight[slab]
     value = minimise(

@@ -249,10 +249,7 @@ def _feedthrough(feeds: Jet, count: int) -> list[Jet]:
     """Direct feedthrough of each load as jets of coefficients C_k, V = (S, n, m), n = `count`.
 
     With `Direct`, where w of the first mode is a(t), 2 Re C_1 w is the feedthrough times a(t).
-
-    Args:
-        feeds: Outputs by a unit of each load, V = (S, m, L).
-        count: Number of modes.
+    `feeds` are the outputs by a unit of each load, V = (S, m, L).
     """
     first = np.eye(count)[0][:, None] / 2
     columns = [feeds[..., i][..., None, :] for i in range(feeds.value.shape[-1])]
