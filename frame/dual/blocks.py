@@ -244,7 +244,7 @@ def enclosed(block: Rows, rotation: Array, series: Series, centre: CentredMatric
     if np.abs(np.linalg.eigvals(norm.spread())).max() >= 1:
         return None
     off = 1.0 - np.eye(len(block))
-    data = _Unknowns(
+    unknowns = _Unknowns(
         residual=_series_residual(pencils, L, x, Mx)
         + _residual_rounding(L, x, Mx, stiffness, rotation, rounding),
         size=x.size(),
@@ -255,13 +255,13 @@ def enclosed(block: Rows, rotation: Array, series: Series, centre: CentredMatric
         inverse_norm=inverse_bound(norm),
         others=o,
     )
-    bounds = data.self_mapped_bounds(systems)
+    bounds = unknowns.self_mapped_bounds(systems)
     if bounds is None:
         return None
     Y, E = bounds
-    wrong = Y @ data.mass_size.T
-    norm = norm.loosened(wrong + wrong.T + Y @ data.heavy @ Y.T)
-    return Block(block, L.loosened(E), x.loosened(Y), Mx.loosened(Y @ data.heavy), norm)
+    norm_error = Y @ unknowns.mass_size.T
+    norm = norm.loosened(norm_error + norm_error.T + Y @ unknowns.heavy @ Y.T)
+    return Block(block, L.loosened(E), x.loosened(Y), Mx.loosened(Y @ unknowns.heavy), norm)
 
 
 def _higher_terms(mass: TaylorModel, x: list[Array], N: int) -> Array:

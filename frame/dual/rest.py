@@ -274,11 +274,13 @@ def _root(A: TaylorModel, B: TaylorModel) -> TaylorModel:
 def _with_best_powers(
     structure: Classical, bounds: list[tuple[TaylorModel, TaylorModel]], ranges: dict[int, Ranges]
 ) -> TruncatedModes:
-    """Truncated modes, for each source and output by the power of λ that bounds them best.
+    """Bounds of truncated modes' motion, for each source and output by the best power of λ.
+
+    The motion is C times the middle of the responses' range, ± an amplitude times its half width.
 
     Args:
         structure: The structure.
-        bounds: C and the bound of √(A B) for each power, V = (sources, m).
+        bounds: C and the amplitude for each power 0, ½, 1, V = (sources, m) each.
         ranges: Ranges of the responses by order of the derivative that is read.
     """
     of_outputs = [ranges[int(order)] for order in structure.order]
@@ -295,4 +297,10 @@ def _with_best_powers(
         share, amplitude = share + pair[0] * (best == k), amplitude + pair[1] * (best == k)
     s, o = np.indices(best.shape)
     deviations = (amplitudes[..., None] * deviation).min(0).sum(0)
-    return TruncatedModes(share, amplitude, middle[best, s, o], half[best, s, o], deviations.T)
+    return TruncatedModes(
+        share=share,
+        amplitude=amplitude,
+        middle=middle[best, s, o],
+        half=half[best, s, o],
+        line_deviation=deviations.T,
+    )
