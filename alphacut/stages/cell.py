@@ -299,7 +299,7 @@ def declared_errors(result: HomogenisedStiffness) -> Document | None:
         return None
     if isinstance(result, HomogenisedSpheres):
         modulus, nu = result.error_of(hill_average)
-        # σ11 under ε11 = ε22 and σ12 under ε12, from the cubic moduli K, G1 (axes), G2 (diagonals)
+        # σ11 under ε11 = ε22 and σ12 under ε12, from the moduli m = K, (C11 − C12)/2 and C44
         s11, s12 = result.error_of(lambda m: STRAIN * np.array([2 * m[0] + 2 / 3 * m[1], 2 * m[2]]))
     else:
         modulus, nu = result.estimated_error * result.modulus, result.poisson_error
