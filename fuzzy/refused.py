@@ -131,11 +131,7 @@ def checked_number(
 
 
 def require_numbers(name: str, values: object) -> None:
-    """Refuse values that are not a list, tuple or array of finite real numbers.
-
-    Raises:
-        RefusedError: They are a text or a single number, or contain something else.
-    """
+    """Refuse values that are not a list, tuple or array of finite real numbers."""
     is_list = isinstance(values, Collection) and not isinstance(values, str)
     require(is_list, name, value=repr(values), allowed="a list of numbers")
     if isinstance(values, np.ndarray) and values.dtype.kind in "iuf" and np.isfinite(values).all():
@@ -145,11 +141,7 @@ def require_numbers(name: str, values: object) -> None:
 
 
 def require_choice(key: str, value: object, names: Iterable[str]) -> None:
-    """Refuse a value that is not one of the allowed names.
-
-    Raises:
-        RefusedError: The message lists the names.
-    """
+    """Refuse a value that is not one of the allowed names."""
     allowed = tuple(names)
     require(value in allowed, key, value=value, allowed=", ".join(allowed))
 

@@ -24,11 +24,7 @@ AVERAGES = {AXES: "eq. 16", ISOTROPIC: "the isotropic average of the plane stiff
 
 
 def require_average(average: str) -> None:
-    """Refuse an average that is not one of `AVERAGES`.
-
-    Raises:
-        RefusedError: The name is unknown.
-    """
+    """Refuse an average that is not one of `AVERAGES`."""
     if average not in AVERAGES:
         raise RefusedError("average", average, " or ".join(AVERAGES))
 

@@ -20,11 +20,7 @@ from alphacut.rve.interruption import uninterrupted
 
 
 def require_real(scalar: type) -> None:
-    """Refuse a PETSc that was built for complex numbers.
-
-    Raises:
-        RefusedError: The scalar type is complex.
-    """
+    """Refuse a PETSc that was built for complex numbers."""
     if np.issubdtype(scalar, np.complexfloating):
         cure = "install DOLFINx with real numbers, such as python3-dolfinx-real"
         raise RefusedError("PETSc", "built for complex numbers", "a build for real numbers", cure)

@@ -86,9 +86,6 @@ def require_fit(outline: Outline, radius: float, limit: float = 1.0) -> None:
         outline: Distance of the edge from the centre over the radius, at angles.
         radius: In halves of the cell's side.
         limit: 1 is the cell's edge.
-
-    Raises:
-        RefusedError: The particle is too large, or its outline is no positive periodic function.
     """
     distances = outline(_ANGLES)
     is_periodic = abs(distances[0] - distances[-1]) <= 1e-9 * distances[0]

@@ -20,21 +20,13 @@ STIFFEST = 0.45
 
 
 def require_mesh_size(size: float) -> None:
-    """Refuse an edge length outside (0, 1], in halves of the cell's side.
-
-    Raises:
-        RefusedError: It lies outside.
-    """
+    """Refuse an edge length outside (0, 1], in halves of the cell's side."""
     if not 0 < size <= 1:
         raise RefusedError("the mesh size", f"{size:g}", f"values in (0, 1], {HALVES}")
 
 
 def require_points(points: int | None) -> None:
-    """Refuse a quadrature rule in θ of fewer than two points; None means the model's choice.
-
-    Raises:
-        RefusedError: There are fewer.
-    """
+    """Refuse a quadrature rule in θ of fewer than two points; None means the model's choice."""
     if points is not None and points < 2:
         raise RefusedError("number of points of the rule in θ", points, "2 or more")
 
@@ -44,9 +36,6 @@ def require_continuous(radius_map: RadiusMap) -> Array:
 
     Returns:
         Radii at 2049 even steps over the support of θ.
-
-    Raises:
-        RefusedError: The map jumps, or gives radii outside (0, 1), or its law of θ is none.
     """
     require_map(radius_map)
     law = radius_map.distribution
@@ -60,11 +49,7 @@ def require_continuous(radius_map: RadiusMap) -> Array:
 
 
 def require_compressible(*phases: AnyPhase) -> None:
-    """Refuse phases that are so incompressible that quadratic elements lock.
-
-    Raises:
-        RefusedError: A Poisson's ratio is above 0.45.
-    """
+    """Refuse phases that are so incompressible that quadratic elements lock."""
     ratio = max((phase.poisson for phase in phases if isinstance(phase, Phase)), default=0.0)
     if ratio > STIFFEST:
         cure = "finite elements lock above: take the series"
@@ -72,11 +57,7 @@ def require_compressible(*phases: AnyPhase) -> None:
 
 
 def require_interphase(interphase: Interphase | None, outline: Outline) -> None:
-    """Refuse an interphase in which elements lock, or around a particle that is not round.
-
-    Raises:
-        RefusedError: Its Poisson's ratio is above 0.45, or the outline is no circle.
-    """
+    """Refuse an interphase in which elements lock, or around a particle that is not round."""
     if interphase is None:
         return
     require_compressible(interphase.phase)
@@ -94,9 +75,6 @@ def require_parts(
         matrix: Should be a phase.
         inclusions: Should be a sequence of one phase or more.
         isotropic: Whether all phases must be isotropic.
-
-    Raises:
-        RefusedError: An argument is of another kind.
     """
     kinds = (Phase,) if isotropic else (Phase, VoigtPhase)
     phases = (matrix, *inclusions) if isinstance(inclusions, Sequence) else ()

@@ -45,9 +45,6 @@ def require_map(radius_map: RadiusMap) -> None:
 
     The radii are evaluated at 65 values of θ.
 
-    Raises:
-        RefusedError: The map or its law is refused.
-
     Example:
         >>> require_map(HermiteMap(0.2, 0.1, 0.8, 0.2))
     """

@@ -113,9 +113,6 @@ class Segmentation:
 
         Args:
             most: Largest allowed uncertain area, as a fraction of the smallest class's.
-
-        Raises:
-            RefusedError: It is larger.
         """
         fraction = self.open_fraction / float(self.fractions.min())
         impulses = float(np.mean(np.isinf(self.smoothing_error)))
@@ -181,9 +178,6 @@ def _require_unclipped(values: Array, borders: tuple[float, ...], sound: Mask) -
         values: Grey values.
         borders: Thresholds between the classes.
         sound: Pixels that are no impulses.
-
-    Raises:
-        RefusedError: They are clipped.
     """
     labels = median_filter(np.searchsorted(borders, values, side="right"), _PATCH, mode="wrap")
     interior = _interior(labels, _BORDER) & sound
@@ -298,9 +292,6 @@ def _inner_pixels(labels: Rows, classes: int) -> Mask:
     """Mask of pixels farther than 3 pixels from other classes, or as far as the classes allow.
 
     The distance is reduced until a tenth of each class is left.
-
-    Raises:
-        RefusedError: A class has no pixel.
     """
     counts = np.bincount(labels.ravel(), minlength=classes)
     value, allowed = "beyond the grey values of a class", "values that leave each class some pixels"

@@ -213,11 +213,7 @@ def flatten(output: Output) -> tuple[Layout, Array]:
 
 
 def _finite_array(name: str, value: ArrayLike | None) -> Array:
-    """Return the output `name` as an array of finite real numbers.
-
-    Raises:
-        RefusedError: A number is not real or not finite, is masked, or has a unit.
-    """
+    """Return the output `name` as an array of finite real numbers."""
     array = np.ma.asanyarray(value)  # type: ignore[no-untyped-call]
     is_plain = array.dtype.kind in "biuf" and not np.ma.is_masked(array)  # type: ignore[no-untyped-call]
     is_allowed = is_plain and not hasattr(value, "units") and np.isfinite(array).all()

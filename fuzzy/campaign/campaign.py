@@ -141,12 +141,7 @@ class Campaign:
         return Values(self.layout, np.array([self._rows[key] for key in keys]))
 
     def _run(self, points: Array) -> Array:
-        """Evaluate new points (n, inputs) and return their outputs (n, columns), NaN if failed.
-
-        Raises:
-            CampaignError: Samples failed and failures are not skipped, or all of the first batch
-                failed.
-        """
+        """Evaluate new points (n, inputs) and return their outputs (n, columns), NaN if failed."""
         batch = _Batch(self, points)
         batch.run()
         LOG.debug("%d samples, %d before", len(points), len(self))

@@ -215,11 +215,7 @@ def _prepare(connection: sqlite3.Connection) -> None:
 
 
 def _is_store(path: Path) -> bool:
-    """Return True for a store, an empty file, or where there is nothing; none of them a link.
-
-    Raises:
-        OSError: The file cannot be read.
-    """
+    """Return True for a store, an empty file, or where there is nothing; none of them a link."""
     sqlite_files = (path.with_name(f"{path.name}{end}") for end in ("", "-journal", "-wal", "-shm"))
     if not all(_is_regular(file, missing=True) for file in sqlite_files):
         return False

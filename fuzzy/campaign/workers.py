@@ -152,9 +152,6 @@ def _result(future: Future[T], at: str = "") -> T:
     Args:
         future: Of a batch, whose calls catch their own exceptions.
         at: Words on the samples that it computes, for the message.
-
-    Raises:
-        FailedError: A worker process died, or the function cannot be sent to one.
     """
     try:
         return future.result()

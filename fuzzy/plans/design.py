@@ -82,9 +82,6 @@ class Design:
 
         Returns:
             Rows of `points`, shape (levels, outputs).
-
-        Raises:
-            FailedError: A level has no sample with a value.
         """
         columns = np.arange(values.shape[1])
         usable = np.where(np.isnan(values), np.inf, values)

@@ -133,9 +133,6 @@ def _inverse(matrix: Array) -> tuple[Array, Array]:
 
     With X the computed inverse and R = I − X·matrix, the true one differs from X by at most
     ‖R‖‖X‖/(1 − ‖R‖), rounding of R included.
-
-    Raises:
-        FailedError: The matrix is singular to rounding.
     """
     inverse = np.linalg.inv(matrix)
     inverse = (inverse + np.swapaxes(inverse, -1, -2)) / 2

@@ -106,9 +106,6 @@ class ImageModel:
         Args:
             images: Least and greatest moduli of each level, for rising α.
             cuts: Proved bounds of each level.
-
-        Raises:
-            FailedError: The proved interval of such an image lies outside a cut that contains it.
         """
         solver = replace(self.solver, accuracy=min(COARSER * self.solver.accuracy, 0.1))
         coarse_model = replace(self, solver=solver)
@@ -125,11 +122,7 @@ class ImageModel:
 
 
 def _require_overlap(name: str, inside: Ends, cut: Ends) -> None:
-    """Refuse the interval of an image inside a cut if it has no point in common with the cut's.
-
-    Raises:
-        FailedError: The intervals are disjoint, so that one of the two proofs is wrong.
-    """
+    """Refuse the interval of an image inside a cut if it has no point in common with the cut's."""
     if not (inside[0] <= cut[1] and cut[0] <= inside[1]):
         what = f"{name} of an image inside a cut is {inside[0]:.9g} … {inside[1]:.9g}"
         what += f", the cut {cut[0]:.9g} … {cut[1]:.9g}"

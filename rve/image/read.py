@@ -47,12 +47,7 @@ def _array(path: Path) -> Array:
 
 
 def _picture(path: Path, square: bool) -> Array:
-    """Read the pixels of an image file with one page of grey values, top row first.
-
-    Raises:
-        RefusedError: It has colours or several pages, pixels that are not square although `square`
-            is set, or more pixels than memory.
-    """
+    """Read the pixels of an image file with one page of grey values, top row first."""
     from PIL import Image
 
     Image.MAX_IMAGE_PIXELS = None  # the memory is checked here, before the pixels are read
@@ -70,11 +65,7 @@ def _picture(path: Path, square: bool) -> Array:
 
 
 def require_memory(rows: int, columns: int) -> None:
-    """Refuse an image whose solution needs more memory than this machine has.
-
-    Raises:
-        RefusedError: It says how much is needed, and how large a piece would fit.
-    """
+    """Refuse an image whose solution needs more memory than this machine has."""
     available = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     needed = BYTES_PER_PIXEL * rows * columns
     if needed > available:
@@ -90,10 +81,6 @@ def require_phases(grey: Array, thresholds: tuple[tuple[float, float], ...]) -> 
     Args:
         grey: Grey values, shape (rows, columns).
         thresholds: Least and greatest value of each fuzzy threshold, rising.
-
-    Raises:
-        RefusedError: A threshold lies outside the grey values, or a phase between two thresholds
-            may be empty.
     """
     low, high = float(grey.min()), float(grey.max())
     for least, greatest in thresholds:

@@ -58,11 +58,7 @@ def orient(prisms: Prisms) -> Prisms:
 
 
 def _require_periodic_square(grid: PrismGrid) -> None:
-    """Refuse levels that do not fill [−1, 1]², or whose opposite sides do not match.
-
-    Raises:
-        MeshError: A level does not, or a node's partner is in another column than on the lowest.
-    """
+    """Refuse levels that do not fill [−1, 1]², or whose opposite sides do not match."""
     assert grid.fixed is not None
     per_level = len(grid.plane.points)
     lowest_partners: list[dict[int, int]] = []

@@ -126,11 +126,7 @@ def read(gmsh: Any) -> Prisms:
 
 
 def _cells_of(gmsh: Any, volume: int, name: str) -> Rows:
-    """Node tags of the prisms of a volume, shape (m, 15), in Basix's order.
-
-    Raises:
-        MeshError: The volume, of the physical group `name`, has other elements.
-    """
+    """Node tags of the prisms of a volume, shape (m, 15), in Basix's order."""
     kinds, _, nodes = gmsh.model.mesh.getElements(3, volume)
     if list(kinds) != [PRISM_15]:
         found = ", ".join(gmsh.model.mesh.getElementProperties(kind)[0] for kind in kinds)

@@ -125,11 +125,7 @@ class PrismForm:
             self.elastic.in_particle.x.array[:] = self._inside(positions, radius).ravel()
 
     def _require_valid_elements(self) -> None:
-        """Refuse inverted elements, and nearly inverted ones about outlines that are not round.
-
-        Raises:
-            FoldedMeshError: det J is too small at a quadrature point, on any rank.
-        """
+        """Refuse inverted elements, and nearly inverted ones about outlines that are not round."""
         determinants = self.areas / slice_weights()
         means = determinants.mean(axis=(1, 2), keepdims=True)
         least_ratio = 0.0 if is_round(self.grid.plane.outline) else LEAST_RATIO

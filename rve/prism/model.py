@@ -313,9 +313,6 @@ class PrismModel:
             strains: Of the slices, under `loads(cell)`.
             cell: The cell solved.
             residual: Relative residual of the linear system.
-
-        Raises:
-            CertificateError: A check is violated by more than twice the declared error.
         """
         loads = self.loads(cell)
         result = HomogenisedStiffness(

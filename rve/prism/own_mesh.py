@@ -69,11 +69,7 @@ def _order_phases(law: FixedCell, names: Sequence[str], phases: object) -> Named
 
 
 def _checked_phases(names: Sequence[str], phases: object) -> Mapping[str, AnyPhase]:
-    """The materials by name, if they are one for each name of the phases of a mesh.
-
-    Raises:
-        RefusedError: One is missing, has another name, or is no material.
-    """
+    """The materials by name, if they are one for each name of the phases of a mesh."""
     listed = ", ".join(names)
     if not isinstance(phases, Mapping):
         value = type(phases).__name__

@@ -142,11 +142,7 @@ def _separate_problem(model: PrismModel, law: RadiusMap | ThetaLaw) -> PrismProb
 
 
 def require_symmetric(matrix: PETSc.Mat) -> None:
-    """Refuse a matrix A that is not symmetric, for which conjugate gradients would be wrong.
-
-    Raises:
-        RefusedError: A x and Aᵀ x differ for a random vector x.
-    """
+    """Refuse a matrix A that is not symmetric, for which conjugate gradients would be wrong."""
     x, product = matrix.createVecs()
     difference = x.duplicate()
     x.array[:] = np.random.default_rng(x.owner_range[0]).standard_normal(x.local_size)

@@ -139,9 +139,6 @@ def _least_area_supports(
         limits: Lower and upper limit of each of the four numbers.
         matrix: Constraints of containment, shape (k, 4).
         right_side: Their right sides, shape (k,).
-
-    Raises:
-        FailedError: No monotone corners fulfil the constraints.
     """
     from scipy.optimize import linprog
 

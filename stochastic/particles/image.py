@@ -111,9 +111,6 @@ class SectionImage:
         """Mask of the particles' pixels, by Otsu's threshold of the smoothed image.
 
         The phase whose pieces fill more of their convex hulls is that of the particles.
-
-        Raises:
-            RefusedError: The greys differ too little beside their noise, or the light is uneven.
         """
         from skimage import filters
 

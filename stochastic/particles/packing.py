@@ -219,9 +219,6 @@ def _push(particles: Particles, growth: float) -> Particles:
     """Move particles apart until none overlap, by fast inertial relaxation (Bitzek et al. 2006).
 
     The energy ½ Σ overlap² of particles with radii grown by the factor `growth` is minimised.
-
-    Raises:
-        FailedError: Particles overlap after `MAX_STEPS` steps.
     """
     centres, box, radii = particles.centres, particles.size, particles.radii * growth
     velocity, step, mixing, n_downhill = np.zeros_like(centres), 0.1, 0.1, 0

@@ -19,11 +19,7 @@ LEAST, MOST = 1e-12, 1e6  # m; no particle of a material is smaller or larger
 
 
 def require_radii(key: str, radii: ArrayLike) -> None:
-    """Refuse an empty list and radii outside [1e-12, 1e6] m, which have a wrong unit or digit.
-
-    Raises:
-        RefusedError: One lies outside.
-    """
+    """Refuse an empty list and radii outside [1e-12, 1e6] m, which have a wrong unit or digit."""
     radii = np.atleast_1d(np.asarray(radii, float))
     wrong = radii[~((radii >= LEAST) & (radii <= MOST))]
     value, are_allowed = f"{wrong[0]:.6g} m" if len(wrong) else None, len(radii) and not len(wrong)

@@ -52,9 +52,6 @@ def require_support(lower: float, upper: float, unit: float = 0.0) -> None:
         lower: Left end.
         upper: Right end.
         unit: Size of θ beside which rounding counts, if larger than the ends.
-
-    Raises:
-        RefusedError: The support is none of those allowed.
     """
     least = MIN_WIDTH * max(abs(lower), abs(upper), unit)
     is_ordered = np.isfinite(lower) and np.isfinite(upper) and lower < upper

@@ -131,10 +131,6 @@ def _panel_edges(law: ThetaLaw, edges: Array, rule: tuple[Array, Array]) -> Arra
         law: Law of θ.
         edges: First edges, rising, shape (n + 1,), n ≤ m.
         rule: Nodes and weights of a rule on [−1, 1].
-
-    Raises:
-        RefusedError: The errors of all panels sum to more than `MASS_GAP`: density and distribution
-            function are not of one law, or the density is not finite.
     """
     for _ in range(_HALVINGS):
         gaps = _mass_gaps(law, edges, rule)
