@@ -257,12 +257,13 @@ class CellCampaign:
 
     @property
     def knowledge(self) -> Knowledge:
-        """Signs of the inputs' effects on E, where mechanics proves them.
+        """Signs of the inputs' effects on E, where mechanics proves them; else none.
 
-        Where both phases have the same Poisson's ratio ν >= 0, more stiff material can only
-        stiffen: A and B of eq. 16 rise, and with them E = 3A/2 − A²/(2B); of spheres the bulk
-        modulus and both averages of the shear modulus. The radius rises with a1, a2, a3 and falls
-        with a4, since h1, h2, h3 >= 0 >= h4 (eq. 12).
+        If both phases have one crisp Poisson's ratio ν ≥ 0 and one phase is the stiffer for all
+        values, more of it can only stiffen the cell: A = C11 + C12 and B = C11 of a fibre cell rise
+        (the paper's eq. 16), and with them E = 3A/2 − A²/(2B); of spheres the bulk modulus and both
+        averages of the shear modulus. The radius Σ a_i h_i(θ) rises with a1, a2 and a3, h_i ≥ 0,
+        and falls with a4, h4 ≤ 0 (the paper's eq. 12).
         """
         if not self.cell.has_series or self.modulus.method == "prism":
             return Knowledge()

@@ -227,16 +227,20 @@ class StageStore:
                     folder_of_parts.rmdir()
 
     def _sample_store(self, folder: ResultsFolder) -> Path:
-        """Path of the store of samples, which the manifest lists before it is made.
+        """Path of the store of samples.
+
+        If there is none yet, the manifest lists it now, so that an interrupted run owns its file.
 
         Raises:
             RefusedError: The run is fresh, and there is a store that no manifest lists.
         """
         path, is_listed = folder.path / SAMPLES, SAMPLES in folder.stage_files
         exists = os.path.lexists(path)
-        fits, cure = is_listed or not (exists and self.fresh), "move it away, or leave out --fresh"
-        require(fits, str(path), value="listed in no manifest", allowed="none", cure=cure)
+        is_allowed = is_listed or not exists or not self.fresh
+        cure = "move it away, or leave out --fresh"
+        require(is_allowed, str(path), value="listed in no manifest", allowed="none", cure=cure)
         if rank() == 0 and not is_listed and not exists:
+            # without checksums, since the store changes
             folder.list_files(SAMPLES, "", {SAMPLES: "", f"{SAMPLES}-journal": ""})
         return path
 

@@ -162,7 +162,7 @@ class Campaign:
     def _reorder_columns(self, array: Array, layouts: Mapping[int, Layout]) -> Array:
         """Outputs (n, columns) of the first batch, with columns in the layout of its first row.
 
-        The layout is kept. Workers end in any order, so that another row may have set it before.
+        That becomes `self.layout`, which before is the layout of whichever row ended first.
 
         Args:
             array: Outputs with columns as in `self.layout`.

@@ -108,12 +108,15 @@ class JointClaim:
     def from_inputs(
         cls, inputs: Mapping[str, FuzzyNumber], nature: str = "guaranteed"
     ) -> JointClaim:
-        """Return the claim of a result of these inputs, with bounds of the given nature.
+        """Return what may be claimed of a result that is computed from some inputs.
+
+        It consists of the rule by which the claims of measured inputs are joined, of the conditions
+        under which it holds, and of the names of inputs with a width but no claim (opinions).
 
         Args:
             inputs: Fuzzy numbers by name.
-            nature: "attained", "estimated" or "guaranteed"; unless guaranteed, that the true range
-                stays inside the bounds is a condition.
+            nature: Nature of the result's bounds, "attained", "estimated" or "guaranteed"; unless
+                guaranteed, that the true range stays inside them is a condition.
         """
         claimed = {
             name: number for name, number in inputs.items() if isinstance(number, ClaimedNumber)
@@ -132,7 +135,8 @@ class JointClaim:
         rule = None
         if claimed:
             name, first = next(iter(claimed.items()))
-            rule = first.joint or JointRule((name,), False, first.claim.about)
+            alone = JointRule(names=(name,), independent=False, means=first.claim.about)
+            rule = first.joint or alone  # joined inputs share one rule
             conditions += [rule.words] if rule.words else []
         if opinions:
             cuts = "their cuts" if len(opinions) > 1 else "its cut"

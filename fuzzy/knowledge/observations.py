@@ -92,17 +92,18 @@ def _is_number(value: object) -> bool:
     return not isinstance(value, int) or abs(value) < sys.float_info.max
 
 
-def _ends(number: int, value: object) -> tuple[float, float]:
+def _ends(position: int, value: object) -> tuple[float, float]:
     """Lower and upper end of a measured value, which is a number or a pair.
 
     Args:
-        number: Position of the value in the list, from 1, for the message.
+        position: Position of the value in the list, from 1, for the message.
         value: The value.
     """
     ends = np.atleast_1d(np.asarray(value, object))
-    is_pair = ends.ndim == 1 and len(ends) in (1, 2) and not np.ma.is_masked(value)  # type: ignore[no-untyped-call]
-    if is_pair and all(_is_number(end) for end in ends):
+    has_ends = ends.ndim == 1 and len(ends) in (1, 2) and not np.ma.is_masked(value)  # type: ignore[no-untyped-call]
+    if has_ends and all(_is_number(end) for end in ends):
         low, high = float(ends[0]), float(ends[-1])
-        if low <= high and np.isfinite((low, high)).any():  # neither both −∞ nor both ∞
+        if low <= high and np.isfinite((low, high)).any():  # at most one end is infinite
             return low, high
-    raise RefusedError(f"value {number}", value, "finite numbers, or pairs (lower, upper) in order")
+    allowed = "finite numbers, or pairs (lower, upper) in order, one end of which may be infinite"
+    raise RefusedError(f"value {position}", value, allowed)

@@ -130,9 +130,15 @@ class PrismModel:
     ) -> list[HomogenisedStiffness]:
         """Homogenised stiffness for each of `inclusions`, in their order, on one mesh.
 
-        On the user's mesh, or with a level set, `solve(law, {name: phase})` gives one result for
-        the law of θ and the materials of its physical groups, or of "matrix" and "inclusion". It
-        declares no error; energies are in the order of these names.
+        On the user's mesh, or with a level set, there is one result, without a declared error, with
+        energies in the order of the materials.
+
+        Args:
+            radius_map: Radius of the particle over θ; on the user's mesh the law of θ.
+            matrix: Material of the matrix; on the user's mesh all materials by physical group, with
+                a level set by "matrix" and "inclusion".
+            inclusions: Materials of the particle, each of which is solved.
+            interphase: Ring around the particle, if there is one.
 
         Raises:
             ConvergenceError: The linear solver stopped early.
@@ -153,6 +159,7 @@ class PrismModel:
         with timed(seconds, "mesh"):
             problem = self.problem(radius_map, thickness_of(interphase))
         with timed(seconds, "solve"):
+            # reduced basis that serves all inclusions; beside a ring each one is solved
             basis = None if interphase else self._basis(problem, matrix, inclusions)
         results = []
         for inclusion in inclusions:

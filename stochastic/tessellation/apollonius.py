@@ -122,7 +122,8 @@ class _Walls:
     def _anomalies(self) -> tuple[Array, Array, Array, Array]:
         """Hyperbolic anomalies at start and end of each arc, and d + Δ and d − Δ, (m,) each.
 
-        d is the distance of the centres of both discs, Δ the difference of their radii.
+        d is the distance of the centres of the arc's disc and of its neighbour, Δ the disc's radius
+        less the neighbour's.
         """
         arcs, pairs = self.arcs, self.pairs.where(self.arcs.function)
         near, far = _near_far(self.discs.radii, pairs.first, pairs.second, pairs.offset)
@@ -228,12 +229,13 @@ def counted_cells(diagram: Apollonius) -> tuple[Rows, Array]:
 
 
 def _reach(diagram: Apollonius) -> Array:
-    """Return how far empty circles about a cell's boundary reach towards each edge, (n, 4), in m.
+    """Return how far empty circles centred on a cell's boundary extend towards each edge, (n, 4).
 
-    The circle about a boundary point at the distance ρ from the disc's centre touches the disc of
-    radius r and a neighbour, and reaches by ρ cos ψ + ρ − r beyond the centre, ψ the angle from
-    the edge's direction. The maximum over `ANGLES` points of each arc is taken, whose error is of
-    second order. It is infinite for a cell that is not closed, of which some ρ is negative.
+    The distance, in m, is measured from the disc's centre towards the four edges of the box; it is
+    infinite for a cell that is not closed, of which some ρ is negative. The circle about a boundary
+    point at the distance ρ from the centre touches the disc of radius r and a neighbour: it has the
+    radius ρ − r and extends by ρ cos ψ + ρ − r, ψ the angle from the edge's direction. The maximum
+    over `ANGLES` points of each arc is taken, with an error of second order.
     """
     angle, rho = diagram.walls(ANGLES)
     is_bounded = rho.min(axis=0) > 0

@@ -34,14 +34,15 @@ def anomaly(psi: Array, near: Array, far: Array) -> Array:
 def sector_area(start: Array, end: Array, near: Array, far: Array) -> Array:
     """Area between a disc's centre and its hyperbolic wall over an arc, shape (m,).
 
-    The wall is 1/ρ = M cos ψ + C with M + C = 2/near and M − C = 2/far. d is the distance of the
-    centres of both discs, Δ the difference of their radii.
+    The wall is 1/ρ = M cos ψ + C with M + C = 2/near and M − C = 2/far, ρ the distance from the
+    disc's centre, ψ the angle from the direction of the neighbour. d is the distance of its centre,
+    Δ the disc's radius less the neighbour's.
 
     Args:
         start: Hyperbolic anomaly at the beginning of the arc, shape (m,).
         end: Anomaly at its end, shape (m,).
-        near: d + Δ, shape (m,).
-        far: d − Δ, shape (m,).
+        near: d + Δ, twice the distance of the wall's nearest point from the centre, shape (m,).
+        far: d − Δ, the same from the neighbour's centre, shape (m,).
     """
     middle, half = (start + end) / 2, (end - start) / 2
     M_plus_C, M_minus_C = 2 / near, 2 / far

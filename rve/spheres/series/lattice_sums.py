@@ -52,13 +52,18 @@ def harmonics(points: Array, highest: int, order: int) -> Array:
 
 @cache
 def lattice_sums(highest: int) -> tuple[Array, Array]:
-    """Lattice sums Σ C_n^m |p|^(−n−1) and Σ C_n^m |p|^(1−n) by degree n and order m.
+    """Sums of harmonics C_n^m(p) |p|^(−n−1), and of C_n^m(p) |p|^(1−n), over a cubic lattice.
+
+    p are the points of the simple cubic lattice but the origin, C_n^m surface harmonics of degree n
+    and order m as in `harmonics`. Up to degree `_DIRECT` Ewald's method is used, beyond it direct
+    sums, which converge fast.
 
     Args:
         highest: Largest degree, at least 4.
 
     Returns:
-        Shape (highest + 1, highest + 1) each; zero where symmetry says so.
+        By degree and order, shape (highest + 1, highest + 1) each; by symmetry only even n ≥ 4 and
+        orders that are multiples of 4 are not zero. Those of degree 0 diverge and are left out.
     """
     harmonic, biharmonic = np.zeros((2, highest + 1, highest + 1))
     ewald_points, direct_points = _points(_REACH), _points(3)

@@ -16,13 +16,17 @@ from alphacut.rve.cell import Phase
 def t_matrices(degrees: Array, matrix: Phase, inclusion: Phase) -> tuple[Array, Array]:
     """T-matrices of a sphere of radius 1: singular amplitudes = T @ regular amplitudes.
 
+    Lamé solutions are numbered as by Kushch (2013): 1 is the gradient of a harmonic, 2 torsional,
+    3 the one with dilatation.
+
     Args:
         degrees: Degrees n of the spherical harmonics, shape (k,).
         matrix: Material outside.
         inclusion: Material inside; its modulus may be so low or high that it is a pore or rigid.
 
     Returns:
-        T of Lamé solutions 1 and 3, shape (k, 2, 2), and of solution 2, shape (k,).
+        T of the coupled solutions 1 and 3, rows singular, columns regular, shape (k, 2, 2), and of
+        solution 2, shape (k,).
     """
     n = np.asarray(degrees, float)
     ratio = float(inclusion.bulk_and_shear[1] / matrix.bulk_and_shear[1])
@@ -35,7 +39,7 @@ def t_matrices(degrees: Array, matrix: Phase, inclusion: Phase) -> tuple[Array, 
         return outside * traction - inside * stiffness @ displacement
 
     singular, regular = traction_mismatch(-n - 1), -traction_mismatch(n)
-    is_radial = n == 0  # one solution each, radial: 1 outside, 3 inside
+    is_radial = n == 0  # singular solution 1 and regular solution 3 alone
     singular[is_radial, :, 1], singular[is_radial, 1, :] = 0.0, 0.0
     singular[is_radial, 1, 1], regular[is_radial, 1, :] = 1.0, 0.0
     torsion_sum = np.where(is_radial, 1.0, (n + 2) * outside + (n - 1) * inside)

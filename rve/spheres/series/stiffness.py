@@ -35,7 +35,9 @@ TRUNCATION = Truncation(
 def cubic_stiffness(
     radius: Array, matrix: Phase, inclusions: Sequence[Phase], *, tolerance: float = 1e-10
 ) -> CellModuli:
-    """K, (C11 − C12)/2 and C44 of n cubic cells times m inclusions, with declared errors.
+    """K, (C11 − C12)/2 and C44 of cubic cells with a sphere in the centre, with declared errors.
+
+    They are computed for n radii times m inclusions.
 
     Args:
         radius: Radii over half the cell's side, shape (n,), each in [0, 1).
@@ -50,10 +52,11 @@ def cubic_stiffness(
     """
 
     def solve(radii: Array, degree: int) -> Array:
-        """K, (C11 − C12)/2 and C44: those of the matrix less the mean stress of force dipoles."""
+        """K, (C11 − C12)/2 and C44, shape (n, m, 3): the matrix's less the mean dipole stress."""
         (bulk, mu), nu = matrix.bulk_and_shear, matrix.poisson
         axial = _dipoles(radii, matrix, inclusions, degree, shear=False)
         shear = _dipoles(radii, matrix, inclusions, degree, shear=True)
+        # of hydrostatic and of tetragonal strain, (n, m, 2); the former in the latter's scale
         axial[..., 0] /= -3 * (1 - 2 * nu)
         dipoles = np.concatenate([axial, shear], axis=-1)
         scale = 8 * np.pi * mu * (1 - nu) * radii[:, None] ** 3 / VOLUME
