@@ -260,7 +260,7 @@ class CellCampaign:
         """Signs of the inputs' effects on E, where mechanics proves them; else none.
 
         If both phases have one crisp Poisson's ratio ν ≥ 0 and one phase is the stiffer for all
-        values, more of it can only stiffen the cell: A = C11 + C12 and B = C11 of a fibre cell rise
+        values, more of it can only stiffen the cell: A = 2 C33 and B = C11 + C12 of fibres rise
         (the paper's eq. 16), and with them E = 3A/2 − A²/(2B); of spheres the bulk modulus and both
         averages of the shear modulus. The radius Σ a_i h_i(θ) rises with a1, a2 and a3, h_i ≥ 0,
         and falls with a4, h4 ≤ 0 (the paper's eq. 12).
