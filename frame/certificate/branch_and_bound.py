@@ -165,10 +165,8 @@ class Tree:
     def _improve(self, frontier: Frontier, items: Array, value: Array) -> None:
         """Replace best points by the centres of higher items, and refine them by Newton's method.
 
-        Args:
-            frontier: The boxes.
-            items: Indices of the higher items by rising value, so that the highest is written last.
-            value: Side × output at the centres of all items.
+        `items` are the indices of these by rising value, so that the highest is written last;
+        `value` is side × output at the centres of all items.
         """
         row_of_problem = np.zeros(len(self.best), np.int64)
         row_of_problem[self.numbers] = np.arange(len(self.numbers))

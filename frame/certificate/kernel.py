@@ -347,10 +347,10 @@ def examine(
                     room = gap - noise - (side * jet[0] - values[problem])
                     if stays_below(g, S, low, high, room, work, L):
                         continue
-                most = -1.0  # bisect along the axis that adds most to what is not known
+                largest_weight = -1.0  # bisect along the axis that adds most to what is not known
                 for i in range(d):
                     slope_margin = third_change[i] / 2 + margin[node, o, 1 + i]
                     weight = r[i] * (2 * slope_margin + second_change[i] / 2)
-                    if r[i] > 0 and weight > most:
-                        most, code[item] = weight, 1 + i
+                    if r[i] > 0 and weight > largest_weight:
+                        largest_weight, code[item] = weight, 1 + i
     return code, value, bound

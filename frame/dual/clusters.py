@@ -68,10 +68,10 @@ def subspaces(
         UnprovedError: The box is so wide that the structure may lose its mass or stiffness.
     """
     weight = (np.arange(len(centre.basis)) < centre.modes).astype(float)
-    heavy = form_variation(centre.mass, weight)
-    stiff = form_variation(centre.stiffness, np.diag(centre.stiffness.value) ** -0.5)
+    mass_variation = form_variation(centre.mass, weight)
+    stiffness_variation = form_variation(centre.stiffness, np.diag(centre.stiffness.value) ** -0.5)
     slopes = _slopes(centre)
-    if not (heavy < 1 and stiff < 1):
+    if not (mass_variation < 1 and stiffness_variation < 1):
         steepest = int(used[(np.abs(slopes) / centre.squared[:, None]).max(0).argmax()])
         what = "the structure may lose its stiffness"
         raise UnprovedError(what, "take narrower inputs", steepest)
@@ -79,14 +79,15 @@ def subspaces(
     blocks, pair = _from_below(centre, slopes, min(wanted, centre.modes), tolerances)
     along = None if pair is None else int(used[np.abs(slopes[pair[0]] - slopes[pair[1]]).argmax()])
     slack = gamma(100 * len(weight))  # rounding of the norms
-    low, high = (1 - slack) * (1 - stiff) / (1 + heavy), (1 + slack) * (1 + stiff) / (1 - heavy)
+    low = (1 - slack) * (1 - stiffness_variation) / (1 + mass_variation)
+    high = (1 + slack) * (1 + stiffness_variation) / (1 - mass_variation)
     return Subspaces(
         blocks=blocks,
         used=used,
         centre=centre,
         low=low * centre.squared,
         high=high * centre.squared,
-        variation=(heavy, stiff),
+        variation=(mass_variation, stiffness_variation),
         along=along,
     )
 
@@ -162,10 +163,7 @@ def _nearness(centre: CentredMatrices, slopes: Array) -> Array:
     """First-order change of λ_j − λ_k over the box, over |λ_j − λ_k| in its middle, (modes, modes).
 
     From 1 on two modes may meet at complex inputs of sizes up to 1, where their series diverge.
-
-    Args:
-        centre: M and K in the coordinates of the box's middle.
-        slopes: ∂λ_j/∂u_i in the middle, shape (modes, d).
+    `slopes` (modes, d) are ∂λ_j/∂u_i in the middle.
     """
     couplings = np.abs(_couplings(centre, np.arange(centre.modes)))
     change = np.abs(slopes[:, None] - slopes).sum(-1) + 2 * couplings.sum(0)
@@ -213,10 +211,7 @@ def _from_below(
 def _component(linked: Mask, modes: Rows, free: Rows) -> Rows:
     """Numbers of the free modes linked to `modes`, directly or through others, rising.
 
-    Args:
-        linked: Which pairs are linked, shape (modes, modes).
-        modes: Numbers to begin with.
-        free: Numbers of the modes that are in no block.
+    `linked` (modes, modes) tells which pairs are; `free` are the numbers of modes in no block.
     """
     while True:
         neighbours = np.intersect1d(free, np.flatnonzero(linked[modes].any(0)))

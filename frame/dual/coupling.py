@@ -48,10 +48,7 @@ class Coupling:
         """Bounds of what the coupling adds to outputs at nodes, and between nodes, (T, m) each.
 
         The second is of how far a block's motion strays from a straight line in the step to a node.
-
-        Args:
-            orders: Derivative of the motion that each output takes, shape (m,).
-            excitation: The loads, the nodes and the names of the sources.
+        `orders` (m,) are the derivatives of the motion that the outputs take.
         """
         loads, time, sources = excitation
         table = Oscillators(self._grid(float(time[-1])), loads, time)

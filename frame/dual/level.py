@@ -279,7 +279,7 @@ class OutputBounds:
 
     @classmethod
     def initial(
-        cls, level: LevelModels, o: int, s: int, enough: float, attained: float = 0.0
+        cls, level: LevelModels, o: int, s: int, wanted_gap: float, attained: float = 0.0
     ) -> OutputBounds:
         """Infinite bounds of output o, negated where s = 0, to be improved by `run`.
 
@@ -287,18 +287,24 @@ class OutputBounds:
             level: Models and response tables over the box.
             o: Output.
             s: 0 for bounds of −output, 1 for bounds of the output.
-            enough: Distance of bound and attained value that suffices.
+            wanted_gap: Distance of bound and attained value that suffices.
             attained: Value of side × output that is known to be attained.
         """
-        side, total = (-1.0, 1.0)[s], len(level.tables.time)
-        group, constant = _truncation_terms(level, o, side)
+        side, n_nodes = (-1.0, 1.0)[s], len(level.tables.time)
+        truncation, constant = _truncation_terms(level, o, side)
         variables = _variables(level, o)
         tables, models = _tables(level, o, variables), _models(level, variables)
-        data = Data(*tables, *models, *group, _grain(level, o))
+        data = Data(*tables, *models, *truncation, _grain(level, o))
         require_in_range({name: x for name, x in data._asdict().items() if name != "table"})
-        out = np.stack([np.full(total, np.inf), np.full(total, -HUGE)])
-        at = np.zeros((total, data.linear.shape[1]))
-        return cls(side, enough, constant, data, out, at, attained)
+        return cls(
+            side=side,
+            wanted_gap=wanted_gap,
+            constant=constant,
+            data=data,
+            out=np.stack([np.full(n_nodes, np.inf), np.full(n_nodes, -HUGE)]),
+            at=np.zeros((n_nodes, data.linear.shape[1])),
+            attained=attained,
+        )
 
     @property
     def incumbent(self) -> float:

@@ -176,15 +176,9 @@ def _model_from_modes(
 
 
 def _coefficient_polynomials(points: Array, data: Modes, degree: int) -> list[Polynomial]:
-    """Fits polynomials to the coefficients C_k, of q(t) = 2 Re Σ C_k w(t; λ_k).
+    """Fits C_k of q(t) = 2 Re Σ C_k w(t; λ_k), n m polynomials, to modes at `points` (S, d).
 
-    Args:
-        points: Unit coordinates, shape (S, d).
-        data: Modes there with derivatives, n modes and m observed rows.
-        degree: Total degree of the polynomials.
-
-    Returns:
-        Of the free motion, then of each load: a vector of n m polynomials.
+    Returned are those of the free motion, then those of each load.
     """
     flat = (
         jet.map(lambda x: x.reshape((*x.shape[:-2], -1))) for jet in (data.coefficient, *data.loads)
