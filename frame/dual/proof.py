@@ -134,7 +134,7 @@ class DualProof:
     def bounds(
         self, flow: LinearFlow, boxes: Boxes, goal: Goal
     ) -> list[PartBounds | UnprovedError]:
-        """Bounds on each level of a part of the box; for a level without, the refusal why."""
+        """Bounds on each level of a part, or the error of one whose modes are not enclosed."""
         found: list[PartBounds | UnprovedError] = []
         for k in range(len(boxes.alpha)):
             try:
