@@ -159,12 +159,7 @@ def _note_failures(bounds: Bounds, failed: int) -> Bounds:
 
 
 def _units(units: Mapping[str, str], outputs: Sequence[str]) -> tuple[str, ...]:
-    """Unit of each output, "" if none is given; empty without any unit.
-
-    Args:
-        units: Unit by the name of an output, or of an array such as "s11" for "s11[0]".
-        outputs: Names of all outputs.
-    """
+    """Unit of each output, "" if none is given; "s11" gives that of "s11[0]" too."""
     arrays = [name.partition("[")[0] for name in outputs]
     for name in units:
         require_choice("unit of", name, sorted({*arrays, *outputs}))

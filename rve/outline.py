@@ -82,10 +82,7 @@ def extents(outline: Outline) -> tuple[float, float, float]:
 def require_fit(outline: Outline, radius: float, limit: float = 1.0) -> None:
     """Refuse a particle with a coordinate of `limit` or more, in halves of the cell's side.
 
-    Args:
-        outline: Distance of the edge from the centre over the radius, at angles.
-        radius: In halves of the cell's side.
-        limit: 1 is the cell's edge.
+    Its outline must be a positive, periodic function of the angle.
     """
     distances = outline(_ANGLES)
     is_periodic = abs(distances[0] - distances[-1]) <= 1e-9 * distances[0]

@@ -70,11 +70,7 @@ def require_parts(
 ) -> None:
     """Refuse arguments of `solve` that are no radius map, no phase and no sequence of phases.
 
-    Args:
-        radius_map: Should be a map θ ↦ r(θ) with the law of θ.
-        matrix: Should be a phase.
-        inclusions: Should be a sequence of one phase or more.
-        isotropic: Whether all phases must be isotropic.
+    `isotropic`: whether all phases must be.
     """
     kinds = (Phase,) if isotropic else (Phase, VoigtPhase)
     phases = (matrix, *inclusions) if isinstance(inclusions, Sequence) else ()

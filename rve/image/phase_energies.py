@@ -43,15 +43,7 @@ def phase_energies(
 def energy_parts(
     element: Element, side: SideSolution, images: ModuliImages, phase: Rows, count: int
 ) -> Array:
-    """Energies of the unit loads in the K and the G of each phase, shape (count, 2, 3, 3).
-
-    Args:
-        element: Of displacements or of stresses.
-        side: Fields of this element.
-        images: Moduli of the pixels, the least equal to the greatest.
-        phase: Number of the phase of each pixel, shape (rows, columns).
-        count: Number of phases.
-    """
+    """Energies of unit strains or stresses in K and in G of each phase, shape (count, 2, 3, 3)."""
     bulk, shear = images.bulk[0], images.shear[0]  # bulk is K + G/3, the modulus of the trace
     divisions = side.fields.shape[-2] // len(phase)
     trace, deviator = coefficients(element, bulk, shear)

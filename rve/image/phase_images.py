@@ -55,13 +55,7 @@ def threshold_ranges(grey: Array, thresholds: Sequence[tuple[float, float]]) -> 
 
 
 def moduli_images(first: Rows, last: Rows, phases: Sequence[ModuliInterval]) -> ModuliImages:
-    """Least and greatest moduli of each pixel over the phases `first` … `last` it may be of.
-
-    Args:
-        first: Least number of each pixel's phase, shape (rows, columns).
-        last: Greatest number, same shape.
-        phases: Moduli of each phase.
-    """
+    """Least and greatest moduli of each pixel over the phases `first` … `last` it may be of."""
     tables = np.zeros((4, len(phases), len(phases)))  # by first and last
     for code in np.unique(first * len(phases) + last):
         a, b = divmod(int(code), len(phases))

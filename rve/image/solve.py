@@ -37,15 +37,10 @@ def solve_image(
     solver: ConjugateGradient | None = None,
     division: int = 1,
 ) -> ImageSolution:
-    """Proved bounds of the effective stiffness of a periodic image, with their fields.
+    """Proved bounds of the effective stiffness of a periodic image; see `solve_between`.
 
-    Args:
-        bulk: Plane-strain bulk modulus K + G/3 of each pixel, shape (rows, columns), in Pa; row 0
-            is at the bottom.
-        shear: Shear modulus G, same shape, in Pa.
-        aspect: Height of a pixel over its width.
-        solver: Stopping rule.
-        division: Elements along each side of a pixel.
+    `bulk` and `shear` are the plane-strain bulk modulus K + G/3 and the shear modulus of each
+    pixel, shape (rows, columns), in Pa, row 0 at the bottom.
     """
     images = ModuliImages((bulk, bulk), (shear, shear))
     return solve_between(images, aspect=aspect, solver=solver, division=division)

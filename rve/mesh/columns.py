@@ -162,12 +162,7 @@ def _columns(prisms: Prisms) -> tuple[Rows, int]:
 def _number_nodes(prisms: Prisms, level: Rows, planar: Rows, layers: int, vertices: int) -> Rows:
     """New number of each node, shape (n,): all levels, then the planes half-way between them.
 
-    Args:
-        prisms: Their nodes in any order.
-        level: Level of each node, −1 half-way between two.
-        planar: Number of each node in the planar mesh, vertices first.
-        layers: Number of layers.
-        vertices: Number of planar vertices, all that is half-way between levels.
+    From the level of each node, −1 half-way, and its number in the planar mesh, vertices first.
     """
     per_level = int(planar.max()) + 1
     number = level * per_level + planar
@@ -181,12 +176,7 @@ def _number_nodes(prisms: Prisms, level: Rows, planar: Rows, layers: int, vertic
 
 
 def _triangles(vertices: Rows, layer: Rows) -> Rows:
-    """Number of the planar triangle below each prism, shape (prisms,).
-
-    Args:
-        vertices: Planar numbers of the lower vertices of each prism, shape (prisms, 3).
-        layer: Layer of each prism.
-    """
+    """Number of the planar triangle below each prism, by its planar vertices, (prisms, 3)."""
     triangle = np.unique(np.sort(vertices, axis=1), axis=0, return_inverse=True)[1].ravel()
     counts = np.bincount(triangle)
     if (counts != layer.max() + 1).any():

@@ -139,13 +139,8 @@ def curved_nodes(mesh: PlaneMesh, order: int) -> tuple[Array, Rows]:
 def _lagrange_nodes(triangles: Rows, edges: Rows, counts: tuple[int, int], order: int) -> Rows:
     """Nodes of each Lagrange triangle of an order, (m, (order + 1)(order + 2)/2), in Basix's order.
 
-    Numbers are those of the vertices, then of the nodes inside edges, then inside triangles.
-
-    Args:
-        triangles: Vertices of each triangle, shape (m, 3).
-        edges: Edges of each triangle, shape (m, 3).
-        counts: Numbers of vertices and of edges.
-        order: Polynomial degree.
+    From its vertices and edges, (m, 3) each, and the numbers of both. Vertices are numbered first,
+    then the nodes inside edges, then inside triangles.
     """
     vertices, edge_count = counts
     per_edge, per_triangle = order - 1, (order - 1) * (order - 2) // 2
@@ -163,13 +158,9 @@ def _interfaces(mesh: PlaneMesh) -> list[tuple[Mask, float]]:
 
 
 def _polar_positions(corners: Array, barycentric: Array) -> Array:
-    """Nodes of triangles in a ring, interpolated in polar coordinates, shape (k, nodes, 2).
+    """Nodes of triangles with corners (k, 3, 2), interpolated in polar coordinates, (k, nodes, 2).
 
-    Both circles are then the same curve at two scales, which do not meet however thin the ring.
-
-    Args:
-        corners: Vertices of the triangles, shape (k, 3, 2).
-        barycentric: Barycentric coordinates of the nodes, shape (nodes, 3).
+    Both circles of a ring are then one curve at two scales, which do not meet however thin it is.
     """
     angle = np.arctan2(corners[..., 1], corners[..., 0])
     difference = (angle - angle[:, :1] + np.pi) % (2 * np.pi) - np.pi  # across ±π too
@@ -180,16 +171,10 @@ def _polar_positions(corners: Array, barycentric: Array) -> Array:
 
 
 def _bend_onto_outline(mesh: PlaneMesh, radius: float, ends: Rows, weights: Array) -> Array:
-    """Displacements that bend one edge of triangles onto the outline, shape (k, nodes, 2).
+    """Displacements that bend an edge of triangles, (k, 2), onto the outline, (k, nodes, 2).
 
     Inside a triangle they fade with the bubble of the edge, so the map stays smooth and the
-    elements keep their order.
-
-    Args:
-        mesh: Vertices and outline.
-        radius: Radius of the outline.
-        ends: Vertices of the edge, shape (k, 2).
-        weights: Barycentric coordinates of the nodes at these vertices, shape (nodes, 2).
+    elements keep their order. `weights`, (nodes, 2), are the nodes' barycentric coordinates at it.
     """
     a, b = mesh.points[ends[:, 0]], mesh.points[ends[:, 1]]
     angle_a, angle_b = (np.arctan2(p[:, 1], p[:, 0]) for p in (a, b))

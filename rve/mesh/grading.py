@@ -55,14 +55,8 @@ def _size_near_particle(
 ) -> float:
     """Edge length at (x, y), over the nominal one, near a particle and between it and its images.
 
-    Gmsh calls this for each point, hence no NumPy.
-
-    Args:
-        x: First coordinate.
-        y: Second coordinate.
-        half_width: Greatest |x1| of the particle.
-        half_height: Greatest |x2|.
-        least: Least distance of its outline from the centre.
+    Gmsh calls this for each point, hence no NumPy. `least` is that of the outline's distances from
+    the centre.
     """
     x, y = abs(x), abs(y)
     by_distance = _PER_RADIUS * max(hypot(x, y), least)

@@ -119,12 +119,5 @@ def _solve_fields(
     np.add.at(mean_stress, cells, stress)
     mean_stress /= np.bincount(cells.ravel())[:, None, None]
     nodes = points % grid.nodes
-    return CellFields(
-        points=positions[nodes],
-        cells=cells,
-        phase=grid.phase,
-        displacement=displacement[nodes],
-        stress=mean_stress,
-        names=grid.names,
-        node=nodes,
-    )
+    fields = displacement[nodes], mean_stress
+    return CellFields(positions[nodes], cells, grid.phase, *fields, grid.names, nodes)

@@ -112,12 +112,7 @@ def _residual_energy(
 ) -> Array:
     """Energy rᵀ P⁻¹ r of the residual of projected solutions at a modulus in Pa, shape (loads,).
 
-    Args:
-        basis: The reduced basis.
-        modulus: Of the particle.
-        images: K_0 v and K_1 v of the basis vectors.
-        forces: f_0 and f_1 of the loads.
-        preconditioner: P⁻¹.
+    `images` are K_0 v and K_1 v of the basis vectors, `forces` f_0 and f_1 of the loads.
     """
     factor, energies = modulus / basis.ends[1], []
     for k, column in enumerate(basis.coefficients(modulus).T):

@@ -41,21 +41,12 @@ class NamedPhases:
 
 
 def mesh_phases(grid: PrismGrid, law: object, phases: object) -> NamedPhases:
-    """Law and materials of a mesh from a file, in its order of phases.
-
-    Raises:
-        RefusedError: The law has another support, or the materials' names are not those of the
-            physical groups.
-    """
+    """Law and materials of a mesh from a file, in its order of phases, or a refusal."""
     return _order_phases(mesh_law(grid, law), grid.names, phases)
 
 
 def level_set_phases(z: LevelFunction, law: object, phases: object) -> NamedPhases:
-    """Law and materials of a cell with a level set z < 0 in the particles, matrix first.
-
-    Raises:
-        RefusedError: The law is none, or the materials' names are not "matrix" and "inclusion".
-    """
+    """Law and materials of a cell with a level set z < 0 in the particles, or a refusal."""
     if not hasattr(law, "pdf"):
         raise RefusedError("law of θ", type(law).__name__, "a law, as TruncatedNormal(-3, 3)")
     return _order_phases(LevelSet(cast("ThetaLaw", law), z), NAMES[:2], phases)

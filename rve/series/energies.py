@@ -35,11 +35,7 @@ def complex_moduli(radius: Array, bulk: Array, shear: Array, *, harmonics: int) 
 
 
 def phase_energies(radius: Array, matrix: Phase, inclusion: Phase, *, harmonics: int) -> Array:
-    """Parts X ∂c/∂X of K and G of both phases in the moduli c of n cells, by a complex step.
-
-    Returns:
-        For C11 + C12, C11 − C12 and C33, shape (n, 2 phases, 2, 3), in Pa.
-    """
+    """Parts X ∂c/∂X of K and G of both phases in C11 ± C12 and C33, shape (n, 2, 2, 3), in Pa."""
     moduli = np.array([matrix.bulk_and_shear, inclusion.bulk_and_shear], complex)
     energies = np.zeros((radius.size, 2, 2, 3))
     for phase, kind in product(range(2), repeat=2):

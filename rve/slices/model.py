@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from time import perf_counter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -207,24 +207,15 @@ class SlicesModel:
 
         A circle without interphase: three orders on one mesh; else two orders and two meshes.
         """
+        options: dict[str, Any] = {
+            "mesh_size": self.mesh_size,
+            "outline": self.outline,
+            "energies": self.energies,
+        }
         if is_round(self.outline) and interphase is None:
-            return solve_slice(
-                radius,
-                matrix,
-                inclusions,
-                mesh_size=self.mesh_size,
-                outline=self.outline,
-                energies=self.energies,
-            )
+            return solve_slice(radius, matrix, inclusions, **options)
         return solve_outline_slice(
-            radius,
-            matrix,
-            inclusions,
-            mesh_size=self.mesh_size,
-            outline=self.outline,
-            order=self.order,
-            energies=self.energies,
-            interphase=interphase,
+            radius, matrix, inclusions, order=self.order, interphase=interphase, **options
         )
 
 
@@ -285,13 +276,10 @@ class Slice:
         return np.asarray((1 + distance) * (1 + self._error_of_order_4(changes)) - 1)
 
     def _error_of_order_4(self, changes: Array) -> Array:
-        """Declared relative errors by order 4, shape (m, 3), extrapolated from lower orders.
+        """Declared relative errors by order 4, (m, 3), from the changes to orders 3 and 4.
 
         The geometric series of the changes by further orders, times a safety factor. One modulus
         may change little by chance: the error of each is at least a fraction of the largest.
-
-        Args:
-            changes: Relative changes from order 2 to 3 and from 3 to 4, shape (2, m, 3).
         """
         first, second = changes
         ratio = np.clip(second / np.maximum(first, 1e-300), _MIN_RATIO, 0.5)
@@ -389,12 +377,9 @@ def solve_outline_slice(
 def _solve_orders(
     cells: Mapping[int, PlaneCell], samples: Sequence[Sequence[AnyPhase]], *, energies: bool = False
 ) -> tuple[dict[int, Array], dict[int, Array]]:
-    """Stiffness, (m, 3, 3), and energies of the phases, (m, phases, 2, 3), by order of elements.
+    """Stiffness, (m, 3, 3), and energies of the phases if wanted, (m, phases, 2, 3), by order.
 
-    Args:
-        cells: Cell by order.
-        samples: Phases of each of m samples.
-        energies: Whether to compute energies; else their mapping is empty.
+    `cells` are the cells by order of their elements, `samples` the phases of each of m samples.
     """
     stiffness, phase_energies = {}, {}
     for order, cell in cells.items():

@@ -79,13 +79,8 @@ def theta_mass(law: ThetaLaw, levels: Array) -> ThetaMass:
     coupling = mass[: layers + 1, layers + 1 :]  # M_hb
     projection: Array = np.asarray(np.linalg.solve(hats, coupling), float)
     orthogonal_mass = bubbles - coupling.T @ projection  # G
-    return ThetaMass(
-        hats=hats.diagonal(),
-        bubbles=bubbles.diagonal(),
-        inverse_root=_inverse_root(hats),
-        bubble_inverse_root=_inverse_root(orthogonal_mass),
-        projection=projection,
-    )
+    roots = _inverse_root(hats), _inverse_root(orthogonal_mass)
+    return ThetaMass(hats.diagonal(), bubbles.diagonal(), *roots, projection)
 
 
 def _inverse_root(matrix: Array) -> Array:
@@ -237,13 +232,8 @@ def _injection(numbering: LevelNumbering) -> sp.csr_matrix:
 
     Edge midpoints get the mean of their two vertices.
     """
-    periodicity = numbering.periodicity
-    vertices, count, ends = (
-        periodicity.vertices,
-        periodicity.count,
-        periodicity.ends(numbering.grid.plane),
-    )
-    is_free = ends >= 0
+    periodicity, ends = numbering.periodicity, numbering.periodicity.ends(numbering.grid.plane)
+    vertices, count, is_free = periodicity.vertices, periodicity.count, ends >= 0
     rows = np.repeat(np.arange(vertices, count), 2).reshape(-1, 2)[is_free]
     halves = np.full(is_free.sum(), 0.5)
     midpoints = sp.csr_matrix((halves, (rows, ends[is_free])), (count, vertices))

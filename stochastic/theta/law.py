@@ -48,10 +48,7 @@ class ThetaLaw(Protocol):
 def require_support(lower: float, upper: float, unit: float = 0.0) -> None:
     """Refuse a support of θ that is not finite, not in order, or too narrow for its rounding.
 
-    Args:
-        lower: Left end.
-        upper: Right end.
-        unit: Size of θ beside which rounding counts, if larger than the ends.
+    Rounding counts beside `unit`, the size of θ, if it is larger than the ends.
     """
     least = MIN_WIDTH * max(abs(lower), abs(upper), unit)
     is_ordered = np.isfinite(lower) and np.isfinite(upper) and lower < upper

@@ -91,15 +91,9 @@ def energies(
 
 
 def _piecewise_products(modes: Array, weight: Array, piece: int) -> Array:
-    """Weighted products of all pairs of fields, summed over pieces of their entries.
+    """Weighted products of all pairs of fields, in sums of `piece` products each.
 
-    Args:
-        modes: Shape (modes, fields, rows, columns).
-        weight: Of each pixel, shape (rows, columns).
-        piece: Number of products in a sum.
-
-    Returns:
-        Symmetric matrices, shape (pieces, fields, fields).
+    From modes (modes, fields, rows, columns) to symmetric matrices (pieces, fields, fields).
     """
     count = modes.shape[1]
 

@@ -72,14 +72,7 @@ def blocks(shape: tuple[int, ...]) -> Iterator[slice]:
 
 
 def gather(element: Element, fields: Array, rows: slice) -> Array:
-    """Local unknowns of the pixels of some rows, shape (local unknowns, loads, rows, columns).
-
-    Args:
-        element: Tells where each local unknown is stored: its number, and how many pixels above and
-            to the right.
-        fields: Shape (loads, unknowns, rows, columns), periodic.
-        rows: Rows of pixels.
-    """
+    """Local unknowns of the pixels of some rows, shape (local unknowns, loads, rows, columns)."""
     row_numbers = np.arange(rows.start, rows.stop)
     local = np.empty((len(element.local), len(fields), row_numbers.size, fields.shape[-1]))
     for k, (unknown, up, right) in enumerate(element.local):

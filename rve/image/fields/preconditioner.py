@@ -38,11 +38,8 @@ class Reference:
     def of_image(cls, trace: Array, deviator: Array, *, stress: bool) -> Reference:
         """Constant material at the geometric mean of an image's extremes, for a narrow spectrum.
 
-        Args:
-            trace: Coefficients of the trace in the pixels, shape (rows, columns).
-            deviator: Coefficients of the deviator, same shape.
-            stress: Whether fields are stresses, of which only the sum of both coefficients counts;
-                the deviator then has the same part in it as in the softest material.
+        `stress`: of stresses only the sum of both coefficients counts; the deviator then has the
+        same part in it as in the softest material.
         """
         min_trace, min_deviator = float(trace.min()), float(deviator.min())
         min_sum, max_sum = min_trace + min_deviator, trace.max() + deviator.max()

@@ -78,12 +78,7 @@ def _solve_loads(
 ) -> tuple[Array, int]:
     """Fields of `SOLVED_LOADS`, (3, unknowns, rows, columns), and the largest iteration count.
 
-    Args:
-        element: Unknowns and modes of a pixel.
-        trace: Coefficient of the trace in each pixel, shape (rows, columns).
-        deviator: Coefficient of the deviator, same shape.
-        solver: Stopping rule.
-        start: First guess, shaped like the fields.
+    From the coefficients of trace and deviator in each pixel, (rows, columns), and a first guess.
     """
     modes = element.mean_modes(SOLVED_LOADS)
     constant = Reference.of_image(trace, deviator, stress=element.stress)
@@ -106,15 +101,9 @@ def _solve_loads(
 
 
 def least_energy(element: Element, trace: Array, deviator: Array, modes: Array) -> Array:
-    """Lower bound of the total energy of any fields with given means, shape (loads,).
+    """Lower bound of the total energy of any fields with given mean modes, shape (loads,).
 
-    That of uniform strain or stress modes in the harmonic mean of each coefficient.
-
-    Args:
-        element: Rows of the trace and of the deviator.
-        trace: Coefficient of the trace in each pixel, shape (rows, columns).
-        deviator: Coefficient of the deviator, same shape.
-        modes: Modes of the uniform fields of these means, shape (modes, loads).
+    That of uniform fields, modes (modes, loads), in the harmonic mean of each coefficient.
     """
     trace_squares, deviator_squares = (np.sum(modes[rows] ** 2, axis=0) for rows in element.parts)
     trace_energy = trace.size / np.mean(1 / trace) * trace_squares

@@ -90,13 +90,9 @@ def _points(reach: int) -> Array:
 
 
 def _epstein(angular: Array, points: Array, n: int, power: int) -> float:
-    """Lattice sum Σ C_n^m |p|^(−n−power) by Ewald's split of the theta function at t = 1.
+    """Lattice sum Σ C_n^m |p|^(−n−power), power ±1, by Ewald's split of the theta function.
 
-    Args:
-        angular: C_n^m at the points.
-        points: Lattice points p near the origin, shape (k, 3).
-        n: Degree.
-        power: 1 or −1.
+    `angular` are the C_n^m at the lattice points p near the origin, `points`.
     """
     square = (points**2).sum(axis=1)
     s, x = n + power / 2, np.pi * square

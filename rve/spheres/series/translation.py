@@ -108,13 +108,6 @@ def _coupling(
 
     Formulas at the head of the file; α and c are those of the multipole (n, m), whose solid
     harmonic has the degree −n − 1, and (k, j) is the regular solution.
-
-    Args:
-        target: Lamé solution 1, 2 or 3.
-        source: Lamé solution, not below the target.
-        pair: n, m, k and j.
-        poisson: Poisson's ratio of the matrix.
-        sums: Harmonic and biharmonic lattice sums.
     """
     harmonic, biharmonic = sums
     n, k = pair.n, np.maximum(pair.k, 1) if target == 1 else pair.k
