@@ -228,8 +228,6 @@ class IntervalQuasiMonteCarlo:
         """Sobol points of the unit cube, one scrambling after another, shape (points, inputs)."""
         from scipy.stats import qmc
 
-        count, rngs = (
-            self.points // SCRAMBLINGS,
-            np.random.default_rng(self.seed).spawn(SCRAMBLINGS),
-        )
+        count = self.points // SCRAMBLINGS
+        rngs = np.random.default_rng(self.seed).spawn(SCRAMBLINGS)
         return np.concatenate([qmc.Sobol(inputs, rng=rng).random(count) for rng in rngs])

@@ -104,9 +104,10 @@ class AxialStiffness:
 
     @classmethod
     def of_result(cls, result: HomogenisedStiffness) -> Self | None:
-        """C13, C23, C63 and C33 from a computed plane stiffness by Hill's relations.
+        """C13, C23, C63 and C33 from a computed plane stiffness by Hill's relations, with errors.
 
-        None without a cell of two isotropic phases, a plane stiffness and its errors.
+        z̄ follows from the in-plane bulk modulus; l = C13 and k are those of the phases. None
+        without a cell of two isotropic phases, a plane stiffness and its errors.
         """
         cell, stiffness, errors = result.cell, result.stiffness, result.stiffness_errors
         if cell is None or stiffness is None or errors is None:

@@ -33,7 +33,9 @@ WHAT = {
 BOUNDS = ("reuss", "voigt", "hashin_shtrikman")
 
 
-def require(checks: Mapping[str, float], *, discretisation: float = ROUND_OFF) -> dict[str, float]:
+def checks_within_limits(
+    checks: Mapping[str, float], *, discretisation: float = ROUND_OFF
+) -> dict[str, float]:
     """Copy of the checks; raises if a violation exceeds its limit.
 
     Args:
@@ -69,7 +71,7 @@ def with_checks(result: HomogenisedStiffness) -> HomogenisedStiffness:
     checks = stress_checks(
         curve.stiffness, np.eye(3), cell.fractions(curve.theta), curve.weights, cell.phases
     )
-    checks = require(checks, discretisation=ROUND_OFF + result.largest_error)
+    checks = checks_within_limits(checks, discretisation=ROUND_OFF + result.largest_error)
     return replace(result, checks=checks)
 
 

@@ -212,12 +212,13 @@ def _is_flat(grey: Array, contrast: float) -> bool:
 
 def _classify(values: Array, borders: tuple[float, ...]) -> Segmentation:
     """Fit levels, light and noise and assign the classes in turn, until no class changes."""
-    shapes, light, last_labels = _polynomials(values.shape), np.zeros_like(values), None
+    polynomials = _polynomials(values.shape)  # of the light
+    light, last_labels = np.zeros_like(values), None
     for _ in range(_MAX_ITERATIONS):
         labels = np.searchsorted(borders, values - light, side="right")
         if last_labels is not None and np.array_equal(labels, last_labels):
             break
-        levels, light, noise = _fit_light(values, labels, shapes, len(borders) + 1)
+        levels, light, noise = _fit_light(values, labels, polynomials, len(borders) + 1)
         last_labels = labels
     return Segmentation(values, borders, levels, light, noise)
 

@@ -117,12 +117,11 @@ class Call:
 
     def __post_init__(self) -> None:
         """Refuse what cannot be called, and calling conventions that exclude each other."""
-        shown = repr(self.function)
-        require(callable(self.function), "function", value=shown, allowed="what can be called")
-        single = not (self.shared and self.vectorised)
-        require(
-            single, "shared", value=self.shared, allowed="none where the function is vectorised"
-        )
+        shown, is_callable = repr(self.function), callable(self.function)
+        require(is_callable, "function", value=shown, allowed="what can be called")
+        are_compatible = not (self.shared and self.vectorised)
+        allowed = "none where the function is vectorised"
+        require(are_compatible, "shared", value=self.shared, allowed=allowed)
         for name in self.shared:
             require_choice("shared input", name, self.names)
 

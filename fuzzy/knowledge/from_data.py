@@ -29,9 +29,8 @@ def from_data(
 ) -> ClaimedNumber:
     """Return the fuzzy number of measured values: P(claimed quantity in its α-cut) >= 1 − α.
 
-    The probability is over repeated samples. Censored values may decide no cut at α, in one sample
-    and not in another: without a bound on that side such samples count as ones whose cut contains
-    the quantity, and the claim says so. Of the samples that do decide it fewer may contain it.
+    The probability is over repeated samples. Where censored values decide no cut at α and no bound
+    stands for it, the sample counts as one whose cut contains the quantity; the claim says so.
 
     For the next value, the median and a quantile this holds for any law, also with ties and steps,
     and any number of values. The values must be drawn independently, or at least exchangeably, from

@@ -80,7 +80,10 @@ def _require_different_values(claimed: Mapping[str, ClaimedNumber]) -> None:
 
 
 def _join_levels(number: ClaimedNumber, rule: JointRule) -> ClaimedNumber:
-    """Copy of a number whose cut at level β has the joint level α(β) ≥ β."""
+    """Copy of a number whose cut at level β stands at α ≥ β, the level of the joint cut.
+
+    The joint cut at α is the box of all inputs' single cuts at β.
+    """
     cuts = number.number
     levels = rule.joint_level(np.asarray(cuts.alpha))
     is_last = np.append(np.diff(levels) > 0, True) & (levels <= 1)  # of equal levels the last cut

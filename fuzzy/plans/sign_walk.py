@@ -68,11 +68,10 @@ class SignWalk:
         return monotone
 
     def _signs_along_walk(self) -> Signs:
-        """Return the sign of the differences by each input along the walk.
+        """Signs of all differences by each input along the walk, shape (outputs, uncertain inputs).
 
-        Returns:
-            Signs of shape (outputs, uncertain inputs): 0 where differences have both signs or are
-            NaN, 1 for an input without effect.
+        The walk goes from each sample to the next by changing one input after the other. A sign is
+        0 where differences have both signs or are NaN, and 1 for an input without effect.
         """
         inputs = len(self.cut.uncertain_inputs)
         steps = self.steps * inputs

@@ -54,7 +54,9 @@ _MAX_DRAWS = 10**6  # points drawn for one round where the interactions allow fe
 def critical_distance(
     samples: int, inputs: int, volume: float = 1.0, sigma: float = SIGMA_ONE_HUMP
 ) -> float:
-    """Return the critical distance r in the unit cube, as the module's docstring defines it.
+    """Critical distance r = (σ Γ(1 + d/2) V ln N / N)^(1/d) / √π of samples in the unit cube.
+
+    A ball of radius r contains σ ln N of them on average (Rinnooy Kan and Timmer, 1987).
 
     Args:
         samples: N, uniform samples of the cut.
@@ -312,9 +314,10 @@ class SingleLinkage:
             self._add_samples(cut, self._draw(cut, missing, rng))
 
     def _descend(self, cut: CutSearch, bounds: list[Bound]) -> None:
-        """Descend from those samples and corners of a cut that have no better one nearby.
+        """Descend to bounds from the samples and corners of a cut that have no better one nearby.
 
-        With two optima inside the cut the critical distance is reduced (σ = 2 in place of 4).
+        Nearby is the critical distance with σ = 4; from two optima that are no corners on, also the
+        smaller one with σ = 2. Descents that have been made before are not repeated.
         """
         rows = self._rows(cut)
         if len(rows) < 2:  # the interactions leave next to nothing

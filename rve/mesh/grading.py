@@ -35,17 +35,17 @@ def particle_grading(outline: Outline, radius: float, thickness: float = 0.0) ->
 def bend_grading(outline: Outline, radius: float, refinement: float) -> Sizes:
     """Function of (x1, x2): edge length by the bends of an outline, over the nominal one.
 
-    On the outline its ratio to the bend radius is that of edge and radius on a circle, divided by
-    `refinement`; off the outline it grows as around a circle.
+    It is proportional to the least sum of bend radius and distance over the outline's points, so
+    that on a circle it is the same at all of them and grows with the distance.
 
     Args:
         outline: Of the particle.
         radius: Its radius.
-        refinement: Above 1 edges are shorter.
+        refinement: Divides the edge length.
     """
-    points, radii = bend_radii(outline)
+    points, unit_bend_radii = bend_radii(outline)
     px, py = radius * points.T
-    radii = radius * radii
+    radii = radius * unit_bend_radii
     factor = _PER_RADIUS / refinement
     return lambda x, y: factor * float((radii + np.hypot(px - x, py - y)).min())
 

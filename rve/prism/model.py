@@ -29,7 +29,7 @@ from alphacut.rve.cell import (
     moduli_of_energies,
     thickness_of,
 )
-from alphacut.rve.certificate import ROUND_OFF, mean, require, stress_checks
+from alphacut.rve.certificate import ROUND_OFF, checks_within_limits, mean, stress_checks
 from alphacut.rve.fenicsx import MPI
 from alphacut.rve.mesh.columns import extrude
 from alphacut.rve.mesh.grading import REFINEMENTS
@@ -199,7 +199,7 @@ class PrismModel:
             unknowns=problem.numbering.size,
             iterations=solved.iterations,
             seconds={**seconds, "total": sum(seconds.values())},
-            checks=require(checks, discretisation=ROUGH_MESH),
+            checks=checks_within_limits(checks, discretisation=ROUGH_MESH),
             energies=PhaseEnergies(energies.values[order], energies.errors[order]),
         )
 
@@ -333,7 +333,9 @@ class PrismModel:
             result = with_errors(result)
         allowed = 2 * result.largest_error if result.errors else self._mesh_tolerance
         checks = _checks(strains, cell.stiffness, loads, cell.phases) | {"residual": residual}
-        return replace(result, checks=require(checks, discretisation=ROUND_OFF + allowed))
+        return replace(
+            result, checks=checks_within_limits(checks, discretisation=ROUND_OFF + allowed)
+        )
 
     @property
     def _mesh_tolerance(self) -> float:

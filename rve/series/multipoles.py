@@ -153,7 +153,8 @@ def _system(
 ) -> tuple[Array, Array]:
     """Linear systems for the multipoles a_n of φ after those of ψ, b_n, are eliminated.
 
-    Equations at the head of the file; p_k and q_k are the Taylor coefficients of φ and ψ.
+    With p_k and q_k the Taylor coefficients of φ and ψ at the particle, made by all images:
+    a_n = outer · [(n + 2) p_{n+2} + q_n] and b_n = inner · p_n + (n − 2) a_{n-2}.
 
     Returns:
         Matrices (n, m, N, N) and right-hand sides (n, m, N) for n radii and m inclusions.

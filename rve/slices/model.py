@@ -124,9 +124,9 @@ class SlicesModel:
         for m, inclusion in enumerate(inclusions):
             cell = Cell(matrix, inclusion, radius_map, self.outline, interphase)
             stiffness = np.array([plane.stiffness(self.order)[m] for plane in slices])
-            moduli = square_moduli(stiffness)
-            error = np.array([plane.error(self.order, square=cell.square)[m] for plane in slices])
+            errors = np.array([plane.error(self.order, square=cell.square)[m] for plane in slices])
             curve = StressCurve.from_stiffness(rule, stiffness[nodes])
+            in_theta = _theta_error(cell, rule, radii, square_moduli(stiffness))
             result = HomogenisedStiffness(
                 curve=curve,
                 method=self.name,
@@ -134,15 +134,8 @@ class SlicesModel:
                 unknowns=max(plane.unknowns[self.order] for plane in slices),
                 seconds=seconds,
                 errors={
-                    "space": mean_errors(curve, error[nodes], square=cell.square),
-                    "theta": theta_error(
-                        radius_map,
-                        rule,
-                        radii=radii,
-                        moduli=moduli,
-                        phases=cell.phases,
-                        thickness=thickness_of(interphase),
-                    ),
+                    "space": mean_errors(curve, errors[nodes], square=cell.square),
+                    "theta": in_theta,
                 },
                 cell=cell,
             )
@@ -150,19 +143,16 @@ class SlicesModel:
         if not self.energies:
             return results
         pairs = [energies_with_errors(plane.energies, self.order) for plane in slices]
-        values, errors = (np.array(x) for x in zip(*pairs, strict=True))
+        energies, energy_errors = (np.array(x) for x in zip(*pairs, strict=True))
         return [
-            replace(
-                result,
-                energies=self._mean_energies(result, radii, nodes, values[:, m], errors[:, m]),
-            )
+            self._with_energies(result, radii, nodes, energies[:, m], energy_errors[:, m])
             for m, result in enumerate(results)
         ]
 
-    def _mean_energies(
+    def _with_energies(
         self, result: HomogenisedStiffness, radii: Array, nodes: Rows, values: Array, errors: Array
-    ) -> PhaseEnergies:
-        """Mean energies of the phases over θ, with declared errors.
+    ) -> HomogenisedStiffness:
+        """Copy of a result with the mean energies of the phases over θ and their declared errors.
 
         Args:
             result: The result, with its cell.
@@ -173,19 +163,10 @@ class SlicesModel:
         """
         cell, rule = result.cell, ThetaRule(result.curve.theta, result.curve.weights)
         assert cell is not None
-        thickness = thickness_of(cell.interphase)
 
         def absolute_theta_error(moduli: Array) -> Array:
             """Error of the mean over θ of moduli at the radii, shape (n, 3), in Pa."""
-            relative = theta_error(
-                cell.radius,
-                rule,
-                radii=radii,
-                moduli=moduli,
-                phases=cell.phases,
-                thickness=thickness,
-            )
-            return relative * rule.mean(moduli[nodes])
+            return _theta_error(cell, rule, radii, moduli) * rule.mean(moduli[nodes])
 
         # energies X ∂c/∂X may change sign, but c + X ∂c/∂X are moduli with stiffer phases
         moduli = values.sum(axis=(1, 2))
@@ -194,7 +175,8 @@ class SlicesModel:
             for phase in range(len(cell.phases))
         ]
         error_in_theta = np.array(stiffer_errors) + absolute_theta_error(moduli)
-        return PhaseEnergies(rule.mean(values[nodes]), rule.mean(errors[nodes]) + error_in_theta)
+        total_errors = rule.mean(errors[nodes]) + error_in_theta
+        return replace(result, energies=PhaseEnergies(rule.mean(values[nodes]), total_errors))
 
     def _slice(
         self,
@@ -217,6 +199,14 @@ class SlicesModel:
         return solve_outline_slice(
             radius, matrix, inclusions, order=self.order, interphase=interphase, **options
         )
+
+
+def _theta_error(cell: Cell, rule: ThetaRule, radii: Array, moduli: Array) -> Array:
+    """Relative errors of the means by a rule of three moduli at the radii, (n, 3), shape (3,)."""
+    thickness = thickness_of(cell.interphase)
+    return theta_error(
+        cell.radius, rule, radii=radii, moduli=moduli, phases=cell.phases, thickness=thickness
+    )
 
 
 def mean_errors(curve: StressCurve, error: Array, *, square: bool) -> Array:

@@ -13,7 +13,7 @@ import numpy as np
 from alphacut.fuzzy.arrays import Array
 from alphacut.rve.bounds import reuss, voigt
 from alphacut.rve.cell import Phase
-from alphacut.rve.certificate import ROUND_OFF, mean, order_checks, require
+from alphacut.rve.certificate import ROUND_OFF, checks_within_limits, mean, order_checks
 from alphacut.rve.result import HomogenisedStiffness
 from alphacut.rve.spheres.cubic import cubic_moduli, hill_average, hill_shear
 from alphacut.rve.spheres.space_bounds import hashin_shtrikman, space_stiffness
@@ -74,5 +74,5 @@ def spheres_with_checks(result: HomogenisedSpheres) -> HomogenisedSpheres:
     low, high = hashin_shtrikman(fraction, matrix, inclusion)[0] @ weights
     checks = order_checks(np.asarray(result.stiffness), reuss_mean, voigt_mean)
     checks["hashin_shtrikman"] = float(max(0.0, low - bulk, bulk - high) / bulk)
-    checks = require(checks, discretisation=ROUND_OFF + result.largest_error)
+    checks = checks_within_limits(checks, discretisation=ROUND_OFF + result.largest_error)
     return replace(result, checks=checks)

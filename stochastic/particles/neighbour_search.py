@@ -79,8 +79,8 @@ class Pairs:
     second: Rows
     offset: Array
 
-    def where(self, keep: Mask) -> Pairs:
-        """The pairs that a mask selects."""
+    def select(self, keep: Mask | Rows) -> Pairs:
+        """The pairs of a mask, or of indices."""
         return Pairs(self.first[keep], self.second[keep], self.offset[keep])
 
     @staticmethod
@@ -114,7 +114,7 @@ def pairs_within(discs: Particles, reach: Array) -> Iterator[tuple[Rows, Pairs]]
         # by the centres, so that the pair (j, i) has exactly the negative offset
         offset = discs.centres[second] - discs.centres[first] + shift[images]
         is_pair = (first != second) | (offset != 0).any(axis=1)
-        yield portion, Pairs(first, second, offset).where(is_pair)
+        yield portion, Pairs(first, second, offset).select(is_pair)
 
 
 def _periodic_images(discs: Particles, margin: float) -> tuple[Rows, Array]:

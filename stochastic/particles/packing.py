@@ -273,6 +273,7 @@ def _shake(particles: Particles, generator: np.random.Generator) -> Array:
     A move is made if it keeps clear of both old and new positions of the neighbours.
     """
     box, dimensions, radii = particles.size, len(particles.size), particles.radii
+    # longest move: a quarter of the mean gap between particles
     reach = 0.25 * particles.spacing * (1 - particles.fraction ** (1 / dimensions))
     centres = particles.centres
     for _ in range(0, MOVES, MOVES_PER_SEARCH):

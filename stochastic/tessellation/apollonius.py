@@ -125,7 +125,7 @@ class _Walls:
         d is the distance of the centres of the arc's disc and of its neighbour, Δ the disc's radius
         less the neighbour's.
         """
-        arcs, pairs = self.arcs, self.pairs.where(self.arcs.function)
+        arcs, pairs = self.arcs, self.pairs.select(self.arcs.function)
         near, far = _near_far(self.discs.radii, pairs.first, pairs.second, pairs.offset)
         direction = np.arctan2(pairs.offset[:, 1], pairs.offset[:, 0])
         start, end = (anomaly(angle - direction, near, far) for angle in (arcs.start, arcs.end))
@@ -167,7 +167,7 @@ def _walls(discs: Particles, reach: Array) -> Iterator[_Walls]:
     """
     for portion, neighbours in pairs_within(discs, reach):
         near, far = _near_far(discs.radii, neighbours.first, neighbours.second, neighbours.offset)
-        walls = neighbours.where((near > 0) & (far > 0))  # neither disc contains the other
+        walls = neighbours.select((near > 0) & (far > 0))  # neither disc contains the other
         pairs = Pairs.join([walls, _bounding_pairs(discs, portion)])
         near, far = _near_far(discs.radii, pairs.first, pairs.second, pairs.offset)
         direction = pairs.offset / np.hypot(pairs.offset[:, 0], pairs.offset[:, 1])[:, None]

@@ -122,6 +122,8 @@ def _sweep(
 ) -> tuple[Rows, Rows, Array, Array]:
     """Arcs of n upper envelopes by one sweep of all around the circle.
 
+    Each step goes from one crossing to the next, at which another function becomes uppermost.
+
     Args:
         a: Coefficients of cos φ, shape (n, w), one row a group.
         b: Coefficients of sin φ, shape (n, w).

@@ -147,10 +147,10 @@ def _panel_edges(law: ThetaLaw, edges: Array, rule: tuple[Array, Array]) -> Arra
 
 
 def _mass_gaps(law: ThetaLaw, edges: Array, rule: tuple[Array, Array]) -> Array:
-    """Return the error of a rule on each panel against the distribution function F, shape (n,).
+    """Error of a rule for the density f on each panel, shape (n,), by its distribution function F.
 
-    The larger of the errors of ∫ f and of ∫ x f, x from −1 to 1 over the panel, which is [x F] − ∫
-    F dx: a jump right in the middle of a panel shows in the second alone.
+    The larger of the errors of ∫ f, which is [F], and of ∫ x f, x from −1 to 1 over the panel,
+    which is [x F] − ∫ F dx: a jump right in the middle of a panel shows in the second alone.
     """
     x, w = rule
     half = np.diff(edges)[:, None] / 2

@@ -78,7 +78,7 @@ def displacement_element(aspect: float = 1.0) -> Element:
         twice_shear=np.hstack([d_dy, d_dx]),
     )
     return Element(
-        unknowns=8,
+        unknowns=8,  # a corner, two edge middles and the centre of a pixel, times two components
         local=tuple((4 * c + 2 * (y % 2) + x % 2, y // 2, x // 2) for c, y, x in nodes),
         modes=modes,
         bulk_rows=constants[1],
