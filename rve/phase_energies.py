@@ -28,7 +28,9 @@ class PhaseEnergies:
     errors: Array
 
     def energy_fractions(self, constants_of: Callable[[Array], Array]) -> tuple[Array, Array]:
-        """Fractions ∂ln c/∂ln X of each phase's K and G in the energy of c = E, G, K.
+        """Fractions ∂ln c/∂ln X of each phase's moduli X = K, G in the effective c = E, G, K.
+
+        By the chain rule from the energies, which are X ∂/∂X of C11 + C12, C11 − C12 and C33.
 
         Args:
             constants_of: E and ν from C11 + C12, C11 − C12 and C33.
@@ -39,7 +41,7 @@ class PhaseEnergies:
         moduli = self.values.sum(axis=(0, 1))
 
         def logarithmic_slopes(change: Array) -> Array:
-            """Relative change of E, G, K by a change of the three moduli, by a complex step."""
+            """Relative changes of E, G, K per change of the three moduli, by a complex step."""
             stepped = moduli + 1j * STEP * change
             young, poisson = constants_of(stepped)
             constants = np.array([young, young / (2 * (1 + poisson)), stepped[0]])

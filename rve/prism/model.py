@@ -236,7 +236,7 @@ class PrismModel:
             return self._moved_problem(radius_map, 0.0, REFINEMENTS[0])
         if is_round(self.outline):
             return self._moved_problem(radius_map, radius, REFINEMENTS[0], thickness)
-        for refinement in REFINEMENTS[:-1]:
+        for refinement in REFINEMENTS[:-1]:  # shorter edges where elements at bends fold
             with suppress(FoldedMeshError):
                 return self._moved_problem(radius_map, radius, refinement)
         return self._moved_problem(radius_map, radius, REFINEMENTS[-1])

@@ -112,7 +112,8 @@ def _residual_energy(
 ) -> Array:
     """Energy rᵀ P⁻¹ r of the residual of projected solutions at a modulus in Pa, shape (loads,).
 
-    `images` are K_0 v and K_1 v of the basis vectors, `forces` f_0 and f_1 of the loads.
+    r = f_0 + t f_1 − Σ c_v (K_0 v + t K_1 v) over the basis vectors v, t the modulus over the
+    range's upper end; `images` are the K_0 v and K_1 v, `forces` f_0 and f_1 of the loads.
     """
     factor, energies = modulus / basis.ends[1], []
     for k, column in enumerate(basis.coefficients(modulus).T):

@@ -251,12 +251,13 @@ class Slice:
     def error(self, order: int, *, square: bool) -> Array:
         """Declared relative errors of C11 + C12, C11 − C12, C33, shape (m, 3).
 
-        The relative distance from order 4, and the declared error of order 4.
+        They are the distance of this order's moduli from those of order 4, and the error of order
+        4, which is extrapolated from the changes between the orders 2, 3 and 4.
 
         Args:
             order: Order of the elements of the result.
-            square: Whether the stiffness has the symmetry of the square; else errors along either
-                axis count.
+            square: Whether the stiffness has the symmetry of the square; else the larger error of
+                the moduli with C11 and with C22 counts.
         """
         moduli = axial_moduli(self.by_order, square=square)  # (3, m, axes, 3)
         distance = abs(moduli[_ORDERS.index(order)] / moduli[-1] - 1).max(axis=1)

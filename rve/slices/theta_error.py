@@ -53,6 +53,7 @@ def theta_error(
     x, fine_x = (np.sqrt(1 - (r + thickness) ** 2) for r in (radii, fine_radii))
     middle, half_width = (x.min() + x.max()) / 2, max(np.ptp(x), 1e-12) / 2
     mean, distances = rule.weights @ moduli[nodes], []
+    # up to the interpolating polynomial, from a degree with some freedom to spare on
     for degree in range(min(max(0, radii.size - 4), 9), min(radii.size, 15)):
         basis = chebvander((x - middle) / half_width, degree)
         coefficients = np.linalg.lstsq(basis * root, logarithm * root, rcond=1e-14)[0]

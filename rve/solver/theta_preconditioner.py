@@ -61,6 +61,8 @@ class ThetaMass:
 def theta_mass(law: ThetaLaw, levels: Array) -> ThetaMass:
     """Mass matrices along θ, weighted by the density, of hats at the levels and bubbles between.
 
+    Of the hats (M), of the bubbles less what the hats carry of them (G), and the projection.
+
     Args:
         law: Law of θ.
         levels: θ of the levels, rising, shape (layers + 1,).

@@ -32,7 +32,11 @@ class Operator:
     deviator: Array
 
     def apply(self, fields: Array) -> Array:
-        """Nodal forces of fields, both of shape (loads, unknowns, rows, columns)."""
+        """Nodal forces of fields, both of shape (loads, unknowns, rows, columns).
+
+        Of each pixel they are (trace Tᵀ T + deviator Dᵀ D) times its local unknowns, with T and D
+        the matrices to the modes of trace and deviator.
+        """
         result = np.zeros_like(fields)
         trace_modes, deviator_modes = (self.element.modes[rows] for rows in self.element.parts)
         matrix = np.hstack([trace_modes.T @ trace_modes, deviator_modes.T @ deviator_modes])
