@@ -1,6 +1,7 @@
 """The product-space model on several MPI ranks gives what it gives on one."""
 
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -97,3 +98,26 @@ def test_only_one_rank_prints_and_the_command_shares_a_cell():
     one, two = (json.loads(run(n, *solve, "--set", "mesh.size=0.4")) for n in (1, 2))
     assert two["E_GPa"] == pytest.approx(one["E_GPa"], rel=1e-10)
     assert two["unknowns"] == one["unknowns"]
+
+
+GARBAGE = """
+import gc
+from mpi4py import MPI
+from petsc4py import PETSc
+from alphacut.rve.cell import Phase
+from alphacut.rve.prism.model import PrismModel
+from alphacut.stochastic import HermiteMap
+
+for modulus in (70e9, 75e9, 80e9):
+    model = PrismModel(0.6, 2, parallel=True, estimate=False)
+    model.solve(HermiteMap(0.2, 0.1, 0.5, 0.1), Phase(20e9), [Phase(modulus)])
+    gc.collect()
+    PETSc.garbage_view(MPI.COMM_WORLD)
+"""
+
+
+def test_solvers_of_earlier_samples_are_freed_on_all_ranks():
+    """PETSc keeps what Python drops on several ranks until all clean up together."""
+    counts = re.findall(r"Rank 0:: Total entries: (\d+)", run(2, "-c", GARBAGE))
+    assert len(counts) == 3
+    assert len(set(counts)) == 1, counts
