@@ -244,7 +244,7 @@ def moduli_of_energies(energies: Array, loads: Array) -> Array:
     moduli = np.full((*energies.shape[:-1], 3), np.nan)
     columns = (0, 2, 1)  # of the moduli that the equibiaxial, shear and deviatoric load give
     for k, strain in enumerate(loads):
-        moduli[..., columns[k]] = energies[..., k] / (strain @ strain)
+        moduli[..., columns[k]] = energies[..., k] / np.dot(strain, strain)
     return moduli
 
 

@@ -70,4 +70,5 @@ def first_order(
     fractions, errors = energies.energy_fractions(constants_of)
     # only differences of losses count in the error, since the fractions add up to 1
     differences = abs(losses - (losses.max() + losses.min()) / 2)
-    return np.tensordot(losses, fractions), np.tensordot(differences, errors)
+    factors, factor_errors = np.tensordot(losses, fractions), np.tensordot(differences, errors)
+    return np.asarray(factors, float), np.asarray(factor_errors, float)

@@ -188,7 +188,8 @@ def over_box(system: LinearSystem, names: Sequence[str], low: Array, high: Array
     """The structure as Taylor models in those inputs `names` whose `low` is below `high`."""
     active, centre, radius = np.flatnonzero(high > low), (low + high) / 2, (high - low) / 2
     inputs, d = TaylorModel.variables(centre[active], radius[active]), len(active)
-    values = dict(system.parameters) | dict(zip(names, centre.tolist(), strict=True))
+    centres = {name: float(x) for name, x in zip(names, centre, strict=True)}
+    values = {**system.parameters, **centres}
     parameters = {name: TaylorModel.constant(x, d) for name, x in values.items()}
     parameters |= {names[int(i)]: inputs[column] for column, i in enumerate(active)}
     return classical(system, parameters)

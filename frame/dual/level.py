@@ -294,7 +294,8 @@ class OutputBounds:
         truncation, constant = _truncation_terms(level, o, side)
         variables = _variables(level, o)
         tables, models = _tables(level, o, variables), _models(level, variables)
-        data = Data(*tables, *models, *truncation, _grain(level, o))
+        fields = [*tables, *models, *truncation, _grain(level, o)]
+        data = Data(*fields)
         require_in_range({name: x for name, x in data._asdict().items() if name != "table"})
         return cls(
             side=side,

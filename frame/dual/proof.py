@@ -256,7 +256,7 @@ class _Bounding:
             tried = np.unique((unit[:, None] * moves).reshape(-1, d), axis=0)
             peaks = np.abs(self.flow.values(self.box.inputs(tried))).max(1)
             unit = tried[peaks.argmin(0)]
-        return np.array([self.box.peak_over_time(at)[o] for o, at in enumerate(unit)])
+        return np.array([self.box.peak_over_time(unit[o])[o] for o in range(len(unit))])
 
     def _require_narrow(self) -> None:
         """Refuse a part whose Taylor remainders exceed `WIDE` of a peak, if bisections help.

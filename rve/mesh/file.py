@@ -74,7 +74,7 @@ def _require_periodic_square(grid: PrismGrid) -> None:
             pairs = [partners(xy, on_side[:, axis], axis) for axis in (0, 1)]
         except MeshError as error:
             raise MeshError(f"{error.what}, on the level θ = {theta:.4g}", error.cure) from None
-        level_partners = [dict(zip(a.tolist(), b.tolist(), strict=True)) for a, b in pairs]
+        level_partners = [{int(a): int(b) for a, b in zip(*pair, strict=True)} for pair in pairs]
         if lowest_partners and level_partners != lowest_partners:
             raise MeshError(f"a column changes its partner at the level θ = {theta:.4g}")
         lowest_partners = lowest_partners or level_partners

@@ -96,8 +96,8 @@ class Particles:
             is_inside = ((centres >= 0) & (centres <= size)).all(axis=1)
             allowed = f"places in the window of {size.tolist()} m"
             _require_all(is_inside, "centres", centres, allowed)
-        for name, value in (("centres", centres), ("radii", radii), ("size", size)):
-            object.__setattr__(self, name, value)
+        for name, array in (("centres", centres), ("radii", radii), ("size", size)):
+            object.__setattr__(self, name, array)
 
     def __len__(self) -> int:
         return len(self.radii)
@@ -133,7 +133,7 @@ def nearest_image(offset: Array, size: Array) -> Array:
     return np.asarray(offset - size * np.round(offset / size))
 
 
-def _require_all(is_allowed: Mask, name: str, values: Array, allowed: str) -> None:
+def _require_all(is_allowed: Mask | np.bool_, name: str, values: Array, allowed: str) -> None:
     """Refuse an array of which some values are not allowed; the message names the first of them."""
     row = int(np.argmin(is_allowed))
     require(is_allowed.all(), f"{name}[{row}]", value=values[row].tolist(), allowed=allowed)
