@@ -65,7 +65,7 @@ def stays_below(
     """
     if allowed <= 0:
         return False
-    d, shift, x, slope = len(g), work[0], work[1], work[2]
+    d, shift, x, slope = len(g), work[0], work[1], work[2]  # shift: the s_i
     for i in range(d):
         width = high[i] - low[i]
         x[i], shift[i] = max(min(0.0, high[i]), low[i]), 0.0
@@ -73,7 +73,7 @@ def stays_below(
             shift[i] = allowed / (d * width * width)
             if (high[i] <= 0 and g[i] > 0) or (low[i] >= 0 and g[i] < 0):
                 shift[i] += abs(g[i]) / width
-    for i in range(d):  # Cholesky of s − H on the axes with a width
+    for i in range(d):  # concave if Cholesky's factor of diag(s) − H exists, on axes with a width
         for j in range(i + 1):
             if high[i] <= low[i] or high[j] <= low[j]:
                 L[i, j] = 0.0

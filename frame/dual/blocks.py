@@ -385,7 +385,7 @@ class _Unknowns:
         right = self.residual + E @ self.mass_size + (F + 2 * E) @ Y @ self.heavy
         new_Y = np.zeros_like(Y)
         for j, system in enumerate(systems):
-            new_Y[j, o] = system.solved(right[j, o])
+            new_Y[j, o] = system.solution_bounds(right[j, o])
         W = Y @ self.mass_size.T
         within = self.residual @ self.size.T + Y @ self.residual.T + self.difference * W
         within = within + W @ F.T + F @ W + 2 * E @ W

@@ -97,12 +97,12 @@ def coupling_of(structure: Classical, shares: BlockShares, found: Subspaces) -> 
     slope = (shares.participation.size().T @ of_columns)[:, None] * read
     size = norm * np.sqrt(shares.of_sources.size())[:, None] * read
     j = np.arange(len(off))
-    low, high = block.rate[j, j].bounds()
-    least = max(float((low - off.sum(1)).min()), float(found.low[block.modes[0]]))
-    most = min(float((high + off.sum(1)).max()), float(found.high[block.modes[-1]]))
-    omega, quotient = damped_range(structure, least, most, block.modes)
+    low, high = block.rate[j, j].bounds()  # the λ lie in Gershgorin's discs about L_jj
+    lambda_low = max(float((low - off.sum(1)).min()), float(found.low[block.modes[0]]))
+    lambda_high = min(float((high + off.sum(1)).max()), float(found.high[block.modes[-1]]))
+    omega, quotient = damped_range(structure, lambda_low, lambda_high, block.modes)
     zeta, b = structure.ratio[block.modes].size().max(), structure.rayleigh[1].size()
-    decay_slope = float(b / 2 + zeta / (2 * np.sqrt(least)))
+    decay_slope = float(b / 2 + zeta / (2 * np.sqrt(lambda_low)))
     return Coupling(
         slope=slope, size=size, omega_range=omega, quotient_range=quotient, decay_slope=decay_slope
     )

@@ -184,7 +184,7 @@ class Comparison:
         """True if T is singular nowhere in the box."""
         return self.inverse is not None or self.least > 0
 
-    def solved(self, right: Array) -> Array:
+    def solution_bounds(self, right: Array) -> Array:
         """Bounds of |y| for all solutions of T y = r with |r| ≤ `right`, by entry, shape (n − p,).
 
         The least of the bounds by T's least eigenvalues and by its comparison matrix is improved,

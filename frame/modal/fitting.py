@@ -111,7 +111,7 @@ def out_of_reach(errors: Sequence[float], tolerance: float, d: int, budget: int)
         d: Number of parameters.
         budget: Most eigen-analyses.
     """
-    if len(errors) < 3 or not 0 < errors[-1] < errors[-3]:
+    if len(errors) < 3 or not 0 < errors[-1] < errors[-3]:  # no rate to go by
         return len(errors) >= 4 and errors[-1] >= errors[-3]
     rate = (errors[-1] / errors[-3]) ** 0.5  # factor of the error by a degree more
     degree = 1 + len(errors) + log(tolerance / errors[-1]) / log(rate)
