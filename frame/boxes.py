@@ -105,9 +105,9 @@ class Boxes:
         The cuts of intervals are the same at every level and need be searched once.
         """
         ends = np.concatenate([self.lower, self.upper], 1)
-        new = np.append(True, (np.diff(ends, axis=0) != 0).any(1))
-        boxes = replace(self, alpha=self.alpha[new], lower=self.lower[new], upper=self.upper[new])
-        return boxes, np.cumsum(new) - 1
+        first = np.append(True, (np.diff(ends, axis=0) != 0).any(1))  # of several equal ones
+        cuts = {"lower": self.lower[first], "upper": self.upper[first]}
+        return replace(self, alpha=self.alpha[first], **cuts), np.cumsum(first) - 1
 
     @property
     def probes(self) -> Array:
@@ -277,7 +277,7 @@ class UnitFlow:
             facts: Further numbers by name.
             notes: Remarks, one sentence each.
         """
-        where = self.boxes.to_physical(at)
+        inputs_at = self.boxes.to_physical(at)
         return Envelope(
             alpha=self.boxes.alpha,
             time=self.time,
@@ -285,8 +285,8 @@ class UnitFlow:
             inputs=self.boxes.inputs,
             lower=-bounds[..., 0],
             upper=bounds[..., 1],
-            lower_at=where[..., 0, :],
-            upper_at=where[..., 1, :],
+            lower_at=inputs_at[..., 0, :],
+            upper_at=inputs_at[..., 1, :],
             error=np.zeros(bounds.shape[:-1]) if error is None else error,
             nature=nature,
             method=method,

@@ -59,16 +59,14 @@ class Envelope(Bounds):
     def peak_words(self) -> str:
         """Text with the proved and the reached peak of each output in the widest cut."""
         words = []
-        for name, unit, *ends in zip(
-            self.outputs,
-            self.units or ("",) * len(self.outputs),
-            *(
-                np.maximum(pair.upper, -pair.lower)[0].max(0)
-                for pair in (self.proved, self.attained)
-            ),
-            strict=True,
+        units = self.units or ("",) * len(self.outputs)
+        proved_peaks, reached_peaks = (
+            np.maximum(pair.upper, -pair.lower)[0].max(0) for pair in (self.proved, self.attained)
+        )
+        for name, unit, *peaks in zip(
+            self.outputs, units, proved_peaks, reached_peaks, strict=True
         ):
-            proved, reached = (f"{float(end):.4g} {unit}".rstrip() for end in ends)
+            proved, reached = (f"{float(peak):.4g} {unit}".rstrip() for peak in peaks)
             words.append(f"{name}: proved {proved}, reached {reached}")
         return "; ".join(words)
 

@@ -48,12 +48,12 @@ class PartStore:
         return self.folder / f"part-{digest.hexdigest()[:32]}.npz"
 
     def read(self, path: Path) -> Found | None:
-        """Return the stored bounds on each level, or None without a file that can be read."""
+        """Return the stored bounds on each level, or None if there is no readable file."""
         if path.is_symlink() or not path.is_file():
             return None
         try:
             with np.load(path, allow_pickle=False) as arrays:
-                return [_unpacked(arrays, k) for k in range(int(arrays["levels"]))]
+                return [_level_bounds(arrays, k) for k in range(int(arrays["levels"]))]
         except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile):
             return None
 
@@ -81,8 +81,8 @@ def _arrays_of(bounds: PartBounds | UnprovedError) -> dict[str, Array]:
     return {name: np.asarray(array) for name, array in arrays.items() if array is not None}
 
 
-def _unpacked(arrays: np.lib.npyio.NpzFile, k: int) -> PartBounds | UnprovedError:
-    """Return bounds, or a refusal, of level k from the arrays of a file."""
+def _level_bounds(arrays: np.lib.npyio.NpzFile, k: int) -> PartBounds | UnprovedError:
+    """Return the bounds or the refusal of level k from the arrays of a file, named "k.field"."""
     fields: dict[str, Any] = {
         name.partition(".")[2]: arrays[name] for name in arrays if name.startswith(f"{k}.")
     }

@@ -98,16 +98,17 @@ class _Tick:
         self, progress: Progress | None, waiting: Sequence[Part], batch: Sequence[Part]
     ) -> None:
         self.progress, self.work = progress, [part.work for part in batch]
-        self.left = sum(part.work for part in waiting)
-        self.done = [0.0] * len(batch)
+        self.waiting_work = sum(part.work for part in waiting)
+        self.fractions = [0.0] * len(batch)
 
-    def __call__(self, position: int, share: float) -> None:
-        """Report the completed fraction `share` of part `position` of the batch."""
-        self.done[position] = max(share, self.done[position])
+    def __call__(self, position: int, fraction: float) -> None:
+        """Report the completed fraction of part `position` of the batch, as that of all work."""
+        self.fractions[position] = max(fraction, self.fractions[position])
         if self.progress is not None:
-            pairs = zip(self.work, self.done, strict=True)
-            left = self.left + sum(work * (1 - OWN_WORK * done) for work, done in pairs)
-            self.progress(1 - left)
+            pairs = zip(self.work, self.fractions, strict=True)
+            remaining = self.waiting_work
+            remaining += sum(work * (1 - OWN_WORK * fraction) for work, fraction in pairs)
+            self.progress(1 - remaining)
 
 
 Key = tuple[int, int, int]
@@ -135,7 +136,10 @@ class Queue:
     store: PartStore | None = None
 
     def __post_init__(self) -> None:
-        """Start with the whole box as the only open part, and an empty hull of closed parts."""
+        """Start with the whole box as the only open part, and an empty hull of closed parts.
+
+        `closed` are proved bounds of closed parts; `inner` are attained bounds, `at` their inputs.
+        """
         shape = (len(self.boxes.alpha), len(self.flow.time), len(self.flow.outputs), 2)
         self.closed, self.inner = np.full(shape, -np.inf), np.full(shape, -np.inf)
         self.at = np.zeros((*shape, len(self.boxes.names)))
@@ -149,7 +153,7 @@ class Queue:
         root = Part(self.boxes, [*range(shape[0])], np.ones(shape, bool), np.full(shape, np.inf))
         self.open = [root]
         self.gap_shares = dict[Key, Array]()
-        self.spent, self.begun = dict[Key, int](), dict[Key, float]()
+        self.parts_of_peak, self.first_gaps = dict[Key, int](), dict[Key, float]()
         self.abandoned = set[Key]()
 
     def run(self, progress: Progress | None = None, *, interruptible: bool = False) -> None:
@@ -157,10 +161,11 @@ class Queue:
 
         Args:
             progress: Called with the completed fraction of the work.
-            interruptible: Whether an interruption leaves the bounds known so far, if there are.
+            interruptible: Whether Ctrl-C ends the work with the bounds known so far, if all parts
+                have some; KeyboardInterrupt is raised otherwise.
 
         Raises:
-            UnprovedError: A part is refused, and so are too many within it.
+            UnprovedError: The proof refuses too many parts, or one that bisections would not help.
         """
         batch: list[Part] = []
         pool = ThreadPoolExecutor(self.workers)
@@ -189,7 +194,7 @@ class Queue:
     def _next(self) -> list[Part]:
         """Remove the most urgent parts, at most `BATCH`, from the queue and return them.
 
-        Before, bounds of abandoned peaks are closed as they are.
+        Parts in which no bound is to be improved any more are dropped before.
         """
         for part in self.open:
             self._drop_abandoned(part)
@@ -199,13 +204,13 @@ class Queue:
         return batch
 
     def _drop_abandoned(self, part: Part) -> None:
-        """Close the known bounds of peaks whose gap is not reduced any more."""
+        """Take a part's known bounds of abandoned peaks, whose gaps fall too slowly, as final."""
         for k, level in enumerate(part.levels):
             for abandoned_level, output, side in self.abandoned:
                 if abandoned_level == level and part.needed[k, :, output, side].any():
                     entry = (slice(None), output, side)
                     mask = np.zeros_like(part.needed[k])
-                    # a part that was refused before has no bounds to leave it with
+                    # a part that was refused has no bounds yet
                     mask[entry] = part.needed[k][entry] & np.isfinite(part.outer[k][entry])
                     self._close(level, mask, part.outer[k])
                     part.needed[k] &= ~mask
@@ -220,11 +225,18 @@ class Queue:
         return np.asarray(np.maximum(self.inner[level:].max((0, 1)), 0.0))
 
     def _goal(self, part: Part, workers: int, tick: Progress) -> Goal:
-        """Return what the proof is asked for on a part."""
+        """Return the bounds and the accuracy that the proof is asked for on a part."""
         incumbent = np.stack([self._incumbent(level) for level in part.levels])
-        arrays = part.needed, part.outer, incumbent
-        last = self.refusals >= self.proof.parts - 1
-        return Goal(self.scale, self.peak, *arrays, max(workers, 1), last, tick)
+        return Goal(
+            scale=self.scale,
+            peak=self.peak,
+            needed=part.needed,
+            outer=part.outer,
+            incumbent=incumbent,
+            workers=max(workers, 1),
+            last=self.refusals >= self.proof.parts - 1,
+            tick=tick,
+        )
 
     def _bounds(self, part: Part, goal: Goal) -> Sequence[PartBounds | UnprovedError]:
         """Return bounds or refusal on each level of a part, from the store or by the proof."""
@@ -242,7 +254,7 @@ class Queue:
         return found
 
     def _settle(self, part: Part, found: Sequence[PartBounds | UnprovedError]) -> None:
-        """Take over the bounds of a part, close what is tight enough, and queue its halves.
+        """Take over the bounds of a part, close tight ones, and queue its halves for the others.
 
         Args:
             part: The part.
@@ -256,23 +268,24 @@ class Queue:
                     part.needed[k], np.minimum(part.outer[k], bounds.outer), part.outer[k]
                 )
                 self._take(level, bounds)
+        # votes for the input to bisect; mask of the bounds that both halves must improve
         votes, children = np.zeros(len(self.boxes.names)), list[Part]()
-        wide = np.zeros_like(part.needed)
+        open_bounds = np.zeros_like(part.needed)
         for k, level in enumerate(part.levels):
             if isinstance(bounds := found[k], PartBounds):
-                wide[k] = self._split(part, k, level, bounds, votes, children)
+                open_bounds[k] = self._split(part, k, level, bounds, votes, children)
             else:
-                wide[k] = part.needed[k]
-                self._refused(bounds, votes)
-        levels = [k for k in range(len(part.levels)) if wide[k].any()]
+                open_bounds[k] = part.needed[k]
+                self._count_refusal(bounds, votes)
+        levels = [k for k in range(len(part.levels)) if open_bounds[k].any()]
         if levels:
-            open_part = part.restricted(levels, wide[levels])
+            open_part = part.restricted(levels, open_bounds[levels])
             children += open_part.bisected(self._axis(open_part.boxes, votes))
         for child in children:
             child.work = (1 - OWN_WORK) * part.work / len(children)
         self._put(children)
 
-    def _refused(self, refusal: UnprovedError, votes: Array) -> None:
+    def _count_refusal(self, refusal: UnprovedError, votes: Array) -> None:
         """Count a refusal and vote for the input to bisect; raise it if parts do not help."""
         self.refusals, self.refusal = self.refusals + 1, refusal
         if self.refusals >= self.proof.parts or isinstance(refusal, BisectionError):
@@ -283,8 +296,9 @@ class Queue:
     def _take(self, level: int, bounds: PartBounds) -> None:
         """Merge the bounds of a part of the box into those of a level.
 
-        Larger attained values replace others with their inputs; of errors the larger, of reached
-        smallest peaks the smaller stay; facts are added or their largest kept.
+        Larger attained values and their inputs replace smaller ones. The larger error and the
+        smaller bound of the smallest peak are kept. Facts in `ADDED` are added; of others the
+        largest is kept.
         """
         better = bounds.inner > self.inner[level]
         self.inner[level][better], self.at[level][better] = bounds.inner[better], bounds.at[better]
@@ -309,23 +323,22 @@ class Queue:
         votes: Array,
         children: list[Part],
     ) -> Mask:
-        """Close what holds no higher peak, and append narrowed parts to `children`.
+        """Close bounds that are tight enough, and return the mask (T, m, 2) of those still open.
+
+        Peaks that can only lie in a smaller box leave the mask; that box is appended to `children`.
 
         Args:
             part: The part.
             k: Row of the level in the part.
             level: Row of the level in all levels.
-            bounds: Its bounds on the level.
-            votes: Votes for the inputs to bisect, shape (n,), to which those of open peaks are
-                added.
+            bounds: The part's bounds on the level.
+            votes: Votes for the inputs to bisect, shape (n,); shares in open gaps are added.
             children: Parts for the queue.
-
-        Returns:
-            Mask of the bounds that the halves must improve, shape (T, m, 2).
         """
         needed, outer = part.needed[k], part.outer[k]
-        top, worthless = self._incumbent(level) + self.gap[:, None], False
-        above = needed & (outer > top)
+        # a bound may hold a peak above the incumbent by more than the wanted gap
+        limit, is_wide = self._incumbent(level) + self.gap[:, None], False
+        above = needed & (outer > limit)
         if bounds.pruned is not None:
             self._close(level, above, bounds.pruned)
         for output, side in _peaks(above):
@@ -335,10 +348,10 @@ class Queue:
             if self._is_hopeless(key, peak, bounds.shares[output, side]):
                 self.abandoned.add(key)
                 above[:, output, side] = False
-            elif peak > top[output, side] + WIDE * self.peak[output]:
+            elif peak > limit[output, side] + WIDE * self.peak[output]:
                 votes += bounds.shares[output, side]
-                worthless = True
-        if worthless:
+                is_wide = True
+        if is_wide:  # so are the bounds elsewhere: all of them are open
             return np.asarray(needed)
         if needed.all():  # parts of this one are asked for their largest peaks alone
             least = 0.0 if bounds.least_peaks is None else bounds.least_peaks.lower
@@ -347,26 +360,31 @@ class Queue:
         for output, side in _peaks(above):
             votes += bounds.shares[output, side]
             ends = None if bounds.remaining is None else bounds.remaining[:, output, side]
-            if ends is None or not self._narrowed(part.boxes.on_levels([k]), ends):
+            if ends is None or not self._is_narrower(ends, part.boxes.on_levels([k])):
                 continue
             mask = np.zeros_like(above)
             mask[:, output, side] = above[:, output, side]
             above = above & ~mask
-            open_part = part.restricted([k], mask[None])
-            open_part.boxes, pruned = open_part.boxes.within(*ends), open_part.boxes.radius
-            share = 1 - open_part.boxes.radius / np.where(pruned > 0, pruned, 1.0)
-            unpruned = [open_part] if share[pruned > 0].sum() >= NARROWED else []
-            children += unpruned or open_part.bisected(
-                self._axis(open_part.boxes, bounds.shares[output, side])
-            )
+            child = part.restricted([k], mask[None])
+            radius = child.boxes.radius
+            child.boxes = child.boxes.within(*ends)
+            pruned = 1 - child.boxes.radius / np.where(radius > 0, radius, 1.0)
+            if pruned[radius > 0].sum() >= NARROWED:
+                children.append(child)
+            else:
+                axis = self._axis(child.boxes, bounds.shares[output, side])
+                children += child.bisected(axis)
         return np.asarray(above)
 
     @staticmethod
-    def _narrowed(boxes: Boxes, ends: Array) -> bool:
+    def _is_narrower(ends: Array, boxes: Boxes) -> bool:
         return bool((ends[0] > boxes.lower[0]).any() or (ends[1] < boxes.upper[0]).any())
 
     def _is_hopeless(self, key: Key, peak: float, shares: Array) -> bool:
-        """Return True if the gap of a peak falls too slowly, or depends on too many inputs.
+        """Return True if bisections are not expected to close the gap of a peak.
+
+        It has fallen too slowly, or will after all parts that are allowed: by 2^−`FALL` for each
+        halving of the inputs that it depends on.
 
         Args:
             key: Level, output and side of the peak.
@@ -374,21 +392,23 @@ class Queue:
             shares: Fraction of each input in its gap, shape (n,).
         """
         level, output, side = key
-        rest_of_queue = [
+        other_bounds = [  # of the peak in parts that wait
             float(part.outer[k, :, output, side][part.needed[k, :, output, side]].max(initial=0))
             for part in self.open
-            for k, own_level in enumerate(part.levels)
-            if own_level == level
+            for k, part_level in enumerate(part.levels)
+            if part_level == level
         ]
-        top, most = self._incumbent(level)[output, side], self.proof.parts
-        gap = max([peak, *(bound for bound in rest_of_queue if np.isfinite(bound))]) - top
-        count = self.spent[key] = self.spent.get(key, 0) + 1
-        first_gap = self.begun.setdefault(key, gap)
-        even = (first_gap - self.gap[output]) * count / most
-        if count >= GRACE and gap > first_gap - MIN_PROGRESS * even:
+        incumbent, max_parts = self._incumbent(level)[output, side], self.proof.parts
+        upper_bound = max([peak, *(bound for bound in other_bounds if np.isfinite(bound))])
+        gap = upper_bound - incumbent
+        count = self.parts_of_peak[key] = self.parts_of_peak.get(key, 0) + 1
+        first_gap = self.first_gaps.setdefault(key, gap)
+        even_fall = (first_gap - self.gap[output]) * count / max_parts
+        if count >= GRACE and gap > first_gap - MIN_PROGRESS * even_fall:
             return True
-        after = gap * 2.0 ** (-FALL * halvings(shares, most))
-        return count > most or (gap > WIDE * self.peak[output] and after > 2 * self.gap[output])
+        final_gap = gap * 2.0 ** (-FALL * halvings(shares, max_parts))
+        is_wide = gap > WIDE * self.peak[output]
+        return count > max_parts or (is_wide and final_gap > 2 * self.gap[output])
 
     def notes(self, outer: Array, inner: Array) -> Iterator[str]:
         """Yield sentences on an interruption, and on the inputs to narrow if a gap remains.
@@ -404,10 +424,10 @@ class Queue:
         if key not in self.gap_shares or gaps[key] * self.peak[key[1]] <= self.gap[key[1]]:
             return
         shares = self.gap_shares[key]
-        first = [axis for axis in np.argsort(-shares)[:NAMED] if shares[axis] > 0]
-        words = ", ".join(f"{self.boxes.names[axis]} {shares[axis]:.0%}" for axis in first)
-        if first:
-            name = self.boxes.names[first[0]]
+        largest = [axis for axis in np.argsort(-shares)[:NAMED] if shares[axis] > 0]
+        words = ", ".join(f"{self.boxes.names[axis]} {shares[axis]:.0%}" for axis in largest)
+        if largest:
+            name = self.boxes.names[largest[0]]
             yield (
                 f"gap of {self.flow.outputs[key[1]]}, {gaps[key]:.2g} of its peak, by input:"
                 f" {words}; narrow {name} first"
@@ -422,7 +442,7 @@ class Queue:
         return int((width / np.maximum(np.abs(boxes.centre), 1e-300)).argmax())
 
     def _put(self, parts: Sequence[Part]) -> None:
-        """Set the urgency of parts and add them to the queue."""
+        """Set the urgency of parts, the largest excess over incumbents in gaps, and queue them."""
         for part in parts:
             excess = [
                 (np.where(part.needed[k], part.outer[k], -np.inf).max(0) - self._incumbent(level))
@@ -460,7 +480,7 @@ def prove(proof: BoxProof, flow: UnitFlow, progress: Progress | None = None) -> 
     start_time, linear, cuts = time.perf_counter(), exact_flow(flow.flow), flow.boxes
     with refusing():
         proof.forecast(linear, cuts)
-    store = None if flow.store is None else PartStore(flow.store, _problem(proof, flow))
+    store = None if flow.store is None else PartStore(flow.store, _fingerprint(proof, flow))
     queue = Queue(proof, linear, cuts, flow.scale, flow.peak, store)
     queue.run(progress, interruptible=flow.interruptible)
     outer = np.minimum.accumulate(queue.closed, axis=0)
@@ -475,11 +495,11 @@ def prove(proof: BoxProof, flow: UnitFlow, progress: Progress | None = None) -> 
     )
     error = (outer - inner).max(-1)
     largest = np.maximum(np.abs(outer).max((1, 3)), 1e-300)
-    of_peaks = (outer.max(1) - inner.max(1)).max(-1) / largest
+    peak_gaps = (outer.max(1) - inner.max(1)).max(-1) / largest
     facts = {
         **queue.facts,
         "gap": float((error / flow.scale).max()),
-        "gap_of_peaks": float(of_peaks.max()),
+        "gap_of_peaks": float(peak_gaps.max()),
     }
     return Envelope(
         alpha=cuts.alpha,
@@ -506,7 +526,7 @@ def prove(proof: BoxProof, flow: UnitFlow, progress: Progress | None = None) -> 
     )
 
 
-def _problem(proof: BoxProof, flow: UnitFlow) -> bytes:
+def _fingerprint(proof: BoxProof, flow: UnitFlow) -> bytes:
     """Return a hash of a proof with its options and of the structure's motion at the probes."""
     options = {name: value for name, value in vars(proof).items() if name != "workers"}
     words = repr((proof.name, options, flow.boxes.names))
@@ -518,11 +538,11 @@ def _require_order(inner: Array, outer: Array, outputs: tuple[str, ...]) -> None
     """Refuse attained bounds (A, T, m, 2), less their rounding, that exceed proved ones.
 
     Raises:
-        FailedError: One does, or is no number.
+        FailedError: One does, or is not a number.
     """
-    wrong = ~(inner <= outer)
-    if wrong.any():
-        output = outputs[int(np.argwhere(wrong)[0, 2])]
-        excess = np.nanmax(np.where(wrong, inner - outer, np.nan))
+    is_wrong = ~(inner <= outer)  # also where one is NaN
+    if is_wrong.any():
+        output = outputs[int(np.argwhere(is_wrong)[0, 2])]
+        excess = np.nanmax(np.where(is_wrong, inner - outer, np.nan))
         what = f"attained bounds of {output} lie outside the proved ones by {excess:.3g}"
         raise FailedError(f"the proof is wrong: {what}", "keep the case and report it")

@@ -194,7 +194,7 @@ def require_envelope(
     integrator: str | Integrator | None = None,
     **options: object,
 ) -> None:
-    """Refuse what `envelope` refuses, from the first steps of a few trajectories.
+    """Refuse arguments that `envelope` refuses, from the first steps of a few trajectories.
 
     Raises:
         RefusedError: As `envelope`.
@@ -207,8 +207,8 @@ def require_envelope(
         >>> require_envelope(frame, {"m1": Triangular(900, 1000, 1100)}, duration=0.5, step=0.1)
     """
     problem = _problem(model, inputs, method, duration, step, alpha, integrator, options)
-    short = replace(problem.flow.flow, duration=min(FIRST_STEPS * step, duration))
-    short.values(problem.flow.boxes.probes)
+    short_flow = replace(problem.flow.flow, duration=min(FIRST_STEPS * step, duration))
+    short_flow.values(problem.flow.boxes.probes)
     if isinstance(problem.method, Proof | DualProof):
         with refusing():
             problem.method.forecast(exact_flow(problem.flow.flow), problem.flow.boxes)
@@ -254,13 +254,13 @@ def _method(
     method: Method | str | None,
     options: Mapping[str, object],
 ) -> Method:
-    """Return the method by its name and options, by default one that fits the model."""
+    """Return a method, given itself or by name and options; by default one that fits the model."""
     if method is None:
         method = "improved-graph-follower" if isinstance(model, LagrangianSystem) else "auto"
     if not isinstance(method, str):
-        runs = hasattr(method, "run") and not isinstance(method, type)
+        is_method = hasattr(method, "run") and not isinstance(method, type)
         allowed = f"{', '.join(METHODS)}, or an object as Proof()"
-        require(runs, "method", value=repr(method), allowed=allowed)
+        require(is_method, "method", value=repr(method), allowed=allowed)
         allowed = "none beside a method that is no name"
         require(not options, "options", value=[*options], allowed=allowed)
         return method
@@ -303,29 +303,29 @@ def require_admissible(system: LinearSystem | LagrangianSystem, cuts: Boxes) -> 
     if isinstance(system, StoreyFrame):
         ends = zip(cuts.lower[0].tolist(), cuts.upper[0].tolist(), strict=True)
         system.require_standing(dict(zip(cuts.names, ends, strict=True)))
-    moved = system.ground is not None and np.any(system.ground.samples)
+    is_moved = system.ground is not None and np.any(system.ground.samples)
     for point in cuts.probes:
         at = ", ".join(f"{name} = {x:g}" for name, x in zip(cuts.names, point, strict=True))
         try:
             matrices = evaluate(system, cuts.names, point[None], derivatives=False)[0]
-            positive = bool(np.linalg.eigvalsh(matrices.mass.value).min() > 0)
+            is_positive = bool(np.linalg.eigvalsh(matrices.mass.value).min() > 0)
         except np.linalg.LinAlgError:  # from damping by a ratio, which divides by the mass
-            positive = False
+            is_positive = False
         require(
-            positive,
+            is_positive,
             "mass",
             value=f"not positive definite at {at}",
             allowed="a mass for every unknown",
         )
-        pushed = matrices.forces is not None and matrices.forces.value.any()
-        moved = moved or pushed or matrices.start.value.any()
+        has_forces = matrices.forces is not None and matrices.forces.value.any()
+        is_moved = is_moved or has_forces or matrices.start.value.any()
     _require_modal_order(system, cuts)
     key, allowed = "q0, v0, ground and loads", "a start, a record or a force that moves something"
-    require(moved, key, value="zero", allowed=allowed)
+    require(is_moved, key, value="zero", allowed=allowed)
 
 
 def _require_modal_order(system: LinearSystem, cuts: Boxes) -> None:
-    """Refuse modes of unequal damping ratio that may cross over the boxes."""
+    """Refuse modes of unequal damping ratio whose frequencies may cross over the boxes."""
     ratios = list(system.ratios)
     if len(ratios) < 2:
         return

@@ -116,7 +116,7 @@ class Flow(ABC):
         return nodes(self.duration, self.step)
 
     def values(self, points: Array) -> Array:
-        """Trajectories at `points` (S, d), shape (S, T, outputs).
+        """Return trajectories of the outputs at parameters (S, d), shape (S, T, outputs).
 
         Raises:
             RefusedError: A trajectory does not exist, or leaves the range of floating-point
@@ -130,11 +130,7 @@ class Flow(ABC):
         return self._finite(points, derivatives=True)
 
     def _finite(self, points: Array, *, derivatives: bool) -> Jet:
-        """Return trajectories at points (S, d), V = (S, T, outputs), all of them finite.
-
-        Args:
-            points: Uncertain parameters, in SI units.
-            derivatives: Whether to differentiate by the parameters.
+        """Return trajectories at parameters (S, d), V = (S, T, outputs), all of them finite.
 
         Raises:
             RefusedError: A matrix is singular or a value not finite; the message names the point.
@@ -159,10 +155,7 @@ class Flow(ABC):
         return motion
 
     def _failing_point(self, points: Array) -> Array:
-        """Return one of the points (S, d) at which the motion fails, shape (d,), by bisection.
-
-        The motion is known to fail at one of them or more.
-        """
+        """Return a point (d,) at which the motion fails, out of (S, d) with one, by bisection."""
         while len(points) > 1:
             half = points[: len(points) // 2]
             try:
@@ -205,10 +198,8 @@ class LinearFlow(Flow):
         return self.integrator.name
 
     def finer(self) -> tuple[LinearFlow, int]:
-        """Return the exact flow with steps divided into equal parts, and the number of parts.
-
-        There are so many that the fastest mode turns by `MAX_PHASE` at most in each of them.
-        """
+        """Return the exact flow with steps divided into equal parts, and the number of parts."""
+        # parts in which the fastest mode turns by MAX_PHASE at most
         phase_per_step = float(frequencies(self.system)[-1]) * self.step
         parts = int(np.clip(np.ceil(phase_per_step / MAX_PHASE), MIN_PARTS, MAX_PARTS))
         return replace(self, step=self.step / parts, integrator=Exact()), parts
@@ -219,12 +210,7 @@ class LinearFlow(Flow):
         return truth, np.abs(self.values(points) - truth)
 
     def _march(self, points: Array, *, derivatives: bool) -> Jet:
-        """Return trajectories x[k+1] = T x[k] + G load[k] of the outputs, V = (S, T, outputs).
-
-        Args:
-            points: Uncertain parameters, shape (S, d), in SI units.
-            derivatives: Whether to differentiate by them.
-        """
+        """Return outputs of x[k+1] = T x[k] + G load[k] at points (S, d), V = (S, T, outputs)."""
         matrices, rows = evaluate(self.system, self.names, points, derivatives=derivatives)
         loads, has_ground = list(histories(self.system).values()), self.system.ground is not None
         h, steps, load = self.step, len(self.time) - 1, None

@@ -55,10 +55,7 @@ class Midpoint:
     def step_map(self, matrices: Matrices, step: float, pushes: Jet) -> StepMap:
         """Return the map of one step, whose velocities are M⁻¹ times the discrete momenta.
 
-        Args:
-            matrices: M, D and K at S parameter sets.
-            step: Length h of a step, in s.
-            pushes: Accelerations by a unit of each load, V = (S, n, L).
+        `pushes` are accelerations by a unit of each load, V = (S, n, L).
         """
         m, h = matrices, step
         inertia, spring = m.mass * (1 / h) + m.damping * 0.5, m.stiffness * (h / 4)
@@ -72,7 +69,7 @@ class Midpoint:
         upper = concatenate([q_by_q, q_by_v], -1)
         lower = concatenate([(q_by_q - eye) * (2 / h), q_by_v * (2 / h) - eye], -1)
         load = concatenate([q_by_load, q_by_load * (2 / h)], -2)
-        return StepMap(concatenate([upper, lower], -2), load)
+        return StepMap(transfer=concatenate([upper, lower], -2), load=load)
 
 
 @dataclass(frozen=True)
@@ -92,7 +89,7 @@ class RungeKutta4:
     stability_limit: ClassVar[float] = 2 * 2**0.5
 
     def step_map(self, matrices: Matrices, step: float, pushes: Jet) -> StepMap:
-        """The map of one step: the exponential series up to h⁴."""
+        """Return the map of one step, by the series of exp(A h) up to h⁴."""
         z = loaded_flow(matrices, step, pushes) * step
         z2 = z @ z
         return split(
@@ -118,13 +115,13 @@ class Exact:
     stability_limit: ClassVar[float] = inf
 
     def step_map(self, matrices: Matrices, step: float, pushes: Jet) -> StepMap:
-        """The map of one step."""
+        """Return the exact map of one step for loads that are linear in it."""
         flow = exponential(loaded_flow(matrices, step, pushes) * step)
         return split(flow, pushes.value.shape[-1])
 
 
 def exponential(z: Jet) -> Jet:
-    """Matrix exponential with derivatives, V = (..., N, N)."""
+    """Return the matrix exponential with derivatives, V = (…, N, N), by scaling and squaring."""
     norm = float(np.abs(z.value).sum(-2).max(initial=0.0))
     squarings = max(0, ceil(log2(norm / 0.25))) if norm > 0 else 0
     z = z * 0.5**squarings
@@ -139,15 +136,10 @@ def exponential(z: Jet) -> Jet:
 
 
 def loaded_flow(m: Matrices, step: float, pushes: Jet) -> Jet:
-    """Return the state matrix extended by L loads and their rises in a step.
+    """Return the state matrix of [q; v; load; rise], shape (S, 2n + 2L, 2n + 2L).
 
-    Its exponential over a step maps [q; v; load; rise] to their values one step later, for loads
-    that are linear in the step. Shape (S, 2n + 2L, 2n + 2L).
-
-    Args:
-        m: The structure.
-        step: Length of a step, in s.
-        pushes: Accelerations by a unit of each load, V = (S, n, L).
+    Its exponential over a step is the map of a step in which each of L loads is linear, with its
+    rise. `pushes` are accelerations by a unit of each load, V = (S, n, L).
     """
     flow = state_matrix(m)
     n, count = pushes.value.shape[-2:]
@@ -167,10 +159,8 @@ def loaded_flow(m: Matrices, step: float, pushes: Jet) -> Jet:
 
 
 def split(extended: Jet, count: int) -> StepMap:
-    """Return the step map of a propagator of states, `count` loads and their rises in a step.
-
-    Columns of loads and rises become columns of the loads at the beginning and the end of a step.
-    """
+    """Return the step map of a propagator of states, `count` loads and their rises in a step."""
+    # a load f at the beginning and f + rise at the end
     n = extended.value.shape[-1] - 2 * count
     old, rise = extended[..., :n, n : n + count], extended[..., :n, n + count :]
     return StepMap(extended[..., :n, :n], concatenate([old - rise, rise], -1))

@@ -24,7 +24,7 @@ compiled = njit(error_model="numpy", cache=True)
 
 @compiled
 def operation(number: int, x: float, y: float) -> float:
-    """Value of an operation of `tape.OPERATIONS`; one of a single operand leaves y out."""
+    """Return operation `number` of `tape.OPERATIONS` on x and y; functions of one ignore y."""
     if number == 0:
         return x + y
     if number == 1:
@@ -48,11 +48,9 @@ def operation(number: int, x: float, y: float) -> float:
 
 @compiled
 def evaluate(tape: Tape, arguments: Array, out: Array) -> None:
-    """Write the values of a tape's m expressions at arguments (K,) to `out`.
-
-    A tape is code (L, 3) of operations and their two operands, the m places of the results, and
-    the places themselves: arguments, then one for the result of each operation.
-    """
+    """Write the values of a tape's m expressions at arguments (K,) to `out`."""
+    # operations with the slots of their operands (L, 3), slots of results (m,), and all slots:
+    # arguments first, then one for each operation
     code, results, slots = tape
     for k in range(len(arguments)):
         slots[k] = arguments[k]
@@ -66,12 +64,8 @@ def evaluate(tape: Tape, arguments: Array, out: Array) -> None:
 def chain_rule_first(flat: Array, m: int, a: int, inner1: Array, out1: Array) -> None:
     """Write first derivatives of m functions f by d inputs to `out1` (d, m), by the chain rule.
 
-    Args:
-        flat: Values (m,) and derivatives (m, a) of f by its a variables, one after the other.
-        m: Number of functions.
-        a: Number of variables.
-        inner1: First derivatives of the variables by the inputs, shape (d, a).
-        out1: Written.
+    `flat` holds f (m,) and its derivatives (m, a) by its variables, one after the other; `inner1`
+    (d, a) are first derivatives of the variables by the inputs.
     """
     for i in range(len(inner1)):
         for c in range(m):
@@ -87,14 +81,8 @@ def chain_rule_second(
 ) -> None:
     """Write derivatives of m functions f by d inputs to `out1` (d, m) and `out2` (d, d, m).
 
-    Args:
-        flat: f (m,) and derivatives (m, a), (m, a, a) by its variables, one after the other.
-        m: Number of functions.
-        a: Number of variables.
-        inner1: First derivatives of the variables by the inputs, shape (d, a).
-        inner2: Their second derivatives, shape (d, d, a).
-        out1: Written: first derivatives of the functions.
-        out2: Written: second ones.
+    `flat` holds f (m,) and its derivatives (m, a), (m, a, a) by its variables, one after the other;
+    `inner1` (d, a) and `inner2` (d, d, a) are derivatives of the variables by the inputs.
     """
     chain_rule_first(flat, m, a, inner1, out1)
     d, hessian_row, hessian_at = len(inner1), np.empty(a), m + m * a
@@ -113,10 +101,7 @@ def chain_rule_second(
 
 @compiled
 def solve(matrix: Array, b: Array) -> None:
-    """Overwrite right-hand sides b (n, m) with the solutions of A x = b, A (n, n) unchanged.
-
-    Gaussian elimination with row exchanges.
-    """
+    """Overwrite b (n, m) with the solutions x of A x = b by elimination with row exchanges."""
     n, m, A = len(matrix), b.shape[1], matrix.copy()
     for k in range(n):
         pivot = k
@@ -142,16 +127,10 @@ def solve(matrix: Array, b: Array) -> None:
 
 @compiled
 def solve_step(newton: Tape, n: int, arguments: Array, pi: Array, flat: Array) -> bool:
-    """Solve for the coordinates after a step by Newton's method; return False if it fails.
+    """Solve for the n coordinates after a step by Newton's method; return False if it fails.
 
-    Args:
-        newton: Tape of the momenta before the step (n) and their derivatives by the coordinates
-            after it (n, n).
-        n: Number of coordinates.
-        arguments: Arguments of the tape; the first n, the coordinates after the step, are a guess
-            that is overwritten with the solution.
-        pi: Momenta before the step, shape (n,).
-        flat: Work space, shape (n + n²,).
+    Tape `newton` gives the momenta before the step, to equal `pi`, and their derivatives by these
+    coordinates: the first `arguments`, a guess, which is overwritten. `flat` is work space.
     """
     residual, jacobian = np.empty((n, 1)), np.empty((n, n))
     for _ in range(ITERATIONS):
@@ -178,15 +157,9 @@ def midpoint_step(
 ) -> bool:
     """Advance a state by one step of the midpoint rule, in place; return False if it fails.
 
-    Args:
-        newton: Tape of the momenta before the step and their derivatives, as of `solve_step`.
-        step: Tape of the momenta before and after the step, with derivatives where d > 0.
-        n: Number of coordinates.
-        p: Parameters, the d inputs first.
-        h: Length of the step, in s.
-        x: Coordinates and momenta, shape (2n,).
-        x1: First derivatives by the inputs, shape (d, 2n).
-        x2: Second ones, shape (d, d, 2n).
+    The state is n coordinates and momenta, x (2n,), with derivatives x1 (d, 2n) and x2 (d, d, 2n)
+    by d inputs, the first of the parameters p. Tape `newton` gives the momenta before the step, as
+    in `solve_step`; `step` the momenta before and after it, with derivatives where d > 0.
     """
     d, m, n_parameters = len(x1), 2 * n, len(p)
     a = m + d
@@ -209,17 +182,12 @@ def midpoint_step(
 
 @compiled
 def step_derivatives(flat: Array, n: int, x1: Array, x2: Array) -> None:
-    """Advance the derivatives of a state by the inputs by one midpoint step, in place.
+    """Advance derivatives x1 (d, 2n) and x2 (d, d, 2n) of a state by one midpoint step, in place.
 
-    The new coordinates are given implicitly by the momenta before the step, of Jacobian J by them:
-    one linear system with J gives their first derivatives, another one the second derivatives.
-
-    Args:
-        flat: Momenta before and after the step, 2n values, with first and second derivatives by new
-            and old coordinates and the inputs, one after the other.
-        n: Number of coordinates.
-        x1: First derivatives of the state (coordinates, momenta), shape (d, 2n).
-        x2: Second ones, shape (d, d, 2n).
+    `flat` holds the momenta before and after the step, with first and second derivatives by new and
+    old coordinates and the inputs. The momenta before the step, whose Jacobian by the new
+    coordinates is J, determine these: one linear system with J gives their first derivatives,
+    another one the second ones.
     """
     d, m = len(x1), 2 * n
     a = m + d

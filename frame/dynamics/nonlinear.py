@@ -56,13 +56,10 @@ class LagrangianFlow(Flow):
 
     @cached_property
     def _expressions(self) -> tuple[Expressions, Expressions, Expressions]:
-        """SymPy expressions of a step, of the outputs and of the start, each with its symbols.
+        """SymPy expressions, each with the symbols to differentiate by, and others.
 
-        Symbols are those to differentiate by, and others.
-
-        1. Momenta π at both ends of a midpoint step: with L_q, L_v and F at the mean of both
-           coordinates and at the velocity (q[k+1] − q[k])/h, they are π[k] = L_v − h/2 (L_q + F)
-           and π[k+1] = L_v + h/2 (L_q + F), functions of q[k+1], q[k], parameters and h.
+        1. Momenta at both ends of a step, π[k] = L_v − h/2 (L_q + F) and π[k+1] = L_v + h/2 (L_q +
+           F), by q[k+1], q[k] and inputs, with the mean of q and the velocity (q[k+1] − q[k])/h.
         2. Outputs of a state (q, π) (eq. 18).
         3. The initial state (q, π).
         """
@@ -145,12 +142,8 @@ def flow_of(
 ) -> Flow:
     """Return the flow that computes trajectories of a linear structure or a Lagrangian system.
 
-    Args:
-        model: The structure.
-        names: Its uncertain parameters.
-        duration: Length of the motion, in s.
-        step: Distance of nodes and length of a step, in s.
-        integrator: Time stepping or its name; Lagrangian systems take "midpoint" alone.
+    `names` are the uncertain parameters; duration and step are in s. Lagrangian systems take the
+    integrator "midpoint" alone.
 
     Raises:
         RefusedError: The structure has no such parameter or integrator.

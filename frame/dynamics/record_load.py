@@ -162,10 +162,9 @@ def parts_per_step(fastest: float, step: float) -> int:
 
 
 def linear_load(history: History, step: float, count: int) -> Array:
-    """Loads at both ends of every step, shape (count, 2), as m/s².
+    """Return the best straight line through a load in each step by its end values, (count, 2).
 
-    They are those of the straight line with the record's impulse and first moment in the step,
-    which is the record where that is linear.
+    It has the load's impulse and first moment in the step, and is the load where that is linear.
     """
-    level, tilt = Segments(history, step, count).moments(step, count, 2).T / step
-    return np.stack([level + 3 * tilt, level - 3 * tilt], -1)
+    mean, tilt = Segments(history, step, count).moments(step, count, 2).T / step
+    return np.stack([mean + 3 * tilt, mean - 3 * tilt], -1)

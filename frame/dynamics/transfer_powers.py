@@ -23,18 +23,9 @@ def exact_response(
 ) -> tuple[StepMap, Array]:
     """Return the exact map of one step x[k+1] = T x[k] + G load[k], and load[k] of all steps.
 
-    Duhamel's integral over a step is a rule with Q points for each load: G holds exp(A τ) b at the
-    points τ, and load[k] the rule's weights.
-
-    Args:
-        matrices: The structure at S parameter sets, of state matrix A.
-        pushes: Accelerations by a unit of each load, V = (S, n, L).
-        loads: The L loads.
-        step: Length of a step, in s.
-        steps: Number of steps.
-
-    Returns:
-        T and G, V = (S, 2n, 2n) and (S, 2n, L Q), and the loads, shape (steps, L Q).
+    Duhamel's integral over a step is a rule with Q points for each of L loads: G holds exp(A τ) b
+    at the points τ, V = (S, 2n, L Q), and load[k] the rule's weights, shape (steps, L Q). A is the
+    state matrix, and b = [0; pushes] the accelerations by a unit of each load.
     """
     flow = state_matrix(matrices)
     fastest = float(np.abs(np.linalg.eigvals(flow.value)).max())

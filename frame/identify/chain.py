@@ -80,10 +80,10 @@ class Chain:
         Returns:
             Two arrays of shape (2, n), stiffness first.
         """
-        rising = self.powers > 0
-        ends = np.where(rising, self.powers * lower, self.powers * upper).sum(-1)
-        tops = np.where(rising, self.powers * upper, self.powers * lower).sum(-1)
-        return ends, tops
+        increases = self.powers > 0
+        lower_bound = np.where(increases, self.powers * lower, self.powers * upper).sum(-1)
+        upper_bound = np.where(increases, self.powers * upper, self.powers * lower).sum(-1)
+        return lower_bound, upper_bound
 
 
 def chain_modes(stiffness: Array, mass: Array) -> tuple[Array, Array]:
@@ -104,7 +104,7 @@ def chain_modes(stiffness: Array, mass: Array) -> tuple[Array, Array]:
 
 
 def eigenvalue_ranges(model: Chain, lower: Array, upper: Array) -> tuple[Array, Array]:
-    """Return proved least and greatest squared angular frequencies over a box, each (n,).
+    """Return proved bounds of squared angular frequencies over a box, lower and upper, (n,) each.
 
     They rise with every stiffness and fall with every mass, so that two corners give them.
 
@@ -117,5 +117,5 @@ def eigenvalue_ranges(model: Chain, lower: Array, upper: Array) -> tuple[Array, 
     stiffness = model.stiffness * np.exp(np.stack([low[0], high[0]]))
     mass = model.mass * np.exp(np.stack([high[1], low[1]]))
     values, _ = chain_modes(stiffness, mass)
-    slack = ROUND_OFF * values[:, -1:] * values.shape[1]
-    return (values - slack)[0], (values + slack)[1]
+    rounding = ROUND_OFF * values[:, -1:] * values.shape[1]
+    return (values - rounding)[0], (values + rounding)[1]

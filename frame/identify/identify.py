@@ -18,7 +18,7 @@ import numpy as np
 from alphacut.frame.identify.chain import Chain, eigenvalue_ranges
 from alphacut.frame.identify.measured import MeasuredMode, ModeCut
 from alphacut.frame.identify.relaxation import enclosure
-from alphacut.frame.identify.samples import inner_point, walk
+from alphacut.frame.identify.samples import inner_point, random_walks
 from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.fuzzy.arrays import Array
@@ -62,11 +62,9 @@ class Evidence:
     def joint(self) -> JointRule | None:
         """Rule by which the claims hold together; None where there is none."""
         names = tuple(name for name, x in self.numbers.items() if isinstance(x, ClaimedNumber))
-        return (
-            JointRule(names, False, "parameter of the measured frame", named=True)
-            if names
-            else None
-        )
+        if not names:
+            return None
+        return JointRule(names, False, "parameter of the measured frame", named=True)
 
     def cut(self, number: FuzzyNumber, alpha: float) -> Cut:
         """Return the α-cut of a number, of a claim at the level where all claims hold jointly."""
@@ -92,9 +90,9 @@ class Evidence:
         columns = []
         for mode, cut in zip(self.measured, modes, strict=True):
             shape = vectors[:, :, mode.mode - 1]
-            unit = shape[:, mode.reference - 1]
+            reference = shape[:, mode.reference - 1]
             columns.append((values[:, mode.mode - 1], cut.low, cut.high))
-            columns += [(shape[:, z - 1] / unit, *cut.shape[z]) for z in mode.shape]
+            columns += [(shape[:, z - 1] / reference, *cut.shape[z]) for z in mode.shape]
         measured, low, high = (np.array(part) for part in zip(*columns, strict=True))
         half = np.maximum((high - low) / 2, 1e-12 * np.abs(high))
         return np.asarray(np.maximum(low - measured.T, measured.T - high) / half)
@@ -140,8 +138,8 @@ class Identified:
     def numbers(self) -> dict[str, FuzzyNumber]:
         """Identified parameters as fuzzy numbers, by name, for an envelope.
 
-        Their cuts are the sides of the boxes; below the lowest level the prior's support holds.
-        Claims of the measurement are joined: they hold together.
+        Their cuts are the sides of the boxes; below the lowest level they are the prior's support.
+        Where priors or measurements are claims, so are the numbers, with one joint confidence.
         """
         rule, priors = self.evidence.joint, self.evidence.prior
         numbers: dict[str, FuzzyNumber] = {}
@@ -151,11 +149,10 @@ class Identified:
             if not isinstance(priors[name], ClaimedNumber):
                 alpha, decided = np.append(0.0, alpha), 0.0
                 ends = np.column_stack([priors[name].support, ends])
-            steps = outer_steps(tuple(alpha), tuple(ends[0]), tuple(ends[1]))
-            claim = CoverageClaim("" if rule is None else rule.means, self.claim.conditions)
-            numbers[name] = (
-                steps if rule is None else ClaimedNumber(steps, claim, decided, joint=rule)
-            )
+            numbers[name] = steps = outer_steps(tuple(alpha), tuple(ends[0]), tuple(ends[1]))
+            if rule is not None:
+                claim = CoverageClaim(rule.means, self.claim.conditions)
+                numbers[name] = ClaimedNumber(steps, claim, decided, joint=rule)
         return numbers
 
     @property
@@ -168,8 +165,8 @@ class Identified:
     def samples(self, number: int = 200, *, row: int = 0, seed: int = 0) -> Array:
         """Return points (number, d) of the set at level `alpha[row]`, about uniform in logarithms.
 
-        Their modes lie in all measured cuts. The walks may leave the box by `LEEWAY`, so that the
-        points test what is proved.
+        The set is that of parameters whose modes lie in all measured cuts. The walks may leave the
+        box that is proved to hold it by `LEEWAY`, so that the points test the proof.
 
         Args:
             number: Number of points.
@@ -177,10 +174,10 @@ class Identified:
             seed: Seed of the walks.
 
         Raises:
-            FailedError: No point of the set was met, or one lies outside the box or has a frequency
-                outside the predictions: the proof is wrong.
+            FailedError: No point of the set was found, or one lies outside the box or has a
+                frequency outside the predictions: the proof is wrong.
         """
-        evidence, level, chance = self.evidence, float(self.alpha[row]), np.random.default_rng(seed)
+        evidence, level, rng = self.evidence, float(self.alpha[row]), np.random.default_rng(seed)
         nominal, modes = evidence.chain.nominal, evidence.modes(level)
         cuts = np.array([evidence.cut(prior, level) for prior in evidence.prior.values()]).T
 
@@ -191,29 +188,29 @@ class Identified:
             return evidence.violation(parameters_of(logs), modes)
 
         box = Ends(np.log(self.lower[row] / nominal), np.log(self.upper[row] / nominal))
-        start = inner_point(violation, box, chance)
+        start = inner_point(violation, box, rng)
         if start is None:
             what = f"no parameters with modes in all measured cuts at α = {level:g} were met"
             raise FailedError(what, "take samples of a lower level, or the box alone")
         leeway = LEEWAY * (box.upper - box.lower)
         wider = Ends(box.lower - leeway, box.upper + leeway)
-        points = parameters_of(walk(violation, start, wider, number, chance))
+        points = parameters_of(random_walks(violation, start, wider, number, rng))
         self._require_contained(points, row)
         return points
 
     def _require_contained(self, points: Array, row: int) -> None:
-        """Raise if a point of the set (S, d) lies outside the box or its predicted frequencies.
+        """Refuse points (S, d) outside the box of a level or its predicted frequencies.
 
         Raises:
-            FailedError: One does.
+            FailedError: There is one.
         """
-        chain, slack = self.evidence.chain, 1 + ROUND_OFF
-        inside = (points * slack >= self.lower[row]) & (points <= self.upper[row] * slack)
+        chain, factor = self.evidence.chain, 1 + ROUND_OFF  # for rounding
+        in_box = (points * factor >= self.lower[row]) & (points <= self.upper[row] * factor)
         logs = [np.log(ends[row] / chain.nominal) for ends in (self.lower, self.upper)]
-        least, most = eigenvalue_ranges(chain, *logs)
+        lower, upper = eigenvalue_ranges(chain, *logs)
         values = chain.modes(points)[0]
-        predicted = (values * slack >= least) & (values <= most * slack)
-        for what, holds in (("parameters", inside), ("squared frequencies", predicted)):
+        are_predicted = (values * factor >= lower) & (values <= upper * factor)
+        for what, holds in (("parameters", in_box), ("squared frequencies", are_predicted)):
             if not holds.all():
                 sample = points[np.argmin(holds.all(1))]
                 pairs = zip(self.names, map(float, sample), strict=True)
@@ -279,21 +276,18 @@ def _require_input(
     Raises:
         RefusedError: There is one.
     """
-    levels, floors = np.asarray(alpha, float), frame.floors
-    rising = levels.ndim == 1 and len(levels) > 0 and bool((np.diff(levels) > 0).all())
-    least = min(widest(number).lower for number in prior.values())
-    numbers = [mode.mode for mode in measured]
-    most = max(
-        (floor for mode in measured for floor in (mode.mode, mode.reference, *mode.shape)),
-        default=0,
-    )
-    ordered = bool(numbers) and sorted(set(numbers)) == numbers
-    inside = rising and levels[0] > 0 and levels[-1] <= 1
-    require(inside, "identify.alpha", value=list(alpha), allowed="rising in (0, 1]")
-    require(ordered, "identify.modes", value=numbers, allowed="one or more, rising")
-    allowed = f"modes and floors from 1 to {floors}"
-    require(most <= floors, "identify.modes", value=most, allowed=allowed)
-    require(least > 0, "identify.parameters", value=least, allowed="positive priors")
+    levels, n_floors = np.asarray(alpha, float), frame.floors
+    is_rising = levels.ndim == 1 and len(levels) > 0 and bool((np.diff(levels) > 0).all())
+    in_range = is_rising and levels[0] > 0 and levels[-1] <= 1
+    require(in_range, "identify.alpha", value=list(alpha), allowed="rising in (0, 1]")
+    mode_numbers = [mode.mode for mode in measured]
+    are_rising = bool(mode_numbers) and sorted(set(mode_numbers)) == mode_numbers
+    require(are_rising, "identify.modes", value=mode_numbers, allowed="one or more, rising")
+    largest = max(x for mode in measured for x in (mode.mode, mode.reference, *mode.shape))
+    allowed = f"modes and floors from 1 to {n_floors}"
+    require(largest <= n_floors, "identify.modes", value=largest, allowed=allowed)
+    smallest = min(widest(number).lower for number in prior.values())
+    require(smallest > 0, "identify.parameters", value=smallest, allowed="positive priors")
 
 
 def _boxes(evidence: Evidence, levels: Array) -> tuple[list[tuple[Array, Array]], float]:
@@ -317,15 +311,10 @@ def _boxes(evidence: Evidence, levels: Array) -> tuple[list[tuple[Array, Array]]
 
 
 def _outward(logs: Array, evidence: Evidence, sign: int) -> Array:
-    """Return parameters (A, d) from their logarithms, rounded outwards but within the priors.
+    """Return box ends (A, d) from logarithms of them over nominal values, within the priors.
 
-    Args:
-        logs: Logarithms of the ends over nominal values, shape (A, d).
-        evidence: The priors.
-        sign: 1 for upper ends, −1 for lower ones.
+    They are rounded outwards: up for upper ends, of `sign` 1, and down for lower ones, of −1.
     """
-    ends = evidence.chain.nominal * np.exp(logs) * (1 + sign * 4e-16)
-    limits = np.array([widest(x) for x in evidence.prior.values()])
-    return np.asarray(
-        np.minimum(ends, limits[:, 1]) if sign > 0 else np.maximum(ends, limits[:, 0])
-    )
+    ends = evidence.chain.nominal * np.exp(logs) * (1 + sign * 4e-16)  # rounding of exp
+    lower, upper = np.array([widest(x) for x in evidence.prior.values()]).T
+    return np.asarray(np.minimum(ends, upper) if sign > 0 else np.maximum(ends, lower))

@@ -42,16 +42,16 @@ class MeasuredMode:
     reference: int = 0
 
     def __post_init__(self) -> None:
-        """Refuse numbers of mode, floors and reference, and frequencies, that are not allowed."""
+        """Refuse a mode number, floors, a reference floor or a frequency that is not allowed."""
         floors, mode = [*self.shape], f"mode {self.mode}"
         require(self.mode >= 1, f"{mode}: number", value=self.mode, allowed="numbers from 1 on")
         are_positive = min(floors, default=1) >= 1
         require(are_positive, f"{mode}: floors", value=floors, allowed="numbers from 1 on")
         hertz, allowed = self.frequency.modal, "positive values in Hz"
         require(hertz > 0, f"{mode}: frequency", value=hertz, allowed=allowed)
-        is_apart = not floors or (self.reference >= 1 and self.reference not in floors)
+        fits = not floors or (self.reference >= 1 and self.reference not in floors)
         allowed = "a floor beside those of the shape"
-        require(is_apart, f"{mode}: reference", value=self.reference, allowed=allowed)
+        require(fits, f"{mode}: reference", value=self.reference, allowed=allowed)
 
     @property
     def quantities(self) -> dict[str, FuzzyNumber]:
@@ -62,7 +62,7 @@ class MeasuredMode:
         }
 
     def ranges(self, cut: Callable[[FuzzyNumber], Cut]) -> ModeCut:
-        """Return ranges of eigenvalue and amplitudes, from a function that cuts fuzzy numbers."""
+        """Return ranges of eigenvalue and amplitudes, given a function that cuts fuzzy numbers."""
         low, high = cut(self.frequency)
         shape = {floor: cut(number) for floor, number in self.shape.items()}
         if self.reference:
@@ -97,7 +97,7 @@ def measured_mode(
     frequency_deviation: float | None = None,
     shape_deviation: float | None = None,
 ) -> MeasuredMode:
-    """Return a mode from repeated measurements; claims are the means of normal laws.
+    """Return a mode from repeated measurements: mean values as fuzzy numbers with claims.
 
     Args:
         mode: Its number by rising frequency, from 1.
@@ -116,9 +116,9 @@ def measured_mode(
     values = np.asarray(frequencies, float)
     rows = {floor: np.asarray(row, float) for floor, row in (shapes or {}).items()}
     counts = [row.size for row in rows.values()]
-    as_many = values.ndim == 1 and not set(counts) - {values.size}
+    fits = values.ndim == 1 and not set(counts) - {values.size}
     allowed = f"{values.size} of each floor, as many as frequencies"
-    require(as_many, f"mode {mode}: amplitudes", value=counts, allowed=allowed)
+    require(fits, f"mode {mode}: amplitudes", value=counts, allowed=allowed)
     spread = None if frequency_deviation is None else frequency_deviation * float(values.mean())
     number = _mean(values, spread, f"mode {mode}: frequencies", "frequency_deviation")
     if not rows:
@@ -152,9 +152,9 @@ def _mean_ratio(ratios: Array, deviation: float | None, what: str, reference: in
     variance = _reference_variance(ratios, deviation)
     value, cure = f"{np.sqrt(variance):.2g} of its amplitude", "take means of several rows"
     key = f"{what}: scatter of floor {reference}"
-    clear = bool(np.isfinite(ratios).all()) and variance <= ROUGH**2
-    require(clear, key, value=value, allowed=f"values up to {ROUGH:g}", cure=cure)
-    # both amplitudes scatter; the last factor is above the second order's
+    is_small = bool(np.isfinite(ratios).all()) and variance <= ROUGH**2
+    require(is_small, key, value=value, allowed=f"values up to {ROUGH:g}", cure=cure)
+    # both amplitudes scatter; the last factor bounds the terms of second order from above
     combined = deviation and deviation * float(
         np.hypot(1, ratios.mean()) * np.sqrt(1 + 8 * variance)
     )
@@ -164,7 +164,7 @@ def _mean_ratio(ratios: Array, deviation: float | None, what: str, reference: in
 
 
 def _reference_variance(ratios: Array, deviation: float | None) -> float:
-    """Return the variance of the reference amplitude over its squared mean.
+    """Return the variance of the reference amplitude, relative to its squared mean.
 
     Without a known deviation it is estimated from the variance of the ratios (n,).
     """
@@ -193,10 +193,11 @@ def _mean(values: Array, deviation: float | None, what: str, key: str) -> Claime
         return from_data(values, "mean", law="normal")
     checked_number(f"{what}: {key}", deviation, positive=True)
     scatter = float(values.std(ddof=1)) if count > 1 else 0.0
-    explained = (count - 1) * (scatter / deviation) ** 2 <= chdtri(max(count - 1, 1), CHANCE)
+    # chi-squared test of the scatter against the deviation
+    is_plausible = (count - 1) * (scatter / deviation) ** 2 <= chdtri(max(count - 1, 1), CHANCE)
     value, allowed = f"{deviation:.3g}", f"values that explain the scatter, {scatter:.3g}"
     require(
-        explained,
+        is_plausible,
         f"{what}: {key} times the mean",
         value=value,
         allowed=allowed,

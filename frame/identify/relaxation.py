@@ -67,9 +67,9 @@ class LinearProgram:
         return self._proved(objective, multipliers)
 
     def empty(self) -> bool:
-        """Return True if no x of the box satisfies A x <= b, by proof.
+        """Return True if it is proved that no x in the box satisfies A x <= b.
 
-        Phase one: the least t with A x − t <= b is proved positive.
+        Phase one: the least t with A x − t <= b for some x is proved to be positive.
         """
         size = self.rows.shape[0]
         phase_one = LinearProgram(
@@ -87,11 +87,12 @@ class LinearProgram:
         It is yᵀb + min (c − Aᵀy)ᵀx over the box, the latter by the sign of each reduced cost.
         """
         reduced_costs = objective - self.rows.T @ multipliers
-        ends = np.where(reduced_costs > 0, reduced_costs * self.lower, reduced_costs * self.upper)
-        reach = np.maximum(np.abs(self.lower), np.abs(self.upper))
-        size = np.abs(multipliers) @ np.abs(self.right) + np.abs(objective) @ reach
-        size += (abs(self.rows).T @ np.abs(multipliers)) @ reach
-        return float(multipliers @ self.right + ends.sum() - ROUND_OFF * size)
+        terms = np.where(reduced_costs > 0, reduced_costs * self.lower, reduced_costs * self.upper)
+        largest_x = np.maximum(np.abs(self.lower), np.abs(self.upper))
+        # sum of the absolute values of all terms, in proportion to which they are rounded
+        size = np.abs(multipliers) @ np.abs(self.right) + np.abs(objective) @ largest_x
+        size += (abs(self.rows).T @ np.abs(multipliers)) @ largest_x
+        return float(multipliers @ self.right + terms.sum() - ROUND_OFF * size)
 
 
 @dataclass(eq=False)
@@ -154,8 +155,8 @@ class Rows:
     def program(self) -> LinearProgram:
         """Return the linear program of all variables and inequalities."""
         row, column, value = np.array(self.entries, float).reshape(-1, 3).T
-        shape, places = (len(self.right), len(self.lower)), (row.astype(int), column.astype(int))
-        rows = csr_array((value, places), shape=shape)
+        shape, indices = (len(self.right), len(self.lower)), (row.astype(int), column.astype(int))
+        rows = csr_array((value, indices), shape=shape)
         return LinearProgram(rows, np.array(self.right), np.array(self.lower), np.array(self.upper))
 
 
@@ -222,15 +223,15 @@ def enclosure(
             program = relaxation(chain, lower, upper, modes, amplitudes)
         if program is None:
             return None
-        before, ends = upper - lower, np.stack([lower, upper])
-        for at in np.flatnonzero(before > 0):
-            low, high = program.ends(program.parameters[at])
-            ends[:, at] = max(low, lower[at]), min(high, upper[at])
+        width, ends = upper - lower, np.stack([lower, upper])
+        for k in np.flatnonzero(width > 0):
+            low, high = program.ends(program.parameters[k])
+            ends[:, k] = max(low, lower[k]), min(high, upper[k])
         lower, upper = ends
         if (lower > upper).any():
             return None
-        wide = before > 0
-        if (1 - (upper - lower)[wide] / before[wide]).max(initial=0.0) < MIN_PROGRESS:
+        has_width = width > 0
+        if (1 - (upper - lower)[has_width] / width[has_width]).max(initial=0.0) < MIN_PROGRESS:
             break
     return lower, upper
 
@@ -251,20 +252,21 @@ def relaxation(
         modes: Ranges of the measured modes at a level.
         amplitudes: Known ends of amplitudes that were not measured, by mode and floor.
     """
-    over = _Chains(chain, lower, upper)
+    chains = _Chains(chain, lower, upper)
     shapes: dict[tuple[int, int], Linear] = {}
     for cut in modes:
-        low, high = max(cut.low, over.least[cut.mode - 1]), min(cut.high, over.most[cut.mode - 1])
+        k = cut.mode - 1
+        low, high = max(cut.low, chains.least[k]), min(cut.high, chains.most[k])
         if low > high:
             return None
-        over.require_frequency(cut)
-        ends = over.amplitudes(high, cut) if cut.shape else None
+        chains.require_frequency(cut)
+        ends = chains.amplitudes(high, cut) if cut.shape else None
         if ends is not None:
             amplitude_ends = {f: amplitudes.get((cut.mode, f), end) for f, end in ends.items()}
-            shape = {f: over.rows.variable(*amplitude_ends[f]) for f in sorted(amplitude_ends)}
+            shape = {f: chains.rows.variable(*amplitude_ends[f]) for f in sorted(amplitude_ends)}
             shapes |= {(cut.mode, f): shape[f] for f in shape if f not in cut.shape}
-            over.require_balance(shape, over.rows.variable(low / high, 1.0), high)
-    return Relaxation(over.rows.program(), tuple(over.logs), shapes)
+            chains.require_balance(shape, chains.rows.variable(low / high, 1.0), high)
+    return Relaxation(chains.rows.program(), tuple(chains.logs), shapes)
 
 
 class _Chains:
@@ -289,16 +291,16 @@ class _Chains:
     def require_balance(
         self, shape: Mapping[int, Linear], share: Linear, eigenvalue: float
     ) -> None:
-        """Add the balance of storey shears and inertia forces at each floor.
+        """Add the balance of shears and inertia forces at floors, T_z − T_(z+1) = λ m_z r_z.
 
         Args:
-            shape: Amplitude by floor.
+            shape: Amplitude r by floor.
             share: λ over its greatest value.
             eigenvalue: Greatest value of λ, in 1/s².
         """
         rows, chain, n = self.rows, self.chain, len(self.mass)
-        unit, below = float(chain.stiffness.mean()), {CONSTANT: 0.0}
-        shears = []
+        unit = float(chain.stiffness.mean())  # of all forces
+        shears, below = [], {CONSTANT: 0.0}  # the ground's amplitude
         for z in range(n):
             drift = total(shape[z + 1], below, -1.0)
             force = rows.product(self.stiffness[z], drift)
@@ -314,8 +316,8 @@ class _Chains:
     def amplitudes(self, eigenvalue: float, cut: ModeCut) -> dict[int, tuple[float, float]] | None:
         """Return the range of the amplitude of each floor; None if unmeasured ones have no bounds.
 
-        Floors between two measured ones are a chain between moved supports, whose matrix K − λ M is
-        positive definite while λ stays below its own least frequency.
+        Floors between two measured ones are a chain between moving supports. While λ is below its
+        least eigenvalue, K − λ M is positive definite and bounds its amplitudes by the supports'.
 
         Args:
             eigenvalue: Greatest value of λ, in 1/s².
@@ -330,16 +332,17 @@ class _Chains:
             floors = np.arange(pin, min(following, n + 1) - 1)  # from 0
             if not len(floors):
                 continue
-            soft = np.append(k[:, 0], 0.0)[np.append(floors, floors[-1] + 1)]
-            A = chain_matrix(soft[:-1]) - eigenvalue * np.diag(m[floors, 1])
-            A[-1, -1] += soft[-1]
+            # lower bound of K − λ M: least springs, the one above included, and greatest masses
+            springs = np.append(k[:, 0], 0.0)[np.append(floors, floors[-1] + 1)]
+            A = chain_matrix(springs[:-1]) - eigenvalue * np.diag(m[floors, 1])
+            A[-1, -1] += springs[-1]
             least = float(np.linalg.eigvalsh(A)[0]) * (1 - 1e-12)
             if least <= 0:
                 return None
-            above = k[following - 1, 1] * ends[following] if following <= n else 0.0
-            pulls = k[pin, 1] * ends[pin], above
-            reach = float(sum(pulls) if len(floors) == 1 else np.hypot(*pulls)) / least
-            amplitudes |= {int(floor) + 1: (-reach, reach) for floor in floors}
+            force_above = k[following - 1, 1] * ends[following] if following <= n else 0.0
+            forces = k[pin, 1] * ends[pin], force_above  # of both moving supports
+            largest = float(sum(forces) if len(floors) == 1 else np.hypot(*forces)) / least
+            amplitudes |= {int(floor) + 1: (-largest, largest) for floor in floors}
         return amplitudes
 
     def require_frequency(self, cut: ModeCut) -> None:

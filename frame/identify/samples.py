@@ -20,17 +20,17 @@ Violation = Callable[[Array], Array]
 """Distance of points (n, d) beyond each range of the set, (n, q), in half widths; <= 0 inside."""
 
 
-def inner_point(violation: Violation, box: Ends, chance: np.random.Generator) -> Array | None:
+def inner_point(violation: Violation, box: Ends, rng: np.random.Generator) -> Array | None:
     """Return a point (d,) at which no range is violated, by least squares; None if none is found.
 
     Args:
         violation: Violation of the ranges at points.
         box: Lower and upper ends of the box, shape (d,) each.
-        chance: Random number generator.
+        rng: Random number generator.
     """
     for start in range(STARTS):
-        share = chance.random(len(box.lower)) if start else 0.5
-        point = box.lower + (box.upper - box.lower) * share
+        unit_point = rng.random(len(box.lower)) if start else 0.5  # the middle first
+        point = box.lower + (box.upper - box.lower) * unit_point
         for margin in MARGINS:
             fitted = least_squares(
                 lambda x, margin=margin: np.maximum(violation(x[None])[0] + margin, 0.0),
@@ -44,8 +44,8 @@ def inner_point(violation: Violation, box: Ends, chance: np.random.Generator) ->
     return None
 
 
-def walk(
-    violation: Violation, start: Array, box: Ends, number: int, chance: np.random.Generator
+def random_walks(
+    violation: Violation, start: Array, box: Ends, number: int, rng: np.random.Generator
 ) -> Array:
     """Return points (number, d) of a set in a box, reached by random walks (hit and run).
 
@@ -59,24 +59,25 @@ def walk(
         start: A point of the set, shape (d,).
         box: Lower and upper corner of the box, shape (d,) each.
         number: Number of points.
-        chance: Random number generator.
+        rng: Random number generator.
     """
     points, width = np.tile(start, (max(number, WALKS), 1)), box.upper - box.lower
-    ends: Array = np.tile([[-1.0], [1.0]], len(points))
+    chord_ends: Array = np.tile([[-1.0], [1.0]], len(points))
     for step in range(STEPS):
-        direction = chance.standard_normal(points.shape) * width
+        direction = rng.standard_normal(points.shape) * width
         if step % 2:
-            direction = chance.permutation(points) - chance.permutation(points)
+            direction = rng.permutation(points) - rng.permutation(points)
         longest = np.abs(direction / np.where(width > 0, width, 1.0)).max(axis=1, keepdims=True)
         direction /= np.where(longest > 0, longest, 1.0)  # now as long as the box
-        (low, high), moved = ends, np.full(len(points), False)
+        (low, high), has_moved = chord_ends, np.full(len(points), False)
         for _ in range(TRIES):
-            share = chance.uniform(low, high)
-            candidate = points + share[:, None] * direction
+            position = rng.uniform(low, high)  # on the chord, 0 at the point itself
+            candidate = points + position[:, None] * direction
             is_inside = ((box.lower <= candidate) & (candidate <= box.upper)).all(axis=1)
-            hit = is_inside & (violation(candidate) <= 0).all(axis=1) & ~moved
-            points[hit], moved[hit] = candidate[hit], True
-            if moved.all():
+            is_accepted = is_inside & (violation(candidate) <= 0).all(axis=1) & ~has_moved
+            points[is_accepted], has_moved[is_accepted] = candidate[is_accepted], True
+            if has_moved.all():
                 break
-            low, high = np.where(share < 0, share, low), np.where(share < 0, high, share)
+            low = np.where(position < 0, position, low)
+            high = np.where(position < 0, high, position)
     return points[:number]

@@ -84,8 +84,8 @@ class Auto:
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
         """Return the envelope on all levels, by a proof if possible; its first note says why.
 
-        Proofs are tried first. Where their gap is too wide, a search attains larger values inside
-        the proved bounds, or estimates the envelope; without oscillating modes the follower does.
+        Where the gap is too wide, a search attains larger values inside the proved bounds, or
+        estimates the envelope; without oscillating modes the follower does.
         """
         follower = ImprovedFollower(0.7 * flow.tolerance(self.tolerance), seed=self.seed)
         if not isinstance(flow.flow, LinearFlow):
@@ -129,11 +129,7 @@ class Auto:
         """Yield the proofs to try, the one with less forecast work first.
 
         The branch and bound is yielded twice where both can be tried: on the box as it is, and with
-        parts.
-
-        Args:
-            flow: The motion and its boxes.
-            reasons: Texts to which the refusals of proofs are appended.
+        parts. Refusals of proofs are appended to `reasons`.
         """
         tolerance, inputs = self.tolerance or DEFAULT_TOLERANCE, len(flow.boxes.names)
         proof = Proof(None, self.tolerance, BOXES, workers=self.workers)
@@ -146,7 +142,7 @@ class Auto:
             dual = replace(dual, gap=max(tolerance, FINEST), peaks=max(tolerance, FINEST))
         elif self.tolerance:
             dual = replace(dual, peaks=WIDE)
-        works = list[tuple[float, Proof | DualProof]]()
+        works = list[tuple[float, Proof | DualProof]]()  # forecast work of each method
         for method in (proof, dual) if inputs <= MOST_PARAMETERS else (dual,):
             try:
                 with refusing():
@@ -154,11 +150,13 @@ class Auto:
             except UnprovedError as error:
                 reasons.append(f"{method.name}: {error}")
         if self.tolerance and not self.peaks and len(works) == 2:
-            works = [(0.0, proof), works[1]]  # branch and bound has one gap at all nodes: first
+            works = [(0.0, proof), works[1]]  # first, since it has the same gap at all nodes
         works.sort(key=lambda pair: pair[0])
-        for _, method in works:
-            yield replace(proof, parts=1) if method is proof and len(works) == 2 else method
-        if len(works) == 2 and works[0][1] is proof:
+        methods = [method for _, method in works]
+        without_parts = replace(proof, parts=1)
+        for method in methods:
+            yield without_parts if method is proof and len(methods) == 2 else method
+        if len(methods) == 2 and methods[0] is proof:
             yield proof
 
     def _is_close(self, proved: Envelope, flow: UnitFlow) -> bool:

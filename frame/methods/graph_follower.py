@@ -114,8 +114,14 @@ class GraphFollower:
         storage.add(flow.boxes.to_unit(flow.boxes.modal)[None])
         levels = len(flow.boxes.alpha)
         shape = (levels, *storage.top.shape)
-        best, guess, new = (np.full(shape, start) for start in (0, 0, -1))
-        out = Followed(np.empty(shape), best, np.zeros(shape), guess, new, storage)
+        out = Followed(
+            bounds=np.empty(shape),
+            best=np.full(shape, 0),
+            predicted_gain=np.zeros(shape),
+            guess=np.full(shape, 0),
+            new=np.full(shape, -1),
+            storage=storage,
+        )
         for done, level in enumerate(reversed(range(levels))):
             self._sweep(out, level, subprogress(progress, done / levels, (done + 1) / levels))
             # post-processing: the best of all graphs at every node (Fig. 24)
@@ -123,23 +129,22 @@ class GraphFollower:
         return out
 
     def _sweep(self, out: Followed, level: int, progress: Progress) -> None:
-        """Compute graphs (trajectories) where a gain is predicted, from the first node to the last.
+        """Compute new graphs (trajectories) node by node where a gain over the bounds is predicted.
 
-        It sets `guess`, `new` and `predicted_gain` of the level in `out`.
+        They are added to the storage; `guess`, `new` and `predicted_gain` of the level are set.
         """
         storage, box = out.storage, out.storage.flow.boxes.unit(level)
         if not (box[1] > box[0]).any():
             return
         nodes = out.bounds.shape[1]
         predicted, target = storage.top.copy(), np.zeros((*storage.top.shape, len(box[0])))
-        self._predict(
-            storage, tuple(np.indices(predicted.shape).reshape(3, -1)), box, predicted, target
-        )
+        all_places = tuple(np.indices(predicted.shape).reshape(3, -1))
+        self._predict(storage, all_places, box, predicted, target)
         for node in range(nodes):
             progress(node / nodes)
             out.guess[level, node] = storage.best[node]
             points = self._new_graphs(out, level, node, predicted, target)
-            if points:
+            if points:  # predict anew where they are now the best graphs
                 improved = storage.add(np.array(points))
                 later = tuple(indices[improved[0] > node] for indices in improved)
                 self._predict(storage, later, box, predicted, target)
@@ -152,14 +157,8 @@ class GraphFollower:
         """Return the inputs whose trajectories (graphs) are to be computed for bounds at a node.
 
         They are those, in unit coordinates (d,), at which a bound is predicted to gain more than
-        the tolerance. The numbers that the storage will give them are written to `out.new`.
-
-        Args:
-            out: Bounds and trajectories so far.
-            level: Row of the level.
-            node: Index of the node.
-            predicted: Values that Taylor models predict, shape (T, m, 2).
-            target: Their unit coordinates, shape (T, m, 2, d).
+        the tolerance. The numbers that the storage will give them are written to `out.new`. Taylor
+        models predict values (T, m, 2) at targets (T, m, 2, d).
         """
         storage, points = out.storage, list[Array]()
         limit = self.tolerance * storage.flow.scale[:, None]

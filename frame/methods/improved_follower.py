@@ -110,11 +110,8 @@ class ImprovedFollower:
     def _error(self, first: PassBounds, second: PassBounds, missed: Array, scale: Array) -> Array:
         """Return the estimated error of the better bounds of two passes, shape (A, T, m).
 
-        Args:
-            first: Bounds of one pass.
-            second: Bounds of the other.
-            missed: Excess of an independent sample, shape (A, m).
-            scale: Factor from a tolerance to the allowed error, shape (m,).
+        `missed` (A, m) is the excess of an independent sample, `scale` (m,) the factor from a
+        tolerance to the allowed error.
         """
         gains, limit = [first.predicted_gain, second.predicted_gain], self.tolerance * scale
         small = [np.where(gain <= limit[:, None], gain, 0.0) for gain in gains]
@@ -131,7 +128,7 @@ class ImprovedFollower:
         d, places = len(flow.boxes.names), storage.top.size // 2
         bounds, gains = np.zeros((2, levels, *storage.top.shape))
         out = PassBounds(bounds, np.zeros((*bounds.shape, d)), gains, storage)
-        at_once = int(np.clip(MAX_NUMBERS / (places * (1 + d + d * d)), 1, BATCH))
+        chunk_size = int(np.clip(MAX_NUMBERS / (places * (1 + d + d * d)), 1, BATCH))
         for done, level in enumerate(reversed(range(levels))):
             search = _Level(storage, flow.boxes.unit(level), self.tolerance)
             tick = subprogress(progress, done / levels, (done + 1) / levels)
@@ -139,7 +136,7 @@ class ImprovedFollower:
             limit, first = self.budget * (done + 1) // levels, len(storage)
             points = self._start(storage, *search.box)[: max(1, limit - len(storage))]
             while len(points):
-                for chunk in np.array_split(points, -(-len(points) // at_once)):
+                for chunk in np.array_split(points, -(-len(points) // chunk_size)):
                     search.predict(storage.add(chunk))
                     tick(min(1.0, (len(storage) - first) / max(1, limit - first)))
                 points = search.proposals(min(BATCH, limit - len(storage)))
@@ -149,18 +146,16 @@ class ImprovedFollower:
         return out
 
     def _start(self, storage: Storage, lower: Array, upper: Array) -> Array:
-        """Return the first points of a level, nominal and spread ones, in unit coordinates, (S, d).
-
-        A box without width needs the nominal point alone, once for all levels.
-        """
+        """Return the first unit coordinates of a level, nominal and spread ones, shape (S, d)."""
         boxes = storage.flow.boxes
-        modal = boxes.to_unit(boxes.modal)[None]
-        if not (upper > lower).any():
-            return modal[: 0 if len(storage) else 1]
+        nominal = boxes.to_unit(boxes.modal)[None]
+        if not (upper > lower).any():  # no other points, and none once it is stored
+            return nominal[:0] if len(storage) else nominal
         middle, half = (lower + upper) / 2, (upper - lower) / 2
+        # points of the sequence that no other level and no other seed takes
         skip = 1 + len(storage) + SEED_STEP * self.seed
         spread = chebyshev_points(len(lower), SPREAD, skip=skip)
-        return np.vstack([modal, middle + half * spread])
+        return np.vstack([nominal, middle + half * spread])
 
 
 @dataclass(frozen=True, eq=False)
@@ -228,10 +223,7 @@ class _Level:
 
 
 def smoothed_maximum(gap: Array) -> Array:
-    """Return the largest of values (A, T, m) over T/20 nodes around each node, same shape.
-
-    It is at least a tenth of the largest value over all nodes.
-    """
+    """Return the largest of values (A, T, m) over T/20 nodes around, at least a tenth of all."""
     from scipy.ndimage import maximum_filter1d
 
     near = maximum_filter1d(gap, 2 * (gap.shape[1] // 40) + 1, axis=1)

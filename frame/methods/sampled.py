@@ -54,12 +54,12 @@ class Sampled:
         start_time, levels = time.perf_counter(), len(flow.boxes.alpha)
         shape = (levels, len(flow.time), len(flow.outputs), 2)
         bounds, at = np.full(shape, -np.inf), np.zeros((*shape, len(flow.boxes.names)))
-        at_once = int(np.clip(MAX_NUMBERS / (shape[1] * shape[2]), 1, 256))
+        chunk_size = int(np.clip(MAX_NUMBERS / (shape[1] * shape[2]), 1, 256))
         for done, level in enumerate(reversed(range(levels))):
-            if level + 1 < levels:
+            if level + 1 < levels:  # what a narrower box attains
                 bounds[level], at[level] = bounds[level + 1], at[level + 1]
             points = self.points(*flow.boxes.unit(level))
-            chunks = np.array_split(points, -(-len(points) // at_once))
+            chunks = np.array_split(points, -(-len(points) // chunk_size))
             for count, chunk in enumerate(chunks, start=1):
                 update_bounds(flow.values(chunk), chunk, bounds[level], at[level])
                 if progress:

@@ -102,7 +102,9 @@ class Search:
                 checked_number(key, getattr(self, key), positive=True)
 
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
-        """Return the envelope on all levels: estimated or, with rough polynomials, attained.
+        """Return the envelope on all levels by two searches, with an error from their differences.
+
+        It is estimated or, where the polynomials of the modes are too rough, only attained.
 
         Raises:
             ModalError: The structure has no oscillating modes over the box, or is not linear.
@@ -113,8 +115,8 @@ class Search:
         model = fit_modes(flow.flow, flow.boxes, tolerance=SMALL * tolerance, scale=flow.scale)
         fitting, searching = subprogress(progress, 0.0, 0.1), subprogress(progress, 0.1, 1.0)
         fitting(0.5)
-        rough = _rough(model, flow)
-        exact = ExactResponse.from_model(model, flow.scale, has_hessian=not rough)
+        is_rough = _rough(model, flow)
+        exact = ExactResponse.from_model(model, flow.scale, has_hessian=not is_rough)
         # each search works on polynomials where they are accurate enough, else on exact motions
         is_accurate = bool((model.error / flow.scale).max() <= SMALL * tolerance)
         second = fit_modes(
@@ -131,6 +133,7 @@ class Search:
                 _second_response(second, flow, is_accurate=is_accurate), self.seed, 1
             ),
         )
+        # optima and errors of each level, from the narrowest box
         levels, solved = len(flow.boxes.alpha), list[tuple[Optima, Array]]()
         for done, level in enumerate(reversed(range(levels))):
             tick = subprogress(searching, done / levels, (done + 1) / levels)
@@ -139,6 +142,7 @@ class Search:
             solved.append(self._level(searches, *ends, tolerance, narrower, tick))
         shape, scale = (levels, len(flow.time), len(flow.outputs), 2), flow.scale[:, None]
         values = [x.side * exact.value_at(x.point, x.node, x.output) for x, _ in solved[::-1]]
+        # wider boxes attain what narrower ones do
         bounds = np.maximum.accumulate(np.stack(values)[::-1])[::-1].reshape(shape) * scale
         at = np.stack([optima.point for optima, _ in solved[::-1]]).reshape(*shape, -1)
         missed = np.stack([error for _, error in solved[::-1]]).reshape(shape) * scale
@@ -153,9 +157,9 @@ class Search:
         return flow.envelope(
             bounds,
             at,
-            None if rough else error,
+            None if is_rough else error,
             method=self.name,
-            nature=Nature.ATTAINED if rough else Nature.ESTIMATED,
+            nature=Nature.ATTAINED if is_rough else Nature.ESTIMATED,
             evaluations=model.analyses,
             seconds=time.perf_counter() - start_time,
             facts=facts,
@@ -211,7 +215,7 @@ class Search:
         narrower: Optima | None,
         tick: Progress,
     ) -> tuple[Optima, Array]:
-        """Search all N bounds in the box of one level until both searches agree.
+        """Return optima of all N bounds in a box, improved by two searches until they agree.
 
         Args:
             searches: The two independent searches.
@@ -264,20 +268,16 @@ class _IndependentSearch:
         self.narrower: Optima | None = None
 
     def start(self, lower: Array, upper: Array, least_gain: float, tick: Progress) -> None:
-        """Find optima in a box from a sample of it, and from those of the narrower box.
+        """Set `optima` to those of all bounds in a box, by a sample and the narrower box's optima.
 
-        Args:
-            lower: Lower ends of the box in unit coordinates, shape (d,).
-            upper: Upper ends.
-            least_gain: Gain below which Newton's method stops.
-            tick: Called with the completed fraction.
+        The box is in unit coordinates; Newton's method stops below `least_gain`.
         """
         self.box = lower, upper, least_gain
         unit = None
         if self.number:
             rng = np.random.default_rng((self.seed, self.number))
             ends = np.ones(len(lower))
-            unit = fresh_points(rng, -ends, ends, SAMPLES)  # the first search has its usual ones
+            unit = fresh_points(rng, -ends, ends, SAMPLES)  # others than those of the first search
         first_tick = subprogress(tick, 0.0, 0.3)
         self.optima = first_optima(_polynomials(self.response), *self.box, unit, first_tick)
         rows = np.arange(len(self.optima.value))
@@ -307,7 +307,7 @@ class _IndependentSearch:
         nodes = np.sort(rng.permutation(len(self.grid))[:n_nodes])
         values = trajectories(_polynomials(self.response), pool, nodes)
         rivals = [best_of(pool, values, nodes)]
-        rivals += [best_of(pool, values, nodes, count, rng) for count in CANDIDATES]
+        rivals += [best_of(pool, values, nodes, number, rng) for number in CANDIDATES]
         improved = np.zeros(len(optima.value), bool)
         for number, rival in enumerate(rivals):
             _evaluate_and_refine(
@@ -336,13 +336,9 @@ class _IndependentSearch:
 def _evaluate_and_refine(
     response: Response, optima: Optima, box: tuple[Array, Array, float], tick: Progress
 ) -> None:
-    """Evaluate a response at the points of optima and refine them, in place, on it.
+    """Set optima to values of a response at their points, and refine them by Newton's method.
 
-    Args:
-        response: Exact motions or polynomials.
-        optima: Optima of another response.
-        box: Lower and upper ends, and the gain below which Newton's method stops.
-        tick: Called with the completed fraction.
+    `box` is its lower and upper ends, and the gain below which Newton's method stops.
     """
     rows = np.arange(len(optima.value))
     optima.value[:] = -np.inf
@@ -359,14 +355,8 @@ def _compared(
 ) -> tuple[Optima, Array]:
     """Return the better optimum of each of N pairs, and the distance of their values (N,).
 
-    The second ones are evaluated and refined by the response of which the first are.
-
-    Args:
-        response: Response whose values count.
-        first: Its optima by one search.
-        second: Optima of the other search.
-        box: Lower and upper ends, and the gain below which Newton's method stops.
-        tick: Called with the completed fraction.
+    The first ones are of the response; the second, of another, are evaluated and refined on it in a
+    box of lower and upper ends, and the gain below which Newton's method stops.
     """
     improved = copy.deepcopy(second)
     _evaluate_and_refine(response, improved, box, tick)

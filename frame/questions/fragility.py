@@ -70,46 +70,38 @@ class CriticalMeasures:
             output: Limited output.
             limit: Limit of its magnitude, in the output's SI unit.
         """
-        ends = [(*x.most(output)[::-1], *x.least(output)[::-1]) for x in peaks]
-        size = np.asarray(measures)[:, None] * limit
+        # of each record, falling: bounds of the greatest peak, then of the least one
+        peak_bounds = [(*x.most(output)[::-1], *x.least(output)[::-1]) for x in peaks]
+        scale = np.asarray(measures)[:, None] * limit
         with np.errstate(divide="ignore"):
-            low, reached, inner, high = (
-                # what starts at rest has no negative peak
-                size / np.maximum([row[k] for row in ends], 0.0)
+            low, low_reached, high_reached, high = (
+                # a structure that starts at rest has no negative peak
+                scale / np.maximum([row[k] for row in peak_bounds], 0.0)
                 for k in range(4)
             )
         # the structure that reaches the greatest peak known is one of the cut
-        return cls(low, reached, np.maximum(inner, reached), high)
+        high_reached = np.maximum(high_reached, low_reached)
+        return cls(low=low, low_reached=low_reached, high_reached=high_reached, high=high)
 
     def band(self, measure: Array) -> Ends:
         """Return bounds of the fraction of the records under which a structure exceeds the limit.
 
         Every structure within the α-cut has its fraction, for this suite of records, inside the
-        band.
-
-        Args:
-            measure: Where the band is wanted, shape (X,).
-
-        Returns:
-            Lower and upper ends, each of shape (A, X).
+        band. Lower and upper ends are of shape (A, X) each, for measures (X,).
         """
         return Ends(*(_counts(end, measure) / len(self.low) for end in (self.high, self.low)))
 
     def confidence_band(self, measure: Array) -> Ends:
         """Return 95 % limits of the probability of exceedance if records are independent draws.
 
-        The lower Clopper–Pearson limit of the least count and the upper one of the greatest
-        (Clopper, Pearson 1934) are taken at each measure.
-
-        Args:
-            measure: Where the band is wanted, shape (X,).
-
-        Returns:
-            Lower and upper limits, each of shape (A, X).
+        At each measure they are the lower Clopper–Pearson limit of the least count of records that
+        exceed, and the upper limit of the greatest count (Clopper, Pearson 1934), of shape (A, X)
+        each, for measures (X,).
         """
         from scipy.special import betaincinv  # which takes time to import
 
         total, tail = len(self.low), (1 - CONFIDENCE) / 2
+        # numbers of records that exceed for all structures of the cut, and for some
         least, most = _counts(self.high, measure), _counts(self.low, measure)
         lower = betaincinv(np.maximum(least, 1), total - least + 1, tail)
         upper = betaincinv(most + 1, np.maximum(total - most, 1), 1 - tail)
@@ -142,8 +134,8 @@ class CriticalMeasures:
 def of_any_limit(limits: Sequence[CriticalMeasures]) -> CriticalMeasures:
     """Return the critical measures of the event that any of several limits is exceeded.
 
-    That of a structure is the least over its limits. The greatest one of single limits may belong
-    to different structures, so that no greater one than `low_reached` is known to be reached.
+    A structure's critical measure is the least over its limits. High measures of single limits may
+    belong to different structures, so that only `low_reached` is known to be reached.
     """
     low, reached, high = (
         np.min([getattr(x, name) for x in limits], axis=0)
@@ -155,10 +147,5 @@ def of_any_limit(limits: Sequence[CriticalMeasures]) -> CriticalMeasures:
 
 
 def _counts(critical: Array, measure: Array) -> Array:
-    """Return the number of records with a critical measure below each measure, (A, X).
-
-    Args:
-        critical: Critical measures, shape (R, A).
-        measure: Measures, shape (X,).
-    """
+    """Return numbers (A, X) of records with critical measures (R, A) below measures (X,)."""
     return np.asarray((critical[:, :, None] < np.asarray(measure)).sum(0))

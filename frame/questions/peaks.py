@@ -65,34 +65,32 @@ class Peaks:
     def most(self, output: str) -> Ends:
         """Return a lower and an upper bound of the greatest peak in each cut, shape (A,) each.
 
-        Attained bounds exclude nothing, since other trajectories may peak higher: the upper one is
-        infinite.
+        If the envelope is only attained the upper one is infinite: other motions may peak higher.
         """
         k = self.outputs.index(output)
-        attained = self.natures[k] is Nature.ATTAINED
-        above = self.upper[:, k] + (np.inf if attained else self.error[:, k])
-        return Ends(self.reached[:, k], above)
+        is_attained = self.natures[k] is Nature.ATTAINED
+        upper_bound = self.upper[:, k] + (np.inf if is_attained else self.error[:, k])
+        return Ends(self.reached[:, k], upper_bound)
 
     def least(self, output: str) -> Ends:
         """Return a lower and an upper bound of the least peak in each cut, shape (A,) each.
 
-        Each cut contains the highest one, whose motions peak no higher than its greatest peak.
+        Each cut contains the narrowest one, whose greatest peak bounds the least peak from above.
         """
         k = self.outputs.index(output)
-        is_proved = self.natures[k] is not Nature.ATTAINED
-        below = self.lower[:, k] - self.error[:, k]
-        if not self._is_signed(output):
-            below = np.maximum(below, 0.0)
-        below = np.where(is_proved, below, -np.inf if self._is_signed(output) else 0.0)
-        above = np.minimum(self.most(output).upper[-1:], self.least_reached[:, k])
-        return Ends(np.maximum(below, self.least_proved[:, k]), above)
+        smallest = -np.inf if self._is_signed(output) else 0.0  # of any peak
+        lower_bound = np.maximum(self.lower[:, k] - self.error[:, k], smallest)
+        if self.natures[k] is Nature.ATTAINED:
+            lower_bound = np.full_like(lower_bound, smallest)
+        upper_bound = np.minimum(self.most(output).upper[-1:], self.least_reached[:, k])
+        return Ends(np.maximum(lower_bound, self.least_proved[:, k]), upper_bound)
 
     @staticmethod
     def _is_signed(output: str) -> bool:
         return output.startswith(("max ", "min "))
 
     def named(self, peaks: Mapping[str, str]) -> Peaks:
-        """Return some peaks under other names.
+        """Return a selection of these peaks under new names.
 
         Args:
             peaks: Peak by new name, such as several limits of one output.
@@ -167,19 +165,18 @@ def _sided(band: Ends, names: Sequence[str], columns: Sequence[int]) -> tuple[Ar
     """
     upper, lower = [], []
     for name, k in zip(names, columns, strict=True):
-        least, most = band.lower[..., k], band.upper[..., k]
+        low, high = band.lower[..., k], band.upper[..., k]
         if name.startswith("min "):
-            least, most = -most, -least
-        elif name == output_of(name):
-            magnitude = np.maximum(most, -least)
-            least, most = np.maximum(np.maximum(least, -most), 0.0), magnitude
-        upper.append(most)
-        lower.append(least)
+            low, high = -high, -low
+        elif name == output_of(name):  # a magnitude
+            low, high = np.maximum(np.maximum(low, -high), 0.0), np.maximum(high, -low)
+        upper.append(high)
+        lower.append(low)
     return np.stack(upper, -1), np.stack(lower, -1)
 
 
 def joined(first: Peaks, second: Peaks) -> Peaks:
-    """Return the peaks of two sets with different names on the same levels as one set."""
+    """Return two sets of peaks on the same levels, with different names, as one set."""
     names = ("lower", "upper", "error", "reached", "least_proved", "least_reached")
     ends = {name: np.hstack([getattr(first, name), getattr(second, name)]) for name in names}
     outputs, natures = (*first.outputs, *second.outputs), (*first.natures, *second.natures)
@@ -187,10 +184,10 @@ def joined(first: Peaks, second: Peaks) -> Peaks:
 
 
 def tightest(first: Peaks, second: Peaks) -> Peaks:
-    """Return the better of two sets of peaks of the same response, output by output.
+    """Return the tightest bounds of peaks by two analyses of the same response, by output.
 
-    Of each output they have the tighter of two proved bounds, or else the bounds of the stronger
-    nature and of the smaller error, and the larger of the magnitudes that are reached.
+    Two proved bounds are intersected; else the bounds of the stronger nature or of the smaller
+    error are taken. Peaks that either analysis reaches are kept.
 
     Args:
         first: Peaks of all or some outputs.
@@ -323,30 +320,43 @@ def passing(peaks: Peaks, limits: Mapping[str, float]) -> dict[str, Passing]:
 
 
 def _passing_of(peaks: Peaks, output: str, limit: float) -> Passing:
-    """Return the degrees to which one output exceeds its limit."""
+    """Return the degrees to which it is possible and necessary that an output exceeds its limit.
+
+    The necessity of exceeding is 1 less the possibility of not exceeding (Dubois, Prade 1988).
+    """
     most, least, alpha = peaks.most(output), peaks.least(output), peaks.alpha
-    possible = _highest(alpha, most.lower > limit), _excluded(alpha, most.upper <= limit)
-    keeps = np.broadcast_to(least.upper <= limit, alpha.shape)
-    levels_within = _highest(alpha, keeps), _excluded(alpha, least.lower > limit)
-    margin = limit - np.stack([most.upper, least.lower], axis=1)
-    necessary, nature = (1 - levels_within[1], 1 - levels_within[0]), peaks.nature([output])
-    return Passing(possible, necessary, margin, float(alpha[0]), nature)
+    possibility = _highest(alpha, most.lower > limit), _excluded(alpha, most.upper <= limit)
+    is_kept = np.broadcast_to(least.upper <= limit, alpha.shape)  # by some motion
+    possibility_of_keeping = _highest(alpha, is_kept), _excluded(alpha, least.lower > limit)
+    return Passing(
+        possibility=possibility,
+        necessity=(1 - possibility_of_keeping[1], 1 - possibility_of_keeping[0]),
+        margin=limit - np.stack([most.upper, least.lower], axis=1),
+        lowest=float(alpha[0]),
+        nature=peaks.nature([output]),
+    )
 
 
 def _any(answers: Mapping[str, Passing], limits: Mapping[str, float]) -> Passing:
-    """Return the degrees to which any limit is exceeded: as possible as the most possible one."""
+    """Return the degrees to which any of several limits is exceeded.
+
+    The possibility is that of the limit most possibly exceeded. The necessity is at least that of
+    each limit, and 0 if no motion of the highest cut exceeds a limit.
+    """
     passings = list(answers.values())
-    possible = tuple(max(x.possibility[k] for x in passings) for k in (0, 1))
-    least = max(x.necessity[0] for x in passings)
-    surely_kept = all(x.possibility[1] < 1 for x in passings)  # by all motions of the highest cut
-    shares = [  # of a limit of 0 all is left, or none
+    possibility = [max(x.possibility[k] for x in passings) for k in (0, 1)]
+    are_kept = all(x.possibility[1] < 1 for x in passings)  # by all motions of the highest cut
+    relative_margins = [  # of a limit of 0 they are the sign
         x.margin / abs(limits[name]) if limits[name] else np.sign(x.margin)
         for name, x in answers.items()
     ]
-    margin = np.min(shares, axis=0)
-    nature = Nature.weakest(x.nature for x in passings)
-    necessary = least, 0.0 if surely_kept else 1.0
-    return Passing((possible[0], possible[1]), necessary, margin, passings[0].lowest, nature)
+    return Passing(
+        possibility=(possibility[0], possibility[1]),
+        necessity=(max(x.necessity[0] for x in passings), 0.0 if are_kept else 1.0),
+        margin=np.min(relative_margins, axis=0),
+        lowest=passings[0].lowest,
+        nature=Nature.weakest(x.nature for x in passings),
+    )
 
 
 def _highest(alpha: Array, holds: Mask) -> float:

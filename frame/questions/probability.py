@@ -116,25 +116,27 @@ def probabilities(
     cuts = boxes(fuzzy, alpha)
     scheme = "midpoint" if isinstance(model, LagrangianSystem) else "exact"
     flow = flow_of(model, (*cuts.names, *random), duration, step, scheme)
-    tried = [_tried(cuts, level) for level in range(len(cuts.alpha))]
-    points = np.concatenate(tried)
-    looked_at = tried[0][:: -(-len(tried[0]) // LOOKED_AT)]
+    points_of_levels = [_tried(cuts, level) for level in range(len(cuts.alpha))]
+    points = np.concatenate(points_of_levels)
+    # errors between nodes and of time steps, from a few of the motions
+    looked_at = points_of_levels[0][:: -(-len(points_of_levels[0]) // LOOKED_AT)]
     few = np.array([[*point, *draw] for point in looked_at for draw in draws[:LOOKED_AT]])
     between = node_deviation(flow, few)
-    off = MARGIN * np.maximum.accumulate(flow.deviations(few)[1].max(0), axis=0)
+    step_error = MARGIN * np.maximum.accumulate(flow.deviations(few)[1].max(0), axis=0)
     columns, sizes = [list(model.outputs).index(x) for x in limits], np.array([*limits.values()])
-    shares = []  # peaks over their limits: at least, at most, at most within steps
+    ratios = []  # of peaks to limits: lower and upper bound at nodes, upper bound within steps
     for count, point in enumerate(points, start=1):
-        size = np.abs(flow.values(np.hstack([np.tile(point, (len(draws), 1)), draws])))
-        three = np.maximum(size - off, 0.0), size + off, within_steps(size + off, between)
-        shares.append([x.max(1)[:, columns] / sizes for x in three])
+        values = np.abs(flow.values(np.hstack([np.tile(point, (len(draws), 1)), draws])))
+        low, high = np.maximum(values - step_error, 0.0), values + step_error
+        bounds = low, high, within_steps(high, between)
+        ratios.append([x.max(1)[:, columns] / sizes for x in bounds])
         if progress:
             progress(count / len(points))
-    by_point = np.moveaxis(np.array(shares), 1, 0)  # (three, points, draws, limits)
-    level = np.repeat(np.arange(len(tried)), [len(some) for some in tried])
+    by_point = np.moveaxis(np.array(ratios), 1, 0)  # (bounds, points, draws, limits)
+    level = np.repeat(np.arange(len(cuts.alpha)), [len(x) for x in points_of_levels])
     events = [*np.moveaxis(by_point, -1, 0)] + ([by_point.max(-1)] if len(limits) > 1 else [])
     return {
-        name: _probability(event, level, scale, spreads=bool(random))
+        name: _probability(event, level, scale, has_random=bool(random))
         for name, event, scale in zip((*limits, ANY), events, (*sizes, 1.0), strict=False)
     }
 
@@ -149,7 +151,7 @@ def _tried(cuts: Boxes, level: int) -> Array:
     return np.asarray(cuts.to_physical(np.vstack([ends, inner])))
 
 
-def _probability(event: Array, level: Array, scale: float, *, spreads: bool) -> Probability:
+def _probability(event: Array, level: Array, scale: float, *, has_random: bool) -> Probability:
     """Return bounds of the probability that a ratio of peak to limit exceeds 1.
 
     Args:
@@ -157,33 +159,35 @@ def _probability(event: Array, level: Array, scale: float, *, spreads: bool) -> 
             bound within the steps.
         level: Row of the level of each point, shape (points,).
         scale: The limit.
-        spreads: Whether there are random inputs.
+        has_random: Whether there are random inputs.
     """
-    least, peak, more = event
-    limits = np.linspace(0.95 * least.min(), 1.05 * peak.max(), LIMITS)
-    low, _ = _bounds(least, level, np.append(limits, 1.0))
-    lowest, high = _bounds(peak, level, np.append(limits, 1.0))
-    above = [ends[:, 0] for ends in _bounds(more, level, np.ones(1))]
-    interval = np.stack([lowest[:, -1], high[:, -1]])
-    if spreads:
-        interval = _interval((least > 1).sum(axis=1), (more > 1).sum(axis=1), peak.shape[1], level)
+    low_ratio, ratio, ratio_within_steps = event
+    # the last limit is the one in question, a ratio of 1
+    limits = np.append(np.linspace(0.95 * low_ratio.min(), 1.05 * ratio.max(), LIMITS), 1.0)
+    low, _ = _bounds(low_ratio, level, limits)
+    least, high = _bounds(ratio, level, limits)
+    larger = [ends[:, 0] for ends in _bounds(ratio_within_steps, level, np.ones(1))]
+    interval = np.stack([least[:, -1], high[:, -1]])
+    if has_random:
+        n_least, n_most = ((x > 1).sum(axis=1) for x in (low_ratio, ratio_within_steps))
+        interval = _interval(n_least, n_most, ratio.shape[1], level)
     return Probability(
-        low[:, -1],
-        high[:, -1],
-        np.maximum(above[0] - lowest[:, -1], above[1] - high[:, -1]),
-        interval,
-        limits * scale,
-        np.stack([low[:, :-1], high[:, :-1]]),
-        peak.size,
+        lower=low[:, -1],
+        upper=high[:, -1],
+        error=np.maximum(larger[0] - least[:, -1], larger[1] - high[:, -1]),
+        interval=interval,
+        limits=limits[:-1] * scale,
+        curve=np.stack([low[:, :-1], high[:, :-1]]),
+        evaluations=ratio.size,
     )
 
 
 def _interval(least: Array, most: Array, draws: int, level: Array) -> Array:
-    """Return Clopper–Pearson limits over all points of each level, lower and upper, (2, A).
+    """Return the least lower and largest upper Clopper–Pearson limit over points, (2, A).
 
     Args:
-        least: Draws that surely exceed the limit, by point, shape (points,).
-        most: Draws that may exceed it, also between nodes, shape (points,).
+        least: Number of draws that exceed the limit for sure, by point, shape (points,).
+        most: Number of draws that may exceed it, also between nodes, shape (points,).
         draws: Independent draws at each point.
         level: Row of the level of each point, shape (points,).
     """

@@ -50,7 +50,7 @@ class Tolerances:
 
 
 def scaled(inputs: Mapping[str, FuzzyNumber], scale: float) -> dict[str, FuzzyNumber]:
-    """Return intervals: supports scaled about their nominal values; crisp ones at scale 0."""
+    """Return inputs as their supports, scaled about nominal values; crisp numbers at scale 0."""
     middles = {name: (number.modal, number.support) for name, number in inputs.items()}
     return {
         name: Interval(modal - scale * (modal - low), modal + scale * (high - modal))
@@ -107,12 +107,12 @@ def tolerances(
         interruptible=False,
         progress=False,
     )
-    tried: dict[float, _Step] = {}
+    tried: dict[float, _Outcome] = {}
 
-    def step_at(scale: float) -> _Step:
-        """Return the state of a scale, computed once."""
+    def outcome_at(scale: float) -> _Outcome:
+        """Return whether limits are exceeded at a scale, computed once."""
         if scale not in tried:
-            tried[scale] = _step_of(peaks(bounds(scaled(inputs, scale))), limits)
+            tried[scale] = _outcome(peaks(bounds(scaled(inputs, scale))), limits)
             if progress:
                 progress(min(1.0, len(tried) / (2 + np.log2(1 / precision))))
         return tried[scale]
@@ -120,48 +120,49 @@ def tolerances(
     # the largest scale at which exceeding is excluded, from the largest one known
     near = precision * most
     if at_one is not None and most >= 1:
-        tried[1.0] = _step_of(at_one, limits)
-    low = next((scale for scale in (most, *tried, 0.0) if step_at(scale).within), 0.0)
-    if low < most and tried[low].within:
+        tried[1.0] = _outcome(at_one, limits)
+    candidates = (most, *tried, 0.0)
+    low = next((scale for scale in candidates if outcome_at(scale).is_excluded), 0.0)
+    if low < most and tried[low].is_excluded:
         high = min(scale for scale in tried if scale > low)
-        low = _halved(lambda scale: step_at(scale).within, low, high, near)
+        low = _bisected(lambda scale: outcome_at(scale).is_excluded, low, high, near)
     # the same for scales at which a computed motion exceeds a limit
-    passed = min((scale for scale, trial in tried.items() if trial.passed), default=np.inf)
+    passed = min((scale for scale, outcome in tried.items() if outcome.is_exceeded), default=np.inf)
     clear = max((scale for scale in tried if scale < passed), default=None)
     if clear is not None and passed < np.inf:
-        clear = _halved(lambda scale: not step_at(scale).passed, clear, passed, near)
-        passed = min(scale for scale, trial in tried.items() if trial.passed)
+        clear = _bisected(lambda scale: not outcome_at(scale).is_exceeded, clear, passed, near)
+        passed = min(scale for scale, outcome in tried.items() if outcome.is_exceeded)
     supports = {name: number.support for name, number in scaled(inputs, low).items()}
-    best = tried[low]
     return Tolerances(
-        low if best.within else None, clear, passed, supports, best.nature, len(tried)
+        admissible=low if tried[low].is_excluded else None,
+        clear=clear,
+        passed=passed,
+        supports=supports,
+        nature=tried[low].nature,
+        envelopes=len(tried),
     )
 
 
-class _Step(NamedTuple):
-    """State of a scale: whether exceeding is excluded, whether a motion exceeds, and nature."""
+class _Outcome(NamedTuple):
+    """Whether exceeding limits is excluded, whether a motion exceeds one, and their nature."""
 
-    within: bool
-    passed: bool
+    is_excluded: bool
+    is_exceeded: bool
     nature: Nature
 
 
-def _step_of(peaks: Peaks, limits: Mapping[str, float]) -> _Step:
-    """Return the state of a scale from the peaks on its supports."""
+def _outcome(peaks: Peaks, limits: Mapping[str, float]) -> _Outcome:
+    """Return whether limits are exceeded, from the peaks on the lowest level."""
     ends = [(peaks.most(name), limit) for name, limit in limits.items()]
-    within = all(most.upper[0] <= limit for most, limit in ends)
-    passed = any(most.lower[0] > limit for most, limit in ends)
-    return _Step(within, passed, peaks.nature(limits))
+    is_excluded = all(most.upper[0] <= limit for most, limit in ends)
+    is_exceeded = any(most.lower[0] > limit for most, limit in ends)
+    return _Outcome(is_excluded, is_exceeded, peaks.nature(limits))
 
 
-def _halved(holds: Callable[[float], bool], low: float, high: float, near: float) -> float:
+def _bisected(holds: Callable[[float], bool], low: float, high: float, near: float) -> float:
     """Return by bisection the largest scale at which a condition holds, to the distance `near`.
 
-    Args:
-        holds: The condition.
-        low: A scale at which it holds.
-        high: A scale at which it does not.
-        near: Distance at which the bisection ends.
+    It holds at `low` and does not at `high`.
     """
     while high - low > near:
         middle = (low + high) / 2

@@ -70,7 +70,7 @@ class Walk(NamedTuple):
 
 
 def walk(history: History, time: Array) -> Walk:
-    """Straight pieces of a load up to the last node, and for each node its piece and place in it.
+    """Return the straight pieces of a load up to the last node, and where each node lies in them.
 
     A sine by which the load is multiplied is left out.
 
@@ -108,10 +108,7 @@ def impulses(history: History, time: Array) -> Array:
 
 
 def absolute_moments(decay: float, history: History, time: Array) -> Array:
-    """Return upper bounds of ∫₀ᵗ τⁿ exp(−g τ) |f(t − τ)| dτ of a load f, shape (5, T).
-
-    n is 0 … 4, t the nodes and g the `decay`, in 1/s.
-    """
+    """Return bounds of ∫₀ᵗ τⁿ exp(−decay τ) |f(t − τ)| dτ at nodes t, n = 0 … 4, shape (5, T)."""
     path = walk(history, time)
     sizes = np.maximum(np.abs(path.first), np.abs(path.last))
     since = path.phases[path.phase] + path.time_rounding
@@ -163,11 +160,7 @@ def responses_at_nodes(
 ) -> tuple[Array, Array]:
     """Return ρ(σ; t) = ∫₀ᵗ exp(σ τ) f(t − τ) dτ at all nodes t, with derivatives by σ.
 
-    Args:
-        sigma: Exponents σ, shape (S,), in 1/s.
-        history: The load f.
-        time: Nodes, rising, shape (T,), in s.
-        derivatives: Number of derivatives, 0 to 2.
+    f is the load `history`, σ (S,) are exponents in 1/s, and there are 0 to 2 derivatives.
 
     Returns:
         ρ and its derivatives, shape (1 + derivatives, T, S), and bounds of the rounding of ρ,
@@ -193,12 +186,8 @@ def responses_at_given_nodes(
 ) -> tuple[Array, Array]:
     """Return ρ(σ; t) = ∫₀ᵗ exp(σ τ) f(t − τ) dτ at one node for each row of σ, with derivatives.
 
-    Args:
-        sigma: Exponents σ, shape (S, n), in 1/s.
-        history: The load f.
-        time: Nodes, rising, shape (T,), in s.
-        node: Index of the node of each row, shape (S,).
-        derivatives: Number of derivatives by σ, 0 to 2.
+    f is the load `history`, σ (S, n) are exponents in 1/s, `node` (S,) is the index of each row's
+    node, and there are 0 to 2 derivatives by σ.
 
     Returns:
         ρ and its derivatives, shape (1 + derivatives, S, n), and bounds of the rounding of ρ,
@@ -277,8 +266,7 @@ def _with_sine(
 def _walk_to_all(sigma: Array, walk: Walk, orders: Orders, out: Array, error: Array) -> None:
     """Write ρ of each σ (S,) at all T nodes to `out`, and bounds of its rounding to `error` (T, S).
 
-    ρ(σ; t) = ∫₀ᵗ exp(σ τ) f(t − τ) dτ. `out` has the shape (1 + len(orders), T, S), with as many
-    derivatives by σ as `orders` has entries.
+    ρ(σ; t) = ∫₀ᵗ exp(σ τ) f(t − τ) dτ; `out` (1 + len(orders), T, S) has derivatives by σ, too.
     """
     for s in prange(len(sigma)):
         nodes = walk.interval, walk.phase, walk.time_rounding
@@ -292,10 +280,10 @@ def _walk_to_given(
 ) -> None:
     """Write ρ of each row of σ (S, n) at the row's node to `out`, its rounding to `error` (S, n).
 
-    ρ(σ; t) = ∫₀ᵗ exp(σ τ) f(t − τ) dτ. `out` has the shape (1 + len(orders), S, n), with as many
-    derivatives by σ as `orders` has entries. `node` is the index of each row's node, shape (S,).
+    ρ(σ; t) = ∫₀ᵗ exp(σ τ) f(t − τ) dτ; `out` (1 + len(orders), S, n) has derivatives by σ, too.
     """
     for s in prange(len(sigma)):
+        # the only node of this row, with a table of its one phase
         here, phase = slice(node[s], node[s] + 1), walk.phase[node[s]]
         nodes = walk.interval[here], np.zeros(1, np.int64), walk.time_rounding[here]
         for k in range(sigma.shape[1]):

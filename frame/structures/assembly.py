@@ -141,10 +141,7 @@ class Matrices:
         return concatenate([q0, v0], -2)
 
     def pushes(self, *, ground: bool) -> Jet:
-        """Return the accelerations by a unit of each load, V = (S, n, L).
-
-        The ground's comes first where `ground` is set, then those of the forces' histories.
-        """
+        """Return accelerations by a unit of each load, the ground's first, V = (S, n, L)."""
         shape = (*self.mass.value.shape[:-1], int(ground))
         parts = [self.mass.like(-np.broadcast_to(self.rigid[:, : int(ground)], shape))]
         if self.forces is not None:

@@ -69,8 +69,8 @@ class LagrangianSystem:
         for name, value in self.parameters.items():
             checked_number(f"parameter {name}", value)
         eq = self.symbols
-        quadratic = not eq.mass.free_symbols & set(eq.v)
-        require(quadratic, "lagrangian", value=eq.mass.tolist(), allowed="functions quadratic in v")
+        fits = not eq.mass.free_symbols & set(eq.v)
+        require(fits, "lagrangian", value=eq.mass.tolist(), allowed="functions quadratic in v")
         for name in self.observed:
             self.output(name, eq.v)
         start = dict(zip([*eq.q, *eq.v], [x for part in self.start() for x in part], strict=True))

@@ -99,8 +99,7 @@ def evaluate(
 def _condensed(full: Assembly[Jet], *, by_ratios: bool) -> tuple[Matrices, Jet]:
     """Return the matrices on unknowns with mass and the rows of the outputs, V = (S, m, 2n).
 
-    Unknowns b without mass follow those with mass, q_b = −K_bb⁻¹ K_ba q_a, and are condensed
-    (Guyan 1965).
+    Unknowns b without mass are condensed, q_b = −K_bb⁻¹ K_ba q_a (Guyan 1965).
     """
     n, a = len(full.pattern), full.massive
     mass, stiffness, damping = full.mass, full.stiffness, _viscous_damping(full)
@@ -110,8 +109,9 @@ def _condensed(full: Assembly[Jet], *, by_ratios: bool) -> tuple[Matrices, Jet]:
         follow = -(inverse(stiffness[:, b[:, None], b]) @ stiffness[:, b[:, None], a])
         mass, damping = mass[inner], damping[inner]
         stiffness = stiffness[inner] + stiffness[:, a[:, None], b] @ follow
-        of_state = (full.rows[:, a + k] + full.rows[:, b + k] @ follow for k in (0, n))
-        rows = concatenate(list(of_state), -1)
+        # columns of displacements, then of velocities
+        columns = [full.rows[:, a + k] + full.rows[:, b + k] @ follow for k in (0, n)]
+        rows = concatenate(columns, -1)
     if full.ratios and by_ratios:
         damping = damping + modal_damping(mass, stiffness, full.ratios)
     forces, static, impulse = (x and x[:, a] for x in (full.forces, full.static, full.impulse))
@@ -145,10 +145,7 @@ def _viscous_damping(full: Assembly[Jet]) -> Jet:
 def round_off(largest: float, slowest: float, time: Array) -> Array:
     """Return the error of a motion by rounding of its frequencies, over its peak, at times (T,).
 
-    Args:
-        largest: Largest ω², in 1/s², whose rounding changes the slowest mode's ω² by as much.
-        slowest: ω of the slowest mode, in rad/s.
-        time: Times, in s.
+    Rounding of the `largest` ω² (1/s²) changes that of the `slowest` mode (ω in rad/s) by as much.
     """
     phase_per_change = np.minimum(time**2, time / max(slowest, 1e-300)) / 2
     return np.asarray(np.finfo(float).eps * largest * phase_per_change)
@@ -164,7 +161,7 @@ def frequencies(system: LinearSystem) -> Array:
 
 
 def modal_damping_ratios(system: LinearSystem) -> tuple[Array, Array]:
-    """Undamped ω in rad/s and damping ratios φᵀDφ/(2ω) at the nominal parameters, (n,) each."""
+    """Return undamped ω in rad/s and ratios φᵀDφ/(2ω) of all modes at nominal values, (n,) each."""
     from scipy.linalg import eigh
 
     matrices, _ = evaluate(system, (), np.zeros((1, 0)), derivatives=False)

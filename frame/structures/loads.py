@@ -73,7 +73,7 @@ class History:
 
     @classmethod
     def harmonic(cls, hertz: float, phase: float = 0.0, start: float = 0.0) -> Self:
-        """A sine of unit amplitude from a time on; frequency in Hz, phase in rad.
+        """Return a sine of unit amplitude from the time `start` on; phase in rad at that time.
 
         Raises:
             RefusedError: The frequency is not positive.
@@ -142,11 +142,13 @@ class History:
             return np.asarray(bound)
         breaks = self.start + np.arange(len(self.samples)) * self.step
         breaks = breaks[(breaks > time[0]) & (breaks <= time[-1] * (1 + 1e-12))]
+        # node at the end of the step in which each sample lies
         node = np.minimum(np.searchsorted(time * (1 + 1e-12), breaks), len(time) - 1)
         line = np.interp(breaks, time, values)
         bound = np.zeros(len(time))
         for side in (-1.0, 1.0):
             distance = np.abs(self.envelope(breaks, side) - line)
+            # the value after a jump at a node belongs to the next step
             is_node = np.abs(breaks - time[node]) < 1e-9 * self.step
             np.maximum.at(bound, node, np.where(is_node & (side > 0), 0.0, distance))
         return np.where(bound > 1e-12 * self.extremes[0], bound, 0.0)

@@ -78,6 +78,7 @@ class MatrixStructure:
     loads: Sequence[Force] = ()
 
     def __post_init__(self) -> None:
+        """Store terms and loads as tuples; refuse values that are not allowed."""
         for name, value in self.parameters.items():
             checked_number(f"parameter {name}", value)
         for kind in ("mass", "stiffness", "observed"):
@@ -125,22 +126,18 @@ class MatrixStructure:
         return np.setdiff1d(np.arange(self.size), self.massive)
 
     def _require_definite(self) -> None:
-        """Refuse structures without a unique motion at the nominal parameters.
+        """Refuse a mass matrix that is not positive definite on the unknowns that have mass.
 
-        The masses of the unknowns that have some must be positive definite. Unknowns without mass
-        need a positive definite stiffness and no dampers.
-
-        Raises:
-            RefusedError: They are not.
+        Of unknowns without mass the stiffness must be positive definite, and they have no dampers.
         """
         mass, stiffness = (
             np.sum([float(value_of(f, self.parameters)) * A for f, A in terms], axis=0)
             for terms in (self.mass, self.stiffness)
         )
         a, b = self.massive, self.massless
-        positive = len(a) > 0 and np.linalg.eigvalsh(mass[np.ix_(a, a)]).min() > 0
+        is_definite = len(a) > 0 and np.linalg.eigvalsh(mass[np.ix_(a, a)]).min() > 0
         allowed = "a positive definite matrix of the unknowns that have mass"
-        require(positive, "mass", value="not positive definite", allowed=allowed)
+        require(is_definite, "mass", value="not positive definite", allowed=allowed)
         if not len(b):
             return
         least = np.linalg.eigvalsh(stiffness[np.ix_(b, b)]).min() / np.abs(stiffness).max()
@@ -176,11 +173,7 @@ class MatrixStructure:
         return factor, self._symmetric(kind, array)
 
     def _require_factor(self, kind: str, factor: Factor | str | float) -> None:
-        """Refuse a factor that is no number, parameter or arithmetic function of parameters.
-
-        Raises:
-            RefusedError: It is none of them; the message names the matrix `kind`.
-        """
+        """Refuse a factor that is no number, parameter or arithmetic function of parameters."""
         names, values = list(self.parameters), np.array([list(self.parameters.values())], float)
         try:
             value = value_of(factor, variables(values, names, names[:1]))
@@ -193,19 +186,11 @@ class MatrixStructure:
         )
 
     def _symmetric(self, kind: str, value: Any) -> Array:
-        """Return a dense or sparse array (n, n) as a dense one that is exactly symmetric.
-
-        Raises:
-            RefusedError: Its shape is another, or it is not symmetric up to rounding.
-        """
+        """Return a dense or sparse array (n, n), symmetric up to rounding, as exactly symmetric."""
         array, key = np.asarray(value.toarray() if hasattr(value, "toarray") else value), "array of"
         size = np.shape(self.mass[0][1])[0]
-        require(
-            array.shape == (size, size),
-            f"{key} {kind}",
-            value=f"of shape {array.shape}",
-            allowed=f"({size}, {size})",
-        )
+        fits, what = array.shape == (size, size), f"of shape {array.shape}"
+        require(fits, f"{key} {kind}", value=what, allowed=f"({size}, {size})")
         require_numbers(kind, array)
         asymmetry = np.abs(array - array.T)
         i, j = np.unravel_index(asymmetry.argmax(), asymmetry.shape)

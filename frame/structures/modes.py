@@ -59,7 +59,7 @@ def joined(parts: Sequence[Modes]) -> Modes:
 
 
 def modes(matrices: Matrices, rows: Jet, pushes: Jet, chosen: Array | None = None) -> Modes:
-    """Eigenvalues and amplitudes of the modes at S parameter sets.
+    """Return eigenvalues and amplitudes of chosen modes at S parameter sets.
 
     Args:
         matrices: The structure.
@@ -124,7 +124,7 @@ def oscillating(rate: Array) -> Array:
 
 
 def eigenvectors(A: Jet) -> tuple[Jet, Jet, Jet]:
-    """Eigenvalues, V = (S, 2n), right and left eigenvectors, V = (S, 2n, 2n) each, of A.
+    """Return eigenvalues V = (S, 2n), right and left eigenvectors V = (S, 2n, 2n) of A.
 
     Eigenvalues with Im λ > 0 come first, then real ones, then those with Im λ < 0, each by |λ|.
 

@@ -68,10 +68,14 @@ def degrees(system: LinearSystem, box: Box) -> dict[str, int]:
 
 
 def _storey_frame_degrees(system: StoreyFrame, box: Box) -> dict[str, int]:
-    """Return a storey frame's degree in each parameter: 1, more in lengths and divided masses."""
+    """Return a storey frame's polynomial degree in each uncertain parameter, by name.
+
+    It is 1, but for lengths, of which stiffnesses hold l⁻³, and for masses where accelerations are
+    observed, which hold m⁻¹.
+    """
     degree = dict.fromkeys(box, 1)
     degree |= {name: inverse_cube_degree(*ends) for name, ends in box.items() if name[0] == "l"}
-    if accelerations(system):  # forces over masses; forces hold the masses too where weights press
+    if accelerations(system):  # forces over masses; with gravity the forces hold masses as well
         gravity_degree = 1 if system.gravity else 0
         masses = {name: ends for name, ends in box.items() if name[0] == "m"}
         degree |= {
@@ -97,20 +101,20 @@ def _require_dissipation(factor: float, array: Array) -> None:
 
 
 def inverse_cube_degree(lower: float, upper: float) -> int:
-    """Degree from which the Chebyshev series of x⁻³ and of x⁻¹ on [lower, upper] is round-off.
+    """Return the degree after which Chebyshev series of x⁻³, x⁻¹ on [lower, upper] are round-off.
 
     Inside the Bernstein ellipse with semi-axes sum ρ > 1 the function stays below M, and what
     follows after degree N is at most 2 M ρ^−N / (ρ − 1) (Trefethen, Approximation Theory and
     Approximation Practice, theorem 8.2).
     """
-    share = (upper - lower) / (upper + lower)
-    if share == 0:
+    radius = (upper - lower) / (upper + lower)  # of the interval, over its middle
+    if radius == 0:
         return 0
 
-    def needed(reach: float) -> int:
-        # the ellipse that crosses the axis where |x| has fallen to 1 − reach of the middle
-        axis = reach / share
+    def degree(reach: float) -> int:
+        # by the ellipse that reaches from the middle x to x (1 − reach) on the axis
+        axis = reach / radius
         rho = axis + sqrt(axis * axis - 1)
         return ceil(log(2 / ((1 - reach) ** 3 * ROUND_OFF * (rho - 1))) / log(rho))
 
-    return max(1, min(needed(share + (1 - share) * k / 20) for k in range(1, 20)))
+    return max(1, min(degree(radius + (1 - radius) * k / 20) for k in range(1, 20)))

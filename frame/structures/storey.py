@@ -145,9 +145,9 @@ class StoreyFrame:
         require_choice("damper_placement", self.damper_placement, ("ground", "storey"))
 
     def _require_springs(self) -> None:
-        """Refuse frames without either stiffnesses or modulus, second moment and lengths.
+        """Refuse frames with neither or both of stiffnesses and what makes them.
 
-        Both together are refused as well, and gravity without lengths.
+        Modulus, second moment and lengths make them. Gravity needs lengths in any case.
         """
         needed: dict[str, object] = {"modulus": self.modulus, "second_moment": self.second_moment}
         if len(self.stiffness):
@@ -194,7 +194,7 @@ class StoreyFrame:
 
     @property
     def parameters(self) -> dict[str, float]:
-        """All parameters with their nominal values, in SI units; of lists, one for each floor."""
+        """Nominal values of all parameters by name, in SI units; of lists, one for each floor."""
         named: dict[str, float] = {} if self.modulus is None else {"E": self.modulus}
         named |= _named("I{}", self.moments)
         for name in ("stiffness", "masses", "lengths", "columns", "dampers", "q0", "v0"):
@@ -290,7 +290,8 @@ class StoreyFrame:
         """
         rows = np.zeros((len(self.outputs), 3 * self.floors))
         for row, (kind, z) in zip(rows, map(self.quantity, self.outputs), strict=True):
-            row[z + self.floors * {"v": 1, "a": 2}.get(kind, 0)] = 1.0
+            block = {"v": 1, "a": 2}.get(kind, 0)  # displacements, velocities, accelerations
+            row[z + self.floors * block] = 1.0
             if kind in ("drift", "shear") and z:
                 row[z - 1] = -1.0
         return rows

@@ -229,9 +229,9 @@ class _EnergyState:
         return np.asarray(rounding[:, None] * (np.abs(self.rows) @ state))
 
     def _loaded_flow(self, substep: float, push: Array) -> Array:
-        """Return F with exp(F) the map of (x, a, increment of a) over a substep (Van Loan 1978).
+        """Return F (2n + 2, 2n + 2) with exp(F) the map of (x, a, rise of a) over a substep.
 
-        The load is b a with b = `push`, and a is linear in the substep; shape (2n + 2, 2n + 2).
+        ẋ = A x + b a with b = `push` and a linear load a (Van Loan 1978).
         """
         size = len(self.matrix)
         flow = np.zeros((size + 2, size + 2))
@@ -242,10 +242,7 @@ class _EnergyState:
 
 
 def _substep_loads(record: Array, parts: int, count: int) -> Array:
-    """Return a record's value at the beginning of each substep and its increment, (count, 2).
-
-    The record is linear between samples, `parts` substeps apart, and zero after the last one.
-    """
+    """Return the load at the start of each substep and its increment, shape (count, 2)."""
     loads = np.zeros((count, 2))
     if len(record) > 1:
         rise = np.repeat(np.diff(record), parts) / parts
@@ -258,7 +255,7 @@ def _substep_loads(record: Array, parts: int, count: int) -> Array:
 def _degree(norm: float) -> int:
     """Return the degree from which terms of exp(A τ), ‖A‖ τ ≤ `norm`, are below `TRUNCATION`.
 
-    A linear load enters by two integrations, for which two degrees are added.
+    The load enters once and its increment twice, which costs two degrees.
     """
     degree, term = 2, 1.0
     while term > TRUNCATION:

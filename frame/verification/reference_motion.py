@@ -41,11 +41,7 @@ class ReferenceMotion:
         self._outputs = sympy.lambdify(arguments, seen, "math")
 
     def outputs(self, parameters: Mapping[str, float], times: Array) -> Array:
-        """Return outputs at rising times by Dormand and Prince's method of order 8, shape (T, m).
-
-        Args:
-            parameters: All parameters by name, in SI units.
-            times: The first one is that of the initial state.
+        """Return outputs by Dormand and Prince's method of order 8 at times from the start, (T, m).
 
         Raises:
             FailedError: The integration does not reach the last time.

@@ -146,23 +146,15 @@ class Trial:
         return np.append(inside.ravel(), time[-1])
 
     def motion_count(self, unknowns: int) -> int:
-        """Return the number of motions to test, at a cost of `SHARE` of the proof's.
-
-        Costs are estimated multiplications; the number lies between `LEAST` and `MOST`.
-
-        Args:
-            unknowns: Size of a motion's state [q; v].
-        """
+        """Return the number of motions of 2n `unknowns` to test, at `SHARE` of the proof's cost."""
         nodes, outputs = self.envelope.lower.shape[1:]
+        # in multiplications
         proof_cost = 2 * self.envelope.lower.size * BOUND_WORK
         motion_cost = QUARTERS * nodes * outputs * unknowns * TERMS
         return int(np.clip(SHARE * proof_cost / motion_cost, LEAST, MOST))
 
     def points(self, most: int) -> Array:
-        """Return distinct finite inputs to test, at most `most`, shape (S, n).
-
-        Those named at peaks come first, then nominal values, corners and points of each level.
-        """
+        """Return at most `most` distinct finite inputs to test, those at peaks first, (S, n)."""
         distinct = dict[tuple[float, ...], None]()
         for point in islice(self._candidates(), 4 * most):
             if len(distinct) < most and np.isfinite(point).all():
@@ -174,11 +166,7 @@ class Trial:
         return np.array(list(dict.fromkeys(tuple(map(float, x)) for x in self._peak_inputs(0))))
 
     def _candidates(self) -> Iterator[Array]:
-        """Yield inputs (n,) to test, without end and some of them more than once.
-
-        Order: inputs named at peaks of the lowest level, nominal values, corners of the lowest
-        level, inputs named at peaks of higher levels, points of low discrepancy in all levels.
-        """
+        """Yield inputs (n,) to test in the order of use, without end, some more than once."""
         (low, high), levels = self.cuts, len(self.envelope.alpha)
         yield from self._peak_inputs(0)
         yield np.array([number.modal for number in self.envelope.inputs.values()], float)
@@ -265,10 +253,7 @@ class _Check:
             self._require(excess, bound, f"{words} of α = {self._alpha(level)},")
 
     def require_attained(self, level: int) -> None:
-        """Refuse attained bounds of a level that name these inputs and differ from the motion.
-
-        It may lie inside a bound by `tolerance` and outside by `slack`, both besides its rounding.
-        """
+        """Refuse attained bounds of a level that name these inputs and differ from the motion."""
         envelope = self.envelope
         if envelope.inner is None:
             return
@@ -278,6 +263,7 @@ class _Check:
             (-1.0, envelope.lower_at[level], envelope.inner.lower[level], "lower"),
         ):
             outside = sign * (self.values[::QUARTERS] - inner)
+            # inside by the tolerance at most, outside by the slack
             excess = np.maximum(-outside - self.tolerance, outside - self.slack) - rounding
             names_point = (at == self.point).all(-1)
             excess = np.where(names_point, excess, -np.inf)
@@ -298,13 +284,7 @@ class _Check:
         return f"{self.envelope.alpha[level]:g}"
 
     def _require(self, excess: Array, bound: Array, words: str, stride: int = 1) -> None:
-        """Refuse an excess of the motion over a bound that is positive or not a number.
-
-        Args:
-            excess: Excess beyond rounding, shape (J, m), at every `stride`-th time.
-            bound: The bound, same shape.
-            words: Kind of the bound, for the message.
-            stride: Times from one row to the next.
+        """Refuse a motion whose excess (J, m) over a bound at every `stride`-th time is not ≤ 0.
 
         Raises:
             ContradictionError: There is one; the message gives the largest.

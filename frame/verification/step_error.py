@@ -124,7 +124,7 @@ def _from_reference(bounds: Envelope, flow: LagrangianFlow, points: Array) -> Ar
 
 
 def _sufficient_step(flow: LagrangianFlow, point: Array, truth: Array) -> str:
-    """Cure in words: the largest halved step whose trajectory is within COARSE / 10 of the peaks.
+    """Return a cure in words: the largest halved step with an error below COARSE / 10 of the peaks.
 
     Args:
         flow: The trajectories by the refused step.
@@ -154,11 +154,8 @@ def node_deviation(flow: Flow, points: Array) -> Array:
     """Return the estimated distance of outputs from straight lines between nodes, shape (T, m).
 
     Row j is that of the step that ends at node j, 0 for the first node. It is `MARGIN` times the
-    largest of the step and its neighbours, and of `FLOOR` times that of any step.
-
-    Args:
-        flow: The trajectories.
-        points: Parameters of those that are looked at, shape (S, d), in SI units.
+    largest of the step and its neighbours, and of `FLOOR` times that of any step, of trajectories
+    at parameters (S, d) in SI units.
     """
     chunks = np.array_split(points, -(-len(points) // CHUNK))
     deviation = np.max([_chord_deviation(flow, chunk) for chunk in chunks], axis=0)

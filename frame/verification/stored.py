@@ -32,7 +32,7 @@ FORCES = {"forces": ("motion", "row", "load"), "feeds": ("motion", "output", "lo
 
 
 def variables(points: Array, motions: Sequence[LinearMotion]) -> Variables:
-    """Variables of a dataset with the inputs (S, n) and matrices of structures, of the first ones.
+    """Return dataset variables with inputs (S, n) and matrices of the first of S structures.
 
     As many are stored as keep three matrices each within `MAX_NUMBERS`.
     """

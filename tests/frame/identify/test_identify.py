@@ -9,7 +9,7 @@ from alphacut.frame import StoreyFrame, envelope
 from alphacut.frame.identify import Identified, MeasuredMode, RefutedError, identify, measured_mode
 from alphacut.frame.identify.chain import Chain, eigenvalue_ranges
 from alphacut.frame.identify.relaxation import CONSTANT, LinearProgram, Rows, relaxation
-from alphacut.frame.identify.samples import inner_point, walk
+from alphacut.frame.identify.samples import inner_point, random_walks
 from alphacut.fuzzy import FuzzyNumber, Interval, Triangular, from_data
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import FailedError
@@ -422,7 +422,7 @@ def test_walks_fill_a_disc_and_no_more() -> None:
     """They are uniform, as the mean square radius of 1/2 says; a side of the box has no width."""
     box = Ends(np.array([-1.0, -1.5, 0.3]), np.array([1.0, 1.5, 0.3]))
     start, rng = np.array([0.9, 0.0, 0.3]), np.random.default_rng(1)
-    points = walk(lambda x: (x**2).sum(axis=1, keepdims=True) - 1, start, box, 2000, rng)
+    points = random_walks(lambda x: (x**2).sum(axis=1, keepdims=True) - 1, start, box, 2000, rng)
     assert (points[:, 2] == 0.3).all()
     square = (points[:, :2] ** 2).sum(axis=1) / (1 - 0.3**2)
     assert square.max() <= 1 + 1e-12
@@ -439,7 +439,7 @@ def test_a_small_and_thin_set_is_met_and_filled() -> None:
 
     start = inner_point(beyond, box, rng)
     assert start is not None
-    points = walk(beyond, start, box, 1000, rng)
+    points = random_walks(beyond, start, box, 1000, rng)
     assert (beyond(points) <= 0).all()
     assert points.mean(axis=0) == pytest.approx([0.75, 0.75], abs=0.02)
     assert points.std(axis=0) == pytest.approx(np.full(2, 0.5 / 12**0.5), rel=0.08)

@@ -11,7 +11,7 @@ from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.questions.peaks import ANY, Peaks, passing, peaks
 from alphacut.frame.questions.probability import _interval, probabilities
-from alphacut.frame.questions.tolerances import _step_of, scaled, tolerances
+from alphacut.frame.questions.tolerances import _outcome, scaled, tolerances
 from alphacut.fuzzy import Triangular
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Ends, Nature
@@ -160,7 +160,7 @@ def test_a_limit_between_what_is_reached_and_what_is_excluded_is_neither(limit, 
     found = Peaks(
         np.zeros(1), ("q1",), 0 * one, 1.9 * one, 0.1 * one, one, 0 * one, np.inf * one, name
     )
-    assert _step_of(found, {"q1": limit})[:2] == (kept, passed)
+    assert _outcome(found, {"q1": limit})[:2] == (kept, passed)
 
 
 def speed(rng, count):
