@@ -248,7 +248,7 @@ class UnitFlow:
         return self.flow.values(self.boxes.to_physical(unit))
 
     def taylor(self, unit: Array) -> Jet:
-        """Return outputs with first and second derivatives by unit coordinates, V = (S, T, m)."""
+        """Return outputs with first and second derivatives by unit coordinates, shape (S, T, m)."""
         return self.boxes.in_unit(self.flow.taylor(self.boxes.to_physical(unit)))
 
     def envelope(

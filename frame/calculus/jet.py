@@ -65,7 +65,7 @@ class Jet:
         return concatenate([x[..., None] for x in jets], -1)
 
     def contract(self, arrays: Array) -> Jet:
-        """Sum of jets V = (…, e) times arrays of numbers (e, …)."""
+        """Sum of jets shape (…, e) times arrays of numbers (e, …)."""
         return self.map(lambda x: np.asarray(np.tensordot(x, arrays, 1)))
 
     def map(self, linear: Callable[[Array], Array]) -> Jet:
@@ -177,7 +177,7 @@ def variables(
 
 
 def inverse(a: Jet) -> Jet:
-    """Inverse of square matrices, V = (..., n, n), by one factorisation."""
+    """Inverse of square matrices, shape (..., n, n), by one factorisation."""
     x = np.linalg.inv(a.value)
     first = -x @ a.first @ x
     if not len(a.second):

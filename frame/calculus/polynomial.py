@@ -152,7 +152,7 @@ def fit(u: Array, data: Jet, degree: int) -> Polynomial:
 
     Args:
         u: Points of the unit box, shape (S, d).
-        data: Values, gradients and Hessians there, V = (S, K).
+        data: Values, gradients and Hessians there, shape (S, K).
         degree: Total degree.
     """
     index = exponents(u.shape[1], degree)

@@ -60,7 +60,7 @@ class TaylorModel:
 
     @classmethod
     def variables(cls, centre: Array, radius: Array, order: int = ORDER) -> TaylorModel:
-        """The inputs themselves, centre + radius u, V = (d,), with the rounding of both."""
+        """The inputs themselves, centre + radius u, shape (d,), with the rounding of both."""
         parts = np.asarray(centre, float)[None], np.diag(np.asarray(radius, float))
         return cls(parts, gamma(2) * (np.abs(centre) + radius), len(centre), order)
 
@@ -80,7 +80,7 @@ class TaylorModel:
 
     @property
     def T(self) -> TaylorModel:  # noqa: N802
-        """Transposed matrices, V = (m, n) for (n, m)."""
+        """Transposed matrices, shape (m, n) for (n, m)."""
         parts = tuple(part.swapaxes(-1, -2) for part in self.parts)
         return TaylorModel(parts, self.remainder.swapaxes(-1, -2), self.inputs, self.order)
 
@@ -269,7 +269,7 @@ class TaylorModel:
         return out.loosened(rounding + truncation)
 
     def contract(self, arrays: Array) -> TaylorModel:
-        """Sum of functions V = (…, e) times arrays of numbers (e, …)."""
+        """Sum of functions shape (…, e) times arrays of numbers (e, …)."""
         factor = _numbers(arrays)
         return self._linear(lambda x, y: np.asarray(np.tensordot(x, y, 1)), factor, len(factor))
 
@@ -351,8 +351,8 @@ def solve(matrix: TaylorModel, right: TaylorModel) -> TaylorModel:
     Its remainder is a bound of |A⁻¹| times one of the residual |A Y − B|.
 
     Args:
-        matrix: A, V = (n, n).
-        right: B, V = (n, m).
+        matrix: A, shape (n, n).
+        right: B, shape (n, m).
 
     Raises:
         UnprovedError: A may be singular.

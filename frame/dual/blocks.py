@@ -55,10 +55,10 @@ class Block:
 
     Args:
         modes: Their numbers from below, from 0, rising, shape (p,).
-        rate: Lᵀ: K x_j = Σ_i rate_ji M x_i, V = (p, p), in 1/s².
-        shape: x_j, V = (p, n).
-        mass_shape: M x_j, V = (p, n).
-        norm: x_iᵀ M x_j, V = (p, p).
+        rate: Lᵀ: K x_j = Σ_i rate_ji M x_i, shape (p, p), in 1/s².
+        shape: x_j, shape (p, n).
+        mass_shape: M x_j, shape (p, n).
+        norm: x_iᵀ M x_j, shape (p, p).
     """
 
     modes: Rows
@@ -89,7 +89,7 @@ class CentredMatrices:
     """M and K over the box in coordinates in which its middle has both diagonal.
 
     Args:
-        mass: M, V = (n, n), as functions of the inputs that M and K depend on.
+        mass: M, shape (n, n), as functions of the inputs that M and K depend on.
         stiffness: K, the same.
         basis: Displacements are basis @ x, shape (n, n).
         modes: Number of modes; the other coordinates, which follow, have no mass.
@@ -313,10 +313,16 @@ def _residual_rounding(
 def _series_residual(
     pencils: list[Pencil], L: TaylorModel, x: TaylorModel, Mx: TaylorModel
 ) -> Array:
-    """Bound of the residual's parts above degree N over the box, shape (p, n).
+    """Bound over the box of the residual K x̃_j − Σ_i L̃_ji M x̃_i of a block's series, shape (p, n).
 
-    The residual is K x̃_j − Σ_i L̃_ji M x̃_i = (K − L̃_jj M) x̃_j − Σ_{i≠j} L̃_ji M x̃_i; `pencils` are
-    the K − L̃_jj M.
+    x̃ and L̃ are polynomials of degree N that solve the equation up to that degree: only terms above
+    it, and remainders, are summed.
+
+    Args:
+        pencils: K − L̃_jj M of each j, whose `sizes` bound it by degree, the remainder last.
+        L: L̃ᵀ, whose diagonal is in the pencils.
+        x: x̃.
+        Mx: M x̃.
     """
     of_x, N, off = x.sizes(), L.order, 1.0 - np.eye(len(pencils))
     of_L, of_Mx = [size * off for size in L.sizes()], Mx.sizes()

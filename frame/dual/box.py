@@ -137,7 +137,10 @@ class Box:
         return value, error, self._line_deviation(modal)
 
     def peak_over_time(self, unit: Array) -> Array:
-        """Upper bound of each output's largest magnitude at coordinates (d,), steps included, (m,).
+        """Upper bound of each output's magnitude over all time, between nodes too, shape (m,).
+
+        Args:
+            unit: Unit coordinates of the motion, shape (d,).
 
         Raises:
             UnprovedError: A mode does not oscillate there.
@@ -147,6 +150,7 @@ class Box:
         motion = replace(self, time=time, low=point, high=point)
         value, error, deviation = motion.centre_motion()
         size = np.abs(value) + error
+        # `deviation` is how far the motion leaves the straight line between both ends of a step
         return np.asarray((np.maximum(size[1:], size[:-1]) + deviation[1:]).max(0))
 
     @property

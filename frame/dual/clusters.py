@@ -99,8 +99,8 @@ def centred_matrices(mass: TaylorModel, stiffness: TaylorModel) -> tuple[Centred
     of their own, in which K is as large as the greatest λ.
 
     Args:
-        mass: M, V = (n, n); rows of zeros where unknowns have no mass.
-        stiffness: K, V = (n, n).
+        mass: M, shape (n, n); rows of zeros where unknowns have no mass.
+        stiffness: K, shape (n, n).
 
     Returns:
         The matrices as functions of the inputs that M or K depends on, and the numbers of these.

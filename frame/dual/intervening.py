@@ -39,10 +39,10 @@ class Oscillator:
     """Intervening variables of one mode, or of one diagonal entry of a block.
 
     Args:
-        omega: ω, V = (), in rad/s.
-        decay: g, V = (), in 1/s.
-        quotient: g/ω, V = ().
-        share: c, V = (sources, m).
+        omega: ω, a scalar, in rad/s.
+        decay: g, a scalar, in 1/s.
+        quotient: g/ω, a scalar.
+        share: c, shape (sources, m).
         omega_range: Least and greatest ω.
         quotient_range: Least and greatest g/ω.
     """
@@ -77,9 +77,9 @@ class BlockShares:
 
     Args:
         block: The block, in the inputs of the shares.
-        read: a, V = (p, m).
-        source_forces: Xᵀ M v, V = (p, sources).
-        participation: β = N⁻¹ Xᵀ M v, V = (p, sources).
+        read: a, shape (p, m).
+        source_forces: Xᵀ M v, shape (p, sources).
+        participation: β = N⁻¹ Xᵀ M v, shape (p, sources).
     """
 
     block: Block
@@ -95,9 +95,9 @@ class BlockShares:
 
         Args:
             block: The block X, as functions of the inputs at `used`.
-            rows: Rows of the outputs in the block's coordinates, V = (m, n), constant but for
+            rows: Rows of the outputs in the block's coordinates, shape (m, n), constant but for
                 rounding.
-            excited: Patterns v of the sources in them, V = (sources, n), of all inputs.
+            excited: Patterns v of the sources in them, shape (sources, n), of all inputs.
             used: Inputs of the block.
         """
         fixed, varying = excited.value, excited - excited.value
@@ -113,17 +113,17 @@ class BlockShares:
 
     @property
     def share(self) -> TaylorModel:
-        """a_j β_j of each column, V = (p, sources, m)."""
+        """a_j β_j of each column, shape (p, sources, m)."""
         return self.participation[:, :, None] * self.read[:, None, :]
 
     @property
     def of_outputs(self) -> TaylorModel:
-        """Sums a N⁻¹ aᵀ of each output, V = (m,)."""
+        """Sums a N⁻¹ aᵀ of each output, shape (m,)."""
         return dots(self.read, solve(self.block.norm, self.read))
 
     @property
     def of_sources(self) -> TaylorModel:
-        """β·N β of each source, V = (sources,)."""
+        """β·N β of each source, shape (sources,)."""
         return dots(self.source_forces, self.participation)
 
 
@@ -171,24 +171,25 @@ def _in_all(model: TaylorModel, structure: Classical, used: Rows) -> TaylorModel
 def _oscillator(
     structure: Classical, squared: TaylorModel, ratio: TaylorModel, share: TaylorModel, ends: Ends
 ) -> Oscillator:
-    """Oscillator of one mode.
+    """Damped frequency ω, decay rate g and g/ω of one mode as Taylor models, with proved ranges.
+
+    g = a/2 + b λ/2 + ζ √λ and ω² = λ − g², a and b the Rayleigh factors.
 
     Args:
-        structure: The structure, with its Rayleigh factors.
-        squared: λ, V = (), in 1/s².
-        ratio: Damping ratio ζ, V = ().
-        share: Amplitudes c, V = (sources, m).
+        structure: The structure.
+        squared: Undamped λ, a scalar, in 1/s².
+        ratio: Damping ratio ζ, a scalar.
+        share: Amplitudes c, shape (sources, m).
         ends: Proved least and greatest λ.
     """
-    root = squared**0.5
     a, b = structure.rayleigh[0], structure.rayleigh[1]
-    decay = a * 0.5 + b * squared * 0.5 + ratio * root
+    decay = a * 0.5 + b * squared * 0.5 + ratio * squared**0.5
     omega = (squared - decay * decay) ** 0.5
     quotient = decay * omega**-1.0
-    q = _ends(quotient)
-    slowest = float(np.sqrt(ends[0] / (1 + q[1] ** 2)))
-    omegas = _overlap(_ends(omega), (slowest, float(np.sqrt(ends[1]))))
-    return Oscillator(omega, decay, quotient, share, omegas, (max(q[0], 0.0), q[1]))
+    q_low, q_high = _ends(quotient)
+    lowest_omega = float(np.sqrt(ends[0] / (1 + q_high**2)))  # ω² = λ / (1 + (g/ω)²)
+    omega_range = _overlap(_ends(omega), (lowest_omega, float(np.sqrt(ends[1]))))
+    return Oscillator(omega, decay, quotient, share, omega_range, (max(q_low, 0.0), q_high))
 
 
 def damped_range(structure: Classical, low: float, high: float, modes: Rows) -> tuple[Ends, Ends]:
@@ -210,7 +211,7 @@ def damped_range(structure: Classical, low: float, high: float, modes: Rows) -> 
 
 
 def sources_of(structure: Classical, sources: Sequence[str]) -> TaylorModel:
-    """Patterns of the sources on the unknowns, V = (sources, n), in their order."""
+    """Patterns of the sources on the unknowns, shape (sources, n), in their order."""
     vectors = {
         "load": structure.start[0] * 0.0 + structure.pattern,
         "velocity": structure.start[1],
@@ -221,7 +222,7 @@ def sources_of(structure: Classical, sources: Sequence[str]) -> TaylorModel:
 
 
 def dots(a: TaylorModel, b: TaylorModel) -> TaylorModel:
-    """Σ_j a_js b_js, V = (s,)."""
+    """Σ_j a_js b_js, shape (s,)."""
     return (a * b).T @ np.ones(a.shape[0])
 
 

@@ -354,7 +354,7 @@ class OutputBounds:
 
 
 def _variables(level: LevelModels, o: int) -> TaylorModel:
-    """Taylor models of ω, g and the amplitudes of each mode, in this order, V = (Z,)."""
+    """Taylor models of ω, g and the amplitudes of each mode, in this order, shape (Z,)."""
     models = ((mode.omega[None], mode.decay[None], mode.share[:, o]) for mode in level.oscillators)
     return concatenate([x for of_mode in models for x in of_mode], -1)
 
@@ -433,7 +433,7 @@ def _radii(x: TaylorModel) -> Array:
 
 
 def _scaled(x: TaylorModel, radius: Array) -> tuple[Array, ...]:
-    """Linear, quadratic and cubic coefficients of models V = (Z,), and remainders, over `radius`.
+    """Linear, quadratic and cubic coefficients of models shape (Z,), and remainders, over `radius`.
 
     Shapes are (Z, monomials), quadratic ones by rows i ≤ j as the kernel has them, and (Z,).
     """

@@ -40,8 +40,8 @@ class TruncatedModes:
     """Modes that are known by sums.
 
     Args:
-        share: C, V = (sources, m).
-        amplitude: Bound of √(A B), V = (sources, m).
+        share: C, shape (sources, m).
+        amplitude: Bound of √(A B), shape (sources, m).
         middle: Middle of the responses that the share is multiplied by, shape (sources, m, T).
         half: Half their range, that the amplitude is multiplied by.
         line_deviation: Bound of the motion's distance from straight lines between nodes, (T, m).
@@ -64,9 +64,9 @@ class _Sums:
     """Sums over modes, without the outputs' factors.
 
     Args:
-        shares: Σ a β and Σ a β / λ, V = (sources, m) each.
-        outputs: Σ a² and Σ a² / λ, V = (m,) each.
-        sources: Σ β² and Σ β² / λ, V = (sources,) each.
+        shares: Σ a β and Σ a β / λ, shape (sources, m) each.
+        outputs: Σ a² and Σ a² / λ, shape (m,) each.
+        sources: Σ β² and Σ β² / λ, shape (sources,) each.
     """
 
     shares: tuple[TaylorModel, TaylorModel]
@@ -95,7 +95,7 @@ def rest_of_modes(
         structure: The structure.
         found: Its enclosed modes.
         shares: Their products with the rows of the outputs and the patterns of the sources.
-        coordinates: Outputs, V = (m, n), and sources, (sources, n), in the coordinates of `found`.
+        coordinates: Outputs (m, n) and sources (sources, n) in the coordinates of `found`.
         excitation: The loads, the nodes and the names of the sources.
     """
     other_modes = found.others
@@ -144,8 +144,8 @@ def _sums_over_modes(
 
     Args:
         found: Enclosed modes, with M and K in the coordinates of the box's middle.
-        read: Rows r of the outputs in these coordinates, V = (m, n).
-        excited: Patterns v of the sources in them, V = (sources, n); may depend on the inputs.
+        read: Rows r of the outputs in these coordinates, shape (m, n).
+        excited: Patterns v of the sources in them, shape (sources, n); may depend on the inputs.
         order: Order of the Taylor models where the patterns are constant.
     """
     centre, mass, stiffness = found.centre, found.centre.mass, found.centre.stiffness
@@ -178,15 +178,15 @@ def _sums_over_modes(
 def _inverse_form(
     matrix: TaylorModel, left: TaylorModel, right: TaylorModel, least: float
 ) -> TaylorModel:
-    """Taylor model of left A⁻¹ rightᵀ, V = (l, r), with a remainder quadratic in small residuals.
+    """Taylor model of left A⁻¹ rightᵀ, shape (l, r), with a remainder quadratic in small residuals.
 
     With series x ≈ left A⁻¹ and y ≈ right A⁻¹ of residuals e = left − x A and f = right − y A it is
     x rightᵀ + e yᵀ + e A⁻¹ fᵀ.
 
     Args:
-        matrix: A, diagonal in the middle of the box, V = (n, n).
-        left: Rows, V = (l, n).
-        right: Rows, V = (r, n).
+        matrix: A, diagonal in the middle of the box, shape (n, n).
+        left: Rows, shape (l, n).
+        right: Rows, shape (r, n).
         least: A(u) ≥ least · A(0) over the box, as quadratic forms.
     """
     middle = np.diag(matrix.value)
@@ -250,7 +250,7 @@ def _diagonal(matrix: TaylorModel) -> TaylorModel:
 def _amplitude_bounds(
     sums: _Sums, structure: Classical, found: Subspaces
 ) -> list[tuple[TaylorModel, TaylorModel]]:
-    """C = Σ a β and a bound of √(Σ a² Σ β²) for each power 0, ½, 1 of λ, V = (sources, m) each.
+    """C = Σ a β and a bound of √(Σ a² Σ β²) for each power 0, ½, 1 of λ, shape (sources, m) each.
 
     By the power no sum, that of a² or all have terms divided by λ. Outputs' factors are in both.
     """
@@ -265,7 +265,7 @@ def _amplitude_bounds(
 
 
 def _root(A: TaylorModel, B: TaylorModel) -> TaylorModel:
-    """Bound (A t + B/t)/2 of √(A B) for A, V = (m,), and B, V = (sources,), V = (sources, m)."""
+    """Bound (A t + B/t)/2 of √(A B), shape (sources, m), for A (m,) and B (sources,)."""
     of_A, of_B = (np.maximum(x.bounds()[1], 1e-300) for x in (A, B))
     t = np.sqrt(of_B[:, None] / of_A)
     return A[None] * (t / 2) + B[:, None] * (0.5 / t)
@@ -280,7 +280,7 @@ def _with_best_powers(
 
     Args:
         structure: The structure.
-        bounds: C and the amplitude for each power 0, ½, 1, V = (sources, m) each.
+        bounds: C and the amplitude for each power 0, ½, 1, shape (sources, m) each.
         ranges: Ranges of the responses by order of the derivative that is read.
     """
     of_outputs = [ranges[int(order)] for order in structure.order]

@@ -23,17 +23,17 @@ class Classical:
     """A structure over a box of d inputs, n unknowns, m outputs.
 
     Args:
-        mass: M, V = (n, n).
-        stiffness: K, V = (n, n).
+        mass: M, shape (n, n).
+        stiffness: K, shape (n, n).
         rows: What outputs take of the displacements, shape (m, n).
-        factor: What they are multiplied by, V = (m,).
+        factor: What they are multiplied by, shape (m,).
         order: Which derivative of the motion they take it of, shape (m,); of order 2 with the
             ground's acceleration added.
-        start: Initial displacements and velocities, V = (2, n).
+        start: Initial displacements and velocities, shape (2, n).
         pattern: ι, how the unknowns move with the ground, shape (n,).
-        forced: M⁻¹ b of each history of forces by its name, V = (n,).
-        rayleigh: a and b, V = (2,).
-        ratio: ζ_k of the modes by rising frequency, V = (modes,); unknowns without mass have none.
+        forced: M⁻¹ b of each history of forces by its name, shape (n,).
+        rayleigh: a and b, shape (2,).
+        ratio: ζ_k of the modes by rising frequency, shape (modes,), none of massless unknowns.
     """
 
     mass: TaylorModel
@@ -49,7 +49,7 @@ class Classical:
 
 
 def classical(system: LinearSystem, parameters: Mapping[str, TaylorModel]) -> Classical:
-    """Matrices, rows and damping of a structure, of parameters by name as Taylor models V = ().
+    """Matrices, rows and damping of a structure, of parameters by name, each a scalar Taylor model.
 
     Raises:
         UnprovedError: Its modes are not known to be classical.
@@ -82,7 +82,7 @@ def classical(system: LinearSystem, parameters: Mapping[str, TaylorModel]) -> Cl
 
 
 def _accelerations(assembly: Assembly[TaylorModel], forces: TaylorModel) -> TaylorModel:
-    """Accelerations M⁻¹ b by forces b, V = (n, k); zero for unknowns without mass."""
+    """Accelerations M⁻¹ b by forces b, shape (n, k); zero for unknowns without mass."""
     a, n = assembly.massive, len(assembly.pattern)
     return np.eye(n)[:, a] @ _solved(assembly.mass[a[:, None], a], forces[a])
 

@@ -35,7 +35,7 @@ def modes_wanted(
     Args:
         structure: The structure.
         centre: Its modes in the middle of the box.
-        excited: Sources in the coordinates of `centre`, V = (sources, n).
+        excited: Sources in the coordinates of `centre`, shape (sources, n).
         excitation: The loads, the nodes and the names of the sources.
         allowed: Truncation error of each output that is allowed, shape (m,).
 

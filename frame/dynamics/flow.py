@@ -126,11 +126,11 @@ class Flow(ABC):
         return self._finite(points, derivatives=False).value
 
     def taylor(self, points: Array) -> Jet:
-        """Trajectories with derivatives of the scheme, V = (S, T, outputs); raises as `values`."""
+        """Trajectories (S, T, outputs) with derivatives of the scheme; raises as `values`."""
         return self._finite(points, derivatives=True)
 
     def _finite(self, points: Array, *, derivatives: bool) -> Jet:
-        """Return trajectories at parameters (S, d), V = (S, T, outputs), all of them finite.
+        """Return trajectories at parameters (S, d), shape (S, T, outputs), all of them finite.
 
         Raises:
             RefusedError: A matrix is singular or a value not finite; the message names the point.
@@ -172,7 +172,7 @@ class Flow(ABC):
 
     @abstractmethod
     def _march(self, points: Array, *, derivatives: bool) -> Jet:
-        """Trajectories at `points`, V = (S, T, outputs)."""
+        """Trajectories at `points`, shape (S, T, outputs)."""
 
 
 @dataclass(frozen=True)
@@ -210,7 +210,7 @@ class LinearFlow(Flow):
         return truth, np.abs(self.values(points) - truth)
 
     def _march(self, points: Array, *, derivatives: bool) -> Jet:
-        """Return outputs of x[k+1] = T x[k] + G load[k] at points (S, d), V = (S, T, outputs)."""
+        """Return outputs of x[k+1] = T x[k] + G load[k] at points (S, d), shape (S, T, outputs)."""
         matrices, rows = evaluate(self.system, self.names, points, derivatives=derivatives)
         loads, has_ground = list(histories(self.system).values()), self.system.ground is not None
         h, steps, load = self.step, len(self.time) - 1, None

@@ -55,7 +55,7 @@ class Midpoint:
     def step_map(self, matrices: Matrices, step: float, pushes: Jet) -> StepMap:
         """Return the map of one step, whose velocities are M⁻¹ times the discrete momenta.
 
-        `pushes` are accelerations by a unit of each load, V = (S, n, L).
+        `pushes` are accelerations by a unit of each load, shape (S, n, L).
         """
         m, h = matrices, step
         inertia, spring = m.mass * (1 / h) + m.damping * 0.5, m.stiffness * (h / 4)
@@ -121,7 +121,7 @@ class Exact:
 
 
 def exponential(z: Jet) -> Jet:
-    """Return the matrix exponential with derivatives, V = (…, N, N), by scaling and squaring."""
+    """Return the matrix exponential with derivatives, shape (…, N, N), by scaling and squaring."""
     norm = float(np.abs(z.value).sum(-2).max(initial=0.0))
     squarings = max(0, ceil(log2(norm / 0.25))) if norm > 0 else 0
     z = z * 0.5**squarings
@@ -139,7 +139,7 @@ def loaded_flow(m: Matrices, step: float, pushes: Jet) -> Jet:
     """Return the state matrix of [q; v; load; rise], shape (S, 2n + 2L, 2n + 2L).
 
     Its exponential over a step is the map of a step in which each of L loads is linear, with its
-    rise. `pushes` are accelerations by a unit of each load, V = (S, n, L).
+    rise. `pushes` are accelerations by a unit of each load, shape (S, n, L).
     """
     flow = state_matrix(m)
     n, count = pushes.value.shape[-2:]

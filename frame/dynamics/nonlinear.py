@@ -103,7 +103,7 @@ class LagrangianFlow(Flow):
         return [with_derivatives(*expression) for expression in self._expressions]
 
     def _march(self, points: Array, *, derivatives: bool) -> Jet:
-        """Return trajectories at points (S, d) by the midpoint rule, V = (S, T, outputs).
+        """Return trajectories at points (S, d) by the midpoint rule, shape (S, T, outputs).
 
         Raises:
             StepError: A step did not converge.

@@ -24,7 +24,7 @@ def exact_response(
     """Return the exact map of one step x[k+1] = T x[k] + G load[k], and load[k] of all steps.
 
     Duhamel's integral over a step is a rule with Q points for each of L loads: G holds exp(A τ) b
-    at the points τ, V = (S, 2n, L Q), and load[k] the rule's weights, shape (steps, L Q). A is the
+    at the points τ, shape (S, 2n, L Q), load[k] the rule's weights, shape (steps, L Q). A is the
     state matrix, and b = [0; pushes] the accelerations by a unit of each load.
     """
     flow = state_matrix(matrices)
@@ -56,19 +56,19 @@ def trajectory(step_map: StepMap, start: Jet, rows: Jet, *, load: Array | None, 
 
     Args:
         step_map: One step, x[k+1] = T x[k] + G load[k].
-        start: Initial state, V = (S, N, 1).
-        rows: Observation rows, V = (S, m, N).
+        start: Initial state, shape (S, N, 1).
+        rows: Observation rows, shape (S, m, N).
         load: What G acts on in each step, shape (count − 1, L), or None.
         count: Number of nodes.
 
     Returns:
-        Outputs, V = (S, count, m).
+        Outputs, shape (S, count, m).
     """
     size = isqrt(count - 1) + 1  # of a block
     blocks = -(-count // size)
     powers = _powers(step_map.transfer, size)
     block_transfer = step_map.transfer @ powers[:, -1]
-    observed = rows[:, None] @ powers  # C T^j, V = (S, size, m, N)
+    observed = rows[:, None] @ powers  # C T^j, shape (S, size, m, N)
     samples, m, n = len(start.value), rows.value.shape[-2], start.value.shape[-2]
     flat = observed.map(lambda x: x.reshape((*x.shape[:-3], size * m, n)))
     if load is None:
@@ -91,7 +91,7 @@ def _responses_from_rest(
     """Return the motion in blocks of `size` steps that each start at rest under the load.
 
     Returns:
-        Outputs, V = (S, size m, blocks), and states after a block, V = (S, N, blocks).
+        Outputs, shape (S, size m, blocks), and states after a block, shape (S, N, blocks).
     """
     padded = np.zeros((blocks * size, load.shape[1]))
     padded[: len(load)] = load
@@ -105,7 +105,7 @@ def _responses_from_rest(
 
 
 def _powers(transfer: Jet, count: int) -> Jet:
-    """Return the powers T^0 … T^(count − 1) of a matrix by doubling, V = (S, count, N, N)."""
+    """Return the powers T^0 … T^(count − 1) of a matrix by doubling, shape (S, count, N, N)."""
     eye = np.broadcast_to(np.eye(transfer.value.shape[-1]), transfer.value.shape)
     powers = Jet.constant(eye, transfer.directions)[:, None]
     next_power = transfer
@@ -116,10 +116,10 @@ def _powers(transfer: Jet, count: int) -> Jet:
 
 
 def _block_starts(block_transfer: Jet, start: Jet, forced: Jet | None, blocks: int) -> Jet:
-    """Return the states at the first node of each block, V = (S, N, blocks).
+    """Return the states at the first node of each block, shape (S, N, blocks).
 
     `block_transfer` is the free motion over a block, `forced` the state after each block that
-    starts at rest under the load, V = (S, N, blocks), or None without a load.
+    starts at rest under the load, shape (S, N, blocks), or None without a load.
     """
     states = [start]
     for b in range(blocks - 1):

@@ -346,12 +346,12 @@ class _Chains:
         return amplitudes
 
     def require_frequency(self, cut: ModeCut) -> None:
-        """Add two linear inequalities that hold where an eigenvalue λ lies within a measured cut.
+        """Add two linear inequalities, necessary for an eigenvalue λ to lie within a measured cut.
 
-        They are low − e₁ ≤ xᵀK x / xᵀM x ≤ high + e₂ in stiffnesses and masses, x the mode shape at
-        the middle of the box. e₁ and e₂ bound the distance of quotient and eigenvalue by the
-        residual (Kato and Temple). Nothing is added if bounds of the neighbouring eigenvalues
-        overlap the quotient.
+        They are low − e₁ ≤ xᵀK x / xᵀM x ≤ high + e₂ in the factors of stiffnesses and masses, x
+        the mode shape at the middle of the box. e₁ and e₂ bound the distance of quotient and
+        eigenvalue by the residual (Kato and Temple). Nothing is added if bounds of the neighbouring
+        eigenvalues overlap the quotient.
 
         Args:
             cut: The mode, with the ends of λ in 1/s².
@@ -373,13 +373,15 @@ class _Chains:
         ):
             return
         shears, force = half[0] * np.abs(chain.stiffness * drift), np.abs(chain.mass * shape)
+        # of K x − λ M x over the box
         residual = shears + np.append(shears[1:], 0.0) + value * half[1] * force
+        # rounding
         residual += 1e-12 * value * force + 1e-13 * np.abs(chain.stiffness).max()
-        size = residual**2 @ (1 / (chain.mass * low[1])) / (inertia @ low[1])
-        quotient_below = size / (quotient[0] - below) if k else 0.0
-        quotient_above = size / (above - quotient[1])
+        squared_residual = residual**2 @ (1 / (chain.mass * low[1])) / (inertia @ low[1])
+        error_below = squared_residual / (quotient[0] - below) if k else 0.0
+        error_above = squared_residual / (above - quotient[1])
         unit = float(inertia.sum() * value)
-        for end, sign in ((cut.low - quotient_below, -1.0), (cut.high + quotient_above, 1.0)):
+        for end, sign in ((cut.low - error_below, -1.0), (cut.high + error_above, 1.0)):
             row: Linear = {}
             for z in range(len(self.mass)):
                 row = total(row, self.stiffness[z], sign * float(strain[z]) / unit)

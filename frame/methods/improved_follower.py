@@ -110,12 +110,15 @@ class ImprovedFollower:
     def _error(self, first: PassBounds, second: PassBounds, missed: Array, scale: Array) -> Array:
         """Return the estimated error of the better bounds of two passes, shape (A, T, m).
 
-        `missed` (A, m) is the excess of an independent sample, `scale` (m,) the factor from a
-        tolerance to the allowed error.
+        Args:
+            first: Bounds of one pass, with the gain (A, T, m, 2) that models still predict.
+            second: Those of the other.
+            missed: How far an independent sample exceeds the bounds, shape (A, m).
+            scale: Factor of each output from a tolerance to the allowed error, shape (m,).
         """
         gains, limit = [first.predicted_gain, second.predicted_gain], self.tolerance * scale
         small = [np.where(gain <= limit[:, None], gain, 0.0) for gain in gains]
-        # gains above the tolerance remain where the budget ended a pass
+        # gains above the tolerance, which remain where the budget ended a pass, come on top
         large = [np.where(gain > limit[:, None], gain, 0.0) for gain in gains]
         predicted = np.maximum(*small) + np.maximum(*large)
         difference = smoothed_maximum(np.abs(second.bounds - first.bounds).max(-1))

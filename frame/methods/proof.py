@@ -186,10 +186,17 @@ class Proof:
     def _accurate_model(
         self, flow: LinearFlow, boxes: Boxes, scale: Array, gap: float
     ) -> tuple[ModalModel, Array]:
-        """Return a modal model of a part and its proved error (T, m), at most a fifth of `gap`.
+        """Return a modal model over a part of the box, and its proved error, shape (T, m).
 
-        The degree is raised until the error is small enough. It is proved only where
-        `LEAST_PROVED_FACTOR` times the error at samples is, since a proof takes time.
+        The degree is raised until the error is small enough. Since a proof takes time, it is tried
+        once `LEAST_PROVED_FACTOR` times the error at samples is small enough.
+
+        Args:
+            flow: Trajectories of the structure.
+            boxes: Cuts of the part.
+            scale: Unit of each output, shape (m,).
+            gap: Gap of proved and attained bounds that is wanted, in these units, of which an error
+                may be a fifth.
 
         Raises:
             UnprovedError: No degree suffices.

@@ -216,7 +216,7 @@ def analyse(
         order: Highest order of derivatives, 0, 1 or 2.
 
     Returns:
-        Jets of λ_k, V = (S, n), in 1/s, and of C_k, V = (S, n, m): of the free motion, of each
+        Jets of λ_k, shape (S, n), in 1/s, and of C_k, shape (S, n, m): of the free motion, of each
         load, and of the direct feedthrough of each force, if any.
 
     Raises:
@@ -240,10 +240,10 @@ def analyse(
 
 
 def _feedthrough(feeds: Jet, count: int) -> list[Jet]:
-    """Direct feedthrough of each load as jets of coefficients C_k, V = (S, n, m), n = `count`.
+    """Direct feedthrough of each load as jets of coefficients C_k, shape (S, n, m), n = `count`.
 
     With `Direct`, where w of the first mode is a(t), 2 Re C_1 w is the feedthrough times a(t).
-    `feeds` are the outputs by a unit of each load, V = (S, m, L).
+    `feeds` are the outputs by a unit of each load, shape (S, m, L).
     """
     first = np.eye(count)[0][:, None] / 2
     columns = [feeds[..., i][..., None, :] for i in range(feeds.value.shape[-1])]

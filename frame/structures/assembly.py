@@ -28,21 +28,21 @@ class Assembly(Generic[Number]):
     Its damping is D = dashpots + a M + b K_springs + 2 M Φ diag(ζ_k ω_k) Φᵀ M.
 
     Args:
-        mass: M, V = (…, n, n), in kg.
-        springs: K of the springs, V = (…, n, n), in N/m.
+        mass: M, shape (…, n, n), in kg.
+        springs: K of the springs, shape (…, n, n), in N/m.
         weights: What weights take from K (P-Delta), the same shape; None for nothing.
-        dashpots: Their part of D, V = (…, n, n), in N s/m.
-        rayleigh: a in 1/s and b in s, V = (…) each.
-        ratios: ζ, V = (…) each: none, one of all modes, or one of each by rising frequency.
-        q0: Initial displacements, V = (…, n), in m.
-        v0: Initial velocities, V = (…, n), in m/s.
-        row_factors: What the outputs' rows are multiplied by, V = (…, m).
+        dashpots: Their part of D, shape (…, n, n), in N s/m.
+        rayleigh: a in 1/s and b in s, shape (…) each.
+        ratios: ζ, shape (…) each: none, one of all modes, or one of each by rising frequency.
+        q0: Initial displacements, shape (…, n), in m.
+        v0: Initial velocities, shape (…, n), in m/s.
+        row_factors: What the outputs' rows are multiplied by, shape (…, m).
         rows: What outputs take of [q; v], shape (m, 2n).
         accelerated: What they take of absolute accelerations, shape (m, n).
         pattern: ι, how the unknowns move rigidly with the ground, shape (n,).
         massive: Unknowns that have mass, rising.
         loads: Forces on unknowns that have mass.
-        columns: Each of them at the amplitude 1 of its history, V = (…, n, F), in N, impulses in
+        columns: Each of them at the amplitude 1 of its history, shape (…, n, F), in N, impulses in
             N s; None where there are none.
     """
 
@@ -64,35 +64,35 @@ class Assembly(Generic[Number]):
 
     @property
     def stiffness(self) -> Number:
-        """K, V = (…, n, n), in N/m."""
+        """K, shape (…, n, n), in N/m."""
         return self.springs if self.weights is None else self.springs - self.weights
 
     @property
     def forces(self) -> Number | None:
-        """Columns b, one a history of forces, V = (…, n, H), in N; None without one."""
+        """Columns b, one a history of forces, shape (…, n, H), in N; None without one."""
         keys = [force.history and force.history.identity for force in self.loads]
         courses = [course.identity for course in different(tuple(self.loads))]
         return self._summed(np.array([[key == x for x in courses] for key in keys], float))
 
     @property
     def static(self) -> Number | None:
-        """Force under which the structure rests at the start besides q0, V = (…, n, 1)."""
+        """Force under which the structure rests at the start besides q0, shape (…, n, 1)."""
         histories = [force.history for force in self.loads]
         first = [x.values(np.zeros(1))[0] if x and x.is_static else 0.0 for x in histories]
         return self._summed(np.array(first, float)[:, None])
 
     @property
     def impulse(self) -> Number | None:
-        """Impulse at t = 0, V = (…, n, 1), in N s; v0 comes before it."""
+        """Impulse at t = 0, shape (…, n, 1), in N s; v0 comes before it."""
         return self._summed(np.array([[float(force.history is None)] for force in self.loads]))
 
     def _summed(self, weight: Array) -> Number | None:
-        """Return Σ_F b_F weight_Fk over all forces, V = (…, n, k); None where all are zero."""
+        """Return Σ_F b_F weight_Fk over all forces, shape (…, n, k); None where all are zero."""
         return self.columns @ weight if self.columns is not None and weight.any() else None
 
 
 def stack(values: Sequence[Number]) -> Number:
-    """Joins numbers V = (…) to one of V = (…, e)."""
+    """Joins numbers shape (…) to one of shape (…, e)."""
     return type(values[0]).stack(values)
 
 
@@ -141,7 +141,7 @@ class Matrices:
         return concatenate([q0, v0], -2)
 
     def pushes(self, *, ground: bool) -> Jet:
-        """Return accelerations by a unit of each load, the ground's first, V = (S, n, L)."""
+        """Return accelerations by a unit of each load, the ground's first, shape (S, n, L)."""
         shape = (*self.mass.value.shape[:-1], int(ground))
         parts = [self.mass.like(-np.broadcast_to(self.rigid[:, : int(ground)], shape))]
         if self.forces is not None:
@@ -150,7 +150,7 @@ class Matrices:
 
     @property
     def feeds(self) -> Jet | None:
-        """What a unit of each force adds to the outputs at once, V = (S, m, H); None if nothing."""
+        """What a unit of each force adds to outputs at once, shape (S, m, H); None if nothing."""
         if self.forces is None or not self.accelerated.any():
             return None
         fed: Jet = self.accelerated @ self.pushes(ground=False)

@@ -87,7 +87,7 @@ def evaluate(
         by_ratios: Whether the damping holds that by ratios, which takes all modes to compute.
 
     Returns:
-        The matrices, and C with output = C [q; v], V = (S, m, 2n).
+        The matrices, and C with output = C [q; v], shape (S, m, 2n).
     """
     fixed = {name: x for name, x in system.parameters.items() if name not in names}
     values = np.hstack([points, np.tile(list(fixed.values()), (len(points), 1))])
@@ -97,7 +97,7 @@ def evaluate(
 
 
 def _condensed(full: Assembly[Jet], *, by_ratios: bool) -> tuple[Matrices, Jet]:
-    """Return the matrices on unknowns with mass and the rows of the outputs, V = (S, m, 2n).
+    """Return the matrices on unknowns with mass and the rows of the outputs, shape (S, m, 2n).
 
     Unknowns b without mass are condensed, q_b = −K_bb⁻¹ K_ba q_a (Guyan 1965).
     """
@@ -134,7 +134,7 @@ def _condensed(full: Assembly[Jet], *, by_ratios: bool) -> tuple[Matrices, Jet]:
 
 
 def _viscous_damping(full: Assembly[Jet]) -> Jet:
-    """Return the damping by dashpots and Rayleigh's factors, V = (S, n, n), in N s/m."""
+    """Return the damping by dashpots and Rayleigh's factors, shape (S, n, n), in N s/m."""
     damping = full.dashpots
     for factor, matrix in zip(full.rayleigh, (full.mass, full.springs), strict=True):
         if factor.value.any() or factor.first.any():

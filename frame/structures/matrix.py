@@ -259,7 +259,7 @@ class MatrixStructure:
 
 
 def values_of(factors: Sequence[Factor | str | float], p: Mapping[str, Number]) -> Number:
-    """Return the values of e factors at parameters V = (…) as one number V = (…, e)."""
+    """Return the values of e factors at parameters shape (…) as one number shape (…, e)."""
     if not factors:
         nothing: Number = lifted(0.0, p)
         return nothing.like(np.zeros((*nothing.value.shape, 0)))
@@ -267,7 +267,7 @@ def values_of(factors: Sequence[Factor | str | float], p: Mapping[str, Number]) 
 
 
 def lifted(factor: Factor | str | float, p: Mapping[str, Number]) -> Number:
-    """Return a factor's value at parameters as a number of their type, V = (…)."""
+    """Return a factor's value at parameters as a number of their type, shape (…)."""
     value = value_of(factor, p)
     like: Number = next(iter(p.values()))
     if isinstance(value, type(like)):

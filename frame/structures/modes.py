@@ -34,9 +34,9 @@ class Modes:
     """Intervening variables of a structure (section 7), smooth in the parameters.
 
     Args:
-        eigenvalue: λ_k with Im λ_k > 0, by rising |λ_k|, complex jet, V = (S, n), in 1/s.
-        coefficient: C_k, what the initial state puts into the outputs, V = (S, n, m).
-        loads: The same for a unit impulse of each load, V = (S, n, m) each.
+        eigenvalue: λ_k with Im λ_k > 0, by rising |λ_k|, complex jet, shape (S, n), in 1/s.
+        coefficient: C_k, what the initial state puts into the outputs, shape (S, n, m).
+        loads: The same for a unit impulse of each load, shape (S, n, m) each.
     """
 
     eigenvalue: Jet
@@ -63,13 +63,13 @@ def modes(matrices: Matrices, rows: Jet, pushes: Jet, chosen: Array | None = Non
 
     Args:
         matrices: The structure.
-        rows: Observation rows, V = (S, m, 2n).
-        pushes: Accelerations by a unit of each load, V = (S, n, L).
+        rows: Observation rows, shape (S, m, 2n).
+        pushes: Accelerations by a unit of each load, shape (S, n, L).
         chosen: Indices of k modes by rising |λ|; all modes when None.
 
     Returns:
-        Eigenvalues λ, one of each conjugate pair, V = (S, k), and amplitudes of exp(λ t) in each
-        output by the start and by a unit impulse of each load, V = (S, k, m).
+        Eigenvalues λ, one of each conjugate pair, shape (S, k), and amplitudes of exp(λ t) in each
+        output by the start and by a unit impulse of each load, shape (S, k, m).
 
     Raises:
         ModalError: A chosen mode does not oscillate (overdamped or free to drift).
@@ -82,7 +82,7 @@ def modes(matrices: Matrices, rows: Jet, pushes: Jet, chosen: Array | None = Non
             "a mode does not oscillate: modal intervening variables need damping below critical in"
             " every mode; use graph-follower"
         )
-    observed_shapes = rows @ X[..., kept]  # V = (S, m, k)
+    observed_shapes = rows @ X[..., kept]  # shape (S, m, k)
 
     def amplitudes(excitation: Jet) -> Jet:
         participation = (Y @ excitation)[..., kept, 0][..., None, :]
@@ -124,7 +124,7 @@ def oscillating(rate: Array) -> Array:
 
 
 def eigenvectors(A: Jet) -> tuple[Jet, Jet, Jet]:
-    """Return eigenvalues V = (S, 2n), right and left eigenvectors V = (S, 2n, 2n) of A.
+    """Return eigenvalues shape (S, 2n), right and left eigenvectors shape (S, 2n, 2n) of A.
 
     Eigenvalues with Im λ > 0 come first, then real ones, then those with Im λ < 0, each by |λ|.
 
@@ -156,14 +156,14 @@ def eigenvectors(A: Jet) -> tuple[Jet, Jet, Jet]:
 
 
 def modal_damping(mass: Jet, stiffness: Jet, ratios: Sequence[Jet]) -> Jet:
-    """Return the damping D = M Φ diag(2 ζ_k ω_k) Φ⁻¹ of modes Φ, V = (S, n, n), in N s/m.
+    """Return the damping D = M Φ diag(2 ζ_k ω_k) Φ⁻¹ of modes Φ, shape (S, n, n), in N s/m.
 
     It follows the parameters through the modes, and is not frozen at their nominal values.
 
     Args:
-        mass: M, symmetric and positive definite, V = (S, n, n), in kg.
-        stiffness: K, symmetric and positive definite, V = (S, n, n), in N/m.
-        ratios: ζ, V = (S,): one of all modes, or one of each mode by rising frequency.
+        mass: M, symmetric and positive definite, shape (S, n, n), in kg.
+        stiffness: K, symmetric and positive definite, shape (S, n, n), in N/m.
+        ratios: ζ, shape (S,): one of all modes, or one of each mode by rising frequency.
 
     Raises:
         RefusedError: A stiffness is not positive definite.
@@ -220,15 +220,15 @@ def require_modal_order(mass: Array, stiffness: Array, ratios: Array) -> None:
 
 
 def ratio_damping(mass: Jet, stiffness: Jet, ratio: Jet) -> Jet:
-    """Return D = 2 ζ M √(M⁻¹K), by which every mode has the damping ratio ζ, V = (S, n, n).
+    """Return D = 2 ζ M √(M⁻¹K), by which every mode has the damping ratio ζ, shape (S, n, n).
 
     D, in N s/m, is that of each of S parameter sets, with its derivatives. The root R with R R =
     M⁻¹K is smooth however the frequencies lie; its derivatives solve Sylvester's equation.
 
     Args:
-        mass: M, symmetric and positive definite, V = (S, n, n), in kg.
-        stiffness: K, symmetric and positive definite, V = (S, n, n), in N/m.
-        ratio: ζ, V = (S,).
+        mass: M, symmetric and positive definite, shape (S, n, n), in kg.
+        stiffness: K, symmetric and positive definite, shape (S, n, n), in N/m.
+        ratio: ζ, shape (S,).
 
     Raises:
         RefusedError: A stiffness is not positive definite.

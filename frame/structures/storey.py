@@ -245,7 +245,7 @@ class StoreyFrame:
         return (name,)
 
     def springs(self, p: Mapping[str, Number]) -> Number:
-        """Return k_z of each storey, V = (…, n), in N/m: as given, or 12 c E I / l³ of columns."""
+        """Return k_z of each storey (…, n), in N/m: as given, or 12 c E I / l³ of columns."""
         if self.stiffness:
             return self._of_floors("k{}", p)
         inertia = self._of_floors("I{}", p) if len(self.moments) > 1 else p["I"][..., None]
@@ -253,7 +253,7 @@ class StoreyFrame:
         return rigidity * self._of_floors("c{}", p) * self._of_floors("l{}", p) ** -3
 
     def softening(self, p: Mapping[str, Number]) -> Number:
-        """P_z / l_z of storeys, V = (…, n), in N/m, P_z the weight of all floors above."""
+        """P_z / l_z of storeys, shape (…, n), in N/m, P_z the weight of all floors above."""
         above = self._of_floors("m{}", p).contract(self.gravity * np.tri(self.floors))
         return above * self._of_floors("l{}", p) ** -1
 
@@ -340,7 +340,7 @@ class StoreyFrame:
             require(k > soft, key, value=f"{k:.5g} N/m", allowed=allowed, cure=cure)
 
     def _of_floors(self, pattern: str, p: Mapping[str, Number]) -> Number:
-        """Parameters of all floors, V = (…, n)."""
+        """Parameters of all floors, shape (…, n)."""
         return stack([p[pattern.format(z + 1)] for z in range(self.floors)])
 
 

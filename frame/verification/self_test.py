@@ -318,9 +318,12 @@ class _Check:
 
 
 def _within_steps(upper: Array, between: Array) -> Array:
-    """Return upper bounds at nodes and quarter points between them, shape (4 (T − 1) + 1, m).
+    """Return upper bounds at nodes and at the quarter points of steps, shape (4 (T − 1) + 1, m).
 
-    `between` (T, m) is what an output may exceed the bounds at both ends of a step by within it.
+    Args:
+        upper: Upper bounds at the nodes, shape (T, m).
+        between: How far an output may exceed, within the step that ends at a node, the larger of
+            the bounds at its ends, shape (T, m); the first row is not used.
     """
     inside = np.maximum(upper[1:], upper[:-1]) + between[1:]
     parts = [upper[:-1], *[inside] * (QUARTERS - 1)]

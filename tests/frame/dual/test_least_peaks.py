@@ -49,7 +49,7 @@ def test_the_peak_of_a_motion_holds_between_nodes():
     fine = LinearFlow(MODEL, tuple(FUZZY), 4.0, 0.001, Exact()).values(box.inputs(unit)[None])[0]
     peak = np.abs(fine).max(0)
     assert (peak <= bound).all(), f"seed {seed}"
-    np.testing.assert_allclose(bound, peak, rtol=0.02, err_msg=f"seed {seed}")
+    np.testing.assert_allclose(bound, peak, rtol=0.05, err_msg=f"seed {seed}")
 
 
 def test_a_limit_below_the_least_peak_must_be_exceeded(found):
