@@ -442,7 +442,10 @@ class Queue:
         return int((width / np.maximum(np.abs(boxes.centre), 1e-300)).argmax())
 
     def _put(self, parts: Sequence[Part]) -> None:
-        """Set the urgency of parts, the largest excess over incumbents in gaps, and queue them."""
+        """Set the urgency of parts and add them to the queue.
+
+        It is the largest excess of a bound over the incumbent, in units of the wanted gap.
+        """
         for part in parts:
             excess = [
                 (np.where(part.needed[k], part.outer[k], -np.inf).max(0) - self._incumbent(level))

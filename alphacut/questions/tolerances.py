@@ -25,15 +25,21 @@ from alphacut.questions.question import (
 
 
 def _row(name: str, support: Document, document: Document) -> Row:
-    """Row of an input: its support with no limit exceeded, the nature, and the relative support."""
-    if document["kept"] is None:  # a limit is exceeded at any scale
+    """Row of an input: its largest support with no limit exceeded, nature, and in % of modal.
+
+    Args:
+        name: Name of the input.
+        support: Scaled support and modal value of the input.
+        document: The answer; no support is kept if a limit is exceeded at every scale.
+    """
+    if document["kept"] is None:
         return f"tolerance of {name}", "–", document["nature"], ""
     ends, modal = support["kept"], support["modal"]
     relative = f"about {modal:g}"
     if modal:
         relative = ", ".join(f"{end / modal - 1:+.2%}".replace("-", "−") for end in ends)
     sides = zip(ends, ("lower", "upper"), strict=True)
-    inside = (rounded(end, side, Nature.ATTAINED) for end, side in sides)
+    inside = (rounded(end, side, Nature.ATTAINED) for end, side in sides)  # rounded inwards
     text = " … ".join(engineering(end, of_storey_frame(name).unit) for end in inside)
     return f"tolerance of {name}", text, document["nature"], relative
 

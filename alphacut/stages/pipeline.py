@@ -143,7 +143,10 @@ class Pipeline:
             results.envelopes[task.name] = data
 
     def _compute_motion(self, structure: Structure) -> None:
-        """Computes identified inputs, then envelopes or a suite, then answers, into the results."""
+        """Computes into the results the identified inputs, then the suite of records or envelopes.
+
+        Answers on limits follow from the peaks of either.
+        """
         results, content = self.results, self.content
         assert content.envelope is not None
         (task,) = envelope.tasks(content.envelope, ())  # of [envelope] itself

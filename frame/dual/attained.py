@@ -270,8 +270,9 @@ def _error(
 ) -> Array:
     """Bound of the rounding of Σ_k r_k c_k e_k over the modes k, shape (N,).
 
-    To the rounding of the factors it adds what the residuals of computed modes move the sum by,
-    times the difference quotients of e between modes or, where that is less, bounds of |de/dλ|.
+    Besides the rounding of the factors it bounds the effect of the residuals of the computed modes:
+    the residual coupling of modes j and k times the difference quotient of e between them or, where
+    that is less, a bound of |de/dλ|.
 
     Args:
         modal: Modes at all points.

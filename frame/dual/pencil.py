@@ -87,10 +87,13 @@ class Pencil:
 
     @classmethod
     def from_rate(cls, rate: list[Array], mass: TaylorModel, stiffness: TaylorModel) -> Pencil:
-        """The pencil T = K − ℓ M over the box, as bounds of its entries' variation by degree.
+        """The pencil T = K − ℓ M over the box, ℓ a polynomial near an eigenvalue.
+
+        It has bounds of the entries' terms of each degree, the last above N, and the terms of
+        degrees 1 and 2 themselves with their rounding.
 
         Args:
-            rate: Coefficients (monomials,) of ℓ, of degree 0 to N.
+            rate: Coefficients (monomials,) of ℓ, of degree 0 to N ≥ 2.
             mass: M.
             stiffness: K.
         """

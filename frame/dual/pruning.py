@@ -29,14 +29,16 @@ def prune_ends(
     above: Rows,
     best: Array,
 ) -> tuple[Array, Array, Array]:
-    """Prune ends of a box, quarters or halves of one input's range, that hold no higher peak.
+    """Prune ends of the box [−1, 1]^d over which no bound exceeds the peak by more than the gap.
+
+    An end is a quarter or a half of one input's range, on the side away from the best input.
 
     Args:
         level: Models over the box.
         problem: Bounds of one output and side over the box.
         bound_index: Number of the output, and 0 for −output or 1 for the output.
         above: Indices of the nodes whose bounds exceed the peak, shape (J,).
-        best: Coordinates of the best inputs found, shape (d,); ends lie away from them.
+        best: Coordinates of the best inputs found, shape (d,).
 
     Returns:
         Lower and upper ends of what remains, (d,) each, and upper bounds at these nodes over all
@@ -46,15 +48,17 @@ def prune_ends(
     pruned = np.full(len(above), -np.inf)
     for slabs in EFFORTS:
         for i in range(len(best)):
-            away = int(best[i] <= 0)  # the upper end lies away from a best input that is low
+            prune_upper = best[i] <= 0
             for fraction in ENDS if high[i] - low[i] == 2.0 else ():  # not pruned before
-                piece = low.copy(), high.copy()
-                piece[1 - away][i] = end = (1 - 2 * fraction) * (1 if away else -1)
+                piece_low, piece_high = low.copy(), high.copy()
+                end = 1 - 2 * fraction if prune_upper else 2 * fraction - 1
+                (piece_low if prune_upper else piece_high)[i] = end
+                piece = piece_low, piece_high
                 bounds = _over_piece(level, problem, bound_index, above, piece, slabs)
                 if bounds.max() > problem.attained + problem.wanted_gap:
                     break
                 pruned = np.maximum(pruned, bounds)
-                (high if away else low)[i] = end
+                (high if prune_upper else low)[i] = end
     return low, high, pruned
 
 

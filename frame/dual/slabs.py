@@ -309,9 +309,9 @@ def bound_slab(
 ) -> float:
     """Improve the dual bound of slab number `slab`; return the largest model value so far.
 
-    Written are the slab's entries of `slabs`, and `u` (L,), the inputs of the largest value, where
-    it exceeds `model_value`, that before. The dual function is evaluated at most `steps` times,
-    until it is below `target`.
+    The slab's entries of `slabs` are written. If a larger value than `model_value`, the largest
+    before, is found, its inputs are written to `u` (L,). The dual function is evaluated at most
+    `steps` times, until it is below `target`.
     """
     here, mu, weight = np.empty(len(u)), slabs.mu[slab], slabs.weight[slab]
     value = minimise(

@@ -27,7 +27,7 @@ def modes_wanted(
     excitation: Excitation,
     allowed: Array,
 ) -> tuple[int, Array]:
-    """Least number of lowest modes beside which the truncation error of the others is allowed.
+    """Least number of lowest modes to keep, so that truncating the others errs by what is allowed.
 
     It is an estimate by the bounds of `TruncatedModes`, with sums and responses in the middle of
     the box.
@@ -40,8 +40,8 @@ def modes_wanted(
         allowed: Truncation error of each output that is allowed, shape (m,).
 
     Returns:
-        The number, and the relative error of each mode's λ that changes an output by what is
-        allowed, shape (n,).
+        The number, and the relative error of each mode's λ that changes an output by its allowed
+        error, shape (n,).
     """
     loads, time, sources = excitation
     time = time[:: -(-len(time) // MAX_NODES)]
@@ -65,7 +65,8 @@ def modes_wanted(
             errors = [
                 _truncation_error(read[o], participation[s], waves, squared, x) for x in POWERS
             ]
-            first = int(reads_massless[o])  # Σ a² is unknown where massless unknowns are read
+            # the first power needs Σ read², which is unknown where massless unknowns are read
+            first = int(reads_massless[o])
             error[:, o] += np.min(errors[first:], axis=0)
     sufficient = np.flatnonzero((error <= allowed).all(1))
     wanted = max(int(sufficient[0]), 1) if len(sufficient) else n

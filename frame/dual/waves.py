@@ -97,18 +97,24 @@ class Oscillators:
     def waves(self, source: str, order: int) -> Waves:
         """Table of the oscillators' responses e to a unit amplitude of `source`, with errors.
 
-        e is read off G = σ^order ρ(σ; t): Re G + (g/ω) Im G for a start, ± Im G / ω else.
+        With σ = −γ + iω and G = σ^order ρ(σ; t), e is Re G + (γ/ω) Im G for a start, ± Im G / ω
+        else. ρ is ∫ exp(σ (t − s)) f(s) ds under a load f, exp(σ t) without one.
 
         Args:
             source: Name of a load or force, "velocity" or "start".
             order: Derivative of the motion that is read, 0 to 2.
+
+        Returns:
+            The responses with bounds of their error, of their deviation from straight lines between
+            nodes, and of |G| and |G'|.
         """
-        g = self.grid
-        sigma = g.sigma.ravel()
+        grid = self.grid
+        sigma = grid.sigma.ravel()
         if source in self.forced:
             rho, rounding, bounds = self.forced[source]
         else:
             t = self.time[:, None]
+            # ρ with two derivatives by σ
             rho, bounds = np.stack([self.free, t * self.free, t * t * self.free]), self.free_bounds
             rounding = self.free_error
         G = _with_power(sigma, rho, order)
@@ -123,10 +129,10 @@ class Oscillators:
             value = G[0].imag / omega * (-1.0 if source == "load" else 1.0)
             direct = feedthrough(source, self.loads, order, self.time)[:, None]
             value, rounding = value + direct, rounding / omega + 8 * UNIT_ROUNDOFF * np.abs(direct)
-        shape = (len(self.time), len(g.quotient), len(g.omega))
+        shape = (len(self.time), len(grid.quotient), len(grid.omega))
         error, largest = self._error(np.abs(G).max(-1), bounds, order, start=source == "start")
         error, deviation = error + rounding.max(-1), self._line_deviation(largest[0], source, order)
-        return Waves(g.omega, g.quotient, value.reshape(shape), error, deviation, largest)
+        return Waves(grid.omega, grid.quotient, value.reshape(shape), error, deviation, largest)
 
     def _error(
         self, largest: Array, bounds: Array, order: int, *, start: bool

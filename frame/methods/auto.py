@@ -126,10 +126,11 @@ class Auto:
         return _noted(replace(estimate, outer=outer), why)
 
     def _proofs(self, flow: UnitFlow, reasons: list[str]) -> Iterator[Proof | DualProof]:
-        """Yield the proofs to try, the one with less forecast work first.
+        """Yield the proofs to try, by rising forecast work; refusals are appended to `reasons`.
 
-        The branch and bound is yielded twice where both can be tried: on the box as it is, and with
-        parts. Refusals of proofs are appended to `reasons`.
+        Branch and bound (`Proof`) comes first if a tolerance holds at all nodes, not only at peaks.
+        If the dual bound can be tried, too, branch and bound is tried on the undivided box, and if
+        it was the first, again with the box in parts at the end.
         """
         tolerance, inputs = self.tolerance or DEFAULT_TOLERANCE, len(flow.boxes.names)
         proof = Proof(None, self.tolerance, BOXES, workers=self.workers)

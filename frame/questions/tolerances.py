@@ -73,9 +73,11 @@ def tolerances(
     at_one: Peaks | None = None,
     progress: Progress | None = None,
 ) -> Tolerances:
-    """Return the largest scale of the supports at which no magnitude exceeds its limit.
+    """Return scales of the supports up to which no magnitude exceeds its limit.
 
-    Scales are bisected, each by an envelope on the scaled supports.
+    Two scales are bisected by envelopes on scaled supports: the largest one at which exceeding is
+    excluded (`admissible`), and the least one at which a computed motion exceeds a limit, between
+    `clear` and `passed`.
 
     Args:
         model: The structure, whose outputs have the limits.
@@ -84,10 +86,10 @@ def tolerances(
         duration: Length of the motion, in s.
         step: Distance of nodes, in s.
         most: Largest scale that is tried.
-        precision: Distance of both scales, relative to `most`, at which the search ends.
+        precision: Width of the interval of a scale at which its bisection ends, over `most`.
         error: Error of the peaks that is aimed at, as a fraction of each.
-        at_one: Peaks on the supports at scale 1, on their first level, where these are known; that
-            scale is then used whatever the others say.
+        at_one: Peaks on the supports at scale 1, on their first level, where these are known; scale
+            1 is then tried at no cost.
         progress: Called with the completed fraction.
 
     Raises:

@@ -83,8 +83,9 @@ def evaluate(
         names: These d parameters; others keep their nominal values.
         points: Values, shape (S, d), in SI units.
         derivatives: Whether to differentiate by `names`.
-        bent: Whether to differentiate twice.
-        by_ratios: Whether the damping holds that by ratios, which takes all modes to compute.
+        bent: Whether to compute second derivatives, too.
+        by_ratios: Whether the damping matrix includes the part that is given by ratios of the
+            modes, which needs all modes.
 
     Returns:
         The matrices, and C with output = C [q; v], shape (S, m, 2n).

@@ -145,9 +145,9 @@ class StoreyFrame:
         require_choice("damper_placement", self.damper_placement, ("ground", "storey"))
 
     def _require_springs(self) -> None:
-        """Refuse frames with neither or both of stiffnesses and what makes them.
+        """Refuse a frame with both stiffnesses and modulus, second moment or columns, or neither.
 
-        Modulus, second moment and lengths make them. Gravity needs lengths in any case.
+        Lengths are required without stiffnesses, and with gravity.
         """
         needed: dict[str, object] = {"modulus": self.modulus, "second_moment": self.second_moment}
         if len(self.stiffness):

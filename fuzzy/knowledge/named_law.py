@@ -82,9 +82,10 @@ def _normal_cuts(data: Observations, quantile: float | None) -> tuple[Array, Arr
 
 
 def _deviation_range(data: Observations) -> tuple[float, float]:
-    """Least and greatest standard deviation of values anywhere within their intervals.
+    """Lower and upper bound of the standard deviation of values anywhere within their intervals.
 
-    By the triangle inequality it differs from that of the middles by the norm of the half widths.
+    By the triangle inequality it differs from that of the middles by at most the norm of the half
+    widths over √(n − 1).
     """
     middle, half_width = (data.lower + data.upper) / 2, (data.upper - data.lower) / 2
     deviation = float(middle.std(ddof=1))

@@ -66,11 +66,15 @@ def windows(n: int, quantile: float | None, open_ends: tuple[bool, bool]) -> Win
 
 
 def _gaps(n: int, quantile: float | None) -> tuple[Array, Array, Array]:
-    """Probability of each gap, of all gaps below it, and of all above it, shape (n + 1,) each.
+    """Probability that a quantile, or the next value, lies in each gap of n sorted values.
 
     Args:
         n: Number of values.
-        quantile: Probability of the quantile; None for the next value, for which gaps are equal.
+        quantile: Probability of the quantile; None for the next value, which is equally probable in
+            all gaps.
+
+    Returns:
+        Probability of each of the n + 1 gaps, of all lower gaps, and of all higher ones, (n + 1,).
     """
     from scipy.stats import binom
 

@@ -240,8 +240,8 @@ class Optimum:
     def is_optimum_of(self, cut: CutSearch) -> bool:
         """Whether the point is a local optimum of another cut as well.
 
-        It is one of a narrower cut that contains it, and of a wider one unless a face of its own
-        cut stopped the descent.
+        It stays one of a narrower cut (higher α) that contains it, and of a wider cut (lower α)
+        unless it lies on a face of its own cut which the wider one moves outwards.
         """
         if self.cut.level <= cut.level:
             return bool(cut.contains(self.point[None])[0])

@@ -78,7 +78,12 @@ def cell_fields(
 
 
 def mesh_fields(model: PrismModel, law: ThetaLaw, phases: Mapping[str, AnyPhase]) -> CellFields:
-    """Fields on a mesh from a file, under three loads.
+    """Displacements and stresses at the nodes of a mesh from a file, under three unit strains.
+
+    Args:
+        model: The model with the mesh.
+        law: Law of θ.
+        phases: Materials by name of their physical group.
 
     Raises:
         ConvergenceError: The linear solver stopped early.

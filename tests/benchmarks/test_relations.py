@@ -158,7 +158,7 @@ def test_an_order_of_inputs_that_matters_is_seen():
     waves = ByPosition(np.array([[1.0, 0.3]]), np.zeros(1), dict.fromkeys(fuzzy, 1.0))
     plain = functions.problem(waves, fuzzy, "automatic")
     other = plain | {"fuzzy": dict(reversed(fuzzy.items()))}
-    assert contradictions(functions.stated_signs(plain), functions.stated_signs(other))
+    assert contradictions(functions.stated(plain), functions.stated(other))
 
 
 def test_a_tolerance_in_metres_is_seen():
@@ -168,5 +168,5 @@ def test_a_tolerance_in_metres_is_seen():
         **{"sampling": 0.02, "nodes": 20, "step": 0.04, "method": "proof"},
         **{"tolerance": 1e-4, "relative": False},
     }
-    smaller = frames.stated_signs(frame | {"powers": (8, 0, 0)})
-    assert contradictions(frames.stated_signs(frame), smaller, within=1e-6)
+    smaller = frames.stated(frame | {"powers": (8, 0, 0)})
+    assert contradictions(frames.stated(frame), smaller, within=1e-6)

@@ -128,9 +128,17 @@ def _coupling(
 
 
 def _weighted_sum(sums: Array, pair: _Pair, lower: int) -> Array:
-    """Lattice sum (−1)^n w_N^M / (w_n^m w_k^j) Σ f_N^M(P) with N = n + k + `lower`, M = m − j.
+    """Coefficients by which multipoles (n, m) at all lattice points give a harmonic (k, j) at one.
 
-    w_n^m = √((n − m)! (n + m)!) carries amplitudes of the ladder's harmonics to Racah's; P = 2p.
+    They are (−1)^n w_N^M / (w_n^m w_k^j) Σ_P f_N^M(P), N = n + k + `lower`, M = m − j, and 0 where
+    there is no such harmonic. f_N^M are irregular solid harmonics, of degree −N − 1 in P = 2p, p
+    the points of the lattice of side 1; w_n^m = √((n − m)! (n + m)!) turns harmonics of the
+    recurrences into Racah's.
+
+    Args:
+        sums: Σ_p f_N^M(p) by N and M ≥ 0, shape (degrees, orders).
+        pair: Degrees and orders n, m, k, j.
+        lower: Degree of the sum less n + k.
     """
     degree, order = pair.n + pair.k + lower, abs(pair.m - pair.j)
     exists = (order <= degree) & (degree >= 0)
