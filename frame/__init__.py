@@ -5,12 +5,12 @@ Example:
     (['exact', 'midpoint', 'rk4'], 7)
 """
 
-from alphacut.frame.dual.proof import DualProof
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import INTEGRATORS, Exact, Midpoint, RungeKutta4
 from alphacut.frame.dynamics.nonlinear import LagrangianFlow
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.auto import Auto
+from alphacut.frame.methods.dual import DualProof
 from alphacut.frame.methods.graph_follower import GraphFollower
 from alphacut.frame.methods.improved_follower import ImprovedFollower
 from alphacut.frame.methods.proof import Proof

@@ -9,15 +9,15 @@ from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
-from alphacut.frame.box_proof import refusing
+from alphacut.frame.bounds.box_proof import refusing
 from alphacut.frame.boxes import ALPHA, Boxes, UnitFlow, boxes
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.dual.proof import DualProof
 from alphacut.frame.dynamics.flow import LinearFlow, exact_flow
 from alphacut.frame.dynamics.integrators import Exact, Integrator
 from alphacut.frame.dynamics.nonlinear import flow_of
 from alphacut.frame.envelope import Ends, Envelope
 from alphacut.frame.methods.auto import Auto
+from alphacut.frame.methods.dual import DualProof
 from alphacut.frame.methods.graph_follower import GraphFollower
 from alphacut.frame.methods.improved_follower import ImprovedFollower
 from alphacut.frame.methods.proof import Proof

@@ -131,7 +131,7 @@ def circles(imports: dict[str, set[str]]) -> set[str]:
 
 
 def folder_of(module: str) -> str:
-    """Folder of a module within its package, as "frame.dual"; a file beside the folders is itself."""
+    """Folder of a module within its package, as "frame.bounds"; a file beside the folders is itself."""
     package = package_of(module)
     parts = module.removeprefix("alphacut.").removeprefix(f"{package}.").split(".")
     return f"{package}.{parts[0]}" if module != f"alphacut.{package}" else package
@@ -182,11 +182,11 @@ def test_a_circle_and_a_backward_import_would_be_seen():
     assert circles({"a": {"b"}, "b": {"c"}, "c": {"b"}, "d": {"a"}}) == {"b", "c"}
     wrong = {"alphacut.io.files": {"alphacut.case.load"}, "alphacut.case.load": set()}
     assert backward(wrong, "alphacut") == ["alphacut.io imports alphacut.case"]
-    pair = {"alphacut.frame.dual.level": {"alphacut.frame.parts"}}
-    pair["alphacut.frame.parts"] = {"alphacut.frame.dual.box"}
-    pair["alphacut.frame.dual.box"] = set()
+    pair = {"alphacut.frame.bounds.level": {"alphacut.frame.boxes"}}
+    pair["alphacut.frame.boxes"] = {"alphacut.frame.bounds.box"}
+    pair["alphacut.frame.bounds.box"] = set()
     assert circles(pair) == set()
-    assert circles(folder_imports(pair)) == {"frame.dual", "frame.parts"}
+    assert circles(folder_imports(pair)) == {"frame.bounds", "frame.boxes"}
 
 
 def test_a_wrong_direction_would_be_seen():

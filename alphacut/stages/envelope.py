@@ -12,7 +12,7 @@ import numpy as np
 from alphacut import frame
 from alphacut.case.motion import EnvelopeSection, Study, Tolerance
 from alphacut.case.structure import Structure
-from alphacut.frame.certificate.remainder import MOST_PARAMETERS
+from alphacut.frame.bounds.remainder import MOST_PARAMETERS
 from alphacut.frame.questions.peaks import Peaks, output_of, peaks, tightest
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.arrays import Array

@@ -20,7 +20,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from alphacut.frame import Envelope, StoreyFrame, envelope
-from alphacut.frame.dual.proof import DualProof
+from alphacut.frame.methods.dual import DualProof
 from alphacut.frame.methods.proof import Proof
 from alphacut.frame.structures.loads import Accelerogram
 from alphacut.fuzzy import FuzzyNumber, Triangular

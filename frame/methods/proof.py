@@ -4,10 +4,11 @@
    (section 7). Polynomials of them, fitted to eigen-analyses, give q(t; p) = 2 Re Σ C_k exp(λ_k t),
    and likewise the motion under a record (`frame.modal`).
 2. What these polynomials miss in the equations of motion is bounded over the whole box, and with it
-   the error of the motion (`frame.certificate.model_error`). The degree rises until that takes a
-   fifth of the gap wanted. Where it does not, the part is refused, and bisected (`frame.parts`).
+   the error of the motion (`frame.bounds.model_error`). The degree rises until that takes a
+   fifth of the gap wanted. Where it does not, the part is refused and bisected
+   (`frame.bounds.parts`).
 3. Branch and bound encloses the polynomials' extremes at all nodes, for all outputs, sides and
-   levels, between a point that is attained and a bound that is proved (`frame.certificate`).
+   levels, between a point that is attained and a bound that is proved (`frame.bounds`).
 """
 
 from __future__ import annotations
@@ -17,17 +18,17 @@ from typing import ClassVar
 
 import numpy as np
 
-from alphacut.frame.box_proof import BisectionError, Goal, PartBounds
+from alphacut.frame.bounds.box_proof import BisectionError, Goal, PartBounds
+from alphacut.frame.bounds.certificate import certify
+from alphacut.frame.bounds.model_error import proved_error
+from alphacut.frame.bounds.parts import prove
+from alphacut.frame.bounds.remainder import MOST_PARAMETERS
 from alphacut.frame.boxes import DEFAULT_TOLERANCE, Boxes, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.certificate.certificate import certify
-from alphacut.frame.certificate.model_error import proved_error
-from alphacut.frame.certificate.remainder import MOST_PARAMETERS
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.modal.fitting import fit_modes
 from alphacut.frame.modal.model import ModalModel
-from alphacut.frame.parts import prove
 from alphacut.frame.structures.polynomial_dependence import degrees
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.progress_bar import Progress

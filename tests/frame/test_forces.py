@@ -21,9 +21,9 @@ from alphacut.frame import (
     StoreyFrame,
     envelope,
 )
+from alphacut.frame.bounds.model_error import proved_error
 from alphacut.frame.boxes import boxes
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.certificate.model_error import proved_error
 from alphacut.frame.modal.fitting import fit_modes
 from alphacut.frame.modal.ground_response import Direct
 from alphacut.frame.structures.linear import evaluate
@@ -218,7 +218,7 @@ def test_a_faulty_force_raises(wrong, monkeypatch):
     if wrong == "feed":
         monkeypatch.setattr(History, "values", lambda self, time: 0.99 * np.ones_like(time))
     else:
-        monkeypatch.setattr("alphacut.frame.dual.structure.solve", lambda a, b: b * 0.0)
+        monkeypatch.setattr("alphacut.frame.modes.structure.solve", lambda a, b: b * 0.0)
     frame = replace(FRAME, ground=None, loads=ALL[:3])
     inputs = {"m1": Triangular(1.9e3, 2e3, 2.1e3), "F3": Triangular(4.7e3, 5e3, 5.3e3)}
     with pytest.raises(FailedError, match="the proof is wrong"):

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from alphacut.frame import StoreyFrame, envelope, propagation
-from alphacut.frame.dual import level
-from alphacut.frame.dual.proof import DualProof
+from alphacut.frame.bounds import level
 from alphacut.frame.envelope import Ends
+from alphacut.frame.methods.dual import DualProof
 from alphacut.frame.methods.proof import Proof
 from alphacut.frame.structures.loads import Accelerogram
 from alphacut.frame.verification.self_test import ContradictionError, Trial, cuts_of

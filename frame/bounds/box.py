@@ -1,0 +1,212 @@
+"""A box of a linear structure's inputs: models over it or a part of it, and exact motions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from alphacut.frame.bounds.level import LevelModels
+from alphacut.frame.calculus.taylor_model import TaylorModel
+from alphacut.frame.calculus.unproved import UnprovedError
+from alphacut.frame.modes.attained import (
+    Modal,
+    load_at_given_nodes,
+    load_at_nodes,
+    modes_at,
+    outputs_at,
+)
+from alphacut.frame.modes.structure import Classical, classical
+from alphacut.frame.response.waves import Grid, Oscillators
+from alphacut.frame.structures.linear import LinearSystem, histories
+from alphacut.frame.structures.loads import History
+from alphacut.fuzzy.arrays import Array, Rows
+
+MOST_ENTRIES = 400_000
+"""Entries of the matrices of all points whose exact motions are computed together."""
+SUBSTEPS = 4
+"""Parts of a step at whose ends the peak of one motion is read; what lies between falls with its
+square."""
+
+
+@dataclass(frozen=True, eq=False)
+class Box:
+    """Inputs of a structure between two ends, d of which have a width.
+
+    Args:
+        system: The structure.
+        names: Its inputs, n of them.
+        time: Nodes, shape (T,), in s.
+        low: Lower ends, shape (n,), in SI units.
+        high: Upper ends.
+    """
+
+    system: LinearSystem
+    names: tuple[str, ...]
+    time: Array
+    low: Array
+    high: Array
+
+    @property
+    def active(self) -> Rows:
+        """Places of the inputs that have a width, shape (d,)."""
+        return np.flatnonzero(self.high > self.low)
+
+    @property
+    def centre(self) -> Array:
+        """Middle of all inputs, shape (n,)."""
+        return np.asarray((self.low + self.high) / 2)
+
+    @cached_property
+    def loads(self) -> dict[str, History]:
+        """Histories of all loads by name."""
+        return histories(self.system)
+
+    @cached_property
+    def structure(self) -> Classical:
+        """The structure over the whole box."""
+        return over_box(self.system, self.names, self.low, self.high)
+
+    def inputs(self, unit: Array) -> Array:
+        """Inputs (…, n) in SI units for unit coordinates (…, d)."""
+        points = np.tile(self.centre, (*unit.shape[:-1], 1))
+        points[..., self.active] += ((self.high - self.low) / 2)[self.active] * unit
+        return np.clip(points, self.low, self.high)
+
+    def level(
+        self,
+        nodes: Rows | slice = slice(None),
+        allowed: Array | None = None,
+        outputs: Rows | slice = slice(None),
+    ) -> LevelModels:
+        """Models over the box of the motion of `outputs` at `nodes`, both all unless given.
+
+        `allowed` is the truncation error of each output that is allowed, (m,).
+
+        Raises:
+            UnprovedError: No mode of the structure can be enclosed.
+        """
+        try:
+            structure = with_outputs(self.structure, outputs)
+            source_names, time = sources(self.system, structure), self.time[nodes]
+            return LevelModels.from_structure(structure, self.loads, time, source_names, allowed)
+        except UnprovedError as refusal:
+            if refusal.along is not None:  # of the active inputs; made one of all
+                refusal.along = int(self.active[refusal.along])
+            raise
+
+    def attained(self, unit: Array, node: Rows, output: Rows) -> Array:
+        """Exact values of outputs at nodes for unit coordinates (S, d), each shape (S,)."""
+        return self.attained_with_error(unit, node, output)[0]
+
+    def attained_with_error(self, unit: Array, node: Rows, output: Rows) -> tuple[Array, Array]:
+        """Exact values of one output at one node for each of S points, and their rounding, (S,).
+
+        Points are unit coordinates (S, d); modes are found once for each distinct one.
+        """
+        points, index = np.unique(unit, axis=0, return_inverse=True)
+        values_and_errors, count = np.empty((2, len(unit))), self._points_at_once
+        for first in range(0, len(points), count):
+            modal = self._modal(points[first : first + count])
+            inside = np.flatnonzero((index >= first) & (index < first + count))
+            for rows in np.array_split(inside, -(-len(inside) // count)):
+                motions = self._motions(modal, index[rows] - first, node[rows], output[rows])
+                values_and_errors[:, rows] = motions
+        return values_and_errors[0], values_and_errors[1]
+
+    def centre_motion(self) -> tuple[Array, Array, Array]:
+        """Exact outputs at the nodes for inputs in the middle of the box.
+
+        Returns:
+            Values, bounds of their rounding, and bounds of how far outputs stray from a straight
+            line in the step to each node, (T, m) each.
+
+        Raises:
+            UnprovedError: A mode does not oscillate there.
+        """
+        modal, (total, m) = self._modal(np.zeros((1, len(self.active)))), self._shape
+        sigma = modal.sigma[0]
+        loads = {name: load_at_nodes(sigma, x, self.time) for name, x in self.loads.items()}
+        first_point = np.zeros(total, int)
+        columns = [
+            outputs_at(modal, first_point, np.full(total, o), self.time, loads) for o in range(m)
+        ]
+        value, error = (np.stack(column, -1) for column in zip(*columns, strict=True))
+        return value, error, self._line_deviation(modal)
+
+    def peak_over_time(self, unit: Array) -> Array:
+        """Upper bound of each output's magnitude over all time, between nodes too, shape (m,).
+
+        Args:
+            unit: Unit coordinates of the motion, shape (d,).
+
+        Raises:
+            UnprovedError: A mode does not oscillate there.
+        """
+        point, steps = self.inputs(unit), SUBSTEPS * (len(self.time) - 1)
+        time = np.linspace(self.time[0], self.time[-1], steps + 1)
+        motion = replace(self, time=time, low=point, high=point)
+        value, error, deviation = motion.centre_motion()
+        size = np.abs(value) + error
+        # `deviation` is how far the motion leaves the straight line between both ends of a step
+        return np.asarray((np.maximum(size[1:], size[:-1]) + deviation[1:]).max(0))
+
+    @property
+    def _shape(self) -> tuple[int, int]:
+        """Numbers of nodes and outputs."""
+        return len(self.time), len(self.structure.order)
+
+    @property
+    def _points_at_once(self) -> int:
+        return max(MOST_ENTRIES // len(self.structure.pattern) ** 2, 1)
+
+    def _modal(self, unit: Array) -> Modal:
+        return modes_at(self.system, self.structure, self.names, self.inputs(unit), unit)
+
+    def _motions(self, modal: Modal, point: Rows, node: Rows, output: Rows) -> tuple[Array, Array]:
+        sigma = modal.sigma[point]
+        loads = {
+            name: load_at_given_nodes(sigma, load, self.time, node)
+            for name, load in self.loads.items()
+        }
+        return outputs_at(modal, point, output, self.time[node], loads)
+
+    def _line_deviation(self, modal: Modal) -> Array:
+        """Bound of how far a motion strays from straight lines in the step to a node, (T, m)."""
+        total, m = self._shape
+        deviation, outputs = np.zeros((total, m)), np.arange(m)
+        read = np.abs(modal.output_coefficients(np.zeros(m, int), outputs)[0])
+        for k, sigma in enumerate(modal.sigma[0]):
+            grid = Grid(np.array([sigma.imag]), np.array([-sigma.real / sigma.imag]))
+            oscillator = Oscillators(grid, self.loads, self.time)
+            for source, share in modal.share.items():
+                for o in outputs:
+                    wave = oscillator.waves(source, int(modal.order[o]))
+                    deviation[:, o] += read[o, k] * abs(share[0, k]) * wave.line_deviation
+        return deviation
+
+
+def over_box(system: LinearSystem, names: Sequence[str], low: Array, high: Array) -> Classical:
+    """The structure as Taylor models in those inputs `names` whose `low` is below `high`."""
+    active, centre, radius = np.flatnonzero(high > low), (low + high) / 2, (high - low) / 2
+    inputs, d = TaylorModel.variables(centre[active], radius[active]), len(active)
+    centres = {name: float(x) for name, x in zip(names, centre, strict=True)}
+    values = {**system.parameters, **centres}
+    parameters = {name: TaylorModel.constant(x, d) for name, x in values.items()}
+    parameters |= {names[int(i)]: inputs[column] for column, i in enumerate(active)}
+    return classical(system, parameters)
+
+
+def with_outputs(structure: Classical, outputs: Rows | slice) -> Classical:
+    """The structure of which some outputs alone are read."""
+    rows, factor, order = structure.rows, structure.factor, structure.order
+    return replace(structure, rows=rows[outputs], factor=factor[outputs], order=order[outputs])
+
+
+def sources(system: LinearSystem, structure: Classical) -> tuple[str, ...]:
+    """Names of what moves the structure: loads, velocity, start."""
+    moved = np.asarray(structure.start.size().any(-1))
+    at_start = [name for name, k in (("velocity", 1), ("start", 0)) if moved[k]]
+    return (*histories(system), *at_start)

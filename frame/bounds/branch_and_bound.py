@@ -1,0 +1,330 @@
+"""Spatial branch and bound for the modal model (Adjiman, Floudas 1998), up to the gap asked for.
+
+All nodes, outputs and sides share one tree of boxes, and each box its polynomials. A box is closed
+for a problem by one of five tests, all but the third on the quadratic Taylor model with the
+remainder of `remainder`: 1. the output is monotone along an axis, and the neighbouring box, or the
+face, covers it; 2. its bound lies below the best known value; 3. so does that of modes which turn
+at rates linear in the parameters, with a remainder that holds only what else they do; 4. a concave
+function above the quadratic model has no higher point; 5. near the best point the same holds for
+the Taylor model there, made less concave by the remainder. Else it is halved.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+
+from alphacut.frame.bounds.kernel import FACES, examine
+from alphacut.frame.bounds.remainder import Remainder
+from alphacut.frame.calculus.jet import Array
+from alphacut.frame.modal.model import ModalModel
+from alphacut.frame.modal.newton import refine
+from alphacut.frame.modal.optima import Optima
+from alphacut.fuzzy.progress_bar import Progress
+
+PIECE = 30_000
+"""Items examined together."""
+HIGHER = 1e-10
+"""Least gain for which a better point is taken over."""
+LOWER, UPPER = -1, -2
+"""Places of an axis that is confined to an end of the domain."""
+
+
+def enclosed(
+    model: ModalModel,
+    lower: Array,
+    upper: Array,
+    optima: Optima,
+    *,
+    gap: float,
+    budget: float = 4000,
+    workers: int = 1,
+    progress: Progress | None = None,
+) -> tuple[Array, int]:
+    """Upper bounds of side × output for all N problems of `optima`, by spatial branch and bound.
+
+    A problem is an output at a node on a side. Better points that are met replace those of
+    `optima`, in place.
+
+    Args:
+        model: The modal model.
+        lower: Lower ends of the box, shape (d,).
+        upper: Upper ends.
+        optima: The problems with their best points.
+        gap: Wanted difference between proved and attained bound, in units of the outputs.
+        budget: Most boxes per problem on average; where it ends first, gaps are wider than `gap`.
+        workers: Threads; the result does not depend on their number.
+        progress: Called with the fraction done.
+
+    Returns:
+        Proved upper bounds, shape (N,), and the number of boxes examined, each counted once for
+        each problem that needs it.
+    """
+    tree = Tree(model, lower, upper, optima, gap)
+    frontier, n_problems = Frontier.of_box(len(lower), tree.numbers), len(tree.numbers)
+    examined = 0
+    while len(frontier) and examined + len(frontier) <= budget * n_problems:
+        examined += len(frontier)
+        frontier = tree.next_frontier(frontier, workers)
+        if progress:
+            progress(1 - len(np.unique(frontier.problem)) / n_problems)
+    return tree.proved(frontier), examined  # boxes that are still open keep their own bounds
+
+
+class Tree:
+    """Boxes of one domain and the problems that share them.
+
+    A problem is an output at a node on a side: number node · 2 m + 2 output + (1 for upper bounds).
+
+    Attributes:
+        optima: N problems with their best points, which improve.
+        numbers: Their numbers, shape (N,).
+        remainder: Of quadratic Taylor models over the domain.
+        best: Side × output at the best points so far, of all problems of the model by number; those
+            without a place in `optima` are idle.
+        point: These points, shape (…, d).
+        jets: Value, gradient and Hessian (upper triangle) of the outputs there, shape (…, q).
+        gap: What the bounds may lie above the best values by.
+    """
+
+    def __init__(
+        self, model: ModalModel, lower: Array, upper: Array, optima: Optima, gap: float
+    ) -> None:
+        m, d, total = len(model.outputs), len(lower), 2 * len(model.outputs) * len(model.time)
+        self.model, self.lower, self.upper = model, lower, upper
+        self.optima, self.gap = optima, gap
+        self.numbers = (optima.node * m + optima.output) * 2 + (optima.side > 0)
+        self.remainder = Remainder(model, lower, upper)
+        self.best, self.point = np.zeros(total), np.zeros((total, d))
+        self.jets = np.zeros((total, 1 + d + d * (d + 1) // 2))
+        self._renew(np.arange(len(self.numbers)))
+
+    def next_frontier(self, frontier: Frontier, workers: int) -> Frontier:
+        """Halves and faces of a frontier's boxes, with the items still open after examination.
+
+        An item is a box with a problem. Best points improve where a centre has a higher value.
+        """
+
+        def outcome_of(part: tuple[slice, slice]) -> tuple[Array, Array, Array]:
+            return self.examine(frontier, *part)
+
+        with ThreadPoolExecutor(workers) as pool:
+            results = list(pool.map(outcome_of, frontier.pieces(PIECE)))
+        code, value, _ = (np.concatenate(arrays) for arrays in zip(*results, strict=True))
+        higher = np.flatnonzero(value > self.best[frontier.problem] + HIGHER)
+        if len(higher):
+            self._improve(frontier, higher[np.argsort(value[higher])], value)
+        return frontier.children(code)
+
+    def proved(self, frontier: Frontier) -> Array:
+        """Upper bounds of all problems, where the boxes of a frontier are left open, (N,)."""
+        upper = self.best + self.gap
+        for part in frontier.pieces(PIECE):
+            bound = self.examine(frontier, *part)[2]
+            np.maximum.at(upper, frontier.problem[part[1]], bound)
+        return np.asarray(upper[self.numbers])
+
+    def examine(self, frontier: Frontier, boxes: slice, items: slice) -> tuple[Array, Array, Array]:
+        """Examine the items of some boxes by `kernel.examine`; an item is a box with a problem.
+
+        Returns:
+            What is done next with each item (codes of `kernel.examine`), side × output at its
+            centre, and its upper bound, each (I,).
+        """
+        model, over_domain, d = self.model, self.remainder, len(self.lower)
+        n, m = model.count, len(model.outputs)
+        centre, radius, edges = frontier.geometry(self.lower, self.upper, boxes)
+        box, problem = frontier.box[items] - boxes.start, frontier.problem[items]
+        node, column = np.divmod(problem, 2 * m)
+        is_new_row = np.append(True, (np.diff(box) != 0) | (np.diff(node) != 0))
+        begin = np.flatnonzero(is_new_row)  # of rows, each a box at a node
+        row_box, row_node = box[begin], node[begin]
+        jets = model.together.jets(centre).swapaxes(0, 1)  # (q, B, n + P n m)
+        rate, share = jets[..., :n], jets[..., n:].reshape(*jets.shape[:2], -1, n, m)
+        waves = np.stack([np.stack(w, 1) for w in model.waves(rate[0, row_box], row_node)], 1)
+        starts = np.searchsorted(row_box, np.arange(len(centre) + 1)), np.append(begin, len(box))
+        flat = [x.reshape(d**order, -1) for order, x in enumerate(over_domain.share)]
+        bounds = over_domain.tensor, over_domain.margin, over_domain.rate[2].reshape(d * d, -1)
+        bounds += over_domain.rate[3].reshape(d**3, -1), flat[0][0], *flat[1:]
+        shares, slopes = _in_planes(share[0, :, 0]), _in_planes(rate[1 : 1 + d].swapaxes(0, 1))
+        outcome: tuple[Array, Array, Array] = examine(
+            (*starts, row_node, column),
+            (centre, radius, edges, _tables(rate, share, d), shares, slopes),
+            _in_planes(waves).reshape(len(begin), -1),
+            model.time,
+            tuple(np.ascontiguousarray(x, float) for x in bounds),
+            (self.best, self.point, self.jets),
+            self.gap,
+            not model.loads,
+        )
+        return outcome
+
+    def _improve(self, frontier: Frontier, items: Array, value: Array) -> None:
+        """Replace best points by the centres of higher items, and refine them by Newton's method.
+
+        `items` are the indices of these by rising value, so that the highest is written last;
+        `value` is side × output at the centres of all items.
+        """
+        row_of_problem = np.zeros(len(self.best), np.int64)
+        row_of_problem[self.numbers] = np.arange(len(self.numbers))
+        rows = row_of_problem[frontier.problem[items]]
+        centre = frontier.geometry(self.lower, self.upper)[0]
+        self.optima.point[rows] = centre[frontier.box[items]]
+        self.optima.value[rows] = value[items]
+        which = np.unique(rows)
+        refine(self.model, self.optima, which, self.lower, self.upper, self.gap / 100)
+        self._renew(which)
+
+    def _renew(self, which: Array) -> None:
+        """Copy value, point and derivatives there of the optima in rows `which` to the tree."""
+        optima, numbers = self.optima, self.numbers[which]
+        point = optima.point[which]
+        f, g, H = self.model.at(point, optima.node[which], optima.output[which])
+        row, column = np.triu_indices(g.shape[1])
+        self.best[numbers], self.point[numbers] = optima.value[which], point
+        self.jets[numbers] = np.column_stack([f, g, H[:, row, column]])
+
+
+@dataclass(frozen=True, eq=False)
+class Frontier:
+    """Open items by box, node and column.
+
+    Along each axis a box is a dyadic interval of the domain, 2^depth + index, or one of its ends,
+    `LOWER` or `UPPER`.
+
+    Args:
+        position: Intervals of the boxes, shape (B, d).
+        box: Box of each item, rising, shape (I,).
+        problem: Number of its problem, rising for each box, shape (I,).
+    """
+
+    position: Array
+    box: Array
+    problem: Array
+
+    @classmethod
+    def of_box(cls, d: int, problems: Array) -> Frontier:
+        """The domain for all `problems` (N,)."""
+        return cls(np.ones((1, d), np.int64), np.zeros(len(problems), np.int64), problems)
+
+    def __len__(self) -> int:
+        return len(self.box)
+
+    def geometry(
+        self, lower: Array, upper: Array, boxes: slice = slice(None)
+    ) -> tuple[Array, Array, Array]:
+        """Centres (B, d), half widths (B, d) and outer faces (B, 2, d) of boxes of a domain.
+
+        Outer are those lower and upper faces along each axis that lie on the domain's.
+        """
+        positions = self.position[boxes]
+        interval = np.maximum(positions, 1)  # 2^depth + index; ends of the domain count as all
+        width = 2.0 ** -np.floor(np.log2(interval + 0.5))  # fraction of the domain: 2^−depth
+        begin = interval * width - 1
+        at_ends = [positions == LOWER, positions == UPPER]
+        middle = np.select(at_ends, [0.0, 1.0], begin + width / 2)
+        radius = np.where(positions < 0, 0.0, (upper - lower) / 2 * width)
+        is_outer = np.stack([begin == 0, begin + width == 1], 1)
+        return lower + (upper - lower) * middle, radius, is_outer
+
+    def pieces(self, max_items: int) -> Iterator[tuple[slice, slice]]:
+        """Yield slices of boxes and of their items, in order, of at most `max_items` items.
+
+        A box with more items is a piece alone.
+        """
+        n_boxes = len(self.position)
+        first_items = np.append(np.searchsorted(self.box, np.arange(n_boxes)), len(self))
+        start = 0
+        while start < n_boxes:
+            stop = int(np.searchsorted(first_items, first_items[start] + max_items, "right")) - 1
+            stop = min(max(stop, start + 1), n_boxes)
+            yield slice(start, stop), slice(int(first_items[start]), int(first_items[stop]))
+            start = stop
+
+    def children(self, code: Array) -> Frontier:
+        """Halves and faces of boxes with the items left open by the codes of `kernel.examine`.
+
+        Args:
+            code: Of each item (a box and a problem): 0 closed, 1 + i halve along axis i, `FACES`
+                and more confine to faces. A box is halved along the axis with most votes.
+        """
+        d = self.position.shape[1]
+        to_halve = np.flatnonzero((code > 0) & (code < FACES))
+        to_confine = np.flatnonzero(code >= FACES)
+        count, box = 2 * d + 3**d, self.box[to_halve]  # count: halves and faces of a box
+        votes = np.bincount(box * d + code[to_halve] - 1, minlength=d * len(self.position))
+        halves = box * count + 2 * votes.reshape(-1, d).argmax(1)[box]
+        faces = self.box[to_confine] * count + 2 * d + code[to_confine] - FACES
+        keys = np.concatenate([halves, halves + 1, faces])  # of child boxes; see `_places`
+        problem = self.problem[np.concatenate([to_halve, to_halve, to_confine])]
+        distinct_keys = np.unique(keys)
+        positions, child = _distinct(self._places(distinct_keys, count))  # faces may coincide
+        n_problems = int(problem.max(initial=0)) + 1
+        items = np.unique(child[np.searchsorted(distinct_keys, keys)] * n_problems + problem)
+        return Frontier(positions, *np.divmod(items, n_problems))
+
+    def _places(self, keys: Array, count: int) -> Array:
+        """Positions of child boxes, shape (K, d), in the form of `position`.
+
+        Args:
+            keys: For each child its parent box × `count` + a number: 2 axis + (0 or 1) for the
+                lower or upper half, 2 d + a ternary code for faces, whose digit of each axis is
+                0: all of it, 1: lower end, 2: upper end.
+            count: Numbers a box, 2 d + 3^d.
+        """
+        d = self.position.shape[1]
+        positions: Array = self.position[keys // count].copy()
+        number = keys % count
+        rows = np.flatnonzero(number < 2 * d)
+        axis, half = np.divmod(number[rows], 2)
+        positions[rows, axis] = 2 * positions[rows, axis] + half
+        rows = np.flatnonzero(number >= 2 * d)
+        ternary = (number[rows, None] - 2 * d) // 3 ** np.arange(d) % 3
+        positions[rows] = np.select([ternary == 1, ternary == 2], [LOWER, UPPER], positions[rows])
+        return np.asarray(positions)
+
+
+def _distinct(rows: Array) -> tuple[Array, Array]:
+    """Distinct rows (B, d) of integers, rising, and which of them each row is, as `np.unique`."""
+    order = np.lexsort(rows.T[::-1])
+    fresh = np.any(np.diff(rows[order], axis=0, prepend=-3), axis=1)
+    number = np.empty(len(rows), np.int64)
+    number[order] = np.cumsum(fresh) - 1
+    return rows[order][fresh], number
+
+
+def _tables(rate: Array, C: Array, d: int) -> Array:
+    """Factors of the waves w, w′, w″ in an output's value, gradient and Hessian, at B points.
+
+    The output is 2 Re Σ_k C_k w(λ_k) over n modes and P parts (free motion and loads); q = 1 + d +
+    d (d + 1)/2 numbers are a value, a gradient and a Hessian's upper triangle.
+
+    Args:
+        rate: λ_k with derivatives, shape (q, B, n).
+        C: C_k with derivatives, shape (q, B, P, n, m).
+        d: Number of parameters.
+
+    Returns:
+        Shape (B, m, 6 P n, q); the third axis runs over parts, orders of the wave's derivative and
+        modes, each with its real and imaginary part.
+    """
+    rate = rate[..., None, :, None]
+    out = np.zeros((*C.shape[1:3], 3, *C.shape[3:], len(C)), complex)  # (B, P, 3, n, m, q)
+    out[:, :, 0] = np.moveaxis(C, 0, -1)
+    for k in range(1, 1 + d):
+        out[:, :, 1, ..., k] = C[0] * rate[k]
+    for a, (i, j) in enumerate(zip(*np.triu_indices(d), strict=True), 1 + d):
+        x, y = rate[1 + i], rate[1 + j]
+        out[:, :, 1, ..., a] = C[1 + i] * y + C[1 + j] * x + C[0] * rate[a]
+        out[:, :, 2, ..., a] = C[0] * x * y
+    doubled = 2 * np.stack([out.real, -out.imag], 4)  # (B, P, 3, n, 2, m, q)
+    flat = doubled.reshape(len(out), -1, *out.shape[-2:])
+    return np.ascontiguousarray(flat.swapaxes(1, 2))
+
+
+def _in_planes(x: Array) -> Array:
+    """Real and imaginary parts of complex numbers along a new last axis, shape (…, 2)."""
+    return np.ascontiguousarray(x).view(float).reshape(*x.shape, 2)

@@ -1,0 +1,358 @@
+"""Bounds at nodes: the model's own ascent from below, and the largest dual bound of all slabs.
+
+Where a bound is too far from the model's own value, the ranges of the modes' tables are halved, the
+slab with the largest bound first (best-first search).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from alphacut.frame.bounds.dual_function import Data, add, compiled, dot, loops, minimise, products
+from alphacut.fuzzy.arrays import Array, Rows
+
+JUMPS, CLIMBS = 4, 16
+"""Most steps of the model's ascent from one point: towards ends of the box, and along gradients."""
+
+GRID = 2.0**24
+"""Steps of the model's ascent in unit coordinates, so that rounding does not lead it elsewhere."""
+
+TRIED, MIN_PROGRESS = 8, 0.5
+"""Slabs after which the effort for a node ends where its gap has fallen by less than this share of
+an even fall to what suffices."""
+
+
+class Effort(NamedTuple):
+    """Effort that a node is worth.
+
+    Args:
+        slabs: Most slabs.
+        steps: Most evaluations of the dual function for a slab.
+        wanted_gap: Distance of bound and attained value that suffices.
+        incumbent: The largest attained value of side × output over time.
+        slack_below_peak: Addition to the wanted gap of a node below the peak, as a share of its
+            distance from the peak; at 1 only bounds above the peak count.
+        remainder_multiple: Least gap worth any effort, as a multiple of what the remainders of the
+            Taylor models add to the bound.
+    """
+
+    slabs: int
+    steps: int
+    wanted_gap: float
+    incumbent: float
+    slack_below_peak: float
+    remainder_multiple: float
+
+
+class Slabs(NamedTuple):
+    """Parts of the modes' tables with their bounds, `Effort.slabs` of them.
+
+    Args:
+        ends: First and last place along ω and along q for each mode, shape (…, K, 4).
+        mu: Multipliers, shape (…, Z).
+        weight: By how much each variable differs between the two maxima of D, the same.
+        value: Bounds of the dual function, shape (…,).
+    """
+
+    ends: Rows
+    mu: Array
+    weight: Array
+    value: Array
+
+
+@loops
+def model(u: Array, node: int, side: float, data: Data, gradient: Array) -> float:
+    """Side × output in the model at inputs u (L,), without its constants; side is −1 or 1.
+
+    Its gradient by u is written to `gradient` (L,).
+    """
+    bilinear, weight = np.empty(data.quadratic.shape[1]), np.zeros(len(data.linear))
+    products(u, bilinear)
+    total = response_and_gradient(u, node, side, data, weight)
+    gradient[:] = 0.0
+    quadratic = np.zeros(len(bilinear))  # of the linearised response, packed by rows i ≤ j
+    for a in range(len(weight)):
+        add(gradient, weight[a], data.linear[a])
+        add(quadratic, weight[a], data.quadratic[a])
+    for s in range(len(data.truncated_linear)):  # truncated modes
+        wave = side * data.truncated_response[s, node]
+        total += wave * (
+            dot(data.truncated_linear[s], u) + dot(data.truncated_quadratic[s], bilinear)
+        )
+        add(gradient, wave, data.truncated_linear[s])
+        add(quadratic, wave, data.truncated_quadratic[s])
+    at = 0
+    for i in range(len(u)):
+        for j in range(i, len(u)):
+            gradient[i] += quadratic[at] * u[j]
+            gradient[j] += quadratic[at] * u[i]
+            at += 1
+    return total
+
+
+@loops
+def response_and_gradient(u: Array, node: int, side: float, data: Data, weight: Array) -> float:
+    """Sum of the modes' responses, side × output, in the model at inputs u; side is −1 or 1.
+
+    `weight` (Z,) is written: its gradient by all scaled intervening variables.
+    """
+    bilinear, z = np.empty(data.quadratic.shape[1]), np.empty(len(data.linear))
+    products(u, bilinear)
+    for a in range(len(z)):
+        z[a] = dot(data.linear[a], u) + dot(data.quadratic[a], bilinear)
+    weight[:] = 0.0
+    total = 0.0
+    for k in range(len(data.share)):
+        total += mode_response(z, k, node, side, data, weight)
+    return total
+
+
+@loops
+def mode_response(z: Array, k: int, node: int, side: float, data: Data, weight: Array) -> float:
+    """Response of mode k at a node, side × output, by bilinear interpolation in its table.
+
+    `z` (Z,) are the scaled intervening variables of all modes: ω, g and amplitudes of each. Written
+    are the mode's entries of `weight` (Z,): derivatives by z.
+    """
+    width, sources = int(data.points[0]), data.share.shape[1]
+    first = k * (2 + sources)
+    w = data.centre[k, 0] + data.radius[k, 0] * z[first]
+    g = data.centre[k, 1] + data.radius[k, 1] * z[first + 1]
+    x = min(max((w - data.start[k, 0]) / data.step[k, 0], 0.0), width - 1.000001)
+    y = min(max((g / w - data.start[k, 1]) / data.step[k, 1], 0.0), data.points[1] - 1.000001)
+    i, j = int(x), int(y)
+    x, y = x - i, y - j
+    at, total = j * width + i, 0.0
+    for s in range(sources):
+        e = data.table[k, s, node]
+        a, b, c, f = e[at], e[at + 1], e[at + width], e[at + width + 1]  # corners of the cell
+        value = side * ((1 - y) * ((1 - x) * a + x * b) + y * ((1 - x) * c + x * f))
+        along = side * ((1 - y) * (b - a) + y * (f - c)) / data.step[k, 0]
+        across = side * ((1 - x) * (c - a) + x * (f - b)) / data.step[k, 1]
+        amplitude = data.share[k, s] + data.reach[k, s] * z[first + 2 + s]
+        total += amplitude * value
+        weight[first] += amplitude * (along - across * g / w**2) * data.radius[k, 0]
+        weight[first + 1] += amplitude * across / w * data.radius[k, 1]
+        weight[first + 2 + s] = value * data.reach[k, s]
+    return total
+
+
+@loops
+def ascend(u: Array, node: int, side: float, data: Data) -> float:
+    """Raise the model's side × output by a local search from inputs u (L,), which are written.
+
+    Steps towards the corner of [−1, 1]^L that the gradient points to come first, then projected
+    gradient ascent.
+
+    Returns:
+        The model's value at the inputs found.
+    """
+    d = len(u)
+    slope, trial, trial_slope = np.empty(d), np.empty(d), np.empty(d)
+    value = model(u, node, side, data, slope)
+    for _ in range(JUMPS):
+        gained, length = False, 1.0
+        for _ in range(3):
+            for i in range(d):
+                trial[i] = u[i] + length * (np.sign(slope[i]) - u[i])
+            new = model(trial, node, side, data, trial_slope)
+            if new > value + 1e-9 * abs(value):
+                value, gained = new, True
+                u[:], slope[:] = trial, trial_slope
+                break
+            length *= 0.35
+        if not gained:
+            break
+    return climb(u, node, side, data, value, slope)
+
+
+@loops
+def climb(u: Array, node: int, side: float, data: Data, value: float, slope: Array) -> float:
+    """Raise the model's side × output by projected gradient ascent with Barzilai–Borwein steps.
+
+    Inputs `u` in [−1, 1]^d are replaced by the best met, whose value is returned. `value` and
+    `slope` are the model's value and gradient at u; the gradient is overwritten.
+    """
+    d = len(u)
+    point, trial, trial_slope = u.copy(), np.empty(d), np.empty(d)
+    size = 0.3 / (np.abs(slope).max() + 1e-300)
+    for _ in range(CLIMBS):
+        for i in range(d):
+            trial[i] = np.rint(GRID * min(max(point[i] + size * slope[i], -1.0), 1.0)) / GRID
+        new = model(trial, node, side, data, trial_slope)
+        along = bend = 0.0
+        for i in range(d):
+            step = trial[i] - point[i]
+            along += step * step
+            bend += step * (slope[i] - trial_slope[i])
+        if along < 1e-8:
+            break
+        if new < value - 0.02 * abs(value):
+            size *= 0.3
+            continue
+        size = along / bend if bend > 0 else 4 * size
+        point[:], slope[:] = trial, trial_slope
+        if new > value:
+            value = new
+            u[:] = point
+    return value
+
+
+@compiled
+def bounds(
+    nodes: Rows, side: float, effort: Effort, constant: Array, data: Data, out: Array, at: Array
+) -> None:
+    """Write upper bounds of side × output at rising nodes.
+
+    Each node begins with the multipliers and inputs of the node before.
+
+    Args:
+        nodes: Nodes, shape (J,).
+        side: +1 for upper bounds of the output, −1 for lower ones.
+        effort: Effort for each node.
+        constant: Added to the model's value for the motion's, and to both for the bound, (2, T).
+        data: Models and tables of the output.
+        out: Written: bounds of side × output and the model's values of it, shape (2, J).
+        at: Written: inputs of the model's values, shape (J, L).
+    """
+    modes, most, Z = len(data.share), effort.slabs, len(data.linear)
+    slabs = Slabs(
+        np.zeros((most, modes, 4), np.int64),
+        np.zeros((most, Z)),
+        np.zeros((most, Z)),
+        np.zeros(most),
+    )
+    mu, u = np.zeros(Z), np.zeros(data.linear.shape[1])
+    for j in range(len(nodes)):
+        refine(nodes[j], side, effort, constant[:, nodes[j]], data, slabs, mu, u, out[:, j])
+        at[j] = u
+
+
+@compiled
+def refine(
+    node: int,
+    side: float,
+    effort: Effort,
+    constant: Array,
+    data: Data,
+    slabs: Slabs,
+    mu: Array,
+    u: Array,
+    out: Array,
+) -> None:
+    """Write the upper bound of side × output at one node, by best-first halving of table ranges.
+
+    Args:
+        node: Node.
+        side: +1 or −1.
+        effort: When to stop.
+        constant: Added to the model's value for the motion's, and to both for the bound, (2,).
+        data: Models and tables of the output.
+        slabs: Scratch; its first `effort.slabs` entries are written.
+        mu: Multipliers to begin with; written: those of the undivided ranges, shape (Z,).
+        u: Inputs to begin with; written: those of the largest model value, shape (L,).
+        out: Written: the bound and the largest model value, shape (2,).
+    """
+    slabs.ends[0], slabs.mu[0], slabs.value[0] = data.ends.astype(np.int64), mu, np.inf
+    model_value = ascend(u, node, side, data)
+    target = target_value(model_value, 0.0, effort, constant)
+    model_value = bound_slab(0, node, side, data, effort.steps, target, slabs, model_value, u)
+    mu[:] = slabs.mu[0]
+    least_gap = effort.remainder_multiple * (constant[1] + dot(np.abs(mu), data.remainder))
+    n_slabs, start_value = 1, slabs.value[0]
+    while n_slabs < effort.slabs:
+        worst = int(np.argmax(slabs.value[:n_slabs]))
+        target = target_value(model_value, least_gap, effort, constant)
+        even = start_value - (start_value - target) * MIN_PROGRESS * n_slabs / effort.slabs
+        too_slow = n_slabs >= TRIED and slabs.value[worst] > even
+        if slabs.value[worst] <= target or too_slow:
+            break
+        if not halve_widest(slabs, worst, n_slabs):
+            break
+        for slab in (worst, n_slabs):
+            model_value = bound_slab(
+                slab, node, side, data, effort.steps, target, slabs, model_value, u
+            )
+        n_slabs += 1
+    out[0] = slabs.value[:n_slabs].max() + constant[0] + constant[1]
+    out[1] = model_value + constant[0]
+
+
+@compiled
+def target_value(model_value: float, least_gap: float, effort: Effort, constant: Array) -> float:
+    """Value of the dual function D at which a node's bound is tight enough.
+
+    Args:
+        model_value: Largest value of the model found at the node.
+        least_gap: Least gap worth any effort.
+        effort: The wanted gap, and what a node below the peak may have more.
+        constant: Added to the model's value for the motion's, and to both for the bound, (2,).
+    """
+    below_peak = max(0.0, effort.incumbent - model_value - constant[0])
+    gap = max(effort.wanted_gap, least_gap) + effort.slack_below_peak * below_peak
+    return model_value + gap - constant[1]
+
+
+@compiled
+def bound_slab(
+    slab: int,
+    node: int,
+    side: float,
+    data: Data,
+    steps: int,
+    target: float,
+    slabs: Slabs,
+    model_value: float,
+    u: Array,
+) -> float:
+    """Improve the dual bound of slab number `slab`; return the largest model value so far.
+
+    The slab's entries of `slabs` are written. If a larger value than `model_value`, the largest
+    before, is found, its inputs are written to `u` (L,). The dual function is evaluated at most
+    `steps` times, until it is below `target`.
+    """
+    here, mu, weight = np.empty(len(u)), slabs.mu[slab], slabs.weight[slab]
+    value = minimise(
+        mu, slabs.ends[slab], node, side, data, steps, target, model_value, weight, here
+    )
+    slabs.value[slab] = min(value, slabs.value[slab])
+    if slabs.value[slab] > target or slab == 0:
+        new_value = ascend(here, node, side, data)
+        if new_value > model_value:
+            model_value = new_value
+            u[:] = here
+    return model_value
+
+
+@compiled
+def halve_widest(slabs: Slabs, halved: int, n_slabs: int) -> bool:
+    """Halve a slab along the ω or q = g/ω on which the maxima of the dual function differ most.
+
+    Args:
+        slabs: All slabs, with these differences as `weight`; the lower half is written to number
+            `halved`, the upper to `n_slabs`.
+        halved: Number of the slab.
+        n_slabs: Number of slabs before.
+
+    Returns:
+        Whether there is a range with a table point between its ends.
+    """
+    ends, weight = slabs.ends[halved], slabs.weight[halved]
+    n_variables = len(weight) // len(ends)  # of a mode: ω, g and its amplitudes
+    largest, mode, axis = 0.0, -1, 0
+    for k in range(len(ends)):
+        for direction in range(2):  # along ω, along q
+            n_intervals = ends[k, 2 * direction + 1] - ends[k, 2 * direction]
+            difference = weight[k * n_variables + direction]
+            if n_intervals >= 2 and difference > largest:
+                largest, mode, axis = difference, k, direction
+    if mode < 0:
+        return False
+    middle = (ends[mode, 2 * axis] + ends[mode, 2 * axis + 1]) // 2
+    slabs.ends[n_slabs], slabs.mu[n_slabs] = ends, slabs.mu[halved]
+    slabs.value[n_slabs] = slabs.value[halved]
+    slabs.ends[halved, mode, 2 * axis + 1] = middle
+    slabs.ends[n_slabs, mode, 2 * axis] = middle
+    return True

@@ -1,0 +1,247 @@
+"""Which modes form blocks: those that meet or come near in the box, and a basis smooth there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from alphacut.frame.calculus.rounding import gamma
+from alphacut.frame.calculus.taylor_model import TaylorModel
+from alphacut.frame.calculus.unproved import UnprovedError
+from alphacut.frame.modes.blocks import Block, CentredMatrices, narrowest_block
+from alphacut.frame.modes.pencil import form_variation
+from alphacut.fuzzy.arrays import Array, Mask, Rows
+
+NEAR = 2.0
+"""Share of their distance that two λ vary against one another from which they are a block without
+an attempt to enclose them alone, which fails at some number between 1 and 2."""
+LEAST_NEAR = 0.4
+"""The same from which a mode joins a block that is not enclosed without it."""
+MAX_BLOCK = 12
+"""Most modes of a block."""
+SWEEPS = 12
+"""Sweeps of Jacobi rotations at most."""
+
+
+@dataclass(frozen=True, eq=False)
+class Subspaces:
+    """Enclosed blocks of a structure over its box.
+
+    Args:
+        blocks: Blocks, of functions of the inputs at `used`.
+        used: Inputs that mass and stiffness depend on.
+        centre: Mass and stiffness in the coordinates of the blocks.
+        low: Least λ of all modes by number from below, shape (modes,), in 1/s².
+        high: Greatest.
+        variation: Bounds of the norms of the variations of M and K, in the order of forms.
+        along: Input whose bisection parts the closest pair that is not enclosed; None if all are.
+    """
+
+    blocks: list[Block]
+    used: Rows
+    centre: CentredMatrices
+    low: Array
+    high: Array
+    variation: tuple[float, float]
+    along: int | None
+
+    @property
+    def others(self) -> Rows:
+        """Numbers of the modes that are not enclosed, rising."""
+        taken = [block.modes for block in self.blocks]
+        return np.setdiff1d(np.arange(self.centre.modes), np.concatenate([[], *taken]))
+
+
+def subspaces(
+    centre: CentredMatrices, used: Rows, wanted: int, tolerances: Array | None = None
+) -> Subspaces:
+    """Enclose the lowest modes over the box, in blocks, from below until one is not enclosed.
+
+    Args:
+        centre: M and K in the coordinates of the box's middle.
+        used: Inputs that they depend on, among all.
+        wanted: Number of modes to enclose.
+        tolerances: Relative error of each mode's λ that suffices; 0 unless given.
+
+    Raises:
+        UnprovedError: The box is so wide that the structure may lose its mass or stiffness.
+    """
+    weight = (np.arange(len(centre.basis)) < centre.modes).astype(float)
+    mass_variation = form_variation(centre.mass, weight)
+    stiffness_variation = form_variation(centre.stiffness, np.diag(centre.stiffness.value) ** -0.5)
+    slopes = _slopes(centre)
+    if not (mass_variation < 1 and stiffness_variation < 1):
+        steepest = int(used[(np.abs(slopes) / centre.squared[:, None]).max(0).argmax()])
+        what = "the structure may lose its stiffness"
+        raise UnprovedError(what, "take narrower inputs", steepest)
+    tolerances = np.zeros(centre.modes) if tolerances is None else tolerances
+    blocks, pair = _from_below(centre, slopes, min(wanted, centre.modes), tolerances)
+    along = None if pair is None else int(used[np.abs(slopes[pair[0]] - slopes[pair[1]]).argmax()])
+    slack = gamma(100 * len(weight))  # rounding of the norms
+    low = (1 - slack) * (1 - stiffness_variation) / (1 + mass_variation)
+    high = (1 + slack) * (1 + stiffness_variation) / (1 - mass_variation)
+    return Subspaces(
+        blocks=blocks,
+        used=used,
+        centre=centre,
+        low=low * centre.squared,
+        high=high * centre.squared,
+        variation=(mass_variation, stiffness_variation),
+        along=along,
+    )
+
+
+def centred_matrices(mass: TaylorModel, stiffness: TaylorModel) -> tuple[CentredMatrices, Rows]:
+    """M and K in coordinates that make both diagonal in the middle of the box.
+
+    Unknowns b without mass follow the others a there, x_b = −K_bb⁻¹ K_ba x_a, and have coordinates
+    of their own, in which K is as large as the greatest λ.
+
+    Args:
+        mass: M, shape (n, n); rows of zeros where unknowns have no mass.
+        stiffness: K, shape (n, n).
+
+    Returns:
+        The matrices as functions of the inputs that M or K depends on, and the numbers of these.
+
+    Raises:
+        UnprovedError: The structure can move rigidly, or is unstable, in the middle.
+    """
+    massive = np.asarray(mass.size().any(1))
+    M, K, n = mass.value, stiffness.value, len(massive)
+    a, b = np.flatnonzero(massive), np.flatnonzero(~massive)
+    massless_values, massless_vectors = np.linalg.eigh(K[np.ix_(b, b)])
+    _require_stiff(massless_values, K)
+    follow = -(massless_vectors / massless_values) @ massless_vectors.T @ K[np.ix_(b, a)]
+    condensed = K[np.ix_(a, a)] + K[np.ix_(a, b)] @ follow
+    inverse_factor = np.linalg.inv(np.linalg.cholesky(M[np.ix_(a, a)]))
+    squared, vectors = np.linalg.eigh(inverse_factor @ condensed @ inverse_factor.T)
+    _require_stiff(squared, squared)
+    basis: Array = np.zeros((n, n))
+    basis[a, : len(a)] = inverse_factor.T @ vectors
+    basis[b, : len(a)] = follow @ inverse_factor.T @ vectors
+    basis[b, len(a) :] = massless_vectors * np.sqrt(squared[-1] / massless_values)
+    used = np.union1d(mass.present(), stiffness.present())
+    used = used if len(used) else np.arange(1)
+    heavy, stiff = (basis.T @ matrix.on(used) @ basis for matrix in (mass, stiffness))
+    weight = (np.arange(n) < len(a)).astype(float)
+    diagonals = _diagonal(heavy, weight), _diagonal(stiff, np.diag(stiff.value))
+    return CentredMatrices(*diagonals, basis, len(a)), used
+
+
+def _diagonal(matrix: TaylorModel, diagonal: Array) -> TaylorModel:
+    """The same with a diagonal in the middle, which it has but for rounding, put into the rest."""
+    middle = np.diag(diagonal)
+    remainder = matrix.remainder + np.abs(matrix.value - middle)
+    return TaylorModel((middle[None], *matrix.parts[1:]), remainder, matrix.inputs, matrix.order)
+
+
+def _require_stiff(values: Array, like: Array) -> None:
+    if len(values) and values.min() <= 1e-12 * np.abs(like).max():
+        raise UnprovedError(
+            "the structure may move rigidly or lose its stiffness",
+            "take the method improved-graph-follower",
+        )
+
+
+def _slopes(centre: CentredMatrices) -> Array:
+    """∂λ_j/∂u_i in the middle, shape (modes, d)."""
+    at = np.arange(centre.modes)
+    stiff, heavy = (x.part(1)[:, at, at] for x in (centre.stiffness, centre.mass))
+    return np.asarray((stiff - centre.squared * heavy).T)
+
+
+def _couplings(centre: CentredMatrices, some: Rows) -> Array:
+    """First-order change of K − λ M between modes, λ the mean of both, shape (d, p, p)."""
+    stiff, heavy = (x.part(1)[:, some[:, None], some] for x in (centre.stiffness, centre.mass))
+    mean = (centre.squared[some, None] + centre.squared[some]) / 2
+    return np.asarray(stiff - mean * heavy)
+
+
+def _nearness(centre: CentredMatrices, slopes: Array) -> Array:
+    """First-order change of λ_j − λ_k over the box, over |λ_j − λ_k| in its middle, (modes, modes).
+
+    From 1 on two modes may meet at complex inputs of sizes up to 1, where their series diverge.
+    `slopes` (modes, d) are ∂λ_j/∂u_i in the middle.
+    """
+    couplings = np.abs(_couplings(centre, np.arange(centre.modes)))
+    change = np.abs(slopes[:, None] - slopes).sum(-1) + 2 * couplings.sum(0)
+    distance = np.abs(centre.squared[:, None] - centre.squared)
+    near = change / np.maximum(distance, 1e-9 * centre.squared)
+    near[np.diag_indices_from(near)] = 0.0
+    return near
+
+
+def _from_below(
+    centre: CentredMatrices, slopes: Array, wanted: int, tolerances: Array
+) -> tuple[list[Block], tuple[int, int] | None]:
+    """Enclose the lowest modes in blocks, up to the first that cannot be enclosed.
+
+    A mode that cannot be enclosed alone is joined by the mode nearest to it, and so on.
+
+    Args:
+        centre: M and K in the coordinates of the box's middle.
+        slopes: ∂λ_j/∂u_i in the middle, shape (modes, d).
+        wanted: Number of modes to enclose.
+        tolerances: Relative error of each mode's λ that suffices, shape (modes,).
+
+    Returns:
+        The blocks, and the closest pair of modes at which it ended early; None if it did not.
+    """
+    near, blocks = _nearness(centre, slopes), list[Block]()
+    free: Rows = np.arange(centre.modes)
+    while len(free) and free[0] < wanted:
+        modes = _component(near > NEAR, free[:1], free)
+        while True:
+            tolerance = float(tolerances[modes].min())
+            block = narrowest_block(modes, rotation(centre, modes), centre, tolerance)
+            if block is not None:
+                break
+            outside = near[np.ix_(modes, free)] * ~np.isin(free, modes)
+            inner, outer = np.unravel_index(int(outside.argmax()), outside.shape)
+            if outside[inner, outer] < LEAST_NEAR or len(modes) >= MAX_BLOCK:
+                return blocks, (int(modes[inner]), int(free[outer]))
+            modes = _component(near > NEAR, np.append(modes, free[outer]), free)
+        blocks.append(block)
+        free = np.setdiff1d(free, modes)
+    return blocks, None
+
+
+def _component(linked: Mask, modes: Rows, free: Rows) -> Rows:
+    """Numbers of the free modes linked to `modes`, directly or through others, rising.
+
+    `linked` (modes, modes) tells which pairs are; `free` are the numbers of modes in no block.
+    """
+    while True:
+        neighbours = np.intersect1d(free, np.flatnonzero(linked[modes].any(0)))
+        extended = np.union1d(modes, neighbours)
+        if len(extended) == len(modes):
+            return np.sort(modes)
+        modes = extended
+
+
+def rotation(centre: CentredMatrices, modes: Rows) -> Array:
+    """Rotation R of p modes after which K − λ M is nearly diagonal over the box, shape (p, p).
+
+    Joint diagonalisation of K − λ M in the middle and of its derivatives by all inputs, by Jacobi
+    rotations (Cardoso, Souloumiac 1996). So modes that cross keep their shapes at the crossing.
+    """
+    p = len(modes)
+    matrices = np.concatenate([np.diag(centre.squared[modes])[None], _couplings(centre, modes)])
+    total, pairs = np.eye(p), [(i, j) for i in range(p) for j in range(i)]
+    for _ in range(SWEEPS):
+        largest = 0.0
+        for i, j in pairs:
+            # matrices' parts on which a rotation by 2 × angle acts
+            h = np.stack([matrices[:, i, i] - matrices[:, j, j], 2 * matrices[:, i, j]])
+            on, off = float(h[0] @ h[0] - h[1] @ h[1]), float(2 * h[0] @ h[1])
+            angle = np.arctan2(off, on + np.hypot(on, off)) / 2
+            step = np.eye(p)
+            step[i, i] = step[j, j] = np.cos(angle)
+            step[j, i], step[i, j] = np.sin(angle), -np.sin(angle)
+            matrices, total = step.T @ matrices @ step, total @ step
+            largest = max(largest, abs(angle))
+        if largest < 1e-12:
+            break
+    return total

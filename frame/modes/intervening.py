@@ -1,0 +1,242 @@
+"""Intervening variables of the modes (section 7) as Taylor models with proved remainders.
+
+Functions of the inputs of which the motion is made (Barthelemy, Haftka 1993).
+
+An output is Σ_k Σ_s c_ks e_s(ω_k, g_k; t) over modes k and sources s (loads, velocity, start):
+few numbers a mode, its frequency ω_k = √(λ − g²), its decay g_k = (a + b λ)/2 + ζ √λ and its
+shares c_ks = (r·x)(x·M v_s)/(x·M x), r the output's row and v_s the pattern of the ground or the
+start. They bend little over the box, however many inputs it has.
+
+A block of p modes answers a e(L) β with a = r X, β = N⁻¹ Xᵀ M v. Each diagonal entry of L is an
+oscillator with the share a_j β_j, as if it were a mode; the rest is bounded (`coupling`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import comb
+
+import numpy as np
+
+from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate, solve
+from alphacut.frame.calculus.unproved import UnprovedError
+from alphacut.frame.modes.blocks import Block
+from alphacut.frame.modes.clusters import Subspaces
+from alphacut.frame.modes.structure import Classical
+from alphacut.frame.response.waves import Grid
+from alphacut.fuzzy.arrays import Array, Rows
+
+MAX_PAIRS = 100_000
+"""Pairs of coefficients in a product of two polynomials at most; a pair takes 3 ns."""
+DEGREES = (4, 6)
+"""Least and greatest degree of shares, before what is above the third is left to the rest."""
+Ends = tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Oscillator:
+    """Intervening variables of one mode, or of one diagonal entry of a block.
+
+    Args:
+        omega: ω, a scalar, in rad/s.
+        decay: g, a scalar, in 1/s.
+        quotient: g/ω, a scalar.
+        share: c, shape (sources, m).
+        omega_range: Least and greatest ω.
+        quotient_range: Least and greatest g/ω.
+    """
+
+    omega: TaylorModel
+    decay: TaylorModel
+    quotient: TaylorModel
+    share: TaylorModel
+    omega_range: Ends
+    quotient_range: Ends
+
+    @property
+    def models(self) -> list[TaylorModel]:
+        """All its models: ω, g, g/ω, c."""
+        return [self.omega, self.decay, self.quotient, self.share]
+
+    def on_part(self, models: Sequence[TaylorModel]) -> Oscillator:
+        """The same over a part of the box, with its models there."""
+        omega, decay, quotient, share = models
+        ends = _overlap(_ends(omega), self.omega_range)
+        quotients = _overlap(_ends(quotient), self.quotient_range)
+        return Oscillator(omega, decay, quotient, share, ends, quotients)
+
+    def places(self, grid: Grid) -> tuple[int, ...]:
+        """First and last points of a grid that enclose ω, and those that enclose g/ω."""
+        return _places(grid.omega, self.omega_range) + _places(grid.quotient, self.quotient_range)
+
+
+@dataclass(frozen=True, eq=False)
+class BlockShares:
+    """What a block takes from the sources and gives to the outputs, without the outputs' factors.
+
+    Args:
+        block: The block, in the inputs of the shares.
+        read: a, shape (p, m).
+        source_forces: Xᵀ M v, shape (p, sources).
+        participation: β = N⁻¹ Xᵀ M v, shape (p, sources).
+    """
+
+    block: Block
+    read: TaylorModel
+    source_forces: TaylorModel
+    participation: TaylorModel
+
+    @classmethod
+    def from_block(
+        cls, block: Block, rows: TaylorModel, excited: TaylorModel, used: Rows
+    ) -> BlockShares:
+        """Shares of a block: r X, Xᵀ M v and N⁻¹ Xᵀ M v, of outputs r and sources v, N = Xᵀ M X.
+
+        Args:
+            block: The block X, as functions of the inputs at `used`.
+            rows: Rows of the outputs in the block's coordinates, shape (m, n), constant but for
+                rounding.
+            excited: Patterns v of the sources in them, shape (sources, n), of all inputs.
+            used: Inputs of the block.
+        """
+        fixed, varying = excited.value, excited - excited.value
+        block = block.cut(min(degree_of_shares(block.norm.inputs), block.norm.order))
+        if len(varying.present()):
+            block = block.cut(excited.order).among(used, excited.inputs)
+            source_forces = block.mass_shape @ fixed.T + block.mass_shape @ varying.T
+        else:
+            rounding = block.mass_shape.size() @ excited.remainder.T
+            source_forces = (block.mass_shape @ fixed.T).loosened(rounding)
+        read = (block.shape @ rows.value.T).loosened(block.shape.size() @ rows.remainder.T)
+        return cls(block, read, source_forces, solve(block.norm, source_forces))
+
+    @property
+    def share(self) -> TaylorModel:
+        """a_j β_j of each column, shape (p, sources, m)."""
+        return self.participation[:, :, None] * self.read[:, None, :]
+
+    @property
+    def of_outputs(self) -> TaylorModel:
+        """Sums a N⁻¹ aᵀ of each output, shape (m,)."""
+        return dots(self.read, solve(self.block.norm, self.read))
+
+    @property
+    def of_sources(self) -> TaylorModel:
+        """β·N β of each source, shape (sources,)."""
+        return dots(self.source_forces, self.participation)
+
+
+def degree_of_shares(inputs: int) -> int:
+    """Greatest degree to which products are affordable."""
+    degree = DEGREES[0]
+    while degree < DEGREES[1] and comb(2 * inputs + degree + 1, degree + 1) <= MAX_PAIRS:
+        degree += 1
+    return degree
+
+
+def oscillators(structure: Classical, of_block: BlockShares, found: Subspaces) -> list[Oscillator]:
+    """Intervening variables (frequency, decay, shares) of the oscillators of a block's columns.
+
+    Raises:
+        UnprovedError: They have different damping ratios.
+    """
+    modes = of_block.block.modes
+    share = _in_all(of_block.share, structure, found.used)
+    rate = _in_all(of_block.block.rate, structure, found.used)
+    ratio = structure.ratio[modes]
+    if any((part[:, 1:] != part[:, :-1]).any() for part in ratio.parts):
+        raise UnprovedError(
+            "modes of different damping ratios may cross", "take one ratio for all modes"
+        )
+    ends = (0.0, np.inf)
+    if len(modes) == 1:
+        ends = (float(found.low[modes[0]]), float(found.high[modes[0]]))
+    return [
+        _oscillator(structure, rate[j, j], ratio[j], share[j] * structure.factor, ends)
+        for j in range(len(modes))
+    ]
+
+
+def _in_all(model: TaylorModel, structure: Classical, used: Rows) -> TaylorModel:
+    """The model cut to the structure's order, as functions of all its inputs.
+
+    `model` has functions of the inputs at `used`, or of all.
+    """
+    d = structure.start.inputs
+    model = model.cut(structure.start.order)
+    return model if model.inputs == d else model.among(used, d)
+
+
+def _oscillator(
+    structure: Classical, squared: TaylorModel, ratio: TaylorModel, share: TaylorModel, ends: Ends
+) -> Oscillator:
+    """Damped frequency ω, decay rate g and g/ω of one mode as Taylor models, with proved ranges.
+
+    g = a/2 + b λ/2 + ζ √λ and ω² = λ − g², a and b the Rayleigh factors.
+
+    Args:
+        structure: The structure.
+        squared: Undamped λ, a scalar, in 1/s².
+        ratio: Damping ratio ζ, a scalar.
+        share: Amplitudes c, shape (sources, m).
+        ends: Proved least and greatest λ.
+    """
+    a, b = structure.rayleigh[0], structure.rayleigh[1]
+    decay = a * 0.5 + b * squared * 0.5 + ratio * squared**0.5
+    omega = (squared - decay * decay) ** 0.5
+    quotient = decay * omega**-1.0
+    q_low, q_high = _ends(quotient)
+    lowest_omega = float(np.sqrt(ends[0] / (1 + q_high**2)))  # ω² = λ / (1 + (g/ω)²)
+    omega_range = _overlap(_ends(omega), (lowest_omega, float(np.sqrt(ends[1]))))
+    return Oscillator(omega, decay, quotient, share, omega_range, (max(q_low, 0.0), q_high))
+
+
+def damped_range(structure: Classical, low: float, high: float, modes: Rows) -> tuple[Ends, Ends]:
+    """Ranges of ω = √(λ − g²) and of g/ω for modes whose λ lie in [low, high], g their decay.
+
+    Raises:
+        UnprovedError: One may not oscillate.
+    """
+    (a_low, b_low), (a, b) = (np.maximum(x, 0.0) for x in structure.rayleigh.bounds())
+    zeta_low, zeta = (np.maximum(x, 0.0) for x in structure.ratio[modes].bounds())
+    slow, fast = np.sqrt(low), np.sqrt(high)
+    # of g/√λ, which is the ratio of damping
+    greatest = float(a / (2 * slow) + b * fast / 2 + zeta.max())
+    least = float(a_low / (2 * fast) + b_low * slow / 2 + zeta_low.min())
+    if greatest >= 1:
+        raise UnprovedError("a mode may not oscillate", "take less damping")
+    shrinkage = np.sqrt(1 - greatest**2)  # least ω/√λ
+    return (float(slow * shrinkage), float(fast)), (least, float(greatest / shrinkage))
+
+
+def sources_of(structure: Classical, sources: Sequence[str]) -> TaylorModel:
+    """Patterns of the sources on the unknowns, shape (sources, n), in their order."""
+    vectors = {
+        "load": structure.start[0] * 0.0 + structure.pattern,
+        "velocity": structure.start[1],
+        "start": structure.start[0],
+        **structure.forced,
+    }
+    return concatenate([vectors[name][None] for name in sources], -2)
+
+
+def dots(a: TaylorModel, b: TaylorModel) -> TaylorModel:
+    """Σ_j a_js b_js, shape (s,)."""
+    return (a * b).T @ np.ones(a.shape[0])
+
+
+def _ends(x: TaylorModel) -> Ends:
+    low, high = x.bounds()
+    return float(low), float(high)
+
+
+def _overlap(first: Ends, second: Ends) -> Ends:
+    return max(first[0], second[0]), min(first[1], second[1])
+
+
+def _places(points: Array, ends: Ends) -> tuple[int, int]:
+    """The last point that is no more than a range's lower end, the first no less than its upper."""
+    first = int(np.searchsorted(points, ends[0], side="right")) - 1
+    last = int(np.searchsorted(points, ends[1]))
+    return max(first, 0), min(last, len(points) - 1)

@@ -1,0 +1,306 @@
+"""What the modes have together that are not enclosed: sums over all modes, less the others.
+
+With a_k = r·φ_k and β_k = φ_k·M v, sums over all modes are known without them: Σ a β = r·v,
+Σ a² = r·M⁻¹ r, Σ β² = v·M v, and with λ in the denominator r·K⁻¹ M v, r·K⁻¹ r, (M v)·K⁻¹ M v. What
+the enclosed modes leave of them is C, A and B. By Cauchy and Schwarz the others' motion is within
+
+    C e ± √(A B) Δe            of mass:       e ± Δe holds all their responses;
+    ± √(A B) sup |ω e|         of both:       A of stiffness, B of mass;
+    C ε ± √(A B) Δε            of stiffness:  ε ± Δε holds all λ e, about the static motion C ε.
+
+The least of the three is taken. For √(A B) stands (A t + B/t)/2, t a number, which is no less and
+a Taylor model: at inputs where A is large B is often small.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from alphacut.frame.calculus.monomials import convolve, matmul
+from alphacut.frame.calculus.rounding import gamma
+from alphacut.frame.calculus.taylor_model import TaylorModel, solve
+from alphacut.frame.modes.clusters import Subspaces
+from alphacut.frame.modes.intervening import BlockShares, Ends, damped_range, dots
+from alphacut.frame.modes.structure import Classical
+from alphacut.frame.response.ranges import Ranges, response_ranges
+from alphacut.frame.structures.loads import History
+from alphacut.fuzzy.arrays import Array
+
+Excitation = tuple[Mapping[str, History], Array, Sequence[str]]
+"""The loads by name, the nodes, and the names of what moves the structure."""
+UNKNOWN = 1e60
+"""Stands for a sum that is not known."""
+
+
+@dataclass(frozen=True, eq=False)
+class TruncatedModes:
+    """Modes that are known by sums.
+
+    Args:
+        share: C, shape (sources, m).
+        amplitude: Bound of √(A B), shape (sources, m).
+        middle: Middle of the responses that the share is multiplied by, shape (sources, m, T).
+        half: Half their range, that the amplitude is multiplied by.
+        line_deviation: Bound of the motion's distance from straight lines between nodes, (T, m).
+    """
+
+    share: TaylorModel
+    amplitude: TaylorModel
+    middle: Array
+    half: Array
+    line_deviation: Array
+
+    @property
+    def width(self) -> Array:
+        """Bound of the half width at the node where it is greatest, shape (m,)."""
+        return np.asarray((self.amplitude.size()[..., None] * self.half).max(-1).sum(0))
+
+
+@dataclass(frozen=True, eq=False)
+class _Sums:
+    """Sums over modes, without the outputs' factors.
+
+    Args:
+        shares: Σ a β and Σ a β / λ, shape (sources, m) each.
+        outputs: Σ a² and Σ a² / λ, shape (m,) each.
+        sources: Σ β² and Σ β² / λ, shape (sources,) each.
+    """
+
+    shares: tuple[TaylorModel, TaylorModel]
+    outputs: tuple[TaylorModel, TaylorModel]
+    sources: tuple[TaylorModel, TaylorModel]
+
+    def less(self, subtracted: _Sums) -> _Sums:
+        """Sums less those of `subtracted`, term by term."""
+        return _Sums(
+            (self.shares[0] - subtracted.shares[0], self.shares[1] - subtracted.shares[1]),
+            (self.outputs[0] - subtracted.outputs[0], self.outputs[1] - subtracted.outputs[1]),
+            (self.sources[0] - subtracted.sources[0], self.sources[1] - subtracted.sources[1]),
+        )
+
+
+def rest_of_modes(
+    structure: Classical,
+    found: Subspaces,
+    shares: Sequence[BlockShares],
+    coordinates: tuple[TaylorModel, TaylorModel],
+    excitation: Excitation,
+) -> TruncatedModes | None:
+    """Bounds of the motion of all modes that are not enclosed; None if there are none.
+
+    Args:
+        structure: The structure.
+        found: Its enclosed modes.
+        shares: Their products with the rows of the outputs and the patterns of the sources.
+        coordinates: Outputs (m, n) and sources (sources, n) in the coordinates of `found`.
+        excitation: The loads, the nodes and the names of the sources.
+    """
+    other_modes = found.others
+    if not len(other_modes):
+        return None
+    sums = _sums_over_modes(found, *coordinates, max(x.block.norm.order for x in shares))
+    for of_block in shares:
+        sums = sums.less(_sums_over_block(of_block))
+    low, high = float(found.low[other_modes].min()), float(found.high[other_modes].max())
+    ends = damped_range(structure, low, high, other_modes)
+    return _truncated_modes(sums, ends, structure, found, excitation)
+
+
+def rest_of_block(
+    structure: Classical,
+    found: Subspaces,
+    of_block: BlockShares,
+    ends: tuple[Ends, Ends],
+    excitation: Excitation,
+) -> TruncatedModes:
+    """Bounds of the motion of a block's modes by sums over them; `ends` bound ω and g/ω."""
+    return _truncated_modes(_sums_over_block(of_block), ends, structure, found, excitation)
+
+
+def _truncated_modes(
+    sums: _Sums,
+    ends: tuple[Ends, Ends],
+    structure: Classical,
+    found: Subspaces,
+    excitation: Excitation,
+) -> TruncatedModes:
+    """Bounds of the motion of modes by sums over them, and by ranges `ends` of their ω and g/ω."""
+    orders = sorted({int(order) for order in structure.order})
+    (omega, quotient), (loads, time, sources) = ends, excitation
+    ranges = response_ranges(omega, quotient, loads, time, sources, orders)
+    return _with_best_powers(structure, _amplitude_bounds(sums, structure, found), ranges)
+
+
+def _sums_over_modes(
+    found: Subspaces, read: TaylorModel, excited: TaylorModel, order: int
+) -> _Sums:
+    """Σ a β, Σ a², Σ β² over all modes φ, and the same with each term divided by λ.
+
+    a = r·φ with the rows r of the outputs, β = φ·M v with the patterns v of the sources. The sums
+    have closed forms, such as Σ a² / λ = r·K⁻¹ r.
+
+    Args:
+        found: Enclosed modes, with M and K in the coordinates of the box's middle.
+        read: Rows r of the outputs in these coordinates, shape (m, n).
+        excited: Patterns v of the sources in them, shape (sources, n); may depend on the inputs.
+        order: Order of the Taylor models where the patterns are constant.
+    """
+    centre, mass, stiffness = found.centre, found.centre.mass, found.centre.stiffness
+    if len(excited.present()):
+        order, d = excited.order, excited.inputs
+        mass, stiffness = (x.among(found.used, d) for x in (mass, stiffness))
+    else:
+        excited = mass.like(excited.value).loosened(excited.remainder)
+    mass, stiffness = mass.to_order(order), stiffness.to_order(order)
+    rows = stiffness.like(read.value).loosened(read.remainder)
+    massive, light = slice(0, centre.modes), slice(centre.modes, None)
+    least_mass, least_stiffness = (1 - variation for variation in found.variation)
+    forces = excited @ mass
+    mass_rows = rows[:, massive]
+    of_mass = _diagonal(_inverse_form(mass[massive, massive], mass_rows, mass_rows, least_mass))
+    of_stiffness = _diagonal(_inverse_form(stiffness, rows, rows, least_stiffness))
+    if centre.modes < len(centre.basis):  # without what massless unknowns move by themselves
+        light_rows = rows[:, light]
+        massless = _inverse_form(stiffness[light, light], light_rows, light_rows, least_stiffness)
+        of_stiffness = of_stiffness - _diagonal(massless)
+        of_mass = of_mass.loosened(np.where(light_rows.size().any(1), UNKNOWN, 0.0))
+    by_stiffness = _inverse_form(stiffness, forces, forces, least_stiffness)
+    return _Sums(
+        shares=(excited @ rows.T, _inverse_form(stiffness, forces, rows, least_stiffness)),
+        outputs=(of_mass, of_stiffness),
+        sources=(_diagonal(forces @ excited.T), _diagonal(by_stiffness)),
+    )
+
+
+def _inverse_form(
+    matrix: TaylorModel, left: TaylorModel, right: TaylorModel, least: float
+) -> TaylorModel:
+    """Taylor model of left A⁻¹ rightᵀ, shape (l, r), with a remainder quadratic in small residuals.
+
+    With series x ≈ left A⁻¹ and y ≈ right A⁻¹ of residuals e = left − x A and f = right − y A it is
+    x rightᵀ + e yᵀ + e A⁻¹ fᵀ.
+
+    Args:
+        matrix: A, diagonal in the middle of the box, shape (n, n).
+        left: Rows, shape (l, n).
+        right: Rows, shape (r, n).
+        least: A(u) ≥ least · A(0) over the box, as quadratic forms.
+    """
+    middle = np.diag(matrix.value)
+    x, left_residual = _row_series(matrix, left)
+    y, right_residual = _row_series(matrix, right)
+    norms = (np.sqrt((size**2 / middle).sum(1)) for size in (left_residual, right_residual))
+    return (x @ right.T).loosened(left_residual @ y.size().T + np.outer(*norms) / least)
+
+
+def _row_series(matrix: TaylorModel, rows: TaylorModel) -> tuple[TaylorModel, Array]:
+    """Series x of `rows` A⁻¹, degree by degree, and a bound of |rows − x A| over the box.
+
+    Up to the order of the series the residual is rounding alone. A is diagonal in the middle.
+    """
+    middle, parts = np.diag(matrix.value), list[Array]()
+    for degree in range(matrix.order + 1):
+        right_side = rows.part(degree)
+        for k in range(1, min(degree, len(matrix.parts) - 1) + 1):
+            pair = (degree - k, k)
+            right_side = right_side - convolve(
+                parts[degree - k], matrix.parts[k], pair, rows.inputs, matmul
+            )
+        parts.append(right_side / middle)
+    series = TaylorModel(tuple(parts), np.zeros(rows.shape), rows.inputs, matrix.order)
+    residual = rows.remainder + series.size() @ matrix.remainder
+    for degree, size in enumerate(rows.sizes()):
+        residual = residual + gamma(_terms(matrix, degree)) * size
+    for i, size in enumerate(series.sizes()):
+        for k, factor in enumerate(matrix.sizes()):
+            is_higher = i + k > matrix.order
+            weight = 1.0 if is_higher else gamma(_terms(matrix, i + k))
+            residual = residual + weight * (size @ factor)
+    return series, residual * (1 + gamma(matrix.order**2 + 4 * len(middle)))
+
+
+def _terms(matrix: TaylorModel, degree: int) -> int:
+    """Roundings of a coefficient of rows A⁻¹, with the division by its middle."""
+    return len(matrix.remainder) * 2**degree + degree + 4
+
+
+def _sums_over_block(of_block: BlockShares) -> _Sums:
+    """Σ a β, Σ a², Σ β² over the modes of a block, and the same with each term divided by λ.
+
+    For K X = M X L they follow from X, N = Xᵀ M X and Xᵀ K X = N L, without the modes.
+    """
+    projected_stiffness = of_block.block.norm @ of_block.block.rate.T
+    read, forces = of_block.read, of_block.source_forces
+    read_over_stiffness = solve(projected_stiffness, read)
+    return _Sums(
+        shares=(of_block.participation.T @ read, forces.T @ read_over_stiffness),
+        outputs=(of_block.of_outputs, dots(read, read_over_stiffness)),
+        sources=(of_block.of_sources, dots(forces, solve(projected_stiffness, forces))),
+    )
+
+
+def _diagonal(matrix: TaylorModel) -> TaylorModel:
+    at = np.arange(len(matrix.remainder))
+    return matrix[at, at]
+
+
+def _amplitude_bounds(
+    sums: _Sums, structure: Classical, found: Subspaces
+) -> list[tuple[TaylorModel, TaylorModel]]:
+    """C = Σ a β and a bound of √(Σ a² Σ β²) for each power 0, ½, 1 of λ, shape (sources, m) each.
+
+    By the power no sum, that of a² or all have terms divided by λ. Outputs' factors are in both.
+    """
+    d, order = structure.start.inputs, structure.start.order
+    (C0, C1), (A0, A1), (B0, B1) = (
+        [x.cut(order) if x.inputs == d else x.cut(order).among(found.used, d) for x in pair]
+        for pair in (sums.shares, sums.outputs, sums.sources)
+    )
+    pairs = ((C0, A0, B0), (C0 * 0.0, A1, B0), (C1, A1, B1))
+    factor = structure.factor
+    return [(C * factor, _root(A, B) * factor) for C, A, B in pairs]
+
+
+def _root(A: TaylorModel, B: TaylorModel) -> TaylorModel:
+    """Bound (A t + B/t)/2 of √(A B), shape (sources, m), for A (m,) and B (sources,)."""
+    of_A, of_B = (np.maximum(x.bounds()[1], 1e-300) for x in (A, B))
+    t = np.sqrt(of_B[:, None] / of_A)
+    return A[None] * (t / 2) + B[:, None] * (0.5 / t)
+
+
+def _with_best_powers(
+    structure: Classical, bounds: list[tuple[TaylorModel, TaylorModel]], ranges: dict[int, Ranges]
+) -> TruncatedModes:
+    """Bounds of truncated modes' motion, for each source and output by the best power of λ.
+
+    The motion is C times the middle of the responses' range, ± an amplitude times its half width.
+
+    Args:
+        structure: The structure.
+        bounds: C and the amplitude for each power 0, ½, 1, shape (sources, m) each.
+        ranges: Ranges of the responses by order of the derivative that is read.
+    """
+    of_outputs = [ranges[int(order)] for order in structure.order]
+    low, high, deviation = (  # (powers, sources, m, T)
+        np.stack(arrays, 2)
+        for arrays in zip(*((x.low, x.high, x.line_deviation) for x in of_outputs), strict=True)
+    )
+    middle, half = (low + high) / 2, (high - low) / 2
+    middle[1], half[1] = 0.0, np.abs(middle[1]) + half[1]  # Σ a β is not known with √λ
+    amplitudes = np.stack([amplitude.size() for _, amplitude in bounds])
+    best = (amplitudes * half.max(-1)).argmin(0)
+    share, amplitude = bounds[0][0] * 0.0, bounds[0][1] * 0.0
+    for k, pair in enumerate(bounds):
+        share, amplitude = share + pair[0] * (best == k), amplitude + pair[1] * (best == k)
+    s, o = np.indices(best.shape)
+    deviations = (amplitudes[..., None] * deviation).min(0).sum(0)
+    return TruncatedModes(
+        share=share,
+        amplitude=amplitude,
+        middle=middle[best, s, o],
+        half=half[best, s, o],
+        line_deviation=deviations.T,
+    )

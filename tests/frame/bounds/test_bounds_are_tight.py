@@ -1,0 +1,234 @@
+"""Ingredients of a proof on cases where they nearly are the truth: halved, none would cover it."""
+
+from copy import copy
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from alphacut.frame import Accelerogram, Exact, LinearFlow, Midpoint, StoreyFrame
+from alphacut.frame.bounds.branch_and_bound import Frontier, Tree, enclosed
+from alphacut.frame.bounds.certificate import certify
+from alphacut.frame.bounds.kernel import stays_below
+from alphacut.frame.bounds.remainder import (
+    Remainder,
+    _convolution_bounds,
+    _kernel_maxima,
+    largest_growth,
+    parts,
+)
+from alphacut.frame.boxes import UnitFlow, boxes
+from alphacut.frame.calculus.polynomial import Polynomial
+from alphacut.frame.modal.fitting import fit_modes
+from alphacut.frame.modal.model import ModalModel
+from alphacut.frame.modal.optima import Optima, problems
+from alphacut.frame.response.duhamel import responses_at_nodes
+from alphacut.frame.verification.step_error import MARGIN, step_error
+from alphacut.fuzzy import Interval
+
+PULSE = Accelerogram(0.37, np.array([1.0, 1.0, 1.0, 1.0, 1.0, 1.0]))
+
+
+def spring(omega: float, ground: Accelerogram | None, duration: float, step: float) -> ModalModel:
+    """An undamped mass whose frequency is uncertain by 5 %."""
+    frame = StoreyFrame((1.0,), (1.0,), omega**2 / 24, 1.0, q0=(1.0,), ground=ground)
+    inputs = {"E": Interval(0.9 * omega**2 / 24, 1.1 * omega**2 / 24)}
+    flow = LinearFlow(frame, ("E",), duration, step, Exact())
+    return fit_modes(flow, boxes(inputs, (0,)), tolerance=1e-9)
+
+
+def test_remainder_of_the_quadratic_model_is_that_of_a_late_oscillation() -> None:
+    model = spring(1.0, None, 400.0, 1.0)
+    bound = Remainder(model, -np.ones(1), np.ones(1)).tensor[:, 0, 0, 0, 0]
+    unit, h = np.linspace(-0.99, 0.99, 400)[:, None], 1e-4
+    for node in (100, 200, 400):
+        at = np.full(len(unit), node), np.zeros(len(unit), int)
+        third = (model.at(unit + h, *at)[2] - model.at(unit - h, *at)[2])[:, 0, 0] / (2 * h)
+        assert 1 <= bound[node] / np.abs(third).max() <= 1.8
+
+
+@pytest.mark.parametrize("order", [0, 1, 2, 3])
+def test_bounds_of_waves_are_reached_by_a_pulse_on_a_soft_spring(order: int) -> None:
+    """Short of a turn all of the pulse adds up: R and its derivatives by λ are ∫ τ^r a."""
+    model = spring(1e-2, PULSE, 4.0, 0.1)
+    growth = largest_growth(model.eigenvalue, np.ones(1))
+    free, forced = parts(model, growth)
+    rate = model.eigenvalue(np.zeros((1, 1)))
+    time = model.time
+    if order < 3:
+        nodes = np.arange(len(time))
+        truth = model.loads[0].response(np.repeat(rate, len(nodes), 0), nodes)[order][:, 0]
+        ratio = forced.waves[order][5:, 0] / np.abs(truth)[5:]
+        assert (ratio >= 1).all()
+        assert (ratio <= 1.8).all()
+    assert free.waves[order][:, 0] == pytest.approx(time**order)
+    assert forced.push[-1] == pytest.approx(1.85)  # ∫ |a| of the pulse, cut at 1.85 s
+    (driven,), _ = responses_at_nodes(rate.ravel(), PULSE, time, 0)
+    elapsed = np.cumsum(np.abs(driven[:, 0])) * 0.1
+    assert (forced.elapsed[5:, 0] >= 0.93 * elapsed[5:]).all()
+    assert (forced.elapsed[5:, 0] <= 1.8 * elapsed[5:]).all()
+
+
+def test_what_outputs_do_between_nodes_is_bounded_where_the_record_jumps() -> None:
+    """The velocity's kink at the end of the pulse lies halfway between two nodes."""
+    frame = StoreyFrame((1.0,), (1.0,), 1e-6 / 24, 1.0, outputs=("v1",), ground=PULSE)
+    flow = LinearFlow(frame, ("E",), 3.7 * 20 / 20, 3.7, Exact())
+    model = fit_modes(flow, boxes({"E": Interval(0.9e-6 / 24, 1e-6 / 24)}, (0,)), tolerance=1e-9)
+    values = model.values(np.zeros((1, 1)))[0]
+    proof = certify(model, gap=1e-2, model_error=np.zeros(values.shape), scale=np.ones(1))
+    fine = LinearFlow(frame, ("E",), 3.7, 3.7 / 200, Exact()).values(np.array([[1e-6 / 24]]))[0]
+    line = np.linspace(fine[0], fine[-1], len(fine))
+    assert 1 <= proof.between[1, 0] / np.abs(fine - line).max() <= 1.8
+
+
+def test_what_a_free_wave_does_between_nodes_is_bounded_and_half_would_not_do() -> None:
+    """A cosine strays from its chord by h² ω²/8 about its crest, as the bound says."""
+    model = spring(1.0, None, 6.0, 0.2)
+    proof = certify(model, gap=1e-2, model_error=np.zeros((31, 1)), scale=np.ones(1))
+    fine = np.cos(np.sqrt(1.1) * np.linspace(0, 6, 6001))  # of the fastest of the box
+    line = np.interp(np.linspace(0, 6, 6001), model.time, fine[::200])
+    off = np.abs(fine - line).max()
+    assert proof.between[1:, 0].min() / off >= 1
+    assert proof.between.max() / off <= 1.3
+
+
+def test_the_model_error_counts_on_both_sides_of_the_gap_asked_for() -> None:
+    """Bounds are raised and attained values lowered by it; both together stay within the gap."""
+    model = spring(1.0, None, 6.0, 0.1)
+    error = np.full((61, 1), 0.004)
+    proof = certify(model, gap=0.01, model_error=error, scale=np.ones(1))
+    gap = (proof.outer - proof.bounds).max()
+    assert 2 * 0.004 < gap <= 0.01
+    with pytest.raises(ValueError, match="twice the model error"):
+        certify(model, gap=0.0079, model_error=error, scale=np.ones(1))
+
+
+def cube(square: float = 0.0) -> ModalModel:
+    """A model of the motion x³ − square x² for all times; its third derivative is 6."""
+    model = spring(1.0, None, 1.0, 1.0)
+    index = np.arange(4)[:, None]
+    half = np.array([0, 0, -square / 2, 0.5])[:, None] + 0j
+    return replace(
+        model, eigenvalue=Polynomial(index, 0 * half), coefficient=Polynomial(index, half)
+    )
+
+
+@pytest.mark.parametrize(("start", "budget"), [(0.5, 4000), (0.0, 1)])
+def test_branch_and_bound_needs_all_of_the_remainder(start: float, budget: float) -> None:
+    """About 0 nothing but the third derivative tells that x³ reaches 1."""
+    one, best = np.ones(1, int), np.full((1, 1), start)
+    optima = Optima(one, 0 * one, np.ones(1), best, best[0] ** 3, np.zeros(1))
+    proved, _ = enclosed(cube(), -np.ones(1), np.ones(1), optima, gap=1e-3, budget=budget)
+    assert 1 <= proved[0] <= 1.01
+
+
+def test_the_best_point_is_not_trusted_beyond_its_remainder() -> None:
+    """About 0, a local maximum, half of the remainder would leave x³ − 3 x²/4 concave up to 1."""
+    one, best = np.ones(1, int), np.zeros((1, 1))
+    optima = Optima(one, 0 * one, np.ones(1), best, np.zeros(1), np.zeros(1))
+    proved, _ = enclosed(cube(0.75), -np.ones(1), np.ones(1), optima, gap=1e-3)
+    assert 0.25 <= proved[0] <= 0.252
+
+
+def test_boxes_given_up_within_the_gap_are_in_the_bound() -> None:
+    """Beside 0.97³ the first box of x³ holds no more than the gap: nothing is looked at, 1 is."""
+    one, best = np.ones(1, int), np.full((1, 1), 0.97)
+    optima = Optima(one, 0 * one, np.ones(1), best, best[0] ** 3, np.zeros(1))
+    proved, _ = enclosed(cube(), -np.ones(1), np.ones(1), optima, gap=0.1)
+    assert 1 <= proved[0] <= 1.02
+
+
+def least_closed(tree: Tree) -> np.ndarray:
+    """Of each problem the least target below which its whole box is closed, shape (N,)."""
+    frontier = Frontier.of_box(len(tree.lower), tree.numbers)
+    low, high = (np.full(len(tree.best), end) for end in (-2.5, 2.5))
+    for _ in range(30):
+        target = (low + high) / 2
+        aimed = copy(tree)
+        aimed.best, aimed.gap = target, 0.0
+        code = aimed.examine(frontier, slice(0, 1), slice(0, len(frontier)))[0]
+        low, high = np.where(code, target, low), np.where(code, high, target)
+    return high
+
+
+def turning() -> ModalModel:
+    """The motion cos((1 + 0.05 u) t) + u, highest at an end whatever the phase."""
+    rate, share = np.array([[1j, 0], [0.05j, 0]]), np.array([[0.5 + 0j, 0], [0, 0.5]])
+    index, plain = np.arange(2)[:, None], spring(1.0, None, 12.0, 0.1)
+    return replace(plain, eigenvalue=Polynomial(index, rate), coefficient=Polynomial(index, share))
+
+
+@pytest.mark.parametrize("even", [True, False])
+def test_a_box_is_closed_where_its_mode_allows_no_more(even: bool) -> None:
+    """At all phases of a mode, whose phase is linear over the box, or is not."""
+    model, ends = turning() if even else spring(1.0, None, 12.0, 0.1), np.ones(1)
+    optima = problems(np.arange(len(model.time)), 1, 1)
+    optima.point[:] = 9.0  # so that no box is near the best point
+    closed = least_closed(Tree(model, -ends, ends, optima, 1e-6)).reshape(-1, 2)
+    values = model.values(np.linspace(-1, 1, 2001)[:, None])[..., 0]
+    truth = np.stack([-values.min(0), values.max(0)], 1)
+    assert (closed >= truth - 1e-7).all()
+    early = model.time <= 6  # up to 0.3 rad from the centre, where little is left out
+    assert (closed - truth)[early].max() <= 4e-3
+
+
+def test_rounding_of_late_phases_is_in_the_margin() -> None:
+    model, narrow = spring(1.0, None, 1e8, 1e6), np.full(1, 1e-8)
+    margin = Remainder(model, -narrow, narrow).margin[:, 0, 0]
+    unit = np.random.default_rng(2).uniform(-narrow, narrow, (200, 1))
+    powers = np.longdouble(unit) ** model.eigenvalue.index[:, 0]
+    phase = powers @ model.eigenvalue.coefficients[:, 0].imag
+    growth = powers @ model.eigenvalue.coefficients[:, 0].real
+    share = [
+        powers @ part[:, 0]
+        for part in (model.coefficient.coefficients.real, model.coefficient.coefficients.imag)
+    ]
+    nodes = np.array([1, 10, 100])
+    for node in nodes:
+        t = np.longdouble(model.time[node])
+        exact = (
+            2 * np.exp(growth * t) * (share[0] * np.cos(phase * t) - share[1] * np.sin(phase * t))
+        )
+        off = np.abs(model.value_at(unit, np.full(200, node), np.zeros(200, int)) - exact)
+        assert 0 < off.max() <= margin[node]
+        assert off.max() > 1e-3 * margin[node]
+
+
+def test_concave_bound_is_that_of_the_curvature_it_adds() -> None:
+    """x²/2 − y² on [−1, 1]² is at most 1/2, and no shift below 1 makes it concave."""
+    g, H, low, high = np.zeros(2), np.diag([1.0, -2.0]), -np.ones(2), np.ones(2)
+    work, L = np.empty((3, 2)), np.empty((2, 2))
+    for shown in (stays_below, stays_below.py_func):  # compiled, and as it is read
+        assert shown(g, H, low, high, 8.01, work, L)
+        assert not shown(g, H, low, high, 0.49, work, L)
+
+
+@pytest.mark.parametrize("power", [1, 2, 3])
+def test_the_summit_of_a_decaying_wave_is_in_its_bound(power: int) -> None:
+    """τ^r exp(−τ) has its summit at r, within an interval whose ends lie well below."""
+    bound = _kernel_maxima(np.array([-1.0]), power * 0.9, 3, power)[:, 0]
+    fine = np.linspace(0, 0.9 * power, 2001) + 0.9 * power * np.arange(3)[:, None]
+    truth = (fine**power * np.exp(-fine)).max(1)
+    assert bound == pytest.approx(truth, rel=1e-6)
+    assert (bound >= truth * (1 - 1e-12)).all()
+
+
+def test_convolutions_are_bounded_in_spite_of_rounding() -> None:
+    rng = np.random.default_rng(5)
+    kernel, size = np.exp(-0.01 * np.arange(4000))[:, None], rng.random(4000) * 1e3
+    direct = np.convolve(kernel[:, 0], size)[:4000]
+    bound = _convolution_bounds(kernel, size)[1:, 0]
+    assert (bound >= direct).all()
+    assert (bound <= direct * (1 + 1e-8) + 1e-6).all()
+
+
+def test_an_error_of_time_stepping_does_not_fall_after_it_was_seen() -> None:
+    """Beats bring two motions together again; the estimate keeps what it was before."""
+    frame = StoreyFrame((1.0,), (1.0,), 1 / 24, 1.0, q0=(1.0,))
+    flow = LinearFlow(frame, ("E",), 40.0, 0.5, Midpoint())
+    cuts = boxes({"E": Interval(0.999 / 24, 1.001 / 24)}, (0,))
+    raw = flow.deviations(cuts.modal[None])[1][0]
+    error = step_error(UnitFlow(flow, cuts))
+    assert (np.diff(raw, axis=0) < 0).any()
+    assert (np.diff(error, axis=0) >= 0).all()
+    assert (error >= MARGIN * np.maximum.accumulate(raw, axis=0) * (1 - 1e-9)).all()

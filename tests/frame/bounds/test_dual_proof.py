@@ -1,0 +1,302 @@
+"""No exact motion leaves a dual bound, whatever the multipliers; and the bounds are near."""
+
+import numpy as np
+import pytest
+
+from alphacut.frame import Auto, StoreyFrame, envelope
+from alphacut.frame.bounds import dual_function as kernel
+from alphacut.frame.bounds.box import Box
+from alphacut.frame.bounds.level import OutputBounds
+from alphacut.frame.calculus.unproved import UnprovedError
+from alphacut.frame.dynamics.flow import LinearFlow
+from alphacut.frame.dynamics.integrators import Exact
+from alphacut.frame.methods import auto
+from alphacut.frame.methods.dual import DualProof
+from alphacut.frame.methods.proof import Proof
+from alphacut.frame.structures.loads import Accelerogram
+from alphacut.frame.structures.matrix import MatrixStructure
+from alphacut.fuzzy import Triangular
+from alphacut.fuzzy.result import Nature
+
+
+def record(seconds=6.0, step=0.02, seed=1):
+    """Filtered noise that rises and fades, 3 m/s² at most."""
+    rng, count = np.random.default_rng(seed), int(seconds / step) + 1
+    noise = np.convolve(rng.normal(size=count + 9), np.hanning(11)[1:], "same")[:count]
+    rise = np.linspace(0, 3, count)
+    shaped = noise * np.minimum(rise, 1) * np.exp(-rise)
+    return Accelerogram(step, 3 * shaped / np.abs(shaped).max())
+
+
+def near(value, share):
+    return Triangular(value * (1 - share), value, value * (1 + share))
+
+
+def each_storey(n, stiffness=0.08, mass=0.05):
+    own = {f"k{z + 1}": near(1.2e8, stiffness) for z in range(n)}
+    return own | {f"m{z + 1}": near(6e4, mass) for z in range(n)}
+
+
+def storeys(n, **values):
+    return StoreyFrame(masses=(6e4,) * n, stiffness=(1.2e8,) * n, **values)
+
+
+def columns(**values):
+    return StoreyFrame(
+        masses=(2e4, 1e4), lengths=(3.0, 2.8), modulus=3e10, second_moment=4e-4, **values
+    )
+
+
+def coupled():
+    """Three masses in a triangle of springs, from matrices."""
+    springs = [np.outer(row, row) for row in ([1, 0, 0], [1, -1, 0], [0, 1, -1], [1, 0, -1])]
+    return MatrixStructure(
+        {"a": 4e4, "b": 2e4, "m": 100.0, "z": 0.03},
+        mass=[("m", np.diag([1.0, 0.5, 0.7]))],
+        stiffness=[
+            ("a", springs[0]),
+            (lambda p: p["a"] * p["b"] ** 0.5 / 200, springs[1]),
+            ("b", springs[2]),
+            (5e3, springs[3]),
+        ],
+        observed={"q1": np.array([1.0, 0, 0]), "v3": np.array([0, 0, 0, 0, 0, 1.0])},
+        v0=np.array([0.0, 1.0, -0.5]),
+        ratios=("z",),
+    )
+
+
+CASES = {
+    "record": (
+        storeys(
+            3,
+            damping_ratio=0.03,
+            ground=record(),
+            outputs=("q3", "drift1", "drift3", "v2", "a3", "base_shear"),
+        ),
+        each_storey(3) | {"zeta": Triangular(0.02, 0.03, 0.04)},
+    ),
+    "free, start and Rayleigh fuzzy": (
+        storeys(
+            3,
+            q0=(0.01, 0.02, 0.03),
+            v0=(0.0, -0.5, 0.2),
+            rayleigh=(0.4, 1e-3),
+            outputs=("q1", "drift2", "a1", "shear3"),
+        ),
+        each_storey(3, 0.05, 0.03)
+        | {
+            "rayleigh_mass": near(0.4, 0.2),
+            "rayleigh_stiffness": near(1e-3, 0.2),
+            "q2_0": near(0.02, 0.1),
+            "v3_0": near(0.2, 0.3),
+        },
+    ),
+    "columns, record and start": (
+        columns(
+            damping_ratio=0.02, ground=record(seed=3), v0=(0.1, 0.2), outputs=("q2", "shear1", "a2")
+        ),
+        {
+            "E": near(3e10, 0.06),
+            "I": near(4e-4, 0.03),
+            "l1": near(3.0, 0.01),
+            "l2": near(2.8, 0.01),
+            "m1": near(2e4, 0.05),
+            "m2": near(1e4, 0.05),
+        },
+    ),
+    "weights": (
+        StoreyFrame(
+            masses=(6e4,) * 2,
+            stiffness=(2e7,) * 2,
+            lengths=(3.0, 3.0),
+            gravity=9.81,
+            damping_ratio=0.05,
+            ground=record(),
+            outputs=("drift1", "drift2"),
+        ),
+        {"k1": near(2e7, 0.1), "k2": near(2e7, 0.1), "m2": near(6e4, 0.1), "l1": near(3.0, 0.02)},
+    ),
+    "matrices": (
+        coupled(),
+        {
+            "a": near(4e4, 0.1),
+            "b": near(2e4, 0.1),
+            "m": near(100.0, 0.05),
+            "z": Triangular(0.02, 0.03, 0.05),
+        },
+    ),
+}
+
+
+def points(found, level, rng, count=300):
+    """Corners and points of a level's box, shape (S, d)."""
+    ends = np.array([number.cut(found.alpha[level]) for number in found.inputs.values()])
+    d = len(ends)
+    unit = np.vstack([rng.integers(0, 2, (count, d)), rng.uniform(0, 1, (count, d))])
+    return ends[:, 0] + unit * (ends[:, 1] - ends[:, 0])
+
+
+@pytest.fixture(scope="module", params=list(CASES))
+def case(request):
+    model, fuzzy = CASES[request.param]
+    found = envelope(
+        model, fuzzy, duration=4.0, step=0.05, alpha=(0, 0.6, 1), method=DualProof(), progress=False
+    )
+    return model, found, LinearFlow(model, list(fuzzy), 4.0, 0.05, Exact())
+
+
+def test_no_exact_motion_leaves_a_bound(case):
+    _, found, flow = case
+    rng = np.random.default_rng(0)
+    for level in range(len(found.alpha)):
+        values = flow.values(points(found, level, rng))
+        slack = 1e-9 * np.abs(values).max((0, 1))
+        assert (values.max(0) <= found.upper[level] + slack).all()
+        assert (values.min(0) >= found.lower[level] - slack).all()
+    assert found.nature == Nature.GUARANTEED
+
+
+def test_attained_bounds_are_attained_within_the_box(case):
+    _, found, flow = case
+    for ends, at in zip(found.inner, (found.upper_at, found.lower_at)[::-1], strict=True):
+        for node in (7, 30, 61):
+            values = flow.values(at[0, node].reshape(-1, at.shape[-1]))[:, node]
+            own = np.diag(values)
+            peak = np.abs(ends[0]).max(0)
+            assert np.abs(own - ends[0, node]).max() <= 1e-8 * peak.max()
+            cut = np.array([number.cut(0) for number in found.inputs.values()])
+            assert (at[0, node] >= cut[:, 0] - 1e-12 * cut[:, 1]).all()
+            assert (at[0, node] <= cut[:, 1] * (1 + 1e-12)).all()
+
+
+def test_gaps_of_peaks_are_small(case):
+    _, found, _ = case
+    assert found.facts["gap_of_peaks"] < 0.06
+    assert (np.nanmedian(found.error[1], 0) <= 0.08 * np.abs(found.upper[1]).max(0)).all()
+
+
+def test_motions_between_nodes_stay_within_what_is_stated(case):
+    model, found, _ = case
+    fine = LinearFlow(model, list(found.inputs), 4.0, 0.0125, Exact())
+    values = fine.values(points(found, 0, np.random.default_rng(1), 60))
+    upper = np.maximum(found.upper[0, 1:], found.upper[0, :-1]) + found.between[1:]
+    lower = np.minimum(found.lower[0, 1:], found.lower[0, :-1]) - found.between[1:]
+    for part in (1, 2, 3):
+        assert (values[:, part::4] <= upper + 1e-12).all()
+        assert (values[:, part::4] >= lower - 1e-12).all()
+
+
+def level_of(model, fuzzy, time):
+    """The widest level and its box."""
+    cut = np.array([number.cut(0) for number in fuzzy.values()])
+    level = Box(model, tuple(fuzzy), time, *cut.T).level()
+    return level, cut.mean(1), np.diff(cut)[:, 0] / 2
+
+
+def test_any_multipliers_bound_any_motion():
+    model, fuzzy = CASES["record"]
+    time = np.arange(0, 4.01, 0.5)
+    level, centre, radius = level_of(model, fuzzy, time)
+    rng = np.random.default_rng(5)
+    unit = rng.uniform(-1, 1, (200, 7)).round(rng.integers(0, 2))
+    values = LinearFlow(model, list(fuzzy), 4.0, 0.5, Exact()).values(centre + radius * unit)
+    for o in range(len(level.structure.order)):
+        for s, side in enumerate((-1.0, 1.0)):
+            problem = OutputBounds.initial(level, o, s, 1.0)
+            columns, rows = problem.data.points.astype(int)
+            whole = np.tile([0, columns - 1, 0, rows - 1], (len(level.oscillators), 1))
+            for node in range(1, len(time)):
+                size = np.abs(values[:, node, o]).max() * 10.0 ** rng.uniform(-2, 1)
+                mu = size * rng.normal(size=len(problem.data.linear))
+                bound = kernel.dual(
+                    mu, whole, node, side, problem.data, np.empty(len(mu)), np.empty(7)
+                )
+                bound += problem.constant[:, node].sum() + kernel.remainder_bound(mu, problem.data)
+                assert (side * values[:, node, o] <= bound).all()
+
+
+def test_the_quadratic_over_a_box_is_bounded():
+    rng = np.random.default_rng(0)
+    for _ in range(100):
+        linear, bend = rng.normal(size=5) * rng.choice([0.1, 1, 5]), rng.normal(size=15)
+        u = np.empty(5)
+        bound = kernel.box_maximum(linear, bend, u)
+        own = np.vstack([rng.uniform(-1, 1, (300, 5)), rng.choice([-1.0, 1.0], (300, 5))])
+        both = own[:, np.triu_indices(5)[0]] * own[:, np.triu_indices(5)[1]]
+        assert (own @ linear + both @ bend <= bound + 1e-12).all()
+        assert (np.abs(u) <= 1).all()
+    corner = kernel.box_maximum(np.full(5, 40.0), bend, u)
+    assert corner == pytest.approx(200 + bend.sum())
+
+
+def test_it_agrees_with_the_branch_and_bound():
+    model = storeys(2, damping_ratio=0.04, ground=record(), outputs=("q2", "drift2"))
+    fuzzy = {"k1": near(1.2e8, 0.05), "m2": near(6e4, 0.05), "zeta": Triangular(0.03, 0.04, 0.05)}
+    given = {"duration": 3.0, "step": 0.05, "alpha": (0, 1), "progress": False}
+    dual, box = (envelope(model, fuzzy, method=way, **given) for way in (DualProof(), Proof()))
+    slack = 1e-9
+    for one, other in ((dual, box), (box, dual)):
+        assert (one.upper >= other.inner.upper - slack).all()
+        assert (one.lower <= other.inner.lower + slack).all()
+
+
+@pytest.mark.parametrize(
+    ("share", "gaps", "method", "why"),
+    [
+        (1e-2, {}, "proof", "proof succeeded"),
+        (
+            1e-2,
+            {"proof": 1.0},
+            "dual",
+            "dual succeeded; proof: its gap is wider than the tolerance",
+        ),
+        (1e-2, {"dual": 1.0, "proof": 0.5}, "proof", "proof and search"),
+    ],
+)
+def test_auto_takes_the_cheaper_proof_that_is_near_enough(share, gaps, method, why, monkeypatch):
+    own = auto._gap
+    monkeypatch.setattr(auto, "_gap", lambda proved: gaps.get(proved.method, own(proved)))
+    model = storeys(4, damping_ratio=0.03, v0=(0.0, 0.0, 0.0, 0.3), outputs=("drift1",))
+    fuzzy = {f"k{z + 1}": near(1.2e8, 0.04) for z in range(4)}
+    way = Auto(share, peaks=True)
+    given = {"duration": 1.0, "step": 0.05, "alpha": (0,), "progress": False, "relative": True}
+    found = envelope(model, fuzzy, method=way, **given)
+    assert (found.method, found.notes[0]) == (method, why)
+
+
+def test_thirteen_inputs_of_six_storeys_are_proved():
+    outputs = ("q6", "drift1", "base_shear")
+    model = storeys(6, damping_ratio=0.03, ground=record(), outputs=outputs)
+    fuzzy = each_storey(6) | {"zeta": Triangular(0.02, 0.03, 0.04)}
+    found = envelope(model, fuzzy, duration=6.0, step=0.1, alpha=(0, 0.5), progress=False)
+    assert (found.method, found.nature) == ("dual", Nature.GUARANTEED)
+    peaks = np.maximum(found.upper.max(1), -found.lower.min(1))
+    inner = np.maximum(found.inner.upper.max(1), -found.inner.lower.min(1))
+    assert (peaks <= inner * (1 + np.array([[0.03], [0.01]]))).all()
+    assert (inner <= peaks).all()
+
+
+@pytest.mark.parametrize(
+    ("model", "width", "match"),
+    [
+        (storeys(2, dampers=(1e4, 1e4), v0=(1.0, 0.0)), 0.05, "dashpots couple the modes"),
+        (storeys(2, v0=(1.0, 0.0)), 0.99, "take narrower inputs"),
+    ],
+)
+def test_what_is_not_covered_is_said(model, width, match):
+    fuzzy = {"k1": near(1.2e8, width), "k2": near(1.2e8, width)}
+    with pytest.raises(UnprovedError, match=match):
+        envelope(model, fuzzy, duration=1.0, step=0.1, method=DualProof(), progress=False)
+
+
+@pytest.mark.parametrize("unit", [1e-6, 7e-3, 3e5])
+def test_a_motion_in_other_units_has_the_same_bounds(unit):
+    def bounds(factor):
+        shaken = Accelerogram(0.02, factor * record(2.0).acceleration)
+        frame = storeys(3, damping_ratio=0.03, ground=shaken, outputs=("q3", "drift1", "a3"))
+        return envelope(frame, each_storey(3), DualProof(), duration=2.0, step=0.02, alpha=(0,))
+
+    metres, others = bounds(1.0), bounds(unit)
+    allowed = 1e-9 * metres.upper.max((0, 1))
+    assert (np.abs(others.upper / unit - metres.upper) <= allowed).all()
+    assert (np.abs(others.lower / unit - metres.lower) <= allowed).all()

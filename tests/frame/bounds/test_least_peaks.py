@@ -1,0 +1,74 @@
+"""No motion of a box peaks lower than its least peak, which is near the lowest one known."""
+
+import numpy as np
+import pytest
+
+from alphacut.frame import DualProof, envelope
+from alphacut.frame.bounds import least_peaks
+from alphacut.frame.bounds.box import Box
+from alphacut.frame.dynamics.flow import LinearFlow
+from alphacut.frame.dynamics.integrators import Exact
+from alphacut.frame.questions.peaks import passing, peaks
+from alphacut.fuzzy import Triangular
+from tests.frame.bounds.test_dual_proof import each_storey, record, storeys
+
+MODEL = storeys(3, damping_ratio=0.03, ground=record(), outputs=("q3", "drift1"))
+FUZZY = each_storey(3) | {"zeta": Triangular(0.02, 0.03, 0.04)}
+
+
+@pytest.fixture(scope="module")
+def found():
+    given = {"duration": 4.0, "step": 0.05, "alpha": (0, 0.5, 1), "progress": False}
+    return envelope(MODEL, FUZZY, method=DualProof(), **given)
+
+
+def lowest(alpha, count=3000):
+    """Smallest peaks of random motions of a cut, (m,)."""
+    low, high = np.array([number.cut(alpha) for number in FUZZY.values()]).T
+    unit = np.random.default_rng().random((count, len(low)))
+    unit[::2] = unit[::2].round()
+    values = LinearFlow(MODEL, tuple(FUZZY), 4.0, 0.05, Exact()).values(low + unit * (high - low))
+    return np.abs(values).max(1).min(0)
+
+
+def test_no_motion_peaks_lower(found):
+    proved, reached = found.least_peaks
+    for level, alpha in enumerate(found.alpha):
+        assert (lowest(alpha) >= proved[level] - 1e-12).all()
+    assert (proved <= reached).all()
+    assert (np.diff(proved, axis=0) >= 0).all()
+    assert (proved[0] >= 0.75 * np.minimum(reached[0], lowest(0.0))).all()
+
+
+def test_the_peak_of_a_motion_holds_between_nodes():
+    low, high = np.array([number.cut(0.0) for number in FUZZY.values()]).T
+    seed = np.random.SeedSequence().entropy
+    unit = np.random.default_rng(seed).uniform(-1, 1, len(low))
+    box = Box(MODEL, tuple(FUZZY), np.linspace(0.0, 4.0, 81), low, high)
+    bound = box.peak_over_time(unit)
+    fine = LinearFlow(MODEL, tuple(FUZZY), 4.0, 0.001, Exact()).values(box.inputs(unit)[None])[0]
+    peak = np.abs(fine).max(0)
+    assert (peak <= bound).all(), f"seed {seed}"
+    np.testing.assert_allclose(bound, peak, rtol=0.05, err_msg=f"seed {seed}")
+
+
+def test_a_limit_below_the_least_peak_must_be_exceeded(found):
+    proved = found.least_peaks.lower[0, 0]
+    read_off = np.maximum(found.lower[0, :, 0], -found.upper[0, :, 0]).max()
+    assert read_off < 0.9 * proved  # what the bounds at the nodes say
+    answer = passing(peaks(found), {"q3": 0.95 * proved})["q3"]
+    assert answer.necessity[0] == 1.0
+
+
+def test_halves_cover_all_places_and_share_the_middle():
+    motion = np.random.default_rng().normal(size=(2, 3, 13, 41))
+    for ends in ([[0, 40, 0, 12], [0, 40, 0, 12]], [[3, 5, 2, 2], [4, 5, 2, 3]]):
+        cell = least_peaks.PeakCell(0.0, 0, np.array(ends), 1, np.zeros(2))
+        lower, upper = least_peaks._halves(cell, motion)
+        np.testing.assert_array_equal(np.minimum(lower, upper)[:, ::2], cell.places[:, ::2])
+        np.testing.assert_array_equal(np.maximum(lower, upper)[:, 1::2], cell.places[:, 1::2])
+        changed = np.argwhere(lower != cell.places)
+        ((mode, place),) = changed
+        assert lower[mode, place] == upper[mode, place - 1]
+    atoms = least_peaks.PeakCell(0.0, 0, np.array([[7, 8, 0, 1]] * 2), 1, np.zeros(2))
+    assert least_peaks._halves(atoms, motion) == []

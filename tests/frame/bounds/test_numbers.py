@@ -1,0 +1,214 @@
+"""Numbers of the dual proof: fast modes, crisp inputs, threads, and what is not finite."""
+
+from collections import defaultdict
+from concurrent.futures import Future
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from alphacut.frame import StoreyFrame, envelope
+from alphacut.frame.bounds import branch_and_bound, level, parts
+from alphacut.frame.bounds.dual_function import deflect, require_in_range
+from alphacut.frame.bounds.level import OutputBounds
+from alphacut.frame.calculus.unproved import UnprovedError
+from alphacut.frame.methods import dual
+from alphacut.frame.methods.dual import DualProof
+from alphacut.frame.methods.proof import Proof
+from alphacut.frame.structures.loads import Accelerogram
+from alphacut.frame.verification.exact_motion import LinearMotion
+from alphacut.fuzzy import Crisp, Triangular
+from tests.frame.bounds.test_dual_proof import CASES, level_of
+from tests.frame.verification.test_exact_motion import UNFORCED
+
+
+def shear_motion(masses, springs, ratio, ground, parts):
+    """Roof of a shear frame at times that divide each interval of the record into equal parts."""
+    n = len(masses)
+    K = np.diag(springs) + np.diag(np.append(springs[1:], 0))
+    K = K - np.diag(springs[1:], 1) - np.diag(springs[1:], -1)
+    root = np.sqrt(masses)
+    squared, U = np.linalg.eigh(K / root / root[:, None])
+    D = (root[:, None] * U) @ np.diag(2 * ratio * np.sqrt(squared)) @ (root[:, None] * U).T
+    arrays = np.diag(masses), D, K, np.eye(2 * n)[[n - 1]], np.zeros(2 * n), np.ones(n)
+    motion = LinearMotion(*arrays, ground.acceleration, ground.step, *UNFORCED)
+    times = np.arange((len(ground.acceleration) - 1) * parts + 1) * ground.step / parts
+    return motion.outputs(times)[0][:, 0]
+
+
+@pytest.mark.parametrize(
+    ("first", "step", "parts"), [(60e6, 0.25, 10), (60e9, 0.02, 1)], ids=["pulses", "stiff"]
+)
+def test_records_far_slower_than_the_modes_are_bounded(first, step, parts):
+    """The step of the record times the highest frequency is 26 and 35."""
+    masses, springs = np.full(4, 20e3), np.array([first, 60e6, 60e6, 60e6])
+    ground = Accelerogram(step, np.random.default_rng(7).normal(size=7))
+    frame = StoreyFrame(
+        masses=masses, stiffness=springs, damping_ratio=0.03, ground=ground, outputs=("q4",)
+    )
+    fuzzy = {f"k{z}": Triangular(*(springs[z - 1] * np.array([0.95, 1, 1.05]))) for z in (1, 2, 4)}
+    found = envelope(
+        frame,
+        fuzzy,
+        duration=6 * step,
+        step=step / parts,
+        alpha=(0,),
+        method=DualProof(slabs=2, peaks=0.5),
+        progress=False,
+    )
+    roof = shear_motion(masses, springs, 0.03, ground, parts)
+    slack = 1e-9 * np.abs(roof).max()
+    assert (roof <= found.upper[0, :, 0] + slack).all()
+    assert (roof >= found.lower[0, :, 0] - slack).all()
+    assert found.upper.max() < 3 * np.abs(roof).max()
+
+
+def oscillator(turn, duration, **values):
+    """A mass on a spring that starts at 1 m/s, and its inputs: a spring without a width."""
+    frame = StoreyFrame(masses=[1e3], stiffness=[1e3 * turn**2], outputs=("q1",), **values)
+    return frame, {"k1": Crisp(1e3 * turn**2)}, {"duration": duration, "alpha": (0, 1)}
+
+
+@pytest.mark.parametrize("method", [DualProof(), Proof()])
+def test_crisp_inputs_stray_between_nodes_as_stated(method):
+    frame, inputs, given = oscillator(20.0, 0.2, damping_ratio=0.02, v0=(1.0,))
+    found = envelope(frame, inputs, step=0.05, method=method, progress=False, **given)
+    time, fast = np.linspace(0, 0.2, 2001), 20 * np.sqrt(1 - 4e-4)
+    motion = np.exp(-0.4 * time) * np.sin(fast * time) / fast
+    nodes = motion[::500]
+    off = np.abs(motion - np.interp(time, time[::500], nodes))[1:].reshape(4, 500).max(1)
+    stray = found.between[1:, 0]
+    assert (off <= stray).all()
+    assert (stray <= 3 * off.max()).all()
+    assert (np.abs(found.upper[1, :, 0] - nodes) <= 2e-5).all()
+
+
+def test_a_crisp_record_strays_as_stated():
+    ground = Accelerogram(0.03, np.random.default_rng(3).normal(size=40))
+    frame, inputs, given = oscillator(20.0, 1.2, damping_ratio=0.05, ground=ground)
+    coarse, fine = (
+        envelope(frame, inputs, step=step, method=DualProof(), progress=False, **given)
+        for step in (0.1, 0.01)
+    )
+    motion = fine.upper[0, :, 0]
+    line = np.interp(fine.time, coarse.time, motion[::10])
+    off = np.abs(motion - line)[1:].reshape(12, 10).max(1)
+    assert (off <= coarse.between[1:, 0]).all()
+    assert coarse.between.max() < 12 * off.max()
+
+
+def test_crisp_modes_that_do_not_oscillate_are_refused():
+    frame, inputs, given = oscillator(20.0, 0.2, rayleigh=(50.0, 0.0), v0=(1.0,))
+    with pytest.raises(UnprovedError, match="a mode may not oscillate"):
+        envelope(frame, inputs, step=0.05, method=DualProof(), progress=False, **given)
+
+
+def test_threads_do_not_change_a_bit():
+    model, fuzzy = CASES["matrices"]
+    given = {"duration": 3.0, "step": 0.02, "alpha": (0,), "progress": False}
+    first, *others = (
+        envelope(model, fuzzy, method=DualProof(peaks=0.01, workers=workers), **given)
+        for workers in (1, 2, 3)
+    )
+    for other in others:
+        for name in ("lower", "upper", "lower_at", "upper_at", "between"):
+            assert (getattr(first, name) == getattr(other, name)).all()
+
+
+class LastFirst:
+    """Executor that runs what waits when a result is asked for, last submitted first."""
+
+    def __init__(self, workers):
+        self.waiting = []
+
+    def submit(self, function, *arguments):
+        future = Future()
+        future.result = lambda timeout=None: self.finished(future)
+        self.waiting.append((future, function, arguments))
+        return future
+
+    def finished(self, future):
+        while self.waiting:
+            other, function, arguments = self.waiting.pop()
+            other.set_result(function(*arguments))
+        return Future.result(future)
+
+    def map(self, function, *arguments):
+        futures = [self.submit(function, *row) for row in zip(*arguments, strict=False)]
+        return (future.result() for future in futures)
+
+    def shutdown(self, **_):
+        self.waiting.clear()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        assert not self.waiting
+
+
+@pytest.mark.parametrize(
+    ("case", "method"),
+    [("matrices", DualProof(peaks=0.01)), ("record", Proof(tolerance=1e-2))],
+    ids=["dual", "proof"],
+)
+def test_the_order_in_which_threads_end_changes_no_bit(monkeypatch, case, method):
+    model, fuzzy = CASES[case][0], dict([*CASES[case][1].items()][:2])
+    given = {"duration": 2.0, "step": 0.02, "alpha": (0, 0.5), "progress": False}
+    usual = envelope(model, fuzzy, method=replace(method, workers=1), **given)
+    monkeypatch.setattr(branch_and_bound, "PIECE", 100)
+    for module in (branch_and_bound, level, parts, dual):
+        monkeypatch.setattr(module, "ThreadPoolExecutor", LastFirst)
+    adverse = envelope(model, fuzzy, method=replace(method, workers=3), **given)
+    for name in ("lower", "upper", "lower_at", "upper_at", "between"):
+        assert (getattr(usual, name) == getattr(adverse, name)).all()
+
+
+def test_a_pass_compares_with_what_is_known_when_it_begins(monkeypatch):
+    """A peak that a block finds changes nothing for the other blocks of its pass."""
+    tops = defaultdict(set)
+
+    def improve(problem, nodes, effort):
+        tops[id(problem), effort.slabs].add(effort.incumbent)
+        problem.out[1, nodes] = problem.incumbent + 1.0
+
+    monkeypatch.setattr(OutputBounds, "improve", improve)
+    over, _, _ = level_of(*CASES["matrices"], np.arange(0, 3.01, 0.02))
+    over.bounds(np.full(len(over.structure.order), 1e-6), 0.1, 2, 20, workers=1)
+    assert len(tops) > 3
+    assert {len(seen) for seen in tops.values()} == {1}
+
+
+def problem_of_matrices():
+    model, fuzzy = CASES["matrices"]
+    return OutputBounds.initial(level_of(model, fuzzy, np.arange(0, 1.01, 0.1))[0], 0, 1, 1e-6)
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf, 1e101])
+@pytest.mark.parametrize("name", ["table", "linear", "remainder"])
+def test_models_that_are_not_finite_are_refused(name, wrong):
+    data = problem_of_matrices().data
+    values = getattr(data, name).copy()
+    values.flat[-1] = wrong
+    with pytest.raises(UnprovedError, match=f"{name} is not finite"):
+        require_in_range({name: values})
+
+
+@pytest.mark.parametrize("gain", [np.nan, np.inf, 1e300])
+def test_a_descent_ends_before_its_multipliers_overflow(gain):
+    mu, gradient = np.zeros(2), np.array([1e-6, 0.0])
+    assert not deflect(mu, gradient, np.zeros(2), gain, grain=1e-9)
+
+
+def test_a_descent_goes_on_with_ordinary_multipliers():
+    mu = np.zeros(2)
+    assert deflect(mu, np.array([1.0, 0.5]), np.zeros(2), 0.1, grain=1e-9)
+    assert mu == pytest.approx([-0.08, -0.04])
+
+
+def test_a_level_with_a_table_of_nan_raises():
+    model, fuzzy = CASES["matrices"]
+    level, _, _ = level_of(model, fuzzy, np.arange(0, 1.01, 0.1))
+    value = {order: np.full_like(x, np.nan) for order, x in level.tables.value.items()}
+    with pytest.raises(UnprovedError, match="table is not finite"):
+        OutputBounds.initial(replace(level, tables=replace(level.tables, value=value)), 0, 1, 1e-6)

@@ -1,0 +1,233 @@
+"""The hull of parts holds every motion, refusals are bisected, and no thread changes a bound."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from alphacut.frame import Accelerogram, DualProof, MatrixStructure, Proof, StoreyFrame, envelope
+from alphacut.frame.bounds.box_proof import BisectionError, PartBounds
+from alphacut.frame.bounds.parts import prove
+from alphacut.frame.boxes import UnitFlow, boxes
+from alphacut.frame.calculus.unproved import UnprovedError
+from alphacut.frame.dynamics.flow import LinearFlow
+from alphacut.frame.dynamics.integrators import Exact
+from alphacut.fuzzy import Interval, Triangular
+
+NAMES = ("k", "m", "z")
+SYSTEM = MatrixStructure(
+    {"k": 100.0, "m": 1.0, "z": 0.05},
+    [("m", np.eye(1))],
+    [("k", np.eye(1))],
+    {"q": np.ones(1)},
+    q0=np.ones(1),
+    ratios=("z",),
+)
+FUZZY = {
+    "k": Interval(80, 125),
+    "m": Triangular(0.95, 1.0, 1.05),
+    "z": Triangular(0.04, 0.05, 0.06),
+}
+FLOW = UnitFlow(LinearFlow(SYSTEM, NAMES, 0.6, 0.1, Exact()), boxes(FUZZY, (0, 0.5)), relative=True)
+
+
+class Lipschitz:
+    """Bounds by the motion in the middle and a constant; refuses parts that are wide in `along`."""
+
+    name, workers = "lipschitz", 2
+
+    def __init__(self, parts=400, widest=np.inf, along=None, gap=0.3):
+        self.parts, self.widest, self.along, self.gap = parts, widest, along, gap
+        self.seen = []
+
+    def forecast(self, flow, cuts):
+        return 1.0
+
+    def peak_gap(self, scale, peak):
+        return self.gap * peak
+
+    def bounds(self, flow, cuts, goal):
+        self.seen.append((cuts, goal.needed.copy()))
+        place = 0 if self.along is None else self.along
+        if cuts.radius[place] > self.widest:
+            raise UnprovedError("too wide", along=self.along)
+        found = []
+        for low, high in zip(cuts.lower, cuts.upper, strict=True):
+            middle = (low + high) / 2
+            value = flow.values(middle[None])[0]
+            # |∂q/∂ω| ≤ t, |∂q/∂ζ| ≤ ω t, and δω/ω ≤ (δk/k + δm/m) / 2, of the lower ends
+            size = np.sqrt(high[0] / low[1])
+            each = (high - low) / 2 * [0.5 * size / low[0], 0.5 * size / low[1], size]
+            slack = (1.5 * flow.time * each.sum())[:, None, None]
+            both = np.stack([-value, value], -1)
+            at = np.broadcast_to(middle, (*both.shape, 3))
+            shares = np.broadcast_to(each / max(each.sum(), 1e-300), (1, 2, 3))
+            found.append(PartBounds(both + slack, both, at, 0 * value, shares))
+        return found
+
+
+def points(alpha, count=3000):
+    low, high = np.array([number.cut(alpha) for number in FUZZY.values()]).T
+    unit = np.random.default_rng(3).random((count, 3))
+    unit[::3] = unit[::3].round()
+    return low + unit * (high - low)
+
+
+def test_the_hull_of_all_parts_holds_every_motion_and_closes_the_gaps_of_peaks():
+    proof = Lipschitz()
+    found = prove(proof, FLOW)
+    for level, alpha in enumerate(found.alpha):
+        values = FLOW.flow.values(points(alpha))
+        assert (values <= found.upper[level] + 1e-12).all()
+        assert (values >= found.lower[level] - 1e-12).all()
+    assert (found.upper.max(1) - found.inner.upper.max(1) <= 0.3 * FLOW.peak).all()
+    assert (found.inner.lower.min(1) - found.lower.min(1) <= 0.3 * FLOW.peak).all()
+    assert len(proof.seen) > 10
+    assert proof.seen[-1][1].sum() < 0.5 * proof.seen[0][1].sum()
+
+
+def test_a_refused_part_is_bisected_along_the_input_named_at_its_geometric_middle():
+    proof = Lipschitz(widest=0.03, along=1, gap=9.0)
+    prove(proof, FLOW)
+    low, high = sorted((cuts for cuts, _ in proof.seen[1:3]), key=lambda cuts: cuts.lower[0, 1])
+    assert low.upper[0, 1] == high.lower[0, 1] == pytest.approx(1.0)
+    assert (low.upper[0, [0, 2]] == [125, 0.06]).all()
+    proof = Lipschitz(widest=15.0, along=0, gap=9.0)
+    prove(proof, FLOW)
+    assert min(cuts.upper[0, 0] for cuts, _ in proof.seen[1:3]) == pytest.approx(100.0)
+
+
+def test_what_no_bisection_cures_is_refused():
+    with pytest.raises(UnprovedError, match="too wide"):
+        prove(Lipschitz(parts=5, widest=0.0, along=2), FLOW)
+    proof = Lipschitz()
+    proof.bounds = lambda *_: (_ for _ in ()).throw(BisectionError("in vain"))
+    with pytest.raises(BisectionError, match="in vain"):
+        prove(proof, FLOW)
+
+
+def test_a_gap_that_falls_too_slowly_is_left_and_its_bounds_stay():
+    found = prove(Lipschitz(parts=12, gap=1e-6), FLOW)
+    assert found.facts["parts"] < 60
+    assert re.match(
+        r"gap of q, .* of its peak, by input: (\w) .*; narrow \1 first$", found.notes[0]
+    )
+    values = FLOW.flow.values(points(0))
+    assert (values <= found.upper[0] + 1e-12).all()
+
+
+def spring(unit=1.0):
+    """A chain on a soil spring, with its modes a factor of two apart or more; lengths in `unit`."""
+    chain = 400.0 * (2 * np.eye(4) - np.eye(4, k=1) - np.eye(4, k=-1))
+    chain[0, 0] = chain[3, 3] = 400.0
+    time = np.arange(0, 3.001, 0.02)
+    ground = Accelerogram(0.02, 3 / unit * np.sin(9 * time) * np.exp(-((time - 1) ** 2)))
+    soil = np.zeros((4, 4))
+    soil[0, 0] = 300.0
+    top = {"top": np.eye(4)[3]}
+    return MatrixStructure(
+        {"s": 1.0},
+        [(1.0, np.eye(4))],
+        [(1.0, chain), ("s", soil)],
+        top,
+        ground=ground,
+        ratios=(0.04,),
+    )
+
+
+@pytest.mark.parametrize("method", [DualProof(peaks=1e-3), Proof(tolerance=1e-3)], ids=repr)
+def test_a_soil_spring_known_within_a_factor_of_four_is_proved_in_parts(method):
+    fuzzy = {"s": Interval(0.5, 2.0)}
+    given = {"duration": 3.0, "step": 0.05, "alpha": (0,), "relative": True, "progress": False}
+    found = envelope(spring(), fuzzy, method=method, **given)
+    assert found.facts["parts"] > 1
+    assert found.facts["gap_of_peaks"] <= 1.1e-3
+    values = LinearFlow(spring(), ("s",), 3.0, 0.05, Exact()).values(
+        np.linspace(0.5, 2.0, 4001)[:, None]
+    )
+    assert (values <= found.upper[0]).all()
+    assert (values >= found.lower[0]).all()
+    again = envelope(
+        spring(), fuzzy, method=type(method)(**{**vars(method), "workers": 1}), **given
+    )
+    assert (again.upper == found.upper).all()
+    assert (again.lower == found.lower).all()
+
+
+def test_progress_rises_in_parts_and_within_them():
+    told = []
+    prove(Lipschitz(), FLOW, told.append)
+    assert told == []  # a proof that tells nothing of its parts
+    proof = Lipschitz()
+    bounds = proof.bounds
+    proof.bounds = lambda flow, cuts, goal: (goal.tick(0.5), bounds(flow, cuts, goal))[1]
+    prove(proof, FLOW, told.append)
+    assert len(told) == len(proof.seen)
+    assert (np.diff(told) >= -1e-12).all()
+    assert 0 < told[0] < 0.5
+    assert 0.9 < told[-1] <= 1
+
+
+def test_the_dual_bound_tells_how_many_nodes_are_done():
+    told = []
+    given = {"duration": 3.0, "step": 0.02, "alpha": (0,), "progress": told.append}
+    envelope(spring(), {"s": Interval(0.9, 1.1)}, method=DualProof(workers=1), **given)
+    assert len(set(told)) > 5
+    assert (np.diff(told) >= 0).all()
+
+
+def test_parts_left_after_a_refusal_have_bounds():
+    """A gap that is left as it is leaves no half of a refused part without bounds."""
+    frame = StoreyFrame(
+        masses=[1e3] * 4,
+        stiffness=[4e5] * 4,
+        damping_ratio=0.02,
+        v0=(0.0, 0.0, 0.0, 1.0),
+        outputs=("q4",),
+    )
+    inputs = {f"k{z}": Triangular(3.2e5, 4e5, 4.8e5) for z in (1, 2, 3, 4)}
+    inputs |= {f"m{z}": Triangular(800.0, 1e3, 1200.0) for z in (1, 2, 3)}
+    motion = {"duration": 1.6, "step": 0.16, "alpha": (0.0,), "progress": False}
+    found = envelope(frame, inputs, method=DualProof(), **motion)
+    assert found.facts["parts"] > 1
+    assert found.facts["motions_tested"] >= 24
+    assert np.isfinite(found.upper).all()
+
+
+class Killed(Lipschitz):
+    """Ends after some parts, as by Ctrl-C."""
+
+    def bounds(self, flow, cuts, goal):
+        if len(self.seen) == 6:
+            raise KeyboardInterrupt
+        return super().bounds(flow, cuts, goal)
+
+
+def test_an_interruption_leaves_the_best_bounds_so_far():
+    whole = prove(Lipschitz(), FLOW)
+    found = prove(Killed(), replace(FLOW, interruptible=True))
+    assert found.notes[0].startswith("interrupted, with ")
+    assert (found.upper >= whole.upper - 1e-12).all()
+    assert (FLOW.flow.values(points(0)) <= found.upper[0] + 1e-12).all()
+    with pytest.raises(KeyboardInterrupt):
+        prove(Killed(), FLOW)
+
+
+@pytest.mark.parametrize("method", [DualProof(peaks=1e-3), Proof(tolerance=1e-3)], ids=repr)
+def test_a_proof_goes_on_from_stored_parts(method, tmp_path, monkeypatch):
+    given = {"duration": 1.0, "step": 0.05, "alpha": (0, 1), "progress": False, "store": tmp_path}
+    fuzzy = {"s": Triangular(0.5, 1.0, 2.0)}
+    first = envelope(spring(), fuzzy, method=method, **given)
+    assert len(list(tmp_path.glob("part-*.npz"))) == first.facts["parts"]
+    monkeypatch.setattr(type(method), "bounds", None)  # not called
+    again = envelope(spring(), fuzzy, method=method, **given)
+    assert (again.upper == first.upper).all()
+    assert (again.lower_at == first.lower_at).all()
+    assert {**again.facts, "seconds": 0} == {**first.facts, "seconds": 0}
+    with pytest.raises(TypeError):
+        envelope(spring(), {"s": Triangular(0.5, 1.0, 2.1)}, method=method, **given)
+    for part in tmp_path.glob("part-*.npz"):  # a link may be anybody's
+        part.symlink_to(part.rename(tmp_path / f"of-{part.stem}"))
+    with pytest.raises(TypeError):
+        envelope(spring(), fuzzy, method=method, **given)

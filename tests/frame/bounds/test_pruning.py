@@ -1,0 +1,95 @@
+"""Bounds over parts of a box hold there, and so do those of what is pruned."""
+
+import numpy as np
+import pytest
+
+from alphacut.frame import envelope
+from alphacut.frame.bounds import pruning
+from alphacut.frame.bounds.box import Box
+from alphacut.frame.bounds.level import OutputBounds
+from alphacut.frame.bounds.pruning import prune_ends
+from alphacut.frame.dynamics.flow import LinearFlow
+from alphacut.frame.dynamics.integrators import Exact
+from alphacut.frame.methods.dual import DualProof
+from tests.frame.bounds.test_dual_proof import each_storey, near, record, storeys
+
+TIME = np.arange(0, 4.01, 0.05)
+MODEL = storeys(3, damping_ratio=0.03, ground=record(), outputs=("drift3", "a3"))
+FUZZY = each_storey(3, 0.1, 0.07) | {"zeta": near(0.03, 0.3)}
+CUT = np.array([number.support for number in FUZZY.values()])
+SIDE = 1
+
+
+@pytest.fixture
+def box():
+    return Box(MODEL, tuple(FUZZY), TIME, *CUT.T)
+
+
+def motions(box, low, high, rng, count=400):
+    """Exact motions (S, T, m) at corners and points of a part, and their coordinates (S, d)."""
+    unit = rng.uniform(0, 1, (count, len(low)))
+    unit[::2] = unit[::2].round()
+    unit = low + unit * (high - low)
+    flow = LinearFlow(MODEL, list(FUZZY), TIME[-1], TIME[1], Exact())
+    return flow.values(box.inputs(unit)), unit
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_models_over_a_part_bound_motions_there(box, seed):
+    rng = np.random.default_rng(seed)
+    ends = np.sort(rng.uniform(-1, 1, (2, 7)), axis=0)
+    values, unit = motions(box, *ends, rng)
+    level = box.level()
+    part, own = level.within(*ends), 2 * (unit - ends[0]) / (ends[1] - ends[0]) - 1
+    for whole, narrow, grid in zip(
+        level.oscillators, part.oscillators, part.tables.grids, strict=True
+    ):
+        assert narrow.omega.at(own) == pytest.approx(whole.omega.at(unit), rel=1e-12)
+        first, last = narrow.places(grid)[:2]
+        inside = (grid.omega[first] <= narrow.omega.at(own)) & (
+            narrow.omega.at(own) <= grid.omega[last]
+        )
+        assert inside.all()
+        assert last - first < len(grid.omega) - 1
+    for o in range(2):
+        problem = OutputBounds.initial(part, o, SIDE, 1e-9)
+        problem.run(np.arange(len(TIME)), 4, 20, 0.0, 0.0)
+        assert (values[:, :, o].max(0) <= problem.out[0] + 1e-12).all()
+
+
+def test_what_is_pruned_is_bounded(box, monkeypatch):
+    values, _ = motions(box, -np.ones(7), np.ones(7), np.random.default_rng(0))
+    most, top = values[:, :, 0].max(0), values[:, :, 0].max()
+    level, above = box.level(), np.flatnonzero(most > 0.8 * top)
+    problem = OutputBounds.initial(level, 0, SIDE, 0.05 * top, top)
+    problem.run(np.arange(len(TIME)), 24, 40, 1.0, 0.0)
+    best = problem.at[above[problem.out[0, above].argmax()]]
+    tried, over_piece = [], pruning._over_piece
+
+    def noted(*call):
+        tried.append((*call[4], over_piece(*call)))
+        return tried[-1][-1]
+
+    monkeypatch.setattr(pruning, "_over_piece", noted)
+    low, high, pruned = prune_ends(level, problem, (0, SIDE), above, best)
+    away = [piece for piece in tried if piece[-1].max() <= 1.05 * top]
+    assert len(away) > 2
+    assert (pruned == np.max([bound for _, _, bound in away], axis=0)).all()
+    values, unit = motions(box, -np.ones(7), np.ones(7), np.random.default_rng(1), 4000)
+    covered = ((low <= unit) & (unit <= high)).all(1)
+    for begin, end, _ in away:
+        inside = ((begin <= unit) & (unit <= end)).all(1)
+        assert (values[inside][:, above, 0].max(0) <= pruned + 1e-12).all()
+        covered |= inside
+    assert covered.all()
+
+
+def test_parts_close_the_gap_of_a_peak():
+    given = {"duration": 4.0, "step": 0.05, "alpha": (0,), "progress": False}
+    wide, narrow = (
+        envelope(MODEL, FUZZY, method=DualProof(gap=1e-4, peaks=peaks), **given)
+        for peaks in (1.0, 3e-3)
+    )
+    assert narrow.facts["gap_of_peaks"] <= 3e-3 < wide.facts["gap_of_peaks"]
+    assert (narrow.upper <= wide.upper + 1e-12).all()
+    assert (narrow.upper >= wide.inner.upper).all()

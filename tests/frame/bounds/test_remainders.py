@@ -1,0 +1,341 @@
+"""Taylor models, eigenpairs and tables hold their bounds; half of a bound would not do."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.linalg import eigh
+
+from alphacut.frame import StoreyFrame
+from alphacut.frame.bounds import dual_function
+from alphacut.frame.bounds.box import over_box
+from alphacut.frame.bounds.level import LevelModels, OutputBounds
+from alphacut.frame.calculus.monomials import convolve, monomials
+from alphacut.frame.calculus.taylor_model import TaylorModel, solve
+from alphacut.frame.calculus.unproved import UnprovedError
+from alphacut.frame.modes.clusters import centred_matrices, subspaces
+from alphacut.frame.modes.rest import _inverse_form
+from alphacut.frame.modes.structure import classical
+from alphacut.frame.response.waves import Grid, Oscillators
+from alphacut.frame.structures.loads import Accelerogram
+from alphacut.frame.structures.matrix import MatrixStructure
+
+TIGHT = 0.5
+"""Share of a bound that something reaches: half the bound would be passed."""
+
+
+def points(d, count=400, seed=0):
+    rng = np.random.default_rng(seed)
+    return np.vstack([np.sign(rng.normal(size=(count, d))), rng.uniform(-1, 1, (count, d))])
+
+
+def inputs(d, seed=0, radius=0.1):
+    rng = np.random.default_rng(seed)
+    return TaylorModel.variables(rng.uniform(1, 2, d), radius * rng.uniform(0.5, 1, d))
+
+
+@pytest.mark.parametrize(
+    ("law", "expected"),
+    [
+        (lambda x: x[0] * x[1] * x[2], lambda v: v[0] * v[1] * v[2]),
+        (lambda x: x[0] ** -3.0 * x[1], lambda v: v[1] / v[0] ** 3),
+        (lambda x: (x[0] * x[2]) ** 0.5 - x[1], lambda v: np.sqrt(v[0] * v[2]) - v[1]),
+        (lambda x: (x[0] + x[1] * 2.0 + 1.0) ** -1.0, lambda v: 1 / (v[0] + 2 * v[1] + 1)),
+    ],
+)
+def test_an_expansion_is_off_by_its_rest_at_most(law, expected):
+    own, u = inputs(3), points(3)
+    f = law(own)
+    off = np.abs(f.at(u) - expected(own.at(u).T))
+    assert off.max() <= f.remainder + 1e-12
+
+
+def test_a_matrix_product_of_expansions_contains_the_product():
+    own, u = inputs(4, 1, 0.3), points(4)
+    a = own.contract(np.eye(4).reshape(4, 2, 2))
+    cube = a @ a @ (a @ a)
+    values = own.at(u).reshape(-1, 2, 2)
+    assert (
+        np.abs(cube.at(u) - values @ values @ values @ values).max(0) <= cube.remainder * (1 + 1e-9)
+    ).all()
+    assert cube.remainder.min() > 0
+
+
+def test_a_power_of_what_may_be_zero_is_refused():
+    with pytest.raises(UnprovedError, match="take narrower inputs"):
+        TaylorModel.variables(np.ones(1), np.full(1, 1.1)) ** 0.5
+
+
+def test_products_of_homogeneous_polynomials_are_those_of_their_values():
+    rng, u = np.random.default_rng(0), np.random.default_rng(1).uniform(-1, 1, 5)
+    for degrees in ((2, 2), (1, 3), (3, 0)):
+        a, b = (rng.normal(size=len(monomials(5, degree))) for degree in degrees)
+        both = convolve(a, b, degrees, 5, np.multiply)
+
+        def at(part, degree):
+            return part @ u[monomials(5, degree)].prod(1)
+
+        expected = at(a, degrees[0]) * at(b, degrees[1])
+        assert at(both, sum(degrees)) == pytest.approx(expected, rel=1e-12)
+
+
+def is_tight(off, bound):
+    return (TIGHT * bound < off).all() and (off <= bound * (1 + 1e-9)).all()
+
+
+def test_half_of_a_remainder_of_series_would_not_do():
+    def line(slope, rest):
+        return TaylorModel(
+            (np.ones((1, 1, 1)), np.full((1, 1, 1), slope)), np.full((1, 1), rest), 1
+        )
+
+    own, other = line(0.2, 0.01), line(-0.2, 0.01)
+    fourth = own * own * own * own
+    for made, exact in (
+        (solve(other, own), 1.21 / 0.79),
+        (fourth, 1.21**4),
+        (fourth.cut(2), 1.21**4),
+        (fourth @ np.array([[-2.0]]), -2 * 1.21**4),
+        (np.array([[-2.0]]) @ fourth, -2 * 1.21**4),
+        (-fourth, -(1.21**4)),
+        (fourth.contract(np.array([-2.0])), -2 * 1.21**4),
+    ):
+        assert is_tight(abs(exact - sum(part.sum() for part in made.parts)), made.remainder)
+
+
+def test_half_of_a_remainder_of_powers_would_not_do():
+    own = TaylorModel.variables(np.ones(1), np.full(1, 0.1)).loosened(0.01)
+    square = own * own
+    for made, u, exact in (
+        (square * square, 1.0, 1.11**4),
+        (own**0.5, -1.0, 0.89**0.5),
+        (own**-1.0, -1.0, 1 / 0.89),
+    ):
+        assert is_tight(np.abs(made.at(np.array([[u]])) - exact), made.remainder)
+
+
+def frame(storeys=4, width=0.05, **values):
+    """A frame with a stiffness and a mass a storey, and its structure over the box."""
+    own = StoreyFrame(
+        masses=(2e4,) * storeys,
+        stiffness=(3e7,) * storeys,
+        v0=(1.0,) * storeys,
+        damping_ratio=0.03,
+        **values,
+    )
+    names = tuple(f"{kind}{z + 1}" for kind in "km" for z in range(storeys))
+    centre = np.array([own.parameters[name] for name in names])
+    radius = width * centre
+    return own, names, centre, radius, over_box(own, names, centre - radius, centre + radius)
+
+
+def along(own, names, centre, radius, i):
+    """The structure where input i alone varies."""
+    only = radius * (np.arange(len(names)) == i)
+    return over_box(own, names, centre - only, centre + only)
+
+
+def modes(structure):
+    """All blocks of a structure."""
+    centre, used = centred_matrices(structure.mass, structure.stiffness)
+    return subspaces(centre, used, centre.modes)
+
+
+def exact_modes(own, names, centre, radius, u):
+    """λ and shapes, those with 1 in their own coordinate of the middle, at points u."""
+    n = own.floors
+    below = np.eye(n) - np.eye(n, k=-1)
+
+    def pencil(values):
+        k, m = values[:n], values[n:]
+        return below.T @ np.diag(k) @ below, np.diag(m)
+
+    basis = eigh(*pencil(centre))[1]
+    for row in centre + radius * u:
+        K, M = pencil(row)
+        squared, shape = eigh(K, M)
+        seen = np.linalg.solve(basis, shape)
+        yield squared, seen / np.diag(seen)
+
+
+def test_eigenpairs_stay_within_their_remainders():
+    own, names, centre, radius, structure = frame()
+    found, u = modes(structure), points(8, 100)
+    assert [list(block.modes) for block in found.blocks] == [[0], [1], [2], [3]]
+    exact = list(exact_modes(own, names, centre, radius, u))
+    for k, block in enumerate(found.blocks):
+        squared, shape = block.rate[0, 0], block.shape[0]
+        off = np.abs(squared.at(u) - [x[0][k] for x in exact])
+        assert off.max() <= squared.remainder
+        off = np.abs(shape.at(u) - [x[1][:, k] for x in exact])
+        assert (off.max(0) <= shape.remainder + 1e-12).all()
+        values, slack = np.array([x[0][k] for x in exact]), 1e-12 * found.high[k]
+        assert found.low[k] <= values.min() + slack
+        assert values.max() <= found.high[k] + slack
+
+
+def test_half_of_a_remainder_of_eigenpairs_would_not_do():
+    own, names, centre, radius, _ = frame(2, 0.1)
+    first = (0, 0)
+    for i, entries in (
+        (0, {"rate": first, "shape": (0, 1), "norm": first}),
+        (2, {"mass_shape": first}),
+    ):
+        found, u = modes(along(own, names, centre, radius, i)), np.array([-1.0, 1])
+        ends = exact_modes(own, names, centre, radius, u[:, None] * np.eye(4)[i])
+        off = {name: [] for name in entries}
+        seen = found.centre.mass.at(u[:, None])
+        for at, M, (squared, shapes) in zip(u, seen, ends, strict=True):
+            x = shapes[:, :1].T
+            exact = {"rate": squared[None], "shape": x, "norm": x @ M @ x.T, "mass_shape": x @ M}
+            for name, entry in entries.items():
+                value = getattr(found.blocks[0], name).at(np.array([[at]]))[0]
+                off[name].append(abs(exact[name][entry] - value[entry]))
+        for name, entry in entries.items():
+            assert is_tight(np.max(off[name]), getattr(found.blocks[0], name).remainder[entry])
+
+
+def test_half_of_the_range_of_eigenvalues_would_not_do():
+    own, _, _, _, structure = frame(1, 0.1)
+    p = {name: TaylorModel.constant(x, 1) for name, x in own.parameters.items()}
+    loose = {name: p[name].loosened(0.1 * own.parameters[name]) for name in ("k1", "m1")}
+    for one in (structure, classical(own, p | loose)):
+        found = modes(one)
+        assert found.low[0] == pytest.approx(3e7 / 2e4 * 0.9 / 1.1)
+        assert found.high[0] == pytest.approx(3e7 / 2e4 * 1.1 / 0.9)
+
+
+def masses_on_springs(loose=0.0):
+    """Three of them beside one another, two of the same frequency, and their sum."""
+    arrays = [np.diag(row) for row in np.eye(3)]
+    own = MatrixStructure(
+        {"a": 1.0, "b": 1.0, "c": 3.0},
+        mass=[(1.0, np.eye(3))],
+        stiffness=list(zip("abc", arrays, strict=True)),
+        observed={"sum": np.ones(3)},
+        v0=np.ones(3),
+    )
+    centre = np.array([1.0, 1.0, 3.0])
+    p = TaylorModel.variables(centre, 1e-3 * centre).loosened(loose * centre)
+    return classical(own, {name: p[i] for i, name in enumerate("abc")})
+
+
+def test_modes_that_cross_are_one_block_and_go_on_through_the_crossing():
+    found = modes(masses_on_springs())
+    assert [list(block.modes) for block in found.blocks] == [[0, 1], [2]]
+    rate, u = found.blocks[0].rate, points(3, 50)
+    expected = 1 + 1e-3 * u[:, :2]
+    assert np.sort(np.linalg.eigvals(rate.at(u))) == pytest.approx(np.sort(expected))
+    assert np.abs(rate.at(u)[:, 0, 1]).max() < 1e-12
+
+
+def test_half_of_what_springs_and_start_are_loosened_by_would_not_do():
+    springs, time, parts = masses_on_springs(0.03), np.arange(0, 44.01, 0.25), 4
+    both = springs.start.loosened(np.array([[0.0] * 3, [0.1, 0.1, 0.0]]))
+    level = LevelModels.from_structure(replace(springs, start=both), {}, time, ("velocity",))
+    outer, _ = level.bounds(np.full(1, 1e-6), 0.1, 40, 100, 1)
+    omega = np.sqrt(np.array([1.0, 1, 3])[:, None] * np.linspace(0.969, 1.031, 201))
+    fine = np.arange(len(time) * parts - parts + 1) * 0.25 / parts
+    waves = np.sin(omega * fine[:, None, None]) / omega
+    start, middle = np.array([0.1, 0.1, 0])[:, None], waves[:, :, 100].sum(-1)
+    for side, column in ((-1, 0), (1, 1)):
+        most = np.maximum((1 - start) * side * waves, (1 + start) * side * waves).max(-1).sum(-1)
+        off = (most - side * middle)[parts::parts]
+        assert is_tight(off, outer[1:, 0, column] - side * middle[parts::parts])
+    off = np.abs(middle - np.interp(fine, time, middle[::parts]))[1:].reshape(-1, parts).max(1)
+    stray = level.line_deviation()[1:, 0]
+    assert (off <= stray).all()
+    assert (off > TIGHT * stray).any()
+
+
+def test_half_of_the_cubic_part_would_not_do():
+    own, names, centre, radius, _ = frame(1, 0.1)
+    structure = along(own, names, centre, radius, 1)
+    data = OutputBounds.initial(
+        LevelModels.from_structure(structure, {}, np.array([0.0, 0.1]), ("velocity",)), 0, 1, 1.0
+    ).data
+    whole, mu, u = np.array([[0, 0, 0, 0]]), np.array([1.0, 0, 0]), np.empty(1)
+    bound = dual_function.dual(mu, whole, 1, 1.0, data, np.empty(3), u) + data.omega[0, 0]
+    bound += dual_function.remainder_bound(mu, data)
+    e = data.share[0, 0] * data.table[0, 0, 1, 0] + abs(data.reach[0, 0] * data.table[0, 0, 1, 0])
+    exact = (0.9**-0.5 - 1) * data.centre[0, 0] / data.radius[0, 0]
+    assert exact <= bound - e <= exact + TIGHT * data.size[0]
+
+
+RECORD = Accelerogram(0.02, np.sin(np.arange(200) * 0.11) * np.sin(np.arange(200) * 0.47))
+
+
+@pytest.mark.parametrize("source", ["load", "velocity", "start"])
+@pytest.mark.parametrize("order", [0, 1, 2])
+def test_tables_miss_what_they_state_and_no_less_than_half(source, order):
+    time = np.arange(0, 6, 0.05)
+    fine = Grid(np.linspace(9, 11, 81), np.linspace(0.02, 0.05, 81))
+    for omega, quotient in ((16, 80), (80, 8), (16, 8)):
+        coarse = Grid(fine.omega[:: 80 // omega], fine.quotient[:: 80 // quotient])
+        table = Oscillators(coarse, {"load": RECORD}, time).waves(source, order)
+        exact = Oscillators(fine, {"load": RECORD}, time).waves(source, order).value
+        at = table.value
+        for axis, (own, grid) in enumerate(
+            ((fine.quotient, coarse.quotient), (fine.omega, coarse.omega)), 1
+        ):
+            weights = np.array([np.interp(own, grid, row) for row in np.eye(len(grid))])
+            at = np.moveaxis(np.tensordot(at, weights, (axis, 0)), -1, axis)
+        off = np.abs(at - exact).max((1, 2))
+        assert (off <= table.error + 1e-14).all()
+        if (omega, quotient) != (16, 8):
+            assert (off[1:] / table.error[1:]).max() > TIGHT
+
+
+def test_what_second_derivatives_do_within_a_cell_is_in_the_error():
+    """G″ = (σ − σ₁)(σ − σ₂) is zero at both ends of a cell, and G strays by 5 h⁴/384 within."""
+    grid, h = Grid(np.array([10.0, 11.0]), np.zeros(1)), 1.0
+    oscillators = Oscillators(grid, {}, np.zeros(1))
+    zero, fourth = np.zeros((3, 1)), np.array([[0.0], [0.0], [0.0], [0.0], [2.0]])
+    error, _ = oscillators._error(zero, fourth, 0, start=True)
+    exact = 5 * h**4 / 384
+    assert exact <= error[0] <= 3 * exact
+
+
+def test_responses_are_those_of_a_fine_march_and_stray_as_stated():
+    grid, parts = Grid(np.linspace(9.99, 10.01, 3), np.array([0, 1e-3])), 8
+    resonant = Accelerogram(0.02, np.sin(0.2 * np.arange(400)))
+    ended = Accelerogram(0.02, np.ones(51))  # between two nodes
+    cases = [(source, resonant, 0.05) for source in ("load", "velocity", "start")]
+    for source, ground, step in (*cases, ("load", ended, 0.01)):
+        coarse = step * (np.arange(120) + 0.5)
+        time = coarse[0] + step / parts * np.arange(119 * parts + 1)
+        for order in (0, 1, 2):
+            wide = Oscillators(grid, {"load": ground}, coarse).waves(source, order)
+            fine = Oscillators(grid, {"load": ground}, time).waves(source, order).value
+            assert np.allclose(fine[::parts], wide.value, atol=1e-12 * np.abs(fine).max())
+            line = np.array([np.interp(time, coarse, x) for x in wide.value.reshape(120, -1).T]).T
+            off = np.abs(fine.reshape(len(time), -1) - line)[1:].reshape(119, -1).max(1)
+            assert (off <= wide.line_deviation[1:] + 1e-13).all()
+            assert (off > TIGHT * wide.line_deviation[1:]).any()
+
+
+@pytest.mark.parametrize("order", [3, 4])
+def test_forms_of_inverses_stay_within_their_rests(order):
+    rng, d, n, shares = np.random.default_rng(order), 3, 4, []
+    matrices = rng.normal(size=(d, n, n))
+    A = TaylorModel(
+        (np.diag([1.0, 2, 3, 5])[None], 0.03 * (matrices + matrices.swapaxes(1, 2))),
+        np.zeros((n, n)),
+        d,
+        order,
+    )
+    left, right = (
+        TaylorModel(
+            (rng.normal(size=(1, m, n)), 0.1 * rng.normal(size=(d, m, n))),
+            np.zeros((m, n)),
+            d,
+            order,
+        )
+        for m in (2, 3)
+    )
+    found = _inverse_form(A, left, right, 0.5)
+    for u in rng.uniform(-1, 1, (300, d)):
+        (a,), (x,), (y,) = (model.at(u[None]) for model in (A, left, right))
+        off = np.abs(x @ np.linalg.inv(a) @ y.T - found.at(u[None])[0])
+        shares.append((off / found.remainder).max())
+    assert 3e-3 <= max(shares) <= 1

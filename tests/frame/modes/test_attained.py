@@ -1,0 +1,135 @@
+"""Exact motions at single inputs agree with forty digits, and their rounding with its bound."""
+
+import mpmath as mp
+import numpy as np
+import pytest
+
+from alphacut.frame import StoreyFrame, envelope
+from alphacut.frame.bounds.box import Box
+from alphacut.frame.methods.dual import DualProof
+from alphacut.frame.structures.loads import Accelerogram
+from alphacut.frame.structures.matrix import MatrixStructure
+from alphacut.fuzzy import Crisp, Interval
+from tests.frame.response.test_duhamel import exact_response
+
+IDLE = 0.01
+"""Share of a bound of rounding that the largest of some errors reaches at least."""
+
+
+def exact_output(frame, springs, masses, time, output):
+    """An output of a shear frame at one time by 40 digits."""
+    n, z = len(springs), int(output[-1]) - 1
+    k, m = ([mp.mpf(float(x)) for x in values] for values in (springs, masses))
+    matrix = mp.zeros(n)
+    for i in range(n):
+        matrix[i, i] = (k[i] + (k[i + 1] if i + 1 < n else 0)) / m[i]
+        if i:
+            matrix[i, i - 1] = matrix[i - 1, i] = -k[i] / mp.sqrt(m[i] * m[i - 1])
+    squared, vectors = mp.eigsy(matrix)
+    order, total = {"v": 1, "a": 2}.get(output[0], 0), mp.mpf(0)
+    for e in range(n):
+        decay = mp.mpf(frame.damping_ratio) * mp.sqrt(squared[e])
+        sigma = mp.mpc(-decay, mp.sqrt(squared[e] - decay**2))
+        x = [vectors[i, e] / mp.sqrt(m[i]) for i in range(n)]
+        read = x[z] - (x[z - 1] if z and output.startswith("drift") else 0)
+        free = sigma**order * mp.exp(sigma * mp.mpf(float(time)))
+        start, speed = (
+            mp.fsum(x[i] * m[i] * mp.mpf(float(values[i])) for i in range(n) if len(values))
+            for values in (frame.q0, frame.v0)
+        )
+        wave = (speed + decay * start) * free.imag / sigma.imag + start * free.real
+        if frame.ground is not None:
+            driven = mp.fsum(x[i] * m[i] for i in range(n))
+            rho = exact_response(sigma, frame.ground, time)
+            wave -= driven * (sigma**order * rho).imag / sigma.imag
+        total += read * wave
+    return total
+
+
+def drawn(seed, stiff, ground, **start):
+    """A frame of three storeys, the lowest `stiff` times stiffer, and a box around it."""
+    rng = np.random.default_rng(seed)
+    masses, springs = rng.uniform(1e4, 5e4, 3), rng.uniform(3e7, 1e8, 3)
+    springs[0] *= stiff
+    frame = StoreyFrame(
+        masses=masses,
+        stiffness=springs,
+        damping_ratio=0.02,
+        ground=ground,
+        outputs=("q3", "drift2", "v1", "a2"),
+        **start,
+    )
+    names = ("k1", "k2", "k3", "m1", "m2", "m3")
+    centre, time = np.r_[springs, masses], np.arange(61) * 0.017
+    return frame, Box(frame, names, time, 0.9 * centre, 1.1 * centre), rng
+
+
+RECORD = Accelerogram(0.02, np.random.default_rng(2).normal(size=40))
+SLOW = Accelerogram(0.3, np.random.default_rng(2).normal(size=6))
+STARTED = {"q0": (0.01, 0.0, 0.02), "v0": (0.1, -0.5, 0.2)}
+
+
+@pytest.mark.parametrize(
+    ("stiff", "ground", "start"),
+    [(1, RECORD, {}), (1e4, RECORD, {}), (1, None, STARTED), (1e6, SLOW, STARTED)],
+    ids=["record", "stiff storey", "free", "stiff storey, slow record and start"],
+)
+def test_motions_are_off_by_their_rounding_at_most(stiff, ground, start):
+    frame, box, rng = drawn(int(np.log10(stiff)), stiff, ground, **start)
+    unit = rng.uniform(-1, 1, (16, 6))
+    node, output = rng.integers(1, 61, 16), np.arange(16) % 4
+    value, error = box.attained_with_error(unit, node, output)
+    shares = []
+    with mp.workdps(40):
+        for i, point in enumerate(box.inputs(unit)):
+            name = frame.outputs[output[i]]
+            true = exact_output(frame, point[:3], point[3:], box.time[node[i]], name)
+            shares.append(float(abs(true - mp.mpf(float(value[i])))) / error[i])
+    assert IDLE <= np.max(shares) <= 1
+
+
+def test_crisp_bounds_hold_the_exact_motion_within_a_hundred_of_its_errors():
+    frame, box, rng = drawn(3, 100.0, RECORD)
+    crisp = {name: Crisp(float(x)) for name, x in zip(box.names, box.centre, strict=True)}
+    frame_time = {"duration": 0.017 * 60, "step": 0.017, "alpha": (0,)}
+    found = envelope(frame, crisp, method=DualProof(), progress=False, **frame_time)
+    shares = []
+    with mp.workdps(40):
+        for node in rng.integers(1, 61, 12):
+            for o, name in enumerate(frame.outputs):
+                true = exact_output(frame, box.centre[:3], box.centre[3:], found.time[node], name)
+                lower, upper = (mp.mpf(float(x[0, node, o])) for x in (found.lower, found.upper))
+                assert lower <= true <= upper
+                shares.append(float(abs(true - (lower + upper) / 2) / ((upper - lower) / 2)))
+    assert np.max(shares) >= IDLE
+
+
+def test_equal_frequencies_do_not_lift_the_rounding():
+    """Two alike masses on two alike springs: the modes of the pair are any two of a plane."""
+    arrays = [np.diag(row) for row in np.eye(3)]
+    own = MatrixStructure(
+        {"a": 3.0, "b": 3.0, "c": 7.0},
+        mass=[(1.0, np.eye(3))],
+        stiffness=list(zip("abc", arrays, strict=True)),
+        observed={"sum": np.ones(3)},
+        v0=np.ones(3),
+    )
+    centre, time = np.array([3.0, 3.0, 7.0]), np.arange(0, 9.01, 0.5)
+    box = Box(own, ("a", "b", "c"), time, 0.9 * centre, 1.1 * centre)
+    value, error, _ = box.centre_motion()
+    exact = np.sum(np.sin(np.sqrt(centre) * time[:, None]) / np.sqrt(centre), 1)
+    assert (np.abs(value[:, 0] - exact) <= error[:, 0] + 4e-16).all()
+    assert error.max() < 1e-12
+
+
+def test_rounding_of_attained_bounds_is_declared():
+    """A storey that is stiffer by 1e6 is read as a difference of nearly equal displacements."""
+    rng = np.random.default_rng(0)
+    masses, springs = rng.uniform(1e4, 5e4, 3), np.array([5e7, 7e13, 8e7])
+    frame = StoreyFrame(
+        masses=masses, stiffness=springs, damping_ratio=0.05, ground=RECORD, outputs=("shear2",)
+    )
+    inputs = {"k1": Interval(4.9e7, 5.1e7), "m2": Interval(0.98 * masses[1], 1.02 * masses[1])}
+    given = {"duration": 0.4, "step": 0.02, "alpha": (0,), "progress": False}
+    found = envelope(frame, inputs, method=DualProof(), **given)
+    assert found.attained_error.max() > 1e-9 * np.abs(found.upper).max()

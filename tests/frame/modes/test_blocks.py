@@ -1,0 +1,259 @@
+"""Blocks of modes, what couples them and what the others add: nothing leaves the bounds."""
+
+import numpy as np
+import pytest
+from scipy.linalg import eigh, expm
+
+from alphacut.frame import MatrixStructure
+from alphacut.frame.bounds.box import over_box, sources
+from alphacut.frame.calculus.unproved import UnprovedError
+from alphacut.frame.modes import rest
+from alphacut.frame.modes.clusters import centred_matrices, subspaces
+from alphacut.frame.modes.models import MotionModels
+from alphacut.frame.response.ranges import response_ranges
+from alphacut.frame.response.waves import Oscillators, spanned
+from alphacut.frame.structures.loads import Accelerogram
+
+TIGHT = 0.5
+"""Share of a bound that something reaches: half the bound would be passed."""
+
+
+def matrices(stiffness, parameters, observed, mass=None, **values):
+    """A structure of springs with a mass matrix that does not vary."""
+    mass = np.eye(len(stiffness[0][1])) if mass is None else mass
+    return MatrixStructure(parameters, [(1.0, mass)], stiffness, observed, **values)
+
+
+def over(structure, widths):
+    """The structure over a box about its modal values, and its inputs' centre and radius."""
+    names = tuple(widths)
+    centre = np.array([structure.parameters[name] for name in names])
+    radius = np.array(list(widths.values()))
+    return over_box(structure, names, centre - radius, centre + radius), centre, radius
+
+
+def pencil(structure, names, values):
+    p = {**structure.parameters, **dict(zip(names, values, strict=True))}
+    return tuple(
+        sum((p[f] if isinstance(f, str) else f) * A for f, A in terms)
+        for terms in (structure.stiffness, structure.mass)
+    )
+
+
+def draws(d, count=60, seed=0):
+    rng = np.random.default_rng(seed)
+    return np.vstack([np.sign(rng.normal(size=(count, d))), rng.uniform(-1, 1, (count, d))])
+
+
+def three_storeys_beside_a_mast(coupling):
+    """Sway of two storeys beside a vertical mode on a soil spring, and a mast on the roof."""
+    beams, soil = np.zeros((4, 4)), np.zeros((4, 4))
+    beams[:2, :2] = [[1, -1], [-1, 1]]
+    soil[1, 1], soil[1, 2], soil[2, 1], soil[2, 2] = coupling**2, -coupling, -coupling, 1
+    mast = np.outer([0, 1, 0, -1], [0, 1, 0, -1])
+    return matrices(
+        [("kc", 300 * np.diag([1.0, 0, 0, 0])), ("kb", 250 * beams), ("ks", soil), ("km", mast)],
+        {"kc": 1.0, "kb": 1.0, "ks": 160.0, "km": 900.0},
+        {"roof": np.array([0, 1.0, 0, 0])},
+        mass=np.diag([1.0, 1.0, 2.0, 0.5]),
+        ratios=(0.03,),
+        v0=np.array([1.0, 1.0, 0.2, 0]),
+    )
+
+
+@pytest.mark.parametrize("coupling", [0.0, 0.05])
+def test_blocks_hold_the_subspaces_of_modes_that_cross(coupling):
+    own = three_storeys_beside_a_mast(coupling)
+    widths = {"kc": 0.1, "kb": 0.1, "ks": 40.0}
+    structure, centre, radius = over(own, widths)
+    middle, used = centred_matrices(structure.mass, structure.stiffness)
+    found = subspaces(middle, used, 4)
+    assert sum(len(block.modes) for block in found.blocks) == 4
+    assert max(len(block.modes) for block in found.blocks) > 1
+    for u in draws(3):
+        K, M = pencil(own, widths, centre + radius * u)
+        squared, shape = eigh(K, M)
+        seen = np.linalg.solve(middle.basis, shape)
+        for block in found.blocks:
+            b = block.modes
+            turn = np.linalg.solve(seen[np.ix_(b, b)], block.shape.value[:, b].T)
+            exact = seen[:, b] @ turn
+            off = np.abs(block.shape.at(u[None])[0] - exact.T)
+            assert (off <= block.shape.remainder + 1e-12).all()
+            rate = np.linalg.solve(turn, squared[b, None] * turn)
+            off = np.abs(block.rate.at(u[None])[0] - rate.T)
+            assert (off <= block.rate.remainder + 1e-9).all()
+            seen_mass = middle.basis.T @ M @ middle.basis
+            off = np.abs(block.norm.at(u[None])[0] - exact.T @ seen_mass @ exact)
+            assert (off <= block.norm.remainder + 1e-12).all()
+
+
+def test_half_of_a_remainder_of_a_block_would_not_do():
+    plan = np.array([[0, 0, 1.0], [0, 0, 1], [1, 1, 0]])
+    springs = [
+        ("a", np.diag([1.0, 0, 0])),
+        ("b", np.diag([0, 1.0, 0])),
+        (3.0, np.diag([0, 0, 1.0])),
+    ]
+    own = matrices(
+        [*springs, ("c", plan)], {"a": 1.0, "b": 1.0, "c": 0.0}, {"q": np.ones(3)}, v0=np.ones(3)
+    )
+    structure, centre, radius = over(own, {"a": 1e-9, "b": 1e-9, "c": 0.45})
+    middle, used = centred_matrices(structure.mass, structure.stiffness)
+    block = subspaces(middle, used, 3).blocks[0]
+    assert len(block.modes) == 2
+    off = {name: np.zeros(getattr(block, name).shape) for name in ("rate", "shape")}
+    for side in (-1.0, 1.0):
+        u = np.array([0, 0, side])
+        K, M = pencil(own, "abc", centre + radius * u)
+        squared, shape = eigh(K, M)
+        seen, b = np.linalg.solve(middle.basis, shape), block.modes
+        turn = np.linalg.solve(seen[np.ix_(b, b)], block.shape.value[:, b].T)
+        exact = {"shape": (seen[:, b] @ turn).T}
+        exact["rate"] = np.linalg.solve(turn, squared[b, None] * turn).T
+        for name, value in exact.items():
+            made = np.abs(getattr(block, name).at(u[None])[0] - value)
+            off[name] = np.maximum(off[name], made)
+    for name, value in off.items():
+        bound = getattr(block, name).remainder
+        assert (value <= bound + 1e-12).all()
+        assert (value > 0.2 * bound).any()
+
+
+def free_motion(K, ratio, start, time):
+    """Motion of M = I with one damping ratio from an initial velocity, shape (T, n)."""
+    n = len(K)
+    squared, shape = np.linalg.eigh(K)
+    damping = shape @ np.diag(2 * ratio * np.sqrt(squared)) @ shape.T
+    A = np.block([[np.zeros((n, n)), np.eye(n)], [-K, -damping]])
+    state = np.concatenate([np.zeros(n), start])
+    return np.array([(expm(A * t) @ state)[:n] for t in time])
+
+
+def crossing_pair(width):
+    """Two masses of nearly the same frequency, a spring between them, and which one is read."""
+    springs = [np.diag([1.0, 0]), np.diag([0, 1.0]), np.array([[0, 1.0], [1, 0]])]
+    own = matrices(
+        list(zip("abc", springs, strict=True)),
+        {"a": 100.0, "b": 100.0, "c": 0.0},
+        {"q": np.array([1.0, 0])},
+        v0=np.array([0, 1.0]),
+        ratios=(0.02,),
+    )
+    return own, over(own, {"a": 1.0, "b": 1.0, "c": width})
+
+
+def test_what_couples_a_block_holds_and_half_would_not_do():
+    time, (own, (structure, centre, radius)) = np.linspace(0, 4, 81), crossing_pair(0.2)
+    models = MotionModels.from_structure(structure, ({}, time, sources(own, structure)))
+    assert len(models.oscillators) == 2
+    reached = np.zeros(len(time))
+    for u in draws(3, 30):
+        K, _ = pencil(own, "abc", centre + radius * u)
+        total = free_motion(K, 0.02, np.array([0, 1.0]), time)[:, 0]
+        for mode in models.oscillators:
+            omega, decay = (float(x.at(u[None])[0]) for x in (mode.omega, mode.decay))
+            share = mode.share.at(u[None])[0, 0, 0]
+            total = total - share * np.exp(-decay * time) * np.sin(omega * time) / omega
+        assert (np.abs(total) <= models.added[:, 0] + 1e-9).all()
+        reached = np.maximum(reached, np.abs(total))
+    assert (reached[1:] > TIGHT * models.added[1:, 0]).any()
+
+
+RECORD = Accelerogram(0.02, np.sin(np.arange(150) * 0.21) * np.sin(np.arange(150) * 0.047))
+
+
+@pytest.mark.parametrize("power", [0, 1, 2])
+def test_modes_known_by_sums_stay_within_each_of_three_norms(power, monkeypatch):
+    own = matrices(
+        [("a", 100 * np.array([[2.0, -1], [-1, 1]])), ("b", np.diag([0, 60.0]))],
+        {"a": 1.0, "b": 1.0},
+        {"q": np.array([1.0, 0])},
+        ground=RECORD,
+        ratios=(0.03,),
+    )
+    structure, centre, radius = over(own, {"a": 0.05, "b": 0.05})
+    time = np.linspace(0, 3, 61)
+    least = rest._with_best_powers
+
+    def chosen(structure, bounds, ranges):
+        narrow = [(C, size if k == power else size + 1e6) for k, (C, size) in enumerate(bounds)]
+        return least(structure, narrow, ranges)
+
+    monkeypatch.setattr(rest, "_with_best_powers", chosen)
+    monkeypatch.setattr("alphacut.frame.modes.models.modes_wanted", lambda *_: (1, np.zeros(9)))
+    models = MotionModels.from_structure(structure, ({"load": RECORD}, time, ("load",)), np.ones(1))
+    (others,) = models.truncated
+    assert len(models.oscillators) == 1
+    ratios = np.zeros(len(time))
+    for u in draws(2, 20):
+        K, _ = pencil(own, "ab", centre + radius * u)
+        squared, shape = np.linalg.eigh(K)
+        omega = np.sqrt(squared[1] * (1 - 0.03**2))
+        point = spanned((omega, omega), (0.03 / np.sqrt(1 - 0.03**2),) * 2, (2, 2))
+        wave = Oscillators(point, {"load": RECORD}, time).waves("load", 0).value[:, 0, 0]
+        motion = shape[0, 1] * shape[:, 1].sum() * wave
+        share, size = (x.at(u[None])[0, 0, 0] for x in (others.share, others.amplitude))
+        width = (size + others.amplitude.remainder[0, 0]) * others.half[0, 0]
+        off = np.abs(motion - share * others.middle[0, 0])
+        slack = others.share.remainder[0, 0] * np.abs(others.middle[0, 0])
+        assert (off <= width + slack + 1e-12).all()
+        ratios = np.maximum(ratios, off / np.maximum(width + slack, 1e-300))
+    assert ratios[1:].max() > TIGHT
+
+
+@pytest.mark.parametrize("order", [0, 1, 2])
+def test_ranges_hold_all_responses_times_powers_of_frequency(order):
+    time, ends, quotient = np.linspace(0, 3, 31), (8.0, 90.0), (0.02, 0.05)
+    found = response_ranges(ends, quotient, {"load": RECORD}, time, ("load", "velocity"), [order])[
+        order
+    ]
+    fine = spanned(ends, quotient, (400, 4))
+    squared = np.abs(fine.sigma) ** 2
+    for s, source in enumerate(("load", "velocity")):
+        value = Oscillators(fine, {"load": RECORD}, time).waves(source, order).value
+        for k, power in enumerate((0.0, 0.5, 1.0)):
+            scaled = (value * squared**power).reshape(len(time), -1)
+            assert (scaled.max(1) <= found.high[k, s] + 1e-9).all()
+            assert (scaled.min(1) >= found.low[k, s] - 1e-9).all()
+            if source == "load":
+                reached = np.ptp(scaled, axis=1)[1:] / (found.high[k, s] - found.low[k, s])[1:]
+                assert reached.max() > TIGHT
+
+
+def test_unknowns_without_mass_follow_the_others():
+    K = np.array([[3.0, -1, 0], [-1, 2, -1], [0, -1, 1.5]])
+    full = matrices(
+        [("k", 100 * K), ("s", 50 * np.diag([0, 0, 1.0]))],
+        {"k": 1.0, "s": 1.0},
+        {"q": np.ones(3)},
+        mass=np.diag([1.0, 2.0, 1e-9]),
+        v0=np.ones(3),
+    )
+    structure, centre, radius = over(full, {"k": 0.1, "s": 0.3})
+    light = structure.mass * np.diag([1.0, 1.0, 0.0])
+    middle, used = centred_matrices(light, structure.stiffness)
+    found = subspaces(middle, used, 2)
+    assert middle.modes == 2
+    for u in draws(2, 20):
+        K, _ = pencil(full, ("k", "s"), centre + radius * u)
+        condensed = K[:2, :2] - np.outer(K[:2, 2], K[2, :2]) / K[2, 2]
+        squared, shape = eigh(condensed, np.diag([1.0, 2.0]))
+        shape = np.vstack([shape, -(K[2, :2] @ shape) / K[2, 2]])
+        for block in found.blocks:
+            k = int(block.modes[0])
+            assert (
+                abs(block.rate.at(u[None])[0, 0, 0] - squared[k])
+                <= block.rate.remainder[0, 0] + 1e-9
+            )
+            seen = np.linalg.solve(middle.basis, shape[:, k])
+            off = np.abs(block.shape.at(u[None])[0, 0] - seen / seen[k])
+            assert (off <= block.shape.remainder[0] + 1e-12).all()
+
+
+def test_a_structure_that_moves_rigidly_is_refused_in_one_line():
+    K = np.array([[1.0, -1], [-1, 1]])
+    own = matrices([("k", K)], {"k": 1.0}, {"q": np.array([1.0, -1])}, v0=np.array([1.0, 0]))
+    structure, _, _ = over(own, {"k": 0.1})
+    with pytest.raises(UnprovedError, match="improved-graph-follower"):
+        centred_matrices(structure.mass, structure.stiffness)
