@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import islice, product
+from itertools import count, islice, product
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from alphacut.frame.verification.stored import variables
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import FailedError
 from alphacut.fuzzy.result import ROUND_OFF
-from alphacut.fuzzy.sets.low_discrepancy import low_discrepancy
+from alphacut.fuzzy.sets.boxes import quasi_random_points
 
 LEAST, MOST = 24, 240
 """Fewest and most motions of a test; more than the most find little that these do not."""
@@ -173,8 +173,9 @@ class Trial:
         yield from _corners(low[0], high[0])
         for level in range(1, levels):
             yield from self._peak_inputs(level)
-        for k, unit_point in enumerate(low_discrepancy(low.shape[1])):
+        for k in count():
             level = (k // 2) % levels if k % 2 else 0  # every second point in the lowest level
+            unit_point = quasi_random_points(low.shape[1], 1, skip=k)[0]
             yield low[level] + (high[level] - low[level]) * unit_point
 
     def _peak_inputs(self, level: int) -> Iterator[Array]:

@@ -14,8 +14,7 @@ from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.knowledge.known import contradiction, negligible
 from alphacut.fuzzy.refused import FailedError, require
 from alphacut.fuzzy.result import Bounds, Ends, Nature
-from alphacut.fuzzy.sets.boxes import Domain
-from alphacut.fuzzy.sets.low_discrepancy import low_discrepancy
+from alphacut.fuzzy.sets.boxes import Domain, quasi_random_points
 
 
 class Plan(Protocol):
@@ -150,12 +149,12 @@ def _test_points(domain: Domain, campaign: Campaign) -> Array:
     """
     lower, upper = domain.boxes
     widths, tests, points = upper - lower, campaign.knowledge.tests, list[Array]()
-    unit_points = low_discrepancy(len(domain.names))
     ends = np.hstack([lower, upper])
     differs = np.append(True, (np.diff(ends, axis=0) != 0).any(axis=1))  # from the cut below
     for level in np.flatnonzero(differs & widths.any(axis=1))[::-1]:
         count = -(-tests // 4) if points else tests
-        points += [lower[level] + widths[level] * next(unit_points) for _ in range(count)]
+        unit_points = quasi_random_points(len(domain.names), count, skip=len(points))
+        points += list(lower[level] + widths[level] * unit_points)
     return np.array(points[: campaign.remaining]).reshape(-1, len(domain.names))
 
 

@@ -15,7 +15,7 @@ from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.knowledge.known import Signs
 from alphacut.fuzzy.refused import require_choice
-from alphacut.fuzzy.sets.boxes import Domain
+from alphacut.fuzzy.sets.boxes import Domain, quasi_random_points
 
 _PROBES = 4  # points inside a box, besides its extreme corners and the modal point
 _MARGIN = 0.05  # of the range of the slopes over the probes, which the least slope must exceed
@@ -128,7 +128,9 @@ class _Box:
         first = np.sign(self._slopes(modal[None], free)[0]).astype(np.int8)
         signs = np.where(stated != 0, stated, first)
         corners = _extreme_corners(signs, self.lower, self.upper)
-        probes = np.concatenate([modal[None], corners, self._halton_points()])
+        unit = quasi_random_points(len(self.lower), _PROBES)
+        inside = self.lower + unit * (self.upper - self.lower)
+        probes = np.concatenate([modal[None], corners, inside])
         slopes = self._slopes(probes, free)
         least, greatest = slopes.min(axis=0), slopes.max(axis=0)
         margin = _MARGIN * (greatest - least)
@@ -136,13 +138,6 @@ class _Box:
         falls = (greatest < 0) & (-greatest >= margin)
         has_no_effect = (least == 0) & (greatest == 0)  # either end will do
         return np.asarray((rises | has_no_effect).astype(np.int8) - falls.astype(np.int8))
-
-    def _halton_points(self) -> Array:
-        """Halton points of the box, (`_PROBES`, inputs); without the first, which is a corner."""
-        from scipy.stats import qmc
-
-        unit: Array = qmc.Halton(len(self.lower), scramble=False).random(_PROBES + 1)[1:]
-        return self.lower + unit * (self.upper - self.lower)
 
     def _slopes(self, points: Array, inputs: Rows) -> Array:
         """Return one-sided difference quotients at points (n, inputs), shape (n, outputs, inputs).

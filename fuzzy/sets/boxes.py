@@ -27,6 +27,25 @@ def levels(steps: int) -> tuple[float, ...]:
     return tuple(step / steps for step in range(steps + 1))
 
 
+def quasi_random_points(dimension: int, count: int, *, skip: int = 0) -> Array:
+    """Return points of the unit box [0, 1)^d that fill it evenly, shape (count, dimension).
+
+    More points continue the same sequence: x_k = 1/2 + k s mod 1, the additive recurrence of
+    Roberts (2018), with s_j = g^(−j) and g the positive root of g^(d + 1) = g + 1.
+
+    Args:
+        dimension: d, 1 or more.
+        count: Number of points.
+        skip: Points of the sequence that are left out at its beginning.
+    """
+    root = 2.0
+    for _ in range(64):  # converges to g
+        root = (1 + root) ** (1 / (dimension + 1))
+    step = root ** -np.arange(1.0, dimension + 1)
+    k = np.arange(skip + 1, skip + count + 1)[:, None]
+    return np.asarray((0.5 + k * step) % 1.0)
+
+
 def fuzzy_inputs(inputs: Mapping[str, FuzzyNumber | float]) -> dict[str, FuzzyNumber]:
     """Return the inputs as fuzzy numbers by name; a plain number becomes a `Crisp` one.
 
