@@ -1,8 +1,4 @@
-"""The front door of alphacut: case files, units, command line, stages, report.
-
-Counts, iterations and the reasons why a proof gave up go to the logger "alphacut", which is silent
-unless a handler is added to it.
-"""
+"""The front door: case files, units, command line, stages, report; logs as "alphacut", silently."""
 
 import logging
 

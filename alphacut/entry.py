@@ -92,15 +92,12 @@ def main(
     program: str = "alphacut",
     names: Mapping[str, str] = COMMANDS,
 ) -> int:
-    """Runs one command; every error becomes one line on standard error and an exit status.
+    """Runs one command; returns its exit status of `STATUSES`, every error as one line.
 
     Args:
         arguments: The command line after the program's name; the process's own if left out.
         program: The program's name, for messages.
         names: File in `alphacut.commands` of each command, by the command's name.
-
-    Returns:
-        Exit status, see `STATUSES`.
     """
     words = sys.argv[1:] if arguments is None else arguments
     with stoppable() as signals, logged(DEBUG in words):

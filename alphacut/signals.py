@@ -17,9 +17,7 @@ SAME_SIGNAL_SECONDS = 1.0
 
 @contextmanager
 def stoppable() -> Iterator[list[int]]:
-    """Lets SIGTERM and SIGHUP interrupt the block as Ctrl-C does.
-
-    A signal that was ignored before, as under nohup, stays ignored.
+    """Lets SIGTERM and SIGHUP interrupt the block as Ctrl-C does; ignored ones stay so (nohup).
 
     Yields:
         The list of the signal numbers received, which grows while the block runs.

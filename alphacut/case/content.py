@@ -120,22 +120,14 @@ class Content(Section):
 
     @property
     def law_and_phases(self) -> tuple[ThetaSection, MeshedCell]:
-        """The law of θ and the phases of a mesh from a file.
-
-        Raises:
-            RefusedError: There is none.
-        """
+        """The law of θ and the phases of a mesh from a file, or RefusedError."""
         if self.mesh_cell is None:
             raise RefusedError("cell.phases", None, "a section for each physical group")
         return self.radius or ThetaSection(), self.mesh_cell
 
     @property
     def radius_and_phases(self) -> tuple[AnyRadius, RoundCell]:
-        """The radius map and the phases of a round particle.
-
-        Raises:
-            RefusedError: There is none.
-        """
+        """The radius map and the phases of a round particle, or RefusedError."""
         if self.particle_cell is None:
             raise RefusedError("cell", None, "a section [cell] with a particle")
         radius = self.radius_map or self.particle_cell.fraction_map
@@ -156,14 +148,10 @@ class Content(Section):
     def structure_of(
         self, modulus: FuzzyNumber | None = None, loss: FuzzyNumber | None = None
     ) -> Structure:
-        """The structure with its forces.
+        """The structure with its forces; RefusedError where there is none or takes no such force.
 
-        Args:
-            modulus: Young's modulus in Pa; its own by default.
-            loss: Loss factor of its material, where the case takes damping from there.
-
-        Raises:
-            RefusedError: There is no structure, or it takes no such force.
+        `modulus` is Young's in Pa, the structure's own by default; `loss` the loss factor of its
+        material, where the case takes damping from there.
         """
         if self.structure_section is None:
             raise RefusedError("envelope", None, "a structure and a section [envelope]")
@@ -177,10 +165,7 @@ class Content(Section):
 
     @model_validator(mode="after")
     def _check_mesh(self) -> Self:
-        """Refuses a mesh file without [cell.phases] or the reverse, and keys that repeat the file.
-
-        A mesh file brings element sizes, layers and particles; only the support of θ is free.
-        """
+        """Refuses a mesh file without [cell.phases] or the reverse; keys that repeat the file."""
         if self.mesh.file is None:
             allowed = "a mesh of Gmsh beside [cell.phases]"
             require(self.mesh_cell is None, "mesh.file", value=None, allowed=allowed)

@@ -32,8 +32,7 @@ class ForceHistory:
     Args:
         history: The time history; None of an impulse.
         unit: SI unit of the amplitudes; empty where they are factors.
-        size: SI value of an amplitude of 1: the largest magnitude in a file that has a unit, else
-            1.
+        size: SI value of an amplitude of 1: the largest magnitude in a file with a unit, else 1.
     """
 
     history: History | None
@@ -67,10 +66,7 @@ def _parse_history(value: object, info: ValidationInfo) -> ForceHistory:
 
 
 def _file_history(name: str, start: float, is_static: bool, info: ValidationInfo) -> ForceHistory:
-    """Time history in a file, from `start` in s on; samples with a unit are scaled to at most 1.
-
-    `is_static`: the first value has acted for ever, so that the structure starts at rest.
-    """
+    """Time history in a file, from `start` in s on; samples with a unit are scaled to at most 1."""
     try:
         path = case_file(name, info)
     except RefusedError as error:
@@ -138,10 +134,7 @@ def with_forces(
 ) -> Structure:
     """The structure with the forces of a case, whose amplitudes become its parameters.
 
-    Args:
-        structure: Structure without forces.
-        sections: Sections on forces.
-        unknowns: Names of the degrees of freedom of a structure from matrices; a frame has floors.
+    `unknowns` names the degrees of freedom of a structure from matrices; a frame has floors.
 
     Raises:
         RefusedError: It takes no forces, or has no such floor.
@@ -177,10 +170,7 @@ NodalForces = Sequence[tuple[str, FuzzyNumber, History | None]]
 def _with_forces_on_unknowns(
     model: MatrixStructure, forces: NodalForces, names: Sequence[str], unknowns: Sequence[str]
 ) -> MatrixStructure:
-    """The structure with forces on its degrees of freedom `unknowns`, whose amplitudes are `names`.
-
-    The amplitudes become parameters of the structure, at their modal values.
-    """
+    """The structure with forces on `unknowns`, whose amplitudes become its parameters `names`."""
     loads: list[Force] = []
     modal: dict[str, float] = {}
     for name, (unknown, amplitude, history) in zip(names, forces, strict=True):

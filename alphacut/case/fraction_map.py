@@ -12,13 +12,7 @@ from alphacut.stochastic.particles.particles import Shape
 
 @dataclass(frozen=True)
 class FractionMap:
-    """Radius map of particles that take the same fraction of the cell at all θ.
-
-    Args:
-        fraction: Fraction of area or volume, crisp or fuzzy.
-        shape: Discs or spheres.
-        theta: Support of θ.
-    """
+    """Radius map of particles that take the same `fraction` of the cell at all θ."""
 
     fraction: FuzzyNumber
     shape: Shape

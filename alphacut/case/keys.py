@@ -30,10 +30,7 @@ def sections() -> dict[str, SectionModels]:
 
 
 def _walk(prefix: str, model: type[Section]) -> Iterator[tuple[str, FieldInfo, SectionModels]]:
-    """Yields each key below a section's class: full name, field of Pydantic, classes if a section.
-
-    A key that is no section has an empty list of classes.
-    """
+    """Yields each key below a section's class: full name, field, classes of a section or none."""
     for key, info in model.model_fields.items():
         name, parts = f"{prefix}{key}", [info.annotation, *_parts(info.annotation)]
         models = [x for x in parts if isinstance(x, type) and issubclass(x, Section)]

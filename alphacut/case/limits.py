@@ -44,11 +44,7 @@ class Limit:
         return output_of(self.peak)
 
     def value_in_si(self, structure: Structure, key: str) -> float:
-        """The limit in the SI unit of its output; a fraction is of the storey's least height.
-
-        Raises:
-            RefusedError: The limit is a fraction, and the structure has no height of the storey.
-        """
+        """The limit in the SI unit of its output; a fraction is of the storey's least height."""
         if not self.is_relative:
             return self.value
         height = structure.heights.get(self.output)
@@ -58,12 +54,7 @@ class Limit:
 
 
 def parse_limit(value: object) -> Limit:
-    """Limit that a text such as "drift1 <= 40 mm" states.
-
-    Raises:
-        RefusedError: It does not consist of an output, a comparison and a quantity, or the limit
-            of a magnitude is not positive.
-    """
+    """Limit that a text such as "drift1 <= 40 mm" states; of a magnitude it is positive."""
     match = re.fullmatch(r"((?:max |min |mean )?)(\w+)\s*(<=|>=)\s*(.+)", str(value).strip())
     allowed = "'drift1 <= 40 mm', 'drift1 <= 0.5 %', 'max q3 <= 80 mm' or 'min q3 >= -60 mm'"
     if match is None or (match[3] == ">=") != (match[1] == "min "):  # only least values have >=
@@ -94,8 +85,8 @@ Limits = Annotated[tuple[AnyLimit, ...], NotEmpty]
 class QuestionSection(Section):
     """A question about limits of outputs, as a section of the case.
 
-    Its attributes are the name of the section, whether the answer is read from the peaks of the
-    limited outputs, and whether each output has one limit, of its magnitude.
+    `reads_peaks`: the answer follows from the peaks of the limited outputs. `needs_magnitudes`:
+    each output has one limit, of its magnitude.
     """
 
     key: ClassVar[str]

@@ -30,14 +30,7 @@ KINDS = {
 
 @dataclass(frozen=True)
 class Case:
-    """A case that was read.
-
-    Args:
-        path: File that it comes from.
-        text: The file as it stands.
-        content: The sections of the file, built.
-        changes: Changes from the command line, KEY=VALUE each.
-    """
+    """A case that was read; `changes` are those of the command line, KEY=VALUE each."""
 
     path: Path
     text: str
@@ -51,11 +44,7 @@ class Case:
 
 
 def load(path: Path | str, changes: Sequence[str] = ()) -> Case:
-    """Reads a case file.
-
-    Args:
-        path: TOML file.
-        changes: ``KEY=VALUE`` each, as ``cell.matrix_modulus=20 GPa``.
+    """Reads a TOML case file, with changes ``KEY=VALUE`` such as ``cell.matrix_modulus=20 GPa``.
 
     Raises:
         BadInput: With every problem of the case.
@@ -157,11 +146,7 @@ def _is_below(key: str, changed: Sequence[str]) -> bool:
 
 
 def apply_changes(table: dict[str, object], changes: Sequence[str]) -> tuple[str, ...]:
-    """Puts every change KEY=VALUE into the table of a case, and returns the keys changed.
-
-    Raises:
-        RefusedError: A key is unknown, or changed twice.
-    """
+    """Puts every change KEY=VALUE into the table of a case; returns the keys, each known."""
     full_keys = [key for key in every_key() if not key.startswith("study.")]
     keys: list[str] = []
     for change in changes:

@@ -263,13 +263,10 @@ class RoundCell(Section):
 def _require_bulk_loss(
     key: str, loss: FuzzyNumber, bulk: FuzzyNumber, ratio: FuzzyNumber | None
 ) -> None:
-    """Refuses a loss factor `bulk` of the bulk modulus K for which that of G would be negative.
-
-    With `loss` η_E, `bulk` η_K and `ratio` ν: η_E = (1 − 2ν)/3 η_K + 2(1 + ν)/3 η_G, by
-    1/E = 1/(9K) + 1/(3G), so that η_G >= 0 needs η_K <= 3 η_E/(1 − 2ν).
-    """
+    """Refuses a loss factor of the bulk modulus K for which that of G would be negative."""
     if ratio is None:
         raise RefusedError(key, "there", "none beside a stiffness")
+    # η_E = (1 − 2ν)/3 η_K + 2(1 + ν)/3 η_G, by 1/E = 1/(9K) + 1/(3G); η_G ≥ 0
     bound = 3 * loss.support.lower / (1 - 2 * ratio.support.lower)
     greatest = bulk.support.upper
     allowed = f"up to {bound:.4g}, where the shear modulus loses nothing"

@@ -101,14 +101,10 @@ class MatricesSection(Section):
     def structure(
         self, modulus: FuzzyNumber | None = None, loss: FuzzyNumber | None = None
     ) -> Structure:
-        """The structure from the matrices.
+        """The structure from the matrices, or RefusedError.
 
-        Args:
-            modulus: Young's modulus in Pa, in place of parameter E; None: that of the case.
-            loss: Loss factor of this modulus, for damping by the material; None: a stand-in.
-
-        Raises:
-            RefusedError: The matrices make no structure.
+        `modulus` in Pa takes the place of parameter E; `loss` is the loss factor of this modulus,
+        for damping by the material, or None for a stand-in.
         """
         try:
             numbers = self._numbers(modulus)
@@ -156,10 +152,7 @@ class MatricesSection(Section):
     def _material_ratios(
         self, damping: MaterialDamping, model: MatrixStructure, loss: FuzzyNumber
     ) -> dict[str, FuzzyNumber]:
-        """Damping ratios by the loss factor of E: "zeta" of all modes if E is in every K term.
-
-        Else "zeta1", "zeta2" … of each mode, by its share of strain energy in the terms with E.
-        """
+        """"zeta" of all modes if E is in every term of K; else "zeta1" … by their strain energy."""
         has_modulus = [any(name == "E" for name, _ in f.powers) for f, _ in self.stiffness]
         allowed = "a term of the stiffness with E"
         require(any(has_modulus), "damping_ratio", value="material", allowed=allowed)

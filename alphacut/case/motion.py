@@ -38,12 +38,7 @@ MOST_STEPS = 1_000_000
 
 @dataclass(frozen=True)
 class Tolerance:
-    """Error of an envelope that is allowed.
-
-    Args:
-        value: In SI, or as a fraction of each output's peak.
-        unit: SI unit, or "" of a fraction.
-    """
+    """Error of an envelope that is allowed: in SI, or without a unit a fraction of each peak."""
 
     value: float
     unit: str = "m"

@@ -112,9 +112,5 @@ class MicrostructureSection(Section):
         return self
 
     def study(self, *, spheres: bool) -> MicrostructureStudy:
-        """The study that computes the radius map from these particles.
-
-        Args:
-            spheres: Whether packed particles are spheres.
-        """
+        """The study that computes the radius map from these particles, or from packed spheres."""
         return MicrostructureStudy(self.sources[0].source(spheres), self.limits, self.seed)

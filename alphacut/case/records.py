@@ -21,12 +21,7 @@ ENDING = re.compile(r"[^A-Za-z0-9_+-]+")
 
 @dataclass(frozen=True)
 class Scale:
-    """Scale of every record.
-
-    Args:
-        value: Factor, or the value of the measure in m/s².
-        measure: "" of a factor, "PGA" or "Sa(T1)".
-    """
+    """Scale of every record: a factor, or the value in m/s² of the measure "PGA" or "Sa(T1)"."""
 
     value: float = 1.0
     measure: str = ""
@@ -41,11 +36,9 @@ class NamedRecording:
 
 
 def _read_files(value: object, info: ValidationInfo) -> tuple[NamedRecording, ...]:
-    """Recordings of all files that a pattern matches, such as "records/*.AT2" or "a.v2#1".
-
-    The text after # is the channel of each file. The folder of the case is the root.
-    """
+    """Recordings of all files below the case's folder that "records/*.AT2" or "a.v2#1" matches."""
     folder: Path = (info.context or {}).get("folder", Path())
+    # the text after # is the channel of each file
     pattern, _, channel = str(value).partition("#")
     allowed = f"files or patterns such as records/*.AT2, from the folder {folder.absolute()}"
     is_relative = isinstance(value, str) and not pattern.startswith("/") and pattern.strip() != ""

@@ -54,20 +54,15 @@ LOSS_STAND_IN = Crisp(0.02)
 
 @dataclass(frozen=True)
 class MaterialDamping:
-    """Damping ratio by the loss factor of the cell's material, independent of frequency.
-
-    Args:
-        joints: Damping ratio of the joints, which is added.
-    """
+    """Damping ratio by the loss factor of the cell's material, and of the joints, to be added."""
 
     joints: FuzzyNumber = ZERO
 
     def ratio(self, loss: FuzzyNumber, energy_share: float = 1.0) -> FuzzyNumber:
         """Damping ratio ζ = sin(½ arctan(w η)) of a mode in free oscillation, plus the joints'.
 
-        Args:
-            loss: Loss factor η of the material's Young's modulus.
-            energy_share: w, the fraction of the mode's strain energy that is in the material.
+        η is the loss factor of the material's Young's modulus, w the fraction of the mode's strain
+        energy that is in the material.
         """
         if loss.support.width == 0 and self.joints.support.width == 0:
             return Crisp(_ratio_of_loss(loss.modal * energy_share) + self.joints.modal)
@@ -171,12 +166,8 @@ class Structure:
     ) -> StoreyFrame | MatrixStructure | LagrangianSystem:
         """The model reduced to some outputs; one that is not linear always computes all of them.
 
-        Args:
-            key: Key of the case that messages name.
-            outputs: The outputs.
-
         Raises:
-            RefusedError: The model lacks one of the outputs.
+            RefusedError: The model lacks one of the outputs; the message names the case's `key`.
         """
         if self.frame is None:
             self.require_outputs(key, outputs)
@@ -296,10 +287,8 @@ class Frame(Section):
     ) -> Structure:
         """The frame with its fuzzy parameters, and the storey heights by the names of the drifts.
 
-        Args:
-            modulus: Young's modulus in Pa, which a frame given by stiffnesses does not take; None
-                for that of the section, or else a stand-in.
-            loss: Loss factor of its material, for damping by the material; None: a stand-in.
+        `modulus` is Young's in Pa, by default the section's own or a stand-in; `loss` the loss
+        factor of its material, or a stand-in.
 
         Raises:
             RefusedError: Its values make no frame.

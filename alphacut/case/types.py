@@ -73,11 +73,7 @@ class Quantity:
         return f'{words}, as "{example}"' if self.si else words
 
     def read(self, value: object) -> object:
-        """The quantity that a value of the case states, such as "80 GPa ± 5 %", in SI.
-
-        Raises:
-            RefusedError: It is no such quantity, or out of range.
-        """
+        """The quantity in SI that a value of the case states, such as "80 GPa ± 5 %", in range."""
         cure = ""
         try:
             number = self._parsed(value)
@@ -159,22 +155,14 @@ NotEmpty = BeforeValidator(_not_empty)
 
 
 def rising(values: tuple[float, ...]) -> tuple[float, ...]:
-    """The numbers as they are, if they rise strictly.
-
-    Raises:
-        RefusedError: They do not rise, or there are none.
-    """
+    """The numbers as they are, if they rise strictly."""
     if not values or any(a >= b for a, b in itertools.pairwise(values)):
         raise RefusedError("", list(values), "numbers in rising order")
     return values
 
 
 def case_file(value: object, info: ValidationInfo) -> Path:
-    """Path of a file that the case names, relative to the folder of the case.
-
-    Raises:
-        RefusedError: There is no such file.
-    """
+    """Path of a file that the case names, relative to the folder of the case."""
     folder: Path = (info.context or {}).get("folder", Path())
     if not isinstance(value, str) or not (folder / value).is_file():
         raise RefusedError("", value, f"a file, from the folder {folder.absolute()}")
@@ -182,11 +170,7 @@ def case_file(value: object, info: ValidationInfo) -> Path:
 
 
 def distinct(values: tuple[str, ...]) -> tuple[str, ...]:
-    """The names as they are, if no two are the same.
-
-    Raises:
-        RefusedError: One stands there twice.
-    """
+    """The names as they are, if no two are the same."""
     if len(set(values)) < len(values):
         raise RefusedError("", ", ".join(values), "each name once")
     return values

@@ -73,11 +73,7 @@ def run(options: argparse.Namespace, out: TextIO) -> int:
 def difference(
     first: HomogenisedStiffness, second: HomogenisedStiffness, tolerance: float
 ) -> float:
-    """Relative difference of E between the results of two methods.
-
-    Raises:
-        FailedError: It is above the tolerance.
-    """
+    """Relative difference of E between the results of two methods; above the tolerance it fails."""
     gap = abs(first.modulus / second.modulus - 1)
     if not gap <= tolerance:
         values = (f"{x.method} gives E = {x.modulus:.10g} Pa" for x in (first, second))

@@ -53,10 +53,7 @@ class Parser(argparse.ArgumentParser):
 
 
 def split_petsc(arguments: Sequence[str]) -> tuple[list[str], dict[str, str]]:
-    """Words of the program's own, and values of PETSc's options by their names without ``-rve_``.
-
-    PETSc's are as ``-rve_ksp_rtol 1e-10`` or ``-log_view``.
-    """
+    """Words of the program's own, and values of PETSc's options, named without ``-rve_``."""
     words: list[str] = []
     petsc: dict[str, str] = {}
     remaining = list(arguments)
@@ -133,13 +130,7 @@ def open_results(
 ) -> Iterator[tuple[Case, StageStore]]:
     """Yields the case and the store of its results, whose folder is locked during the block.
 
-    Args:
-        options: Of the command.
-        folder: Folder of the results where ``--out`` is left out; empty to write nothing.
-
-    Raises:
-        BadInput: The case has problems.
-        RefusedError: There are fewer than one worker, or the folder is not this program's.
+    `folder` is that of the results where ``--out`` is left out; empty to write nothing.
     """
     allowed = "a whole number 1 or more"
     require(options.workers >= 1, "--workers", value=options.workers, allowed=allowed)

@@ -29,9 +29,6 @@ def write_cell(fields: CellFields, path: Path) -> int:
     The ending of the file's name chooses the format. Gmsh's file holds the mesh once, with fields
     as values at the nodes of its elements; in VTK's and XDMF nodes of the interface stand twice,
     since stresses jump there. Abaqus's has no fields.
-
-    Raises:
-        RefusedError: The name ends otherwise.
     """
     kind = FORMATS.get(path.suffix)
     if kind is None:

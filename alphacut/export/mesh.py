@@ -55,13 +55,7 @@ def wedge_mesh(
 
 
 def prism_mesh(cell: Cell, size: float, layers: int) -> meshio.Mesh:
-    """The mesh of prisms of a cell, whose particle follows the radius map.
-
-    Args:
-        cell: Radius map and phases.
-        size: Of the triangles, in halves of the cell's side.
-        layers: In θ.
-    """
+    """The mesh of prisms whose particle follows the radius map; `size` is in halves of the side."""
     from alphacut.rve.mesh.columns import extrude
     from alphacut.rve.mesh.triangulation import RING_THICKNESS, reference_radius
 

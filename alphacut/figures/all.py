@@ -95,13 +95,7 @@ def _structure_figures(results: Results) -> Iterator[Drawing]:
 def draw_figures(results: Results, store: StageStore, executor: Executor | None) -> list[str]:
     """Draws all figures as SVG and PNG into figures/, unless stored ones have the same inputs.
 
-    Args:
-        results: Results of the run.
-        store: Store of the results.
-        executor: Processes that draw concurrently; None: this process draws.
-
-    Returns:
-        Paths of the files, relative to the folder of the results.
+    Returns the paths of the files, relative to the folder of the results.
     """
     inputs = [results.content, results.answers]
     inputs += [sorted(x.fingerprint for x in results.stages.values())]

@@ -97,11 +97,7 @@ def mapping(results: Results, *, count: int = 40, duration: float = 5.0) -> Figu
 
 
 def identified_inputs(document: Document) -> Figure:
-    """Draws each input's prior interval and its identified cuts, over the prior's middle.
-
-    Args:
-        document: As of `stages.identify.identify_inputs`.
-    """
+    """Draws each input's prior interval and its identified cuts, over the prior's middle."""
     names, alpha = list(document["inputs"]), np.asarray(document["alpha"], float)
     figure, axes = style.figure(height=0.9 + 0.32 * len(names))
     rows = np.arange(len(names), dtype=float)[::-1]

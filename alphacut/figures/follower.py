@@ -95,10 +95,7 @@ def graph_follower_steps(results: Results, task: EnvelopeTask) -> Figure:
 
 
 def followed_run(results: Results, task: EnvelopeTask) -> tuple[Followed, int]:
-    """Bounds and graphs of a Graph Follower at α = 0, and the column of the output to be drawn.
-
-    The output is the displacement of the highest floor.
-    """
+    """Bounds and graphs of a Graph Follower at α = 0; the column of the highest displacement."""
     structure, step = results.structure, task.section.step
     assert structure is not None
     cuts, tolerance = boxes(structure.inputs(task.fuzzy), (0.0,)), task.tolerance(structure)

@@ -66,13 +66,7 @@ def chain(section: Frame) -> Figure:
 
 
 def draw_storey(axes: Axes, floor: int, placement: str | None) -> None:
-    """Draws a floor's mass m, spring k, damper d and displacement q.
-
-    Args:
-        axes: Axes of the chain.
-        floor: Number of the floor, from 1.
-        placement: "ground" or "storey": to what the damper connects the mass; None: no damper.
-    """
+    """Draws a floor's mass m, spring k, displacement q and damper d to "ground" or "storey"."""
     right = PITCH * floor
     left, start = right - 1.0, max(0.0, right - PITCH)
     middle, half = (left + right) / 2, (start + left) / 2

@@ -34,9 +34,7 @@ def number_of_each_kind(given: FuzzyNumber, result: FuzzyNumber) -> dict[str, Fu
 def kinds_of_numbers(given: FuzzyNumber, result: FuzzyNumber) -> Figure:
     """Fig. 36: membership functions of crisp, interval, triangular … numbers, side by side.
 
-    Args:
-        given: Young's modulus of the particle, in Pa, of which the first four are made.
-        result: Young's modulus of the cell, in Pa, which is the last.
+    Four are made of the particle's Young's modulus in Pa, `given`; the last is the cell's.
     """
     import matplotlib.pyplot as plt
 
@@ -56,11 +54,7 @@ def kinds_of_numbers(given: FuzzyNumber, result: FuzzyNumber) -> Figure:
 
 
 def alpha_cuts(number: FuzzyNumber) -> Figure:
-    """Fig. 37: a triangular number in six α-cuts.
-
-    Args:
-        number: Young's modulus of the particle, in Pa.
-    """
+    """Fig. 37: the particle's Young's modulus in Pa, a triangular number, in six α-cuts."""
     figure, axes = style.figure()
     alpha = np.linspace(0, 1, CUTS)
     number.plot(axes, color=INK, lw=1.4)

@@ -111,11 +111,7 @@ def levels_of_samples(dataset: xarray.Dataset) -> Array:
 
 
 def stress_curves(dataset: xarray.Dataset) -> Figure:
-    """Fig. 16: homogenised stress σ₁₁ over θ, one curve a sample, coloured by its membership.
-
-    Args:
-        dataset: Of the stage modulus; `curve11` has shape (samples, θ), in Pa.
-    """
+    """Fig. 16: homogenised stress σ₁₁ over θ, one curve a sample, coloured by its membership."""
     figure, axes = style.figure()
     alpha = dataset["alpha"].values
     shades = dict(zip(alpha, [*style.colours(alpha)[:-1], style.INK], strict=True))

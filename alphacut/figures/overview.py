@@ -27,10 +27,7 @@ BOX_WIDTH, PITCH = 2.4, 3.3
 def domains(cell: Cell, size: float, layers: int) -> Figure:
     """Fig. 1: physical, stochastic and product domain, from the mesh that is solved.
 
-    Args:
-        cell: Radius map and phases.
-        size: Edge length of the triangles, in halves of the cell's side.
-        layers: Layers of prisms in θ.
+    `size` is the edge length of the triangles in halves of the cell's side.
     """
     import matplotlib.pyplot as plt
 
@@ -78,10 +75,7 @@ def draw_density(axes: Axes, cell: Cell, levels: Array) -> None:
 def draw_prisms(axes: Any, grid: PrismGrid, positions: Array) -> None:
     """Draws the product domain: prisms on the particle's cone, two front sides and the bottom.
 
-    Args:
-        axes: Axes of Matplotlib in three dimensions.
-        grid: The prisms.
-        positions: Coordinates (x1, x2, θ) of the nodes, shape (values of θ, nodes, 3).
+    `positions` are (x1, x2, θ) of the nodes, shape (values of θ, nodes, 3).
     """
     from matplotlib.colors import to_rgb
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]

@@ -17,9 +17,7 @@ ALLOWED = "a file .mtx, .npz, .npy or .csv with one array of finite real numbers
 def read_array(path: Path, name: str = "") -> Array:
     """Reads one array of floats, shape (n,) or (n, m), from a file; a sparse one becomes dense.
 
-    Args:
-        path: The file.
-        name: Name of the array in a .npz file; may be left out where there is one.
+    `name` chooses one of several arrays in a .npz file.
 
     Raises:
         RefusedError: The file cannot be read, or holds something else.

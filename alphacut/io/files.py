@@ -47,11 +47,8 @@ def is_special(path: Path) -> bool:
 def whole_file(path: Path | str, *, follow_links: bool = True) -> Iterator[Path]:
     """Yields a temporary path beside `path`; the file written there replaces `path` in the end.
 
-    If the block fails, `path` stays as it was. A device or a pipe is written to instead.
-
-    Args:
-        path: The file.
-        follow_links: Whether a link stays and its target is replaced; else the link is replaced.
+    If the block fails, `path` stays as it was. A device or a pipe is written to instead. A link
+    stays and its target is replaced, or the link itself without `follow_links`.
     """
     path = Path(path)
     if is_special(path) and follow_links:
@@ -96,8 +93,7 @@ def _plain(value: object) -> object:
 def standard_output(*, alone: bool) -> Iterator[TextIO]:
     """Yields the stream for answers: standard output of the first MPI rank, nothing of others.
 
-    Args:
-        alone: Whether all else that is printed, by C libraries too, goes to standard error.
+    `alone`: all else that is printed, by C libraries too, goes to standard error.
     """
     if not alone and rank() == 0:
         yield sys.stdout

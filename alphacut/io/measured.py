@@ -28,10 +28,8 @@ class ModeRows:
         mode: Its number.
         frequencies: In Hz, shape (rows,).
         amplitudes: By floor, each of shape (rows,), to any scale.
-        frequency_deviation: Standard deviation of a frequency as a share of the mean; None where
-            the file states none.
-        shape_deviation: Standard deviation of an amplitude as a share of the mode's largest; None
-            where the file states none.
+        frequency_deviation: Standard deviation over the mean; None where the file states none.
+        shape_deviation: Standard deviation over the mode's largest amplitude, or None.
     """
 
     mode: int
@@ -44,8 +42,7 @@ class ModeRows:
 def mode_rows(path: Path) -> tuple[ModeRows, ...]:
     """Reads the measurements of each mode, by rising number, from ``mode,frequency [Hz],q1,q2``.
 
-    An empty amplitude was not measured. Standard deviations, which operational modal analysis
-    states beside the modes, may stand in columns of their own.
+    An empty amplitude was not measured. Standard deviations may stand in columns of their own.
 
     Raises:
         RefusedError: The file is missing, its header or a row is wrong, or a mode has some

@@ -105,12 +105,7 @@ def command() -> str:
 
 
 def origin(case_text: str, key: str) -> dict[str, object]:
-    """Origin of a result, which its JSON file states.
-
-    Args:
-        case_text: The case file.
-        key: Fingerprint of the result.
-    """
+    """Origin of a result, which its JSON file states, from the case file and the fingerprint."""
     return {
         "format_version": FORMAT,
         "created_by": f"alphacut {own_version()}",

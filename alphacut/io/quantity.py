@@ -97,11 +97,7 @@ def decimal(text: str) -> Decimal:
 
 
 def parse_number(text: str, si: str) -> Decimal:
-    """The number in the SI unit `si` that a quantity such as "80 GPa" states.
-
-    Raises:
-        ValueError: It begins with no number, or its unit is wrong.
-    """
+    """The number in the SI unit `si` that a quantity such as "80 GPa" states, or ValueError."""
     match = SINGLE.fullmatch(text.strip())
     if match is None or match[2].startswith((",", "_")):
         raise ValueError(f'"{text.strip()}" does not begin with a number such as 1.5')
@@ -123,9 +119,7 @@ def interval_of_spread(match: re.Match[str], si: str) -> tuple[Decimal, Decimal]
 def numbers(value: object, si: str) -> tuple[float, ...]:
     """All numbers of a quantity in the SI unit `si`: one, an array, or the ends of a spread.
 
-    Args:
-        value: Text with a unit, or a bare number or array where no unit is needed.
-        si: SI unit; empty for a number without a unit.
+    `value` is text with a unit, or a bare number or array where no unit is needed.
 
     Raises:
         ValueError: It is no quantity, its unit is wrong, or it is too large or small.
@@ -156,11 +150,7 @@ def _checked_float(value: Decimal) -> float:
 
 
 def number(value: object, si: str) -> float:
-    """A single crisp quantity, in `si`.
-
-    Raises:
-        ValueError: As of `numbers`, or there are several.
-    """
+    """A single crisp quantity, in `si`; ValueError as of `numbers`, or of several values."""
     values = numbers(value, si)
     if len(values) != 1:
         raise ValueError(f"{len(values)} values stand where one is needed")
@@ -180,11 +170,7 @@ def fuzzy(value: object, si: str) -> FuzzyNumber:
 
 
 def fuzzy_of_any_unit(value: object) -> FuzzyNumber:
-    """A crisp or fuzzy quantity in the SI unit of `QUANTITIES` that its own unit fits.
-
-    Raises:
-        ValueError: It fits none.
-    """
+    """A quantity in the SI unit of `QUANTITIES` that its own unit fits, crisp or fuzzy."""
     reasons = []
     for si in QUANTITIES:
         try:

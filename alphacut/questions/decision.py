@@ -21,10 +21,7 @@ from alphacut.questions.question import (
 
 
 def _limit_document(name: str, answer: Passing, limit: float, peaks: Peaks) -> Document:
-    """Numbers on a limit in SI: degrees, margins, verdict, and its peak on each level.
-
-    The event that any limit is exceeded has no peak.
-    """
+    """Numbers on a limit in SI; the event that any limit is exceeded has no peak."""
     peak = {} if name == ANY else peak_document(peaks, name) | {"proved": peaks.most(name).upper}
     return {
         "peak": peak,
@@ -108,10 +105,7 @@ class DecisionQuestion(Question):
 
     @staticmethod
     def number_rows(document: Document) -> tuple[Row, list[NumberRow]]:
-        """Header and rows of the CSV: of each limit verdict, and degrees to which it is exceeded.
-
-        Margin and peaks are those of the lowest level.
-        """
+        """Rows of the CSV: verdict, degrees of exceeding each limit, peaks of the lowest level."""
         head: Row = ("limited output", "unit", "limit", "verdict", "from α", "nature")
         head += ("least possibility", "greatest possibility", "least necessity")
         head += ("greatest necessity", "least margin", "peak at most", "peak reached")

@@ -84,10 +84,7 @@ class FragilityQuestion(Question):
 
     @staticmethod
     def rows(document: Document) -> list[Row]:
-        """Rows of the fragility table: of each limit median and dispersion of critical measures.
-
-        Columns: limit, median at α = 0, nature, dispersion at α = 0, median at α = 1.
-        """
+        """A row for each limit: median and dispersion of the critical measures."""
         return [
             (
                 limit_words(limit["output"], limit["limit"], limit["output_unit"]),

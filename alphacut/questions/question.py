@@ -1,8 +1,4 @@
-"""A question to the motion of a case: an answer, and the rows and words of the report.
-
-Its section stands in `alphacut.case.limits`, its figure in `alphacut.figures.answers`. Each
-question is one file beside this one, and one line of `alphacut.questions.all`.
-"""
+"""A question to the motion of a case: an answer, and the rows and words of the report."""
 
 from __future__ import annotations
 
@@ -75,8 +71,7 @@ class FuzzyResponse:
         alpha: Levels.
         duration: Length, in s.
         step: Distance of nodes, in s.
-        peaks: Peaks of the outputs, under a suite of any record; None where no question reads
-            them.
+        peaks: Peaks of the outputs, under a suite of any record; None where no question reads them.
         suite: Records that move the structure one by one; None where there are none.
         progress: Takes the share done.
     """
@@ -104,11 +99,7 @@ NumberRow = tuple[str | float | None, ...]
 class Question(ABC):
     """A question about limits of outputs: its answer, and how that is read.
 
-    Its attributes are the name of its section, of its results and its figure; the heading in the
-    report; the caption of the figure; and the titles of the columns of `rows`.
-
-    Args:
-        section: The section of the case that puts the question.
+    `key` names its section, results and figure, `head` the columns of `rows`.
     """
 
     section: QuestionSection
@@ -118,11 +109,7 @@ class Question(ABC):
     head: ClassVar[Row]
 
     def require_answerable(self, response: FuzzyResponse) -> None:
-        """Refuses a response about which this question cannot be answered.
-
-        Raises:
-            RefusedError: The structure lacks an output, or a limit does not fit.
-        """
+        """Refuses a response about which this question cannot be answered."""
         self.section.check(response.structure)
 
     @abstractmethod

@@ -25,13 +25,7 @@ from alphacut.questions.question import (
 
 
 def _row(name: str, support: Document, document: Document) -> Row:
-    """Row of an input: its largest support with no limit exceeded, nature, and in % of modal.
-
-    Args:
-        name: Name of the input.
-        support: Scaled support and modal value of the input.
-        document: The answer; no support is kept if a limit is exceeded at every scale.
-    """
+    """Row of an input: its largest support with no limit exceeded, nature, and in % of modal."""
     if document["kept"] is None:
         return f"tolerance of {name}", "–", document["nature"], ""
     ends, modal = support["kept"], support["modal"]

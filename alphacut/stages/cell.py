@@ -67,11 +67,7 @@ def average_name(cell: AnyCell, modulus: ModulusSection) -> str:
 def model_of(cell: AnyCell, mesh: Mesh, modulus: ModulusSection, **elements: Any) -> Solve:
     """The function that solves cells by the model that the sections of a case name.
 
-    Args:
-        cell: Phases.
-        mesh: Resolution of elements, or the file of their mesh.
-        modulus: Method, tolerance and average.
-        elements: Options of the product-space elements: petsc, parallel, estimate, moduli.
+    `elements` are options of the product-space elements: petsc, parallel, estimate, moduli.
 
     Raises:
         RefusedError: It needs what is not installed, or an option is out of range.
@@ -94,17 +90,7 @@ def model_of(cell: AnyCell, mesh: Mesh, modulus: ModulusSection, **elements: Any
 def _model_of_particle(
     cell: RoundCell, mesh: Mesh, modulus: ModulusSection, prism_options: Mapping[str, Any]
 ) -> Callable[..., list[HomogenisedStiffness]]:
-    """Method `solve` of the model of a cell with one particle.
-
-    Spheres have their series; a fibre the first of series, slices and prisms that the cell and
-    `modulus.method` allow. A method that the cell does not allow was refused with the case.
-
-    Args:
-        cell: The cell.
-        mesh: Sizes of the mesh.
-        modulus: The section [modulus].
-        prism_options: Further options of the prisms.
-    """
+    """Method `solve` of the first of series, slices and prisms that the case allows."""
     tolerance, method = modulus.tolerance, modulus.method
     if cell.particles == "spheres":
         accuracy = max(TOLERANCE_PART * (tolerance or SPHERE_TOLERANCE), 1e-11)
@@ -171,11 +157,7 @@ def references(
 ) -> Document:
     """Particle fraction, Hashin–Shtrikman bounds and Mori–Tanaka estimate of E at modal inputs.
 
-    Args:
-        radius: Random radius, or law of θ of a mesh from a file.
-        cell: Phases.
-        stated: Particle fraction for the bounds and the estimate; None: the mean fraction of the
-            radius map.
+    The bounds are at the fraction `stated`, else at the mean fraction of the radius map.
 
     Returns:
         `fraction` (mean of the map), `fraction_of_case` (as stated), `hashin_shtrikman_E_GPa`
@@ -211,10 +193,7 @@ def isotropic_bounds(fractions: Array, stiffness: Sequence[Array]) -> list[float
     """Lower and upper Hashin–Shtrikman bound of the transverse Young's modulus in GPa.
 
     They are its values at the lower and at the upper bounds of the plane moduli K and G.
-
-    Args:
-        fractions: Area fractions of the phases, shape (phases,).
-        stiffness: Plane stiffness of each phase in Pa, shape (3, 3) each.
+    Area fractions have shape (phases,), plane stiffnesses in Pa (3, 3) each.
     """
     moduli = bounds.hashin_shtrikman(fractions, stiffness).T
     return [_transverse_young(*bulk_and_shear) / GPA for bulk_and_shear in moduli]
@@ -312,16 +291,9 @@ def require_bounds(
 ) -> None:
     """Refuses E of spheres outside the Hashin–Shtrikman bounds of the fraction that a case states.
 
-    E is outside where the radius map holds another fraction, since cells denser than any cube are
-    cut off, or because the mean over cells with different spheres need not obey the bounds.
-
-    Args:
-        modulus_bounds: Lower and upper bound of E at the nominal inputs, in Pa.
-        references: Bounds and fractions, as function `references` gives them.
-        particles: Kind of the particles, of which only "spheres" are checked.
-
-    Raises:
-        RefusedError: E lies outside by more than `BOUNDS_SLACK`.
+    E is outside by more than `BOUNDS_SLACK` where the radius map holds another fraction, since
+    cells denser than any cube are cut off, or because the mean over cells with different spheres
+    need not obey the bounds. `modulus_bounds` are those of E at the nominal inputs, in Pa.
     """
     if particles != "spheres" or "fraction_of_case" not in references:
         return
@@ -336,11 +308,7 @@ def require_bounds(
 
 
 def require_tolerance(error: Mapping[str, float], tolerance: float | None) -> None:
-    """Requires the declared relative errors of E, by source, within a tolerance, if any.
-
-    Raises:
-        FailedError: Their sum is larger.
-    """
+    """Requires the sum of the declared relative errors of E within a tolerance, if any."""
     total = sum(error.values())
     if tolerance is not None and total > tolerance * (1 + 1e-9):
         what = f"the relative error of E is {total:.2g}; the case allows {tolerance:.2g}"

@@ -50,11 +50,7 @@ class EnvelopeTask:
     limited: tuple[str, ...] = ()
 
     def tolerance(self, structure: Structure) -> Tolerance:
-        """Error of the envelope that the case allows, in the unit of some output or relative.
-
-        Raises:
-            RefusedError: No output has that unit.
-        """
+        """Error of the envelope that the case allows, in the unit of some output or relative."""
         units = {Output(x).unit for x in structure.outputs}
         tolerance = self.section.tolerance or DEFAULT_TOLERANCE
         value = f"{tolerance.value:g} {tolerance.unit}"
@@ -77,11 +73,7 @@ class EnvelopeTask:
         return {"tolerance": tolerance * (self.section.gain if method in FOLLOWERS else 1.0)}
 
     def compute(self, structure: Structure, context: StageContext) -> StageResult:
-        """Computes the envelope as a dataset, and the fuzzy peak of each output as a document.
-
-        Raises:
-            RefusedError: The structure or the method does not take these values.
-        """
+        """Computes the envelope as a dataset, and the fuzzy peak of each output as a document."""
         arguments = self.arguments(structure) | _store_and_progress(context)
         result = frame.envelope(**arguments, relative=not self.tolerance(structure).unit)
         signed = [name for name in self.limited if name != output_of(name)]
@@ -113,10 +105,7 @@ class EnvelopeTask:
     def close_peaks(self, structure: Structure, context: StageContext, nodes: int = 1) -> Peaks:
         """Peaks of the limited outputs by the method that bounds peaks most closely.
 
-        Args:
-            structure: The structure.
-            context: Folder of a proof's parts, and progress.
-            nodes: Nodes in each step of [envelope].
+        There are `nodes` nodes in each step of [envelope].
         """
         model = structure.model_with_outputs("limits", outputs_of(self.limited))
         magnitudes = all(name == output_of(name) for name in self.limited)
@@ -149,10 +138,7 @@ def outputs_of(peaks: Sequence[str]) -> tuple[str, ...]:
 def loose_peaks(peaks: Peaks, outputs: Sequence[str], gap: float) -> tuple[str, ...]:
     """Names of those peaks that are not guaranteed to within a gap, or not there at all.
 
-    Args:
-        peaks: Bounds of peaks.
-        outputs: Names of the peaks that matter, such as q3 and max q3.
-        gap: Largest distance between the proved and the reached peak, relative to the proved one.
+    The gap is that between the proved and the reached peak, relative to the proved one.
     """
     loose = []
     for output in outputs:
@@ -190,11 +176,7 @@ def tasks(
 ) -> tuple[EnvelopeTask, ...]:
     """Tasks of the envelopes of a case: one for each study, or the one of [envelope], "all".
 
-    Args:
-        section: The section [envelope].
-        studies: Studies of the case, if any.
-        limited: Outputs whose peaks questions compare with limits; only tasks with the motion of
-            [envelope] have them.
+    Only tasks with the motion of [envelope] have the outputs `limited` by questions.
     """
     studied = tuple(
         EnvelopeTask(study.name, study.fuzzy, study.duration, section, study.figures)
@@ -239,10 +221,7 @@ def require_tolerance(result: StageResult, task: EnvelopeTask, structure: Struct
     """Requires the declared errors of an envelope within the tolerance, where the case names one.
 
     A larger error of a Graph Follower is a warning: it takes the tolerance only as the least gain
-    for which it computes a trajectory.
-
-    Raises:
-        FailedError: One is larger.
+    for which it computes a trajectory. Others fail.
     """
     if task.section.tolerance is None:
         return

@@ -29,14 +29,6 @@ def identify_inputs(
     """Numbers of the inputs identified from measured modes, in SI, and the updated structure.
 
     Where the measurement refutes the frame, the document says so and the structure is as before.
-
-    Args:
-        section: Measured modes, and the names of the inputs.
-        structure: The frame with its prior inputs.
-        alpha: Levels, above 0.
-
-    Raises:
-        RefusedError: The file of modes is wrong, or an input cannot be learned.
     """
     rows, learned_modes, prior = require_learnable(section, structure, alpha)
     assert structure.frame is not None
@@ -58,9 +50,6 @@ def require_learnable(
 
     Returns:
         Measurements by mode; the modes to learn from, without held-out ones; the prior inputs.
-
-    Raises:
-        RefusedError: The file of modes is wrong, or an input cannot be learned.
     """
     require(alpha[0] > 0, "envelope.alpha", value=list(alpha), allowed="levels above 0")
     rows = {row.mode: row for row in _measured_rows(section)}

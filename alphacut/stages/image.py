@@ -59,11 +59,7 @@ def stage(cell: ImageCell, alpha: tuple[float, ...], average: str) -> Stage:
 def compute_cuts(
     cell: ImageCell, alpha: tuple[float, ...], average: str, context: StageContext
 ) -> StageResult:
-    """Computes α-cuts of E and of the stiffness of an image, and how its sources widen E.
-
-    Raises:
-        RefusedError: The image cannot give what the case asks for.
-    """
+    """Computes α-cuts of E and of the stiffness of an image, and how its sources widen E."""
     start, tick = perf_counter(), context.tick or (lambda fraction: None)
     study, aspect = image_study(cell), cell.pixel[-1] / cell.pixel[0]
     modal = study.images(None, None)  # at modal thresholds and moduli
@@ -142,10 +138,7 @@ def image_loss_bounds(energies: PhaseEnergies, cuts: LossCuts, average: str) -> 
 def _widths(
     study: ImageStudy, lowest: float, width: Callable[[AlphaLevel, AlphaLevel], float]
 ) -> dict[str, float]:
-    """Widths of E in Pa on the lowest level by what causes them, the largest first.
-
-    `width` gives that at levels of the threshold and of the phases; None: at modal values.
-    """
+    """Widths of E in Pa on the lowest level by what causes them, the largest first."""
     base = width(None, None)
     widths = {"discretisation": base}
     if study.fuzzy_threshold:
@@ -233,11 +226,7 @@ class ImageStudy:
 
 
 def image_study(cell: ImageCell) -> ImageStudy:
-    """The study of an image cell, by its labels or by thresholds.
-
-    Raises:
-        RefusedError: The image cannot be read, or cannot be segmented into these phases.
-    """
+    """The study of an image cell, by its labels or by thresholds."""
     grey = read_grey(cell.image, square=len(cell.pixel) == 1)
     if cell.labels:
         return _study_by_labels(grey, cell, cell.labels)
@@ -245,11 +234,7 @@ def image_study(cell: ImageCell) -> ImageStudy:
 
 
 def _study_by_thresholds(grey: Array, cell: ImageCell) -> ImageStudy:
-    """The study of an image whose phases are told by thresholds of its greys.
-
-    Pixels of which noise or uneven light leaves the phase open have a range of phases, unless a
-    threshold is fuzzy, which then says all that is not known.
-    """
+    """The study of an image whose phases are told by thresholds of its greys."""
     numbers = cell.threshold or ()
     require_phases(grey, tuple(number.cut(0.0) for number in numbers))
     modal = [number.modal for number in numbers]
@@ -260,6 +245,7 @@ def _study_by_thresholds(grey: Array, cell: ImageCell) -> ImageStudy:
 
     def phase_ranges(level: AlphaLevel) -> tuple[Rows, Rows]:
         """Least and greatest phase of each pixel at a level."""
+        # noise and uneven light leave phases open, unless a fuzzy threshold says all that is not known
         if level is not None and not is_fuzzy:
             return segmentation.ranges()
         cuts = (cut_at(number, level) for number in numbers)

@@ -46,11 +46,7 @@ def solve_samples(model: PrismModel, samples: Sequence[MeshedSample]) -> list[Ho
 
 
 def require_mesh(mesh: Mesh, law: ThetaSection, cell: MeshedCell) -> None:
-    """Refuses a mesh file that is no periodic cell of prisms, or that [cell.phases] does not fit.
-
-    Raises:
-        RefusedError: With the physical group, side or level, or DOLFINx is not installed.
-    """
+    """Refuses a mesh file that is no periodic cell of prisms, or does not fit [cell.phases]."""
     try:
         from alphacut.rve.mesh.file import read_grid
         from alphacut.rve.mesh.periodicity import MeshError

@@ -32,16 +32,6 @@ def compute_map(
     """Computes the fuzzy radius map of particles, and writes its files if there is a folder.
 
     The result does not depend on the number of workers.
-
-    Args:
-        section: The section [microstructure].
-        spheres: Whether particles are spheres, not fibres.
-        figures: Whether figures are among the files.
-        context: Workers, folder and progress.
-
-    Raises:
-        RefusedError: The measured data are invalid.
-        FailedError: The packing is too dense.
     """
     with pool(context.workers) as executor:
         result = study(section.study(spheres=spheres), executor=executor, progress=context.tick)

@@ -91,12 +91,7 @@ PLANS: dict[str, Plan] = {
 class CellTask:
     """Samples of the cell that share all but the inclusion's modulus, for any process.
 
-    Args:
-        model: Model of the cell.
-        radius: Random radius.
-        cell: Phases.
-        crisp: Inputs that are not fuzzy, by name, in SI.
-        losses: Cuts of the phases' loss factors, if there are.
+    `crisp` has the inputs that are not fuzzy, by name, in SI.
     """
 
     model: Solve
@@ -137,16 +132,7 @@ def theta_of(radius: AnyRadius | ThetaSection) -> Array:
 
 @dataclass(frozen=True)
 class CellCampaign:
-    """Samples that the sections of a case ask for.
-
-    Args:
-        radius: Random radius.
-        cell: Phases.
-        mesh: Resolution of elements.
-        modulus: Method, plan, levels.
-        petsc: PETSc options.
-        stated_fraction: Share that particles take as the case states; None where it does not.
-    """
+    """Samples that the sections of a case ask for, by a solver with PETSc's options."""
 
     radius: AnyRadius | ThetaSection
     cell: AnyCell
@@ -221,9 +207,6 @@ class CellCampaign:
 
         The points are the middles of the narrowest and of the widest cut of the inputs. The
         tolerance is `TEST_TOLERANCE_FACTOR` times as large, elements are twice as large.
-
-        Raises:
-            FailedError: E of such a point lies outside a cut by more than both errors.
         """
         if result.nature_of("E") is not Nature.GUARANTEED:
             return
@@ -281,10 +264,7 @@ class CellCampaign:
         return Knowledge(signs=of_inputs, source="as mechanics proves of exact cells", tests=2)
 
     def loss_errors(self, result: Bounds) -> dict[str, float]:
-        """Errors of the loss factors of E, G and K by name: the largest of all samples.
-
-        Prisms declare those of the modal cell, and a mesh from a file declares none.
-        """
+        """Largest errors of the loss factors of E, G and K; of prisms those of the modal cell."""
         assert self.losses is not None
         assert result.samples is not None
         if isinstance(self.cell, MeshedCell):
@@ -392,8 +372,7 @@ def loss_outputs(result: HomogenisedStiffness, cuts: LossCuts) -> dict[str, Arra
 def loss_cuts(result: Bounds) -> dict[str, Array]:
     """α-cuts of the loss factors by the names of `CONSTANTS`, shape (levels, 2) each.
 
-    Outputs loss_lower[level][constant] and loss_upper of a sample bound the loss factor for the
-    phases' cuts on that level. The cut runs from the least lower to the greatest upper one.
+    They run from the least loss_lower[level][constant] of the samples to the greatest loss_upper.
     """
     cuts: dict[str, Array] = {name: np.empty((len(result.alpha), 2)) for name in CONSTANTS}
     for (constant, name), level in product(enumerate(CONSTANTS), range(len(result.alpha))):
@@ -428,11 +407,7 @@ def fuzzy_loss(data: xarray.Dataset) -> FuzzyNumber | None:
 
 
 def fuzzy_modulus(data: xarray.Dataset, key: str = "modulus") -> FuzzyNumber:
-    """The fuzzy Young's modulus in Pa that stored α-cuts make.
-
-    Raises:
-        RefusedError: There is none, or it is not positive, or lacks the levels 0 and 1.
-    """
+    """The fuzzy Young's modulus in Pa that stored α-cuts with levels from 0 to 1 make."""
     require("E" in data, key, value="without E", allowed="a modulus.nc of this program")
     least = float(data["E"].min())
     require(least > 0, key, value=f"{least / GPA:.3g} GPa", allowed="a modulus above 0")

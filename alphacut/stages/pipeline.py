@@ -39,15 +39,7 @@ if TYPE_CHECKING:
 
 @dataclass
 class Pipeline:
-    """A run of the stages of a case.
-
-    Args:
-        results: Where the results go; of the stages before, what is there.
-        store: Store of the results.
-        petsc: PETSc options that override the solver's.
-        figures: Whether the particles are drawn.
-        executor: Processes that compute envelopes side by side.
-    """
+    """A run of the stages of a case; envelopes are computed side by side by `executor`."""
 
     results: Results
     store: StageStore
@@ -104,11 +96,9 @@ class Pipeline:
         cell.require_bounds((young[0], young[1]), data.document["references"], particles)
 
     def structure(self, data: xarray.Dataset | None, key: str = "modulus") -> Structure:
-        """The structure of the case with the modulus and the loss factor of stage modulus.
+        """The structure of the case with modulus and loss factor of stage modulus, else as stated.
 
-        Args:
-            data: Arrays of stage modulus; None: those that the case states.
-            key: Option or key that names the data, for messages.
+        `key` is the option or key that names the data, for messages.
         """
         content, section = self.content, self.content.structure_section
         young = None if data is None else modulus.fuzzy_modulus(data, key)
@@ -143,10 +133,7 @@ class Pipeline:
             results.envelopes[task.name] = data
 
     def _compute_motion(self, structure: Structure) -> None:
-        """Computes into the results the identified inputs, then the suite of records or envelopes.
-
-        Answers on limits follow from the peaks of either.
-        """
+        """Computes the identified inputs, then the suite of records or envelopes, and answers."""
         results, content = self.results, self.content
         assert content.envelope is not None
         (task,) = envelope.tasks(content.envelope, ())  # of [envelope] itself
@@ -194,10 +181,7 @@ class Pipeline:
         return FuzzyResponse(structure, task.fuzzy, alpha, task.duration, step, peaks)
 
     def _limited_peaks(self, task: EnvelopeTask, structure: Structure) -> Peaks | None:
-        """Peaks for questions, from the study with [envelope]'s motion or else computed alone.
-
-        None where no study has it and no question needs them.
-        """
+        """Peaks for questions: of the study with [envelope]'s motion, else computed alone."""
         alpha = task.section.alpha
         for study in self.results.tasks:
             if study.has_motion_of(task.section):

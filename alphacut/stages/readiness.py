@@ -18,11 +18,7 @@ from alphacut.stochastic.sections import Simulated
 
 
 def require_runnable(content: Content) -> None:
-    """Reads and builds all that the stages of a case need, so that what they refuse is refused now.
-
-    Raises:
-        RefusedError: A stage would refuse a file, a model or a value.
-    """
+    """Reads and builds all that the stages of a case need, so that `check` refuses it too."""
     stages = content.stages
     if "microstructure" in stages and content.microstructure is not None:
         study = content.microstructure.study(spheres=content.has_spheres)
@@ -55,10 +51,7 @@ def campaign_of(content: Content, petsc: Mapping[str, str] | None = None) -> Cel
 
 
 def _require_motion(content: Content) -> None:
-    """Requires that identification, each study's envelope and each question can be computed.
-
-    Nothing is solved: stand-ins replace a modulus and a loss factor that are still to be computed.
-    """
+    """Requires that identification, each study's envelope and each question can be computed."""
     if content.structure_section is None or content.envelope is None:
         return
     modulus, alpha = _stand_in_modulus(content), content.envelope.alpha

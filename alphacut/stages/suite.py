@@ -39,12 +39,7 @@ QUANTILES = {"mean": None, "median": 0.5, "84 %": 0.84}
 
 @dataclass(frozen=True)
 class NominalMode:
-    """First mode of the structure at its most plausible inputs.
-
-    Args:
-        period: T1, in s.
-        ratio: Damping ratio of the mode.
-    """
+    """First mode at the most plausible inputs: its period T1 in s, and damping ratio."""
 
     period: float
     ratio: float
@@ -72,11 +67,7 @@ class SuiteRecord:
 
 
 def nominal_mode(structure: Structure) -> NominalMode:
-    """First mode at the most plausible inputs.
-
-    Raises:
-        RefusedError: The structure is not linear.
-    """
+    """First mode at the most plausible inputs of a linear structure."""
     if structure.linear is None:
         what = "with a system that is not linear"
         raise RefusedError("records", what, "linear structures")
