@@ -245,7 +245,7 @@ def _study_by_thresholds(grey: Array, cell: ImageCell) -> ImageStudy:
 
     def phase_ranges(level: AlphaLevel) -> tuple[Rows, Rows]:
         """Least and greatest phase of each pixel at a level."""
-        # noise and uneven light leave phases open, unless a fuzzy threshold says all that is not known
+        # noise and light leave phases open, unless a fuzzy threshold says all that is not known
         if level is not None and not is_fuzzy:
             return segmentation.ranges()
         cuts = (cut_at(number, level) for number in numbers)
