@@ -152,7 +152,7 @@ class MatricesSection(Section):
     def _material_ratios(
         self, damping: MaterialDamping, model: MatrixStructure, loss: FuzzyNumber
     ) -> dict[str, FuzzyNumber]:
-        """ "zeta" of all modes if E is in every term of K; else "zeta1" … by their strain energy."""
+        """Ratio "zeta" of all modes if E is in every term of K; else "zeta1" … by energy shares."""
         has_modulus = [any(name == "E" for name, _ in f.powers) for f, _ in self.stiffness]
         allowed = "a term of the stiffness with E"
         require(any(has_modulus), "damping_ratio", value="material", allowed=allowed)
