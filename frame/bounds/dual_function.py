@@ -21,8 +21,8 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from alphacut.frame.calculus.kernels import compiled, kernel
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.fuzzy.arrays import Array, Rows
 
@@ -102,9 +102,8 @@ def require_in_range(fields: Mapping[str, Array]) -> None:
             raise UnprovedError(f"dual function: {name} is not finite or above {LARGEST:g}")
 
 
-compiled = njit(cache=True, nogil=True, error_model="numpy")
 # bounds of rounding hold for any order of a sum, with fused products too; NaN and infinity stay
-loops = njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "contract"})
+loops = kernel(fastmath={"reassoc", "contract"})
 
 
 @loops

@@ -15,8 +15,8 @@ from __future__ import annotations
 from math import inf, sqrt
 
 import numpy as np
-from numba import njit
 
+from alphacut.frame.calculus.kernels import compiled
 from alphacut.fuzzy.arrays import Array, Rows
 
 FACES = 16
@@ -28,8 +28,6 @@ MAX_PHASE = 4.0
 """Largest change of phase, in rad, over a box for which linear phases are used."""
 SWELL = 1.7
 """Largest z for which 1 + z + z² lies above exp(z)."""
-
-compiled = njit(cache=True, nogil=True, error_model="numpy")
 
 
 @compiled

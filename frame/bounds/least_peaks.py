@@ -18,8 +18,9 @@ from heapq import heappop, heappush
 
 import numpy as np
 
-from alphacut.frame.bounds.dual_function import Data, compiled, minimise
+from alphacut.frame.bounds.dual_function import Data, minimise
 from alphacut.frame.bounds.level import LevelModels, OutputBounds
+from alphacut.frame.calculus.kernels import compiled
 from alphacut.fuzzy.arrays import Array, Rows
 
 BISECTIONS = 48

@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from alphacut.frame.bounds.dual_function import Data, add, compiled, dot, loops, minimise, products
+from alphacut.frame.bounds.dual_function import Data, add, dot, loops, minimise, products
+from alphacut.frame.calculus.kernels import compiled
 from alphacut.fuzzy.arrays import Array, Rows
 
 JUMPS, CLIMBS = 4, 16

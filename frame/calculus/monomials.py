@@ -13,8 +13,8 @@ from itertools import combinations_with_replacement
 from math import comb
 
 import numpy as np
-from numba import njit
 
+from alphacut.frame.calculus.kernels import compiled
 from alphacut.fuzzy.arrays import Array, Rows
 
 SMALL = 300_000
@@ -97,7 +97,7 @@ def convolve(
     return out
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _add_products(a: Array, b: Array, at: Rows, out: Array) -> None:
     """Add a[x] b[y], entry by entry, (v,), to out[at[x, y]] for all pairs of monomials x, y."""
     for x in range(len(a)):
@@ -109,7 +109,7 @@ def _add_products(a: Array, b: Array, at: Rows, out: Array) -> None:
                 out[p, k] += a[x, k] * b[y, k]
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _add_matrix_products(a: Array, b: Array, at: Rows, out: Array) -> None:
     """Add a[x] @ b[y], (p, q) by (q, r), to out[at[x, y]] for all pairs of monomials x, y."""
     for x in range(len(a)):

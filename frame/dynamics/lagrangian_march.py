@@ -10,16 +10,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit, types
 
+from alphacut.frame.calculus.kernels import compiled
 from alphacut.frame.calculus.tape import Tape
 from alphacut.fuzzy.arrays import Array
 
-TAPE = types.Tuple((types.i8[:, ::1], types.i8[::1], types.f8[::1]))
 ITERATIONS = 30
 """Newton steps after which a time step has not converged."""
-
-compiled = njit(error_model="numpy", cache=True)
 
 
 @compiled
@@ -231,15 +228,7 @@ def step_derivatives(flat: Array, n: int, x1: Array, x2: Array) -> None:
                 x2[i, j, n + c] = total
 
 
-@njit(
-    types.boolean(
-        TAPE, TAPE, TAPE,
-        types.f8[:, ::1], types.f8, types.f8[:, ::1], types.f8[:, :, ::1],
-        types.f8[:, :, :, ::1], types.f8[:, :, ::1], types.f8[:, :, :, ::1],
-        types.f8[:, :, :, :, ::1],
-    ),
-    error_model="numpy", cache=True,
-)  # fmt: skip
+@compiled
 def march(
     newton: Tape,
     step: Tape,
@@ -296,7 +285,7 @@ def march(
     return True
 
 
-@njit(types.void(TAPE, types.f8[:, ::1], types.f8[:, ::1]), error_model="numpy", cache=True)
+@compiled
 def evaluate_all(tape: Tape, arguments: Array, out: Array) -> None:
     """Write the values of a tape's m expressions at S sets of arguments (S, K) to `out` (S, m)."""
     for s in range(len(arguments)):

@@ -7,10 +7,10 @@ from functools import cached_property
 from math import ceil, exp, lgamma, log
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from alphacut.frame.calculus.jet import Array
+from alphacut.frame.calculus.kernels import compiled
 from alphacut.frame.calculus.polynomial import Polynomial
 from alphacut.frame.response.duhamel import responses_at_nodes, responses_in_windows
 from alphacut.frame.structures.loads import History
@@ -177,7 +177,7 @@ def _moments(
     return np.asarray(np.fft.fft(values, axis=1) / order / phase ** np.arange(order))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def window_series(
     rate: Complex,
     node: Rows,

@@ -23,8 +23,9 @@ from threading import Lock
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 
+from alphacut.frame.calculus.kernels import compiled, kernel
 from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF
 from alphacut.frame.response.step_integrals import (
     error_of_integrals,
@@ -34,6 +35,7 @@ from alphacut.frame.response.step_integrals import (
 from alphacut.frame.structures.loads import History
 from alphacut.fuzzy.arrays import Array, Rows
 
+parallel = kernel(parallel=True)
 PARALLEL_LOOP = Lock()
 """Held by the thread that is in a parallel loop of Numba, which not all its layers share."""
 SAME_TIME = 4 * UNIT_ROUNDOFF
@@ -117,7 +119,7 @@ def absolute_moments(decay: float, history: History, time: Array) -> Array:
     return out
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _walk_moments(
     sizes: Array, interval: Rows, since: Array, decay: float, h: float, out: Array
 ) -> None:
@@ -140,7 +142,7 @@ def _walk_moments(
         moments[:] = next_moments
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _advance_moments(moments: Array, decay: float, h: float, size: float, out: Array) -> None:
     """Write bounds of the moments a time h later, under a load with |f| ≤ `size`, to `out` (5,).
 
@@ -262,7 +264,7 @@ def _with_sine(
     return response, (minus_rounding + plus_rounding) / 2 + rounding
 
 
-@njit(cache=True, parallel=True)
+@parallel
 def _walk_to_all(sigma: Array, walk: Walk, orders: Orders, out: Array, error: Array) -> None:
     """Write ρ of each σ (S,) at all T nodes to `out`, and bounds of its rounding to `error` (T, S).
 
@@ -274,7 +276,7 @@ def _walk_to_all(sigma: Array, walk: Walk, orders: Orders, out: Array, error: Ar
         _walk_along(sigma[s], walk, orders, nodes, parts, (0, 0j), out[:, :, s], error[:, s])
 
 
-@njit(cache=True, parallel=True)
+@parallel
 def _walk_to_given(
     sigma: Array, walk: Walk, orders: Orders, node: Rows, out: Array, error: Array
 ) -> None:
@@ -292,7 +294,7 @@ def _walk_to_given(
             _walk_along(sigma[s, k], walk, orders, nodes, parts, (0, 0j), *end)
 
 
-@njit(cache=True, parallel=True)
+@parallel
 def _walk_in_windows(sigma: Array, walk: Walk, length: int, out: Array) -> None:
     """Write ρ of each σ (S,) at all nodes to `out` (1, T, S), from rest at each window's beginning.
 
@@ -312,7 +314,7 @@ def _walk_in_windows(sigma: Array, walk: Walk, length: int, out: Array) -> None:
             _walk_along(sigma[s], walk, (), nodes, parts, start, out[:, inside, s], error)
 
 
-@njit(cache=True)
+@compiled
 def _phase_factors(sigma: complex, phases: Array) -> tuple[Array, Array, Array, Array]:
     """Return factors that carry a response from the beginning of an interval to times x in it.
 
@@ -335,7 +337,7 @@ def _phase_factors(sigma: complex, phases: Array) -> tuple[Array, Array, Array, 
     return phases, factors, integrals, rounding
 
 
-@njit(cache=True)
+@compiled
 def _walk_along(
     sigma: complex,
     walk: Walk,

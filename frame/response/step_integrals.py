@@ -13,8 +13,8 @@ integrals grow like exp(z) and are scaled by it: z reaches up to `LARGEST_GROWTH
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from alphacut.frame.calculus.kernels import compiled
 from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.fuzzy.arrays import Array
@@ -53,7 +53,7 @@ def require_in_range(sigma: Array, step: float, duration: float) -> None:
         )
 
 
-@njit(cache=True)
+@compiled
 def step_integrals(sigma: complex, h: float, out: Array) -> None:
     """Write J_n = ∫₀ʰ τⁿ exp(σ τ) dτ, n = 0 … 3, to `out` (4,); see `require_in_range` for σ h."""
     z = sigma * h
@@ -74,7 +74,7 @@ def step_integrals(sigma: complex, h: float, out: Array) -> None:
         out[n] = integral * h ** (n + 1)
 
 
-@njit(cache=True)
+@compiled
 def error_of_integrals(sigma: complex, h: float) -> float:
     """Return a bound of the rounding of J₀ and of 2 J₁ / h, J_n = ∫₀ʰ τⁿ exp(σ τ) dτ, in s.
 
