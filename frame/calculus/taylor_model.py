@@ -327,39 +327,26 @@ def all_within(models: Sequence[TaylorModel], low: Array, high: Array) -> list[T
     return found
 
 
-def inverse_bound(matrix: TaylorModel) -> Array:
+def inverse_bound(matrix: TaylorModel) -> Array | None:
     """Bound of |A⁻¹| over the box, entry by entry, by Neumann's series, shape (n, n).
 
-    |A⁻¹| ≤ (I − R)⁻¹ |C| with C ≈ A₀⁻¹ and R a bound of |I − C A|.
-
-    Raises:
-        UnprovedError: The series diverges.
+    It is None where the series diverges, or may. Of a matrix that is diagonal in the middle it is
+    the inverse of Ostrowski's comparison matrix (1937).
     """
     C, n = np.linalg.inv(matrix.value), len(matrix.value)
     in_middle = np.abs(np.eye(n) - C @ matrix.value)
     in_middle += gamma(n + 1) * (np.abs(C) @ np.abs(matrix.value))
-    ratio = np.abs(C) @ matrix.spread() + in_middle
-    if np.abs(np.linalg.eigvals(ratio)).max() >= 1:
-        raise UnprovedError("a matrix may be singular in the box", "take narrower inputs")
+    ratio = np.abs(C) @ matrix.spread() + in_middle  # bounds |I − C A|
+    # with (I − |I − C A|)⁻¹ ≥ 0 the spectral radius of a matrix of positive entries is below 1
     inverse = np.linalg.inv(np.eye(n) - ratio) * (1 + gamma(8 * n * n))
+    if not ((inverse >= 0).all() and np.abs(np.linalg.eigvals(ratio)).max(initial=0.0) < 1):
+        return None
     return np.asarray(inverse @ np.abs(C))
 
 
-def solve(matrix: TaylorModel, right: TaylorModel) -> TaylorModel:
-    """Taylor model of the solution Y of A Y = B, its coefficients found degree by degree.
-
-    Its remainder is a bound of |A⁻¹| times one of the residual |A Y − B|.
-
-    Args:
-        matrix: A, shape (n, n).
-        right: B, shape (n, m).
-
-    Raises:
-        UnprovedError: A may be singular.
-    """
-    d, order = matrix.inputs, max(matrix.order, right.order)
-    if not d:
-        matrix, right, order = matrix.cut(0), right.cut(0), 0
+def solution_series(matrix: TaylorModel, right: TaylorModel) -> TaylorModel:
+    """Polynomials Y, degree by degree, of A Y ≈ B for A (n, n) and B (n, m); without remainders."""
+    d, order = matrix.inputs, max(matrix.order, right.order) if matrix.inputs else 0
     middle_inverse, parts = np.linalg.inv(matrix.value), list[Array]()
     for degree in range(order + 1):
         right_side = right.part(degree)
@@ -367,8 +354,19 @@ def solve(matrix: TaylorModel, right: TaylorModel) -> TaylorModel:
             pair = (k, degree - k)
             right_side = right_side - convolve(matrix.parts[k], parts[degree - k], pair, d, matmul)
         parts.append(middle_inverse @ right_side)
-    found = TaylorModel(tuple(parts), np.zeros(right.shape), d, order)
-    return found.loosened(inverse_bound(matrix) @ (matrix @ found - right).size())
+    return TaylorModel(tuple(parts), np.zeros(right.shape), d, order)
+
+
+def solve(matrix: TaylorModel, right: TaylorModel) -> TaylorModel:
+    """Taylor model of the solution Y of A Y = B, for A (n, n) and B (n, m).
+
+    Raises:
+        UnprovedError: A may be singular.
+    """
+    found, bound = solution_series(matrix, right), inverse_bound(matrix)
+    if bound is None:
+        raise UnprovedError("a matrix may be singular in the box", "take narrower inputs")
+    return found.loosened(bound @ (matrix @ found - right).size())
 
 
 def _numbers(value: ArrayLike) -> Array:

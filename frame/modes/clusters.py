@@ -10,7 +10,7 @@ from alphacut.frame.calculus.rounding import gamma
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.blocks import Block, CentredMatrices, narrowest_block
-from alphacut.frame.modes.pencil import form_variation
+from alphacut.frame.modes.pencil import eigenvalue_drop
 from alphacut.fuzzy.arrays import Array, Mask, Rows
 
 NEAR = 2.0
@@ -67,9 +67,13 @@ def subspaces(
     Raises:
         UnprovedError: The box is so wide that the structure may lose its mass or stiffness.
     """
-    weight = (np.arange(len(centre.basis)) < centre.modes).astype(float)
-    mass_variation = form_variation(centre.mass, weight)
-    stiffness_variation = form_variation(centre.stiffness, np.diag(centre.stiffness.value) ** -0.5)
+    mass_variation, stiffness_variation = (
+        max(eigenvalue_drop(matrix, scale, sign) for sign in (1.0, -1.0))
+        for matrix, scale in (
+            (centre.mass, centre.has_mass),
+            (centre.stiffness, np.diag(centre.stiffness.value) ** -0.5),
+        )
+    )
     slopes = _slopes(centre)
     if not (mass_variation < 1 and stiffness_variation < 1):
         steepest = int(used[(np.abs(slopes) / centre.squared[:, None]).max(0).argmax()])
@@ -78,7 +82,7 @@ def subspaces(
     tolerances = np.zeros(centre.modes) if tolerances is None else tolerances
     blocks, pair = _from_below(centre, slopes, min(wanted, centre.modes), tolerances)
     along = None if pair is None else int(used[np.abs(slopes[pair[0]] - slopes[pair[1]]).argmax()])
-    slack = gamma(100 * len(weight))  # rounding of the norms
+    slack = gamma(4)
     low = (1 - slack) * (1 - stiffness_variation) / (1 + mass_variation)
     high = (1 + slack) * (1 + stiffness_variation) / (1 - mass_variation)
     return Subspaces(

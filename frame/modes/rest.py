@@ -19,9 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from alphacut.frame.calculus.monomials import convolve, matmul
-from alphacut.frame.calculus.rounding import gamma
-from alphacut.frame.calculus.taylor_model import TaylorModel, solve
+from alphacut.frame.calculus.taylor_model import TaylorModel, solution_series, solve
 from alphacut.frame.modes.clusters import Subspaces
 from alphacut.frame.modes.intervening import BlockShares, Ends, damped_range, dots
 from alphacut.frame.modes.structure import Classical
@@ -189,42 +187,11 @@ def _inverse_form(
         right: Rows, shape (r, n).
         least: A(u) ≥ least · A(0) over the box, as quadratic forms.
     """
-    middle = np.diag(matrix.value)
-    x, left_residual = _row_series(matrix, left)
-    y, right_residual = _row_series(matrix, right)
-    norms = (np.sqrt((size**2 / middle).sum(1)) for size in (left_residual, right_residual))
-    return (x @ right.T).loosened(left_residual @ y.size().T + np.outer(*norms) / least)
-
-
-def _row_series(matrix: TaylorModel, rows: TaylorModel) -> tuple[TaylorModel, Array]:
-    """Series x of `rows` A⁻¹, degree by degree, and a bound of |rows − x A| over the box.
-
-    Up to the order of the series the residual is rounding alone. A is diagonal in the middle.
-    """
-    middle, parts = np.diag(matrix.value), list[Array]()
-    for degree in range(matrix.order + 1):
-        right_side = rows.part(degree)
-        for k in range(1, min(degree, len(matrix.parts) - 1) + 1):
-            pair = (degree - k, k)
-            right_side = right_side - convolve(
-                parts[degree - k], matrix.parts[k], pair, rows.inputs, matmul
-            )
-        parts.append(right_side / middle)
-    series = TaylorModel(tuple(parts), np.zeros(rows.shape), rows.inputs, matrix.order)
-    residual = rows.remainder + series.size() @ matrix.remainder
-    for degree, size in enumerate(rows.sizes()):
-        residual = residual + gamma(_terms(matrix, degree)) * size
-    for i, size in enumerate(series.sizes()):
-        for k, factor in enumerate(matrix.sizes()):
-            is_higher = i + k > matrix.order
-            weight = 1.0 if is_higher else gamma(_terms(matrix, i + k))
-            residual = residual + weight * (size @ factor)
-    return series, residual * (1 + gamma(matrix.order**2 + 4 * len(middle)))
-
-
-def _terms(matrix: TaylorModel, degree: int) -> int:
-    """Roundings of a coefficient of rows A⁻¹, with the division by its middle."""
-    return len(matrix.remainder) * 2**degree + degree + 4
+    x, y = (solution_series(matrix, rows.T).T for rows in (left, right))
+    e, f = (left - x @ matrix).size(), (right - y @ matrix).size()
+    # |e A⁻¹ fᵀ| ≤ |e| |f| / least in the norm of A(0)⁻¹
+    norms = (np.sqrt((size**2 / np.diag(matrix.value)).sum(1)) for size in (e, f))
+    return (x @ right.T).loosened(e @ y.size().T + np.outer(*norms) / least)
 
 
 def _sums_over_block(of_block: BlockShares) -> _Sums:

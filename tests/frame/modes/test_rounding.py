@@ -1,9 +1,6 @@
 """Taylor models of modes are off by their rests, where these are rounding alone, against mpmath."""
 
-from fractions import Fraction
-from functools import reduce
 from itertools import combinations_with_replacement
-from operator import mul
 
 import mpmath as mp
 import numpy as np
@@ -12,14 +9,7 @@ import pytest
 from alphacut.frame.bounds.box import Box
 from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF, gamma
 from alphacut.frame.calculus.taylor_model import TaylorModel, solve
-from alphacut.frame.modes.blocks import (
-    CentredMatrices,
-    _residual_rounding,
-    _rotated,
-    _rounding,
-    subspace_series,
-)
-from alphacut.frame.modes.clusters import _diagonal, rotation
+from alphacut.frame.modes.clusters import _diagonal
 from tests.frame.modes.test_attained import IDLE, RECORD, drawn
 
 
@@ -128,56 +118,6 @@ def test_rests_of_arithmetic_are_rounding_and_no_hundred_times_more():
                 off = float(abs(exact_value(model, u) - exact[name]))
                 shares.setdefault(name, []).append(off / float(model.remainder))
     assert all(IDLE <= np.max(values) <= 1 for values in shares.values())
-
-
-def pencil(rng):
-    """M and K of three unknowns and one input, diagonal in the middle, as a `CentredMatrices`."""
-    slopes = 0.05 * rng.normal(size=(2, 3, 3))
-    slopes = slopes + slopes.swapaxes(1, 2)
-    middle = np.eye(3), np.diag([1.0, 3.0, 7.0])
-    models = (
-        TaylorModel((x[None], slope[None]), np.zeros((3, 3)), 1)
-        for x, slope in zip(middle, slopes, strict=True)
-    )
-    return CentredMatrices(*models, np.eye(3), 3)
-
-
-def matmul_exact(*matrices):
-    """Product of matrices of fractions."""
-    return reduce(
-        lambda a, b: [[sum(map(mul, r, c)) for c in zip(*b, strict=True)] for r in a], matrices
-    )
-
-
-def fractions(array):
-    """The numbers of a matrix as fractions."""
-    return [[Fraction(float(x)) for x in row] for row in array]
-
-
-@pytest.mark.parametrize("block", [np.array([1]), np.array([0, 1])])
-def test_series_leave_a_residual_of_rounding_in_the_degrees_they_keep(block):
-    rng, shares = np.random.default_rng(0), []
-    for _ in range(10):
-        centre = pencil(rng)
-        turn = rotation(centre, block)
-        rate, shape, moved = _rotated(subspace_series(block, 4, centre), turn)
-        models = [
-            TaylorModel(tuple(x), np.zeros(x[0].shape[1:]), 1, 4) for x in (rate, shape, moved)
-        ]
-        of_moved = _rounding(models[1], centre.mass, 0)
-        bound = _residual_rounding(*models, centre.stiffness, turn, of_moved)
-        L, x = ([fractions(part[0]) for part in parts] for parts in (rate, shape))
-        M, K = ([fractions(p[0]) for p in model.parts] for model in (centre.mass, centre.stiffness))
-        total = np.zeros(bound.shape)
-        for m in range(5):
-            residual = np.zeros(bound.shape, object)
-            for b in range(min(m, 1) + 1):
-                residual = residual + np.array(matmul_exact(x[m - b], K[b]))
-                for a in range(m - b + 1):
-                    residual = residual - np.array(matmul_exact(L[a], x[m - b - a], M[b]))
-            total += np.abs(residual.astype(float))
-        shares.append((total / bound).max())
-    assert IDLE <= np.max(shares) <= 1
 
 
 def test_what_is_put_onto_a_diagonal_is_put_into_the_rest():
