@@ -81,7 +81,7 @@ def with_keys(
     _app: Sphinx, _what: str, _name: str, documented: object, _options: object, lines: list[str]
 ) -> None:
     """Adds the keys of a section of a case as a table, from the model's own fields."""
-    from alphacut.case.keys import allowed
+    from alphacut.case.load import allowed
 
     fields = getattr(documented, "model_fields", {})
     rows = [

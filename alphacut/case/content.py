@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
+from functools import cached_property
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from alphacut.case.forces import ForceSection, with_forces
 from alphacut.case.limits import (
     DecisionSection,
     FragilitySection,
@@ -15,22 +15,19 @@ from alphacut.case.limits import (
     QuestionSection,
     TolerancesSection,
 )
+from alphacut.case.loads import ForceSection, RecordsSection, with_forces
 from alphacut.case.material import (
     AnyLaw,
-    AnyRadius,
     Cell,
     ImageCell,
     Mesh,
+    MeshedCell,
     ModulusSection,
-    RadiusMapSection,
     RoundCell,
-    ThetaSection,
 )
 from alphacut.case.matrices import MatricesSection
-from alphacut.case.meshed import MeshedCell
 from alphacut.case.motion import EnvelopeSection, Identify, Study
-from alphacut.case.particles import MicrostructureSection
-from alphacut.case.records import RecordsSection
+from alphacut.case.radius import AnyRadius, MicrostructureSection, RadiusMapSection, ThetaSection
 from alphacut.case.structure import Frame, MaterialDamping, Pendulum, Structure
 from alphacut.case.types import NotEmpty, Section, after, distinct, require_alone
 from alphacut.fuzzy import FuzzyNumber
@@ -140,10 +137,11 @@ class Content(Section):
         """The radius map, or the law of θ of a mesh, and the phases of a cell that is no image."""
         return self.radius_and_phases if self.mesh_cell is None else self.law_and_phases
 
-    @property
+    @cached_property
     def structure(self) -> Structure | None:
-        """The structure, with a stand-in for a modulus that is yet to be computed."""
-        return None if self.structure_section is None else self.structure_of()
+        """The structure, with stand-ins for what is yet to be computed; built once."""
+        section = self.structure_section
+        return None if section is None else self._loaded(section.nominal)
 
     def structure_of(
         self, modulus: FuzzyNumber | None = None, loss: FuzzyNumber | None = None
@@ -155,8 +153,17 @@ class Content(Section):
         """
         if self.structure_section is None:
             raise RefusedError("envelope", None, "a structure and a section [envelope]")
+        return self._loaded(self.structure_section.structure(modulus, loss))
+
+    def _loaded(self, structure: Structure) -> Structure:
         unknowns = () if self.matrices is None else self.matrices.unknowns
-        return with_forces(self.structure_section.structure(modulus, loss), self.force, unknowns)
+        return with_forces(structure, self.force, unknowns)
+
+    @property
+    def has_material_damping(self) -> bool:
+        """True if the structure takes damping from the loss factors of its material."""
+        ratio = getattr(self.structure_section, "damping_ratio", None)
+        return isinstance(ratio, MaterialDamping)
 
     @property
     def structure_section(self) -> Frame | Pendulum | MatricesSection | None:
@@ -230,9 +237,8 @@ class Content(Section):
     @model_validator(mode="after")
     def _check_material_damping(self) -> Self:
         """Refuses damping by the material where no stage computes the material's loss factors."""
-        ratio = getattr(self.structure_section, "damping_ratio", None)
         has_losses = "modulus" in self.stages and bool(self.cell and self.cell.losses)
-        if isinstance(ratio, MaterialDamping):
+        if self.has_material_damping:
             section = "frame" if self.frame else "matrices"
             allowed = "stage modulus and loss factors in [cell], or a number"
             require(has_losses, f"{section}.damping_ratio", value="material", allowed=allowed)
@@ -292,9 +298,8 @@ class Content(Section):
         self, key: str, study: Study, envelope: EnvelopeSection, structure: Structure
     ) -> None:
         """Refuses inputs, outputs and a duration that a study of the structure cannot have."""
-        ratio = getattr(self.structure_section, "damping_ratio", None)
         computed = "E" if "modulus" in self.stages else "(?!)"  # which matches no name
-        if isinstance(ratio, MaterialDamping):
+        if self.has_material_damping:
             computed = r"E|zeta\d*"
         stated = [name for name in study.fuzzy if not re.fullmatch(computed, name)]
         structure.inputs(stated, f"{key}.fuzzy")  # refuses unknown and crisp ones

@@ -111,7 +111,7 @@ class QuestionSection(Section):
         key, limits = f"{self.key}.limits", self.limits_by_name
         values = {name: limit.value_in_si(structure, key) for name, limit in limits.items()}
         outputs = tuple(dict.fromkeys(limit.output for limit in self.limits))
-        structure.model_with_outputs(key, outputs)  # refuses unknown ones
+        structure.require_quantities(key, outputs)
         texts = ", ".join(limit.text for limit in self.limits)
         require(len(values) == len(self.limits), key, value=texts, allowed="each limit once")
         return values

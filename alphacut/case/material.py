@@ -1,16 +1,14 @@
-"""Sections on the material: random radius, phases, mesh, modulus and stress of the cell."""
+"""Sections on the material: phases, mesh, modulus and stress of the cell."""
 
 from __future__ import annotations
 
-import itertools
 import re
 from collections.abc import Mapping
 from typing import Annotated, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from alphacut.case.fraction_map import FractionMap
-from alphacut.case.meshed import MeshedCell
+from alphacut.case.radius import FractionMap, Number, Radius, RadiusMapSection, ThetaSection
 from alphacut.case.types import (
     ALPHA,
     CaseFile,
@@ -23,75 +21,101 @@ from alphacut.case.types import (
     Quantity,
     Ratio,
     Section,
-    after,
-    rising,
 )
-from alphacut.fuzzy import FuzzyNumber
+from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.fuzzy.refused import RefusedError, require
-from alphacut.rve.cell import THINNEST, VoigtPhase
+from alphacut.rve.cell import THINNEST, Phase, VoigtPhase
 from alphacut.rve.outline import Ellipse, circle, reach
-from alphacut.stochastic import HermiteMap, TruncatedNormal
 from alphacut.stochastic.particles.particles import DISCS, SPHERES, Shape
 
-Radius = Annotated[FuzzyNumber, Quantity(above=0, below=1, fuzzy=True)]
-Number = Annotated[FuzzyNumber, Quantity(fuzzy=True)]
+
+class PhaseSection(Section):
+    """Elastic phase of a mesh."""
+
+    modulus: ModulusOrStiffness = Field(
+        description="Young's modulus, or three rows of the plane-strain stiffness"
+    )
+    poisson: Annotated[float, Quantity(above=-1, below=0.5)] | None = Field(
+        default=None, description="Poisson's ratio, beside Young's modulus"
+    )
+    loss: Loss | None = Field(default=None, description="loss factor tan δ of the stiffness")
+
+    @model_validator(mode="after")
+    def _check_ratio(self) -> Self:
+        """Refuses a Poisson's ratio beside a stiffness, and Young's modulus without one."""
+        isotropic = isinstance(self.modulus, FuzzyNumber)
+        value = "without poisson" if self.poisson is None else "with poisson"
+        allowed = "poisson beside Young's modulus, none beside a stiffness"
+        require(isotropic == (self.poisson is not None), "", value=value, allowed=allowed)
+        return self
+
+    def phase(self, modulus: float | None) -> Phase | VoigtPhase:
+        """The material, with its Young's modulus in Pa where it is isotropic."""
+        if isinstance(self.modulus, VoigtPhase):
+            return self.modulus
+        assert modulus is not None
+        assert self.poisson is not None
+        return Phase(modulus, self.poisson)
+
+
+class MeshedCell(Section):
+    """Phases of a mesh from a file, `mesh.file`, by the names of its physical groups."""
+
+    phases: dict[str, PhaseSection] = Field(description="phase of each physical group of volumes")
+
+    @property
+    def constants(self) -> dict[str, FuzzyNumber]:
+        """Young's moduli by input, as steel_modulus; "scale" = 1 where no phase is isotropic."""
+        moduli = {
+            f"{name}_modulus": phase.modulus
+            for name, phase in self.phases.items()
+            if isinstance(phase.modulus, FuzzyNumber)
+        }
+        return moduli or {"scale": Crisp(1.0)}  # a campaign needs an input
+
+    @property
+    def losses(self) -> tuple[tuple[FuzzyNumber, FuzzyNumber | None], ...]:
+        """Loss factor of each phase, whose bulk modulus has the same; empty for none."""
+        losses = (phase.loss for phase in self.phases.values())
+        return tuple((loss, None) for loss in losses if loss is not None)
+
+    @model_validator(mode="after")
+    def _check_losses(self) -> Self:
+        """Refuses losses of some phases alone."""
+        missing = [name for name, phase in self.phases.items() if phase.loss is None]
+        complete = len(missing) in (0, len(self.phases))
+        key = f"cell.phases.{missing[0]}.loss" if missing else ""
+        require(complete, key, value=None, allowed="a loss factor of each phase, 0 for none")
+        return self
+
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """Models that can solve it."""
+        return "auto", "prism"
+
+    @property
+    def particles(self) -> str:
+        """Kind of its particles, in results."""
+        return "mesh"
+
+    @property
+    def is_fibre(self) -> bool:
+        """False: constants along fibres need one round particle."""
+        return False
+
+    @property
+    def has_series(self) -> bool:
+        """False: a file may hold any phases."""
+        return False
+
+
 Thickness = Annotated[FuzzyNumber, Quantity(least=THINNEST, below=1, fuzzy=True)]
-Theta = Annotated[float, Quantity(least=-10, most=10)]
+
 ELLIPSES = re.compile(r"^ellipses\(([^,]*),([^,]*)\)$")
+
 SHAPES = (
     'cylinders, spheres or ellipses(ratio of axes from 1/4 to 4, degrees), as "ellipses(2, 30)"'
 )
-
-
-class ThetaSection(Section):
-    """Law of θ alone, where a mesh from a file has the geometry."""
-
-    theta: Annotated[tuple[Theta, Theta], after(rising)] = Field(
-        default=(-3.0, 3.0), description="support of θ"
-    )
-
-    @property
-    def law(self) -> TruncatedNormal:
-        """Law of θ, a normal one cut off at both ends."""
-        return TruncatedNormal(*self.theta)
-
-
-class RadiusMapSection(ThetaSection):
-    """Random radius of the particle over half the cell's side, as a map of θ (eq. 12)."""
-
-    a1: Radius = Field(description="radius at the lower end of θ")
-    a3: Radius = Field(description="radius at the upper end of θ")
-    a2: Number = Field(description="slope dr/dξ at the lower end")
-    a4: Number = Field(description="slope dr/dξ at the upper end")
-
-    @property
-    def numbers(self) -> dict[str, FuzzyNumber]:
-        """Parameters of the map by name: the factors a1 … a4 of the functions of eq. 12."""
-        return {"a1": self.a1, "a2": self.a2, "a3": self.a3, "a4": self.a4}
-
-    def at(self, values: Mapping[str, float]) -> HermiteMap:
-        """The map at crisp values of its parameters."""
-        a1, a2, a3, a4 = (values[name] for name in self.numbers)
-        return HermiteMap(a1, a2, a3, a4, self.law)
-
-    @property
-    def largest_radius(self) -> float:
-        """Largest radius at the corners of the supports."""
-        corners = itertools.product(*(x.support for x in self.numbers.values()))
-        maps = (self.at(dict(zip(self.numbers, corner, strict=True))) for corner in corners)
-        return max(radius.extremes()[1] for radius in maps)
-
-    @model_validator(mode="after")
-    def _check_range(self) -> Self:
-        """Refuses supports of a1 … a4 for which the radius leaves (0, 1) at some θ."""
-        # corners of the supports suffice, as the map is linear in a1 … a4
-        for corner in itertools.product(*({*x.support} for x in self.numbers.values())):
-            values = dict(zip(self.numbers, corner, strict=True))
-            try:
-                self.at(values)  # refuses such a map
-            except RefusedError as error:
-                raise RefusedError("radius", values, error.allowed, error.cure) from None
-        return self
 
 
 def _outline(particles: str) -> Ellipse | None:
@@ -336,14 +360,13 @@ def _cell_kind(table: Mapping[str, object]) -> str:
     return "<mesh>" if "phases" in table else "<round>"
 
 
-AnyRadius = RadiusMapSection | FractionMap
-"""The random radius of a case, of [radius] or of cell.fraction."""
 Cell = Annotated[
     Annotated[RoundCell, Tag("<round>")]
     | Annotated[ImageCell, Tag("<image>")]
     | Annotated[MeshedCell, Tag("<mesh>")],
     Discriminator(_cell_kind),
 ]
+
 AnyLaw = Annotated[
     Annotated[RadiusMapSection, Tag("<map>")] | Annotated[ThetaSection, Tag("<law>")],
     Discriminator(lambda table: "<law>" if set(table) <= {"theta"} else "<map>"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import cached_property
 from typing import Annotated, Self
 
 import numpy as np
@@ -97,6 +98,11 @@ class MatricesSection(Section):
         default=None, description="file of the ground's acceleration; motion is relative to it"
     )
     outputs: dict[str, ObservedRow] = Field(description="observed quantities by name")
+
+    @cached_property
+    def nominal(self) -> Structure:
+        """The structure with stand-ins for what is yet to be computed; built once."""
+        return self.structure()
 
     def structure(
         self, modulus: FuzzyNumber | None = None, loss: FuzzyNumber | None = None
@@ -201,7 +207,7 @@ class MatricesSection(Section):
         require(bool(self.outputs), "matrices.outputs", value=None, allowed="one output or more")
         if self.accelerogram is not None or self.direction:
             self.require_pattern()
-        self.structure()  # refuses matrices that do not fit together
+        _ = self.nominal  # refuses matrices that do not fit together
         return self
 
     def require_pattern(self) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, PlainValidator, ValidationInfo, model_validator
@@ -156,6 +157,17 @@ class Structure:
         for name in names:
             require_choice(key, name, self.outputs)
 
+    def require_quantities(self, key: str, names: Sequence[str]) -> None:
+        """Refuses outputs that the model cannot have, though it need not observe them."""
+        if self.frame is None:
+            self.require_outputs(key, names)
+            return
+        try:
+            for name in names:
+                self.frame.quantity(name)
+        except RefusedError as error:
+            raise RefusedError(key, error.value, error.allowed) from None
+
     @property
     def linear(self) -> StoreyFrame | MatrixStructure | None:
         """The model if it is linear, else None."""
@@ -169,19 +181,16 @@ class Structure:
         Raises:
             RefusedError: The model lacks one of the outputs; the message names the case's `key`.
         """
-        if self.frame is None:
-            self.require_outputs(key, outputs)
-            if isinstance(self.model, MatrixStructure):
-                observed: dict[str, Array] = {
-                    x: self.model.observed[x] for x in self.model.outputs if x in outputs
-                }
-                factors = {x: f for x, f in self.model.row_factors.items() if x in outputs}
-                return replace(self.model, observed=observed, row_factors=factors)
-            return self.model
-        try:
-            return replace(self.frame, outputs=outputs)
-        except RefusedError as error:
-            raise RefusedError(key, error.value, error.allowed) from None
+        self.require_quantities(key, outputs)
+        if isinstance(self.model, StoreyFrame):
+            return replace(self.model, outputs=outputs)
+        if isinstance(self.model, MatrixStructure):
+            observed: dict[str, Array] = {
+                x: self.model.observed[x] for x in self.model.outputs if x in outputs
+            }
+            factors = {x: f for x, f in self.model.row_factors.items() if x in outputs}
+            return replace(self.model, observed=observed, row_factors=factors)
+        return self.model
 
     def flow(
         self, names: Sequence[str], duration: float, step: float, integrator: str | None = None
@@ -282,6 +291,11 @@ class Frame(Section):
         per_storey = values or ()
         return per_storey * self.floors if len(per_storey) == 1 else per_storey
 
+    @cached_property
+    def nominal(self) -> Structure:
+        """The frame with stand-ins for what is yet to be computed; built once."""
+        return self.structure()
+
     def structure(
         self, modulus: FuzzyNumber | None = None, loss: FuzzyNumber | None = None
     ) -> Structure:
@@ -363,7 +377,7 @@ class Frame(Section):
         is_damped = any(map(self.has_key, DAMPING))
         allowed = " or ".join(DAMPING)
         require(is_damped, "frame.dampers", value=None, allowed=allowed, cure='"0 %" for none')
-        self.structure()  # refuses values that make no frame
+        _ = self.nominal  # refuses values that make no frame
         return self
 
 
@@ -376,6 +390,11 @@ class Pendulum(Section):
     gravity: Acceleration = Field(description="acceleration of gravity")
     angle: Angle = Field(description="angle at the start, 0 hanging down")
     angular_velocity: Spin = Field(description="angular velocity at the start")
+
+    @cached_property
+    def nominal(self) -> Structure:
+        """The pendulum, built once."""
+        return self.structure()
 
     def structure(
         self, modulus: FuzzyNumber | None = None, loss: FuzzyNumber | None = None

@@ -8,8 +8,8 @@ from math import pi
 from typing import TextIO
 
 from alphacut.case.content import Content
-from alphacut.case.keys import quantity_of
-from alphacut.case.records import RecordsSection
+from alphacut.case.load import quantity_of
+from alphacut.case.loads import RecordsSection
 from alphacut.case.structure import Structure
 from alphacut.case.types import Section
 from alphacut.commands.options import Command, add_common, read_case, write_answer
@@ -75,20 +75,17 @@ def nominal_structure(content: Content) -> StoreyFrame | MatrixStructure | None:
 
     A modulus to be computed is taken from the series; None also where that does not fit the cell.
     """
-    if "envelope" not in content.stages or content.structure_section is None:
+    if "envelope" not in content.stages or content.structure is None:
         return None
-    if content.frame is None:
-        return content.structure_of().linear
-    number = None
-    if not content.frame.has_stated_modulus:
-        if content.particle_cell is None or not content.particle_cell.has_series:
-            return None
-        if content.radius_map is None and content.particle_cell.fraction is None:
-            return None
-        section = content.modulus.model_copy(update={"method": "auto", "tolerance": 1e-4})
-        model = model_of(content.particle_cell, content.mesh, section)
-        number = Crisp(solve(*content.radius_and_phases, model).modulus)
-    return content.structure_of(number).frame
+    if content.frame is None or content.frame.has_stated_modulus:
+        return content.structure.linear
+    if content.particle_cell is None or not content.particle_cell.has_series:
+        return None
+    if content.radius_map is None and content.particle_cell.fraction is None:
+        return None
+    section = content.modulus.model_copy(update={"method": "auto", "tolerance": 1e-4})
+    model = model_of(content.particle_cell, content.mesh, section)
+    return content.structure_of(Crisp(solve(*content.radius_and_phases, model).modulus)).linear
 
 
 def rows_of(prefix: str, section: Section) -> Iterator[Row]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from alphacut.case.material import RadiusMapSection
+from alphacut.case.radius import RadiusMapSection
 from alphacut.case.structure import Frame
 from alphacut.figures import style
 from alphacut.fuzzy.arrays import Array

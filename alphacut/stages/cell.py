@@ -8,8 +8,8 @@ from typing import Any, cast
 
 import numpy as np
 
-from alphacut.case.material import AnyRadius, Mesh, ModulusSection, RoundCell, ThetaSection
-from alphacut.case.meshed import MeshedCell
+from alphacut.case.material import Mesh, MeshedCell, ModulusSection, RoundCell
+from alphacut.case.radius import AnyRadius, ThetaSection
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import FailedError, RefusedError

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from alphacut.case.material import Mesh, ThetaSection
-from alphacut.case.meshed import MeshedCell
+from alphacut.case.material import Mesh, MeshedCell
+from alphacut.case.radius import ThetaSection
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.problem import missing
 from alphacut.rve.cell import Phase, VoigtPhase

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from alphacut.case.material import RadiusMapSection
-from alphacut.case.particles import MicrostructureSection
+from alphacut.case.radius import MicrostructureSection, RadiusMapSection
 from alphacut.fuzzy.campaign.workers import pool
 from alphacut.io.columns import columns_text
 from alphacut.io.files import Document, write_text

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from alphacut.case.material import AnyRadius, Mesh, ModulusSection, ThetaSection
-from alphacut.case.meshed import MeshedCell
+from alphacut.case.material import Mesh, MeshedCell, ModulusSection
+from alphacut.case.radius import AnyRadius, ThetaSection
 from alphacut.fuzzy import (
     Crisp,
     Extended,

@@ -10,8 +10,8 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from alphacut.case.content import Content
-from alphacut.case.records import RecordsSection
-from alphacut.case.structure import MaterialDamping, Structure
+from alphacut.case.loads import RecordsSection
+from alphacut.case.structure import Structure
 from alphacut.frame.questions.peaks import Peaks
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io.files import as_json, say
@@ -108,8 +108,7 @@ class Pipeline:
         has_modulus = young is not None or content.has_stated_modulus
         allowed = "a modulus, or --modulus FILE.nc"
         require(has_modulus, "frame.modulus", value=None, allowed=allowed)
-        by_material = isinstance(getattr(section, "damping_ratio", None), MaterialDamping)
-        has_damping = loss is not None or not by_material
+        has_damping = loss is not None or not content.has_material_damping
         allowed = "loss factors of the cell, or a number"
         require(has_damping, "frame.damping_ratio", value="material", allowed=allowed)
         return content.structure_of(young, loss)

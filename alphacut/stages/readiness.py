@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 from alphacut import frame
 from alphacut.case.content import Content
-from alphacut.case.structure import LOSS_STAND_IN, STAND_IN, Structure
+from alphacut.case.structure import Structure
 from alphacut.fuzzy import Crisp, FuzzyNumber, Triangular
 from alphacut.questions.all import questions_of
 from alphacut.questions.question import FuzzyResponse
@@ -52,10 +54,9 @@ def campaign_of(content: Content, petsc: Mapping[str, str] | None = None) -> Cel
 
 def _require_motion(content: Content) -> None:
     """Requires that identification, each study's envelope and each question can be computed."""
-    if content.structure_section is None or content.envelope is None:
+    if content.structure is None or content.envelope is None:
         return
-    modulus, alpha = _stand_in_modulus(content), content.envelope.alpha
-    structure = content.structure_of(modulus, _stand_in_loss(content, modulus))
+    alpha, structure = content.envelope.alpha, _with_stand_ins(content, content.structure)
     if content.identify is not None:
         identify.require_learnable(content.identify, structure, alpha)
     if content.records is not None:
@@ -71,26 +72,29 @@ def _require_motion(content: Content) -> None:
         question.require_answerable(response)
 
 
-def _stand_in_modulus(content: Content) -> FuzzyNumber | None:
-    """Young's modulus that stands in for the one of stage modulus, fuzzy where that will be."""
+def _with_stand_ins(content: Content, structure: Structure) -> Structure:
+    """The structure with numbers as fuzzy as those that stage modulus will compute."""
     if "modulus" not in content.stages:
-        return None
-    value = STAND_IN.modal
+        return structure
+    numbers, is_crisp = dict(structure.numbers), content.modulus.alpha == (1.0,)
     is_fuzzy = content.image_cell is not None or "microstructure" in content.stages
     if not is_fuzzy:
         inputs = campaign_of(content).inputs.values()
         is_fuzzy = any(number.support.width > 0 for number in inputs)
-    crisp = content.modulus.alpha == (1.0,) or not is_fuzzy
-    return Crisp(value) if crisp else Triangular(0.99 * value, value, 1.01 * value)
-
-
-def _stand_in_loss(content: Content, modulus: FuzzyNumber | None) -> FuzzyNumber:
-    """Loss factor that stands in for the one of stage modulus, fuzzy where that will be."""
+    if "E" in numbers:
+        numbers["E"] = _stand_in(numbers["E"], 0.01 if is_fuzzy and not is_crisp else 0.0)
     losses = [x for pair in content.cell.losses for x in pair if x] if content.cell else []
-    widths = [x.support.width for x in (*losses, modulus) if x is not None]
-    value = LOSS_STAND_IN.modal
-    is_fuzzy = any(widths) and content.modulus.alpha != (1.0,)
-    return Triangular(0.9 * value, value, 1.1 * value) if is_fuzzy else LOSS_STAND_IN
+    is_fuzzy = is_fuzzy or any(x.support.width > 0 for x in losses)
+    if content.has_material_damping and is_fuzzy and not is_crisp:
+        ratios = {name for name in numbers if re.fullmatch(r"zeta\d*", name)}
+        numbers |= {name: _stand_in(numbers[name], 0.1) for name in ratios}
+    return replace(structure, numbers=numbers)
+
+
+def _stand_in(number: FuzzyNumber, share: float) -> FuzzyNumber:
+    """A number with the same modal value, fuzzy by a share of it."""
+    modal = number.modal
+    return Triangular((1 - share) * modal, modal, (1 + share) * modal) if share else Crisp(modal)
 
 
 def cut_record_warnings(content: Content, structure: Structure) -> Iterator[str]:

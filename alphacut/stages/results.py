@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from alphacut.case.content import Content
-from alphacut.case.structure import MaterialDamping, Structure
+from alphacut.case.structure import Structure
 from alphacut.frame import StoreyFrame
 from alphacut.frame.structures.linear import frequencies
 from alphacut.io.files import Document
@@ -75,8 +75,7 @@ class Results:
         if self.structure is not None and self.structure.frame is not None:
             numbers["structure"] = frame_properties(self.structure, self.structure.frame)
         tasks = {task.name: task for task in self.tasks}
-        ratio = getattr(self.content.structure_section, "damping_ratio", None)
-        if self.structure is not None and isinstance(ratio, MaterialDamping):
+        if self.structure is not None and self.content.has_material_damping:
             numbers["damping"] = {
                 name: (number.support.lower, number.modal, number.support.upper)
                 for name, number in self.structure.numbers.items()

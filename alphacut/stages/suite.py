@@ -9,8 +9,8 @@ from math import ceil, pi
 
 import numpy as np
 
+from alphacut.case.loads import NamedRecording, RecordsSection
 from alphacut.case.motion import EnvelopeSection
-from alphacut.case.records import NamedRecording, RecordsSection
 from alphacut.case.structure import Structure
 from alphacut.frame import Accelerogram
 from alphacut.frame.questions.peaks import Peaks, joined, output_of

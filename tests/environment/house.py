@@ -64,7 +64,7 @@ def written_docs() -> list[Path]:
 
 def interface() -> dict[str, int]:
     """Counts of the commands, their options, and the keys of a case."""
-    from alphacut.case.keys import every_key
+    from alphacut.case.load import every_key
     from alphacut.entry import COMMANDS, parsers
 
     each = parsers("alphacut", COMMANDS)[1]

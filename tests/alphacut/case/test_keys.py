@@ -7,7 +7,7 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from alphacut.case.keys import allowed, every_key, json_schema, sections
+from alphacut.case.load import allowed, every_key, json_schema, sections
 
 ROOT = Path(__file__).parents[3]
 CASES = sorted((ROOT / "cases").glob("*.toml"))
@@ -21,7 +21,7 @@ def test_each_key_says_what_it_is():
 
 def test_the_schema_is_that_of_the_models():
     text = (ROOT / "cases/case.schema.json").read_text(encoding="utf-8")
-    assert text == SCHEMA, "python -m alphacut.case.keys > cases/case.schema.json"
+    assert text == SCHEMA, "python -m alphacut.case.load > cases/case.schema.json"
 
 
 @pytest.mark.parametrize("path", CASES, ids=lambda path: path.stem)

@@ -1,20 +1,119 @@
-"""Sections on particles: packed at random, measured, or seen on a photograph."""
+"""Sections on the random radius: its map, a fraction, or particles packed, measured or seen."""
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from alphacut.case.types import CaseFile, Fraction, Length, Quantity, Section, after, rising
-from alphacut.fuzzy.refused import require
+from alphacut.case.types import (
+    CaseFile,
+    Fraction,
+    Length,
+    Quantity,
+    Section,
+    after,
+    rising,
+)
+from alphacut.fuzzy import FuzzyNumber
+from alphacut.fuzzy.refused import RefusedError, require
+from alphacut.stochastic import HermiteMap, TruncatedNormal
 from alphacut.stochastic.microstructure import MicrostructureStudy
 from alphacut.stochastic.particles.circles_csv import CircleFile
 from alphacut.stochastic.particles.image import SectionImage
 from alphacut.stochastic.particles.packing import Packing
-from alphacut.stochastic.particles.particles import DISCS, SPHERES
+from alphacut.stochastic.particles.particles import DISCS, SPHERES, Shape
 from alphacut.stochastic.particles.radius_laws import LogNormalRadii, MeasuredRadii, RadiusLaw
 from alphacut.stochastic.sections import Simulated
+
+Radius = Annotated[FuzzyNumber, Quantity(above=0, below=1, fuzzy=True)]
+
+Number = Annotated[FuzzyNumber, Quantity(fuzzy=True)]
+
+Theta = Annotated[float, Quantity(least=-10, most=10)]
+
+
+class ThetaSection(Section):
+    """Law of θ alone, where a mesh from a file has the geometry."""
+
+    theta: Annotated[tuple[Theta, Theta], after(rising)] = Field(
+        default=(-3.0, 3.0), description="support of θ"
+    )
+
+    @property
+    def law(self) -> TruncatedNormal:
+        """Law of θ, a normal one cut off at both ends."""
+        return TruncatedNormal(*self.theta)
+
+
+class RadiusMapSection(ThetaSection):
+    """Random radius of the particle over half the cell's side, as a map of θ (eq. 12)."""
+
+    a1: Radius = Field(description="radius at the lower end of θ")
+    a3: Radius = Field(description="radius at the upper end of θ")
+    a2: Number = Field(description="slope dr/dξ at the lower end")
+    a4: Number = Field(description="slope dr/dξ at the upper end")
+
+    @property
+    def numbers(self) -> dict[str, FuzzyNumber]:
+        """Parameters of the map by name: the factors a1 … a4 of the functions of eq. 12."""
+        return {"a1": self.a1, "a2": self.a2, "a3": self.a3, "a4": self.a4}
+
+    def at(self, values: Mapping[str, float]) -> HermiteMap:
+        """The map at crisp values of its parameters."""
+        a1, a2, a3, a4 = (values[name] for name in self.numbers)
+        return HermiteMap(a1, a2, a3, a4, self.law)
+
+    @property
+    def largest_radius(self) -> float:
+        """Largest radius at the corners of the supports."""
+        corners = itertools.product(*(x.support for x in self.numbers.values()))
+        maps = (self.at(dict(zip(self.numbers, corner, strict=True))) for corner in corners)
+        return max(radius.extremes()[1] for radius in maps)
+
+    @model_validator(mode="after")
+    def _check_range(self) -> Self:
+        """Refuses supports of a1 … a4 for which the radius leaves (0, 1) at some θ."""
+        # corners of the supports suffice, as the map is linear in a1 … a4
+        for corner in itertools.product(*({*x.support} for x in self.numbers.values())):
+            values = dict(zip(self.numbers, corner, strict=True))
+            try:
+                self.at(values)  # refuses such a map
+            except RefusedError as error:
+                raise RefusedError("radius", values, error.allowed, error.cure) from None
+        return self
+
+
+@dataclass(frozen=True)
+class FractionMap:
+    """Radius map of particles that take the same `fraction` of the cell at all θ."""
+
+    fraction: FuzzyNumber
+    shape: Shape
+    theta: tuple[float, float] = (-3.0, 3.0)
+
+    @property
+    def numbers(self) -> dict[str, FuzzyNumber]:
+        """Parameters of the map by name."""
+        return {"fraction": self.fraction}
+
+    @property
+    def law(self) -> TruncatedNormal:
+        """Law of θ, a normal one cut off at both ends."""
+        return TruncatedNormal(*self.theta)
+
+    @property
+    def largest_radius(self) -> float:
+        """Largest radius of the support."""
+        return float(self.shape.reduced_radius(self.fraction.support.upper))
+
+    def at(self, values: Mapping[str, float]) -> HermiteMap:
+        """The map at a crisp fraction."""
+        radius = self.shape.reduced_radius(values["fraction"])
+        return HermiteMap(radius, 0.0, radius, 0.0, self.law)
 
 
 class PackingSection(Section):
@@ -114,3 +213,7 @@ class MicrostructureSection(Section):
     def study(self, *, spheres: bool) -> MicrostructureStudy:
         """The study that computes the radius map from these particles, or from packed spheres."""
         return MicrostructureStudy(self.sources[0].source(spheres), self.limits, self.seed)
+
+
+AnyRadius = RadiusMapSection | FractionMap
+"""The random radius of a case, of [radius] or of cell.fraction."""
