@@ -1,11 +1,17 @@
-"""What a proof of bounds over a box of inputs is asked for, and what it answers."""
+"""What a proof of bounds over a box of inputs is asked for, what it answers, and their store."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+import hashlib
+import json
+import os
+import tempfile
+import zipfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
-from typing import ClassVar, Protocol
+from pathlib import Path
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
@@ -14,23 +20,22 @@ from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.structures.modes import ModalError
 from alphacut.fuzzy.arrays import Array, Mask
-from alphacut.fuzzy.progress_bar import Progress
 from alphacut.fuzzy.result import Ends
 
 
 @dataclass(frozen=True, eq=False)
 class Goal:
-    """Requested accuracy and known bounds of a part of the box, on its L levels.
+    """Bounds that a proof is asked for over a box of L levels, and what is known there.
 
     Args:
         scale: Units of the tolerances of each output, shape (m,).
         peak: Peak of each output at the nominal inputs and the probes, shape (m,).
         needed: Bounds of (−output, output) that are asked for, shape (L, T, m, 2).
-        outer: Bounds that are known, the same shape; infinite where none is.
-        incumbent: Largest attained value of (−output, output), shape (L, m, 2).
-        workers: Threads.
-        last: Whether the part is not bisected any more, so that wide bounds are better than none.
-        tick: Called with the completed fraction of the part.
+        outer: Upper bounds that are known, the same shape; infinite where none is.
+        incumbent: Largest reached values of (−output, output), shape (L, m, 2).
+        workers: Number of threads.
+        last: Whether a refusal ends the proof, so that wide bounds are better than none.
+        tick: Called with the completed fraction.
     """
 
     scale: Array
@@ -40,28 +45,28 @@ class Goal:
     incumbent: Array
     workers: int
     last: bool
-    tick: Progress
+    tick: Callable[[float], None]
 
 
 @dataclass(frozen=True, eq=False)
-class PartBounds:
-    """Upper bounds of (−output, output) over one level of a part of the box, n inputs.
+class BoxBounds:
+    """Bounds of (−output, output) over one level of a box of n inputs.
 
     Args:
-        outer: Proved, shape (T, m, 2).
-        inner: Attained, less rounding; −inf where nothing is.
-        at: Inputs that attain `inner`, shape (T, m, 2, n), in SI units.
+        outer: Proved upper bounds, shape (T, m, 2); at nodes not asked for any valid bound.
+        inner: Values that motions reach, less rounding; −inf where none is known.
+        at: Inputs of these motions, shape (T, m, 2, n), in SI units.
         between: Largest deviation of an output from a straight line in the step before each node,
             shape (T, m).
         shares: Fraction of each input in the gap at each peak, shape (m, 2, n).
         attained_error: What the exact motion at `at` may exceed `inner` by, shape (T, m); None for
             rounding alone.
         remaining: Lower and upper ends of the box that may contain each peak, shape (2, m, 2, n),
-            in SI units; None for all of the part.
-        pruned: Upper bounds over the remainder of the part, for the nodes asked for; None if
-            nothing was pruned.
-        least_peaks: Lower bound of each output's smallest peak, and one that some motion does not
-            exceed, between nodes too, shapes (m,); None where not all nodes are bounded.
+            in SI units; None for all of the box.
+        pruned: Upper bounds over the rest of the box for each peak, shape (T, m, 2); None if all of
+            the box remains.
+        least_peaks: Lower bound of each output's least peak over time, and the peak of a motion
+            that peaks low, between nodes too, (m,) each; None for what the bounds at nodes say.
         facts: Further numbers by name.
     """
 
@@ -81,6 +86,43 @@ class BisectionError(UnprovedError):
     """Bounds are not proved, and bisections would not help enough."""
 
 
+Answer = BoxBounds | UnprovedError
+TEXTS = ("facts", "what", "cure", "along")
+"""Fields of answers that are stored as text: of bounds, and those of a refusal."""
+
+
+class BoxProof(Protocol):
+    """A proof of bounds over any box of the inputs."""
+
+    name: ClassVar[str]
+
+    @property
+    def parts(self) -> int:
+        """Most boxes that a peak of an output is worth, and that may be refused."""
+
+    @property
+    def workers(self) -> int | None:
+        """Threads; all cores unless given."""
+
+    def forecast(self, flow: LinearFlow, boxes: Boxes) -> float:
+        """Return the expected work on the box, in evaluations of a mode's motion at a node.
+
+        Raises:
+            UnprovedError: No part of the box can be proved.
+        """
+
+    def peak_gap(self, scale: Array, peak: Array) -> Array:
+        """Return the wanted gap of the outputs' peaks, shape (m,), in their units; see `Goal`."""
+
+    def bounds(self, flow: LinearFlow, boxes: Boxes, goal: Goal) -> Sequence[Answer]:
+        """Return bounds on each level of a box, or the refusal of that level.
+
+        Raises:
+            UnprovedError: All levels are refused.
+            ModalError: The structure has no smooth oscillating modes over the box.
+        """
+
+
 @contextmanager
 def refusing() -> Iterator[None]:
     """Context manager that turns errors of modes and matrices into a proof's refusal.
@@ -97,35 +139,62 @@ def refusing() -> Iterator[None]:
         raise UnprovedError(what, "take improved-graph-follower") from None
 
 
-class BoxProof(Protocol):
-    """A proof of bounds over any box of the inputs."""
+@dataclass(frozen=True)
+class BoxStore:
+    """Answers in a folder, from which a proof that was killed goes on.
 
-    name: ClassVar[str]
+    A file is named by all that the answers follow from: the problem, the box and the goal.
 
-    @property
-    def parts(self) -> int:
-        """Most parts that a box, or a peak of an output, is worth."""
+    Args:
+        folder: Where the files are; made if it does not exist.
+        problem: Fingerprint of the proof and the structure.
+    """
 
-    @property
-    def workers(self) -> int | None:
-        """Threads; all cores unless given."""
+    folder: Path
+    problem: bytes
 
-    def forecast(self, flow: LinearFlow, boxes: Boxes) -> float:
-        """Return the expected work on the box, in evaluations of a mode's motion at a node.
+    def path(self, boxes: Boxes, goal: Goal) -> Path:
+        """Return the file of the answers."""
+        digest = hashlib.sha256(self.problem)
+        goal_arrays = goal.needed, goal.outer, goal.incumbent, np.array(goal.last)
+        for array in (boxes.alpha, boxes.lower, boxes.upper, *goal_arrays):
+            digest.update(np.ascontiguousarray(array).tobytes())
+        return self.folder / f"part-{digest.hexdigest()[:32]}.npz"
 
-        Raises:
-            UnprovedError: No part of the box can be proved.
-        """
+    def read(self, path: Path) -> list[Answer] | None:
+        """Return the stored answers of all levels, or None if there is no readable file."""
+        if path.is_symlink() or not path.is_file():  # a link may be anybody's
+            return None
+        try:
+            with np.load(path, allow_pickle=False) as arrays:
+                return [_answer(arrays, f"{k}.") for k in range(int(arrays["levels"]))]
+        except (OSError, EOFError, KeyError, TypeError, ValueError, zipfile.BadZipFile):
+            return None
 
-    def peak_gap(self, scale: Array, peak: Array) -> Array:
-        """Return the wanted gap of the outputs' peaks, shape (m,), in their units; see `Goal`."""
+    def write(self, path: Path, answers: Sequence[Answer]) -> None:
+        """Write answers to a file, completely or not at all; without room nothing is written."""
+        arrays: dict[str, Array] = {"levels": np.array(len(answers))}
+        for k, answer in enumerate(answers):
+            values = dict(vars(answer))
+            texts = {key: values.pop(key) for key in TEXTS if key in values}
+            arrays[f"{k}.texts"] = np.array(json.dumps(texts))
+            arrays |= {f"{k}.{name}": np.asarray(x) for name, x in values.items() if x is not None}
+        with suppress(OSError):
+            self.folder.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryDirectory(dir=self.folder) as folder:
+                partial = Path(folder) / path.name
+                np.savez(partial, **arrays)  # type: ignore[arg-type]
+                os.replace(partial, path)
 
-    def bounds(
-        self, flow: LinearFlow, boxes: Boxes, goal: Goal
-    ) -> Sequence[PartBounds | UnprovedError]:
-        """Return bounds on each level of a part of the box, or the refusal of that level.
 
-        Raises:
-            UnprovedError: All levels are refused.
-            ModalError: The structure has no smooth oscillating modes over the part.
-        """
+def _answer(arrays: np.lib.npyio.NpzFile, prefix: str) -> Answer:
+    """The answer whose fields' names in a file begin with `prefix`."""
+    values: dict[str, Any] = {
+        name.removeprefix(prefix): arrays[name] for name in arrays if name.startswith(prefix)
+    }
+    texts = json.loads(str(values.pop("texts")))
+    if "what" in texts:
+        return UnprovedError(**texts)
+    if "least_peaks" in values:
+        values["least_peaks"] = Ends(*values["least_peaks"])
+    return BoxBounds(**values, **texts)

@@ -19,7 +19,6 @@ from typing import ClassVar
 import numpy as np
 
 from alphacut.frame.bounds.box_proof import refusing
-from alphacut.frame.bounds.parts import WIDE
 from alphacut.frame.bounds.remainder import MOST_PARAMETERS
 from alphacut.frame.boxes import DEFAULT_TOLERANCE, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError
@@ -29,6 +28,7 @@ from alphacut.frame.methods.dual import DualProof
 from alphacut.frame.methods.improved_follower import ImprovedFollower
 from alphacut.frame.methods.proof import Proof
 from alphacut.frame.methods.search import Search
+from alphacut.frame.numbers import WIDE
 from alphacut.frame.structures.modes import ModalError
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.progress_bar import Progress

@@ -14,7 +14,7 @@ found. The cost is one of modes, tables and nodes, and hardly one of inputs (`du
    not boxes of many u. Near the peaks, that is; elsewhere a wider gap is left.
 4. What the maxima name leads to inputs whose exact motion is the other end of the gap (`box`).
 5. The few nodes whose bounds are still too far above a peak are bounded over parts of the box
-   (`alphacut.frame.bounds.parts`), after its ends are pruned (`pruning`).
+   (`alphacut.frame.bounds.spatial_branch_and_bound`), after its ends are pruned (`pruning`).
 6. The same bounds, over ranges of the leading mode, tell how low a peak can be (`least_peaks`).
 """
 
@@ -29,15 +29,16 @@ from typing import ClassVar
 import numpy as np
 
 from alphacut.frame.bounds.box import Box
-from alphacut.frame.bounds.box_proof import Goal, PartBounds
+from alphacut.frame.bounds.box_proof import BoxBounds, Goal
 from alphacut.frame.bounds.least_peaks import least_peak
 from alphacut.frame.bounds.level import OutputBounds
-from alphacut.frame.bounds.parts import WIDE, halvings, prove
 from alphacut.frame.bounds.pruning import prune_ends, remainder
+from alphacut.frame.bounds.spatial_branch_and_bound import halvings, prove
 from alphacut.frame.boxes import Boxes, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.envelope import Ends, Envelope
+from alphacut.frame.numbers import WIDE
 from alphacut.frame.structures.linear import frequencies
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.progress_bar import Progress
@@ -131,11 +132,9 @@ class DualProof:
             )
         return float(self.slabs * self.steps)
 
-    def bounds(
-        self, flow: LinearFlow, boxes: Boxes, goal: Goal
-    ) -> list[PartBounds | UnprovedError]:
+    def bounds(self, flow: LinearFlow, boxes: Boxes, goal: Goal) -> list[BoxBounds | UnprovedError]:
         """Bounds on each level of a part, or the error of one whose modes are not enclosed."""
-        found: list[PartBounds | UnprovedError] = []
+        found: list[BoxBounds | UnprovedError] = []
         for k in range(len(boxes.alpha)):
             try:
                 found.append(self._of_level(flow, boxes, goal, k))
@@ -143,7 +142,7 @@ class DualProof:
                 found.append(refusal)
         return found
 
-    def _of_level(self, flow: LinearFlow, boxes: Boxes, goal: Goal, k: int) -> PartBounds:
+    def _of_level(self, flow: LinearFlow, boxes: Boxes, goal: Goal, k: int) -> BoxBounds:
         """Bounds on level k of a part; those of the exact motion where no input has a width."""
         low, high = boxes.lower[k], boxes.upper[k]
         box = Box(flow.system, boxes.names, flow.time, low, high)
@@ -151,7 +150,7 @@ class DualProof:
             return _Bounding(self, flow, box, goal, k).bounds()
         value, error, deviation = box.centre_motion()
         sides, margin = np.stack([-value, value], -1), error[..., None]
-        return PartBounds(
+        return BoxBounds(
             outer=sides + margin,
             inner=sides - margin,
             at=np.broadcast_to(low, (*sides.shape, len(low))).copy(),
@@ -188,7 +187,7 @@ class _Bounding:
         self.unit = np.zeros((*self.outer.shape, d))
         self.shares = np.zeros((*self.outer.shape[1:], d))
 
-    def bounds(self) -> PartBounds:
+    def bounds(self) -> BoxBounds:
         """Proved and attained bounds that are asked for, with the part pruned near peaks."""
         if self.needed.all():
             self._require_narrow()
@@ -221,7 +220,7 @@ class _Bounding:
         shares[..., active] = self.shares
         between = np.zeros(self.outer.shape[:2])
         between[self.nodes] = self.level.line_deviation() if self.needed.all() else 0.0
-        return PartBounds(
+        return BoxBounds(
             outer=self.outer,
             inner=inner,
             at=self.box.inputs(self.unit),

@@ -6,7 +6,7 @@
 2. What these polynomials miss in the equations of motion is bounded over the whole box, and with it
    the error of the motion (`frame.bounds.model_error`). The degree rises until that takes a
    fifth of the gap wanted. Where it does not, the part is refused and bisected
-   (`frame.bounds.parts`).
+   (`frame.bounds.spatial_branch_and_bound`).
 3. Branch and bound encloses the polynomials' extremes at all nodes, for all outputs, sides and
    levels, between a point that is attained and a bound that is proved (`frame.bounds`).
 """
@@ -18,11 +18,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from alphacut.frame.bounds.box_proof import BisectionError, Goal, PartBounds
+from alphacut.frame.bounds.box_proof import BisectionError, BoxBounds, Goal
 from alphacut.frame.bounds.certificate import certify
 from alphacut.frame.bounds.model_error import proved_error
-from alphacut.frame.bounds.parts import prove
 from alphacut.frame.bounds.remainder import MOST_PARAMETERS
+from alphacut.frame.bounds.spatial_branch_and_bound import prove
 from alphacut.frame.boxes import DEFAULT_TOLERANCE, Boxes, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import LinearFlow
@@ -126,7 +126,7 @@ class Proof:
         degrees(flow.system, dict(zip(boxes.names, ends, strict=True)))
         return float(BOXES_OF_INPUT**n_inputs)
 
-    def bounds(self, flow: LinearFlow, boxes: Boxes, goal: Goal) -> list[PartBounds]:
+    def bounds(self, flow: LinearFlow, boxes: Boxes, goal: Goal) -> list[BoxBounds]:
         """Return proved and attained bounds on each level of a part of the box.
 
         Raises:
@@ -152,7 +152,7 @@ class Proof:
         inputs = boxes.to_physical(proof.at)
         shares = np.broadcast_to(tail_shares(model), inputs.shape[2:])
         return [
-            PartBounds(
+            BoxBounds(
                 outer=outer,
                 inner=inner,
                 at=at,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from alphacut.frame import StoreyFrame, envelope
-from alphacut.frame.bounds import branch_and_bound, level, parts
+from alphacut.frame.bounds import branch_and_bound, level, spatial_branch_and_bound
 from alphacut.frame.bounds.dual_function import deflect, require_in_range
 from alphacut.frame.bounds.level import OutputBounds
 from alphacut.frame.calculus.unproved import UnprovedError
@@ -157,7 +157,7 @@ def test_the_order_in_which_threads_end_changes_no_bit(monkeypatch, case, method
     given = {"duration": 2.0, "step": 0.02, "alpha": (0, 0.5), "progress": False}
     usual = envelope(model, fuzzy, method=replace(method, workers=1), **given)
     monkeypatch.setattr(branch_and_bound, "PIECE", 100)
-    for module in (branch_and_bound, level, parts, dual):
+    for module in (branch_and_bound, level, spatial_branch_and_bound, dual):
         monkeypatch.setattr(module, "ThreadPoolExecutor", LastFirst)
     adverse = envelope(model, fuzzy, method=replace(method, workers=3), **given)
     for name in ("lower", "upper", "lower_at", "upper_at", "between"):

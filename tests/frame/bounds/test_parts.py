@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from alphacut.frame import Accelerogram, DualProof, MatrixStructure, Proof, StoreyFrame, envelope
-from alphacut.frame.bounds.box_proof import BisectionError, PartBounds
-from alphacut.frame.bounds.parts import prove
+from alphacut.frame.bounds.box_proof import BisectionError, BoxBounds
+from alphacut.frame.bounds.spatial_branch_and_bound import prove
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import LinearFlow
@@ -63,7 +63,7 @@ class Lipschitz:
             both = np.stack([-value, value], -1)
             at = np.broadcast_to(middle, (*both.shape, 3))
             shares = np.broadcast_to(each / max(each.sum(), 1e-300), (1, 2, 3))
-            found.append(PartBounds(both + slack, both, at, 0 * value, shares))
+            found.append(BoxBounds(both + slack, both, at, 0 * value, shares))
         return found
 
 
