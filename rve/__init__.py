@@ -9,9 +9,9 @@ Example:
 
 from typing import TYPE_CHECKING, Any
 
-from alphacut.rve.cell import LOADS, STRAIN, Cell, Interphase, Phase, VoigtPhase
-from alphacut.rve.outline import Ellipse
-from alphacut.rve.result import HomogenisedStiffness, StressCurve, effective_modulus
+from alphacut.rve.cell.cell import LOADS, STRAIN, Cell, Interphase, Phase, VoigtPhase
+from alphacut.rve.cell.outline import Ellipse
+from alphacut.rve.result.result import HomogenisedStiffness, StressCurve, effective_modulus
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.slices.model import SlicesModel
 

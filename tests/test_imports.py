@@ -191,7 +191,7 @@ def test_a_circle_and_a_backward_import_would_be_seen():
 
 def test_a_wrong_direction_would_be_seen():
     assert wrong_directions(
-        "fuzzy", "plan.py", ast.parse("def f():\n    from alphacut.rve.cell import Phase\n")
+        "fuzzy", "plan.py", ast.parse("def f():\n    from alphacut.rve.cell.cell import Phase\n")
     ) == {"rve"}
     assert wrong_directions("rve", "cell.py", ast.parse("import alphacut.entry")) == {"alphacut"}
     assert not wrong_directions("rve", "__main__.py", ast.parse("import alphacut.entry"))

@@ -32,7 +32,7 @@ from alphacut.case.structure import Frame, MaterialDamping, Pendulum, Structure
 from alphacut.case.types import NotEmpty, Section, after, distinct, require_alone
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.refused import RefusedError, require
-from alphacut.rve.outline import CLOSEST
+from alphacut.rve.cell.outline import CLOSEST
 
 Stage = Literal["microstructure", "modulus", "envelope"]
 

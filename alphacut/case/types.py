@@ -27,7 +27,7 @@ from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io import quantity
 from alphacut.io.quantity import QUANTITIES
-from alphacut.rve.cell import VoigtPhase
+from alphacut.rve.cell.cell import VoigtPhase
 
 
 class Section(BaseModel):

@@ -15,7 +15,7 @@ from alphacut.fuzzy.refused import FailedError, require
 from alphacut.io.files import Document, ranks
 from alphacut.report.results import ISOTROPIC, fibre_label
 from alphacut.report.tables import text_table
-from alphacut.rve.result import HomogenisedStiffness
+from alphacut.rve.result.result import HomogenisedStiffness
 from alphacut.stages import cell
 from alphacut.stages.meshed import modal_sample
 

@@ -21,8 +21,8 @@ from alphacut.io.files import Document
 from alphacut.io.netcdf import read_dataset
 from alphacut.report.results import ISOTROPIC, cut_text, fibre_label, width_text
 from alphacut.report.tables import run_text, tables, text_table
-from alphacut.rve.engineering_constants import FREE, PLANE_STRAIN
-from alphacut.rve.phase_energies import CONSTANTS
+from alphacut.rve.result.engineering_constants import FREE, PLANE_STRAIN
+from alphacut.rve.result.loss_factors import CONSTANTS
 from alphacut.stages.identify import identify_inputs
 from alphacut.stages.pipeline import Pipeline
 from alphacut.stages.results import Results

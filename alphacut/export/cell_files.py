@@ -12,7 +12,7 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.files import say, whole_file
 from alphacut.rve.mesh.file import write
-from alphacut.rve.mesh.wedge_orders import MESHIO_ORDER
+from alphacut.rve.mesh.gmsh_prisms import MESHIO_ORDER
 
 if TYPE_CHECKING:
     import meshio

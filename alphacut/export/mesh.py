@@ -19,8 +19,8 @@ from alphacut.case.material import Mesh
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.refused import FailedError
 from alphacut.io.files import say, whole_file
-from alphacut.rve.cell import Cell, thickness_of
-from alphacut.rve.mesh.wedge_orders import VTK_ORDER
+from alphacut.rve.cell.cell import Cell, thickness_of
+from alphacut.rve.mesh.gmsh_prisms import VTK_ORDER
 
 if TYPE_CHECKING:
     import meshio
@@ -57,7 +57,7 @@ def wedge_mesh(
 def prism_mesh(cell: Cell, size: float, layers: int) -> meshio.Mesh:
     """The mesh of prisms whose particle follows the radius map; `size` is in halves of the side."""
     from alphacut.rve.mesh.columns import extrude
-    from alphacut.rve.mesh.triangulation import RING_THICKNESS, reference_radius
+    from alphacut.rve.mesh.prism_grid import RING_THICKNESS, reference_radius
 
     thickness = thickness_of(cell.interphase)
     grid = extrude(

@@ -10,7 +10,7 @@ from alphacut.figures import style
 from alphacut.figures.style import BLUE, INK, ORANGE, PURPLE, Look
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array, Mask, Rows
-from alphacut.rve.cell import Cell
+from alphacut.rve.cell.cell import Cell
 from alphacut.stages.results import Results
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ def domains(cell: Cell, size: float, layers: int) -> Figure:
     import matplotlib.pyplot as plt
 
     from alphacut.rve.mesh.columns import extrude
-    from alphacut.rve.mesh.triangulation import reference_radius
+    from alphacut.rve.mesh.prism_grid import reference_radius
 
     radius = reference_radius(cell.radius, cell.outline)
     grid = extrude(size=size, radius=radius, layers=layers, outline=cell.outline)

@@ -16,17 +16,16 @@ from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.io.files import Document
 from alphacut.io.problem import missing
 from alphacut.io.provenance import versions
-from alphacut.rve import bounds
-from alphacut.rve.cell import STRAIN, Cell, Interphase, Phase
-from alphacut.rve.engineering_constants import NAMES, engineering_constants
-from alphacut.rve.fibre_constants import fibre_constants
-from alphacut.rve.outline import circle
-from alphacut.rve.result import HomogenisedStiffness, effective_modulus
+from alphacut.rve.cell.cell import STRAIN, Cell, Interphase, Phase
+from alphacut.rve.cell.outline import circle
+from alphacut.rve.result import bounds
+from alphacut.rve.result.engineering_constants import NAMES, engineering_constants
+from alphacut.rve.result.result import HomogenisedStiffness, effective_modulus
+from alphacut.rve.series.fibre_constants import fibre_constants
 from alphacut.rve.series.model import SeriesModel
-from alphacut.rve.spheres import space_bounds
-from alphacut.rve.spheres.cubic import hill_average
-from alphacut.rve.spheres.result import HomogenisedSpheres, volume_fraction
-from alphacut.rve.spheres.series.model import SphereSeriesModel
+from alphacut.rve.spheres import result as space_bounds
+from alphacut.rve.spheres.model import SphereSeriesModel
+from alphacut.rve.spheres.result import HomogenisedSpheres, hill_average, volume_fraction
 from alphacut.stages.meshed import MeshedSample, sample_at, solve_samples
 from alphacut.stochastic import gauss_rule
 

@@ -18,18 +18,17 @@ from alphacut.fuzzy.refused import require
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document
 from alphacut.io.provenance import file_digest
-from alphacut.rve.anisotropy import plane_constants
-from alphacut.rve.cell import Phase
-from alphacut.rve.engineering_constants import NAMES
+from alphacut.rve.cell.cell import Phase
 from alphacut.rve.image.bounds import Ends
+from alphacut.rve.image.energies import phase_energies
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.model import ImageCut, ImageModel, usual_division
-from alphacut.rve.image.moduli import ModuliInterval
-from alphacut.rve.image.phase_energies import phase_energies
-from alphacut.rve.image.phase_images import ModuliImages, moduli_images, threshold_ranges
+from alphacut.rve.image.phases import ModuliImages, ModuliInterval, moduli_images, threshold_ranges
 from alphacut.rve.image.read import read_grey, require_phases
-from alphacut.rve.loss_factors import bulk_and_shear_losses
-from alphacut.rve.phase_energies import CONSTANTS, PhaseEnergies, first_order
+from alphacut.rve.result.engineering_constants import NAMES
+from alphacut.rve.result.loss_factors import CONSTANTS, bulk_and_shear_losses, first_order
+from alphacut.rve.result.moduli import plane_constants
+from alphacut.rve.result.result import PhaseEnergies
 from alphacut.stages.cell import AVERAGES, GPA, as_cut, isotropic_bounds
 from alphacut.stages.losses import LossCuts, loss_document
 from alphacut.stages.store import Stage, StageContext, StageResult

@@ -13,9 +13,13 @@ from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document
-from alphacut.rve.loss_factors import MAX_FIRST_ORDER, bulk_and_shear_losses, loss_factors
-from alphacut.rve.phase_energies import CONSTANTS
-from alphacut.rve.result import HomogenisedStiffness
+from alphacut.rve.result.loss_factors import (
+    CONSTANTS,
+    MAX_FIRST_ORDER,
+    bulk_and_shear_losses,
+    loss_factors,
+)
+from alphacut.rve.result.result import HomogenisedStiffness
 from alphacut.stages.cell import as_cut
 
 Losses = tuple[FuzzyNumber, FuzzyNumber | None]

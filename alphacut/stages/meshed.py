@@ -11,12 +11,12 @@ from alphacut.case.material import Mesh, MeshedCell
 from alphacut.case.radius import ThetaSection
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.problem import missing
-from alphacut.rve.cell import Phase, VoigtPhase
+from alphacut.rve.cell.cell import Phase, VoigtPhase
 from alphacut.stochastic import TruncatedNormal
 
 if TYPE_CHECKING:
     from alphacut.rve.prism.model import PrismModel
-    from alphacut.rve.result import HomogenisedStiffness
+    from alphacut.rve.result.result import HomogenisedStiffness
 
 
 @dataclass(frozen=True)

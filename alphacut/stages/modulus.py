@@ -30,9 +30,9 @@ from alphacut.fuzzy.result import Bounds, Nature
 from alphacut.fuzzy.sets.numbers import outer_steps
 from alphacut.io.files import Document
 from alphacut.io.provenance import file_digest, source_digest, versions
-from alphacut.rve.fibre_constants import fibre_constants
-from alphacut.rve.phase_energies import CONSTANTS
-from alphacut.rve.result import HomogenisedStiffness
+from alphacut.rve.result.loss_factors import CONSTANTS
+from alphacut.rve.result.result import HomogenisedStiffness
+from alphacut.rve.series.fibre_constants import fibre_constants
 from alphacut.rve.series.model import SeriesModel
 from alphacut.stages.cell import (
     GPA,
@@ -74,7 +74,7 @@ FIBRES = {
     "G_T": ("Pa", "shear modulus across the fibres"),
     "G_L": ("Pa", "shear modulus along the fibres"),
 }
-"""Constants of cylinders besides; see rve.fibre_constants."""
+"""Constants of cylinders besides; see rve.series.fibre_constants."""
 QUANTITIES = BOUNDS | FIBRES | PLANE
 """Unit and meaning of each output that has α-cuts."""
 CUT = ("alpha", "bound")

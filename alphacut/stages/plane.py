@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
-from alphacut.rve.engineering_constants import FREE, NAMES, PLANE_STRAIN, engineering_constants
-from alphacut.rve.result import HomogenisedStiffness
+from alphacut.rve.result.engineering_constants import (
+    FREE,
+    NAMES,
+    PLANE_STRAIN,
+    engineering_constants,
+)
+from alphacut.rve.result.result import HomogenisedStiffness
 
 SUFFIXES = {PLANE_STRAIN: "", FREE: "_free"}
 """What is added to a constant's name, by definition."""

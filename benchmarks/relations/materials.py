@@ -13,7 +13,7 @@ from scipy.ndimage import gaussian_filter
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.rve import Ellipse, Phase, SeriesModel, SlicesModel
-from alphacut.rve.image.solve import solve_image
+from alphacut.rve.image.model import solve_image
 from alphacut.stochastic import HermiteMap
 from alphacut.stochastic.microstructure import MicrostructureStudy, fit_map
 from alphacut.stochastic.particles.packing import Packing

@@ -17,7 +17,7 @@ from pathlib import Path
 from time import perf_counter, process_time
 
 from alphacut.rve.prism.model import PrismModel
-from alphacut.rve.result import HomogenisedStiffness
+from alphacut.rve.result.result import HomogenisedStiffness
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.slices.model import SlicesModel
 from benchmarks.rows import write

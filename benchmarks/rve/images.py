@@ -16,12 +16,11 @@ from time import perf_counter
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Mask
-from alphacut.rve.cell import Phase
+from alphacut.rve.cell.cell import Phase
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
-from alphacut.rve.image.moduli import ModuliInterval, PlaneModuli
-from alphacut.rve.image.phase_images import moduli_images
-from alphacut.rve.image.solve import ImageSolution, solve_between, solve_image
-from alphacut.rve.series.stiffness import square_stiffness
+from alphacut.rve.image.model import ImageSolution, solve_between, solve_image
+from alphacut.rve.image.phases import ModuliInterval, PlaneModuli, moduli_images
+from alphacut.rve.series.multipoles import square_stiffness
 
 RESULTS = Path(__file__).parents[1] / "results"
 DIVISIONS = (1, 2, 4)

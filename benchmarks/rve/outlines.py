@@ -19,10 +19,11 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import FailedError, RefusedError
-from alphacut.rve.cell import Phase, square_moduli
+from alphacut.rve.cell.cell import Phase
+from alphacut.rve.cell.outline import Ellipse, Outline, reach
 from alphacut.rve.mesh.curved import plane_mesh
-from alphacut.rve.outline import Ellipse, Outline, reach
 from alphacut.rve.prism.model import PrismModel
+from alphacut.rve.result.moduli import square_moduli
 from alphacut.rve.slices.model import SlicesModel
 from alphacut.rve.slices.plane_cell import PlaneCell
 from alphacut.stochastic import HermiteMap

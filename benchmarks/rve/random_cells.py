@@ -21,13 +21,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from alphacut.fuzzy.refused import FailedError, RefusedError
-from alphacut.rve.cell import Cell, Phase, VoigtPhase
-from alphacut.rve.engineering_constants import NAMES, engineering_constants
-from alphacut.rve.loss_factors import loss_factors
-from alphacut.rve.outline import Ellipse, circle
-from alphacut.rve.prism.form import FoldedMeshError
+from alphacut.rve.cell.cell import Cell, Phase, VoigtPhase
+from alphacut.rve.cell.outline import Ellipse, circle
 from alphacut.rve.prism.model import PrismModel
-from alphacut.rve.result import HomogenisedStiffness
+from alphacut.rve.prism.problem import FoldedMeshError
+from alphacut.rve.result.engineering_constants import NAMES, engineering_constants
+from alphacut.rve.result.loss_factors import loss_factors
+from alphacut.rve.result.result import HomogenisedStiffness
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.slices.model import SlicesModel
 from alphacut.stochastic import HermiteMap

@@ -18,7 +18,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from alphacut.rve.cell import Phase
+from alphacut.rve.cell.cell import Phase
 from alphacut.rve.prism.model import PrismModel
 from benchmarks.rows import write
 from benchmarks.rve.solvers import MATRIX, PAPER, PARTICLE

@@ -22,14 +22,13 @@ from time import perf_counter, process_time
 import numpy as np
 
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.rve.cell import LOADS, Phase
+from alphacut.rve.cell.cell import LOADS, Phase
 from alphacut.rve.fenicsx import PETSc
 from alphacut.rve.mesh import gmsh_prisms
 from alphacut.rve.prism.model import PrismModel
 from alphacut.rve.prism.problem import PrismProblem
-from alphacut.rve.result import effective_modulus
-from alphacut.rve.solver.krylov import ConvergenceError, Solutions, solve
-from alphacut.rve.solver.options import SolverOptions
+from alphacut.rve.result.result import effective_modulus
+from alphacut.rve.solver.krylov import ConvergenceError, Solutions, SolverOptions, solve
 from alphacut.stochastic import HermiteMap, RadiusMap
 from benchmarks.rows import write
 

@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.rve.cell import Phase
-from alphacut.rve.result import HomogenisedStiffness
+from alphacut.rve.cell.cell import Phase
+from alphacut.rve.result.result import HomogenisedStiffness
 from alphacut.rve.series.model import SeriesModel
 from alphacut.stochastic import HermiteMap, RadiusMap, TruncatedNormal
 

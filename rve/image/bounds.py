@@ -9,9 +9,8 @@ from scipy.linalg import eigh
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import FailedError
-from alphacut.rve.anisotropy import AXES, shear_modulus
-from alphacut.rve.cell import square_moduli
 from alphacut.rve.image.fields.energy import SAFETY, UNIT
+from alphacut.rve.result.moduli import AXES, shear_modulus, square_moduli
 
 Ends = tuple[float, float]
 

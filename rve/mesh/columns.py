@@ -12,13 +12,12 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from alphacut.fuzzy.arrays import Array, Mask, Rows
+from alphacut.rve.cell.outline import Outline, circle, is_round
 from alphacut.rve.mesh import square
 from alphacut.rve.mesh.gmsh_prisms import INCLUSION, INTERPHASE, Prisms, extruded
-from alphacut.rve.mesh.grading import REFINEMENTS, Sizes, bend_grading
 from alphacut.rve.mesh.periodicity import SAME_PLACE, MeshError
-from alphacut.rve.mesh.prism_grid import PrismGrid
-from alphacut.rve.mesh.triangulation import Ring, Triangulation
-from alphacut.rve.outline import Outline, circle, is_round
+from alphacut.rve.mesh.prism_grid import PrismGrid, Ring, Triangulation
+from alphacut.rve.mesh.square import REFINEMENTS, Sizes, bend_grading
 
 if TYPE_CHECKING:
     from alphacut.rve.fenicsx import MPI

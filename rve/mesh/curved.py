@@ -1,4 +1,7 @@
-"""Two-dimensional cell of Gmsh triangles of any order with a curved interface."""
+"""Two-dimensional cell of Gmsh triangles of any order with a curved interface.
+
+Soundness of curved triangles: det J at their quadrature points beside its mean.
+"""
 
 from __future__ import annotations
 
@@ -9,12 +12,11 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Mask, Rows
 from alphacut.fuzzy.refused import RefusedError
+from alphacut.rve.cell.outline import CLOSEST, Outline, circle, is_round, require_fit
+from alphacut.rve.cell.settings import require_mesh_size
 from alphacut.rve.fenicsx import basix
 from alphacut.rve.mesh import square
-from alphacut.rve.mesh.grading import REFINEMENTS, Sizes, bend_grading, particle_grading
-from alphacut.rve.mesh.jacobian import LEAST_RATIO, jacobian_ratios
-from alphacut.rve.outline import CLOSEST, Outline, circle, is_round, require_fit
-from alphacut.rve.settings import require_mesh_size
+from alphacut.rve.mesh.square import REFINEMENTS, Sizes, bend_grading, particle_grading
 
 MATRIX, PARTICLE, INTERPHASE = range(3)
 COARSEST = 0.7  # mesh size: on coarser ones small particles hide from every order
@@ -187,3 +189,32 @@ def _bend_onto_outline(mesh: PlaneMesh, radius: float, ends: Rows, weights: Arra
     bubble = weights.prod(axis=1)
     fade = np.divide(bubble, along * (1 - along), out=np.zeros_like(bubble), where=bubble > 1e-14)
     return np.asarray((arc - chord) * fade[:, None])
+
+
+LEAST_RATIO = 0.2
+"""Least det J over its mean in an element. Below, shape functions are far from polynomials of x and
+neither order nor mesh size tells the error; inverted elements have ratios below 0."""
+
+
+def quadrature_degree(order: int) -> int:
+    """Degree of the quadrature on triangles whose field and geometry are of an order."""
+    return 2 * order + 1
+
+
+def jacobian_ratios(nodes: Array, cells: Rows, order: int) -> Array:
+    """Least det J over its mean in each isoparametric triangle, shape (m,).
+
+    Args:
+        nodes: Positions, shape (n, 2).
+        cells: Nodes of each triangle in Basix's order, shape (m, (order + 1)(order + 2)/2).
+        order: Polynomial degree of the geometry.
+    """
+    element = basix.create_element(
+        basix.ElementFamily.P, basix.CellType.triangle, order, basix.LagrangeVariant.gll_warped
+    )
+    points, weights = basix.make_quadrature(basix.CellType.triangle, quadrature_degree(order))
+    d_xi, d_eta = np.asarray(element.tabulate(1, points))[1:, :, :, 0]  # of the shape functions
+    x, y = nodes[cells].transpose(2, 1, 0)
+    determinants = (d_xi @ x) * (d_eta @ y) - (d_eta @ x) * (d_xi @ y)
+    means = weights @ determinants / weights.sum()
+    return np.asarray((determinants / means).min(axis=0))

@@ -2,6 +2,8 @@
 
 Gmsh triangulates the cell and extrudes it along θ. Its 15-node prisms ("Prism 15", type 18) have
 Basix's order of nodes. Physical groups name phases, sides and the two ends of θ.
+
+Orders of the nodes of a quadratic wedge in other programs, from that of Basix.
 """
 
 from __future__ import annotations
@@ -12,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.rve.cell.outline import Outline
 from alphacut.rve.mesh import square
 from alphacut.rve.mesh.periodicity import MeshError
-from alphacut.rve.outline import Outline
 
 PRISM_15 = 18
 """Gmsh's type of the element."""
@@ -135,3 +137,10 @@ def _cells_of(gmsh: Any, volume: int, name: str) -> Rows:
             "mesh with Prism 15: extrude with recombine, Mesh.SecondOrderIncomplete = 1, order 2",
         )
     return np.asarray(nodes[0].astype(np.int64)).reshape(-1, 15)
+
+
+MESHIO_ORDER = [0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11]
+"""Of meshio, Abaqus and Gmsh: edges of the lower triangle, of the upper, and vertical ones."""
+VTK_OF_MESHIO = [0, 2, 1, 3, 5, 4, 8, 7, 6, 11, 10, 9, 12, 14, 13]
+"""From meshio's order to that of VTK, whose lower triangle is seen from outside."""
+VTK_ORDER = [MESHIO_ORDER[k] for k in VTK_OF_MESHIO]

@@ -13,7 +13,7 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Mask, Rows
 from alphacut.fuzzy.refused import FailedError
-from alphacut.rve.mesh.triangulation import Triangulation
+from alphacut.rve.mesh.prism_grid import Triangulation
 
 SAME_PLACE = 1e-8
 """Distance below which two nodes coincide, in halves of the side: far above the noise of Gmsh's

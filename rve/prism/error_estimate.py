@@ -13,9 +13,9 @@ from dataclasses import replace
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.rve.cell import STRAIN, Cell, Phase, axial_moduli
-from alphacut.rve.phase_energies import PhaseEnergies
-from alphacut.rve.result import HomogenisedStiffness, StressCurve
+from alphacut.rve.cell.cell import STRAIN, Cell, Phase
+from alphacut.rve.result.moduli import axial_moduli
+from alphacut.rve.result.result import HomogenisedStiffness, PhaseEnergies, StressCurve
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.slices.model import SlicesModel
 

@@ -8,15 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Rows
-from alphacut.rve.cell import THREE_LOADS, AnyPhase, Cell, Interphase, thickness_of
+from alphacut.rve.cell.cell import THREE_LOADS, AnyPhase, Cell, Interphase, thickness_of
 from alphacut.rve.fenicsx import at_points, fem
-from alphacut.rve.form import strain
+from alphacut.rve.mesh.gmsh_prisms import VTK_ORDER
 from alphacut.rve.mesh.wedge import vertices_and_midpoints
-from alphacut.rve.mesh.wedge_orders import VTK_ORDER
 from alphacut.rve.prism.model import PrismModel
 from alphacut.rve.prism.problem import PrismProblem
-from alphacut.rve.solver.krylov import solve
-from alphacut.rve.solver.options import SolverOptions
+from alphacut.rve.solver.form import strain
+from alphacut.rve.solver.krylov import SolverOptions, solve
 from alphacut.stochastic import RadiusMap, ThetaLaw
 
 NODES = 15

@@ -19,43 +19,34 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.rve.cell import (
+from alphacut.rve.cell.cell import (
     LOADS,
     THREE_LOADS,
     AnyPhase,
     Cell,
     Interphase,
     Phase,
-    moduli_of_energies,
     thickness_of,
 )
-from alphacut.rve.certificate import ROUND_OFF, checks_within_limits, mean, stress_checks
-from alphacut.rve.fenicsx import MPI
-from alphacut.rve.mesh.columns import extrude
-from alphacut.rve.mesh.grading import REFINEMENTS
-from alphacut.rve.mesh.prism_grid import LevelFunction
-from alphacut.rve.mesh.triangulation import RING_THICKNESS, reference_radius
-from alphacut.rve.outline import Outline, circle, is_round
-from alphacut.rve.phase_energies import PhaseEnergies
-from alphacut.rve.prism.error_estimate import with_errors
-from alphacut.rve.prism.form import FoldedMeshError
-from alphacut.rve.prism.modulus_basis import TOLERANCE, ModulusBasis, modulus_basis
-from alphacut.rve.prism.own_mesh import (
-    NamedPhases,
-    level_set_phases,
-    mesh_phases,
-    own_mesh_problem,
-)
-from alphacut.rve.prism.problem import PrismProblem, SliceStrains
-from alphacut.rve.result import HomogenisedStiffness, StressCurve
-from alphacut.rve.settings import (
+from alphacut.rve.cell.outline import Outline, circle, is_round
+from alphacut.rve.cell.settings import (
     require_compressible,
     require_interphase,
     require_mesh_size,
     require_parts,
 )
-from alphacut.rve.solver.krylov import Solutions, solve
-from alphacut.rve.solver.options import SolverOptions
+from alphacut.rve.fenicsx import MPI
+from alphacut.rve.mesh.columns import extrude
+from alphacut.rve.mesh.prism_grid import RING_THICKNESS, LevelFunction, reference_radius
+from alphacut.rve.mesh.square import REFINEMENTS
+from alphacut.rve.prism.error_estimate import with_errors
+from alphacut.rve.prism.modulus_basis import TOLERANCE, ModulusBasis, modulus_basis
+from alphacut.rve.prism.own_mesh import NamedPhases, level_set_phases, mesh_phases, own_mesh_problem
+from alphacut.rve.prism.problem import FoldedMeshError, PrismProblem, SliceStrains
+from alphacut.rve.result.checks import ROUND_OFF, checks_within_limits, mean, stress_checks
+from alphacut.rve.result.moduli import moduli_of_energies
+from alphacut.rve.result.result import HomogenisedStiffness, PhaseEnergies, StressCurve
+from alphacut.rve.solver.krylov import Solutions, SolverOptions, solve
 from alphacut.stochastic import RadiusMap, ThetaLaw
 
 ROUGH_MESH = 0.1

@@ -12,11 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.rve.cell import AREA, Phase
+from alphacut.rve.cell.cell import AREA, Phase
 from alphacut.rve.fenicsx import PETSc
 from alphacut.rve.prism.problem import PrismProblem, SliceStrains
-from alphacut.rve.solver.krylov import solve
-from alphacut.rve.solver.options import SolverOptions
+from alphacut.rve.solver.krylov import SolverOptions, solve
 
 TOLERANCE = 2e-10  # of the energy that is left out; E is off by half of it at most
 _CHEBYSHEV = (0.5 - 0.125**0.5, 0.5 + 0.125**0.5)  # nodes in [0, 1]

@@ -11,14 +11,14 @@ from typing import cast
 import numpy as np
 
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.rve.cell import AnyPhase, Phase, VoigtPhase
+from alphacut.rve.cell.cell import AnyPhase, Phase, VoigtPhase
+from alphacut.rve.cell.settings import require_compressible
 from alphacut.rve.fenicsx import MPI
 from alphacut.rve.mesh.columns import from_first_rank
 from alphacut.rve.mesh.file import read_grid
 from alphacut.rve.mesh.gmsh_prisms import NAMES
 from alphacut.rve.mesh.prism_grid import FixedCell, LevelFunction, LevelSet, PrismGrid
 from alphacut.rve.prism.problem import PrismProblem
-from alphacut.rve.settings import require_compressible
 from alphacut.stochastic import ThetaLaw
 
 SAME_LEVEL = 1e-6

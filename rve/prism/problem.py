@@ -1,4 +1,7 @@
-"""The product-space cell problem of one grid: constraints, solutions, and means over slices."""
+"""The form on cell × θ: prism elements, weight f_Θ, strains and areas at quadrature points.
+
+The product-space cell problem of one grid: constraints, solutions, and means over slices.
+"""
 
 from __future__ import annotations
 
@@ -7,14 +10,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array
-from alphacut.rve.cell import AREA
-from alphacut.rve.fenicsx import MPI, PETSc, fem, petsc
-from alphacut.rve.form import ALL_PARTS
+from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.refused import FailedError, RefusedError
+from alphacut.rve.cell.cell import AREA
+from alphacut.rve.cell.outline import is_round
+from alphacut.rve.fenicsx import MPI, PETSc, at_points, basix, fem, mesh_of, petsc, ufl
+from alphacut.rve.mesh.curved import LEAST_RATIO
 from alphacut.rve.mesh.prism_grid import PrismGrid
-from alphacut.rve.mesh.wedge import POINTS_PER_SLICE, SLICES_PER_LAYER
-from alphacut.rve.prism.form import PrismForm
-from alphacut.rve.solver.krylov import krylov_solver
+from alphacut.rve.mesh.wedge import (
+    POINTS_PER_SLICE,
+    SLICES_PER_LAYER,
+    prism_rule,
+    slice_weights,
+    wedge,
+)
+from alphacut.rve.solver.form import ALL_PARTS, CellForm, strain
+from alphacut.rve.solver.krylov import SolverOptions, krylov_solver
 from alphacut.rve.solver.numbering import (
     LevelNumbering,
     NodeScatter,
@@ -22,8 +33,169 @@ from alphacut.rve.solver.numbering import (
     reduced_vector,
     zero_matrix,
 )
-from alphacut.rve.solver.options import SolverOptions
 from alphacut.stochastic import RadiusMap
+from alphacut.stochastic.theta.quadrature import level_rule
+
+
+class FoldedMeshError(FailedError):
+    """The mesh folds over where it follows a map."""
+
+
+class PrismForm:
+    """Prism mesh, form and loads of one grid; positions and phases are set anew.
+
+    Args:
+        grid: Topology; the ranks divide its prisms among them.
+        comm: Communicator.
+
+    Attributes:
+        mesh: DOLFINx's.
+        space: Displacements, two at each node of a prism.
+        node: Number in the grid of each of this rank's nodes, shape (n,).
+        wedge: Number in the grid of each of this rank's prisms, shape (m,).
+        layer: Layer of each of these prisms, shape (m,).
+        dx: Measure of each phase by its name, with the rule of the prisms, for forms of the user.
+        elastic: Stiffness and loads; `elastic.density` is f_Θ at the points.
+        areas: Weights of the points in their slice, shape (cells, 3, points); a slice's sum is 4.
+    """
+
+    def __init__(self, grid: PrismGrid, comm: MPI.Intracomm) -> None:
+        self.grid = grid
+        self.mesh = mesh_of(comm, grid.cells, grid.nodes, wedge(3))
+        self.space = fem.functionspace(self.mesh, wedge(2))
+        self.wedge: Rows = np.asarray(self.mesh.topology.original_cell_index)
+        self.layer = self.wedge // len(grid.plane.triangles)
+        self.node = self._node_of_dof()
+        self._compile_forms()
+
+    def _node_of_dof(self) -> Rows:
+        sizes, geometry = self.space.dofmap.index_map, self.mesh.geometry
+        nodes = np.empty(sizes.size_local + sizes.num_ghosts, np.int64)
+        nodes[self.space.dofmap.list] = geometry.input_global_indices[geometry.dofmap]
+        return nodes
+
+    def _compile_forms(self) -> None:
+        """Compile the elasticity form, and strain and det J at the quadrature points of prisms."""
+        points, weights = prism_rule()
+        metadata = {
+            "quadrature_rule": "custom",
+            "quadrature_points": points,
+            "quadrature_weights": weights,
+        }
+        phase = self.grid.phase[self.wedge]
+        cells = [
+            (k, np.flatnonzero(phase == k).astype(np.int32)) for k in range(len(self.grid.names))
+        ]
+        dx = ufl.Measure("dx", self.mesh, metadata=metadata, subdomain_data=cells)
+        self.dx = {name: dx(k) for k, name in enumerate(self.grid.names)}
+        point_element = basix.ufl.quadrature_element("prism", points=points, weights=weights)
+        point_space = fem.functionspace(self.mesh, point_element)
+        ignores_interface = not self.grid.conforming
+        measures = list(self.dx.values())
+        self.elastic = CellForm(self.space, point_space, measures, mixed=ignores_interface)
+        self._u = fem.Function(self.space)
+        self._strain = at_points(strain(self._u), points)
+        self._volume = at_points(ufl.JacobianDeterminant(self.mesh), points)
+
+    def move_to(self, radius: RadiusMap, thickness: float = 0.0) -> None:
+        """Move the nodes to the cone of `radius` and mark the particle at the quadrature points.
+
+        After an error the form stays where it was.
+
+        Args:
+            radius: Radius over θ.
+            thickness: Of the interphase, of a grid that has one.
+
+        Raises:
+            FoldedMeshError: An element is inverted.
+            RefusedError: The density of θ is not positive at a quadrature point.
+        """
+        names = ("_levels", "_law", "areas")
+        nodes = self.mesh.geometry.x.copy()
+        state = {name: getattr(self, name) for name in names if hasattr(self, name)}
+        try:
+            self._move(radius, thickness)
+        except (FoldedMeshError, RefusedError):
+            self.mesh.geometry.x[:] = nodes
+            self.__dict__.update(state)
+            raise
+
+    def _move(self, radius: RadiusMap, thickness: float) -> None:
+        """Move the nodes, check density and elements, and set both functions of the form."""
+        positions, geometry = self.grid.positions(radius, thickness), self.mesh.geometry
+        geometry.x[:] = positions[geometry.input_global_indices]
+        self._levels = self.grid.level_thetas(radius.distribution)
+        self._law = radius.distribution
+        theta, _ = self.slice_rule()
+        density = radius.distribution.pdf(theta)
+        if not (density > 0).all():
+            key = f"density of θ at {theta[~(density > 0)][0]:.4g}"
+            cure = "shorten the support, or take the series"
+            raise RefusedError(key, f"{density.min():g}", "positive densities", cure)
+        self.areas = self._areas()
+        self._require_valid_elements()
+        prism_density = self.at_prisms(density)
+        self.elastic.density.x.array[:] = np.repeat(prism_density, POINTS_PER_SLICE)
+        if not self.grid.conforming:
+            self.elastic.in_particle.x.array[:] = self._inside(positions, radius).ravel()
+
+    def _require_valid_elements(self) -> None:
+        """Refuse inverted elements, and nearly inverted ones about outlines that are not round."""
+        determinants = self.areas / slice_weights()
+        means = determinants.mean(axis=(1, 2), keepdims=True)
+        least_ratio = 0.0 if is_round(self.grid.plane.outline) else LEAST_RATIO
+        is_folded = (means <= 0) | (determinants <= least_ratio * means)
+        if self.mesh.comm.allreduce(int(is_folded.any())):
+            where = f"where it follows the radius through {self.grid.layers} layers in θ"
+            cure = "take more layers or a smaller mesh size"
+            raise FoldedMeshError(f"the mesh folds over {where}", cure)
+
+    def _inside(self, positions: Array, radius: RadiusMap) -> Array:
+        """Indicator of the particle, 1 inside and 0 elsewhere, at the points, (cells, points)."""
+        shapes: Array = wedge(1).tabulate(0, prism_rule()[0])[0].reshape(-1, 15)
+        points = np.einsum("qn,cnd->cqd", shapes, positions[self.grid.cells[self.wedge]])
+        return np.asarray(self.grid.particle_indicator(points, radius))
+
+    def strains(self, displacement: Array) -> Array:
+        """(ε11, ε22, 2 ε12) at the points of the slices, shape (cells, 3, points, 3).
+
+        Args:
+            displacement: Of this rank's nodes, shape (nodes, 2).
+        """
+        self._u.x.array[:] = displacement.ravel()
+        return self._at_points(self._strain, 3)
+
+    def _areas(self) -> Array:
+        heights = np.diff(self._levels)[self.layer]
+        volume = self._at_points(self._volume, 1)[..., 0]
+        return np.asarray(volume / heights[:, None, None] * slice_weights())
+
+    def _at_points(self, expression: fem.Expression, size: int) -> Array:
+        cells = np.arange(len(self.wedge), dtype=np.int32)
+        values = np.asarray(expression.eval(self.mesh, cells))
+        return values.reshape(len(cells), SLICES_PER_LAYER, -1, size)
+
+    def phase_areas(self) -> Array:
+        """`areas` of the points in each phase, 0 elsewhere, shape (phases, cells, 3, points)."""
+        if self.grid.conforming:
+            phase = self.grid.phase[self.wedge][:, None, None]
+            return np.array([self.areas * (phase == k) for k in range(len(self.grid.names))])
+        indicator = self.elastic.in_particle.x.array.reshape(self.areas.shape)
+        return np.stack([self.areas * (1 - indicator), self.areas * indicator])
+
+    def slice_rule(self) -> tuple[Array, Array]:
+        """θ and weights of the slices, the Gauss points of all layers, shape (3 layers,) each."""
+        rule = level_rule(self._law, self._levels, points=SLICES_PER_LAYER)
+        return rule.nodes, rule.weights
+
+    def at_prisms(self, slice_values: Array) -> Array:
+        """Values of the slices, (3 layers,), repeated for this rank's prisms, shape (cells, 3)."""
+        return np.asarray(slice_values.reshape(-1, SLICES_PER_LAYER)[self.layer])
+
+    def sum_by_layer(self, values: Array) -> Array:
+        """Sums over this rank's prisms of each layer of values (cells, …), shape (layers, …)."""
+        member = np.equal.outer(np.arange(self.grid.layers), self.layer).astype(float)
+        return np.asarray(np.tensordot(member, values, axes=1))
 
 
 @dataclass(frozen=True)

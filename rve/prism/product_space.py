@@ -13,12 +13,11 @@ import numpy as np
 
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.fenicsx import PETSc, compiled, fem, ufl
-from alphacut.rve.form import strain
 from alphacut.rve.prism.model import PrismModel
 from alphacut.rve.prism.own_mesh import mesh_law, own_mesh_problem
 from alphacut.rve.prism.problem import PrismProblem
-from alphacut.rve.solver.krylov import Solutions, solve
-from alphacut.rve.solver.options import SolverOptions
+from alphacut.rve.solver.form import strain
+from alphacut.rve.solver.krylov import Solutions, SolverOptions, solve
 from alphacut.rve.solver.theta_preconditioner import ThetaPreconditioner
 from alphacut.stochastic import RadiusMap, ThetaLaw
 

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.special import gammaln, zeta
 
 from alphacut.fuzzy.arrays import Array, Rows
-from alphacut.rve.cell import AREA
+from alphacut.rve.cell.cell import AREA
 
 # ζ(z + P) − ζ(z) = π conj(P) / area: Legendre's relation on the square lattice
 ZETA_PERIOD = np.pi / AREA

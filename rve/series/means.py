@@ -1,30 +1,162 @@
-"""Means over θ of cells that a series solves: as many nodes as settle, to a declared error."""
+"""Means over θ of cells that a multipole series solves, to a declared error.
+
+Terms of the series at each radius, and nodes of the rule in θ, are as many as the error asks.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
+from itertools import product
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import FailedError
-from alphacut.rve.result import StressCurve
-from alphacut.rve.series.truncation import CellModuli, error_by_more_terms
-from alphacut.rve.settings import require_continuous
+from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.refused import FailedError, RefusedError
+from alphacut.rve.cell.cell import Cell, Phase
+from alphacut.rve.cell.settings import require_continuous
+from alphacut.rve.result.result import STEP, PhaseEnergies, StressCurve
 from alphacut.stochastic import RadiusMap, ThetaRule, gauss_rule
 
+_BATCH = 2_000_000  # entries of one batch of matrices
 _MOST_POINTS = 1200
 _SAFETY = 1.6
 _NOISE = 1e-13  # of a declared error: what rounding leaves
+_ENERGY_NOISE = 1e-12  # of energies, over the modulus
 
-
+Solve = Callable[[Array, int], Array]
+"""Three moduli of k cells times m inclusions, shape (k, m, 3), from radii and number of terms."""
+SolveMaterials = Callable[[Array, Array, Array, int], Array]
+"""The same, shape (k, 1, 3), from radii, K and G of matrix and particle, and number of terms."""
 _cached_rule = lru_cache(maxsize=256)(gauss_rule)
+
+
+class SeriesError(FailedError):
+    """The multipole series does not reach its tolerance."""
 
 
 class RuleError(FailedError):
     """No rule in θ reaches the wanted accuracy."""
+
+
+@dataclass(frozen=True, eq=False)
+class CellModuli:
+    """Moduli of n cells times m inclusions.
+
+    Args:
+        moduli: In Pa, shape (n, m, 3): of the plane C11 + C12, C11 − C12 and C33, of space K,
+            (C11 − C12)/2 and C44.
+        errors: Their declared relative truncation errors, same shape.
+        terms: Number of terms that reached it, shape (n, m).
+        voigt: Stiffness from the three moduli.
+    """
+
+    moduli: Array
+    errors: Array
+    terms: Rows
+    voigt: Callable[[Array, Array, Array], Array]
+
+    @property
+    def matrix(self) -> Array:
+        """Voigt matrices, shape (n, m, 3, 3) of the plane and (n, m, 6, 6) of space, in Pa."""
+        return self.voigt(*np.moveaxis(self.moduli, -1, 0))
+
+
+def _error_terms(terms: int) -> tuple[int, int]:
+    """Two larger numbers of terms: a distance from one alone may be small by chance."""
+    return terms + max(2, terms // 4), terms + max(4, terms // 2)
+
+
+@dataclass(frozen=True)
+class Truncation:
+    """Numbers of terms of a series, its error estimate, and the words of its error message.
+
+    Args:
+        steps: Numbers of terms to try, rising.
+        decay: d in: error ~ exp(−d · terms · arccosh(1/r)).
+        unknowns: Of one linear system with so many terms.
+        safety: Factor of the estimated error.
+        round_off: Relative, of a modulus.
+        terms: Their name in the message, such as "harmonics".
+        particles: Name of the particles that nearly touch.
+        voigt: Stiffness from the three moduli.
+    """
+
+    steps: tuple[int, ...]
+    decay: float
+    unknowns: Callable[[int], int]
+    safety: float
+    round_off: float
+    terms: str
+    particles: str
+    voigt: Callable[[Array, Array, Array], Array]
+
+    def converged_moduli(
+        self, radius: Array, inclusions: int, solve: Solve, *, tolerance: float
+    ) -> CellModuli:
+        """Moduli of n cells times m inclusions, each with as many terms as its error asks.
+
+        The error is the distance from the moduli by a quarter and by half more terms, times
+        `safety`.
+
+        Args:
+            radius: Radii over half the cell's side, shape (n,), each in [0, 1).
+            inclusions: Number m of inclusions.
+            solve: Moduli by the series, from radii and number of terms.
+            tolerance: Relative error allowed, of the moduli.
+
+        Raises:
+            RefusedError: A radius lies outside [0, 1).
+            SeriesError: The largest number of terms does not suffice.
+        """
+        radius, tolerance = np.atleast_1d(radius), max(tolerance, 2 * self.round_off)
+        if not ((radius >= 0) & (radius < 1)).all():
+            worst = float(radius[np.argmax(np.abs(radius - 0.5))])
+            raise RefusedError("radius", worst, "values in [0, 1) halves of the cell's side")
+        steps, shape = np.array(self.steps), (radius.size, inclusions)
+        moduli, errors = np.zeros((*shape, 3)), np.full((*shape, 3), np.inf)
+        terms, unsolved = np.zeros(shape, int), np.arange(radius.size)
+        rate = self.decay * np.arccosh(1 / np.maximum(radius, 1e-3))
+        step_index = np.searchsorted(steps, np.log(1 / tolerance) / rate)
+        step_index = np.minimum(step_index, steps.size - 1)
+        while unsolved.size:
+            for step in np.unique(step_index[unsolved]):
+                cells, count = unsolved[step_index[unsolved] == step], int(steps[step])
+                # results do not depend on which inclusions are solved together
+                is_open = errors[cells].max(axis=2) > tolerance
+                coarse, finer, finest = (
+                    np.concatenate(
+                        [solve(x, n) for x in self.batches(radius[cells], inclusions, n)]
+                    )
+                    for n in (count, *_error_terms(count))
+                )
+                distance = _largest_distance(coarse, finer, finest)
+                new_errors = self.safety * distance + self.round_off
+                moduli[cells] = np.where(is_open[..., None], coarse, moduli[cells])
+                errors[cells] = np.where(is_open[..., None], new_errors, errors[cells])
+                terms[cells] = np.where(is_open, count, terms[cells])
+            unsolved = unsolved[errors[unsolved].max(axis=(1, 2)) > tolerance]
+            failed = unsolved[step_index[unsolved] == steps.size - 1]
+            if failed.size:
+                raise SeriesError(
+                    f"the series at r = {radius[failed].max():.6g} reaches a relative error of"
+                    f" {errors[failed].max():.1e} with {self.steps[-1]} {self.terms},"
+                    f" {tolerance:.1e} is allowed: {self.particles} nearly touch",
+                    "lower the radius or raise the tolerance",
+                )
+            step_index[unsolved] += 1
+        return CellModuli(moduli, errors, terms, self.voigt)
+
+    def batches(self, radius: Array, inclusions: int, terms: int) -> Iterator[Array]:
+        """Radii in so many parts that matrices stay small."""
+        parts = -(-radius.size * inclusions * self.unknowns(terms) ** 2 // _BATCH)
+        yield from np.array_split(radius, min(radius.size, parts))
+
+
+def _largest_distance(coarse: Array, finer: Array, finest: Array) -> Array:
+    """Relative distance from the farther of two better values."""
+    return np.asarray(np.maximum(np.abs(coarse / finer - 1), np.abs(coarse / finest - 1)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,12 +166,12 @@ class Mean:
     Args:
         curve: With its stiffness.
         errors: Declared relative errors of the three mean moduli by source: space, theta.
-        terms: Most terms of the series.
+        terms: Terms of the series at each node, shape (n,).
     """
 
     curve: StressCurve
     errors: dict[str, Array]
-    terms: int
+    terms: Rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,18 +220,20 @@ def converged_means(
     averages: dict[int, _Averages] = {}
     means: dict[int, Mean] = {}
     while True:
-        counts = [count, finer_count(count), finer_count(finer_count(count))]
+        counts = [count, _finer_count(count), _finer_count(_finer_count(count))]
         for n in counts:
             if n not in averages:
                 rule = make_rule(law, points=n)
                 averages[n] = _Averages(rule, cells(radius_map(rule.nodes)))
         coarse, finer, finest = (averages[n] for n in counts)
-        distance = error_by_more_terms(coarse.moduli, finer.moduli, finest.moduli)
-        errors = _SAFETY * distance + _NOISE
+        errors = _SAFETY * _largest_distance(coarse.moduli, finer.moduli, finest.moduli) + _NOISE
         for k in range(len(errors)):
             if k not in means and (points or errors[k].max() <= accuracy):
                 # each inclusion by itself, whatever the others need
-                means[k] = _mean_of_inclusion(k, coarse, finest, errors[k])
+                in_space = np.maximum(coarse.errors[k], finest.errors[k])
+                curve = StressCurve.from_stiffness(coarse.rule, coarse.cells.matrix[:, k])
+                by_source = {"space": in_space, "theta": errors[k]}
+                means[k] = Mean(curve, by_source, coarse.cells.terms[:, k])
         if len(means) == len(errors):
             return [means[k] for k in range(len(errors))]
         if counts[-1] >= _MOST_POINTS:
@@ -111,15 +245,62 @@ def converged_means(
         count = counts[1]
 
 
-def _mean_of_inclusion(k: int, coarse: _Averages, finest: _Averages, theta_error: Array) -> Mean:
-    """Mean of inclusion k by the coarse rule; its error in space is the larger of both rules'."""
-    return Mean(
-        curve=StressCurve.from_stiffness(coarse.rule, coarse.cells.matrix[:, k]),
-        errors={"space": np.maximum(coarse.errors[k], finest.errors[k]), "theta": theta_error},
-        terms=int(coarse.cells.terms[:, k].max()),
-    )
-
-
-def finer_count(count: int) -> int:
+def _finer_count(count: int) -> int:
     """Nodes of the next finer rule: a third more."""
     return count + max(2, count // 3)
+
+
+def mean_energies(
+    cell: Cell, mean: Mean, solve: SolveMaterials, truncation: Truncation
+) -> PhaseEnergies:
+    """Mean parts X ∂c/∂X of K and G of both phases over θ, by complex steps of the series.
+
+    Their error is the distance from means by two finer rules with more terms.
+    """
+    rule, terms = ThetaRule(mean.curve.theta, mean.curve.weights), mean.terms
+    node_radii = cell.radius(rule.nodes)
+    values, distances = _rule_energies(cell, rule, terms, solve, truncation), []
+    order = np.argsort(node_radii)
+    rising_terms = np.maximum.accumulate(terms[order])
+    finer = rule
+    for k in range(2):
+        finer = gauss_rule(cell.radius.distribution, points=_finer_count(finer.nodes.size))
+        coarse_terms = np.interp(cell.radius(finer.nodes), node_radii[order], rising_terms)
+        finer_terms = np.array([_error_terms(int(np.ceil(n)))[k] for n in coarse_terms])
+        distances.append(abs(values - _rule_energies(cell, finer, finer_terms, solve, truncation)))
+    errors = _SAFETY * np.max(distances, axis=0) + _ENERGY_NOISE * values.sum(axis=(0, 1))
+    moduli_at = partial(_mean_moduli, cell, rule, terms, solve, truncation)
+    return PhaseEnergies(values, errors, moduli_at)
+
+
+def _rule_energies(
+    cell: Cell, rule: ThetaRule, terms: Rows, solve: SolveMaterials, truncation: Truncation
+) -> Array:
+    """Mean energies X ∂c/∂X, shape (2 phases, K and G, 3 moduli), in Pa."""
+    moduli = np.array([phase.bulk_and_shear for phase in cell.phases if isinstance(phase, Phase)])
+    energies = np.zeros((2, 2, 3))
+    for phase, kind in product(range(2), repeat=2):
+        stepped = moduli.astype(complex)
+        stepped[phase, kind] *= 1 + 1j * STEP
+        means = _mean_moduli(cell, rule, terms, solve, truncation, *stepped.T)
+        energies[phase, kind] = means.imag / STEP
+    return energies
+
+
+def _mean_moduli(
+    cell: Cell,
+    rule: ThetaRule,
+    terms: Rows,
+    solve: SolveMaterials,
+    truncation: Truncation,
+    bulk: Array,
+    shear: Array,
+) -> Array:
+    """Mean moduli over θ, (3,), with complex K and G of matrix and particle, (2,) each."""
+    radii, total = cell.radius(rule.nodes), np.zeros(3, complex)
+    for count in np.unique(terms):
+        nodes = np.flatnonzero(terms == count)
+        batches = truncation.batches(radii[nodes], 1, int(count))
+        moduli = np.concatenate([solve(x, bulk, shear, int(count))[:, 0] for x in batches])
+        total += rule.weights[nodes] @ moduli
+    return total

@@ -12,14 +12,12 @@ from typing import ClassVar
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.rve.cell import Cell, Phase
-from alphacut.rve.certificate import with_checks
-from alphacut.rve.result import HomogenisedStiffness
-from alphacut.rve.series.energies import mean_energies
-from alphacut.rve.series.means import Mean, converged_means
-from alphacut.rve.series.stiffness import square_stiffness
-from alphacut.rve.series.truncation import CellModuli
-from alphacut.rve.settings import require_parts, require_points
+from alphacut.rve.cell.cell import Cell, Phase
+from alphacut.rve.cell.settings import require_parts, require_points
+from alphacut.rve.result.checks import with_checks
+from alphacut.rve.result.result import HomogenisedStiffness, PhaseEnergies
+from alphacut.rve.series.means import CellModuli, Mean, converged_means, mean_energies
+from alphacut.rve.series.multipoles import TRUNCATION, material_moduli, square_stiffness
 from alphacut.stochastic import RadiusMap
 
 
@@ -33,9 +31,6 @@ class SeriesModel:
         accuracy: Relative error allowed, of the series at each θ and, without `points`, of E by the
             rule in θ; from `LEAST` to 0.1.
         energies: Whether to compute the energies of the phases, for loss factors.
-
-    Raises:
-        RefusedError: A value lies outside its range.
 
     Example:
         >>> from alphacut.rve import Phase
@@ -75,22 +70,20 @@ class SeriesModel:
 
         means = converged_means(radius_map, moduli, points=self.points, accuracy=self.accuracy)
         seconds = perf_counter() - start
-        results = [
-            self._result(mean, Cell(matrix, inclusion, radius_map), seconds)
-            for mean, inclusion in zip(means, inclusions, strict=True)
-        ]
-        if not self.energies:
-            return results
-        all_energies = self._energies(radius_map, matrix, inclusions, means)
-        return [
-            replace(result, energies=energies)
-            for result, energies in zip(results, all_energies, strict=True)
-        ]
-
-    _energies = staticmethod(mean_energies)
+        results = []
+        for mean, inclusion in zip(means, inclusions, strict=True):
+            cell = Cell(matrix, inclusion, radius_map)
+            result = self._result(mean, cell, seconds)
+            if self.energies:
+                result = replace(result, energies=self._energies(cell, mean))
+            results.append(result)
+        return results
 
     def _moduli(self, radii: Array, matrix: Phase, inclusions: Sequence[Phase]) -> CellModuli:
         return square_stiffness(radii, matrix, inclusions, tolerance=self.accuracy)
+
+    def _energies(self, cell: Cell, mean: Mean) -> PhaseEnergies:
+        return mean_energies(cell, mean, material_moduli, TRUNCATION)
 
     def _result(self, mean: Mean, cell: Cell, seconds: float) -> HomogenisedStiffness:
         """Result of one inclusion from its means over θ, with its checks."""
@@ -98,7 +91,7 @@ class SeriesModel:
             HomogenisedStiffness(
                 curve=mean.curve,
                 method=self.name,
-                unknowns=mean.terms,
+                unknowns=int(mean.terms.max()),
                 seconds={"total": seconds},
                 errors=mean.errors,
                 cell=cell,

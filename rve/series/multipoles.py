@@ -29,8 +29,10 @@ import numpy as np
 from scipy.special import gammaln
 
 from alphacut.fuzzy.arrays import Array, Rows
-from alphacut.rve.cell import Phase
+from alphacut.rve.cell.cell import Phase
+from alphacut.rve.result.moduli import square_voigt
 from alphacut.rve.series.lattice_sums import ZETA_PERIOD, LatticeSums, lattice_images, lattice_sums
+from alphacut.rve.series.means import CellModuli, Truncation
 
 MOST_HARMONICS = 160  # per potential and load; reaches r = 0.999
 LOADS = ("hydrostatic", "deviator", "shear")
@@ -217,3 +219,58 @@ def _dilatation_pole(a: Array, radius: Array, contrast: Contrast) -> Array:
 
 def _sums() -> LatticeSums:
     return lattice_sums(12 * MOST_HARMONICS + 8)
+
+
+TRUNCATION = Truncation(
+    steps=(3, 4, 5, 6, 8, 10, 12, 16, 24, 32, 48, 64, 96, 128, MOST_HARMONICS),
+    decay=8.0,
+    unknowns=int,
+    safety=1.6,
+    round_off=2e-15,
+    terms="harmonics",
+    particles="particles",
+    voigt=square_voigt,
+)
+
+
+def square_stiffness(
+    radius: Array, matrix: Phase, inclusions: Sequence[Phase], *, tolerance: float = 1e-12
+) -> CellModuli:
+    """C11 + C12, C11 − C12 and C33 of n square cells times m inclusions, with declared errors.
+
+    Args:
+        radius: Radii over half the cell's side, shape (n,), each in [0, 1).
+        matrix: Material outside the particle.
+        inclusions: Materials of the particle, m of them.
+        tolerance: Relative truncation error allowed, at least 1e-13.
+
+    Raises:
+        RefusedError: A radius lies outside [0, 1).
+        SeriesError: The series does not reach `tolerance` (particles nearly in touch).
+    """
+    contrast = Contrast.of_phases(matrix, inclusions)
+
+    def solve(radii: Array, harmonics: int) -> Array:
+        return _plane_moduli(radii, contrast, harmonics)
+
+    return TRUNCATION.converged_moduli(radius, len(inclusions), solve, tolerance=tolerance)
+
+
+def material_moduli(radius: Array, bulk: Array, shear: Array, harmonics: int) -> Array:
+    """C11 + C12, C11 − C12 and C33 of n cells times m inclusions, shape (n, m, 3).
+
+    Args:
+        radius: Radii over half the cell's side, shape (n,).
+        bulk: K of the matrix, then of m inclusions, complex, shape (1 + m,).
+        shear: G, likewise.
+        harmonics: Terms of the series.
+    """
+    return _plane_moduli(radius, Contrast.of_moduli(bulk, shear), harmonics)
+
+
+def _plane_moduli(radius: Array, contrast: Contrast, harmonics: int) -> Array:
+    columns = [
+        modulus(load, multipoles(load, radius, contrast, harmonics=harmonics), radius, contrast)
+        for load in LOADS
+    ]
+    return np.stack(columns, axis=-1)

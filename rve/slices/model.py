@@ -15,20 +15,9 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.rve.cell import (
-    STRAIN,
-    AnyPhase,
-    Cell,
-    Interphase,
-    axial_moduli,
-    square_moduli,
-    thickness_of,
-)
-from alphacut.rve.certificate import with_checks
-from alphacut.rve.outline import Outline, circle, is_round
-from alphacut.rve.phase_energies import PhaseEnergies
-from alphacut.rve.result import HomogenisedStiffness, StressCurve
-from alphacut.rve.settings import (
+from alphacut.rve.cell.cell import STRAIN, AnyPhase, Cell, Interphase, thickness_of
+from alphacut.rve.cell.outline import Outline, circle, is_round
+from alphacut.rve.cell.settings import (
     require_compressible,
     require_continuous,
     require_interphase,
@@ -36,6 +25,9 @@ from alphacut.rve.settings import (
     require_parts,
     require_points,
 )
+from alphacut.rve.result.checks import with_checks
+from alphacut.rve.result.moduli import axial_moduli, square_moduli
+from alphacut.rve.result.result import HomogenisedStiffness, PhaseEnergies, StressCurve
 from alphacut.rve.slices.outline_slice import (
     ACCURATE_ORDER,
     REFERENCE_ORDER,

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.rve.cell import axial_moduli
+from alphacut.rve.result.moduli import axial_moduli
 
 ACCURATE_ORDER, REFERENCE_ORDER = 4, 5
 """Order of the elements whose error is estimated, and the next, which estimates it."""

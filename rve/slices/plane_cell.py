@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.rve.cell import AREA, THREE_LOADS, AnyPhase, moduli_of_energies
+from alphacut.rve.cell.cell import AREA, THREE_LOADS, AnyPhase
 from alphacut.rve.fenicsx import MPI, PETSc, basix, cholesky, fem, mesh_of
-from alphacut.rve.form import CellForm, measure_of
-from alphacut.rve.mesh.curved import PlaneMesh, curved_nodes
-from alphacut.rve.mesh.jacobian import quadrature_degree
+from alphacut.rve.mesh.curved import PlaneMesh, curved_nodes, quadrature_degree
 from alphacut.rve.mesh.periodicity import unknowns
+from alphacut.rve.result.moduli import moduli_of_energies
+from alphacut.rve.solver.form import CellForm, measure_of
 from alphacut.rve.solver.krylov import ConvergenceError, solve
 from alphacut.rve.solver.numbering import map_of, reduced_vector, zero_matrix
 

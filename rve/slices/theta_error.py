@@ -8,8 +8,8 @@ import numpy as np
 from numpy.polynomial.chebyshev import chebvander
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.rve.bounds import mori_tanaka
-from alphacut.rve.cell import AnyPhase
+from alphacut.rve.cell.cell import AnyPhase
+from alphacut.rve.result.bounds import mori_tanaka
 from alphacut.stochastic import RadiusMap, ThetaRule, gauss_rule
 
 DIGITS = 12  # radii equal to so many decimals are one slice

@@ -35,8 +35,9 @@ import scipy.sparse as sp
 from alphacut.fuzzy.arrays import Array
 from alphacut.rve.fenicsx import PETSc, cholesky
 from alphacut.rve.solver.numbering import LevelNumbering
-from alphacut.rve.solver.options import LEVEL, PREFIX
 from alphacut.stochastic import ThetaLaw
+
+PREFIX, LEVEL = "rve_", "level_"  # of PETSc options, and after it of the levels' solvers
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@ import pytest
 from scipy.sparse import coo_array
 from scipy.sparse.linalg import splu
 
-from alphacut.rve.image.phase_images import ModuliImages
-from alphacut.rve.image.solve import solve_between, solve_image
+from alphacut.rve.image.model import solve_between, solve_image
+from alphacut.rve.image.phases import ModuliImages
 from tests.calibration.declared import Calibration, free_seed
 
 REFINEMENTS = (2, 4, 8)

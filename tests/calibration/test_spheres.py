@@ -4,10 +4,8 @@ import numpy as np
 import pytest
 
 from alphacut.rve import Phase
-from alphacut.rve.spheres.result import volume_fraction
-from alphacut.rve.spheres.series.model import SphereSeriesModel
-from alphacut.rve.spheres.series.stiffness import cubic_stiffness
-from alphacut.rve.spheres.space_bounds import hashin_shtrikman
+from alphacut.rve.spheres.model import SphereSeriesModel, cubic_stiffness
+from alphacut.rve.spheres.result import hashin_shtrikman, volume_fraction
 from alphacut.stochastic import HermiteMap
 from tests.calibration.declared import Calibration, free_seed
 

@@ -44,7 +44,7 @@ def test_running_a_package_makes_no_second_class():
 
 
 def test_a_second_class_would_be_seen():
-    assert "Cell" in doubled("import alphacut.rve.cell, rve.cell")[1]
+    assert "Cell" in doubled("import alphacut.rve.cell.cell, rve.cell.cell")[1]
 
 
 def test_all_imports_begin_with_alphacut():

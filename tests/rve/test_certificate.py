@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from alphacut.rve.bounds import bulk_modulus, hashin_shtrikman, reuss, voigt
-from alphacut.rve.cell import LOADS, Phase
-from alphacut.rve.certificate import CertificateError, checks_within_limits, stress_checks
+from alphacut.rve.cell.cell import LOADS, Phase
+from alphacut.rve.result.bounds import bulk_modulus, hashin_shtrikman, reuss, voigt
+from alphacut.rve.result.checks import CertificateError, checks_within_limits, stress_checks
 from alphacut.stochastic import HermiteMap
 
 SOFT, HARD = Phase(20e9), Phase(80e9, 0.2)
@@ -113,7 +113,7 @@ class TestProductSpace:
         assert max(checks[k] for k in ("reuss", "voigt")) == 0
 
     def test_a_flipped_sign_of_the_load_is_found(self, monkeypatch):
-        from alphacut.rve.form import CellForm
+        from alphacut.rve.solver.form import CellForm
 
         right = CellForm.load
         monkeypatch.setattr(CellForm, "load", lambda self, *parts: -right(self, *parts))

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from alphacut.rve import Phase
-from alphacut.rve.cell import square_moduli
+from alphacut.rve.result.moduli import square_moduli
 from alphacut.rve.series.model import SeriesModel
-from alphacut.rve.series.stiffness import square_stiffness
+from alphacut.rve.series.multipoles import square_stiffness
 from alphacut.rve.slices.model import solve_slice
 from alphacut.stochastic import HermiteMap
 

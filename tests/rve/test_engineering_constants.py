@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 from alphacut.rve import Ellipse, Phase, SeriesModel, SlicesModel
-from alphacut.rve.axial import AxialStiffness
-from alphacut.rve.engineering_constants import (
+from alphacut.rve.mesh.curved import plane_mesh
+from alphacut.rve.result.engineering_constants import (
     FREE,
     PLANE_STRAIN,
+    AxialStiffness,
     EngineeringConstants,
     engineering_constants,
 )
-from alphacut.rve.fibre_constants import fibre_constants
-from alphacut.rve.mesh.curved import plane_mesh
+from alphacut.rve.series.fibre_constants import fibre_constants
 from alphacut.rve.slices.plane_cell import PlaneCell
 from alphacut.stochastic import HermiteMap
 
@@ -61,7 +61,7 @@ def test_hill_s_relations_are_what_a_strain_along_the_fibres_gives(particle):
 
 def strained_along(cell, phases, fraction):
     """C13, C23, C63 and C33 by fields under ε33 = 1: an eigenstress C13 of the phases."""
-    from alphacut.rve.cell import AREA
+    from alphacut.rve.cell.cell import AREA
     from alphacut.rve.solver.numbering import reduced_vector
 
     cell.stiffness(tuple(phase.stiffness for phase in phases))

@@ -9,8 +9,7 @@ from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve import Ellipse, Interphase, Phase, PrismModel, SeriesModel, SlicesModel
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.model import ImageModel
-from alphacut.rve.image.moduli import ModuliInterval
-from alphacut.rve.image.phase_images import moduli_images
+from alphacut.rve.image.phases import ModuliInterval, moduli_images
 from alphacut.rve.mesh.file import write
 from alphacut.stochastic import HermiteMap
 

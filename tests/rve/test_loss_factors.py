@@ -5,10 +5,8 @@ import pytest
 
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve import Phase, PrismModel, SeriesModel, SlicesModel, VoigtPhase
-from alphacut.rve.loss_factors import bulk_and_shear_losses, loss_factors
-from alphacut.rve.phase_energies import first_order
-from alphacut.rve.series.energies import complex_moduli
-from alphacut.rve.spheres.series.model import SphereSeriesModel
+from alphacut.rve.result.loss_factors import bulk_and_shear_losses, first_order, loss_factors
+from alphacut.rve.spheres.model import SphereSeriesModel
 from alphacut.stochastic import HermiteMap
 
 RADIUS = HermiteMap(0.1337, 0.1, 0.8663, 0.1692)
@@ -106,8 +104,7 @@ def test_losses_to_first_order_declare_what_complex_moduli_show():
         phase.bulk_and_shear * (1 + 1j * loss)
         for phase, loss in zip((MATRIX, PARTICLE), losses, strict=True)
     ]
-    radii = RADIUS(result.curve.theta)
-    mean = result.curve.weights @ complex_moduli(radii, *np.transpose(moduli), harmonics=20)[:, 0]
+    mean = result.energies.moduli_at(*np.transpose(moduli))
     young = result.constants_of(mean)[0]
     gap = abs(found.values["E"] - young.imag / young.real)
     assert only_energies[0] < gap <= found.errors["E"]

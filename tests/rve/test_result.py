@@ -7,18 +7,19 @@ import pytest
 
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve import Phase, effective_modulus
-from alphacut.rve.anisotropy import (
+from alphacut.rve.cell.cell import STRAIN
+from alphacut.rve.result.bounds import hashin_shtrikman
+from alphacut.rve.result.moduli import (
     AVERAGES,
     AXES,
     ISOTROPIC,
     plane_constants,
+    square_moduli,
+    square_voigt,
 )
-from alphacut.rve.bounds import hashin_shtrikman
-from alphacut.rve.cell import STRAIN, square_moduli, square_voigt
-from alphacut.rve.fibre_constants import fibre_constants
-from alphacut.rve.series.longitudinal import longitudinal_shear
+from alphacut.rve.series.fibre_constants import fibre_constants, longitudinal_shear
 from alphacut.rve.series.model import SeriesModel
-from alphacut.rve.series.stiffness import square_stiffness
+from alphacut.rve.series.multipoles import square_stiffness
 from alphacut.stochastic import HermiteMap
 
 MATRIX, PARTICLE = Phase(20e9), Phase(80e9)

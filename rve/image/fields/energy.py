@@ -14,8 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.rve.image.fields.element import Element
-from alphacut.rve.image.fields.grid import blocks, gather
+from alphacut.rve.image.fields.element import Element, blocks, gather
 
 UNIT = 2.0**-53  # rounding unit
 SAFETY = 1.01  # for the rounding of the error bound itself and for terms of second order

@@ -8,9 +8,8 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient, System
-from alphacut.rve.image.fields.element import Element
+from alphacut.rve.image.fields.element import Element, Operator
 from alphacut.rve.image.fields.energy import Energies, energies
-from alphacut.rve.image.fields.grid import Operator
 from alphacut.rve.image.fields.preconditioner import FourierPreconditioner, Reference
 
 UNIT_LOADS = np.eye(3)

@@ -13,7 +13,7 @@ from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve import Phase, PrismModel
 from alphacut.rve.mesh import square
 from alphacut.rve.mesh.file import read_grid
-from alphacut.rve.mesh.wedge_orders import MESHIO_ORDER, VTK_OF_MESHIO
+from alphacut.rve.mesh.gmsh_prisms import MESHIO_ORDER, VTK_OF_MESHIO
 from alphacut.rve.prism.fields import cell_fields
 from alphacut.stochastic import HermiteMap
 from tests.rve.mesh.test_prisms import volumes

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from alphacut.rve.image.fields.element import displacement_element
-from alphacut.rve.image.fields.grid import Operator
+from alphacut.rve.image.fields.element import Operator, displacement_element
 
 pytest.importorskip("dolfinx")
 

@@ -5,14 +5,11 @@ import pytest
 
 from alphacut.fuzzy.refused import FailedError
 from alphacut.rve import Phase, SeriesModel
-from alphacut.rve.anisotropy import AVERAGES
-from alphacut.rve.cell import square_moduli
-from alphacut.rve.engineering_constants import EngineeringConstants
 from alphacut.rve.image.bounds import StiffnessBounds
+from alphacut.rve.image.energies import energy_parts, phase_energies
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient, System, inner
-from alphacut.rve.image.fields.element import airy_element, displacement_element
+from alphacut.rve.image.fields.element import Operator, airy_element, displacement_element
 from alphacut.rve.image.fields.energy import energies
-from alphacut.rve.image.fields.grid import Operator
 from alphacut.rve.image.fields.preconditioner import FourierPreconditioner, Reference
 from alphacut.rve.image.fields.side import (
     SOLVED_LOADS,
@@ -21,11 +18,10 @@ from alphacut.rve.image.fields.side import (
     least_energy,
     solve_side,
 )
-from alphacut.rve.image.model import ImageModel
-from alphacut.rve.image.moduli import ModuliInterval, PlaneModuli
-from alphacut.rve.image.phase_energies import energy_parts, phase_energies
-from alphacut.rve.image.phase_images import moduli_images
-from alphacut.rve.image.solve import solve_image
+from alphacut.rve.image.model import ImageModel, solve_image
+from alphacut.rve.image.phases import ModuliInterval, PlaneModuli, moduli_images
+from alphacut.rve.result.engineering_constants import EngineeringConstants
+from alphacut.rve.result.moduli import AVERAGES, square_moduli
 from alphacut.stochastic import HermiteMap
 
 TIGHT = ConjugateGradient(accuracy=1e-11)

@@ -6,11 +6,15 @@ import numpy as np
 import pytest
 
 from alphacut.fuzzy.refused import FailedError, RefusedError
-from alphacut.rve.image.model import ImageModel, nested, usual_division
-from alphacut.rve.image.moduli import ModuliInterval, PlaneModuli
-from alphacut.rve.image.phase_images import ModuliImages, moduli_images, threshold_ranges
+from alphacut.rve.image.model import ImageModel, nested, solve_image, usual_division
+from alphacut.rve.image.phases import (
+    ModuliImages,
+    ModuliInterval,
+    PlaneModuli,
+    moduli_images,
+    threshold_ranges,
+)
 from alphacut.rve.image.read import read_grey, require_memory, require_phases
-from alphacut.rve.image.solve import solve_image
 
 ALPHA = (0.0, 0.5, 1.0)
 

@@ -9,7 +9,6 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from alphacut.rve.anisotropy import AVERAGES, AXES
 from alphacut.rve.image.bounds import StiffnessBounds, inverse_below, residual_above
 from alphacut.rve.image.fields.element import airy_element, displacement_element
 from alphacut.rve.image.fields.energy import (
@@ -21,6 +20,7 @@ from alphacut.rve.image.fields.energy import (
     energies,
     modes_of,
 )
+from alphacut.rve.result.moduli import AVERAGES, AXES
 
 LOST = UNIT * (1 - 2.0**-20)  # just too little to change 1
 ELEMENTS = [displacement_element(), airy_element()]

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.rve.image.moduli import ModuliInterval
-from alphacut.rve.image.phase_images import moduli_images
-from alphacut.rve.image.solve import solve_between
+from alphacut.rve.image.model import solve_between
+from alphacut.rve.image.phases import ModuliInterval, moduli_images
 from alphacut.stochastic.segmentation import segment
 from tests.stochastic.test_segmentation import picture
 

@@ -6,14 +6,12 @@ import pytest
 pytest.importorskip("dolfinx")
 
 from alphacut.fuzzy.refused import RefusedError
+from alphacut.rve.cell.outline import Ellipse, area, circle, is_round
 from alphacut.rve.fenicsx import basix
 from alphacut.rve.mesh.columns import extrude
-from alphacut.rve.mesh.curved import curved_nodes, plane_mesh
-from alphacut.rve.mesh.jacobian import jacobian_ratios
+from alphacut.rve.mesh.curved import curved_nodes, jacobian_ratios, plane_mesh
 from alphacut.rve.mesh.periodicity import MeshError, identify, unknowns
-from alphacut.rve.mesh.prism_grid import nodes_at_radii
-from alphacut.rve.mesh.triangulation import reference_radius
-from alphacut.rve.outline import Ellipse, area, circle, is_round
+from alphacut.rve.mesh.prism_grid import nodes_at_radii, reference_radius
 from alphacut.stochastic import HermiteMap
 
 

@@ -7,13 +7,13 @@ import pytest
 
 pytest.importorskip("dolfinx")
 
+from alphacut.rve.cell.outline import Ellipse, circle
 from alphacut.rve.fenicsx import MPI
 from alphacut.rve.mesh import gmsh_prisms, square
 from alphacut.rve.mesh.columns import extrude, grid_of
 from alphacut.rve.mesh.periodicity import MeshError
 from alphacut.rve.mesh.wedge import prism_rule, wedge
-from alphacut.rve.outline import Ellipse, circle
-from alphacut.rve.prism.form import PrismForm
+from alphacut.rve.prism.problem import PrismForm
 from alphacut.stochastic import HermiteMap
 
 MAP = HermiteMap(0.3, 0, 0.6, 0)

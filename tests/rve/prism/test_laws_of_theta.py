@@ -5,7 +5,7 @@ import pytest
 
 pytest.importorskip("dolfinx")
 
-from alphacut.rve.cell import Phase
+from alphacut.rve.cell.cell import Phase
 from alphacut.rve.prism.model import PrismModel
 from alphacut.rve.series.model import SeriesModel
 from alphacut.stochastic import HermiteMap

@@ -6,16 +6,16 @@ import pytest
 pytest.importorskip("dolfinx")
 
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.rve.bounds import reuss, voigt
-from alphacut.rve.cell import Phase, VoigtPhase
-from alphacut.rve.certificate import CertificateError
-from alphacut.rve.engineering_constants import PLANE_STRAIN, engineering_constants
-from alphacut.rve.loss_factors import loss_factors
+from alphacut.rve.cell.cell import Phase, VoigtPhase
+from alphacut.rve.cell.outline import Ellipse
 from alphacut.rve.mesh.columns import extrude
 from alphacut.rve.mesh.wedge import slice_weights
-from alphacut.rve.outline import Ellipse
-from alphacut.rve.prism.form import FoldedMeshError
 from alphacut.rve.prism.model import PrismModel
+from alphacut.rve.prism.problem import FoldedMeshError
+from alphacut.rve.result.bounds import reuss, voigt
+from alphacut.rve.result.checks import CertificateError
+from alphacut.rve.result.engineering_constants import PLANE_STRAIN, engineering_constants
+from alphacut.rve.result.loss_factors import loss_factors
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.slices.model import SlicesModel
 from alphacut.rve.solver.krylov import ConvergenceError

@@ -3,12 +3,11 @@ import pytest
 
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve import Phase
-from alphacut.rve.cell import square_moduli
+from alphacut.rve.result.moduli import square_moduli
 from alphacut.rve.series.lattice_sums import lattice_sums
-from alphacut.rve.series.means import RuleError
+from alphacut.rve.series.means import RuleError, SeriesError
 from alphacut.rve.series.model import SeriesModel
-from alphacut.rve.series.stiffness import TRUNCATION, square_stiffness
-from alphacut.rve.series.truncation import SeriesError
+from alphacut.rve.series.multipoles import TRUNCATION, square_stiffness
 from alphacut.rve.slices.model import SlicesModel
 from alphacut.stochastic import HermiteMap, TruncatedNormal
 

@@ -7,10 +7,11 @@ import pytest
 
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve import Phase
-from alphacut.rve.cell import VoigtPhase, axial_moduli, square_moduli
-from alphacut.rve.outline import Ellipse, circle
+from alphacut.rve.cell.cell import VoigtPhase
+from alphacut.rve.cell.outline import Ellipse, circle
+from alphacut.rve.result.moduli import axial_moduli, square_moduli
 from alphacut.rve.series.model import SeriesModel
-from alphacut.rve.series.stiffness import square_stiffness
+from alphacut.rve.series.multipoles import square_stiffness
 from alphacut.rve.slices.model import SlicesModel, solve_outline_slice, solve_slice
 from alphacut.rve.slices.theta_error import theta_error
 from alphacut.stochastic import HermiteMap, gauss_rule

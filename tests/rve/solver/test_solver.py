@@ -10,15 +10,14 @@ import scipy.sparse as sp
 
 pytest.importorskip("dolfinx")
 
-from alphacut.rve.cell import LOADS, Phase
+from alphacut.rve.cell.cell import LOADS, Phase
 from alphacut.rve.fenicsx import MPI, PETSc
 from alphacut.rve.mesh.columns import extrude
 from alphacut.rve.mesh.periodicity import identify
 from alphacut.rve.prism.problem import PrismProblem
 from alphacut.rve.solver import theta_preconditioner as preconditioner
-from alphacut.rve.solver.krylov import krylov_solver, solve
+from alphacut.rve.solver.krylov import SolverOptions, krylov_solver, solve
 from alphacut.rve.solver.numbering import LevelNumbering
-from alphacut.rve.solver.options import SolverOptions
 from alphacut.rve.solver.theta_preconditioner import ThetaPreconditioner, theta_mass
 from alphacut.stochastic import HermiteMap, TruncatedNormal
 

@@ -16,10 +16,10 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.refused import FailedError, RefusedError
-from alphacut.rve.cell import Phase
+from alphacut.rve.cell.cell import Phase
+from alphacut.rve.cell.settings import HALVES, require_mesh_size
 from alphacut.rve.fenicsx import MPI, PETSc, cholesky, compiled, fem, petsc, ufl
 from alphacut.rve.interruption import uninterrupted
-from alphacut.rve.settings import HALVES, require_mesh_size
 
 with uninterrupted():
     try:

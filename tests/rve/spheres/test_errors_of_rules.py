@@ -1,8 +1,8 @@
 import numpy as np
 
 from alphacut.rve import Phase
-from alphacut.rve.spheres.cubic import cubic_moduli
-from alphacut.rve.spheres.series.model import SphereSeriesModel
+from alphacut.rve.spheres.model import SphereSeriesModel
+from alphacut.rve.spheres.result import cubic_moduli
 from alphacut.stochastic import HermiteMap
 
 

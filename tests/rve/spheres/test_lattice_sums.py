@@ -3,7 +3,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from alphacut.rve.spheres.series.lattice_sums import harmonics, lattice_sums
+from alphacut.rve.spheres.lattice_sums import harmonics, lattice_sums
 
 
 def test_sums_of_rayleigh():

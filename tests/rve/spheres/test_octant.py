@@ -5,7 +5,7 @@ import pytest
 
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve import Phase
-from alphacut.rve.spheres.series.stiffness import cubic_stiffness
+from alphacut.rve.spheres.model import cubic_stiffness
 
 pytest.importorskip("dolfinx")
 from tests.rve.spheres.octant import Octant

@@ -5,14 +5,16 @@ import pytest
 
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve import Phase
-from alphacut.rve.certificate import CertificateError
-from alphacut.rve.spheres.cubic import cubic_moduli, cubic_voigt, hill_average
-from alphacut.rve.spheres.result import spheres_with_checks
-from alphacut.rve.spheres.series.model import SphereSeriesModel
-from alphacut.rve.spheres.space_bounds import (
+from alphacut.rve.result.checks import CertificateError
+from alphacut.rve.spheres.model import SphereSeriesModel
+from alphacut.rve.spheres.result import (
+    cubic_moduli,
+    cubic_voigt,
     hashin_shtrikman,
+    hill_average,
     mori_tanaka,
     space_stiffness,
+    spheres_with_checks,
 )
 from alphacut.stochastic import HermiteMap
 

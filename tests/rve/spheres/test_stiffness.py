@@ -6,11 +6,10 @@ import pytest
 
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve import Phase
-from alphacut.rve.series.truncation import SeriesError
-from alphacut.rve.spheres.result import volume_fraction
-from alphacut.rve.spheres.series import stiffness as series
-from alphacut.rve.spheres.series.stiffness import cubic_stiffness
-from alphacut.rve.spheres.space_bounds import hashin_shtrikman, space_stiffness
+from alphacut.rve.series.means import SeriesError
+from alphacut.rve.spheres import model as series
+from alphacut.rve.spheres.model import cubic_stiffness
+from alphacut.rve.spheres.result import hashin_shtrikman, space_stiffness, volume_fraction
 
 MATRIX = Phase(20e9)
 
@@ -158,7 +157,7 @@ def test_a_radius_outside_is_refused(radius):
 
 
 def test_twice_the_shear_modulus_of_the_matrix_divides_by_nothing():
-    from alphacut.rve.spheres.series.scattering import t_matrices
+    from alphacut.rve.spheres.scattering import t_matrices
 
     matrix, twice = Phase(20e9, 0.25), Phase(40e9 * 1.3 / 1.25, 0.3)
     with np.errstate(all="raise"):

@@ -1,18 +1,49 @@
-"""Stiffness of the simple cubic array of spheres by multipole series, to a declared error."""
+"""Series model of the cell with a sphere: exact for the simple cubic array, at nodes of θ."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import lru_cache
+from typing import ClassVar
 
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.rve.cell import Phase
-from alphacut.rve.series.truncation import CellModuli, Truncation
-from alphacut.rve.spheres.cubic import cubic_voigt
-from alphacut.rve.spheres.series.scattering import t_matrices
-from alphacut.rve.spheres.series.translation import VOLUME, Multipoles, couplings
+from alphacut.rve.cell.cell import Cell, Phase
+from alphacut.rve.result.result import PhaseEnergies
+from alphacut.rve.series.means import CellModuli, Mean, Truncation, mean_energies
+from alphacut.rve.series.model import SeriesModel
+from alphacut.rve.spheres.result import HomogenisedSpheres, cubic_voigt, spheres_with_checks
+from alphacut.rve.spheres.scattering import Elastic, Material, t_matrices
+from alphacut.rve.spheres.translation import VOLUME, Multipoles, couplings
+
+
+@dataclass(frozen=True)
+class SphereSeriesModel(SeriesModel):
+    """As `SeriesModel`, for spheres; `accuracy` is that of the mean moduli."""
+
+    accuracy: float = 1e-9
+    LEAST: ClassVar[float] = 1e-11
+
+    def _moduli(self, radii: Array, matrix: Phase, inclusions: Sequence[Phase]) -> CellModuli:
+        return cubic_stiffness(radii, matrix, inclusions, tolerance=self.accuracy)
+
+    def _energies(self, cell: Cell, mean: Mean) -> PhaseEnergies:
+        return mean_energies(cell, mean, material_moduli, TRUNCATION)
+
+    def _result(self, mean: Mean, cell: Cell, seconds: float) -> HomogenisedSpheres:
+        """Result of one inclusion from its means over θ, with its checks."""
+        return spheres_with_checks(
+            HomogenisedSpheres(
+                curve=mean.curve,
+                method=self.name,
+                unknowns=unknowns(int(mean.terms.max())),
+                seconds={"total": seconds},
+                errors=mean.errors,
+                cell=cell,
+            )
+        )
 
 
 def unknowns(degree: int) -> int:
@@ -52,21 +83,33 @@ def cubic_stiffness(
     """
 
     def solve(radii: Array, degree: int) -> Array:
-        """K, (C11 − C12)/2 and C44, shape (n, m, 3): the matrix's less the mean dipole stress."""
-        (bulk, mu), nu = matrix.bulk_and_shear, matrix.poisson
-        axial = _dipoles(radii, matrix, inclusions, degree, shear=False)
-        shear = _dipoles(radii, matrix, inclusions, degree, shear=True)
-        # of hydrostatic and of tetragonal strain, (n, m, 2); the former in the latter's scale
-        axial[..., 0] /= -3 * (1 - 2 * nu)
-        dipoles = np.concatenate([axial, shear], axis=-1)
-        scale = 8 * np.pi * mu * (1 - nu) * radii[:, None] ** 3 / VOLUME
-        return np.asarray(np.array([bulk, mu, mu]) - scale[..., None] * dipoles)
+        return _cubic_moduli(radii, matrix, inclusions, degree)
 
     return TRUNCATION.converged_moduli(radius, len(inclusions), solve, tolerance=tolerance)
 
 
+def material_moduli(radius: Array, bulk: Array, shear: Array, degree: int) -> Array:
+    """K, (C11 − C12)/2 and C44, shape (n, m, 3), from K and G of the matrix and of m spheres."""
+    pairs = zip(bulk, shear, strict=True)
+    matrix, *spheres = (Elastic.of_bulk_and_shear(k, g) for k, g in pairs)
+    return _cubic_moduli(radius, matrix, spheres, degree)
+
+
+def _cubic_moduli(
+    radius: Array, matrix: Material, inclusions: Sequence[Material], degree: int
+) -> Array:
+    """K, (C11 − C12)/2 and C44, shape (n, m, 3): the matrix's less the mean dipole stress."""
+    (bulk, mu), nu = matrix.bulk_and_shear, matrix.poisson
+    axial = _dipoles(radius, matrix, inclusions, degree, shear=False)
+    shear = _dipoles(radius, matrix, inclusions, degree, shear=True)
+    # of hydrostatic and of tetragonal strain, (n, m, 2); the former in the latter's scale
+    dipoles = np.concatenate([axial / [-3 * (1 - 2 * nu), 1], shear], axis=-1)
+    scale = 8 * np.pi * mu * (1 - nu) * radius[:, None] ** 3 / VOLUME
+    return np.asarray(np.array([bulk, mu, mu]) - scale[..., None] * dipoles)
+
+
 def _dipoles(
-    radius: Array, matrix: Phase, inclusions: Sequence[Phase], degree: int, *, shear: bool
+    radius: Array, matrix: Material, inclusions: Sequence[Material], degree: int, *, shear: bool
 ) -> Array:
     """Force dipoles of n times m spheres over r³ under unit strains, shape (n, m, loads).
 
@@ -79,13 +122,17 @@ def _dipoles(
     images = images * regular_scale[..., None] * singular_scale[:, None]
     order = 2 if shear else 0
     # of each load: index of its far field, of its dipole, and amplitude at unit strain
-    loads = [(poles.index_of(1, 2, order), poles.index_of(3, 2, order), 1.0)]
+    loads: list[tuple[int, int, complex]] = [
+        (poles.index_of(1, 2, order), poles.index_of(3, 2, order), 1.0)
+    ]
     if not shear:
         unit = -1 / (2 * (1 - 2 * matrix.poisson))  # solution 3 of degree 0 is −2(1 − 2ν) x
         loads.insert(0, (poles.index_of(3, 0, 0), poles.index_of(1, 0, 0), unit))
     sources, dipole_rows, units = map(list, zip(*loads, strict=True))
-    columns, dipoles = range(len(loads)), np.empty((radius.size, len(inclusions), len(loads)))
-    far_field = np.zeros((poles.n.size, len(loads)))
+    columns, shape = range(len(loads)), (radius.size, len(inclusions), len(loads))
+    kind = np.result_type(*(x for phase in (matrix, *inclusions) for x in phase.bulk_and_shear))
+    dipoles = np.empty(shape, kind)
+    far_field = np.zeros((poles.n.size, len(loads)), kind)
     far_field[sources, columns] = units
     for j, inclusion in enumerate(inclusions):
         sphere = cached_t_matrices(degree, matrix, inclusion, shear=shear)
@@ -110,7 +157,7 @@ def multipoles(degree: int, *, shear: bool) -> Multipoles:
 
 @lru_cache(maxsize=1024)
 def cached_t_matrices(
-    degree: int, matrix: Phase, inclusion: Phase, *, shear: bool
+    degree: int, matrix: Material, inclusion: Material, *, shear: bool
 ) -> tuple[Array, Array]:
     """T-matrices of a sphere for the multipoles of one load: of solutions 1 and 3, and of 2."""
     poles = multipoles(degree, shear=shear)

@@ -7,13 +7,36 @@ systems for each degree, whatever the order m.
 
 from __future__ import annotations
 
+from typing import NamedTuple, Self
+
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.rve.cell import Phase
+from alphacut.rve.cell.cell import Phase
 
 
-def t_matrices(degrees: Array, matrix: Phase, inclusion: Phase) -> tuple[Array, Array]:
+class Elastic(NamedTuple):
+    """Moduli of an isotropic material, complex where it has losses."""
+
+    bulk: complex
+    shear: complex
+    poisson: complex
+
+    @classmethod
+    def of_bulk_and_shear(cls, bulk: complex, shear: complex) -> Self:
+        """From K and G."""
+        return cls(bulk, shear, (3 * bulk - 2 * shear) / (6 * bulk + 2 * shear))
+
+    @property
+    def bulk_and_shear(self) -> tuple[complex, complex]:
+        """K and G."""
+        return self.bulk, self.shear
+
+
+Material = Phase | Elastic
+
+
+def t_matrices(degrees: Array, matrix: Material, inclusion: Material) -> tuple[Array, Array]:
     """T-matrices of a sphere of radius 1: singular amplitudes = T @ regular amplitudes.
 
     Lamé solutions are numbered as by Kushch (2013): 1 is the gradient of a harmonic, 2 torsional,
@@ -29,7 +52,7 @@ def t_matrices(degrees: Array, matrix: Phase, inclusion: Phase) -> tuple[Array, 
         solution 2, shape (k,).
     """
     n = np.asarray(degrees, float)
-    ratio = float(inclusion.bulk_and_shear[1] / matrix.bulk_and_shear[1])
+    ratio = inclusion.bulk_and_shear[1] / matrix.bulk_and_shear[1]
     # weights of tractions outside and inside, finite for pores and rigid spheres
     outside, inside = 1 / (1 + ratio), ratio / (1 + ratio)
     stiffness = _surface_stiffness(n, inclusion.poisson)
@@ -47,14 +70,14 @@ def t_matrices(degrees: Array, matrix: Phase, inclusion: Phase) -> tuple[Array, 
     return np.asarray(np.linalg.solve(singular, regular)), np.asarray(torsion)
 
 
-def _surface_stiffness(n: Array, poisson: float) -> Array:
+def _surface_stiffness(n: Array, poisson: complex) -> Array:
     """Traction over μ from displacement of the surface of a solid sphere, shape (k, 2, 2)."""
     displacement, traction = _surface_fields(n, poisson)
     displacement[n == 0, 1, 0] = 1.0  # ∇1 is no displacement: keeps the matrix invertible
     return np.asarray(traction @ np.linalg.inv(displacement))
 
 
-def _surface_fields(degree: Array, poisson: float) -> tuple[Array, Array]:
+def _surface_fields(degree: Array, poisson: complex) -> tuple[Array, Array]:
     """Displacement and traction over μ of Lamé solutions 1 and 3 on the unit sphere.
 
     Args:

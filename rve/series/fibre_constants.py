@@ -5,6 +5,8 @@ With the in-plane bulk modulus k, l = C13 and n = C33 of `axial`
     E_L = n − l²/k,   ν_LT = l/(2 k),   1/E_T = 1/(4 G_T) + 1/(4 K_T) + ν_LT²/E_L
 
 G_T and K_T are those of the result's average, G_L is the shear modulus along the fibres.
+
+Shear modulus along the fibres of the square array, by Rayleigh's harmonic multipoles (1892).
 """
 
 from __future__ import annotations
@@ -16,13 +18,13 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.rve.axial import Mixture
-from alphacut.rve.cell import Cell, Phase
-from alphacut.rve.series.longitudinal import longitudinal_shear
+from alphacut.rve.cell.cell import Cell, Phase
+from alphacut.rve.result.engineering_constants import Mixture
 from alphacut.stochastic import ThetaRule, gauss_rule
 
 if TYPE_CHECKING:
-    from alphacut.rve.result import HomogenisedStiffness
+    from alphacut.rve.result.result import HomogenisedStiffness
+from alphacut.rve.series.lattice_sums import ZETA_PERIOD, lattice_images, lattice_sums
 
 CONSTANTS = ("E_T", "E_L", "nu_LT", "G_T", "G_L", "K_T")
 _FINE, _COARSER = 32, 24  # nodes in θ
@@ -93,3 +95,41 @@ def _mean_longitudinal_shear(cell: Cell) -> tuple[float, float]:
     value, error = mean(gauss_rule(cell.radius.distribution, points=_FINE))
     coarser, _ = mean(gauss_rule(cell.radius.distribution, points=_COARSER))
     return value, error + abs(coarser / value - 1)
+
+
+_FEWEST, _MOST, _CONVERGED = 4, 128, 1e-12
+
+
+def longitudinal_shear(radius: Array, matrix: Phase, inclusion: Phase) -> tuple[Array, Array]:
+    """Shear modulus G_L along the fibres of n cells in Pa, and its relative error, (n,) each.
+
+    Args:
+        radius: Radii over half the cell's side, shape (n,), each in [0, 1).
+        matrix: Material outside the particle.
+        inclusion: Material of the particle.
+    """
+    shears = float(matrix.stiffness[2, 2]), float(inclusion.stiffness[2, 2])
+    harmonics, moduli = _FEWEST, _rayleigh_moduli(radius, *shears, _FEWEST)
+    while True:
+        harmonics, last_moduli = 2 * harmonics, moduli
+        moduli = _rayleigh_moduli(radius, *shears, harmonics)
+        change = np.abs(moduli / last_moduli - 1)
+        if change.max() <= _CONVERGED or harmonics >= _MOST:
+            return moduli, change + _CONVERGED
+
+
+def _rayleigh_moduli(radius: Array, matrix: float, inclusion: float, harmonics: int) -> Array:
+    """G_L of n cells by Rayleigh's multipoles, shape (n,), in the unit of both shear moduli.
+
+    The potential is A z + Σ_P Σ_n a_n (z − P)^-n over all particles P, odd n.
+    """
+    orders = 2 * np.arange(harmonics) + 1
+    scale = radius[:, None] ** orders
+    images = lattice_images(lattice_sums(4 * _MOST), orders, orders)
+    contrast = (matrix - inclusion) / (matrix + inclusion)
+    system = np.eye(harmonics) - contrast * images * scale[:, :, None] * scale[:, None, :]
+    source = np.zeros((radius.size, harmonics, 1))
+    source[:, 0, 0] = contrast * radius
+    dipole = np.linalg.solve(system, source)[:, 0, 0]  # a_1 over A, scaled by r
+    jump = ZETA_PERIOD * radius * dipole  # of the potential across the cell, by the images
+    return np.asarray(matrix * (1 - jump) / (1 + jump))

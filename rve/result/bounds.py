@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.rve.cell import AnyPhase
+from alphacut.rve.cell.cell import AnyPhase
 
 
 def voigt(fractions: Array, stiffness: Sequence[Array]) -> Array:

@@ -8,8 +8,8 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.rve.cell import AnyPhase, Interphase, Phase, VoigtPhase
-from alphacut.rve.outline import Outline, is_round
+from alphacut.rve.cell.cell import AnyPhase, Interphase, Phase, VoigtPhase
+from alphacut.rve.cell.outline import Outline, is_round
 from alphacut.stochastic import RadiusMap, require_map
 
 HALVES = "in halves of the cell's side"

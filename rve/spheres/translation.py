@@ -26,7 +26,7 @@ import numpy as np
 from scipy.special import gammaln
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.rve.spheres.series.lattice_sums import lattice_sums
+from alphacut.rve.spheres.lattice_sums import lattice_sums
 
 VOLUME = 8.0  # of the cell of side 2
 
@@ -65,7 +65,7 @@ class Multipoles:
 
 
 @lru_cache(maxsize=96)  # as many Poisson ratios and degrees as a fuzzy modulus takes
-def couplings(highest: int, poisson: float, *, shear: bool) -> Array:
+def couplings(highest: int, poisson: complex, *, shear: bool) -> Array:
     """Regular amplitudes (rows) at one sphere by unit multipoles at all its images (columns).
 
     Args:
@@ -78,7 +78,7 @@ def couplings(highest: int, poisson: float, *, shear: bool) -> Array:
     """
     poles = Multipoles.up_to(highest, shear=shear)
     sums = lattice_sums(max(2 * highest, 4))
-    coupling = np.zeros((poles.n.size, poles.n.size))
+    coupling = np.zeros((poles.n.size, poles.n.size), np.result_type(poisson, float))
     for target, source in ((1, 1), (1, 2), (1, 3), (2, 2), (2, 3), (3, 3)):
         rows, columns = np.flatnonzero(poles.kind == target), np.flatnonzero(poles.kind == source)
         k, j = poles.n[rows, None], poles.m[rows, None]
@@ -102,7 +102,7 @@ class _Pair:
 
 
 def _coupling(
-    target: int, source: int, pair: _Pair, poisson: float, sums: tuple[Array, Array]
+    target: int, source: int, pair: _Pair, poisson: complex, sums: tuple[Array, Array]
 ) -> Array:
     """Amplitude of regular Lamé solution `target` by the images of multipoles of kind `source`.
 
@@ -162,7 +162,7 @@ def _projection_factor(pair: _Pair) -> Array:
 
 
 def _with_periodic_strain(
-    coupling: Array, poles: Multipoles, poisson: float, *, shear: bool
+    coupling: Array, poles: Multipoles, poisson: complex, *, shear: bool
 ) -> Array:
     """The couplings less the mean strain of the conditionally convergent sums, those of degree −2.
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Rows
-from alphacut.rve.cell import square_moduli
 from alphacut.rve.image.fields.element import Element, airy_element, displacement_element
 from alphacut.rve.image.fields.energy import energies
 from alphacut.rve.image.fields.side import UNIT_LOADS, SideSolution, coefficients
-from alphacut.rve.image.phase_images import ModuliImages
-from alphacut.rve.image.solve import ImageSolution
-from alphacut.rve.phase_energies import PhaseEnergies
+from alphacut.rve.image.model import ImageSolution
+from alphacut.rve.image.phases import ModuliImages
+from alphacut.rve.result.moduli import square_moduli
+from alphacut.rve.result.result import PhaseEnergies
 
 
 def phase_energies(

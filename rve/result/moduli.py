@@ -55,3 +55,46 @@ def plane_constants(moduli: Array, average: str) -> Array:
     poisson = (1 - 2 * shear / hydrostatic) / 2  # eq. 16 with A = 2 G and B = C11 + C12
     young = 2 * shear * (1 + poisson)
     return np.stack([young, poisson], axis=-1)
+
+
+def square_voigt(bulk: Array, deviator: Array, shear: Array) -> Array:
+    """Voigt matrices (…, 3, 3) of square symmetry from C11 + C12, C11 − C12 and C33."""
+    voigt = np.zeros((*bulk.shape, 3, 3))
+    voigt[..., 0, 0] = voigt[..., 1, 1] = (bulk + deviator) / 2
+    voigt[..., 0, 1] = voigt[..., 1, 0] = (bulk - deviator) / 2
+    voigt[..., 2, 2] = shear
+    return voigt
+
+
+def square_moduli(stiffness: Array) -> Array:
+    """C11 + C12, C11 − C12 and C33 of the square-symmetric part, shape (…, 3)."""
+    mean, lateral = (stiffness[..., 0, 0] + stiffness[..., 1, 1]) / 2, stiffness[..., 0, 1]
+    return np.stack([mean + lateral, mean - lateral, stiffness[..., 2, 2]], axis=-1)
+
+
+def moduli_of_energies(energies: Array, loads: Array) -> Array:
+    """C11 + C12, C11 − C12 and C33 from the energies of loads, shape (…, 3), in Pa.
+
+    Args:
+        energies: Mean of σ_a : ε_a for each load a, shape (…, loads), in Pa.
+        loads: Macroscopic strains (ε11, ε22, 2 ε12) of `LOADS` or `THREE_LOADS`, shape (loads, 3);
+            without the third, C11 − C12 is nan.
+    """
+    moduli = np.full((*energies.shape[:-1], 3), np.nan)
+    columns = (0, 2, 1)  # of the moduli that the equibiaxial, shear and deviatoric load give
+    for k, strain in enumerate(loads):
+        moduli[..., columns[k]] = energies[..., k] / np.dot(strain, strain)
+    return moduli
+
+
+def axial_moduli(stiffness: Array, *, square: bool) -> Array:
+    """C11 + C12, C11 − C12 and C33 of a plane stiffness (…, 3, 3), shape (…, 1 or 3, 3).
+
+    First with the mean of C11 and C22; unless the symmetry is that of the square, then also with
+    C11 alone and with C22 alone.
+    """
+    moduli = [square_moduli(stiffness)]
+    for k in () if square else (0, 1):
+        axial, lateral = stiffness[..., k, k], stiffness[..., 0, 1]
+        moduli.append(np.stack([axial + lateral, axial - lateral, stiffness[..., 2, 2]], -1))
+    return np.stack(moduli, axis=-2)

@@ -10,9 +10,15 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.rve.anisotropy import AVERAGES, AXES, plane_constants, require_average, shear_modulus
-from alphacut.rve.cell import STRAIN, Cell, square_moduli
-from alphacut.rve.phase_energies import PhaseEnergies
+from alphacut.rve.cell.cell import STRAIN, Cell
+from alphacut.rve.result.moduli import (
+    AVERAGES,
+    AXES,
+    plane_constants,
+    require_average,
+    shear_modulus,
+    square_moduli,
+)
 from alphacut.stochastic import ThetaRule
 
 
@@ -70,6 +76,56 @@ class StressCurve:
     def mean(self) -> tuple[float, float]:
         """Means of s11 and s12 under f_Θ, in Pa."""
         return float(self.weights @ self.s11), float(self.weights @ self.s12)
+
+
+STEP = 1e-30  # of complex-step derivatives, which have no cancellation
+
+
+def young_shear_bulk(moduli: Array, constants_of: Callable[[Array], Array]) -> Array:
+    """E, G and first modulus (2 K_T of the plane, K of space), (3,), from the three moduli."""
+    young, poisson = constants_of(moduli)
+    return np.array([young, young / (2 * (1 + poisson)), moduli[0]])
+
+
+@dataclass(frozen=True, eq=False)
+class PhaseEnergies:
+    """Parts of the phases in the strain energy: X ∂c/∂X of the three moduli c.
+
+    Args:
+        values: For X = K and G of each phase, of C11 + C12, C11 − C12 and C33, shape
+            (phases, 2, 3), in Pa; their sum is the three moduli (nan where not computed).
+        errors: Declared absolute errors, same shape; nan where unknown.
+        moduli_at: The three moduli, (3,), from complex K and G of all phases, (phases,) each; None
+            where the model takes real ones alone.
+    """
+
+    values: Array
+    errors: Array
+    moduli_at: Callable[[Array, Array], Array] | None = None
+
+    def energy_fractions(self, constants_of: Callable[[Array], Array]) -> tuple[Array, Array]:
+        """Fractions ∂ln c/∂ln X of each phase's moduli X = K, G in the effective c = E, G, K.
+
+        Args:
+            constants_of: E and ν from C11 + C12, C11 − C12 and C33.
+
+        Returns:
+            The fractions, shape (phases, 2, 3), and their declared errors.
+        """
+        moduli = self.values.sum(axis=(0, 1))
+
+        def logarithmic_slopes(change: Array) -> Array:
+            """Relative changes of E, G, K per change of the three moduli, by a complex step."""
+            constants = young_shear_bulk(moduli + 1j * STEP * change, constants_of)
+            return np.asarray(constants.imag / (STEP * constants.real))
+
+        fractions = np.apply_along_axis(logarithmic_slopes, -1, self.values)
+        unknown = np.isnan(moduli)
+        slopes = abs(np.array([logarithmic_slopes(unit) for unit in np.eye(3)]))
+        errors, parts = (np.where(unknown, 0, abs(x)) for x in (self.errors, self.values))
+        # the slopes themselves are off by as much as the moduli are
+        moduli_error = (errors.sum(axis=(0, 1)) / np.where(unknown, 1, moduli)).max()
+        return fractions, np.asarray((errors + moduli_error * parts) @ slopes)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

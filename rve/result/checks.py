@@ -9,9 +9,9 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import FailedError
-from alphacut.rve.bounds import hashin_shtrikman, reuss, voigt
-from alphacut.rve.cell import AnyPhase, Phase
-from alphacut.rve.result import HomogenisedStiffness
+from alphacut.rve.cell.cell import AnyPhase, Phase
+from alphacut.rve.result.bounds import hashin_shtrikman, reuss, voigt
+from alphacut.rve.result.result import HomogenisedStiffness
 
 ROUND_OFF = 1e-9
 ALGEBRAIC = 1e-7

@@ -1,0 +1,111 @@
+"""Loss factors of the cell from those of its phases.
+
+A phase with losses has the moduli K (1 + i η_K) and G (1 + i η_G), and the cell has the elastic
+stiffness at these (correspondence principle: Hashin, J. Appl. Mech. 32, 630, 1965). To first order
+the loss factor of an effective modulus c is Σ η ∂ln c/∂ln X over all K and G of the phases. By Hill
+and Mandel's lemma X ∂C/∂X is the part of X in the strain energy (Ungar and Kerwin, J. Acoust. Soc.
+Am. 34, 954, 1962).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.rve.cell.cell import AnyPhase, Phase
+from alphacut.rve.result.result import HomogenisedStiffness, PhaseEnergies, young_shear_bulk
+
+CONSTANTS = ("E", "G", "K")
+"""Effective moduli that loss factors are of; K is the plane-strain bulk modulus."""
+MAX_FIRST_ORDER = 0.1
+"""Loss factor of a phase above which series take complex moduli."""
+ROUND_OFF = 1e-12
+
+
+@dataclass(frozen=True)
+class LossFactors:
+    """Effective loss factors by the names of `CONSTANTS`, and their declared absolute errors."""
+
+    values: dict[str, float]
+    errors: dict[str, float]
+
+
+def bulk_and_shear_losses(phase: AnyPhase | None, has_bulk: bool) -> Array:
+    """Matrix (2, 2) from loss factors (η_E, η_K) of a phase to (η_K, η_G).
+
+    1/E = 1/(9 K) + 1/(3 G) gives η_E/E = η_K/(9 K) + η_G/(3 G).
+
+    Args:
+        phase: The material.
+        has_bulk: Whether η_K is given; else both factors are η_E.
+
+    Raises:
+        RefusedError: η_K is given for a phase that is not isotropic.
+    """
+    if not has_bulk:
+        return np.array([[1.0, 0.0], [1.0, 0.0]])
+    if not isinstance(phase, Phase):
+        raise RefusedError("loss of the bulk modulus", "there", "none beside a stiffness")
+    nu = phase.poisson
+    return np.array([[0.0, 1.0], [1.5 / (1 + nu), (nu - 0.5) / (1 + nu)]])
+
+
+def loss_factors(result: HomogenisedStiffness, losses: Array) -> LossFactors:
+    """Effective loss factors of E, G and K with declared errors.
+
+    They are of first order; where a phase has more than `MAX_FIRST_ORDER` and the model takes
+    complex moduli (series), those of complex moduli.
+
+    Args:
+        result: Of any model, with the energies of its phases.
+        losses: Loss factors of K and G of each phase, shape (phases, 2).
+
+    Raises:
+        RefusedError: The model was not asked for the energies.
+    """
+    energies = result.energies
+    if energies is None:
+        raise RefusedError("energies", None, "a model with energies=True")
+    values, errors = first_order(energies, losses, result.constants_of)
+    if losses.max() > MAX_FIRST_ORDER and energies.moduli_at is not None:
+        values = _by_complex_moduli(result, energies.moduli_at, losses)
+    else:
+        errors = errors + np.ptp(losses) ** 2 * values  # second order; 0 where losses are equal
+    errors = errors + ROUND_OFF * abs(values)
+    return LossFactors(
+        dict(zip(CONSTANTS, map(float, values), strict=True)),
+        dict(zip(CONSTANTS, map(float, errors), strict=True)),
+    )
+
+
+def _by_complex_moduli(
+    result: HomogenisedStiffness, moduli_at: Callable[[Array, Array], Array], losses: Array
+) -> Array:
+    """Loss factors Im/Re of E, G, K with complex K and G of the phases, (3,)."""
+    assert result.cell is not None
+    phases = [phase for phase in result.cell.phases if isinstance(phase, Phase)]
+    bulk, shear = (np.array([phase.bulk_and_shear for phase in phases]) * (1 + 1j * losses)).T
+    constants = young_shear_bulk(moduli_at(bulk, shear), result.constants_of)
+    return np.asarray(constants.imag / constants.real)
+
+
+def first_order(
+    energies: PhaseEnergies, losses: Array, constants_of: Callable[[Array], Array]
+) -> tuple[Array, Array]:
+    """Loss factors of E, G, K to first order, and their errors from those of energies, (3,) each.
+
+    Args:
+        energies: Parts of the phases in the strain energy.
+        losses: Loss factors of K and G of each phase, shape (phases, 2).
+        constants_of: E and ν, from which G and K follow, of C11 + C12, C11 − C12 and C33.
+    """
+    # by phase, by its K and G, and by E, G and K of the cell: (phases, 2, 3)
+    fractions, errors = energies.energy_fractions(constants_of)
+    # only differences of losses count in the error, since the fractions add up to 1
+    differences = abs(losses - (losses.max() + losses.min()) / 2)
+    factors, factor_errors = np.tensordot(losses, fractions), np.tensordot(differences, errors)
+    return np.asarray(factors, float), np.asarray(factor_errors, float)
