@@ -16,8 +16,8 @@ ROOT = Path(__file__).parents[3]
 MODELS = """
 import json
 from mpi4py import MPI
-from alphacut.rve.cell import Phase
-from alphacut.rve.outline import Ellipse
+from alphacut.rve.cell.cell import Phase
+from alphacut.rve.cell.outline import Ellipse
 from alphacut.rve.prism.model import PrismModel
 from alphacut.stochastic import HermiteMap
 
@@ -104,7 +104,7 @@ GARBAGE = """
 import gc
 from mpi4py import MPI
 from petsc4py import PETSc
-from alphacut.rve.cell import Phase
+from alphacut.rve.cell.cell import Phase
 from alphacut.rve.prism.model import PrismModel
 from alphacut.stochastic import HermiteMap
 
