@@ -26,7 +26,6 @@ from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.rve.cell.cell import THINNEST, Phase, VoigtPhase
 from alphacut.rve.cell.outline import Ellipse, circle, reach
-from alphacut.stochastic import HermiteMap, TruncatedNormal
 from alphacut.stochastic.particles.particles import DISCS, SPHERES, Shape
 
 
