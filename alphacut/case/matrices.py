@@ -21,8 +21,7 @@ from alphacut.case.structure import (
 )
 from alphacut.case.types import NotEmpty, Section, after, case_file, distinct, text
 from alphacut.frame import Accelerogram, MatrixStructure
-from alphacut.frame.structures.energy_shares import modal_energy_shares
-from alphacut.frame.structures.monomial import Monomial
+from alphacut.frame.structures.matrix import Monomial, modal_energy_shares
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.fuzzy.arrays import Array

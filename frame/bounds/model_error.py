@@ -24,8 +24,7 @@ from alphacut.frame.modal.fitting import fit_states
 from alphacut.frame.modal.ground_response import Direct
 from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.structures import polynomial_dependence
-from alphacut.frame.structures.assembly import Matrices
-from alphacut.frame.structures.linear import LinearSystem, evaluate, histories
+from alphacut.frame.structures.linear import LinearSystem, Matrices, evaluate, histories
 
 MOST_NUMBERS = 60_000_000
 """Values of the defects on their grid, at most: 0.5 GB."""

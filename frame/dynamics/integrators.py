@@ -15,7 +15,7 @@ from typing import ClassVar
 import numpy as np
 
 from alphacut.frame.calculus.jet import Jet, concatenate, inverse
-from alphacut.frame.structures.assembly import Matrices
+from alphacut.frame.structures.linear import Matrices
 from alphacut.frame.structures.modes import state_matrix
 
 

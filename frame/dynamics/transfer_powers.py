@@ -10,7 +10,7 @@ import numpy as np
 from alphacut.frame.calculus.jet import Array, Jet, concatenate
 from alphacut.frame.dynamics.integrators import StepMap, exponential
 from alphacut.frame.dynamics.record_load import load_rule, parts_per_step
-from alphacut.frame.structures.assembly import Matrices
+from alphacut.frame.structures.linear import Matrices
 from alphacut.frame.structures.loads import History
 from alphacut.frame.structures.modes import state_matrix
 

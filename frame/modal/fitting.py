@@ -20,8 +20,7 @@ from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.modal.ground_response import Direct, LoadTables
 from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.response.duhamel import impulses
-from alphacut.frame.structures.assembly import Matrices
-from alphacut.frame.structures.linear import courses_of_forces, evaluate, histories
+from alphacut.frame.structures.linear import Matrices, courses_of_forces, evaluate, histories
 from alphacut.frame.structures.modes import (
     ModalError,
     Modes,

@@ -13,8 +13,7 @@ import numpy as np
 
 from alphacut.frame.calculus.taylor_model import TaylorModel, solve
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.structures.assembly import Assembly, stack
-from alphacut.frame.structures.linear import LinearSystem, histories
+from alphacut.frame.structures.linear import Assembly, LinearSystem, histories, stack
 from alphacut.fuzzy.arrays import Array, Rows
 
 

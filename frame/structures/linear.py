@@ -1,28 +1,102 @@
-"""Linear structures at parameter sets: matrices, rows of the outputs, loads, frequencies."""
+"""Linear structures M(p) q̈ + D(p) q̇ + K(p) q = −M(p) ι a(t) + Σ b_i(p) f_i(t) (section 6.1).
+
+A structure is written once, as an `Assembly` over both number types: jets at S parameter sets,
+which `evaluate` condenses to `Matrices`, and Taylor models over a box. In shapes, … is the S
+parameter sets of jets, and nothing for Taylor models.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from typing import Protocol
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
-from alphacut.frame.calculus.jet import Array, Jet, concatenate, inverse, variables
-from alphacut.frame.structures.assembly import Assembly, Matrices, Number
+from alphacut.frame.calculus.jet import Jet, concatenate, inverse, variables
+from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.structures.loads import Accelerogram, Force, History, different
-from alphacut.frame.structures.modes import modal_damping
 from alphacut.frame.structures.quantities import Parameter
+from alphacut.fuzzy.arrays import Array, Mask, Rows
 from alphacut.fuzzy.refused import require
 
+Number = TypeVar("Number", Jet, TaylorModel)
 
-def require_ground(ground: object) -> None:
-    """Refuse a base excitation that is neither an `Accelerogram` nor None.
 
-    Raises:
-        RefusedError: It is neither.
+@dataclass(frozen=True, eq=False)
+class Assembly(Generic[Number]):
+    """A structure of n unknowns and m outputs with its parameters as jets or as Taylor models.
+
+    Its damping is D = dashpots + a M + b K_springs + 2 M Φ diag(ζ_k ω_k) Φᵀ M.
+
+    Args:
+        mass: M, shape (…, n, n), in kg.
+        springs: K of the springs, shape (…, n, n), in N/m.
+        weights: What weights take from K (P-Delta), the same shape; None for nothing.
+        dashpots: Their part of D, shape (…, n, n), in N s/m.
+        rayleigh: a in 1/s and b in s, shape (…) each.
+        ratios: ζ, shape (…) each: none, one of all modes, or one of each by rising frequency.
+        q0: Initial displacements, shape (…, n), in m.
+        v0: Initial velocities, shape (…, n), in m/s.
+        row_factors: What the outputs' rows are multiplied by, shape (…, m).
+        rows: What outputs take of [q; v], shape (m, 2n).
+        accelerated: What they take of absolute accelerations, shape (m, n).
+        pattern: ι, how the unknowns move rigidly with the ground, shape (n,).
+        massive: Unknowns that have mass, rising.
+        loads: Forces on unknowns that have mass.
+        columns: Each of them at the amplitude 1 of its history, shape (…, n, F), in N, impulses in
+            N s; None where there are none.
     """
-    is_record = ground is None or isinstance(ground, Accelerogram)
-    require(is_record, "ground", value=type(ground).__name__, allowed="an Accelerogram, or None")
+
+    mass: Number
+    springs: Number
+    weights: Number | None
+    dashpots: Number
+    rayleigh: tuple[Number, Number]
+    ratios: list[Number]
+    q0: Number
+    v0: Number
+    row_factors: Number
+    rows: Array
+    accelerated: Array
+    pattern: Array
+    massive: Rows
+    loads: Sequence[Force]
+    columns: Number | None
+
+    @property
+    def stiffness(self) -> Number:
+        """K, shape (…, n, n), in N/m."""
+        return self.springs if self.weights is None else self.springs - self.weights
+
+    @property
+    def forces(self) -> Number | None:
+        """Columns b, one a history of forces, shape (…, n, H), in N; None without one."""
+        keys = [force.history and force.history.identity for force in self.loads]
+        courses = [course.identity for course in different(tuple(self.loads))]
+        return self._summed(np.array([[key == x for x in courses] for key in keys], float))
+
+    @property
+    def static(self) -> Number | None:
+        """Force under which the structure rests at the start besides q0, shape (…, n, 1)."""
+        courses = [force.history for force in self.loads]
+        first = [x.values(np.zeros(1))[0] if x and x.is_static else 0.0 for x in courses]
+        return self._summed(np.array(first, float)[:, None])
+
+    @property
+    def impulse(self) -> Number | None:
+        """Impulse at t = 0, shape (…, n, 1), in N s; v0 comes before it."""
+        return self._summed(np.array([[float(force.history is None)] for force in self.loads]))
+
+    def _summed(self, weight: Array) -> Number | None:
+        """Σ_F b_F weight_Fk over all forces, shape (…, n, k); None where all are zero."""
+        return self.columns @ weight if self.columns is not None and weight.any() else None
+
+
+def stack(values: Sequence[Number]) -> Number:
+    """Joins numbers shape (…) to one of shape (…, e)."""
+    return type(values[0]).stack(values)
 
 
 class LinearSystem(Protocol):
@@ -58,13 +132,83 @@ class LinearSystem(Protocol):
 def histories(system: LinearSystem) -> dict[str, History]:
     """Histories of all loads by name, in the order of `Matrices.pushes`: load, force1, …."""
     of_ground = {} if system.ground is None else {"load": system.ground}
-    of_forces = enumerate(different(tuple(system.loads)), start=1)
-    return {**of_ground, **{f"force{number}": history for number, history in of_forces}}
+    return of_ground | {f"force{k}": x for k, x in enumerate(courses_of_forces(system), start=1)}
 
 
 def courses_of_forces(system: LinearSystem) -> list[History]:
     """Histories of the forces alone, in the order of `Matrices.feeds`."""
-    return [history for name, history in histories(system).items() if name != "load"]
+    return list(different(tuple(system.loads)))
+
+
+def require_ground(ground: object) -> None:
+    """Refuse a base excitation that is neither an `Accelerogram` nor None.
+
+    Raises:
+        RefusedError: It is neither.
+    """
+    is_record = ground is None or isinstance(ground, Accelerogram)
+    require(is_record, "ground", value=type(ground).__name__, allowed="an Accelerogram, or None")
+
+
+@dataclass(frozen=True, eq=False)
+class Matrices:
+    """The structure at S parameter sets, each entry a jet, its massless unknowns condensed.
+
+    Args:
+        mass: M, shape (S, n, n), in kg.
+        damping: D, shape (S, n, n), in N s/m.
+        stiffness: K, shape (S, n, n), in N/m.
+        q0: Initial displacement, shape (S, n, 1), in m.
+        v0: Initial velocity, shape (S, n, 1), in m/s.
+        rigid: ι, how the unknowns move rigidly with the ground, shape (n, 1).
+        accelerated: Accelerations that outputs read besides their rows, which a force on the same
+            unknown adds to at once, shape (m, n).
+        forces: b of each history of forces, shape (S, n, H), in N; None for none.
+        static: Force under which the structure rests at the start besides q0, shape (S, n, 1).
+        impulse: Impulse at t = 0, shape (S, n, 1), in N s; v0 comes before it.
+    """
+
+    mass: Jet
+    damping: Jet
+    stiffness: Jet
+    q0: Jet
+    v0: Jet
+    rigid: Array
+    accelerated: Array
+    forces: Jet | None = None
+    static: Jet | None = None
+    impulse: Jet | None = None
+
+    @cached_property
+    def inverse_mass(self) -> Jet:
+        """M⁻¹, shape (S, n, n)."""
+        return inverse(self.mass)
+
+    @property
+    def start(self) -> Jet:
+        """Initial state [q; v], shape (S, 2n, 1)."""
+        q0, v0 = self.q0, self.v0
+        if self.static is not None:
+            q0 = q0 + inverse(self.stiffness) @ self.static
+        if self.impulse is not None:
+            v0 = v0 + self.inverse_mass @ self.impulse
+        return concatenate([q0, v0], -2)
+
+    def pushes(self, *, ground: bool) -> Jet:
+        """Accelerations by a unit of each load, the ground's first, shape (S, n, L)."""
+        shape = (*self.mass.value.shape[:-1], int(ground))
+        parts = [self.mass.like(-np.broadcast_to(self.rigid[:, : int(ground)], shape))]
+        if self.forces is not None:
+            parts.append(self.inverse_mass @ self.forces)
+        return concatenate(parts, -1)
+
+    @property
+    def feeds(self) -> Jet | None:
+        """What a unit of each force adds to outputs at once, shape (S, m, H); None if nothing."""
+        if self.forces is None or not self.accelerated.any():
+            return None
+        fed: Jet = self.accelerated @ self.pushes(ground=False)
+        return fed
 
 
 def evaluate(
@@ -76,7 +220,7 @@ def evaluate(
     bent: bool = True,
     by_ratios: bool = True,
 ) -> tuple[Matrices, Jet]:
-    """Return a structure's matrices and observation rows at S sets of some parameters.
+    """A structure's matrices and observation rows at S sets of some parameters.
 
     Args:
         system: The structure.
@@ -92,20 +236,15 @@ def evaluate(
     """
     fixed = {name: x for name, x in system.parameters.items() if name not in names}
     values = np.hstack([points, np.tile(list(fixed.values()), (len(points), 1))])
-    order = 1 + bent  # of the highest derivative
-    p = variables(values, [*names, *fixed], names if derivatives else (), order)
-    return _condensed(system.assembly(p), by_ratios=by_ratios)
-
-
-def _condensed(full: Assembly[Jet], *, by_ratios: bool) -> tuple[Matrices, Jet]:
-    """Return the matrices on unknowns with mass and the rows of the outputs, shape (S, m, 2n).
-
-    Unknowns b without mass are condensed, q_b = −K_bb⁻¹ K_ba q_a (Guyan 1965).
-    """
+    p = variables(values, [*names, *fixed], names if derivatives else (), order=1 + bent)
+    full = system.assembly(p)
     n, a = len(full.pattern), full.massive
-    mass, stiffness, damping = full.mass, full.stiffness, _viscous_damping(full)
+    mass, stiffness, damping = full.mass, full.stiffness, full.dashpots
+    for factor, matrix in zip(full.rayleigh, (full.mass, full.springs), strict=True):
+        if factor.value.any() or factor.first.any():
+            damping = damping + factor[:, None, None] * matrix
     rows: Jet | Array = full.rows
-    if len(a) < n:
+    if len(a) < n:  # unknowns b without mass are condensed, q_b = −K_bb⁻¹ K_ba q_a (Guyan 1965)
         b, inner = np.setdiff1d(np.arange(n), a), (slice(None), a[:, None], a)
         follow = -(inverse(stiffness[:, b[:, None], b]) @ stiffness[:, b[:, None], a])
         mass, damping = mass[inner], damping[inner]
@@ -134,39 +273,93 @@ def _condensed(full: Assembly[Jet], *, by_ratios: bool) -> tuple[Matrices, Jet]:
     return matrices, full.row_factors[..., None] * rows
 
 
-def _viscous_damping(full: Assembly[Jet]) -> Jet:
-    """Return the damping by dashpots and Rayleigh's factors, shape (S, n, n), in N s/m."""
-    damping = full.dashpots
-    for factor, matrix in zip(full.rayleigh, (full.mass, full.springs), strict=True):
-        if factor.value.any() or factor.first.any():
-            damping = damping + factor[:, None, None] * matrix
-    return damping
+def undamped_modes(mass: Array, stiffness: Array) -> tuple[Array, Array]:
+    """λ = ω², rising, and modes φ of K φ = λ M φ with φᵀM φ = 1, shapes (…, n) and (…, n, n)."""
+    inverse_factor = np.linalg.inv(np.linalg.cholesky(mass))  # L⁻¹ of M = L Lᵀ
+    transposed = inverse_factor.swapaxes(-1, -2)
+    squared, vectors = np.linalg.eigh(inverse_factor @ stiffness @ transposed)
+    return squared, transposed @ vectors
+
+
+def modal_damping(mass: Jet, stiffness: Jet, ratios: Sequence[Jet]) -> Jet:
+    """D = M Φ diag(2 ζ_k ω_k) Φᵀ M, shape (S, n, n), in N s/m, with its derivatives.
+
+    It follows the parameters through the modes Φ, and is not frozen at their nominal values. Modes
+    of one ratio may have equal frequencies.
+
+    Args:
+        mass: M, symmetric and positive definite, shape (S, n, n), in kg.
+        stiffness: K, symmetric and positive definite, shape (S, n, n), in N/m.
+        ratios: ζ, shape (S,): one of all modes, or one of each mode by rising frequency.
+
+    Raises:
+        RefusedError: A stiffness is not positive definite, but for rounding.
+    """
+    squared, X = undamped_modes(mass.value, stiffness.value)
+    ratio = (squared / abs(squared).max(-1, keepdims=True)).min()
+    key, what = "squared frequency of a damped mode", f"{ratio:.1e} of the greatest"
+    cure = "give dampers, or join storeys that are too stiff"
+    require(ratio > 1e-12, key, value=what, allowed="above rounding, 1e-12", cure=cure)
+    Y, A = X.swapaxes(-1, -2) @ mass.value, inverse(mass) @ stiffness
+    G, omega = Y @ A.first @ X, np.sqrt(squared)
+    total, number = mass * 0.0, np.full(squared.shape[-1], 0)
+    if len(ratios) > 1:
+        same = [[_equal(x, y) for y in ratios] for x in ratios]
+        number = np.argmax(same, axis=1)  # that of the first mode with the same ratio
+    for k in np.unique(number):
+        # f(A) of f(λ) = 2 √λ for the modes of this ratio, 0 for others
+        quotients, second_quotients = _divided_differences(omega, number == k)
+        f = [np.where(number == k, 2 * omega, 0.0)[:, None] * X, quotients * G]
+        second = np.zeros((0, 0, *X.shape))
+        if len(A.second):  # Daleckii, Krein 1965
+            pairs = np.einsum("sikj,asik,bskj->absij", second_quotients, G, G, optimize=True)
+            bend = quotients * (Y @ A.second @ X) + pairs + pairs.swapaxes(0, 1)
+            second = X @ bend @ Y
+        of_modes = Jet(f[0] @ Y, X @ f[1] @ Y, second)
+        total = total + ratios[k][:, None, None] * (mass @ of_modes)
+    return total
+
+
+def _equal(x: Jet, y: Jet) -> bool:
+    return all(np.array_equal(getattr(x, k), getattr(y, k)) for k in ("value", "first", "second"))
+
+
+def _divided_differences(omega: Array, inside: Mask) -> tuple[Array, Array]:
+    """f[λ_i, λ_j] and f[λ_i, λ_k, λ_j], (S, n, n) and (S, n, n, n), of f = 2 √λ `inside`, else 0.
+
+    Modes inside may have equal λ, not one inside and one outside.
+    """
+    both, sums = inside[:, None] & inside, omega[:, :, None] + omega[:, None]
+    gaps = omega[:, :, None] ** 2 - omega[:, None] ** 2
+    apart = inside[:, None] != inside
+    f, safe = np.where(inside, 2 * omega, 0.0), np.where(apart, gaps, 1.0)
+    first = np.where(both, 2 / sums, np.where(apart, (f[:, :, None] - f[:, None]) / safe, 0.0))
+    # f[x, y, z] = (f[x, y] − f[y, z]) / (x − z) by a pair of which one is inside, one outside
+    i_k = (first[:, :, None] - first[:, None]) / safe[..., None]
+    i_j = (first[..., None] - first[:, None]) / safe[:, :, None]
+    closed = -2 / (sums[..., None] * sums[:, None] * sums[:, :, None])
+    mixed = np.where(apart[..., None], i_k, np.where(apart[:, None], i_j, 0.0))
+    return first, np.where(both[..., None] & inside, closed, mixed)
+
+
+def frequencies(system: LinearSystem) -> Array:
+    """Undamped angular frequencies at the nominal parameters, rising, shape (n,), in rad/s."""
+    return modal_damping_ratios(system)[0]
+
+
+def modal_damping_ratios(system: LinearSystem) -> tuple[Array, Array]:
+    """Undamped ω in rad/s and ratios φᵀDφ/(2ω) of all modes at nominal values, shape (n,) each."""
+    matrices, _ = evaluate(system, (), np.zeros((1, 0)), derivatives=False)
+    M, D, K = (x.value[0] for x in (matrices.mass, matrices.damping, matrices.stiffness))
+    squared, shapes = undamped_modes(M, K)
+    omega = np.sqrt(np.maximum(squared, 0.0))
+    return omega, np.einsum("ik,ij,jk->k", shapes, D, shapes) / np.maximum(2 * omega, 1e-300)
 
 
 def round_off(largest: float, slowest: float, time: Array) -> Array:
-    """Return the error of a motion by rounding of its frequencies, over its peak, at times (T,).
+    """Error of a motion by rounding of its frequencies, over its peak, at times (T,).
 
     Rounding of the `largest` ω² (1/s²) changes that of the `slowest` mode (ω in rad/s) by as much.
     """
     phase_per_change = np.minimum(time**2, time / max(slowest, 1e-300)) / 2
     return np.asarray(np.finfo(float).eps * largest * phase_per_change)
-
-
-def frequencies(system: LinearSystem) -> Array:
-    """Undamped angular frequencies at the nominal parameters, rising, shape (n,), in rad/s."""
-    from scipy.linalg import eigh
-
-    matrices, _ = evaluate(system, (), np.zeros((1, 0)), derivatives=False)
-    squared = eigh(matrices.stiffness.value[0], matrices.mass.value[0], eigvals_only=True)
-    return np.asarray(np.sqrt(np.maximum(squared, 0.0)))
-
-
-def modal_damping_ratios(system: LinearSystem) -> tuple[Array, Array]:
-    """Return undamped ω in rad/s and ratios φᵀDφ/(2ω) of all modes at nominal values, (n,) each."""
-    from scipy.linalg import eigh
-
-    matrices, _ = evaluate(system, (), np.zeros((1, 0)), derivatives=False)
-    squared, shapes = eigh(matrices.stiffness.value[0], matrices.mass.value[0])
-    omega = np.sqrt(np.maximum(squared, 0.0))
-    damping = np.einsum("ik,ij,jk->k", shapes, matrices.damping.value[0], shapes)
-    return omega, damping / np.maximum(2 * omega, 1e-300)

@@ -2,20 +2,32 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
 from alphacut.frame.calculus.jet import Jet, variables
-from alphacut.frame.structures.assembly import Assembly, Number, stack
-from alphacut.frame.structures.linear import require_ground
+from alphacut.frame.structures.linear import (
+    Assembly,
+    Number,
+    require_ground,
+    stack,
+    undamped_modes,
+)
 from alphacut.frame.structures.loads import Accelerogram, Factor, Force, require_forces
 from alphacut.frame.structures.quantities import RATIO, Output, Parameter
 from alphacut.fuzzy.arrays import Array, Rows
-from alphacut.fuzzy.refused import checked_number, require, require_choice, require_numbers
+from alphacut.fuzzy.refused import (
+    RefusedError,
+    checked_number,
+    require,
+    require_choice,
+    require_numbers,
+)
 
 KINDS = ("mass", "damping", "stiffness")
 Terms = Sequence[tuple[Factor | str | float, Array]]
@@ -103,12 +115,8 @@ class MatrixStructure:
         fits = len(ratios) in (0, 1, len(self.massive)) and all(
             Parameter("", range=RATIO).admits(x, x) for x in ratios
         )
-        require(
-            fits,
-            "ratios",
-            value=self.ratios,
-            allowed=f"one number or parameter, or one a mode, {RATIO}",
-        )
+        allowed = f"one number or parameter, or one a mode, {RATIO}"
+        require(fits, "ratios", value=self.ratios, allowed=allowed)
 
     @property
     def size(self) -> int:
@@ -126,10 +134,6 @@ class MatrixStructure:
         return np.setdiff1d(np.arange(self.size), self.massive)
 
     def _require_definite(self) -> None:
-        """Refuse a mass matrix that is not positive definite on the unknowns that have mass.
-
-        Of unknowns without mass the stiffness must be positive definite, and they have no dampers.
-        """
         mass, stiffness = (
             np.sum([float(value_of(f, self.parameters)) * A for f, A in terms], axis=0)
             for terms in (self.mass, self.stiffness)
@@ -143,14 +147,9 @@ class MatrixStructure:
         least = np.linalg.eigvalsh(stiffness[np.ix_(b, b)]).min() / np.abs(stiffness).max()
         allowed = f"springs that hold the unknowns without mass, {b[:5].tolist()}"
         require(least > 1e-14, "stiffness", value="not positive definite there", allowed=allowed)
-        damped_massless = [k for k in b if any(array[k].any() for _, array in self.damping)]
-        allowed = "dampers between unknowns that have mass"
-        require(
-            not damped_massless,
-            "damping",
-            value=f"of unknowns {np.array(damped_massless[:5]).tolist()} without mass",
-            allowed=allowed,
-        )
+        damped = [int(k) for k in b if any(array[k].any() for _, array in self.damping)]
+        what, allowed = f"of unknowns {damped[:5]} without mass", "dampers between those with mass"
+        require(not damped, "damping", value=what, allowed=allowed)
 
     @property
     def outputs(self) -> tuple[Output, ...]:
@@ -163,30 +162,26 @@ class MatrixStructure:
         return Parameter(name, range=RATIO if name in ratios else "")
 
     def _term(self, kind: str, term: Any) -> tuple[Factor | str | float, Array]:
-        """Return a checked term of a matrix: its factor, and its array made exactly symmetric."""
+        """A checked term of a matrix: its factor, and its array made exactly symmetric."""
         is_pair = isinstance(term, Sequence) and not isinstance(term, str) and len(term) == 2
-        require(
-            is_pair, f"term of {kind}", value=type(term).__name__, allowed="pairs (factor, array)"
-        )
+        what = type(term).__name__
+        require(is_pair, f"term of {kind}", value=what, allowed="pairs (factor, array)")
         factor, array = term
         self._require_factor(kind, factor)
         return factor, self._symmetric(kind, array)
 
     def _require_factor(self, kind: str, factor: Factor | str | float) -> None:
-        """Refuse a factor that is no number, parameter or arithmetic function of parameters."""
         names, values = list(self.parameters), np.array([list(self.parameters.values())], float)
         try:
             value = value_of(factor, variables(values, names, names[:1]))
         except (KeyError, TypeError, AttributeError, ValueError) as failure:
             value = failure
-        allowed = "arithmetic to one number, of "
+        allowed = f"arithmetic to one number, of {', '.join(names)}"
         is_number = isinstance(value, Jet | float | int | np.number)
-        require(
-            is_number, f"factor of {kind}", value=repr(value), allowed=allowed + ", ".join(names)
-        )
+        require(is_number, f"factor of {kind}", value=repr(value), allowed=allowed)
 
     def _symmetric(self, kind: str, value: Any) -> Array:
-        """Return a dense or sparse array (n, n), symmetric up to rounding, as exactly symmetric."""
+        """A dense or sparse array (n, n), symmetric up to rounding, as exactly symmetric."""
         array, key = np.asarray(value.toarray() if hasattr(value, "toarray") else value), "array of"
         size = np.shape(self.mass[0][1])[0]
         fits, what = array.shape == (size, size), f"of shape {array.shape}"
@@ -194,19 +189,13 @@ class MatrixStructure:
         require_numbers(kind, array)
         asymmetry = np.abs(array - array.T)
         i, j = np.unravel_index(asymmetry.argmax(), asymmetry.shape)
-        is_symmetric = asymmetry[i, j] <= 1e-9 * np.abs(array).max()
+        fits = asymmetry[i, j] <= 1e-9 * np.abs(array).max()
         what = f"not symmetric: [{i}, {j}] is {array[i, j]:g}, [{j}, {i}] is {array[j, i]:g}"
-        require(
-            is_symmetric,
-            f"{key} {kind}",
-            value=what,
-            allowed="symmetric arrays",
-            cure="mirror one triangle",
-        )
+        allowed, cure = "symmetric arrays", "mirror one triangle"
+        require(fits, f"{key} {kind}", value=what, allowed=allowed, cure=cure)
         return np.asarray((array + array.T) / 2, float)
 
     def _require_vectors(self) -> None:
-        """Refuse vectors (q0, v0, ι, rows, forces) whose length does not fit the n unknowns."""
         n = self.size
         vectors: list[tuple[str, Any, tuple[int, ...]]]
         vectors = [(name, getattr(self, name), (n,)) for name in ("q0", "v0", "pattern")]
@@ -215,13 +204,12 @@ class MatrixStructure:
         for name, value, lengths in vectors:
             if value is not None:
                 require_numbers(name, value)
-                fits = np.ndim(value) == 1 and len(value) in lengths
-                require(
-                    fits, name, value=f"of shape {np.shape(value)}", allowed=f"{lengths} numbers"
-                )
+                fits, what = np.ndim(value) == 1, f"of shape {np.shape(value)}"
+                fits = fits and len(value) in lengths
+                require(fits, name, value=what, allowed=f"{lengths} numbers")
 
     def assembly(self, p: Mapping[str, Number]) -> Assembly[Number]:
-        """Return matrices, rows and loads at parameters `p`, jets or Taylor models."""
+        """Matrices, rows and loads at parameters `p`, jets or Taylor models."""
         n = self.size
         nothing: Number = lifted(0.0, p)
         shape = (*nothing.value.shape, n)
@@ -259,7 +247,7 @@ class MatrixStructure:
 
 
 def values_of(factors: Sequence[Factor | str | float], p: Mapping[str, Number]) -> Number:
-    """Return the values of e factors at parameters shape (…) as one number shape (…, e)."""
+    """Values of e factors at parameters shape (…) as one number shape (…, e)."""
     if not factors:
         nothing: Number = lifted(0.0, p)
         return nothing.like(np.zeros((*nothing.value.shape, 0)))
@@ -267,7 +255,7 @@ def values_of(factors: Sequence[Factor | str | float], p: Mapping[str, Number]) 
 
 
 def lifted(factor: Factor | str | float, p: Mapping[str, Number]) -> Number:
-    """Return a factor's value at parameters as a number of their type, shape (…)."""
+    """A factor's value at parameters as a number of their type, shape (…)."""
     value = value_of(factor, p)
     like: Number = next(iter(p.values()))
     if isinstance(value, type(like)):
@@ -280,3 +268,89 @@ def value_of(factor: Factor | str | float, p: Mapping[str, Any]) -> Any:
     if isinstance(factor, str):
         return p[factor]
     return factor(p) if callable(factor) else factor
+
+
+def modal_energy_shares(system: MatrixStructure, terms: Sequence[int] | Rows) -> Array:
+    """Fraction of each mode's strain energy in some terms of K = Σ K_i, shape (modes,).
+
+    It is Σ φᵀK_i φ / φᵀK φ over these terms, for the modes φ by rising frequency. The loss factor
+    of a mode is to first order the mean of those of its parts by these shares (Johnson and
+    Kienholz, AIAA Journal 20, 1284, 1982), with modes at nominal values.
+
+    Args:
+        system: The structure.
+        terms: Indices of the terms in the structure's stiffness.
+    """
+    p, a, b = system.parameters, system.massive, system.massless
+    mass = np.sum([float(value_of(factor, p)) * array for factor, array in system.mass], axis=0)
+    parts = np.array([float(value_of(factor, p)) * array for factor, array in system.stiffness])
+    stiffness, shapes = parts.sum(axis=0), np.zeros((system.size, len(a)))
+    # static condensation: q_b = follow q_a
+    follow = -np.linalg.solve(stiffness[np.ix_(b, b)], stiffness[np.ix_(b, a)])
+    condensed = stiffness[np.ix_(a, a)] + stiffness[np.ix_(a, b)] @ follow
+    shapes[a] = undamped_modes(mass[np.ix_(a, a)], condensed)[1]
+    shapes[b] = follow @ shapes[a]
+    energies = np.einsum("ik,tij,jk->tk", shapes, parts, shapes)
+    return np.asarray(energies[terms].sum(axis=0) / energies.sum(axis=0))
+
+
+NAME = r"[A-Za-z_][A-Za-z0-9_]*"
+NUMBER = r"[0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)?"
+FACTOR = re.compile(
+    rf"\s*(?:(?P<name>{NAME})|(?P<number>{NUMBER}))\s*(?:(?:\^|\*\*)\s*(?P<power>-?[0-9]+))?\s*"
+)
+
+
+@dataclass(frozen=True)
+class Monomial:
+    """The function c Π pᵢ^kᵢ of named parameters, read from text without evaluating it.
+
+    Args:
+        coefficient: c.
+        powers: Names with their whole exponents, none 0.
+
+    Example:
+        >>> stiffness = Monomial.parse("12*E*I/l^3")
+        >>> stiffness({"E": 2.0, "I": 3.0, "l": 2.0})
+        9.0
+    """
+
+    coefficient: float
+    powers: tuple[tuple[str, int], ...]
+
+    @classmethod
+    def parse(cls, text: str) -> Self:
+        """The monomial of a text such as "12*E*I/l^3", of ``*``, ``/`` and ``^`` or ``**``.
+
+        Raises:
+            RefusedError: The text is another kind of expression.
+        """
+        coefficient, powers = 1.0, dict[str, int]()
+        parts = re.split(r"(?<!\*)([*/])(?!\*)", text)  # factors, with single * and / between
+        for operator, part in zip(["*", *parts[1::2]], parts[::2], strict=True):
+            match = FACTOR.fullmatch(part)
+            if match is None:
+                allowed = 'a product of powers of parameters, as "1", "Ec" or "2*E*I*l^-2"'
+                raise RefusedError("factor", repr(text[:60]), allowed)
+            power = int(match["power"] or 1) * (1 if operator == "*" else -1)
+            if name := match["name"]:
+                powers[name] = powers.get(name, 0) + power
+            else:
+                coefficient *= float(match["number"]) ** power
+        return cls(coefficient, tuple((name, k) for name, k in powers.items() if k))
+
+    def __call__(self, p: Mapping[str, Any]) -> Any:
+        """Value at parameters, which may be numbers, arrays or anything with × and powers."""
+        value: Any = self.coefficient
+        for name, power in self.powers:
+            value = p[name] ** power * value if power != 1 else p[name] * value
+        return value
+
+    @property
+    def simplest(self) -> Monomial | str | float:
+        """The number or the parameter's name if the monomial is one; else the monomial itself."""
+        if not self.powers:
+            return self.coefficient
+        if self.coefficient == 1 and len(self.powers) == 1 and self.powers[0][1] == 1:
+            return self.powers[0][0]
+        return self

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array, Jet, concatenate, inverse
-from alphacut.frame.structures.assembly import Matrices
+from alphacut.frame.structures.linear import Matrices, undamped_modes
 from alphacut.fuzzy.refused import FailedError, require
 
 
@@ -155,42 +155,6 @@ def eigenvectors(A: Jet) -> tuple[Jet, Jet, Jet]:
     return Jet(values, slope, np.einsum("...kk->...k", second)), right, inverse(right)
 
 
-def modal_damping(mass: Jet, stiffness: Jet, ratios: Sequence[Jet]) -> Jet:
-    """Return the damping D = M Φ diag(2 ζ_k ω_k) Φ⁻¹ of modes Φ, shape (S, n, n), in N s/m.
-
-    It follows the parameters through the modes, and is not frozen at their nominal values.
-
-    Args:
-        mass: M, symmetric and positive definite, shape (S, n, n), in kg.
-        stiffness: K, symmetric and positive definite, shape (S, n, n), in N/m.
-        ratios: ζ, shape (S,): one of all modes, or one of each mode by rising frequency.
-
-    Raises:
-        RefusedError: A stiffness is not positive definite.
-    """
-    if len(ratios) == 1:
-        return ratio_damping(mass, stiffness, ratios[0])
-    squared, X, Y = (jet.map(np.real) for jet in eigenvectors(inverse(mass) @ stiffness))
-    _require_stiff(squared.value)
-    omega = squared**0.5
-    rates = [2.0 * ratio * omega[:, k] for k, ratio in enumerate(ratios)]
-    scaled_shapes = [X[:, :, k] * rate[:, None] for k, rate in enumerate(rates)]
-    columns = concatenate([shape[..., None] for shape in scaled_shapes], -1)
-    return mass @ (columns @ Y)
-
-
-def _require_stiff(squared: Array) -> None:
-    """Refuse squared frequencies (S, n) that are not clearly positive beside the greatest.
-
-    Raises:
-        RefusedError: One is below 1e-12 of the greatest of its set, which rounding may cause.
-    """
-    ratio = (squared / abs(squared).max(-1, keepdims=True)).min()
-    key, what = "squared frequency of a damped mode", f"{ratio:.1e} of the greatest"
-    cure = "give dampers, or join storeys that are too stiff"
-    require(ratio > 1e-12, key, value=what, allowed="above rounding, 1e-12", cure=cure)
-
-
 def require_modal_order(mass: Array, stiffness: Array, ratios: Array) -> None:
     """Refuse modes of unequal damping ratio that change places between parameter sets.
 
@@ -202,9 +166,7 @@ def require_modal_order(mass: Array, stiffness: Array, ratios: Array) -> None:
     Raises:
         RefusedError: Shapes of one set are those of the nominal set in another order.
     """
-    inverse_root = np.linalg.inv(np.linalg.cholesky(mass))
-    U = np.linalg.eigh(inverse_root @ stiffness @ inverse_root.swapaxes(-1, -2))[1]
-    shapes = inverse_root.swapaxes(-1, -2) @ U
+    shapes = undamped_modes(mass, stiffness)[1]
     similarity = np.abs(shapes[0].T @ mass[0] @ shapes)  # of nominal shapes (rows) and others
     nominal = similarity.argmax(1)  # the nominal mode that each mode is most like, (S, n)
     for _, k in np.argwhere(ratios[nominal] != ratios):
@@ -217,37 +179,3 @@ def require_modal_order(mass: Array, stiffness: Array, ratios: Array) -> None:
             allowed="modes apart",
             cure=cure,
         )
-
-
-def ratio_damping(mass: Jet, stiffness: Jet, ratio: Jet) -> Jet:
-    """Return D = 2 ζ M √(M⁻¹K), by which every mode has the damping ratio ζ, shape (S, n, n).
-
-    D, in N s/m, is that of each of S parameter sets, with its derivatives. The root R with R R =
-    M⁻¹K is smooth however the frequencies lie; its derivatives solve Sylvester's equation.
-
-    Args:
-        mass: M, symmetric and positive definite, shape (S, n, n), in kg.
-        stiffness: K, symmetric and positive definite, shape (S, n, n), in N/m.
-        ratio: ζ, shape (S,).
-
-    Raises:
-        RefusedError: A stiffness is not positive definite.
-    """
-    operator, lower = inverse(mass) @ stiffness, np.linalg.cholesky(mass.value)
-    below = np.linalg.inv(lower)  # L⁻¹ of M = L Lᵀ
-    squared, U = np.linalg.eigh(below @ (mass.value @ operator.value) @ below.swapaxes(-1, -2))
-    _require_stiff(squared)
-    omega = np.sqrt(squared)
-    X = below.swapaxes(-1, -2) @ U  # right eigenvectors of M⁻¹K, Y the left ones
-    Y = U.swapaxes(-1, -2) @ lower.swapaxes(-1, -2)
-    frequency_sums = omega[:, :, None] + omega[:, None, :]
-
-    def sylvester(right: Array) -> Array:  # Z with R Z + Z R = right
-        return np.asarray(X @ ((Y @ right @ X) / frequency_sums) @ Y)
-
-    first, value = sylvester(operator.first), (X * omega[:, None, :]) @ Y
-    second = np.zeros((0, 0, *value.shape))
-    if len(operator.second):
-        pair = first[:, None] @ first[None, :]
-        second = sylvester(operator.second - pair - pair.swapaxes(0, 1))
-    return 2.0 * ratio[:, None, None] * (mass @ Jet(value, first, second))

@@ -15,8 +15,7 @@ from typing import Literal
 import numpy as np
 
 from alphacut.frame.calculus.jet import Jet
-from alphacut.frame.structures.assembly import Assembly, Number, stack
-from alphacut.frame.structures.linear import require_ground
+from alphacut.frame.structures.linear import Assembly, Number, require_ground, stack
 from alphacut.frame.structures.loads import Accelerogram, Force, require_forces
 from alphacut.frame.structures.quantities import Output, Parameter, of_storey_frame
 from alphacut.fuzzy.arrays import Array

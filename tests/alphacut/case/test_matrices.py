@@ -7,7 +7,7 @@ import scipy.sparse
 
 from alphacut.case.load import load
 from alphacut.frame import Exact, LinearFlow, StoreyFrame
-from alphacut.frame.structures.monomial import Monomial
+from alphacut.frame.structures.matrix import Monomial
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.problem import BadInput
 

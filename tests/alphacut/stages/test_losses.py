@@ -10,7 +10,7 @@ from alphacut.case.load import load
 from alphacut.case.structure import MaterialDamping
 from alphacut.entry import main
 from alphacut.frame import MatrixStructure
-from alphacut.frame.structures.energy_shares import modal_energy_shares
+from alphacut.frame.structures.matrix import modal_energy_shares
 from alphacut.fuzzy import Crisp, Triangular
 from alphacut.io.problem import BadInput
 

@@ -8,7 +8,7 @@ from alphacut.frame import Accelerogram, MatrixStructure, StoreyFrame, envelope
 from alphacut.frame.calculus.jet import Jet
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
-from alphacut.frame.structures.modes import modal_damping
+from alphacut.frame.structures.linear import modal_damping
 from alphacut.frame.verification.exact_motion import LinearMotion
 from alphacut.fuzzy import Interval, Triangular
 from alphacut.fuzzy.refused import RefusedError
