@@ -19,7 +19,7 @@ from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.modal.ground_response import Direct, LoadTables
 from alphacut.frame.modal.model import ModalModel
-from alphacut.frame.response.duhamel import impulses
+from alphacut.frame.response.duhamel import absolute_moments
 from alphacut.frame.structures.linear import Matrices, courses_of_forces, evaluate, histories
 from alphacut.frame.structures.modes import (
     ModalError,
@@ -268,7 +268,7 @@ def needed_modes(flow: LinearFlow, boxes: Boxes, allowed: Array, *, energy: bool
     for history, unit_load in zip(histories(flow.system).values(), accelerations.T, strict=True):
         # |R(t; λ)| ≤ min(∫ |a|, max |a| / −Re λ)
         steady = history.extremes[0] / np.maximum(-eigenvalue.real, 1e-300)
-        response = np.minimum(float(impulses(history, flow.time)[-1]), steady)
+        response = np.minimum(float(absolute_moments(0.0, history, flow.time)[0, -1]), steady)
         participation = np.abs(Y @ np.append(0.0 * unit_load, unit_load))
         modal_state += participation[:, None] * response[:, None]
     upper = np.flatnonzero(eigenvalue.imag >= 0)  # one of each conjugate pair

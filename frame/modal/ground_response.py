@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.kernels import compiled
 from alphacut.frame.calculus.polynomial import Polynomial
-from alphacut.frame.response.duhamel import responses_at_nodes, responses_in_windows
+from alphacut.frame.response.duhamel import responses_at_nodes
 from alphacut.frame.structures.loads import History
 from alphacut.frame.structures.modes import ModalError
 from alphacut.fuzzy.arrays import Rows
@@ -173,7 +173,7 @@ def _moments(
     """
     unit_circle = np.exp(2j * np.pi / order * np.arange(order))
     rate = middle + phase * unit_circle / (length * (time[1] - time[0]))
-    values = responses_in_windows(rate, history, time, length)
+    (values,), _ = responses_at_nodes(rate, history, time, window=length)
     return np.asarray(np.fft.fft(values, axis=1) / order / phase ** np.arange(order))
 
 

@@ -24,7 +24,7 @@ from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF, gamma
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.structure import Classical
 from alphacut.frame.response.duhamel import (
-    impulses,
+    absolute_moments,
     responses_at_given_nodes,
     responses_at_nodes,
 )
@@ -321,10 +321,12 @@ class LoadAtNodes:
 def load_at_given_nodes(sigma: Array, load: History, time: Array, node: Rows) -> LoadAtNodes:
     """Responses of oscillators σ (N, n) to a load, each row at its node (N,) of `time`."""
     responses = responses_at_given_nodes(sigma, load, time, node, 1)
-    return LoadAtNodes(*responses, impulses(load, time)[node], load.values(time[node]))
+    return LoadAtNodes(
+        *responses, absolute_moments(0.0, load, time)[0, node], load.values(time[node])
+    )
 
 
 def load_at_nodes(sigma: Array, load: History, time: Array) -> LoadAtNodes:
     """Responses of oscillators σ (n,) to a load at all nodes."""
     responses = responses_at_nodes(sigma, load, time, 1)
-    return LoadAtNodes(*responses, impulses(load, time), load.values(time))
+    return LoadAtNodes(*responses, absolute_moments(0.0, load, time)[0], load.values(time))

@@ -25,8 +25,11 @@ from math import comb, perm
 import numpy as np
 
 from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF
-from alphacut.frame.response.duhamel import absolute_moments, responses_at_nodes
-from alphacut.frame.response.step_integrals import require_in_range
+from alphacut.frame.response.duhamel import (
+    absolute_moments,
+    require_in_range,
+    responses_at_nodes,
+)
 from alphacut.frame.structures.loads import History
 from alphacut.fuzzy.arrays import Array
 

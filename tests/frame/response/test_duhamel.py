@@ -9,18 +9,15 @@ import pytest
 from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.response.duhamel import (
-    responses_at_given_nodes,
-    responses_at_nodes,
-    responses_in_windows,
-    walk,
-)
-from alphacut.frame.response.step_integrals import (
     ERROR_OF_INTEGRALS,
     FROM_RECURRENCE,
     error_of_integrals,
+    linear_pieces,
+    responses_at_given_nodes,
+    responses_at_nodes,
     step_integrals,
 )
-from alphacut.frame.structures.loads import Accelerogram
+from alphacut.frame.structures.loads import Accelerogram, History
 
 IDLE = 0.01
 """Share of a bound of rounding that the largest of some errors reaches at least."""
@@ -149,13 +146,18 @@ def test_derivatives_are_those_of_the_response():
     assert np.allclose(value[2], second, rtol=1e-3, atol=1e-5)
 
 
+RECORD = Accelerogram(0.05, np.random.default_rng(1).normal(size=30))
+LATE = History.constant(start=0.3)  # 1 s between its samples, in which the fastest decay underflows
+
+
+@pytest.mark.parametrize("ground", [RECORD, LATE], ids=["record", "late"])
 @pytest.mark.parametrize("node_step", [0.02, 0.05, 0.0371])
-def test_windows_begin_at_rest(node_step):
+def test_windows_begin_at_rest(node_step, ground):
     """What arose before a window goes on freely; the rest is the window's own."""
-    ground = Accelerogram(0.05, np.random.default_rng(1).normal(size=30))
-    time, sigma, length = np.arange(41) * node_step, np.array([-0.3 + 9j, 0.4 - 20j, -30 + 2j]), 7
+    time, sigma = np.arange(41) * node_step, np.array([-0.3 + 9j, 0.4 - 20j, -30 + 2j, -2e3 + 9j])
+    length = 7
     whole, _ = responses_at_nodes(sigma, ground, time, 0)
-    found = responses_in_windows(sigma, ground, time, length)
+    (found,), _ = responses_at_nodes(sigma, ground, time, window=length)
     before = (np.maximum(np.arange(41) - 1, 0) // length) * length
     free = np.exp(sigma * (time - time[before])[:, None]) * whole[0, before]
     assert np.allclose(found + free, whole[0], atol=1e-13 * np.abs(whole).max(), rtol=1e-11)
@@ -166,9 +168,9 @@ def test_nodes_stay_where_they_are():
     """A node a billionth of a step beside a sample is not moved onto it; rounding of times is."""
     ground = Accelerogram(0.1, np.ones(20))
     time = np.array([0.0, 0.1 + 1e-10, 0.2 - 1e-10, 0.1 * 3, 0.7, 1.1])
-    found = walk(ground, time)
-    assert found.interval * 0.1 + found.phases[found.phase] == pytest.approx(time, abs=1e-15)
-    assert np.count_nonzero(found.phases == 0) == 1
+    found = linear_pieces(ground, time)
+    assert found.interval * 0.1 + found.offsets[found.offset] == pytest.approx(time, abs=1e-15)
+    assert np.count_nonzero(found.offsets == 0) == 1
     assert found.interval.tolist() == [0, 1, 1, 3, 7, 11]
 
 
