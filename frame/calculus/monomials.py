@@ -78,7 +78,7 @@ def convolve(
     """
     at, total = product_places(d, *degrees), count(d, sum(degrees))
     shape = bilinear(a[0], b[0]).shape
-    out = np.zeros((total, *shape))
+    out = np.zeros((total, *shape), np.result_type(a, b))
     inner, longer = (a.shape[-1] if bilinear == matmul else 1), max(len(a), len(b))
     if longer * out[0].size * inner <= SMALL:
         if bilinear == matmul and a.ndim == b.ndim == 3:

@@ -32,6 +32,8 @@ from alphacut.fuzzy.arrays import Array, Rows
 
 ORDER = 3
 """Order of a Taylor model unless another is given."""
+COMPLEX = 2
+"""Roundings of a product of complex numbers beyond one: √2 γ_2 ≤ γ_3 (Higham 2002, lemma 3.5)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +41,8 @@ class TaylorModel:
     """Functions of the unit box, an array of shape V of them.
 
     Args:
-        parts: Coefficients of degree 0, 1, …, shapes (monomials, *V); missing ones are zero.
+        parts: Coefficients of degree 0, 1, …, shapes (monomials, *V), real or complex; missing ones
+            are zero.
         remainder: Bound of what they leave out and of their rounding, shape V, never negative.
         inputs: Number of inputs d.
         order: Degree to which products are kept.
@@ -55,7 +58,7 @@ class TaylorModel:
     @classmethod
     def constant(cls, value: ArrayLike, inputs: int, order: int = ORDER) -> TaylorModel:
         """Functions without dependence on the inputs, values of shape V."""
-        array = np.asarray(value, float)
+        array = _numbers(value)
         return cls((array[None],), np.zeros(array.shape), inputs, order)
 
     @classmethod
@@ -93,11 +96,11 @@ class TaylorModel:
         """Coefficients of one degree, shape (monomials, *V)."""
         if degree < len(self.parts):
             return self.parts[degree]
-        return np.zeros((count(self.inputs, degree), *self.shape))
+        return np.zeros((count(self.inputs, degree), *self.shape), self.parts[0].dtype)
 
     def sizes(self) -> list[Array]:
         """Bounds of the parts over the box, each of shape V."""
-        of_sums = len(self.parts) + 2
+        of_sums = len(self.parts) + 4
         return [np.abs(part).sum(0) * (1 + gamma(len(part) + of_sums)) for part in self.parts]
 
     def size(self) -> Array:
@@ -119,7 +122,7 @@ class TaylorModel:
 
     def at(self, u: Array) -> Array:
         """The polynomials' values at points u (S, d), shape (S, *V)."""
-        total: Array = np.zeros((len(u), *self.shape))
+        total: Array = np.zeros((len(u), *self.shape), self.parts[0].dtype)
         for degree, part in enumerate(self.parts):
             powers = u[:, monomials(self.inputs, degree)].prod(-1)
             total += np.tensordot(powers, part, 1)
@@ -149,6 +152,17 @@ class TaylorModel:
             full[places(inputs[monomials(self.inputs, degree)], d)] = part
             parts.append(full)
         return TaylorModel(tuple(parts), self.remainder, d, self.order)
+
+    @property
+    def real(self) -> TaylorModel:
+        """Real parts."""
+        parts = tuple(part.real for part in self.parts)
+        return TaylorModel(parts, self.remainder, self.inputs, self.order)
+
+    @property
+    def polynomial(self) -> TaylorModel:
+        """The polynomials alone, functions that have no remainder."""
+        return TaylorModel(self.parts, np.zeros(self.shape), self.inputs, self.order)
 
     def cut(self, order: int) -> TaylorModel:
         """The same to a lower order, with the sizes of what is dropped in the rest."""
@@ -192,7 +206,7 @@ class TaylorModel:
         shape = np.broadcast_shapes(self.shape, b.shape)
         parts = []
         for degree in range(max(len(self.parts), len(b.parts))):
-            part = np.zeros((count(self.inputs, degree), *shape))
+            part = np.zeros((count(self.inputs, degree), *shape), _dtype(self, b))
             for x in (self, b):
                 if degree < len(x.parts):
                     part += _padded(x.parts[degree], len(shape))
@@ -220,7 +234,7 @@ class TaylorModel:
         factor = _numbers(other)
         parts = tuple(_padded(part, factor.ndim) * factor for part in self.parts)
         remainder = self.remainder * np.abs(factor)
-        return TaylorModel(parts, remainder, self.inputs, self.order).with_rounding(1)
+        return TaylorModel(parts, remainder, self.inputs, self.order).with_rounding(1 + COMPLEX)
 
     __rmul__ = __mul__
 
@@ -290,7 +304,7 @@ class TaylorModel:
             terms: Number of terms of each sum in that product.
         """
         remainder = np.asarray(bilinear(self.remainder, np.abs(factor))) * (1 + gamma(terms + 2))
-        rounding = gamma(terms) * bilinear(np.sum(self.sizes(), 0), np.abs(factor))
+        rounding = gamma(terms + COMPLEX) * bilinear(np.sum(self.sizes(), 0), np.abs(factor))
         parts = tuple(np.asarray(bilinear(part, factor)) for part in self.parts)
         return TaylorModel(parts, remainder + rounding, self.inputs, self.order)
 
@@ -370,7 +384,12 @@ def solve(matrix: TaylorModel, right: TaylorModel) -> TaylorModel:
 
 
 def _numbers(value: ArrayLike) -> Array:
-    return np.asarray(value, float)
+    array = np.asarray(value)
+    return array if np.iscomplexobj(array) else np.asarray(array, float)
+
+
+def _dtype(a: TaylorModel, b: TaylorModel) -> np.dtype[Any]:
+    return np.result_type(a.parts[0], b.parts[0])
 
 
 def _padded(part: Array, ndim: int) -> Array:
@@ -393,14 +412,14 @@ def _product(
     remainder = bilinear(a.remainder, np.asarray(sum(b_sizes)) + b.remainder)
     remainder = remainder + bilinear(np.asarray(sum(a_sizes)), b.remainder)
     degrees = range(min(order, len(a_sizes) + len(b_sizes) - 2) + 1)
-    parts = [np.zeros((count(d, k), *remainder.shape)) for k in degrees]
+    parts = [np.zeros((count(d, k), *remainder.shape), _dtype(a, b)) for k in degrees]
     inner = a.shape[-1] if bilinear == matmul else 1
     for i, x in enumerate(a.parts):
         for j, y in enumerate(b.parts):
             omitted = 1.0  # fraction of the parts' product that the polynomial leaves out
             if i + j <= order:
                 parts[i + j] += convolve(_padded(x, ndim), _padded(y, ndim), (i, j), d, bilinear)
-                omitted = gamma(inner * comb(i + j, i) + i + j + 1)
+                omitted = gamma(inner * comb(i + j, i) + i + j + 1 + COMPLEX)
             remainder = remainder + omitted * bilinear(a_sizes[i], b_sizes[j])
     remainder = remainder * (1 + gamma(inner + (order + 1) ** 2))
     return TaylorModel(tuple(parts), np.asarray(remainder), d, order)
