@@ -19,7 +19,7 @@ from alphacut.frame.modes.attained import (
     outputs_at,
 )
 from alphacut.frame.modes.structure import Classical, classical
-from alphacut.frame.response.waves import Grid, Oscillators
+from alphacut.frame.response.oscillators import Grid, Oscillators
 from alphacut.frame.structures.linear import LinearSystem, histories
 from alphacut.frame.structures.loads import History
 from alphacut.fuzzy.arrays import Array, Rows
@@ -183,7 +183,7 @@ class Box:
             oscillator = Oscillators(grid, self.loads, self.time)
             for source, share in modal.share.items():
                 for o in outputs:
-                    wave = oscillator.waves(source, int(modal.order[o]))
+                    wave = oscillator.responses(source, int(modal.order[o]))
                     deviation[:, o] += read[o, k] * abs(share[0, k]) * wave.line_deviation
         return deviation
 

@@ -17,7 +17,7 @@ from alphacut.frame.modes.intervening import Oscillator
 from alphacut.frame.modes.models import MotionModels
 from alphacut.frame.modes.rest import Excitation
 from alphacut.frame.modes.structure import Classical
-from alphacut.frame.response.waves import Grid, Oscillators, spanned
+from alphacut.frame.response.oscillators import Grid, Oscillators, grid_over
 from alphacut.frame.structures.loads import History
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.progress_bar import Progress, subprogress
@@ -81,7 +81,7 @@ def response_tables(
     """
     loads, time, sources = excitation
     points, distinct = _points(single, float(time[-1])), sorted(map(int, set(orders)))
-    grids = [spanned(mode.omega_range, mode.quotient_range, points) for mode in single]
+    grids = [grid_over(mode.omega_range, mode.quotient_range, points) for mode in single]
     modes = [_responses(grid, loads, time, sources, distinct) for grid in grids]
     value, error, line_deviation = (
         {order: np.stack([mode[order][i] for mode in modes]) for order in distinct}
@@ -108,7 +108,7 @@ def _responses(
     oscillators = Oscillators(grid, loads, time)
     responses = {}
     for order in orders:
-        waves = [oscillators.waves(source, order) for source in sources]
+        waves = [oscillators.responses(source, order) for source in sources]
         value = np.stack([wave.value.reshape(len(time), -1) for wave in waves])
         error = np.stack([wave.error for wave in waves])
         responses[order] = value, error, np.stack([wave.line_deviation for wave in waves])

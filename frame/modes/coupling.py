@@ -17,7 +17,7 @@ from alphacut.frame.modes.clusters import Subspaces
 from alphacut.frame.modes.intervening import BlockShares, Ends, damped_range
 from alphacut.frame.modes.rest import Excitation
 from alphacut.frame.modes.structure import Classical
-from alphacut.frame.response.waves import Grid, Oscillators, Waves, spanned
+from alphacut.frame.response.oscillators import Grid, ModalResponses, Oscillators, grid_over
 from alphacut.fuzzy.arrays import Array, Rows
 
 STEP = 0.2
@@ -56,7 +56,7 @@ class Coupling:
         for order in np.unique(orders):
             o = np.flatnonzero(orders == order)
             for s, source in enumerate(sources):
-                wave = table.waves(source, int(order))
+                wave = table.responses(source, int(order))
                 half = np.ptp(wave.value, axis=(1, 2)) / 2 + wave.error
                 by_slope = np.outer(self._slope(wave, source), self.slope[s, o])
                 added[:, o] += np.minimum(by_slope, 2 * np.outer(half, self.size[s, o]))
@@ -69,9 +69,9 @@ class Coupling:
         reach = STEP * (least * low + 2 / max(duration, 1e-300))
         points = (high - low) / reach, (most - least) * high / reach
         across, along = (int(np.clip(x, 1, MAX_POINTS)) + 1 for x in points[::-1])
-        return spanned(self.omega_range, self.quotient_range, (along, across))
+        return grid_over(self.omega_range, self.quotient_range, (along, across))
 
-    def _slope(self, wave: Waves, source: str) -> Array:
+    def _slope(self, wave: ModalResponses, source: str) -> Array:
         """Bound of |de/dλ| over the block's ranges of ω and g/ω, shape (T,).
 
         e is Re G + (g/ω) Im G for a start and ± Im G/ω else, with G(σ; t), σ = −g + iω.

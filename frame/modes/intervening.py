@@ -24,7 +24,7 @@ from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.blocks import Block
 from alphacut.frame.modes.clusters import Subspaces
 from alphacut.frame.modes.structure import Classical
-from alphacut.frame.response.waves import Grid
+from alphacut.frame.response.oscillators import Grid
 from alphacut.fuzzy.arrays import Array, Rows
 
 MAX_PAIRS = 100_000

@@ -23,7 +23,7 @@ from alphacut.frame.calculus.taylor_model import TaylorModel, solution_series, s
 from alphacut.frame.modes.clusters import Subspaces
 from alphacut.frame.modes.intervening import BlockShares, Ends, damped_range, dots
 from alphacut.frame.modes.structure import Classical
-from alphacut.frame.response.ranges import Ranges, response_ranges
+from alphacut.frame.response.oscillators import Ranges, response_ranges
 from alphacut.frame.structures.loads import History
 from alphacut.fuzzy.arrays import Array
 

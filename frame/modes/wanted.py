@@ -11,8 +11,7 @@ from alphacut.frame.modes.blocks import CentredMatrices
 from alphacut.frame.modes.rest import Excitation
 from alphacut.frame.modes.structure import Classical
 from alphacut.frame.response.duhamel import responses_at_nodes
-from alphacut.frame.response.ranges import POWERS
-from alphacut.frame.response.waves import feedthrough
+from alphacut.frame.response.oscillators import POWERS, feedthrough
 from alphacut.frame.structures.loads import History
 from alphacut.fuzzy.arrays import Array
 

@@ -16,7 +16,7 @@ from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.clusters import centred_matrices, subspaces
 from alphacut.frame.modes.rest import _inverse_form
 from alphacut.frame.modes.structure import classical
-from alphacut.frame.response.waves import Grid, Oscillators
+from alphacut.frame.response.oscillators import Grid, Oscillators
 from alphacut.frame.structures.loads import Accelerogram
 from alphacut.frame.structures.matrix import MatrixStructure
 
@@ -272,8 +272,8 @@ def test_tables_miss_what_they_state_and_no_less_than_half(source, order):
     fine = Grid(np.linspace(9, 11, 81), np.linspace(0.02, 0.05, 81))
     for omega, quotient in ((16, 80), (80, 8), (16, 8)):
         coarse = Grid(fine.omega[:: 80 // omega], fine.quotient[:: 80 // quotient])
-        table = Oscillators(coarse, {"load": RECORD}, time).waves(source, order)
-        exact = Oscillators(fine, {"load": RECORD}, time).waves(source, order).value
+        table = Oscillators(coarse, {"load": RECORD}, time).responses(source, order)
+        exact = Oscillators(fine, {"load": RECORD}, time).responses(source, order).value
         at = table.value
         for axis, (own, grid) in enumerate(
             ((fine.quotient, coarse.quotient), (fine.omega, coarse.omega)), 1
@@ -305,8 +305,8 @@ def test_responses_are_those_of_a_fine_march_and_stray_as_stated():
         coarse = step * (np.arange(120) + 0.5)
         time = coarse[0] + step / parts * np.arange(119 * parts + 1)
         for order in (0, 1, 2):
-            wide = Oscillators(grid, {"load": ground}, coarse).waves(source, order)
-            fine = Oscillators(grid, {"load": ground}, time).waves(source, order).value
+            wide = Oscillators(grid, {"load": ground}, coarse).responses(source, order)
+            fine = Oscillators(grid, {"load": ground}, time).responses(source, order).value
             assert np.allclose(fine[::parts], wide.value, atol=1e-12 * np.abs(fine).max())
             line = np.array([np.interp(time, coarse, x) for x in wide.value.reshape(120, -1).T]).T
             off = np.abs(fine.reshape(len(time), -1) - line)[1:].reshape(119, -1).max(1)

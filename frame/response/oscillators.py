@@ -1,0 +1,321 @@
+"""Responses of oscillators over ranges of frequency and damping, with proved bounds.
+
+An oscillator with decay g and frequency ω (σ = −g + iω) answers a unit of its share by
+
+    load       e = −Im(σ^ν ρ) / ω,   ρ(σ; t) = ∫₀ᵗ exp(σ τ) a(t − τ) dτ,
+    force      e = Im(σ^ν ρ) / ω, and f(t) besides where ν = 2, of the relative acceleration,
+    velocity   e = Im(σ^ν exp(σ t)) / ω,
+    start      e = Re(σ^ν exp(σ t)) + (g/ω) Im(σ^ν exp(σ t)),
+
+ν the derivative of the motion that an output takes (ν = 2 under a load of the ground: the absolute
+acceleration). All are read off one function G(σ) = σ^ν ρ that is analytic, so one complex
+derivative bounds all real ones. Tables (`Oscillators`) stand on ω × q, q = g/ω; within a cell a
+function strays from the bilinear one through the corners by at most h_ω²/8 sup|∂²e/∂ω²| +
+h_q²/8 sup|∂²e/∂q²|, and these follow from sup |G|, |G'|, |G''|. sup |G''| itself is its largest
+value at the corners, and what it strays between them, which |G''''| bounds; that in turn follows
+from integrals of τⁿ exp(−g τ) |a|.
+
+Of modes that are known by sums alone, ranges of λ^κ e over all frequencies between two are wanted
+(`response_ranges`). They are cut into pieces; in each a table bounds the responses, and so does an
+integral of |a|.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from math import comb, perm
+
+import numpy as np
+
+from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF
+from alphacut.frame.response.duhamel import (
+    absolute_moments,
+    require_in_range,
+    responses_at_nodes,
+)
+from alphacut.frame.structures.loads import History
+from alphacut.fuzzy.arrays import Array
+
+POWERS = (0.0, 0.5, 1.0)
+"""Powers κ of λ."""
+RATIO = 1.5
+"""Greatest over least frequency of a piece."""
+STEP = 0.4
+"""Distance of a piece's points, as a share of the decay and of the inverse duration."""
+MAX_POINTS = (240, 8)
+"""Points of a piece along ω, above which the integral alone bounds it, and along g/ω."""
+
+
+@dataclass(frozen=True, eq=False)
+class ModalResponses:
+    """Responses of oscillators on a grid of W frequencies and Q quotients g/ω at T nodes.
+
+    Args:
+        omega: Frequencies, shape (W,), in rad/s.
+        quotient: g/ω, shape (Q,).
+        value: Responses, shape (T, Q, W).
+        error: Bound of their distance from bilinear interpolation, with rounding, shape (T,).
+        line_deviation: Bound of their distance from a straight line in the step to each node, (T,).
+        largest: Bounds of |G| and |G'| over the grid, shape (2, T).
+    """
+
+    omega: Array
+    quotient: Array
+    value: Array
+    error: Array
+    line_deviation: Array
+    largest: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """A box of ω, shape (W,), and q = g/ω, shape (Q,), with its points."""
+
+    omega: Array
+    quotient: Array
+
+    @property
+    def sigma(self) -> Array:
+        """σ of all points, shape (Q, W)."""
+        return np.asarray((-self.quotient[:, None] + 1j) * self.omega)
+
+
+def grid_over(
+    omega: tuple[float, float], quotient: tuple[float, float], points: tuple[int, int]
+) -> Grid:
+    """Return a grid of equally spaced ω and q = g/ω over their ranges, widened if empty."""
+    q = quotient if quotient[1] > quotient[0] else (quotient[0], quotient[0] + 1e-12)
+    w = omega if omega[1] > omega[0] * (1 + 1e-12) else (omega[0], omega[0] * (1 + 1e-9))
+    axes = (np.linspace(*ends, count) for ends, count in zip((w, q), points, strict=True))
+    return Grid(*(np.asarray(axis, float) for axis in axes))
+
+
+class Oscillators:
+    """Analytic functions ρ and exp(σ t) on a grid, from which all responses are read."""
+
+    def __init__(self, grid: Grid, loads: Mapping[str, History], time: Array) -> None:
+        self.grid, self.loads, self.time = grid, loads, time
+        sigma, t, duration = grid.sigma.ravel(), time[:, None], float(time[-1])
+        require_in_range(sigma, duration, duration)
+        free = np.exp(sigma * t)
+        rounding = UNIT_ROUNDOFF * (4 + np.abs(sigma) * t) * np.abs(free)
+        decay = float((grid.quotient[:, None] * grid.omega).min())
+        bounds = np.stack([time**n * np.exp(-decay * time) for n in range(5)])
+        # ρ with two derivatives by σ, its rounding, and bounds of its derivatives of order 0 to 4
+        self.free = np.stack([free, t * free, t * t * free]), rounding, bounds
+        self.forced = {
+            name: (*responses_at_nodes(sigma, load, time, 2), absolute_moments(decay, load, time))
+            for name, load in loads.items()
+        }
+
+    def responses(self, source: str, order: int) -> ModalResponses:
+        """Return responses to a unit share of a source, with bounds of their errors.
+
+        Args:
+            source: Name of a load or force, "velocity" or "start".
+            order: Derivative ν of the motion that is read, 0 to 2.
+        """
+        grid, is_start = self.grid, source == "start"
+        sigma = grid.sigma.ravel()
+        rho, rounding, bounds = self.forced.get(source, self.free)
+        G = _with_power(sigma, rho, order)
+        omega, quotient = np.abs(sigma.imag), -sigma.real / sigma.imag
+        # of the power and of what is read off
+        rounding = np.abs(sigma) ** order * rounding
+        rounding += 2 * (order + 3) * UNIT_ROUNDOFF * np.abs(G[0])
+        if is_start:
+            value = G[0].real + quotient * G[0].imag
+            rounding *= 1 + quotient
+        else:
+            direct = feedthrough(source, self.loads, order, self.time)[:, None]
+            value = direct + G[0].imag / omega * (-1.0 if source == "load" else 1.0)
+            rounding = rounding / omega + 8 * UNIT_ROUNDOFF * np.abs(direct)
+        shape = (len(self.time), len(grid.quotient), len(grid.omega))
+        error, largest = self._error(np.abs(G).max(-1), bounds, order, start=is_start)
+        error, deviation = error + rounding.max(-1), self._line_deviation(largest[0], source, order)
+        table = value.reshape(shape)
+        return ModalResponses(grid.omega, grid.quotient, table, error, deviation, largest)
+
+    def _error(
+        self, largest: Array, bounds: Array, order: int, *, start: bool
+    ) -> tuple[Array, Array]:
+        """Bounds of the interpolation error, (T,), and of |G| and |G'| over the grid, (2, T)."""
+        # largest (3, T): |G|, |G'|, |G''| at the points; bounds (5, T): of derivatives of ρ by σ.
+        # Along ω at constant q = g/ω, dσ = (−q + i) dω; along q, dσ = −ω dq.
+        low, high, q = self.grid.omega[0], self.grid.omega[-1], self.grid.quotient[-1]
+        h, k = (np.diff(x).max(initial=0.0) for x in (self.grid.omega, self.grid.quotient))
+        stretch = 1 + q**2  # |dσ/dω|²
+        fourth = sum(
+            comb(4, j) * perm(order, j) * (high * stretch**0.5) ** (order - j) * bounds[4 - j]
+            for j in range(order + 1)
+        )
+        # half the diagonal of a cell is √(2 between)
+        between = (stretch * h**2 + high**2 * k**2) / 8
+        second = largest[2] + between * fourth
+        first = largest[1] + np.sqrt(2 * between) * second
+        zero = largest[0] + between * second
+        if start:  # Re G + q Im G
+            along = stretch**1.5 * second
+            across = high**2 * (1 + q) * second + 2 * high * first
+        else:  # Im G / ω
+            along = stretch * second / low + 2 * stretch**0.5 * first / low**2 + 2 * zero / low**3
+            across = high * second
+        return np.asarray((h**2 * along + k**2 * across) / 8), np.stack([zero, first])
+
+    def _line_deviation(self, size: Array, source: str, order: int) -> Array:
+        """Bounds of how far responses stray from a line in the step to each node, (T,)."""
+        # A chord errs by at most h²/8 sup |ë|. Under a load a(t), ρ̇ = σ ρ + a and
+        # ρ̈ = σ² ρ + σ a + ȧ; where a jumps, ρ̇ does, which adds h/4 of the jump.
+        h = np.diff(self.time, prepend=self.time[0])
+        low, fastest = self.grid.omega[0], float(np.abs(self.grid.sigma).max())
+        before = np.append(size[:1], size[:-1])  # |σ^order ρ| at the step's beginning
+        if source == "start":
+            return np.asarray(h**2 / 8 * fastest**2 * before * (1 + self.grid.quotient[-1]))
+        if source not in self.loads:
+            return np.asarray(h**2 / 8 * fastest**2 * before / low)
+        load, power = self.loads[source], fastest**order
+        largest, slope = load.extremes
+        bend = fastest**2 * (before + h * power * largest) + power * (fastest * largest + slope)
+        kink = np.zeros(len(self.time))
+        for at, jump in load.jumps if order else ():
+            is_kinked = (self.time - h <= at * (1 + 1e-9)) & (self.time >= at * (1 - 1e-9))
+            kink += np.where(is_kinked, h / 4 * power * jump, 0.0)
+        deviation = (h**2 / 8 * bend + kink) / low
+        if _has_feedthrough(source, order):
+            deviation += load.line_deviation(self.time)
+        return np.asarray(deviation)
+
+
+def feedthrough(source: str, loads: Mapping[str, History], order: int, time: Array) -> Array:
+    """Direct feedthrough f(t) of a force to accelerations at nodes, shape of `time`, else 0."""
+    if not _has_feedthrough(source, order):
+        return np.zeros_like(time)
+    return loads[source].values(time)
+
+
+def _has_feedthrough(source: str, order: int) -> bool:
+    return order == 2 and source.startswith("force")
+
+
+def _with_power(sigma: Array, rho: Array, order: int) -> Array:
+    """G = σ^order ρ and its first two derivatives by σ, shape (3, T, S), from those of ρ."""
+    power, first = sigma**order, order * sigma ** max(order - 1, 0)
+    second = order * (order - 1) * rho[0] + 2 * first * rho[1] + power * rho[2]
+    return np.stack([power * rho[0], first * rho[0] + power * rho[1], second])
+
+
+@dataclass(frozen=True, eq=False)
+class Ranges:
+    """Bounds of λ^κ e at nodes, each of shape (powers, sources, T).
+
+    Args:
+        low: Lower bounds.
+        high: Upper bounds.
+        line_deviation: Bounds of how far λ^κ e strays from a straight line in the step to a node.
+    """
+
+    low: Array
+    high: Array
+    line_deviation: Array
+
+
+def response_ranges(
+    omega: tuple[float, float],
+    quotient: tuple[float, float],
+    loads: Mapping[str, History],
+    time: Array,
+    sources: Sequence[str],
+    orders: Sequence[int],
+) -> dict[int, Ranges]:
+    """Return ranges of λ^κ e at nodes `time` (T,) over all oscillators with ω and g/ω in ranges.
+
+    e is the response to a source and κ one of `POWERS`; keys are the `orders` of derivatives of the
+    motion that are read.
+    """
+    shape = (len(POWERS), len(sources), len(time))
+    found = {
+        order: Ranges(np.full(shape, np.inf), np.full(shape, -np.inf), np.zeros(shape))
+        for order in orders
+    }
+    count = max(1, int(np.ceil(np.log(omega[1] / omega[0]) / np.log(RATIO))))
+    ratio = (omega[1] / omega[0] * (1 + 1e-9)) ** (1 / count)
+    for n in range(count):
+        piece = _Piece((omega[0] * ratio**n, omega[0] * ratio ** (n + 1)), quotient, loads, time)
+        for order, ranges in found.items():
+            for s, source in enumerate(sources):
+                for k, (low, high, deviation) in enumerate(piece.bounds(source, order)):
+                    ranges.low[k, s] = np.minimum(ranges.low[k, s], low)
+                    ranges.high[k, s] = np.maximum(ranges.high[k, s], high)
+                    ranges.line_deviation[k, s] = np.maximum(ranges.line_deviation[k, s], deviation)
+    return found
+
+
+class _Piece:
+    """Responses of oscillators of one piece of a range of frequencies."""
+
+    def __init__(
+        self,
+        omega: tuple[float, float],
+        quotient: tuple[float, float],
+        loads: Mapping[str, History],
+        time: Array,
+    ) -> None:
+        self.omega, self.quotient, self.loads, self.time = omega, quotient, loads, time
+        decay = quotient[0] * omega[0]
+        self.decay_factor = np.exp(-decay * time)
+        self.integral = {name: absolute_moments(decay, x, time)[0] for name, x in loads.items()}
+        self.table: Oscillators | None = None
+        distance = STEP * (decay + 2 / max(float(time[-1]), 1e-300))
+        along = int(np.ceil((omega[1] - omega[0]) / distance)) + 1
+        across = int(np.ceil((quotient[1] - quotient[0]) * omega[1] / distance)) + 1
+        if loads and along <= MAX_POINTS[0]:
+            points = max(along, 2), int(np.clip(across, 2, MAX_POINTS[1]))
+            self.table = Oscillators(grid_over(omega, quotient, points), loads, time)
+
+    def bounds(self, source: str, order: int) -> Iterator[tuple[Array, Array, Array]]:
+        """Yield least, greatest and line deviation of λ^κ e at nodes, (T,) each, for each κ."""
+        size, between = self._sizes(source, order)
+        fastest = self.omega[1] * np.sqrt(1 + self.quotient[1] ** 2)
+        for power in POWERS:
+            factor = fastest ** (2 * power)
+            low, high, deviation = -factor * size, factor * size, 2 * factor * between
+            if source in self.loads and self.table is not None:
+                table = self.table.responses(source, order)
+                eigenvalue = np.abs(self.table.grid.sigma) ** 2
+                least, greatest = _bounds_over_cells(table.value, table.error, eigenvalue**power)
+                low, high = np.maximum(low, least), np.minimum(high, greatest)
+                deviation = np.minimum(deviation, factor * table.line_deviation)
+            yield low, high, deviation
+
+    def _sizes(self, source: str, order: int) -> tuple[Array, Array]:
+        """Bounds of |e| of any oscillator at nodes and in the step to each, (T,) each."""
+        q, (slowest, fastest) = self.quotient[1], self.omega
+        largest = (fastest * np.sqrt(1 + q**2)) ** order
+        if source in self.loads:
+            integral, size = self.integral[source], self.loads[source].extremes[0]
+            step = np.diff(self.time, prepend=self.time[0])
+            before = np.append(integral[:1], integral[:-1]) + step * size
+            direct = np.abs(feedthrough(source, self.loads, order, self.time))
+            in_step = np.maximum(before, integral) * largest / slowest + size * bool(direct.any())
+            return integral * largest / slowest + direct, in_step
+        factor = largest * (1 + q) if source == "start" else largest / slowest
+        before = np.append(self.decay_factor[:1], self.decay_factor[:-1])
+        return factor * self.decay_factor, factor * before
+
+
+def _bounds_over_cells(value: Array, error: Array, factor: Array) -> tuple[Array, Array]:
+    """Lower and upper bound of factor × value over a table, shape (T,) each.
+
+    Args:
+        value: Values at the points, shape (T, Q, W).
+        error: What bilinear interpolation misses, shape (T,).
+        factor: Positive factors, monotone along Q and rising along W, at the points, shape (Q, W).
+    """
+    # over strips between neighbouring ω, each over all Q
+    low, high = value.min(1) - error[:, None], value.max(1) + error[:, None]  # (T, W)
+    low, high = np.minimum(low[:, 1:], low[:, :-1]), np.maximum(high[:, 1:], high[:, :-1])
+    least, greatest = factor.min(0)[:-1], factor.max(0)[1:]
+    bottom = np.minimum(low * least, low * greatest)
+    top = np.maximum(high * least, high * greatest)
+    return bottom.min(1), top.max(1)
