@@ -34,8 +34,7 @@ from alphacut.frame.verification.step_error import (
     with_step_error,
 )
 from alphacut.fuzzy import FuzzyNumber
-from alphacut.fuzzy.arrays import Array, Rows
-from alphacut.fuzzy.blas import on_one_blas_thread
+from alphacut.fuzzy.arrays import Array, Rows, on_one_blas_thread
 from alphacut.fuzzy.progress_bar import Progress, progress_reporter, subprogress
 from alphacut.fuzzy.refused import require, require_choice
 

@@ -1,18 +1,15 @@
 """Fuzzy inputs through any model: α-cuts, methods of search, bounds."""
 
 from alphacut.fuzzy.campaign.store import Store
-from alphacut.fuzzy.interval_quasi_monte_carlo import IntervalQuasiMonteCarlo, RandomInput
 from alphacut.fuzzy.knowledge.from_data import from_data
 from alphacut.fuzzy.knowledge.joint import jointly
 from alphacut.fuzzy.knowledge.known import Knowledge
-from alphacut.fuzzy.plans.alpha_cut_optimisation import Optimisation
 from alphacut.fuzzy.plans.automatic import Automatic
 from alphacut.fuzzy.plans.transformation import Extended, General, Reduced, Signed
 from alphacut.fuzzy.propagation import propagate, width_shares
 from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.fuzzy.result import Bounds, Nature
 from alphacut.fuzzy.sets.boxes import levels
-from alphacut.fuzzy.sets.interaction import Ellipsoidal, Linear
 from alphacut.fuzzy.sets.numbers import (
     Crisp,
     FuzzyNumber,
@@ -23,9 +20,8 @@ from alphacut.fuzzy.sets.numbers import (
 )
 
 __all__ = [
-    "Automatic", "Bounds", "Crisp", "Ellipsoidal", "Extended", "FailedError", "FuzzyNumber",
-    "General", "Interval", "IntervalQuasiMonteCarlo", "Knowledge", "Linear", "Nature",
-    "Optimisation", "PiecewiseLinear", "RandomInput", "Reduced", "RefusedError",
-    "Signed", "Store", "Trapezoidal", "Triangular", "from_data", "jointly", "levels",
-    "propagate", "width_shares",
+    "Automatic", "Bounds", "Crisp", "Extended", "FailedError", "FuzzyNumber", "General",
+    "Interval", "Knowledge", "Nature", "PiecewiseLinear", "Reduced", "RefusedError", "Signed",
+    "Store", "Trapezoidal", "Triangular", "from_data", "jointly", "levels", "propagate",
+    "width_shares",
 ]  # fmt: skip

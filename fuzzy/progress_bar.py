@@ -16,7 +16,7 @@ _FORETOLD = 0.05  # share of the work from which the time left is told; less for
 
 
 def subprogress(progress: Progress | None, first: float, last: float) -> Progress:
-    """Function that reports the progress of a part of a task to `progress`, that of the task.
+    """Return a function that reports the progress of a part of a task to `progress`.
 
     Args:
         progress: Takes the completed fraction of the task; None for no report.
@@ -57,12 +57,11 @@ class _Bar:
         if now - self.begun >= _BAR_DELAY and now - self.moved >= _BAR_PERIOD:
             self.moved, full = now, round(_WIDTH * share)
             bar = "█" * full + "░" * (_WIDTH - full)
-            _on_terminal(f"{bar} {share:4.0%} {now - self.begun:.0f} s")
+            _write(f"\r\x1b[K{bar} {share:4.0%} {now - self.begun:.0f} s")
 
     def close(self) -> None:
-        """Remove the bar."""
         if self.moved:
-            _on_terminal("")
+            _write("\r\x1b[K")
 
 
 class _Lines:
@@ -76,13 +75,12 @@ class _Lines:
         if now - self.written >= _LINE_PERIOD:
             self.written, elapsed = now, now - self.begun
             left = f", some {elapsed / share - elapsed:.0f} s left" if share >= _FORETOLD else ""
-            sys.stderr.write(f"{share:4.0%} after {elapsed:.0f} s{left}\n")
-            sys.stderr.flush()
+            _write(f"{share:4.0%} after {elapsed:.0f} s{left}\n")
 
     def close(self) -> None:
-        """Does nothing: lines stay."""
+        """Lines stay."""
 
 
-def _on_terminal(text: str) -> None:
-    sys.stderr.write(f"\r\x1b[K{text}")
+def _write(text: str) -> None:
+    sys.stderr.write(text)
     sys.stderr.flush()

@@ -26,7 +26,6 @@ from alphacut.fuzzy.progress_bar import Progress, progress_reporter
 from alphacut.fuzzy.refused import require, require_choice
 from alphacut.fuzzy.result import Bounds, Nature
 from alphacut.fuzzy.sets.boxes import Domain, fuzzy_inputs, levels
-from alphacut.fuzzy.sets.interaction import Interaction
 from alphacut.fuzzy.sets.numbers import Crisp, FuzzyNumber
 
 BUDGET = 10_000
@@ -39,7 +38,6 @@ def propagate(
     method: Plan | None = None,
     *,
     alpha: Sequence[float] | None = None,
-    interactions: Sequence[Interaction] = (),
     knowledge: Knowledge | None = None,
     budget: int = BUDGET,
     units: Mapping[str, str] | None = None,
@@ -54,8 +52,6 @@ def propagate(
 ) -> Bounds:
     """Return the range of each output of a function of fuzzy inputs, on every α-level.
 
-    ``propagate(lambda x, y: x * y, {"x": Triangular(1, 2, 4), "y": Interval(3, 5)})`` is enough.
-
     Args:
         function: Takes the inputs by name; returns a number, an array, or a mapping of names to
             either.
@@ -63,7 +59,6 @@ def propagate(
             Numbers that claim a coverage are joined (`jointly`).
         method: Search of the boxes, such as ``General()``; `Automatic` if not given.
         alpha: Rising levels; 0, ¼, ½, ¾, 1 if not given.
-        interactions: Constraints between the inputs; methods that cannot respect them refuse.
         knowledge: Facts on which guaranteed bounds rest, such as the signs of the inputs' effects.
         budget: Evaluations that the call may take, stored ones among them. Methods that know their
             samples beforehand refuse to begin; a search ends, and says so.
@@ -99,7 +94,7 @@ def propagate(
         Ends(lower=array([3., 6.]), upper=array([20., 10.]))
     """
     start = perf_counter()
-    domain = Domain(joined_inputs(inputs), levels(4) if alpha is None else alpha, interactions)
+    domain = Domain(joined_inputs(inputs), levels(4) if alpha is None else alpha)
     method = method or Automatic()
     _require_method(method)
     require_choice("on_failure", on_failure, ("raise", "skip"))
@@ -138,12 +133,12 @@ def _require_method(method: Plan) -> None:
     is_plan = hasattr(method, "run") and not isinstance(method, type)
     is_plan = is_plan and len(signature(method.run).parameters) == 2  # campaign and domain
     allowed = "an object such as General() or Signed()"
-    cure = "IntervalQuasiMonteCarlo().run(…) takes random inputs besides"
+    cure = "demos/random_inputs.py shows random inputs beside fuzzy ones"
     require(is_plan, "method", value=repr(method), allowed=allowed, cure=cure)
 
 
 def _note_failures(bounds: Bounds, failed: int) -> Bounds:
-    """The bounds if no sample failed, else a copy as attained bounds with a note on the number."""
+    """The bounds, if samples failed as attained ones with a note on their number."""
     if not failed:
         return bounds
     note = f"{failed} samples failed and were left out: the true range may reach further there"
@@ -176,7 +171,7 @@ class Shares:
     Args:
         names: Inputs or groups.
         width: Width with all inputs fuzzy, shape (…, outputs).
-        reduction: Reduction of the width when an input is fixed at its modal value, shape
+        reduction: Reduction of the width when an input is fixed at its nominal value, shape
             (names, …, outputs). Reductions need not add up to the width: effects overlap.
     """
 
@@ -208,9 +203,6 @@ def width_shares(
         inputs: The fuzzy inputs.
         groups: Names of inputs that are fixed together, by the name of their group; each input by
             itself if not given.
-
-    Raises:
-        RefusedError: A group names no input.
 
     Example:
         >>> from alphacut.fuzzy import Interval, Reduced

@@ -27,13 +27,9 @@ def printable(value: object, most: int = LONGEST) -> str:
 def fit_message(
     value: str, allowed: str, compose: Callable[[str, str], str], cure: str = ""
 ) -> str:
-    """Message of at most `LONGEST` characters, whose cure is never cut off.
+    """Return a message of at most `LONGEST` characters: `compose(value, allowed)`, then the cure.
 
-    Args:
-        value: Refused value, which is cut off first.
-        allowed: Allowed values, which are cut off next.
-        compose: Function from the two to the message without its cure.
-        cure: Advice that is appended after a semicolon.
+    The value is cut off first, the allowed values next, the cure never.
     """
     end = f"; {cure}" if cure else ""
     room = max(LONGEST - len(end), LEAST_SHOWN)
@@ -79,10 +75,6 @@ class FailedError(RuntimeError):
     Args:
         what: What failed, with its numbers.
         cure: What the caller can change.
-
-    Example:
-        >>> FailedError("no convergence after 20 steps", "take a smaller step")
-        FailedError('no convergence after 20 steps; take a smaller step')
     """
 
     def __init__(self, what: str, cure: str = "") -> None:
@@ -99,7 +91,7 @@ def checked_number(
     least: float = -inf,
     most: float = inf,
 ) -> float:
-    """Return a finite real number as a float; True and False are refused.
+    """Return a finite real number from `least` to `most` as a float; True and False are refused.
 
     Args:
         key: Name of the argument, for the message.
@@ -149,10 +141,6 @@ def require_choice(key: str, value: object, names: Iterable[str]) -> None:
 def require(
     holds: bool | np.bool_, key: str, *, value: object, allowed: str, cure: str = ""
 ) -> None:
-    """Raise `RefusedError`(key, value, allowed, cure) unless the condition `holds`.
-
-    Raises:
-        RefusedError: The condition does not hold.
-    """
+    """Raise `RefusedError`(key, value, allowed, cure) unless the condition `holds`."""
     if not holds:
         raise RefusedError(key, value, allowed, cure)

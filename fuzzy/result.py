@@ -31,12 +31,7 @@ _MAX_LINES = 25
 
 
 class Nature(StrEnum):
-    """What bounds promise, from the weakest to the strongest.
-
-    Example:
-        >>> Nature.ATTAINED.sentence
-        'Some inputs reach these bounds; the true range may be wider.'
-    """
+    """What bounds promise, from the weakest to the strongest."""
 
     ATTAINED = "attained"
     ESTIMATED = "estimated"
@@ -60,8 +55,8 @@ class Nature(StrEnum):
 def rounded(value: float, side: str, nature: Nature, digits: int = 4) -> float:
     """Return the lower or upper end of a range, rounded to some significant digits.
 
-    Attained ends are rounded towards the inside of the range, estimated and guaranteed ones towards
-    the outside, so that they stay true. A difference in the tenth digit is taken for round-off.
+    Attained ends are rounded towards the inside of the range, others towards the outside, so that
+    they stay true. A difference in the tenth digit is taken for round-off.
     """
     if value == 0 or not math.isfinite(value):
         return value
@@ -84,7 +79,6 @@ class Ends(NamedTuple):
 class Bounds:
     """Ranges of the outputs of a function of fuzzy inputs, an α-cut a level, over time if there is.
 
-    `print` shows them, `bounds(name)` gives the ends of an output, `number(name)` a fuzzy number.
     The nature of an output says what its ends are worth:
 
     - attained: `lower_at` and `upper_at` are inputs that reach them. The true range may be wider.
@@ -159,7 +153,6 @@ class Bounds:
         self._check_proof()
 
     def _check_shapes(self) -> None:
-        """Refuse arrays whose shapes do not fit the levels, times, outputs and inputs."""
         middle = () if self.time is None else (len(self.time),)
         shape = (len(self.alpha), *middle, len(self.outputs))
         for name in ("lower", "upper", "error"):
@@ -180,10 +173,8 @@ class Bounds:
         )
 
     def _check_proof(self) -> None:
-        """Raise `FailedError` if cuts are not nested or attained bounds lie outside proved ones.
-
-        Differences within the stated errors and round-off are allowed.
-        """
+        """Raise `FailedError` if cuts are not nested or attained bounds lie outside proved ones."""
+        # differences within the stated errors and round-off are allowed
         round_off, error = self._round_off, np.nan_to_num(self.error)
         estimated = np.where(self._guaranteed, 0.0, error)
         slack = 2 * round_off + error[1:] + error[:-1]  # between two levels
@@ -213,10 +204,7 @@ class Bounds:
 
     @cached_property
     def attained(self) -> Ends:
-        """Ends of the ranges that some inputs are known to reach; NaN where none are known.
-
-        The stated error of bounds that are not guaranteed is subtracted from them.
-        """
+        """Ends that some inputs are known to reach, less their stated error; NaN where unknown."""
         blank = np.full(self.lower.shape, np.nan)
         inner = self.inner or Ends(blank, blank)
         lower = np.where(self._guaranteed, inner.lower, self.lower + self.error)
@@ -238,10 +226,9 @@ class Bounds:
     def number(self, output: str = "y") -> Stepwise | ClaimedNumber:
         """Return one output as a fuzzy number; between two levels the wider α-cut holds.
 
-        It is a `ClaimedNumber` number if the inputs carry a claim of coverage.
-
         Raises:
-            RefusedError: The levels do not run from 0 to 1, and the inputs carry no claim.
+            RefusedError: The levels do not run from 0 to 1, and the inputs carry no claim of
+                coverage, which the number would have.
         """
         steps, claim = outer_steps(self.alpha, *self.bounds(output)), self.claim.claim
         if claim is not None:
@@ -252,11 +239,7 @@ class Bounds:
         return steps
 
     def column(self, output: str = "y") -> int:
-        """Return the index of an output on the last axis of `lower` and `upper`.
-
-        Raises:
-            RefusedError: There is no such output.
-        """
+        """Return the index of an output on the last axis of `lower` and `upper`."""
         require_choice("output", output, self.outputs)
         return self.outputs.index(output)
 
@@ -271,10 +254,7 @@ class Bounds:
         return self.natures[column] if self.natures else self.nature
 
     def __str__(self) -> str:
-        """Return a text: nature, basis and cost, a line for each level of each output, the notes.
-
-        Of more than 25 lines only the first outputs are shown.
-        """
+        """Return nature, basis and cost, a line for each level of the first outputs, the notes."""
         count = max(1, _MAX_LINES // len(self.alpha))  # outputs that are shown
         lines = [self._head]
         for column in range(len(self.outputs))[:count]:
@@ -288,7 +268,6 @@ class Bounds:
 
     @property
     def _head(self) -> str:
-        """Nature, what it rests on, and what it cost."""
         basis = f" (given that {' and '.join(self.basis)})" if self.basis else ""
         time = "" if self.time is None else f" over {self.time[0]:g} … {self.time[-1]:g} s"
         budget = f" of at most {self.budget:,}" if self.budget else ""
@@ -302,10 +281,7 @@ class Bounds:
         return tuple(f"{name} [{unit}]" if unit else name for name, unit in pairs)
 
     def _lines(self, column: int) -> Iterator[str]:
-        """Yield a line of text for each level of an output: range, error and nature if it differs.
-
-        Of an output over time it shows the extremes over time.
-        """
+        """Yield a line of text for each level of an output; of one over time its extremes."""
         lowers, uppers, errors = (x[..., column] for x in (self.lower, self.upper, self.error))
         if self.time is not None:
             lowers, uppers, errors = lowers.min(axis=1), uppers.max(axis=1), errors.max(axis=1)
@@ -320,11 +296,11 @@ class Bounds:
             yield f"{head}, {error_name} {_digits(error)}{suffix}"
 
     def plot(self, axes: Axes | None = None, output: str = "", **line: Any) -> Axes:
-        """Draw an output and return the axes: its membership function, or its α-cuts over time.
+        """Draw an output, the first by default: its membership function, or α-cuts over time.
 
         Args:
-            axes: Axes of Matplotlib; new ones if not given.
-            output: Name of the output; the first if left out.
+            axes: Axes of Matplotlib, which are returned; new ones by default.
+            output: Name of the output.
             line: Keywords of `Axes.plot`, or of `Axes.fill_between` over time.
         """
         output = output or self.outputs[0]
@@ -340,9 +316,8 @@ class Bounds:
     def to_dataset(self) -> xarray.Dataset:
         """Return the bounds as an xarray dataset.
 
-        Returns:
-            lower, upper and error over (alpha, time, output), the inputs `lower_at` and `upper_at`
-            that reach them over a further axis parameter, and nature and label of each output.
+        It has lower, upper and error over (alpha, time, output), the inputs `lower_at` and
+        `upper_at` that reach them over a further axis parameter, nature and label of each output.
         """
         import xarray
 

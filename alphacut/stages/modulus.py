@@ -22,8 +22,7 @@ from alphacut.fuzzy import (
     Signed,
     propagate,
 )
-from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.blas import on_one_blas_thread
+from alphacut.fuzzy.arrays import Array, on_one_blas_thread
 from alphacut.fuzzy.plans.design import Plan
 from alphacut.fuzzy.refused import FailedError, require
 from alphacut.fuzzy.result import Bounds, Nature

@@ -15,7 +15,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from alphacut.frame.verification.self_test import ContradictionError
-from alphacut.fuzzy.blas import on_one_blas_thread
+from alphacut.fuzzy.arrays import on_one_blas_thread
 from alphacut.fuzzy.progress_bar import Progress, progress_reporter
 from alphacut.fuzzy.refused import FailedError, require
 from alphacut.io.columns import columns_text

@@ -19,7 +19,6 @@ from alphacut.fuzzy import (
     Extended,
     FuzzyNumber,
     General,
-    Optimisation,
     Reduced,
     Signed,
     Triangular,
@@ -32,13 +31,11 @@ from benchmarks.rows import write
 
 _GRID = 1e-4  # share of the widest cut that the grid of the true bounds may miss
 RESULTS = Path(__file__).parents[1] / "results"
-SEARCHES = [Optimisation(starts=k, look=4 * k) for k in (1, 2, 3, 6)]
 METHODS: dict[str, list[Plan]] = {
     "reduced": [Reduced()],
     "general": [General()],
     "extended": [Extended()],
     "signed": [Signed()],
-    "optimisation": [*SEARCHES],
     "automatic": [Automatic(uncovered=share) for share in (0.02, 0.002)],
 }
 

@@ -61,12 +61,7 @@ class Values:
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Points at which a model was evaluated, and its outputs there.
-
-    Args:
-        points: Shape (n, inputs).
-        values: Outputs at the points.
-    """
+    """Points (n, inputs) at which a model was evaluated, and its outputs there."""
 
     points: Array
     values: Values
@@ -116,7 +111,6 @@ class Call:
     vectorised: bool = False
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be called, and calling conventions that exclude each other."""
         shown, is_callable = repr(self.function), callable(self.function)
         require(is_callable, "function", value=shown, allowed="what can be called")
         are_compatible = not (self.shared and self.vectorised)
@@ -128,9 +122,8 @@ class Call:
     def tasks(self, points: Array) -> Iterator[list[int]]:
         """Yield the rows of the points (n, inputs) that are evaluated by one call of the function.
 
-        Args:
-            points: Shape (n, inputs). They are grouped by equal shared inputs, or in batches of
-                1024 for a vectorised function; else each point is a call.
+        Points are grouped by equal shared inputs, or in batches for a vectorised function; else
+        each point is a call.
         """
         if self.shared:
             columns = [self.names.index(name) for name in self.shared]
@@ -150,9 +143,8 @@ class Call:
         """
         try:
             outputs = self._outputs(points)
-            require(
-                len(outputs) == len(points), "outputs", value=len(outputs), allowed=f"{len(points)}"
-            )
+            found, expected = len(outputs), len(points)
+            require(found == expected, "outputs", value=found, allowed=f"{expected}")
         except (Exception, SystemExit) as error:  # a model that ends its program ends its sample
             if len(points) > 1:
                 return [self(point[None])[0] for point in points]
@@ -162,19 +154,15 @@ class Call:
     def _outputs(self, points: Array) -> Sequence[Any]:
         """Call the function; its unchecked outputs at each of the points (n, inputs)."""
         if self.vectorised:
-            return self._vectorised_outputs(points)
-        named = [named_point(self.names, point) for point in points]
+            outputs = self.function(**dict(zip(self.names, points.T, strict=True)))
+            named = outputs if isinstance(outputs, Mapping) else {"y": outputs}
+            arrays = {x: np.atleast_1d(np.asarray(value, float)) for x, value in named.items()}
+            rows = zip(*arrays.values(), strict=True)
+            return [dict(zip(arrays, row, strict=True)) for row in rows]
+        points_by_name = [named_point(self.names, point) for point in points]
         if self.shared:
-            return cast(Sequence[Any], self.function(named))
-        return [self.function(**point) for point in named]
-
-    def _vectorised_outputs(self, points: Array) -> Sequence[Any]:
-        """Call the function once; its outputs at each point, a mapping of names to values."""
-        outputs = self.function(**dict(zip(self.names, points.T, strict=True)))
-        named = outputs if isinstance(outputs, Mapping) else {"y": outputs}
-        arrays = {name: np.atleast_1d(np.asarray(value, float)) for name, value in named.items()}
-        rows = zip(*arrays.values(), strict=True)
-        return [dict(zip(arrays, row, strict=True)) for row in rows]
+            return cast(Sequence[Any], self.function(points_by_name))
+        return [self.function(**point) for point in points_by_name]
 
 
 def named_point(names: Sequence[str], point: Array) -> dict[str, float]:
@@ -187,16 +175,13 @@ def _outcome(output: Any) -> Outcome:
     if isinstance(output, Exception):
         return Failure(f"{type(output).__name__}: {output}")
     try:
-        return Sample(*flatten(output))
+        return _flatten(output)
     except (TypeError, ValueError) as error:
         return Failure(f"{type(error).__name__}: {error}")
 
 
-def flatten(output: Output) -> tuple[Layout, Array]:
-    """Return the layout (name and shape of each output) of a sample, and its numbers in a row (m,).
-
-    Args:
-        output: A number (named `y`), an array (`y[0]`, …) or a mapping of names to either.
+def _flatten(output: Output) -> Sample:
+    """Return a number (named `y`), an array (`y[0]`, …) or a mapping of names to either as sample.
 
     Raises:
         RefusedError: There is no number, one that is not finite, or two of the same name.
@@ -208,11 +193,10 @@ def flatten(output: Output) -> tuple[Layout, Array]:
     are_distinct = bool(columns) and len(set(columns)) == len(columns)
     allowed = "one number or more, all of different names"
     require(are_distinct, "outputs", value=columns, allowed=allowed)
-    return layout, np.concatenate([array.ravel() for array in arrays.values()])
+    return Sample(layout, np.concatenate([array.ravel() for array in arrays.values()]))
 
 
 def _finite_array(name: str, value: ArrayLike | None) -> Array:
-    """Return the output `name` as an array of finite real numbers."""
     array = np.ma.asanyarray(value)  # type: ignore[no-untyped-call]
     is_plain = array.dtype.kind in "biuf" and not np.ma.is_masked(array)  # type: ignore[no-untyped-call]
     is_allowed = is_plain and not hasattr(value, "units") and np.isfinite(array).all()

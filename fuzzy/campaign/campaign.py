@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from time import perf_counter
@@ -26,6 +26,7 @@ from alphacut.fuzzy.campaign.store import Store, point_key
 from alphacut.fuzzy.campaign.workers import Task, completed
 from alphacut.fuzzy.knowledge.known import Knowledge
 from alphacut.fuzzy.refused import FailedError, checked_number
+from alphacut.fuzzy.sets.boxes import Domain, quasi_random_points
 
 LOG = logging.getLogger(__name__)
 
@@ -33,6 +34,7 @@ _MAX_QUOTED = 3  # failed samples that a message quotes
 _MAX_LETTERS = 300  # letters of an error that a message quotes
 _MIN_PAUSE = 0.05  # seconds between two transactions at least
 _MIN_PAUSE_RATIO = 10  # a transaction that took t is not followed by another within 10 t
+_FIRST_POINTS = 16  # points that are tried, where samples may fail, to learn the outputs' names
 
 
 class CampaignError(FailedError):
@@ -41,25 +43,22 @@ class CampaignError(FailedError):
     Args:
         failures: Inputs of each failed sample, by name, with its error.
         total: Samples of the batch.
+        cure: What the caller can change.
     """
 
-    def __init__(self, failures: list[tuple[dict[str, float], str]], total: int) -> None:
+    def __init__(self, failures: list[tuple[dict[str, float], str]], total: int, cure: str) -> None:
         self.failures, self.total = failures, total
-        lines = [
-            f"at {_named_values(point)}: {_brief(error)}" for point, error in failures[:_MAX_QUOTED]
-        ]
+        lines = []
+        for point, error in failures[:_MAX_QUOTED]:
+            first_line = error.strip().partition("\n")[0]
+            is_long = len(first_line) > _MAX_LETTERS
+            brief = f"{first_line[:_MAX_LETTERS]} …" if is_long else first_line
+            values = ", ".join(f"{name} = {value:.6g}" for name, value in point.items())
+            lines.append(f"at {values}: {brief}")
         more = f"; and {len(failures) - _MAX_QUOTED} more" if len(failures) > _MAX_QUOTED else ""
-        what = f"{len(failures)} of {total} samples failed, the others are done: "
-        super().__init__(what + "; ".join(lines) + more, 'on_failure="skip" leaves them out')
-
-
-def _named_values(point: dict[str, float]) -> str:
-    return ", ".join(f"{name} = {value:.6g}" for name, value in point.items())
-
-
-def _brief(error: str) -> str:
-    first = error.strip().partition("\n")[0]
-    return first if len(first) <= _MAX_LETTERS else f"{first[:_MAX_LETTERS]} …"
+        rest = "the others are done: " if len(failures) < total else ""
+        what = f"{len(failures)} of {total} samples failed, {rest}"
+        super().__init__(what + "; ".join(lines) + more, cure)
 
 
 @dataclass
@@ -120,6 +119,34 @@ class Campaign:
             self._samples = Samples(points, values)
         return self._samples
 
+    def output_names(self, domain: Domain) -> tuple[str, ...]:
+        """Return the names of all outputs, columns of every sample.
+
+        The nominal point is evaluated; if it fails and may, other points of the widest box.
+
+        Raises:
+            CampaignError: No sample succeeds.
+        """
+        unit = quasi_random_points(len(domain.names), _FIRST_POINTS)
+        lower, upper = (ends[0] for ends in domain.boxes)
+        failures: list[tuple[dict[str, float], str]] = []
+        failed_points = []
+        for point in (domain.modal, *(lower + unit * (upper - lower))):
+            try:
+                columns = self(point[None]).columns
+            except CampaignError as error:
+                if not self.skip:
+                    raise
+                failures += error.failures
+                failed_points.append(point + 0.0)
+                continue
+            without_value = np.full(len(columns), np.nan)
+            self._rows |= {failed.tobytes(): without_value for failed in failed_points}
+            self._samples = None
+            self.failed += len(failed_points)
+            return columns
+        raise CampaignError(failures, len(failures), "mend the function, or narrow its inputs")
+
     def __call__(self, points: Array) -> Values:
         """Return the outputs at the points (n, inputs), in their order; NaN where one failed.
 
@@ -146,31 +173,22 @@ class Campaign:
         batch.run()
         LOG.debug("%d samples, %d before", len(points), len(self))
         failures = {row: x.error for row, x in batch.outcomes.items() if isinstance(x, Failure)}
-        none_succeeded = len(failures) == len(points) and not self._rows
-        if failures and (not self.skip or none_succeeded):
+        if failures and not (self.skip and self.layout):
             names = self.call.names
             pairs = [(named_point(names, points[row]), failures[row]) for row in sorted(failures)]
-            raise CampaignError(pairs, len(points))
+            raise CampaignError(pairs, len(points), 'on_failure="skip" leaves them out')
         self.failed += len(failures)
         width = len(Values(self.layout, np.zeros((0, 0))).columns)
         outputs = np.full((len(points), width), np.nan)
         for row, outcome in batch.outcomes.items():
             if isinstance(outcome, Sample):
                 outputs[row] = outcome.row
-        return outputs if self._rows else self._reorder_columns(outputs, batch.layouts)
-
-    def _reorder_columns(self, array: Array, layouts: Mapping[int, Layout]) -> Array:
-        """Outputs (n, columns) of the first batch, with columns in the layout of its first row.
-
-        That becomes `self.layout`, which before is the layout of whichever row ended first.
-
-        Args:
-            array: Outputs with columns as in `self.layout`.
-            layouts: Layouts of the rows that succeeded, by number of the row.
-        """
-        values = Values(self.layout, array)
-        self.layout = layouts[min(layouts)]
-        columns = [values.output(name).reshape(len(array), -1) for name, _ in self.layout]
+        if self._rows:
+            return outputs
+        # the order of the outputs is that of the first row, not of the row that ended first
+        values = Values(self.layout, outputs)
+        self.layout = batch.layouts[min(batch.layouts)]
+        columns = [values.output(name).reshape(len(points), -1) for name, _ in self.layout]
         return np.concatenate(columns, axis=1)
 
     def in_order(self, outcome: Outcome) -> Outcome:
@@ -198,21 +216,17 @@ class Campaign:
 
 
 class _Batch:
-    """Evaluation of new points by the store and the workers.
-
-    Args:
-        campaign: The campaign, which takes the layout of the outputs from the first sample.
-        points: Shape (n, inputs).
+    """Evaluation of new points (n, inputs) by the store and the workers.
 
     Attributes:
-        outcomes: Sample or failure by row of `points`.
+        outcomes: Sample or failure by row of the points.
         layouts: Layout of each sample as the function returned it, by row.
     """
 
     def __init__(self, campaign: Campaign, points: Array) -> None:
         self.campaign, self.points = campaign, points
         self.outcomes: dict[int, Outcome] = {}
-        self.layouts: dict[int, Layout] = {}  # as the function returned them
+        self.layouts: dict[int, Layout] = {}
         self._unwritten: dict[str, Sample] = {}
         self._written, self._write_seconds = perf_counter(), 0.0  # time and cost of the last write
 
@@ -222,11 +236,16 @@ class _Batch:
         Samples are stored even if the evaluation is interrupted.
         """
         campaign, count = self.campaign, len(self.points)
-        self._read_stored()
+        if campaign.store is not None:
+            for row in range(count):
+                if sample := campaign.store.get(campaign.model, self._key(row)):
+                    self._keep(row, sample)
         try:
             for rows, outcomes in completed(campaign.call, self._tasks(), campaign.executor):
                 for row, outcome in zip(rows, outcomes, strict=True):
-                    self._record(row, outcome)
+                    self._keep(row, outcome)
+                    if campaign.store and isinstance(outcome, Sample) and row in self.layouts:
+                        self._unwritten[self._key(row)] = outcome
                 self._write()
                 # the first batch of a design is most of the work; later ones are not foreseen
                 if not len(campaign) and count > 1:
@@ -236,16 +255,6 @@ class _Batch:
 
     def _key(self, row: int) -> str:
         return point_key(self.campaign.call.names, self.points[row])
-
-    def _read_stored(self) -> None:
-        """Set the outcomes of the points that are in the store."""
-        campaign = self.campaign
-        if campaign.store is None:
-            return
-        for row in range(len(self.points)):
-            sample = campaign.store.get(campaign.model, self._key(row))
-            if sample is not None:
-                self._keep(row, sample)
 
     def _tasks(self) -> Iterator[Task]:
         """Yield rows and points of each call for the points that are not in the store."""
@@ -257,11 +266,6 @@ class _Batch:
         self.outcomes[row] = self.campaign.in_order(outcome)
         if isinstance(outcome, Sample) and isinstance(self.outcomes[row], Sample):
             self.layouts[row] = outcome.layout
-
-    def _record(self, row: int, outcome: Outcome) -> None:
-        self._keep(row, outcome)
-        if self.campaign.store and isinstance(outcome, Sample) and row in self.layouts:
-            self._unwritten[self._key(row)] = outcome
 
     def _write(self, *, now: bool = False) -> None:
         """Store new samples if `now`, or if storing has taken under a tenth of the time."""

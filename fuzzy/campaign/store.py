@@ -3,9 +3,9 @@
 The key of a sample is the identity of the model (case, mesh options, versions: whatever the caller
 names) and the values of all inputs. Each row has a checksum over all its columns, and a batch is
 one transaction: a killed process or a power cut loses only samples that were not yet written.
-Opening a store reads and checks all rows. The rows of a damaged file that can be read are copied
-into a new one, with a warning; other samples are computed anew. SQLite's application id tells that
-a file is a store. Links, devices, pipes and data bases of other programs are refused, unchanged.
+Opening a store reads and checks all rows. A damaged file is set aside as NAME.damaged and a new one
+takes its intact rows; other samples are computed anew. SQLite's application id tells that a file is
+a store. Links, devices, pipes and data bases of other programs are refused, unchanged.
 """
 
 from __future__ import annotations
@@ -24,20 +24,17 @@ from typing import NamedTuple
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.campaign.call import Layout, Sample
+from alphacut.fuzzy.campaign.call import Layout, Sample, named_point
 from alphacut.fuzzy.refused import FailedError, require
 
 Identity = Mapping[str, object]
 _WRITE_TIMEOUT = 60.0  # seconds to wait for another campaign's write
-_APPLICATION = 0x616C7068
-"""Application id in the head of each store: "alph" in ASCII."""
+_APPLICATION = 0x616C7068  # application id in the head of each store: "alph" in ASCII
+_HEAD = 72  # bytes of the head of an SQLite file that end with its application id
 _TABLE = """CREATE TABLE sample
 (model blob, point text, layout text, outputs blob, checksum blob, primary key (model, point))"""
-_SCHEMA = "select sql from sqlite_master where sql is not null"
-_HEAD = 72
-"""Bytes of the head of an SQLite file that end with its application id."""
-_ACCESS_ERRORS = ("BUSY", "LOCKED", "FULL", "READONLY", "CANTOPEN", "PERM", "NOMEM")
 _COLUMNS = "model, point, layout, outputs, checksum"
+_ACCESS_ERRORS = ("BUSY", "LOCKED", "FULL", "READONLY", "CANTOPEN", "PERM", "NOMEM")
 
 
 class Row(NamedTuple):
@@ -86,10 +83,7 @@ def _checksum(model: bytes, point: str, layout: str, outputs: bytes) -> bytes:
 
 
 class Store:
-    """Samples of all models in one file.
-
-    Args:
-        path: The file; created if there is none.
+    """Samples of all models in one file, which is created if there is none.
 
     Raises:
         RefusedError: The file is not a store, or it cannot be opened or created.
@@ -106,68 +100,50 @@ class Store:
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
         self._rows: dict[tuple[bytes, str], Row] = {}
-        allowed, cure = (
-            "a file of samples that may be written",
-            "move it away, or name another path",
-        )
+        cure = "move it away, or name another path"
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             is_store = _is_store(self.path)
         except OSError as error:
             is_store, cure = False, str(error)
+        allowed = "a file of samples that may be written"
         require(is_store, "store", value=self.path, allowed=allowed, cure=cure)
-        self._connection = self._open()
+        with self._reported():
+            self._connection = sqlite3.connect(self.path, timeout=_WRITE_TIMEOUT)
+            if not self._read():
+                self._renew()
 
-    def _open(self) -> sqlite3.Connection:
-        """Open the file and read its intact rows; a damaged one is replaced by those rows."""
-        connection = self._connect(self.path)
-        with self.reported():
-            try:
-                _prepare(connection)
-                damaged = connection.execute("pragma quick_check").fetchone() != ("ok",)
-                damaged |= connection.execute(_SCHEMA).fetchall() != [(_TABLE,)]
-            except (sqlite3.DatabaseError, UnicodeDecodeError) as error:
-                name = getattr(error, "sqlite_errorname", "")  # none: text is no UTF-8
-                if any(word in name for word in _ACCESS_ERRORS):  # no damage
-                    raise
-                damaged = True
-        damaged |= not self._read(connection)
-        return self._with_intact_rows(connection) if damaged else connection
-
-    def _read(self, connection: sqlite3.Connection) -> bool:
-        """Read the intact rows; False if a row is damaged, or SQLite could not read all."""
-        all_intact = True
+    def _read(self) -> bool:
+        """Read the intact rows; False if the file or a row is damaged."""
         try:
-            for columns in connection.execute(f"select {_COLUMNS} from sample"):
+            _prepare(self._connection)
+            schema = "select sql from sqlite_master where sql is not null"
+            check = self._connection.execute("pragma quick_check").fetchone()
+            is_intact = bool(check == ("ok",))
+            is_intact &= self._connection.execute(schema).fetchall() == [(_TABLE,)]
+            for columns in self._connection.execute(f"select {_COLUMNS} from sample"):
                 row = Row(*columns)
-                all_intact &= row.is_intact
+                is_intact &= row.is_intact
                 if row.is_intact:
                     self._rows[row.model, row.point] = row
-        except (sqlite3.DatabaseError, UnicodeDecodeError):
+        except (sqlite3.DatabaseError, UnicodeDecodeError) as error:
+            name = getattr(error, "sqlite_errorname", "")  # none: text is no UTF-8
+            if any(word in name for word in _ACCESS_ERRORS):  # no damage
+                raise
             return False
-        return all_intact
+        return is_intact
 
-    def _with_intact_rows(self, connection: sqlite3.Connection) -> sqlite3.Connection:
-        """Close the damaged file, rename it, and return a new file with the rows that were read."""
-        connection.close()
-        damaged = self.path.with_name(f"{self.path.name}.damaged")
+    def _renew(self) -> None:
+        """Set the damaged file aside and write the rows that were read into a new one."""
+        self._connection.close()
         with suppress(FileNotFoundError):
             os.remove(f"{self.path}-journal")
-        if os.path.lexists(damaged):  # of an earlier damage, or of somebody else
-            os.remove(self.path)
-        else:
-            os.rename(self.path, damaged)
-        new_connection = self._connect(self.path)
-        with self.reported():
-            _prepare(new_connection)
-        self._write(new_connection, self._rows.values())
+        os.replace(self.path, self.path.with_name(f"{self.path.name}.damaged"))
+        self._connection = sqlite3.connect(self.path, timeout=_WRITE_TIMEOUT)
+        _prepare(self._connection)
+        self._write(self._rows.values())
         outcome = f"{len(self._rows)} samples are intact, the others are evaluated anew"
-        warnings.warn(f"the store {self.path} was damaged: {outcome}", stacklevel=2)
-        return new_connection
-
-    def _connect(self, path: Path) -> sqlite3.Connection:
-        with self.reported():
-            return sqlite3.connect(path, timeout=_WRITE_TIMEOUT)
+        warnings.warn(f"the store {self.path} was damaged: {outcome}", stacklevel=4)
 
     def get(self, model: bytes, point: str) -> Sample | None:
         """The sample of a model at a point; None where there is none."""
@@ -177,16 +153,17 @@ class Store:
     def put(self, model: bytes, samples: Mapping[str, Sample]) -> None:
         """Write samples in one transaction: all or none."""
         rows = [Row.from_sample(model, point, sample) for point, sample in samples.items()]
-        self._write(self._connection, rows)
+        with self._reported():
+            self._write(rows)
         self._rows |= {(row.model, row.point): row for row in rows}
 
-    def _write(self, connection: sqlite3.Connection, rows: Iterable[Row]) -> None:
+    def _write(self, rows: Iterable[Row]) -> None:
         insert = f"insert or replace into sample ({_COLUMNS}) values (?, ?, ?, ?, ?)"
-        with self.reported(), connection:
-            connection.executemany(insert, rows)
+        with self._connection as transaction:
+            transaction.executemany(insert, rows)
 
     @contextmanager
-    def reported(self) -> Iterator[None]:
+    def _reported(self) -> Iterator[None]:
         """Context manager that turns errors of SQLite into a `FailedError` with a cure."""
         try:
             yield
@@ -216,25 +193,17 @@ def _prepare(connection: sqlite3.Connection) -> None:
 
 def _is_store(path: Path) -> bool:
     """Return True for a store, an empty file, or where there is nothing; none of them a link."""
-    sqlite_files = (path.with_name(f"{path.name}{end}") for end in ("", "-journal", "-wal", "-shm"))
-    if not all(_is_regular(file, missing=True) for file in sqlite_files):
-        return False
+    for end in ("", "-journal", "-wal", "-shm"):
+        with suppress(FileNotFoundError):
+            if not stat.S_ISREG(os.lstat(path.with_name(f"{path.name}{end}")).st_mode):
+                return False
     if not os.path.lexists(path):
         return True
     with path.open("rb") as file:
         head = file.read(_HEAD)
     if not head.startswith(b"SQLite format 3\0"):
         return not head
-    application = int.from_bytes(head[_HEAD - 4 :], "big")
-    return application == _APPLICATION
-
-
-def _is_regular(path: Path, *, missing: bool) -> bool:
-    """Return whether a path is a regular file, no link or device; `missing` without a file."""
-    try:
-        return stat.S_ISREG(os.lstat(path).st_mode)
-    except FileNotFoundError:
-        return missing
+    return int.from_bytes(head[_HEAD - 4 :], "big") == _APPLICATION
 
 
 def model_key(identity: Identity) -> bytes:
@@ -256,5 +225,4 @@ def model_key(identity: Identity) -> bytes:
 
 def point_key(names: tuple[str, ...], point: Array) -> str:
     """Return the key of a point: its inputs as JSON in alphabetical order, exact to the bit."""
-    values = {name: float(x) + 0.0 for name, x in zip(names, point, strict=True)}
-    return json.dumps(values, sort_keys=True, separators=(",", ":"))
+    return json.dumps(named_point(names, point + 0.0), sort_keys=True, separators=(",", ":"))

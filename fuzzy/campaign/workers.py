@@ -15,7 +15,7 @@ from typing import ParamSpec, TypeVar
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.campaign.call import Call, Outcome
+from alphacut.fuzzy.campaign.call import Call, Outcome, named_point
 from alphacut.fuzzy.refused import FailedError, checked_number
 
 P = ParamSpec("P")
@@ -29,10 +29,10 @@ _GROUP_SIGNALS = [signal.SIGHUP] if hasattr(signal, "SIGHUP") else []  # not on 
 
 @contextmanager
 def pool(workers: int) -> Iterator[Executor | None]:
-    """Context manager of an executor of `workers` processes; None for one worker, this process.
+    """Context manager of an executor of `workers` processes; None where this process does the work.
 
-    Under `python -m mpi4py.futures` it is the pool of all MPI processes instead, whatever `workers`
-    says. Functions are sent by value where the processes cannot import them.
+    Under `python -m mpi4py.futures` it is the pool of all MPI processes, whatever `workers` says.
+    Functions are sent by value where the processes cannot import them.
     """
     checked_number("workers", workers, positive=True, whole=True)
     if {"mpi4py.run", "mpi4py.futures"} <= sys.modules.keys():
@@ -52,7 +52,6 @@ def pool(workers: int) -> Iterator[Executor | None]:
 
 
 def _processes(workers: int) -> Executor:
-    """Return an executor of `workers` processes on this machine, which end with this process."""
     from joblib.externals.loky import ProcessPoolExecutor
 
     # loky starts its semaphore tracker here. The tracker inherits the mask of blocked signals, so
@@ -86,7 +85,7 @@ def _end_with_parent(parent: int) -> None:
 def submit(
     executor: Executor | None, function: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs
 ) -> Future[T]:
-    """Future of a call of a function by an executor; without executor the call is made at once."""
+    """Return the future of a call by an executor; without executor the call is made at once."""
     if executor is not None:
         return executor.submit(function, *args, **kwargs)
     done: Future[T] = Future()
@@ -99,12 +98,8 @@ def completed(
 ) -> Iterator[tuple[list[int], list[Outcome]]]:
     """Yield rows and outcomes of each task, in the order in which the tasks end.
 
-    Tasks are sent in batches; at most two batches for each worker are submitted at a time.
-
-    Args:
-        call: The function with its calling convention.
-        tasks: Rows and points of each call, read from the iterable as batches are submitted.
-        executor: Any `concurrent.futures` executor; None: this process, one after another.
+    Tasks are read and sent in batches of about a tenth of a second, two for each worker at a time.
+    Without executor this process evaluates one after another.
 
     Raises:
         FailedError: A worker process died, or the function cannot be sent to one.
@@ -122,7 +117,7 @@ def completed(
                 return
             for future in wait(pending, return_when=FIRST_COMPLETED).done:
                 batch = pending.pop(future)
-                outcomes, seconds = _result(future, f" at or near {_sample_words(call, batch)}")
+                outcomes, seconds = _result(future, call, batch)
                 ideal_size = _BATCH_SECONDS * len(batch) / max(seconds, 1e-9)
                 batch_size = int(min(max(ideal_size, 1), _MAX_BATCH))
                 pairs = zip(batch, outcomes, strict=True)
@@ -132,36 +127,26 @@ def completed(
             future.cancel()
 
 
-def _sample_words(call: Call, batch: list[Task]) -> str:
-    """Return number and inputs of the first sample of a batch as a text for messages."""
-    rows, points = batch[0]
-    first = np.atleast_2d(points)[0]
-    values = ", ".join(f"{x} = {y:.6g}" for x, y in zip(call.names, first, strict=False))
-    return f"sample {rows[0] + 1} ({values})"
-
-
 def _run(call: Call, batch: list[Array]) -> tuple[list[list[Outcome]], float]:
     """Outcomes of each call of a batch, and their wall time in s."""
     start = perf_counter()
     return [call(points) for points in batch], perf_counter() - start
 
 
-def _result(future: Future[T], at: str = "") -> T:
-    """Wait for the result of a future.
-
-    Args:
-        future: Of a batch, whose calls catch their own exceptions.
-        at: Words on the samples that it computes, for the message.
-    """
+def _result(future: Future[T], call: Call, batch: list[Task]) -> T:
+    """Wait for the result of a batch, whose calls catch their own exceptions."""
     try:
         return future.result()
+    except BrokenExecutor as error:
+        rows, points = batch[0]
+        inputs = named_point(call.names, np.atleast_2d(points)[0])
+        values = ", ".join(f"{name} = {value:.6g}" for name, value in inputs.items())
+        what = f"a worker process died at or near sample {rows[0] + 1} ({values})"
+        cure = "out of memory, or a crash in compiled code; what a store holds stays"
+        raise FailedError(what, cure) from error
     except Exception as error:
         what = f"the function or its outputs cannot be sent between processes: {error}"
-        cure = "take workers=1, or a function that can be pickled"
-        if isinstance(error, BrokenExecutor):
-            what = f"a worker process died{at}"
-            cure = "out of memory, or a crash in compiled code; what a store holds stays"
-        raise FailedError(what, cure) from error
+        raise FailedError(what, "take workers=1, or a function that can be pickled") from error
 
 
 def n_workers(executor: Executor) -> int:

@@ -10,7 +10,8 @@ import numpy as np
 from alphacut.fuzzy.arrays import Array, Mask
 from alphacut.fuzzy.campaign.call import SpentError
 from alphacut.fuzzy.campaign.campaign import Campaign
-from alphacut.fuzzy.plans.cut import attained_bounds, cuts_with_width
+from alphacut.fuzzy.plans.cut import cuts_with_width
+from alphacut.fuzzy.plans.design import bounds_of_samples
 from alphacut.fuzzy.plans.sign_walk import SignWalk
 from alphacut.fuzzy.plans.single_linkage import ROUNDING, VALUE_TOLERANCE, SingleLinkage
 from alphacut.fuzzy.plans.transformation import Reduced, corners_suffice
@@ -33,11 +34,8 @@ class Automatic:
     where a bound lies at a kink or a jump. Of more than 12 outputs none is searched.
 
     Args:
-        uncovered: Share of each cut up to which a search goes on, in (0, 1).
+        uncovered: Share of each cut up to which a search goes on, in (0, 1].
         seed: Seed of all samples.
-
-    Raises:
-        RefusedError: A value is out of range.
 
     Example:
         >>> from alphacut.fuzzy import Interval, propagate
@@ -57,104 +55,56 @@ class Automatic:
 
     def run(self, campaign: Campaign, domain: Domain) -> Bounds:
         """Bounds of every output: by corners if the knowledge allows, else by a search."""
-        outputs = campaign(domain.modal[None]).columns
-        monotone = campaign.knowledge.monotone_in(domain.names, outputs)
-        if not domain.interactions and corners_suffice(domain, monotone).all():
+        outputs = campaign.output_names(domain)
+        stated = campaign.knowledge.monotone_in(domain.names, outputs)
+        if corners_suffice(domain, stated).all():
             return replace(Reduced().run(campaign, domain), method=self.name)
-        return _Search(campaign, domain, outputs, self).run()
-
-
-class _Search:
-    """Search of a model of which too little is known for a proof.
-
-    Args:
-        campaign: The model.
-        domain: Inputs and levels.
-        outputs: All outputs.
-        method: Options.
-    """
-
-    def __init__(
-        self, campaign: Campaign, domain: Domain, outputs: tuple[str, ...], method: Automatic
-    ) -> None:
-        self.campaign, self.domain, self.outputs, self.method = campaign, domain, outputs, method
-        self.cuts = list(cuts_with_width(campaign, domain))
-        self.monotone: Mask = np.zeros(len(outputs), bool)
-        self.n_points = 0  # at which each input was changed alone
-        self.searched: tuple[str, ...] = ()
-        self.linkage: SingleLinkage | None = None
-        self.ended = False
-
-    def run(self) -> Bounds:
-        """Search within the budget; the bounds of every output, each estimated or attained only."""
-        try:
-            if self.cuts:
-                self._search()
-        except SpentError:
-            self.ended = True
-        bounds = attained_bounds(self.campaign, self.domain, Automatic.name, ended=self.ended)
-        return self._with_natures(bounds)
-
-    def _search(self) -> None:
-        """Evaluate the corners for outputs whose effects keep their signs, and search the others.
-
-        It sets `monotone`, `searched` and `linkage`.
-        """
-        widest = self.cuts[-1]
-        first: Array = np.empty((0, len(widest.uncertain_inputs)))
-        if not self.domain.interactions:
-            walk = SignWalk(self.campaign, widest, self.method.seed)
-            self.monotone, first = walk.corners_suffice(), walk.samples
-            self.n_points = walk.points
-        names = tuple(np.array(self.outputs)[~self.monotone])
-        if not names:
-            return
-        self.searched = names if len(names) <= _MAX_SEARCHED else ()
-        self.linkage = SingleLinkage(
-            self.campaign,
-            self.domain,
-            self.searched,
-            uncovered=self.method.uncovered,
-            seed=self.method.seed,
-        )
-        if self.searched:
-            self.linkage.run(first)
-        else:
-            self.linkage.sample()
-
-    def _with_natures(self, bounds: Bounds) -> Bounds:
-        """Copy of attained bounds with the error and nature of each output, and notes.
-
-        Bounds of monotone outputs, and of those whose search met its stopping rule, are estimated.
-        """
-        is_estimated = self.monotone.copy()
-        for column, output in enumerate(self.outputs):
-            is_estimated[column] |= self.linkage is not None and self.linkage.is_estimate(output)
-        size = np.maximum(np.abs(bounds.lower), np.abs(bounds.upper)).max(axis=0)
-        error = VALUE_TOLERANCE * (bounds.upper - bounds.lower)[0] + ROUNDING * size
-        lower, upper = self.domain.boxes
-        is_crisp = (lower == upper).all(axis=1)[:, None]
-        natures = tuple(Nature.ESTIMATED if x else Nature.ATTAINED for x in is_estimated)
-        return replace(
-            bounds,
-            error=np.where(is_estimated & ~is_crisp, error, 0.0),
-            natures=natures,
-            nature=Nature.weakest(natures),
-            notes=(*self._notes(), *bounds.notes),
-        )
-
-    def _notes(self) -> list[str]:
-        """Return sentences on what the estimates rest on and on bounds at kinks or jumps."""
-        notes = []
-        if self.monotone.any():
-            names = _listed(np.array(self.outputs)[self.monotone])
-            which = f"the differences of each input keep their sign at {self.n_points} points"
-            notes.append(f"corners alone bound {names}: {which}")
-        if self.linkage is not None and self.searched:
-            notes.append(self.linkage.summary())
-            if not self.ended and (rough := [x for x in self.searched if self.linkage.is_rough(x)]):
+        monotone: Mask = np.zeros(len(outputs), bool)
+        linkage, ended, notes = None, False, list[str]()
+        if cuts := list(cuts_with_width(campaign, domain)):
+            try:
+                walk = SignWalk(campaign, cuts[-1], self.seed)
+                monotone = walk.corners_suffice()
+                if monotone.any():
+                    which = f"keep their sign at {walk.n_points} points"
+                    notes.append(
+                        f"corners alone bound {_listed(np.array(outputs)[monotone])}:"
+                        f" the differences of each input {which}"
+                    )
+                if not monotone.all():
+                    names = tuple(np.array(outputs)[~monotone])
+                    searched = names if len(names) <= _MAX_SEARCHED else ()
+                    linkage = SingleLinkage(
+                        campaign, domain, searched, uncovered=self.uncovered, seed=self.seed
+                    )
+                    linkage.run(walk.samples)
+            except SpentError:
+                ended = True
+        if linkage is not None and linkage.outputs:
+            notes.append(linkage.summary())
+            rough = () if ended else [name for name in linkage.outputs if linkage.is_rough(name)]
+            if rough:
                 notes.append(f"a bound of {_listed(rough)} lies at a kink or a jump")
-        return notes
+        if ended:
+            notes.append("the budget ended the search: a larger one may find more")
+        found_all = [linkage is not None and linkage.is_estimate(output) for output in outputs]
+        bounds = bounds_of_samples(domain, campaign.samples, self.name)
+        return replace(_with_errors(bounds, monotone | found_all, domain), notes=tuple(notes))
+
+
+def _with_errors(bounds: Bounds, is_estimated: Mask, domain: Domain) -> Bounds:
+    """Copy of attained bounds in which those of some outputs (outputs,) are estimated."""
+    size = np.maximum(np.abs(bounds.lower), np.abs(bounds.upper)).max(axis=0)
+    error: Array = VALUE_TOLERANCE * (bounds.upper - bounds.lower)[0] + ROUNDING * size
+    lower, upper = domain.boxes
+    is_crisp = (lower == upper).all(axis=1)[:, None]
+    natures = tuple(Nature.ESTIMATED if x else Nature.ATTAINED for x in is_estimated)
+    return replace(
+        bounds,
+        error=np.where(is_estimated & ~is_crisp, error, 0.0),
+        natures=natures,
+        nature=Nature.weakest(natures),
+    )
 
 
 def _listed(names: Iterable[str]) -> str:

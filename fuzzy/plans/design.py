@@ -30,13 +30,7 @@ class Plan(Protocol):
 
 @dataclass(frozen=True)
 class Design:
-    """Distinct samples, and the rows of those that each level uses.
-
-    Args:
-        domain: Inputs and levels.
-        points: Distinct samples, shape (n, inputs).
-        levels: For each level, the rows of its samples.
-    """
+    """Distinct samples (n, inputs) over a domain, and for each level the rows of its samples."""
 
     domain: Domain
     points: Array
@@ -52,11 +46,8 @@ class Design:
     def bounds(self, values: Values, method: str) -> Bounds:
         """Attained bounds: extremes over the samples of each level and of all higher levels.
 
-        This is the retransformation of Hanss (2005).
-
-        Args:
-            values: Outputs at `points`; NaN where a sample failed and was skipped.
-            method: Name of the method.
+        This is the retransformation of Hanss (2005). `values` are outputs at `points`, NaN where a
+        sample failed and was skipped.
         """
         lowest, highest = self._extremes(values.array), self._extremes(-values.array)
         columns = np.arange(values.array.shape[1])
@@ -74,25 +65,15 @@ class Design:
         )
 
     def _extremes(self, values: Array) -> Rows:
-        """Row of the sample with the least value, for each level and output.
-
-        Args:
-            values: Outputs at the samples, shape (n, outputs); NaN where a sample failed.
-
-        Returns:
-            Rows of `points`, shape (levels, outputs).
-        """
+        """Row of the sample with the least of the values (n, outputs), shape (levels, outputs)."""
         columns = np.arange(values.shape[1])
         usable = np.where(np.isnan(values), np.inf, values)
         least_rows: list[Rows] = []  # from the highest level down
         for alpha, rows in zip(reversed(self.domain.alpha), reversed(self.levels), strict=True):
-            candidates = least_rows[-1:]  # higher levels are contained in lower ones
+            candidates = [*least_rows[-1:]]  # higher levels are contained in lower ones
             if len(rows):
                 candidates.insert(0, rows[usable[rows].argmin(axis=0)])
-            if not candidates:
-                what = f"no sample of the cut at α = {alpha:g} fulfils its interactions"
-                raise FailedError(what, "widen them, or take fewer")
-            if np.isinf(usable[candidates[0], columns]).any():
+            if not candidates or np.isinf(usable[candidates[0], columns]).any():
                 raise FailedError(f"no sample of the cut at α = {alpha:g} has a value")
             stacked = np.array(candidates)
             least_rows.append(stacked[usable[stacked, columns].argmin(axis=0), columns])
@@ -106,9 +87,7 @@ def bounds_of_samples(domain: Domain, samples: Samples, method: str) -> Bounds:
 
 
 def guaranteed_bounds(bounds: Bounds, campaign: Campaign, proved: Mask) -> Bounds:
-    """Copy of bounds, guaranteed for the outputs that the knowledge covers, after testing it.
-
-    The tests are further samples inside the cuts.
+    """Copy of bounds, guaranteed for outputs that the knowledge covers, after tests by samples.
 
     Args:
         bounds: Bounds attained at the corners that the knowledge names.
@@ -142,11 +121,9 @@ def guaranteed_bounds(bounds: Bounds, campaign: Campaign, proved: Mask) -> Bound
 
 
 def _test_points(domain: Domain, campaign: Campaign) -> Array:
-    """Points inside the cuts at which stated knowledge is tested, shape (n, inputs).
-
-    The narrowest cut that has a width gets all tests, each wider one a quarter as many: points of a
-    narrower cut lie in the wider ones, too. The budget limits their number.
-    """
+    """Points inside the cuts at which stated knowledge is tested, shape (n, inputs)."""
+    # the narrowest cut with a width gets all tests, each wider one a quarter as many: points of a
+    # narrower cut lie in the wider ones, too
     lower, upper = domain.boxes
     widths, tests, points = upper - lower, campaign.knowledge.tests, list[Array]()
     ends = np.hstack([lower, upper])

@@ -24,12 +24,9 @@ _STEP = 1e-3  # of a finite difference, over the width of the box
 
 @dataclass(frozen=True)
 class Effects:
-    """Signs of the effects of the inputs on the outputs.
+    """Signs of the effects of the inputs on the outputs, shape (levels, outputs, inputs).
 
-    Args:
-        outputs: Names of the outputs.
-        signs: +1, −1, or 0 where neither holds, shape (levels, outputs, inputs); an input without
-            width has +1.
+    They are +1, −1, or 0 where neither holds; an input without width has +1.
     """
 
     outputs: tuple[str, ...]
@@ -57,7 +54,7 @@ def verify(campaign: Campaign, domain: Domain, outputs: tuple[str, ...] = ()) ->
         domain: Inputs and levels.
         outputs: Outputs that matter; all if none is named.
     """
-    columns = campaign(domain.modal[None]).columns
+    columns = campaign.output_names(domain)
     for name in outputs:
         require_choice("output", name, columns)
     outputs = outputs or columns
@@ -77,18 +74,8 @@ def verify(campaign: Campaign, domain: Domain, outputs: tuple[str, ...] = ()) ->
 
 
 def _sign_test_points(modal: Array, signs: Signs, lower: Array, upper: Array, column: int) -> Array:
-    """Return points that test the stated sign of one input, without repetitions, (points, inputs).
-
-    Each pair has the input at its lower and upper bound and the others at their modal values, or at
-    the corner at which an output is least or greatest.
-
-    Args:
-        modal: Modal values, shape (inputs,).
-        signs: Stated signs, shape (outputs, inputs).
-        lower: Lower bounds of the box, shape (inputs,).
-        upper: Upper bounds of the box, shape (inputs,).
-        column: Index of the input.
-    """
+    """Return points (n, inputs) that test the stated sign of the input in a column."""
+    # pairs with the input at either end, the others at nominal values or at an extreme corner
     others = np.concatenate([modal[None], _extreme_corners(signs, lower, upper)])
     points = np.repeat(others, 2, axis=0)
     points[::2, column], points[1::2, column] = lower[column], upper[column]
@@ -96,11 +83,7 @@ def _sign_test_points(modal: Array, signs: Signs, lower: Array, upper: Array, co
 
 
 def _extreme_corners(signs: Signs, lower: Array, upper: Array) -> Array:
-    """Return the corners of least and greatest output for each distinct row of signs.
-
-    Returns:
-        Points of shape (2 · distinct rows, inputs).
-    """
+    """Return the corners of least and greatest output for each distinct row of signs."""
     rises = np.unique(signs >= 0, axis=0)
     return np.concatenate([np.where(rises, lower, upper), np.where(rises, upper, lower)])
 
@@ -117,15 +100,11 @@ class _Box:
     def observed_signs(self, modal: Array, stated: Signs) -> Signs:
         """Return the sign of the slopes at all probes of the box, shape (outputs, inputs).
 
-        It is 0 where slopes differ in sign, or the smallest is below 5 % of their range; and 1 for
-        an input without any effect.
-
-        Args:
-            modal: Modal values of the inputs, shape (inputs,).
-            stated: Signs known before, 0 where they are to be observed, shape (outputs, inputs).
+        It is 0 where slopes differ in sign, or the smallest is below 5 % of their range, and 1 for
+        an input without any effect. Only inputs without a sign in `stated` are probed.
         """
         free = np.flatnonzero((stated == 0).any(axis=0))
-        first = np.sign(self._slopes(modal[None], free)[0]).astype(np.int8)
+        first = np.nan_to_num(np.sign(self._slopes(modal[None], free)[0])).astype(np.int8)
         signs = np.where(stated != 0, stated, first)
         corners = _extreme_corners(signs, self.lower, self.upper)
         unit = quasi_random_points(len(self.lower), _PROBES)
@@ -140,12 +119,7 @@ class _Box:
         return np.asarray((rises | has_no_effect).astype(np.int8) - falls.astype(np.int8))
 
     def _slopes(self, points: Array, inputs: Rows) -> Array:
-        """Return one-sided difference quotients at points (n, inputs), shape (n, outputs, inputs).
-
-        Args:
-            points: Points of the box; differences stay inside it.
-            inputs: Columns of the inputs that are varied; the slopes of the others are 0.
-        """
+        """Return one-sided differences by some inputs inside the box, (n, outputs, inputs)."""
         values = self._values(points)
         slopes = np.zeros((*values.shape, points.shape[1]))
         for column in inputs:
@@ -157,6 +131,5 @@ class _Box:
         return slopes
 
     def _values(self, points: Array) -> Array:
-        """Values of `outputs` at the points, shape (n, outputs)."""
         values = self.campaign(points)
         return values.array[:, [values.column(name) for name in self.outputs]]

@@ -25,29 +25,23 @@ _SMALL_STEP = 1e-3  # of the width: detects humps near a corner; the large step 
 class SignWalk:
     """Differences of every input along a walk through the widest cut.
 
-    Args:
-        campaign: The model.
-        cut: The widest cut.
-        seed: Seed of the walk.
-
     Attributes:
         steps: Points along the walk at which each input is changed.
         samples: Points of the walk between which each input changes once, in unit coordinates,
             shape (steps + 1, uncertain inputs): a Latin hypercube sample of the cut.
     """
 
-    def __init__(self, campaign: Campaign, cut: CutSearch, seed: int) -> None:
+    def __init__(self, campaign: Campaign, widest: CutSearch, seed: int) -> None:
         from scipy.stats import qmc
 
-        self.campaign, self.cut = campaign, cut
-        hypercube = qmc.LatinHypercube(
-            len(cut.uncertain_inputs), rng=np.random.default_rng([seed, 0])
-        )
-        self.steps = _WALK if len(cut.uncertain_inputs) > 1 else _WALK_OF_ONE
+        self.campaign, self.cut = campaign, widest
+        inputs = len(widest.uncertain_inputs)
+        self.steps = _WALK if inputs > 1 else _WALK_OF_ONE
+        hypercube = qmc.LatinHypercube(inputs, rng=np.random.default_rng([seed, 0]))
         self.samples: Array = hypercube.random(self.steps + 1)
 
     @property
-    def points(self) -> int:
+    def n_points(self) -> int:
         """Points of the widest cut at which each input is changed alone."""
         return self.steps + 2 * (2 if len(self.cut.uncertain_inputs) > 1 else 1)
 
@@ -70,8 +64,7 @@ class SignWalk:
     def _signs_along_walk(self) -> Signs:
         """Signs of all differences by each input along the walk, shape (outputs, uncertain inputs).
 
-        The walk goes from each sample to the next by changing one input after the other. A sign is
-        0 where differences have both signs or are NaN, and 1 for an input without effect.
+        0 where differences have both signs or are NaN, 1 for an input without effect.
         """
         inputs = len(self.cut.uncertain_inputs)
         steps = self.steps * inputs
@@ -89,12 +82,9 @@ class SignWalk:
         return np.where(is_unknown, 0, np.where(falls, -1, 1)).astype(np.int8).T
 
     def _evaluate_corners(self, signs: Signs) -> None:
-        """Evaluate the corners of each cut, and steps along each input from two of the widest cut.
+        """Evaluate the extreme corners of each cut for effects of these signs, (uncertain inputs,).
 
-        Args:
-            signs: Sign of each input's effect on an output, shape (uncertain inputs,). The output
-                is greatest at the corner with all inputs of positive sign at their upper ends, and
-                least at the opposite one.
+        From the two corners of the widest cut steps along each input are evaluated, too.
         """
         greatest = (signs > 0).astype(float)
         corners = np.stack([greatest, 1 - greatest])

@@ -3,11 +3,11 @@
 Each cut has N uniform samples, shared by all bounds. A descent starts from a sample only if none
 within the critical distance r of it is better, with
 
-    r = (σ Γ(1 + d/2) V ln N / N)^(1/d) / √π
+    r = (σ Γ(1 + d/2) ln N / N)^(1/d) / √π
 
-for d inputs and the share V of the box that the interactions allow. The search of a bound ends by
-the rule of Boender and Rinnooy Kan (1987): with W different optima, the basins not yet seen cover
-W (W + 1) / (N (N − 1)) of the cut, as Bayes' rule tells from a uniform prior.
+for d inputs. The search of a bound ends by the rule of Boender and Rinnooy Kan (1987): with W
+different optima, the basins not yet seen cover W (W + 1) / (N (N − 1)) of the cut, as Bayes' rule
+tells from a uniform prior.
 
 The rule takes a sample's basin as seen although its descent was left out. A ball of radius r holds
 σ ln N samples, with σ = 4 and N = 100 a fifth of all, and may hide a basin as large beside a better
@@ -18,6 +18,10 @@ straight line from its start to its end is made again with a short first step.
 
 Samples of a cut that lie in a narrower one are uniform there too and count for it. Optima of other
 cuts, and descents from corners, raise W and the bound, but not N.
+
+Samples of one value lie on a plateau, from which no descent finds its way. It counts as one
+optimum, and its samples do not count as explored: its share of the cut stays uncovered. With a
+thousand of them the search of a bound ends, and the bound is attained only.
 """
 
 from __future__ import annotations
@@ -28,7 +32,7 @@ from math import ceil, gamma, inf, log, pi, sqrt
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Mask, Rows
 from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.plans.cut import Bound, CutSearch, Optimum, cuts_with_width
 from alphacut.fuzzy.sets.boxes import Domain
@@ -45,26 +49,20 @@ VALUE_TOLERANCE = 1e-5
 """Of an output's range in the widest cut: values that differ by less count as one."""
 ROUNDING = 1e-9
 """The same of an output's size."""
+MAX_ON_PLATEAUS = 1000
+"""Samples on plateaus with which the search of a bound ends: 95 % find a cone of 0.3 % of them."""
+_EQUAL = 1e-13  # of an output's size: two samples that differ by less lie on a plateau
 _SAME_PLACE = 0.01  # of the width: optima of one value are the same there without a look between
 _BETWEEN = np.array([0.25, 0.5, 0.75])  # points of a line on which a hump is looked for
 _MIN_NEW = 15  # samples that a round adds
-_MAX_DRAWS = 10**6  # points drawn for one round where the interactions allow few
 
 
-def critical_distance(
-    samples: int, inputs: int, volume: float = 1.0, sigma: float = SIGMA_ONE_HUMP
-) -> float:
-    """Critical distance r = (σ Γ(1 + d/2) V ln N / N)^(1/d) / √π of samples in the unit cube.
+def critical_distance(samples: int, inputs: int, sigma: float = SIGMA_ONE_HUMP) -> float:
+    """Critical distance r = (σ Γ(1 + d/2) ln N / N)^(1/d) / √π of N samples in the unit cube.
 
     A ball of radius r contains σ ln N of them on average (Rinnooy Kan and Timmer, 1987).
-
-    Args:
-        samples: N, uniform samples of the cut.
-        inputs: d, uncertain inputs.
-        volume: V, the fraction of the cut that the interactions allow.
-        sigma: σ.
     """
-    ball = sigma * gamma(1 + inputs / 2) * volume * log(samples) / samples
+    ball = sigma * gamma(1 + inputs / 2) * log(samples) / samples
     return float(ball ** (1 / inputs) / sqrt(pi))
 
 
@@ -94,18 +92,33 @@ def linkage_starts(unit: Array, values: Array, distance: float) -> Rows:
     return np.setdiff1d(np.flatnonzero(np.isfinite(values)), worse)
 
 
+def on_plateaus(values: Array) -> Mask:
+    """Mask of the samples whose value (n,) another sample has as well, to rounding."""
+    order = np.argsort(values)
+    ordered = values[order]
+    with np.errstate(invalid="ignore"):  # ∞ − ∞ of failed samples
+        is_equal = np.diff(ordered) <= _EQUAL * np.abs(values[np.isfinite(values)]).max(initial=0)
+    is_tied = np.zeros(len(values), bool)
+    is_tied[order] = np.append(is_equal, False) | np.append(False, is_equal)
+    return is_tied
+
+
 @dataclass
 class BoundSearch:
     """State of the search of one bound in one cut.
 
     Args:
         started: Rows of the samples from which a descent has started; negative for corners.
-        samples: N, samples all of whose descents are done.
+        samples: N, samples off plateaus all of whose descents are done.
+        plateau_samples: Samples on plateaus.
+        plateaus: Values of plateaus from which a descent has started.
         optima: W different results of descents, in any cut, that are optima of this cut.
     """
 
     started: set[int] = field(default_factory=set)
     samples: int = 0
+    plateau_samples: int = 0
+    plateaus: list[float] = field(default_factory=list)
     optima: list[Optimum] = field(default_factory=list)
 
     @property
@@ -116,7 +129,8 @@ class BoundSearch:
     @property
     def uncovered(self) -> float:
         """Expected fraction of the cut that is not yet covered by the basins of optima."""
-        return uncovered_fraction(self.samples, len(self.optima))
+        plateau_fraction = self.plateau_samples / max(self.samples + self.plateau_samples, 1)
+        return plateau_fraction + uncovered_fraction(self.samples, len(self.optima))
 
     @property
     def is_smooth(self) -> bool:
@@ -135,18 +149,22 @@ class BoundSearch:
 
     def is_open(self, allowed: float) -> bool:
         """Return whether the search goes on; kinks and jumps at the best optimum end it, too."""
+        if self.plateau_samples >= MAX_ON_PLATEAUS:
+            return False
         if self.samples < MIN_SAMPLES or not self.optima:
             return True
         return self.uncovered >= allowed and self.is_smooth
 
     def next_samples(self, allowed: float) -> int:
-        """Samples N with which W (W + 1) / (N (N − 1)) falls to `allowed` without a new optimum.
+        """Samples with which W (W + 1) / (N (N − 1)) falls to `allowed` without a new optimum.
 
-        N is at most twice the present number.
+        With plateaus so many that `MAX_ON_PLATEAUS` lie on them; at most twice the present number.
         """
-        W = len(self.optima)
+        W, present = len(self.optima), self.samples + self.plateau_samples
         needed = ceil(0.5 + sqrt(0.25 + W * (W + 1) / allowed)) + 1
-        return max(MIN_SAMPLES, min(max(needed, self.samples + _MIN_NEW), 2 * self.samples))
+        if self.plateau_samples:
+            needed = ceil(1.01 * MAX_ON_PLATEAUS * present / self.plateau_samples)
+        return max(MIN_SAMPLES, min(max(needed, present + _MIN_NEW), 2 * present))
 
 
 class SingleLinkage:
@@ -174,7 +192,7 @@ class SingleLinkage:
         uncovered: float,
         seed: int,
     ) -> None:
-        self.campaign, self.domain = campaign, domain
+        self.campaign, self.outputs = campaign, outputs
         self.uncovered, self.seed = uncovered, seed
         self.cuts = list(cuts_with_width(campaign, domain))[::-1]
         self.bounds = [Bound(output, sign) for output, sign in product(outputs, (1.0, -1.0))]
@@ -185,11 +203,11 @@ class SingleLinkage:
         self._points: Array = np.empty((0, len(domain.names)))
         self._values: dict[Bound, Array] = {bound: np.empty(0) for bound in self.bounds}
         self._levels: Rows = np.empty(0, int)
-        self._volumes = {cut.level: 1.0 for cut in self.cuts}  # that the interactions leave
-        self._exhausted: set[int] = set()  # levels of cuts that the interactions leave no volume
 
     def run(self, first: Array) -> None:
         """Sample and descend, cut by cut in rounds, until every bound meets the stopping rule.
+
+        Without outputs to search each cut gets `MIN_SAMPLES` samples and no descents.
 
         Args:
             first: Uniform samples of the widest cut in unit coordinates, (n, uncertain inputs).
@@ -197,6 +215,10 @@ class SingleLinkage:
         Raises:
             SpentError: The budget ended the search.
         """
+        if not self.outputs:
+            for cut in self.cuts:
+                self._sample_up_to(cut, MIN_SAMPLES, 0)
+            return
         self._add_samples(self.cuts[0], first)
         rounds = 0
         while visits := [(cut, bounds) for cut in self.cuts if (bounds := self._open_bounds(cut))]:
@@ -205,7 +227,8 @@ class SingleLinkage:
                 states = [self.states[cut.level, bound] for bound in bounds]
                 count = max(state.next_samples(self.uncovered) for state in states)
                 self._sample_up_to(cut, count, rounds)
-                self._descend(cut, bounds)
+                for bound in bounds:
+                    self._descend(cut, bound)
                 self.campaign.report(1 - (1 - 0.8 * number / len(visits)) / rounds)
 
     def is_estimate(self, output: str) -> bool:
@@ -221,41 +244,58 @@ class SingleLinkage:
     def summary(self) -> str:
         """Return a sentence on the bound with the largest uncovered fraction of its cut."""
         worst = max(self.states.values(), key=lambda state: state.uncovered)
-        return (
-            f"W = {len(worst.optima)} optima found from N = {worst.samples} samples: of each cut"
-            f" {worst.uncovered:.3%} or less is not yet covered"
-        )
-
-    def sample(self) -> None:
-        """Evaluate `MIN_SAMPLES` uniform samples of each cut, without descents."""
-        for cut in self.cuts:
-            self._sample_up_to(cut, MIN_SAMPLES, 0)
+        note = f"W = {len(worst.optima)} optima found from N = {worst.samples} samples"
+        if worst.plateau_samples:
+            note += f" beside {worst.plateau_samples} on plateaus"
+        return f"{note}: of each cut {min(worst.uncovered, 1):.3%} or less is not yet covered"
 
     def _open_bounds(self, cut: CutSearch) -> list[Bound]:
         """Bounds of a cut whose search goes on, after descents from samples better than optima."""
         for bound in self.bounds:
-            self._descend_from_better(cut, bound)
-        if cut.level in self._exhausted:
-            return []
+            state, samples = self.states[cut.level, bound], self.campaign.samples
+            if not state.optima:
+                continue
+            inside = cut.contains(samples.points)
+            values = bound.sign * samples.values.array[inside, samples.values.column(bound.output)]
+            best = int(np.nanargmin(values))
+            if values[best] < state.best.value - self._tolerance(bound):
+                self._descend_from(cut, bound, cut.unit(samples.points[inside][best][None])[0])
         states = [(bound, self.states[cut.level, bound]) for bound in self.bounds]
         return [bound for bound, state in states if state.is_open(self.uncovered)]
 
-    def _descend_from_better(self, cut: CutSearch, bound: Bound) -> None:
-        """Descend from the best of all samples in the cut if it is better than all known optima."""
-        state, samples = self.states[cut.level, bound], self.campaign.samples
-        if not state.optima:
-            return
-        inside = cut.contains(samples.points)
-        values = bound.sign * samples.values.array[inside, samples.values.column(bound.output)]
-        best = int(np.nanargmin(values))
-        if values[best] < state.best.value - self._tolerance(bound):
-            self._descend_from(cut, bound, cut.unit(samples.points[inside][best][None])[0])
+    def _descend(self, cut: CutSearch, bound: Bound) -> None:
+        """Descend from the samples and corners of a cut that have no better one nearby.
+
+        Nearby is the critical distance with σ = 4; from two optima that are no corners on, also the
+        smaller one with σ = 2. Descents that have been made before are not repeated.
+        """
+        state, rows = self.states[cut.level, bound], self._rows(cut)
+        unit = np.concatenate([cut.unit(self._points[rows]), cut.corners])
+        keys = [*map(int, rows), *range(-len(cut.corners), 0)]  # N does not count corners
+        sampled = self._values[bound][rows]
+        values = np.append(sampled, cut.values(cut.corners, bound))
+        is_tied = np.append(on_plateaus(sampled), np.zeros(len(cut.corners), bool))
+        tolerance = _EQUAL * np.abs(values[np.isfinite(values)]).max(initial=0)
+        for sigma in (SIGMA_ONE_HUMP, SIGMA_SEVERAL_HUMPS):
+            if sigma == SIGMA_SEVERAL_HUMPS and state.n_humps(cut) < 2:
+                continue
+            distance = critical_distance(len(rows), len(cut.uncertain_inputs), sigma)
+            for start in linkage_starts(unit, values, distance):
+                if is_tied[start]:
+                    value = float(values[start])
+                    if any(abs(value - known) <= tolerance for known in state.plateaus):
+                        continue
+                    state.plateaus.append(value)
+                if keys[start] not in state.started:
+                    state.started.add(keys[start])
+                    self._descend_from(cut, bound, unit[start])
+        state.plateau_samples = int(is_tied.sum())
+        state.samples = len(rows) - state.plateau_samples
 
     def _descend_from(self, cut: CutSearch, bound: Bound, start: Array) -> None:
-        """Descend from a start and record the optimum.
+        """Descend from a start and record the optimum; again with a short step if it left a basin.
 
-        If values do not fall all along the straight line to it, the descent has left the basin of
-        its start; it is repeated with a short first step.
+        It did where values do not fall all along the straight line to the optimum.
         """
         optimum = cut.descend(start, bound)
         self._record(optimum)
@@ -267,16 +307,16 @@ class SingleLinkage:
                 self._record(cut.descend(start, bound, FIRST_STEP))
 
     def _record(self, optimum: Optimum) -> None:
-        """Add an optimum to the list of every cut of which it is a local optimum.
+        """Add an optimum to the list of every cut of which it is a local optimum, or to its equal.
 
-        One at the same point, to within a tolerance, is replaced if its value is worse.
+        The better of two equal ones stays.
         """
         for cut in self.cuts:
             if not optimum.is_optimum_of(cut):
                 continue
             optima = self.states[cut.level, optimum.bound].optima
             index = self._index_of_equal(cut, optimum)
-            if index == len(optima):  # none at this point
+            if index == len(optima):
                 optima.append(optimum)
             elif optimum.value < optima[index].value:
                 optima[index] = optimum
@@ -306,66 +346,24 @@ class SingleLinkage:
         values = self._values[bound][np.isfinite(self._values[bound])]
         return float(VALUE_TOLERANCE * np.ptp(values) + ROUNDING * np.abs(values).max())
 
+    def _rows(self, cut: CutSearch) -> Rows:
+        """Return the rows of the samples that are uniform in a cut: its own and of wider cuts."""
+        return np.flatnonzero((self._levels <= cut.level) & cut.contains(self._points))
+
     def _sample_up_to(self, cut: CutSearch, count: int, rounds: int) -> None:
         """Evaluate new uniform samples of a cut until it has `count` of them."""
         missing = count - len(self._rows(cut))
         if missing > 0:
             rng = np.random.default_rng([self.seed, 1 + cut.level, rounds])
-            self._add_samples(cut, self._draw(cut, missing, rng))
-
-    def _descend(self, cut: CutSearch, bounds: list[Bound]) -> None:
-        """Descend to bounds from the samples and corners of a cut that have no better one nearby.
-
-        Nearby is the critical distance with σ = 4; from two optima that are no corners on, also the
-        smaller one with σ = 2. Descents that have been made before are not repeated.
-        """
-        rows = self._rows(cut)
-        if len(rows) < 2:  # the interactions leave next to nothing
-            return
-        unit = np.concatenate([cut.unit(self._points[rows]), cut.corners])
-        keys = [*map(int, rows), *range(-len(cut.corners), 0)]  # N does not count corners
-        for bound in bounds:
-            state = self.states[cut.level, bound]
-            values = np.append(self._values[bound][rows], cut.values(cut.corners, bound))
-            for sigma in (SIGMA_ONE_HUMP, SIGMA_SEVERAL_HUMPS):
-                if sigma == SIGMA_SEVERAL_HUMPS and state.n_humps(cut) < 2:
-                    continue
-                volume = self._volumes[cut.level]
-                distance = critical_distance(len(rows), len(cut.uncertain_inputs), volume, sigma)
-                for start in linkage_starts(unit, values, distance):
-                    if keys[start] not in state.started:
-                        state.started.add(keys[start])
-                        self._descend_from(cut, bound, unit[start])
-            state.samples = len(rows)
-
-    def _rows(self, cut: CutSearch) -> Rows:
-        """Return the rows of the samples that are uniform in a cut: its own and of wider cuts."""
-        return np.flatnonzero((self._levels <= cut.level) & cut.contains(self._points))
-
-    def _draw(self, cut: CutSearch, count: int, rng: np.random.Generator) -> Array:
-        """Return `count` uniform points of the allowed part of a cut, (count, uncertain inputs).
-
-        They are in unit coordinates. There may be fewer where the interactions allow next to
-        nothing.
-        """
-        allowed: Array = np.empty((0, len(cut.uncertain_inputs)))
-        drawn = 0
-        while len(allowed) < count and drawn < _MAX_DRAWS:
-            unit = rng.random((count, len(cut.uncertain_inputs)))
-            allowed, drawn = np.concatenate([allowed, unit[cut.slack(unit) >= 0]]), drawn + count
-        self._volumes[cut.level] = len(allowed) / drawn
-        if len(allowed) < count:
-            self._exhausted.add(cut.level)
-        return allowed[:count]
+            self._add_samples(cut, rng.random((missing, len(cut.uncertain_inputs))))
 
     def _add_samples(self, cut: CutSearch, unit: Array) -> None:
         """Evaluate uniform samples (n, uncertain inputs) of a cut and append them."""
-        if len(unit):
-            points = cut.points(unit)
-            rows = self.campaign(points)
-            for bound, values in self._values.items():
-                added = bound.sign * rows.array[:, rows.column(bound.output)]
-                added[np.isnan(added)] = inf
-                self._values[bound] = np.concatenate([values, added])
-            self._points = np.concatenate([self._points, points])
-            self._levels = np.concatenate([self._levels, np.full(len(points), cut.level)])
+        points = cut.points(unit)
+        rows = self.campaign(points)
+        for bound, values in self._values.items():
+            added = bound.sign * rows.array[:, rows.column(bound.output)]
+            added[np.isnan(added)] = inf
+            self._values[bound] = np.concatenate([values, added])
+        self._points = np.concatenate([self._points, points])
+        self._levels = np.concatenate([self._levels, np.full(len(points), cut.level)])

@@ -91,15 +91,7 @@ def _full_design(
 def _bounds_of_combinations(
     campaign: Campaign, domain: Domain, refined: Collection[str], method: str
 ) -> Bounds:
-    """Evaluate all combinations of points; their bounds, guaranteed where corners suffice.
-
-    Args:
-        campaign: The model with the knowledge about it.
-        domain: Inputs and levels.
-        refined: Inputs with points between the ends of their cuts.
-        method: Name of the method.
-    """
-    domain.require_free(method)
+    """Evaluate all combinations of points; their bounds, guaranteed where corners suffice."""
     design = _full_design(campaign, domain, refined, method)
     bounds = design.bounds(campaign(design.points), method)
     monotone = campaign.knowledge.monotone_in(domain.names, bounds.outputs)
@@ -109,9 +101,7 @@ def _bounds_of_combinations(
 def corners_suffice(domain: Domain, monotone: Mask) -> Mask:
     """Return the outputs that are monotone in every input that has a width, a mask (outputs,).
 
-    Args:
-        domain: Inputs and levels.
-        monotone: Whether each output is monotone in each input, shape (outputs, inputs).
+    `monotone` says whether each output is in each input, shape (outputs, inputs).
     """
     lower, upper = domain.boxes
     return np.asarray((monotone | (lower[0] == upper[0])).all(axis=1))
@@ -127,15 +117,7 @@ def require_budget(samples: float, campaign: Campaign, method: str) -> None:
 
 @dataclass(frozen=True)
 class General:
-    """General transformation method: all combinations of the recursion's points.
-
-    Example:
-        >>> from alphacut.fuzzy import Triangular, levels, propagate
-        >>> inputs = {"x": Triangular(-1, 0, 2)}
-        >>> bounds = propagate(lambda x: x**2, inputs, General(), alpha=levels(2))
-        >>> bounds.upper[0].item(), bounds.evaluations
-        (4.0, 6)
-    """
+    """General transformation method: all combinations of the recursion's points."""
 
     name = "general"
 
@@ -146,15 +128,7 @@ class General:
 
 @dataclass(frozen=True)
 class Reduced:
-    """Reduced transformation method: corners of each cut; exact where monotone.
-
-    Example:
-        >>> from alphacut.fuzzy import Interval, propagate
-        >>> inputs = {"x": Interval(1, 2), "y": 3.0}
-        >>> bounds = propagate(lambda x, y: x * y, inputs, Reduced(), alpha=[0])
-        >>> bounds.upper.item()
-        6.0
-    """
+    """Reduced transformation method: corners of each cut; exact where monotone."""
 
     name = "reduced"
 
@@ -171,12 +145,6 @@ class Extended:
 
     Args:
         outputs: Outputs whose bounds matter; all if none is named.
-
-    Example:
-        >>> from alphacut.fuzzy import Triangular, levels, propagate
-        >>> inputs = {"x": Triangular(-1, 0, 1), "y": Triangular(1, 2, 3)}
-        >>> propagate(lambda x, y: x**2 + y, inputs, Extended(), alpha=levels(2)).upper[0].item()
-        4.0
     """
 
     outputs: tuple[str, ...] = ()
@@ -185,7 +153,6 @@ class Extended:
 
     def run(self, campaign: Campaign, domain: Domain) -> Bounds:
         """Find the monotone inputs, evaluate the samples, rearrange them into α-cuts."""
-        domain.require_free(self.name)
         effects = verify(campaign, domain, self.outputs)
         stated = campaign.knowledge.monotone_in(domain.names, effects.outputs)
         monotone = ((effects.signs[0] != 0) | stated).all(axis=0)  # by input, for all outputs
@@ -219,7 +186,6 @@ class Signed:
 
     def run(self, campaign: Campaign, domain: Domain) -> Bounds:
         """Verify the signs, run the corners, rearrange them into α-cuts."""
-        domain.require_free(self.name)
         effects = verify(campaign, domain, self.outputs)
         require_budget(_sample_count(effects, domain), campaign, self.name)
         levels = zip(effects.signs, grids(domain, domain.names), strict=True)
@@ -257,17 +223,11 @@ def _sample_count(effects: Effects, domain: Domain) -> float:
 def _level_points(signs: Signs, grid: list[list[float]]) -> Array:
     """Return the points of the signed plan on one level, shape (n, inputs).
 
-    Args:
-        signs: Distinct rows of signs, shape (rows, inputs); each names two opposite corners.
-        grid: Points of each input; inputs without a sign take all of them.
+    Each row of signs (rows, inputs) names two opposite corners; inputs without a sign take all
+    their points.
     """
     rows: list[tuple[float, ...]] = []
     for pattern in np.concatenate([signs, -signs]):
         pairs = zip(pattern, grid, strict=True)
-        rows += product(*(_ends(points, sign) for sign, points in pairs))
+        rows += product(*(x if sign == 0 else [x[0 if sign > 0 else -1]] for sign, x in pairs))
     return np.array(rows)
-
-
-def _ends(points: list[float], sign: int) -> list[float]:
-    """Return the first point for a positive sign, the last for a negative one, all for none."""
-    return points if sign == 0 else [points[0 if sign > 0 else -1]]

@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Mask
-from alphacut.fuzzy.refused import checked_number, require, require_choice
+from alphacut.fuzzy.refused import checked_number, require
 from alphacut.fuzzy.sets.claimed import ClaimedNumber
-from alphacut.fuzzy.sets.interaction import Interaction
 from alphacut.fuzzy.sets.numbers import Crisp, FuzzyNumber, checked_levels
 
 _ROUND_OFF = 1e-12  # of the support: points this close to a cut lie in it
@@ -47,12 +46,7 @@ def quasi_random_points(dimension: int, count: int, *, skip: int = 0) -> Array:
 
 
 def fuzzy_inputs(inputs: Mapping[str, FuzzyNumber | float]) -> dict[str, FuzzyNumber]:
-    """Return the inputs as fuzzy numbers by name; a plain number becomes a `Crisp` one.
-
-    Raises:
-        RefusedError: The inputs are not a mapping or empty, or a value is not a number, fuzzy or
-            plain.
-    """
+    """Return the inputs as fuzzy numbers by name, plain ones as `Crisp`; refuse other values."""
     is_named = isinstance(inputs, Mapping) and inputs and all(isinstance(x, str) for x in inputs)
     allowed = "a mapping, as {'E': Triangular(24, 25, 26)}"
     require(bool(is_named), "inputs", value=inputs, allowed=allowed)
@@ -72,19 +66,16 @@ class Domain:
         inputs: Name of each input and its fuzzy number, in the order of the columns of every array
             of points.
         alpha: Levels, rising within [0, 1].
-        interactions: Constraints between the inputs.
 
     Raises:
-        RefusedError: There is no input or level, the levels do not rise within [0, 1], an
-            interaction names an unknown input, or values do not decide the cuts of a number.
+        RefusedError: There is no input or level, the levels do not rise within [0, 1], or values do
+            not decide the cuts of a number.
     """
 
     inputs: Mapping[str, FuzzyNumber]
     alpha: Sequence[float]
-    interactions: Sequence[Interaction] = ()
 
     def __post_init__(self) -> None:
-        """Store levels and inputs as checked; refuse interactions of unknown inputs."""
         alpha = checked_levels(self.alpha)
         inputs = fuzzy_inputs(self.inputs)
         for name, number in inputs.items():
@@ -93,10 +84,6 @@ class Domain:
                 inputs[name] = replace(number, decided=0.0)
         object.__setattr__(self, "alpha", alpha)
         object.__setattr__(self, "inputs", inputs)
-        object.__setattr__(self, "interactions", tuple(self.interactions))
-        for interaction in self.interactions:
-            for name in interaction.names:
-                require_choice(f"input of {type(interaction).__name__}", name, self.names)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -116,27 +103,9 @@ class Domain:
         return np.array([number.modal for number in self.inputs.values()], float)
 
     def inside(self, points: Array) -> Mask:
-        """Return which points (n, inputs) lie in the α-cut of each level, a mask (levels, n).
-
-        A point is in the cut if it is in the box of the cuts and fulfils all interactions there.
-        """
+        """Return which points (n, inputs) lie in the box of each level, a mask (levels, n)."""
         lower, upper = self.boxes
         tolerance = _ROUND_OFF * (upper[0] - lower[0])
         above = (points >= (lower - tolerance)[:, None]).all(axis=2)
         below = (points <= (upper + tolerance)[:, None]).all(axis=2)
-        interaction = np.array([self.slack(points, alpha) for alpha in self.alpha])
-        return np.asarray(above & below & (interaction >= -_ROUND_OFF))
-
-    def slack(self, points: Array, alpha: float) -> Array:
-        """Return the least slack of all interactions at points (n, inputs), shape (n,).
-
-        It is negative where an interaction is violated and infinite without interactions.
-        """
-        slacks = [x.slack(points, self.inputs, alpha) for x in self.interactions]
-        return np.asarray(np.min([np.full(len(points), np.inf), *slacks], axis=0))
-
-    def require_free(self, method: str) -> None:
-        """Refuse a domain with interactions, for a method that evaluates corners of boxes only."""
-        kinds = ", ".join(type(interaction).__name__ for interaction in self.interactions)
-        allowed, cure = f"none with the method {method}", "take Automatic or Optimisation"
-        require(not kinds, "interactions", value=kinds, allowed=allowed, cure=cure)
+        return np.asarray(above & below)

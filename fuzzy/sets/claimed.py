@@ -13,12 +13,9 @@ from alphacut.fuzzy.sets.numbers import Cut, Cuts, FuzzyNumber, Stepwise, checke
 
 @dataclass(frozen=True)
 class CoverageClaim:
-    """P(quantity in the cut at α) >= 1 − α at every α, over repeated samples.
+    """P(quantity in the cut at α) >= 1 − α at every α, over repeated samples, under conditions.
 
-    Args:
-        about: The quantity: "next value", "mean", "median", "quantile 0.9", or what a joint claim
-            means.
-        conditions: Conditions under which it holds, one each.
+    The quantity is `about`: "next value", "mean", "quantile 0.9", or what a joint claim means.
     """
 
     about: str
@@ -46,9 +43,9 @@ class JointRule:
     named: bool = False
 
     def joint_level(self, beta: Array) -> Array:
-        """Level α of the joint cut made of the single cuts at level β (any shape).
+        """Level α of the joint cut made of m single cuts at level β, any shape.
 
-        For m claims: α = 1 − (1 − β)^m with independent sources, else min(m β, 1) (Bonferroni).
+        α = 1 − (1 − β)^m with independent sources, else min(m β, 1) (Bonferroni).
         """
         m = len(self.names)
         if m == 1:
@@ -60,7 +57,7 @@ class JointRule:
 
     @property
     def words(self) -> str:
-        """Text that names the number of sources and their dependence; empty for a single source."""
+        """Number of sources and their dependence, in words; empty for a single source."""
         sources = "independent sources" if self.independent else "sources of unknown dependence"
         return f"{len(self.names)} {sources}" if len(self.names) > 1 else ""
 
@@ -76,9 +73,6 @@ class ClaimedNumber(FuzzyNumber):
             everywhere, or physical bounds fill in.
         joint: Rule by which its cuts were widened to hold together with others; None where they
             hold by themselves.
-
-    Raises:
-        RefusedError: `decided` lies outside [0, 1].
     """
 
     number: Stepwise
@@ -91,21 +85,12 @@ class ClaimedNumber(FuzzyNumber):
 
     @property
     def cuts(self) -> Cuts:
-        """The α-cuts at all levels.
-
-        Raises:
-            RefusedError: The measured values leave a cut at low α without a finite end.
-        """
+        """The α-cuts at all levels; refused where the values do not decide those at low α."""
         self.cut(0.0)
         return self.number.cuts
 
     def cut(self, alpha: float) -> Cut:
-        """Return the α-cut at `alpha` in [0, 1].
-
-        Raises:
-            RefusedError: `alpha` lies outside [0, 1] or below `decided`, where the measured values
-                leave the cut without a finite end.
-        """
+        """Return the α-cut at `alpha` in [0, 1]; refused below `decided`, where it has no end."""
         if checked_level(alpha) < self.decided:
             allowed = f"levels from {self.decided:.4g} on, which the values decide"
             cure = "give bounds=(lower, upper), what is physically possible, or measure more"

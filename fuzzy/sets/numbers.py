@@ -27,7 +27,7 @@ class Cut(NamedTuple):
 
     @property
     def width(self) -> float:
-        """Upper less lower end."""
+        """Length of the interval."""
         return self.upper - self.lower
 
 
@@ -54,7 +54,7 @@ class FuzzyNumber(ABC):
 
     @cached_property
     def modal(self) -> float:
-        """The value of membership 1, or the middle of the modal interval."""
+        """The nominal value: of membership 1, or the middle of the interval of such values."""
         lower, upper = self.cut(1.0)
         return lower if lower == upper else (lower + upper) / 2
 
@@ -77,11 +77,9 @@ class FuzzyNumber(ABC):
         return np.where(np.isnan(x), np.nan, grade)
 
     def plot(self, axes: Axes | None = None, **line: Any) -> Axes:
-        """Draw the membership function as a line, and return the axes.
+        """Draw the membership function on Matplotlib axes, new ones by default, and return them.
 
-        Args:
-            axes: Axes of Matplotlib; new ones if not given.
-            line: Keywords of `Axes.plot`, such as `color`.
+        `line` has keywords of `Axes.plot`, such as `color`.
         """
         axes = new_axes() if axes is None else axes
         levels, lower, upper = map(np.asarray, self.cuts)
@@ -99,20 +97,12 @@ def new_axes() -> Axes:
 
 
 def checked_level(alpha: float) -> float:
-    """The level as a float.
-
-    Raises:
-        RefusedError: It lies outside [0, 1].
-    """
+    """Return the level as a float; refuse one outside [0, 1]."""
     return checked_number("alpha", alpha, least=0, most=1)
 
 
 def checked_levels(alpha: Iterable[float]) -> tuple[float, ...]:
-    """Return levels as a tuple of floats, which must rise within [0, 1].
-
-    Raises:
-        RefusedError: There is no level, they do not rise, or one lies outside [0, 1].
-    """
+    """Return levels as a tuple of floats; refuse those that do not rise within [0, 1], or none."""
     levels = tuple(map(checked_level, alpha))
     ordered = bool(levels) and (np.diff(levels) > 0).all()
     require(ordered, "alpha", value=list(levels), allowed="levels that rise within [0, 1]")
@@ -132,10 +122,7 @@ def _interpolate(alpha: float, levels: Sequence[float], ends: Sequence[float]) -
 
 
 def _highest_level(x: Array, levels: Array, lower: Array) -> Array:
-    """Return the highest level α whose cut has its lower end at or below x, interpolated linearly.
-
-    It is the membership of x on the left flank; 0 where x lies below all cuts.
-    """
+    """Return the membership of x on the left flank, 0 where x lies below all cuts."""
     count = np.searchsorted(lower, x, side="right")  # cuts with their lower end at or below x
     right = np.clip(count, 1, len(lower) - 1)
     left = right - 1
@@ -159,7 +146,6 @@ class _Corners(FuzzyNumber):
 
     @cached_property
     def cuts(self) -> Cuts:
-        """Support and modal interval."""
         corners = [getattr(self, corner.name) for corner in fields(self)]
         left, right = corners[(len(corners) - 1) // 2], corners[len(corners) // 2]
         return Cuts((0.0, 1.0), (corners[0], left), (corners[-1], right))
@@ -167,12 +153,7 @@ class _Corners(FuzzyNumber):
 
 @dataclass(frozen=True)
 class Crisp(_Corners):
-    """A single value of membership 1.
-
-    Example:
-        >>> Crisp(2.0).support
-        Cut(lower=2.0, upper=2.0)
-    """
+    """A single value of membership 1."""
 
     value: float
 
@@ -181,15 +162,7 @@ class Crisp(_Corners):
 
 @dataclass(frozen=True)
 class Interval(_Corners):
-    """A crisp interval: membership 1 between its ends, 0 outside.
-
-    Raises:
-        RefusedError: The ends are not finite or not in order.
-
-    Example:
-        >>> Interval(1.0, 2.0).cut(0.5)
-        Cut(lower=1.0, upper=2.0)
-    """
+    """A crisp interval: membership 1 between its finite ends, 0 outside."""
 
     lower: float
     upper: float
@@ -199,12 +172,7 @@ class Interval(_Corners):
 
 @dataclass(frozen=True)
 class Triangular(_Corners):
-    """Triangular fuzzy number.
-
-    Args:
-        lower: Left end of the support.
-        modal: Value of membership 1.
-        upper: Right end of the support.
+    """Triangular fuzzy number: ends of the support, and between them the value of membership 1.
 
     Raises:
         RefusedError: The three are not finite or not in order.
@@ -223,21 +191,7 @@ class Triangular(_Corners):
 
 @dataclass(frozen=True)
 class Trapezoidal(_Corners):
-    """Fuzzy interval with straight flanks.
-
-    Args:
-        lower: Left end of the support.
-        left: Left end of the modal interval.
-        right: Right end of the modal interval.
-        upper: Right end of the support.
-
-    Raises:
-        RefusedError: The four are not finite or not in order.
-
-    Example:
-        >>> Trapezoidal(0, 1, 2, 4).cut(0.5)
-        Cut(lower=0.5, upper=3.0)
-    """
+    """Fuzzy interval with straight flanks: membership 1 from `left` to `right`, 0 at the others."""
 
     lower: float
     left: float
@@ -258,7 +212,6 @@ class _Nested(FuzzyNumber):
     to_one: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
-        """Store levels and cuts as tuples of floats; refuse cuts that are not finite and nested."""
         levels = checked_levels(self.alpha)
         lower, upper = (tuple(map(float, ends)) for ends in (self.lower, self.upper))
         is_complete = levels[0] == 0 and (levels[-1] == 1 or not self.to_one)
@@ -286,10 +239,6 @@ class PiecewiseLinear(_Nested):
     Raises:
         RefusedError: Lengths differ, levels do not rise from 0 to 1, or cuts are not finite, nested
             intervals.
-
-    Example:
-        >>> PiecewiseLinear((0, 0.5, 1), lower=(0, 1, 2), upper=(5, 3, 2)).cut(0.75)
-        Cut(lower=1.5, upper=2.5)
     """
 
     to_one = True
@@ -302,24 +251,14 @@ class PiecewiseLinear(_Nested):
 
 @dataclass(frozen=True)
 class Stepwise(_Nested):
-    """Fuzzy number by nested cuts, each of which holds from its level up to the next one.
+    """Fuzzy number from nested cuts, each of which holds from its level up to the next one.
 
-    Args:
-        alpha: Levels from which the cuts hold, rising from 0, at most 1.
-        lower: Lower ends, not falling.
-        upper: Upper ends, not rising.
-
-    Raises:
-        RefusedError: Lengths differ, levels do not rise from 0 within [0, 1], or cuts are not
-            finite, nested intervals.
+    The arguments are as of `PiecewiseLinear`, but the levels may end below 1.
     """
 
     @cached_property
     def cuts(self) -> Cuts:
-        """The cuts as a piecewise linear membership function with jumps.
-
-        Each cut is listed at its level and at the last floating-point number below the next level.
-        """
+        """The cuts, each at its level and at the last float below the next one: with jumps."""
         ends = [*(float(np.nextafter(level, 0.0)) for level in self.alpha[1:]), 1.0]
         cuts = []
         for start, end, lower, upper in zip(self.alpha, ends, self.lower, self.upper, strict=True):
@@ -338,9 +277,11 @@ def outer_steps(
 ) -> Stepwise:
     """Return the fuzzy number that has the given nested cuts, and between two levels the wider one.
 
+    The first cut holds from α = 0 on. A level that rounding has lifted above a decimal, as 0.1 +
+    0.2, counts as that decimal.
+
     Args:
-        alpha: Levels, rising, shape (A,); the first cut holds from α = 0 on. A level that rounding
-            has lifted above a decimal, as 0.1 + 0.2, counts as that decimal.
+        alpha: Levels, rising, shape (A,).
         lower: Lower ends of the cuts, shape (A,).
         upper: Upper ends of the cuts, shape (A,).
     """

@@ -8,15 +8,11 @@ import pytest
 from alphacut.fuzzy import (
     Automatic,
     Crisp,
-    Ellipsoidal,
     Extended,
     FailedError,
     General,
     Interval,
-    IntervalQuasiMonteCarlo,
     Knowledge,
-    Linear,
-    Optimisation,
     PiecewiseLinear,
     RefusedError,
     Trapezoidal,
@@ -71,19 +67,6 @@ def run(function=lambda x: x, inputs=X, *args, **options):
         (lambda: Knowledge({"x": 2}), "sign of x"),
         (lambda: run(lambda x: x, X, Extended(outputs=("z",))), "output"),
         (lambda: Automatic(uncovered=0), "uncovered"),
-        (lambda: Optimisation(starts=0), "starts"),
-        (lambda: IntervalQuasiMonteCarlo(0), "points"),
-        (lambda: IntervalQuasiMonteCarlo(12), "points"),
-        (lambda: IntervalQuasiMonteCarlo(8).run(abs, {}, X, alpha=[0]), "random inputs"),
-        (lambda: Linear({"x": np.nan}, 1), "weight of x"),
-        (lambda: Ellipsoidal({("x", "y"): 1.1}), "correlation of x and y"),
-        (lambda: Ellipsoidal({("x", "y"): 1.0}), "correlation"),
-        (lambda: Ellipsoidal({}), "correlation"),
-        (
-            lambda: Ellipsoidal({("a", "b"): 0.9, ("b", "c"): 0.9, ("a", "c"): -0.9}),
-            "correlation",
-        ),
-        (lambda: run(interactions=[Linear({"y": 1}, 1)]), "input of Linear"),
         (lambda: run(store="/proc/none/s.db", identity={"v": 1}), "store"),
         (lambda: run(store="s.db"), "identity"),
         (lambda: model_key({"f": abs}), "identity"),
@@ -145,11 +128,6 @@ def test_outputs_that_are_no_numbers_fail_with_the_point_and_the_cause(output, a
     assert allowed in failed.value.what
     assert "at x = 1" in failed.value.what
     assert "skip" in failed.value.cure
-
-
-def test_a_cut_without_an_allowed_point_is_a_failure():
-    with pytest.raises(FailedError, match="fulfils its interactions"):
-        run(interactions=[Linear({"x": 1}, -0.5)])
 
 
 def test_errors_pass_between_processes():

@@ -10,7 +10,7 @@ SCRIPT = """
 import sys
 from math import exp, sin
 
-from alphacut.fuzzy import General, Optimisation, Triangular, propagate
+from alphacut.fuzzy import Automatic, General, Triangular, propagate
 
 def model(points):
     return [{"y": sin(3 * p["a"]) * exp(p["b"]), "z": [p["a"] / 3, p["b"] ** 2]} for p in points]
@@ -19,7 +19,7 @@ if __name__ == "__main__":
     inputs = {"a": Triangular(0.0, 0.3, 1.0), "b": Triangular(-1.0, 0.0, 2.0)}
     workers, out = int(sys.argv[1]), sys.argv[2]
     parts = []
-    for plan in (General(), Optimisation()):
+    for plan in (General(), Automatic()):
         found = propagate(model, inputs, plan, shared=("a",), workers=workers, store=sys.argv[3], identity={"run": out})
         parts += [found.samples.values.array.tobytes(), found.lower.tobytes(), found.upper.tobytes(), found.lower_at.tobytes()]
     with open(out, "wb") as file:

@@ -311,15 +311,3 @@ def test_what_is_nobodys_store_is_refused_and_not_touched(tmp_path, made):
             then.st_ino,
             then.st_mtime_ns,
         )
-
-
-def test_a_second_damage_leaves_the_copy_of_the_first(tmp_path):
-    path = tmp_path / "s.db"
-    for stored in ("first", "second"):
-        run(path)
-        with closing(sqlite3.connect(path)) as base:
-            base.execute("update sample set layout = ? where rowid = 1", (stored,))
-            base.commit()
-        with pytest.warns(UserWarning, match="54 samples are intact"):
-            run(path)
-    assert b"first" in (tmp_path / "s.db.damaged").read_bytes()
