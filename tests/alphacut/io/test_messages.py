@@ -5,7 +5,7 @@ import pytest
 
 from alphacut.entry import main
 from alphacut.frame import Accelerogram, MatrixStructure, Proof, StoreyFrame, envelope
-from alphacut.fuzzy import Crisp, FailedError, RefusedError, Triangular, propagate
+from alphacut.fuzzy import Crisp, FailedError, General, RefusedError, propagate
 from alphacut.fuzzy.refused import checked_number
 from alphacut.io.problem import InputProblem
 from tests.alphacut.small import FRAME, written
@@ -71,9 +71,7 @@ MISUSES = {
         (1e4,), (3.0,), 2e10, (1e-5,), q0=(0.01,), outputs=("q1", "q1")
     ),
     "no output": lambda: MatrixStructure({"k": 1.0}, [(1.0, np.eye(1))], [("k", np.eye(1))], {}),
-    "a method of another question": lambda: propagate(
-        lambda a: {"y": a}, {"a": Triangular(0, 1, 2)}, Proof(), progress=False
-    ),
+    "a class as method of propagate": lambda: propagate(abs, {"x": Crisp(1.0)}, General),
 }
 
 
