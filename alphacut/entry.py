@@ -16,7 +16,7 @@ from alphacut.commands.options import (
     PETSC_LOG,
     Command,
     Parser,
-    read_case,
+    read_cell,
     require_petsc,
     split_petsc,
 )
@@ -175,7 +175,7 @@ def _run_command(arguments: Sequence[str], program: str, names: Mapping[str, str
         if PETSC_LOG not in petsc:
             return command.run(options, out)
         if "case" in options:
-            read_case(options)  # refuses the log of a case without prisms
+            read_cell(options)  # refuses the log of a case without prisms
         del petsc[PETSC_LOG]
         from alphacut.rve.fenicsx import log_on_standard_error
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 from functools import cached_property
-from typing import Annotated, Literal, Self
+from typing import Self
 
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
+from alphacut.case.cell import CellContent
 from alphacut.case.limits import (
     DecisionSection,
     FragilitySection,
@@ -16,40 +17,19 @@ from alphacut.case.limits import (
     TolerancesSection,
 )
 from alphacut.case.loads import ForceSection, RecordsSection, with_forces
-from alphacut.case.material import (
-    AnyLaw,
-    Cell,
-    ImageCell,
-    Mesh,
-    MeshedCell,
-    ModulusSection,
-    RoundCell,
-)
 from alphacut.case.matrices import MatricesSection
+from alphacut.case.microstructure import MicrostructureSection
 from alphacut.case.motion import EnvelopeSection, Identify, Study
-from alphacut.case.radius import AnyRadius, MicrostructureSection, RadiusMapSection, ThetaSection
 from alphacut.case.structure import Frame, MaterialDamping, Pendulum, Structure
-from alphacut.case.types import NotEmpty, Section, after, distinct, require_alone
+from alphacut.case.types import require_alone
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.refused import RefusedError, require
-from alphacut.rve.cell.outline import CLOSEST
-
-Stage = Literal["microstructure", "modulus", "envelope"]
 
 
-class Content(Section):
+class Content(CellContent):
     """A case."""
 
-    title: str = Field(description="one line, for figures and the report")
-    about: str = Field(default="", description="a paragraph: what the case shows")
-    stages: Annotated[tuple[Stage, ...], NotEmpty, after(distinct)] = Field(
-        description="stages that `alphacut run` computes"
-    )
     microstructure: MicrostructureSection | None = None
-    radius: AnyLaw | None = None
-    cell: Cell | None = None
-    mesh: Mesh = Mesh()
-    modulus: ModulusSection = ModulusSection()
     frame: Frame | None = None
     pendulum: Pendulum | None = None
     matrices: MatricesSection | None = None
@@ -77,65 +57,16 @@ class Content(Section):
         return tuple(dict.fromkeys(peak.removeprefix("mean ") for peak in peaks))
 
     @property
-    def image_cell(self) -> ImageCell | None:
-        """The cell if it is an image."""
-        return self.cell if isinstance(self.cell, ImageCell) else None
-
-    @property
-    def particle_cell(self) -> RoundCell | None:
-        """The cell if it has one particle."""
-        return self.cell if isinstance(self.cell, RoundCell) else None
-
-    @property
-    def has_spheres(self) -> bool:
-        """True if the particles of the cell are spheres."""
-        return self.particle_cell is not None and self.particle_cell.particles == "spheres"
+    def stated_fraction(self) -> float | None:
+        """Fraction of the cell that the particles take as the case says, at its modal value."""
+        if self.microstructure is not None and self.microstructure.packing is not None:
+            return self.microstructure.packing.fraction
+        return super().stated_fraction
 
     @property
     def has_stated_modulus(self) -> bool:
         """True if the structure needs no modulus of a stage."""
         return self.frame is None or self.frame.has_stated_modulus
-
-    @property
-    def stated_fraction(self) -> float | None:
-        """Fraction of the cell that the particles take as the case says, at its modal value."""
-        if self.microstructure is not None and self.microstructure.packing is not None:
-            return self.microstructure.packing.fraction
-        if self.particle_cell is None or self.particle_cell.fraction is None:
-            return None
-        return float(self.particle_cell.fraction.modal)
-
-    @property
-    def mesh_cell(self) -> MeshedCell | None:
-        """The cell if its mesh comes from a file."""
-        return self.cell if isinstance(self.cell, MeshedCell) else None
-
-    @property
-    def radius_map(self) -> RadiusMapSection | None:
-        """The radius map of [radius], if there is one."""
-        return self.radius if isinstance(self.radius, RadiusMapSection) else None
-
-    @property
-    def law_and_phases(self) -> tuple[ThetaSection, MeshedCell]:
-        """The law of θ and the phases of a mesh from a file, or RefusedError."""
-        if self.mesh_cell is None:
-            raise RefusedError("cell.phases", None, "a section for each physical group")
-        return self.radius or ThetaSection(), self.mesh_cell
-
-    @property
-    def radius_and_phases(self) -> tuple[AnyRadius, RoundCell]:
-        """The radius map and the phases of a round particle, or RefusedError."""
-        if self.particle_cell is None:
-            raise RefusedError("cell", None, "a section [cell] with a particle")
-        radius = self.radius_map or self.particle_cell.fraction_map
-        if radius is None:
-            raise RefusedError("radius", None, "a section [radius], or cell.fraction")
-        return radius, self.particle_cell
-
-    @property
-    def random_cell(self) -> tuple[AnyRadius | ThetaSection, RoundCell | MeshedCell]:
-        """The radius map, or the law of θ of a mesh, and the phases of a cell that is no image."""
-        return self.radius_and_phases if self.mesh_cell is None else self.law_and_phases
 
     @cached_property
     def structure(self) -> Structure | None:
@@ -169,70 +100,6 @@ class Content(Section):
     def structure_section(self) -> Frame | Pendulum | MatricesSection | None:
         """The section of the structure, if the case has one."""
         return self.frame or self.pendulum or self.matrices
-
-    @model_validator(mode="after")
-    def _check_mesh(self) -> Self:
-        """Refuses a mesh file without [cell.phases] or the reverse; keys that repeat the file."""
-        if self.mesh.file is None:
-            allowed = "a mesh of Gmsh beside [cell.phases]"
-            require(self.mesh_cell is None, "mesh.file", value=None, allowed=allowed)
-            is_complete = self.radius is None or self.radius_map is not None
-            about = RadiusMapSection.model_fields["a1"].description
-            allowed = f"{about}; theta alone beside mesh.file"
-            require(is_complete, "radius.a1", value=None, allowed=allowed)
-            return self
-        allowed = "[cell.phases], a phase for each physical group of mesh.file"
-        require(self.mesh_cell is not None, "cell.phases", value=None, allowed=allowed)
-        for key in ("size", "layers"):
-            require_alone(f"mesh.{key}", self.mesh.has_key(key), "mesh.file")
-        has_map = self.radius_map is not None or "microstructure" in self.stages
-        allowed = "theta alone beside mesh.file"
-        require(not has_map, "radius", value="a map of radii", allowed=allowed)
-        tolerance, cure = self.modulus.tolerance, "compare a coarser mesh"
-        allowed = "none beside mesh.file, whose error nobody knows"
-        require(tolerance is None, "modulus.tolerance", value=tolerance, allowed=allowed, cure=cure)
-        return self
-
-    @model_validator(mode="after")
-    def _check_interphase(self) -> Self:
-        """Refuses an interphase that reaches the sides of the cell; lengths over half a side."""
-        thickness = None if self.particle_cell is None else self.particle_cell.interphase_thickness
-        has_map = self.radius_map is not None or self.stated_fraction is not None
-        if thickness is None or not has_map or "microstructure" in self.stages:
-            return self
-        radius, thickest = self.radius_and_phases[0].largest_radius, thickness.support.upper
-        fits = radius + thickest < CLOSEST  # the largest outer radius that can be meshed
-        allowed = f"values below {CLOSEST - radius:.4g}, beside radii up to {radius:.4g}"
-        require(fits, "cell.interphase_thickness", value=f"{thickest:g}", allowed=allowed)
-        return self
-
-    @model_validator(mode="after")
-    def _check_stages(self) -> Self:
-        """Refuses stages without their sections, two sources of the radius, and unfit methods."""
-        has_fraction = self.particle_cell is not None and self.particle_cell.fraction is not None
-        has_radius = "microstructure" in self.stages or has_fraction
-        has_geometry = self.image_cell is not None or self.mesh_cell is not None
-        sections = {
-            "microstructure": ("microstructure",),
-            "modulus": ("cell",) if has_radius or has_geometry else ("radius", "cell"),
-            "envelope": ("envelope",),
-        }
-        for stage in self.stages:
-            for key in sections[stage]:
-                allowed = f"[{key}], which stage {stage} needs"
-                require(getattr(self, key) is not None, key, value=None, allowed=allowed)
-        is_source = {
-            "radius": self.radius is not None,
-            "cell.fraction": has_fraction,
-            "stage microstructure": "microstructure" in self.stages,
-        }
-        first, *further = [name for name, is_there in is_source.items() if is_there] or [""]
-        require_alone(first, bool(further), ", ".join(further))
-        method, cell = self.modulus.method, self.particle_cell or self.mesh_cell
-        methods = (method,) if cell is None else cell.methods
-        allowed = f"{', '.join(methods)} for this cell"
-        require(method in methods, "modulus.method", value=method, allowed=allowed)
-        return self
 
     @model_validator(mode="after")
     def _check_material_damping(self) -> Self:

@@ -1,50 +1,25 @@
-"""A case, from TOML text and changes of it; every problem is reported at once, by its key."""
+"""A whole case: its keys, its sections and its JSON Schema."""
 
 from __future__ import annotations
 
 import json
-import re
-import tomllib
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from functools import cache
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, get_args
 
-from pydantic import ValidationError
 from pydantic.fields import FieldInfo
-from pydantic_core import ErrorDetails
 
 from alphacut.case.content import Content
-from alphacut.case.types import Quantity, Section
-from alphacut.fuzzy.refused import RefusedError, printable, require
-from alphacut.io.problem import BadInput, InputProblem, nearest, suggestion
-from alphacut.stochastic.particles.csv_columns import text_of
+from alphacut.case.parse import (
+    ParsedCase,
+    SectionModels,
+    annotation_parts,
+    keys_of,
+    parse,
+    sections_of,
+)
+from alphacut.case.types import Quantity
 
-KINDS = {
-    "tuple_type": "an array",
-    "bool_type": "true or false",
-    "string_type": "text in quotes",
-    "dict_type": "a table",
-    "model_type": "a section",
-    "model_attributes_type": "a section",
-}
-"""What a key takes, by Pydantic's name of the error."""
-
-
-@dataclass(frozen=True)
-class Case:
-    """A case that was read; `changes` are those of the command line, KEY=VALUE each."""
-
-    path: Path
-    text: str
-    content: Content
-    changes: tuple[str, ...] = ()
-
-    @property
-    def name(self) -> str:
-        """The file's name without its ending: results go to results/NAME."""
-        return self.path.stem
+Case = ParsedCase[Content]
 
 
 def load(path: Path | str, changes: Sequence[str] = ()) -> Case:
@@ -53,181 +28,29 @@ def load(path: Path | str, changes: Sequence[str] = ()) -> Case:
     Raises:
         BadInput: With every problem of the case.
     """
-    path = Path(path)
-    text = text_of(path)
-    table = _parse_toml(path, text)
-    changed = apply_changes(table, changes)
-    try:
-        content = Content.model_validate(table, context={"folder": path.parent})
-    except ValidationError as error:
-        problems = [
-            replace(x, file="command line" if _is_below(x.key, changed) else str(path))
-            for x in _problems(error)
-        ]
-        raise BadInput([*dict.fromkeys(problems)]) from None
-    return Case(path, text, content, tuple(changes))
+    return parse(Content, path, changes)
 
 
-def _parse_toml(path: Path, text: str) -> dict[str, object]:
-    """The top table of a TOML text; an error of syntax is raised with the file and the line."""
-    try:
-        return tomllib.loads(text.replace("\r\n", "\n"))
-    except (RecursionError, ValueError) as error:
-        match = re.search(r"\(at line (\d+), column \d+\)", str(error))
-        line = int(match[1]) if match else 0  # an integer of too many digits has no line
-        lines = text.splitlines()
-        shown = lines[line - 1].strip() if 0 < line <= len(lines) else ""
-        what = f"is not TOML: {str(error).partition(' (at')[0].lower()}"
-        raise BadInput(InputProblem(shown or "the file", what, file=str(path), line=line)) from None
-
-
-def _problems(error: ValidationError) -> Iterator[InputProblem]:
-    """The problem of each error that Pydantic reports; a misspelt key is not missing as well."""
-    details = [(_key(detail["loc"]), detail) for detail in error.errors(include_url=False)]
-    unknown = [key for key, detail in details if detail["type"] == "extra_forbidden"]
-    suggested = {key: _suggested_key(key) for key in unknown}
-    for key, detail in details:
-        if key in suggested:
-            kind = "section" if isinstance(detail["input"], dict) else "key"
-            close = suggested[key].removeprefix(f"{_section(key)}.")
-            names = ", ".join(_names(key))
-            cure = f"did you mean {close}?" if close else ""
-            yield InputProblem(key, f"is an unknown {kind}", "", "" if close else names, cure)
-        elif key not in suggested.values():
-            yield _problem(key, detail)
-
-
-def _section(key: str) -> str:
-    return key.rpartition(".")[0]
-
-
-def _names(key: str) -> list[str]:
-    """Keys and sections beside a key."""
-    inside = re.sub(r"\[\d+\]", "", _section(key))
-    names = (*every_key(), *sections())
-    return [name.rpartition(".")[2] for name in names if name and _section(name) == inside]
-
-
-def _suggested_key(key: str) -> str:
-    """Full name of the known key nearest to an unknown one; empty where none is near."""
-    name = key.rpartition(".")[2]
-    if close := nearest(name, _names(key)):
-        return f"{_section(key)}.{close}".lstrip(".")
-    elsewhere = {x.rpartition(".")[2]: x for x in every_key()}
-    return elsewhere.get(nearest(name, elsewhere), "")
-
-
-def _problem(key: str, detail: ErrorDetails) -> InputProblem:
-    """The problem of a key whose value is wrong or missing, from the error of Pydantic."""
-    cause = detail.get("ctx", {}).get("error")
-    if isinstance(cause, RefusedError):
-        return replace(InputProblem.from_error(cause), key=cause.key or key)
-    what, value, cure = "", _as_text(detail["input"]), ""
-    allowed = str(cause or KINDS.get(detail["type"], detail["msg"]))
-    if detail["type"] == "missing":
-        about = every_key().get(re.sub(r"\[\d+\]", "", key))
-        what, value, allowed = "is missing", "", (about and about.description) or "a section"
-    if detail["type"] == "literal_error":
-        allowed = str(detail["ctx"]["expected"]).replace("'", '"')
-        cure = suggestion(str(detail["input"]), re.findall(r'"([^"]+)"', allowed))
-    return InputProblem(key, what, value, allowed, cure)
-
-
-def _key(location: tuple[int | str, ...]) -> str:
-    """Full name of a key, without the tags of unions, which stand in angle brackets."""
-    parts = (f"[{part}]" if isinstance(part, int) else f".{part}" for part in location)
-    return "".join(part for part in parts if not part.startswith(".<")).lstrip(".")
-
-
-def _as_text(value: object) -> str:
-    """A value as it stood in the file, near enough."""
-    return f'"{value}"' if isinstance(value, str) else printable(value).replace("'", '"')
-
-
-def _is_below(key: str, changed: Sequence[str]) -> bool:
-    """True for a changed key, one of its entries, or a key of its table."""
-    return any(re.match(rf"{re.escape(name)}(?![\w-])", key) for name in changed)
-
-
-def apply_changes(table: dict[str, object], changes: Sequence[str]) -> tuple[str, ...]:
-    """Puts every change KEY=VALUE into the table of a case; returns the keys, each known."""
-    full_keys = [key for key in every_key() if not key.startswith("study.")]
-    keys: list[str] = []
-    for change in changes:
-        key, _, value = (part.strip() for part in change.partition("="))
-        endings = (f"did you mean {full}?" for full in full_keys if full.endswith(f".{key}"))
-        cure = next(endings, suggestion(key, full_keys))
-        allowed = "KEY=VALUE, each full key once, as cell.matrix_modulus='20 GPa'"
-        is_new = key in full_keys and key not in keys
-        require(is_new, "--set", value=change, allowed=allowed, cure=cure)
-        _put(table, key, _value(value))
-        keys.append(key)
-    return tuple(keys)
-
-
-def _put(table: object, key: str, value: object) -> None:
-    *outer, last = key.split(".")
-    for name in outer:
-        table = table.setdefault(name, {}) if isinstance(table, dict) else None
-    if isinstance(table, dict):
-        table[last] = value
-
-
-def _value(text: str) -> object:
-    """Value that a text states: as TOML if it is TOML, words with commas as an array, else text."""
-    try:
-        return tomllib.loads(f"x = {text}")["x"]
-    except (RecursionError, ValueError):
-        pass
-    if re.fullmatch(r"[\w .+-]+(,[\w .+-]+)+", text):
-        return [_value(part.strip()) for part in text.split(",")]
-    return text
-
-
-SectionModels = list[type[Section]]
-"""Classes of a section; one that may have several kinds has a class for each."""
-
-
-@cache
 def every_key() -> dict[str, FieldInfo]:
     """All keys by their full names, sections left out."""
-    return {name: info for name, info, models in _walk("", Content) if not models}
+    return keys_of(Content)
 
 
-@cache
 def sections() -> dict[str, SectionModels]:
     """The models of every section by its name; that of an image and of a round cell have one."""
-    models_by_section: dict[str, SectionModels] = {"": [Content]}
-    return models_by_section | {name: models for name, _, models in _walk("", Content) if models}
-
-
-def _walk(prefix: str, model: type[Section]) -> Iterator[tuple[str, FieldInfo, SectionModels]]:
-    """Yields each key below a section's class: full name, field, classes of a section or none."""
-    for key, info in model.model_fields.items():
-        name, parts = f"{prefix}{key}", [info.annotation, *_parts(info.annotation)]
-        models = [x for x in parts if isinstance(x, type) and issubclass(x, Section)]
-        yield name, info, models
-        for inner in models:
-            yield from _walk(f"{name}.", inner)
-
-
-def _parts(annotation: Any) -> Iterator[Any]:
-    """Everything inside an annotation, what is annotated with it too."""
-    for part in (*get_args(annotation), *getattr(annotation, "__metadata__", ())):
-        yield part
-        yield from _parts(part)
+    return sections_of(Content)
 
 
 def quantity_of(info: FieldInfo) -> Quantity | None:
     """The quantity of a key, or of the entries of its array."""
-    parts = [*info.metadata, *_parts(info.annotation)]
+    parts = [*info.metadata, *annotation_parts(info.annotation)]
     return next((part for part in parts if isinstance(part, Quantity)), None)
 
 
 def allowed(info: FieldInfo) -> str:
     """Allowed values of a key in words; empty where it takes any text."""
     quantity = quantity_of(info)
-    choices = [part for part in _parts(info.annotation) if isinstance(part, str)]
+    choices = [part for part in annotation_parts(info.annotation) if isinstance(part, str)]
     return quantity.allowed if quantity else ", ".join(choices)
 
 

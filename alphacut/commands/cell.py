@@ -9,12 +9,11 @@ from typing import TextIO
 
 import numpy as np
 
-from alphacut.case.content import Content
-from alphacut.commands.options import Command, add_common, read_case, write_answer
+from alphacut.case.cell import CellContent
+from alphacut.commands.options import Command, add_common, read_cell, write_answer
 from alphacut.fuzzy.refused import FailedError, require
+from alphacut.io.columns import ISOTROPIC, fibre_label, text_table
 from alphacut.io.files import Document, ranks
-from alphacut.report.results import ISOTROPIC, fibre_label
-from alphacut.report.tables import text_table
 from alphacut.rve.result.result import HomogenisedStiffness
 from alphacut.stages import cell
 from alphacut.stages.meshed import modal_sample
@@ -48,7 +47,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, out: TextIO) -> int:
     """Solves the cell at the modal values, checks and writes its result; returns exit status 0."""
-    content = read_case(options).content
+    content = read_cell(options)
     radius, phases = content.random_cell
     elements = {"petsc": options.petsc, "parallel": ranks() > 1, "estimate": True}
     model = cell.model_of(phases, content.mesh, content.modulus, **elements)
@@ -84,7 +83,7 @@ def difference(
     return gap
 
 
-def export(content: Content, path: Path) -> Document:
+def export(content: CellContent, path: Path) -> Document:
     """Writes the mesh with displacements and stresses; returns the file and its number of nodes."""
     from alphacut.export.cell_files import write_cell
     from alphacut.rve.prism.fields import cell_fields, mesh_fields

@@ -12,13 +12,14 @@ from alphacut.case.load import quantity_of
 from alphacut.case.loads import RecordsSection
 from alphacut.case.structure import Structure
 from alphacut.case.types import Section
-from alphacut.commands.options import Command, add_common, read_case, write_answer
+from alphacut.commands.options import Command, add_common, write_answer
+from alphacut.commands.results import read_case
 from alphacut.frame import MatrixStructure, StoreyFrame
 from alphacut.frame.structures.linear import frequencies
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal, Triangular
+from alphacut.io.columns import text_table
 from alphacut.io.quantity import engineering
 from alphacut.report.results import GRAVITY
-from alphacut.report.tables import text_table
 from alphacut.stages.cell import model_of, solve
 from alphacut.stages.readiness import cut_record_warnings, require_runnable
 from alphacut.stages.suite import SuiteRecord, suite_records, suite_warnings

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass, replace
-from pathlib import Path
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import NoReturn, TextIO
 
-from alphacut.case.load import Case, load
+from alphacut.case.cell import CellContent
+from alphacut.case.parse import parse
 from alphacut.fuzzy.refused import RefusedError, require
-from alphacut.io.files import as_json, locked, rank, require_writable, say, write_text
-from alphacut.io.manifest import MANIFEST, ResultsFolder
+from alphacut.io.files import as_json, write_text
 from alphacut.io.problem import BadInput, InputProblem, suggestion
-from alphacut.stages.store import StageStore
 
 PETSC_PREFIX = "-rve_"
 PETSC_LOG = "-log_view"
@@ -110,44 +107,22 @@ def add_run(parser: argparse.ArgumentParser, default_place: str = "nothing is ke
     parser.add_argument("--workers", metavar="N", type=int, default=1, help="processes (default 1)")
 
 
-def read_case(options: argparse.Namespace) -> Case:
-    """The case file that the options name, with the changes of ``--set``.
+def require_case_petsc(petsc: Mapping[str, str], content: CellContent) -> None:
+    """Refuses options of PETSc where the case solves no prisms."""
+    prisms = content.particle_cell is not None and content.modulus.method == "prism"
+    require_petsc(petsc, prisms or content.mesh_cell is not None)
+
+
+def read_cell(options: argparse.Namespace) -> CellContent:
+    """The sections of the cell in the case file that the options name, with changes of ``--set``.
 
     Raises:
-        BadInput: The case has problems.
+        BadInput: They have problems.
         RefusedError: There are options of PETSc, and the case solves no prisms.
     """
-    case = load(options.case, options.set)
-    content = case.content
-    prisms = content.particle_cell is not None and content.modulus.method == "prism"
-    require_petsc(options.petsc, prisms or content.mesh_cell is not None)
-    return case
-
-
-@contextmanager
-def open_results(
-    options: argparse.Namespace, folder: str = ""
-) -> Iterator[tuple[Case, StageStore]]:
-    """Yields the case and the store of its results, whose folder is locked during the block.
-
-    `folder` is that of the results where ``--out`` is left out; empty to write nothing.
-    """
-    allowed = "a whole number 1 or more"
-    require(options.workers >= 1, "--workers", value=options.workers, allowed=allowed)
-    case, path = read_case(options), options.out or folder
-    fresh = getattr(options, "fresh", False)
-    store = StageStore(None, case.text, fresh, options.quiet, options.workers)
-    if not path:
-        yield case, store
-        return
-    require_writable("--out", path, folder=True)
-    with locked("--out", Path(path)) if rank() == 0 else nullcontext():
-        results = ResultsFolder.read(Path(path))
-        if results.is_damaged:
-            say(f"warning: {results.path / MANIFEST} is damaged; everything is computed anew")
-        if fresh and rank() == 0:
-            results.clear()
-        yield case, replace(store, folder=results)
+    content = parse(CellContent, options.case, options.set).content
+    require_case_petsc(options.petsc, content)
+    return content
 
 
 def write_answer(

@@ -9,10 +9,12 @@ from pathlib import Path
 from typing import TextIO
 
 from alphacut.case.load import Case
-from alphacut.commands.options import Command, add_quiet, add_run, open_results, write_answer
+from alphacut.commands.options import Command, add_quiet, add_run, write_answer
+from alphacut.commands.results import open_results
 from alphacut.figures.all import draw_figures
 from alphacut.fuzzy.campaign.workers import pool
 from alphacut.fuzzy.refused import require
+from alphacut.io.columns import text_table
 from alphacut.io.files import Document, as_json, locked, say, write_text
 from alphacut.io.manifest import ResultsFolder
 from alphacut.io.netcdf import read_summary
@@ -20,7 +22,7 @@ from alphacut.io.provenance import FORMAT, command, door, versions
 from alphacut.report.comparison import comparison
 from alphacut.report.markup import write_markup
 from alphacut.report.page import comparison_page, render_page
-from alphacut.report.tables import run_text, tables, text_table, write_csv, write_tables
+from alphacut.report.tables import run_text, tables, write_csv, write_tables
 from alphacut.stages.pipeline import Pipeline
 from alphacut.stages.results import Results
 from alphacut.stages.store import StageStore, put_text

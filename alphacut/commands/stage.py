@@ -11,16 +11,16 @@ from alphacut.commands.options import (
     Command,
     add_common,
     add_run,
-    open_results,
-    read_case,
     write_answer,
 )
+from alphacut.commands.results import open_results, read_case
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature
+from alphacut.io.columns import ISOTROPIC, fibre_label, text_table
 from alphacut.io.files import Document
 from alphacut.io.netcdf import read_dataset
-from alphacut.report.results import ISOTROPIC, cut_text, fibre_label, width_text
-from alphacut.report.tables import run_text, tables, text_table
+from alphacut.report.results import cut_text, width_text
+from alphacut.report.tables import run_text, tables
 from alphacut.rve.result.engineering_constants import FREE, PLANE_STRAIN
 from alphacut.rve.result.loss_factors import CONSTANTS
 from alphacut.stages.identify import identify_inputs

@@ -15,7 +15,6 @@ from alphacut.questions.question import Row
 Table = tuple[Row, list[Row]]
 """Titles of the columns, and the rows."""
 MATERIAL = ("material", "most plausible", "range at α = 0", "nature", "± error")
-ISOTROPIC = "Hashin–Shtrikman bounds of an isotropic E"
 MEANING = "Least … largest value if every input stays in its range; α = 1: most plausible"
 """First line of all results, for readers who do not know α-cuts; "nominal" is α = 1."""
 TOLERANCE_TABLE = "table on the page and in tolerances.csv"
@@ -79,11 +78,6 @@ def without_empty_columns(head: Row, rows: list[Row]) -> Table:
     """The table without columns whose cells are all empty or "none"."""
     columns = [k for k in range(len(head)) if any(row[k] not in ("", "none") for row in rows)]
     return tuple(head[k] for k in columns), [tuple(row[k] for k in columns) for row in rows]
-
-
-def fibre_label(key: str) -> str:
-    """Label of a constant of fibres: nu_LT as ν_LT, E_T_GPa as E_T, GPa."""
-    return key.replace("nu", "ν").replace("_GPa", ", GPa")
 
 
 def width_text(image: Document) -> str:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from alphacut.fuzzy.result import Nature, rounded
+from alphacut.io.columns import text_table
 from alphacut.io.files import Document, write_text
 from alphacut.io.manifest import ResultsFolder
 from alphacut.io.netcdf import dataset_of
@@ -243,16 +244,3 @@ def over_time(data: xarray.Dataset, output: str, unit: str) -> Table:
                 values = (rounded(float(x), kind, nature, DIGITS) for x in at_level[kind].values)
                 columns[f"{title} at alpha {level:g} [{unit}]"] = [*map(_number_text, values)]
     return tuple(columns), [*zip(*columns.values(), strict=True)]
-
-
-def text_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Lines of a table: the first column to the left, the others to the right.
-
-    Args:
-        head: Titles of the n columns.
-        rows: Each of n cells.
-    """
-    lines = [[*head], *map(list, rows)]
-    first, *further_widths = (max(len(line[k]) for line in lines) for k in range(len(head)))
-    aligned = ([line[0].ljust(first), *map(str.rjust, line[1:], further_widths)] for line in lines)
-    return "".join(f"{'  '.join(line).rstrip()}\n" for line in aligned)

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from alphacut.case.radius import MicrostructureSection, RadiusMapSection
+from alphacut.case.microstructure import MicrostructureSection
+from alphacut.case.radius import RadiusMapSection
 from alphacut.fuzzy.campaign.workers import pool
 from alphacut.io.columns import columns_text
 from alphacut.io.files import Document, write_text

@@ -3,7 +3,7 @@
 import pytest
 
 from alphacut.fuzzy import Crisp, Interval, Trapezoidal, Triangular
-from alphacut.io.quantity import engineering, fuzzy, number
+from alphacut.io.quantity import POWERS_OF_TEN, engineering, fuzzy, number, registry
 
 RIGHT = [
     ("80 GPa", "Pa", Crisp(80e9)),
@@ -72,3 +72,11 @@ def test_one_number_is_one():
 )
 def test_numbers_for_people(value, unit, words):
     assert engineering(value, unit) == words
+
+
+@pytest.mark.parametrize("si", POWERS_OF_TEN)
+def test_common_units_are_what_pint_says(si):
+    for unit, power in POWERS_OF_TEN[si].items():
+        assert registry().Quantity(10**-power if power < 0 else 1, unit) == registry().Quantity(
+            1 if power < 0 else 10**power, si
+        )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from alphacut.case.load import load
-from alphacut.case.radius import PackingSection
+from alphacut.case.microstructure import PackingSection
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.stages.cell import model_of, references, require_bounds, solve
 from tests.alphacut.case.test_load import fraction_case
