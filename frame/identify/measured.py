@@ -10,7 +10,7 @@ from scipy.special import chdtri
 
 from alphacut.fuzzy import FuzzyNumber, from_data
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.knowledge.named_law import from_scatter
+from alphacut.fuzzy.knowledge.from_data import from_scatter
 from alphacut.fuzzy.refused import checked_number, require
 from alphacut.fuzzy.sets.claimed import ClaimedNumber
 from alphacut.fuzzy.sets.numbers import Cut

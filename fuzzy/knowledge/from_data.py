@@ -1,21 +1,31 @@
-"""Fuzzy numbers from measured values, with a claim how often their cuts contain a quantity."""
+"""Fuzzy numbers from measured values, with a claim how often their cuts contain a quantity.
+
+Without a law: by ranks (`order_statistics`), the mean by a band. Under a named law, normal, or
+log-normal through the logarithms of the values: next value and mean by Student's t, quantiles by
+the non-central t (Hahn and Meeker, Statistical Intervals, 1991, chapters 4 and 14).
+"""
 
 from __future__ import annotations
 
 import re
 from functools import lru_cache
-from typing import get_args
+from typing import Literal, get_args
 
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.knowledge.named_law import LEVELS, Law, law_cuts
-from alphacut.fuzzy.knowledge.observations import Limits, Observations, Values
-from alphacut.fuzzy.knowledge.order_statistics import rank_cuts
-from alphacut.fuzzy.refused import require, require_choice
+from alphacut.fuzzy.knowledge.order_statistics import Limits, Observations, Values, rank_cuts
+from alphacut.fuzzy.refused import checked_number, require, require_choice
 from alphacut.fuzzy.sets.claimed import ClaimedNumber, CoverageClaim
 from alphacut.fuzzy.sets.numbers import Stepwise
 
+Law = Literal["normal", "log-normal"]
+LEVELS = np.unique(
+    np.round(np.concatenate([np.geomspace(1e-9, 1, 600), np.linspace(0.0025, 1, 400)]), 12)
+)
+"""Levels at which the cuts are exact: hundredths and quarters of them among others. Between two of
+them the wider cut holds.
+"""
 CLAIMS = "'next value', 'mean', 'median' or 'quantile Q' with Q in (0, 1)"
 UNDECIDED = "samples whose censored values decide no cut count as containing it"
 
@@ -32,25 +42,20 @@ def from_data(
     The probability is over repeated samples. Where censored values decide no cut at α and no bound
     stands for it, the sample counts as one whose cut contains the quantity; the claim says so.
 
-    For the next value, the median and a quantile this holds for any law, also with ties and steps,
-    and any number of values. The values must be drawn independently, or at least exchangeably, from
-    one law. Without bounds n values decide the cuts of the next value from α = 2/(n + 1) on, of the
-    median from 2^(1 − n), of the quantile q from qⁿ + (1 − q)ⁿ. Where the law is continuous the
-    coverage exceeds 1 − α by 1/(n + 1) at most for the next value, by one binomial probability for
-    a quantile.
+    For the next value, the median and a quantile this holds for any law and any number of values,
+    drawn independently, or at least exchangeably, from one law. Without bounds n values decide the
+    cuts of the next value from α = 2/(n + 1) on, of the median from 2^(1 − n), of the quantile q
+    from qⁿ + (1 − q)ⁿ.
 
     Args:
         values: Numbers, or pairs (lower, upper) between which each value is known to lie; an
-            infinite end means censored on that side. Ends of rounded values are half a step away.
+            infinite end means censored on that side.
         claim: "next value", "mean", "median" or "quantile 0.95". A mean needs a law or both bounds.
         bounds: Physically possible values (lower, upper), None where there is no bound. They are
             the ends of cuts that the values do not decide: without them the number has no cut at
             low α.
         law: "normal" or, except for the mean, "log-normal", where the law is known: narrower cuts,
             which rest on it.
-
-    Returns:
-        The number, which prints with its claim.
 
     Raises:
         RefusedError: An argument is wrong, or the values decide nothing.
@@ -124,11 +129,108 @@ def mean_cuts(data: Observations) -> Stepwise:
 
 @lru_cache(maxsize=64)
 def _band_half_width(n: int) -> Array:
-    """Half width of Smirnov's band for n values at each of the `LEVELS`, in [0, 1].
-
-    The distribution function leaves either side of the band with half the level's probability.
-    """
+    """Half width of Smirnov's band for n values at each of the `LEVELS`, in [0, 1]."""
     from scipy.stats import ksone
 
+    # the distribution function leaves either side with half the level's probability
     band: Array = ksone.isf(LEVELS / 2, n)
     return np.clip(band, 0.0, 1.0)
+
+
+def law_cuts(
+    data: Observations, law: Law, quantile: float | None, *, mean: bool
+) -> tuple[Stepwise, float]:
+    """Return the α-cuts of a quantity under a named law, and the least level with finite ends.
+
+    The cuts, at the `LEVELS`, are clipped to the physical bounds; with two of them the level is 0.
+
+    Args:
+        data: The values.
+        law: Name of the law.
+        quantile: Probability of the quantile to bound; None for the next value, or for the mean.
+        mean: Whether the mean is to be bounded, which `from_data` allows with a normal law alone.
+
+    Raises:
+        RefusedError: The values do not fit the law: fewer than two, all equal, not positive, or
+            censored without an end.
+    """
+    is_logarithmic = law == "log-normal"
+    cure = "give bounds=(lower, upper) in place of a law, or measure more"
+    least, allowed = data.lower[0], "positive ones with a log-normal law"
+    has_logarithm = least > 0 or not is_logarithmic
+    require(has_logarithm, "least value", value=least, allowed=allowed, cure=cure)
+    are_finite = np.isfinite([data.lower, data.upper]).all()
+    are_distinct = not data.exact or data.lower[0] < data.lower[-1]
+    is_enough = data.count > 1 and are_finite and are_distinct
+    values = f"{data.count} from {data.lower[0]:g} to {data.upper[-1]:g}"
+    allowed = "two or more, finite, unlike"
+    require(is_enough, f"values of a {law} law", value=values, allowed=allowed, cure=cure)
+    normal_data = data.mapped(np.log) if is_logarithmic else data
+    lower, upper = _normal_cuts(normal_data, 0.5 if mean else quantile)
+    if is_logarithmic:
+        with np.errstate(over="ignore"):
+            lower, upper = np.exp(lower), np.exp(upper)
+    return _clip_cuts(lower, upper, data.bounds)
+
+
+def _normal_cuts(data: Observations, quantile: float | None) -> tuple[Array, Array]:
+    """Ends at the `LEVELS`: mean + factor · deviation, widest over values in their intervals."""
+    lower_factor, upper_factor = _factors(data.count, quantile)
+    least, greatest = _deviation_range(data)
+    lower = data.lower.mean() + lower_factor * np.where(lower_factor < 0, greatest, least)
+    upper = data.upper.mean() + upper_factor * np.where(upper_factor > 0, greatest, least)
+    return lower, upper
+
+
+def _deviation_range(data: Observations) -> tuple[float, float]:
+    """Lower and upper bound of the standard deviation of values anywhere within their intervals."""
+    middle, half_width = (data.lower + data.upper) / 2, (data.upper - data.lower) / 2
+    deviation = float(middle.std(ddof=1))
+    # triangle inequality: it differs from that of the middles by |half widths| / √(n − 1) at most
+    change = float(np.sqrt((half_width**2).sum() / (data.count - 1)))
+    return max(deviation - change, 0.0), deviation + change
+
+
+@lru_cache(maxsize=64)
+def _factors(n: int, quantile: float | None) -> tuple[Array, Array]:
+    """Factors k of the ends, mean + k · deviation, at confidence 1 − α, (levels,) each."""
+    tail = LEVELS / 2
+    # Student's t for the next value, the mean and the median, the non-central t for quantiles
+    if quantile is None or quantile == 0.5:
+        from scipy.stats import t
+
+        variance = 1 + 1 / n if quantile is None else 1 / n
+        factor = np.maximum(t.isf(tail, n - 1), 0.0) * np.sqrt(variance)
+        return -factor, factor
+    from scipy.stats import nct, norm
+
+    noncentrality = norm.ppf(quantile) * np.sqrt(n)
+    lower, upper = nct.ppf(tail, n - 1, noncentrality), nct.isf(tail, n - 1, noncentrality)
+    return lower / np.sqrt(n), upper / np.sqrt(n)
+
+
+def _clip_cuts(lower: Array, upper: Array, bounds: tuple[float, float]) -> tuple[Stepwise, float]:
+    """Cuts at the `LEVELS` clipped to physical bounds, and the level from which they are finite."""
+    low, high = bounds
+    upper = np.minimum.accumulate(np.clip(upper, low, high))
+    # at α = 1 both are one point, to round-off
+    lower = np.minimum(np.maximum.accumulate(np.clip(lower, low, high)), upper[-1])
+    first = int((np.isfinite(lower) & np.isfinite(upper)).argmax())
+    is_bounded = bool(np.isfinite(bounds).all())
+    least, greatest = (low, high) if is_bounded else (lower[first], upper[first])
+    lower[:first], upper[:first] = lower[first], upper[first]
+    cuts = Stepwise((0.0, *LEVELS), (least, *lower), (greatest, *upper))
+    return cuts, 0.0 if is_bounded else float(LEVELS[first])
+
+
+def from_scatter(mean: float, deviation: float, count: int) -> ClaimedNumber:
+    """Return the number of a normal law's mean from `count` values of known standard deviation."""
+    from scipy.stats import norm
+
+    checked_number("mean", mean)
+    checked_number("deviation", deviation, positive=True)
+    checked_number("count", count, positive=True, whole=True)
+    half_width = deviation / np.sqrt(count) * np.maximum(norm.isf(LEVELS / 2), 0.0)
+    law = f"{count} values drawn alike and independently from a normal law of known deviation"
+    cuts, decided = _clip_cuts(mean - half_width, mean + half_width, (-np.inf, np.inf))
+    return ClaimedNumber(cuts, CoverageClaim("mean", (law,)), decided)

@@ -51,11 +51,7 @@ def jointly(
 
 
 def joined_inputs(inputs: Mapping[str, FuzzyNumber | float]) -> dict[str, FuzzyNumber]:
-    """Return the inputs as fuzzy numbers whose claims hold jointly (`jointly`, if not done before).
-
-    Raises:
-        RefusedError: As `fuzzy_inputs` and `jointly`.
-    """
+    """Return the inputs as fuzzy numbers whose claims hold jointly; those joined before stay."""
     numbers = fuzzy_inputs(inputs)
     rules = {number.joint for number in numbers.values() if isinstance(number, ClaimedNumber)}
     are_joined = len(rules) == 1 and None not in rules
@@ -80,10 +76,7 @@ def _require_different_values(claimed: Mapping[str, ClaimedNumber]) -> None:
 
 
 def _join_levels(number: ClaimedNumber, rule: JointRule) -> ClaimedNumber:
-    """Copy of a number whose cut at level β stands at α ≥ β, the level of the joint cut.
-
-    The joint cut at α is the box of all inputs' single cuts at β.
-    """
+    """Copy of a number whose cut at level β stands at α ≥ β, the level of the joint cut."""
     cuts = number.number
     levels = rule.joint_level(np.asarray(cuts.alpha))
     is_last = np.append(np.diff(levels) > 0, True) & (levels <= 1)  # of equal levels the last cut
@@ -113,22 +106,12 @@ class JointClaim:
     ) -> JointClaim:
         """Return what may be claimed of a result that is computed from some inputs.
 
-        It consists of the rule by which the claims of measured inputs are joined, of the conditions
-        under which it holds, and of the names of inputs with a width but no claim (opinions).
-
-        Args:
-            inputs: Fuzzy numbers by name.
-            nature: Nature of the result's bounds, "attained", "estimated" or "guaranteed"; unless
-                guaranteed, that the true range stays inside them is a condition.
+        Unless the `nature` of its bounds is "guaranteed", that the true range stays inside them is
+        a condition. Inputs with a width but no claim are opinions.
         """
-        claimed = {
-            name: number for name, number in inputs.items() if isinstance(number, ClaimedNumber)
-        }
-        opinions = tuple(
-            name
-            for name, number in inputs.items()
-            if name not in claimed and number.support.width > 0
-        )
+        claimed = {name: x for name, x in inputs.items() if isinstance(x, ClaimedNumber)}
+        others = {name: x for name, x in inputs.items() if name not in claimed}
+        opinions = tuple(name for name, x in others.items() if x.support.width > 0)
         names_by_condition: dict[str, list[str]] = {}
         for name, number in claimed.items():
             if number.claim.conditions:

@@ -43,16 +43,11 @@ class Knowledge:
     tests: int = 16
 
     def __post_init__(self) -> None:
-        """Refuse signs other than 1 and −1 and a number of tests that is no whole number."""
         checked_number("tests", self.tests, whole=True)
         for name, sign in self.signs.items():
             for value in sign.values() if isinstance(sign, Mapping) else (sign,):
-                require(
-                    value in (-1, 1),
-                    f"sign of {name}",
-                    value=value,
-                    allowed="1 (rises), -1 (falls)",
-                )
+                allowed = "1 (rises), -1 (falls)"
+                require(value in (-1, 1), f"sign of {name}", value=value, allowed=allowed)
 
     @property
     def words(self) -> tuple[str, ...]:

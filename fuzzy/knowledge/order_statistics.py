@@ -1,4 +1,4 @@
-"""Exact cuts from the ranks of values: next value, median, quantile, without a law assumed.
+"""Measured values as intervals, and exact cuts of any law from their ranks.
 
 Between n values in rising order, with the physical bounds at both ends, there are n + 1 gaps. The
 probability that the quantity lies in gap k does not depend on the law: 1/(n + 1) for the next value
@@ -13,25 +13,110 @@ Statistics, section 7.1; Vovk, Gammerman and Shafer, Algorithmic Learning in a R
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from alphacut.fuzzy.arrays import Array, Rows
-from alphacut.fuzzy.knowledge.observations import Observations
-from alphacut.fuzzy.refused import require
+from alphacut.fuzzy.refused import RefusedError, checked_number, require
 from alphacut.fuzzy.sets.numbers import Stepwise
+
+Values = Sequence[float] | Sequence[tuple[float, float]] | NDArray[np.float64]
+Limits = tuple[float | None, float | None]
+
+
+@dataclass(frozen=True, eq=False)
+class Observations:
+    """Values that are known to lie between two ends each, both rows in rising order.
+
+    Args:
+        lower: Lower ends, shape (n,), rising; −∞ where a value is only known from above.
+        upper: Upper ends, shape (n,), rising; ∞ where a value is only known from below.
+        bounds: Physically possible values; infinite where there is none.
+    """
+
+    lower: Array
+    upper: Array
+    bounds: tuple[float, float]
+
+    @classmethod
+    def from_values(cls, values: Values, bounds: Limits | None = None) -> Observations:
+        """Return the observations of values as measured, numbers or pairs, within physical bounds.
+
+        Raises:
+            RefusedError: There is no value, a value is not a number, a pair is not in order, or a
+                value lies outside the bounds.
+        """
+        low, high = _limits(bounds)
+        ends = np.array([_ends(number, value) for number, value in enumerate(values, 1)])
+        require(len(ends) > 0, "values", value=list(values), allowed="one or more")
+        lower, upper = ends.T
+        is_possible = (upper >= low) & (lower <= high)
+        row = int(np.argmin(is_possible))
+        allowed = f"values within the bounds [{low:g}, {high:g}]"
+        require(is_possible.all(), f"value {row + 1}", value=ends[row].tolist(), allowed=allowed)
+        return cls(np.sort(np.maximum(lower, low)), np.sort(np.minimum(upper, high)), (low, high))
+
+    @property
+    def count(self) -> int:
+        """Number of values n."""
+        return len(self.lower)
+
+    @property
+    def exact(self) -> bool:
+        """True if every value is known exactly."""
+        return bool((self.lower == self.upper).all())
+
+    @property
+    def is_censored(self) -> bool:
+        """True if a value has an infinite end, which no bound replaces."""
+        return bool(np.isinf([self.lower, self.upper]).any())
+
+    def mapped(self, function: np.ufunc) -> Observations:
+        """Observations of a rising function of the values, such as the logarithm."""
+        with np.errstate(divide="ignore"):
+            low, high = (float(function(end)) for end in self.bounds)
+            return Observations(function(self.lower), function(self.upper), (low, high))
+
+
+def _limits(bounds: Limits | None) -> tuple[float, float]:
+    """Return the physical bounds as two floats, infinite where there is none."""
+    lower, upper = (None, None) if bounds is None else bounds
+    low = -np.inf if lower is None else checked_number("lower bound", lower)
+    high = np.inf if upper is None else checked_number("upper bound", upper)
+    allowed = "(lower, upper) with lower < upper, None for none"
+    require(low < high, "bounds", value=bounds, allowed=allowed)
+    return low, high
+
+
+def _is_number(value: object) -> bool:
+    """True for a number that a float can hold; truth values are none."""
+    if isinstance(value, bool) or not isinstance(value, int | float | np.number):
+        return False
+    return not isinstance(value, int) or abs(value) < sys.float_info.max
+
+
+def _ends(position: int, value: object) -> tuple[float, float]:
+    """Lower and upper end of the measured value at a position from 1: a number or a pair."""
+    ends = np.atleast_1d(np.asarray(value, object))
+    has_ends = ends.ndim == 1 and len(ends) in (1, 2) and not np.ma.is_masked(value)  # type: ignore[no-untyped-call]
+    if has_ends and all(_is_number(end) for end in ends):
+        low, high = float(ends[0]), float(ends[-1])
+        if low <= high and np.isfinite((low, high)).any():  # at most one end is infinite
+            return low, high
+    allowed = "finite numbers, or pairs (lower, upper) in order, one end of which may be infinite"
+    raise RefusedError(f"value {position}", value, allowed)
 
 
 @dataclass(frozen=True, eq=False)
 class Windows:
-    """Nested ranges of gaps, and the level from which each of them is the cut.
+    """Nested ranges of gaps from `low` to `high`, and the level of each, the probability outside.
 
-    Args:
-        level: Probability outside, rising from 0, shape (k,).
-        low: First gap, shape (k,).
-        high: Last gap, shape (k,).
+    Three arrays of shape (k,), levels rising from 0.
     """
 
     level: Array
@@ -41,9 +126,7 @@ class Windows:
 
 @lru_cache(maxsize=64)
 def windows(n: int, quantile: float | None, open_ends: tuple[bool, bool]) -> Windows:
-    """Nested windows of gaps between n sorted values, and the level of each.
-
-    The largest window holds all n + 1 gaps; `_removes_lowest` says which gap is removed next.
+    """Nested windows of the n + 1 gaps between n sorted values, and the level of each.
 
     Args:
         n: Number of values.
@@ -66,16 +149,7 @@ def windows(n: int, quantile: float | None, open_ends: tuple[bool, bool]) -> Win
 
 
 def _gaps(n: int, quantile: float | None) -> tuple[Array, Array, Array]:
-    """Probability that a quantile, or the next value, lies in each gap of n sorted values.
-
-    Args:
-        n: Number of values.
-        quantile: Probability of the quantile; None for the next value, which is equally probable in
-            all gaps.
-
-    Returns:
-        Probability of each of the n + 1 gaps, of all lower gaps, and of all higher ones, (n + 1,).
-    """
+    """Probability of the quantity in each of the n + 1 gaps, in all lower, in all higher ones."""
     from scipy.stats import binom
 
     gaps = np.arange(n + 1)
@@ -88,18 +162,9 @@ def _gaps(n: int, quantile: float | None) -> tuple[Array, Array, Array]:
 def _removes_lowest(
     gaps: tuple[Array, Array, Array], low: int, high: int, open_ends: tuple[bool, bool]
 ) -> bool:
-    """True if the next gap to remove is the lowest of the window, False if it is the highest.
-
-    A gap at an open end is removed first, then the less probable one, then the one at the end from
-    which less was removed.
-
-    Args:
-        gaps: Probabilities as of `_gaps`.
-        low: First gap of the window.
-        high: Last gap of the window.
-        open_ends: Whether the lowest and the highest gap of all have no physical bound.
-    """
+    """True if the next gap to remove is the lowest of the window, False if it is the highest."""
     probability, below, above = gaps
+    # a gap at an open end first, then the less probable one, then that where less was removed
     low_is_open = open_ends[0] and low == 0
     high_is_open = open_ends[1] and high == len(probability) - 1
     if low_is_open != high_is_open:
@@ -112,13 +177,11 @@ def _removes_lowest(
 def rank_cuts(data: Observations, quantile: float | None) -> tuple[Stepwise, float]:
     """Return the α-cuts from ranks, and the least level at which the values decide both ends.
 
+    Below that level the cuts repeat the first that is finite. Physical bounds count as ends.
+
     Args:
         data: The values.
         quantile: Probability of the quantile; None for the next value.
-
-    Returns:
-        The cuts; below the level they repeat the first that is finite. Physical bounds count as
-        ends.
 
     Raises:
         RefusedError: The values decide no cut at all.

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-import alphacut.fuzzy.knowledge.named_law as laws
+import alphacut.fuzzy.knowledge.from_data as laws
 import alphacut.fuzzy.knowledge.order_statistics as ranks
 from benchmarks.fuzzy.coverage import ALPHA, FREE, LAWS, NAMED, held, jointly_held
 from tests.calibration.declared import free_seed

@@ -8,7 +8,7 @@ from scipy import stats
 
 import alphacut.fuzzy.knowledge.from_data as own
 from alphacut.fuzzy import RefusedError, from_data
-from alphacut.fuzzy.knowledge.named_law import from_scatter
+from alphacut.fuzzy.knowledge.from_data import from_scatter
 from alphacut.fuzzy.knowledge.order_statistics import windows
 from benchmarks.fuzzy.coverage import FREE, NAMED, held
 
