@@ -11,14 +11,14 @@ import numpy as np
 from alphacut.frame.bounds.level import LevelModels
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.modes.attained import (
+from alphacut.frame.modes.structure import Classical, classical
+from alphacut.frame.modes.superposition import (
     Modal,
     load_at_given_nodes,
     load_at_nodes,
     modes_at,
     outputs_at,
 )
-from alphacut.frame.modes.structure import Classical, classical
 from alphacut.frame.response.oscillators import Grid, Oscillators
 from alphacut.frame.structures.linear import LinearSystem, histories
 from alphacut.frame.structures.loads import History

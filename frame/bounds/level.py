@@ -13,9 +13,8 @@ from alphacut.frame.bounds.slabs import Effort, bounds
 from alphacut.frame.calculus.monomials import monomials
 from alphacut.frame.calculus.rounding import gamma
 from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate
-from alphacut.frame.modes.intervening import Oscillator
+from alphacut.frame.modes.intervening import Excitation, Oscillator
 from alphacut.frame.modes.models import MotionModels
-from alphacut.frame.modes.rest import Excitation
 from alphacut.frame.modes.structure import Classical
 from alphacut.frame.response.oscillators import Grid, Oscillators, grid_over
 from alphacut.frame.structures.loads import History

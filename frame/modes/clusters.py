@@ -11,11 +11,13 @@ from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.blocks import Block, CentredMatrices, narrowest_block
 from alphacut.frame.modes.pencil import eigenvalue_drop
+from alphacut.frame.structures.linear import undamped_modes
 from alphacut.fuzzy.arrays import Array, Mask, Rows
 
 NEAR = 2.0
-"""Share of their distance that two λ vary against one another from which they are a block without
-an attempt to enclose them alone, which fails at some number between 1 and 2."""
+"""First-order change of the distance of two λ over the box, as a share of that distance, from which
+they are a block without an attempt to enclose them alone, which fails at some number between 1 and
+2."""
 LEAST_NEAR = 0.4
 """The same from which a mode joins a block that is not enclosed without it."""
 MAX_BLOCK = 12
@@ -34,7 +36,7 @@ class Subspaces:
         centre: Mass and stiffness in the coordinates of the blocks.
         low: Least λ of all modes by number from below, shape (modes,), in 1/s².
         high: Greatest.
-        variation: Bounds of the norms of the variations of M and K, in the order of forms.
+        variation: Bounds of how far M and K fall below M(0) and K(0), as shares of these.
         along: Input whose bisection parts the closest pair that is not enclosed; None if all are.
     """
 
@@ -58,6 +60,8 @@ def subspaces(
 ) -> Subspaces:
     """Enclose the lowest modes over the box, in blocks, from below until one is not enclosed.
 
+    A block that cannot be enclosed is joined by the mode nearest to it, and tried again.
+
     Args:
         centre: M and K in the coordinates of the box's middle.
         used: Inputs that they depend on, among all.
@@ -67,33 +71,44 @@ def subspaces(
     Raises:
         UnprovedError: The box is so wide that the structure may lose its mass or stiffness.
     """
-    mass_variation, stiffness_variation = (
-        max(eigenvalue_drop(matrix, scale, sign) for sign in (1.0, -1.0))
-        for matrix, scale in (
-            (centre.mass, centre.has_mass),
-            (centre.stiffness, np.diag(centre.stiffness.value) ** -0.5),
-        )
-    )
-    slopes = _slopes(centre)
-    if not (mass_variation < 1 and stiffness_variation < 1):
-        steepest = int(used[(np.abs(slopes) / centre.squared[:, None]).max(0).argmax()])
-        what = "the structure may lose its stiffness"
-        raise UnprovedError(what, "take narrower inputs", steepest)
     tolerances = np.zeros(centre.modes) if tolerances is None else tolerances
-    blocks, pair = _from_below(centre, slopes, min(wanted, centre.modes), tolerances)
-    along = None if pair is None else int(used[np.abs(slopes[pair[0]] - slopes[pair[1]]).argmax()])
-    slack = gamma(4)
-    low = (1 - slack) * (1 - stiffness_variation) / (1 + mass_variation)
-    high = (1 + slack) * (1 + stiffness_variation) / (1 - mass_variation)
-    return Subspaces(
-        blocks=blocks,
-        used=used,
-        centre=centre,
-        low=low * centre.squared,
-        high=high * centre.squared,
-        variation=(mass_variation, stiffness_variation),
-        along=along,
+    slopes = _slopes(centre)
+    low, high, variation = _ranges(centre, int(used[_steepest(centre, slopes)]))
+    near, blocks, along = _nearness(centre, slopes), list[Block](), None
+    free: Rows = np.arange(centre.modes)
+    while len(free) and free[0] < wanted and along is None:
+        modes, block = _linked(near > NEAR, free[:1], free), None
+        while block is None:
+            tolerance = float(tolerances[modes].min())
+            block = narrowest_block(modes, rotation(centre, modes), centre, tolerance)
+            if block is not None:
+                blocks.append(block)
+                free = np.setdiff1d(free, modes)
+                break
+            outside = near[np.ix_(modes, free)] * ~np.isin(free, modes)
+            inner, outer = np.unravel_index(int(outside.argmax()), outside.shape)
+            if outside[inner, outer] < LEAST_NEAR or len(modes) >= MAX_BLOCK:
+                drift = slopes[modes[inner]] - slopes[free[outer]]
+                along = int(used[np.abs(drift).argmax()])
+                break
+            modes = _linked(near > NEAR, np.append(modes, free[outer]), free)
+    return Subspaces(blocks, used, centre, low, high, variation, along)
+
+
+def _ranges(centre: CentredMatrices, along: int) -> tuple[Array, Array, tuple[float, float]]:
+    """Bounds of all λ over the box from M ≥ (1 − μ) M(0), K ≥ (1 − κ) K(0) and such, with μ, κ."""
+    scales = centre.has_mass, np.diag(centre.stiffness.value) ** -0.5
+    mass, stiffness = (
+        max(eigenvalue_drop(matrix, scale, sign) for sign in (1.0, -1.0))
+        for matrix, scale in zip((centre.mass, centre.stiffness), scales, strict=True)
     )
+    if not (mass < 1 and stiffness < 1):
+        what = "the structure may lose its stiffness"
+        raise UnprovedError(what, "take narrower inputs", along)
+    # Rayleigh quotients φᵀKφ / φᵀMφ and Courant's minima and maxima
+    low = (1 - gamma(4)) * (1 - stiffness) / (1 + mass) * centre.squared
+    high = (1 + gamma(4)) * (1 + stiffness) / (1 - mass) * centre.squared
+    return low, high, (mass, stiffness)
 
 
 def centred_matrices(mass: TaylorModel, stiffness: TaylorModel) -> tuple[CentredMatrices, Rows]:
@@ -118,13 +133,11 @@ def centred_matrices(mass: TaylorModel, stiffness: TaylorModel) -> tuple[Centred
     massless_values, massless_vectors = np.linalg.eigh(K[np.ix_(b, b)])
     _require_stiff(massless_values, K)
     follow = -(massless_vectors / massless_values) @ massless_vectors.T @ K[np.ix_(b, a)]
-    condensed = K[np.ix_(a, a)] + K[np.ix_(a, b)] @ follow
-    inverse_factor = np.linalg.inv(np.linalg.cholesky(M[np.ix_(a, a)]))
-    squared, vectors = np.linalg.eigh(inverse_factor @ condensed @ inverse_factor.T)
+    squared, shapes = undamped_modes(M[np.ix_(a, a)], K[np.ix_(a, a)] + K[np.ix_(a, b)] @ follow)
     _require_stiff(squared, squared)
     basis: Array = np.zeros((n, n))
-    basis[a, : len(a)] = inverse_factor.T @ vectors
-    basis[b, : len(a)] = follow @ inverse_factor.T @ vectors
+    basis[a, : len(a)] = shapes
+    basis[b, : len(a)] = follow @ shapes
     basis[b, len(a) :] = massless_vectors * np.sqrt(squared[-1] / massless_values)
     used = np.union1d(mass.present(), stiffness.present())
     used = used if len(used) else np.arange(1)
@@ -143,10 +156,8 @@ def _diagonal(matrix: TaylorModel, diagonal: Array) -> TaylorModel:
 
 def _require_stiff(values: Array, like: Array) -> None:
     if len(values) and values.min() <= 1e-12 * np.abs(like).max():
-        raise UnprovedError(
-            "the structure may move rigidly or lose its stiffness",
-            "take the method improved-graph-follower",
-        )
+        what = "the structure may move rigidly or lose its stiffness"
+        raise UnprovedError(what, "take the method improved-graph-follower")
 
 
 def _slopes(centre: CentredMatrices) -> Array:
@@ -154,6 +165,11 @@ def _slopes(centre: CentredMatrices) -> Array:
     at = np.arange(centre.modes)
     stiff, heavy = (x.part(1)[:, at, at] for x in (centre.stiffness, centre.mass))
     return np.asarray((stiff - centre.squared * heavy).T)
+
+
+def _steepest(centre: CentredMatrices, slopes: Array) -> int:
+    """The input with the largest relative effect on a mode's λ."""
+    return int((np.abs(slopes) / centre.squared[:, None]).max(0).argmax())
 
 
 def _couplings(centre: CentredMatrices, some: Rows) -> Array:
@@ -167,7 +183,6 @@ def _nearness(centre: CentredMatrices, slopes: Array) -> Array:
     """First-order change of λ_j − λ_k over the box, over |λ_j − λ_k| in its middle, (modes, modes).
 
     From 1 on two modes may meet at complex inputs of sizes up to 1, where their series diverge.
-    `slopes` (modes, d) are ∂λ_j/∂u_i in the middle.
     """
     couplings = np.abs(_couplings(centre, np.arange(centre.modes)))
     change = np.abs(slopes[:, None] - slopes).sum(-1) + 2 * couplings.sum(0)
@@ -177,48 +192,10 @@ def _nearness(centre: CentredMatrices, slopes: Array) -> Array:
     return near
 
 
-def _from_below(
-    centre: CentredMatrices, slopes: Array, wanted: int, tolerances: Array
-) -> tuple[list[Block], tuple[int, int] | None]:
-    """Enclose the lowest modes in blocks, up to the first that cannot be enclosed.
-
-    A mode that cannot be enclosed alone is joined by the mode nearest to it, and so on.
-
-    Args:
-        centre: M and K in the coordinates of the box's middle.
-        slopes: ∂λ_j/∂u_i in the middle, shape (modes, d).
-        wanted: Number of modes to enclose.
-        tolerances: Relative error of each mode's λ that suffices, shape (modes,).
-
-    Returns:
-        The blocks, and the closest pair of modes at which it ended early; None if it did not.
-    """
-    near, blocks = _nearness(centre, slopes), list[Block]()
-    free: Rows = np.arange(centre.modes)
-    while len(free) and free[0] < wanted:
-        modes = _component(near > NEAR, free[:1], free)
-        while True:
-            tolerance = float(tolerances[modes].min())
-            block = narrowest_block(modes, rotation(centre, modes), centre, tolerance)
-            if block is not None:
-                break
-            outside = near[np.ix_(modes, free)] * ~np.isin(free, modes)
-            inner, outer = np.unravel_index(int(outside.argmax()), outside.shape)
-            if outside[inner, outer] < LEAST_NEAR or len(modes) >= MAX_BLOCK:
-                return blocks, (int(modes[inner]), int(free[outer]))
-            modes = _component(near > NEAR, np.append(modes, free[outer]), free)
-        blocks.append(block)
-        free = np.setdiff1d(free, modes)
-    return blocks, None
-
-
-def _component(linked: Mask, modes: Rows, free: Rows) -> Rows:
-    """Numbers of the free modes linked to `modes`, directly or through others, rising.
-
-    `linked` (modes, modes) tells which pairs are; `free` are the numbers of modes in no block.
-    """
+def _linked(pairs: Mask, modes: Rows, free: Rows) -> Rows:
+    """Numbers of the free modes that `pairs` link to `modes`, directly or through others."""
     while True:
-        neighbours = np.intersect1d(free, np.flatnonzero(linked[modes].any(0)))
+        neighbours = np.intersect1d(free, np.flatnonzero(pairs[modes].any(0)))
         extended = np.union1d(modes, neighbours)
         if len(extended) == len(modes):
             return np.sort(modes)

@@ -2,18 +2,18 @@
 
 Functions of the inputs of which the motion is made (Barthelemy, Haftka 1993).
 
-An output is Σ_k Σ_s c_ks e_s(ω_k, g_k; t) over modes k and sources s (loads, velocity, start):
-few numbers a mode, its frequency ω_k = √(λ − g²), its decay g_k = (a + b λ)/2 + ζ √λ and its
-shares c_ks = (r·x)(x·M v_s)/(x·M x), r the output's row and v_s the pattern of the ground or the
-start. They bend little over the box, however many inputs it has.
+An output is Σ_k Σ_s c_ks e_s(ω_k, g_k; t) over modes k and sources s (loads, velocity, start), with
+few numbers a mode: its frequency ω_k, its decay g_k and its shares c_ks = (r·x)(x·M v_s)/(x·M x), r
+the output's row and v_s the pattern of the ground or the start. They bend little over the box,
+however many inputs it has.
 
 A block of p modes answers a e(L) β with a = r X, β = N⁻¹ Xᵀ M v. Each diagonal entry of L is an
-oscillator with the share a_j β_j, as if it were a mode; the rest is bounded (`coupling`).
+oscillator with the share a_j β_j, as if it were a mode; what couples them is bounded (`rest`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import comb
 
@@ -25,6 +25,7 @@ from alphacut.frame.modes.blocks import Block
 from alphacut.frame.modes.clusters import Subspaces
 from alphacut.frame.modes.structure import Classical
 from alphacut.frame.response.oscillators import Grid
+from alphacut.frame.structures.loads import History
 from alphacut.fuzzy.arrays import Array, Rows
 
 MAX_PAIRS = 100_000
@@ -32,6 +33,8 @@ MAX_PAIRS = 100_000
 DEGREES = (4, 6)
 """Least and greatest degree of shares, before what is above the third is left to the rest."""
 Ends = tuple[float, float]
+Excitation = tuple[Mapping[str, History], Array, Sequence[str]]
+"""The loads by name, the nodes, and the names of what moves the structure."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,15 +103,16 @@ class BlockShares:
             excited: Patterns v of the sources in them, shape (sources, n), of all inputs.
             used: Inputs of the block.
         """
-        fixed, varying = excited.value, excited - excited.value
-        block = block.cut(min(degree_of_shares(block.norm.inputs), block.norm.order))
-        if len(varying.present()):
+        degree, d = DEGREES[0], block.norm.inputs
+        while degree < DEGREES[1] and comb(2 * d + degree + 1, degree + 1) <= MAX_PAIRS:
+            degree += 1
+        block = block.cut(min(degree, block.norm.order))
+        if len(excited.present()):
             block = block.cut(excited.order).among(used, excited.inputs)
-            source_forces = block.mass_shape @ fixed.T + block.mass_shape @ varying.T
         else:
-            rounding = block.mass_shape.size() @ excited.remainder.T
-            source_forces = (block.mass_shape @ fixed.T).loosened(rounding)
+            excited = block.norm.like(excited.value).loosened(excited.remainder)
         read = (block.shape @ rows.value.T).loosened(block.shape.size() @ rows.remainder.T)
+        source_forces = block.mass_shape @ excited.T
         return cls(block, read, source_forces, solve(block.norm, source_forces))
 
     @property
@@ -127,69 +131,42 @@ class BlockShares:
         return dots(self.source_forces, self.participation)
 
 
-def degree_of_shares(inputs: int) -> int:
-    """Greatest degree to which products are affordable."""
-    degree = DEGREES[0]
-    while degree < DEGREES[1] and comb(2 * inputs + degree + 1, degree + 1) <= MAX_PAIRS:
-        degree += 1
-    return degree
-
-
 def oscillators(structure: Classical, of_block: BlockShares, found: Subspaces) -> list[Oscillator]:
-    """Intervening variables (frequency, decay, shares) of the oscillators of a block's columns.
+    """Intervening variables of the oscillators of a block's columns, with proved ranges.
+
+    With λ = L_jj they are g = a/2 + b λ/2 + ζ √λ, a and b Rayleigh's factors, ω = √(λ − g²), g/ω
+    and the shares a_j β_j times the outputs' factors.
 
     Raises:
         UnprovedError: They have different damping ratios.
     """
-    modes = of_block.block.modes
-    share = _in_all(of_block.share, structure, found.used)
-    rate = _in_all(of_block.block.rate, structure, found.used)
+    modes, d, order = of_block.block.modes, structure.start.inputs, structure.start.order
+    share, rate = (
+        x.cut(order) if x.inputs == d else x.cut(order).among(found.used, d)
+        for x in (of_block.share, of_block.block.rate)
+    )
     ratio = structure.ratio[modes]
     if any((part[:, 1:] != part[:, :-1]).any() for part in ratio.parts):
         raise UnprovedError(
             "modes of different damping ratios may cross", "take one ratio for all modes"
         )
-    ends = (0.0, np.inf)
+    low, high = 0.0, np.inf  # of √λ
     if len(modes) == 1:
-        ends = (float(found.low[modes[0]]), float(found.high[modes[0]]))
-    return [
-        _oscillator(structure, rate[j, j], ratio[j], share[j] * structure.factor, ends)
-        for j in range(len(modes))
-    ]
-
-
-def _in_all(model: TaylorModel, structure: Classical, used: Rows) -> TaylorModel:
-    """The model cut to the structure's order, as functions of all its inputs.
-
-    `model` has functions of the inputs at `used`, or of all.
-    """
-    d = structure.start.inputs
-    model = model.cut(structure.start.order)
-    return model if model.inputs == d else model.among(used, d)
-
-
-def _oscillator(
-    structure: Classical, squared: TaylorModel, ratio: TaylorModel, share: TaylorModel, ends: Ends
-) -> Oscillator:
-    """Damped frequency ω, decay rate g and g/ω of one mode as Taylor models, with proved ranges.
-
-    g = a/2 + b λ/2 + ζ √λ and ω² = λ − g², a and b the Rayleigh factors.
-
-    Args:
-        structure: The structure.
-        squared: Undamped λ, a scalar, in 1/s².
-        ratio: Damping ratio ζ, a scalar.
-        share: Amplitudes c, shape (sources, m).
-        ends: Proved least and greatest λ.
-    """
+        low, high = (float(np.sqrt(x[modes[0]])) for x in (found.low, found.high))
     a, b = structure.rayleigh[0], structure.rayleigh[1]
-    decay = a * 0.5 + b * squared * 0.5 + ratio * squared**0.5
-    omega = (squared - decay * decay) ** 0.5
-    quotient = decay * omega**-1.0
-    q_low, q_high = _ends(quotient)
-    lowest_omega = float(np.sqrt(ends[0] / (1 + q_high**2)))  # ω² = λ / (1 + (g/ω)²)
-    omega_range = _overlap(_ends(omega), (lowest_omega, float(np.sqrt(ends[1]))))
-    return Oscillator(omega, decay, quotient, share, omega_range, (max(q_low, 0.0), q_high))
+    made = list[Oscillator]()
+    for j in range(len(modes)):
+        squared = rate[j, j]
+        decay = a * 0.5 + b * squared * 0.5 + ratio[j] * squared**0.5
+        omega = (squared - decay * decay) ** 0.5
+        quotient = decay * omega**-1.0
+        q_low, q_high = _ends(quotient)
+        # ω² = λ / (1 + (g/ω)²)
+        omega_range = _overlap(_ends(omega), (float(low / np.sqrt(1 + q_high**2)), high))
+        quotient_range = max(q_low, 0.0), q_high
+        shares = share[j] * structure.factor
+        made.append(Oscillator(omega, decay, quotient, shares, omega_range, quotient_range))
+    return made
 
 
 def damped_range(structure: Classical, low: float, high: float, modes: Rows) -> tuple[Ends, Ends]:

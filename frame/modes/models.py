@@ -9,13 +9,24 @@ import numpy as np
 from alphacut.frame.calculus.rounding import gamma
 from alphacut.frame.calculus.taylor_model import TaylorModel, all_within
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.modes.clusters import Subspaces, centred_matrices, subspaces
-from alphacut.frame.modes.coupling import coupling_of
-from alphacut.frame.modes.intervening import BlockShares, Oscillator, oscillators, sources_of
-from alphacut.frame.modes.rest import Excitation, TruncatedModes, rest_of_block, rest_of_modes
+from alphacut.frame.modes.blocks import CentredMatrices
+from alphacut.frame.modes.clusters import centred_matrices, subspaces
+from alphacut.frame.modes.intervening import (
+    BlockShares,
+    Excitation,
+    Oscillator,
+    oscillators,
+    sources_of,
+)
+from alphacut.frame.modes.rest import TruncatedModes, coupling_of, rest_of_block, rest_of_modes
 from alphacut.frame.modes.structure import Classical
-from alphacut.frame.modes.wanted import modes_wanted
+from alphacut.frame.modes.superposition import read_response
+from alphacut.frame.response.duhamel import responses_at_nodes
+from alphacut.frame.response.oscillators import POWERS, feedthrough
 from alphacut.fuzzy.arrays import Array
+
+MAX_NODES = 500
+"""Nodes at most at which the number of modes that are worth enclosing is estimated."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,24 +49,26 @@ class MotionModels:
     def within(self, low: Array, high: Array) -> MotionModels:
         """The models over the part low ≤ u ≤ high of the box, in unit coordinates of the part."""
         models = [x for mode in self.oscillators for x in mode.models]
-        models += [
-            x for truncated in self.truncated for x in (truncated.share, truncated.amplitude)
-        ]
+        models += [x for rest in self.truncated for x in (rest.share, rest.amplitude)]
         restricted = iter(all_within(models, low, high))  # in the same order
-        single = [
-            mode.on_part([next(restricted) for _ in mode.models]) for mode in self.oscillators
-        ]
-        rests = [
-            replace(truncated, share=next(restricted), amplitude=next(restricted))
-            for truncated in self.truncated
-        ]
-        return replace(self, oscillators=single, truncated=rests)
+        return replace(
+            self,
+            oscillators=[x.on_part([next(restricted) for _ in x.models]) for x in self.oscillators],
+            truncated=[
+                replace(x, share=next(restricted), amplitude=next(restricted))
+                for x in self.truncated
+            ],
+        )
 
     @classmethod
     def from_structure(
         cls, structure: Classical, excitation: Excitation, allowed: Array | None = None
     ) -> MotionModels:
-        """Models of a structure's motion over its box: enclosed blocks of modes, and all others.
+        """Models of a structure's motion over its box.
+
+        The lowest modes are enclosed in blocks. A block of one mode is an oscillator. A larger one
+        is an oscillator for each mode and a bound of their coupling or, where that is narrower,
+        modes known by their sums, as all modes are that are not enclosed.
 
         Args:
             structure: The structure.
@@ -77,48 +90,22 @@ class MotionModels:
             )
         rows = structure.start.like(structure.rows) @ centre.basis
         shares = [BlockShares.from_block(block, rows, excited, used) for block in found.blocks]
-        zero = np.zeros((len(excitation[1]), len(structure.order)))
-        models = cls(oscillators=[], truncated=[], added=zero, line_deviation=zero)
+        single, truncated = list[Oscillator](), list[TruncatedModes]()
+        added, deviation = np.zeros((2, len(excitation[1]), len(structure.order)))
         for of_block in shares:
-            models = models.with_block(structure, of_block, found, excitation, allowed)
-        truncated = rest_of_modes(structure, found, shares, (rows, excited), excitation)
-        if truncated is None:
-            return models
-        return replace(models, truncated=[*models.truncated, truncated])
-
-    def with_block(
-        self,
-        structure: Classical,
-        of_block: BlockShares,
-        found: Subspaces,
-        excitation: Excitation,
-        allowed: Array | None,
-    ) -> MotionModels:
-        """Models with a block of close modes added.
-
-        A block of one mode is an oscillator. A larger one is an oscillator for each mode and a
-        bound of their coupling or, where that is narrower, truncated modes known by their sums.
-
-        Args:
-            structure: The structure.
-            of_block: What the block takes from the sources and gives to the outputs.
-            found: All enclosed blocks.
-            excitation: The loads, the nodes and the names of the sources.
-            allowed: Error of each output by which both are compared, shape (m,); None for the bound
-                of the coupling.
-        """
-        all_oscillators = self.oscillators + oscillators(structure, of_block, found)
-        if len(of_block.block.modes) == 1:
-            return replace(self, oscillators=all_oscillators)
-        coupling = coupling_of(structure, of_block, found)
-        added, deviation = coupling.bounds(structure.order, excitation)
-        ends = coupling.omega_range, coupling.quotient_range
-        truncated = rest_of_block(structure, found, of_block, ends, excitation)
-        scale = np.maximum(added.max(0) if allowed is None else allowed, 1e-300)
-        if (truncated.width / scale).max() < (added.max(0) / scale).max():
-            return replace(self, truncated=[*self.truncated, truncated])
-        added, deviation = self.added + added, self.line_deviation + deviation
-        return replace(self, oscillators=all_oscillators, added=added, line_deviation=deviation)
+            of_modes = oscillators(structure, of_block, found)
+            if len(of_modes) > 1:
+                more, straying, ends = coupling_of(structure, of_block, found, excitation)
+                by_sums = rest_of_block(structure, found, of_block, ends, excitation)
+                scale = np.maximum(more.max(0) if allowed is None else allowed, 1e-300)
+                if (by_sums.width / scale).max() < (more.max(0) / scale).max():
+                    truncated.append(by_sums)
+                    continue
+                added, deviation = added + more, deviation + straying
+            single += of_modes
+        others = rest_of_modes(structure, found, shares, (rows, excited), excitation)
+        truncated += [] if others is None else [others]
+        return cls(single, truncated, np.asarray(added), np.asarray(deviation))
 
 
 def inverse(basis: Array, like: TaylorModel) -> TaylorModel:
@@ -127,3 +114,77 @@ def inverse(basis: Array, like: TaylorModel) -> TaylorModel:
     left = np.abs(np.eye(n) - basis @ found) + gamma(n + 1) * (np.abs(basis) @ np.abs(found))
     # B⁻¹ − C = C (I − B C) + …, of which the terms beyond the first are far below a tenth
     return like.like(found).loosened(1.1 * np.abs(found) @ left)
+
+
+def modes_wanted(
+    structure: Classical,
+    centre: CentredMatrices,
+    excited: TaylorModel,
+    excitation: Excitation,
+    allowed: Array,
+) -> tuple[int, Array]:
+    """Least number of lowest modes to enclose, so that what truncating the others errs is allowed.
+
+    It is an estimate by the bounds of `TruncatedModes`, with sums and responses in the middle of
+    the box.
+
+    Args:
+        structure: The structure.
+        centre: Its modes in the middle of the box.
+        excited: Sources in the coordinates of `centre`, shape (sources, n).
+        excitation: The loads, the nodes and the names of the sources.
+        allowed: Truncation error of each output that is allowed, shape (m,).
+
+    Returns:
+        The number, and the relative error of each mode's λ that changes an output by its allowed
+        error, shape (n,).
+    """
+    loads, time, sources = excitation
+    time = time[:: -(-len(time) // MAX_NODES)]
+    squared, n = centre.squared, centre.modes
+    rows = structure.rows @ centre.basis
+    read = rows[:, :n] * structure.factor.value[:, None]
+    participation = excited.value[:, :n]
+    reads_massless = np.any(rows[:, n:], axis=1)
+    a, b = structure.rayleigh.value
+    decay = (a + b * squared) / 2 + structure.ratio.value[:n] * np.sqrt(squared)
+    omega = np.sqrt(np.maximum(squared - decay**2, 1e-6 * squared))
+    sigma = (-decay + 1j * omega)[:, None]
+    error, sensitivity = np.zeros((2, n, len(allowed)))
+    for s, source in enumerate(sources):
+        if source in loads:  # ρ and its derivative by σ, (modes, T) each
+            rho = responses_at_nodes(sigma[:, 0], loads[source], time, 1)[0].swapaxes(1, 2)
+        else:
+            rho = np.stack([np.exp(sigma * time), time * np.exp(sigma * time)])
+        for o, order in enumerate(structure.order):
+            response = read_response(source, sigma, sigma**order * rho[0])
+            response = response + feedthrough(source, loads, int(order), time)
+            # λ |de/dλ|, as |dσ/dλ| ≈ 1/(2 ω)
+            slope = np.abs(rho[1]).max(1) * omega ** (order + (source == "start")) / 2
+            sensitivity[:, o] += np.abs(read[o] * participation[s]) * slope
+            errors = [
+                _truncation_error(read[o], participation[s], response, squared, x) for x in POWERS
+            ]
+            # the first power needs Σ read², which is unknown where massless unknowns are read
+            error[:, o] += np.min(errors[int(reads_massless[o]) :], axis=0)
+    sufficient = np.flatnonzero((error <= allowed).all(1))
+    wanted = max(int(sufficient[0]), 1) if len(sufficient) else n
+    return wanted, np.min(allowed / np.maximum(sensitivity, 1e-300), axis=1)
+
+
+def _truncation_error(
+    read: Array, participation: Array, response: Array, squared: Array, power: float
+) -> Array:
+    """Error of an output without the modes from k on, for each k, shape (n,).
+
+    By Cauchy and Schwarz it is the root of Σ a² Σ β² over these modes times half the range of
+    λ^power e; from power ½ on the terms a² are divided by λ, at 1 those of β² too.
+    """
+    outputs = np.cumsum((read**2 / squared ** float(power > 0))[::-1])[::-1]
+    sources = np.cumsum((participation**2 / squared ** float(power == 1))[::-1])[::-1]
+    scaled = response * squared[:, None] ** power
+    high, low = (np.maximum.accumulate(sign * scaled[::-1])[::-1] for sign in (1, -1))
+    half = np.maximum(high, low)
+    if power != POWERS[1]:  # ranges reach down to the mode below, as frequencies vary
+        half = (high + low)[np.maximum(np.arange(len(high)) - 1, 0)] / 2
+    return np.asarray(np.sqrt(outputs * sources) * half.max(1))

@@ -1,8 +1,9 @@
-"""What the modes have together that are not enclosed: sums over all modes, less the others.
+"""What an output has beside its oscillators: the modes not enclosed, and what couples blocks.
 
-With a_k = r·φ_k and β_k = φ_k·M v, sums over all modes are known without them: Σ a β = r·v,
-Σ a² = r·M⁻¹ r, Σ β² = v·M v, and with λ in the denominator r·K⁻¹ M v, r·K⁻¹ r, (M v)·K⁻¹ M v. What
-the enclosed modes leave of them is C, A and B. By Cauchy and Schwarz the others' motion is within
+Modes known by sums. With a_k = r·φ_k and β_k = φ_k·M v, sums over all modes are known without
+them: Σ a β = r·v, Σ a² = r·M⁻¹ r, Σ β² = v·M v, and with λ in the denominator r·K⁻¹ M v, r·K⁻¹ r,
+(M v)·K⁻¹ M v. What the enclosed modes leave of them is C, A and B. By Cauchy and Schwarz the
+others' motion is within
 
     C e ± √(A B) Δe            of mass:       e ± Δe holds all their responses;
     ± √(A B) sup |ω e|         of both:       A of stiffness, B of mass;
@@ -10,27 +11,35 @@ the enclosed modes leave of them is C, A and B. By Cauchy and Schwarz the others
 
 The least of the three is taken. For √(A B) stands (A t + B/t)/2, t a number, which is no less and
 a Taylor model: at inputs where A is large B is often small.
+
+Coupling of a block. It answers a e(L) β with a = r X, β = N⁻¹ Xᵀ M v, of which the diagonal of L
+gives Σ_j a_j β_j e(L_jj). With V the eigenvectors of L, N^½ V orthogonal, and F = L off its
+diagonal, V⁻¹ (e(L) − e(diag L)) has the entries e[λ_i, L_jj] (V⁻¹ F)_ij (Daleckii, Krein 1965). So
+the rest is no more than |a N^-½| Σ_j |β_j| |N^½ F_j| sup |de/dλ|, nor than twice |a N^-½| |N^½ β|
+times half the range of e, |β| and |a| with the norm of N; λ_i lie in the discs of Gershgorin about
+L_jj.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from alphacut.frame.calculus.taylor_model import TaylorModel, solution_series, solve
 from alphacut.frame.modes.clusters import Subspaces
-from alphacut.frame.modes.intervening import BlockShares, Ends, damped_range, dots
+from alphacut.frame.modes.intervening import BlockShares, Ends, Excitation, damped_range, dots
 from alphacut.frame.modes.structure import Classical
-from alphacut.frame.response.oscillators import Ranges, response_ranges
-from alphacut.frame.structures.loads import History
+from alphacut.frame.response.oscillators import Oscillators, Ranges, grid_over, response_ranges
 from alphacut.fuzzy.arrays import Array
 
-Excitation = tuple[Mapping[str, History], Array, Sequence[str]]
-"""The loads by name, the nodes, and the names of what moves the structure."""
 UNKNOWN = 1e60
 """Stands for a sum that is not known."""
+STEP = 0.2
+"""Distance of a table's points, as a share of the decay and of the inverse duration."""
+MAX_POINTS = 120
+"""Points along ω and along g/ω at most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,25 +68,22 @@ class TruncatedModes:
 
 @dataclass(frozen=True, eq=False)
 class _Sums:
-    """Sums over modes, without the outputs' factors.
+    """Sums over modes, without the outputs' factors; in each pair the second has terms over λ.
 
     Args:
-        shares: Σ a β and Σ a β / λ, shape (sources, m) each.
-        outputs: Σ a² and Σ a² / λ, shape (m,) each.
-        sources: Σ β² and Σ β² / λ, shape (sources,) each.
+        shares: Σ a β, shape (sources, m) each.
+        outputs: Σ a², shape (m,) each.
+        sources: Σ β², shape (sources,) each.
     """
 
     shares: tuple[TaylorModel, TaylorModel]
     outputs: tuple[TaylorModel, TaylorModel]
     sources: tuple[TaylorModel, TaylorModel]
 
-    def less(self, subtracted: _Sums) -> _Sums:
-        """Sums less those of `subtracted`, term by term."""
-        return _Sums(
-            (self.shares[0] - subtracted.shares[0], self.shares[1] - subtracted.shares[1]),
-            (self.outputs[0] - subtracted.outputs[0], self.outputs[1] - subtracted.outputs[1]),
-            (self.sources[0] - subtracted.sources[0], self.sources[1] - subtracted.sources[1]),
-        )
+    def __sub__(self, other: _Sums) -> _Sums:
+        names = ("shares", "outputs", "sources")
+        pairs = (zip(getattr(self, x), getattr(other, x), strict=True) for x in names)
+        return _Sums(*((a0 - b0, a1 - b1) for (a0, b0), (a1, b1) in pairs))
 
 
 def rest_of_modes(
@@ -101,7 +107,7 @@ def rest_of_modes(
         return None
     sums = _sums_over_modes(found, *coordinates, max(x.block.norm.order for x in shares))
     for of_block in shares:
-        sums = sums.less(_sums_over_block(of_block))
+        sums = sums - _sums_over_block(of_block)
     low, high = float(found.low[other_modes].min()), float(found.high[other_modes].max())
     ends = damped_range(structure, low, high, other_modes)
     return _truncated_modes(sums, ends, structure, found, excitation)
@@ -125,7 +131,6 @@ def _truncated_modes(
     found: Subspaces,
     excitation: Excitation,
 ) -> TruncatedModes:
-    """Bounds of the motion of modes by sums over them, and by ranges `ends` of their ω and g/ω."""
     orders = sorted({int(order) for order in structure.order})
     (omega, quotient), (loads, time, sources) = ends, excitation
     ranges = response_ranges(omega, quotient, loads, time, sources, orders)
@@ -135,17 +140,7 @@ def _truncated_modes(
 def _sums_over_modes(
     found: Subspaces, read: TaylorModel, excited: TaylorModel, order: int
 ) -> _Sums:
-    """Σ a β, Σ a², Σ β² over all modes φ, and the same with each term divided by λ.
-
-    a = r·φ with the rows r of the outputs, β = φ·M v with the patterns v of the sources. The sums
-    have closed forms, such as Σ a² / λ = r·K⁻¹ r.
-
-    Args:
-        found: Enclosed modes, with M and K in the coordinates of the box's middle.
-        read: Rows r of the outputs in these coordinates, shape (m, n).
-        excited: Patterns v of the sources in them, shape (sources, n); may depend on the inputs.
-        order: Order of the Taylor models where the patterns are constant.
-    """
+    """Sums over all modes, of outputs `read` (m, n) and sources `excited` (sources, n)."""
     centre, mass, stiffness = found.centre, found.centre.mass, found.centre.stiffness
     if len(excited.present()):
         order, d = excited.order, excited.inputs
@@ -158,22 +153,22 @@ def _sums_over_modes(
     least_mass, least_stiffness = (1 - variation for variation in found.variation)
     forces = excited @ mass
     mass_rows = rows[:, massive]
-    of_mass = _diagonal(_inverse_form(mass[massive, massive], mass_rows, mass_rows, least_mass))
-    of_stiffness = _diagonal(_inverse_form(stiffness, rows, rows, least_stiffness))
+    of_mass = _diagonal(inverse_form(mass[massive, massive], mass_rows, mass_rows, least_mass))
+    of_stiffness = _diagonal(inverse_form(stiffness, rows, rows, least_stiffness))
     if centre.modes < len(centre.basis):  # without what massless unknowns move by themselves
         light_rows = rows[:, light]
-        massless = _inverse_form(stiffness[light, light], light_rows, light_rows, least_stiffness)
+        massless = inverse_form(stiffness[light, light], light_rows, light_rows, least_stiffness)
         of_stiffness = of_stiffness - _diagonal(massless)
         of_mass = of_mass.loosened(np.where(light_rows.size().any(1), UNKNOWN, 0.0))
-    by_stiffness = _inverse_form(stiffness, forces, forces, least_stiffness)
+    by_stiffness = inverse_form(stiffness, forces, forces, least_stiffness)
     return _Sums(
-        shares=(excited @ rows.T, _inverse_form(stiffness, forces, rows, least_stiffness)),
+        shares=(excited @ rows.T, inverse_form(stiffness, forces, rows, least_stiffness)),
         outputs=(of_mass, of_stiffness),
         sources=(_diagonal(forces @ excited.T), _diagonal(by_stiffness)),
     )
 
 
-def _inverse_form(
+def inverse_form(
     matrix: TaylorModel, left: TaylorModel, right: TaylorModel, least: float
 ) -> TaylorModel:
     """Taylor model of left A⁻¹ rightᵀ, shape (l, r), with a remainder quadratic in small residuals.
@@ -195,10 +190,7 @@ def _inverse_form(
 
 
 def _sums_over_block(of_block: BlockShares) -> _Sums:
-    """Σ a β, Σ a², Σ β² over the modes of a block, and the same with each term divided by λ.
-
-    For K X = M X L they follow from X, N = Xᵀ M X and Xᵀ K X = N L, without the modes.
-    """
+    """Sums over a block's modes, by X, N = Xᵀ M X and Xᵀ K X = N L."""
     projected_stiffness = of_block.block.norm @ of_block.block.rate.T
     read, forces = of_block.read, of_block.source_forces
     read_over_stiffness = solve(projected_stiffness, read)
@@ -217,10 +209,7 @@ def _diagonal(matrix: TaylorModel) -> TaylorModel:
 def _amplitude_bounds(
     sums: _Sums, structure: Classical, found: Subspaces
 ) -> list[tuple[TaylorModel, TaylorModel]]:
-    """C = Σ a β and a bound of √(Σ a² Σ β²) for each power 0, ½, 1 of λ, shape (sources, m) each.
-
-    By the power no sum, that of a² or all have terms divided by λ. Outputs' factors are in both.
-    """
+    """C and the bound of √(A B) for each power 0, ½, 1 of λ, with the outputs' factors."""
     d, order = structure.start.inputs, structure.start.order
     (C0, C1), (A0, A1), (B0, B1) = (
         [x.cut(order) if x.inputs == d else x.cut(order).among(found.used, d) for x in pair]
@@ -241,15 +230,7 @@ def _root(A: TaylorModel, B: TaylorModel) -> TaylorModel:
 def _with_best_powers(
     structure: Classical, bounds: list[tuple[TaylorModel, TaylorModel]], ranges: dict[int, Ranges]
 ) -> TruncatedModes:
-    """Bounds of truncated modes' motion, for each source and output by the best power of λ.
-
-    The motion is C times the middle of the responses' range, ± an amplitude times its half width.
-
-    Args:
-        structure: The structure.
-        bounds: C and the amplitude for each power 0, ½, 1, shape (sources, m) each.
-        ranges: Ranges of the responses by order of the derivative that is read.
-    """
+    """Bounds of truncated modes' motion, for each source and output by the best power of λ."""
     of_outputs = [ranges[int(order)] for order in structure.order]
     low, high, deviation = (  # (powers, sources, m, T)
         np.stack(arrays, 2)
@@ -271,3 +252,54 @@ def _with_best_powers(
         half=half[best, s, o],
         line_deviation=deviations.T,
     )
+
+
+def coupling_of(
+    structure: Classical, shares: BlockShares, found: Subspaces, excitation: Excitation
+) -> tuple[Array, Array, tuple[Ends, Ends]]:
+    """Bounds of what couples a block's oscillators, by L of K X = M X L off its diagonal.
+
+    Returns:
+        Bounds of what the coupling adds to outputs at nodes, and of how far the block's motion
+        strays from a straight line in the step to a node, (T, m) each; its ranges of ω and of g/ω.
+    """
+    loads, time, sources = excitation
+    block, modes = shares.block, shares.block.modes
+    # bounds of the coupling over sup |de/dλ|, and of |a N^-½| |N^½ β|, (sources, m) each
+    off = block.rate.size() * (1.0 - np.eye(len(modes)))
+    norm = 1 + float(np.linalg.norm(block.norm.spread(), 2))
+    read = np.sqrt(shares.of_outputs.size()) * structure.factor.size()
+    of_columns = np.sqrt(norm) * np.linalg.norm(off, axis=1)
+    by_slope = (shares.participation.size().T @ of_columns)[:, None] * read
+    size = norm * np.sqrt(shares.of_sources.size())[:, None] * read  # of |a| |β|, too
+    j = np.arange(len(off))
+    low, high = block.rate[j, j].bounds()  # the λ lie in Gershgorin's discs about L_jj
+    lambda_low = max(float((low - off.sum(1)).min()), float(found.low[modes[0]]))
+    lambda_high = min(float((high + off.sum(1)).max()), float(found.high[modes[-1]]))
+    (low_omega, high_omega), (least, most) = ends = damped_range(
+        structure, lambda_low, lambda_high, modes
+    )
+    # g = (a + b λ)/2 + ζ √λ and ω² = λ − g²
+    zeta, b = structure.ratio[modes].size().max(), structure.rayleigh[1].size()
+    decay_slope = float(b / 2 + zeta / (2 * np.sqrt(lambda_low)))
+    omega_slope = (1 + 2 * most * high_omega * decay_slope) / (2 * low_omega)
+    reach = STEP * (least * low_omega + 2 / max(float(time[-1]), 1e-300))
+    points = (high_omega - low_omega) / reach, (most - least) * high_omega / reach
+    along, across = (int(np.clip(x, 1, MAX_POINTS)) + 1 for x in points)
+    table = Oscillators(grid_over(*ends, (along, across)), loads, time)
+    added, deviation = (np.zeros((len(time), len(structure.order))) for _ in range(2))
+    for order in np.unique(structure.order):
+        o = np.flatnonzero(structure.order == order)
+        for s, source in enumerate(sources):
+            response = table.responses(source, int(order))
+            G, G_slope = response.largest  # e = Re G + (g/ω) Im G of a start, ± Im G/ω of others
+            slope = G_slope * (decay_slope + omega_slope)  # |de/dλ|
+            if source == "start":
+                slope = (1 + most) * slope + G * (decay_slope + most * omega_slope) / low_omega
+            else:
+                slope = slope / low_omega + G * omega_slope / low_omega**2
+            half = np.ptp(response.value, axis=(1, 2)) / 2 + response.error
+            bounds = np.outer(slope, by_slope[s, o]), 2 * np.outer(half, size[s, o])
+            added[:, o] += np.minimum(*bounds)
+            deviation[:, o] += np.outer(response.line_deviation, size[s, o])
+    return added, deviation, ends

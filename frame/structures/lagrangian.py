@@ -76,12 +76,8 @@ class LagrangianSystem:
         start = dict(zip([*eq.q, *eq.v], [x for part in self.start() for x in part], strict=True))
         nominal = {eq.p[name]: value for name, value in self.parameters.items()}
         has_inertia = abs(eq.mass.subs(start).subs(nominal).evalf().det()) >= 1e-300
-        require(
-            has_inertia,
-            "mass of the lagrangian",
-            value="singular",
-            allowed="inertia of each coordinate",
-        )
+        key, allowed = "mass of the lagrangian", "inertia of each coordinate"
+        require(has_inertia, key, value="singular", allowed=allowed)
 
     def start(self) -> tuple[list[Expr], list[Expr]]:
         """The initial state (q0, v0) in symbols."""
@@ -90,7 +86,7 @@ class LagrangianSystem:
         return q0, _expressions("initial", lambda: self.initial(p)[1], p, n)
 
     def output(self, name: str, velocity: Symbols) -> Expr:
-        """Return an output as an expression in coordinates, given velocities and parameters."""
+        """An output as an expression in coordinates, given velocities and parameters."""
         eq, expression = self.symbols, self.observed[name]
         value = _expressions(
             f"observed: {name}", lambda: [expression(list(eq.q), list(velocity), eq.p)], eq.p
@@ -147,17 +143,7 @@ class Equations:
 def _expressions(
     name: str, values: Callable[[], Any], parameters: Named, count: int = 1
 ) -> list[Expr]:
-    """Return the `count` SymPy expressions that a user's function returns.
-
-    Args:
-        name: Name of the function for messages.
-        values: The function, its arguments bound.
-        parameters: Parameters that it may take.
-        count: Number of expressions.
-
-    Raises:
-        RefusedError: The function fails, or returns another number or kind of values.
-    """
+    """The `count` SymPy expressions of a user's function; refused where it gives no such."""
     import sympy
 
     allowed = f"functions of {', '.join(parameters)} and the coordinates by {SMOOTH}"
@@ -179,7 +165,7 @@ def pendulum(
     phi0: float = 1.5,
     omega0: float = 0.0,
 ) -> LagrangianSystem:
-    """Return a damped pendulum as a system: L = m l² φ̇²/2 + m g l cos φ, moment −d φ̇.
+    """A damped pendulum as a system: L = m l² φ̇²/2 + m g l cos φ, moment −d φ̇.
 
     Parameters: "m", "l", "d", "g", "phi_0", "omega_0". Outputs: "force" in the bar, m l φ̇² + m g
         cos φ, and the angle "phi".

@@ -73,7 +73,7 @@ class History:
 
     @classmethod
     def harmonic(cls, hertz: float, phase: float = 0.0, start: float = 0.0) -> Self:
-        """Return a sine of unit amplitude from the time `start` on; phase in rad at that time.
+        """A sine of unit amplitude from the time `start` on; phase in rad at that time.
 
         Raises:
             RefusedError: The frequency is not positive.
@@ -110,7 +110,8 @@ class History:
 
     def values(self, time: Array) -> Array:
         """Values of f at times, the same shape."""
-        return self.envelope(np.asarray(time, float)) * self.wave(np.asarray(time, float))
+        times = np.asarray(time, float)
+        return self.envelope(times) * self.wave(times)
 
     def wave(self, time: Array) -> Array:
         """The sine that g is multiplied by; ones where there is none."""
@@ -119,7 +120,7 @@ class History:
         return np.asarray(np.sin(self.frequency * (time - self.start) + self.phase))
 
     def envelope(self, time: Array, side: float = 1.0) -> Array:
-        """Return values of g at times, same shape: after jumps (`side` 1) or before them (−1)."""
+        """Values of g at times, same shape: after jumps (`side` 1) or before them (−1)."""
         n, position = len(self.samples), (time - self.start) / self.step
         is_sample = np.abs(position - np.round(position)) < 1e-9
         position = np.where(is_sample, np.round(position), position)
@@ -129,7 +130,7 @@ class History:
         return np.asarray(np.where(has_started & ~has_ended, inside, 0.0))
 
     def line_deviation(self, time: Array) -> Array:
-        """Return upper bounds of the distance of f from straight lines between nodes, shape (T,).
+        """Upper bounds of the distance of f from straight lines between nodes, shape (T,).
 
         Row j is that of the step that ends at node j. Without a sine f deviates most at a sample,
         just before or after it; with one by ω² h²/8 at most and by its jumps.

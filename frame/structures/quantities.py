@@ -39,7 +39,7 @@ class Output(str):
     unit: str
 
     def __new__(cls, name: str, unit: str = "") -> Output:
-        """Return the name with a unit; without one with that of its kind, such as "m" of "q3"."""
+        """The name with a unit; without one with that of its kind, such as "m" of "q3"."""
         output = super().__new__(cls, name)
         own_unit = name.unit if isinstance(name, Output) else UNITS.get(output._parts[0], "SI")
         output.unit = unit or own_unit

@@ -123,7 +123,6 @@ class StoreyFrame:
         self.require_standing({})
 
     def _require_values(self) -> None:
-        """Refuse values that are no numbers or out of range, and lists of a wrong length."""
         n = len(self.masses)
         require(n > 0, "masses", value=None, allowed="one value a floor, from below")
         checked_number("gravity", self.gravity, least=0)
@@ -144,20 +143,12 @@ class StoreyFrame:
         require_choice("damper_placement", self.damper_placement, ("ground", "storey"))
 
     def _require_springs(self) -> None:
-        """Refuse a frame with both stiffnesses and modulus, second moment or columns, or neither.
-
-        Lengths are required without stiffnesses, and with gravity.
-        """
         needed: dict[str, object] = {"modulus": self.modulus, "second_moment": self.second_moment}
         if len(self.stiffness):
             columns = self.columns if len(self.columns) else None
             beside = [k for k, x in {**needed, "columns": columns}.items() if x is not None]
-            require(
-                not beside,
-                ", ".join(beside),
-                value="there",
-                allowed="either stiffness or what makes it",
-            )
+            allowed = "either stiffness or what makes it"
+            require(not beside, ", ".join(beside), value="there", allowed=allowed)
             needed = {}
         if not len(self.stiffness) or self.gravity:
             needed["lengths"] = self.lengths if len(self.lengths) else None
@@ -165,7 +156,6 @@ class StoreyFrame:
             require(value is not None, name, value=None, allowed=SPRING_KEYS)
 
     def _require_loads(self) -> None:
-        """Refuse forces on no floor, or without an amplitude."""
         require_forces(self.loads)
         for force in self.loads:
             is_floor = force.at in range(1, self.floors + 1)
@@ -185,11 +175,9 @@ class StoreyFrame:
     @property
     def ratios(self) -> dict[str, float]:
         """Damping ratios by the names of their parameters; empty where there are none."""
-        return (
-            {}
-            if self.damping_ratio is None
-            else _named("zeta{}", np.atleast_1d(self.damping_ratio))
-        )
+        if self.damping_ratio is None:
+            return {}
+        return _named("zeta{}", np.atleast_1d(self.damping_ratio))
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -199,14 +187,9 @@ class StoreyFrame:
         for name in ("stiffness", "masses", "lengths", "columns", "dampers", "q0", "v0"):
             if name != "lengths" or not self.stiffness or self.gravity:
                 named |= _named(SYMBOLS[name], getattr(self, name), single=False)
-        damping = {"rayleigh_mass": self.rayleigh[0], "rayleigh_stiffness": self.rayleigh[1]}
+        named |= {"rayleigh_mass": self.rayleigh[0], "rayleigh_stiffness": self.rayleigh[1]}
         forces = zip(self.force_names, self.loads, strict=True)
-        return {
-            **named,
-            **damping,
-            **self.ratios,
-            **{x: checked_number(x, force.amplitude) for x, force in forces},
-        }
+        return named | self.ratios | {x: checked_number(x, y.amplitude) for x, y in forces}
 
     @property
     def force_names(self) -> tuple[str, ...]:
@@ -223,7 +206,7 @@ class StoreyFrame:
         return of_storey_frame(name)
 
     def group(self, name: str) -> tuple[str, ...]:
-        """Return the parameters that a short name stands for: "m" for m1 … mn; else itself.
+        """The parameters that a short name stands for: "m" for m1 … mn; else itself.
 
         Raises:
             RefusedError: The name is neither a group nor a parameter.
@@ -235,16 +218,12 @@ class StoreyFrame:
             return self.force_names
         if name in patterns:
             return tuple(patterns[name].format(z + 1) for z in range(self.floors))
-        require(
-            name in self.parameters,
-            "parameter",
-            value=name,
-            allowed=", ".join([*patterns, *self.parameters]),
-        )
+        allowed = ", ".join([*patterns, *self.parameters])
+        require(name in self.parameters, "parameter", value=name, allowed=allowed)
         return (name,)
 
     def springs(self, p: Mapping[str, Number]) -> Number:
-        """Return k_z of each storey (…, n), in N/m: as given, or 12 c E I / l³ of columns."""
+        """k_z of each storey (…, n), in N/m: as given, or 12 c E I / l³ of columns."""
         if self.stiffness:
             return self._of_floors("k{}", p)
         inertia = self._of_floors("I{}", p) if len(self.moments) > 1 else p["I"][..., None]
@@ -257,7 +236,7 @@ class StoreyFrame:
         return above * self._of_floors("l{}", p) ** -1
 
     def assembly(self, p: Mapping[str, Number]) -> Assembly[Number]:
-        """Return matrices, rows and loads at parameters `p`, jets or Taylor models (eq. 23)."""
+        """Matrices, rows and loads at parameters `p`, jets or Taylor models (eq. 23)."""
         n, links, names = self.floors, self.springs(p), self.force_names
         floors, storeys = diagonal(np.eye(n)), chain_matrix(np.eye(n))
         dashpots, one = self._of_floors("d{}", p), p["rayleigh_mass"] * 0.0 + 1.0
@@ -283,20 +262,17 @@ class StoreyFrame:
 
     @property
     def _rows(self) -> Array:
-        """Coefficients of outputs on displacements, velocities and accelerations, shape (m, 3n).
-
-        A storey shear has those of its drift; the stiffness is its factor besides.
-        """
+        """Coefficients of outputs on displacements, velocities and accelerations, shape (m, 3n)."""
         rows = np.zeros((len(self.outputs), 3 * self.floors))
         for row, (kind, z) in zip(rows, map(self.quantity, self.outputs), strict=True):
             block = {"v": 1, "a": 2}.get(kind, 0)  # displacements, velocities, accelerations
             row[z + self.floors * block] = 1.0
-            if kind in ("drift", "shear") and z:
+            if kind in ("drift", "shear") and z:  # of shears the stiffness is a factor besides
                 row[z - 1] = -1.0
         return rows
 
     def quantity(self, name: str) -> tuple[str, int]:
-        """Return an output's kind, such as "drift", and its floor or storey, counted from 0.
+        """An output's kind, such as "drift", and its floor or storey, counted from 0.
 
         Raises:
             RefusedError: There is no such output.
@@ -330,9 +306,8 @@ class StoreyFrame:
             name: Jet.constant(np.array([high if name[0] in worst_when_high else low]), 0)
             for name, (low, high) in worst.items()
         }
-        for z, (k, soft) in enumerate(
-            zip(self.springs(p).value[0], self.softening(p).value[0], strict=True), start=1
-        ):
+        stiffness, softening = self.springs(p).value[0], self.softening(p).value[0]
+        for z, (k, soft) in enumerate(zip(stiffness, softening, strict=True), start=1):
             allowed = f"more than weight over height, {soft:.5g} N/m"
             cure = "else it buckles: take stiffer storeys, lighter floors or narrower supports"
             key = f"stiffness of storey {z} under P-Delta"

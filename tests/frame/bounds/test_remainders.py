@@ -14,7 +14,7 @@ from alphacut.frame.calculus.monomials import convolve, monomials
 from alphacut.frame.calculus.taylor_model import TaylorModel, solve
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.clusters import centred_matrices, subspaces
-from alphacut.frame.modes.rest import _inverse_form
+from alphacut.frame.modes.rest import inverse_form
 from alphacut.frame.modes.structure import classical
 from alphacut.frame.response.oscillators import Grid, Oscillators
 from alphacut.frame.structures.loads import Accelerogram
@@ -333,7 +333,7 @@ def test_forms_of_inverses_stay_within_their_rests(order):
         )
         for m in (2, 3)
     )
-    found = _inverse_form(A, left, right, 0.5)
+    found = inverse_form(A, left, right, 0.5)
     for u in rng.uniform(-1, 1, (300, d)):
         (a,), (x,), (y,) = (model.at(u[None]) for model in (A, left, right))
         off = np.abs(x @ np.linalg.inv(a) @ y.T - found.at(u[None])[0])

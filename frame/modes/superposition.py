@@ -1,0 +1,288 @@
+"""Responses of a structure with classical modes at single inputs, and bounds of their rounding.
+
+An output is Σ_k r_k c_k e(λ_k), over modes of unit mass: r the output's coefficient of mode k,
+c the mode's participation in a source, e the response of its oscillator. Computed modes X and λ
+are the exact ones of a pencil near by: Xᵀ K X = diag λ + E and Xᵀ M X = I + F, whose entries are
+bounded by the computed residuals and their γ_n (Higham 2002, section 3.5). With
+G = |E| + |F| diag λ the outputs are off, to first order, by
+
+    Σ_jk |r_j| G_jk |e[λ_j, λ_k]| |c_k| + Σ_jk |r_j e_j| |F_jk| |c_k|,
+
+e[·, ·] a divided difference, which holds for close modes too. The entry of the slowest mode in G is
+some n ε ω_max², so that its frequency is off by a share of n ε (ω_max/ω₁)². Rounding of the
+response itself comes from the recursion over the record.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF, gamma
+from alphacut.frame.calculus.unproved import UnprovedError
+from alphacut.frame.modes.structure import Classical
+from alphacut.frame.response.duhamel import (
+    absolute_moments,
+    responses_at_given_nodes,
+    responses_at_nodes,
+)
+from alphacut.frame.structures.linear import LinearSystem, evaluate, histories, undamped_modes
+from alphacut.frame.structures.loads import History
+from alphacut.fuzzy.arrays import Array, Mask, Rows
+
+ENTRY_ROUNDINGS = 8
+"""Roundings of an entry of M, K and of output rows, as a stiffness 12 c E I / l³ takes."""
+
+
+@dataclass(frozen=True, eq=False)
+class Modal:
+    """Modes of a structure at S points, with bounds of what rounding leaves of the pencil.
+
+    Args:
+        squared: λ, shape (S, n), rising, in 1/s².
+        sigma: Exponents −g + iω, shape (S, n), in 1/s.
+        sigma_slope: Bound of |dσ/dλ|, shape (S, n), in s.
+        is_alike: Whether all modes of a point have one ratio of damping, shape (S,).
+        shape: Displacements of the modes, of unit mass, shape (S, n, n).
+        share: c of each source, by its name, shape (S, n).
+        share_error: Bounds of their rounding.
+        stiffness_error: G, shape (S, n, n).
+        mass_error: |F|, shape (S, n, n).
+        rows: Rows of all outputs on the state, shape (S, m, 2 n).
+        order: Which derivative of the displacements each output reads, shape (m,).
+        accelerated: What those of order 2 read of the accelerations, shape (m, n).
+    """
+
+    squared: Array
+    sigma: Array
+    sigma_slope: Array
+    is_alike: Mask
+    shape: Array
+    share: dict[str, Array]
+    share_error: dict[str, Array]
+    stiffness_error: Array
+    mass_error: Array
+    rows: Array
+    order: Rows
+    accelerated: Array
+
+    def output_coefficients(self, point: Rows, output: Rows) -> tuple[Array, Array]:
+        """Coefficients r of modes in outputs (N,) at points (N,), and their rounding, (N, n)."""
+        n, order = self.shape.shape[-1], self.order[output][:, None]
+        rows, shape = self.rows[point, output], self.shape[point]
+        row = np.where(order == 1, rows[:, n:], rows[:, :n])
+        row = np.where(order == 2, self.accelerated[output], row)
+        size = np.einsum("si,sik->sk", np.abs(row), np.abs(shape))
+        return np.einsum("si,sik->sk", row, shape), gamma(n + ENTRY_ROUNDINGS) * size
+
+
+def modes_at(
+    system: LinearSystem,
+    structure: Classical,
+    names: Sequence[str],
+    points: Array,
+    unit: Array,
+) -> Modal:
+    """Modes of a structure at S values of its inputs `names`, with bounds of their rounding.
+
+    The values are `points` (S, inputs) in SI units, and `unit` (S, d) in the unit coordinates of
+    the box of `structure`, from which damping is taken.
+
+    Raises:
+        UnprovedError: A mode does not oscillate.
+    """
+    matrices, rows = evaluate(system, names, points, derivatives=False, by_ratios=False)
+    M, K = matrices.mass.value, matrices.stiffness.value
+    squared, shape = undamped_modes(M, K)
+    a, b = structure.rayleigh.at(unit).T[:, :, None]
+    ratio, positive = structure.ratio.at(unit), np.maximum(squared, 1e-300)
+    decay = (a + b * squared) / 2 + ratio * np.sqrt(positive)
+    if not (squared > decay**2).all():
+        raise UnprovedError("a mode may not oscillate", "take less damping, and hold the structure")
+    omega, decay_slope = np.sqrt(squared - decay**2), b / 2 + ratio / (2 * np.sqrt(positive))
+    n, (q0, v0) = M.shape[-1], np.split(matrices.start.value[..., 0], 2, axis=-1)
+    patterns, pushes = {"velocity": v0, "start": q0}, matrices.pushes(ground=False).value
+    forces = [name for name in histories(system) if name != "load"]
+    patterns |= {name: pushes[..., k] for k, name in enumerate(forces)}
+    if system.ground is not None:
+        patterns["load"] = np.broadcast_to(matrices.rigid[:, 0], squared.shape)
+    share, share_error, product = {}, {}, "sik,sij,sj->sk"
+    for name, x in patterns.items():
+        share[name] = np.einsum(product, shape, M, x, optimize=True)
+        size = np.einsum(product, *(np.abs(part) for part in (shape, M, x)), optimize=True)
+        share_error[name] = gamma(2 * n + 2 * ENTRY_ROUNDINGS) * size
+    of_stiffness, of_mass = _residual(shape, K, squared), _residual(shape, M, np.ones_like(squared))
+    of_stiffness += of_mass * squared[:, None]
+    of_stiffness += gamma(8) * squared[:, None] * np.eye(n)  # of σ from λ
+    return Modal(
+        squared=squared,
+        sigma=-decay + 1j * omega,
+        sigma_slope=decay_slope + np.abs(1 - 2 * decay * decay_slope) / (2 * omega),
+        is_alike=(ratio == ratio[:, :1]).all(1),
+        shape=shape,
+        share=share,
+        share_error=share_error,
+        stiffness_error=of_stiffness,
+        mass_error=of_mass,
+        rows=rows.value,
+        order=structure.order,
+        # accelerations are read of structures whose unknowns all have mass
+        accelerated=structure.rows[:, :n],
+    )
+
+
+def _residual(shape: Array, matrix: Array, diagonal: Array) -> Array:
+    """Bound of |Xᵀ A X − diag| for the exact A, with the rounding of its product, (S, n, n)."""
+    n, across = shape.shape[-1], shape.swapaxes(-1, -2)
+    residual = across @ matrix @ shape - diagonal[:, None] * np.eye(n)
+    size = np.abs(across) @ np.abs(matrix) @ np.abs(shape)
+    return np.asarray(np.abs(residual) + gamma(2 * n + ENTRY_ROUNDINGS) * size)
+
+
+@dataclass(frozen=True, eq=False)
+class LoadAtNodes:
+    """Responses ρ of oscillators to a load, each row at a node.
+
+    Args:
+        rho: ρ and its derivative ρ′ by σ, shape (2, N, n).
+        error: Bounds of the rounding of ρ, shape (N, n).
+        impulse: Bound of |ρ| at any σ that does not grow, ∫ |f| up to the node, shape (N,).
+        value: f, shape (N,).
+    """
+
+    rho: Array
+    error: Array
+    impulse: Array
+    value: Array
+
+
+def load_at_given_nodes(sigma: Array, load: History, time: Array, node: Rows) -> LoadAtNodes:
+    """Responses of oscillators σ (N, n) to a load, each row at its node (N,) of `time`."""
+    responses = responses_at_given_nodes(sigma, load, time, node, 1)
+    impulse = absolute_moments(0.0, load, time)[0]
+    return LoadAtNodes(*responses, impulse[node], load.values(time[node]))
+
+
+def load_at_nodes(sigma: Array, load: History, time: Array) -> LoadAtNodes:
+    """Responses of oscillators σ (n,) to a load at all nodes."""
+    responses = responses_at_nodes(sigma, load, time, 1)
+    return LoadAtNodes(*responses, absolute_moments(0.0, load, time)[0], load.values(time))
+
+
+def read_response(source: str, sigma: Array, G: Array) -> Array:
+    """Response e of oscillators to a source by G = σ^order ρ(σ; t), without feedthrough.
+
+    It is Re G + (g/ω) Im G of a start, g = −Re σ, and Im G/ω of other sources, with the other sign
+    for the ground's acceleration, which acts as −M ι a.
+    """
+    if source == "start":
+        return np.asarray(G.real - sigma.real / sigma.imag * G.imag)
+    return np.asarray((-1.0 if source == "load" else 1.0) * G.imag / sigma.imag)
+
+
+def outputs_at(
+    modal: Modal,
+    point: Rows,
+    output: Rows,
+    time: Array,
+    loads: Mapping[str, LoadAtNodes],
+) -> tuple[Array, Array]:
+    """Exact values of outputs at points and nodes, and bounds of their rounding, (N,) each.
+
+    Args:
+        modal: Modes at all points.
+        point: Point of each value, shape (N,).
+        output: Output of each value, shape (N,).
+        time: Node of each value, shape (N,), in s.
+        loads: The loads by name.
+    """
+    sigma, t = modal.sigma[point], time[:, None]
+    exp = np.exp(sigma * t)
+    rounding = (gamma(4) + UNIT_ROUNDOFF * np.abs(sigma) * t) * np.abs(exp)
+    one = np.ones_like(time)
+    free = LoadAtNodes(np.stack([exp, t * exp]), rounding, one, 0 * one)
+    read = modal.output_coefficients(point, output)
+    total, error = np.zeros((2, len(point)))
+    for source, load in {"velocity": free, "start": free, **loads}.items():
+        response = _Responses.of_modes(modal, point, modal.order[output], source, load, time)
+        share = modal.share[source][point], modal.share_error[source][point]
+        total += (read[0] * share[0] * response.value).sum(-1)
+        error += _superposition_error(modal, point, read, share, response)
+    # terms of second order in the residuals are at most this fraction of those of first order
+    diagonal = np.einsum("skk->sk", modal.stiffness_error[point])
+    second_order = (diagonal * modal.sigma_slope[point] * t).max(-1)
+    return total, error / np.maximum(1 - second_order, 1e-300)
+
+
+@dataclass(frozen=True, eq=False)
+class _Responses:
+    """Responses e of all modes to one source, at a node for each of N points, each (N, n).
+
+    Args:
+        value: e.
+        error: Bound of its rounding.
+        slope: Bound of |de/dλ| at the modes, λ the squared undamped angular frequency.
+        slope_anywhere: The same at any λ, from bounds of ρ at any σ that does not grow.
+    """
+
+    value: Array
+    error: Array
+    slope: Array
+    slope_anywhere: Array
+
+    @classmethod
+    def of_modes(
+        cls, modal: Modal, point: Rows, orders: Rows, source: str, load: LoadAtNodes, time: Array
+    ) -> _Responses:
+        """Responses to a source of the modes at points (N,), read by derivatives `orders` (N,)."""
+        sigma, sigma_slope, order = modal.sigma[point], modal.sigma_slope[point], orders[:, None]
+        omega, size = sigma.imag, np.abs(sigma)
+        power, power_slope = size**order, order * size ** np.maximum(order - 1, 0)
+        G = sigma**order * load.rho[0]
+        error = power * load.error + gamma(2 * order.max() + 6) * np.abs(G)
+        direct = np.zeros_like(time)
+        if source.startswith("force"):  # of the relative acceleration
+            direct = np.where(orders == 2, load.value, 0.0)
+        # |G| and |dG/dσ| at the modes, and anywhere, where |ρ| ≤ ∫ |f| and |ρ′| ≤ t ∫ |f|
+        impulse, quotient = load.impulse[:, None], -sigma.real / omega
+        slopes = []
+        for rho, rho_slope in (np.abs(load.rho), (impulse, time[:, None] * impulse)):
+            G_size, G_slope = power * rho, power_slope * rho + power * rho_slope
+            if source == "start":
+                by_quotient = sigma_slope * (1 + quotient) / omega * G_size
+                slopes.append(sigma_slope * (1 + quotient) * G_slope + by_quotient)
+            else:
+                slopes.append(sigma_slope * (G_slope / omega + G_size / omega**2))
+        error = error * (1 + quotient) if source == "start" else error / omega
+        error = error + gamma(8) * np.abs(direct)[:, None]
+        return cls(read_response(source, sigma, G) + direct[:, None], error, *slopes)
+
+
+def _superposition_error(
+    modal: Modal,
+    point: Rows,
+    read: tuple[Array, Array],
+    share: tuple[Array, Array],
+    response: _Responses,
+) -> Array:
+    """Bound of the rounding of Σ_k r_k c_k e_k, shape (N,); r and c with theirs, (N, n) each."""
+    (r, r_error), (c, c_error) = (tuple(np.abs(x) for x in pair) for pair in (read, share))
+    e, n = np.abs(response.value), response.value.shape[-1]
+    error = (r * c * response.error + (r_error * c + r * c_error) * e).sum(-1)
+    error += gamma(n + 6) * (r * c * e).sum(-1)
+    # e[λ_j, λ_k] is no more than (|e_j| + |e_k|) / |λ_j − λ_k|, nor than sup |de/dλ| between modes
+    # of one damping ratio
+    squared, anywhere = modal.squared[point], response.slope_anywhere
+    gaps = np.abs(squared[:, :, None] - squared[:, None])
+    of_ratios = np.where(modal.is_alike[point][:, None, None], 0.0, np.inf)
+    cap = of_ratios + np.maximum(anywhere[:, :, None], anywhere[:, None])
+    unlimited = np.full_like(gaps, np.inf)
+    quotient = np.divide(e[:, :, None] + e[:, None], gaps, out=unlimited, where=gaps > 0)
+    diagonal = np.eye(n, dtype=bool)
+    divided = np.where(diagonal, response.slope[:, None], np.minimum(quotient, cap))
+    couplings = modal.stiffness_error[point] * divided
+    error += np.einsum("sj,sjk,sk->s", r, couplings, c, optimize=True)
+    error += np.einsum("sj,sjk,sk->s", r * e, modal.mass_error[point], c, optimize=True)
+    return np.asarray(error)
