@@ -63,14 +63,10 @@ def growth(phase: Array) -> dict[str, Array]:
     """Factor per step on an undamped oscillation at ω h = `phase`."""
     oscillator = StoreyFrame((1.0,), (1.0,), 1 / 24, 1.0)  # ω = 1 rad/s
     matrices, _ = evaluate(oscillator, (), np.zeros((1, 0)), derivatives=False)
-    found = {}
+    pushes, found = matrices.pushes(ground=False), {}
     for name, method in INTEGRATORS.items():
-        transfer = np.array(
-            [
-                method.step_map(matrices, float(h), matrices.pushes(ground=False)).transfer.value[0]
-                for h in phase
-            ]
-        )
+        maps = (method.step_map(matrices, pushes, [], float(h), 1) for h in phase)
+        transfer = np.array([x.transfer.value[0] for x in maps])
         found[name] = np.abs(np.linalg.eigvals(transfer)).max(1)
     return found
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.polynomial import Polynomial, derivative
-from alphacut.frame.dynamics.record_load import Segments
+from alphacut.frame.dynamics.integrators import absolute_integrals
 from alphacut.frame.modal.ground_response import REACH, Direct, LoadTables
 from alphacut.frame.modal.model import ModalModel
 
@@ -120,7 +120,7 @@ def _forced_part(model: ModalModel, growth: Array, number: int) -> MotionPart:
     kernels = [_kernel_maxima(growth, h, count, power) for power in range(4)]
     # upper sums of ∫ exp(g s) ds from 0 to the end of each interval
     integrated = np.cumsum(kernels[0], axis=0) * h
-    impulses = Segments(load.history, h, count).magnitudes(count)
+    impulses = absolute_integrals(load.history, h, count)
     waves, elapsed, push = (
         _convolution_bounds(kernel, impulses)[..., ::substeps, :]
         for kernel in (np.stack(kernels), integrated, np.ones((count, 1)))

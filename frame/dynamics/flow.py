@@ -5,14 +5,13 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from math import isqrt
 
 import numpy as np
 
-from alphacut.frame.calculus.jet import Array, Jet
+from alphacut.frame.calculus.jet import Array, Jet, concatenate
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.dynamics.integrators import Exact, Integrator, Midpoint
-from alphacut.frame.dynamics.record_load import linear_load
-from alphacut.frame.dynamics.transfer_powers import exact_response, trajectory
+from alphacut.frame.dynamics.integrators import Exact, Integrator, Midpoint, StepMap
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import (
     LinearSystem,
@@ -31,6 +30,11 @@ from alphacut.fuzzy.refused import (
 
 MAX_STEPS = 10_000_000
 """Most steps of a motion: bounds of one output at two levels are 320 MB of them."""
+MIN_SUBSTEPS, MAX_SUBSTEPS = 4, 64
+"""Fewest and most parts of a step in `LinearFlow.finer`."""
+MAX_PHASE = 0.8
+"""Most phase in rad that the fastest mode takes in a part, up to the most parts."""
+CURE = "keep the parameters where the motion exists, such as positive masses"
 
 
 def nodes(duration: float, step: float) -> Array:
@@ -50,13 +54,6 @@ def nodes(duration: float, step: float) -> Array:
         allowed=f"1 to {MAX_STEPS:,} whole steps of {step:g} s",
     )
     return np.arange(count + 1) * step
-
-
-MIN_PARTS, MAX_PARTS = 4, 64
-"""Fewest and most parts of a step in `LinearFlow.finer`."""
-MAX_PHASE = 0.8
-"""Most phase in rad that the fastest mode takes in a part, up to the most parts."""
-CURE = "keep the parameters where the motion exists, such as positive masses"
 
 
 class StepError(FailedError):
@@ -130,12 +127,7 @@ class Flow(ABC):
         return self._finite(points, derivatives=True)
 
     def _finite(self, points: Array, *, derivatives: bool) -> Jet:
-        """Return trajectories at parameters (S, d), shape (S, T, outputs), all of them finite.
-
-        Raises:
-            RefusedError: A matrix is singular or a value not finite; the message names the point.
-            StepError: A step did not converge; the message names the point.
-        """
+        """Trajectories at points (S, d), all of them finite; errors name the point."""
         try:
             with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
                 motion = self._march(points, derivatives=derivatives)
@@ -155,7 +147,7 @@ class Flow(ABC):
         return motion
 
     def _failing_point(self, points: Array) -> Array:
-        """Return a point (d,) at which the motion fails, out of (S, d) with one, by bisection."""
+        """One (d,) of the points (S, d) at which the motion fails, by bisection."""
         while len(points) > 1:
             half = points[: len(points) // 2]
             try:
@@ -166,7 +158,6 @@ class Flow(ABC):
         return np.asarray(points[0])
 
     def _point_words(self, point: Array) -> str:
-        """Return a point (d,) as a text with names and values of its parameters."""
         pairs = zip(self.names, point, strict=True)
         return ", ".join(f"{name} = {x:g}" for name, x in pairs) or "the nominal parameters"
 
@@ -201,7 +192,7 @@ class LinearFlow(Flow):
         """Return the exact flow with steps divided into equal parts, and the number of parts."""
         # parts in which the fastest mode turns by MAX_PHASE at most
         phase_per_step = float(frequencies(self.system)[-1]) * self.step
-        parts = int(np.clip(np.ceil(phase_per_step / MAX_PHASE), MIN_PARTS, MAX_PARTS))
+        parts = int(np.clip(np.ceil(phase_per_step / MAX_PHASE), MIN_SUBSTEPS, MAX_SUBSTEPS))
         return replace(self, step=self.step / parts, integrator=Exact()), parts
 
     def deviations(self, points: Array) -> tuple[Array, Array]:
@@ -210,24 +201,77 @@ class LinearFlow(Flow):
         return truth, np.abs(self.values(points) - truth)
 
     def _march(self, points: Array, *, derivatives: bool) -> Jet:
-        """Return outputs of x[k+1] = T x[k] + G load[k] at points (S, d), shape (S, T, outputs)."""
+        """Outputs of x[k+1] = T x[k] + G load[k] at points (S, d), shape (S, T, outputs)."""
         matrices, rows = evaluate(self.system, self.names, points, derivatives=derivatives)
         loads, has_ground = list(histories(self.system).values()), self.system.ground is not None
-        h, steps, load = self.step, len(self.time) - 1, None
         pushes = matrices.pushes(ground=has_ground)  # accelerations by a unit of each load
-        if self.exact and loads:
-            step_map, load = exact_response(matrices, pushes, loads, step=h, steps=steps)
-        else:
-            step_map = self.integrator.step_map(matrices, h, pushes)
-            if loads:
-                loads_of_steps = np.stack([linear_load(x, h, steps) for x in loads], -1)
-                load = loads_of_steps.reshape(steps, -1)
-        motion = trajectory(step_map, matrices.start, rows, load=load, count=steps + 1)
+        steps = len(self.time) - 1
+        step_map = self.integrator.step_map(matrices, pushes, loads, self.step, steps)
+        motion = trajectory(step_map, matrices.start, rows)
         if matrices.feeds is None:
             return motion
         # accelerations among the outputs also hold the forces themselves, over the masses
         at_nodes = np.stack([x.values(self.time) for x in courses_of_forces(self.system)])
         return motion + (matrices.feeds @ at_nodes).map(lambda x: x.swapaxes(-1, -2))
+
+
+def trajectory(step_map: StepMap, start: Jet, rows: Jet) -> Jet:
+    """Return outputs C x[k], k = 0 … steps, of x[k+1] = T x[k] + G load[k].
+
+    Nodes come in blocks of √steps: states at the first node of each block come from one another,
+    those in a block from powers of T and, all blocks at once, from the motion that starts at rest.
+
+    Args:
+        step_map: T, G and the loads of all steps.
+        start: Initial state, shape (S, N, 1).
+        rows: Observation rows C, shape (S, m, N).
+
+    Returns:
+        Outputs, shape (S, steps + 1, m).
+    """
+    loads, transfer = step_map.loads, step_map.transfer
+    count = len(loads) + 1
+    size = isqrt(len(loads)) + 1  # of a block
+    blocks = -(-count // size)
+    powers = _powers(transfer, size)
+    observed = rows[:, None] @ powers  # C T^j, shape (S, size, m, N)
+    samples, m, n = len(start.value), rows.value.shape[-2], start.value.shape[-2]
+    flat = observed.map(lambda x: x.reshape((*x.shape[:-3], size * m, n)))
+    has_loads = loads.shape[1] > 0
+    if has_loads:
+        columns = np.zeros((blocks * size, loads.shape[1]))
+        columns[: len(loads)] = loads
+        columns = columns.reshape(blocks, size, -1)
+        state = step_map.load @ np.zeros((loads.shape[1], blocks))
+        outputs = []
+        for k in range(size):
+            outputs.append(rows @ state)  # eq. 18, of a linear structure
+            state = transfer @ state + step_map.load @ columns[:, k].T
+    block_transfer, starts = transfer @ powers[:, -1], [start]
+    for b in range(blocks - 1):
+        following = block_transfer @ starts[-1]
+        starts.append(following + state[..., b : b + 1] if has_loads else following)
+    out = flat @ concatenate(starts, -1)  # (…, S, size m, blocks)
+    if has_loads:
+        out = out + concatenate(outputs, -2)
+
+    def in_time(x: Array) -> Array:
+        lead = x.shape[:-3]
+        ordered = np.moveaxis(x.reshape((*lead, samples, size, m, blocks)), -1, -3)
+        return ordered.reshape((*lead, samples, blocks * size, m))[..., :count, :]
+
+    return out.map(in_time)
+
+
+def _powers(transfer: Jet, count: int) -> Jet:
+    """The powers T^0 … T^(count − 1) of a matrix by doubling, shape (S, count, N, N)."""
+    eye = np.broadcast_to(np.eye(transfer.value.shape[-1]), transfer.value.shape)
+    powers = Jet.constant(eye, transfer.directions)[:, None]
+    next_power = transfer
+    while powers.value.shape[1] < count:
+        powers = concatenate([powers, powers @ next_power[:, None]], -3)
+        next_power = next_power @ next_power
+    return powers[:, :count]
 
 
 def exact_flow(flow: object) -> LinearFlow:

@@ -4,19 +4,36 @@ Every method is a frozen dataclass with two claims that tests measure: `order`, 
 `stability_limit`, the largest ω h without growth of an undamped oscillation. All derivatives of a
 step with respect to parameters share one factorisation (`jet.inverse`): it is the scheme that is
 differentiated, not the differential equation (internal differentiation: Bock 1981).
+
+Loads come at their own times: linear between their samples, or that times a sine, with jumps where
+they begin or end. Neither samples nor jumps need lie on nodes.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from math import ceil, inf, log2
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from alphacut.frame.calculus.jet import Jet, concatenate, inverse
+from alphacut.frame.calculus.jet import Array, Jet, concatenate, inverse
 from alphacut.frame.structures.linear import Matrices
+from alphacut.frame.structures.loads import History
 from alphacut.frame.structures.modes import state_matrix
+from alphacut.fuzzy.arrays import Rows
+
+SAME = 1e-12
+"""Distance of a sample from a node, as a share of the step, that is rounding."""
+TERMS = 26
+"""Terms of exp(A τ) where |λ| τ ≤ `MAX_PHASE`: the next is 2^26 / 26! = 2e-19."""
+MAX_PHASE = 2.0
+"""Largest |λ| times a substep of the exact step."""
+MAX_SUBSTEPS = 4096
+SINE_POINTS = 16
+"""Points of Gauss quadrature for a sine that turns by `MAX_PHASE` at most, beside the others."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,12 +42,13 @@ class StepMap:
 
     Args:
         transfer: T, shape (S, 2n, 2n).
-        load: G, shape (S, 2n, L); of one-step methods L is twice the number of loads, for their
-            values at the beginning of a step and then at its end, linear between.
+        load: G, shape (S, 2n, L).
+        loads: What G acts on in each step, shape (steps, L).
     """
 
     transfer: Jet
     load: Jet
+    loads: Array
 
 
 @dataclass(frozen=True)
@@ -52,10 +70,12 @@ class Midpoint:
     order: ClassVar[float] = 2
     stability_limit: ClassVar[float] = inf
 
-    def step_map(self, matrices: Matrices, step: float, pushes: Jet) -> StepMap:
-        """Return the map of one step, whose velocities are M⁻¹ times the discrete momenta.
+    def step_map(
+        self, matrices: Matrices, pushes: Jet, loads: Sequence[History], step: float, count: int
+    ) -> StepMap:
+        """Return the map of each of `count` steps, whose velocities are M⁻¹ times the momenta.
 
-        `pushes` are accelerations by a unit of each load, shape (S, n, L).
+        `pushes` are accelerations by a unit of each of the L loads, shape (S, n, L).
         """
         m, h = matrices, step
         inertia, spring = m.mass * (1 / h) + m.damping * 0.5, m.stiffness * (h / 4)
@@ -69,55 +89,75 @@ class Midpoint:
         upper = concatenate([q_by_q, q_by_v], -1)
         lower = concatenate([(q_by_q - eye) * (2 / h), q_by_v * (2 / h) - eye], -1)
         load = concatenate([q_by_load, q_by_load * (2 / h)], -2)
-        return StepMap(transfer=concatenate([upper, lower], -2), load=load)
+        return StepMap(concatenate([upper, lower], -2), load, linear_loads(loads, h, count))
 
 
 @dataclass(frozen=True)
 class RungeKutta4:
-    """The classical explicit method of order 4.
-
-    Example:
-        >>> from alphacut.frame import LinearFlow, StoreyFrame
-        >>> frame = StoreyFrame(masses=[1e3], stiffness=[4e4], q0=[0.1])
-        >>> flow = LinearFlow(frame, ("m1",), duration=1.0, step=0.1, integrator=RungeKutta4())
-        >>> flow.values([[1e3]])[0, -1].round(4).tolist()
-        [0.0995]
-    """
+    """The classical explicit method of order 4; arguments and result as of `Midpoint`."""
 
     name: ClassVar[str] = "rk4"
     order: ClassVar[float] = 4
     stability_limit: ClassVar[float] = 2 * 2**0.5
 
-    def step_map(self, matrices: Matrices, step: float, pushes: Jet) -> StepMap:
-        """Return the map of one step, by the series of exp(A h) up to h⁴."""
-        z = loaded_flow(matrices, step, pushes) * step
-        z2 = z @ z
-        return split(
-            np.eye(z.value.shape[-1]) + z + z2 * 0.5 + z2 @ z * (1 / 6) + z2 @ z2 * (1 / 24),
-            pushes.value.shape[-1],
-        )
+    def step_map(
+        self, matrices: Matrices, pushes: Jet, loads: Sequence[History], step: float, count: int
+    ) -> StepMap:
+        """Return the map of each of `count` steps, by the series of exp(A h) up to h⁴."""
+        z = state_matrix(matrices) * step
+        eye, zero = np.eye(z.value.shape[-1]), pushes * 0.0
+        by_rise = eye / 2 + z * (1 / 6) + z @ z * (1 / 24)  # Σ z^(k − 2) / k!, k = 2 … 4
+        by_value = eye + z @ by_rise  # Σ z^(k − 1) / k!
+        push = concatenate([zero, pushes], -2) * step
+        value, rise = by_value @ push, by_rise @ push  # of a load f + rise · τ/h
+        load = concatenate([value - rise, rise], -1)
+        return StepMap(eye + z @ by_value, load, linear_loads(loads, step, count))
 
 
 @dataclass(frozen=True)
 class Exact:
-    """Exact propagator exp(A h) by scaling and squaring, for a load linear in each step.
-
-    Example:
-        >>> from alphacut.frame import LinearFlow, StoreyFrame
-        >>> frame = StoreyFrame(masses=[1e3], stiffness=[4e4], q0=[0.1])
-        >>> flow = LinearFlow(frame, ("m1",), duration=1.0, step=0.1, integrator=Exact())
-        >>> flow.values([[1e3]])[0, -1].round(4).tolist()
-        [0.0999]
-    """
+    """Exact propagator exp(A h) and Duhamel integral; arguments and result as of `Midpoint`."""
 
     name: ClassVar[str] = "exact"
     order: ClassVar[float] = inf
     stability_limit: ClassVar[float] = inf
 
-    def step_map(self, matrices: Matrices, step: float, pushes: Jet) -> StepMap:
-        """Return the exact map of one step for loads that are linear in it."""
-        flow = exponential(loaded_flow(matrices, step, pushes) * step)
-        return split(flow, pushes.value.shape[-1])
+    def step_map(
+        self, matrices: Matrices, pushes: Jet, loads: Sequence[History], step: float, count: int
+    ) -> StepMap:
+        """Return the exact map of each of `count` steps.
+
+        Over a substep of length h, ∫ exp(A τ) b f(h − τ) dτ = Σ_k (A h)^k b / k! ∫ (τ/h)^k f dτ:
+        G holds (A h)^k b / k! of each load, b = [0; push], carried on to the step's end, and
+        `loads` the moments.
+
+        Raises:
+            ValueError: A step would take more than `MAX_SUBSTEPS` substeps.
+        """
+        A, substeps = state_matrix(matrices), 1
+        if loads:
+            fastest = float(np.abs(np.linalg.eigvals(A.value)).max())
+            substeps = substeps_of(max(fastest, *(load.frequency for load in loads)), step)
+        h = step / substeps
+        term = concatenate([pushes * 0.0, pushes], -2)
+        series = [term]
+        for k in range(1, TERMS):
+            term = A @ term * (h / k)
+            series.append(term)
+        columns = [concatenate([x[..., i : i + 1] for x in series], -1) for i in range(len(loads))]
+        transfer = exponential(A * h)
+        for _ in range(substeps.bit_length() - 1):  # doubles the time until it is a step
+            columns = [concatenate([x, transfer @ x], -1) for x in columns]
+            transfer = transfer @ transfer
+        moments = [load_moments(load, h, count * substeps, TERMS) for load in loads]
+        # the last substep comes first, as in the columns
+        by_step = [x.reshape(count, substeps, TERMS)[:, ::-1].reshape(count, -1) for x in moments]
+        gain = concatenate(columns, -1) if loads else term
+        return StepMap(transfer, gain, np.concatenate([np.empty((count, 0)), *by_step], -1))
+
+
+Integrator = Midpoint | RungeKutta4 | Exact
+INTEGRATORS: dict[str, Integrator] = {m.name: m for m in (Midpoint(), RungeKutta4(), Exact())}
 
 
 def exponential(z: Jet) -> Jet:
@@ -135,36 +175,114 @@ def exponential(z: Jet) -> Jet:
     return series
 
 
-def loaded_flow(m: Matrices, step: float, pushes: Jet) -> Jet:
-    """Return the state matrix of [q; v; load; rise], shape (S, 2n + 2L, 2n + 2L).
+def substeps_of(fastest: float, step: float) -> int:
+    """Return the number of substeps of an exact step, a power of 2.
 
-    Its exponential over a step is the map of a step in which each of L loads is linear, with its
-    rise. `pushes` are accelerations by a unit of each load, shape (S, n, L).
+    Args:
+        fastest: Largest |λ| of the motions and angular frequency of the loads, in rad/s.
+        step: Length of a step, in s.
+
+    Raises:
+        ValueError: There would be more than `MAX_SUBSTEPS`.
     """
-    flow = state_matrix(m)
-    n, count = pushes.value.shape[-2:]
-    size = 2 * (n + count)
-    extended = flow.like(np.zeros((len(flow.value), size, size)))
-    for target, state_part, load_part in zip(  # values, first and second derivatives
-        (extended.value, extended.first, extended.second),
-        (flow.value, flow.first, flow.second),
-        (pushes.value, pushes.first, pushes.second),
-        strict=True,
-    ):
-        target[..., : 2 * n, : 2 * n] = state_part
-        target[..., n : 2 * n, 2 * n : 2 * n + count] = load_part
-    # the rate of each load is its rise over the step
-    extended.value[:, 2 * n : 2 * n + count, 2 * n + count :] = np.eye(count) / step
-    return extended
+    substeps = 1 << max(0, ceil(log2(max(1.0, fastest * step / MAX_PHASE)) - 1e-9))
+    if substeps > MAX_SUBSTEPS:
+        raise ValueError(
+            f"step: {step:g} s with motions as fast as {fastest:.3g} rad/s under a record is"
+            f" {fastest * step:.2g} rad a step, above {MAX_PHASE * MAX_SUBSTEPS:g}; take a step of"
+            f" at most {MAX_PHASE * MAX_SUBSTEPS / fastest:.2g} s"
+        )
+    return substeps
 
 
-def split(extended: Jet, count: int) -> StepMap:
-    """Return the step map of a propagator of states, `count` loads and their rises in a step."""
-    # a load f at the beginning and f + rise at the end
-    n = extended.value.shape[-1] - 2 * count
-    old, rise = extended[..., :n, n : n + count], extended[..., :n, n + count :]
-    return StepMap(extended[..., :n, :n], concatenate([old - rise, rise], -1))
+class Segments(NamedTuple):
+    """A load over equal steps from t = 0 on, cut at all nodes and samples into L segments.
+
+    Args:
+        step: Step in which each segment lies, rising from 0, shape (L,).
+        start: Time from the beginning of its step, shape (L,), in s.
+        length: Shape (L,), in s.
+        first: Load just after its beginning, without a sine, shape (L,).
+        last: Load just before its end, shape (L,); it is linear between.
+    """
+
+    step: Rows
+    start: Array
+    length: Array
+    first: Array
+    last: Array
 
 
-Integrator = Midpoint | RungeKutta4 | Exact
-INTEGRATORS: dict[str, Integrator] = {m.name: m for m in (Midpoint(), RungeKutta4(), Exact())}
+def load_segments(history: History, step: float, count: int) -> Segments:
+    """Return the segments of a load over `count` steps of length `step`."""
+    samples = history.start + np.arange(len(history.samples)) * history.step
+    nearest = np.round(samples / step)
+    inner = (np.abs(samples - nearest * step) > SAME * step) & (samples < count * step)
+    home = np.concatenate([np.arange(count), np.floor(samples[inner] / step).astype(int)])
+    start = np.concatenate([np.zeros(count), samples[inner] - home[count:] * step])
+    order = np.lexsort((start, home))
+    home, start = home[order], start[order]
+    end = np.append(start[1:], 0.0)
+    end[np.append(np.diff(home) > 0, True)] = step
+    return Segments(home, start, end - start, *_end_values(history, home * step, start, end))
+
+
+def _end_values(history: History, node: Array, start: Array, end: Array) -> tuple[Array, Array]:
+    """g, the load without its sine, just after starts and just before ends of segments, (L,)."""
+    a, h = history.samples, history.step
+    piece = np.floor((node + (start + end) / 2 - history.start) / h).astype(int)  # between samples
+    is_sampled, is_after = (piece >= 0) & (piece < len(a) - 1), piece >= len(a) - 1
+    k = np.where(is_sampled, piece, 0)
+    slope = (a[k + 1] - a[k]) / h
+    outside = np.where(is_after & np.array(history.is_held), a[-1], 0.0)
+    first, last = (a[k] + slope * (node + x - history.start - k * h) for x in (start, end))
+    return np.where(is_sampled, first, outside), np.where(is_sampled, last, outside)
+
+
+def absolute_integrals(history: History, step: float, count: int) -> Array:
+    """Return ∫ |f| dt over each of `count` steps, shape (count,); an upper bound with a sine."""
+    segments = load_segments(history, step, count)
+    a, b = np.abs(segments.first), np.abs(segments.last)
+    crosses_zero = segments.first * segments.last < 0  # then |f| is two triangles
+    triangles = (a**2 + b**2) / np.where(crosses_zero, a + b, 1.0)
+    mean = np.where(crosses_zero, triangles, a + b) / 2
+    return np.bincount(segments.step, segments.length * mean, count)
+
+
+@lru_cache(maxsize=8)
+def load_moments(history: History, step: float, count: int, order: int) -> Array:
+    """Return ∫ s^k f dt of a load f over each of `count` steps, k < `order`, shape (count, order).
+
+    s falls from 1 at a step's beginning to 0 at its end.
+    """
+    segments = load_segments(history, step, count)
+    # exact, with a sine to round-off
+    points, weights = np.polynomial.legendre.leggauss(
+        order // 2 + 1 + (SINE_POINTS if history.frequency else 0)
+    )
+    share = (points + 1) / 2  # of a segment
+    since = segments.start[:, None] + segments.length[:, None] * share
+    load = segments.first[:, None] * (1 - share) + segments.last[:, None] * share
+    if history.frequency:
+        load = load * history.wave(segments.step[:, None] * step + since)
+    load = load * (segments.length[:, None] / 2 * weights)
+    first_segment = np.searchsorted(segments.step, np.arange(count))  # of each step
+    moments: Array = np.empty((count, order))
+    for k in range(order):
+        moments[:, k] = np.add.reduceat(load.sum(1), first_segment)
+        load = load * (1 - since / step)
+    return moments
+
+
+def linear_loads(loads: Sequence[History], step: float, count: int) -> Array:
+    """Return the best lines through L loads in each step by end values, shape (count, 2 L).
+
+    A line has the load's impulse and first moment in the step, and is the load where that is
+    linear. Values at the beginnings of steps come first, load by load, then those at their ends.
+    """
+    mean, moment = (
+        np.array([load_moments(x, step, count, 2) for x in loads]).reshape(-1, 2).T / step
+    )
+    tilt = (2 * moment - mean).reshape(len(loads), count)
+    mean = mean.reshape(len(loads), count)
+    return np.concatenate([mean + 3 * tilt, mean - 3 * tilt]).T

@@ -108,31 +108,32 @@ def linear_pieces(history: History, time: Array) -> LinearPieces:
 def absolute_moments(decay: float, history: History, time: Array) -> Array:
     """Return bounds of ∫₀ᵗ τⁿ exp(−decay τ) |f(t − τ)| dτ at nodes t, n = 0 … 4, shape (5, T)."""
     load = linear_pieces(history, time)
-    sizes = np.maximum(np.abs(load.first), np.abs(load.last))
-    offset = load.offsets[load.offset] + load.time_rounding
     out: Array = np.empty((5, len(time)))
-    _absolute_moments(sizes, load.interval, offset, decay, load.step, out)
+    _absolute_moments(load, load.offsets[load.offset] + load.time_rounding, decay, out)
     return out
 
 
 @compiled
-def _absolute_moments(
-    sizes: Array, interval: Rows, offset: Array, decay: float, h: float, out: Array
-) -> None:
-    """Write bounds of ∫₀ᵗ τⁿ exp(−g τ) |f(t − τ)| dτ to `out` (5, T); |f| ≤ size in an interval."""
+def _absolute_moments(load: LinearPieces, offset: Array, decay: float, out: Array) -> None:
+    """Write bounds of ∫₀ᵗ τⁿ exp(−g τ) |f(t − τ)| dτ at nodes t, n = 0 … 4, to `out` (5, T)."""
     moments, later, node = np.zeros(5), np.empty(5), 0  # at an interval's beginning, x later
-    for i in range(interval[-1] + 1):
-        is_node = True
+    for i in range(load.interval[-1] + 1):
+        is_node, a, slope = True, load.first[i], (load.last[i] - load.first[i]) / load.step
         while is_node:  # then once more for the interval's end
-            is_node = node < len(interval) and interval[node] == i
-            x = offset[node] if is_node else h
-            decay_factor = np.exp(-decay * x)
+            is_node = node < len(load.interval) and load.interval[node] == i
+            x = offset[node] if is_node else load.step
+            b, decay_factor = a + slope * x, np.exp(-decay * x)
+            largest, growth = max(abs(a), abs(b)), max(decay_factor, 1.0)
+            area = x * (abs(a) + abs(b)) / 2  # ∫ |f| over x, of two triangles where f crosses zero
+            if a * b < 0:
+                area = x * (a * a + b * b) / (2 * (abs(a) + abs(b)))
             for n in range(5):
                 total, binomial = 0.0, 1.0
                 for j in range(n, -1, -1):  # Σ C(n, j) x^(n − j) moments_j
                     total += binomial * x ** (n - j) * moments[j]
                     binomial *= j / (n - j + 1)
-                later[n] = decay_factor * total + sizes[i] * x ** (n + 1) / (n + 1)
+                added = min(area * x**n, largest * x ** (n + 1) / (n + 1))
+                later[n] = decay_factor * total + growth * added
             if is_node:
                 out[:, node] = later
                 node += 1

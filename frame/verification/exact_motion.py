@@ -1,7 +1,7 @@
 """Exact motion of a linear structure at one set of parameters, to test proofs with.
 
-This file must not be merged with what it judges. It shares no code with `Jet`, `record_load`,
-`transfer_powers`, `LinearFlow` or the modal models, and needs NumPy and SciPy alone, so that a
+This file must not be merged with what it judges. It shares no code with `Jet`, the integrators,
+`LinearFlow` or the modal models, and needs NumPy and SciPy alone, so that a
 fault in one of them does not hide itself.
 
 Method: the exponential of the state matrix from one substep to the next (Van Loan, 1978, for the

@@ -7,8 +7,7 @@ import pytest
 
 from alphacut.frame import Accelerogram, Exact, LinearFlow, Midpoint, StoreyFrame, envelope
 from alphacut.frame.boxes import boxes
-from alphacut.frame.dynamics.integrators import Integrator, RungeKutta4
-from alphacut.frame.dynamics.record_load import linear_load
+from alphacut.frame.dynamics.integrators import Integrator, RungeKutta4, linear_loads
 from alphacut.frame.modal.fitting import fit_modes
 from alphacut.frame.structures.linear import evaluate
 from alphacut.frame.verification.exact_motion import LinearMotion
@@ -164,7 +163,7 @@ def test_fast_motions_turn_as_far_in_a_step_as_its_rule_allows(turn: float) -> N
 
 def test_the_line_in_a_step_is_the_record_where_that_is_linear() -> None:
     samples = np.random.default_rng(4).standard_normal(9)
-    found = linear_load(Accelerogram(0.1, samples), 0.05, 20)
+    found = linear_loads([Accelerogram(0.1, samples)], 0.05, 20)
     exact = np.interp(0.05 * np.arange(17), 0.1 * np.arange(9), samples)
     assert found[:16] == pytest.approx(np.stack([exact[:-1], exact[1:]], -1), abs=1e-13)
     assert found[16:] == pytest.approx(0.0, abs=1e-13)
