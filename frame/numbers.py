@@ -15,3 +15,34 @@ GAP_POWER = 3.0
 """Power of the inputs' widths with which gaps fall at least; remainders are of fourth degree."""
 NARROWED = 0.5
 """Fractions pruned from all inputs, in sum, from which a box is bounded anew, not bisected."""
+
+TABLE_SPACING = 0.07
+"""Distance of the points of a mode's table along ω and g, as a fraction of its decay."""
+PATIENCE = 12
+"""Subgradient steps without a third of the expected fall of D after which less is expected."""
+JUMPS, CLIMBS = 4, 16
+"""Most steps of the model's ascent from one point: towards ends of the box, and along gradients."""
+CELL_GRACE = 8
+"""Cells of a node after which the fall of its gap counts."""
+MIN_CELL_PROGRESS = 0.5
+"""The effort for a node ends where its gap has fallen by less than this fraction of an even fall
+to what suffices."""
+EXPECTED_CUBIC = 0.5
+"""Fraction of the cubic parts' sizes that is expected of their sum, in which they partly cancel."""
+
+PRUNING_CELLS, PRUNING_STEPS = 24, 40
+"""Most cells of a bound over an end of an input's range, and evaluations of D for each."""
+LEAST_PEAK_BISECTIONS = 48
+"""Most bisections of cells; three times as many raise the bounds of six storeys by 2 %."""
+LEAST_PEAK_NODES, LEAST_PEAK_STEPS = 6, 80
+"""Nodes that are tried in a cell, and evaluations of D for each."""
+LEAST_PEAK_DESCENTS = 3
+"""Steps of the descent over corners to a motion that peaks low."""
+PEAK_CELLS, PEAK_STEPS = 240, 40
+"""Most cells of a bound above a peak over a sub-box, and evaluations of D for each."""
+CELLS_ABOVE_PEAK = 6
+"""Multiple of the cells that nodes are worth whose bounds lie above the peak."""
+REMAINDER_MULTIPLE, REMAINDER_MULTIPLE_AT_PEAKS = 1.0, 0.25
+"""Multiples of the remainders' own part of a bound below which no gap is worth any effort."""
+TRUNCATION = 0.1
+"""Fraction of a gap that modes may take which are not enclosed."""

@@ -1,4 +1,4 @@
-"""A box of a linear structure's inputs: models over it or a part of it, and exact motions."""
+"""A box of a linear structure's inputs: models over it, and exact motions at points of it."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from alphacut.frame.structures.linear import LinearSystem, histories
 from alphacut.frame.structures.loads import History
 from alphacut.fuzzy.arrays import Array, Rows
 
-MOST_ENTRIES = 400_000
+MAX_ENTRIES = 400_000
 """Entries of the matrices of all points whose exact motions are computed together."""
 SUBSTEPS = 4
 """Parts of a step at whose ends the peak of one motion is read; what lies between falls with its
@@ -34,6 +34,8 @@ square."""
 @dataclass(frozen=True, eq=False)
 class Box:
     """Inputs of a structure between two ends, d of which have a width.
+
+    Unit coordinates are those of these d inputs, within [−1, 1].
 
     Args:
         system: The structure.
@@ -89,7 +91,9 @@ class Box:
             UnprovedError: No mode of the structure can be enclosed.
         """
         try:
-            structure = with_outputs(self.structure, outputs)
+            whole = self.structure
+            rows, factor, order = whole.rows[outputs], whole.factor[outputs], whole.order[outputs]
+            structure = replace(whole, rows=rows, factor=factor, order=order)
             source_names, time = sources(self.system, structure), self.time[nodes]
             return LevelModels.from_structure(structure, self.loads, time, source_names, allowed)
         except UnprovedError as refusal:
@@ -97,23 +101,29 @@ class Box:
                 refusal.along = int(self.active[refusal.along])
             raise
 
-    def attained(self, unit: Array, node: Rows, output: Rows) -> Array:
-        """Exact values of outputs at nodes for unit coordinates (S, d), each shape (S,)."""
-        return self.attained_with_error(unit, node, output)[0]
-
-    def attained_with_error(self, unit: Array, node: Rows, output: Rows) -> tuple[Array, Array]:
+    def reached(self, unit: Array, node: Rows, output: Rows) -> tuple[Array, Array]:
         """Exact values of one output at one node for each of S points, and their rounding, (S,).
 
         Points are unit coordinates (S, d); modes are found once for each distinct one.
+
+        Raises:
+            UnprovedError: A mode does not oscillate there.
         """
         points, index = np.unique(unit, axis=0, return_inverse=True)
-        values_and_errors, count = np.empty((2, len(unit))), self._points_at_once
+        values_and_errors = np.empty((2, len(unit)))
+        count = max(MAX_ENTRIES // len(self.structure.pattern) ** 2, 1)
         for first in range(0, len(points), count):
             modal = self._modal(points[first : first + count])
             inside = np.flatnonzero((index >= first) & (index < first + count))
             for rows in np.array_split(inside, -(-len(inside) // count)):
-                motions = self._motions(modal, index[rows] - first, node[rows], output[rows])
-                values_and_errors[:, rows] = motions
+                point, nodes = index[rows] - first, node[rows]
+                loads = {
+                    name: load_at_given_nodes(modal.sigma[point], load, self.time, nodes)
+                    for name, load in self.loads.items()
+                }
+                values_and_errors[:, rows] = outputs_at(
+                    modal, point, output[rows], self.time[nodes], loads
+                )
         return values_and_errors[0], values_and_errors[1]
 
     def centre_motion(self) -> tuple[Array, Array, Array]:
@@ -126,21 +136,18 @@ class Box:
         Raises:
             UnprovedError: A mode does not oscillate there.
         """
-        modal, (total, m) = self._modal(np.zeros((1, len(self.active)))), self._shape
-        sigma = modal.sigma[0]
+        modal, count = self._modal(np.zeros((1, len(self.active)))), len(self.time)
+        sigma, point = modal.sigma[0], np.zeros(count, int)
         loads = {name: load_at_nodes(sigma, x, self.time) for name, x in self.loads.items()}
-        first_point = np.zeros(total, int)
         columns = [
-            outputs_at(modal, first_point, np.full(total, o), self.time, loads) for o in range(m)
+            outputs_at(modal, point, np.full(count, output), self.time, loads)
+            for output in range(len(modal.order))
         ]
         value, error = (np.stack(column, -1) for column in zip(*columns, strict=True))
         return value, error, self._line_deviation(modal)
 
     def peak_over_time(self, unit: Array) -> Array:
-        """Upper bound of each output's magnitude over all time, between nodes too, shape (m,).
-
-        Args:
-            unit: Unit coordinates of the motion, shape (d,).
+        """Upper bound of each output's magnitude at one point (d,), between nodes too, shape (m,).
 
         Raises:
             UnprovedError: A mode does not oscillate there.
@@ -150,34 +157,16 @@ class Box:
         motion = replace(self, time=time, low=point, high=point)
         value, error, deviation = motion.centre_motion()
         size = np.abs(value) + error
-        # `deviation` is how far the motion leaves the straight line between both ends of a step
         return np.asarray((np.maximum(size[1:], size[:-1]) + deviation[1:]).max(0))
-
-    @property
-    def _shape(self) -> tuple[int, int]:
-        """Numbers of nodes and outputs."""
-        return len(self.time), len(self.structure.order)
-
-    @property
-    def _points_at_once(self) -> int:
-        return max(MOST_ENTRIES // len(self.structure.pattern) ** 2, 1)
 
     def _modal(self, unit: Array) -> Modal:
         return modes_at(self.system, self.structure, self.names, self.inputs(unit), unit)
 
-    def _motions(self, modal: Modal, point: Rows, node: Rows, output: Rows) -> tuple[Array, Array]:
-        sigma = modal.sigma[point]
-        loads = {
-            name: load_at_given_nodes(sigma, load, self.time, node)
-            for name, load in self.loads.items()
-        }
-        return outputs_at(modal, point, output, self.time[node], loads)
-
     def _line_deviation(self, modal: Modal) -> Array:
         """Bound of how far a motion strays from straight lines in the step to a node, (T, m)."""
-        total, m = self._shape
-        deviation, outputs = np.zeros((total, m)), np.arange(m)
-        read = np.abs(modal.output_coefficients(np.zeros(m, int), outputs)[0])
+        outputs = np.arange(len(modal.order))
+        deviation = np.zeros((len(self.time), len(outputs)))
+        read = np.abs(modal.output_coefficients(np.zeros_like(outputs), outputs)[0])
         for k, sigma in enumerate(modal.sigma[0]):
             grid = Grid(np.array([sigma.imag]), np.array([-sigma.real / sigma.imag]))
             oscillator = Oscillators(grid, self.loads, self.time)
@@ -197,12 +186,6 @@ def over_box(system: LinearSystem, names: Sequence[str], low: Array, high: Array
     parameters = {name: TaylorModel.constant(x, d) for name, x in values.items()}
     parameters |= {names[int(i)]: inputs[column] for column, i in enumerate(active)}
     return classical(system, parameters)
-
-
-def with_outputs(structure: Classical, outputs: Rows | slice) -> Classical:
-    """The structure of which some outputs alone are read."""
-    rows, factor, order = structure.rows, structure.factor, structure.order
-    return replace(structure, rows=rows[outputs], factor=factor[outputs], order=order[outputs])
 
 
 def sources(system: LinearSystem, structure: Classical) -> tuple[str, ...]:

@@ -1,18 +1,13 @@
-"""The dual function of one bound and its minimisation.
+"""The dual function of a Lagrangian relaxation and its minimisation by deflected subgradients.
 
-The step is that of the deflected subgradient (Camerini, Fratta, Maffioli 1975) with a target value
-(Polyak 1969).
+An output at a node is Σ_k F_k(z_k(u)): z_k are intervening variables of mode k, F_k the response of
+one oscillator. All z are scaled to [−1, 1] over the box: z = a·u + u·Q u ± R. For any multipliers μ
+the maximum of side × output over the inputs u is at most (Geoffrion 1974)
 
-Scaled variables are used: ẑ = (z − z₀)/s for each intervening variable, within [−1, 1] over the
-box, so that ẑ(u) = a·u + u·Q u ± R with a, Q and R of order one. For a node, an output and a
-side,
+    D(μ) = Σ_k max over the mode's table of [ Σ_s c e + |r e − μ_s| − μ_ω ω − μ_g g ]
+         + max over u of [ Σ μ (a·u + u·Q u) + truncated modes ] + Σ |μ| R,
 
-    D(μ) = Σ_k max over the grid of [ Σ_s c₀ e + |s e − μ_s| − μ_ω ω̂ − μ_g ĝ ]
-         + max over u of [ Σ μ (a·u + u·Q u) + truncated modes ] + Σ |μ| R
-
-is convex, and a bound for any μ. Its second line is bounded, not solved: inputs whose linear
-part outweighs all that couples them are at an end of the box, one after the other; products of
-the rest count by magnitude.
+a convex function; e are responses to source s, c ± r the range of their amplitude.
 """
 
 from __future__ import annotations
@@ -28,10 +23,6 @@ from alphacut.fuzzy.arrays import Array, Rows
 
 LARGEST = 1e100
 """Magnitude of models, tables and multipliers at most: no sum of their products overflows."""
-PATIENCE = 12
-"""Steps without half the expected gain after which less is expected."""
-EXPECTED = 0.5
-"""Share of the cubic parts' sizes that is expected of their sum, in which they partly cancel."""
 
 
 class Data(NamedTuple):
@@ -44,7 +35,7 @@ class Data(NamedTuple):
         start: Least ω and q of each table, shape (K, 2).
         step: Distances of its points, shape (K, 2).
         points: Number of points along ω and along q, shape (2,).
-        ends: First and last place along ω and along q that the box reaches, shape (K, 4).
+        ends: First and last point along ω and along q that the box reaches, shape (K, 4).
         centre: Centres of ω and g, shape (K, 2).
         radius: Their radii.
         share: Centres of the shares, shape (K, sources).
@@ -52,8 +43,8 @@ class Data(NamedTuple):
         linear: Linear parts of all scaled variables, shape (Z, L).
         quadratic: Quadratic parts, packed by rows, shape (Z, L (L + 1)/2).
         cubic: Cubic parts, packed, shape (Z, monomials).
-        size: Their sizes over the box, shape (Z,).
-        remainder: Remainders with `EXPECTED` of `size`, shape (Z,).
+        expected: What is expected of the cubic parts' sum for a multiplier of 1, shape (Z,).
+        remainder: Remainders, with `expected`, shape (Z,).
         truncated_response: Middles and half ranges of truncated modes' responses, shape
             (2 sources, T); (0, 1) if there are none.
         truncated_linear: Linear parts of their shares and amplitudes, shape (2 sources, L).
@@ -75,7 +66,7 @@ class Data(NamedTuple):
     linear: Array
     quadratic: Array
     cubic: Array
-    size: Array
+    expected: Array
     remainder: Array
     truncated_response: Array
     truncated_linear: Array
@@ -89,14 +80,7 @@ def roundings(modes: int, sources: int, inputs: int) -> int:
 
 
 def require_in_range(fields: Mapping[str, Array]) -> None:
-    """Refuse models and tables with numbers for which the dual function may overflow.
-
-    Args:
-        fields: Fields of `Data` by name.
-
-    Raises:
-        UnprovedError: A number is not finite or larger than `LARGEST`.
-    """
+    """Raise UnprovedError where a number of models or tables is not finite or above `LARGEST`."""
     for name, values in fields.items():
         if not (np.abs(values) <= LARGEST).all():
             raise UnprovedError(f"dual function: {name} is not finite or above {LARGEST:g}")
@@ -108,11 +92,10 @@ loops = kernel(fastmath={"reassoc", "contract"})
 
 @loops
 def box_maximum(linear: Array, quadratic: Array, u: Array) -> float:
-    """Upper bound of linear·u + Σ_{i ≤ j} q_ij u_i u_j over the box [−1, 1]^d.
+    """Upper bound of linear·u + Σ_{i ≤ j} q_ij u_i u_j over [−1, 1]^d; `u` near it is written.
 
-    Inputs whose slope outweighs all that couples them are put to an end of the box; products of the
-    others count by magnitude. The q_ij are packed by rows, i ≤ j; `u` (d,) is written: inputs near
-    the maximum.
+    Inputs whose slope outweighs all that couples them are at an end of the box, one after the
+    other; products of the rest count by magnitude. The q_ij are packed by rows.
     """
     d = len(u)
     # full: q_ij, symmetric; slack: Σ_j |q_ij| over the free j ≠ i
@@ -182,20 +165,19 @@ def dot(a: Array, b: Array) -> float:
 
 @loops
 def dual(
-    mu: Array, slab: Rows, node: int, side: float, data: Data, gradient: Array, u: Array
+    mu: Array, cell: Rows, node: int, side: float, data: Data, gradient: Array, u: Array
 ) -> float:
-    """Value D(μ) of the dual function at multipliers μ (Z,), without its constants.
+    """Value D(μ) of the dual function at multipliers μ (Z,), without constants and cubic parts.
 
-    D(μ) = Σ_k max over mode k's table of (response − μ·z) + max over inputs u of μ·z(u) + |μ|·R,
-    z(u) ± R the Taylor models of the intervening variables. Written are a subgradient (Z,) and `u`
-    (L,), the inputs of the second maximum. `slab` (K, 4) holds the first and last place along ω and
-    along q at which each mode's table is read. |μ| and data are at most `LARGEST`.
+    Written are a subgradient (Z,) and `u` (L,), the inputs of the second maximum. `cell` (K, 4)
+    holds the first and last point along ω and along q at which each mode's table is read. |μ| and
+    data are at most `LARGEST`.
     """
     modes, sources = data.share.shape
     gradient[:] = 0.0
     total, values = 0.0, np.empty(data.omega.shape[1])
     for k in range(modes):
-        highest, at = mode_maximum(mu, k, slab[k], node, side, data, values)
+        highest, at = mode_maximum(mu, k, cell[k], node, side, data, values)
         total += highest
         first = k * (2 + sources)
         gradient[first] = -data.omega[k, at]
@@ -221,15 +203,14 @@ def dual(
 
 @loops
 def mode_maximum(
-    mu: Array, k: int, slab: Rows, node: int, side: float, data: Data, values: Array
+    mu: Array, k: int, cell: Rows, node: int, side: float, data: Data, values: Array
 ) -> tuple[float, int]:
-    """Maximum of mode k's term in D(μ) over a slab of its table, and the table point of it.
+    """Maximum of mode k's term in D(μ) over a cell of its table, and its point.
 
-    `slab` holds the first and last place along ω, then along q; `values` is scratch. Loops run over
-    slices from 0, without which they are not compiled to vector instructions.
+    Loops run over slices from 0, without which they are not compiled to vector instructions.
     """
-    count, width = int(data.points[0]), slab[1] + 1 - slab[0]  # a row has `count` points along ω
-    first, end = slab[2] * count + slab[0], slab[3] * count + slab[1] + 1
+    count, width = int(data.points[0]), cell[1] + 1 - cell[0]  # a row has `count` points along ω
+    first, end = cell[2] * count + cell[0], cell[3] * count + cell[1] + 1
     maximand(mu, k, first, node, side, data, values[first:end])
     highest = np.full(width, -1e300)
     for begin in range(first, end, count):
@@ -249,11 +230,7 @@ def mode_maximum(
 def maximand(
     mu: Array, k: int, first: int, node: int, side: float, data: Data, values: Array
 ) -> None:
-    """Write Σ_s c_s e_s + |r_s e_s − μ_s| − μ_ω ω − μ_g g at points of mode k's table to `values`.
-
-    e_s are the responses to source s, c_s ± r_s (times side) the range of their amplitude; points
-    are consecutive, from `first` on.
-    """
+    """Write Σ_s c e + |r e − μ_s| − μ_ω ω − μ_g g to `values`, from mode k's point `first` on."""
     sources, end = data.share.shape[1], first + len(values)
     z = k * (2 + sources)
     w, g, mu_w, mu_g = data.omega[k, first:end], data.decay[k, first:end], mu[z], mu[z + 1]
@@ -274,36 +251,41 @@ def remainder_bound(mu: Array, data: Data) -> float:
     total, expected = np.zeros(data.cubic.shape[1]), 0.0
     for z in range(len(mu)):
         add(total, mu[z], data.cubic[z])
-        expected += abs(mu[z]) * data.size[z]
-    return np.abs(total).sum() - EXPECTED * expected
+        expected += abs(mu[z]) * data.expected[z]
+    return np.abs(total).sum() - expected
 
 
 @compiled
 def minimise(
     mu: Array,
-    slab: Rows,
+    cell: Rows,
     node: int,
     side: float,
     data: Data,
     steps: int,
+    patience: int,
     target: float,
-    aim: float,
+    model_value: float,
     weight: Array,
     u: Array,
 ) -> float:
-    """Minimise the dual function D(μ) by a deflected subgradient method; return an upper bound.
+    """Minimise the dual function D(μ) by deflected subgradient steps; return an upper bound.
 
-    The bound is the least D(μ) that is met, with that of the Taylor models' cubic parts.
+    The direction is the subgradient with a part of the last direction where these oppose one
+    another (Camerini, Fratta, Maffioli 1975). Its length aims at a value of D that is expected
+    (Polyak 1969); less is expected after `patience` steps without a third of it. The bound is the
+    least D that is met, with that of the Taylor models' cubic parts.
 
     Args:
-        mu: Multipliers to begin with, and the best ones afterwards.
-        slab: First and last place along ω and along q of each mode's table, shape (K, 4).
+        mu: Multipliers to begin with, shape (Z,); written: the best ones.
+        cell: First and last point along ω and along q of each mode's table, shape (K, 4).
         node: Node.
         side: +1 or −1.
         data: Models and tables of the output.
         steps: Most evaluations of D.
-        target: Value at which the search ends.
-        aim: A value that D cannot fall below: the model's at some inputs.
+        patience: Steps after which less is expected.
+        target: Value at which the minimisation ends.
+        model_value: The model's value at some inputs, which D cannot fall below.
         weight: Written: by how much each intervening variable differs between the two maxima of D,
             times its multiplier, shape (Z,).
         u: Written: inputs that the best multipliers name.
@@ -313,7 +295,7 @@ def minimise(
     least, expected_drop, idle = np.inf, np.inf, 0
     weight[:] = 0.0
     for _ in range(steps):
-        value = dual(mu, slab, node, side, data, gradient, here)
+        value = dual(mu, cell, node, side, data, gradient, here)
         for z in range(len(mu)):
             weight[z] = 0.8 * weight[z] + abs(gradient[z] * mu[z])
         if value < least:
@@ -324,27 +306,25 @@ def minimise(
         if least <= target:
             break
         if expected_drop == np.inf:
-            expected_drop = 0.7 * max(least - aim, 0.0)
+            expected_drop = 0.7 * max(least - model_value, 0.0)
         idle += 1
-        if idle > PATIENCE:
+        if idle > patience:  # back to the best multipliers
             expected_drop, idle = 0.5 * expected_drop, 0
             mu[:], direction[:] = best, 0.0
-            if expected_drop < 0.1 * (target - aim):
+            if expected_drop < 0.1 * (target - model_value):
                 break
-        elif not deflect(mu, gradient, direction, value - least + expected_drop, data.grain[0]):
+        elif not step(mu, gradient, direction, value - least + expected_drop, data.grain[0]):
             break
     mu[:] = best
     return least + remainder_bound(mu, data)
 
 
 @loops
-def deflect(mu: Array, gradient: Array, direction: Array, gain: float, grain: float) -> bool:
-    """Make a deflected subgradient step of the multipliers μ, rounded to multiples of `grain`.
+def step(mu: Array, gradient: Array, direction: Array, drop: float, grain: float) -> bool:
+    """Make a deflected subgradient step of the multipliers μ that aims at a fall of D by `drop`.
 
-    The direction is the gradient with a part of the last direction, where these oppose one another
-    (Camerini, Fratta, Maffioli 1975); its length aims at a fall of D by `gain` (Polyak 1969). `mu`
-    and `direction` are written. On a grid the path of μ does not depend on rounding; any μ gives a
-    bound.
+    `mu` and `direction` are written. Multipliers are rounded to multiples of `grain`: on a grid
+    their path does not depend on rounding, and any μ gives a bound.
 
     Returns:
         False where the direction is zero, or a multiplier exceeds `LARGEST`.
@@ -353,15 +333,15 @@ def deflect(mu: Array, gradient: Array, direction: Array, gain: float, grain: fl
     for z in range(len(mu)):
         along += gradient[z] * direction[z]
         length += direction[z] ** 2
-    weight = -1.5 * along / length if along < 0 and length > 0 else 0.0
+    deflection = -1.5 * along / length if along < 0 and length > 0 else 0.0
     length = 0.0
     for z in range(len(mu)):
-        direction[z] = gradient[z] + weight * direction[z]
+        direction[z] = gradient[z] + deflection * direction[z]
         length += direction[z] ** 2
     if length < 1e-24:
         return False
     for z in range(len(mu)):
-        mu[z] = grain * np.rint((mu[z] - gain / length * direction[z]) / grain)
+        mu[z] = grain * np.rint((mu[z] - drop / length * direction[z]) / grain)
         if not abs(mu[z]) <= LARGEST:
             return False
     return True

@@ -10,100 +10,76 @@ from __future__ import annotations
 
 import numpy as np
 
+from alphacut.frame import numbers
 from alphacut.frame.bounds.level import LevelModels, OutputBounds
-from alphacut.frame.bounds.slabs import response_and_gradient
+from alphacut.frame.bounds.node_bounds import response_and_gradient
 from alphacut.fuzzy.arrays import Array, Rows
 
-ENDS = (0.25, 0.5)
-"""Shares of an input's range that are tried, the second where the first can be pruned."""
-EFFORTS = (1, 24)
-"""Slabs of a bound over an end."""
-STEPS = 40
-"""Evaluations of the dual function for each slab."""
+FRACTIONS = (0.25, 0.5)
+"""Fractions of an input's range that are tried, the second where the first can be pruned."""
 
 
 def prune_ends(
-    level: LevelModels,
-    problem: OutputBounds,
-    bound_index: tuple[int, int],
-    above: Rows,
-    best: Array,
-) -> tuple[Array, Array, Array]:
+    level: LevelModels, bounds: OutputBounds, above: Rows
+) -> tuple[Array, Array, Array, Array]:
     """Prune ends of the box [−1, 1]^d over which no bound exceeds the peak by more than the gap.
-
-    An end is a quarter or a half of one input's range, on the side away from the best input.
 
     Args:
         level: Models over the box.
-        problem: Bounds of one output and side over the box.
-        bound_index: Number of the output, and 0 for −output or 1 for the output.
-        above: Indices of the nodes whose bounds exceed the peak, shape (J,).
-        best: Coordinates of the best inputs found, shape (d,).
+        bounds: Bounds of one output and side over the box.
+        above: Nodes whose bounds exceed the peak, shape (J,).
 
     Returns:
-        Lower and upper ends of what remains, (d,) each, and upper bounds at these nodes over all
-        that is pruned, (J,).
+        Lower and upper ends of what remains, (d,) each; upper bounds at these nodes over all that
+        is pruned, (J,), −inf if nothing is; and each input's share in the gap, (d,).
     """
+    highest = int(above[bounds.out[0, above].argmax()])
+    best = bounds.at[highest]
     low, high = -np.ones_like(best), np.ones_like(best)
     pruned = np.full(len(above), -np.inf)
-    for slabs in EFFORTS:
+    limit = bounds.reached + bounds.wanted_gap
+    for cells in (1, int(numbers.PRUNING_CELLS)):
         for i in range(len(best)):
             prune_upper = best[i] <= 0
-            for fraction in ENDS if high[i] - low[i] == 2.0 else ():  # not pruned before
-                piece_low, piece_high = low.copy(), high.copy()
+            for fraction in FRACTIONS if high[i] - low[i] == 2.0 else ():  # not pruned before
                 end = 1 - 2 * fraction if prune_upper else 2 * fraction - 1
+                piece_low, piece_high = low.copy(), high.copy()
                 (piece_low if prune_upper else piece_high)[i] = end
-                piece = piece_low, piece_high
-                bounds = _over_piece(level, problem, bound_index, above, piece, slabs)
-                if bounds.max() > problem.attained + problem.wanted_gap:
+                piece = level.within(piece_low, piece_high)
+                inside = OutputBounds.initial(
+                    piece, *bounds.index, bounds.wanted_gap, bounds.reached
+                )
+                inside.out[0] = bounds.out[0]
+                effort = inside.effort(cells, int(numbers.PRUNING_STEPS), slack_below_peak=1.0)
+                for node in above[np.argsort(-bounds.out[0, above])]:  # the largest bound first
+                    inside.improve(np.array([node]), effort)
+                    if inside.out[0, node] > limit:
+                        break
+                over_piece = inside.out[0, above]
+                if over_piece.max() > limit:
                     break
-                pruned = np.maximum(pruned, bounds)
+                pruned = np.maximum(pruned, over_piece)
                 (high if prune_upper else low)[i] = end
-    return low, high, pruned
+    return low, high, pruned, remainder_addition(bounds, highest)[1]
 
 
-def _over_piece(
-    level: LevelModels,
-    problem: OutputBounds,
-    bound_index: tuple[int, int],
-    above: Rows,
-    piece: tuple[Array, Array],
-    slabs: int,
-) -> Array:
-    """Upper bounds of one output and side over a piece of the box at nodes `above`, shape (J,).
-
-    `piece` are its lower and upper ends, (d,) each; `bound_index` is the output's number, and 0 for
-    −output or 1. The largest bounds are improved first, by at most `slabs` slabs each, until one
-    stays above the peak; the others are those of the box, in `problem`.
-    """
-    inside = OutputBounds.initial(
-        level.within(*piece), *bound_index, problem.wanted_gap, problem.attained
-    )
-    inside.out[0] = problem.out[0]
-    for node in above[np.argsort(-problem.out[0, above])]:
-        inside.run(np.array([node]), slabs, STEPS, 1.0, 0.0)
-        if inside.out[0, node] > problem.attained + problem.wanted_gap:
-            break
-    return np.asarray(inside.out[0, above])
-
-
-def remainder(problem: OutputBounds, node: int) -> tuple[float, Array]:
-    """Least addition of the Taylor remainders to a bound at a node, and each input's part in it.
-
-    Returns:
-        The addition, in the output's unit, and fractions of it, shape (d,), whose sum is 1.
+def remainder_addition(bounds: OutputBounds, node: int) -> tuple[float, Array]:
+    """Return the least addition of the Taylor remainders to a bound, and each input's part in it.
 
     At the maximum the multipliers are the slopes of the motion by the intervening variables.
     Remainders are of fourth degree: they are shared out by the squares of what the first and second
     degree of each variable have of an input.
+
+    Returns:
+        The addition, in the output's unit, and fractions of it, shape (d,), whose sum is 1.
     """
-    data, d = problem.data, problem.data.linear.shape[1]
+    data, d = bounds.data, bounds.data.linear.shape[1]
     slope = np.zeros(len(data.linear))  # of the response by each intervening variable
-    response_and_gradient(problem.at[node], node, problem.side, data, slope)
+    response_and_gradient(bounds.at[node], node, bounds.side, data, slope)
     upper = np.zeros((len(slope), d, d))
     upper[(slice(None), *np.triu_indices(d))] = np.abs(data.quadratic)
     size = (np.abs(data.linear) + upper.sum(1) + upper.sum(2)) ** 2
-    by_input = np.abs(slope) * data.remainder
-    shares = (by_input / np.maximum(size.sum(1), 1e-300)) @ size
-    least = float(problem.constant[1, node] + by_input.sum())
+    by_variable = np.abs(slope) * data.remainder
+    shares = (by_variable / np.maximum(size.sum(1), 1e-300)) @ size
+    least = float(bounds.constant[1, node] + by_variable.sum())
     return least, np.asarray(shares / max(float(shares.sum()), 1e-300))

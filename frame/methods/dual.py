@@ -1,26 +1,18 @@
-"""Proved envelopes of linear structures with many fuzzy inputs: the dual bound as a method.
+"""Proved envelopes of linear structures with many fuzzy inputs: Lagrangian relaxation as a method.
 
-1. A linear structure with classical modes answers as Σ_k F_k(z_k): z_k are few intervening
-   variables of mode k (section 7), its frequency, its decay and its shares, F_k the exact
-   response of one oscillator. They bend little over the box: z = Z u + quadratic terms + R, |R|
-   proved (`blocks`, `intervening`). The F_k stand in tables of proved error (`waves`).
-2. For any multipliers μ
+A linear structure with classical modes answers as Σ_k F_k(z_k(u)): z_k(u) are few intervening
+variables of mode k (section 7), its frequency, its decay and its shares, F_k the response of one
+oscillator. They bend little over the box: z = Z u + quadratic terms + R, |R| proved. For any
+multipliers μ
 
-       max Σ_k F_k(z_k(u)) ≤ Σ_k max (F_k − μ_k·z_k) + max μ·(z − R)(u) + |μ|·R,
+    max Σ_k F_k(z_k(u)) ≤ Σ_k max (F_k − μ_k·z_k) + max μ·(z − R)(u) + |μ|·R
 
-by Lagrangian relaxation (Geoffrion 1974; Lemaréchal 2001), so that nothing rests on how μ is
-found. The cost is one of modes, tables and nodes, and hardly one of inputs (`dual_function`).
-3. Where the modes' own maxima lie too far from one u, their ranges are halved: slabs of few z,
-   not boxes of many u. Near the peaks, that is; elsewhere a wider gap is left.
-4. What the maxima name leads to inputs whose exact motion is the other end of the gap (`box`).
-5. The few nodes whose bounds are still too far above a peak are bounded over parts of the box
-   (`alphacut.frame.bounds.spatial_branch_and_bound`), after its ends are pruned (`pruning`).
-6. The same bounds, over ranges of the leading mode, tell how low a peak can be (`least_peaks`).
+(Geoffrion 1974; Lemaréchal 2001), so that nothing rests on how μ is found. The cost is one of
+modes, tables and nodes, and hardly one of inputs.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -28,34 +20,30 @@ from typing import ClassVar
 
 import numpy as np
 
+from alphacut.frame import numbers
 from alphacut.frame.bounds.box import Box
-from alphacut.frame.bounds.box_proof import BoxBounds, Goal
+from alphacut.frame.bounds.box_proof import Answer, BoxBounds, Goal
 from alphacut.frame.bounds.least_peaks import least_peak
-from alphacut.frame.bounds.level import OutputBounds
-from alphacut.frame.bounds.pruning import prune_ends, remainder
+from alphacut.frame.bounds.level import LevelModels, OutputBounds, improve_all
+from alphacut.frame.bounds.pruning import prune_ends, remainder_addition
 from alphacut.frame.bounds.spatial_branch_and_bound import halvings, prove
 from alphacut.frame.boxes import Boxes, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.envelope import Ends, Envelope
-from alphacut.frame.numbers import WIDE
 from alphacut.frame.structures.linear import frequencies
-from alphacut.fuzzy.arrays import Array, Rows
-from alphacut.fuzzy.progress_bar import Progress
+from alphacut.fuzzy.arrays import Array, Mask, Rows
+from alphacut.fuzzy.progress_bar import Progress, subprogress
 from alphacut.fuzzy.refused import RefusedError
 
-PEAK_SLABS, PEAK_STEPS = 240, 40
-"""Most slabs of a bound above a peak over a part, and evaluations for each."""
 DRIFT = 1e-6
 """Lowest frequency over the highest at which rounding of the stiffness may hide a drift."""
 NEAR = 1e-3
-"""Share of the box about the nominal inputs over which modes are enclosed if any part of the box
+"""Fraction of the box about the nominal inputs over which modes are enclosed if any part of the box
 can be proved."""
-
-CORNERS = 3
-"""Corners of the box that a descent to the smallest peak visits."""
-TRUNCATION = 0.1
-"""Share of a gap that modes may take which are not enclosed."""
+WORK_OF_PASSES = 0.0, 0.05, 0.75, 1.0
+"""Fractions of the work at which the passes over all nodes begin and end, about."""
+Problems = dict[tuple[int, int], OutputBounds]
 
 
 @dataclass(frozen=True)
@@ -99,7 +87,7 @@ class DualProof:
                 raise RefusedError(key, getattr(self, key), "a positive number")
 
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
-        """Guaranteed envelope of all outputs on all levels.
+        """Return the guaranteed envelope of all outputs on all levels.
 
         Raises:
             UnprovedError: The structure has no classical modes that can be enclosed, or the motion
@@ -108,12 +96,12 @@ class DualProof:
         return prove(self, flow, progress)
 
     def peak_gap(self, scale: Array, peak: Array) -> Array:
-        """Gap at peaks that suffices, shape (m,)."""
+        """Return the gap at peaks that suffices, shape (m,)."""
         del scale
         return self.peaks * peak
 
     def forecast(self, flow: LinearFlow, boxes: Boxes) -> float:
-        """Expected work on the box: evaluations of the dual function for a bound, at most.
+        """Return the most evaluations of the dual function for a bound.
 
         A small part of the box is bounded first, so that what no part can mend is refused at once.
 
@@ -132,193 +120,149 @@ class DualProof:
             )
         return float(self.slabs * self.steps)
 
-    def bounds(self, flow: LinearFlow, boxes: Boxes, goal: Goal) -> list[BoxBounds | UnprovedError]:
-        """Bounds on each level of a part, or the error of one whose modes are not enclosed."""
-        found: list[BoxBounds | UnprovedError] = []
-        for k in range(len(boxes.alpha)):
+    def bounds(self, flow: LinearFlow, boxes: Boxes, goal: Goal) -> list[Answer]:
+        """Return bounds on each level of a box, or the refusal where modes are not enclosed."""
+        answers = list[Answer]()
+        for k, (low, high) in enumerate(zip(boxes.lower, boxes.upper, strict=True)):
+            box = Box(flow.system, boxes.names, flow.time, low, high)
             try:
-                found.append(self._of_level(flow, boxes, goal, k))
+                is_fuzzy = (high > low).any()
+                answers.append(self._relaxed(flow, box, goal, k) if is_fuzzy else _exact(box))
             except UnprovedError as refusal:
-                found.append(refusal)
-        return found
+                answers.append(refusal)
+        return answers
 
-    def _of_level(self, flow: LinearFlow, boxes: Boxes, goal: Goal, k: int) -> BoxBounds:
-        """Bounds on level k of a part; those of the exact motion where no input has a width."""
-        low, high = boxes.lower[k], boxes.upper[k]
-        box = Box(flow.system, boxes.names, flow.time, low, high)
-        if (high > low).any():
-            return _Bounding(self, flow, box, goal, k).bounds()
-        value, error, deviation = box.centre_motion()
-        sides, margin = np.stack([-value, value], -1), error[..., None]
+    def _relaxed(self, flow: LinearFlow, box: Box, goal: Goal, k: int) -> BoxBounds:
+        """Bounds on level k by Lagrangian relaxation, and what motions at the maximisers reach."""
+        needed, outer = goal.needed[k], goal.outer[k].copy()
+        nodes, outputs = np.flatnonzero(needed.any((1, 2))), np.flatnonzero(needed.any((0, 2)))
+        is_complete = bool(needed.all())
+        gap = (self.gap if is_complete else self.peaks) * goal.peak
+        level = box.level(nodes, numbers.TRUNCATION * gap[outputs], outputs)
+        problems: Problems = {}
+        for o, s in zip(*np.nonzero(needed.any(0)), strict=True):
+            index = int(np.searchsorted(outputs, o)), int(s)
+            problems[o, s] = OutputBounds.initial(level, *index, gap[o], goal.incumbent[k, o, s])
+            problems[o, s].out[0] = outer[nodes, o, s]
+        with ThreadPoolExecutor(goal.workers) as pool:
+            # 1. find multipliers with low bounds, and inputs with high values of the models
+            self._minimise(problems, goal, box, pool, needed[nodes], is_complete)
+            unit = np.zeros((*needed.shape, len(box.active)))
+            for (o, s), problem in problems.items():
+                outer[nodes, o, s], unit[nodes, o, s] = problem.out[0], problem.at
+            # 2. raise the incumbents to what the exact motions at these inputs reach
+            node, output, side = np.nonzero(needed)
+            value, error = box.reached(unit[needed], node, output)
+            inner, attained_error = np.full(needed.shape, -np.inf), np.zeros(needed.shape[:2])
+            inner[needed] = np.where(side, value, -value) - error
+            np.maximum.at(attained_error, (node, output), 2 * error)
+            above = dict[tuple[int, int], Rows]()
+            for (o, s), problem in problems.items():
+                problem.wanted_gap = self.peaks * goal.peak[o]
+                problem.reached = max(problem.reached, inner[:, o, s].max())
+                above[o, s] = problem.nodes_above(np.flatnonzero(needed[nodes, o, s]))
+            # 3. prune ends of the box that hold no peak above the incumbent and the gap
+            peaks = [peak for peak in problems if len(above[peak])]
+            shape = (*needed.shape[1:], len(box.low))
+            shares, remaining, pruned = np.zeros(shape), np.empty((2, *shape)), outer.copy()
+            remaining[:] = np.stack([box.low, box.high])[:, None, None]
+            jobs = [pool.submit(prune_ends, level, problems[x], above[x]) for x in peaks]
+            for (o, s), job in zip(peaks, jobs, strict=True):
+                low, high, over_pruned, share = job.result()
+                shares[o, s, box.active] = share
+                remaining[:, o, s] = box.inputs(np.stack([low, high]))
+                pruned[nodes[above[o, s]], o, s] = over_pruned
+            # 4. bound from below how low a peak can be
+            least = self._least_peaks(flow, box, level, pool) if is_complete else None
         return BoxBounds(
-            outer=sides + margin,
-            inner=sides - margin,
-            at=np.broadcast_to(low, (*sides.shape, len(low))).copy(),
-            between=deviation,
-            shares=np.zeros((*sides.shape[1:], len(low))),
-            attained_error=2 * error,
-            least_peaks=Ends((np.abs(value) - error).max(0), box.peak_over_time(np.zeros(0))),
-        )
-
-
-class _Bounding:
-    """Bounds over one level of a part.
-
-    Attributes:
-        needed: Bounds that are asked for, shape (T, m, 2).
-        nodes: Nodes of these, shape (J,).
-        outputs: Outputs of these, rising.
-        level: Models of the motion at these.
-        outer: Upper bounds of (−output, output) at all nodes, shape (T, m, 2).
-        unit: Coordinates of the best inputs, shape (T, m, 2, d).
-        shares: Share of each input in the gap at each peak, shape (m, 2, d).
-    """
-
-    def __init__(self, proof: DualProof, flow: LinearFlow, box: Box, goal: Goal, k: int) -> None:
-        self.proof, self.flow, self.box, self.goal = proof, flow, box, goal
-        self.needed, self.outer = goal.needed[k], goal.outer[k].copy()
-        self.incumbent = goal.incumbent[k].copy()
-        self.nodes: Rows = np.flatnonzero(self.needed.any((1, 2)))
-        gap = proof.gap if self.needed.all() else proof.peaks
-        self.outputs: Rows = np.flatnonzero(self.needed.any((0, 2)))
-        allowed = TRUNCATION * gap * goal.peak[self.outputs]
-        self.level = box.level(self.nodes, allowed, self.outputs)
-        d = len(box.active)
-        self.unit = np.zeros((*self.outer.shape, d))
-        self.shares = np.zeros((*self.outer.shape[1:], d))
-
-    def bounds(self) -> BoxBounds:
-        """Proved and attained bounds that are asked for, with the part pruned near peaks."""
-        if self.needed.all():
-            self._require_narrow()
-            proof, goal = self.proof, self.goal
-            bounds, self.unit = self.level.bounds(
-                proof.gap * goal.peak,
-                proof.below,
-                proof.slabs,
-                proof.steps,
-                goal.workers,
-                goal.tick,
-            )
-            self.outer = np.minimum(self.outer, bounds)
-        else:
-            self._at_peaks(self._bound)
-        inner = np.full(self.outer.shape, -np.inf)
-        node, output, side = np.nonzero(self.needed)
-        value, error = self.box.attained_with_error(self.unit[self.needed], node, output)
-        inner[self.needed] = np.where(side, value, -value) - error
-        attained_error = np.zeros(self.outer.shape[:2])
-        np.maximum.at(attained_error, (node, output), 2 * error)
-        self.incumbent = np.maximum(self.incumbent, inner.max(0))
-        n, active = len(self.box.low), self.box.active
-        self.remaining = np.empty((2, *self.incumbent.shape, n))
-        self.remaining[:] = np.stack([self.box.low, self.box.high])[:, None, None]
-        self.pruned = np.full(self.outer.shape, -np.inf)
-        self._at_peaks(self._prune)
-        least = self._least_peaks() if self.needed.all() else None
-        shares = np.zeros((*self.incumbent.shape, n))
-        shares[..., active] = self.shares
-        between = np.zeros(self.outer.shape[:2])
-        between[self.nodes] = self.level.line_deviation() if self.needed.all() else 0.0
-        return BoxBounds(
-            outer=self.outer,
+            outer=outer,
             inner=inner,
-            at=self.box.inputs(self.unit),
-            between=between,
+            at=box.inputs(unit),
+            between=level.line_deviation() if is_complete else np.zeros(needed.shape[:2]),
             shares=shares,
             attained_error=attained_error,
-            remaining=self.remaining,
-            pruned=self.pruned,
+            remaining=remaining,
+            pruned=pruned,
             least_peaks=least,
-            facts={"single_modes": len(self.level.oscillators)},
+            facts={"single_modes": len(level.oscillators)},
         )
 
-    def _least_peaks(self) -> Ends:
-        """Proved lower bound of each output's smallest peak, and a small one that is reached."""
-        outputs = range(len(self.incumbent))
-        with ThreadPoolExecutor(self.goal.workers) as pool:
-            bounds, units = zip(*pool.map(partial(least_peak, self.level), outputs), strict=True)
-        return Ends(np.array(bounds), self._least_peak_bounds(np.stack(units)))
+    def _minimise(
+        self,
+        problems: Problems,
+        goal: Goal,
+        box: Box,
+        pool: ThreadPoolExecutor,
+        needed: Mask,
+        is_complete: bool,
+    ) -> None:
+        """Minimise the dual functions of all bounds that are asked for, `needed` (J, m, 2)."""
+        first = next(iter(problems.values()))
+        first.improve(np.arange(0), first.effort(1, 1))  # compiles before there are threads
+        if not is_complete:
+            efforts = int(numbers.PEAK_CELLS), int(numbers.PEAK_STEPS), 1.0
+            jobs = [
+                (problem, np.flatnonzero(needed[:, o, s]), problem.effort(*efforts))
+                for (o, s), problem in problems.items()
+            ]
+            return improve_all(jobs, pool, lambda done: None)
+        # a first pass shows the peaks, a second halves cells where gaps are wide, a third does so
+        # further where bounds lie above a peak
+        cells_at_peaks = int(numbers.CELLS_ABOVE_PEAK * self.slabs)
+        for number, (cells, steps, slack, multiple) in enumerate(
+            (
+                (1, 1, 0.0, 0.0),
+                (self.slabs, self.steps, self.below, numbers.REMAINDER_MULTIPLE),
+                (cells_at_peaks, self.steps, 1.0, numbers.REMAINDER_MULTIPLE_AT_PEAKS),
+            )
+        ):
+            jobs = [
+                (problem, problem.open_nodes(slack), problem.effort(cells, steps, slack, multiple))
+                for problem in problems.values()
+            ]
+            improve_all(jobs, pool, subprogress(goal.tick, *WORK_OF_PASSES[number : number + 2]))
+            if number == 0 and not goal.last:
+                self._require_narrow(problems, box, goal.peak)
 
-    def _least_peak_bounds(self, unit: Array) -> Array:
-        """Upper bound of each output's least peak over the box, shape (m,).
-
-        Steepest descent over corners, one coordinate at a time, by the peaks at the nodes; at the
-        corner that it finds the peak is bounded between nodes, too.
-
-        Args:
-            unit: Coordinates near each output's smallest peak, shape (m, d).
-        """
-        d = unit.shape[-1]
-        moves = 1 - 2 * np.eye(d + 1, d)  # one coordinate changes its sign, or none
-        for _ in range(CORNERS):
-            tried = np.unique((unit[:, None] * moves).reshape(-1, d), axis=0)
-            peaks = np.abs(self.flow.values(self.box.inputs(tried))).max(1)
-            unit = tried[peaks.argmin(0)]
-        return np.array([self.box.peak_over_time(unit[o])[o] for o in range(len(unit))])
-
-    def _require_narrow(self) -> None:
-        """Refuse a part whose Taylor remainders exceed `WIDE` of a peak, if bisections help.
-
-        Nothing is refused where the part cannot be bisected any more.
-
-        Raises:
-            UnprovedError: They do.
-        """
-        if self.goal.last:
-            return
-        for o, s in np.ndindex(self.incumbent.shape):
-            bounds = self._initial_bounds(o, s, 0.0, 0.0)
-            bounds.run(np.arange(len(self.nodes)), 1, 1, 0.0, 0.0)
-            node, shares = int(bounds.out[1].argmax()), np.zeros(len(self.box.low))
-            addition, shares[self.box.active] = remainder(bounds, node)
-            if addition > WIDE * self.goal.peak[o] and halvings(shares, self.proof.parts) >= 1:
-                what = (
-                    f"the remainders of the modes are {addition / self.goal.peak[o]:.2g} of a peak"
-                )
+    def _require_narrow(self, problems: Problems, box: Box, peak: Array) -> None:
+        """Refuse a box whose Taylor remainders exceed `WIDE` of a peak, if bisections help."""
+        for (o, _), problem in problems.items():
+            shares = np.zeros(len(box.low))
+            highest = int(problem.out[1].argmax())
+            addition, shares[box.active] = remainder_addition(problem, highest)
+            if addition > numbers.WIDE * peak[o] and halvings(shares, self.parts) >= 1:
+                what = f"the remainders of the modes are {addition / peak[o]:.2g} of a peak"
                 raise UnprovedError(what, "take narrower inputs", int(shares.argmax()))
 
-    def _at_peaks(self, improve: Callable[[int, int], None]) -> None:
-        """Call `improve(output, side)` for each pair with a bound above what suffices."""
-        enough = self.proof.peaks * self.goal.peak[:, None]
-        above = self.needed & (self.outer > self.incumbent + enough)
-        with ThreadPoolExecutor(self.goal.workers) as pool:
-            for job in [pool.submit(improve, *peak) for peak in np.argwhere(above.any(0))]:
-                job.result()
+    def _least_peaks(
+        self, flow: LinearFlow, box: Box, level: LevelModels, pool: ThreadPoolExecutor
+    ) -> Ends:
+        """Lower bound of each output's smallest peak, and the peak of a motion that peaks low.
 
-    def _open_bounds(self, o: int, s: int) -> tuple[OutputBounds, Rows]:
-        """Bounds of output o on side s so far, and places of nodes where they do not suffice."""
-        wanted_gap, attained = self.proof.peaks * float(self.goal.peak[o]), self.incumbent[o, s]
-        bounds = self._initial_bounds(o, s, wanted_gap, float(attained))
-        bounds.out[0] = self.outer[self.nodes, o, s]
-        above = self.needed[self.nodes, o, s] & (bounds.out[0] > attained + wanted_gap)
-        return bounds, np.flatnonzero(above)
-
-    def _initial_bounds(self, o: int, s: int, enough: float, top: float) -> OutputBounds:
-        """Infinite bounds of output o on side s (0 for −output, 1 for the output)."""
-        return OutputBounds.initial(
-            self.level, int(np.searchsorted(self.outputs, o)), s, enough, top
-        )
-
-    def _bound(self, o: int, s: int) -> None:
-        """Improve the bounds of output o on side s at the nodes where they exceed its peak."""
-        bounds, above = self._open_bounds(o, s)
-        bounds.run(above, PEAK_SLABS, PEAK_STEPS, 1.0, 0.0)
-        nodes = self.nodes[above]
-        self.outer[nodes, o, s], self.unit[nodes, o, s] = bounds.out[0, above], bounds.at[above]
-
-    def _prune(self, o: int, s: int) -> None:
-        """Prune the ends of the part's box that hold no higher peak of output o on side s.
-
-        Written are the inputs' shares in the gap, what remains, and bounds over what is pruned.
+        Steepest descent over corners, one coordinate at a time, by the peaks at the nodes, begins
+        at the inputs that the lower bound names.
         """
-        bounds, above = self._open_bounds(o, s)
-        nodes = self.nodes[above]
-        bounds.at[above] = self.unit[nodes, o, s]
-        highest_node = int(above[bounds.out[0, above].argmax()])
-        self.shares[o, s] = remainder(bounds, highest_node)[1]
-        best = self.unit[nodes, o, s][self.outer[nodes, o, s].argmax()]
-        index = int(np.searchsorted(self.outputs, o)), s
-        low, high, pruned = prune_ends(self.level, bounds, index, above, best)
-        self.remaining[:, o, s] = self.box.inputs(np.stack([low, high]))
-        self.pruned[nodes, o, s] = pruned
+        count = len(level.structure.order)
+        bounds, units = zip(*pool.map(partial(least_peak, level), range(count)), strict=True)
+        unit, d = np.stack(units), len(box.active)
+        moves = 1 - 2 * np.eye(d + 1, d)  # one coordinate changes its sign, or none
+        for _ in range(int(numbers.LEAST_PEAK_DESCENTS)):
+            tried = np.unique((unit[:, None] * moves).reshape(-1, d), axis=0)
+            unit = tried[np.abs(flow.values(box.inputs(tried))).max(1).argmin(0)]
+        reached = np.array([box.peak_over_time(unit[o])[o] for o in range(count)])
+        return Ends(np.array(bounds), reached)
+
+
+def _exact(box: Box) -> BoxBounds:
+    """Bounds where no input has a width: the exact motion with its rounding."""
+    value, error, deviation = box.centre_motion()
+    sides, margin = np.stack([-value, value], -1), error[..., None]
+    return BoxBounds(
+        outer=sides + margin,
+        inner=sides - margin,
+        at=np.broadcast_to(box.low, (*sides.shape, len(box.low))).copy(),
+        between=deviation,
+        shares=np.zeros((*sides.shape[1:], len(box.low))),
+        attained_error=2 * error,
+        least_peaks=Ends((np.abs(value) - error).max(0), box.peak_over_time(np.zeros(0))),
+    )

@@ -65,9 +65,9 @@ def test_halves_cover_all_places_and_share_the_middle():
     for ends in ([[0, 40, 0, 12], [0, 40, 0, 12]], [[3, 5, 2, 2], [4, 5, 2, 3]]):
         cell = least_peaks.PeakCell(0.0, 0, np.array(ends), 1, np.zeros(2))
         lower, upper = least_peaks._halves(cell, motion)
-        np.testing.assert_array_equal(np.minimum(lower, upper)[:, ::2], cell.places[:, ::2])
-        np.testing.assert_array_equal(np.maximum(lower, upper)[:, 1::2], cell.places[:, 1::2])
-        changed = np.argwhere(lower != cell.places)
+        np.testing.assert_array_equal(np.minimum(lower, upper)[:, ::2], cell.ends[:, ::2])
+        np.testing.assert_array_equal(np.maximum(lower, upper)[:, 1::2], cell.ends[:, 1::2])
+        changed = np.argwhere(lower != cell.ends)
         ((mode, place),) = changed
         assert lower[mode, place] == upper[mode, place - 1]
     atoms = least_peaks.PeakCell(0.0, 0, np.array([[7, 8, 0, 1]] * 2), 1, np.zeros(2))

@@ -1,6 +1,5 @@
 """Numbers of the dual proof: fast modes, crisp inputs, threads, and what is not finite."""
 
-from collections import defaultdict
 from concurrent.futures import Future
 from dataclasses import replace
 
@@ -8,8 +7,8 @@ import numpy as np
 import pytest
 
 from alphacut.frame import StoreyFrame, envelope
-from alphacut.frame.bounds import branch_and_bound, level, spatial_branch_and_bound
-from alphacut.frame.bounds.dual_function import deflect, require_in_range
+from alphacut.frame.bounds import branch_and_bound, spatial_branch_and_bound
+from alphacut.frame.bounds.dual_function import require_in_range, step
 from alphacut.frame.bounds.level import OutputBounds
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.methods import dual
@@ -157,26 +156,11 @@ def test_the_order_in_which_threads_end_changes_no_bit(monkeypatch, case, method
     given = {"duration": 2.0, "step": 0.02, "alpha": (0, 0.5), "progress": False}
     usual = envelope(model, fuzzy, method=replace(method, workers=1), **given)
     monkeypatch.setattr(branch_and_bound, "PIECE", 100)
-    for module in (branch_and_bound, level, spatial_branch_and_bound, dual):
+    for module in (branch_and_bound, spatial_branch_and_bound, dual):
         monkeypatch.setattr(module, "ThreadPoolExecutor", LastFirst)
     adverse = envelope(model, fuzzy, method=replace(method, workers=3), **given)
     for name in ("lower", "upper", "lower_at", "upper_at", "between"):
         assert (getattr(usual, name) == getattr(adverse, name)).all()
-
-
-def test_a_pass_compares_with_what_is_known_when_it_begins(monkeypatch):
-    """A peak that a block finds changes nothing for the other blocks of its pass."""
-    tops = defaultdict(set)
-
-    def improve(problem, nodes, effort):
-        tops[id(problem), effort.slabs].add(effort.incumbent)
-        problem.out[1, nodes] = problem.incumbent + 1.0
-
-    monkeypatch.setattr(OutputBounds, "improve", improve)
-    over, _, _ = level_of(*CASES["matrices"], np.arange(0, 3.01, 0.02))
-    over.bounds(np.full(len(over.structure.order), 1e-6), 0.1, 2, 20, workers=1)
-    assert len(tops) > 3
-    assert {len(seen) for seen in tops.values()} == {1}
 
 
 def problem_of_matrices():
@@ -197,12 +181,12 @@ def test_models_that_are_not_finite_are_refused(name, wrong):
 @pytest.mark.parametrize("gain", [np.nan, np.inf, 1e300])
 def test_a_descent_ends_before_its_multipliers_overflow(gain):
     mu, gradient = np.zeros(2), np.array([1e-6, 0.0])
-    assert not deflect(mu, gradient, np.zeros(2), gain, grain=1e-9)
+    assert not step(mu, gradient, np.zeros(2), gain, 1e-9)
 
 
 def test_a_descent_goes_on_with_ordinary_multipliers():
     mu = np.zeros(2)
-    assert deflect(mu, np.array([1.0, 0.5]), np.zeros(2), 0.1, grain=1e-9)
+    assert step(mu, np.array([1.0, 0.5]), np.zeros(2), 0.1, 1e-9)
     assert mu == pytest.approx([-0.08, -0.04])
 
 

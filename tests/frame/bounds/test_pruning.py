@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from alphacut.frame import envelope
-from alphacut.frame.bounds import pruning
 from alphacut.frame.bounds.box import Box
 from alphacut.frame.bounds.level import OutputBounds
 from alphacut.frame.bounds.pruning import prune_ends
@@ -53,35 +52,23 @@ def test_models_over_a_part_bound_motions_there(box, seed):
         assert last - first < len(grid.omega) - 1
     for o in range(2):
         problem = OutputBounds.initial(part, o, SIDE, 1e-9)
-        problem.run(np.arange(len(TIME)), 4, 20, 0.0, 0.0)
+        problem.improve(np.arange(len(TIME)), problem.effort(4, 20))
         assert (values[:, :, o].max(0) <= problem.out[0] + 1e-12).all()
 
 
-def test_what_is_pruned_is_bounded(box, monkeypatch):
+def test_what_is_pruned_is_bounded(box):
     values, _ = motions(box, -np.ones(7), np.ones(7), np.random.default_rng(0))
     most, top = values[:, :, 0].max(0), values[:, :, 0].max()
     level, above = box.level(), np.flatnonzero(most > 0.8 * top)
     problem = OutputBounds.initial(level, 0, SIDE, 0.05 * top, top)
-    problem.run(np.arange(len(TIME)), 24, 40, 1.0, 0.0)
-    best = problem.at[above[problem.out[0, above].argmax()]]
-    tried, over_piece = [], pruning._over_piece
-
-    def noted(*call):
-        tried.append((*call[4], over_piece(*call)))
-        return tried[-1][-1]
-
-    monkeypatch.setattr(pruning, "_over_piece", noted)
-    low, high, pruned = prune_ends(level, problem, (0, SIDE), above, best)
-    away = [piece for piece in tried if piece[-1].max() <= 1.05 * top]
-    assert len(away) > 2
-    assert (pruned == np.max([bound for _, _, bound in away], axis=0)).all()
+    problem.improve(np.arange(len(TIME)), problem.effort(24, 40, 1.0))
+    low, high, pruned, shares = prune_ends(level, problem, above)
+    assert shares.sum() == pytest.approx(1.0)
+    assert (np.maximum(low + 1, 1 - high) > 0).sum() > 2
+    assert pruned.max() <= 1.05 * top
     values, unit = motions(box, -np.ones(7), np.ones(7), np.random.default_rng(1), 4000)
-    covered = ((low <= unit) & (unit <= high)).all(1)
-    for begin, end, _ in away:
-        inside = ((begin <= unit) & (unit <= end)).all(1)
-        assert (values[inside][:, above, 0].max(0) <= pruned + 1e-12).all()
-        covered |= inside
-    assert covered.all()
+    is_pruned = ~((low <= unit) & (unit <= high)).all(1)
+    assert (values[is_pruned][:, above, 0].max(0) <= pruned + 1e-12).all()
 
 
 def test_parts_close_the_gap_of_a_peak():

@@ -78,7 +78,7 @@ def test_motions_are_off_by_their_rounding_at_most(stiff, ground, start):
     frame, box, rng = drawn(int(np.log10(stiff)), stiff, ground, **start)
     unit = rng.uniform(-1, 1, (16, 6))
     node, output = rng.integers(1, 61, 16), np.arange(16) % 4
-    value, error = box.attained_with_error(unit, node, output)
+    value, error = box.reached(unit, node, output)
     shares = []
     with mp.workdps(40):
         for i, point in enumerate(box.inputs(unit)):

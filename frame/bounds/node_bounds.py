@@ -1,0 +1,333 @@
+"""Bounds at nodes: best-first bisection of the modes' frequencies and damping, with dual bounds.
+
+Where the bound at a node is too far above a value of the model, the cell of the modes' tables with
+the largest bound is halved: ranges of the few ω and g/ω of a mode, not of the many inputs.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from alphacut.frame.bounds.dual_function import Data, add, dot, loops, minimise, products
+from alphacut.frame.calculus.kernels import compiled
+from alphacut.fuzzy.arrays import Array, Rows
+
+GRID = 2.0**24
+"""Steps of the model's ascent in unit coordinates, so that rounding does not lead it elsewhere."""
+
+
+class Effort(NamedTuple):
+    """Effort that a node is worth.
+
+    Args:
+        cells: Most cells.
+        steps: Most evaluations of the dual function for a cell.
+        slack_below_peak: Addition to the wanted gap of a node below the peak, as a fraction of its
+            distance from the peak; at 1 only bounds above the peak count.
+        remainder_multiple: Least gap worth any effort, as a multiple of what the remainders of the
+            Taylor models add to the bound.
+        wanted_gap: Distance of bound and model value that suffices.
+        incumbent: The largest reached value of side × output over time.
+        patience: Steps of `minimise` after which less is expected.
+        ascents: Most steps of the model's ascent towards ends of the box, and along gradients.
+        grace: Cells after which the fall of the gap counts.
+        min_progress: Least fall of the gap, as a fraction of an even fall to what suffices.
+    """
+
+    cells: int
+    steps: int
+    slack_below_peak: float
+    remainder_multiple: float
+    wanted_gap: float
+    incumbent: float
+    patience: int
+    ascents: tuple[int, int]
+    grace: int
+    min_progress: float
+
+
+class Cells(NamedTuple):
+    """Parts of the modes' tables with their dual bounds, at most `Effort.cells` of them.
+
+    Args:
+        ends: First and last point along ω and along q for each mode, shape (…, K, 4).
+        mu: Multipliers, shape (…, Z).
+        weight: By how much each variable differs between the two maxima of D, the same.
+        value: Bounds of the dual function, shape (…,).
+    """
+
+    ends: Rows
+    mu: Array
+    weight: Array
+    value: Array
+
+
+@compiled
+def bound_nodes(
+    nodes: Rows, side: float, effort: Effort, constant: Array, data: Data, out: Array, at: Array
+) -> None:
+    """Write upper bounds of side × output at rising nodes; each begins where the last one ended.
+
+    Args:
+        nodes: Nodes, shape (J,).
+        side: +1 for upper bounds of the output, −1 for lower ones.
+        effort: Effort for each node.
+        constant: Added to the model's value for the motion's, and to both for the bound, (2, T).
+        data: Models and tables of the output.
+        out: Written: bounds of side × output and the model's values of it, shape (2, J).
+        at: Written: inputs of the model's values, shape (J, L).
+    """
+    count, Z = effort.cells, len(data.linear)
+    cells = Cells(
+        np.zeros((count, len(data.share), 4), np.int64),
+        np.zeros((count, Z)),
+        np.zeros((count, Z)),
+        np.zeros(count),
+    )
+    mu, u = np.zeros(Z), np.zeros(data.linear.shape[1])
+    for j in range(len(nodes)):
+        bound_node(nodes[j], side, effort, constant[:, nodes[j]], data, cells, mu, u, out[:, j])
+        at[j] = u
+
+
+@compiled
+def bound_node(
+    node: int,
+    side: float,
+    effort: Effort,
+    constant: Array,
+    data: Data,
+    cells: Cells,
+    mu: Array,
+    u: Array,
+    out: Array,
+) -> None:
+    """Write the upper bound of side × output at one node, by best-first bisection of cells.
+
+    Args:
+        node: Node.
+        side: +1 or −1.
+        effort: When to stop.
+        constant: Added to the model's value for the motion's, and to both for the bound, (2,).
+        data: Models and tables of the output.
+        cells: Scratch.
+        mu: Multipliers to begin with; written: those of the undivided tables, shape (Z,).
+        u: Inputs to begin with; written: those of the largest model value, shape (L,).
+        out: Written: the bound and the largest model value, shape (2,).
+    """
+    cells.ends[0], cells.mu[0], cells.value[0] = data.ends.astype(np.int64), mu, np.inf
+    model_value = ascend(u, node, side, data, effort.ascents)
+    target = target_value(model_value, 0.0, effort, constant)
+    model_value = bound_cell(0, node, side, data, effort, target, cells, model_value, u)
+    mu[:] = cells.mu[0]
+    least_gap = effort.remainder_multiple * (constant[1] + dot(np.abs(mu), data.remainder))
+    count, start_value = 1, cells.value[0]
+    while count < effort.cells:
+        worst = int(np.argmax(cells.value[:count]))
+        target = target_value(model_value, least_gap, effort, constant)
+        fall = (start_value - target) * effort.min_progress * count / effort.cells
+        falls_slowly = count >= effort.grace and cells.value[worst] > start_value - fall
+        if cells.value[worst] <= target or falls_slowly:
+            break
+        if not halve_widest(cells, worst, count):
+            break
+        for half in (worst, count):
+            model_value = bound_cell(half, node, side, data, effort, target, cells, model_value, u)
+        count += 1
+    out[0] = cells.value[:count].max() + constant[0] + constant[1]
+    out[1] = model_value + constant[0]
+
+
+@compiled
+def target_value(model_value: float, least_gap: float, effort: Effort, constant: Array) -> float:
+    """Value of the dual function at which a node's bound is tight enough."""
+    below_peak = max(0.0, effort.incumbent - model_value - constant[0])
+    gap = max(effort.wanted_gap, least_gap) + effort.slack_below_peak * below_peak
+    return model_value + gap - constant[1]
+
+
+@compiled
+def bound_cell(
+    cell: int,
+    node: int,
+    side: float,
+    data: Data,
+    effort: Effort,
+    target: float,
+    cells: Cells,
+    model_value: float,
+    u: Array,
+) -> float:
+    """Improve the dual bound of a cell; return the largest model value so far, at inputs `u`."""
+    here, mu, weight = np.empty(len(u)), cells.mu[cell], cells.weight[cell]
+    steps, patience = effort.steps, effort.patience
+    value = minimise(
+        mu, cells.ends[cell], node, side, data, steps, patience, target, model_value, weight, here
+    )
+    cells.value[cell] = min(value, cells.value[cell])
+    if cells.value[cell] > target or cell == 0:
+        new_value = ascend(here, node, side, data, effort.ascents)
+        if new_value > model_value:
+            model_value = new_value
+            u[:] = here
+    return model_value
+
+
+@compiled
+def halve_widest(cells: Cells, halved: int, count: int) -> bool:
+    """Halve a cell along the ω or q = g/ω on which the maxima of the dual function differ most.
+
+    The upper half is written to number `count`. False if no such range has a point inside.
+    """
+    ends, weight = cells.ends[halved], cells.weight[halved]
+    n_variables = len(weight) // len(ends)  # of a mode: ω, g and its amplitudes
+    largest, mode, axis = 0.0, -1, 0
+    for k in range(len(ends)):
+        for direction in range(2):  # along ω, along q
+            n_intervals = ends[k, 2 * direction + 1] - ends[k, 2 * direction]
+            difference = weight[k * n_variables + direction]
+            if n_intervals >= 2 and difference > largest:
+                largest, mode, axis = difference, k, direction
+    if mode < 0:
+        return False
+    middle = (ends[mode, 2 * axis] + ends[mode, 2 * axis + 1]) // 2
+    cells.ends[count], cells.mu[count] = ends, cells.mu[halved]
+    cells.value[count] = cells.value[halved]
+    cells.ends[halved, mode, 2 * axis + 1] = middle
+    cells.ends[count, mode, 2 * axis] = middle
+    return True
+
+
+@loops
+def model(u: Array, node: int, side: float, data: Data, gradient: Array) -> float:
+    """Side × output in the model at inputs u (L,), without its constants; `gradient` is written."""
+    bilinear, weight = np.empty(data.quadratic.shape[1]), np.zeros(len(data.linear))
+    products(u, bilinear)
+    total = response_and_gradient(u, node, side, data, weight)
+    gradient[:] = 0.0
+    quadratic = np.zeros(len(bilinear))  # of the linearised response, packed by rows i ≤ j
+    for a in range(len(weight)):
+        add(gradient, weight[a], data.linear[a])
+        add(quadratic, weight[a], data.quadratic[a])
+    for s in range(len(data.truncated_linear)):  # truncated modes
+        wave = side * data.truncated_response[s, node]
+        total += wave * (
+            dot(data.truncated_linear[s], u) + dot(data.truncated_quadratic[s], bilinear)
+        )
+        add(gradient, wave, data.truncated_linear[s])
+        add(quadratic, wave, data.truncated_quadratic[s])
+    at = 0
+    for i in range(len(u)):
+        for j in range(i, len(u)):
+            gradient[i] += quadratic[at] * u[j]
+            gradient[j] += quadratic[at] * u[i]
+            at += 1
+    return total
+
+
+@loops
+def response_and_gradient(u: Array, node: int, side: float, data: Data, weight: Array) -> float:
+    """Sum of the modes' responses, side × output, in the model at inputs u (L,).
+
+    `weight` (Z,) is written: its gradient by all scaled intervening variables.
+    """
+    bilinear, z = np.empty(data.quadratic.shape[1]), np.empty(len(data.linear))
+    products(u, bilinear)
+    for a in range(len(z)):
+        z[a] = dot(data.linear[a], u) + dot(data.quadratic[a], bilinear)
+    weight[:] = 0.0
+    total = 0.0
+    for k in range(len(data.share)):
+        total += mode_response(z, k, node, side, data, weight)
+    return total
+
+
+@loops
+def mode_response(z: Array, k: int, node: int, side: float, data: Data, weight: Array) -> float:
+    """Response of mode k at a node, side × output, by bilinear interpolation in its table.
+
+    `z` (Z,) are the scaled ω, g and amplitudes of all modes. Written are the mode's entries of
+    `weight` (Z,): derivatives by z.
+    """
+    width, sources = int(data.points[0]), data.share.shape[1]
+    first = k * (2 + sources)
+    w = data.centre[k, 0] + data.radius[k, 0] * z[first]
+    g = data.centre[k, 1] + data.radius[k, 1] * z[first + 1]
+    x = min(max((w - data.start[k, 0]) / data.step[k, 0], 0.0), width - 1.000001)
+    y = min(max((g / w - data.start[k, 1]) / data.step[k, 1], 0.0), data.points[1] - 1.000001)
+    i, j = int(x), int(y)
+    x, y = x - i, y - j
+    at, total = j * width + i, 0.0
+    for s in range(sources):
+        e = data.table[k, s, node]
+        a, b, c, f = e[at], e[at + 1], e[at + width], e[at + width + 1]  # corners
+        value = side * ((1 - y) * ((1 - x) * a + x * b) + y * ((1 - x) * c + x * f))
+        along = side * ((1 - y) * (b - a) + y * (f - c)) / data.step[k, 0]
+        across = side * ((1 - x) * (c - a) + x * (f - b)) / data.step[k, 1]
+        amplitude = data.share[k, s] + data.reach[k, s] * z[first + 2 + s]
+        total += amplitude * value
+        weight[first] += amplitude * (along - across * g / w**2) * data.radius[k, 0]
+        weight[first + 1] += amplitude * across / w * data.radius[k, 1]
+        weight[first + 2 + s] = value * data.reach[k, s]
+    return total
+
+
+@loops
+def ascend(u: Array, node: int, side: float, data: Data, steps: tuple[int, int]) -> float:
+    """Raise the model's side × output from inputs u (L,), which are written; return its value.
+
+    Steps towards the corner of [−1, 1]^L that the gradient points to come first, then projected
+    gradient ascent; `steps` are the most of each.
+    """
+    d = len(u)
+    slope, trial, trial_slope = np.empty(d), np.empty(d), np.empty(d)
+    value = model(u, node, side, data, slope)
+    for _ in range(steps[0]):
+        gained, length = False, 1.0
+        for _ in range(3):
+            for i in range(d):
+                trial[i] = u[i] + length * (np.sign(slope[i]) - u[i])
+            new = model(trial, node, side, data, trial_slope)
+            if new > value + 1e-9 * abs(value):
+                value, gained = new, True
+                u[:], slope[:] = trial, trial_slope
+                break
+            length *= 0.35
+        if not gained:
+            break
+    return climb(u, node, side, data, value, slope, steps[1])
+
+
+@loops
+def climb(
+    u: Array, node: int, side: float, data: Data, value: float, slope: Array, steps: int
+) -> float:
+    """Raise the model's side × output by projected gradient ascent with Barzilai–Borwein steps.
+
+    `value` and `slope` are the model's at `u`; both arrays are written. Returns the largest value.
+    """
+    d = len(u)
+    point, trial, trial_slope = u.copy(), np.empty(d), np.empty(d)
+    size = 0.3 / (np.abs(slope).max() + 1e-300)
+    for _ in range(steps):
+        for i in range(d):
+            trial[i] = np.rint(GRID * min(max(point[i] + size * slope[i], -1.0), 1.0)) / GRID
+        new = model(trial, node, side, data, trial_slope)
+        along = bend = 0.0
+        for i in range(d):
+            step = trial[i] - point[i]
+            along += step * step
+            bend += step * (slope[i] - trial_slope[i])
+        if along < 1e-8:
+            break
+        if new < value - 0.02 * abs(value):
+            size *= 0.3
+            continue
+        size = along / bend if bend > 0 else 4 * size
+        point[:], slope[:] = trial, trial_slope
+        if new > value:
+            value = new
+            u[:] = point
+    return value
