@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from alphacut.frame import DualProof, envelope
+from alphacut.frame import DualProof, Proof, StoreyFrame, envelope
 from alphacut.frame.bounds import least_peaks
 from alphacut.frame.bounds.box import Box
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.questions.peaks import passing, peaks
-from alphacut.fuzzy import Triangular
+from alphacut.fuzzy import Interval, Triangular
 from tests.frame.bounds.test_dual_proof import each_storey, record, storeys
 
 MODEL = storeys(3, damping_ratio=0.03, ground=record(), outputs=("q3", "drift1"))
@@ -72,3 +72,19 @@ def test_halves_cover_all_places_and_share_the_middle():
         assert lower[mode, place] == upper[mode, place - 1]
     atoms = least_peaks.PeakCell(0.0, 0, np.array([[7, 8, 0, 1]] * 2), 1, np.zeros(2))
     assert least_peaks._halves(atoms, motion) == []
+
+
+@pytest.mark.parametrize("method", [Proof(workers=1), DualProof(workers=1)], ids=["proof", "dual"])
+def test_both_proofs_know_a_least_peak_and_a_motion_near_it(method):
+    frame = StoreyFrame(
+        [2e4] * 3, stiffness=[4e7] * 3, damping_ratio=0.03, v0=(0, 0, 0.5), outputs=("q3",)
+    )
+    inputs = {"k1": Interval(3.8e7, 4.2e7), "m3": Interval(1.9e4, 2.1e4)}
+    found = envelope(frame, inputs, method, duration=2.0, step=0.02, alpha=(0,), progress=False)
+    proved, reached = (float(bound[0, 0]) for bound in found.least_peaks)
+    unit = np.random.default_rng(0).random((500, 2))
+    unit[::2] = unit[::2].round()
+    points = np.array([3.8e7, 1.9e4]) + unit * [4e6, 2e3]
+    motions = LinearFlow(frame, tuple(inputs), 2.0, 0.02, Exact()).values(points)
+    lowest = np.abs(motions).max(1).min()
+    assert 0.95 * lowest <= proved <= lowest <= reached <= 1.08 * lowest
