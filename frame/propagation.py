@@ -14,7 +14,7 @@ from alphacut.frame.boxes import ALPHA, Boxes, UnitFlow, boxes
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import LinearFlow, exact_flow
 from alphacut.frame.dynamics.integrators import Exact, Integrator
-from alphacut.frame.dynamics.nonlinear import flow_of
+from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.envelope import Ends, Envelope
 from alphacut.frame.methods.auto import Auto
 from alphacut.frame.methods.dual import DualProof
@@ -176,7 +176,7 @@ def _problem(
         is_linear = not isinstance(model, LagrangianSystem)
         integrator = "exact" if uses_modes and is_linear else "midpoint"
     cuts = boxes(inputs, alpha)
-    flow = flow_of(model, cuts.names, duration, step, integrator)
+    flow = make_flow(model, cuts.names, duration, step, integrator)
     require_admissible(model, cuts)
     distinct_cuts, rows = cuts.distinct()
     return _Problem(chosen_method, UnitFlow(flow, distinct_cuts), cuts.alpha, rows)

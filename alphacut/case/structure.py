@@ -13,7 +13,7 @@ from pydantic import Field, PlainValidator, ValidationInfo, model_validator
 from alphacut.case.types import Modulus, OneOrMany, Quantity, Section, case_file, text
 from alphacut.frame import Accelerogram, MatrixStructure, StoreyFrame
 from alphacut.frame.dynamics.flow import Flow
-from alphacut.frame.dynamics.nonlinear import flow_of
+from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.structures.lagrangian import LagrangianSystem, pendulum
 from alphacut.frame.structures.quantities import Output
 from alphacut.frame.structures.storey import SYMBOLS
@@ -196,7 +196,7 @@ class Structure:
         self, names: Sequence[str], duration: float, step: float, integrator: str | None = None
     ) -> Flow:
         """Trajectories as a function of parameters, by the midpoint rule by default."""
-        return flow_of(self.model, names, duration, step, integrator or "midpoint")
+        return make_flow(self.model, names, duration, step, integrator or "midpoint")
 
 
 def read_accelerogram(value: object, info: ValidationInfo) -> Accelerogram:

@@ -239,9 +239,9 @@ def trajectory(step_map: StepMap, start: Jet, rows: Jet) -> Jet:
     flat = observed.map(lambda x: x.reshape((*x.shape[:-3], size * m, n)))
     has_loads = loads.shape[1] > 0
     if has_loads:
-        columns = np.zeros((blocks * size, loads.shape[1]))
-        columns[: len(loads)] = loads
-        columns = columns.reshape(blocks, size, -1)
+        padded = np.zeros((blocks * size, loads.shape[1]))
+        padded[: len(loads)] = loads
+        columns = padded.reshape(blocks, size, -1)
         state = step_map.load @ np.zeros((loads.shape[1], blocks))
         outputs = []
         for k in range(size):

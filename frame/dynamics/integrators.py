@@ -280,9 +280,7 @@ def linear_loads(loads: Sequence[History], step: float, count: int) -> Array:
     A line has the load's impulse and first moment in the step, and is the load where that is
     linear. Values at the beginnings of steps come first, load by load, then those at their ends.
     """
-    mean, moment = (
-        np.array([load_moments(x, step, count, 2) for x in loads]).reshape(-1, 2).T / step
-    )
-    tilt = (2 * moment - mean).reshape(len(loads), count)
-    mean = mean.reshape(len(loads), count)
+    moments = np.array([load_moments(x, step, count, 2) for x in loads])
+    mean, moment = np.moveaxis(moments.reshape(len(loads), count, 2) / step, -1, 0)
+    tilt = 2 * moment - mean
     return np.concatenate([mean + 3 * tilt, mean - 3 * tilt]).T

@@ -1,7 +1,14 @@
-"""Trajectories of general systems with internal derivatives, many sets at once."""
+"""Trajectories of Lagrangian systems with derivatives by the inputs, compiled by Numba.
+
+A state is (q, π), coordinates and momenta, 2n numbers, with first derivatives (d, 2n) and second
+ones (d, d, 2n) by d inputs. The equations come as tapes (`calculus/tape.py`), so that one
+compilation serves all systems. Loops are written out: they compile in a fraction of the time that
+array expressions take.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -10,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from alphacut.frame.calculus.jet import Jet
+from alphacut.frame.calculus.kernels import compiled
 from alphacut.frame.calculus.tape import Tape, tape, with_derivatives
 from alphacut.frame.dynamics.flow import Flow, LinearFlow, StepError
 from alphacut.frame.dynamics.integrators import INTEGRATORS, Integrator
@@ -20,11 +28,41 @@ from alphacut.fuzzy.refused import require_choice
 
 Expressions = tuple[list[Any], list[Any], list[Any]]
 """Components, and the symbols they depend on: those to differentiate by, and others."""
+MAX_ITERATIONS = 30
+"""Newton steps after which a time step has not converged."""
+
+
+def make_flow(
+    model: LinearSystem | LagrangianSystem,
+    names: Sequence[str],
+    duration: float,
+    step: float,
+    integrator: str | Integrator = "midpoint",
+) -> Flow:
+    """Create the flow of a linear structure or a Lagrangian system.
+
+    Args:
+        model: The structure.
+        names: Its uncertain parameters.
+        duration: In s.
+        step: Length of a step, in s.
+        integrator: Name or method; of Lagrangian systems "midpoint" alone.
+
+    Raises:
+        RefusedError: The structure has no such parameter or integrator.
+    """
+    if isinstance(model, LagrangianSystem):
+        require_choice("integrator", integrator, ["midpoint"])
+        return LagrangianFlow(model, tuple(names), duration, step)
+    if isinstance(integrator, str):
+        require_choice("integrator", integrator, INTEGRATORS)
+        integrator = INTEGRATORS[integrator]
+    return LinearFlow(model, tuple(names), duration, step, integrator)
 
 
 @dataclass(frozen=True, eq=False)
 class LagrangianFlow(Flow):
-    """Trajectories of a general system by the midpoint variational integrator.
+    """Trajectories of a Lagrangian system by the midpoint variational integrator.
 
     Example:
         >>> from alphacut.frame import pendulum
@@ -56,13 +94,7 @@ class LagrangianFlow(Flow):
 
     @cached_property
     def _expressions(self) -> tuple[Expressions, Expressions, Expressions]:
-        """SymPy expressions, each with the symbols to differentiate by, and others.
-
-        1. Momenta at both ends of a step, π[k] = L_v − h/2 (L_q + F) and π[k+1] = L_v + h/2 (L_q +
-           F), by q[k+1], q[k] and inputs, with the mean of q and the velocity (q[k+1] − q[k])/h.
-        2. Outputs of a state (q, π) (eq. 18).
-        3. The initial state (q, π).
-        """
+        """Momenta before and after a step; outputs of a state (eq. 18); the initial state."""
         import sympy
 
         eq, n = self.system.symbols, self.system.coordinates
@@ -72,6 +104,7 @@ class LagrangianFlow(Flow):
             sympy.Matrix(sympy.symbols(f"{x}:{n}", real=True)) for x in ("new", "old", "pi")
         )
         h = sympy.Symbol("h", positive=True)
+        # π[k] = L_v − h/2 (L_q + F) and π[k+1] = L_v + h/2 (L_q + F) at the mean of q[k] and q[k+1]
         middle = dict(zip([*eq.q, *eq.v], [*((old + new) / 2), *((new - old) / h)], strict=True))
         momentum, impulse = eq.momentum.subs(middle), h / 2 * eq.push.subs(middle)
         velocity, (q0, v0) = eq.velocity(momenta), self.system.start()
@@ -103,55 +136,270 @@ class LagrangianFlow(Flow):
         return [with_derivatives(*expression) for expression in self._expressions]
 
     def _march(self, points: Array, *, derivatives: bool) -> Jet:
-        """Return trajectories at points (S, d) by the midpoint rule, shape (S, T, outputs).
-
-        Raises:
-            StepError: A step did not converge.
-        """
-        # Numba compiles these when they are imported
-        from alphacut.frame.dynamics.lagrangian_march import evaluate_all, march
-
-        d, m = len(self.names) if derivatives else 0, 2 * self.system.coordinates
-        step, observation, initial = self._deep if d else self._plain
+        """Trajectories at points (S, d) by the midpoint rule, shape (S, T, outputs)."""
+        d = len(self.names) if derivatives else 0
         constants = [x for name, x in self.system.parameters.items() if name not in self.names]
         inputs = np.hstack([points, np.tile(constants, (len(points), 1))])
         inputs = np.ascontiguousarray(inputs, float)
-        flat = np.empty((len(inputs), m + m * d + m * d * d))
-        evaluate_all(initial, inputs, flat)
-        state, first, second = np.split(flat, [m, m + m * d], axis=1)
-        state_jet = (  # advanced in place by the march
-            np.ascontiguousarray(state),
-            np.ascontiguousarray(np.moveaxis(first.reshape(len(inputs), m, d), 1, 2)),
-            np.ascontiguousarray(np.moveaxis(second.reshape(len(inputs), m, d, d), 1, 3)),
-        )
+        tapes = (self._newton, *(self._deep if d else self._plain))
         nodes = (len(points), len(self.time))
         out = [np.empty((*nodes, *(d,) * order, len(self.outputs))) for order in range(3)]
-        if not march(self._newton, step, observation, inputs, self.step, *state_jet, *out):
+        if not _march(*tapes, self.system.coordinates, inputs, self.step, *out):
             what = f"a step of {self.step:g} s did not converge, or leaves the numbers"
             raise StepError(what, "take a smaller step, or parameters where the motion exists")
         # jets have the axes of the derivatives first
         return Jet(out[0], np.moveaxis(out[1], 2, 0), np.moveaxis(out[2], (2, 3), (0, 1)))
 
 
-def flow_of(
-    model: LinearSystem | LagrangianSystem,
-    names: Sequence[str],
-    duration: float,
-    step: float,
-    integrator: str | Integrator = "midpoint",
-) -> Flow:
-    """Return the flow that computes trajectories of a linear structure or a Lagrangian system.
+@compiled
+def _march(
+    newton: Tape,
+    step: Tape,
+    observe: Tape,
+    initial: Tape,
+    n: int,
+    inputs: Array,
+    h: float,
+    out: Array,
+    out1: Array,
+    out2: Array,
+) -> bool:
+    """Write outputs of S motions at T nodes, with derivatives; return False if a step fails.
 
-    `names` are the uncertain parameters; duration and step are in s. Lagrangian systems take the
-    integrator "midpoint" alone.
-
-    Raises:
-        RefusedError: The structure has no such parameter or integrator.
+    Args:
+        newton: Tape of the momenta before a step and their derivatives by the new coordinates.
+        step: Tape of the momenta before and after a step, with derivatives where d > 0.
+        observe: Tape of the outputs of a state, likewise.
+        initial: Tape of the initial state, likewise.
+        n: Number of coordinates.
+        inputs: d inputs and then other parameters, shape (S, K).
+        h: Length of a step, in s.
+        out: Written: outputs, shape (S, T, m).
+        out1: Written: their first derivatives, shape (S, T, d, m).
+        out2: Written: their second ones, shape (S, T, d, d, m).
     """
-    if isinstance(model, LagrangianSystem):
-        require_choice("integrator", integrator, ["midpoint"])
-        return LagrangianFlow(model, tuple(names), duration, step)
-    if isinstance(integrator, str):
-        require_choice("integrator", integrator, INTEGRATORS)
-        integrator = INTEGRATORS[integrator]
-    return LinearFlow(model, tuple(names), duration, step, integrator)
+    size, d, m = 2 * n, out1.shape[2], out.shape[2]
+    a = size + d
+    flat, arguments = np.empty(m + (m * a + m * a * a if d else 0)), np.empty(size + len(inputs[0]))
+    start, x = np.empty(size * (1 + d + d * d)), np.empty(size)
+    x1, x2 = np.empty((d, size)), np.empty((d, d, size))
+    inner1, inner2 = np.zeros((d, a)), np.zeros((d, d, a))  # of state and inputs by the inputs
+    for i in range(d):
+        inner1[i, size + i] = 1.0
+    for s in range(len(inputs)):
+        p = inputs[s]
+        arguments[size:] = p
+        _evaluate(initial, p, start)
+        for c in range(size):
+            x[c] = start[c]
+            for i in range(d):
+                x1[i, c] = start[size + c * d + i]
+                for j in range(d):
+                    x2[i, j, c] = start[size + size * d + (c * d + i) * d + j]
+        for t in range(out.shape[1]):
+            if t and not _midpoint_step(newton, step, n, p, h, x, x1, x2):
+                return False
+            arguments[:size] = x
+            _evaluate(observe, arguments, flat)
+            out[s, t] = flat[:m]
+            if d:
+                for i in range(d):
+                    for c in range(size):
+                        inner1[i, c] = x1[i, c]
+                        for j in range(d):
+                            inner2[i, j, c] = x2[i, j, c]
+                _chain_rule_second(flat, m, a, inner1, inner2, out1[s, t], out2[s, t])
+    return True
+
+
+@compiled
+def _midpoint_step(
+    newton: Tape, step: Tape, n: int, p: Array, h: float, x: Array, x1: Array, x2: Array
+) -> bool:
+    """Advance a state x (2n,) with derivatives x1 and x2 in place; return False if it fails.
+
+    Tape `newton` gives the momenta before the step, to equal those of the state, and their
+    derivatives by the new coordinates, which Newton's method finds.
+    """
+    d, m, n_parameters = len(x1), 2 * n, len(p)
+    arguments, flat = np.empty(m + n_parameters + 1), np.empty(n + n * n)
+    residual, jacobian = np.empty((n, 1)), np.empty((n, n))
+    for i in range(n):
+        arguments[i] = arguments[n + i] = x[i]  # new coordinates, guessed, and old ones
+    for i in range(n_parameters):
+        arguments[m + i] = p[i]
+    arguments[m + n_parameters] = h
+    is_solved = False
+    for _ in range(MAX_ITERATIONS):
+        _evaluate(newton, arguments, flat)
+        for i in range(n):
+            residual[i, 0] = flat[i] - x[n + i]
+            for j in range(n):
+                jacobian[i, j] = flat[n + i * n + j]
+        _solve(jacobian, residual)
+        change, size = 0.0, 0.0
+        for i in range(n):
+            arguments[i] -= residual[i, 0]
+            if not math.isfinite(arguments[i]):
+                return False
+            change, size = max(change, abs(residual[i, 0])), max(size, abs(arguments[i]))
+        if change <= 1e-12 * (1 + size):
+            is_solved = True
+            break
+    if not is_solved:
+        return False
+    a = m + d
+    flat = np.empty(m + (m * a + m * a * a if d else 0))
+    _evaluate(step, arguments, flat)
+    for i in range(n):
+        x[i], x[n + i] = arguments[i], flat[n + i]
+    if d:
+        _step_derivatives(flat, n, x1, x2)
+    return True
+
+
+@compiled
+def _step_derivatives(flat: Array, n: int, x1: Array, x2: Array) -> None:
+    """Advance derivatives x1 (d, 2n) and x2 (d, d, 2n) of a state by one midpoint step, in place.
+
+    `flat` holds the momenta before and after the step, with first and second derivatives by new and
+    old coordinates and the inputs. The momenta before the step, whose Jacobian by the new
+    coordinates is J, determine these: one linear system with J gives their first derivatives,
+    another one the second ones.
+    """
+    d, m = len(x1), 2 * n
+    a = m + d
+    J = np.empty((n, n))
+    # derivatives of the variables (new coordinates, old coordinates, inputs) by the inputs
+    inner1, inner2 = np.zeros((d, a)), np.zeros((d, d, a))
+    out1, out2 = np.empty((d, m)), np.empty((d, d, m))
+    new_first, new_second = np.empty((n, d)), np.empty((n, d * d))
+    for i in range(n):
+        for j in range(n):
+            J[i, j] = flat[m + i * a + j]
+    for i in range(d):
+        inner1[i, m + i] = 1.0
+        for c in range(n):
+            inner1[i, n + c] = x1[i, c]
+            for j in range(d):
+                inner2[i, j, n + c] = x2[i, j, c]
+    # of both momenta while the new coordinates are held
+    _chain_rule_first(flat, m, a, inner1, out1)
+    for c in range(n):
+        for i in range(d):
+            new_first[c, i] = x1[i, n + c] - out1[i, c]
+    _solve(J, new_first)
+    for c in range(n):
+        for i in range(d):
+            inner1[i, c] = new_first[c, i]
+    _chain_rule_second(flat, m, a, inner1, inner2, out1, out2)
+    for c in range(n):
+        for i in range(d):
+            for j in range(d):
+                new_second[c, i * d + j] = x2[i, j, n + c] - out2[i, j, c]
+    _solve(J, new_second)
+    for i in range(d):  # coordinates and momenta after the step
+        for c in range(n):
+            x1[i, c], x1[i, n + c] = inner1[i, c], out1[i, n + c]
+            for j in range(d):
+                x2[i, j, c] = new_second[c, i * d + j]
+                total = out2[i, j, n + c]
+                for k in range(n):
+                    total += flat[m + (n + c) * a + k] * new_second[k, i * d + j]
+                x2[i, j, n + c] = total
+
+
+@compiled
+def _chain_rule_first(flat: Array, m: int, a: int, inner1: Array, out1: Array) -> None:
+    """Write first derivatives of m functions by d inputs to `out1` (d, m), by the chain rule."""
+    # flat: the functions f (m,) and their derivatives (m, a) by a variables, one after the other;
+    # inner1 (d, a): derivatives of the variables by the inputs
+    for i in range(len(inner1)):
+        for c in range(m):
+            total = 0.0
+            for x in range(a):
+                total += flat[m + c * a + x] * inner1[i, x]
+            out1[i, c] = total
+
+
+@compiled
+def _chain_rule_second(
+    flat: Array, m: int, a: int, inner1: Array, inner2: Array, out1: Array, out2: Array
+) -> None:
+    """Write first and second derivatives by d inputs to `out1` (d, m) and `out2` (d, d, m)."""
+    # as above, with (m, a, a) second derivatives in `flat` and inner2 (d, d, a)
+    _chain_rule_first(flat, m, a, inner1, out1)
+    d, hessian_row, hessian_at = len(inner1), np.empty(a), m + m * a
+    for c in range(m):
+        for i in range(d):
+            for y in range(a):  # the Hessian of f_c times the derivatives by input i
+                hessian_row[y] = 0.0
+                for x in range(a):
+                    hessian_row[y] += flat[hessian_at + (c * a + x) * a + y] * inner1[i, x]
+            for j in range(i, d):
+                total = 0.0
+                for x in range(a):
+                    total += flat[m + c * a + x] * inner2[i, j, x] + hessian_row[x] * inner1[j, x]
+                out2[i, j, c] = out2[j, i, c] = total
+
+
+@compiled
+def _solve(matrix: Array, b: Array) -> None:
+    """Overwrite b (n, m) with the solutions x of A x = b by elimination with row exchanges."""
+    n, m, A = len(matrix), b.shape[1], matrix.copy()
+    for k in range(n):
+        pivot = k
+        for i in range(k + 1, n):
+            if abs(A[i, k]) > abs(A[pivot, k]):
+                pivot = i
+        for j in range(n):
+            A[k, j], A[pivot, j] = A[pivot, j], A[k, j]
+        for j in range(m):
+            b[k, j], b[pivot, j] = b[pivot, j], b[k, j]
+        for i in range(k + 1, n):
+            factor = A[i, k] / A[k, k]
+            for j in range(k, n):
+                A[i, j] -= factor * A[k, j]
+            for j in range(m):
+                b[i, j] -= factor * b[k, j]
+    for k in range(n - 1, -1, -1):
+        for j in range(m):
+            for i in range(k + 1, n):
+                b[k, j] -= A[k, i] * b[i, j]
+            b[k, j] /= A[k, k]
+
+
+@compiled
+def _evaluate(tape: Tape, arguments: Array, out: Array) -> None:
+    """Write the values of a tape's m expressions at arguments (K,) to `out`."""
+    code, results, slots = tape  # slots: arguments first, then results of operations
+    for k in range(len(arguments)):
+        slots[k] = arguments[k]
+    for k in range(len(code)):
+        slots[len(arguments) + k] = _operation(code[k, 0], slots[code[k, 1]], slots[code[k, 2]])
+    for k in range(len(results)):
+        out[k] = slots[results[k]]
+
+
+@compiled
+def _operation(number: int, x: float, y: float) -> float:
+    """Operation `number` of `tape.OPERATIONS` on x and y; functions of one argument ignore y."""
+    if number == 0:
+        return x + y
+    if number == 1:
+        return x * y
+    if number == 2:
+        return x**y
+    if number == 3:
+        return 1 / x
+    if number == 4:
+        return math.sqrt(x)
+    if number == 5:
+        return math.sin(x)
+    if number == 6:
+        return math.cos(x)
+    if number == 7:
+        return math.tan(x)
+    if number == 8:
+        return math.exp(x)
+    return math.log(x)

@@ -18,7 +18,7 @@ import numpy as np
 
 from alphacut.frame.boxes import ALPHA, Boxes, boxes
 from alphacut.frame.calculus.low_discrepancy import chebyshev_points, corners
-from alphacut.frame.dynamics.nonlinear import flow_of
+from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.questions.peaks import ANY, require_limits, within_steps
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem
@@ -115,7 +115,7 @@ def probabilities(
     draws = np.column_stack(drawn) if drawn else np.zeros((1, 0))
     cuts = boxes(fuzzy, alpha)
     scheme = "midpoint" if isinstance(model, LagrangianSystem) else "exact"
-    flow = flow_of(model, (*cuts.names, *random), duration, step, scheme)
+    flow = make_flow(model, (*cuts.names, *random), duration, step, scheme)
     points_of_levels = [_tried(cuts, level) for level in range(len(cuts.alpha))]
     points = np.concatenate(points_of_levels)
     # errors between nodes and of time steps, from a few of the motions

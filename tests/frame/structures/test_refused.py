@@ -17,7 +17,7 @@ from alphacut.frame import (
     StoreyFrame,
     pendulum,
 )
-from alphacut.frame.dynamics.nonlinear import flow_of
+from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.fuzzy.refused import RefusedError
 
 COLUMNS = StoreyFrame((2e4, 1e4), (3.0, 2.5), 25e9, 1e-4)
@@ -125,7 +125,7 @@ def test_motions_refuse_unknown_names_and_odd_durations():
             "step is -0.1; allowed: finite numbers greater than 0",
         ),
         (lambda: LagrangianFlow(pendulum(), ("x",), 1.0, 0.1), "parameter is x; allowed: m, l"),
-        (lambda: flow_of(pendulum(), ("l",), 1.0, 0.1, "euler"), "integrator is euler"),
+        (lambda: make_flow(pendulum(), ("l",), 1.0, 0.1, "euler"), "integrator is euler"),
         (
             lambda: LagrangianFlow(LagrangianSystem(**ROUGH), ("m",), 1.0, 0.1).values(ONE),
             "function of the lagrangian is sign; allowed: reciprocal",

@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 
 from alphacut.frame import Sampled, envelope, pendulum
 from alphacut.frame.dynamics.flow import StepError
-from alphacut.frame.dynamics.nonlinear import flow_of
+from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.verification.reference_motion import ReferenceMotion
 from alphacut.fuzzy import Interval
 
@@ -52,5 +52,5 @@ def test_reference_motion_is_that_of_the_equations():
     system, time = pendulum(phi0=2.0), np.linspace(0, 4, 41)
     values = ReferenceMotion(system).outputs(system.parameters, time)
     assert values[:, 1] == pytest.approx(angle(system.parameters, time), abs=1e-8)
-    steps = flow_of(system, (), 4.0, 1e-3).values(np.zeros((1, 0)))[0, ::100]
+    steps = make_flow(system, (), 4.0, 1e-3).values(np.zeros((1, 0)))[0, ::100]
     assert values == pytest.approx(steps, abs=2e-4)
