@@ -21,8 +21,7 @@ from alphacut.fuzzy.refused import require
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
 from alphacut.stochastic.fit.hermite_fit import HermiteFit, SlopeBand, slope_band
 from alphacut.stochastic.fit.pbox import PBox, least_pbox
-from alphacut.stochastic.particles.circles_csv import CircleFile
-from alphacut.stochastic.particles.image import SectionImage
+from alphacut.stochastic.particles.measured import CircleFile, SectionImage
 from alphacut.stochastic.particles.particles import DISCS, SPHERES, Shape
 from alphacut.stochastic.sections import ParticleCells, Simulated, reduced_radii, with_cells
 from alphacut.stochastic.theta.quadrature import gauss_rule
@@ -65,11 +64,8 @@ class MicrostructureStudy:
     def cap_sample(self, sample: AreaWeighted) -> AreaWeighted:
         """Copy of a sample with r_n of discs capped at `Shape.reach`, unless limits are stated.
 
-        Cells of spheres that are tighter are cut off by the limits; the sample is unchanged.
-
-        Raises:
-            RefusedError: More than `MAX_CAPPED` of the area or volume lies in cells tighter than
-                that.
+        Cells of spheres that are tighter are cut off by the limits instead. More than `MAX_CAPPED`
+        of the area or volume in such cells is refused.
         """
         if self.limits:
             return sample
@@ -168,11 +164,9 @@ def study(
 def _sections(
     case: MicrostructureStudy, executor: Executor | None, progress: Callable[[float], None]
 ) -> list[ParticleCells]:
-    """Particles with their cells: of one image or file, or of simulated packings.
-
-    Packings of spheres are repeated, at most `MAX_PACKINGS` times, with a volume fraction that is
-    corrected until the fitted map has the fraction of the case.
-    """
+    """Particles with their cells: of one image or file, or of simulated packings."""
+    # packings of spheres are repeated with a volume fraction that is corrected until the fitted map
+    # has the fraction of the case
     source = case.source
     if not isinstance(source, Simulated):
         return [with_cells(source.read())]
@@ -201,8 +195,8 @@ def fit_map(
     """Fit the radius map to a sample of r_n and make its slopes fuzzy.
 
     Returns:
-        Sample within the limits, p-box, bootstrap band of the slopes, and half width of the
-        bootstrap band of the distribution function, in probability.
+        Sample within the limits, p-box, bootstrap band of the slopes, and half width of that of the
+        distribution function, in probability.
 
     Raises:
         RefusedError: All cells have one r_n.

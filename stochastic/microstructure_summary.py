@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from alphacut.stochastic.microstructure import Microstructure
-from alphacut.stochastic.tessellation.delaunay import neighbouring_values, neighbours
+from alphacut.stochastic.tessellation.apollonius import neighbouring_values, neighbours
 
 if TYPE_CHECKING:
     import xarray
@@ -39,10 +39,7 @@ def summary(result: Microstructure) -> dict[str, object]:
 
 
 def _neighbour_numbers(result: Microstructure) -> dict[str, object]:
-    """Number and distances of direct neighbours, and correlation of r_n across cell walls.
-
-    Empty for spheres.
-    """
+    """Number and distances of direct neighbours, and correlation of r_n; empty for spheres."""
     diagrams = [section.diagram for section in result.sections if section.diagram]
     if not diagrams:
         return {}
@@ -61,12 +58,7 @@ def _neighbour_numbers(result: Microstructure) -> dict[str, object]:
 
 
 def _map_numbers(result: Microstructure) -> dict[str, object]:
-    """Return the numbers of the radius map by name, for the summary.
-
-    They are statistics of the reduced radii r_n; the map's a1, a3 and fuzzy slopes a2, a4 (low,
-    peak, high) with their confidence bands; its p-box, and how far the sample leaves it; and the
-    misfit of the curve at the peaks of the slopes.
-    """
+    """Numbers of the sample of r_n, of the fuzzy map, and how far the sample leaves its p-box."""
     pbox, sample = result.pbox, result.sample
     return {
         "cells": len(sample.values),
@@ -108,11 +100,7 @@ def radius_section(result: Microstructure) -> dict[str, list[float] | float]:
 
 
 def fragment(numbers: Mapping[str, Any]) -> str:
-    """The case section [radius] as TOML text, with fractions as comments.
-
-    Args:
-        numbers: Numbers of a study by name, from `summary`.
-    """
+    """The case section [radius] as TOML text, with fractions as comments, from a `summary`."""
     measure = "volume" if "mean_volume_fraction_of_map" in numbers else "area"
     stated, map_fraction = numbers["fraction_of_case"], numbers[f"mean_{measure}_fraction_of_map"]
     case_words = "" if stated is None else f"; of the case: {stated:g}"
@@ -129,11 +117,7 @@ def fragment(numbers: Mapping[str, Any]) -> str:
 
 
 def to_dataset(result: Microstructure) -> xarray.Dataset:
-    """Return the distribution function of r_n over 501 radii as a dataset.
-
-    Returns:
-        Variables cdf (of the sample), pbox_lower, pbox_upper and fitted, over the coordinate r_n.
-    """
+    """Return cdf of the sample, pbox_lower, pbox_upper and fitted over 501 r_n as a dataset."""
     import xarray
 
     box, fit = result.pbox, result.pbox.fit

@@ -41,13 +41,7 @@ class RadiusMap(Protocol):
 
 
 def require_map(radius_map: RadiusMap) -> None:
-    """Refuse a radius map whose law of θ has no support or whose radii leave (0, 1).
-
-    The radii are evaluated at 65 values of θ.
-
-    Example:
-        >>> require_map(HermiteMap(0.2, 0.1, 0.8, 0.2))
-    """
+    """Refuse a radius map whose law of θ has no support or whose radii, at 65 θ, leave (0, 1)."""
     law = radius_map.distribution
     require_support(law.lower, law.upper)
     theta = np.linspace(law.lower, law.upper, 65)

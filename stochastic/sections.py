@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import shutil
+import subprocess
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Rows
-from alphacut.fuzzy.refused import require
+from alphacut.fuzzy.refused import FailedError, require
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
 from alphacut.stochastic.particles.packing import Packing
 from alphacut.stochastic.particles.particles import DISCS, Particles
 from alphacut.stochastic.tessellation.apollonius import Apollonius, apollonius, counted_cells
-from alphacut.stochastic.tessellation.power_cells import cell_volumes
 
 PATCHES = 5  # a single section is cut into 5 × 5 patches, which the bootstrap draws
 
@@ -59,12 +62,7 @@ def with_cells(particles: Particles) -> ParticleCells:
 
 @dataclass(frozen=True)
 class Simulated:
-    """Independent packings of one kind.
-
-    Args:
-        packing: Specification of each.
-        packings: Their number; the bootstrap draws packings.
-    """
+    """Independent packings of one kind, of which the bootstrap draws."""
 
     packing: Packing
     packings: int = 20
@@ -76,13 +74,7 @@ class Simulated:
         executor: Executor | None = None,
         progress: Callable[[float], None] | None = None,
     ) -> list[ParticleCells]:
-        """Return all packings with their cells; the k-th depends on `seed` and k only.
-
-        Args:
-            seed: Seed of all packings.
-            executor: Runs the packings; this process if None.
-            progress: Called with the completed fraction.
-        """
+        """Return all packings with their cells; the k-th depends on `seed` and k only."""
         seeds = np.random.SeedSequence(seed).spawn(self.packings)
         map_function = executor.map if executor else map
         sections: list[ParticleCells] = []
@@ -127,3 +119,34 @@ def _patches(section: ParticleCells) -> Rows:
     patch = (PATCHES * particles.centres[section.counted] / particles.size).astype(int)
     base = PATCHES ** np.arange(len(particles.size))[::-1]
     return np.asarray(np.minimum(patch, PATCHES - 1) @ base)
+
+
+def cell_volumes(spheres: Particles) -> Array:
+    """Volumes of the power (Laguerre) cells of spheres in a periodic cube, in m³, shape (n,).
+
+    Voro++ (Rycroft, Chaos 19, 041111, 2009) is run as a program; Debian's package is voro++.
+
+    Raises:
+        FailedError: Voro++ is not installed or fails, or a sphere has no cell.
+    """
+    program = shutil.which("voro++")
+    if program is None:
+        raise FailedError("cells of spheres need Voro++", "install Debian's package voro++")
+    side, count = float(spheres.size[0]), len(spheres)
+    table = np.c_[np.arange(count), spheres.centres / side, spheres.radii / side]
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "spheres"
+        np.savetxt(file, table, fmt="%d %.17g %.17g %.17g %.17g")
+        command = [program, "-r", "-p", "-c", "%i %v", *"010101", str(file)]
+        subprocess.run(command, capture_output=True, check=False)
+        output = file.with_suffix(".vol")
+        cells = np.loadtxt(output, ndmin=2) if output.is_file() else np.zeros((0, 2))
+    volumes = np.zeros(count)
+    volumes[cells[:, 0].astype(int)] = cells[:, 1]
+    if not (volumes > 0).all() or abs(volumes.sum() - 1) > 1e-5:  # Voro++ prints six digits
+        raise FailedError(
+            f"the power cells of {count} spheres fill {volumes.sum():.6f} of the cube, and"
+            f" {int((volumes <= 0).sum())} spheres have none",
+            "take spheres that do not overlap",
+        )
+    return volumes * side**3

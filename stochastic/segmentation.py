@@ -9,25 +9,15 @@ light there. Texture of the phases counts as noise.
 Grey values that are clipped hide noise and light, so that no judgement holds: an image is refused
 where the values of a class pile up at an end, or one class is flat beside another one that is not.
 Clipped until both are flat, an image looks like a clean one and is taken for it.
-
-Smoothing is that of non-local means (Buades, Coll, Morel 2005), which keeps edges. In doubt besides
-is what a second pass would change once more, or one deviation of the noise that smoothing leaves
-(measured by adding half as much noise again), whichever is more.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import (
-    maximum_filter,
-    median_filter,
-    minimum_filter,
-    percentile_filter,
-    uniform_filter,
-)
+from scipy.ndimage import maximum_filter, median_filter, minimum_filter, percentile_filter
 
 from alphacut.fuzzy.arrays import Array, Mask, Rows
 from alphacut.fuzzy.refused import RefusedError, require
@@ -48,9 +38,7 @@ MIN_IMPULSES = 0.01
 """Share of pixels that are impulses from which on they count; noise alone has 0.003."""
 _AROUND, _MOST_AROUND = 7, (15, 85)  # pixels around, and percentiles; a line has 7 of 49 pixels
 _MIN_PIXELS = 50  # of a class whose grey values are checked for clipping
-_PATCH, _REACH = 5, 7  # pixels of a neighbourhood, and to those that it is compared with
-_NOISE_SAMPLES = 4  # of added noise, to measure how much of it smoothing leaves
-_STRENGTH = 0.8  # of the smoothing, over the noise
+_MEDIAN = 5  # pixels of the median filter of the classes
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,8 +52,7 @@ class Segmentation:
         levels: Grey value of each class under mean light.
         light: What the light adds to each pixel, of mean zero, shape (rows, columns).
         noise: Standard deviation of the residuals, in grey values.
-        smoothing_error: Uncertainty of each grey value from smoothing; infinite at impulses and
-            scratches.
+        is_impulse: Pixels that are salt, pepper or scratches, which may be of any class.
     """
 
     grey: Array
@@ -73,7 +60,7 @@ class Segmentation:
     levels: Array
     light: Array
     noise: float
-    smoothing_error: Array | float = 0.0
+    is_impulse: Mask
 
     @property
     def drift(self) -> float:
@@ -100,86 +87,67 @@ class Segmentation:
     def ranges(self) -> tuple[Rows, Rows]:
         """Least and greatest class that each pixel may be of, shape (rows, columns) each.
 
-        The grey value is varied by `CONFIDENT` deviations of the noise, by the light and by the
-        uncertainty from smoothing.
+        The grey value is varied by `CONFIDENT` deviations of the noise and by the light.
         """
-        uncertainty = CONFIDENT * self.noise + np.abs(self.light) + self.smoothing_error
+        uncertainty = CONFIDENT * self.noise + np.abs(self.light)
+        uncertainty = np.where(self.is_impulse, np.inf, uncertainty)
         first = np.searchsorted(self.thresholds, self.grey - uncertainty, side="right")
         last = np.searchsorted(self.thresholds, self.grey + uncertainty, side="right")
         return first, last
 
     def require_certain(self, most: float = MOST_OPEN) -> None:
-        """Refuse a segmentation with too much uncertain area beside that of the smallest class.
-
-        Args:
-            most: Largest allowed uncertain area, as a fraction of the smallest class's.
-        """
+        """Refuse a segmentation whose open area is more than `most` times that of a class."""
         fraction = self.open_fraction / float(self.fractions.min())
-        impulses = float(np.mean(np.isinf(self.smoothing_error)))
+        impulses = float(np.mean(self.is_impulse))
         value = (
             f"in doubt on {fraction:.1%} of the smallest phase, by noise of {self.noise:.3g} and"
             f" drift of light of {self.drift:.3g} grey levels"
         )
         if impulses:
             value += f", and by impulses or scratches on {impulses:.1%}"
-        cure = 'remove = ["noise", "light"] takes noise and the drift of light away'
+        cure = "the how-to on images takes noise and light away by scikit-image"
         require(fraction <= most, "threshold", value=value, allowed=f"up to {most:.0%}", cure=cure)
 
 
-def segment(
-    grey: Array, thresholds: Sequence[float], *, smooth: bool = False, level: bool = False
-) -> Segmentation:
-    """Segment a grey image: classes, light, noise, and the uncertainty of each pixel.
+def segment(grey: Array, thresholds: Sequence[float]) -> Segmentation:
+    """Segment a grey image: classes, light, noise, and pixels that may be of another class.
+
+    Levels, light and noise are fitted and classes assigned in turn, until no class changes.
 
     Args:
         grey: Grey values, shape (rows, columns).
         thresholds: Grey values between the classes, rising.
-        smooth: Remove noise first.
-        level: Remove the drift of the light first; the thresholds, which were read off the uneven
-            image, are replaced by the `level_midpoints` of the even one.
 
     Raises:
         RefusedError: A class has no pixel, or grey values are clipped.
     """
     values, borders = np.asarray(grey, float), tuple(map(float, thresholds))
-    impulses = _impulses(_classify(values, borders))
+    polynomials = _polynomials(values.shape)  # of the light
+    light, last_labels = np.zeros_like(values), None
+    for _ in range(_MAX_ITERATIONS):
+        labels = np.searchsorted(borders, values - light, side="right")
+        if last_labels is not None and np.array_equal(labels, last_labels):
+            break
+        levels, light, noise = _fit_light(values, labels, polynomials, len(borders) + 1)
+        last_labels = labels
+    impulses = _impulses(values - light, levels, noise)
     _require_unclipped(values, borders, ~impulses)
-    smoothing_error: Array | float = 0.0
-    if level:
-        values = values - _classify(values, borders).light
-        borders = _classify(values, borders).level_midpoints
-    if smooth and (noise := _classify(values, borders).noise):
-        noisy, values = values, _denoise(values, noise)
-        second_change = np.abs(values - _denoise(values, noise))
-        smoothing_error = np.maximum(second_change, _remaining_noise(noisy, values, noise))
-    return replace(
-        _classify(values, borders), smoothing_error=np.where(impulses, np.inf, smoothing_error)
-    )
+    return Segmentation(values, borders, levels, light, noise, impulses)
 
 
-def _impulses(image: Segmentation) -> Mask:
-    """Mask of the pixels that are salt, pepper or scratches, shape (rows, columns).
-
-    Their grey values lie beyond the noise of every class and of most pixels around them, unlike
-    those of a blurred border. If they are less than `MIN_IMPULSES` of the image there are none.
-    """
-    grey = image.grey - image.light
-    band = CONFIDENT * image.noise + _EXACT * float(np.abs(grey).max())
-    is_outlier = np.abs(grey[..., None] - image.levels).min(axis=-1) > band
+def _impulses(grey: Array, levels: Array, noise: float) -> Mask:
+    """Mask of the pixels that are salt, pepper or scratches in an evenly lit image."""
+    # beyond the noise of every class and of most pixels around, unlike those of a blurred border
+    band = CONFIDENT * noise + _EXACT * float(np.abs(grey).max())
+    is_outlier = np.abs(grey[..., None] - levels).min(axis=-1) > band
     low, high = (percentile_filter(grey, q, _AROUND, mode="wrap") for q in _MOST_AROUND)
     impulses = is_outlier & ((grey < low - band) | (grey > high + band))
     return np.asarray(impulses & (impulses.mean() >= MIN_IMPULSES))
 
 
 def _require_unclipped(values: Array, borders: tuple[float, ...], sound: Mask) -> None:
-    """Refuse an image whose grey values are clipped: a class piles up at an end of the values.
-
-    Args:
-        values: Grey values.
-        borders: Thresholds between the classes.
-        sound: Pixels that are no impulses.
-    """
-    labels = median_filter(np.searchsorted(borders, values, side="right"), _PATCH, mode="wrap")
+    """Refuse an image of which a class piles up at an end of the values; `sound`: no impulses."""
+    labels = median_filter(np.searchsorted(borders, values, side="right"), _MEDIAN, mode="wrap")
     interior = _interior(labels, _BORDER) & sound
     classes = [values[interior & (labels == k)] for k in range(len(borders) + 1)]
     classes = [grey for grey in classes if grey.size >= _MIN_PIXELS]
@@ -197,61 +165,12 @@ def _require_unclipped(values: Array, borders: tuple[float, ...], sound: Mask) -
 
 
 def _is_flat(grey: Array, contrast: float) -> bool:
-    """Whether a class has one grey value, or up to three distant ones, as in a clean image.
-
-    Args:
-        grey: Grey values of the pixels of a class, shape (n,).
-        contrast: Range of the grey values of the image.
-    """
+    """Whether a class has one grey value, or up to three distant ones, as in a clean image."""
     values, counts = np.unique(grey, return_counts=True)
     order = np.argsort(-counts)[:_MAX_FLAT]  # of the most frequent values
     fractions = counts[order] / grey.size
     are_distant = (np.diff(np.sort(values[order])) >= _FLAT_GAP * contrast).all()
     return bool(fractions[0] >= _FLAT or (are_distant and fractions.sum() >= _FLAT))
-
-
-def _classify(values: Array, borders: tuple[float, ...]) -> Segmentation:
-    """Fit levels, light and noise and assign the classes in turn, until no class changes."""
-    polynomials = _polynomials(values.shape)  # of the light
-    light, last_labels = np.zeros_like(values), None
-    for _ in range(_MAX_ITERATIONS):
-        labels = np.searchsorted(borders, values - light, side="right")
-        if last_labels is not None and np.array_equal(labels, last_labels):
-            break
-        levels, light, noise = _fit_light(values, labels, polynomials, len(borders) + 1)
-        last_labels = labels
-    return Segmentation(values, borders, levels, light, noise)
-
-
-def _denoise(grey: Array, noise: float) -> Array:
-    """Remove the noise of an image by non-local means with periodic edges.
-
-    Args:
-        grey: Grey values, shape (rows, columns).
-        noise: Standard deviation of the noise.
-    """
-    from skimage import restoration
-
-    edge = _PATCH + _REACH
-    padded = np.pad(grey, edge, mode="wrap")
-    smooth = restoration.denoise_nl_means(
-        padded, patch_size=_PATCH, patch_distance=_REACH, h=_STRENGTH * noise, sigma=noise
-    )
-    return np.asarray(smooth[edge:-edge, edge:-edge])
-
-
-def _remaining_noise(noisy: Array, smooth: Array, noise: float) -> Array:
-    """Standard deviation of the noise that smoothing leaves in each pixel, (rows, columns).
-
-    Half as much noise again is added and its effect on the smoothed image measured nearby. Near
-    borders few patches are alike, so that more is left than inside the classes.
-    """
-    rng = np.random.default_rng(0)
-    squares = [
-        (_denoise(noisy + noise / 2 * rng.normal(size=noisy.shape), noise) - smooth) ** 2
-        for _ in range(_NOISE_SAMPLES)
-    ]
-    return np.asarray(2 * np.sqrt(uniform_filter(np.mean(squares, axis=0), 3, mode="wrap")))
 
 
 def _polynomials(shape: tuple[int, ...]) -> Array:
@@ -264,16 +183,7 @@ def _polynomials(shape: tuple[int, ...]) -> Array:
 def _fit_light(
     values: Array, labels: Rows, shapes: Array, classes: int
 ) -> tuple[Array, Array, float]:
-    """Fit grey levels (classes,), light (rows, columns) and noise to a classified image.
-
-    Least squares over pixels away from borders; outliers are left out in three passes.
-
-    Args:
-        values: Grey values, shape (rows, columns).
-        labels: Class of each pixel.
-        shapes: Polynomials of the light at the pixels, shape (pixels, 5).
-        classes: Number of classes.
-    """
+    """Fit levels (classes,), light (rows, columns) and noise by least squares without outliers."""
     inner = _inner_pixels(labels, classes).ravel()
     columns = np.hstack([labels.reshape(-1, 1) == np.arange(classes), shapes])
     flat, used = values.ravel(), inner
@@ -290,10 +200,7 @@ def _fit_light(
 
 
 def _inner_pixels(labels: Rows, classes: int) -> Mask:
-    """Mask of pixels farther than 3 pixels from other classes, or as far as the classes allow.
-
-    The distance is reduced until a tenth of each class is left.
-    """
+    """Mask of pixels 3 pixels from other classes, or nearer until a tenth of each class is left."""
     counts = np.bincount(labels.ravel(), minlength=classes)
     value, allowed = "beyond the grey values of a class", "values that leave each class some pixels"
     require(counts.all(), "threshold", value=value, allowed=allowed)

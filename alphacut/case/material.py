@@ -317,9 +317,6 @@ class ImageCell(Section):
     loss: Annotated[tuple[Loss, ...], OneOrMany] | None = Field(
         default=None, description="loss factor tan δ of each phase's Young's modulus at real ν"
     )
-    remove: Annotated[tuple[Literal["noise", "light"], ...], OneOrMany] = Field(
-        default=(), description="what is taken away first: noise, the drift of light"
-    )
 
     @property
     def pairs(self) -> tuple[tuple[FuzzyNumber, FuzzyNumber], ...]:

@@ -9,8 +9,7 @@ from pydantic import Field, model_validator
 from alphacut.case.types import CaseFile, Fraction, Length, Quantity, Section, after, rising
 from alphacut.fuzzy.refused import require
 from alphacut.stochastic.microstructure import MicrostructureStudy
-from alphacut.stochastic.particles.circles_csv import CircleFile
-from alphacut.stochastic.particles.image import SectionImage
+from alphacut.stochastic.particles.measured import CircleFile, SectionImage
 from alphacut.stochastic.particles.packing import Packing
 from alphacut.stochastic.particles.particles import DISCS, SPHERES
 from alphacut.stochastic.particles.radius_laws import LogNormalRadii, MeasuredRadii, RadiusLaw

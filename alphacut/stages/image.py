@@ -237,9 +237,8 @@ def _study_by_thresholds(grey: Array, cell: ImageCell) -> ImageStudy:
     numbers = cell.threshold or ()
     require_phases(grey, tuple(number.cut(0.0) for number in numbers))
     modal = [number.modal for number in numbers]
-    segmentation = segment(grey, modal, smooth="noise" in cell.remove, level="light" in cell.remove)
+    segmentation = segment(grey, modal)
     segmentation.require_certain()
-    shifts = [new - old for new, old in zip(segmentation.thresholds, modal, strict=True)]
     is_fuzzy = any(number.support.width > 0 for number in numbers)
 
     def phase_ranges(level: AlphaLevel) -> tuple[Rows, Rows]:
@@ -247,9 +246,7 @@ def _study_by_thresholds(grey: Array, cell: ImageCell) -> ImageStudy:
         # noise and light leave phases open, unless a fuzzy threshold says all that is not known
         if level is not None and not is_fuzzy:
             return segmentation.ranges()
-        cuts = (cut_at(number, level) for number in numbers)
-        pairs = [(low + by, high + by) for (low, high), by in zip(cuts, shifts, strict=True)]
-        return threshold_ranges(segmentation.grey, pairs)
+        return threshold_ranges(grey, [cut_at(number, level) for number in numbers])
 
     return ImageStudy(cell, phase_ranges, is_fuzzy or segmentation.open_fraction > 0)
 

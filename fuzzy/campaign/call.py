@@ -181,11 +181,7 @@ def _outcome(output: Any) -> Outcome:
 
 
 def _flatten(output: Output) -> Sample:
-    """Return a number (named `y`), an array (`y[0]`, …) or a mapping of names to either as sample.
-
-    Raises:
-        RefusedError: There is no number, one that is not finite, or two of the same name.
-    """
+    """Return a number (named `y`), an array (`y[0]`, …) or a mapping of names to them as sample."""
     named = output if isinstance(output, Mapping) else {"y": output}
     arrays = {str(name): _finite_array(str(name), value) for name, value in named.items()}
     layout = tuple((name, array.shape) for name, array in arrays.items())

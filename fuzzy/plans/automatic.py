@@ -164,10 +164,7 @@ class SignWalk:
         return monotone
 
     def _signs_along_walk(self) -> Signs:
-        """Signs of all differences by each input along the walk, shape (outputs, uncertain inputs).
-
-        0 where differences have both signs or are NaN, 1 for an input without effect.
-        """
+        """Signs of all differences along the walk, 0 where mixed, (outputs, uncertain inputs)."""
         inputs = len(self.cut.uncertain_inputs)
         steps = self.steps * inputs
         walk = np.empty((steps + 1, inputs))
@@ -184,10 +181,7 @@ class SignWalk:
         return np.where(is_unknown, 0, np.where(falls, -1, 1)).astype(np.int8).T
 
     def _evaluate_corners(self, signs: Signs) -> None:
-        """Evaluate the extreme corners of each cut for effects of these signs, (uncertain inputs,).
-
-        From the two corners of the widest cut steps along each input are evaluated, too.
-        """
+        """Evaluate extreme corners of each cut for such signs, and steps from the widest."""
         greatest = (signs > 0).astype(float)
         corners = np.stack([greatest, 1 - greatest])
         steps = np.eye(len(signs)) * (1 - 2 * corners[:, None])  # inwards

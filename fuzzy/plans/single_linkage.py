@@ -293,10 +293,7 @@ class SingleLinkage:
         state.samples = len(rows) - state.plateau_samples
 
     def _descend_from(self, cut: CutSearch, bound: Bound, start: Array) -> None:
-        """Descend from a start and record the optimum; again with a short step if it left a basin.
-
-        It did where values do not fall all along the straight line to the optimum.
-        """
+        """Descend and record the optimum; with a short step again if it left the basin."""
         optimum = cut.descend(start, bound)
         self._record(optimum)
         step = cut.unit(optimum.point[None])[0] - start
@@ -307,10 +304,7 @@ class SingleLinkage:
                 self._record(cut.descend(start, bound, FIRST_STEP))
 
     def _record(self, optimum: Optimum) -> None:
-        """Add an optimum to the list of every cut of which it is a local optimum, or to its equal.
-
-        The better of two equal ones stays.
-        """
+        """Add an optimum to every cut of which it is one; the better of two equal ones stays."""
         for cut in self.cuts:
             if not optimum.is_optimum_of(cut):
                 continue
@@ -322,11 +316,9 @@ class SingleLinkage:
                 optima[index] = optimum
 
     def _index_of_equal(self, cut: CutSearch, optimum: Optimum) -> int:
-        """Index of an equal optimum in the list of a cut; its length if there is none.
-
-        Optima of nearly one value are equal if they are close, or if no value between them is
-        larger: a valley is where many descents end, and symmetric hills are several.
-        """
+        """Index of an equal optimum in the list of a cut; its length if there is none."""
+        # Optima of nearly one value are equal if they are close, or if no value between them is
+        # larger: a valley is where many descents end, and symmetric hills are several
         optima = self.states[cut.level, optimum.bound].optima
         tolerance = self._tolerance(optimum.bound)
         alike = [k for k, x in enumerate(optima) if abs(x.value - optimum.value) <= tolerance]

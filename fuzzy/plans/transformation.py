@@ -227,11 +227,8 @@ def _sample_count(effects: Effects, domain: Domain) -> float:
 
 
 def _level_points(signs: Signs, grid: list[list[float]]) -> Array:
-    """Return the points of the signed plan on one level, shape (n, inputs).
-
-    Each row of signs (rows, inputs) names two opposite corners; inputs without a sign take all
-    their points.
-    """
+    """Return the points of the signed plan on one level, shape (n, inputs)."""
+    # a row of signs names two opposite corners; inputs without a sign take all their points
     rows: list[tuple[float, ...]] = []
     for pattern in np.concatenate([signs, -signs]):
         pairs = zip(pattern, grid, strict=True)

@@ -31,13 +31,17 @@ from alphacut.stochastic.figures.style import (
 )
 from alphacut.stochastic.microstructure import Microstructure
 from alphacut.stochastic.microstructure_summary import to_dataset
-from alphacut.stochastic.particles.image import SectionImage
+from alphacut.stochastic.particles.measured import SectionImage
 from alphacut.stochastic.particles.packing import Packing
 from alphacut.stochastic.particles.particles import DISCS, Particles
 from alphacut.stochastic.particles.radius_laws import LogNormalRadii, RadiusLaw
 from alphacut.stochastic.sections import Simulated
-from alphacut.stochastic.tessellation.apollonius import Apollonius, apollonius
-from alphacut.stochastic.tessellation.delaunay import neighbouring_values, neighbours
+from alphacut.stochastic.tessellation.apollonius import (
+    Apollonius,
+    apollonius,
+    neighbouring_values,
+    neighbours,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -9,8 +9,7 @@ import numpy as np
 from alphacut.fuzzy.arrays import Array
 from alphacut.stochastic.figures.style import GREEN, GREY, INK, LIGHT, ORANGE, PALE, two_panels
 from alphacut.stochastic.particles.particles import Particles
-from alphacut.stochastic.tessellation.apollonius import Apollonius, apollonius
-from alphacut.stochastic.tessellation.delaunay import neighbours
+from alphacut.stochastic.tessellation.apollonius import Apollonius, apollonius, neighbours
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -101,9 +100,8 @@ def draw_neighbours(discs: Particles) -> Figure:
 def draw_two_point(discs: Particles, generator: np.random.Generator) -> Figure:
     """Draw why the distribution of pair distances does not describe a packing (Figs. 3, 4).
 
-    Left: around one disc, others drawn independently with the packing's own pair distances: they
-    overlap each other. Right: the true discs within the same distance; only the direct neighbours
-    (green) touch the centre's cell.
+    Left others drawn independently with the packing's pair distances: they overlap. Right the true
+    discs within the same distance; only direct neighbours (green) touch the centre's cell.
     """
     reach, radius = 3.5 * discs.spacing, float(discs.radii[0])
     centre = int(np.argmin(np.hypot(*(discs.centres - discs.size / 2).T)))
@@ -150,12 +148,7 @@ def _overlaps(places: Array, radius: float) -> int:
 
 
 def draw_overlay(picture: Array, discs: Particles) -> Figure:
-    """Draw the grey image with the outline of every circle that was found in it.
-
-    Args:
-        picture: Grey values, shape (rows, columns).
-        discs: Circles in the same window; y points up from the lower edge.
-    """
+    """Draw the grey image (rows, columns) with the outline of every circle found in it."""
     import matplotlib.pyplot as plt
 
     width, height = 1e3 * discs.size

@@ -15,15 +15,13 @@ from alphacut.fuzzy.refused import require
 
 @dataclass(frozen=True, eq=False)
 class AreaWeighted:
-    """Weighted sample of r_n: the weight of a value is the share of area of its cell (eq. 9).
-
-    Of spheres the share of volume takes the place of the share of area.
+    """Weighted sample of r_n: a value's weight is the share of area or volume of its cell (eq. 9).
 
     Args:
         values: r_n, shape (n,); sorted when built by `from_values`.
         weights: shape (n,), sum 1.
-        groups: Group of each value, shape (n,), the number of its packing or of its patch of a
-            section; the bootstrap draws groups.
+        groups: Number of each value's packing, or of its patch of a section, shape (n,); the
+            bootstrap draws groups.
     """
 
     values: Array
@@ -77,18 +75,11 @@ class AreaWeighted:
         return float(self.weights[(self.values >= lower) & (self.values <= upper)].sum())
 
     def limits(self, share: float) -> tuple[float, float]:
-        """Return limits of r_n that contain the fraction `share` in (0, 1) of the area.
-
-        Equal fractions lie below and above them.
-        """
+        """Return limits of r_n with the fraction `share` of area between, equal ones outside."""
         return float(self.quantile((1 - share) / 2)), float(self.quantile((1 + share) / 2))
 
     def truncated(self, lower: float, upper: float) -> AreaWeighted:
-        """Return the part of the sample within limits of r_n, its weights scaled to the sum 1.
-
-        Raises:
-            RefusedError: Fewer than ten values lie within them.
-        """
+        """Return the part within limits of r_n, of sum 1; refuse fewer than ten values."""
         inside = (self.values >= lower) & (self.values <= upper)
         count = int(inside.sum())
         value = f"[{lower:g}, {upper:g}] with {count} reduced radii"
@@ -103,10 +94,7 @@ class AreaWeighted:
         return AreaWeighted(np.minimum(self.values, most), self.weights, self.groups)
 
     def bootstrap_weights(self, number: int, generator: np.random.Generator) -> Iterator[Array]:
-        """Yield the weights of the values, (n,), sum 1, in each of `number` bootstrap samples.
-
-        Groups are drawn with replacement.
-        """
+        """Yield the weights of the values, (n,), sum 1, in each of `number` samples of groups."""
         count = int(self.groups.max()) + 1
         for _ in range(number):
             repetitions = np.bincount(generator.integers(count, size=count), minlength=count)
@@ -116,12 +104,7 @@ class AreaWeighted:
     def band_half_width(self, level: float, number: int, generator: np.random.Generator) -> float:
         """Half width of the simultaneous bootstrap band of the distribution function F.
 
-        It is the `level` quantile of sup |F* − F| over the resampled distribution functions F*.
-
-        Args:
-            level: Confidence, in (0, 1).
-            number: Number of bootstrap samples.
-            generator: Random number generator.
+        It is the `level` quantile of sup |F* − F| over `number` resampled functions F*.
 
         Raises:
             RefusedError: There are fewer than five groups to draw from.

@@ -35,12 +35,7 @@ SLOPES = np.array([polynomial.polyval(XI, polynomial.polyder(h)) for h in SHAPES
 
 @dataclass(frozen=True)
 class HermiteFit:
-    """Least-squares fit of the slopes a2, a4 of a Hermite map between two ends.
-
-    Args:
-        a1: Lower limit of r_n.
-        a3: Upper limit of r_n.
-    """
+    """Least-squares fit of the slopes a2, a4 of a Hermite map between two limits a1, a3 of r_n."""
 
     a1: float
     a3: float
@@ -50,11 +45,8 @@ class HermiteFit:
     def slopes(self, sample: AreaWeighted, weights: Array | None = None) -> tuple[float, float]:
         """Slopes a2, a4 of the monotone cubic H nearest to the sample between the limits.
 
-        The distance is ∫ (Q(F_Θ(θ)) − H(θ))² f_Θ dθ, Q the quantile function of the sample.
-
-        Args:
-            sample: r_n within [a1, a3].
-            weights: Other weights of the same values, shape (n,), sum 1 (for the bootstrap).
+        The distance is ∫ (Q(F_Θ(θ)) − H(θ))² f_Θ dθ, Q the quantile function of the sample; the
+        bootstrap gives its values other weights.
         """
         cumulated = sample.cumulated if weights is None else np.minimum(np.cumsum(weights), 1.0)
         probability = np.concatenate([[0.0], cumulated])
@@ -70,12 +62,7 @@ class HermiteFit:
         return HermiteMap(self.a1, slopes[0], self.a3, slopes[1], self.distribution)
 
     def misfit(self, sample: AreaWeighted, slopes: tuple[float, float]) -> float:
-        """Root mean square over θ of the sample's quantile function less the map, in r_n.
-
-        Args:
-            sample: r_n within [a1, a3].
-            slopes: Slopes (a2, a4) of the map.
-        """
+        """Root mean square over θ of the sample's quantiles less the map with slopes (a2, a4)."""
         probability = (np.arange(20_000) + 0.5) / 20_000
         fitted = self.map(slopes)(self.distribution.quantile(probability))
         return float(np.sqrt(np.mean((sample.quantile(probability) - fitted) ** 2)))
@@ -88,13 +75,9 @@ class HermiteFit:
         return np.array([Polynomial(h)(xi).coef for h in SHAPES[[1, 3]]])
 
     def _integrals(self, probability: Array) -> Array:
-        """Integrals ∫ h_i f_Θ dθ of h2 and h4 up to the quantiles of probabilities, shape (2, n).
-
-        The moments ∫ θ^k f_Θ dθ follow from each other by partial integration, as f' = −θ f.
-
-        Args:
-            probability: Shape (n,), rising from 0 to 1.
-        """
+        """Integrals ∫ h_i f_Θ dθ of h2, h4 up to quantiles of probabilities (n,), (2, n)."""
+        # the moments ∫ θ^k f_Θ dθ follow from each other by partial integration, as f' = −θ f
+        # the moments ∫ θ^k f_Θ dθ follow from each other by partial integration, as f' = −θ f
         law = self.distribution
         theta = law.quantile(probability)
         density, first = law.pdf(theta), law.pdf(law.lower)
@@ -140,11 +123,9 @@ class HermiteFit:
         return float(weights @ shape[1]), float(-weights @ shape[3])
 
     def _nearest_monotone(self, best: Array) -> Array:
-        """Slopes (2,) of the monotone map nearest to the map with slopes `best` (2,).
-
-        Least distance programming by non-negative least squares (Lawson, Hanson 1974, chapter 23):
-        the least |x| with G x ≥ h, x = Lᵀ (slopes − best) and L Lᵀ the Gram matrix.
-        """
+        """Slopes (2,) of the monotone map nearest to the map with slopes `best` (2,)."""
+        # least distance programming by non-negative least squares (Lawson, Hanson 1974, chapter
+        # 23): the least |x| with G x ≥ h, x = Lᵀ (slopes − best) and L Lᵀ the Gram matrix
         from scipy.optimize import nnls
 
         L = np.linalg.cholesky(self._gram)
@@ -159,26 +140,16 @@ class HermiteFit:
 
 @dataclass(frozen=True)
 class SlopeBand:
-    """Fitted slopes and the ends of their joint band.
-
-    Args:
-        a2: Lower end, fitted value, upper end of a2.
-        a4: The same of a4.
-    """
+    """Lower end, fitted value and upper end of each slope in their joint band."""
 
     a2: tuple[float, float, float]
     a4: tuple[float, float, float]
 
     def monotone_part(self, fit: HermiteFit) -> SlopeBand:
-        """Largest part of the band around the fitted slopes with four monotone corners.
-
-        The quantile function of a sample rises, so slopes beyond are those of no radius map. The
-        ends are cut at slopes from zero to three times the chord's (Fritsch and Carlson 1980), then
-        moved towards the fitted slopes until all corners rise.
-
-        Args:
-            fit: Ends of the map and law of θ.
-        """
+        """Largest part of the band around the fitted slopes with four monotone corners."""
+        # slopes beyond are those of no radius map. The ends are cut at slopes from zero to three
+        # times the chord's (Fritsch and Carlson 1980), then moved towards the fitted ones until all
+        # corners rise
         chord = fit.a3 - fit.a1
         least, greatest = MARGIN * chord, (STEEPEST - 4 * MARGIN) * chord
         lower, fitted, upper = np.array([self.a2, self.a4]).T
@@ -201,18 +172,11 @@ def slope_band(
     resamples: int,
     generator: np.random.Generator,
 ) -> SlopeBand:
-    """Fitted slopes and their joint confidence band, by the bootstrap.
+    """Fitted slopes and their joint band of confidence `level` in (0, 1), by the bootstrap.
 
     The half width is a quantile of Student's t times the bootstrap standard error. The probability
     of error is halved between the two slopes (Bonferroni); t has one degree of freedom less than
     there are groups to draw.
-
-    Args:
-        fit: Ends of the map and law of θ.
-        sample: r_n within the ends.
-        level: Joint confidence, in (0, 1).
-        resamples: Bootstrap resamples, at least 2.
-        generator: Random number generator.
     """
     from scipy.special import stdtrit
 

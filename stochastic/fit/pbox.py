@@ -23,13 +23,7 @@ from alphacut.stochastic.fit.hermite_fit import SHAPES, SLOPES, HermiteFit, Slop
 
 @dataclass(frozen=True)
 class PBox:
-    """A Hermite map with triangular fuzzy slopes.
-
-    Args:
-        fit: Its ends and the law of θ.
-        a2: Lower end, modal value and upper end of a2.
-        a4: The same of a4.
-    """
+    """A Hermite map with fuzzy slopes a2, a4: lower end, modal value, upper end of each."""
 
     fit: HermiteFit
     a2: tuple[float, float, float]
@@ -47,10 +41,7 @@ class PBox:
         return (self.a2[2] - self.a2[0]) * h2 + (self.a4[2] - self.a4[0]) * h4
 
     def excess(self, sample: AreaWeighted) -> float:
-        """Largest distance of the sample's distribution function outside the p-box.
-
-        It is a probability; 0 if the p-box contains the function.
-        """
+        """Largest distance, a probability, of the sample's distribution outside the p-box."""
         values, before, after = sample.steps
         law = self.fit.distribution
         theta = np.asarray(np.linspace(law.lower, law.upper, 20_001), float)
@@ -66,16 +57,13 @@ def least_pbox(
 ) -> PBox:
     """P-box of least area around the fitted map that contains the sample's band.
 
-    The misfit alone gives little fuzziness where data are few and the band is wide; `required` adds
-    the scatter of the slopes.
-
     Args:
         fit: Ends of the map and law of θ.
         sample: r_n within the ends.
         band: Half width of the band by which the p-box may miss the sample's distribution function,
             in probability, in [0, 1).
-        required: Slopes that the supports must contain as well, such as their bootstrap band, as
-            far as its maps are monotone.
+        required: Slopes that the supports must contain as well, as far as their maps are monotone,
+            such as their bootstrap band: where data are few, the misfit alone is little fuzzy.
 
     Raises:
         FailedError: No p-box of monotone cubics with these ends contains the sample.
@@ -96,12 +84,9 @@ def _support_limits(
 
 
 def _containment(fit: HermiteFit, sample: AreaWeighted, band: float) -> tuple[Array, Array]:
-    """Matrix (k, 4) and right side (k,) of the linear constraints that the p-box has the band.
-
-    They read matrix @ (a2L, a2U, a4L, a4U) ≤ right side. At each step of the sample's distribution
-    function the greatest radius must reach the value where the band's lower edge rises, and the
-    least radius must not pass it where the upper edge does.
-    """
+    """Matrix (k, 4) and right side (k,) by which (a2L, a2U, a4L, a4U) contain the sample's band."""
+    # at each step of the sample's distribution function the greatest radius must reach the value
+    # where the band's lower edge rises, and the least must not pass it where the upper edge does
     probability, values, is_lower_edge = _band_corners(sample, band)
     law = fit.distribution
     xi = (law.quantile(probability) - law.lower) / (law.upper - law.lower)
@@ -114,12 +99,7 @@ def _containment(fit: HermiteFit, sample: AreaWeighted, band: float) -> tuple[Ar
 
 
 def _band_corners(sample: AreaWeighted, band: float) -> tuple[Array, Array, Array]:
-    """Corners of the band around the sample's distribution function, three arrays (k,).
-
-    Returns:
-        Probability and value of each corner, and whether it is one of the lower edge, where the
-        greatest radius is constrained; the least radius otherwise.
-    """
+    """Probability, value of each corner of the sample's band, whether of the lower edge, (k,)."""
     values, before, after = sample.steps
     lower, upper = before + band < 1, after - band > 0
     return (
@@ -132,14 +112,7 @@ def _band_corners(sample: AreaWeighted, band: float) -> tuple[Array, Array, Arra
 def _least_area_supports(
     fit: HermiteFit, limits: list[tuple[float, float | None]], matrix: Array, right_side: Array
 ) -> list[float]:
-    """Supports (a2L, a2U, a4L, a4U) of the p-box of least area, by a linear program.
-
-    Args:
-        fit: Ends of the map and law of θ.
-        limits: Lower and upper limit of each of the four numbers.
-        matrix: Constraints of containment, shape (k, 4).
-        right_side: Their right sides, shape (k,).
-    """
+    """Supports (a2L, a2U, a4L, a4U) of least area, by a linear program: matrix @ ends ≤ right."""
     from scipy.optimize import linprog
 
     monotone = np.zeros((4, SLOPES.shape[1], 4))

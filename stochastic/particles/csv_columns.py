@@ -45,11 +45,7 @@ def length_columns(path: Path, columns: Sequence[str]) -> tuple[Rows, Array]:
 
 
 def fields(path: Path) -> list[tuple[int, list[str]]]:
-    """Return number and fields of each line of a CSV file that is neither empty nor a comment.
-
-    Raises:
-        RefusedError: The file is missing, no text, or has no row.
-    """
+    """Return number and fields of each line of a CSV file that is neither empty nor a comment."""
     text = text_of(path)
     lines = [(row, line) for row, line in enumerate(text.splitlines(), 1)]
     lines = [(row, line) for row, line in lines if line.strip() and not line.startswith("#")]
@@ -61,11 +57,7 @@ def fields(path: Path) -> list[tuple[int, list[str]]]:
 
 
 def cells_of(name: str, row: int, line: str, separator: str) -> list[str]:
-    """Return the fields of line `row` of the file `name`.
-
-    Raises:
-        RefusedError: A field is longer than Python's reader takes.
-    """
+    """Return the fields of line `row` of the file `name`; refuse one that is too long."""
     try:
         return next(csv.reader([line], delimiter=separator))
     except csv.Error:
@@ -74,11 +66,7 @@ def cells_of(name: str, row: int, line: str, separator: str) -> list[str]:
 
 
 def text_of(path: Path) -> str:
-    """Return the text of a file in UTF-8.
-
-    Raises:
-        RefusedError: It cannot be read, or is no text.
-    """
+    """Return the text of a file in UTF-8; refuse what is none."""
     try:
         return path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
@@ -87,11 +75,7 @@ def text_of(path: Path) -> str:
 
 
 def number(path: Path, row: int, cells: Sequence[str], column: int) -> float:
-    """Return the number in a field of a row, in plain ASCII digits with a decimal point.
-
-    Raises:
-        RefusedError: The field is missing or holds no number.
-    """
+    """Return the number in a field of a row, in plain ASCII digits; refuse what is none."""
     text = cells[column].strip() if column < len(cells) else ""
     if len(text) > LONGEST or not NUMBER.fullmatch(text) or not isfinite(float(text)):
         allowed = "numbers such as 1.25 or 1e-3"

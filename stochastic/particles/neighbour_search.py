@@ -26,14 +26,9 @@ def size_classes(radii: Array) -> Iterator[Rows]:
 
 
 def close_pairs(particles: Particles, gap: float) -> tuple[Rows, Rows]:
-    """Unordered pairs of particles whose surfaces are closer than a gap.
+    """Return first and second index of unordered pairs with surfaces closer than `gap`, (m,) each.
 
-    Args:
-        particles: In a periodic box or a window.
-        gap: Distance between the surfaces, in m; 0 finds overlaps.
-
-    Returns:
-        Indices of first and second particle, shape (m,) each.
+    The gap is in m, 0 finds overlaps; particles are in a periodic box or a window.
     """
     box = particles.size if particles.periodic else None
     classes = list(size_classes(particles.radii))
@@ -96,12 +91,8 @@ class Pairs:
 def pairs_within(discs: Particles, reach: Array) -> Iterator[tuple[Rows, Pairs]]:
     """Yield ordered pairs of disc i and periodic image of disc j with centres within reach_i.
 
-    Args:
-        discs: The discs.
-        reach: Largest distance of the centres for each i, shape (n,), in m.
-
-    Yields:
-        Indices i of a portion of the discs, of at most `MAX_PAIRS` pairs or so, and their pairs.
+    They come in portions of `MAX_PAIRS` pairs or so, with the indices i of each; `reach` is in m,
+    shape (n,).
     """
     disc_of_image, shift = _periodic_images(discs, float(reach.max()))
     tree = KDTree(discs.centres[disc_of_image] + shift)
@@ -118,12 +109,7 @@ def pairs_within(discs: Particles, reach: Array) -> Iterator[tuple[Rows, Pairs]]
 
 
 def _periodic_images(discs: Particles, margin: float) -> tuple[Rows, Array]:
-    """Disc and shift of all periodic images with centres within `margin` (m) of the rectangle.
-
-    Returns:
-        Index of the disc of each image, shape (m,), the discs themselves first, and the shift of
-        its centre, shape (m, 2), in m.
-    """
+    """Disc and shift of all periodic images within `margin` of the box, originals first."""
     originals = np.arange(len(discs), dtype=np.intp)
     indices: list[Rows] = [originals]
     shifts: list[Array] = [np.zeros((len(discs), 2))]

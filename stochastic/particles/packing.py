@@ -55,21 +55,15 @@ class Packing:
         checked_number(key, self.fraction, positive=True, most=self.shape.densest)
 
     def make(self, generator: np.random.Generator) -> Particles:
-        """Return a random packing, in a square or cube that the particles fill to `fraction`.
-
-        Raises:
-            FailedError: The packing is too dense.
-        """
+        """Return a random packing in a square or cube that it fills to `fraction`, if it can."""
         radii, side = self._radii(generator)
         box = np.full(self.shape.dimensions, side)
         return Particles(self._centres(radii, box, generator), radii, box)
 
     def _radii(self, generator: np.random.Generator) -> tuple[Array, float]:
-        """Draw radii until their box has room for the largest: radii (n,) and side, in m.
-
-        On average this keeps the frequencies of the law (Wald's identity), as drawing all of them
-        anew does not.
-        """
+        """Draw radii until their box has room for the largest: radii (n,) and side, in m."""
+        # on average this keeps the frequencies of the law (Wald's identity), as drawing all anew
+        # does not
         radii: Array = np.empty(0)
         side = -np.inf
         # a diameter of a disc, and two of a sphere, so that its cell is apart from its own images
@@ -93,10 +87,10 @@ class Packing:
 
 
 def random_sequential(radii: Array, box: Array, generator: np.random.Generator) -> Array | None:
-    """Centres (n, d), in m, of particles without overlap, by random sequential addition.
+    """Centres (n, d), in m, of particles in a periodic box, by random sequential addition.
 
     Particles are added from the largest down, in blocks; each one that overlaps is proposed again
-    at a new centre, uniform in the periodic box.
+    at a new centre, uniform in the box.
 
     Args:
         radii: shape (n,), in m.
@@ -122,13 +116,7 @@ def random_sequential(radii: Array, box: Array, generator: np.random.Generator) 
 
 
 class _Obstacles:
-    """Particles that have been placed, for tests whether proposed ones overlap them.
-
-    Args:
-        centres: shape (n, d), in m.
-        radii: shape (n,), in m.
-        box: Sides of the periodic box, shape (d,), in m.
-    """
+    """Particles with centres (n, d) and radii (n,) in a periodic box, for tests of overlap."""
 
     def __init__(self, centres: Array, radii: Array, box: Array) -> None:
         classes = list(size_classes(radii)) if len(radii) else []
@@ -138,12 +126,7 @@ class _Obstacles:
         ]
 
     def overlapped_by(self, proposal: Array, radii: Array) -> Mask:
-        """Mask of the proposed particles that overlap a placed one, shape (n,).
-
-        Args:
-            proposal: Proposed centres, shape (n, d), in m.
-            radii: Their radii, shape (n,), in m.
-        """
+        """Mask of the proposed particles, centres (n, d), radii (n,), that overlap a placed one."""
         overlaps = np.zeros(len(proposal), bool)
         for tree, centres, placed_radii in self.size_classes:
             candidates = np.flatnonzero(~overlaps)
@@ -157,10 +140,7 @@ class _Obstacles:
 
 
 def _add_block(obstacles: _Obstacles, radii: Array, generator: np.random.Generator) -> Array | None:
-    """Centres (n, d) of further particles that overlap neither obstacles nor each other.
-
-    None if for a particle `MAX_PROPOSALS` proposals all overlap.
-    """
+    """Centres (n, d) of further particles without overlap; None if `MAX_PROPOSALS` fail for one."""
     box = obstacles.box
     centres = np.full((len(radii), len(box)), np.nan)
     new_obstacles = _Obstacles(centres[:0], radii[:0], box)
@@ -195,14 +175,10 @@ def _accepted_in_order(proposal: Array, radii: Array, box: Array) -> Mask:
 
 
 def relax_random_centres(radii: Array, box: Array, generator: np.random.Generator) -> Array:
-    """Centres (n, d), in m, of particles without overlap in a periodic box, by relaxation.
+    """Centres (n, d), in m, of particles in a periodic box, by relaxation of random ones.
 
-    Random centres are pushed apart (`_push`) and then moved at random (`_shake`).
-
-    Args:
-        radii: shape (n,), in m.
-        box: Sides of the box, shape (d,), in m.
-        generator: Random number generator.
+    They are pushed apart (`_push`) and then moved at random (`_shake`). The arguments are as of
+    `random_sequential`.
 
     Raises:
         FailedError: The particles still overlap after all steps.
@@ -216,10 +192,7 @@ def relax_random_centres(radii: Array, box: Array, generator: np.random.Generato
 
 
 def _push(particles: Particles, growth: float) -> Particles:
-    """Move particles apart until none overlap, by fast inertial relaxation (Bitzek et al. 2006).
-
-    The energy ½ Σ overlap² of particles with radii grown by the factor `growth` is minimised.
-    """
+    """Move particles apart until none overlap, by fast inertial relaxation (Bitzek et al. 2006)."""
     centres, box, radii = particles.centres, particles.size, particles.radii * growth
     velocity, step, mixing, n_downhill = np.zeros_like(centres), 0.1, 0.1, 0
     # pairs within the skin are searched anew when a particle has moved half of it
@@ -253,10 +226,7 @@ def _push(particles: Particles, growth: float) -> Particles:
 def _repulsion(
     centres: Array, radii: Array, pairs: tuple[Rows, Rows], box: Array
 ) -> tuple[Array, float]:
-    """Force on each particle, shape (n, d), and the greatest overlap, both in m.
-
-    Each pair repels along the line of centres with a force equal to its overlap.
-    """
+    """Force on each particle, (n, d), equal to its overlaps, and the greatest overlap, in m."""
     first, second = pairs
     offset = nearest_image(centres[second] - centres[first], box)
     distance = np.maximum(np.linalg.norm(offset, axis=1), 1e-300)
@@ -268,10 +238,8 @@ def _repulsion(
 
 
 def _shake(particles: Particles, generator: np.random.Generator) -> Array:
-    """Centres (n, d), in m, after `MOVES` random moves of each particle without overlap.
-
-    A move is made if it keeps clear of both old and new positions of the neighbours.
-    """
+    """Centres (n, d), in m, after `MOVES` random moves of each particle without overlap."""
+    # a move is made if it keeps clear of both old and new positions of the neighbours
     box, dimensions, radii = particles.size, len(particles.size), particles.radii
     # longest move: a quarter of the mean gap between particles
     reach = 0.25 * particles.spacing * (1 - particles.fraction ** (1 / dimensions))

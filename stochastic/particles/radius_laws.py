@@ -86,11 +86,9 @@ class LogNormalRadii:
 
 @dataclass(frozen=True)
 class MeasuredRadii:
-    """Radii of a list; the distribution function is linear between neighbouring values.
+    """Radii of a list, in m; the distribution function is linear between neighbouring values.
 
-    Args:
-        values: The list, in m, at least one.
-        source: Name of the list.
+    `source` is the name of the list.
 
     Raises:
         RefusedError: The list is empty, or a value is out of range.
@@ -105,11 +103,7 @@ class MeasuredRadii:
 
     @classmethod
     def read(cls, path: Path) -> MeasuredRadii:
-        """Return the radii of a CSV file with a column r, or d of diameters, as ``d [mm]``.
-
-        Raises:
-            RefusedError: The file cannot be read, or a row has no radius.
-        """
+        """Return the radii of a CSV file with a column r, or d of diameters, as ``d [mm]``."""
         rows, values = length_columns(path, ("r",))
         for row, radius in zip(rows, values[:, 0], strict=True):
             require_radii(f"{path.name}, row {row}", radius)

@@ -1,4 +1,4 @@
-"""Apollonius diagram of discs with exact cell areas (section 4.1, Fig. 10).
+"""Apollonius diagram of discs with exact cell areas (section 4.1, Fig. 10), direct neighbours.
 
 The cell of disc i holds the points x with |x − c_i| − r_i ≤ |x − c_j| − r_j for all j. It is
 star-shaped around c_i, and bounded by 1/ρ(φ) = max_j (a_j cos φ + b_j sin φ + c_j): one hyperbola
@@ -27,6 +27,7 @@ from alphacut.stochastic.tessellation.circle_envelope import (
     upper_envelopes,
 )
 
+LAYER = 8.0  # mean spacings; no circumcircle of a packing is wider
 NEAR = 3.0  # mean spacings from a disc's edge within which discs bound its cell at first
 EDGES = np.array([np.pi, 0.0, -np.pi / 2, np.pi / 2])
 """Directions of the left, right, lower and upper edge."""
@@ -63,13 +64,9 @@ class Apollonius:
         return np.asarray(2 * self.discs.radii / np.sqrt(self.areas))
 
     def walls(self, count: int) -> tuple[Array, Array]:
-        """Points along the wall of each arc in polar coordinates around its cell's centre.
+        """Angle and distance (in m) of `count` points along the wall of each arc, (count, m) each.
 
-        Args:
-            count: Number of points on each arc, its ends among them.
-
-        Returns:
-            Angle and distance, the latter in m, two arrays of shape (count, m).
+        They are polar coordinates around the centre of the arc's cell, the arc's ends among them.
         """
         angle = np.asarray(np.linspace(self.start, self.end, count), float)
         near, far = _near_far(self.discs.radii, self.cell, self.neighbour, self.offset)
@@ -78,15 +75,10 @@ class Apollonius:
 
 
 def apollonius(discs: Particles) -> Apollonius:
-    """Apollonius diagram of discs, of which none lies inside another one.
-
-    Cells bounded by the discs nearby contain the true ones, and a disc j can only cut the cell of i
-    if |c_j − c_i| < 2 ρ_max,i − r_i + r_j, with ρ_max,i the largest radius of that first cell; all
-    such discs are then taken into account.
-
-    Args:
-        discs: Periodic box or open window.
-    """
+    """Return the Apollonius diagram of discs, of which none lies inside another one."""
+    # Cells bounded by the discs nearby contain the true ones, and a disc j can only cut the cell of
+    # i if |c_j − c_i| < 2 ρ_max,i − r_i + r_j, with ρ_max,i the largest radius of that first cell:
+    # all such discs are then taken into account.
     largest_disc = float(discs.radii.max())
     rho_max = np.zeros(len(discs))
     for walls in _walls(discs, np.full(len(discs), largest_disc + NEAR * discs.spacing)):
@@ -102,10 +94,7 @@ def apollonius(discs: Particles) -> Apollonius:
 
 
 def _near_far(radii: Array, first: Rows, second: Rows, offset: Array) -> tuple[Array, Array]:
-    """Return d + Δ and d − Δ of pairs, (m,): d distance of the centres, Δ = r_first − r_second.
-
-    At a window's edge, where `second` is −1, Δ is 0.
-    """
+    """D + Δ and d − Δ of pairs: d distance of the centres, Δ = r_first − r_second, 0 at an edge."""
     distance = np.hypot(offset[:, 0], offset[:, 1])
     difference = np.where(second < 0, 0.0, radii[first] - radii[second])
     return distance + difference, distance - difference
@@ -120,11 +109,7 @@ class _Walls:
     arcs: Arcs
 
     def _anomalies(self) -> tuple[Array, Array, Array, Array]:
-        """Hyperbolic anomalies at start and end of each arc, and d + Δ and d − Δ, (m,) each.
-
-        d is the distance of the centres of the arc's disc and of its neighbour, Δ the disc's radius
-        less the neighbour's.
-        """
+        """Hyperbolic anomalies at start and end of each arc, and its d + Δ and d − Δ, (m,) each."""
         arcs, pairs = self.arcs, self.pairs.select(self.arcs.function)
         near, far = _near_far(self.discs.radii, pairs.first, pairs.second, pairs.offset)
         direction = np.arctan2(pairs.offset[:, 1], pairs.offset[:, 0])
@@ -137,11 +122,9 @@ class _Walls:
         return np.asarray(np.bincount(self.arcs.owner, sectors, len(self.discs)), float)
 
     def largest_radius(self) -> Array:
-        """Upper bound of the distance from each centre to its cell's boundary, shape (n,), in m.
-
-        The boundary is farthest at a corner. Of its two walls the one with the smaller anomaly s
-        there gives the distance, (d cosh s + Δ)/2; a per mille is added for round-off.
-        """
+        """Upper bound of the distance from each centre to its cell's boundary, shape (n,), in m."""
+        # farthest at a corner; of its two walls that with the smaller anomaly s there gives the
+        # distance (d cosh s + Δ)/2; a per mille is added for round-off
         start, end, near, far = self._anomalies()
         owner = self.arcs.owner
         following = np.append(np.arange(1, len(owner)), 0)
@@ -157,14 +140,7 @@ class _Walls:
 
 
 def _walls(discs: Particles, reach: Array) -> Iterator[_Walls]:
-    """Yield the walls of portions of the discs: envelopes of all neighbours within reach.
-
-    The wall at angle φ is 1/ρ(φ) = a cos φ + b sin φ + c, and the largest 1/ρ is the cell's.
-
-    Args:
-        discs: The discs.
-        reach: Distance up to which other discs count as neighbours, shape (n,), in m.
-    """
+    """Yield the walls of portions of the discs towards all neighbours within `reach` (n,), in m."""
     for portion, neighbours in pairs_within(discs, reach):
         near, far = _near_far(discs.radii, neighbours.first, neighbours.second, neighbours.offset)
         walls = neighbours.select((near > 0) & (far > 0))  # neither disc contains the other
@@ -177,11 +153,7 @@ def _walls(discs: Particles, reach: Array) -> Iterator[_Walls]:
 
 
 def _bounding_pairs(discs: Particles, portion: Rows) -> Pairs:
-    """Pairs that bound every cell: a disc and its own images, or its mirror images.
-
-    In a periodic box these are the eight nearest images, in a window the mirror images at its four
-    edges, with `second` −1.
-    """
+    """Pairs that bound every cell: own images, or in a window mirror images (`second` is −1)."""
     if discs.periodic:
         shifts = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j]) * discs.size
         owner = np.repeat(portion, 8)
@@ -229,14 +201,11 @@ def counted_cells(diagram: Apollonius) -> tuple[Rows, Array]:
 
 
 def _reach(diagram: Apollonius) -> Array:
-    """Return how far empty circles centred on a cell's boundary extend towards each edge, (n, 4).
-
-    The distance, in m, is measured from the disc's centre towards the four edges of the box; it is
-    infinite for a cell that is not closed, of which some ρ is negative. The circle about a boundary
-    point at the distance ρ from the centre touches the disc of radius r and a neighbour: it has the
-    radius ρ − r and extends by ρ cos ψ + ρ − r, ψ the angle from the edge's direction. The maximum
-    over `ANGLES` points of each arc is taken, with an error of second order.
-    """
+    """How far empty circles on each cell's boundary extend towards each edge, (n, 4), in m."""
+    # from the disc's centre; ∞ for a cell that is not closed, of which some ρ is negative. The
+    # circle about a boundary point at the distance ρ touches the disc of radius r and a neighbour:
+    # its radius is ρ − r, and it extends by ρ cos ψ + ρ − r, ψ the angle from the edge's direction.
+    # The maximum over `ANGLES` points of each arc has an error of second order
     angle, rho = diagram.walls(ANGLES)
     is_bounded = rho.min(axis=0) > 0
     reach = np.full((len(diagram.discs), 4), -np.inf)
@@ -244,3 +213,55 @@ def _reach(diagram: Apollonius) -> Array:
         arc_reach = (rho * (1 + np.cos(angle - direction))).max(axis=0)
         np.maximum.at(reach[:, edge], diagram.cell, np.where(is_bounded, arc_reach, np.inf))
     return reach - diagram.discs.radii[:, None]
+
+
+@dataclass(frozen=True, eq=False)
+class Neighbours:
+    """Delaunay neighbours of disc centres.
+
+    Args:
+        number: Neighbours of each centre that is counted, shape (n,).
+        first: Centre at one end of each edge, shape (m,); each edge appears once from either end.
+        offset: Vector to the other end, shape (m, 2), in m.
+    """
+
+    number: Rows
+    first: Rows
+    offset: Array
+
+    @property
+    def distances(self) -> Array:
+        """Distances of the centres, shape (m,), in m."""
+        return np.asarray(np.hypot(self.offset[:, 0], self.offset[:, 1]))
+
+
+def neighbours(discs: Particles) -> Neighbours:
+    """Delaunay neighbours of the disc centres; in a window, those on the hull are not counted."""
+    # a periodic section is triangulated with a layer of images: its triangles are those of the
+    # plane if no circumcircle is wider, as in any packing
+    from scipy.spatial import Delaunay, QhullError
+
+    tiles = (0, 1, -1) if discs.periodic else (0,)
+    layer = LAYER * discs.spacing
+    points = np.concatenate([discs.centres + discs.size * (i, j) for i in tiles for j in tiles])
+    is_near = np.asarray(((points > -layer) & (points < discs.size + layer)).all(axis=1))
+    is_near[: len(discs)] = True
+    points = points[is_near]
+    try:
+        triangulation = Delaunay(points)
+    except QhullError:  # fewer than three, or all in one line
+        return Neighbours(np.zeros(0, int), np.zeros(0, int), np.zeros((0, 2)))
+    is_counted = np.arange(len(points)) < len(discs)  # no images
+    is_counted[triangulation.convex_hull] = False
+    start, second = triangulation.vertex_neighbor_vertices
+    first = np.repeat(np.arange(len(points)), np.diff(start))
+    first, second = first[is_counted[first]], second[is_counted[first]]
+    number = np.bincount(first, minlength=len(points))[is_counted]
+    return Neighbours(number, first, points[second] - points[first])
+
+
+def neighbouring_values(diagram: Apollonius, values: Array) -> Array:
+    """Return pairs of `values` of cells that share a wall, in both orders, shape (2, m)."""
+    once = diagram.neighbour > diagram.cell
+    pair = np.unique(np.stack([diagram.cell[once], diagram.neighbour[once]]), axis=1)
+    return np.concatenate([values[pair], values[pair[::-1]]], axis=1)

@@ -19,12 +19,7 @@ from alphacut.fuzzy.refused import FailedError
 def anomaly(psi: Array, near: Array, far: Array) -> Array:
     """Hyperbolic anomaly s of points on walls at angle ψ: tanh(s/2) = √(near/far) tan(ψ/2), (m,).
 
-    d is the distance of the centres of both discs, Δ the difference of their radii.
-
-    Args:
-        psi: Angle from the direction of the neighbour, shape (m,), brought to [−π, π] here.
-        near: Twice the least distance of the wall from the centre of the disc, shape (m,).
-        far: The same from the centre of the neighbour, shape (m,).
+    ψ is measured from the direction of the neighbour; `near` and `far` are as of `sector_area`.
     """
     psi = psi - 2 * np.pi * np.round(psi / (2 * np.pi))
     tanh = np.clip(np.sqrt(near / far) * np.tan(psi / 2), -1 + 2**-53, 1 - 2**-53)
@@ -35,14 +30,13 @@ def sector_area(start: Array, end: Array, near: Array, far: Array) -> Array:
     """Area between a disc's centre and its hyperbolic wall over an arc, shape (m,).
 
     The wall is 1/ρ = M cos ψ + C with M + C = 2/near and M − C = 2/far, ρ the distance from the
-    disc's centre, ψ the angle from the direction of the neighbour. d is the distance of its centre,
-    Δ the disc's radius less the neighbour's.
+    disc's centre, ψ the angle from the direction of the neighbour.
 
     Args:
         start: Hyperbolic anomaly at the beginning of the arc, shape (m,).
         end: Anomaly at its end, shape (m,).
-        near: d + Δ, twice the distance of the wall's nearest point from the centre, shape (m,).
-        far: d − Δ, the same from the neighbour's centre, shape (m,).
+        near: Twice the distance of the wall's nearest point from the centre, shape (m,).
+        far: The same from the neighbour's centre, shape (m,).
     """
     middle, half = (start + end) / 2, (end - start) / 2
     M_plus_C, M_minus_C = 2 / near, 2 / far
@@ -68,15 +62,10 @@ MAX_TABLE = 60_000  # entries of a table of functions: what the cache holds
 
 @dataclass(frozen=True)
 class Arcs:
-    """Arcs of envelopes.
+    """Arcs of envelopes from φ = `start` to `end`, ordered by their `owner` and φ, (m,) each.
 
-    Args:
-        owner: Envelope that each arc belongs to, shape (m,), rising; the arcs of one envelope in
-            the order of φ.
-        function: Index of the function that is uppermost on the arc, shape (m,), counted through
-            all envelopes.
-        start: φ at which the arc begins, shape (m,).
-        end: φ at which it ends, `start` ≤ `end`, shape (m,).
+    `owner` is the envelope that each belongs to, `function` the index of the function that is
+    uppermost there, counted through all envelopes.
     """
 
     owner: Rows
@@ -89,13 +78,10 @@ def upper_envelopes(a: Array, b: Array, c: Array, counts: Rows) -> Arcs:
     """Arcs of the upper envelopes of groups of functions a cos φ + b sin φ + c.
 
     Args:
-        a: Coefficients of cos φ, shape (k,), the groups one after the other.
-        b: Coefficients of sin φ, shape (k,).
-        c: Constants, shape (k,).
+        a: Coefficients of cos φ, shape (k,), the groups one after the other; b and c likewise.
+        b: Coefficients of sin φ.
+        c: Constants.
         counts: Functions in each group, shape (n,), sum k; a group of none has no arcs.
-
-    Raises:
-        FailedError: A sweep does not close; this would be an error of the program.
     """
     first = np.concatenate([[0], np.cumsum(counts)[:-1]]).astype(np.intp)
     pending = np.argsort(counts, kind="stable")
@@ -120,19 +106,10 @@ def upper_envelopes(a: Array, b: Array, c: Array, counts: Rows) -> Arcs:
 def _sweep(
     a: Array, b: Array, c: Array, table: Rows, group: Rows
 ) -> tuple[Rows, Rows, Array, Array]:
-    """Arcs of n upper envelopes by one sweep of all around the circle.
+    """Arcs of n upper envelopes by one sweep of all around the circle, from crossing to crossing.
 
-    Each step goes from one crossing to the next, at which another function becomes uppermost.
-
-    Args:
-        a: Coefficients of cos φ, shape (n, w), one row a group.
-        b: Coefficients of sin φ, shape (n, w).
-        c: Constants, shape (n, w).
-        table: Index of each function among all groups, shape (n, w).
-        group: Number of each group, shape (n,).
-
-    Returns:
-        Group, function, start and end of each arc, as of `Arcs`.
+    The tables (n, w) have a row for each group, whose numbers are `group`, and the index of each
+    function among all groups. The arcs are as of `Arcs`.
     """
     row = np.arange(len(a), dtype=np.intp)
     highest = np.argmax(np.hypot(a, b) + c, axis=1)  # its maximum is on the envelope
@@ -158,15 +135,7 @@ def _sweep(
 def _arcs_between(
     crossings: list[tuple[Rows, Rows, Array]], table: Rows, group: Rows
 ) -> tuple[Rows, Rows, Array, Array]:
-    """Group, function, start and end of the arcs between the crossings of a sweep.
-
-    An arc across the start of the sweep is joined into one.
-
-    Args:
-        crossings: Rows, columns of functions that become uppermost, and φ of each step.
-        table: Index of each function among all groups, shape (n, w).
-        group: Number of each group, shape (n,).
-    """
+    """Arcs between the crossings of a sweep: row, column that becomes uppermost, φ of each."""
     row, column, start = map(np.concatenate, zip(*crossings, strict=True))
     order = np.argsort(row, kind="stable")
     row, start = row[order], start[order]
@@ -183,23 +152,11 @@ def _arcs_between(
 
 
 def _next_crossing(a: Array, b: Array, c: Array, phi: Array) -> tuple[Rows, Array]:
-    """Uppermost function of each row at an angle φ, and the angle from there to its next crossing.
-
-    The difference g ≤ 0 of another function to the uppermost one has at φ the value −h, the slope q
-    and the oscillating part p; d is its constant. Ahead by δ, with t = tan(δ/2), it crosses zero
-    where (d − p) t² + 2 q t − h = 0, at the root where it rises. The largest 1/t is the nearest
-    crossing; it is computed without cancellation.
-
-    Args:
-        a: Coefficients of cos φ, shape (n, w).
-        b: Coefficients of sin φ, shape (n, w).
-        c: Constants, shape (n, w).
-        phi: Angles, shape (n,).
-
-    Returns:
-        Column of the uppermost function, shape (n,), and the angle from φ at which another one
-        rises above it, 2π if none does, shape (n,).
-    """
+    """Uppermost function (n,) of each row at angles φ (n,), and the angle to its next crossing."""
+    # The difference g ≤ 0 of another function to the uppermost one has at φ the value −h, the slope
+    # q, the oscillating part p and the constant d. Ahead by δ, with t = tan(δ/2), it is zero where
+    # (d − p) t² + 2 q t − h = 0, at the root where it rises; the largest 1/t is the nearest
+    # crossing
     row = np.arange(len(a))
     cos, sin = np.cos(phi)[:, None], np.sin(phi)[:, None]
     wave = a * cos + b * sin

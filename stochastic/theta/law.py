@@ -60,11 +60,7 @@ def require_support(lower: float, upper: float, unit: float = 0.0) -> None:
 
 @dataclass(frozen=True)
 class TruncatedNormal:
-    """Standard normal law cut to [lower, upper], its density normalised there.
-
-    Args:
-        lower: Left end of the support, in standard deviations.
-        upper: Right end of the support, greater than `lower`.
+    """Standard normal law cut to [lower, upper], in standard deviations, and normalised there.
 
     Raises:
         RefusedError: The ends are not finite or not in order.
@@ -106,11 +102,7 @@ class TruncatedNormal:
         return np.asarray(self._below(inside) / self.mass, float)
 
     def quantile(self, probability: ArrayLike) -> Array:
-        """Return θ with P(Θ ≤ θ) = probability in [0, 1], any shape.
-
-        Raises:
-            RefusedError: A probability lies outside [0, 1].
-        """
+        """Return θ with P(Θ ≤ θ) = probability in [0, 1], any shape."""
         from scipy.special import ndtri
 
         p = np.asarray(probability, float)

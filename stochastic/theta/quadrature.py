@@ -26,17 +26,7 @@ MOST_NODES = 40  # nodes of a polynomial
 
 @dataclass(frozen=True)
 class ThetaRule:
-    """Nodes and weights for ∫ g(θ) f_Θ(θ) dθ ≈ Σ w_k g(θ_k); the density is inside the weights.
-
-    Args:
-        nodes: θ, shape (n,), rising.
-        weights: shape (n,); their sum is 1.
-
-    Example:
-        >>> import numpy as np
-        >>> ThetaRule(np.array([-1.0, 1.0]), np.array([0.5, 0.5])).mean(np.array([2.0, 4.0])).item()
-        3.0
-    """
+    """Nodes θ, rising, and weights, of sum 1, for ∫ g(θ) f_Θ(θ) dθ ≈ Σ w_k g(θ_k), (n,) each."""
 
     nodes: Array
     weights: Array
@@ -49,14 +39,8 @@ class ThetaRule:
 def layered_rule(distribution: ThetaLaw, *, layers: int, points: int) -> ThetaRule:
     """Return a Gauss–Legendre rule with `points` nodes in each of `layers` equal intervals of θ.
 
-    The weights contain the density f_Θ and are scaled to the sum 1, so that a constant is its own
-    mean. Where the density is smooth, the error of the mean of a smooth function falls with the
-    power 2·points of the interval's length.
-
-    Example:
-        >>> from alphacut.stochastic import TruncatedNormal
-        >>> len(layered_rule(TruncatedNormal(), layers=4, points=2).nodes)
-        8
+    The weights contain the density f_Θ and are scaled to the sum 1. Where the density is smooth,
+    the error of the mean of a smooth function falls with the power 2·points of the interval.
     """
     levels = np.asarray(np.linspace(distribution.lower, distribution.upper, layers + 1), float)
     return level_rule(distribution, levels, points=points)
@@ -82,10 +66,6 @@ def gauss_rule(distribution: ThetaLaw, *, points: int) -> ThetaRule:
     The recurrence of the orthogonal polynomials comes from the discretised Stieltjes procedure on a
     fine Legendre rule (Gautschi, Orthogonal Polynomials, 2004, section 2.2.3), the nodes from the
     Jacobi matrix (Golub & Welsch 1969).
-
-    Args:
-        distribution: Law of θ.
-        points: Nodes, at least 1.
 
     Raises:
         RefusedError: There is no point, or density and distribution function disagree.
@@ -122,16 +102,9 @@ def _fine_rule(law: ThetaLaw, points: int) -> ThetaRule:
 
 
 def _panel_edges(law: ThetaLaw, edges: Array, rule: tuple[Array, Array]) -> Array:
-    """Edges of panels on which a rule integrates the density of θ, rising, shape (m + 1,).
-
-    A panel on which the rule misses the difference of the distribution function is halved, which
-    resolves corners, jumps and narrow peaks of the density.
-
-    Args:
-        law: Law of θ.
-        edges: First edges, rising, shape (n + 1,), n ≤ m.
-        rule: Nodes and weights of a rule on [−1, 1].
-    """
+    """Refine rising edges until a rule on [−1, 1] integrates the density of θ on each panel."""
+    # a panel on which it misses the difference of the distribution function is halved, which
+    # resolves corners, jumps and narrow peaks of the density
     for _ in range(_HALVINGS):
         gaps = _mass_gaps(law, edges, rule)
         coarse = np.flatnonzero(~(gaps <= _PANEL_GAP))  # also where a gap is not a number
@@ -147,11 +120,11 @@ def _panel_edges(law: ThetaLaw, edges: Array, rule: tuple[Array, Array]) -> Arra
 
 
 def _mass_gaps(law: ThetaLaw, edges: Array, rule: tuple[Array, Array]) -> Array:
-    """Error of a rule for the density f on each panel, shape (n,), by its distribution function F.
-
-    The larger of the errors of ∫ f, which is [F], and of ∫ x f, x from −1 to 1 over the panel,
-    which is [x F] − ∫ F dx: a jump right in the middle of a panel shows in the second alone.
-    """
+    """Error of a rule for the density f on each panel, (n,), by its distribution function F."""
+    # the larger of the errors of ∫ f, which is [F], and of ∫ x f, x from −1 to 1 over the panel,
+    # which is [x F] − ∫ F dx: a jump right in the middle of a panel shows in the second alone
+    # the larger of the errors of ∫ f, which is [F], and of ∫ x f, x from −1 to 1 over the panel,
+    # which is [x F] − ∫ F dx: a jump right in the middle of a panel shows in the second alone
     x, w = rule
     half = np.diff(edges)[:, None] / 2
     theta = edges[:-1, None] + half * (1 + x)
@@ -166,9 +139,8 @@ def _mass_gaps(law: ThetaLaw, edges: Array, rule: tuple[Array, Array]) -> Array:
 def between_nodes(nodes: Array, values: Array, at: Array) -> Array:
     """Interpolate values at rising nodes, both of shape (n,), at points `at` of any shape.
 
-    It is the polynomial through all nodes if these are few and its Lebesgue function is small at
-    the points, as for the nodes of one Gauss rule, with which it then converges. Otherwise it is
-    made of monotone cubic pieces (PCHIP).
+    By the polynomial through all nodes if these are few and its Lebesgue function is small at the
+    points, as for the nodes of one Gauss rule; otherwise by monotone cubic pieces (PCHIP).
     """
     from scipy.interpolate import BarycentricInterpolator, PchipInterpolator
 

@@ -18,14 +18,12 @@ from alphacut.stochastic.fit.area_weighted import AreaWeighted
 from alphacut.stochastic.fit.pbox import PBox, least_pbox
 from alphacut.stochastic.microstructure import MicrostructureStudy, fit_map, study
 from alphacut.stochastic.microstructure_summary import fragment, summary
-from alphacut.stochastic.particles.circles_csv import CircleFile
-from alphacut.stochastic.particles.image import SectionImage
+from alphacut.stochastic.particles.measured import CircleFile, SectionImage
 from alphacut.stochastic.particles.packing import Packing
 from alphacut.stochastic.particles.particles import SPHERES, Particles
 from alphacut.stochastic.particles.radius_laws import LogNormalRadii, MeasuredRadii
 from alphacut.stochastic.sections import Simulated, reduced_radii, with_cells
-from alphacut.stochastic.tessellation.apollonius import apollonius, counted_cells
-from alphacut.stochastic.tessellation.delaunay import neighbours
+from alphacut.stochastic.tessellation.apollonius import apollonius, counted_cells, neighbours
 
 EQUAL, TENFOLD = LogNormalRadii(1e-3, 1e-3), LogNormalRadii(1e-3, 1e-2)
 SOURCE = Simulated(Packing(300, 0.2, TENFOLD), 12)

@@ -54,26 +54,12 @@ def test_a_border_is_open_by_the_deviations_of_the_noise():
     assert (~sure).sum() == pytest.approx(100 * 40 / 100 * 2 * CONFIDENT * noise, rel=0.2)
 
 
-@pytest.mark.parametrize(
-    ("noise", "drift", "options"),
-    [(0.15, 0.0, {}), (0.02, 0.9, {}), (0.6, 0.0, {"smooth": True})],
-)
-def test_what_noise_and_light_leave_too_open_is_refused(noise, drift, options):
+@pytest.mark.parametrize(("noise", "drift"), [(0.15, 0.0), (0.02, 0.9)])
+def test_what_noise_and_light_leave_too_open_is_refused(noise, drift):
     grey, _ = picture(np.random.default_rng(2), noise=noise, drift=drift)
     with pytest.raises(RefusedError) as error:
-        segment(grey, [110], **options).require_certain()
+        segment(grey, [110]).require_certain()
     assert error.value.key == "threshold"
-
-
-@pytest.mark.parametrize(
-    ("noise", "drift", "options"),
-    [(0.15, 0.0, {"smooth": True}), (0.02, 0.9, {"level": True})],
-)
-def test_smoothing_and_levelling_cure_what_was_refused(noise, drift, options):
-    grey, cover = picture(np.random.default_rng(2), noise=noise, drift=drift)
-    judged = segment(grey, [110], **options)
-    judged.require_certain()
-    assert judged.fractions[1] == pytest.approx(np.mean(cover >= 0.5), rel=0.03)
 
 
 def test_a_threshold_beyond_the_grey_values_is_refused():

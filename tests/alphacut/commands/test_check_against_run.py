@@ -77,7 +77,7 @@ CHANGES = {
     ],
     "image": [
         "cell.threshold=[300]", "cell.threshold=[130]", "cell.labels=[50, 150]",
-        "modulus.alpha=[1]", 'cell.pixel=["1 µm", "2 µm"]', "cell.remove=noise", "cell.remove=light",
+        "modulus.alpha=[1]", 'cell.pixel=["1 µm", "2 µm"]', "cell.remove=noise",
     ],
     "circles": [
         "microstructure.limits=[0.1, 0.9]", 'microstructure.circles.size=["1 mm", "1 mm"]',

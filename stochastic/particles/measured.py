@@ -1,6 +1,6 @@
-"""Circles from the image of a section, by scikit-image.
+"""Measured circles of a section: from a CSV file, or from an image by scikit-image.
 
-The image is smoothed and cut at Otsu's threshold. A watershed on the distance to the background
+An image is smoothed and cut at Otsu's threshold. A watershed on the distance to the background
 separates particles that touch. Each piece becomes the circle of its centroid and area. Pieces at
 the image's edge are left out, since their circle is not known.
 
@@ -16,9 +16,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from alphacut.fuzzy.arrays import Array, Mask
+from alphacut.fuzzy.arrays import Array, Mask, Rows
 from alphacut.fuzzy.refused import RefusedError, checked_number, require
+from alphacut.stochastic.particles.csv_columns import length_columns
+from alphacut.stochastic.particles.neighbour_search import close_pairs, surface_distance
 from alphacut.stochastic.particles.particles import Particles
+from alphacut.stochastic.particles.radius_laws import require_radii
 
 SMOOTHING = 1.5  # standard deviation, in pixels
 SMALLEST = 4.0  # least radius of a particle, in pixels
@@ -27,6 +30,50 @@ MAX_NOT_ROUND = 0.02  # share of the particles' area in pieces that are not roun
 NOISE = 3.0  # distance of the two greys over their standard deviation, at least
 MAX_UNEVENNESS = 0.2  # of the contrast, by which the matrix may differ between tiles
 TILES = 8  # along each side of the image
+ROUNDING = 1e-9  # overlap over the smaller radius that is no overlap
+
+
+@dataclass(frozen=True)
+class CircleFile:
+    """Circles of a CSV file with the columns x, y, r and their units: ``x [mm], y [mm], r [mm]``.
+
+    Args:
+        path: The file. A column "d" (diameter) may stand in for r.
+        size: Width and height of the section, a window with a corner at the origin, in m.
+    """
+
+    path: Path
+    size: tuple[float, float]
+
+    def read(self) -> Particles:
+        """Read the circles, in m from the section's corner, all inside and without overlap."""
+        rows, values = length_columns(self.path, ("x", "y", "r"))
+        centres, radii = values[:, :2], values[:, 2]
+        for row, centre, radius in zip(rows, centres, radii, strict=True):
+            require_radii(f"{self.path.name}, row {row}", radius)
+            if not ((centre >= 0) & (centre <= self.size)).all():
+                value = f"a centre {(1e3 * centre).round(6).tolist()} mm from the corner"
+                width, height = (f"{1e3 * side:g}" for side in self.size)
+                allowed = f"places in the section of {width} × {height} mm"
+                raise RefusedError(f"{self.path.name}, row {row}", value, allowed)
+        discs = Particles(centres, radii, np.array(self.size), periodic=False)
+        self._refuse_overlap(discs, rows)
+        return discs
+
+    def _refuse_overlap(self, discs: Particles, rows: Rows) -> None:
+        """Refuse the file if two circles overlap, with the rows of the worst pair."""
+        first, second = close_pairs(discs, 0.0)
+        smaller = np.minimum(discs.radii[first], discs.radii[second])
+        overlap = -surface_distance(discs, first, second) / smaller
+        if overlap.max(initial=0.0) > ROUNDING:
+            worst = int(np.argmax(overlap))
+            upper, lower = sorted(int(rows[k]) for k in (first[worst], second[worst]))
+            raise RefusedError(
+                f"{self.path.name}, row {lower}",
+                f"a circle that overlaps that of row {upper} by {overlap[worst]:.2g} of its radius",
+                "circles that do not overlap",
+                "mend the row",
+            )
 
 
 @dataclass(frozen=True)
@@ -54,11 +101,7 @@ class SectionImage:
         return self.circles(self.picture())
 
     def picture(self) -> Array:
-        """Return the grey values of the image file, shape (rows, columns).
-
-        Raises:
-            RefusedError: The file is no image.
-        """
+        """Return the grey values of the image file, (rows, columns); refuse other files."""
         from PIL import Image
 
         try:
@@ -70,12 +113,9 @@ class SectionImage:
             raise RefusedError("image.file", self.path, allowed) from None
 
     def circles(self, picture: Array) -> Particles:
-        """Circles of the same area and centroid as the particles in a grey image, in m.
+        """Return the circles, of equal area and centroid, of the particles in a grey image, in m.
 
         Particles that touch the image's edge are left out.
-
-        Args:
-            picture: Grey values, shape (rows, columns).
 
         Raises:
             RefusedError: Noise or light hide the particles, or too many of them are not round.
@@ -108,10 +148,8 @@ class SectionImage:
         return Particles(centres * self.pixel, radius * self.pixel, size, periodic=False)
 
     def _particle_mask(self, picture: Array) -> Mask:
-        """Mask of the particles' pixels, by Otsu's threshold of the smoothed image.
-
-        The phase whose pieces fill more of their convex hulls is that of the particles.
-        """
+        """Mask of the particles' pixels, by Otsu's threshold of the smoothed image."""
+        # the phase whose pieces fill more of their convex hulls is that of the particles
         from skimage import filters
 
         smooth = filters.gaussian(picture, SMOOTHING, preserve_range=True)  # type: ignore[no-untyped-call]
@@ -134,10 +172,7 @@ class SectionImage:
 
 
 def _label_particles(phase: Mask) -> NDArray[np.int_]:
-    """Number of the particle at each pixel, 0 outside, shape (rows, columns).
-
-    Particles that touch are separated by a watershed of the distance to the background.
-    """
+    """Number of the particle at each pixel, 0 outside; touching ones are parted by a watershed."""
     from scipy import ndimage
     from skimage import feature, measure, segmentation
 
