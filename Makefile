@@ -3,6 +3,7 @@
 # make bench-solver, make bench-scaling, make charts, make stability    what the methods cost and where they end
 # make coverage    the lines of the five packages that the tests run, and those that they do not
 # make relations   contradictions of problems said otherwise and of cases run otherwise (RELATIONS="--seed 7")
+# make findings    what packages of the field do that one would not guess, run anew (needs the network)
 # make docs, make lint, make pictures    documentation, style and types, the README's picture
 # The environment is made on first use; make clean-env removes it.
 CASE ?= cases/paper.toml
@@ -13,7 +14,7 @@ IN = ./enter
 help:
 	@sed -n 's/^# //p' Makefile
 
-.PHONY: help run test test-slow coverage lint charts bench-solver bench-scaling stability relations docs pictures clean clean-env
+.PHONY: help run test test-slow coverage lint charts bench-solver bench-scaling stability relations findings docs pictures clean clean-env
 
 run:
 	$(IN) python -m alphacut run $(CASE) --out $(OUT) --workers $(WORKERS) $(if $(FRESH),--fresh)
@@ -52,6 +53,9 @@ stability:
 
 relations:
 	$(IN) python -m benchmarks.relations $(RELATIONS)
+
+findings:
+	@set -e; for finding in findings/*.sh; do echo "$$finding"; $(IN) bash "$$finding"; done
 
 docs:
 	$(IN) sphinx-build -q docs build/docs
