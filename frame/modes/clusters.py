@@ -22,6 +22,8 @@ LEAST_NEAR = 0.4
 """The same from which a mode joins a block that is not enclosed without it."""
 MAX_BLOCK = 12
 """Most modes of a block."""
+EQUAL = 1e-9
+"""Relative distance up to which two λ count as equal: that of their rounding and some more."""
 SWEEPS = 12
 """Sweeps of Jacobi rotations at most."""
 
@@ -187,7 +189,9 @@ def _nearness(centre: CentredMatrices, slopes: Array) -> Array:
     couplings = np.abs(_couplings(centre, np.arange(centre.modes)))
     change = np.abs(slopes[:, None] - slopes).sum(-1) + 2 * couplings.sum(0)
     distance = np.abs(centre.squared[:, None] - centre.squared)
-    near = change / np.maximum(distance, 1e-9 * centre.squared)
+    # modes of equal frequencies have no shapes of their own, whether they part in the box or not
+    equal = distance <= EQUAL * np.maximum(centre.squared[:, None], centre.squared)
+    near = np.where(equal, np.inf, change / np.where(equal, 1.0, distance))
     near[np.diag_indices_from(near)] = 0.0
     return near
 
