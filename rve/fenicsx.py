@@ -69,10 +69,10 @@ def at_points(value: Any, points: Array) -> fem.Expression:
 
 
 def mesh_of(comm: MPI.Intracomm, cells: Rows, nodes: int, element: Any) -> dolfinx.mesh.Mesh:
-    """DOLFINx mesh of given cells with all coordinates 0, to be set later.
+    """DOLFINx mesh with all coordinates 0, to be set later; rank r gets the r-th part of the cells.
 
     Args:
-        comm: Communicator; rank r gets the r-th part of the consecutive cells.
+        comm: Communicator.
         cells: Nodes of all cells, in Basix's order, shape (cells, nodes of a cell).
         nodes: Number of nodes.
         element: Coordinate element.
@@ -104,10 +104,7 @@ def log_on_standard_error() -> Iterator[None]:
 
 
 def option_is_used(name: str) -> bool:
-    """True if PETSc has asked for the option.
-
-    By C, since petsc4py 3.22 has no call for options that are set and not used.
-    """
+    """True if PETSc has asked for the option; by C, since petsc4py 3.22 has no call for it."""
     interface = cffi.FFI()
     interface.cdef("int PetscOptionsUsed(void *options, const char *name, char *used);")
     used = interface.new("char[8]")  # as large as any PetscBool

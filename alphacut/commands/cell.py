@@ -88,11 +88,12 @@ def export(content: CellContent, path: Path) -> Document:
     from alphacut.export.cell_files import write_cell
     from alphacut.rve.prism.fields import cell_fields, mesh_fields
     from alphacut.rve.prism.model import PrismModel
+    from alphacut.rve.prism.own_mesh import MeshModel
 
     mesh = content.mesh
     if mesh.file is not None:
         sample = modal_sample(*content.law_and_phases)
-        fields = mesh_fields(PrismModel(mesh=mesh.file), sample.law, sample.phases)
+        fields = mesh_fields(MeshModel(mesh.file), sample.law, sample.phases)
     else:
         modal = cell.modal_cell(*content.radius_and_phases)
         model = PrismModel(mesh.size, mesh.layers, outline=modal.outline)

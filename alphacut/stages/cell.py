@@ -36,6 +36,8 @@ SPHERE_TOLERANCE = 1e-5
 """Default tolerance of E of spheres, relative: 1e-9 takes seconds near a reduced radius of 0.97."""
 BOUNDS_SLACK = 5e-3
 """Allowed relative distance of E outside its bounds: packings meet a fraction to 0.5 %."""
+MESH_OPTIONS = ("petsc", "parallel")
+"""Options of elements that a mesh from a file takes."""
 AnyCell = RoundCell | MeshedCell
 AnySample = Cell | MeshedSample
 Solve = Callable[[Sequence[Any]], list[HomogenisedStiffness]]
@@ -77,10 +79,11 @@ def model_of(cell: AnyCell, mesh: Mesh, modulus: ModulusSection, **elements: Any
         if isinstance(cell, RoundCell):
             model: Solve = partial(solve_cells, _model_of_particle(cell, mesh, modulus, options))
         else:
-            from alphacut.rve.prism.model import PrismModel
+            from alphacut.rve.prism.own_mesh import MeshModel
 
             assert mesh.file is not None
-            model = partial(solve_samples, PrismModel(mesh=mesh.file, **options))
+            elements = {name: value for name, value in elements.items() if name in MESH_OPTIONS}
+            model = partial(solve_samples, MeshModel(mesh.file, **elements))
     except ImportError as error:
         raise RefusedError("modulus.method", modulus.method, "series", missing(error)) from None
     return partial(solve_and_average, model) if is_averaged else model
@@ -103,8 +106,7 @@ def _model_of_particle(
     if method in ("auto", "slices"):
         from alphacut.rve.slices.model import SlicesModel
 
-        energies = bool(cell.losses)
-        return SlicesModel(mesh_size=mesh.size, outline=outline, energies=energies).solve
+        return SlicesModel(mesh_size=mesh.size, outline=outline).solve
     from alphacut.rve.prism.model import PrismModel
 
     return PrismModel(mesh.size, mesh.layers, outline=outline, **prism_options).solve

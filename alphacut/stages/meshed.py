@@ -15,7 +15,7 @@ from alphacut.rve.cell.cell import Phase, VoigtPhase
 from alphacut.stochastic import TruncatedNormal
 
 if TYPE_CHECKING:
-    from alphacut.rve.prism.model import PrismModel
+    from alphacut.rve.prism.own_mesh import MeshModel
     from alphacut.rve.result.result import HomogenisedStiffness
 
 
@@ -40,7 +40,7 @@ def modal_sample(law: ThetaSection, cell: MeshedCell) -> MeshedSample:
     return sample_at({name: x.modal for name, x in cell.constants.items()}, law, cell)
 
 
-def solve_samples(model: PrismModel, samples: Sequence[MeshedSample]) -> list[HomogenisedStiffness]:
+def solve_samples(model: MeshModel, samples: Sequence[MeshedSample]) -> list[HomogenisedStiffness]:
     """One result for each sample, in their order."""
     return [model.solve(sample.law, sample.phases)[0] for sample in samples]
 

@@ -103,7 +103,7 @@ def draw_prism(rng: np.random.Generator, cell: Cell) -> PrismModel:
 def draw_slices(rng: np.random.Generator, cell: Cell) -> SlicesModel:
     """Slices at a random resolution."""
     size, points = float(rng.uniform(0.2, 1.0)), int(rng.integers(3, 10))
-    return SlicesModel(int(rng.integers(2, 5)), size, points, cell.outline, energies=True)
+    return SlicesModel(int(rng.integers(2, 5)), size, points, cell.outline)
 
 
 def judged(own: HomogenisedStiffness, truth: HomogenisedStiffness) -> Iterator[Judgement]:
@@ -165,9 +165,7 @@ def judge(cell: Cell, rng: np.random.Generator) -> list[Judgement]:
     if cell.square:
         truth = SeriesModel(accuracy=1e-12, energies=True).solve(*parts)[0]
     else:
-        truth = SlicesModel(points=16, mesh_size=0.15, outline=cell.outline, energies=True).solve(
-            *parts
-        )[0]
+        truth = SlicesModel(points=16, mesh_size=0.15, outline=cell.outline).solve(*parts)[0]
     return [one for result in results for one in judged(result, truth)]
 
 

@@ -31,13 +31,6 @@ class Phase:
     Args:
         modulus: Young's modulus in Pa, positive.
         poisson: Poisson's ratio, inside (−1, 0.5).
-
-    Raises:
-        ValueError: A value lies outside its range.
-
-    Example:
-        >>> Phase(modulus=20e9, poisson=0.3).modulus
-        20000000000.0
     """
 
     modulus: float
@@ -95,14 +88,6 @@ class VoigtPhase:
     Args:
         rows: Stiffness in Voigt order (11, 22, 12 with 2 ε12), symmetric positive definite, three
             rows of three, in Pa.
-
-    Raises:
-        RefusedError: The matrix is not symmetric positive definite.
-
-    Example:
-        >>> rows = ((4.0, 1.0, 0.0), (1.0, 3.0, 0.0), (0.0, 0.0, 1.0))
-        >>> VoigtPhase(rows).rows[0]
-        (4.0, 1.0, 0.0)
     """
 
     rows: tuple[tuple[float, ...], ...]
@@ -138,16 +123,8 @@ class Interphase:
     """Ring of a third material around a round particle.
 
     Args:
-        thickness: In halves of the cell's side, from `THINNEST` on; the same at all θ.
+        thickness: In halves of the cell's side, from `THINNEST` to below 1; the same at all θ.
         phase: Its material.
-
-    Raises:
-        RefusedError: The thickness is less, or the ring as wide as the cell.
-
-    Example:
-        >>> ring = Interphase(0.02, Phase(12e9, 0.2))
-        >>> ring.thickness
-        0.02
     """
 
     thickness: float
@@ -174,12 +151,6 @@ class Cell:
         radius: Map θ ↦ r(θ) in (0, 1), with the law of θ.
         outline: Distance of the particle's edge from its centre over r(θ), a function of the angle.
         interphase: Ring around a round particle, if there is one.
-
-    Example:
-        >>> from alphacut.stochastic import HermiteMap
-        >>> cell = Cell(Phase(20e9), Phase(80e9), HermiteMap(0.2, 0.1, 0.6, 0.1))
-        >>> len(cell.phases)
-        2
     """
 
     matrix: AnyPhase

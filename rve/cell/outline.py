@@ -31,13 +31,6 @@ class Ellipse:
     Args:
         aspect: One semi-axis over the other, in [1/4, 4].
         turn: Angle from x1 to the first, counterclockwise, in degrees.
-
-    Raises:
-        RefusedError: The aspect is out of range, or the angle is not finite.
-
-    Example:
-        >>> Ellipse(aspect=2.0, turn=30.0).aspect
-        2.0
     """
 
     aspect: float
@@ -80,10 +73,7 @@ def extents(outline: Outline) -> tuple[float, float, float]:
 
 
 def require_fit(outline: Outline, radius: float, limit: float = 1.0) -> None:
-    """Refuse a particle with a coordinate of `limit` or more, in halves of the cell's side.
-
-    Its outline must be a positive, periodic function of the angle.
-    """
+    """Refuse a particle that reaches `limit` halves of the cell's side, or what is no outline."""
     distances = outline(_ANGLES)
     is_periodic = abs(distances[0] - distances[-1]) <= 1e-9 * distances[0]
     if not (distances > 0).all() or not is_periodic:

@@ -32,11 +32,7 @@ def require_points(points: int | None) -> None:
 
 
 def require_continuous(radius_map: RadiusMap) -> Array:
-    """Refuse a radius map with a jump over θ, for which no quadrature rule can tell its error.
-
-    Returns:
-        Radii at 2049 even steps over the support of θ.
-    """
+    """Radii at 2049 even steps over θ; refuses a map with a jump, whose error no rule can tell."""
     require_map(radius_map)
     law = radius_map.distribution
     theta = np.linspace(law.lower, law.upper, 2049)
@@ -68,10 +64,7 @@ def require_interphase(interphase: Interphase | None, outline: Outline) -> None:
 def require_parts(
     radius_map: object, matrix: object, inclusions: object, *, isotropic: bool = True
 ) -> None:
-    """Refuse arguments of `solve` that are no radius map, no phase and no sequence of phases.
-
-    `isotropic`: whether all phases must be.
-    """
+    """Refuse arguments of `solve` that are no radius map, no phase and no sequence of phases."""
     kinds = (Phase,) if isotropic else (Phase, VoigtPhase)
     phases = (matrix, *inclusions) if isinstance(inclusions, Sequence) else ()
     has_phases = len(phases) > 1 and all(isinstance(phase, kinds) for phase in phases)

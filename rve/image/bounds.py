@@ -17,14 +17,10 @@ Ends = tuple[float, float]
 
 @dataclass(frozen=True, eq=False)
 class StiffnessBounds:
-    """Lower ≤ C ≤ upper as quadratic forms of the mean strain.
+    """Lower ≤ C ≤ upper as quadratic forms of the mean strain, in Voigt order, (3, 3), in Pa.
 
     The moduli C11 + C12, C11 − C12 and C33 of the square part are such forms, so that those of the
     ends bound them, and with them whatever rises in each of the three.
-
-    Args:
-        lower: Voigt order (11, 22, 12 with 2 ε12), shape (3, 3), in Pa.
-        upper: Same.
     """
 
     lower: Array
@@ -49,10 +45,7 @@ class StiffnessBounds:
         return low - slack, high + slack
 
     def young(self, average: str = AXES) -> Ends:
-        """Lower and upper bound of Young's modulus E = 3 G − G²/K of an average, in Pa.
-
-        E rises with K; it rises with G up to its maximum at G = 3/2 K and falls beyond.
-        """
+        """Lower and upper bound of Young's modulus E = 3 G − G²/K of an average, in Pa."""
         (min_shear, max_shear), (min_bulk, max_bulk) = self.shear(average), self.bulk
         low = min(
             _young(shear, min_bulk) - _young_rounding(shear, min_bulk)
@@ -69,10 +62,7 @@ class StiffnessBounds:
         return low, (1 - min_ratio) / 2 + UNIT * (1 + min_ratio)
 
     def constants(self) -> Array:
-        """Bounds of E_x, E_y (Pa), ν_xy and G_xy (Pa) in plane strain, shape (4, 2).
-
-        From bounds low ≤ S ≤ high of the compliance; `UNIT` is the rounding unit.
-        """
+        """Bounds of E_x, E_y (Pa), ν_xy and G_xy (Pa) in plane strain, shape (4, 2)."""
         low, high = inverse_below(self.upper), inverse_above(self.lower)
         slack = 4 * UNIT
         moduli = [(1 / high[k, k] * (1 - slack), 1 / low[k, k] * (1 + slack)) for k in range(3)]
@@ -104,35 +94,19 @@ def _young_rounding(shear: float, bulk: float) -> float:
 
 
 def inverse_below(matrix: Array) -> Array:
-    """Lower bound of the inverses of all symmetric matrices ≤ `matrix`, shape (…, 3, 3).
-
-    ≤ is the Loewner order.
-
-    Raises:
-        FailedError: The matrix is singular to rounding.
-    """
+    """Lower bound of the inverses of symmetric matrices ≤ `matrix` (Loewner's order), (…, 3, 3)."""
     inverse, error = _inverse(matrix)
     return np.asarray(inverse - error * np.eye(matrix.shape[-1]))
 
 
 def inverse_above(matrix: Array) -> Array:
-    """Upper bound of the inverses of all symmetric matrices ≥ `matrix`, shape (…, 3, 3).
-
-    ≥ is the Loewner order.
-
-    Raises:
-        FailedError: The matrix is singular to rounding.
-    """
+    """Upper bound of the inverses of symmetric matrices ≥ `matrix` (Loewner's order), (…, 3, 3)."""
     inverse, error = _inverse(matrix)
     return np.asarray(inverse + error * np.eye(matrix.shape[-1]))
 
 
 def _inverse(matrix: Array) -> tuple[Array, Array]:
-    """Computed symmetric inverse (…, n, n), and a bound of the norm of its error, (…, 1, 1).
-
-    With X the computed inverse and R = I − X·matrix, the true one differs from X by at most
-    ‖R‖‖X‖/(1 − ‖R‖), rounding of R included.
-    """
+    """Computed symmetric inverse (…, n, n), and a bound of the norm of its error, (…, 1, 1)."""
     inverse = np.linalg.inv(matrix)
     inverse = (inverse + np.swapaxes(inverse, -1, -2)) / 2
     residual_norm = residual_above(inverse, matrix).sum(axis=-1).max(axis=-1)

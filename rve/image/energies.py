@@ -17,10 +17,9 @@ from alphacut.rve.result.result import PhaseEnergies
 def phase_energies(
     solution: ImageSolution, images: ModuliImages, phase: Rows, *, count: int, aspect: float = 1.0
 ) -> PhaseEnergies:
-    """Estimated parts of K and G of each phase in C11 + C12, C11 − C12 and C33.
+    """Estimated parts of K and G of each phase in C11 + C12, C11 − C12 and C33; nothing is proved.
 
-    They are the mean of the values by displacements and by stresses, whose distance is the declared
-    error; nothing is proved.
+    The mean of the values by displacements and by stresses, whose distance is the declared error.
 
     Args:
         solution: Fields of one image.

@@ -53,10 +53,7 @@ class ImageModel:
         aspect: Height of a pixel over its width.
         division: Parts along each side of a pixel; see `usual_division`.
         solver: Stopping rule of the fields.
-        average: What E and ν are of, a name in `anisotropy.AVERAGES`.
-
-    Raises:
-        RefusedError: A value lies outside its range.
+        average: What E and ν are of, a name in `moduli.AVERAGES`.
     """
 
     aspect: float = 1.0
@@ -79,14 +76,11 @@ class ImageModel:
     def cuts(
         self, images: Sequence[ModuliImages], crisp: tuple[ModuliImages, ImageSolution]
     ) -> list[ImageCut]:
-        """Bounds of stiffness, E, ν and engineering constants at each α-level, nested.
+        """Bounds of stiffness, E, ν and engineering constants at each α-level, nested, in order.
 
         Args:
             images: Least and greatest moduli of each level, for rising α.
             crisp: A pair of images and its solution by the same model, the first guess.
-
-        Returns:
-            One cut for each level, in the order of the images.
         """
         last_pair, solution = crisp
         bounds = []  # for falling α, from the narrowest cut to the widest
@@ -104,14 +98,10 @@ class ImageModel:
         return cuts[::-1]
 
     def require_consistent(self, images: Sequence[ModuliImages], cuts: Sequence[ImageCut]) -> None:
-        """Refuse cuts that contradict independent bounds of an image inside them.
+        """Refuse cuts, one a level of `images`, that contradict bounds of an image inside them.
 
-        Two images with moduli in the middle of the narrowest and of the widest cut are solved
-        anew, with `COARSER` times the energy error and without a first guess.
-
-        Args:
-            images: Least and greatest moduli of each level, for rising α.
-            cuts: Proved bounds of each level.
+        Two images with moduli in the middle of the narrowest and of the widest cut are solved anew,
+        with `COARSER` times the energy error and without a first guess.
         """
         solver = replace(self.solver, accuracy=min(COARSER * self.solver.accuracy, 0.1))
         coarse_model = replace(self, solver=solver)
@@ -143,24 +133,14 @@ def nested(intervals: Sequence[Ends]) -> list[Ends]:
 
 
 def usual_division(images: ModuliImages) -> int:
-    """Default number of elements along each side of a pixel, 1 or 2.
-
-    Two where both moduli of an image stay within a factor `MILD`, so that few iterations are
-    needed, and the image has up to `LARGE` pixels; else one.
-    """
+    """Elements along each side of a pixel: 2 up to `MILD` contrast and `LARGE` pixels, else 1."""
     contrast = max(float(upper.max() / lower.min()) for lower, upper in (images.bulk, images.shear))
     return 2 if contrast <= MILD and images.bulk[0].size <= LARGE else 1
 
 
 @dataclass(frozen=True, eq=False)
 class ImageSolution:
-    """Bounds of the stiffness with the fields that prove them.
-
-    Args:
-        bounds: Of the stiffness.
-        upper: Displacement side.
-        lower: Stress side.
-    """
+    """Bounds of the stiffness, and displacements (upper) and stresses (lower) that prove them."""
 
     bounds: StiffnessBounds
     upper: SideSolution
@@ -175,11 +155,7 @@ def solve_image(
     solver: ConjugateGradient | None = None,
     division: int = 1,
 ) -> ImageSolution:
-    """Proved bounds of the effective stiffness of a periodic image; see `solve_between`.
-
-    `bulk` and `shear` are the plane-strain bulk modulus K + G/3 and the shear modulus of each
-    pixel, shape (rows, columns), in Pa, row 0 at the bottom.
-    """
+    """Proved bounds of a periodic image of K + G/3 and G in Pa, row 0 at the bottom."""
     images = ModuliImages((bulk, bulk), (shear, shear))
     return solve_between(images, aspect=aspect, solver=solver, division=division)
 

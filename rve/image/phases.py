@@ -73,10 +73,7 @@ class ModuliInterval:
 
     @classmethod
     def of_young(cls, modulus: tuple[float, float], poisson: tuple[float, float]) -> ModuliInterval:
-        """Least and greatest plane bulk and shear modulus over intervals of E (Pa) and of ν.
-
-        The bulk modulus E/(2 (1 + ν) (1 − 2 ν)) is convex in ν; the shear modulus decreases.
-        """
+        """Least and greatest plane bulk and shear modulus over intervals of E (Pa) and of ν."""
         (young_low, young_high), (nu_low, nu_high) = modulus, poisson
         nu_softest = min(max(nu_low, NU_AT_LEAST_BULK), nu_high)
         least_bulk = PlaneModuli.of_young(young_low, nu_softest).bulk

@@ -16,14 +16,10 @@ BYTES_PER_PIXEL = 2500  # of both sides together, measured at 1024 × 1024
 
 
 def read_grey(path: Path, *, square: bool = True) -> Array:
-    """Read the grey values of an image file, shape (rows, columns), row 0 at the bottom.
+    """Grey values of ``.png``, ``.tif`` … or ``.npy``, (rows, columns), row 0 at the bottom.
 
-    Args:
-        path: A file ``.png``, ``.tif`` … or ``.npy``.
-        square: Refuse a file that says that its pixels are not square.
-
-    Raises:
-        RefusedError: The file is no plane grey image, holds no numbers, or is too large for memory.
+    Refuses what is no plane image of numbers or too large for memory and, with `square`, a file
+    that says that its pixels are not square.
     """
     try:
         values = _array(path) if path.suffix == ".npy" else _picture(path, square)
@@ -76,12 +72,7 @@ def require_memory(rows: int, columns: int) -> None:
 
 
 def require_phases(grey: Array, thresholds: tuple[tuple[float, float], ...]) -> None:
-    """Refuse thresholds that may leave a phase without a pixel.
-
-    Args:
-        grey: Grey values, shape (rows, columns).
-        thresholds: Least and greatest value of each fuzzy threshold, rising.
-    """
+    """Refuse thresholds (least, greatest), rising, that may leave a phase without a pixel."""
     low, high = float(grey.min()), float(grey.max())
     for least, greatest in thresholds:
         if not (low < least and greatest <= high):

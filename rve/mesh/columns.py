@@ -159,10 +159,7 @@ def _columns(prisms: Prisms) -> tuple[Rows, int]:
 
 
 def _number_nodes(prisms: Prisms, level: Rows, planar: Rows, layers: int, vertices: int) -> Rows:
-    """New number of each node, shape (n,): all levels, then the planes half-way between them.
-
-    From the level of each node, −1 half-way, and its number in the planar mesh, vertices first.
-    """
+    """New number of each node, (n,): all levels, then the planes half-way, vertices first."""
     per_level = int(planar.max()) + 1
     number = level * per_level + planar
     half = prisms.cells[:, HALF_WAY]
@@ -186,15 +183,7 @@ def _triangles(vertices: Rows, layer: Rows) -> Rows:
 def _plane(
     points: Array, cells: Rows, inside: Mask, radius: float, outline: Outline
 ) -> Triangulation:
-    """Triangulation of the lowest level, with its edges and its nodes on the interface.
-
-    Args:
-        points: Positions of the nodes, vertices first, shape (n, 2).
-        cells: Nodes of the prisms of the lowest layer in Basix's order, shape (m, 15).
-        inside: Mask of the prisms in the particle, shape (m,).
-        radius: Radius of the particle, 0 for none.
-        outline: Outline of the particle.
-    """
+    """Triangulation of the lowest level, with its edges and its nodes on the interface."""
     triangles = cells[:, BELOW]
     vertices = int(triangles[:, :3].max()) + 1
     ends: Rows = np.empty((len(points) - vertices, 2), np.intp)

@@ -64,8 +64,8 @@ def plane_mesh(
         thickness: Of an interphase around a round one, 0 for none.
 
     Raises:
-        RefusedError: A value out of range, or particles nearly touch: the mesh between them would
-            have no end; or an outline is so sharp that elements fold however short they are.
+        RefusedError: Particles nearly touch, so that the mesh between them would have no end; or an
+            outline is so sharp that elements fold however short they are.
     """
     require_mesh_size(size)
     require_fit(outline, radius + thickness, CLOSEST)
@@ -112,11 +112,7 @@ def _graded_mesh(
 
 
 def curved_nodes(mesh: PlaneMesh, order: int) -> tuple[Array, Rows]:
-    """Nodes of Lagrange triangles of `order`, the interface's edges bent onto the outline.
-
-    Returns:
-        Positions (n, 2) and the nodes of each triangle (m, (order + 1)(order + 2)/2).
-    """
+    """Nodes (n, 2) and cells of Lagrange triangles of `order`, bent onto the outline."""
     element = basix.create_element(
         basix.ElementFamily.P, basix.CellType.triangle, order, basix.LagrangeVariant.gll_warped
     )
@@ -202,13 +198,7 @@ def quadrature_degree(order: int) -> int:
 
 
 def jacobian_ratios(nodes: Array, cells: Rows, order: int) -> Array:
-    """Least det J over its mean in each isoparametric triangle, shape (m,).
-
-    Args:
-        nodes: Positions, shape (n, 2).
-        cells: Nodes of each triangle in Basix's order, shape (m, (order + 1)(order + 2)/2).
-        order: Polynomial degree of the geometry.
-    """
+    """Least det J over its mean in each isoparametric triangle of `order`, shape (m,)."""
     element = basix.create_element(
         basix.ElementFamily.P, basix.CellType.triangle, order, basix.LagrangeVariant.gll_warped
     )

@@ -54,13 +54,7 @@ def extruded(
 ) -> Prisms:
     """Mesh the cell by Gmsh and extrude the triangles to prisms, θ from 0 to 1 in equal layers.
 
-    Args:
-        size: Edge length in the plane, in halves of the cell's side.
-        radius: Radius of the particle; 0 for a mesh that knows nothing of it.
-        outline: Outline of the particle.
-        layers: Number of layers along θ.
-        sizes: Edge length at (x1, x2), in place of `size`.
-        thickness: Thickness of the interphase around the particle, 0 for none.
+    Arguments as of `columns.extrude`; `sizes` is the edge length at (x1, x2) in place of `size`.
     """
     with square.model() as gmsh:
         surfaces = square.surfaces(size, radius, outline, thickness)

@@ -52,14 +52,7 @@ def identify(plane: Triangulation) -> Periodicity:
 
 
 def unknowns(points: Array) -> Rows:
-    """Number of each node's unknown, the same for periodic partners, −1 at corners, shape (n,).
-
-    Args:
-        points: Positions, shape (n, 2).
-
-    Raises:
-        MeshError: A node of a side has no partner.
-    """
+    """Number of each node's unknown, the same for periodic partners, −1 at corners, shape (n,)."""
     on_side = abs(abs(points) - 1) <= SAME_PLACE
     representative: Rows = np.arange(len(points))
     for axis in (0, 1):
@@ -72,9 +65,7 @@ def unknowns(points: Array) -> Rows:
 
 
 def partners(points: Array, on_side: Mask, axis: int) -> tuple[Rows, Rows]:
-    """Nodes of the side x = −1 and their periodic partners on x = 1, shape (k,) each.
-
-    Both are sorted along the side, so that partners have the same rank.
+    """Nodes of the side x = −1 and their partners on x = 1, (k,) each, sorted along the side.
 
     Args:
         points: Positions, shape (n, 2).

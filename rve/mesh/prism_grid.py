@@ -68,12 +68,9 @@ class Triangulation:
 def reference_radius(
     radius_map: RadiusMap, outline: Outline = circle, thickness: float = 0.0
 ) -> float:
-    """Radius of the particle in the planar mesh, which is then moved to all radii of a map.
+    """Radius of the planar mesh that is moved to all radii of a map: the middle of its range.
 
-    The middle of the map's range, rounded to 1/20, in [0.1, 0.9 / reach of the outline].
-
-    Raises:
-        ValueError: The map gives radii outside (0, 1), or its law of θ is none.
+    Rounded to 1/20, in [0.1, 0.9 / reach of the outline].
     """
     require_map(radius_map)
     law = radius_map.distribution
@@ -100,11 +97,7 @@ LevelFunction = Callable[[Array, Array, Array], Array]
 
 @dataclass(frozen=True)
 class LevelSet(FixedCell):
-    """Particles of any shape on a mesh that ignores them, with the law of θ.
-
-    Args:
-        z: Negative in the particles.
-    """
+    """Particles where z is negative, on a mesh that ignores them, with the law of θ."""
 
     z: LevelFunction
 
@@ -153,11 +146,7 @@ def nodes_at_radii(mesh: Triangulation, radii: Array, thickness: float = 0.0) ->
 
 
 def _ring_positions(mesh: Triangulation, ring: Ring, radii: Array, thickness: float) -> Array:
-    """Positions of the nodes of an interphase at k radii of the particle, shape (k, nodes, 2).
-
-    Middles of edges have the mean radius and the mean angle of their ends. So both circles are
-    copies of one curve at two scales, which do not meet however thin the ring.
-    """
+    """Positions of the nodes of an interphase at k radii of the particle, shape (k, nodes, 2)."""
     x, y = mesh.points[: mesh.vertices].T
     depth = (np.hypot(x, y) - mesh.radius) / ring.thickness  # 0 at the particle, 1 at the matrix
     angle = np.arctan2(y, x)

@@ -31,14 +31,7 @@ def triangles(
 ) -> Triangles:
     """Mesh the cell by Gmsh: vertices (n, 2), triangles (m, 3) and their phases (m,).
 
-    Phases are matrix 0, particle 1, interphase 2.
-
-    Args:
-        size: Edge length, in halves of the cell's side.
-        radius: Radius of the particle.
-        outline: Outline of the particle.
-        sizes: Edge length at (x1, x2), in place of `size`.
-        thickness: Thickness of the interphase around it, 0 for none.
+    Arguments as of `surfaces`; `sizes` is the edge length at (x1, x2).
     """
     with model() as gmsh:
         phase_surfaces = surfaces(size, radius, outline, thickness, sizes)
@@ -91,11 +84,11 @@ def surfaces(
 
 
 def edges(triangles: Rows, inside: Mask) -> tuple[Rows, Rows, Mask]:
-    """Edges of a triangulation and which of them lie between the inside and the outside.
+    """Edges of a triangulation and the mask of those between inside and outside.
 
     Returns:
         Vertices of each edge, (k, 2); edges of each triangle, (m, 3), in the order of `EDGES`; and
-        the mask of the edges on the interface, (k,).
+        the mask, (k,).
     """
     vertex_pairs = np.sort(triangles[:, EDGES].reshape(-1, 2), axis=1)
     ends, number = np.unique(vertex_pairs, axis=0, return_inverse=True)
@@ -159,11 +152,7 @@ def _quarter_steps(inner: float, outer: float, sizes: Sizes) -> int:
 def _particle_in_ring(
     geo: Any, size: float, radii: tuple[float, float], steps: int
 ) -> dict[int, list[int]]:
-    """Add a round particle in a ring with a structured mesh of `steps` elements a quarter.
-
-    Returns:
-        Surface tags by phase: matrix 0, particle 1, ring 2.
-    """
+    """Add a round particle in a ring with a structured mesh; surface tags by phase."""
     import gmsh
 
     centre, quarters = geo.addPoint(0, 0, 0, size), [(k, (k + 1) % 4) for k in range(4)]
@@ -237,28 +226,17 @@ REFINEMENTS = (0.5, 0.75, 1.1, 1.7, 2.5, 4.0)
 
 
 def particle_grading(outline: Outline, radius: float, thickness: float = 0.0) -> Sizes:
-    """Function of (x1, x2): edge length near a particle and in gaps, over the nominal one.
-
-    Args:
-        outline: Of the particle.
-        radius: Its radius.
-        thickness: Of a ring around it.
-    """
+    """Edge length at (x1, x2) near a particle and in gaps, over the nominal one."""
     half_width, half_height, least = (radius * extent for extent in extents(outline))
     outer = half_width + thickness, half_height + thickness
     return lambda x, y: _size_near_particle(x, y, *outer, least)
 
 
 def bend_grading(outline: Outline, radius: float, refinement: float) -> Sizes:
-    """Function of (x1, x2): edge length by the bends of an outline, over the nominal one.
+    """Edge length at (x1, x2) by the bends of an outline, over the nominal one times `refinement`.
 
     It is proportional to the least sum of bend radius and distance over the outline's points, so
     that on a circle it is the same at all of them and grows with the distance.
-
-    Args:
-        outline: Of the particle.
-        radius: Its radius.
-        refinement: Divides the edge length.
     """
     points, unit_bend_radii = bend_radii(outline)
     px, py = radius * points.T
@@ -270,11 +248,7 @@ def bend_grading(outline: Outline, radius: float, refinement: float) -> Sizes:
 def _size_near_particle(
     x: float, y: float, half_width: float, half_height: float, least: float
 ) -> float:
-    """Edge length at (x, y), over the nominal one, near a particle and between it and its images.
-
-    Gmsh calls this for each point, hence no NumPy. `least` is that of the outline's distances from
-    the centre.
-    """
+    """Edge length at (x, y) over the nominal one; Gmsh calls this a point at a time: no NumPy."""
     x, y = abs(x), abs(y)
     by_distance = _PER_RADIUS * max(hypot(x, y), least)
     # width of the gap to the cell's side, which grows along it as beside a circle

@@ -70,11 +70,7 @@ def wedge(components: int) -> Any:
 
 @cache
 def prism_rule() -> tuple[Array, Array]:
-    """Quadrature on the reference prism: six points of a triangle times three of Gauss along ζ.
-
-    Returns:
-        Points, shape (18, 3), ordered by ζ first, and weights, shape (18,), their sum 1/2.
-    """
+    """Points (18, 3), by ζ first, and weights, sum 1/2: six of a triangle times three of Gauss."""
     triangle, planar_weights = basix.make_quadrature(basix.CellType.triangle, 4)
     z, line_weights = basix.make_quadrature(basix.CellType.interval, 5)
     order = np.argsort(z[:, 0])

@@ -13,6 +13,7 @@ from alphacut.rve.fenicsx import at_points, fem
 from alphacut.rve.mesh.gmsh_prisms import VTK_ORDER
 from alphacut.rve.mesh.wedge import vertices_and_midpoints
 from alphacut.rve.prism.model import PrismModel
+from alphacut.rve.prism.own_mesh import MeshModel
 from alphacut.rve.prism.problem import PrismProblem
 from alphacut.rve.solver.form import strain
 from alphacut.rve.solver.krylov import SolverOptions, solve
@@ -60,36 +61,16 @@ def cell_fields(
     """Fields of one cell, on one rank, by a mesh that follows the interface.
 
     Raises:
-        ConvergenceError: The linear solver stopped early.
         FoldedMeshError: The map bends more than the layers can follow.
-
-    Example:
-        >>> from alphacut.rve import Phase
-        >>> from alphacut.stochastic import HermiteMap
-        >>> model, radius = PrismModel(mesh_size=0.5, layers=2), HermiteMap(0.2, 0.1, 0.6, 0.1)
-        >>> fields = cell_fields(model, radius, Phase(20e9), Phase(80e9))
-        >>> fields.vtk_cells.shape == fields.cells.shape
-        True
     """
     cell = Cell(matrix, inclusion, radius_map, model.outline, interphase)
     problem = model.problem(radius_map, thickness_of(interphase))
     return _solve_fields(problem, cell.stiffness, model.loads(cell), model.options)
 
 
-def mesh_fields(model: PrismModel, law: ThetaLaw, phases: Mapping[str, AnyPhase]) -> CellFields:
-    """Displacements and stresses at the nodes of a mesh from a file, under three unit strains.
-
-    Args:
-        model: The model with the mesh.
-        law: Law of θ.
-        phases: Materials by name of their physical group.
-
-    Raises:
-        ConvergenceError: The linear solver stopped early.
-        MeshError: The file holds no cell of prisms.
-        RefusedError: Law or phases are not those of the mesh.
-    """
-    problem, named = model.mesh_problem(law, phases)
+def mesh_fields(model: MeshModel, law: ThetaLaw, phases: Mapping[str, AnyPhase]) -> CellFields:
+    """Displacements and stresses at the nodes of a mesh from a file, under three unit strains."""
+    problem, named = model.problem_of(law, phases)
     stiffness = [phase.stiffness for phase in named.phases]
     return _solve_fields(problem, stiffness, THREE_LOADS, model.options)
 

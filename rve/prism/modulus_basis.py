@@ -69,9 +69,6 @@ def modulus_basis(
         poisson: Of the particle.
         ends: Least and greatest modulus of the particle, in Pa, not equal.
         strains: Macroscopic strains, shape (loads, 3).
-
-    Raises:
-        ConvergenceError: A linear solve stopped early.
     """
     low, high = ends
     phases = matrix.stiffness, Phase(high, poisson).stiffness
@@ -109,11 +106,7 @@ def _residual_energy(
     forces: list[list[PETSc.Vec]],
     preconditioner: PETSc.PC,
 ) -> Array:
-    """Energy rᵀ P⁻¹ r of the residual of projected solutions at a modulus in Pa, shape (loads,).
-
-    r = f_0 + t f_1 − Σ c_v (K_0 v + t K_1 v) over the basis vectors v, t the modulus over the
-    range's upper end; `images` are the K_0 v and K_1 v, `forces` f_0 and f_1 of the loads.
-    """
+    """Energy rᵀ P⁻¹ r of the residual of projected solutions at a modulus in Pa, shape (loads,)."""
     factor, energies = modulus / basis.ends[1], []
     for k, column in enumerate(basis.coefficients(modulus).T):
         residual = _scaled_sum(forces[0][k], forces[1][k], factor)

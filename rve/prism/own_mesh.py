@@ -1,26 +1,44 @@
-"""The user's mesh with its law of θ and its materials, refused where they do not fit."""
+"""Prisms of the user's own: a mesh from a file, or particles by a level set.
+
+Both take the law of θ and the materials by name, and give one result without a declared error.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import cast
+from typing import ClassVar, cast
 
 import numpy as np
 
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.rve.cell.cell import AnyPhase, Phase, VoigtPhase
+from alphacut.rve.cell.cell import THREE_LOADS, AnyPhase, Phase, VoigtPhase
+from alphacut.rve.cell.outline import circle
 from alphacut.rve.cell.settings import require_compressible
 from alphacut.rve.fenicsx import MPI
 from alphacut.rve.mesh.columns import from_first_rank
 from alphacut.rve.mesh.file import read_grid
 from alphacut.rve.mesh.gmsh_prisms import NAMES
 from alphacut.rve.mesh.prism_grid import FixedCell, LevelFunction, LevelSet, PrismGrid
+from alphacut.rve.mesh.square import REFINEMENTS
+from alphacut.rve.prism.model import (
+    Seconds,
+    cached_problem,
+    prism_result,
+    require_prisms,
+    solve_loads,
+    timed,
+)
 from alphacut.rve.prism.problem import PrismProblem
+from alphacut.rve.result.checks import checks_within_limits
+from alphacut.rve.result.result import HomogenisedStiffness, PhaseEnergies
+from alphacut.rve.solver.krylov import SolverOptions
 from alphacut.stochastic import ThetaLaw
 
+ROUGH_MESH = 0.1
+"""Relative violation of a bound that a user's mesh may have, whose error nobody knows."""
 SAME_LEVEL = 1e-6
 """Distance of an end of the law from the mesh's that is none, over the support."""
 
@@ -40,27 +58,132 @@ class NamedPhases:
     order: tuple[int, ...]
 
 
+class _NamedModel:
+    """A model whose materials have names."""
+
+    petsc: Mapping[str, str]
+    name: ClassVar[str] = "prism"
+
+    def problem_of(self, law: object, phases: object) -> tuple[PrismProblem, NamedPhases]:
+        """Problem moved to the law, with its law and materials checked."""
+        raise NotImplementedError
+
+    @property
+    def options(self) -> SolverOptions:
+        """The linear solver with what overrides it."""
+        return SolverOptions(self.petsc)
+
+    def solve(self, law: ThetaLaw, phases: Mapping[str, AnyPhase]) -> list[HomogenisedStiffness]:
+        """Homogenised stiffness, one result in a list; energies in the order of `phases`.
+
+        Args:
+            law: Law of θ.
+            phases: Materials by the name of their physical group, or of a level set "matrix" and
+                "inclusion".
+
+        Raises:
+            ConvergenceError: The linear solver stopped early.
+            CertificateError: A property that every right result has is violated.
+            MeshError: The mesh is no cell of prisms.
+            RefusedError: Law or phases are not those of the mesh, or a Poisson's ratio is above
+                0.45.
+        """
+        seconds: Seconds = {}
+        with timed(seconds, "mesh"):
+            problem, named = self.problem_of(law, phases)
+        stiffness = [phase.stiffness for phase in named.phases]
+        strains, solved = solve_loads(problem, stiffness, THREE_LOADS, self.options, seconds)
+        result = prism_result(strains, named.phases, THREE_LOADS, self.options)
+        checks = {**result.checks, "residual": solved.residual}
+        energies, order = cast("PhaseEnergies", result.energies), list(named.order)
+        return [
+            replace(
+                result,
+                unknowns=problem.numbering.size,
+                iterations=solved.iterations,
+                seconds={**seconds, "total": sum(seconds.values())},
+                checks=checks_within_limits(checks, discretisation=ROUGH_MESH),
+                energies=PhaseEnergies(energies.values[order], energies.errors[order]),
+            )
+        ]
+
+
+@dataclass(frozen=True)
+class MeshModel(_NamedModel):
+    """The user's mesh of 15-node prisms, solved as it is.
+
+    Args:
+        file: File of Gmsh.
+        petsc: PETSc options without their prefix `rve_`.
+        parallel: Whether all MPI ranks work on one cell together.
+    """
+
+    file: Path | str
+    petsc: Mapping[str, str] = field(default_factory=dict)
+    parallel: bool = False
+
+    def problem_of(self, law: object, phases: object) -> tuple[PrismProblem, NamedPhases]:
+        """Problem on the mesh, moved to the law, with law and materials checked."""
+        problem = self.cached_problem()
+        named = mesh_phases(problem.form.grid, law, phases)
+        problem.move(named.law)
+        return problem, named
+
+    def cached_problem(self) -> PrismProblem:
+        """Problem on the mesh, cached as long as the file does not change."""
+        path = Path(self.file)
+        if not path.is_file():
+            raise RefusedError("mesh.file", path, "a file of Gmsh")
+        return _mesh_problem(str(path), path.stat().st_mtime_ns, self.parallel)
+
+
+@lru_cache(maxsize=2)
+def _mesh_problem(path: str, _changed: int, parallel: bool) -> PrismProblem:
+    comm = MPI.COMM_WORLD if parallel else MPI.COMM_SELF
+    return PrismProblem(from_first_rank(comm, partial(read_grid, path)), comm)
+
+
+@dataclass(frozen=True)
+class LevelSetModel(_NamedModel):
+    """Particles of any number and shape by the sign of a function, on a mesh that ignores them.
+
+    The error is of first order in the mesh size, the result too stiff.
+
+    Args:
+        z: Takes x1, x2 and θ; negative in the particles.
+        mesh_size: Edge length of the triangles, in halves of the cell's side, in (0, 1].
+        layers: Layers in θ, at least 1.
+        petsc: PETSc options without their prefix `rve_`.
+        parallel: Whether all MPI ranks work on one cell together.
+    """
+
+    z: LevelFunction
+    mesh_size: float = 0.15
+    layers: int = 12
+    petsc: Mapping[str, str] = field(default_factory=dict)
+    parallel: bool = False
+
+    def __post_init__(self) -> None:
+        require_prisms(self.mesh_size, self.layers)
+
+    def problem_of(self, law: object, phases: object) -> tuple[PrismProblem, NamedPhases]:
+        """Problem on a cached mesh."""
+        if not hasattr(law, "pdf"):
+            raise RefusedError("law of θ", type(law).__name__, "a law, as TruncatedNormal(-3, 3)")
+        named = _order_phases(LevelSet(cast("ThetaLaw", law), self.z), NAMES[:2], phases)
+        mesh = (self.mesh_size, 0.0, circle, REFINEMENTS[0], self.layers, self.parallel)
+        problem = cached_problem(*mesh, 0.0)
+        problem.move(named.law)
+        return problem, named
+
+
 def mesh_phases(grid: PrismGrid, law: object, phases: object) -> NamedPhases:
     """Law and materials of a mesh from a file, in its order of phases, or a refusal."""
     return _order_phases(mesh_law(grid, law), grid.names, phases)
 
 
-def level_set_phases(z: LevelFunction, law: object, phases: object) -> NamedPhases:
-    """Law and materials of a cell with a level set z < 0 in the particles, or a refusal."""
-    if not hasattr(law, "pdf"):
-        raise RefusedError("law of θ", type(law).__name__, "a law, as TruncatedNormal(-3, 3)")
-    return _order_phases(LevelSet(cast("ThetaLaw", law), z), NAMES[:2], phases)
-
-
 def _order_phases(law: FixedCell, names: Sequence[str], phases: object) -> NamedPhases:
-    """Materials in the order of `names`, those of the mesh, checked."""
-    named = _checked_phases(names, phases)
-    order = tuple(names.index(name) for name in named)
-    return NamedPhases(law, tuple(named[name] for name in names), order)
-
-
-def _checked_phases(names: Sequence[str], phases: object) -> Mapping[str, AnyPhase]:
-    """The materials by name, if they are one for each name of the phases of a mesh."""
+    """Materials in the order of `names`, those of the mesh: one for each, or a refusal."""
     listed = ", ".join(names)
     if not isinstance(phases, Mapping):
         value = type(phases).__name__
@@ -72,7 +195,8 @@ def _checked_phases(names: Sequence[str], phases: object) -> Mapping[str, AnyPha
         if not isinstance(phases[name], Phase | VoigtPhase):
             raise RefusedError(f"phase {name!r}", repr(phases[name]), "a Phase or a VoigtPhase")
     require_compressible(*phases.values())
-    return phases
+    order = tuple(names.index(name) for name in phases)
+    return NamedPhases(law, tuple(phases[name] for name in names), order)
 
 
 def mesh_law(grid: PrismGrid, law: object) -> FixedCell:
@@ -92,22 +216,3 @@ def mesh_law(grid: PrismGrid, law: object) -> FixedCell:
         allowed = f"laws on {low:g} … {high:g}, the lowest and the highest level of the mesh"
         raise RefusedError("law of θ", value, allowed)
     return FixedCell(cast("ThetaLaw", law))
-
-
-def own_mesh_problem(path: Path | str, parallel: bool) -> PrismProblem:
-    """Problem on the mesh of a Gmsh file; cached as long as the file does not change.
-
-    Raises:
-        RefusedError: There is no such file, or it is none of Gmsh.
-        MeshError: Its elements are no prisms that fill a periodic cell.
-    """
-    path = Path(path)
-    if not path.is_file():
-        raise RefusedError("mesh.file", path, "a file of Gmsh")
-    return _problem(str(path), path.stat().st_mtime_ns, parallel)
-
-
-@lru_cache(maxsize=2)
-def _problem(path: str, _changed: int, parallel: bool) -> PrismProblem:
-    comm = MPI.COMM_WORLD if parallel else MPI.COMM_SELF
-    return PrismProblem(from_first_rank(comm, partial(read_grid, path)), comm)

@@ -1,7 +1,4 @@
-"""The form on cell × θ: prism elements, weight f_Θ, strains and areas at quadrature points.
-
-The product-space cell problem of one grid: constraints, solutions, and means over slices.
-"""
+"""The product-space cell problem of one grid: form, constraints, solutions, means over slices."""
 
 from __future__ import annotations
 
@@ -14,7 +11,7 @@ from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.rve.cell.cell import AREA
 from alphacut.rve.cell.outline import is_round
-from alphacut.rve.fenicsx import MPI, PETSc, at_points, basix, fem, mesh_of, petsc, ufl
+from alphacut.rve.fenicsx import MPI, PETSc, basix, fem, mesh_of, petsc, ufl
 from alphacut.rve.mesh.curved import LEAST_RATIO
 from alphacut.rve.mesh.prism_grid import PrismGrid
 from alphacut.rve.mesh.wedge import (
@@ -24,7 +21,7 @@ from alphacut.rve.mesh.wedge import (
     slice_weights,
     wedge,
 )
-from alphacut.rve.solver.form import ALL_PARTS, CellForm, strain
+from alphacut.rve.solver.form import ALL_PARTS, CellForm, PointStrains, strain_products
 from alphacut.rve.solver.krylov import SolverOptions, krylov_solver
 from alphacut.rve.solver.numbering import (
     LevelNumbering,
@@ -75,7 +72,6 @@ class PrismForm:
         return nodes
 
     def _compile_forms(self) -> None:
-        """Compile the elasticity form, and strain and det J at the quadrature points of prisms."""
         points, weights = prism_rule()
         metadata = {
             "quadrature_rule": "custom",
@@ -93,18 +89,10 @@ class PrismForm:
         ignores_interface = not self.grid.conforming
         measures = list(self.dx.values())
         self.elastic = CellForm(self.space, point_space, measures, mixed=ignores_interface)
-        self._u = fem.Function(self.space)
-        self._strain = at_points(strain(self._u), points)
-        self._volume = at_points(ufl.JacobianDeterminant(self.mesh), points)
+        self._strains = PointStrains(self.space, points)
 
     def move_to(self, radius: RadiusMap, thickness: float = 0.0) -> None:
-        """Move the nodes to the cone of `radius` and mark the particle at the quadrature points.
-
-        After an error the form stays where it was.
-
-        Args:
-            radius: Radius over θ.
-            thickness: Of the interphase, of a grid that has one.
+        """Move the nodes to the cone of `radius` and mark the particle; not after an error.
 
         Raises:
             FoldedMeshError: An element is inverted.
@@ -121,7 +109,6 @@ class PrismForm:
             raise
 
     def _move(self, radius: RadiusMap, thickness: float) -> None:
-        """Move the nodes, check density and elements, and set both functions of the form."""
         positions, geometry = self.grid.positions(radius, thickness), self.mesh.geometry
         geometry.x[:] = positions[geometry.input_global_indices]
         self._levels = self.grid.level_thetas(radius.distribution)
@@ -151,29 +138,18 @@ class PrismForm:
             raise FoldedMeshError(f"the mesh folds over {where}", cure)
 
     def _inside(self, positions: Array, radius: RadiusMap) -> Array:
-        """Indicator of the particle, 1 inside and 0 elsewhere, at the points, (cells, points)."""
         shapes: Array = wedge(1).tabulate(0, prism_rule()[0])[0].reshape(-1, 15)
         points = np.einsum("qn,cnd->cqd", shapes, positions[self.grid.cells[self.wedge]])
         return np.asarray(self.grid.particle_indicator(points, radius))
 
     def strains(self, displacement: Array) -> Array:
-        """(ε11, ε22, 2 ε12) at the points of the slices, shape (cells, 3, points, 3).
-
-        Args:
-            displacement: Of this rank's nodes, shape (nodes, 2).
-        """
-        self._u.x.array[:] = displacement.ravel()
-        return self._at_points(self._strain, 3)
+        """(ε11, ε22, 2 ε12) at points, (cells, 3, points, 3), of displacements (nodes, 2)."""
+        return self._strains(displacement).reshape(len(self.wedge), SLICES_PER_LAYER, -1, 3)
 
     def _areas(self) -> Array:
         heights = np.diff(self._levels)[self.layer]
-        volume = self._at_points(self._volume, 1)[..., 0]
+        volume = self._strains.determinants().reshape(len(self.wedge), SLICES_PER_LAYER, -1)
         return np.asarray(volume / heights[:, None, None] * slice_weights())
-
-    def _at_points(self, expression: fem.Expression, size: int) -> Array:
-        cells = np.arange(len(self.wedge), dtype=np.int32)
-        values = np.asarray(expression.eval(self.mesh, cells))
-        return values.reshape(len(cells), SLICES_PER_LAYER, -1, size)
 
     def phase_areas(self) -> Array:
         """`areas` of the points in each phase, 0 elsewhere, shape (phases, cells, 3, points)."""
@@ -229,19 +205,6 @@ class SliceStrains:
         stresses = [matrix @ strain for matrix, strain in zip(stiffness, self.strain, strict=True)]
         return np.asarray(sum(stresses))
 
-    def energy(self, stiffness: Sequence[Array]) -> Array:
-        """Mean of σ_a : ε_b over cell and θ, shape (fields, fields), in Pa."""
-        return np.asarray(np.einsum("pij,piajb->ab", np.array(stiffness), self.products))
-
-    def energy_parts(self, stiffness_parts: Sequence[Array]) -> Array:
-        """Mean of σ_a : ε_a by K and G of each phase, shape (phases, 2, fields), in Pa.
-
-        Args:
-            stiffness_parts: What K and G give to the phases' stiffness, (2, 3, 3) each.
-        """
-        parts = np.array(stiffness_parts)
-        return np.asarray(np.einsum("pxij,piaja->pxa", parts, self.products))
-
 
 class PrismProblem:
     """The product-space problem of one grid; map and phases are set anew for each sample.
@@ -272,24 +235,13 @@ class PrismProblem:
     def move(self, radius_map: RadiusMap, thickness: float = 0.0) -> None:
         """Move the nodes to the interface r(θ) of a map and mark the particle (eq. 13, 14).
 
-        Args:
-            radius_map: Radius of the particle over θ.
-            thickness: Of the interphase, of a grid that has one.
-
-        Raises:
-            FoldedMeshError: An element is inverted.
-            RefusedError: The density of θ is not positive everywhere.
+        `thickness` is that of the interphase. Raises as `PrismForm.move_to`.
         """
         self.map, self.thickness = radius_map, thickness
         self.form.move_to(radius_map, thickness)
 
     def assemble(self, stiffness: Sequence[Array], parts: slice = ALL_PARTS) -> PETSc.Mat:
-        """Assemble the reduced stiffness of eq. 7 into `self.matrix`, which is returned.
-
-        Args:
-            stiffness: Of the phases in the order of the grid, (3, 3) each.
-            parts: Of the mesh: all, or one phase alone.
-        """
+        """Assemble the reduced stiffness of eq. 7, of all phases or `parts`, and return it."""
         self.form.elastic.set_phases(stiffness)
         self.matrix.zeroEntries()
         self.form.elastic.add_stiffness(self.matrix, parts)
@@ -302,12 +254,7 @@ class PrismProblem:
         return [reduced_vector(force, self.local_map, num_rows, size) for force in forces]
 
     def solver(self, options: SolverOptions, matrix: PETSc.Mat | None = None) -> PETSc.KSP:
-        """PETSc solver of the assembled stiffness, or of another symmetric operator.
-
-        Args:
-            options: PETSc options.
-            matrix: Reduced operator from `assemble_operator`.
-        """
+        """PETSc solver of the assembled stiffness, or of another reduced symmetric operator."""
         operator = self.matrix if matrix is None else matrix
         return krylov_solver(operator, self.numbering, self.map.distribution, options)
 
@@ -332,9 +279,7 @@ class PrismProblem:
     def slice_strains(self, fields: Sequence[tuple[Array, Array | None]]) -> SliceStrains:
         """Mean strains of slices by phase, area fractions and mean products, summed over ranks.
 
-        Args:
-            fields: Macroscopic strain (3,) and fluctuation (nodes, 2) of each; None is no
-                fluctuation.
+        `fields` are pairs of a macroscopic strain (3,) and a fluctuation (nodes, 2), None for none.
         """
         form, count = self.form, len(fields)
         strain = np.empty((len(form.wedge), SLICES_PER_LAYER, POINTS_PER_SLICE, 3, count))
@@ -346,8 +291,8 @@ class PrismProblem:
         fractions = np.stack([form.sum_by_layer(phase.sum(axis=-1)) for phase in areas])
         theta, weights = form.slice_rule()
         point_weights = form.at_prisms(weights)[None, :, :, None] * areas
-        flat = strain.reshape(-1, 3 * count)
-        products = np.array([flat.T @ (phase.reshape(-1, 1) * flat) for phase in point_weights])
+        point_weights = point_weights.reshape(len(areas), -1)
+        products = strain_products(strain.reshape(-1, 3, count), point_weights)
         means, fractions, products = map(self.comm.allreduce, (means, fractions, products))
         phases = len(areas)
         return SliceStrains(
@@ -355,5 +300,5 @@ class PrismProblem:
             weights=weights,
             strain=means.reshape(phases, -1, 3, count),
             fractions=fractions.reshape(phases, -1),
-            products=products.reshape(phases, 3, count, 3, count),
+            products=products,
         )

@@ -14,7 +14,7 @@ import numpy as np
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.fenicsx import PETSc, compiled, fem, ufl
 from alphacut.rve.prism.model import PrismModel
-from alphacut.rve.prism.own_mesh import mesh_law, own_mesh_problem
+from alphacut.rve.prism.own_mesh import MeshModel, mesh_law
 from alphacut.rve.prism.problem import PrismProblem
 from alphacut.rve.solver.form import strain
 from alphacut.rve.solver.krylov import Solutions, SolverOptions, solve
@@ -53,8 +53,8 @@ class ProductSpace:
         True
     """
 
-    def __init__(self, model: PrismModel, law: RadiusMap | ThetaLaw) -> None:
-        if model.interface != "conforming":
+    def __init__(self, model: PrismModel | MeshModel, law: RadiusMap | ThetaLaw) -> None:
+        if isinstance(model, PrismModel) and model.interface != "conforming":
             raise RefusedError("the interface", repr(model.interface), "'conforming'")
         self._petsc = model.petsc
         self._problem = _separate_problem(model, law)
@@ -90,12 +90,7 @@ class ProductSpace:
         function.x.array[:] = self._problem.field(vector).ravel()
 
     def preconditioner(self, matrix: PETSc.Mat) -> ThetaPreconditioner:
-        """Preconditioner by levels along the stochastic coordinate θ, for `PC.setPythonContext`.
-
-        Args:
-            matrix: Reduced matrix, symmetric positive definite, of a form with the density f_Θ(θ)
-                as a factor.
-        """
+        """Preconditioner along θ for `PC.setPythonContext`; the form has the density as factor."""
         problem = self._problem
         return ThetaPreconditioner(matrix, problem.numbering, problem.map.distribution)
 
@@ -127,10 +122,10 @@ class ProductSpace:
         return self._forms[form]
 
 
-def _separate_problem(model: PrismModel, law: RadiusMap | ThetaLaw) -> PrismProblem:
+def _separate_problem(model: PrismModel | MeshModel, law: RadiusMap | ThetaLaw) -> PrismProblem:
     """New problem for a map or law; the cached ones of the model would move to its next map."""
-    if model.mesh:
-        cached = own_mesh_problem(model.mesh, model.parallel)
+    if isinstance(model, MeshModel):
+        cached = model.cached_problem()
         radius: RadiusMap = mesh_law(cached.form.grid, law)
     else:
         cached = model.problem(cast("RadiusMap", law))

@@ -15,12 +15,7 @@ from alphacut.rve.cell.cell import AnyPhase
 
 
 def voigt(fractions: Array, stiffness: Sequence[Array]) -> Array:
-    """Stiffness at uniform strain of any number of phases, shape (…, k, k).
-
-    Args:
-        fractions: Of area or volume, shape (phases, …).
-        stiffness: Of the phases, (k, k) each.
-    """
+    """Stiffness at uniform strain, shape (…, k, k), of phases (k, k) with fractions (phases, …)."""
     return np.asarray(np.tensordot(fractions, np.stack(stiffness), axes=([0], [0])))
 
 
@@ -31,7 +26,7 @@ def reuss(fractions: Array, stiffness: Sequence[Array]) -> Array:
 
 
 def hashin_shtrikman(fractions: Array, stiffness: Sequence[Array]) -> Array:
-    """Hashin–Shtrikman bounds of the in-plane bulk and shear moduli of a fibre composite, in Pa.
+    """Lower and upper bound of the in-plane K, then of G, of a fibre composite in Pa, (2, 2, …).
 
     Hill (J. Mech. Phys. Solids 12, 199, 1964) and Hashin (ibid. 13, 119, 1965); of any number of
     phases and with the extreme moduli of either Walpole (ibid. 17, 235, 1969). That of K holds for
@@ -40,9 +35,6 @@ def hashin_shtrikman(fractions: Array, stiffness: Sequence[Array]) -> Array:
     Args:
         fractions: Area fractions, shape (phases, …).
         stiffness: Plane-strain stiffness of each phase, isotropic across the fibres, (3, 3).
-
-    Returns:
-        Lower and upper bound of K, lower and upper bound of G: shape (2, 2, …).
     """
     bulk = np.array([float(bulk_modulus(phase)) for phase in stiffness])
     shear = np.array([float(phase[2, 2]) for phase in stiffness])
@@ -64,10 +56,9 @@ def bulk_modulus(stiffness: Array) -> Array:
 
 
 def mori_tanaka(fraction: Array, matrix: AnyPhase, inclusion: AnyPhase) -> Array:
-    """Plane stiffness of round aligned fibres by Mori and Tanaka (1973), exact for few fibres.
+    """C11 + C12, C11 − C12 and C33 of round aligned fibres in Pa, (…, 3), by Mori and Tanaka.
 
-    Returns:
-        C11 + C12, C11 − C12 and C33 in Pa, shape (…, 3) for area fractions of shape (…).
+    Exact for few fibres (1973); area fractions have the shape (…).
     """
     bulks = [float(bulk_modulus(phase.stiffness)) for phase in (matrix, inclusion)]
     shears = [float(phase.stiffness[2, 2]) for phase in (matrix, inclusion)]

@@ -36,12 +36,11 @@ BOUNDS = ("reuss", "voigt", "hashin_shtrikman")
 def checks_within_limits(
     checks: Mapping[str, float], *, discretisation: float = ROUND_OFF
 ) -> dict[str, float]:
-    """Copy of the checks; raises if a violation exceeds its limit.
+    """Copy of the checks, relative violations by the names of `WHAT`.
 
     Args:
-        checks: Relative violations by the names of `WHAT`.
-        discretisation: Limit of the violations of bounds, the declared error of the stiffness; that
-            of the others is `ALGEBRAIC`.
+        checks: The checks.
+        discretisation: Limit of those in `BOUNDS`; that of the others is `ALGEBRAIC`.
 
     Raises:
         CertificateError: A violation is too large; the message names it, its value and its limit.
@@ -57,10 +56,7 @@ def checks_within_limits(
 
 
 def with_checks(result: HomogenisedStiffness) -> HomogenisedStiffness:
-    """Copy of a result with the measured violations of symmetry and of the bounds as its checks.
-
-    Args:
-        result: With its cell and its stiffness.
+    """Copy of a result, which has its stiffness, with violations of symmetry and bounds as checks.
 
     Raises:
         CertificateError: A violation exceeds the declared error of the result.
@@ -78,21 +74,17 @@ def with_checks(result: HomogenisedStiffness) -> HomogenisedStiffness:
 def stress_checks(
     stress: Array, loads: Array, fractions: Array, weights: Array, phases: Sequence[AnyPhase]
 ) -> dict[str, float]:
-    """Relative violations of symmetry and of bounds by the mean stiffness over θ.
+    """Relative violations of symmetry and of bounds by the mean stiffness over θ, 0 for none.
 
-    The stiffness is known only by the stresses under some loads, so that the Voigt, Reuss and
-    Hashin–Shtrikman bounds are those of energies of these loads.
+    Voigt's, Reuss's and, of isotropic phases, Hashin and Shtrikman's bounds are those of energies
+    of the loads, under which alone the stiffness is known.
 
     Args:
-        stress: Homogenised (σ11, σ22, σ12) at the nodes of θ for each load, shape (n, 3, loads), in
-            Pa.
+        stress: Homogenised (σ11, σ22, σ12) at the nodes of θ, shape (n, 3, loads), in Pa.
         loads: Macroscopic strains (ε11, ε22, 2 ε12), shape (loads, 3), ε11 = ε22 in their span.
         fractions: Area fractions of the phases at the nodes, shape (phases, n).
         weights: Weights of the nodes, shape (n,).
         phases: Materials, in the order of their fractions.
-
-    Returns:
-        "symmetry", "reuss", "voigt" and, of isotropic phases, "hashin_shtrikman"; 0 where it holds.
     """
     stiffness = [phase.stiffness for phase in phases]
     energy = loads @ mean(weights, stress)

@@ -35,12 +35,7 @@ MARGIN = 1.1  # of errors to first order in those of the stiffness
 
 @dataclass(frozen=True, eq=False)
 class EngineeringConstants:
-    """E_x, E_y, ν_xy and G_xy of one definition.
-
-    Args:
-        values: In the order of `NAMES`, moduli in Pa, shape (4,).
-        errors: Declared absolute errors, same shape; nan where unknown.
-    """
+    """E_x, E_y, ν_xy, G_xy, moduli in Pa, (4,), and declared absolute errors, nan if unknown."""
 
     values: Array
     errors: Array
@@ -58,11 +53,9 @@ class EngineeringConstants:
 
 
 def engineering_constants(result: HomogenisedStiffness) -> dict[str, EngineeringConstants]:
-    """E_x, E_y, ν_xy and G_xy in plane strain, and without stress along the fibres where known.
+    """E_x, E_y, ν_xy and G_xy by `PLANE_STRAIN` and, of two isotropic phases, `FREE`.
 
-    Returns:
-        Constants by `PLANE_STRAIN` and, of two isotropic phases, `FREE`; empty for a result without
-        its plane stiffness.
+    Empty for a result without its plane stiffness.
     """
     stiffness, errors = result.stiffness, result.stiffness_errors
     if stiffness is None or errors is None or stiffness.shape != (3, 3):
@@ -140,14 +133,7 @@ class Mixture:
 
 @dataclass(frozen=True, eq=False)
 class AxialStiffness:
-    """C13, C23, C63 and C33 with their declared absolute errors, in Pa.
-
-    Args:
-        lateral: C13, C23 and C63, shape (3,).
-        axial: C33.
-        lateral_errors: Shape (3,).
-        axial_error: Of C33.
-    """
+    """C13, C23 and C63, shape (3,), and C33, with their declared absolute errors, in Pa."""
 
     lateral: Array
     axial: float
@@ -158,8 +144,7 @@ class AxialStiffness:
     def of_result(cls, result: HomogenisedStiffness) -> Self | None:
         """C13, C23, C63 and C33 from a computed plane stiffness by Hill's relations, with errors.
 
-        z̄ follows from the in-plane bulk modulus; l = C13 and k are those of the phases. None
-        without a cell of two isotropic phases, a plane stiffness and its errors.
+        None without a cell of two isotropic phases, a plane stiffness and its errors.
         """
         cell, stiffness, errors = result.cell, result.stiffness, result.stiffness_errors
         if cell is None or stiffness is None or errors is None:
@@ -185,10 +170,7 @@ class AxialStiffness:
         )
 
     def condense_axial_stress(self, stiffness: Array, errors: Array) -> tuple[Array, Array]:
-        """Stiffness C − c cᵀ/C33 without stress along the fibres, and its entries' errors.
-
-        c = (C13, C23, C63). Arguments and results have the shape (3, 3) and are in Pa.
-        """
+        """C − c cᵀ/C33 without stress along the fibres, and errors of its entries, (3, 3) in Pa."""
         c = self.lateral
         reduction = np.outer(c, c) / self.axial
         by_lateral = np.outer(abs(c), self.lateral_errors) / self.axial

@@ -37,11 +37,7 @@ class LossFactors:
 def bulk_and_shear_losses(phase: AnyPhase | None, has_bulk: bool) -> Array:
     """Matrix (2, 2) from loss factors (η_E, η_K) of a phase to (η_K, η_G).
 
-    1/E = 1/(9 K) + 1/(3 G) gives η_E/E = η_K/(9 K) + η_G/(3 G).
-
-    Args:
-        phase: The material.
-        has_bulk: Whether η_K is given; else both factors are η_E.
+    1/E = 1/(9 K) + 1/(3 G) gives η_E/E = η_K/(9 K) + η_G/(3 G). Without η_K both factors are η_E.
 
     Raises:
         RefusedError: η_K is given for a phase that is not isotropic.
@@ -55,17 +51,13 @@ def bulk_and_shear_losses(phase: AnyPhase | None, has_bulk: bool) -> Array:
 
 
 def loss_factors(result: HomogenisedStiffness, losses: Array) -> LossFactors:
-    """Effective loss factors of E, G and K with declared errors.
+    """Effective loss factors of E, G and K, to first order or by complex moduli, with errors.
 
-    They are of first order; where a phase has more than `MAX_FIRST_ORDER` and the model takes
-    complex moduli (series), those of complex moduli.
+    Complex moduli where a phase has more than `MAX_FIRST_ORDER` and the model takes them (series).
 
     Args:
-        result: Of any model, with the energies of its phases.
+        result: Of any model, with the energies of its phases, else it is refused.
         losses: Loss factors of K and G of each phase, shape (phases, 2).
-
-    Raises:
-        RefusedError: The model was not asked for the energies.
     """
     energies = result.energies
     if energies is None:
@@ -101,7 +93,7 @@ def first_order(
     Args:
         energies: Parts of the phases in the strain energy.
         losses: Loss factors of K and G of each phase, shape (phases, 2).
-        constants_of: E and ν, from which G and K follow, of C11 + C12, C11 − C12 and C33.
+        constants_of: E and ν, from which G and K follow, from the three moduli.
     """
     # by phase, by its K and G, and by E, G and K of the cell: (phases, 2, 3)
     fractions, errors = energies.energy_fractions(constants_of)

@@ -30,11 +30,9 @@ def require_average(average: str) -> None:
 
 
 def shear_modulus(moduli: Array, average: str) -> Array:
-    """In-plane shear modulus G_T of a plane stiffness, shape (…), in the unit of the moduli.
+    """In-plane shear modulus G_T, shape (…), of C11 + C12, C11 − C12 and C33, shape (…, 3).
 
-    Args:
-        moduli: C11 + C12, C11 − C12 and C33, shape (…, 3).
-        average: "axes" for C33 alone, "isotropic" for Hill's mean over all directions.
+    C33 alone for `average` "axes", Hill's mean over all directions for "isotropic".
     """
     along_axes, along_diagonals = moduli[..., 2], moduli[..., 1] / 2
     if average == AXES:
@@ -45,12 +43,7 @@ def shear_modulus(moduli: Array, average: str) -> Array:
 
 
 def plane_constants(moduli: Array, average: str) -> Array:
-    """E (in the unit of the moduli) and ν of a plane-strain stiffness, shape (…, 2).
-
-    Args:
-        moduli: C11 + C12, C11 − C12 and C33, shape (…, 3).
-        average: Which shear modulus G counts, one of `AVERAGES`.
-    """
+    """E and ν, (…, 2), by an average of `AVERAGES`, from C11 + C12, C11 − C12 and C33, (…, 3)."""
     hydrostatic, shear = moduli[..., 0], shear_modulus(moduli, average)
     poisson = (1 - 2 * shear / hydrostatic) / 2  # eq. 16 with A = 2 G and B = C11 + C12
     young = 2 * shear * (1 + poisson)
@@ -77,8 +70,7 @@ def moduli_of_energies(energies: Array, loads: Array) -> Array:
 
     Args:
         energies: Mean of σ_a : ε_a for each load a, shape (…, loads), in Pa.
-        loads: Macroscopic strains (ε11, ε22, 2 ε12) of `LOADS` or `THREE_LOADS`, shape (loads, 3);
-            without the third, C11 − C12 is nan.
+        loads: `LOADS` or `THREE_LOADS`; without the third, C11 − C12 is nan.
     """
     moduli = np.full((*energies.shape[:-1], 3), np.nan)
     columns = (0, 2, 1)  # of the moduli that the equibiaxial, shear and deviatoric load give
@@ -90,8 +82,7 @@ def moduli_of_energies(energies: Array, loads: Array) -> Array:
 def axial_moduli(stiffness: Array, *, square: bool) -> Array:
     """C11 + C12, C11 − C12 and C33 of a plane stiffness (…, 3, 3), shape (…, 1 or 3, 3).
 
-    First with the mean of C11 and C22; unless the symmetry is that of the square, then also with
-    C11 alone and with C22 alone.
+    First with the mean of C11 and C22; if not `square`, then also with C11 and with C22 alone.
     """
     moduli = [square_moduli(stiffness)]
     for k in () if square else (0, 1):

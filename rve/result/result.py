@@ -28,11 +28,6 @@ def effective_modulus(s11: float, s12: float) -> tuple[float, float]:
     Args:
         s11: Mean homogenised σ11 under ε11 = ε22 = 0.01, in Pa.
         s12: Mean homogenised σ12 under ε12 = 0.01, in Pa.
-
-    Example:
-        >>> young, poisson = effective_modulus(s11=0.5e9, s12=0.2e9)
-        >>> round(young / 1e9, 3), round(poisson, 3)
-        (26.0, 0.3)
     """
     moduli = np.array([s11, np.nan, s12 / 2]) / STRAIN
     young, poisson = plane_constants(moduli, AXES)
@@ -50,14 +45,6 @@ class StressCurve:
         s12: σ12 under load 2 at the nodes, shape (n,), in Pa.
         stiffness: The whole stiffness at the nodes if known, in Voigt order, in Pa: of the plane
             (11, 22, 12 with 2 ε12), shape (n, 3, 3), or of space, (n, 6, 6).
-
-    Example:
-        >>> import numpy as np
-        >>> from alphacut.stochastic import TruncatedNormal, gauss_rule
-        >>> stiffness = np.tile(4e9 * np.eye(3), (2, 1, 1))
-        >>> curve = StressCurve.from_stiffness(gauss_rule(TruncatedNormal(), points=2), stiffness)
-        >>> [f"{mean:.4g}" for mean in curve.mean]
-        ['4e+07', '8e+07']
     """
 
     theta: Array
@@ -92,8 +79,8 @@ class PhaseEnergies:
     """Parts of the phases in the strain energy: X ∂c/∂X of the three moduli c.
 
     Args:
-        values: For X = K and G of each phase, of C11 + C12, C11 − C12 and C33, shape
-            (phases, 2, 3), in Pa; their sum is the three moduli (nan where not computed).
+        values: For X = K and G of each phase, shape (phases, 2, 3), in Pa; their sum is the three
+            moduli (nan where not computed).
         errors: Declared absolute errors, same shape; nan where unknown.
         moduli_at: The three moduli, (3,), from complex K and G of all phases, (phases,) each; None
             where the model takes real ones alone.
@@ -104,13 +91,9 @@ class PhaseEnergies:
     moduli_at: Callable[[Array, Array], Array] | None = None
 
     def energy_fractions(self, constants_of: Callable[[Array], Array]) -> tuple[Array, Array]:
-        """Fractions ∂ln c/∂ln X of each phase's moduli X = K, G in the effective c = E, G, K.
+        """Fractions ∂ln c/∂ln X of X = K, G of each phase in c = E, G, K, (phases, 2, 3); errors.
 
-        Args:
-            constants_of: E and ν from C11 + C12, C11 − C12 and C33.
-
-        Returns:
-            The fractions, shape (phases, 2, 3), and their declared errors.
+        By the chain rule with `constants_of`, which makes E and ν from the three moduli.
         """
         moduli = self.values.sum(axis=(0, 1))
 
@@ -142,11 +125,10 @@ class HomogenisedStiffness:
         errors: Declared relative errors of the mean moduli by source (space, theta): of C11 + C12,
             C11 − C12 and C33, shape (3,), nan for a modulus that was not computed; empty where none
             were estimated.
-        checks: Measured violation of each property of `certificate`, by name, within its bound.
+        checks: Measured violation of each property of `checks.WHAT`, by name, within its bound.
         cell: What was homogenised.
-        average: Average that E and ν belong to, a name in `anisotropy.AVERAGES`.
-        energies: Parts of the phases in the strain energy, for loss factors; None where the model
-            was not asked for them.
+        average: Average that E and ν belong to, a name in `moduli.AVERAGES`.
+        energies: Parts of the phases in the strain energy, for loss factors, where computed.
 
     Example:
         >>> from alphacut.rve import Phase, SeriesModel
@@ -170,11 +152,10 @@ class HomogenisedStiffness:
     energies: PhaseEnergies | None = None
 
     def with_average(self, average: str) -> HomogenisedStiffness:
-        """Copy of the result whose E and ν are those of another average over directions.
+        """Copy whose E and ν are those of another average of `moduli.AVERAGES`.
 
         Raises:
-            RefusedError: The name is not in `anisotropy.AVERAGES`, or the average needs C11 − C12,
-                which was not computed.
+            RefusedError: The name is none, or the average needs C11 − C12, which was not computed.
         """
         require_average(average)
         if average != AXES and self.stiffness is None:
@@ -237,10 +218,7 @@ class HomogenisedStiffness:
 
     @property
     def modulus_errors(self) -> Array:
-        """Declared relative errors of the mean C11 + C12, C11 − C12 and C33, shape (3,).
-
-        All sources together; nan where unknown.
-        """
+        """Declared relative errors of the three mean moduli, all sources, (3,); nan if unknown."""
         if not self.errors:
             return np.full(3, np.nan)
         return np.asarray(np.prod([1 + error for error in self.errors.values()], axis=0) - 1)
@@ -263,10 +241,7 @@ class HomogenisedStiffness:
         return np.asarray(np.sqrt(np.outer(diagonal, diagonal)))
 
     def error_of(self, function: Callable[[Array], Array | float]) -> Array:
-        """Declared absolute error of a function of the three moduli, shaped like its value.
-
-        The function must not depend on a modulus that was not computed.
-        """
+        """Declared absolute error of a function of the three moduli, shaped like its value."""
         return largest_change(function, self.moduli, self._known_errors(self.modulus_errors))
 
     def _known_errors(self, errors: Array) -> Array:
@@ -291,19 +266,13 @@ class HomogenisedStiffness:
 
     @property
     def largest_error(self) -> float:
-        """Largest of the declared relative errors of E and the moduli and the absolute one of ν.
-
-        nan if none was declared.
-        """
+        """Largest relative error of E and the moduli and absolute error of ν; nan if unknown."""
         if not self.errors:
             return float("nan")
         return float(np.nanmax([*self.modulus_errors, self.estimated_error, self.poisson_error]))
 
     def _error_of_modulus(self, errors: Array) -> float:
-        """Relative error of E from relative errors of C11 + C12, C11 − C12 and C33, shape (3,).
-
-        The larger of E/E₀ − 1 and E₀/E − 1 over the box of the moduli, with E₀ at its centre.
-        """
+        """Larger of E/E₀ − 1 and E₀/E − 1 over the box of the moduli, with E₀ at its centre."""
         modulus = self.modulus
 
         def ratios(moduli: Array) -> Array:
@@ -318,15 +287,10 @@ def largest_change(
 ) -> Array:
     """Largest absolute change of a function at the corners of a box around its arguments.
 
-    Each value runs from value/(1 + error) to value·(1 + error).
-
     Args:
-        function: Takes an array like `values`; monotone in each of them over the box.
+        function: Monotone in each of its n values over the box.
         values: Arguments, positive, shape (n,).
-        errors: Relative errors of the arguments, shape (n,).
-
-    Returns:
-        Array shaped like the function's value; nan if an error is.
+        errors: Each value runs from value/(1 + error) to value·(1 + error); nan gives nan.
     """
     value = np.asarray(function(values))
     if not np.isfinite(errors).all():

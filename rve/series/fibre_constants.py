@@ -33,12 +33,7 @@ _ROUND_OFF = 1e-12
 
 @dataclass(frozen=True)
 class FibreConstants:
-    """Constants along (L) and across (T) the fibres.
-
-    Args:
-        values: By the names of `CONSTANTS`, moduli in Pa.
-        errors: Declared absolute errors by the same names, nan where unknown.
-    """
+    """Values and declared absolute errors (nan if unknown) by the names of `CONSTANTS`, in Pa."""
 
     values: dict[str, float]
     errors: dict[str, float]
@@ -101,13 +96,7 @@ _FEWEST, _MOST, _CONVERGED = 4, 128, 1e-12
 
 
 def longitudinal_shear(radius: Array, matrix: Phase, inclusion: Phase) -> tuple[Array, Array]:
-    """Shear modulus G_L along the fibres of n cells in Pa, and its relative error, (n,) each.
-
-    Args:
-        radius: Radii over half the cell's side, shape (n,), each in [0, 1).
-        matrix: Material outside the particle.
-        inclusion: Material of the particle.
-    """
+    """Shear modulus G_L along the fibres in Pa and its relative error, at radii in [0, 1), (n,)."""
     shears = float(matrix.stiffness[2, 2]), float(inclusion.stiffness[2, 2])
     harmonics, moduli = _FEWEST, _rayleigh_moduli(radius, *shears, _FEWEST)
     while True:
@@ -119,10 +108,7 @@ def longitudinal_shear(radius: Array, matrix: Phase, inclusion: Phase) -> tuple[
 
 
 def _rayleigh_moduli(radius: Array, matrix: float, inclusion: float, harmonics: int) -> Array:
-    """G_L of n cells by Rayleigh's multipoles, shape (n,), in the unit of both shear moduli.
-
-    The potential is A z + Σ_P Σ_n a_n (z − P)^-n over all particles P, odd n.
-    """
+    """G_L by the potential A z + Σ_P Σ_n a_n (z − P)^-n over all particles P, odd n, shape (n,)."""
     orders = 2 * np.arange(harmonics) + 1
     scale = radius[:, None] ** orders
     images = lattice_images(lattice_sums(4 * _MOST), orders, orders)

@@ -24,13 +24,7 @@ _UNIT_POINTS = 208  # exponent from which |p| ≥ √2 leaves less than 1e-30
 
 @dataclass(frozen=True)
 class LatticeSums:
-    """Lattice sums by exponent, over p = P/2 so that they stay of order one.
-
-    Args:
-        plain: Σ p^-n at index n, shape (highest + 1,); zero where symmetry or convention makes it
-            so.
-        conjugate: Σ conj(p) p^-n at index n, same shape.
-    """
+    """Σ p^-n and Σ conj(p) p^-n at index n, over p = P/2 so that they stay of order one."""
 
     plain: Array
     conjugate: Array
@@ -50,10 +44,7 @@ class LatticeSums:
 
 @cache
 def lattice_sums(highest: int) -> LatticeSums:
-    """Sums Σ p^-n and Σ conj(p) p^-n over p = m + i j ≠ 0 for n ≤ `highest`, from 60 on.
-
-    By series that converge fast for n < 40, by the points near the origin for others.
-    """
+    """Sums Σ p^-n and Σ conj(p) p^-n over p = m + i j ≠ 0 for n ≤ `highest`, from 60 on."""
     plain, conjugate = np.zeros(highest + 1), np.zeros(highest + 1)
     for n in range(4, highest + 1, 4):
         # Σ p^-n by Riemann's ζ and Lipschitz' formula

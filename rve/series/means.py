@@ -97,8 +97,7 @@ class Truncation:
     ) -> CellModuli:
         """Moduli of n cells times m inclusions, each with as many terms as its error asks.
 
-        The error is the distance from the moduli by a quarter and by half more terms, times
-        `safety`.
+        The error is the distance from moduli by a quarter and by half more terms, times `safety`.
 
         Args:
             radius: Radii over half the cell's side, shape (n,), each in [0, 1).
@@ -107,7 +106,6 @@ class Truncation:
             tolerance: Relative error allowed, of the moduli.
 
         Raises:
-            RefusedError: A radius lies outside [0, 1).
             SeriesError: The largest number of terms does not suffice.
         """
         radius, tolerance = np.atleast_1d(radius), max(tolerance, 2 * self.round_off)
@@ -211,7 +209,6 @@ def converged_means(
 
     Raises:
         RuleError: No rule of up to `_MOST_POINTS` nodes converges.
-        RefusedError: The map jumps, or gives radii outside (0, 1), or its law of θ is none.
     """
     require_continuous(radius_map)
     count = points or max(6, int(np.ceil(1 - 0.75 * np.log10(accuracy))))

@@ -40,10 +40,7 @@ LOADS = ("hydrostatic", "deviator", "shear")
 
 @dataclass(frozen=True)
 class Contrast:
-    """Factors of the interface conditions, one matrix and m inclusions, shape (m,).
-
-    They are complex where the phases have losses: in the equations below nothing is conjugated.
-    """
+    """Factors of the interface conditions of a matrix and m inclusions; complex with losses."""
 
     kappa: complex
     mu: complex
@@ -134,16 +131,13 @@ def family(harmonics: int, *, hydrostatic: bool) -> Family:
 
 
 def multipoles(load: str, radius: Array, contrast: Contrast, *, harmonics: int) -> Array:
-    """Multipoles a_n of the potential φ, scaled by rⁿ, under a unit macroscopic strain.
+    """Multipoles a_n of φ, scaled by rⁿ, under a unit macroscopic strain, shape (n, m, N).
 
     Args:
-        load: One of `LOADS`: "hydrostatic", "deviator" or "shear".
+        load: One of `LOADS`; of "shear" the a_n are the imaginary parts.
         radius: Of the particles over half the cell's side, shape (n,).
         contrast: The materials, m inclusions.
         harmonics: Number N of multipoles.
-
-    Returns:
-        Shape (n, m, N); of the shear load the imaginary parts.
     """
     orders = family(harmonics, hydrostatic=load == "hydrostatic")
     matrices, sources = _system(orders, radius, contrast, mirror=-1.0 if load == "shear" else 1.0)
@@ -153,14 +147,7 @@ def multipoles(load: str, radius: Array, contrast: Contrast, *, harmonics: int) 
 def _system(
     orders: Family, radius: Array, contrast: Contrast, *, mirror: float
 ) -> tuple[Array, Array]:
-    """Linear systems for the multipoles a_n of φ after those of ψ, b_n, are eliminated.
-
-    With p_k and q_k the Taylor coefficients of φ and ψ at the particle, made by all images:
-    a_n = outer · [(n + 2) p_{n+2} + q_n] and b_n = inner · p_n + (n − 2) a_{n-2}.
-
-    Returns:
-        Matrices (n, m, N, N) and right-hand sides (n, m, N) for n radii and m inclusions.
-    """
+    """Matrices (n, m, N, N) and right-hand sides (n, m, N) for the a_n of φ, the b_n eliminated."""
     r_a, r_b = radius[:, None] ** orders.a, radius[:, None] ** orders.b
     to_p = orders.to_p * r_b[:, :, None] * r_a[:, None, :]
     to_next = orders.to_next * (r_a * radius[:, None] ** 2)[:, :, None] * r_a[:, None, :]
@@ -188,16 +175,10 @@ def _system(
 
 
 def modulus(load: str, a: Array, radius: Array, contrast: Contrast) -> Array:
-    """C11 + C12, C11 − C12 or C33 in Pa, shape (n, m), from the multipoles of one load.
+    """C11 + C12, C11 − C12 or C33 in Pa, (n, m), from scaled multipoles `a` of its load, (n, m, N).
 
     Mean strain and stress follow from the jumps across the cell of 2μu and of the resultant force
     φ + z conj(φ') + conj(ψ).
-
-    Args:
-        load: "hydrostatic" for C11 + C12, "deviator" for C11 − C12 or "shear" for C33.
-        a: Scaled multipoles of φ, shape (n, m, N).
-        radius: Shape (n,).
-        contrast: The materials.
     """
     r, kappa, mu = radius[:, None], contrast.kappa, contrast.mu
     if load == "hydrostatic":
@@ -245,7 +226,6 @@ def square_stiffness(
         tolerance: Relative truncation error allowed, at least 1e-13.
 
     Raises:
-        RefusedError: A radius lies outside [0, 1).
         SeriesError: The series does not reach `tolerance` (particles nearly in touch).
     """
     contrast = Contrast.of_phases(matrix, inclusions)
@@ -257,13 +237,9 @@ def square_stiffness(
 
 
 def material_moduli(radius: Array, bulk: Array, shear: Array, harmonics: int) -> Array:
-    """C11 + C12, C11 − C12 and C33 of n cells times m inclusions, shape (n, m, 3).
+    """C11 + C12, C11 − C12 and C33, (n, m, 3), from K and G of the matrix, then of m inclusions.
 
-    Args:
-        radius: Radii over half the cell's side, shape (n,).
-        bulk: K of the matrix, then of m inclusions, complex, shape (1 + m,).
-        shear: G, likewise.
-        harmonics: Terms of the series.
+    K and G, shape (1 + m,), may be complex.
     """
     return _plane_moduli(radius, Contrast.of_moduli(bulk, shear), harmonics)
 

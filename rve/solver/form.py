@@ -12,7 +12,9 @@ from typing import Any
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Rows
-from alphacut.rve.fenicsx import PETSc, compiled, fem, petsc, ufl
+from alphacut.rve.cell.cell import AnyPhase
+from alphacut.rve.fenicsx import PETSc, at_points, compiled, fem, petsc, ufl
+from alphacut.rve.result.moduli import moduli_of_energies
 
 ALL_PARTS = slice(None)
 """All parts of a form."""
@@ -87,3 +89,52 @@ class CellForm:
         self._uniform.value[:] = uniform
         vectors = [fem.assemble_vector(form).array for form in self._load[parts]]
         return np.asarray(np.sum(vectors, axis=0))
+
+
+class PointStrains:
+    """Strains and det J at quadrature points (n, dimension) of this rank's cells."""
+
+    def __init__(self, space: fem.FunctionSpace, points: Array) -> None:
+        mesh = space.mesh
+        self._mesh, self._cells = mesh, np.arange(len(mesh.geometry.dofmap), dtype=np.int32)
+        self._u = fem.Function(space)
+        self._strain = at_points(strain(self._u), points)
+        self._determinant = at_points(ufl.JacobianDeterminant(mesh), points)
+
+    def __call__(self, displacement: Array) -> Array:
+        """(ε11, ε22, 2 ε12), shape (cells, points, 3), of displacements of nodes, (nodes, 2)."""
+        self._u.x.array[:] = displacement.ravel()
+        values = np.asarray(self._strain.eval(self._mesh, self._cells))
+        return values.reshape(len(self._cells), -1, 3)
+
+    def determinants(self) -> Array:
+        """Determinants of J at the points, shape (cells, points)."""
+        values = np.asarray(self._determinant.eval(self._mesh, self._cells))
+        return values.reshape(len(self._cells), -1)
+
+
+def strain_products(strains: Array, weights: Array) -> Array:
+    """Integral of ε_a ⊗ ε_b over each phase, shape (phases, 3, fields, 3, fields).
+
+    Args:
+        strains: At n points, shape (n, 3, fields).
+        weights: Of the points in each phase, 0 outside it, shape (phases, n).
+    """
+    fields = strains.shape[-1]
+    flat = strains.reshape(-1, 3 * fields)
+    products = np.array([flat.T @ (phase[:, None] * flat) for phase in weights])
+    return products.reshape(-1, 3, fields, 3, fields)
+
+
+def total_energy(products: Array, stiffness: Sequence[Array]) -> Array:
+    """Mean of σ_a : ε_b over all phases, shape (fields, fields), in Pa, from `strain_products`."""
+    return np.asarray(np.einsum("pij,piajb->ab", np.array(stiffness), products))
+
+
+def energies_by_phase(products: Array, phases: Sequence[AnyPhase], loads: Array) -> Array:
+    """Σ ε : C_X ε of X = K, G of each phase in the three moduli, (phases, 2, 3), in Pa.
+
+    C_X is what X gives to the phase's stiffness; `loads` are the fields' macroscopic strains.
+    """
+    parts = np.array([phase.stiffness_parts for phase in phases])
+    return moduli_of_energies(np.einsum("pxij,piaja->pxa", parts, products), loads)

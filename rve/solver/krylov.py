@@ -45,11 +45,7 @@ def _to_standard_error(name: str, value: str) -> str:
 
 @dataclass(frozen=True)
 class SolverOptions:
-    """The default with what overrides it.
-
-    Args:
-        overrides: PETSc options without prefix.
-    """
+    """The default with the PETSc options, without prefix, that override it."""
 
     overrides: Mapping[str, str] = field(default_factory=dict)
 
@@ -80,13 +76,7 @@ class ConvergenceError(FailedError):
 
 @dataclass(frozen=True)
 class Solutions:
-    """Solutions of one system for several loads.
-
-    Args:
-        vectors: One for each load.
-        iterations: For each load.
-        residual: The largest relative residual, as it truly is.
-    """
+    """One solution and number of iterations a load, and the largest true relative residual."""
 
     vectors: list[PETSc.Vec]
     iterations: tuple[int, ...]
@@ -96,13 +86,7 @@ class Solutions:
 def krylov_solver(
     matrix: PETSc.Mat, numbering: LevelNumbering, law: ThetaLaw, options: SolverOptions
 ) -> PETSc.KSP:
-    """PETSc Krylov solver of a reduced stiffness, with its preconditioner set up.
-
-    Args:
-        matrix: The reduced stiffness, symmetric positive definite.
-        numbering: Its unknowns by level.
-        law: Law of θ.
-        options: PETSc options.
+    """PETSc Krylov solver of a reduced stiffness, symmetric positive definite, set up.
 
     Raises:
         RefusedError: PETSc refuses an option or its value, or does not use it.
@@ -168,7 +152,6 @@ def in_database(options: SolverOptions) -> Iterator[None]:
 
     Raises:
         RefusedError: PETSc refuses an option, or has not used an override in the block.
-        ConvergenceError: PETSc fails otherwise.
     """
     database = PETSc.Options(PREFIX)
     existing = {name: database.getString(name) for name in options.all if database.hasName(name)}

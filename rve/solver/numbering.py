@@ -27,8 +27,6 @@ def map_of(pairs: Rows, comm: MPI.Intracomm) -> PETSc.LGMap:
 def zero_matrix(pairs: Rows, local_map: PETSc.LGMap, rows: range, size: int) -> PETSc.Mat:
     """PETSc matrix of zeros with the sparsity pattern of all unknowns that share a cell.
 
-    Unknowns come in pairs, the two displacements of a node.
-
     Args:
         pairs: Pair number of each node of the cells that touch these rows, −1 where eliminated,
             shape (cells, nodes).
@@ -56,14 +54,7 @@ def zero_matrix(pairs: Rows, local_map: PETSc.LGMap, rows: range, size: int) -> 
 
 
 def reduced_vector(values: Array, local_map: PETSc.LGMap, num_rows: int, size: int) -> PETSc.Vec:
-    """PETSc vector of unknowns: the nodal values, those of periodic partners added.
-
-    Args:
-        values: On this rank, two entries a node, shape (2 nodes,).
-        local_map: Nodes of this rank to pairs of unknowns.
-        num_rows: Number of unknowns of this rank.
-        size: Number of unknowns of all ranks.
-    """
+    """PETSc vector of unknowns, `num_rows` of `size` here: nodal values, partners' added."""
     vector = PETSc.Vec().createMPI((num_rows, size), bsize=2, comm=local_map.comm)
     vector.setLGMap(local_map)
     nodes = np.arange(len(values) // 2, dtype=PETSc.IntType)
@@ -73,12 +64,7 @@ def reduced_vector(values: Array, local_map: PETSc.LGMap, num_rows: int, size: i
 
 
 class NodeScatter:
-    """Scatter of a vector of unknowns to the nodes of this rank.
-
-    Args:
-        pairs: Pair of unknowns of each node, −1 where eliminated, shape (nodes,).
-        vector: Any vector of unknowns, for its layout.
-    """
+    """Scatter of vectors of unknowns, as `vector` is one, to this rank's nodes by `pairs`."""
 
     def __init__(self, pairs: Rows, vector: PETSc.Vec) -> None:
         self._free_nodes = np.flatnonzero(pairs >= 0)
@@ -145,11 +131,7 @@ class LevelNumbering:
         return np.concatenate([on_levels.ravel(), half_way.ravel()])
 
     def split_levels(self, values: Array) -> tuple[Array, Array]:
-        """Copies of the values of all unknowns on levels and half-way between them.
-
-        Returns:
-            Shapes (layers + 1, level_size) and (layers, half_level_size).
-        """
+        """Copies of values on levels, (layers + 1, level_size), and half-way between them."""
         layers = values[: self.grid.layers * self.stride].reshape(-1, self.stride)
         top = values[self.grid.layers * self.stride :][None]
         on_levels = np.concatenate([layers[:, : self.level_size], top])

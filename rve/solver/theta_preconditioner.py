@@ -60,14 +60,7 @@ class ThetaMass:
 
 
 def theta_mass(law: ThetaLaw, levels: Array) -> ThetaMass:
-    """Mass matrices along θ, weighted by the density, of hats at the levels and bubbles between.
-
-    Of the hats (M), of the bubbles less what the hats carry of them (G), and the projection.
-
-    Args:
-        law: Law of θ.
-        levels: θ of the levels, rising, shape (layers + 1,).
-    """
+    """Masses along θ, weighted by the density, of hats at the levels and bubbles between them."""
     layers, heights = len(levels) - 1, np.diff(levels)[:, None]
     abscissae, gauss_weights = np.polynomial.legendre.leggauss(3)  # on [−1, 1]
     t, w = (abscissae + 1) / 2, gauss_weights / 2
@@ -93,12 +86,7 @@ def _inverse_root(matrix: Array) -> Array:
 
 
 class PlaneSolver:
-    """A solver of one level, by default a Cholesky factor.
-
-    Args:
-        block: The level's block.
-        mass: Its mass along θ, by which it is divided.
-    """
+    """A solver of one level's block over its mass along θ, by default a Cholesky factor."""
 
     def __init__(self, block: PETSc.Mat, mass: float) -> None:
         block.scale(1 / mass)
@@ -118,13 +106,7 @@ class PlaneSolver:
 
 
 class ThetaPreconditioner:
-    """P⁻¹ of a reduced stiffness; a context of PETSc's ``pc_type python``.
-
-    Args:
-        matrix: The reduced stiffness.
-        numbering: Its unknowns.
-        law: Law of θ.
-    """
+    """P⁻¹ of a reduced stiffness; a context of PETSc's ``pc_type python``."""
 
     def __init__(self, matrix: PETSc.Mat, numbering: LevelNumbering, law: ThetaLaw) -> None:
         self.numbering = numbering
@@ -183,10 +165,7 @@ class ThetaPreconditioner:
         return numbering.join_levels(on_levels, half_way)
 
     def _multiply_theta(self, hats: Array, bubbles: Array) -> tuple[Array, Array]:
-        """This rank's rows of (M^-½ ⊗ 1; Z J (G^-½ ⊗ 1)) times hats and bubbles.
-
-        Hats include the level above this rank's, which takes part in the values half-way.
-        """
+        """This rank's rows of (M^-½ ⊗ 1; Z J (G^-½ ⊗ 1)) times hats and bubbles."""
         mass, numbering = self.mass, self.numbering
         start = numbering.levels.start
         rows = slice(start, start + len(numbering.half_levels) + 1)
@@ -195,10 +174,7 @@ class ThetaPreconditioner:
         return rank_hats, mass.bubble_inverse_root[list(numbering.half_levels)] @ bubbles
 
     def view(self, _pc: PETSc.PC, viewer: PETSc.Viewer) -> None:
-        """Print the number of levels and the solver of the first one, for ``-rve_ksp_view``.
-
-        PETSc calls it. All levels have the same kind of solver.
-        """
+        """Print the number of levels and the first one's solver, for ``-rve_ksp_view``."""
         count = f"{len(self.levels)} levels and {len(self.half_levels)} half-way on the first rank"
         viewer.printfASCII(f"    preconditioner along θ, {count}, each solved by\n")
         rank_viewer = viewer.getSubViewer(PETSc.COMM_SELF)
@@ -231,10 +207,7 @@ def _hats(level_size: int, half_size: int, *, below: bool, above: bool) -> PETSc
 
 
 def _injection(numbering: LevelNumbering) -> sp.csr_matrix:
-    """Matrix J from linear to quadratic triangles, shape (level_size, half_level_size).
-
-    Edge midpoints get the mean of their two vertices.
-    """
+    """Matrix J from linear to quadratic triangles; midpoints get the mean of their vertices."""
     periodicity, ends = numbering.periodicity, numbering.periodicity.ends(numbering.grid.plane)
     vertices, count, is_free = periodicity.vertices, periodicity.count, ends >= 0
     rows = np.repeat(np.arange(vertices, count), 2).reshape(-1, 2)[is_free]

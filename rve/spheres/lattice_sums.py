@@ -24,15 +24,9 @@ _REACH = 4  # of Ewald's sums: exp(−π 17) is the first term left out
 
 
 def harmonics(points: Array, highest: int, order: int) -> Array:
-    """Real parts of Racah's spherical harmonics C_n^m of the directions of points, for one m.
+    """Real parts of Racah's C_n^m of the directions of k points, n up to `highest`, m = `order`.
 
-    Args:
-        points: Shape (k, 3), none zero.
-        highest: Largest degree n.
-        order: m ≥ 0.
-
-    Returns:
-        Shape (highest + 1, k); zero where n < m.
+    Shape (highest + 1, k); zero where n < m.
     """
     radius = np.linalg.norm(points, axis=1)
     cosine = points[:, 2] / radius
@@ -52,18 +46,10 @@ def harmonics(points: Array, highest: int, order: int) -> Array:
 
 @cache
 def lattice_sums(highest: int) -> tuple[Array, Array]:
-    """Sums of harmonics C_n^m(p) |p|^(−n−1), and of C_n^m(p) |p|^(1−n), over a cubic lattice.
+    """Sums Σ C_n^m(p) |p|^(−n−1) and Σ C_n^m(p) |p|^(1−n) over the simple cubic lattice.
 
-    p are the points of the simple cubic lattice but the origin, C_n^m surface harmonics of degree n
-    and order m as in `harmonics`. Up to degree `_DIRECT` Ewald's method is used, beyond it direct
-    sums, which converge fast.
-
-    Args:
-        highest: Largest degree, at least 4.
-
-    Returns:
-        By degree and order, shape (highest + 1, highest + 1) each; by symmetry only even n ≥ 4 and
-        orders that are multiples of 4 are not zero. Those of degree 0 diverge and are left out.
+    By degree and order, (highest + 1, highest + 1) each; by symmetry only even n ≥ 4 and orders
+    that are multiples of 4 are not zero. Those of degree 0 diverge and are left out.
     """
     harmonic, biharmonic = np.zeros((2, highest + 1, highest + 1))
     ewald_points, direct_points = _points(_REACH), _points(3)
@@ -90,10 +76,7 @@ def _points(reach: int) -> Array:
 
 
 def _epstein(angular: Array, points: Array, n: int, power: int) -> float:
-    """Lattice sum Σ C_n^m |p|^(−n−power), power ±1, by Ewald's split of the theta function.
-
-    `angular` are the C_n^m at the lattice points p near the origin, `points`.
-    """
+    """Σ C_n^m |p|^(−n−power), power ±1, from the C_n^m at lattice points p near the origin."""
     square = (points**2).sum(axis=1)
     s, x = n + power / 2, np.pi * square
     direct = angular @ (square ** (-(n + power) / 2) * gammaincc(s, x))

@@ -66,9 +66,7 @@ TRUNCATION = Truncation(
 def cubic_stiffness(
     radius: Array, matrix: Phase, inclusions: Sequence[Phase], *, tolerance: float = 1e-10
 ) -> CellModuli:
-    """K, (C11 − C12)/2 and C44 of cubic cells with a sphere in the centre, with declared errors.
-
-    They are computed for n radii times m inclusions.
+    """K, (C11 − C12)/2 and C44 of n cubic cells times m spheres, with declared errors.
 
     Args:
         radius: Radii over half the cell's side, shape (n,), each in [0, 1).
@@ -78,7 +76,6 @@ def cubic_stiffness(
         tolerance: Relative truncation error allowed, at least 1e-12.
 
     Raises:
-        RefusedError: A radius lies outside [0, 1).
         SeriesError: The series does not reach `tolerance` (spheres nearly in touch).
     """
 
@@ -111,11 +108,7 @@ def _cubic_moduli(
 def _dipoles(
     radius: Array, matrix: Material, inclusions: Sequence[Material], degree: int, *, shear: bool
 ) -> Array:
-    """Force dipoles of n times m spheres over r³ under unit strains, shape (n, m, loads).
-
-    The loads are hydrostatic and axial deviatoric strain, or shear strain alone. Amplitudes of the
-    singular solutions follow from T (regular amplitudes of the far field and of all images).
-    """
+    """Force dipoles of n times m spheres over r³ under unit strains, shape (n, m, loads)."""
     poles = multipoles(degree, shear=shear)
     regular_scale, singular_scale = (radius[:, None] ** power for power in _powers(poles))
     images = couplings(degree, matrix.poisson, shear=shear)

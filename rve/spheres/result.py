@@ -46,11 +46,7 @@ def cubic_moduli(stiffness: Array) -> Array:
 
 
 def hill_shear(moduli: Array) -> Array:
-    """Mean of the Voigt and Reuss averages of the shear modulus over all directions (Hill 1952).
-
-    Args:
-        moduli: K, (C11 − C12)/2 and C44, shape (…, 3).
-    """
+    """Mean of Voigt's and Reuss's average of shear (Hill 1952) of K, (C11 − C12)/2, C44, (…, 3)."""
     deviator, shear = moduli[..., 1], moduli[..., 2]
     voigt, reuss = (2 * deviator + 3 * shear) / 5, 5 / (2 / deviator + 3 / shear)
     return np.asarray((voigt + reuss) / 2)
@@ -70,11 +66,7 @@ def space_stiffness(phase: Phase) -> Array:
 
 
 def hashin_shtrikman(fraction: Array, matrix: Phase, inclusion: Phase) -> Array:
-    """Hashin–Shtrikman bounds of K and μ in Pa, for volume fractions of shape (…).
-
-    Returns:
-        Lower and upper bound of K, lower and upper bound of μ: shape (2, 2, …).
-    """
+    """Lower and upper bound of K, then of μ, in Pa, (2, 2, …), for volume fractions (…)."""
     bulks, shears = zip(*(map(float, x.bulk_and_shear) for x in (matrix, inclusion)), strict=True)
     bounds = []
     for extreme in (min, max):
@@ -85,10 +77,7 @@ def hashin_shtrikman(fraction: Array, matrix: Phase, inclusion: Phase) -> Array:
 
 
 def mori_tanaka(fraction: Array, matrix: Phase, inclusion: Phase) -> Array:
-    """K and μ of spheres by Mori and Tanaka (1973), in Pa, shape (2, …).
-
-    The bound that the matrix gives: the lower one of stiffer spheres, the upper one of softer.
-    """
+    """K and μ of spheres in Pa, (2, …), by Mori and Tanaka (1973): the bound of the matrix."""
     terms = _reference_terms(*matrix.bulk_and_shear)
     pairs = zip(matrix.bulk_and_shear, inclusion.bulk_and_shear, strict=True)
     return np.array(
@@ -144,11 +133,7 @@ def volume_fraction(radius: Array) -> Array:
 
 
 def spheres_with_checks(result: HomogenisedSpheres) -> HomogenisedSpheres:
-    """Copy of a result with the relative violations of symmetry and bounds as its checks.
-
-    Raises:
-        CertificateError: A violation exceeds the declared error of the result.
-    """
+    """Copy of a result with the relative violations of symmetry and bounds as its checks."""
     cell = result.cell
     assert cell is not None
     matrix, inclusion = cell.phases

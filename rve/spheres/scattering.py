@@ -40,16 +40,11 @@ def t_matrices(degrees: Array, matrix: Material, inclusion: Material) -> tuple[A
     """T-matrices of a sphere of radius 1: singular amplitudes = T @ regular amplitudes.
 
     Lamé solutions are numbered as by Kushch (2013): 1 is the gradient of a harmonic, 2 torsional,
-    3 the one with dilatation.
-
-    Args:
-        degrees: Degrees n of the spherical harmonics, shape (k,).
-        matrix: Material outside.
-        inclusion: Material inside; its modulus may be so low or high that it is a pore or rigid.
+    3 the one with dilatation. The inclusion may be as soft as a pore or as stiff as rigid.
 
     Returns:
-        T of the coupled solutions 1 and 3, rows singular, columns regular, shape (k, 2, 2), and of
-        solution 2, shape (k,).
+        T of the coupled solutions 1 and 3 of k degrees, rows singular, columns regular, (k, 2, 2),
+        and of solution 2, (k,).
     """
     n = np.asarray(degrees, float)
     ratio = inclusion.bulk_and_shear[1] / matrix.bulk_and_shear[1]
@@ -78,15 +73,7 @@ def _surface_stiffness(n: Array, poisson: complex) -> Array:
 
 
 def _surface_fields(degree: Array, poisson: complex) -> tuple[Array, Array]:
-    """Displacement and traction over μ of Lamé solutions 1 and 3 on the unit sphere.
-
-    Args:
-        degree: Degrees d of the solid harmonic h, n inside and −n − 1 outside, shape (k,).
-        poisson: Poisson's ratio.
-
-    Returns:
-        Components along x Y and ∇Y (rows) of both solutions (columns), shape (k, 2, 2) each.
-    """
+    """Displacement and traction over μ along x Y and ∇Y of solutions 1 and 3, (k, 2, 2) each."""
     d, nu = degree, poisson
     alpha, unit = d + 5 - 4 * nu, np.ones_like(d)
     radial = d * alpha - 2 * (3 * d + 1 - 2 * nu * (2 * d + 1))  # α d + c

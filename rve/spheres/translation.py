@@ -68,13 +68,7 @@ class Multipoles:
 def couplings(highest: int, poisson: complex, *, shear: bool) -> Array:
     """Regular amplitudes (rows) at one sphere by unit multipoles at all its images (columns).
 
-    Args:
-        highest: Largest degree n.
-        poisson: Poisson's ratio of the matrix.
-        shear: Whether the load is ε12; else ε11, ε22 or ε33.
-
-    Returns:
-        In the order of `Multipoles.up_to`, at r = 1, shape (N, N).
+    At r = 1 in the order of `Multipoles.up_to`, shape (N, N); `shear` for the load ε12.
     """
     poles = Multipoles.up_to(highest, shear=shear)
     sums = lattice_sums(max(2 * highest, 4))
@@ -104,11 +98,7 @@ class _Pair:
 def _coupling(
     target: int, source: int, pair: _Pair, poisson: complex, sums: tuple[Array, Array]
 ) -> Array:
-    """Amplitude of regular Lamé solution `target` by the images of multipoles of kind `source`.
-
-    Formulas at the head of the file; α and c are those of the multipole (n, m), whose solid
-    harmonic has the degree −n − 1, and (k, j) is the regular solution.
-    """
+    """Amplitude of regular Lamé solution `target` by the images of multipoles of kind `source`."""
     harmonic, biharmonic = sums
     n, k = pair.n, np.maximum(pair.k, 1) if target == 1 else pair.k
     if target == source:
@@ -128,18 +118,7 @@ def _coupling(
 
 
 def _weighted_sum(sums: Array, pair: _Pair, lower: int) -> Array:
-    """Coefficients by which multipoles (n, m) at all lattice points give a harmonic (k, j) at one.
-
-    They are (−1)^n w_N^M / (w_n^m w_k^j) Σ_P f_N^M(P), N = n + k + `lower`, M = m − j, and 0 where
-    there is no such harmonic. f_N^M are irregular solid harmonics, of degree −N − 1 in P = 2p, p
-    the points of the lattice of side 1; w_n^m = √((n − m)! (n + m)!) turns harmonics of the
-    recurrences into Racah's.
-
-    Args:
-        sums: Σ_p f_N^M(p) by N and M ≥ 0, shape (degrees, orders).
-        pair: Degrees and orders n, m, k, j.
-        lower: Degree of the sum less n + k.
-    """
+    """Σ_P f_N^M(P) (−1)^n w_N^M / (w_n^m w_k^j), N = n + k + `lower`, M = m − j, or 0."""
     degree, order = pair.n + pair.k + lower, abs(pair.m - pair.j)
     exists = (order <= degree) & (degree >= 0)
     degree, order = np.where(exists, degree, 0), np.where(exists, order, 0)
@@ -164,10 +143,7 @@ def _projection_factor(pair: _Pair) -> Array:
 def _with_periodic_strain(
     coupling: Array, poles: Multipoles, poisson: complex, *, shear: bool
 ) -> Array:
-    """The couplings less the mean strain of the conditionally convergent sums, those of degree −2.
-
-    The array is changed in place.
-    """
+    """The couplings, changed in place, less the mean strain of the sums of degree −2."""
     m = 2 if shear else 0
     polarised_ball = 16 * np.pi * (4 - 5 * poisson) / (15 * VOLUME)  # strain of Eshelby's ball
     coupling[poles.index_of(1, 2, m), poles.index_of(3, 2, m)] -= polarised_ball

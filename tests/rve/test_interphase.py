@@ -6,7 +6,7 @@ import pytest
 pytest.importorskip("dolfinx")
 
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.rve import Ellipse, Interphase, Phase, PrismModel, SeriesModel, SlicesModel
+from alphacut.rve import Ellipse, Interphase, MeshModel, Phase, PrismModel, SeriesModel, SlicesModel
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.model import ImageModel
 from alphacut.rve.image.phases import ModuliInterval, moduli_images
@@ -31,7 +31,7 @@ def test_a_ring_of_its_neighbour_is_the_cell_of_two_phases_on_the_same_mesh(tmp_
     points = grid.positions(CONE, ring.thickness)
     write(tmp_path / "two.msh", points, grid.cells, two, grid.names[:2])
     phases = {"matrix": SOFT, "inclusion": HARD}
-    right = PrismModel(mesh=tmp_path / "two.msh").solve(CONE.distribution, phases)[0]
+    right = MeshModel(tmp_path / "two.msh").solve(CONE.distribution, phases)[0]
     assert result.modulus == pytest.approx(right.modulus, rel=1e-10)
     assert result.stiffness == pytest.approx(right.stiffness, rel=1e-9, abs=1.0)
 

@@ -73,10 +73,7 @@ class ConjugateGradient:
     watch: Callable[[], None] = field(default=lambda: None, compare=False, repr=False, kw_only=True)
 
     def solve(self, system: System) -> tuple[Array, int]:
-        """Solve for all loads by preconditioned conjugate gradients.
-
-        Returns:
-            Fields whose energy error is within the accuracy, and the number of iterations.
+        """Fields of all loads with an energy error within the accuracy, and number of iterations.
 
         Raises:
             FailedError: `LIMIT` iterations are not enough.
@@ -118,13 +115,7 @@ def inner(first: Array, second: Array) -> Array:
 
 
 def _radau(excess: Array, beta: Array, least: float) -> Array:
-    """Next factor of the energy error's bound by the Gauss–Radau rule (Meurant, Tichý 2013).
-
-    Args:
-        excess: Last factor minus the step length α, positive but for rounding.
-        beta: Ratio of the last two residual products.
-        least: Lower bound of the spectrum; 1/least is the factor without the rule.
-    """
+    """Next factor of the energy error's bound by the Gauss–Radau rule (Meurant, Tichý 2013)."""
     sharper = _ratio(excess, least * excess + beta)
     return np.where(excess > 0, sharper, 1 / least)
 

@@ -92,10 +92,7 @@ def displacement_element(aspect: float = 1.0) -> Element:
 
 @cache
 def airy_element(aspect: float = 1.0) -> Element:
-    """Bicubic stress element of an Airy function φ on a pixel of height `aspect` times its width.
-
-    Unknowns are φ and its slopes per pixel at the corners.
-    """
+    """Bicubic stress element of φ and its slopes, per pixel of height `aspect` times its width."""
     # value and slope at 0, value and slope at 1
     basis = ((1, 0, -3, 2), (0, 1, -2, 1), (0, 0, 3, -2), (0, 0, -1, 1))
     value, slope, curvature = _derivative_modes(basis)
@@ -129,16 +126,7 @@ def airy_element(aspect: float = 1.0) -> Element:
 
 
 def _derivative_modes(basis: Basis) -> list[Array]:
-    """Coefficients of basis functions and their derivatives in orthonormal Legendre polynomials.
-
-    The integrals are exact fractions, so that zeros are exact.
-
-    Args:
-        basis: Polynomial coefficients of each function on [0, 1].
-
-    Returns:
-        For the derivatives of order 0, 1 and 2, a matrix of shape (polynomials, functions).
-    """
+    """Matrices (polynomials, functions) to orthonormal Legendre modes of derivatives 0, 1 and 2."""
     functions, matrices = list(basis), []
     count = len(basis[0])
     norms = np.sqrt(2 * np.arange(float(count)) + 1)
@@ -183,11 +171,7 @@ class Operator:
     deviator: Array
 
     def apply(self, fields: Array) -> Array:
-        """Nodal forces of fields, both of shape (loads, unknowns, rows, columns).
-
-        Of each pixel they are (trace Tᵀ T + deviator Dᵀ D) times its local unknowns, with T and D
-        the matrices to the modes of trace and deviator.
-        """
+        """Nodal forces of fields, both of shape (loads, unknowns, rows, columns)."""
         result = np.zeros_like(fields)
         trace_modes, deviator_modes = (self.element.modes[rows] for rows in self.element.parts)
         matrix = np.hstack([trace_modes.T @ trace_modes, deviator_modes.T @ deviator_modes])
@@ -199,14 +183,7 @@ class Operator:
         return result
 
     def load(self, mean_modes: Array) -> Array:
-        """Right-hand sides: minus the nodal forces of uniform fields.
-
-        Args:
-            mean_modes: Modes of each uniform field, from `Element.mean_modes`, (modes, loads).
-
-        Returns:
-            Shape (loads, unknowns, rows, columns).
-        """
+        """Minus the nodal forces of mean modes (modes, loads), (loads, unknowns, rows, columns)."""
         result = np.zeros((mean_modes.shape[1], self.element.unknowns, *self.trace.shape))
         trace_force, deviator_force = (
             -(self.element.modes[part].T @ mean_modes[part])[..., None, None]

@@ -90,10 +90,7 @@ def energies(
 
 
 def _piecewise_products(modes: Array, weight: Array, piece: int) -> Array:
-    """Weighted products of all pairs of fields, in sums of `piece` products each.
-
-    From modes (modes, fields, rows, columns) to symmetric matrices (pieces, fields, fields).
-    """
+    """Weighted products of all pairs of fields, symmetric, in sums of `piece` products each."""
     count = modes.shape[1]
 
     def cut(values: Array) -> Array:
@@ -109,12 +106,7 @@ def _piecewise_products(modes: Array, weight: Array, piece: int) -> Array:
 def modes_of(
     element: Element, fields: Array, mean_modes: Array
 ) -> Iterator[tuple[slice, Array, Array]]:
-    """Modes of fields plus uniform fields, with bounds of their rounding errors, in blocks.
-
-    Yields:
-        Rows of pixels, the modes of shape (modes, fields, rows, columns), and a bound of the
-        rounding error of each, same shape.
-    """
+    """Yield by blocks: rows of pixels, modes (modes, fields, rows, columns), bounds of rounding."""
     absolute, count = np.abs(element.modes), len(element.local)
     for rows in blocks(fields.shape):
         local, local_error = _subtract_anchors(element, gather(element, fields, rows))

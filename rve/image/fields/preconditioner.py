@@ -24,23 +24,14 @@ ROUNDING = 1e-3  # of the preconditioner
 
 @dataclass(frozen=True)
 class Reference:
-    """One constant material.
-
-    Args:
-        trace: Coefficient of the trace, positive.
-        deviator: Coefficient of the deviator, positive.
-    """
+    """One constant material: coefficients of trace and deviator, positive."""
 
     trace: float
     deviator: float
 
     @classmethod
     def of_image(cls, trace: Array, deviator: Array, *, stress: bool) -> Reference:
-        """Constant material at the geometric mean of an image's extremes, for a narrow spectrum.
-
-        `stress`: of stresses only the sum of both coefficients counts; the deviator then has the
-        same part in it as in the softest material.
-        """
+        """Constant material at the geometric mean of an image's extremes, for a narrow spectrum."""
         min_trace, min_deviator = float(trace.min()), float(deviator.min())
         min_sum, max_sum = min_trace + min_deviator, trace.max() + deviator.max()
         mean_sum = float(np.sqrt(min_sum * max_sum))
@@ -58,11 +49,9 @@ class Reference:
 
 @dataclass(frozen=True, eq=False)
 class FourierPreconditioner:
-    """Inverse of the constant-coefficient operator on a periodic grid.
+    """Inverse of the constant-coefficient operator on a periodic grid of `shape` (rows, columns).
 
-    Args:
-        inverse: Hermitian blocks, shape (unknowns, unknowns, rows, waves along x).
-        shape: Rows and columns of the grid.
+    `inverse` has Hermitian blocks, shape (unknowns, unknowns, rows, waves along x).
     """
 
     inverse: Complex
@@ -72,10 +61,7 @@ class FourierPreconditioner:
     def of_material(
         cls, element: Element, constant: Reference, shape: tuple[int, int]
     ) -> FourierPreconditioner:
-        """Inverse operator of a constant material on a grid of `shape` = (rows, columns).
-
-        The block of wave number 0 is singular by rigid fields and gets its pseudo-inverse.
-        """
+        """Inverse operator of a constant material; its rigid fields have a pseudo-inverse."""
         ky, kx = 2 * np.pi * np.fft.fftfreq(shape[0]), 2 * np.pi * np.fft.rfftfreq(shape[1])
         blocks = fourier_blocks(element, constant, ky, kx)
         pseudo_inverse = np.linalg.pinv(blocks[0, 0], rcond=1e-10, hermitian=True)
@@ -92,11 +78,7 @@ class FourierPreconditioner:
 
 
 def fourier_blocks(element: Element, constant: Reference, ky: Array, kx: Array) -> Complex:
-    """Fourier symbol of the operator of a constant material at wave numbers ky, kx per pixel.
-
-    Returns:
-        Hermitian blocks, shape (len(ky), len(kx), unknowns, unknowns).
-    """
+    """Fourier symbol of a constant material at waves per pixel, (ky, kx, unknowns, unknowns)."""
     # forms of the strain's trace and of its deviator on a pixel
     trace, deviator = (element.modes[part].T @ element.modes[part] for part in element.parts)
     matrix = constant.trace * trace + constant.deviator * deviator

@@ -75,10 +75,7 @@ def solve_side(
 def _solve_loads(
     element: Element, trace: Array, deviator: Array, solver: ConjugateGradient, start: Array | None
 ) -> tuple[Array, int]:
-    """Fields of `SOLVED_LOADS`, (3, unknowns, rows, columns), and the largest iteration count.
-
-    From the coefficients of trace and deviator in each pixel, (rows, columns), and a first guess.
-    """
+    """Fields of `SOLVED_LOADS`, (3, unknowns, rows, columns), and the largest iteration count."""
     modes = element.mean_modes(SOLVED_LOADS)
     constant = Reference.of_image(trace, deviator, stress=element.stress)
     rows, columns = trace.shape
@@ -100,10 +97,7 @@ def _solve_loads(
 
 
 def least_energy(element: Element, trace: Array, deviator: Array, modes: Array) -> Array:
-    """Lower bound of the total energy of any fields with given mean modes, shape (loads,).
-
-    That of uniform fields, modes (modes, loads), in the harmonic mean of each coefficient.
-    """
+    """Lower bound of the energy of any fields with given mean modes, shape (loads,)."""
     trace_squares, deviator_squares = (np.sum(modes[rows] ** 2, axis=0) for rows in element.parts)
     trace_energy = trace.size / np.mean(1 / trace) * trace_squares
     return np.asarray(trace_energy + deviator.size / np.mean(1 / deviator) * deviator_squares)

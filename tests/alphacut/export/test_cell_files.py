@@ -10,7 +10,7 @@ pytest.importorskip("dolfinx")
 
 from alphacut.export.cell_files import FORMATS, write_cell
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.rve import Phase, PrismModel
+from alphacut.rve import MeshModel, Phase, PrismModel
 from alphacut.rve.mesh import square
 from alphacut.rve.mesh.file import read_grid
 from alphacut.rve.mesh.gmsh_prisms import MESHIO_ORDER, VTK_OF_MESHIO
@@ -106,7 +106,7 @@ def test_what_gmsh_was_given_is_a_mesh_of_ones_own(written):
     assert grid.names == fields().names
     right = PrismModel(0.5, 3, stiffness=True, estimate=False).solve(MAP, SOFT, [HARD])[0]
     phases = {"matrix": SOFT, "inclusion": HARD}
-    own = PrismModel(mesh=written).solve(MAP.distribution, phases)[0]
+    own = MeshModel(written).solve(MAP.distribution, phases)[0]
     assert own.modulus == pytest.approx(right.modulus, rel=1e-12)
 
 

@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip("dolfinx")
 
 from alphacut.entry import main
-from alphacut.rve import Phase, PrismModel
+from alphacut.rve import MeshModel, Phase
 from alphacut.stochastic import TruncatedNormal
 from tests.alphacut.small import CELL, written
 
@@ -32,7 +32,7 @@ STIFFNESS = (
 
 def modulus(young):
     phases = {"matrix": Phase(20e9), "particles": Phase(young)}
-    model = PrismModel(mesh=MESHES / "two-particles.msh")
+    model = MeshModel(MESHES / "two-particles.msh")
     return model.solve(TruncatedNormal(-3, 3), phases)[0].with_average("isotropic").modulus
 
 

@@ -6,7 +6,7 @@ import pytest
 pytest.importorskip("dolfinx")
 
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.rve import Phase, PrismModel
+from alphacut.rve import LevelSetModel, Phase, PrismModel
 from alphacut.stochastic import HermiteMap, TruncatedNormal
 
 CONE, LAW = HermiteMap(0.2, 0.1, 0.7, 0.1), TruncatedNormal(-3, 3)
@@ -23,7 +23,7 @@ def two_particles(x, y, theta):
 
 
 def solve(level_set, size, layers=1, law=LAW, phases=PHASES):
-    model = PrismModel(size, layers, interface="sign", level_set=level_set)
+    model = LevelSetModel(level_set, size, layers)
     return model.solve(law, phases)[0]
 
 
@@ -44,8 +44,6 @@ def test_two_particles_are_too_stiff_by_first_order():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: PrismModel(level_set=cone), "beside interface 'conforming'"),
-        (lambda: PrismModel(mesh="a.msh", level_set=cone, interface="sign"), "beside a mesh"),
         (lambda: solve(lambda x, y, t: np.sqrt(x), 0.5), "level set is NaN"),
         (lambda: solve(lambda x, y, t: 1.0, 0.5), r"level set is of shape \(\)"),
         (lambda: solve(cone, 0.5, law=CONE), "law of θ is HermiteMap"),

@@ -76,14 +76,14 @@ import sys
 from mpi4py import MPI
 sys.modules.update({"gmsh": None} if MPI.COMM_WORLD.rank else {})
 from alphacut.fuzzy.refused import FailedError
-from alphacut.rve import Phase, PrismModel
+from alphacut.rve import Phase, PrismModel, MeshModel
 from alphacut.stochastic import HermiteMap, TruncatedNormal
 
 soft, hard = Phase(20e9), Phase(80e9)
 PrismModel(0.5, 2, parallel=True, estimate=False).solve(HermiteMap(0.4, 0, 0.4, 0), soft, [hard])
 phases = {"matrix": soft, "particle": hard}
 try:
-    PrismModel(mesh="meshes/unlike-sides.msh", parallel=True).solve(TruncatedNormal(-3, 3), phases)
+    MeshModel("meshes/unlike-sides.msh", parallel=True).solve(TruncatedNormal(-3, 3), phases)
 except FailedError as error:
     print("refused", flush=True)
 """

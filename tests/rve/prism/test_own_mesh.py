@@ -11,7 +11,7 @@ import pytest
 pytest.importorskip("dolfinx")
 
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.rve import Phase, PrismModel
+from alphacut.rve import MeshModel, Phase, PrismModel
 from alphacut.rve.mesh.columns import extrude
 from alphacut.rve.mesh.file import MIRRORED, UPSIDE_DOWN, orient, read_grid, write
 from alphacut.rve.mesh.gmsh_prisms import Prisms
@@ -24,7 +24,7 @@ SOFT, HARD = Phase(20e9), Phase(80e9)
 
 
 def solve(name, **phases):
-    return PrismModel(mesh=MESHES / name).solve(LAW, phases)[0]
+    return MeshModel(MESHES / name).solve(LAW, phases)[0]
 
 
 def test_a_written_cell_is_solved_bit_for_bit(tmp_path):
@@ -33,7 +33,7 @@ def test_a_written_cell_is_solved_bit_for_bit(tmp_path):
     grid = model.problem(PAPER).form.grid
     write(tmp_path / "a.msh", grid.positions(PAPER), grid.cells, grid.phase, grid.names)
     phases = {"inclusion": HARD, "matrix": SOFT}
-    result = PrismModel(mesh=str(tmp_path / "a.msh")).solve(PAPER.distribution, phases)[0]
+    result = MeshModel(str(tmp_path / "a.msh")).solve(PAPER.distribution, phases)[0]
     assert result.modulus == pytest.approx(right.modulus, rel=1e-12)
     assert not result.errors
     assert np.isnan(result.estimated_error)
@@ -68,7 +68,7 @@ def test_levels_may_be_uneven(tmp_path):
         half = prisms.cells[:, [8, 10, 11]]
         points[half, 2] = (points[prisms.cells[:, :3], 2] + points[prisms.cells[:, 3:6], 2]) / 2
         write(tmp_path / f"{power}.msh", points, prisms.cells, prisms.phase, prisms.names)
-        model = PrismModel(mesh=tmp_path / f"{power}.msh")
+        model = MeshModel(tmp_path / f"{power}.msh")
         results.append(model.solve(LAW, {"matrix": SOFT, "inclusion": HARD})[0])
     assert results[1].modulus == pytest.approx(results[0].modulus, rel=1e-9)
     assert not np.allclose(results[0].curve.theta, results[1].curve.theta)
@@ -90,7 +90,7 @@ def test_levels_may_be_uneven(tmp_path):
 )
 def test_law_and_phases_that_do_not_fit_are_refused(law, phases, message):
     with pytest.raises(RefusedError, match=message):
-        PrismModel(mesh=MESHES / "ring.msh").solve(law, phases)
+        MeshModel(MESHES / "ring.msh").solve(law, phases)
 
 
 def test_sides_that_do_not_match_are_refused_with_side_and_level():
@@ -128,7 +128,7 @@ def test_a_file_that_is_none_is_refused(tmp_path):
     (tmp_path / "no.msh").write_text("nothing")
     for path in (tmp_path / "no.msh", tmp_path / "absent.msh"):
         with pytest.raises((RefusedError, MeshError)):
-            PrismModel(mesh=path).solve(LAW, {"matrix": SOFT})
+            MeshModel(path).solve(LAW, {"matrix": SOFT})
 
 
 def test_prisms_of_any_orientation_are_set_upright():

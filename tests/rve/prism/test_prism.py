@@ -157,7 +157,7 @@ SMALL = HermiteMap(0.2, 0.1, 0.55, 0.1)
 def turned_ellipse():
     """An ellipse of an orthotropic material, both turned, by prisms and by slices."""
     outline = Ellipse(2.0, 30.0)
-    slices = SlicesModel(4, 0.4, 5, outline, energies=True)
+    slices = SlicesModel(4, 0.4, 5, outline)
     models = PrismModel(0.4, 3, outline=outline), slices
     return [model.solve(SMALL, MATRIX, [ORTHOTROPIC])[0] for model in models]
 

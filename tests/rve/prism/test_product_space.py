@@ -9,7 +9,7 @@ import pytest
 pytest.importorskip("dolfinx")
 
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.rve import LOADS, Phase, PrismModel, ProductSpace
+from alphacut.rve import LOADS, MeshModel, Phase, PrismModel, ProductSpace
 from alphacut.rve.fenicsx import PETSc, fem, ufl
 from alphacut.rve.prism import product_space
 from alphacut.rve.solver.krylov import solve
@@ -118,7 +118,7 @@ def test_the_example_of_the_class_runs():
 
 
 def test_a_mesh_from_a_file_has_its_measures_by_the_names_of_its_groups():
-    model = PrismModel(mesh=MESHES / "two-particles.msh")
+    model = MeshModel(MESHES / "two-particles.msh")
     cell = ProductSpace(model, TruncatedNormal())
     share = 1 - cell.mean(cell.density * cell.dx["matrix"])
     assert share == pytest.approx(np.pi * (0.35**2 + 0.40**2) / 4, rel=1e-3)

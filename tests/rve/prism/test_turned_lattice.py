@@ -9,7 +9,7 @@ import pytest
 pytest.importorskip("dolfinx")
 pytest.importorskip("gmsh")
 
-from alphacut.rve import Phase, PrismModel, SeriesModel
+from alphacut.rve import MeshModel, Phase, SeriesModel
 from alphacut.stochastic import HermiteMap, TruncatedNormal
 
 MESHES = Path(__file__).parents[3] / "meshes"
@@ -28,7 +28,7 @@ def stiffness_of_two(folder, size, monkeypatch):
     matrix = plane.surface(plane.square(size), *places)
     particles = [plane.surface(place) for place in places]
     plane.extrude({"matrix": [matrix], "particles": particles}, f"{size}.msh", layers=1)
-    model = PrismModel(mesh=folder / f"{size}.msh")
+    model = MeshModel(folder / f"{size}.msh")
     phases = {"matrix": MATRIX, "particles": PARTICLE}
     return model.solve(TruncatedNormal(-3, 3), phases)[0].stiffness
 
