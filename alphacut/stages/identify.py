@@ -13,7 +13,7 @@ from alphacut.frame.identify import (
     identify,
     measured_mode,
 )
-from alphacut.frame.identify.identify import widest
+from alphacut.frame.identify.identify import widest_cut
 from alphacut.frame.structures.quantities import of_storey_frame
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.refused import require
@@ -39,7 +39,7 @@ def identify_inputs(
     modes = sorted(mode for mode in section.held_out if mode <= structure.frame.floors)
     predicted = [_prediction(rows[mode], posterior.predictions()) for mode in modes]
     document = {**_document(posterior), "held_out": predicted}
-    document["prior"] = {name: list(widest(number)) for name, number in prior.items()}
+    document["prior"] = {name: list(widest_cut(number)) for name, number in prior.items()}
     return document, replace(structure, numbers={**structure.numbers, **posterior.numbers})
 
 

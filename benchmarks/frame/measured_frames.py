@@ -20,7 +20,7 @@ import numpy as np
 from alphacut.case.load import load
 from alphacut.frame import StoreyFrame
 from alphacut.frame.identify import MeasuredMode, RefutedError, identify, measured_mode
-from alphacut.frame.identify.chain import Chain, eigenvalue_ranges
+from alphacut.frame.identify.modes import Chain, eigenvalue_ranges
 from alphacut.fuzzy import FuzzyNumber, Interval
 from alphacut.stages.identify import identify_inputs
 from benchmarks.rows import write

@@ -9,16 +9,15 @@ is. Predictions (`Identified.predictions`) say what its frames vibrate like.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.optimize import least_squares
 
-from alphacut.frame.identify.chain import Chain, eigenvalue_ranges
-from alphacut.frame.identify.measured import MeasuredMode, ModeCut
-from alphacut.frame.identify.relaxation import enclosure
-from alphacut.frame.identify.samples import inner_point, random_walks
+from alphacut.frame.identify.enclosure import enclosure
+from alphacut.frame.identify.modes import Chain, MeasuredMode, ModeCut, eigenvalue_ranges
 from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.fuzzy.arrays import Array
@@ -32,10 +31,96 @@ ALPHA = (0.05, 0.1, 0.25, 0.5, 0.75, 1.0)
 LEEWAY = 0.1
 """Share of the box's width by which samples may leave it; a larger one finds a wrong box that is
 much too narrow, but its walks meet the set less often."""
+STEPS, MIN_WALKS, MAX_TRIES = 60, 100, 50
+"""Steps of each random walk; walks at least, as they show one another the way; tries of a step."""
+STARTS = 10
+"""Starts of the search for a first sample."""
+MARGINS = (1.0, 0.5, 0.1, 1e-2, 1e-4)
+"""Distances from the ends of all ranges, in half widths, that the search asks for in turn."""
+
+Violation = Callable[[Array], Array]
+"""Distance of points (n, d) beyond each range of the set, (n, q), in half widths; <= 0 inside."""
 
 
 class RefutedError(FailedError):
     """No parameters in the priors agree with the measurement at the lowest level."""
+
+
+def identify(
+    frame: StoreyFrame,
+    prior: Mapping[str, FuzzyNumber | float],
+    measured: Sequence[MeasuredMode],
+    *,
+    alpha: Sequence[float] = ALPHA,
+) -> Identified:
+    """Return boxes of a frame's parameters that agree with its measured natural modes.
+
+    Args:
+        frame: The frame; damping, initial motion and outputs do not matter.
+        prior: Fuzzy numbers of the parameters, of "E", "I", "c1" … (columns of a storey), "l1" …,
+            "m1" …, in SI units.
+        measured: The measured modes, by rising number.
+        alpha: Levels, rising within (0, 1].
+
+    Raises:
+        RefusedError: An input is no parameter of the natural modes, a mode or floor is not the
+            frame's, or levels do not rise within (0, 1].
+        RefutedError: No parameters in the priors agree with the measurement at the lowest level.
+    """
+    numbers = {k: x if isinstance(x, FuzzyNumber) else Crisp(float(x)) for k, x in prior.items()}
+    _require_input(frame, measured, numbers, alpha)
+    evidence = Evidence(Chain(frame, tuple(numbers)), numbers, tuple(measured))
+    nominal, levels, empty = evidence.chain.nominal, np.asarray(alpha, float), 1.0
+    boxes: list[tuple[Array, Array]] = []  # logarithms of parameters over nominal values
+    for level in map(float, levels):
+        cuts = [evidence.cut(x, level) for x in numbers.values()]
+        low, high = np.log(np.array(cuts).T / nominal)
+        if boxes:  # sets are nested
+            low, high = np.maximum(low, boxes[-1][0]), np.minimum(high, boxes[-1][1])
+        box = None
+        if (low <= high).all():
+            box = enclosure(evidence.chain, low, high, evidence.modes(level))
+        if box is None:
+            empty = level
+            break
+        boxes.append(box)
+    if not boxes:
+        raise RefutedError(
+            f"no parameters in their priors agree with the measured modes at α = {levels[0]:g}:"
+            f" a storey frame with such parameters is refuted (by chance with P <= {levels[0]:g})",
+            "widen the priors, or check masses and numbers of modes",
+        )
+    boxes += [boxes[-1]] * (len(levels) - len(boxes))
+    lower, upper = (nominal * np.exp(np.stack(side)) for side in zip(*boxes, strict=True))
+    least, greatest = np.array([widest_cut(x) for x in numbers.values()]).T
+    # rounding of exp, outwards and within the priors
+    lower, upper = np.maximum(lower * (1 - 4e-16), least), np.minimum(upper * (1 + 4e-16), greatest)
+    return Identified(evidence, levels, lower, upper, empty)
+
+
+def _require_input(
+    frame: StoreyFrame,
+    measured: Sequence[MeasuredMode],
+    prior: Mapping[str, FuzzyNumber],
+    alpha: Sequence[float],
+) -> None:
+    levels, n_floors = np.asarray(alpha, float), frame.floors
+    is_rising = levels.ndim == 1 and len(levels) > 0 and bool((np.diff(levels) > 0).all())
+    in_range = is_rising and levels[0] > 0 and levels[-1] <= 1
+    require(in_range, "identify.alpha", value=list(alpha), allowed="rising in (0, 1]")
+    mode_numbers = [mode.mode for mode in measured]
+    are_rising = bool(mode_numbers) and sorted(set(mode_numbers)) == mode_numbers
+    require(are_rising, "identify.modes", value=mode_numbers, allowed="one or more, rising")
+    largest = max(x for mode in measured for x in (mode.mode, mode.reference, *mode.shape))
+    allowed = f"modes and floors from 1 to {n_floors}"
+    require(largest <= n_floors, "identify.modes", value=largest, allowed=allowed)
+    smallest = min(widest_cut(number).lower for number in prior.values())
+    require(smallest > 0, "identify.parameters", value=smallest, allowed="positive priors")
+
+
+def widest_cut(number: FuzzyNumber) -> Cut:
+    """Return the widest cut that a number decides."""
+    return number.cut(number.decided) if isinstance(number, ClaimedNumber) else number.support
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +158,7 @@ class Evidence:
         return number.cut(alpha)
 
     def modes(self, alpha: float) -> list[ModeCut]:
-        """Ranges of the measured modes at the joint level α."""
+        """Return ranges of the measured modes at the joint level α."""
         return [mode.ranges(lambda x: self.cut(x, alpha)) for mode in self.measured]
 
     def violation(self, points: Array, modes: list[ModeCut]) -> Array:
@@ -96,11 +181,6 @@ class Evidence:
         measured, low, high = (np.array(part) for part in zip(*columns, strict=True))
         half = np.maximum((high - low) / 2, 1e-12 * np.abs(high))
         return np.asarray(np.maximum(low - measured.T, measured.T - high) / half)
-
-
-def widest(number: FuzzyNumber) -> Cut:
-    """The widest cut that a number decides."""
-    return number.cut(number.decided) if isinstance(number, ClaimedNumber) else number.support
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,11 +248,6 @@ class Identified:
         The set is that of parameters whose modes lie in all measured cuts. The walks may leave the
         box that is proved to hold it by `LEEWAY`, so that the points test the proof.
 
-        Args:
-            number: Number of points.
-            row: Index of the level.
-            seed: Seed of the walks.
-
         Raises:
             FailedError: No point of the set was found, or one lies outside the box or has a
                 frequency outside the predictions: the proof is wrong.
@@ -199,122 +274,77 @@ class Identified:
         return points
 
     def _require_contained(self, points: Array, row: int) -> None:
-        """Refuse points (S, d) outside the box of a level or its predicted frequencies.
-
-        Raises:
-            FailedError: There is one.
-        """
+        """Refuse points (S, d) outside the box of a level or its predicted frequencies."""
         chain, factor = self.evidence.chain, 1 + ROUND_OFF  # for rounding
         in_box = (points * factor >= self.lower[row]) & (points <= self.upper[row] * factor)
-        logs = [np.log(ends[row] / chain.nominal) for ends in (self.lower, self.upper)]
-        lower, upper = eigenvalue_ranges(chain, *logs)
+        lower, upper = self._eigenvalues(row)
         values = chain.modes(points)[0]
         are_predicted = (values * factor >= lower) & (values <= upper * factor)
         for what, holds in (("parameters", in_box), ("squared frequencies", are_predicted)):
             if not holds.all():
                 sample = points[np.argmin(holds.all(1))]
                 pairs = zip(self.names, map(float, sample), strict=True)
-                at = ", ".join(f"{x} = {y!r}" for x, y in pairs)
-                text = f"the proof is wrong: {what} that agree with the modes lie outside, at {at}"
-                raise FailedError(text, "keep the case and report it")
+                values_text = ", ".join(f"{x} = {y!r}" for x, y in pairs)
+                text = f"the proof is wrong: {what} that agree with the modes lie outside, at "
+                raise FailedError(text + values_text, "keep the case and report it")
+
+    def _eigenvalues(self, row: int) -> tuple[Array, Array]:
+        nominal = self.evidence.chain.nominal
+        logs = (np.log(ends[row] / nominal) for ends in (self.lower, self.upper))
+        return eigenvalue_ranges(self.evidence.chain, *logs)
 
     def predictions(self) -> Ends:
         """Return proved ends of all n natural frequencies on each level, (A, n) each, in Hz."""
-        chain = self.evidence.chain
-        logs = [np.log(ends / chain.nominal) for ends in (self.lower, self.upper)]
-        ranges = [eigenvalue_ranges(chain, low, high) for low, high in zip(*logs, strict=True)]
-        lower, upper = np.sqrt(np.maximum(np.array(ranges), 0.0)).swapaxes(0, 1) / (2 * np.pi)
+        ranges = np.array([self._eigenvalues(row) for row in range(len(self.alpha))])
+        lower, upper = np.sqrt(np.maximum(ranges, 0.0)).swapaxes(0, 1) / (2 * np.pi)
         return Ends(lower, upper)
 
 
-def identify(
-    frame: StoreyFrame,
-    prior: Mapping[str, FuzzyNumber | float],
-    measured: Sequence[MeasuredMode],
-    *,
-    alpha: Sequence[float] = ALPHA,
-) -> Identified:
-    """Return boxes of a frame's parameters that agree with its measured natural modes.
+def inner_point(violation: Violation, box: Ends, rng: np.random.Generator) -> Array | None:
+    """Return a point (d,) of a box at which no range is violated, by least squares; None if not."""
+    for start in range(STARTS):
+        unit_point = rng.random(len(box.lower)) if start else 0.5  # the middle first
+        point = box.lower + (box.upper - box.lower) * unit_point
+        for margin in MARGINS:
+            fitted = least_squares(
+                lambda x, margin=margin: np.maximum(violation(x[None])[0] + margin, 0.0),
+                point,
+                bounds=(box.lower - 1e-9, box.upper + 1e-9),  # a side may have no width
+                max_nfev=30,
+            )
+            point = np.clip(fitted.x, *box)
+            if (violation(point[None]) <= 0).all():
+                return np.asarray(point)
+    return None
 
-    Args:
-        frame: The frame; damping, initial motion and outputs do not matter.
-        prior: Fuzzy numbers of the parameters, of "E", "I", "c1" … (columns of a storey), "l1" …,
-            "m1" …, in SI units.
-        measured: The measured modes, by rising number.
-        alpha: Levels, rising within (0, 1].
 
-    Raises:
-        RefusedError: An input is no parameter of the natural modes, a mode or floor is not the
-            frame's, or levels do not rise within (0, 1].
-        RefutedError: No parameters in the priors agree with the measurement at the lowest level.
+def random_walks(
+    violation: Violation, start: Array, box: Ends, number: int, rng: np.random.Generator
+) -> Array:
+    """Return points (number, d) of a set in a box, reached by random walks from a point (d,) of it.
+
+    Each step is a point of a random chord (hit and run), cut at points outside the set (shrinking
+    slice sampler; Neal, Annals of Statistics 31, 2003). Every second chord points from one walk to
+    another, as long and thin sets need (ter Braak, Statistics and Computing 16, 2006). The points
+    become uniform in a convex set; in others they reach the part in which such chords lie.
     """
-    numbers = {k: x if isinstance(x, FuzzyNumber) else Crisp(float(x)) for k, x in prior.items()}
-    _require_input(frame, measured, numbers, alpha)
-    evidence = Evidence(Chain(frame, tuple(numbers)), numbers, tuple(measured))
-    levels = np.asarray(alpha, float)
-    boxes, empty = _boxes(evidence, levels)
-    if not boxes:
-        raise RefutedError(
-            f"no parameters in their priors agree with the measured modes at α = {levels[0]:g}:"
-            f" a storey frame with such parameters is refuted (by chance with P <= {levels[0]:g})",
-            "widen the priors, or check masses and numbers of modes",
-        )
-    boxes += [boxes[-1]] * (len(levels) - len(boxes))
-    lower, upper = (np.stack(side) for side in zip(*boxes, strict=True))
-    ends = _outward(lower, evidence, -1), _outward(upper, evidence, +1)
-    return Identified(evidence, levels, *ends, empty)
-
-
-def _require_input(
-    frame: StoreyFrame,
-    measured: Sequence[MeasuredMode],
-    prior: Mapping[str, FuzzyNumber],
-    alpha: Sequence[float],
-) -> None:
-    """Refuse levels, mode numbers, floors or priors that are not allowed for the frame.
-
-    Raises:
-        RefusedError: There is one.
-    """
-    levels, n_floors = np.asarray(alpha, float), frame.floors
-    is_rising = levels.ndim == 1 and len(levels) > 0 and bool((np.diff(levels) > 0).all())
-    in_range = is_rising and levels[0] > 0 and levels[-1] <= 1
-    require(in_range, "identify.alpha", value=list(alpha), allowed="rising in (0, 1]")
-    mode_numbers = [mode.mode for mode in measured]
-    are_rising = bool(mode_numbers) and sorted(set(mode_numbers)) == mode_numbers
-    require(are_rising, "identify.modes", value=mode_numbers, allowed="one or more, rising")
-    largest = max(x for mode in measured for x in (mode.mode, mode.reference, *mode.shape))
-    allowed = f"modes and floors from 1 to {n_floors}"
-    require(largest <= n_floors, "identify.modes", value=largest, allowed=allowed)
-    smallest = min(widest(number).lower for number in prior.values())
-    require(smallest > 0, "identify.parameters", value=smallest, allowed="positive priors")
-
-
-def _boxes(evidence: Evidence, levels: Array) -> tuple[list[tuple[Array, Array]], float]:
-    """Return the enclosing box of each level, until one is proved empty, and that level or 1.
-
-    The ends are logarithms of the parameters over nominal values, shape (d,) each.
-    """
-    boxes: list[tuple[Array, Array]] = []
-    for level in map(float, levels):
-        cuts = [evidence.cut(x, level) for x in evidence.prior.values()]
-        lower, upper = np.log(np.array(cuts).T / evidence.chain.nominal)
-        if boxes:
-            lower, upper = np.maximum(lower, boxes[-1][0]), np.minimum(upper, boxes[-1][1])
-        box = None
-        if (lower <= upper).all():
-            box = enclosure(evidence.chain, lower, upper, evidence.modes(level))
-        if box is None:
-            return boxes, level
-        boxes.append(box)
-    return boxes, 1.0
-
-
-def _outward(logs: Array, evidence: Evidence, sign: int) -> Array:
-    """Return box ends (A, d) from logarithms of them over nominal values, within the priors.
-
-    They are rounded outwards: up for upper ends, of `sign` 1, and down for lower ones, of −1.
-    """
-    ends = evidence.chain.nominal * np.exp(logs) * (1 + sign * 4e-16)  # rounding of exp
-    lower, upper = np.array([widest(x) for x in evidence.prior.values()]).T
-    return np.asarray(np.minimum(ends, upper) if sign > 0 else np.maximum(ends, lower))
+    points, width = np.tile(start, (max(number, MIN_WALKS), 1)), box.upper - box.lower
+    chord_ends: Array = np.tile([[-1.0], [1.0]], len(points))
+    for step in range(STEPS):
+        direction = rng.standard_normal(points.shape) * width
+        if step % 2:
+            direction = rng.permutation(points) - rng.permutation(points)
+        longest = np.abs(direction / np.where(width > 0, width, 1.0)).max(axis=1, keepdims=True)
+        direction /= np.where(longest > 0, longest, 1.0)  # now as long as the box
+        (low, high), has_moved = chord_ends, np.full(len(points), False)
+        for _ in range(MAX_TRIES):
+            position = rng.uniform(low, high)  # on the chord, 0 at the point itself
+            candidate = points + position[:, None] * direction
+            is_inside = ((box.lower <= candidate) & (candidate <= box.upper)).all(axis=1)
+            is_accepted = is_inside & (violation(candidate) <= 0).all(axis=1) & ~has_moved
+            points[is_accepted], has_moved[is_accepted] = candidate[is_accepted], True
+            if has_moved.all():
+                break
+            low = np.where(position < 0, position, low)
+            high = np.where(position < 0, high, position)
+    return points[:number]

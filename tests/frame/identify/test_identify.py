@@ -7,9 +7,9 @@ import pytest
 
 from alphacut.frame import StoreyFrame, envelope
 from alphacut.frame.identify import Identified, MeasuredMode, RefutedError, identify, measured_mode
-from alphacut.frame.identify.chain import Chain, eigenvalue_ranges
-from alphacut.frame.identify.relaxation import CONSTANT, LinearProgram, Rows, relaxation
-from alphacut.frame.identify.samples import inner_point, random_walks
+from alphacut.frame.identify.enclosure import CONSTANT, LinearProgram, Rows, relaxation
+from alphacut.frame.identify.identify import inner_point, random_walks
+from alphacut.frame.identify.modes import Chain, eigenvalue_ranges
 from alphacut.fuzzy import FuzzyNumber, Interval, Triangular, from_data
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import FailedError

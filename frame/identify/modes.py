@@ -1,23 +1,119 @@
-"""Measured natural modes: frequencies and shapes as fuzzy numbers, claimed or opinions."""
+"""Natural modes of a storey frame: of a chain of masses on springs, and measured ones.
+
+Stiffnesses of the chain are k_z = 12 c_z E I / l_z³ or given, so that logarithms of stiffnesses and
+masses are linear in those of the parameters. Natural frequencies rise with every stiffness and fall
+with every mass (Courant and Fischer): their ranges over a box are exact.
+"""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.special import chdtri
 
+from alphacut.frame.calculus.jet import Jet
+from alphacut.frame.structures.storey import StoreyFrame, chain_matrix
 from alphacut.fuzzy import FuzzyNumber, from_data
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.knowledge.from_data import from_scatter
-from alphacut.fuzzy.refused import checked_number, require
+from alphacut.fuzzy.refused import RefusedError, checked_number, require
 from alphacut.fuzzy.sets.claimed import ClaimedNumber
 from alphacut.fuzzy.sets.numbers import Cut
 
-NEAR = 0.8  # share of a mode's largest amplitude from which on a floor may be the reference
-ROUGH = 0.2  # deviation of the reference over its amplitude above which ratios have no law
-CHANCE = 1e-6  # probability below which values contradict their deviation
+ROUND_OFF = 1e-13
+"""Share of the largest eigenvalue by which a computed one may be wrong, at most."""
+NEAR = 0.8
+"""Share of a mode's largest amplitude from which on a floor may be the reference."""
+MAX_SCATTER = 0.2
+"""Deviation of the reference over its amplitude above which ratios have no known distribution."""
+CHANCE = 1e-6
+"""Probability below which values contradict their deviation."""
+
+
+class Chain:
+    """Chain of n masses on springs: a frame of which d parameters are uncertain.
+
+    Args:
+        frame: The frame.
+        names: The parameters, of "E", "I" or "I1" …, "c1" …, "l1" …, "k1" …, "m1" ….
+
+    Attributes:
+        nominal: Their nominal values, shape (d,).
+        stiffness: Nominal stiffnesses, shape (n,), in N/m.
+        mass: Nominal masses, shape (n,), in kg.
+        powers: Exponents of the parameters in stiffnesses and masses, shape (2, n, d).
+
+    Raises:
+        RefusedError: A name is no parameter of stiffness or mass, or weights soften the storeys, so
+            that stiffnesses are no products.
+    """
+
+    def __init__(self, frame: StoreyFrame, names: Sequence[str]) -> None:
+        n, values = frame.floors, frame.parameters
+        allowed = "none: a storey softened by weight has no stiffness of such a product"
+        require(not frame.gravity, "frame.gravity", value=frame.gravity, allowed=allowed)
+        self.powers = np.zeros((2, n, len(names)))
+        for column, name in enumerate(names):
+            part = re.fullmatch(r"([clmkI])(\d+)", name)
+            if name in ("E", "I") and name in values:
+                self.powers[0, :, column] = 1
+            elif part and name in values:
+                row = int(part[2]) - 1
+                self.powers[int(part[1] == "m"), row, column] = -3 if part[1] == "l" else 1
+            else:
+                allowed = f"E, I, c1 … c{n} (columns), l1 …, m1 …, or k1 … k{n} (stiffnesses)"
+                raise RefusedError("identify.parameters", name, allowed)
+        nominal = {name: Jet.constant([value], 0) for name, value in values.items()}
+        self.names, self.nominal = tuple(names), np.array([values[name] for name in names])
+        self.stiffness, self.mass = frame.springs(nominal).value[0], np.asarray(frame.masses, float)
+
+    def modes(self, points: Array) -> tuple[Array, Array]:
+        """Return eigenvalues λ = ω² (S, n), rising, and mode shapes (S, floor, mode).
+
+        `points` are parameters, shape (S, d), in SI units.
+        """
+        stiffness, mass = np.exp(np.log(points / self.nominal) @ self.powers.swapaxes(1, 2))
+        return chain_modes(self.stiffness * stiffness, self.mass * mass)
+
+    def ranges(self, lower: Array, upper: Array) -> tuple[Array, Array]:
+        """Return bounds of logarithms of stiffnesses and masses over nominal ones, (2, n) each.
+
+        `lower` and `upper` are corners of a box of logarithms of parameters over nominal values,
+        shape (d,); stiffnesses come first in the bounds.
+        """
+        increases = self.powers > 0
+        lower_bound = np.where(increases, self.powers * lower, self.powers * upper).sum(-1)
+        upper_bound = np.where(increases, self.powers * upper, self.powers * lower).sum(-1)
+        return lower_bound, upper_bound
+
+
+def chain_modes(stiffness: Array, mass: Array) -> tuple[Array, Array]:
+    """Return eigenvalues ω² (S, n), rising, and shapes of unit modal mass (S, floor, mode).
+
+    Stiffnesses (S, n) are in N/m, masses (S, n) in kg.
+    """
+    root = np.sqrt(mass)
+    values, vectors = np.linalg.eigh(
+        chain_matrix(stiffness) / root[..., :, None] / root[..., None, :]
+    )
+    return values, vectors / root[..., None]
+
+
+def eigenvalue_ranges(chain: Chain, lower: Array, upper: Array) -> tuple[Array, Array]:
+    """Return proved bounds of eigenvalues ω² over a box, (n,) each, in 1/s².
+
+    The box is that of `Chain.ranges`. They rise with every stiffness and fall with every mass, so
+    that two corners give them.
+    """
+    low, high = chain.ranges(lower, upper)
+    stiffness = chain.stiffness * np.exp(np.stack([low[0], high[0]]))
+    mass = chain.mass * np.exp(np.stack([high[1], low[1]]))
+    values, _ = chain_modes(stiffness, mass)
+    rounding = ROUND_OFF * values[:, -1:] * values.shape[1]
+    return (values - rounding)[0], (values + rounding)[1]
 
 
 @dataclass(frozen=True)
@@ -42,7 +138,6 @@ class MeasuredMode:
     reference: int = 0
 
     def __post_init__(self) -> None:
-        """Refuse a mode number, floors, a reference floor or a frequency that is not allowed."""
         floors, mode = [*self.shape], f"mode {self.mode}"
         require(self.mode >= 1, f"{mode}: number", value=self.mode, allowed="numbers from 1 on")
         are_positive = min(floors, default=1) >= 1
@@ -77,7 +172,7 @@ class ModeCut:
 
     Args:
         mode: Its number by rising frequency, from 1.
-        low: Least squared angular frequency, in 1/s².
+        low: Least eigenvalue ω², in 1/s².
         high: Greatest.
         shape: Interval of the amplitude by floor, the reference included; empty where no shape was
             measured.
@@ -111,7 +206,7 @@ def measured_mode(
 
     Raises:
         RefusedError: Values are too few or contradict their deviation, counts differ, or an
-            amplitude of the reference is 0 or scatters by more than `ROUGH`.
+            amplitude of the reference is 0 or scatters by more than `MAX_SCATTER`.
     """
     values = np.asarray(frequencies, float)
     rows = {floor: np.asarray(row, float) for floor, row in (shapes or {}).items()}
@@ -138,22 +233,18 @@ def measured_mode(
 
 
 def _mean_ratio(ratios: Array, deviation: float | None, what: str, reference: int) -> ClaimedNumber:
-    """Return the mean of amplitude ratios as a fuzzy number, without the bias of the division.
-
-    Args:
-        ratios: Amplitudes of a floor over those of the reference floor, shape (n,).
-        deviation: Standard deviation of either amplitude over the reference's mean, if known.
-        what: Name of the ratios for messages.
-        reference: The reference floor.
-
-    Raises:
-        RefusedError: The reference scatters by more than `ROUGH`, or as `_mean`.
-    """
-    variance = _reference_variance(ratios, deviation)
+    """Mean of amplitude ratios (n,) as a fuzzy number, without the bias of the division."""
+    # `deviation` is that of either amplitude over the reference's mean, if known; `variance` is the
+    # reference's over its squared mean
+    variance = 0.0
+    if deviation is not None:
+        variance = deviation**2
+    elif len(ratios) > 1:
+        variance = float(ratios.var(ddof=1) / (1 + ratios.mean() ** 2))
     value, cure = f"{np.sqrt(variance):.2g} of its amplitude", "take means of several rows"
     key = f"{what}: scatter of floor {reference}"
-    is_small = bool(np.isfinite(ratios).all()) and variance <= ROUGH**2
-    require(is_small, key, value=value, allowed=f"values up to {ROUGH:g}", cure=cure)
+    is_small = bool(np.isfinite(ratios).all()) and variance <= MAX_SCATTER**2
+    require(is_small, key, value=value, allowed=f"values up to {MAX_SCATTER:g}", cure=cure)
     # both amplitudes scatter; the last factor bounds the terms of second order from above
     combined = deviation and deviation * float(
         np.hypot(1, ratios.mean()) * np.sqrt(1 + 8 * variance)
@@ -163,28 +254,8 @@ def _mean_ratio(ratios: Array, deviation: float | None, what: str, reference: in
     return _mean(unbiased, combined, what, "shape_deviation")
 
 
-def _reference_variance(ratios: Array, deviation: float | None) -> float:
-    """Return the variance of the reference amplitude, relative to its squared mean.
-
-    Without a known deviation it is estimated from the variance of the ratios (n,).
-    """
-    if deviation is not None:
-        return deviation**2
-    return float(ratios.var(ddof=1) / (1 + ratios.mean() ** 2)) if len(ratios) > 1 else 0.0
-
-
 def _mean(values: Array, deviation: float | None, what: str, key: str) -> ClaimedNumber:
-    """Return the mean of measured values as a fuzzy number with a claim.
-
-    Args:
-        values: Measured values, shape (n,).
-        deviation: Standard deviation of a value; None to estimate it from the values.
-        what: Name of the values for messages.
-        key: Name of the argument with the deviation for messages.
-
-    Raises:
-        RefusedError: Their scatter is unknown, or contradicts the deviation.
-    """
+    """Mean of measured values (n,) as a fuzzy number with a claim; refuses unknown scatter."""
     count = len(values)
     if deviation is None:
         value, cure = f"{count} times {values[0]:g}", f"set {key}, such as 0.01"
