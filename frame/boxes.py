@@ -15,7 +15,7 @@ from alphacut.frame.dynamics.flow import Flow
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.structures.quantities import Output, units_of
 from alphacut.fuzzy import FuzzyNumber, Interval
-from alphacut.fuzzy.arrays import Rows
+from alphacut.fuzzy.arrays import Mask, Rows
 from alphacut.fuzzy.knowledge.joint import joined_inputs
 from alphacut.fuzzy.refused import require, require_numbers
 from alphacut.fuzzy.result import Nature
@@ -26,6 +26,9 @@ FAR_APART = 1.5
 """Ratio of an input's ends from which on their geometric mean is its middle."""
 DEFAULT_TOLERANCE = 1e-3
 """Error wanted unless one is given, as a share of each output's peak."""
+AT_REST = 1e-9
+"""Peak of an output, as a share of what the energy of the motion allows it, up to which rounding
+alone moves it; rounding is some ε (ω_max/ω₁)² of the latter."""
 
 
 CORNERS = 16
@@ -225,10 +228,24 @@ class UnitFlow:
         return f"{value:.3g} {unit}"
 
     @cached_property
+    def _peak_and_rest(self) -> tuple[Array, Mask]:
+        peak, reach = np.abs(self.flow.values(self.boxes.probes)).max((0, 1)), self.flow.reach()
+        at_rest = peak <= AT_REST * reach
+        size = np.where(reach > 0, reach, float(peak.max()) or 1.0)
+        return np.where(at_rest, size, peak), at_rest
+
+    @property
     def peak(self) -> Array:
-        """Peak of each output at the nominal parameters and the probes, shape (m,)."""
-        peak = np.abs(self.flow.values(self.boxes.probes)).max((0, 1))
-        return np.where(peak > 0, peak, float(peak.max()) or 1.0)
+        """Peak of each output at the nominal parameters and the probes, shape (m,).
+
+        Of an output at rest it is what the energy of the motion allows.
+        """
+        return self._peak_and_rest[0]
+
+    @property
+    def at_rest(self) -> Mask:
+        """Outputs that rounding alone moves, shape (m,)."""
+        return self._peak_and_rest[1]
 
     @cached_property
     def scale(self) -> Array:

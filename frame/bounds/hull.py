@@ -89,6 +89,8 @@ class Hull:
         least_reached = self._least_reached(outer)
         error = (outer - inner).max(-1)
         largest = np.maximum(np.abs(outer).max((1, 3)), 1e-300)
+        # the gap of an output at rest is judged by what the motion's energy allows
+        largest = np.where(self.problem.at_rest, self.problem.peak, largest)
         facts = {
             **self.facts,
             "gap": float((error / self.problem.scale).max()),

@@ -15,6 +15,7 @@ from alphacut.frame.dynamics.integrators import Exact, Integrator, Midpoint, Ste
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import (
     LinearSystem,
+    Matrices,
     courses_of_forces,
     evaluate,
     frequencies,
@@ -106,6 +107,10 @@ class Flow(ABC):
     @abstractmethod
     def deviations(self, points: Array) -> tuple[Array, Array]:
         """Return more accurate trajectories at points (S, d) and this flow's errors, (S, T, m)."""
+
+    def reach(self) -> Array:
+        """Size that outputs could have by the energy of the nominal motion, (m,); 0 if unknown."""
+        return np.zeros(len(self.outputs))
 
     @cached_property
     def time(self) -> Array:
@@ -200,14 +205,36 @@ class LinearFlow(Flow):
         truth = replace(self, integrator=Exact()).values(points)
         return truth, np.abs(self.values(points) - truth)
 
-    def _march(self, points: Array, *, derivatives: bool) -> Jet:
-        """Outputs of x[k+1] = T x[k] + G load[k] at points (S, d), shape (S, T, outputs)."""
-        matrices, rows = evaluate(self.system, self.names, points, derivatives=derivatives)
+    def reach(self) -> Array:
+        """Size that outputs could have by the energy of the nominal motion, shape (m,).
+
+        An output r q + s v is at most √(r K⁻¹ rᵀ + s M⁻¹ sᵀ) √(qᵀ K q + vᵀ M v).
+        """
+        nominal = np.array([[self.system.parameters[name] for name in self.names]], float)
+        matrices, rows = evaluate(self.system, self.names, nominal, derivatives=False)
+        n = matrices.mass.value.shape[-1]
+        states = trajectory(
+            self._step_map(matrices), matrices.start, rows.like(np.eye(2 * n)[None])
+        )
+        energy, size = np.zeros(len(self.time)), np.zeros(len(self.outputs))
+        for k, matrix in enumerate((matrices.stiffness.value[0], matrices.mass.value[0])):
+            part = slice(k * n, (k + 1) * n)
+            x, row = states.value[0, :, part], rows.value[0, :, part]
+            energy += np.einsum("ti,ij,tj->t", x, matrix, x, optimize=True)
+            inverse = np.linalg.pinv(matrix, hermitian=True)
+            size += np.einsum("oi,ij,oj->o", row, inverse, row, optimize=True)
+        return np.asarray(np.sqrt(np.maximum(size, 0.0) * max(float(energy.max()), 0.0)))
+
+    def _step_map(self, matrices: Matrices) -> StepMap:
         loads, has_ground = list(histories(self.system).values()), self.system.ground is not None
         pushes = matrices.pushes(ground=has_ground)  # accelerations by a unit of each load
         steps = len(self.time) - 1
-        step_map = self.integrator.step_map(matrices, pushes, loads, self.step, steps)
-        motion = trajectory(step_map, matrices.start, rows)
+        return self.integrator.step_map(matrices, pushes, loads, self.step, steps)
+
+    def _march(self, points: Array, *, derivatives: bool) -> Jet:
+        """Outputs of x[k+1] = T x[k] + G load[k] at points (S, d), shape (S, T, outputs)."""
+        matrices, rows = evaluate(self.system, self.names, points, derivatives=derivatives)
+        motion = trajectory(self._step_map(matrices), matrices.start, rows)
         if matrices.feeds is None:
             return motion
         # accelerations among the outputs also hold the forces themselves, over the masses

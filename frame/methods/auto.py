@@ -98,13 +98,13 @@ class Auto:
             except (UnprovedError, ModalError) as error:
                 reasons.append(f"{proof.name}: {error}")
                 continue
-            proved = found if proved is None or _gap(found) < _gap(proved) else proved
+            proved = found if proved is None or _gap(found, flow) < _gap(proved, flow) else proved
             if self._is_close(found, flow):
                 return _noted(found, "; ".join([f"{proof.name} succeeded", *reasons]))
             reasons.append(f"{proof.name}: its gap is wider than the tolerance")
         # a tolerance that holds for all bounds, not for the peaks alone
         needs_tolerance = self.tolerance is not None and not self.peaks
-        if proved is not None and not needs_tolerance and _gap(proved) <= WIDE:
+        if proved is not None and not needs_tolerance and _gap(proved, flow) <= WIDE:
             return _noted(proved, "; ".join([f"{proved.method} succeeded", *reasons]))
         search = Search(self.tolerance, seed=self.seed)
         try:
@@ -169,8 +169,8 @@ class Auto:
         if self.tolerance is not None and not self.peaks:
             return bool((proved.error <= self._allowed(flow)).all())
         if self.tolerance is not None and flow.relative and len(flow.boxes.names) <= FEW_INPUTS:
-            return _gap(proved) <= 2 * self.tolerance
-        return _gap(proved) <= WIDE
+            return _gap(proved, flow) <= 2 * self.tolerance
+        return _gap(proved, flow) <= WIDE
 
     def _allowed(self, flow: UnitFlow) -> Array:
         """Error allowed of each output, shape (m,), in its unit; a little more for rounding."""
@@ -211,7 +211,7 @@ def with_attained(
         upper_at=inputs[1],
         error=np.maximum(proved.upper - ends[1], ends[0] - proved.lower),
     )
-    facts = {**combined.facts, "gap_of_peaks": _gap(combined)}
+    facts = {**combined.facts, "gap_of_peaks": _gap(combined, flow)}
     return replace(combined, facts=facts, notes=(combined.peak_words, *combined.notes))
 
 
@@ -223,11 +223,12 @@ def _possible_peaks(proved: Envelope) -> Rows:
     return np.flatnonzero(np.logical_or(*above).any((0, 2)))
 
 
-def _gap(proved: Envelope) -> float:
+def _gap(proved: Envelope, flow: UnitFlow) -> float:
     """Return the largest gap between proved and attained peak, as a fraction of the peak."""
     assert proved.inner is not None
     ends = ((proved.upper, proved.inner.upper), (-proved.lower, -proved.inner.lower))
     peak = np.maximum(*(outer.max(1) for outer, _ in ends))  # (A, m), as of the gaps
+    peak = np.where(flow.at_rest, flow.peak, peak)
     gaps = [outer.max(1) - inner.max(1) for outer, inner in ends]
     return float((np.maximum(*gaps) / np.maximum(peak, 1e-300)).max())
 
