@@ -12,15 +12,16 @@ import numpy as np
 from pydantic import Field, ValidationInfo, model_validator
 
 from alphacut.case.structure import Structure
-from alphacut.case.types import NotEmpty, OneOrMany, Section, case_file, text
+from alphacut.case.types import NotEmpty, OneOrMany, Section, Time, case_file, text
 from alphacut.frame import Force, History, MatrixStructure, StoreyFrame
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError, require, require_choice
 from alphacut.io import quantity
-from alphacut.records.force_history import read_force_history
 from alphacut.records.read import read_recording
 from alphacut.records.recording import Baseline, Recording, Trim
+from alphacut.records.tables import Layout, read_force_history
+from alphacut.records.text_file import ACCELERATION_UNITS, acceleration_factor
 
 KINDS = ("step", "harmonic", "impulse")
 
@@ -218,8 +219,33 @@ def _read_files(value: object, info: ValidationInfo) -> tuple[NamedRecording, ..
     allowed = f"{allowed}; 1 to {MAX_RECORDS} files"
     require(0 < len(paths) <= MAX_RECORDS, "", value=value, allowed=allowed)
     names = [ENDING.sub("_", path.stem) + (f"_{channel}" if channel else "") for path in paths]
-    recordings = [read_recording(path, channel) for path in paths]
+    layout = Layout(info.data.get("step"), info.data.get("unit") or "")
+    recordings: list[Recording] = []
+    errors: list[RefusedError] = []
+    for path in paths:
+        try:
+            recordings.append(read_recording(path, channel, layout))
+        except RefusedError as error:
+            errors.append(error)
+    if len(errors) == 1:
+        raise errors[0]
+    if errors:  # all bad files of a folder at once, the first with its reason
+        others = ", ".join(error.key.partition(",")[0] for error in errors[1:])
+        first = errors[0]
+        value = f"{first.value}; bad as well: {others}"
+        raise RefusedError(first.key, value, first.allowed, first.cure)
     return tuple(NamedRecording(*pair) for pair in zip(names, recordings, strict=True))
+
+
+def _parse_unit(value: object, _: ValidationInfo) -> str:
+    """Parse a unit of acceleration, such as g."""
+    unit = str(value)
+    try:
+        is_unit = acceleration_factor(unit) is not None or quantity.factor(unit, "m/s^2") > 0
+    except ValueError:
+        is_unit = False
+    require(is_unit, "", value=value, allowed=f"a unit of {ACCELERATION_UNITS}")
+    return unit
 
 
 def _parse_scale(value: object, _: ValidationInfo) -> Scale:
@@ -261,6 +287,12 @@ class RecordsSection(Section):
     five natural periods, and at most envelope.duration.
     """
 
+    step: Time | None = Field(
+        default=None, description="time between the numbers of a file of one column"
+    )
+    unit: Annotated[str, text(_parse_unit)] | None = Field(
+        default=None, description="unit of files that have none: columns without a head, waveforms"
+    )
     files: Annotated[tuple[Files, ...], OneOrMany, NotEmpty] = Field(
         description="files or patterns, as `records/*.AT2`; FILE#CHANNEL of several"
     )

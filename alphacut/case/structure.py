@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -200,8 +201,12 @@ class Structure:
 
 
 def read_accelerogram(value: object, info: ValidationInfo) -> Accelerogram:
-    """Record of a file that the case names."""
-    return read_recording(case_file(value, info)).accelerogram()
+    """Record of a file that the case names; warns of what is unusual in it."""
+    path = case_file(value, info)
+    recording = read_recording(path)
+    for doubt in recording.doubts():
+        warnings.warn(f"of {path.name} {doubt}", stacklevel=2)
+    return recording.accelerogram()
 
 
 def ratios_of(

@@ -1,42 +1,61 @@
-"""Records of the COSMOS format, volume 2: one or several channels of corrected acceleration.
+"""Records of CESMD: volumes 1 and 2 of COSMOS and of CSMIP, with one or several channels.
 
-Entry 34 of the real header is the step. Files have it in seconds or, older ones, in milliseconds:
-it is the one that agrees with the duration in the line above the samples.
+COSMOS: entry 34 of the real header is the step of the raw series in s (older files: in ms), entry
+62 that of the processed series in ms. The step is the first of them that agrees with the duration
+in the line above the samples. CSMIP: a line announces each series, as ``1200 points of accel data
+equally spaced at .010 sec, in cm/sec2. (8f10.6)``; in volume 1 without such a line the numbers
+stand behind 13 lines of text, 7 of integers and 7 of reals.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from math import ceil
 
+import numpy as np
+
+from alphacut.fuzzy.arrays import Array
 from alphacut.records.recording import Recording
 from alphacut.records.text_file import ACCELERATION_UNITS, TextFile, acceleration_factor
 
+FORTRAN = r"\(\s*(\d*)\s*[A-Za-z](\d+)(?:\.\d+\w*)?\s*\)"
+"""Numbers in a line and characters of one, as in (8f10.6)."""
 DATA = re.compile(
     r"\s*(\d+)\s+acc\w*\s+(?:pts|points),?\s+approx\s+(\d+)\s+secs?,\s*units\s*=\s*([^,(]+?)\s*"
-    r"(?:\(\s*\d+\s*\))?\s*,\s*Format\s*=\s*\(\s*\d*[A-Za-z](\d+)(?:\.\d+\w*)?\s*\).*",
+    rf"(?:\(\s*\d+\s*\))?\s*,?\s*Format\s*=\s*{FORTRAN}.*",
     re.IGNORECASE,
 )
 REALS = re.compile(
-    r"\s*(\d+)\s+Real-header values follow on\s+(\d+)\s+lines,?\s*"
-    r"Format\s*=\s*\(\s*\d*[A-Za-z](\d+).*",
+    rf"\s*(\d+)\s+Real-header values follow on\s+(\d+)\s+lines\s*,?\s*Format\s*=\s*{FORTRAN}.*",
     re.IGNORECASE,
 )
 CHANNEL = re.compile(r".*\bSta\s+Chan\s*(\w+)\s*:\s*(.*?)\s*(?:\(|Location|$).*", re.IGNORECASE)
-CODE = re.compile(r"\s*End[- ]of[- ]data for\s+(?:Chan\s*)?(\S*).*", re.IGNORECASE)
-STEP_ENTRY = 34
+CODE = re.compile(r"\s*End[- ]of[- ]data for\s+(?:Chan\s*)?(\w*)\b.*", re.IGNORECASE)
+RAW_STEP, PROCESSED_STEP = 34, 62  # entries of the real header
 ROUNDED = 1.5
 """Seconds by which the stated duration may be off; files have it rounded or cut to seconds."""
+CSMIP = re.compile(r"\s*(UN)?CORRECTED ACCELEROGRAM\b.*", re.IGNORECASE)
+SERIES = re.compile(
+    r"\s*(\d+)\s+(?:raw\s+)?points\s+of\s+(?:raw\s+)?acc\w*\s+data\s+equally\s+spaced\s+at\s+"
+    r"([0-9]*\.?[0-9]+)\s*sec\w*\W*"
+    rf"(?:in\s+(?:units\s+of\s+)?([^\s(]+)|\(?units?:?\s*([^)\s]+)\)?)?\s*(?:{FORTRAN})?.*",
+    re.IGNORECASE,
+)
+CSMIP_CHANNEL = re.compile(r".*\bChan(?:nel)?\s*(\w+)\s*:\s*(.*?)\s*(?:\(|from|$).*", re.IGNORECASE)
+V1_TEXT, V1_INTEGERS, V1_REALS = 13, 7, 7  # lines
+V1_COUNTS, V1_DURATION = (33, 28), 3  # entries of the integer header and of the real one
+V1_UNIT = re.compile(r"\b(g/10|g\*10|10\*?g|cm/s(?:ec)?/s(?:ec)?|g)\b", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
 class _Channel:
-    """Where a channel's samples and its real header begin, and the names that it has."""
+    """A channel of a file: the names that it has, the line that announces it, and its reader."""
 
-    data: int
-    reals: int
     names: tuple[str, ...]
+    line: int
+    read: Callable[[], Recording]
 
 
 def is_cosmos(file: TextFile) -> bool:
@@ -44,8 +63,13 @@ def is_cosmos(file: TextFile) -> bool:
     return any(DATA.fullmatch(line) for line in file.lines)
 
 
+def is_csmip(file: TextFile) -> bool:
+    """True if the first line is that of CSMIP's volume 1 or 2."""
+    return CSMIP.fullmatch(file.lines[0]) is not None
+
+
 def read_cosmos(file: TextFile, channel: str = "") -> Recording:
-    """Recording of one channel of a COSMOS file.
+    """Recording of one channel of a file of COSMOS or CSMIP.
 
     Args:
         file: The file.
@@ -56,50 +80,29 @@ def read_cosmos(file: TextFile, channel: str = "") -> Recording:
         RefusedError: There is no such channel or there are several, or its step, unit or samples
             are not those of the format.
     """
-    channels = _acceleration_channels(file)
+    channels = list(_cosmos_channels(file) if is_cosmos(file) else _csmip_channels(file))
     chosen = [entry for entry in channels if not channel or channel.lower() in entry.names]
     if len(chosen) != 1:
-        names = "; ".join(" or ".join(entry.names) for entry in channels)
-        line = channels[0].data if channels else 0
+        names = "; ".join(" or ".join(entry.names) for entry in channels) or "accelerations"
+        line = channels[0].line if channels else 0
         raise file.refusal(line, f"channel {channel or 'not named'}", f"one of: {names}")
-    return _read_channel(file, chosen[0])
+    return chosen[0].read()
 
 
-def _read_channel(file: TextFile, channel: _Channel) -> Recording:
-    """Recording of a channel, from the line that announces its samples and the lines below it."""
-    match = DATA.fullmatch(file.lines[channel.data])
-    assert match is not None
-    count, duration, unit, width = int(match[1]), float(match[2]), match[3], int(match[4])
+def _samples(
+    file: TextFile, line: int, count: int, unit: str, per_line: int, width: int
+) -> tuple[float, Array]:
+    """Factor of a unit to m/s², and the samples below the line that announces them."""
     factor = acceleration_factor(unit)
     if factor is None:
-        raise file.refusal(channel.data, f"in units of {unit}", ACCELERATION_UNITS)
-    step = _step(file, channel, count, duration)
-    first = channel.data + 1
-    per_line = max(1, len(file.lines[first].rstrip()) // width)
-    samples = file.numbers(first, first + ceil(count / per_line), width=width)
-    file.require_count(samples, count, channel.data)
-    return Recording("COSMOS V2", unit, step, samples * factor)
+        raise file.refusal(line, f"in units of {unit}", ACCELERATION_UNITS)
+    samples = file.numbers(line + 1, line + 1 + ceil(count / per_line), width=width)
+    file.require_count(samples, count, line)
+    return factor, samples
 
 
-def _step(file: TextFile, channel: _Channel, count: int, duration: float) -> float:
-    """Step in s, from entry 34 of the real header in s or ms: whichever fits the duration in s."""
-    match = REALS.fullmatch(file.lines[channel.reals]) if channel.reals >= 0 else None
-    allowed = "a real header whose entry 34 is the step, and agrees with the duration"
-    if match is None:
-        raise file.refusal(channel.data, "without a real header", allowed)
-    first = channel.reals + 1
-    reals = file.numbers(first, first + int(match[2]), width=int(match[3]))
-    entry = reals[STEP_ENTRY - 1] if len(reals) >= STEP_ENTRY else 0.0
-    for step in (float(entry), float(entry) / 1000):
-        if step > 0 and abs(count * step - duration) <= ROUNDED + 0.01 * duration:
-            return step
-    value = f"a step of {entry:g} for {count} samples in {duration:g} s"
-    raise file.refusal(channel.reals, value, allowed)
-
-
-def _acceleration_channels(file: TextFile) -> list[_Channel]:
+def _cosmos_channels(file: TextFile) -> Iterator[_Channel]:
     """Channels of acceleration, without those of velocity and displacement, in the file's order."""
-    channels: list[_Channel] = []
     reals, names = -1, list[str]()  # line of the real header and names read last
     for row, line in enumerate(file.lines):
         if REALS.fullmatch(line):
@@ -107,9 +110,96 @@ def _acceleration_channels(file: TextFile) -> list[_Channel]:
         elif match := CHANNEL.fullmatch(line):
             names = [match[1].lower(), match[2].strip().lower()]
         elif DATA.fullmatch(line):
-            channels.append(_Channel(row, reals, tuple(filter(None, names))))
-        elif (match := CODE.fullmatch(line)) and channels and "acc" in line.lower():  # at its end
-            last = channels[-1]
-            code = (match[1].lower(),) if match[1].lower() not in last.names else ()
-            channels[-1] = _Channel(last.data, last.reals, (*last.names, *code))
-    return channels
+            ends = (CODE.fullmatch(x) for x in file.lines[row:] if "acc" in x.lower())
+            code = next((match[1].lower() for match in ends if match), "")
+            unique = tuple(dict.fromkeys(name for name in (*names, code) if name))
+            yield _Channel(unique, row, _cosmos_reader(file, row, reals, unique))
+
+
+def _cosmos_reader(
+    file: TextFile, line: int, reals: int, names: tuple[str, ...]
+) -> Callable[[], Recording]:
+    def read() -> Recording:
+        match = DATA.fullmatch(file.lines[line])
+        assert match is not None
+        count, unit, width = int(match[1]), match[3].rstrip("."), int(match[5])
+        step = _cosmos_step(file, line, reals, count, float(match[2]))
+        per_line = max(1, len(file.lines[line + 1].rstrip()) // width)
+        factor, samples = _samples(file, line, count, unit, per_line, width)
+        return Recording("COSMOS V2", unit, step, samples * factor, " ".join(names))
+
+    return read
+
+
+def _cosmos_step(file: TextFile, line: int, reals: int, count: int, duration: float) -> float:
+    """Step in s from the real header: the first entry that fits the duration in s."""
+    match = REALS.fullmatch(file.lines[reals]) if reals >= 0 else None
+    allowed = f"a real header whose entry {PROCESSED_STEP} or {RAW_STEP} agrees with the duration"
+    if match is None:
+        raise file.refusal(line, "without a real header", allowed)
+    values = file.numbers(reals + 1, reals + 1 + int(match[2]), width=int(match[4]))
+    entries = np.append(values, np.zeros(PROCESSED_STEP))
+    processed, raw = float(entries[PROCESSED_STEP - 1]), float(entries[RAW_STEP - 1])
+    for step in (processed / 1000, raw, raw / 1000):
+        if step > 0 and abs(count * step - duration) <= ROUNDED + 0.01 * duration:
+            return step
+    value = f"a step of {raw:g} for {count} samples in {duration:g} s"
+    raise file.refusal(reals, value, allowed)
+
+
+def _csmip_channels(file: TextFile) -> Iterator[_Channel]:
+    """Channels of a file of CSMIP, each of which begins with the line that tells the format."""
+    titles = {k: match for k, line in enumerate(file.lines) if (match := CSMIP.fullmatch(line))}
+    # volume 2 repeats the title of volume 1 in its second line
+    starts = [k for k, match in titles.items() if match[1] == titles[0][1] or match[1] is None]
+    for start, end in zip(starts, [*starts[1:], len(file.lines)], strict=True):
+        block = file.lines[start:end]
+        named = (CSMIP_CHANNEL.fullmatch(line) for line in block[:V1_TEXT])
+        match = next(filter(None, named), None)
+        names = tuple(x.lower() for x in match.groups() if x) if match else ()
+        yield _Channel(names, start, _csmip_reader(file, start, end, names))
+
+
+def _csmip_reader(
+    file: TextFile, start: int, end: int, names: tuple[str, ...]
+) -> Callable[[], Recording]:
+    def read() -> Recording:
+        for line in range(start, end):
+            if match := SERIES.fullmatch(file.lines[line]):
+                count, step = int(match[1]), float(match[2])
+                unit = (match[3] or match[4] or "").rstrip(".,")
+                per_line, width = int(match[5] or 8), int(match[6] or 10)
+                factor, samples = _samples(file, line, count, unit, per_line, width)
+                return Recording("CSMIP", unit, step, samples * factor, " ".join(names))
+        return _read_unannounced(file, start, end, names)
+
+    return read
+
+
+def _read_unannounced(file: TextFile, start: int, end: int, names: tuple[str, ...]) -> Recording:
+    """Recording of volume 1 in its old form, with counts and duration in the headers."""
+    first = start + V1_TEXT + V1_INTEGERS
+    line = first + V1_REALS  # of the first sample, or of a text above it
+    integers = file.numbers(start + V1_TEXT, first, width=5)
+    reals = file.numbers(first, line, width=10)
+    units = (V1_UNIT.search(text) for text in file.lines[start : start + V1_TEXT])
+    unit = next((match[1] for match in units if match), "")
+    if len(integers) < V1_COUNTS[0] or len(reals) < V1_DURATION or line >= end:
+        allowed = "the headers of CSMIP's volume 1, or a line such as 1200 points of accel data …"
+        raise file.refusal(start, "without a series", allowed)
+    count = next((int(integers[k - 1]) for k in V1_COUNTS if integers[k - 1] > 0), 0)
+    duration = float(reals[V1_DURATION - 1])
+    if count < 2 or not duration > 0:
+        allowed = "a count and a duration above 0"
+        raise file.refusal(first, f"{count} samples in {duration:g} s", allowed)
+    if re.search("[A-Za-z]", file.lines[line]):
+        factor, samples = _samples(file, line, count, unit, 8, 9)
+        return Recording(
+            "CSMIP V1", unit, duration / (count - 1), samples * factor, " ".join(names)
+        )
+    factor, pairs = _samples(file, line - 1, 2 * count, unit, 10, 7)
+    steps = np.diff(pairs[::2])
+    if np.ptp(steps) > 0.1 * steps.mean() or not steps.mean() > 0:
+        raise file.refusal(line, "uneven times", "even steps", "resample to even steps")
+    samples = pairs[1::2]
+    return Recording("CSMIP V1", unit, float(steps.mean()), samples * factor, " ".join(names))

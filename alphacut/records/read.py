@@ -1,57 +1,113 @@
-"""Recordings from files as they are downloaded; the format is that of the content."""
+"""Recordings from files as they are downloaded; what a file is, its own marks decide first."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
-from alphacut.fuzzy.refused import RefusedError
-from alphacut.records.cosmos import is_cosmos, read_cosmos
-from alphacut.records.csv_record import read_csv_record
-from alphacut.records.esm import is_esm, read_esm
-from alphacut.records.knet import is_knet, read_knet
+import numpy as np
+
+from alphacut.fuzzy.refused import RefusedError, require
+from alphacut.io.quantity import factor
+from alphacut.records.cosmos import is_cosmos, is_csmip, read_cosmos
+from alphacut.records.networks import is_esm, is_knet, is_smc, read_esm, read_knet, read_smc
 from alphacut.records.peer import is_peer, read_peer
 from alphacut.records.recording import Recording
-from alphacut.records.text_file import TextFile
-from alphacut.records.uff import ENDINGS, read_uff_record
+from alphacut.records.tables import Layout, is_table, read_table
+from alphacut.records.text_file import TextFile, acceleration_factor, read_bytes
+from alphacut.records.uff import is_universal, read_uff_record
 
 FORMATS: tuple[tuple[Callable[[TextFile], bool], Callable[[TextFile], Recording]], ...] = (
     (is_knet, read_knet),
+    (is_smc, read_smc),
     (is_esm, read_esm),
     (is_peer, read_peer),
 )
 """Formats of one channel: what tells a file of it, and its reader."""
+READ = "PEER AT2, COSMOS, CSMIP, SMC, K-NET, ESM, miniSEED, SAC, UFF 58, CSV"
+MINISEED = re.compile(rb"[0-9 ]{6}[DRQM][ \0]|MS\x03")
+SAC_HEAD, SAC_VERSION, SAC_COUNT = 632, 304, 316
+"""Bytes of the head of a SAC file, and where its version (6 or 7) and number of samples stand."""
 
 
-def read_recording(path: Path, channel: str = "") -> Recording:
-    """Reads a recording from a file of PEER, K-NET, ESM or COSMOS, a universal or a CSV file.
+def read_recording(path: Path, channel: str = "", layout: Layout | None = None) -> Recording:
+    """Reads a recording from a file of one of the formats in `READ`.
 
     Args:
         path: The file.
-        channel: Channel of a COSMOS or universal file with several.
+        channel: Channel of a file with several.
+        layout: Step and unit of files that do not say them.
 
     Raises:
         RefusedError: The file cannot be read, is of another format, or its head and its samples
             do not fit; the message names the line.
     """
     try:
-        return _read_by_format(path, channel)
+        recording = _read_by_marks(path, channel, layout or Layout())
     except RefusedError:
         raise
     except (ValueError, OverflowError) as error:  # of a head's integer of thousands of digits
         raise RefusedError(path.name, str(error), "numbers of a recording") from None
+    allowed = "two samples or more"
+    require(len(recording.samples) > 1, path.name, value=len(recording.samples), allowed=allowed)
+    return recording
 
 
-def _read_by_format(path: Path, channel: str) -> Recording:
-    """Reads a recording by the format that a file's ending or content shows."""
-    if path.suffix.lower() in ENDINGS:
-        return read_uff_record(path, channel)
-    file = TextFile.read(path)
-    if is_cosmos(file):
+def _read_by_marks(path: Path, channel: str, layout: Layout) -> Recording:
+    """Reads a recording by the format that the marks in a file's content show."""
+    content = read_bytes(path)
+    if is_universal(content):
+        return read_uff_record(path.name, content, channel)
+    if _is_waveform(content):
+        return _read_waveform(path, channel, layout)
+    file = TextFile.from_bytes(path.name, content)
+    if is_cosmos(file) or is_csmip(file):
         return read_cosmos(file, channel)
     for is_format, read in FORMATS:
         if is_format(file):
             return read(file)
-    if path.suffix.lower() == ".at2":
-        return read_peer(file)  # refuses, and says what a head has
-    return read_csv_record(file)
+    if is_table(file):
+        return read_table(file, layout)
+    cure = 'one column is read with records.step = "0.005 s", records.unit = "g"'
+    raise RefusedError(path.name, "of no format that is read", READ, cure)
+
+
+def _is_waveform(content: bytes) -> bool:
+    """True for a file of miniSEED or SAC."""
+    if MINISEED.match(content):
+        return True
+    for order in ("<i4", ">i4") if len(content) > SAC_HEAD else ():
+        version, count = (
+            int(np.frombuffer(content, order, 1, offset=at)[0]) for at in (SAC_VERSION, SAC_COUNT)
+        )
+        if version in (6, 7) and 0 < 4 * count <= len(content) - SAC_HEAD:
+            return True
+    return False
+
+
+def _read_waveform(path: Path, channel: str, layout: Layout) -> Recording:
+    """Recording of a file of miniSEED or SAC, which have no unit: the case says it."""
+    try:
+        import obspy
+    except ImportError:
+        cure = "pip install 'alphacut[obspy]'"
+        raise RefusedError(path.name, "miniSEED or SAC", "with obspy", cure) from None
+    try:
+        traces = list(obspy.read(str(path)))
+    except Exception as error:  # readers of damaged files raise errors of many kinds
+        reason = " ".join(str(error).split())[:80] or type(error).__name__
+        raise RefusedError(path.name, reason, "miniSEED or SAC that obspy reads") from None
+    names = [str(trace.stats.channel).lower() for trace in traces]
+    chosen = [k for k, name in enumerate(names) if not channel or name == channel.lower()]
+    value = f"channel {channel or 'not named'}"
+    allowed = f"one of: {', '.join(dict.fromkeys(names))}; without gaps"
+    require(len(chosen) == 1, path.name, value=value, allowed=allowed)
+    trace = traces[chosen[0]]
+    require(bool(layout.unit), path.name, value="without a unit", allowed='records.unit = "m/s^2"')
+    to_si = acceleration_factor(layout.unit) or float(factor(layout.unit, "m/s^2"))
+    samples, step = np.asarray(trace.data, float), float(trace.stats.delta)
+    are_plain = bool(np.isfinite(samples).all()) and step > 0
+    require(are_plain, path.name, value="not finite", allowed="finite samples, a step above 0")
+    file_format = str(trace.stats.get("_format", "waveform"))
+    return Recording(file_format, layout.unit, step, to_si * samples, str(trace.stats.channel))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
@@ -10,11 +12,20 @@ import numpy as np
 from alphacut.frame import Accelerogram
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import require
+from alphacut.io.quantity import factor
 
 Baseline = Literal["none", "mean", "linear"]
 Trim = tuple[float, float] | Literal["arias"]
 ARIAS_SHARES = 0.05, 0.95
 """Arias intensity before and after the significant duration (Trifunac, Brady 1975)."""
+LARGEST_PEAK = 5.0
+"""In g; the largest that instruments have recorded on the ground is about 4."""
+USUAL_STEPS = 1e-4, 0.1
+"""In s: instruments sample 50 to 1000 times a second, and simulations at least ten times."""
+VERTICAL = re.compile(
+    r"(?:.*\W)?(?:up|dn|down|ud|u-d|v|vert|vertical|z|[A-Z][HNLG]Z)(?:\W.*)?", re.I
+)
+"""Names of vertical channels: as a word, or SEED codes such as HNZ."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,12 +37,16 @@ class Recording:
         unit: Unit as the file states it.
         step: Time between samples, in s.
         samples: Accelerations from the first sample on, shape (n,), in m/s².
+        channel: The file's own name of the channel; empty if it has none.
+        remarks: What reading left out or took for granted, one clause each.
     """
 
     file_format: str
     unit: str
     step: float
     samples: Array
+    channel: str = ""
+    remarks: tuple[str, ...] = ()
 
     @property
     def peak(self) -> float:
@@ -42,6 +57,17 @@ class Recording:
     def offset_share(self) -> float:
         """Mean acceleration as a share of the peak; 0 of a recording of zeros."""
         return float(self.samples.mean()) / self.peak if self.peak > 0 else 0.0
+
+    def doubts(self) -> Iterator[str]:
+        """Yield clauses on what a user should look at: unusual values, a vertical channel."""
+        yield from self.remarks
+        peak_in_g = self.peak / float(factor("g", "m/s^2"))
+        if peak_in_g > LARGEST_PEAK:
+            yield f"its peak is {peak_in_g:.3g} g: check the unit {self.unit}"
+        if not USUAL_STEPS[0] <= self.step <= USUAL_STEPS[1]:
+            yield f"its step is {self.step:g} s: check it"
+        if VERTICAL.fullmatch(self.channel):
+            yield f"its channel {self.channel} is vertical"
 
     def accelerogram(
         self, *, baseline: Baseline = "none", trim: Trim | None = None, scale: float = 1.0

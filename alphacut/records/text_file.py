@@ -17,7 +17,7 @@ from alphacut.io.quantity import factor
 
 NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eEdD][-+]?[0-9]+)?")
 """A number as C, Python or FORTRAN writes it; D stands for E."""
-GRAVITY_UNIT = re.compile(r"g(?:'s|s)?", re.IGNORECASE)
+GRAVITY_UNIT = re.compile(r"(?:10\*?)?g(?:'s|s)?(/10|\*10)?", re.IGNORECASE)
 PER_SECOND_SQUARED = re.compile(
     r"(cm|m)\s*/\s*(?:s(?:ec)?\s*/\s*s(?:ec)?|s(?:ec)?\s*(?:\^|\*\*)?\s*(?:2|²))", re.IGNORECASE
 )
@@ -46,18 +46,18 @@ class TextFile:
             RefusedError: The file cannot be read, holds bytes that no text has, or a line of more
                 than `LONGEST_LINE` letters.
         """
-        try:
-            content = path.read_bytes()
-        except OSError as error:
-            reason = str(error.strerror or "unreadable").lower()
-            raise RefusedError(str(path), reason, "a text file") from None
+        return cls.from_bytes(path.name, read_bytes(path))
+
+    @classmethod
+    def from_bytes(cls, name: str, content: bytes) -> Self:
+        """The lines of a file's content; `name` is for messages."""
         if b"\0" in content:
-            raise RefusedError(path.name, "no text", "a text file with a record")
+            raise RefusedError(name, "no text", "a text file with a record")
         try:
             text = content.decode("utf-8-sig")
         except UnicodeDecodeError:
             text = content.decode("latin-1")
-        file = cls(path.name, tuple(re.split(r"\r\n|\r|\n", text)))
+        file = cls(name, tuple(re.split(r"\r\n|\r|\n", text)))
         lengths = [len(line) for line in file.lines]
         longest = lengths.index(max(lengths))
         if lengths[longest] > LONGEST_LINE:
@@ -69,21 +69,24 @@ class TextFile:
         """Error about a line, counted from 0."""
         return RefusedError(f"{self.name}, line {line + 1}", str(value)[:80], allowed, cure)
 
-    def numbers(self, first: int, last: int, *, width: int = 0) -> Array:
-        """All numbers from line `first` up to, but not with, line `last`.
+    def numbers(self, first: int, last: int, *, width: int = 0, count: int = 0) -> Array:
+        """All numbers from line `first` up to, but not with, line `last`, counted from 0.
 
         Args:
-            first: Line from 0.
-            last: Line from 0.
+            first: First line.
+            last: Line behind the last one.
             width: Characters of one number in files of fixed columns; 0 where spaces part them.
+            count: Numbers after which lines of text end the reading; 0 where none may.
 
         Raises:
             RefusedError: Something there is no finite number.
         """
         values: list[float] = []
         for row in range(first, min(last, len(self.lines))):
-            for word in _words(self.lines[row], width):
-                values.append(self._number(row, word))
+            words = _words(self.lines[row], width)
+            if 0 < count <= len(values) and not all(map(NUMBER.fullmatch, words)):
+                break
+            values += [self._number(row, word) for word in words]
         return np.array(values)
 
     def _number(self, line: int, word: str) -> float:
@@ -93,21 +96,26 @@ class TextFile:
         return value
 
     def require_count(self, samples: Array, count: int, line: int) -> None:
-        """Refuses another number of samples than the head states.
-
-        Raises:
-            RefusedError: There are more or fewer.
-        """
+        """Refuses another number of samples than the head states."""
         if len(samples) != count:
             what = f"{count} samples, and {len(samples)} follow"
             raise self.refusal(line, what, "as many samples as the head states", "load it anew")
 
 
+def read_bytes(path: Path) -> bytes:
+    """The content of a file; refuses one that cannot be read."""
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        reason = str(error.strerror or "unreadable").lower()
+        raise RefusedError(str(path), reason, "a file with a record") from None
+
+
 def acceleration_factor(unit: str) -> float | None:
     """Factor to m/s² of a unit of acceleration as files of records write it; None if unknown."""
-    text = unit.strip().strip("()[]").strip()
-    if GRAVITY_UNIT.fullmatch(text):
-        return float(factor("g", "m/s^2"))
+    text = unit.strip().strip("()[]").strip().rstrip(".")
+    if match := GRAVITY_UNIT.fullmatch(text):
+        return float(factor("g", "m/s^2")) * {"": 1.0, "/10": 0.1}.get(match[1] or "", 10.0)
     if text.lower() in ("gal", "gals"):
         return float(factor("gal", "m/s^2"))
     match = PER_SECOND_SQUARED.fullmatch(text)

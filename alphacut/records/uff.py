@@ -1,11 +1,12 @@
-"""Universal files: mode shapes (data set 55) and time histories (data set 58), read by pyuff.
+"""Universal files: mode shapes (data set 55, read by pyuff) and time histories (data set 58).
 
 pyuff is an optional extra: ``pip install 'alphacut[uff]'``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,18 +16,19 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io.measured import ModeRows
 from alphacut.records.recording import Recording
-from alphacut.records.text_file import ACCELERATION_UNITS, acceleration_factor
+from alphacut.records.text_file import ACCELERATION_UNITS, NUMBER, acceleration_factor
 
 ENDINGS = (".uff", ".unv")
 NORMAL_MODE, COMPLEX_MODES = 2, (3, 7)
-TIME_HISTORY = 1
-ACCELERATION = 12
-"""Specific data type of an acceleration in data set 58."""
+TIME_HISTORY, TIME = 1, 17
+"""Function type of a time history, and type of an axis of times, in data set 58."""
+HEAD_LINES, BIG_ENDIAN, DOUBLE, COMPLEX = 11, 2, (4, 6), (5, 6)
+"""Lines of its head, and its codes of byte order and of ordinates."""
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 MIN_COLLINEARITY = 0.9
 """Modal phase collinearity below which a complex shape has no real one (Pappa, Elliott 1993)."""
 EVEN = 1e-3
-"""Share of a step by which times may be uneven; the format has them in single precision."""
+"""Share of a step by which times may be uneven besides the rounding of their digits."""
 
 
 def uff_mode_rows(path: Path, floors: Mapping[str, int]) -> tuple[ModeRows, ...]:
@@ -53,37 +55,156 @@ def uff_mode_rows(path: Path, floors: Mapping[str, int]) -> tuple[ModeRows, ...]
     return tuple(modes[number] for number in sorted(modes))
 
 
-def read_uff_record(path: Path, channel: str = "") -> Recording:
-    """Reads a recording of acceleration from a data set 58 of a universal file.
+def is_universal(content: bytes) -> bool:
+    """True if the first line is the mark with which data sets of universal files begin and end."""
+    return content.lstrip()[:20].split(b"\n")[0].strip() == b"-1"
+
+
+def read_uff_record(name: str, content: bytes, channel: str = "") -> Recording:
+    """Reads a recording of acceleration from a data set 58 of a universal file, text or binary.
+
+    The stated unit says whether it is an acceleration, whatever numeric type the file gives it.
 
     Args:
-        path: The file.
+        name: Name of the file, for messages.
+        content: The file.
         channel: NODE.DIRECTION of the response, as "7.x"; may be left out where there is one.
 
     Raises:
-        RefusedError: The file cannot be read, or holds no such acceleration over even times in a
-            known unit.
+        RefusedError: The file holds no such acceleration over even times in a known unit.
     """
-    sets = {_response_name(dataset): dataset for dataset in _datasets(path, 58)}
-    names = [name for name in sets if not channel or name == channel.lower()]
+    sets = {series.name: series for series in _series(name, content)}
+    names = [response for response in sets if not channel or response == channel.lower()]
     value, allowed = f"channel {channel or 'not named'}", ", ".join(sets) or "none is there"
-    require(len(names) == 1, path.name, value=value, allowed=f"one of: {allowed}")
-    dataset, key = sets[names[0]], f"{path.name}, response {names[0]}"
-    kind = dataset["func_type"], dataset.get("ordinate_spec_data_type")
-    allowed = "a time history (1) of an acceleration (12)"
-    value = f"of function type {kind[0]} and data type {kind[1]}"
-    require(kind == (TIME_HISTORY, ACCELERATION), key, value=value, allowed=allowed)
-    unit = str(dataset.get("ordinate_axis_units_lab", "")).strip()
-    factor = acceleration_factor(unit)
+    require(len(names) == 1, name, value=value, allowed=f"one of: {allowed}")
+    series, key = sets[names[0]], f"{name}, response {names[0]}"
+    is_history = series.function == TIME_HISTORY or (series.function == 0 and series.axis == TIME)
+    allowed = "a time history (1) of an acceleration"
+    require(is_history, key, value=f"of function type {series.function}", allowed=allowed)
+    factor = acceleration_factor(series.unit)
     if factor is None:
-        raise RefusedError(key, f"in units of {unit or 'none'}", ACCELERATION_UNITS)
-    time, samples = np.asarray(dataset["x"], float), np.real(np.asarray(dataset["data"]))
-    steps = np.diff(time)
-    is_even = len(steps) > 0 and steps[0] > 0 and np.ptp(steps) <= EVEN * steps[0]
-    fits = is_even and np.isfinite(samples).all()
-    require(fits, key, value="uneven", allowed="even times, finite samples")
-    step = float(time[-1] - time[0]) / len(steps)
-    return Recording("UFF 58", unit, step, factor * samples)
+        raise RefusedError(key, f"in units of {series.unit or 'none'}", ACCELERATION_UNITS)
+    is_full = len(series.samples) == series.count > 1 and bool(np.isfinite(series.samples).all())
+    value = f"{series.count} points, and {len(series.samples)} are there"
+    require(is_full, key, value=value, allowed="two or more finite samples, as many as stated")
+    step = _even_step(key, series) if series.times is not None else series.step
+    allowed = "a finite step above 0 s"
+    require(0 < step < np.inf, key, value=f"a step of {step:g} s", allowed=allowed)
+    return Recording("UFF 58", series.unit, step, factor * series.samples, names[0])
+
+
+@dataclass(frozen=True, eq=False)
+class _Series:
+    """A data set 58: NODE.DIRECTION of the response, types of function and axis, and its samples.
+
+    `times` are None where the steps are even, (n,) in s otherwise.
+    """
+
+    name: str
+    function: int
+    axis: int
+    unit: str
+    count: int
+    step: float
+    times: Array | None
+    samples: Array
+
+
+def _series(name: str, content: bytes) -> Iterator[_Series]:
+    """Yield the data sets 58 of a file."""
+    try:
+        for head, values in _sets_58(content):
+            yield _parse_series(head, values)
+    except (ValueError, IndexError) as error:
+        raise RefusedError(name, str(error)[:80], "data sets 58 of a universal file") from None
+
+
+def _sets_58(content: bytes) -> Iterator[tuple[list[str], bytes | list[str]]]:
+    """Yield the eleven lines of the head of each data set 58, and its bytes or its lines."""
+    position = 0
+
+    def line() -> bytes:
+        nonlocal position
+        end = content.find(b"\n", position)
+        end = len(content) if end < 0 else end
+        start, position = position, end + 1
+        return content[start:end]
+
+    while position < len(content):
+        if line().strip() != b"-1":
+            continue
+        first = line()
+        if first[:7].strip() == b"58b":
+            byte_order, _, _, size = (int(word) for word in first[7:].split()[:4])
+            head = [_text(line()) for _ in range(HEAD_LINES)]
+            # some writers put an end of line between the head and the bytes
+            starts = (position + extra for extra in range(3))
+            ends = (x for x in starts if content[x + size :].lstrip()[:2] == b"-1")
+            start = next(ends, position)
+            position = start + max(size, 0)
+            yield [*head, ">" if byte_order == BIG_ENDIAN else "<"], content[start:position]
+        rows = []
+        while position < len(content) and (row := line()).strip() != b"-1":
+            rows.append(_text(row))
+        if first.strip() == b"58":
+            yield rows[:HEAD_LINES], rows[HEAD_LINES:]
+
+
+def _text(line: bytes) -> str:
+    try:
+        return line.decode().rstrip("\r")
+    except UnicodeDecodeError:
+        return line.decode("latin-1").rstrip("\r")
+
+
+def _parse_series(head: list[str], values: bytes | list[str]) -> _Series:
+    """The series of a data set 58, by the columns of its head (I-DEAS, Universal File Format)."""
+    response, direction = int(head[5][41:51]), abs(int(head[5][51:55]))
+    axis_name = DIRECTIONS[direction - 1] if 1 <= direction <= 6 else str(direction)
+    kind, count, is_even = (int(head[6][start : start + 10]) for start in (0, 10, 20))
+    step = float(head[6][43:56])
+    parts = 2 if kind in COMPLEX else 1
+    columns = parts if is_even else parts + 1
+    if isinstance(values, bytes):
+        real = f"{head[HEAD_LINES]}f{8 if kind in DOUBLE else 4}"
+        time = f"{head[HEAD_LINES]}f4"  # a time is single, beside doubles as well
+        row = np.dtype([("time", time)] * (not is_even) + [("value", real, (parts,))])
+        table = np.frombuffer(values, row, min(count, len(values) // row.itemsize))
+        times = None if is_even else table["time"].astype(float)
+        with np.errstate(invalid="ignore"):  # damaged bytes, which are refused
+            samples = table["value"][:, 0].astype(float)
+    else:
+        numbers = np.array([float(x) for text in values for x in NUMBER.findall(text)])
+        rows = numbers[: count * columns]  # what follows is padding
+        rows = rows[: len(rows) // columns * columns].reshape(-1, columns)
+        times = None if is_even else rows[:, 0]
+        samples = rows[:, columns - parts]
+    unit = head[8][47:67].strip()
+    return _Series(
+        f"{response}.{axis_name}",
+        int(head[5][:5]),
+        int(head[7][:10]),
+        "" if unit.upper() == "NONE" else unit,
+        count,
+        step,
+        times,
+        samples,
+    )
+
+
+def _even_step(key: str, series: _Series) -> float:
+    """Step in s of times that are even but for the six digits with which the format has them."""
+    times = series.times
+    assert times is not None
+    even = np.linspace(times[0], times[-1], len(times))
+    step = float(even[1] - even[0])
+    size = np.maximum(np.abs(times), np.finfo(float).tiny)
+    rounding = 10 ** (np.floor(np.log10(size)) - 5)
+    is_even = step > 0 and bool((np.abs(times - even) <= rounding + EVEN * step).all())
+    require(is_even, key, value="uneven", allowed="even times")
+    rate = round(1 / step)  # of which the digits are often but a rounding
+    is_whole = rate > 0 and abs(1 / rate - step) * (len(times) - 1) <= rounding[-1]
+    return 1 / rate if is_whole else step
 
 
 def phase_collinearity(shape: Array) -> float:
@@ -100,7 +221,7 @@ def phase_collinearity(shape: Array) -> float:
 
 
 def _datasets(path: Path, kind: int) -> list[dict[str, Any]]:
-    """Data sets of a kind (55 or 58) in a universal file, as pyuff reads them."""
+    """Data sets of a kind in a universal file, as pyuff reads them."""
     import pyuff
 
     try:
@@ -150,10 +271,3 @@ def _real_shape(shape: Array) -> Array:
     """Real part of a complex shape, after a turn of all phases that makes it largest."""
     angle = 0.5 * np.angle((shape**2).sum())
     return np.asarray((shape * np.exp(-1j * angle)).real)
-
-
-def _response_name(dataset: dict[str, Any]) -> str:
-    """NODE.DIRECTION of the response, whose direction is ±1 … ±6."""
-    direction = abs(int(dataset["rsp_dir"]))
-    name = DIRECTIONS[direction - 1] if 1 <= direction <= len(DIRECTIONS) else str(direction)
-    return f"{int(dataset['rsp_node'])}.{name}"

@@ -56,6 +56,7 @@ class SuiteRecord:
         measures: "PGA" and "Sa(T1)" of the scaled record, in m/s², and "scale", 1.
         cut_share: Share of the Arias intensity after the end of the motion.
         offset_share: Mean of the record over its peak, after the correction.
+        doubts: What is unusual in its file, one clause each.
     """
 
     name: str
@@ -64,6 +65,7 @@ class SuiteRecord:
     measures: Mapping[str, float]
     cut_share: float
     offset_share: float
+    doubts: tuple[str, ...] = ()
 
 
 def nominal_mode(structure: Structure) -> NominalMode:
@@ -107,12 +109,17 @@ def _suite_record(
     offset = float(ground.samples.mean()) / ground.extremes[0]
     scaled = Accelerogram(ground.step, factor * ground.acceleration)
     measures |= {name: factor * measures[name] for name in ("PGA", "Sa(T1)")}
-    return SuiteRecord(named.name, scaled, steps * envelope.step, measures, cut_share, offset)
+    doubts = tuple(named.recording.doubts())
+    return SuiteRecord(
+        named.name, scaled, steps * envelope.step, measures, cut_share, offset, doubts
+    )
 
 
 def suite_warnings(records: Sequence[SuiteRecord]) -> Iterator[str]:
-    """Yields warnings on records with a large mean, and on those that outlast their motion."""
+    """Yields warnings on unusual records, large means, and records that outlast their motion."""
     for record in records:
+        for doubt in record.doubts:
+            yield f"of record {record.name} {doubt}"
         if abs(record.offset_share) > MAX_OFFSET:
             yield (
                 f"the mean of record {record.name} is {record.offset_share:.1%} of its peak;"

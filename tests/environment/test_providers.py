@@ -69,6 +69,7 @@ INDIRECT = {  # imported by others on this project's behalf
 }
 FROM_PYPI = {  # each is needed by one comparison, or is an optional extra
     "pyuff": "alphacut/records/uff.py",
+    "obspy": "alphacut/records/read.py",
     "openseespylinux": "benchmarks/frame/opensees.py",
 }
 

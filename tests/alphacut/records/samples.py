@@ -57,21 +57,25 @@ def esm(unit: str = "cm/s^2") -> str:
     return head + lines(size * samples(), "20.10E", 1)
 
 
-def cosmos(step: float = STEP, names=("1: 90 deg", "2: Up"), width: int = 15) -> str:
+def cosmos(step=STEP, processed=-999.0, names=("1: 90 deg", "2: Up"), width=15, **marks) -> str:
+    """Volume 2; `marks` are other spellings of the lines that announce reals and samples."""
     reals = [-999.0] * 100
-    reals[33] = step
+    reals[33], reals[61] = step, processed
+    real_mark = marks.get("reals", " 100 Real-header values follow on  17 lines, Format= (6F13.6)")
+    unit = marks.get("unit", "cm/sec2 (4), ")
+    size = G * 100 if unit.startswith("cm") else 1.0
     blocks = []
     for number, name in enumerate(names, 1):
-        values = 100 * G * samples() * (1 if number == 1 else 0.5)
+        values = size * samples() * (1 if number == 1 else 0.5)
+        title = f"Sta Chan   {name} (Rcrdr Chan  {number}) Location:Free Field\n" if name else ""
         blocks.append(
-            "Corrected acceleration   (Format v01.20 with 13 text lines)\n"
-            f"Sta Chan   {name} (Rcrdr Chan  {number}) Location:Free Field\n"
+            f"Corrected acceleration   (Format v01.20 with 13 text lines)\n{title}"
             " 100 Integer-header values follow on  10 lines, Format= (10I8)\n"
             + lines([7] * 100, "8d", 10)
-            + " 100 Real-header values follow on  17 lines, Format= (6F13.6)\n"
+            + f"{real_mark}\n"
             + lines(reals, "13.6f", 6)
             + '   1 Comment line(s) follow, each starting with a "|":\n|\n'
-            f"    2000 acceleration pts, approx   10 secs, units=cm/sec2 (4), Format=(5E{width}.{width - 8})\n"
+            f"    2000 acceleration pts, approx   10 secs, units={unit}Format=(5E{width}.{width - 8})\n"
             + lines(values, f"{width}.{width - 8}E", 5)
             + f"End-of-data for ChanHN{'EZ'[number - 1]} acceleration\n"
             f"    2000 velocity pts, approx   10 secs, units=cm/sec (5), Format=(5E{width}.{width - 8})\n"
@@ -81,7 +85,65 @@ def cosmos(step: float = STEP, names=("1: 90 deg", "2: Up"), width: int = 15) ->
     return "".join(blocks)
 
 
-def csv_text(unit: str = "g", mark: str = ",") -> str:
+def csmip(announced=True, names=("1: 90 Deg", "2: Up"), unit="cm/sec2", raw=False) -> str:
+    """Volume 2, or volume 1 if `raw`; not `announced` is an old form of that."""
+    blocks = []
+    for number, name in enumerate(names, 1):
+        size = {"g": 1.0, "g/10": 10.0}.get(unit, 100 * G) * (1 if number == 1 else 0.5)
+        integers, reals = [0] * 112, [0.0] * 56
+        integers[27], reals[2] = COUNT, STEP * (COUNT - 1)
+        title = "UNCORRECTED ACCELEROGRAM DATA" if raw else "CORRECTED ACCELEROGRAM"
+        text = f"{title}   00000-X0000      Chan  {name}     from\n"
+        second = "text" if raw else "UNCORRECTED ACCELEROGRAM DATA PROCESSED: 01/01/00"
+        text += f"{second}\n" + "text\n" * 9 + f"DURATION 10 SEC  UNITS ARE SEC AND {unit}\ntext\n"
+        text += lines(integers, "5d", 16) + lines(reals, "10.4f", 8)
+        series = (
+            f" {COUNT} points of accel data equally spaced at  .0050 sec, in {unit}. (8f12.6)\n"
+        )
+        if announced:
+            text += series + lines(size * samples(), "12.6f", 8)
+        else:
+            text += "ACCELEROGRAM DATA\n" + lines(size * samples(), "9.5f", 8)
+        text += f" {COUNT} points of veloc data equally spaced at  .0050 sec, in cm/sec. (8f10.6)\n"
+        blocks.append(text + lines(0 * samples(), "10.6f", 8) + "/& --- End of data ---\n")
+    return "".join(blocks)
+
+
+def smc(first="2 CORRECTED ACCELEROGRAM", angle=90, count=COUNT) -> str:
+    integers, reals = [-32768] * 48, [1.7e38] * 50
+    integers[12], integers[15], integers[16] = angle, 2, count
+    reals[1] = 1 / STEP
+    text = f"{first}\n" + "*\n" * 10 + lines(integers, "10d", 8) + lines(reals, "15.7E", 5)
+    values = [f"{x:.4E}".replace("E-0", "E-").replace("E+0", "E+") for x in 100 * G * samples()]
+    return text + "| a comment\n|\n" + lines(values, ">10s", 8)
+
+
+def csv_text(unit: str = "g", mark: str = ",", start: float = 0.0) -> str:
     size = {"g": 1.0, "gal": 100 * G, "m/s^2": G, "cm/s^2": 100 * G}[unit]
-    rows = [f"{k * STEP:.3f}{mark}{x:.10g}" for k, x in enumerate(size * samples())]
+    rows = [f"{start + k * STEP:.3f}{mark}{x:.10g}" for k, x in enumerate(size * samples())]
     return f"time [s]{mark}acceleration [{unit}]\n" + "\n".join(rows) + "\n"
+
+
+def uff58(
+    values, *, kind=2, function=1, unit="m/s^2", spec=12, times=None, step=STEP, order=""
+) -> bytes:
+    """Data set 58 by the columns of its head; kind 2 has single reals, 4 doubles; `order` < or >: 58b."""
+    single = kind == 2
+    numbers = np.asarray(values, float)
+    if times is not None:
+        numbers = np.column_stack([times, numbers]).ravel()
+    data = numbers.astype(f"{order or '<'}f{4 if single else 8}").tobytes()
+    first = (
+        f"    58b     {1 + (order == '>')}     2          11{len(data):12d}" if order else "    58"
+    )
+    head = [
+        "    -1", first, "made up", "NONE", "01-Jan-20 00:00:00", "NONE", "NONE",
+        f"{function:5d}{0:10d}{0:5d}{0:10d} {'NONE':<10}{7:10d}{1:4d} {'NONE':<10}{0:10d}{0:4d}",
+        f"{kind:10d}{len(values):10d}{int(times is None):10d}{0:13.5E}{step:13.5E}{0:13.5E}",
+        f"{17:10d}{0:5d}{0:5d}{0:5d} {'Time':<20} {'s':<20}",
+        f"{spec:10d}{0:5d}{0:5d}{0:5d} {'Channel 1':<20} {unit:<20}",
+        *[f"{0:10d}{0:5d}{0:5d}{0:5d} {'NONE':<20} {'NONE':<20}"] * 2,
+    ]  # fmt: skip
+    if not order:
+        data = (lines(numbers, "13.5E", 6) if single else lines(numbers, "20.12E", 4)).encode()
+    return "".join(f"{line:<80}\n" for line in head).encode() + data + b"    -1\n"

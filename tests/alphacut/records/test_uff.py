@@ -1,4 +1,4 @@
-"""Universal files, written by pyuff itself, are read; what has no meaning is refused."""
+"""Universal files: modes as pyuff writes them, histories by the columns of the format."""
 
 import numpy as np
 import pytest
@@ -6,6 +6,7 @@ import pytest
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.records.read import read_recording
 from alphacut.records.uff import phase_collinearity, uff_mode_rows
+from tests.alphacut.records.samples import uff58
 
 FLOORS = {"11.x": 1, "12.x": 2, "13.x": 3}
 SHAPE = np.array([0.4, 0.8, 1.0])
@@ -56,27 +57,88 @@ def test_a_complex_shape_is_turned_to_its_real_one_or_refused(tmp_path):
         uff_mode_rows(written(tmp_path / "b.uff", [complex_mode(1.2)]), FLOORS)
 
 
-def history(node=7, **changes):
-    prepare = pytest.importorskip("pyuff").prepare_58
-    time = 0.005 * np.arange(400)
-    own = {"func_type": 1, "rsp_node": node, "rsp_dir": 1, "ref_node": 1, "ref_dir": 1}
-    own |= {"x": time, "data": np.sin(9 * time), "binary": 0, "ord_data_type": 4}
-    own |= {"ordinate_axis_units_lab": "m/s^2", "ordinate_spec_data_type": 12}
-    own |= {f"{axis}_spec_data_type": 0 for axis in ("orddenom", "z_axis")}
-    own |= {"abscissa_spacing": 1, "num_pts": 400, "abscissa_inc": 0.005, "abscissa_min": 0.0}
-    return prepare(**own | changes)
+WAVE = np.sin(9 * 0.005 * np.arange(400))
 
 
-def test_a_time_history_is_a_record_and_another_function_is_refused(tmp_path):
-    path = written(tmp_path / "record.uff", [history(), history(node=8)])
-    record = read_recording(path, "8.x")
-    assert record.step == pytest.approx(0.005, rel=1e-5)
-    assert record.samples == pytest.approx(np.sin(9 * 0.005 * np.arange(400)), abs=1e-6)
+def saved(folder, content):
+    path = folder / "record.uff"
+    path.write_bytes(content)
+    return path
+
+
+@pytest.mark.parametrize("spec", [0, 1, 12, 15])
+@pytest.mark.parametrize(("unit", "size"), [("m/s^2", 1.0), ("m/s²", 1.0), ("g", 9.80665)])
+def test_the_stated_unit_says_what_a_history_is(tmp_path, spec, unit, size):
+    record = read_recording(saved(tmp_path, uff58(WAVE, unit=unit, spec=spec)))
+    assert record.step == pytest.approx(0.005, rel=1e-9)
+    assert record.samples == pytest.approx(size * WAVE, abs=1e-4)
+
+
+@pytest.mark.parametrize("order", ["", "<", ">"])
+@pytest.mark.parametrize("kind", [2, 4])
+def test_text_and_bytes_of_single_and_double_reals_are_read(tmp_path, kind, order):
+    content = uff58(WAVE, kind=kind, order=order)
+    record = read_recording(saved(tmp_path, content))
+    assert record.samples == pytest.approx(WAVE, abs=1e-11 if kind == 4 else 1e-5)
+    several = content + uff58(2 * WAVE, kind=kind, order=order).replace(
+        b"         7   1", b"         8   1"
+    )
+    assert read_recording(saved(tmp_path, several), "8.x").samples == pytest.approx(
+        2 * WAVE, abs=2e-5
+    )
     with pytest.raises(RefusedError, match=r"one of: 7\.x, 8\.x"):
-        read_recording(path)
-    other = written(tmp_path / "frf.uff", [history(func_type=4)])
-    with pytest.raises(RefusedError, match="of function type 4"):
-        read_recording(other)
+        read_recording(saved(tmp_path, several))
+
+
+def test_padding_is_dropped_and_a_missing_point_refused(tmp_path):
+    content = uff58(WAVE)
+    padded = content.replace(b"    -1\n", b" 0.00000E+00 0.00000E+00\n    -1\n")
+    assert len(read_recording(saved(tmp_path, padded)).samples) == len(WAVE)
+    with pytest.raises(RefusedError, match="401 points, and 400 are there"):
+        read_recording(saved(tmp_path, content.replace(b"       400", b"       401")))
+
+
+@pytest.mark.parametrize("rate", [256, 200, 1000])
+def test_times_that_are_even_but_for_their_digits_are_even(tmp_path, rate):
+    wave = np.sin(np.arange(8000) / 40)
+    times = np.arange(8000) / rate
+    record = read_recording(saved(tmp_path, uff58(wave, times=times)))
+    assert record.step == pytest.approx(1 / rate, rel=1e-9)
+    assert record.samples == pytest.approx(wave, abs=1e-5)
+    times[4000:] += 0.4 / rate
+    with pytest.raises(RefusedError, match="uneven"):
+        read_recording(saved(tmp_path, uff58(wave, times=times)))
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [({"unit": "Pa"}, "in units of Pa"), ({"unit": "NONE"}, "in units of none"),
+     ({"function": 4}, "of function type 4"), ({"step": 0.0}, "a step of 0 s")],
+)  # fmt: skip
+def test_what_is_no_acceleration_over_time_is_refused(tmp_path, changes, message):
+    with pytest.raises(RefusedError, match=message):
+        read_recording(saved(tmp_path, uff58(WAVE, **changes)))
+
+
+def record_or_message(path):
+    try:
+        return read_recording(path)
+    except RefusedError as error:
+        return str(error)
+
+
+def test_mutated_universal_files_end_in_one_line_or_in_a_record(tmp_path):
+    seed = np.random.SeedSequence().entropy % 10**6
+    print("seed", seed)
+    rng = np.random.default_rng(seed)
+    for _ in range(200):
+        content = bytearray(uff58(WAVE[:60], order=str(rng.choice(["", "<"]))))
+        place = int(rng.integers(len(content)))
+        content[place : place + int(rng.integers(30))] = rng.bytes(int(rng.integers(20)))
+        outcome = record_or_message(saved(tmp_path, bytes(content)))
+        assert (
+            "\n" not in outcome if isinstance(outcome, str) else np.isfinite(outcome.samples).all()
+        )
 
 
 def test_what_is_not_there_is_refused(tmp_path):

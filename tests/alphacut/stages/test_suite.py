@@ -9,7 +9,7 @@ from alphacut.case.load import load
 from alphacut.entry import main
 from alphacut.io.problem import BadInput
 from alphacut.records.spectrum import spectral_acceleration
-from alphacut.stages.suite import nominal_mode, suite_records
+from alphacut.stages.suite import nominal_mode, suite_records, suite_warnings
 
 CASE = """
 title = "One storey under two records"
@@ -86,6 +86,33 @@ def test_what_makes_no_suite_is_one_line(tmp_path, old, new, message):
     with pytest.raises(BadInput) as caught:
         records_of(tmp_path, old, new)
     assert message in str(caught.value)
+
+
+def test_columns_without_a_head_have_step_and_unit_from_the_case(tmp_path):
+    samples = np.loadtxt(written(tmp_path).with_name("one.csv"), delimiter=",", skiprows=1)[:, 1]
+    np.savetxt(tmp_path / "plain.txt", samples)
+    new = '[records]\nstep = "0.02 s"\nunit = "m/s^2"\nfiles = ["plain.txt", "two.csv"]'
+    (record, _), _ = records_of(tmp_path, '[records]\nfiles = ["one.csv", "two.csv"]', new)
+    assert record.ground.step == 0.02
+    assert record.ground.acceleration == pytest.approx(samples)
+    for old, bad in (("0.02 s", "0.02"), ("m/s^2", "mm"), ('unit = "m/s^2"\n', "")):
+        with pytest.raises(BadInput, match=r"unit|step"):
+            records_of(tmp_path, '[records]\nfiles = ["one.csv", "two.csv"]', new.replace(old, bad))
+
+
+def test_all_bad_files_of_a_folder_are_named_at_once(tmp_path):
+    for name in ("bad1.AT2", "bad2.AT2", "bad3.AT2"):
+        (tmp_path / name).write_text("no record\n")
+    with pytest.raises(BadInput, match=r"bad1\.AT2 .*bad2\.AT2, bad3\.AT2"):
+        records_of(tmp_path, '"one.csv"', '"*.AT2"')
+
+
+def test_what_is_unusual_in_a_record_is_a_warning(tmp_path):
+    late = "".join(f"{10 + 0.02 * k:.2f},{60 * np.sin(k)}\n" for k in range(80))
+    (tmp_path / "late.csv").write_text(f"time [s],acceleration [m/s^2]\n{late}")
+    warnings = "\n".join(suite_warnings(records_of(tmp_path, '"one.csv"', '"late.csv"')[0]))
+    assert "of record late its times begin at 10 s" in warnings
+    assert "of record late its peak is 6.12 g" in warnings
 
 
 def test_a_bad_record_is_named_before_anything_is_computed(tmp_path, capsys):

@@ -1,0 +1,141 @@
+"""Records of networks with one channel a file: K-NET and KiK-net, ESM and ITACA, SMC."""
+
+from __future__ import annotations
+
+import re
+from math import ceil
+
+from alphacut.records.recording import Recording
+from alphacut.records.text_file import ACCELERATION_UNITS, NUMBER, TextFile, acceleration_factor
+
+SCALE = re.compile(r"\s*([0-9.]+)\s*\(gal\)\s*/\s*([0-9.]+)\s*", re.IGNORECASE)
+FREQUENCY = re.compile(r"\s*([0-9.]+)\s*Hz\s*", re.IGNORECASE)
+DURATION = re.compile(r"\s*([0-9.]+)\s*")
+KNET_FIELDS = {"Sampling Freq(Hz)": FREQUENCY, "Duration Time(s)": DURATION, "Scale Factor": SCALE}
+KNET_LABEL = 18
+"""Columns of a label in the head."""
+ESM_LINE = re.compile(r"([A-Z][A-Z0-9_/.]*(?: [A-Z0-9_/.]+)*)\s*:\s*(.*)")
+INTERVAL, COUNT, KIND = "SAMPLING_INTERVAL_S", "NDATA", "DATA_TYPE"
+SMC = re.compile(r"\s*([1-4])\s+(?:(?:UN)?CORRECTED ACCELEROGRAM|VELOCITY|DISPLACEMENT)\s*")
+SMC_TEXT, SMC_INTEGERS, SMC_REALS = 11, 6, 10
+"""Lines of the three heads of an SMC file."""
+VERTICAL_ANGLE, COMMENTS, POINTS, RATE = 13, 16, 17, 2
+"""Entries of the integer head, from 1, and the one of the real head with samples in a second."""
+
+
+def is_knet(file: TextFile) -> bool:
+    """True if the first line is that of a K-NET file."""
+    return file.lines[0].startswith("Origin Time")
+
+
+def read_knet(file: TextFile) -> Recording:
+    """Recording of a K-NET or KiK-net file: a head of 17 lines, then counts, eight to a line.
+
+    One count is the scale factor ``7845(gal)/8223790``. Counts keep the sensor's offset, so that
+    such a record wants ``baseline = "mean"``.
+
+    Raises:
+        RefusedError: A line of the head is missing, or the counts are not those it states.
+    """
+    end = next((k for k, line in enumerate(file.lines) if line.startswith("Memo")), None)
+    if end is None:
+        raise file.refusal(len(file.lines) - 1, "without a line Memo.", "the head of a K-NET file")
+    fields = (_knet_field(file, name, end) for name in KNET_FIELDS)
+    (frequency, _), (duration, line), (scale, _) = fields
+    rate = float(frequency[1])  # samples in a second
+    gal_per_count = float(scale[1]) / float(scale[2])
+    counts = file.numbers(end + 1, len(file.lines))
+    file.require_count(counts, round(float(duration[1]) * rate), line)
+    channel = next((x[KNET_LABEL:].strip() for x in file.lines[:end] if x.startswith("Dir.")), "")
+    return Recording("K-NET", "gal", 1 / rate, counts * gal_per_count * 0.01, channel)
+
+
+def _knet_field(file: TextFile, name: str, end: int) -> tuple[re.Match[str], int]:
+    """Match of the value of a name in the head, which has `end` lines, and its line from 0."""
+    for row, line in enumerate(file.lines[:end]):
+        if line.startswith(name):
+            match = KNET_FIELDS[name].fullmatch(line[min(KNET_LABEL, len(line)) :])
+            if match and all(float(number) > 0 for number in match.groups()):
+                return match, row
+            raise file.refusal(row, line.strip(), f"{name}, as in files of K-NET")
+    raise file.refusal(end, f"without {name}", "the head of a K-NET file")
+
+
+def is_esm(file: TextFile) -> bool:
+    """True if a line of the head states the sampling interval as files of ESM do."""
+    return any(line.startswith(INTERVAL) for line in file.lines[:80])
+
+
+def read_esm(file: TextFile) -> Recording:
+    """Recording of a file of ESM or ITACA: a head of lines ``KEY: value``, then one sample a line.
+
+    Raises:
+        RefusedError: A line of the head is missing, the samples are no accelerations, or there are
+            not as many as the head states.
+    """
+    head = _esm_head(file)
+    step, count = _positive_number(file, head, INTERVAL), int(_positive_number(file, head, COUNT))
+    if not 0 < step < 10:
+        raise file.refusal(head[INTERVAL][1], f"a step of {step:g} s", "above 0 and below 10 s")
+    unit, line = head.get("UNITS", ("", head[INTERVAL][1]))
+    factor = acceleration_factor(unit)
+    kind = head.get(KIND, ("ACCELERATION", 0))[0]
+    if factor is None or "ACCELERATION" not in kind.upper():
+        value = f"{kind} in {unit or 'no unit'}"
+        raise file.refusal(line, value, f"accelerations in {ACCELERATION_UNITS}")
+    first = 1 + max(row for _, row in head.values())
+    samples = file.numbers(first, len(file.lines))
+    file.require_count(samples, count, head[COUNT][1])
+    return Recording("ESM", unit, step, samples * factor, head.get("STREAM", ("", 0))[0])
+
+
+def _esm_head(file: TextFile) -> dict[str, tuple[str, int]]:
+    """Value and line number, from 0, of each key of the head, which ends at the first number."""
+    head: dict[str, tuple[str, int]] = {}
+    for row, line in enumerate(file.lines):
+        match = ESM_LINE.fullmatch(line.strip())
+        if match is not None:
+            head[match[1]] = match[2].strip(), row
+        elif NUMBER.fullmatch(line.strip()):
+            break
+    return head
+
+
+def _positive_number(file: TextFile, head: dict[str, tuple[str, int]], key: str) -> float:
+    text, line = head.get(key, ("", 0))
+    if not NUMBER.fullmatch(text) or float(text) <= 0:
+        raise file.refusal(line, f"{key}: {text}", "a number above 0", "load the file anew")
+    return float(text)
+
+
+def is_smc(file: TextFile) -> bool:
+    """True if the first line is that of an SMC file."""
+    return SMC.fullmatch(file.lines[0]) is not None
+
+
+def read_smc(file: TextFile) -> Recording:
+    """Recording of an SMC file of the USGS, in cm/s²: three heads, comments, eight samples a line.
+
+    Raises:
+        RefusedError: The series is no acceleration, or the samples are not those of the heads.
+    """
+    match = SMC.fullmatch(file.lines[0])
+    assert match is not None
+    if match[1] not in "12":
+        raise file.refusal(0, file.lines[0].strip(), "1 UNCORRECTED or 2 CORRECTED ACCELEROGRAM")
+    integers = file.numbers(SMC_TEXT, SMC_TEXT + SMC_INTEGERS, width=10)
+    reals_line = SMC_TEXT + SMC_INTEGERS
+    reals = file.numbers(reals_line, reals_line + SMC_REALS, width=15)
+    if len(integers) < POINTS or len(reals) < RATE:
+        value, allowed = f"{len(integers)} integers and {len(reals)} reals", "48 and 50, as in SMC"
+        raise file.refusal(SMC_TEXT, value, allowed)
+    count, comments = int(integers[POINTS - 1]), max(int(integers[COMMENTS - 1]), 0)
+    rate = float(reals[RATE - 1])
+    if not (count > 1 and 0.1 < rate <= 1e5):
+        value = f"{count} samples, {rate:g} in a second"
+        raise file.refusal(reals_line, value, "two or more, 0.1 to 1e5 in a second")
+    first = reals_line + SMC_REALS + comments
+    samples = file.numbers(first, first + ceil(count / 8), width=10)
+    file.require_count(samples, count, SMC_TEXT)
+    channel = "vertical" if integers[VERTICAL_ANGLE - 1] in (0, 180) else ""
+    return Recording("SMC", "cm/s^2", 1 / rate, samples * 0.01, channel)
