@@ -18,11 +18,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.frame.bounds.kernel import FACES, examine
+from alphacut.frame.bounds.newton import Optima, refine
 from alphacut.frame.bounds.remainder import Remainder
 from alphacut.frame.calculus.jet import Array
-from alphacut.frame.modal.model import ModalModel
-from alphacut.frame.modal.newton import refine
-from alphacut.frame.modal.optima import Optima
+from alphacut.frame.modes.modal_model import ModalModel
 from alphacut.fuzzy.progress_bar import Progress
 
 PIECE = 30_000

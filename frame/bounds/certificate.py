@@ -8,13 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.frame.bounds.branch_and_bound import enclosed
+from alphacut.frame.bounds.newton import Optima, first_optima
 from alphacut.frame.bounds.remainder import Remainder, largest_growth, parts, suprema
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.polynomial import Polynomial
-from alphacut.frame.modal.ground_response import Direct
-from alphacut.frame.modal.model import ModalModel
-from alphacut.frame.modal.newton import first_optima
-from alphacut.frame.modal.optima import Optima
+from alphacut.frame.modes.modal_model import ModalModel
+from alphacut.frame.response.load_tables import Direct
 from alphacut.fuzzy.progress_bar import Progress, subprogress
 
 LOG = logging.getLogger(__name__)

@@ -1,237 +1,178 @@
-"""Proved bound of the polynomials' error in a modal model, over the whole box.
+"""Proved bound of the error of a modal model, over the whole box and all times.
 
-Polynomials z_k = [φ_k; w_k] for the states of the modes make q(t) = 2 Re Σ φ_k exp(λ_k t) a motion
-that nearly obeys the equations. What it misses, λ_k φ_k − w_k and λ_k M w_k + D w_k + K φ_k, is a
-polynomial in the parameters, bounded by its Chebyshev coefficients. Damping only takes energy, so
-the deviation from the true motion, in the norm √(qᵀ K q + vᵀ M v), grows no faster than this
-defect: no eigenvalue problem is solved anew, and nothing rests on a distance between eigenvalues.
-Damping by one ratio for all modes is no polynomial; `ratio_damping` bounds what that adds.
+Polynomials φ_k, w_k, λ_k make q(t) = 2 Re Σ φ_k exp(λ_k t) a motion that nearly obeys the
+equations. What it misses, λ_k φ_k − w_k and λ_k M w_k + D w_k + K φ_k, are Taylor models of which
+hardly more than the remainder is left. Damping only takes energy, so the deviation from the true
+motion, in the norm √(qᵀ K q + vᵀ M v), grows no faster than this defect: no eigenvalue problem is
+solved anew, and nothing rests on a distance between eigenvalues.
+
+Damping by one ratio ζ, D₀ + 2 ζ M √(M⁻¹K), is no polynomial. For any μ > 0 and vector w, in the
+norm of M⁻¹, ‖2 ζ M √(M⁻¹K) w − 2 ζ √μ M w‖ ≤ 2 ζ ‖(K − μ M) w‖ / (√λ + √μ), λ the least eigenvalue
+of K against M. With μ = |λ_k|² the motion is measured with 2 ζ √μ M w in place of the damping.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
-from alphacut.frame.bounds.ratio_damping import LoewnerBounds, RatioDamping
-from alphacut.frame.bounds.remainder import MotionPart, largest_growth, parts, suprema
-from alphacut.frame.calculus.jet import Array, Jet
-from alphacut.frame.calculus.polynomial import LowerGrid, Polynomial
+from alphacut.frame.bounds.remainder import largest_growth, parts, suprema
+from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.modal.fitting import fit_states
-from alphacut.frame.modal.ground_response import Direct
-from alphacut.frame.modal.model import ModalModel
-from alphacut.frame.structures import polynomial_dependence
-from alphacut.frame.structures.linear import LinearSystem, Matrices, evaluate, histories
+from alphacut.frame.modes.damped import DampedModes, DampedStructure, norm_of
+from alphacut.frame.modes.modal_model import ModalModel
+from alphacut.frame.response.load_tables import Direct
+from alphacut.fuzzy.arrays import Array
 
-MOST_NUMBERS = 60_000_000
-"""Values of the defects on their grid, at most: 0.5 GB."""
-CHUNK = 10_000
-Sample = Callable[[Array], dict[str, Array]]
+ROUNDING = 1e-9
+"""Relative rounding of the norms, some thousand operations."""
 
 
 def proved_error(model: ModalModel) -> Array:
     """Bound of |modal model − true motion| over the box, shape (T, m), in units of the outputs.
 
-    Defects of the model in the equations of motion push the motion off in the norm of energy; an
-    output reads a part of this deviation, and its own defects add to it.
+    Defects in the equations of motion push the motion off in the norm of energy; an output reads a
+    part of this deviation, and its own defects add to it.
 
     Raises:
-        UnprovedError: The structure is not known to be a polynomial that loses energy, or the
-            box is so wide or has so many parameters that the bound cannot be computed.
+        UnprovedError: The box is so wide that M or K may lose its definiteness.
     """
-    reach, m = np.ones(len(model.boxes.names)), len(model.outputs)
-    ratio, growth = RatioDamping.from_model(model), largest_growth(model.eigenvalue, reach)
-    states = fit_states(model)
-    defects_of_parts = [
-        (part, partial(_defects, model, part, states, ratio)) for part in parts(model, growth)
-    ]
-    grid = _grid(model)
-    for _, defects in defects_of_parts:
-        _require_affordable(grid, defects)
-    structure = _expanded(grid, partial(_structure, model))
-    stiffness, mass = LoewnerBounds(structure["stiffness"]), LoewnerBounds(structure["mass"])
+    structure, reach = model.structure, np.ones(len(model.boxes.names))
+    n, m = model.count, len(model.outputs)
+    # what is proved are the polynomials that bounds are made of
+    modes = replace(model.modes, rate=model.eigenvalue.as_model((n,)))
+    norms = EnergyNorms(structure)
+    by_ratio = _ratio_errors(structure, modes, norms)
+    energy_rate = _energy_rates(structure, modes, norms, by_ratio)
+    start, outputs = _start_errors(structure, modes, norms), modes.outputs(structure)
     deviation, output_error = np.zeros(len(model.time)), np.zeros((len(model.time), m))
-    for part, defects in defects_of_parts:
-        defect = _expanded(grid, defects)
+    for s, part in enumerate(parts(model, largest_growth(model.eigenvalue, reach))):
+        share = part.share.as_model((n, m))
         if isinstance(part.load, Direct):
-            output_error += 2 * part.waves[0][:, :1] * np.abs(defect["outputs"][:, 0]).sum(0)
+            assert structure.feeds is not None
+            error = (structure.feeds[:, s - len(start)] - share.real[0] * 2.0).size()
+            output_error += part.waves[0][:, :1] * error
             continue
-        deviation += part.push * _size_of_start(defect, stiffness, mass)
-        for k in range(model.count):
-            force = mass.sup_dual(defect["dynamic"][:, k])
-            if ratio is not None:
-                damping_error = ratio.damping_error(defect, k, stiffness, mass)
-                force += damping_error
-                wave = part.waves[0][:, k : k + 1]
-                output_error += 2 * wave * damping_error / ratio.root_masses
-            energy_rate = np.hypot(stiffness.sup(defect["kinematic"][:, k]), force)
-            deviation += 2 * energy_rate * part.elapsed[:, k]
-        largest = suprema(part.share, reach)[0].reshape(model.count, m)
-        of_modes = np.abs(defect["outputs"]).sum(0) + part.left_out[:, None] * largest
-        output_error += 2 * part.waves[0] @ of_modes
-    gain = _output_gains(structure["rows"], stiffness, mass, ratio)
-    return deviation[:, None] * gain + output_error
+        deviation += part.push * start[s] + 2 * part.elapsed @ energy_rate[s]
+        share_error = (outputs[s] - share).size() + by_ratio[s][:, None] * norms.reading
+        largest = suprema(part.share, reach)[0].reshape(n, m)
+        output_error += 2 * part.waves[0] @ (share_error + part.left_out[:, None] * largest)
+    return (1 + ROUNDING) * (deviation[:, None] * norms.outputs + output_error)
 
 
-def _output_gains(
-    rows: Array, stiffness: LoewnerBounds, mass: LoewnerBounds, ratio: RatioDamping | None
-) -> Array:
-    """Bound of each output's error over the deviation √(qᵀ K q + vᵀ M v), shape (m,).
+@dataclass(frozen=True, eq=False)
+class EnergyNorms:
+    """Bounds of energy norms over the box, by M and K in its middle, the unit matrix and diag(ω²).
 
-    `rows` (J, m, 2N) are Chebyshev coefficients of the outputs' rows on [q, v]; with `ratio`, the
-    damping by one ratio, accelerations of floors read its force too.
-    """
-    size = len(stiffness.factor)
-    rows = np.moveaxis(rows, 1, 0)  # (m, J, 2N)
-    of_displacement = np.array([stiffness.sup_dual(row[:, :size]) for row in rows])
-    of_velocity = np.array([mass.sup_dual(row[:, size:]) for row in rows])
-    if ratio is not None:
-        of_velocity = of_velocity + ratio.acceleration_gains(stiffness, mass)
-    return np.asarray(np.hypot(of_displacement, of_velocity))
-
-
-def _grid(model: ModalModel) -> LowerGrid:
-    """Grid of unit coordinates whose values determine all defects, which are polynomials."""
-    ends = zip(model.boxes.lower[0].tolist(), model.boxes.upper[0].tolist(), strict=True)
-    exponents = polynomial_dependence.degrees(
-        model.flow.system, dict(zip(model.boxes.names, ends, strict=True))
-    )
-    return LowerGrid(tuple(exponents[name] for name in model.boxes.names), 2 * model.degree)
-
-
-def _require_affordable(grid: LowerGrid, sample: Sample) -> None:
-    """Refuse a grid on which the arrays of `sample` take more than `MOST_NUMBERS` numbers.
+    (1 − μ) 1 ≤ M ≤ (1 + μ) 1 and (1 − κ) ω² ≤ K ≤ (1 + κ) ω² with spectral norms μ and κ of bounds
+    of |M − 1| and |K − ω²| / (ω ωᵀ).
 
     Raises:
-        UnprovedError: They do.
+        UnprovedError: M or K is not shown to stay positive definite.
     """
-    d = len(grid.degrees)
-    values = sample(np.zeros((1, d))).values()
-    width = sum(x.size * (2 if np.iscomplexobj(x) else 1) for x in values)
-    if len(grid) * width > MOST_NUMBERS:
-        raise UnprovedError(
-            f"the error of the modes takes {len(grid)} points of {d} fuzzy inputs, and"
-            f" {MOST_NUMBERS // width} are affordable; fewer outputs at once, narrower or fewer"
-            " inputs, or a shorter duration, can be proved"
+
+    structure: DampedStructure
+
+    def __post_init__(self) -> None:
+        if not max(self.mass_spread, self.stiffness_spread) < 1:
+            raise UnprovedError(
+                "the box is so wide that mass and stiffness are not shown to stay positive definite"
+            )
+
+    @cached_property
+    def mass_spread(self) -> float:
+        """Number μ."""
+        mass = self.structure.mass
+        return float(np.linalg.norm((mass - np.eye(len(mass.value))).size(), 2))
+
+    @cached_property
+    def stiffness_spread(self) -> float:
+        """Number κ."""
+        omega, stiffness = self.structure.omega, self.structure.stiffness
+        spread = (stiffness - np.diag(omega**2)).size() / (omega[:, None] * omega)
+        return float(np.linalg.norm(spread, 2))
+
+    def of_displacement(self, x: Array) -> Array:
+        """Bound of √(x* K x) for vectors of entries up to x (…, N), shape (…,)."""
+        return np.sqrt(1 + self.stiffness_spread) * norm_of(x * self.structure.omega)
+
+    def of_spring_force(self, f: Array) -> Array:
+        """Bound of √(f* K⁻¹ f)."""
+        return norm_of(f / self.structure.omega) / np.sqrt(1 - self.stiffness_spread)
+
+    def of_force(self, f: Array) -> Array:
+        """Bound of √(f* M⁻¹ f)."""
+        return norm_of(f) / np.sqrt(1 - self.mass_spread)
+
+    @property
+    def least_frequency(self) -> float:
+        """Lower bound of the frequencies over the box, in rad/s."""
+        ratio = (1 - self.stiffness_spread) / (1 + self.mass_spread)
+        return float(self.structure.omega[0] * np.sqrt(ratio))
+
+    @property
+    def greatest_ratio(self) -> float:
+        """Largest damping ratio."""
+        ratio = self.structure.ratio
+        return 0.0 if ratio is None else float(ratio.bounds()[1])
+
+    @cached_property
+    def reading(self) -> Array:
+        """What outputs read of a force, over its norm of M⁻¹: √(r M rᵀ) of their rows, (m,)."""
+        return np.sqrt(1 + self.mass_spread) * norm_of(self.structure.reading.size())
+
+    @cached_property
+    def outputs(self) -> Array:
+        """Error of outputs over a deviation √(qᵀ K q + vᵀ M v) of the motion, shape (m,).
+
+        Accelerations read the force of the damping by a ratio too, 2 ζ ω √(vᵀ M v) at most.
+        """
+        of_displacement, of_velocity = np.split(self.structure.rows.size(), 2, axis=1)
+        ratio = (1 + self.stiffness_spread) / (1 - self.mass_spread)
+        fastest = self.structure.omega[-1] * np.sqrt(ratio)
+        by_ratio = 2 * self.greatest_ratio * fastest * self.reading
+        return np.hypot(
+            self.of_spring_force(of_displacement), self.of_force(of_velocity) + by_ratio
         )
 
 
-def _expanded(grid: LowerGrid, sample: Sample) -> dict[str, Array]:
-    """Chebyshev coefficients of `sample` at unit coordinates (S, d), each (J, …)."""
-    pieces = [sample(chunk) for chunk in np.array_split(grid.points, -(-len(grid) // CHUNK))]
-    return {
-        name: grid.coefficients(np.concatenate([piece.pop(name) for piece in pieces]))
-        for name in list(pieces[0])
-    }
+def _energy_rates(
+    structure: DampedStructure, modes: DampedModes, norms: EnergyNorms, by_ratio: Array
+) -> Array:
+    """Bounds of what the defects of modes add to the deviation over exp(λ t) and time, (S, n)."""
+    rate, momentum = modes.rate[:, None], modes.velocity @ structure.mass
+    kinematic = rate * modes.shape - modes.velocity
+    dynamic = (
+        rate * momentum + modes.velocity @ structure.damping + modes.shape @ structure.stiffness
+    )
+    if structure.ratio is not None:
+        dynamic = dynamic + modes.ratio_force(structure)
+    force = norms.of_force(dynamic.size()) + by_ratio
+    return np.hypot(norms.of_displacement(kinematic.size()), force)
 
 
-def _structure(model: ModalModel, unit: Array) -> dict[str, Array]:
-    """Values of M, K and the outputs' rows at unit coordinates (S, d), by name."""
-    matrices, rows = _evaluate(model, unit)
-    return {"mass": matrices.mass.value, "stiffness": matrices.stiffness.value, "rows": rows.value}
+def _ratio_errors(structure: DampedStructure, modes: DampedModes, norms: EnergyNorms) -> Array:
+    """Bounds of the damping forces by a ratio less 2 ζ |λ_k| M w_k, in the norm of M⁻¹, (S, n)."""
+    if structure.ratio is None:
+        return np.zeros(modes.shape.shape[:2])
+    squared = modes.squared_frequency
+    residual = modes.velocity @ structure.stiffness
+    residual = residual - squared[:, None] * (modes.velocity @ structure.mass)
+    sums = norms.least_frequency + np.sqrt(np.maximum(squared.bounds()[0], 0.0))
+    return 2 * norms.greatest_ratio * norms.of_force(residual.size()) / sums
 
 
-def _evaluate(model: ModalModel, unit: Array) -> tuple[Matrices, Jet]:
-    """Matrices and rows at unit coordinates, but for damping by ratios, which is no polynomial."""
-    points, flow = model.boxes.to_physical(unit), model.flow
-    return evaluate(flow.system, flow.names, points, derivatives=False, by_ratios=False)
+def _start_errors(structure: DampedStructure, modes: DampedModes, norms: EnergyNorms) -> Array:
+    """Bounds of the sources' initial conditions' defects in the norm of energy, (S,)."""
+    q, v = (2.0 * _sum_of_modes(x.real) for x in (modes.shape, modes.velocity))
+    spring = q @ structure.stiffness - structure.static.T
+    momentum = v @ structure.mass - structure.impulse.T
+    return np.hypot(norms.of_spring_force(spring.size()), norms.of_force(momentum.size()))
 
 
-def _start(
-    system: LinearSystem, matrices: Matrices, part: MotionPart, q: Array, v: Array
-) -> dict[str, Array]:
-    """Residuals of the initial conditions of a part of the motion, by name, shape (S, N) each.
-
-    Of the free motion they are q − q₀ and v − v₀, or K q − f and M v − p where forces f and
-    impulses p give its start. That of a load's part is its response to a unit impulse of the load.
-
-    Args:
-        system: The structure.
-        matrices: Its matrices at S parameter sets.
-        part: The part.
-        q: Its displacements at t = 0, shape (S, N).
-        v: Its velocities.
-    """
-    n = matrices.mass.value.shape[-1]
-    if part.load is None:
-        q, v = q - matrices.q0.value[..., 0], v - matrices.v0.value[..., 0]
-        forces = [matrices.static, matrices.impulse]
-        if forces == [None, None]:
-            return {"start_q": q, "start_v": v}
-        static, impulse = (np.zeros(n) if x is None else x.value[..., 0] for x in forces)
-    else:
-        of_ground = system.ground is not None
-        if of_ground and part.number == 0:
-            return {"start_q": q, "start_v": v + matrices.rigid[:, 0]}
-        assert matrices.forces is not None
-        static, impulse = np.zeros(n), matrices.forces.value[..., part.number - of_ground]
-    M, K = matrices.mass.value, matrices.stiffness.value
-    spring, momentum = ((x[:, None] @ A)[:, 0] for x, A in ((q, K), (v, M)))
-    return {"start_spring": spring - static, "start_momentum": momentum - impulse}
-
-
-def _size_of_start(
-    defect: dict[str, Array], stiffness: LoewnerBounds, mass: LoewnerBounds
-) -> float:
-    """Bound of the initial conditions' defect in the norm √(qᵀ K q + vᵀ M v).
-
-    `defect` has coefficients of residuals of q and v, or of K q and M v, as of `_start`.
-    """
-    if "start_q" in defect:
-        return float(np.hypot(stiffness.sup(defect["start_q"]), mass.sup(defect["start_v"])))
-    spring, momentum = defect["start_spring"], defect["start_momentum"]
-    return float(np.hypot(stiffness.sup_dual(spring), mass.sup_dual(momentum)))
-
-
-def _at_once(model: ModalModel, part: MotionPart, unit: Array) -> dict[str, Array]:
-    """Defect of the direct feedthrough of a load, "outputs" (S, n, m), at unit coordinates."""
-    system, (matrices, _) = model.flow.system, _evaluate(model, unit)
-    assert matrices.feeds is not None
-    missed = part.share(unit).reshape(len(unit), model.count, -1)
-    missed[:, 0] -= matrices.feeds.value[..., part.number - len(histories(system))] / 2
-    return {"outputs": missed}
-
-
-def _defects(
-    model: ModalModel,
-    part: MotionPart,
-    states: list[Polynomial],
-    ratio: RatioDamping | None,
-    unit: Array,
-) -> dict[str, Array]:
-    """Defects of one part of the modal model in the equations of motion, by name.
-
-    Args:
-        model: The modal model.
-        part: Its free part, or that of a load.
-        states: Polynomials of the states [φ_k; w_k]: of the free part, then of each load.
-        ratio: Damping by one ratio for all modes; None for other damping.
-        unit: Unit coordinates, shape (S, d).
-
-    Returns:
-        "kinematic" λ φ − w and "dynamic" λ M w + D w + K φ, (S, n, N) each; "outputs", (S, n, m);
-        those of the start, and with `ratio` those of the damping.
-    """
-    if isinstance(part.load, Direct):
-        return _at_once(model, part, unit)
-    system, (matrices, rows) = model.flow.system, _evaluate(model, unit)
-    M, D, K, C = matrices.mass.value, matrices.damping.value, matrices.stiffness.value, rows.value
-    rate = model.eigenvalue(unit)[..., None]
-    column = 0 if part.load is None else 1 + part.number
-    z = states[column](unit).reshape(len(unit), model.count, -1)  # (S, n, 2N)
-    shape, speed = np.split(z, 2, axis=-1)  # φ and w
-    defects = {
-        **_start(system, matrices, part, 2 * shape.real.sum(1), 2 * speed.real.sum(1)),
-        "kinematic": rate * shape - speed,
-        "dynamic": rate * (speed @ M) + speed @ D.swapaxes(-1, -2) + shape @ K,
-        "outputs": part.share(unit).reshape(len(unit), model.count, -1) - z @ C.swapaxes(-1, -2),
-    }
-    if ratio is not None:
-        damping, ratio_defect = ratio.defects(unit, model.boxes.to_physical(unit), speed, M, K)
-        defects |= {**ratio_defect, "dynamic": defects["dynamic"] + damping}
-        for column, floor in polynomial_dependence.accelerations(system).items():
-            defects["outputs"][..., column] += damping[..., floor] / M[:, None, floor, floor]
-    return defects
+def _sum_of_modes(x: TaylorModel) -> TaylorModel:
+    """Sum over modes, (S, N) of (S, n, N)."""
+    n = x.shape[1]
+    return (np.ones((1, n)) @ x)[:, 0]

@@ -8,45 +8,46 @@ dτ, with g a bound of Re λ.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import ceil
+from itertools import combinations_with_replacement, permutations
 
 import numpy as np
 
-from alphacut.frame.calculus.jet import Array
-from alphacut.frame.calculus.polynomial import Polynomial, derivative
-from alphacut.frame.dynamics.integrators import absolute_integrals
-from alphacut.frame.modal.ground_response import REACH, Direct, LoadTables
-from alphacut.frame.modal.model import ModalModel
+from alphacut.frame.calculus.polynomial import Polynomial
+from alphacut.frame.modes.modal_model import ModalModel
+from alphacut.frame.response.duhamel import absolute_moments
+from alphacut.frame.response.load_tables import REACH, Direct, LoadTables
+from alphacut.fuzzy.arrays import Array
 
 MOST_PARAMETERS = 6
 """Tensors of third derivatives grow with the cube of the number of parameters."""
 MOST_TERMS = 100
 """Terms of the series of a wave under a load, at most, as rounding counts them."""
-ROUNDING = 1e-13
-"""Error of a convolution by Fourier transforms over the norms of its factors; some ε log₂ N."""
+ROUNDING = 1e-9
+"""Relative rounding of integrals over a load: of a million intervals at most."""
 
 
 def suprema(polynomial: Polynomial, reach: Array) -> list[Array]:
     """Upper bounds of the |derivatives| of K polynomials over the box |u_i| ≤ reach_i.
 
     Returns:
-        Of order 0 to 3, shapes (d,) * order + (K,): Σ |coefficient| times its monomial's bound.
+        Of order 0 to 3, shapes (d,) * order + (K,): the derivatives of Σ |coefficient| u^e at u =
+        reach.
     """
-    d = polynomial.index.shape[1]
-    monomial_bounds = np.prod(reach**polynomial.index, axis=1)
-
-    def bound(coefficients: Array) -> Array:
-        return np.asarray(monomial_bounds @ np.abs(coefficients))
-
-    zero = bound(polynomial.coefficients)
-    first = np.stack([bound(polynomial.gradient[i]) for i in range(d)])
-    second = np.stack([[bound(polynomial.hessian[i, j]) for j in range(d)] for i in range(d)])
-    third = np.zeros((d, *second.shape))
-    for i in range(d):
-        for j in range(d):
-            for k in range(d):
-                third[i, j, k] = bound(derivative(polynomial.index, k, polynomial.hessian[i, j]))
-    return [zero, first, second, third]
+    size, (terms, d) = np.abs(polynomial.coefficients), polynomial.index.shape
+    bounds = list[Array]()
+    for order in range(4):
+        weight: Array = np.zeros((d,) * order + (terms,))
+        for axes in combinations_with_replacement(range(d), order):
+            exponent = polynomial.index.copy()
+            factor: Array = np.ones(terms)
+            for axis in axes:
+                factor = factor * exponent[:, axis]
+                exponent[:, axis] -= 1
+            factor *= np.prod(reach ** np.maximum(exponent, 0), axis=1)
+            for permuted in set(permutations(axes)):
+                weight[permuted] = factor
+        bounds.append(weight @ size)
+    return bounds
 
 
 def largest_growth(eigenvalue: Polynomial, reach: Array) -> Array:
@@ -68,7 +69,6 @@ class MotionPart:
             part.
         left_out: Bound of the model's error of w, over waves[0], shape (n,).
         load: The load; None of the free part.
-        number: Its place among the loads.
     """
 
     share: Polynomial
@@ -77,7 +77,6 @@ class MotionPart:
     push: Array
     left_out: Array
     load: LoadTables | None = None
-    number: int = 0
 
 
 def parts(model: ModalModel, growth: Array) -> list[MotionPart]:
@@ -85,95 +84,37 @@ def parts(model: ModalModel, growth: Array) -> list[MotionPart]:
 
     Args:
         model: The modal model.
-        growth: Upper bounds of Re λ_k, shape (n,), in 1/s.
+        growth: Upper bounds g of Re λ_k, shape (n,), in 1/s.
     """
     time = model.time[:, None]
-    powers = time ** np.arange(4)[:, None, None]
     divisor = np.where(growth == 0, 1.0, growth)
-    elapsed = np.where(growth == 0, time, np.expm1(growth * time) / divisor)
     free = MotionPart(
         share=model.coefficient,
-        waves=powers * np.exp(growth * time),
-        elapsed=elapsed,
+        waves=time ** np.arange(4)[:, None, None] * np.exp(growth * time),
+        elapsed=np.where(growth == 0, time, np.expm1(growth * time) / divisor),
         push=np.ones(len(time)),
         left_out=np.zeros(model.count),
     )
-    return [free, *(_forced_part(model, growth, k) for k in range(len(model.loads)))]
+    return [free, *(_forced_part(model, growth, load) for load in model.loads)]
 
 
-def _forced_part(model: ModalModel, growth: Array, number: int) -> MotionPart:
-    """Part of a modal model's motion that is due to load `number`, a(t).
+def _forced_part(model: ModalModel, growth: Array, load: LoadTables) -> MotionPart:
+    """Part of a model's motion that a load a(t) makes, w = R = ∫ exp(λ τ) a(t − τ) dτ."""
+    if isinstance(load, Direct):  # w of the first mode is a(t)
+        waves: Array = np.zeros((4, len(model.time), model.count))
+        waves[0] = np.abs(load.at_nodes(np.zeros((1, model.count)))[0])
+        return MotionPart(load.share, waves, 0 * waves[0], 0 * model.time, load.truncation, load)
 
-    It has at the nodes bounds of the derivatives by λ of R = ∫ exp(λ (t − s)) a(s) ds, of orders 0
-    to 3, of ∫ |R| and of ∫ |a|, from convolutions of |a| with upper sums of τ^k exp(g τ).
+    def moments(decay: float) -> Array:  # of exp(−decay τ) |a(t − τ)|
+        return (1 + ROUNDING) * absolute_moments(decay, load.history, model.time)
 
-    Args:
-        model: The modal model.
-        growth: Upper bounds g of Re λ_k, shape (n,), in 1/s.
-        number: Index of the load among the model's.
-    """
-    load, steps = model.loads[number], len(model.time) - 1
-    if isinstance(load, Direct):
-        return _feedthrough_part(model, load, number)
-    substeps = ceil(model.flow.step / load.history.step - 1e-9)
-    h, count = model.flow.step / substeps, substeps * steps
-    kernels = [_kernel_maxima(growth, h, count, power) for power in range(4)]
-    # upper sums of ∫ exp(g s) ds from 0 to the end of each interval
-    integrated = np.cumsum(kernels[0], axis=0) * h
-    impulses = absolute_integrals(load.history, h, count)
-    waves, elapsed, push = (
-        _convolution_bounds(kernel, impulses)[..., ::substeps, :]
-        for kernel in (np.stack(kernels), integrated, np.ones((count, 1)))
-    )
-    return MotionPart(load.share, waves, elapsed, push[:, 0], load.truncation, load, number)
-
-
-def _feedthrough_part(model: ModalModel, load: Direct, number: int) -> MotionPart:
-    """The part of a load's direct feedthrough: w of the first mode is a(t), with no dynamics."""
-    waves: Array = np.zeros((4, len(model.time), model.count))
-    waves[0] = np.abs(load.at_nodes(np.zeros((1, model.count)))[0])
-    no_push = np.zeros(len(model.time))
-    return MotionPart(load.share, waves, 0 * waves[0], no_push, load.truncation, load, number)
-
-
-def _kernel_maxima(growth: Array, step: float, count: int, power: int) -> Array:
-    """Largest value of τ^power exp(g τ) in each of `count` intervals of time, shape (count, n).
-
-    It lies at an end of the interval, or at τ = −power / g where that is inside.
-
-    Args:
-        growth: g, shape (n,), in 1/s.
-        step: Length of an interval, in s.
-        count: Number of intervals, from τ = 0 on.
-        power: Exponent of τ.
-    """
-    ends = (np.arange(count + 1) * step)[:, None]
-    value = ends**power * np.exp(growth * ends)
-    peak_time = -power / np.where(growth < 0, growth, -1e-300)
-    inside = (peak_time > ends[:-1]) & (peak_time < ends[1:])
-    peak = np.where(inside, peak_time, 0.0) ** power * np.exp(-float(power))
-    return np.asarray(np.maximum(np.maximum(value[:-1], value[1:]), np.where(inside, peak, 0.0)))
-
-
-def _convolution_bounds(kernel: Array, size: Array) -> Array:
-    """Upper bounds of ∫ kernel(τ) |a(t − τ)| dτ at t = 0 and the ends of J equal intervals.
-
-    Args:
-        kernel: Maxima of the kernel over the intervals, shape (…, J, n).
-        size: ∫ |a| over each interval, shape (J,).
-
-    Returns:
-        Upper sums with the rounding of the Fourier transforms, shape (…, J + 1, n).
-    """
-    from scipy.signal import oaconvolve  # which takes time to import
-
-    count = len(size)
-    record = size.reshape((1,) * (kernel.ndim - 2) + (-1, 1))
-    convolution = oaconvolve(kernel, record, axes=-2)[..., :count, :]
-    # what rounding of the Fourier transforms may take off, per row
-    rounding = ROUNDING * np.sqrt((kernel**2).sum(-2, keepdims=True) * (size**2).sum())
-    start = np.zeros((*convolution.shape[:-2], 1, convolution.shape[-1]))
-    return np.concatenate([start, np.maximum(convolution, 0.0) + rounding], axis=-2)
+    undamped = moments(0.0)
+    of_modes = np.stack([moments(-float(g)) for g in growth], -1)  # (5, T, n)
+    # ∫₀ᵗ |R| ≤ ∫ |a(t − τ)| ∫₀^τ exp(g s) ds dτ, the inner one at most
+    # τ and 1/|g| where g < 0, else τ exp(g τ)
+    decaying = np.minimum(undamped[1], undamped[0] / np.maximum(-growth, 1e-300)[:, None]).T
+    elapsed = np.where(growth < 0, decaying, of_modes[1])
+    return MotionPart(load.share, of_modes[:4], elapsed, undamped[0], load.truncation, load)
 
 
 class Remainder:

@@ -1,16 +1,18 @@
-"""Polynomials of bounded total degree on the unit box, fitted to values and derivatives."""
+"""Polynomials of bounded total degree on the unit box: their values and derivatives at points."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from itertools import combinations_with_replacement, pairwise
+from itertools import pairwise
 from math import comb
 
 import numpy as np
-from scipy.sparse import csr_array
 
-from alphacut.frame.calculus.jet import Array, Jet
+from alphacut.frame.calculus.jet import Jet
+from alphacut.frame.calculus.monomials import count, exponents
+from alphacut.frame.calculus.taylor_model import TaylorModel
+from alphacut.fuzzy.arrays import Array
 
 Index = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
 
@@ -18,20 +20,6 @@ Index = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
 def terms(dimension: int, degree: int) -> int:
     """Number of monomials of at most `degree` in `dimension` variables."""
     return comb(dimension + degree, degree)
-
-
-@lru_cache
-def exponents(dimension: int, degree: int) -> Index:
-    """Exponents of the monomials by rising total degree, shape (terms, dimension)."""
-    rows = []
-    for total in range(degree + 1):
-        for chosen in combinations_with_replacement(range(dimension), total):
-            rows.append(
-                np.bincount(chosen, minlength=dimension)
-                if chosen
-                else np.zeros(dimension, np.int64)
-            )
-    return np.array(rows, np.int64)
 
 
 def basis(u: Array, index: Index) -> Array:
@@ -104,6 +92,22 @@ class Polynomial:
     index: Index
     coefficients: Array
 
+    @classmethod
+    def of_model(cls, model: TaylorModel) -> Polynomial:
+        """The polynomials of a Taylor model, K functions in the order of its shape."""
+        d, degrees = model.inputs, range(model.order + 1)
+        index = np.concatenate([exponents(d, degree) for degree in degrees])
+        parts = [model.part(degree).reshape(count(d, degree), -1) for degree in degrees]
+        return cls(index, np.concatenate(parts))
+
+    def as_model(self, shape: tuple[int, ...]) -> TaylorModel:
+        """The polynomials as functions of some shape, of which none has a remainder."""
+        total = self.index.sum(1)
+        order = int(total.max(initial=0))
+        parts = (self.coefficients[total == degree] for degree in range(order + 1))
+        shaped = tuple(part.reshape(len(part), *shape) for part in parts)
+        return TaylorModel(shaped, np.zeros(shape), self.index.shape[1], order)
+
     @cached_property
     def gradient(self) -> Array:
         """Coefficients of the first derivatives, shape (d, terms, K)."""
@@ -155,7 +159,7 @@ def fit(u: Array, data: Jet, degree: int) -> Polynomial:
         data: Values, gradients and Hessians there, shape (S, K).
         degree: Total degree.
     """
-    index = exponents(u.shape[1], degree)
+    index = np.concatenate([exponents(u.shape[1], k) for k in range(degree + 1)])
     d, w = u.shape[1], 1 / max(degree, 1)  # w: weight of slopes, w² of second derivatives
     B = basis(u, index)
     pairs = [(i, j) for i in range(d) for j in range(i, d)]
@@ -168,113 +172,6 @@ def fit(u: Array, data: Jet, degree: int) -> Polynomial:
     q, r = np.linalg.qr(design / column_norms)
     solution = np.linalg.solve(r, product(q.T, values)) / column_norms[:, None]
     return Polynomial(index, solution)
-
-
-@dataclass(frozen=True)
-class LowerGrid:
-    """As many points as terms, for products of a polynomial of `degrees` and one of total `excess`.
-
-    Args:
-        degrees: Exponents along each axis that are free of any sum, d of them.
-        excess: Largest sum of what exponents exceed these by.
-    """
-
-    degrees: tuple[int, ...]
-    excess: int
-
-    def __len__(self) -> int:
-        counts = np.eye(1, self.excess + 1, dtype=object)[0]  # sets of axes so far, by their sum
-        for degree in self.degrees:
-            counts = (degree * counts) + np.cumsum(counts)
-        return int(counts.sum())
-
-    @cached_property
-    def index(self) -> Index:
-        """Exponents e of the terms, shape (S, d): all with Σ max(e_i − degree_i, 0) ≤ excess."""
-        rows, used_excess = np.zeros((1, 0), np.int64), np.zeros(1, np.int64)
-        for degree in self.degrees:
-            count = degree + 1 + self.excess - used_excess
-            which = np.repeat(np.arange(len(rows)), count)
-            exponents = np.concatenate([np.arange(n) for n in count])
-            rows = np.column_stack([rows[which], exponents])
-            used_excess = used_excess[which] + np.maximum(exponents - degree, 0)
-        return rows
-
-    @property
-    def points(self) -> Array:
-        """Leja points on which the terms are known, shape (S, d)."""
-        return leja(max(self.degrees) + self.excess + 1)[self.index]
-
-    def coefficients(self, values: Array) -> Array:
-        """Chebyshev coefficients c_j of polynomials with `values` (S, …) at `points`, same shape.
-
-        The constant comes first. Since no product of Chebyshev polynomials T_k exceeds 1 on the
-        box, Σ ‖c_j‖ bounds ‖polynomial‖ there, for any norm. The matrix of T_k at the points is L U
-        along each axis; so is that of all terms, since with a term the set holds all of lower
-        exponents.
-        """
-        out = values.reshape(len(values), -1)
-        for factor in self._factors:
-            out = factor @ out
-        return np.asarray(out.reshape(values.shape))
-
-    @cached_property
-    def _factors(self) -> list[csr_array]:
-        """L⁻¹ along each axis, then U⁻¹."""
-        triangles = _triangles(max(self.degrees) + self.excess + 1)
-        axes = range(len(self.degrees))
-        return [self._along(axis, triangle) for triangle in triangles for axis in axes]
-
-    def _along(self, axis: int, factor: Array) -> csr_array:
-        """Sparse matrix (S, S) that applies a triangular `factor` (n, n) along one axis.
-
-        Its rows and columns are the S terms. With a term the set holds all of lower degree along
-        the axis; they are found by keys that have the exponents as digits.
-        """
-        degrees = self.index[:, axis]
-        place_values = len(factor) ** np.arange(len(self.degrees))
-        keys = self.index @ place_values
-        order = np.argsort(keys)
-        rows, columns = [], []
-        for difference in range(int(degrees.max()) + 1):
-            high = np.flatnonzero(degrees >= difference)
-            low = order[np.searchsorted(keys[order], keys[high] - difference * place_values[axis])]
-            rows.append(high)
-            columns.append(low)
-        high, low = np.concatenate(rows), np.concatenate(columns)
-        is_lower = bool(factor[-1, 0])  # a lower triangle takes from the terms below
-        to, source = (high, low) if is_lower else (low, high)
-        return csr_array(
-            (factor[degrees[to], degrees[source]], (to, source)), shape=(len(degrees),) * 2
-        )
-
-
-@lru_cache
-def leja(count: int) -> Array:
-    """Leja points on [−1, 1], shape (count,), from 0 on.
-
-    Each has the greatest product of its distances from all before, among 4001 candidates.
-    """
-    candidates = np.cos(np.linspace(0, np.pi, 4001))
-    points, distance_products = [0.0], np.abs(candidates)
-    while len(points) < count:
-        points.append(float(candidates[distance_products.argmax()]))
-        distance_products = distance_products * np.abs(candidates - points[-1])
-    return np.array(points)
-
-
-@lru_cache
-def _triangles(count: int) -> tuple[Array, Array]:
-    """L⁻¹ and U⁻¹, (count, count) each, where L U has entries T_k(x_j) at Leja points x_j.
-
-    T_k are Chebyshev's polynomials; L has ones on its diagonal.
-    """
-    upper = np.polynomial.chebyshev.chebvander(leja(count), count - 1)
-    lower = np.eye(count)
-    for k in range(count - 1):  # Gaussian elimination; the order of Leja points needs no pivots
-        lower[k + 1 :, k] = upper[k + 1 :, k] / upper[k, k]
-        upper[k + 1 :] -= np.outer(lower[k + 1 :, k], upper[k])
-    return np.tril(np.linalg.inv(lower)), np.triu(np.linalg.inv(np.triu(upper)))
 
 
 def _differentiated(B: Array, index: Index, axes: tuple[int, ...]) -> Array:

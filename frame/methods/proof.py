@@ -14,6 +14,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import comb
 from typing import ClassVar
 
 import numpy as np
@@ -27,21 +28,25 @@ from alphacut.frame.boxes import DEFAULT_TOLERANCE, Boxes, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.envelope import Envelope
-from alphacut.frame.modal.fitting import fit_modes
-from alphacut.frame.modal.model import ModalModel
-from alphacut.frame.structures.polynomial_dependence import degrees
+from alphacut.frame.modes.damped import require_dissipation
+from alphacut.frame.modes.modal_model import ModalModel
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.progress_bar import Progress
 from alphacut.fuzzy.refused import checked_number
 
 MAX_ERROR_FRACTION = 0.2
 """Fraction of the gap that the error of the modal model may take on either side."""
-LEAST_PROVED_FACTOR = 10.0
-"""Proved over sampled error of the model, seldom less."""
+LEFT_OUT = 1 / 120
+"""Fraction of the gap that modes may be worth that are left out; their energy counts as error."""
 BOXES_OF_INPUT = 4.0
 """Factor by which one more input multiplies the boxes of a branch and bound, about."""
-ATTEMPTS = 5
-"""Models of rising degree that are tried on a box."""
+LEAST_DEGREE, MAX_DEGREE = 3, 20
+MAX_TERMS = 3100
+"""Monomials of a polynomial: degree 13, 10 and 8 of 4, 5 and 6 inputs."""
+FIRST_DECAY = 0.1
+"""Factor by which a degree more multiplies the error, before any is seen."""
+CAUTION = 0.8
+"""Fraction of the degrees that the errors ask for which is taken at once."""
 
 
 class GapError(UnprovedError):
@@ -60,7 +65,6 @@ class Proof:
             first output without one) where the envelope is not relative; 1e-3 unless given.
         boxes: Most boxes looked at for each bound, on average; where they end, the gap is wider.
         parts: Most parts of the box that a peak is worth, and that are refused.
-        budget: Most eigen-analyses on each part.
         workers: Threads, which do not change the result; all cores unless given.
 
     Raises:
@@ -80,11 +84,10 @@ class Proof:
     tolerance: float | None = None
     boxes: float = 4000
     parts: int = 16
-    budget: int = 280
     workers: int | None = None
 
     def __post_init__(self) -> None:
-        for key in ("gap", "tolerance", "boxes", "parts", "budget"):
+        for key in ("gap", "tolerance", "boxes", "parts"):
             if getattr(self, key) is not None:
                 checked_number(key, getattr(self, key), positive=True)
 
@@ -122,8 +125,7 @@ class Proof:
             )
         if len(flow.system.ratios) > 1:
             raise UnprovedError("damping by a ratio of each mode is no polynomial", "take dual")
-        ends = zip(boxes.lower[0].tolist(), boxes.upper[0].tolist(), strict=True)
-        degrees(flow.system, dict(zip(boxes.names, ends, strict=True)))
+        require_dissipation(flow.system, boxes)
         return float(BOXES_OF_INPUT**n_inputs)
 
     def bounds(self, flow: LinearFlow, boxes: Boxes, goal: Goal) -> list[BoxBounds]:
@@ -147,7 +149,7 @@ class Proof:
             "model_error": float((error / goal.scale).max()),
             "degree": model.degree,
             "boxes": proof.boxes / len(boxes.alpha),
-            "evaluations": model.analyses / len(boxes.alpha),
+            "evaluations": 1 / len(boxes.alpha),
         }
         inputs = boxes.to_physical(proof.at)
         shares = np.broadcast_to(tail_shares(model), inputs.shape[2:])
@@ -187,53 +189,41 @@ class Proof:
     def _accurate_model(
         self, flow: LinearFlow, boxes: Boxes, scale: Array, gap: float
     ) -> tuple[ModalModel, Array]:
-        """Return a modal model over a part of the box, and its proved error, shape (T, m).
-
-        The degree is raised until the error is small enough. Since a proof takes time, it is tried
-        once `LEAST_PROVED_FACTOR` times the error at samples is small enough.
-
-        Args:
-            flow: Trajectories of the structure.
-            boxes: Cuts of the part.
-            scale: Unit of each output, shape (m,).
-            gap: Gap of proved and attained bounds that is wanted, in these units, of which an error
-                may be a fifth.
+        """Modal model of a box whose proved error, (T, m), is a fifth of the gap at most.
 
         Raises:
-            UnprovedError: No degree suffices.
+            GapError: No affordable degree suffices.
+            UnprovedError: Nor would bisections help, or no error is proved.
         """
-        # a proved error is some thirty times that at samples
-        tolerance, last_degree, largest = gap / 30, 0, np.inf
-        allowed = MAX_ERROR_FRACTION * gap
-        for _ in range(ATTEMPTS):
-            model = fit_modes(
-                flow, boxes, tolerance=tolerance, budget=self.budget, scale=scale, energy=True
-            )
-            if model.degree <= last_degree:
-                break
-            sampled = float((model.error / scale).max())
-            largest = LEAST_PROVED_FACTOR * sampled
-            if largest <= allowed:
-                error = proved_error(model)
-                largest = float((error / scale).max())
-                if largest <= allowed:
-                    return model, error
-            # one degree more divides the error by ten or so
-            tolerance, last_degree = sampled * min(0.99, 4 * allowed / largest), model.degree
-        raise self._refusal(model, largest / gap)
+        degree, max_degree, step, before = LEAST_DEGREE, _max_degree(len(boxes.names)), 0, np.inf
+        while True:
+            model = ModalModel.of_degree(flow, boxes, degree, LEFT_OUT * gap * scale)
+            error = proved_error(model)
+            excess = float((error / scale).max()) / (MAX_ERROR_FRACTION * gap)
+            if excess <= 1:
+                return model, error
+            # factor of the error by a degree more, and how many degrees more it takes at that rate
+            decay = (excess / before) ** (1 / step) if step else FIRST_DECAY
+            further = np.log(excess) / -np.log(decay) if decay < 1 else np.inf
+            if degree == max_degree or (step and not degree + further < max_degree + 1):
+                raise self._refusal(model, excess, decay)
+            step = min(max(1, int(CAUTION * further)), max_degree - degree)
+            degree, before = degree + step, excess
 
-    def _refusal(self, model: ModalModel, fraction: float) -> UnprovedError:
-        """Return the error to raise if a model's error takes this fraction of the gap.
+    def _refusal(self, model: ModalModel, excess: float, decay: float) -> UnprovedError:
+        """Error to raise if a model's error is so many times too large and decays so with degrees.
 
-        Halving the inputs that contribute to the error divides it by 2^(degree + 1) or so. A
+        Halving the inputs that contribute to it divides the error of degree N by 2^(N + 1). A
         `GapError` names the input to bisect; where too many bisections are needed it is a
         `BisectionError`.
         """
-        what = f"the proved error of the modes, {fraction:.3g} of it, takes too much of the gap"
+        what = f"the proved error of the modes, {MAX_ERROR_FRACTION * excess:.3g} of it,"
+        what += " takes too much of the gap"
         cure = "narrower or fewer fuzzy inputs, or a wider gap, can be proved"
-        input_shares = tail_shares(model)
-        halvings = np.ceil(np.log2(fraction / MAX_ERROR_FRACTION) / (model.degree + 1))
-        if halvings / (input_shares**2).sum() > np.log2(self.parts):
+        input_shares, max_degree = tail_shares(model), _max_degree(len(model.boxes.names))
+        with_all_degrees = np.log2(excess) + (max_degree - model.degree) * np.log2(decay)
+        halvings = max(1.0, np.ceil(with_all_degrees / (max_degree + 1)))
+        if not halvings / (input_shares**2).sum() <= np.log2(self.parts):
             return BisectionError(what, cure)
         return GapError(what, cure, int(input_shares.argmax()))
 
@@ -251,3 +241,11 @@ def tail_shares(model: ModalModel) -> Array:
         weight += (size / np.maximum(size.max(0), 1e-300)).max(1)
     shares = weight[top] @ index[top]
     return np.asarray(shares / max(float(shares.sum()), 1e-300))
+
+
+def _max_degree(d: int) -> int:
+    """Greatest degree of polynomials in d inputs that are affordable."""
+    degree = MAX_DEGREE
+    while comb(d + degree, d) > MAX_TERMS:
+        degree -= 1
+    return degree

@@ -13,8 +13,8 @@ import numpy as np
 
 from alphacut.frame.calculus.polynomial import Polynomial, fit
 from alphacut.frame.modal.fitting import analyse, fit_points
-from alphacut.frame.modal.ground_response import LoadTables
 from alphacut.frame.modal.model import ModalModel
+from alphacut.frame.response.load_tables import LoadTables
 from alphacut.frame.structures.linear import frequencies
 from alphacut.frame.structures.modes import Modes
 from alphacut.fuzzy.arrays import Array, Rows

@@ -17,9 +17,9 @@ from alphacut.frame.calculus.low_discrepancy import chebyshev_points
 from alphacut.frame.calculus.polynomial import Polynomial, fit, terms
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
-from alphacut.frame.modal.ground_response import Direct, LoadTables
 from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.response.duhamel import absolute_moments
+from alphacut.frame.response.load_tables import Direct, LoadTables
 from alphacut.frame.structures.linear import Matrices, courses_of_forces, evaluate, histories
 from alphacut.frame.structures.modes import (
     ModalError,

@@ -19,7 +19,7 @@ from alphacut.frame.boxes import Boxes
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.polynomial import Polynomial
 from alphacut.frame.dynamics.flow import LinearFlow
-from alphacut.frame.modal.ground_response import LoadTables
+from alphacut.frame.response.load_tables import LoadTables
 
 PIECE = 20_000
 """Points whose values are computed together."""

@@ -24,8 +24,8 @@ from alphacut.frame import (
 from alphacut.frame.bounds.model_error import proved_error
 from alphacut.frame.boxes import boxes
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.modal.fitting import fit_modes
-from alphacut.frame.modal.ground_response import Direct
+from alphacut.frame.modes.modal_model import ModalModel
+from alphacut.frame.response.load_tables import Direct
 from alphacut.frame.structures.linear import evaluate
 from alphacut.frame.verification.self_test import structures_at
 from alphacut.frame.verification.stored import stored_motions, variables
@@ -229,7 +229,7 @@ def test_a_wrong_share_at_once_is_proved_to_be_no_better():
     inputs = {"m1": Interval(1.9e3, 2.1e3), "F1": Interval(1.9e3, 2.1e3)}
     frame = replace(FRAME, damping_ratio=None, rayleigh=(0.3, 1e-4))
     flow, cuts = LinearFlow(frame, tuple(inputs), 2.0, 0.02, Exact()), boxes(inputs, (0,))
-    good = fit_modes(flow, cuts, tolerance=1e-6)
+    good = ModalModel.of_degree(flow, cuts, 6)
     assert proved_error(good)[:, 3:5].max() < 1e-4
     loads = [
         replace(x, share=replace(x.share, coefficients=1.01 * x.share.coefficients))

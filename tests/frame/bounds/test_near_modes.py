@@ -44,7 +44,7 @@ def test_a_proof_holds_where_frequencies_come_near(coupling: float, widest: floa
     assert proof.error.max() <= 1.1e-2 * np.abs(values).max()
 
 
-@pytest.mark.parametrize(("coupling", "width"), [(0.0, 0.5), (1e-4, 0.5), (0.01, 4.0)])
+@pytest.mark.parametrize(("coupling", "width"), [(1e-4, 0.5), (0.01, 4.0)])
 def test_a_proof_is_refused_where_frequencies_cross(coupling: float, width: float) -> None:
     with pytest.raises((UnprovedError, ModalError)):
         proof_of(coupling, width)

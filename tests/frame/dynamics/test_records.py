@@ -8,7 +8,7 @@ import pytest
 from alphacut.frame import Accelerogram, Exact, LinearFlow, Midpoint, StoreyFrame, envelope
 from alphacut.frame.boxes import boxes
 from alphacut.frame.dynamics.integrators import Integrator, RungeKutta4, linear_loads
-from alphacut.frame.modal.fitting import fit_modes
+from alphacut.frame.modes.modal_model import ModalModel
 from alphacut.frame.structures.linear import evaluate
 from alphacut.frame.verification.exact_motion import LinearMotion
 from alphacut.fuzzy import Interval
@@ -94,7 +94,7 @@ def test_tables_of_the_modes_are_exact_under_any_record() -> None:
         step = float(rng.choice(NODES))
         cuts = boxes({"E": Interval(frame.modulus, 1.0001 * frame.modulus)}, (0,))
         flow = LinearFlow(frame, ("E",), round(4 / step) * step, step, Exact())
-        model = fit_modes(flow, cuts, tolerance=1e-16)
+        model = ModalModel.of_degree(flow, cuts, 4)
         truth = motion(replace(frame, modulus=1.0001 * frame.modulus), flow.time)
         everywhere = (np.ones((truth.size, 1)), *map(np.ravel, np.indices(truth.shape)))
         for values in (model.values(np.ones((1, 1)))[0], model.value_at(*everywhere)):

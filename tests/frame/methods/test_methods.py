@@ -152,16 +152,16 @@ def test_a_follower_stays_within_proved_bounds_and_says_what_it_misses(proofs, k
     assert (np.abs(found.upper - true.upper) <= found.error + 1e-12).all()
 
 
-def test_a_wide_box_is_proved_in_parts_where_the_degree_is_limited():
+def test_a_wide_box_is_proved_in_parts():
     inputs = {"k": Interval(40, 120)}
-    found = envelope(CHAIN, inputs, method=frame.Proof(tolerance=1e-2, budget=15), **MOTION)
+    found = envelope(CHAIN, inputs, method=frame.Proof(tolerance=1e-2), **MOTION)
     assert found.facts["parts"] > 1
     values = trajectories(CHAIN, inputs, drawn(inputs, 0.0, 4000))
     assert (values <= found.upper[0]).all()
     assert (values >= found.lower[0]).all()
     assert found.error.max() <= 1.1e-2 * np.abs(found.upper).max()
     with pytest.raises(UnprovedError, match="too much of the gap"):
-        envelope(CHAIN, inputs, method=frame.Proof(tolerance=1e-2, budget=15, parts=1), **MOTION)
+        envelope(CHAIN, inputs, method=frame.Proof(tolerance=1e-2, parts=1), **MOTION)
 
 
 def test_auto_takes_the_proof_else_the_search_else_the_follower_and_says_why():

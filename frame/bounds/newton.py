@@ -1,0 +1,143 @@
+"""Local optima of an envelope's bounds: Newton's method with a trust region, for many at a time.
+
+A problem is an output at a node on a side; its best point so far is the inner bound.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from alphacut.frame.calculus.box_quadratic import gain, global_maximum, local_maximum
+from alphacut.frame.calculus.low_discrepancy import chebyshev_points
+from alphacut.frame.modes.modal_model import ModalModel
+from alphacut.fuzzy.arrays import Array, Rows
+
+SAMPLES = 256
+"""Trajectories of the model that the first optima begin at."""
+MAX_PIECE = 6000
+"""Most problems solved together, of six inputs; more would leave the cache."""
+MIN_PIECE = 250
+"""Problems below which a piece costs more than it saves."""
+LOCAL_STEPS = 6
+"""Newton steps by local maxima of the quadratic models; problems that need more lie on ridges, and
+their models are maximised over all faces of the box."""
+FIRST_RADIUS = 0.4
+"""First radius of the trust region, in unit coordinates."""
+SOUND = 0.1
+"""Relative error of a predicted gain up to which the radius grows five times in place of twice."""
+BOX_WIDTH = 2.0
+"""Width of the unit box [−1, 1]^d."""
+ITERATIONS = 300
+"""Newton steps after which a problem that has not converged is left as it is."""
+
+
+@dataclass(eq=False)
+class Optima:
+    """Best points so far of N problems.
+
+    Args:
+        node: Time node of each problem, shape (N,).
+        output: Its output, shape (N,).
+        side: +1 for an upper bound, −1 for a lower, shape (N,).
+        point: Unit coordinates, shape (N, d).
+        value: side × output there, shape (N,).
+    """
+
+    node: Rows
+    output: Rows
+    side: Array
+    point: Array
+    value: Array
+
+
+def first_optima(model: ModalModel, lower: Array, upper: Array, least_gain: float) -> Optima:
+    """Local optima of all outputs, on both sides, at all nodes over the box [lower, upper].
+
+    Each begins at the best of the centre and Chebyshev points, and is refined by Newton's method.
+
+    Args:
+        model: The modal model.
+        lower: Lower ends, shape (d,).
+        upper: Upper ends.
+        least_gain: Predicted gain below which Newton's method stops, in units of the outputs.
+
+    Returns:
+        They are ordered by node, then output, then side (−1, +1).
+    """
+    d, steps, m = len(lower), len(model.time), len(model.outputs)
+    unit = np.vstack([np.zeros((1, d)), chebyshev_points(d, SAMPLES)])
+    pool = (lower + upper) / 2 + (upper - lower) / 2 * unit
+    values = np.concatenate([model.values(pool[k : k + 64]) for k in range(0, len(pool), 64)])
+    columns = values.reshape(len(pool), -1)
+    best = np.stack([columns.argmin(0), columns.argmax(0)], 1).ravel()
+    side = np.tile([-1.0, 1.0], steps * m)
+    optima = Optima(
+        node=np.repeat(np.arange(steps), 2 * m),
+        output=np.tile(np.repeat(np.arange(m), 2), steps),
+        side=side,
+        point=pool[best],
+        value=side * columns[best, np.arange(len(best)) // 2],
+    )
+    if (upper > lower).any():
+        refine(model, optima, np.arange(len(best)), lower, upper, least_gain)
+    return optima
+
+
+def refine(
+    model: ModalModel, optima: Optima, which: Rows, lower: Array, upper: Array, least_gain: float
+) -> None:
+    """Improve the optima in rows `which` by Newton's method in a box, in place.
+
+    A problem ends when its quadratic model predicts a gain of at most `least_gain`.
+    """
+    half_of_all = -(-len(which) // 2)
+    size = min(MAX_PIECE * 6 // max(lower.size, 6), max(MIN_PIECE, half_of_all))
+    for piece in np.array_split(which, -(-len(which) // size) or 1):
+        _newton(model, optima, piece, lower, upper, least_gain)
+
+
+def _newton(
+    model: ModalModel, optima: Optima, which: Rows, lower: Array, upper: Array, least_gain: float
+) -> None:
+    radius: Array = np.full(len(which), FIRST_RADIUS)
+    f, g, H = _signed(model, optima, optima.point[which], which)
+    for count in range(ITERATIONS):
+        low = np.maximum(lower - optima.point[which], -radius[:, None])
+        high = np.minimum(upper - optima.point[which], radius[:, None])
+        step = (
+            local_maximum(g, H, low, high, rounds=2)
+            if count < LOCAL_STEPS
+            else global_maximum(g, H, low, high)
+        )
+        predicted = gain(g, H, step)
+        at_edge = np.abs(step).max(1, initial=0.0) >= 0.999 * radius
+        # at the edge of the region, a parabola would gain as much more in the whole box
+        growth = np.where(at_edge, np.minimum((BOX_WIDTH / radius) ** 2, 1e3), 1.0)
+        open_ = predicted * growth > least_gain
+        if not open_.all():
+            which, radius, step, predicted, g, H = (
+                x[open_] for x in (which, radius, step, predicted, g, H)
+            )
+        if not len(which):
+            return
+        trial = np.clip(optima.point[which] + step, lower, upper)
+        f, trial_g, trial_H = _signed(model, optima, trial, which)
+        actual_gain = f - optima.value[which]
+        better = actual_gain > 0
+        optima.point[which[better]], optima.value[which[better]] = trial[better], f[better]
+        g[better], H[better] = trial_g[better], trial_H[better]
+        ratio = actual_gain / predicted
+        expansion = np.where(np.abs(ratio - 1) < SOUND, 5, 2)
+        wider, narrower = np.minimum(expansion * radius, BOX_WIDTH), 0.3 * np.abs(step).max(1)
+        radius = np.where(ratio > 0.75, wider, np.where(ratio < 0.25, narrower, radius))
+
+
+def _signed(
+    model: ModalModel, optima: Optima, points: Array, which: Rows
+) -> tuple[Array, Array, Array]:
+    """Side × output (W,), its gradient and Hessian, of problems `which` at their points (W, d)."""
+    side = optima.side[which]
+    f, g, H = model.at(points, optima.node[which], optima.output[which])
+    return side * f, side[:, None] * g, side[:, None, None] * H

@@ -1,0 +1,360 @@
+"""Modes with dashpots as Taylor models over a box: q(t; p) = 2 Re Σ_k φ_k(p) exp(λ_k(p) t).
+
+(λ² M + λ D + K) φ = 0 is solved degree by degree about the middle of the box (perturbation series;
+Stewart, Sun 1990). The polynomials need no proof of their own: `bounds.model_error` bounds what
+they miss in the equations of motion, whatever the distances of the eigenvalues.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import eigh
+
+from alphacut.frame.boxes import Boxes
+from alphacut.frame.calculus.monomials import convolve, count, matmul
+from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate, solve
+from alphacut.frame.calculus.unproved import UnprovedError
+from alphacut.frame.response.duhamel import absolute_moments
+from alphacut.frame.structures.linear import LinearSystem
+from alphacut.frame.structures.loads import History
+from alphacut.frame.structures.matrix import MatrixStructure
+from alphacut.frame.structures.modes import DOUBLE, ModalError, oscillating
+from alphacut.frame.structures.storey import StoreyFrame
+from alphacut.fuzzy.arrays import Array, Rows
+
+
+@dataclass(frozen=True, eq=False)
+class DampedStructure:
+    """M q̈ + D q̇ + K q = f of N unknowns and m outputs over the unit box of the inputs.
+
+    Coordinates are those in which the middle of the box has M = 1 and K = diag(ω²). What moves it
+    are S sources: the start, then a unit impulse of the ground and of each history of forces. Each
+    starts the motion by K q(0) = static and M q̇(0) = impulse.
+
+    Args:
+        mass: M, shape (N, N).
+        damping: D without the damping by a ratio, shape (N, N).
+        stiffness: K, shape (N, N).
+        ratio: ζ of all modes, which adds 2 ζ M √(M⁻¹K) to D; None without one.
+        omega: ω, rising, shape (N,), in rad/s.
+        static: Forces of the sources, shape (N, S).
+        impulse: Impulses of the sources, shape (N, S).
+        rows: What outputs take of [q, q̇], without the damping by a ratio, shape (m, 2N).
+        reading: What outputs take of forces, as accelerations do, shape (m, N).
+        feeds: What a unit of each history of forces adds to outputs at once, shape (m, H); None if
+            nothing.
+    """
+
+    mass: TaylorModel
+    damping: TaylorModel
+    stiffness: TaylorModel
+    ratio: TaylorModel | None
+    omega: Array
+    static: TaylorModel
+    impulse: TaylorModel
+    rows: TaylorModel
+    reading: TaylorModel
+    feeds: TaylorModel | None
+
+    @classmethod
+    def over_box(cls, system: LinearSystem, boxes: Boxes, order: int) -> DampedStructure:
+        """The structure over the widest of some boxes, as Taylor models of an order.
+
+        Raises:
+            UnprovedError: The mass in the middle, or a quantity that must be positive, is not so.
+            ModalError: The structure can drift.
+        """
+        d, inputs = len(boxes.names), TaylorModel.variables(boxes.centre, boxes.radius, order)
+        parameters = {x: TaylorModel.constant(v, d, order) for x, v in system.parameters.items()}
+        parameters |= {name: inputs[i] for i, name in enumerate(boxes.names)}
+        full = system.assembly(parameters)
+        damping = full.dashpots
+        for factor, matrix in zip(full.rayleigh, (full.mass, full.springs), strict=True):
+            damping = damping + factor * matrix if factor.size() > 0 else damping
+        try:
+            squared, basis = eigh(full.stiffness.value, full.mass.value)
+        except np.linalg.LinAlgError:
+            raise UnprovedError("the mean mass matrix is not positive definite") from None
+        if not squared[0] > np.finfo(float).eps * squared[-1]:
+            raise ModalError("a mode does not oscillate: the stiffness lets the structure drift")
+        M, D, K = (basis.T @ matrix @ basis for matrix in (full.mass, damping, full.stiffness))
+        static, impulse = full.stiffness @ full.q0[:, None], full.mass @ full.v0[:, None]
+        impulses = [impulse if full.impulse is None else impulse + full.impulse]
+        if system.ground is not None:
+            impulses.append(full.mass @ -full.pattern[:, None])
+        if full.forces is not None:
+            impulses.append(full.forces)
+        statics = [static if full.static is None else static + full.static]
+        statics += [impulse * 0.0 for impulse in impulses[1:]]
+        factors = full.row_factors[:, None]
+        rows = factors * (full.rows @ np.kron(np.eye(2), basis))
+        reading, feeds = factors * (full.accelerated @ basis), None
+        if full.accelerated.any():  # q̈ + ι a = M⁻¹ (b f − D q̇ − K q)
+            reading = factors * solve(M, M.like((full.accelerated @ basis).T)).T
+            rows = rows - concatenate([reading @ K, reading @ D], -1)
+            feeds = None if full.forces is None else reading @ (basis.T @ full.forces)
+        return cls(
+            mass=M,
+            damping=D,
+            stiffness=K,
+            ratio=full.ratios[0] if full.ratios else None,
+            omega=np.sqrt(squared),
+            static=basis.T @ concatenate(statics, -1),
+            impulse=basis.T @ concatenate(impulses, -1),
+            rows=rows,
+            reading=reading,
+            feeds=feeds,
+        )
+
+    def damping_series(self) -> TaylorModel:
+        """D with the damping by a ratio, of which the remainder is not known."""
+        if self.ratio is None:
+            return self.damping
+        squared, root = solve(self.mass, self.stiffness), [np.diag(self.omega)[None]]
+        sums = self.omega[:, None] + self.omega
+        for m in range(1, squared.order + 1):  # R R = M⁻¹ K, in degree m (ω_i + ω_j) R_ij + known
+            right = squared.part(m)
+            for a in range(1, m):
+                right = right - convolve(root[a], root[m - a], (a, m - a), squared.inputs, matmul)
+            root.append(right / sums)
+        R = TaylorModel(tuple(root), 0 * sums, squared.inputs, squared.order)
+        return self.damping + self.ratio * 2.0 * (self.mass @ R)
+
+
+@dataclass(frozen=True, eq=False)
+class DampedModes:
+    """Polynomials of n modes of a structure with S sources, N unknowns, m outputs.
+
+    Args:
+        rate: λ_k, Im λ_k > 0, shape (n,), in 1/s.
+        shape: φ_k of each source, shape (S, n, N).
+        velocity: w_k ≈ λ_k φ_k, shape (S, n, N).
+        share: C_k ≈ the outputs of [φ_k, w_k], shape (S, n, m).
+    """
+
+    rate: TaylorModel
+    shape: TaylorModel
+    velocity: TaylorModel
+    share: TaylorModel
+
+    @classmethod
+    def of_structure(cls, structure: DampedStructure, chosen: Rows) -> DampedModes:
+        """Series of the modes in places `chosen` (n,) by rising |λ|, about the middle of the box.
+
+        Raises:
+            ModalError: One does not oscillate, or has the frequency of another one.
+        """
+        damping = structure.damping_series()
+        rate, shape = _eigen_series(structure, damping, chosen)
+        force = shape @ structure.impulse
+        if structure.static.size().any():
+            force = force - (shape @ structure.static) * _reciprocal(rate[:, None])
+        # near a pole (λ² M + λ D + K)⁻¹ is φ φᵀ / (φᵀ (2 λ M + D) φ (λ − λ_k))
+        weighted = (rate * 2.0)[:, None] * (shape @ structure.mass) + shape @ damping
+        norm = (weighted * shape) @ np.ones((len(structure.omega), 1))
+        shape = ((force * _reciprocal(norm)).T[..., None] * shape).polynomial
+        velocity = (rate[:, None] * shape).polynomial
+        modes = cls(rate, shape, velocity, shape)
+        return cls(rate, shape, velocity, modes.outputs(structure).polynomial)
+
+    def ratio_force(self, structure: DampedStructure) -> TaylorModel:
+        """Damping force 2 ζ |λ_k| M w_k of modes by a ratio ζ, shape (S, n, N)."""
+        assert structure.ratio is not None
+        frequency = self.squared_frequency**0.5
+        return structure.ratio * 2.0 * (frequency[:, None] * (self.velocity @ structure.mass))
+
+    @property
+    def squared_frequency(self) -> TaylorModel:
+        """|λ_k|², shape (n,)."""
+        real, imaginary = self.rate.real, (self.rate * -1j).real
+        return real * real + imaginary * imaginary
+
+    def outputs(self, structure: DampedStructure) -> TaylorModel:
+        """Outputs of the states [φ_k, w_k], shape (S, n, m)."""
+        of_shape, of_velocity = (structure.rows[:, part].T for part in _halves(structure))
+        found = self.shape @ of_shape + self.velocity @ of_velocity
+        if structure.ratio is None or not structure.reading.size().any():
+            return found
+        return found - self.ratio_force(structure) @ structure.reading.T
+
+
+def _halves(structure: DampedStructure) -> tuple[slice, slice]:
+    n = len(structure.omega)
+    return slice(None, n), slice(n, None)
+
+
+def needed_modes(
+    structure: DampedStructure, loads: Sequence[History], time: Array, allowed: Array | float
+) -> Rows:
+    """Places (n,) by rising |λ| of the modes without which outputs miss at most `allowed` (m,).
+
+    An output r q + s q̇ is at most √(r K⁻¹ rᵀ + s M⁻¹ sᵀ) times √(qᵀ K q + q̇ᵀ M q̇). All is that of
+    the middle of the box: what is left out counts as an error of the start in the proof.
+
+    Args:
+        structure: The structure.
+        loads: Histories of its sources but the start.
+        time: Nodes, shape (T,), in s.
+        allowed: Largest error of each output, shape (m,).
+    """
+    rate, shape, norm = _middle_modes(structure)
+    omega, (r, s) = structure.omega, (structure.rows.value[:, x] for x in _halves(structure))
+    force = shape @ structure.impulse.value - shape @ structure.static.value / rate[:, None]
+    amplitude = np.abs(force / norm[:, None])  # (2N, S)
+    for k, history in enumerate(loads, start=1):  # |∫ exp(λ τ) a| ≤ min(∫ |a|, max |a| / −Re λ)
+        steady = history.extremes[0] / np.maximum(-rate.real, 1e-300)
+        amplitude[:, k] *= np.minimum(absolute_moments(0.0, history, time)[0, -1], steady)
+    energy = np.hypot(norm_of(shape * omega), np.abs(rate) * norm_of(shape))
+    reads = np.hypot(norm_of(r / omega), norm_of(s)) / np.maximum(allowed, 1e-300)
+    size = 2 * energy * amplitude.sum(1) * reads.max()
+    upper = np.flatnonzero(rate.imag >= 0)  # one of each conjugate pair
+    order = upper[np.argsort(size[upper])]
+    return np.setdiff1d(upper, order[:-1][np.cumsum(size[order[:-1]]) <= 1])
+
+
+def _middle_modes(structure: DampedStructure) -> tuple[Array, Array, Array]:
+    """λ, unit shapes φ and φᵀ (2 λ M + D) φ in the middle, shapes (2N,), (2N, N) and (2N,).
+
+    Those with Im λ > 0 come first, then real ones, each by rising |λ|.
+    """
+    omega, n = structure.omega, len(structure.omega)
+    D = _middle_damping(structure)
+    lower = np.hstack([-np.diag(omega**2), -D])
+    rate, X = np.linalg.eig(np.vstack([np.eye(n, 2 * n, n), lower]))
+    group = np.where(oscillating(rate), 0, np.where(oscillating(rate.conj()), 2, 1))
+    order = np.lexsort((np.abs(rate), group))
+    rate, shape = rate[order], X[:n, order].T
+    shape = shape / norm_of(shape)[:, None]
+    return rate, shape, ((2 * rate[:, None] * shape + shape @ D) * shape).sum(1)
+
+
+def _middle_damping(structure: DampedStructure) -> Array:
+    ratio = 0.0 if structure.ratio is None else float(structure.ratio.value)
+    return structure.damping.value + 2 * ratio * np.diag(structure.omega)
+
+
+def norm_of(vectors: Array) -> Array:
+    """Euclidean norms along the last axis."""
+    return np.asarray(np.linalg.norm(vectors, axis=-1))
+
+
+def _eigen_series(
+    structure: DampedStructure, D: TaylorModel, chosen: Rows
+) -> tuple[TaylorModel, TaylorModel]:
+    """λ (n,) and φ (n, N) with (λ² M + λ D + K) φ = 0 to the order of M, about the middle.
+
+    In degree m, (λ₀² M₀ + λ₀ D₀ + K₀) φ_m + λ_m (2 λ₀ M₀ + D₀) φ₀ is known, and φ₀* φ_m = 0.
+
+    Raises:
+        ModalError: A mode does not oscillate, or has the frequency of another one.
+    """
+    M, K = structure.mass, structure.stiffness
+    rates, shapes, _ = _middle_modes(structure)
+    lam, phi = rates[chosen], shapes[chosen]
+    _require_single(rates, chosen)
+    N, d = phi.shape[1], M.inputs
+    bordered = np.zeros((len(lam), N + 1, N + 1), complex)
+    for k, x in enumerate(lam):
+        bordered[k, :N, :N] = x**2 * M.value + x * D.value + K.value
+        bordered[k, :N, N] = (2 * x * M.value + D.value) @ phi[k]
+        bordered[k, N, :N] = phi[k].conj()
+    inverse = np.linalg.inv(bordered)
+    # by degree: λ, φ, w = λ φ and w M
+    L, P, W, U = (
+        [lam[None]],
+        [phi[None]],
+        [lam[:, None] * phi[None]],
+        [lam[:, None] * phi @ M.value],
+    )
+    for m in range(1, M.order + 1):
+
+        def product(rows: list[Array], matrix: TaylorModel, first: int, m: int = m) -> Array:
+            found = np.zeros((count(d, m), *phi.shape), complex)
+            for b in range(first, min(m, len(matrix.parts) - 1) + 1):
+                found += convolve(rows[m - b], matrix.parts[b], (m - b, b), d, matmul)
+            return found
+
+        def scaled(rows: list[Array], m: int = m) -> Array:  # Σ λ_a rows_(m−a), 0 < a < m
+            found = np.zeros((count(d, m), *phi.shape), complex)
+            for a in range(1, m):
+                found += convolve(L[a][..., None], rows[m - a], (a, m - a), d, np.multiply)
+            return found
+
+        W.append(scaled(P))  # of lower degrees alone
+        U.append(product(W, M, 0))
+        known = lam[:, None] * U[m] + scaled(U) + product(W, D, 0) + product(P, K, 1)
+        found = np.einsum("kij,mkj->mki", inverse[..., :N], -known)
+        P.append(found[..., :N])
+        L.append(found[..., N])
+        added = lam[:, None] * P[m] + L[m][..., None] * phi
+        W[m] += added
+        U[m] += added @ M.value
+    return (
+        TaylorModel(tuple(L), np.zeros(lam.shape), d, M.order),
+        TaylorModel(tuple(P), np.zeros(phi.shape), d, M.order),
+    )
+
+
+def _require_single(rates: Array, chosen: Rows) -> None:
+    """Refuse chosen eigenvalues that do not oscillate, or are equal to others of `rates` (2N,)."""
+    if not oscillating(rates[chosen]).all():
+        raise ModalError(
+            "a mode does not oscillate: modal intervening variables need damping below critical in"
+            " every mode; use graph-follower"
+        )
+    distance = np.abs(rates[chosen, None] - rates)
+    distance[np.arange(len(chosen)), chosen] = np.inf
+    for k, other in zip(chosen, distance.argmin(1), strict=True):
+        if np.abs(rates[k] - rates[other]) < DOUBLE * np.abs(rates[k]):
+            raise ModalError(
+                f"modal: modes {min(k, other) + 1} and {max(k, other) + 1} have the same frequency,"
+                f" {np.abs(rates[k]):.4g} rad/s, and so no smooth shapes; take the method auto or"
+                " improved-graph-follower"
+            )
+
+
+def _reciprocal(x: TaylorModel) -> TaylorModel:
+    """Series of 1/x about the middle, entry by entry, without a remainder."""
+    parts = [1 / x.parts[0]]
+    for m in range(1, x.order + 1):
+        total = np.zeros((count(x.inputs, m), *x.shape), complex)
+        for b in range(1, m + 1):
+            total += convolve(x.part(b), parts[m - b], (b, m - b), x.inputs, np.multiply)
+        parts.append(-parts[0] * total)
+    return TaylorModel(tuple(parts), np.zeros(x.shape), x.inputs, x.order)
+
+
+def require_dissipation(system: LinearSystem, boxes: Boxes) -> None:
+    """Refuse structures that are not known to lose energy everywhere in the box.
+
+    It follows from how a structure is written, not from samples of it.
+
+    Raises:
+        UnprovedError: Unknowns have no mass, a parameter leaves its range, or a term of the damping
+            may feed energy into the structure.
+    """
+    if not isinstance(system, StoreyFrame | MatrixStructure):
+        raise UnprovedError(f"nothing is known about the parameters of a {type(system).__name__}")
+    lowest = {**system.parameters, **dict(zip(boxes.names, boxes.lower[0].tolist(), strict=True))}
+    for name, low, high in zip(boxes.names, boxes.lower[0], boxes.upper[0], strict=True):
+        if not (parameter := system.parameter(name)).admits(low, high):
+            what = f"{name} reaches from {low:g} to {high:g}"
+            raise UnprovedError(f"{what}, and is known to be {parameter.range or 'finite'}")
+    if isinstance(system, StoreyFrame):
+        return  # whose ranges have no negative damping
+    if len(system.massless):
+        raise UnprovedError("unknowns without mass are condensed", "take the method dual")
+    for kind in ("mass", "damping", "stiffness"):
+        if any(callable(factor) for factor, _ in getattr(system, kind)):
+            raise UnprovedError(f"{kind} has a factor that is a function")
+    for factor, array in system.damping:
+        eigenvalues = np.linalg.eigvalsh(array)
+        least = lowest[factor] if isinstance(factor, str) else float(factor)  # type: ignore[arg-type]
+        if least < 0 or eigenvalues[0] < -1e-14 * np.abs(eigenvalues).max():
+            raise UnprovedError(
+                "a term of the damping has a negative factor or an indefinite array: it may feed"
+                " energy into the structure"
+            )
