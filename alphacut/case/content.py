@@ -53,8 +53,10 @@ class Content(CellContent):
     def limited_outputs(self) -> tuple[str, ...]:
         """Peaks that questions compare with limits, each once, such as q3 and max q3."""
         sections = (section for section in self.questions.values() if section.reads_peaks)
-        peaks = (limit.peak for x in sections for limit in x.limits)
-        return tuple(dict.fromkeys(peak.removeprefix("mean ") for peak in peaks))
+        limits = (limit for section in sections for limit in section.limits)
+        # the mean over records follows from the peaks under each
+        peaks = (limit.output if limit.side == "mean" else limit.peak for limit in limits)
+        return tuple(dict.fromkeys(peaks))
 
     @property
     def stated_fraction(self) -> float | None:

@@ -8,17 +8,18 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, cast
 
 import numpy as np
 from pydantic import Field, PlainValidator
 
 from alphacut.case.structure import Structure
 from alphacut.case.types import NotEmpty, Quantity, Section
-from alphacut.frame.questions.peaks import output_of
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io import quantity
+
+Side = Literal["", "max", "min", "mean"]
 
 
 @dataclass(frozen=True)
@@ -26,22 +27,28 @@ class Limit:
     """Largest magnitude allowed of an output, or its greatest or least value.
 
     Args:
-        peak: The output, or "max", "min" or "mean" and the output.
-        value: In the SI unit of the output, or as a fraction of the storey's height; of a least
-            value its negative, which the negative of the output must not pass.
+        side: "max" or "min" of the output itself, "" of its magnitude, "mean" of that over records.
+        output: The output of the structure.
+        value: In the SI unit of the output, or as a fraction of the storey's height.
         is_relative: Whether it is such a fraction.
         text: The limit as the user wrote it.
     """
 
-    peak: str
+    side: Side
+    output: str
     value: float
     is_relative: bool
     text: str
 
     @property
-    def output(self) -> str:
-        """The output of the structure."""
-        return output_of(self.peak)
+    def peak(self) -> str:
+        """Name of the peak as `Peaks` has it, such as "max q3"."""
+        return f"{self.side} {self.output}".strip()
+
+    @property
+    def sign(self) -> int:
+        """−1 of a least value, whose peak is that of the output's negative; else 1."""
+        return -1 if self.side == "min" else 1
 
     def value_in_si(self, structure: Structure, key: str) -> float:
         """The limit in the SI unit of its output; a fraction is of the storey's least height."""
@@ -55,9 +62,9 @@ class Limit:
 
 def parse_limit(value: object) -> Limit:
     """Limit that a text such as "drift1 <= 40 mm" states; of a magnitude it is positive."""
-    match = re.fullmatch(r"((?:max |min |mean )?)(\w+)\s*(<=|>=)\s*(.+)", str(value).strip())
+    match = re.fullmatch(r"(?:(max|min|mean) )?(\w+)\s*(<=|>=)\s*(.+)", str(value).strip())
     allowed = "'drift1 <= 40 mm', 'drift1 <= 0.5 %', 'max q3 <= 80 mm' or 'min q3 >= -60 mm'"
-    if match is None or (match[3] == ">=") != (match[1] == "min "):  # only least values have >=
+    if match is None or (match[3] == ">=") != (match[1] == "min"):  # only least values have >=
         raise RefusedError("", value, allowed)
     side, name, _, text = match.groups()
     is_relative = name.startswith("drift") and text.endswith("%")
@@ -65,10 +72,8 @@ def parse_limit(value: object) -> Limit:
         number = _number(text, "" if is_relative else Output(name).unit)
     except ValueError as error:
         raise RefusedError("", value, allowed, str(error)) from None
-    is_signed = side in ("max ", "min ")
-    require(number > 0 or is_signed, "", value=value, allowed=allowed)
-    bound = 0.0 - number if side == "min " else number  # 0.0 − 0.0 is no negative zero
-    return Limit(f"{side}{name}", bound, is_relative, str(value))
+    require(number > 0 or side in ("max", "min"), "", value=value, allowed=allowed)
+    return Limit(cast("Side", side or ""), name, number, is_relative, str(value))
 
 
 def _number(text: str, unit: str) -> float:
@@ -103,24 +108,21 @@ class QuestionSection(Section):
         return {x.peak if peaks.count(x.peak) == 1 else x.text: x for x in self.limits}
 
     def in_si(self, structure: Structure) -> dict[str, float]:
-        """Value of each limit in the SI unit of its output, by the names of `limits_by_name`.
+        """Value of each peak's limit in the SI unit of its output, by `limits_by_name`.
+
+        The peak of a least value is that of the output's negative, and so is its limit.
 
         Raises:
             RefusedError: The structure has no such output, or a limit stands there twice.
         """
         key, limits = f"{self.key}.limits", self.limits_by_name
-        values = {name: limit.value_in_si(structure, key) for name, limit in limits.items()}
+        # 0.0 − 0.0 is no negative zero
+        values = {name: 0.0 + x.sign * x.value_in_si(structure, key) for name, x in limits.items()}
         outputs = tuple(dict.fromkeys(limit.output for limit in self.limits))
         structure.require_quantities(key, outputs)
         texts = ", ".join(limit.text for limit in self.limits)
         require(len(values) == len(self.limits), key, value=texts, allowed="each limit once")
         return values
-
-    def peak_and_unit(self, name: str, structure: Structure) -> dict[str, str]:
-        """Peak ("output") and SI unit of a limit; the name and no unit of several together."""
-        limit = self.limits_by_name.get(name)
-        unit = "" if limit is None else structure.unit(limit.output)
-        return {"output": name if limit is None else limit.peak, "unit": unit}
 
     def check(self, structure: Structure) -> None:
         """Refuses outputs that the structure lacks, and limits that this question cannot take."""
@@ -192,6 +194,6 @@ class FragilitySection(QuestionSection):
         allowed = "linear structures that start at rest, without forces: they scale with records"
         require(is_free and is_at_rest, "fragility", value="of another motion", allowed=allowed)
         for limit in self.limits:
-            fits = limit.value > 0 and not limit.peak.startswith("mean ")
+            fits = limit.sign * limit.value > 0 and limit.side != "mean"
             allowed = "limits of each record that the structure at rest keeps"
             require(fits, "fragility.limits", value=limit.text, allowed=allowed)

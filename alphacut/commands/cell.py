@@ -12,11 +12,11 @@ import numpy as np
 from alphacut.case.cell import CellContent
 from alphacut.commands.options import Command, add_common, read_cell, write_answer
 from alphacut.fuzzy.refused import FailedError, require
-from alphacut.io.columns import ISOTROPIC, fibre_label, text_table
+from alphacut.io.arrays import text_table
 from alphacut.io.files import Document, ranks
 from alphacut.rve.result.result import HomogenisedStiffness
 from alphacut.stages import cell
-from alphacut.stages.meshed import modal_sample
+from alphacut.stages.cell import ISOTROPIC, constant_label
 
 KEYS = {
     "--a2": ("radius.a2", "slope of the radius at the lower end of θ"),
@@ -92,7 +92,7 @@ def export(content: CellContent, path: Path) -> Document:
 
     mesh = content.mesh
     if mesh.file is not None:
-        sample = modal_sample(*content.law_and_phases)
+        sample = cell.modal_sample(*content.law_and_phases)
         fields = mesh_fields(MeshModel(mesh.file), sample.law, sample.phases)
     else:
         modal = cell.modal_cell(*content.radius_and_phases)
@@ -113,7 +113,7 @@ def summary(result: HomogenisedStiffness, document: Document) -> str:
     value_texts += [f"{stress['s11']:#.9g}", f"{stress['s12']:#.9g}"]
     rows = [*zip(names, value_texts, error_texts, strict=True)]
     for key, number in document["fibres"].items():
-        rows.append((fibre_label(key), *_value_and_error(number)))
+        rows.append((constant_label(key), *_value_and_error(number)))
     rows += plane_rows(document)
     if bounds := document["references"].get("hashin_shtrikman_E_GPa"):
         rows.append((f"{ISOTROPIC}, GPa", f"{bounds[0]:.4f} … {bounds[1]:.4f}", ""))
@@ -135,7 +135,7 @@ def plane_rows(document: Document) -> Iterator[tuple[str, str, str]]:
         yield f"C{PLANE_INDICES[i]}{PLANE_INDICES[j]}, GPa", f"{stiffness[i, j]:.6g}", error
     for definition, constants in document["plane"].items():
         for key, number in constants.items():
-            yield f"{fibre_label(key)} ({definition})", *_value_and_error(number)
+            yield f"{constant_label(key)} ({definition})", *_value_and_error(number)
 
 
 def _value_and_error(number: Document) -> tuple[str, str]:

@@ -13,17 +13,17 @@ from alphacut.case.loads import RecordsSection
 from alphacut.case.structure import Structure
 from alphacut.case.types import Section
 from alphacut.commands.options import Command, add_common, write_answer
+from alphacut.commands.pipeline import cut_record_warnings, require_runnable
 from alphacut.commands.results import read_case
 from alphacut.frame import MatrixStructure, StoreyFrame
 from alphacut.frame.structures.linear import frequencies
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal, Triangular
-from alphacut.io.columns import text_table
-from alphacut.io.quantity import engineering
-from alphacut.report.results import GRAVITY
+from alphacut.io.arrays import text_table
+from alphacut.io.quantity import STANDARD_GRAVITY, engineering
 from alphacut.stages.cell import model_of, solve
-from alphacut.stages.readiness import cut_record_warnings, require_runnable
 from alphacut.stages.suite import SuiteRecord, suite_records, suite_warnings
 
+GRAVITY = float(STANDARD_GRAVITY)
 KINDS = {Crisp: "crisp", Interval: "interval", Triangular: "triangle", Trapezoidal: "trapezoid"}
 Row = tuple[str, str, str]
 

@@ -12,7 +12,7 @@ from alphacut.case.load import Case, load
 from alphacut.commands.options import require_case_petsc
 from alphacut.fuzzy.refused import require
 from alphacut.io.files import locked, rank, require_writable, say
-from alphacut.io.manifest import MANIFEST, ResultsFolder
+from alphacut.io.results import MANIFEST, ResultsFolder
 from alphacut.stages.store import StageStore
 
 

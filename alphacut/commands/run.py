@@ -8,24 +8,25 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TextIO
 
+import pandas as pd
+
 from alphacut.case.load import Case
 from alphacut.commands.options import Command, add_quiet, add_run, write_answer
+from alphacut.commands.pipeline import Pipeline
 from alphacut.commands.results import open_results
 from alphacut.figures.all import draw_figures
 from alphacut.fuzzy.campaign.workers import pool
 from alphacut.fuzzy.refused import require
-from alphacut.io.columns import text_table
-from alphacut.io.files import Document, as_json, locked, say, write_text
-from alphacut.io.manifest import ResultsFolder
-from alphacut.io.netcdf import read_summary
+from alphacut.io.arrays import text_table
+from alphacut.io.files import locked, say, write_text
 from alphacut.io.provenance import FORMAT, command, door, versions
-from alphacut.report.comparison import comparison
-from alphacut.report.markup import write_markup
+from alphacut.io.results import ResultsFolder
+from alphacut.questions.summary import SUMMARY, Summary
 from alphacut.report.page import comparison_page, render_page
-from alphacut.report.tables import run_text, tables, write_csv, write_tables
-from alphacut.stages.pipeline import Pipeline
+from alphacut.report.results import comparison, run_text
+from alphacut.report.tables import tables, write_csv, write_markup, write_tables
 from alphacut.stages.results import Results
-from alphacut.stages.store import StageStore, put_text
+from alphacut.stages.store import StageStore
 
 PAGE = "report.html"
 
@@ -41,10 +42,10 @@ def run(options: argparse.Namespace, out: TextIO) -> int:
     """Computes all stages of a case, draws figures and shows tables; returns exit status 0."""
     folder = options.out or f"results/{Path(options.case).stem}"
     with open_results(options, folder) as (case, store):
-        document = compute_run(case, store, options.petsc, figures=not options.no_figures)
-    write_answer(options, document, out, run_text(document))
+        summary = compute_run(case, store, options.petsc, figures=not options.no_figures)
+    write_answer(options, summary.parts(), out, run_text(summary))
     if options.json != "-" and not options.quiet:
-        say(f"results are in {folder}, after {document['seconds']:.0f} s")
+        say(f"results are in {folder}, after {summary.seconds:.0f} s")
         if store.up_to_date:
             say(f"{len(store.up_to_date)} of the stages were up to date")
         say(f"next: {door('report', folder)}")
@@ -53,28 +54,28 @@ def run(options: argparse.Namespace, out: TextIO) -> int:
 
 def compute_run(
     case: Case, store: StageStore, petsc: Mapping[str, str], *, figures: bool
-) -> Document:
-    """Computes all stages of a case, and returns their numbers, written last as summary.json."""
+) -> Summary:
+    """Computes all stages of a case; returns their numbers, written last as summary.json."""
     start = time.perf_counter()
     with pool(store.workers) as executor:
         results = Pipeline(Results(case.content), store, petsc, figures, executor).run()
         names = draw_figures(results, store, executor) if figures else []
-    document: Document = {
-        "format_version": FORMAT,
-        "case": case.name,
-        "title": case.content.title,
-        "about": case.content.about,
-        "case_text": case.text,
-        "command": command(),
-        "versions": versions(),
-        **results.document(),
-        "changes": list(case.changes),
-        "figures": names,
-        "seconds": time.perf_counter() - start,
-        "fingerprints": {name: result.fingerprint for name, result in results.stages.items()},
-    }
-    store.put_text("summary.json", as_json(document, indent=2))
-    return document
+    summary = Summary.of(
+        results,
+        format_version=FORMAT,
+        case=case.name,
+        title=case.content.title,
+        about=case.content.about,
+        case_text=case.text,
+        command=command(),
+        versions=versions(),
+        changes=case.changes,
+        figures=tuple(names),
+        seconds=time.perf_counter() - start,
+        fingerprints=results.fingerprints,
+    )
+    store.put_text(SUMMARY, summary.to_json())
+    return summary
 
 
 def add_page(parser: argparse.ArgumentParser) -> None:
@@ -101,10 +102,10 @@ def report(options: argparse.Namespace, out: TextIO) -> int:
     path = Path(options.out) if options.out else folder.path / PAGE
     if path.name == PAGE and path.parent.resolve() == folder.path.resolve():
         with locked("FOLDER", folder.path):
-            put_text(ResultsFolder.read(folder.path), PAGE, page)
+            ResultsFolder.read(folder.path).put_text(PAGE, page)
     else:
         write_text(path, page)
-    summary, files = read_summary(folder), list[Path]()
+    summary, files = Summary.read(folder), list[Path]()
     if options.csv:
         files = write_tables(summary, folder, Path(options.csv))
     if options.tables:
@@ -118,19 +119,19 @@ def compare(options: argparse.Namespace, out: TextIO) -> int:
     """Shows two runs side by side, and writes the files requested; returns exit status 0."""
     folders = options.folder
     require(len(folders) == 2, "FOLDER", value=f"{len(folders)} folders", allowed="one or two")
-    first, second = (read_summary(ResultsFolder.read(Path(name))) for name in folders)
+    first, second = (Summary.read(ResultsFolder.read(Path(name))) for name in folders)
     table = comparison(first, second)
     allowed = "two runs with a quantity in common"
-    require(bool(table[1]), "FOLDER", value=" and ".join(folders), allowed=allowed)
-    named, files = {"comparison": table}, list[Path]()
+    require(bool(table.rows), "FOLDER", value=" and ".join(folders), allowed=allowed)
+    rows = [dict(zip(table.head, row, strict=True)) for row in table.rows]
+    files = list[Path]()
     if options.out:
         write_text(Path(options.out), comparison_page(first, second, table))
         files.append(Path(options.out))
     if options.csv:
-        files += write_csv(named, Path(options.csv))
+        files += write_csv({"comparison": pd.DataFrame(rows)}, Path(options.csv))
     if options.tables:
-        files += write_markup(named, Path(options.tables))
-    rows = [dict(zip(table[0], row, strict=True)) for row in table[1]]
+        files += write_markup({"comparison": table}, Path(options.tables))
     text = text_table(*table) + "".join(f"{file}\n" for file in files)
     write_answer(options, {"rows": rows, "tables": [*map(str, files)]}, out, text)
     return 0

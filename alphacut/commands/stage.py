@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TextIO
 
@@ -13,19 +13,24 @@ from alphacut.commands.options import (
     add_run,
     write_answer,
 )
+from alphacut.commands.pipeline import Pipeline
 from alphacut.commands.results import open_results, read_case
+from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature
-from alphacut.io.columns import ISOTROPIC, fibre_label, text_table
-from alphacut.io.files import Document
-from alphacut.io.netcdf import read_dataset
-from alphacut.report.results import cut_text, width_text
-from alphacut.report.tables import run_text, tables
-from alphacut.rve.result.engineering_constants import FREE, PLANE_STRAIN
-from alphacut.rve.result.loss_factors import CONSTANTS
+from alphacut.io.arrays import text_table
+from alphacut.io.results import read_dataset
+from alphacut.questions.summary import Parts
+from alphacut.report import tables
+from alphacut.report.results import cut_text, run_text, width_text
+from alphacut.report.tables import shown
+from alphacut.stages.cell import ISOTROPIC, References, constant_label
 from alphacut.stages.identify import identify_inputs
-from alphacut.stages.pipeline import Pipeline
+from alphacut.stages.image import ImageResult
+from alphacut.stages.losses import LossResult
+from alphacut.stages.modulus import ModulusResult
 from alphacut.stages.results import Results
+from alphacut.stages.store import Cuts
 from alphacut.stochastic.microstructure_summary import fragment
 
 ONLY = "Plane strain alone: the other definition is for one particle of two isotropic phases"
@@ -34,7 +39,7 @@ ONLY = "Plane strain alone: the other definition is for one particle of two isot
 def microstructure(options: argparse.Namespace, out: TextIO) -> int:
     """Computes the radius map of particles, and prints its section [radius]; exit status 0."""
     with open_results(options) as (case, store):
-        numbers = Pipeline(Results(case.content), store).compute_microstructure().document
+        numbers = Pipeline(Results(case.content), store).compute_microstructure().numbers
     text = fragment(numbers)
     write_answer(options, numbers | {"fragment": text}, out, text)
     return 0
@@ -45,70 +50,72 @@ def modulus(options: argparse.Namespace, out: TextIO) -> int:
     with open_results(options) as (case, store):
         results = Results(case.content)
         Pipeline(results, store, options.petsc).compute_modulus()
-    document, texts = results.document(), {"modulus": modulus_text, "image": image_text}
-    for name in document.keys() & texts.keys():
-        text = text_table(*tables(document)[name]) + texts[name](document[name])
-        write_answer(options, document[name], out, text)
+    if results.image is not None:
+        image = results.image.numbers
+        text = text_table(*shown(tables.image(image))) + image_text(image)
+        write_answer(options, dict(image), out, text)
+    elif results.modulus is not None:
+        cell = results.modulus.numbers
+        text = text_table(*shown(tables.modulus(cell))) + modulus_text(cell)
+        write_answer(options, dict(cell), out, text)
     return 0
 
 
-def image_text(document: Document) -> str:
+def image_text(result: ImageResult) -> str:
     """Lines on an image: its constants, area fractions, and what widens the bounds of E."""
-    shares = (f"{name}: {share:.1%} of the area\n" for name, share in document["fractions"].items())
+    shares = (f"{name}: {share:.1%} of the area\n" for name, share in result.fractions.items())
     return (
-        plane_text(document["plane"], document["cuts"]["alpha"], Nature.GUARANTEED)
-        + loss_text(document.get("loss"))
-        + bounds_text(document)
+        plane_text(result.plane, result.cuts.alpha, Nature.GUARANTEED)
+        + loss_text(result.loss)
+        + bounds_text(result.references)
         + "".join(shares)
-        + f"{width_text(document)}\n"
+        + f"{width_text(result)}\n"
     )
 
 
-def modulus_text(document: Document) -> str:
+def modulus_text(result: ModulusResult) -> str:
     """Lines on a modulus: constants on the lowest and highest level, references, and the cost."""
-    alpha, plane = document["alpha"], document["plane"]
+    alpha, plane = result.alpha, result.plane
     return (
-        cuts_text("of fibres", document["fibres"], alpha, Nature(document["nature"]))
+        cuts_text("of fibres", result.fibres, alpha, result.nature)
         + (plane_text(plane, alpha, Nature.ATTAINED) if plane else "")
-        + loss_text(document.get("loss"))
-        + bounds_text(document)
-        + f"{document['samples']} samples, {document['solves']} linear systems,"
-        f" {document['seconds']:.1f} s, {document['method']}\n"
+        + loss_text(result.loss)
+        + bounds_text(result.references)
+        + f"{result.samples} samples, {result.solves} linear systems,"
+        f" {result.seconds:.1f} s, {result.method}\n"
     )
 
 
-def bounds_text(document: Document) -> str:
+def bounds_text(references: References) -> str:
     """Line on the Hashin–Shtrikman bounds; empty where there are none."""
-    bounds = document["references"].get("hashin_shtrikman_E_GPa")
+    bounds = references.get("hashin_shtrikman_E_GPa")
     return f"{ISOTROPIC}: {bounds[0]:.4f} … {bounds[1]:.4f} GPa\n" if bounds else ""
 
 
-def cuts_text(title: str, cuts: Document, alpha: Sequence[float], nature: Nature) -> str:
+def cuts_text(title: str, cuts: Mapping[str, Cuts], alpha: Array, nature: Nature) -> str:
     """Table of the lowest and highest cut of each constant; empty where there are none."""
     rows = [
-        (fibre_label(x), cut_text(bounds, 0, nature), cut_text(bounds, -1, nature))
-        for x, bounds in cuts.items()
+        (constant_label(x), cut_text(ends, 0, nature), cut_text(ends, -1, nature))
+        for x, ends in cuts.items()
     ]
     return text_table((title, f"α = {alpha[0]:g}", f"α = {alpha[-1]:g}"), rows) if rows else ""
 
 
-def plane_text(cuts: Document, alpha: Sequence[float], nature: Nature) -> str:
-    """Constants along x and y: a table in plane strain, and one with free extension."""
-    free = {x.replace("_free", ""): bounds for x, bounds in cuts.items() if "_free" in x}
-    plane_strain = {x: bounds for x, bounds in cuts.items() if "_free" not in x}
-    text = cuts_text(PLANE_STRAIN, plane_strain, alpha, nature)
-    return text + (cuts_text(FREE, free, alpha, nature) or f"{ONLY}\n")
+def plane_text(cuts: Mapping[str, Mapping[str, Cuts]], alpha: Array, nature: Nature) -> str:
+    """Constants along x and y, a table for each definition."""
+    texts = [cuts_text(definition, x, alpha, nature) for definition, x in cuts.items()]
+    return "".join(texts) + (f"{ONLY}\n" if len(texts) == 1 else "")
 
 
-def loss_text(losses: Document | None) -> str:
+def loss_text(loss: LossResult | None) -> str:
     """Table of loss factors on the lowest and highest level; empty where there are none."""
-    if losses is None:
+    if loss is None:
         return ""
     rows = []
-    for name in CONSTANTS:
-        cuts = (cut_text(losses[name], level, Nature.ATTAINED) for level in (0, -1))
-        error = f"{losses['error'][name]:.1e}" if losses["error"] else "not declared"
-        rows.append((f"loss factor of {name}", *cuts, error))
+    for name, cuts in (("E", loss.E), ("G", loss.G), ("K", loss.K)):
+        texts = (cut_text(cuts, level, Nature.ATTAINED) for level in (0, -1))
+        error = f"{loss.error[name]:.1e}" if loss.error else "not declared"
+        rows.append((f"loss factor of {name}", *texts, error))
     return text_table(("tan δ = 2 ζ", "α = 0", "α = 1", "± error"), rows)
 
 
@@ -124,8 +131,8 @@ def envelope(options: argparse.Namespace, out: TextIO) -> int:
     with open_results(options) as (case, store):
         pipeline = Pipeline(Results(case.content), store)
         pipeline.compute_envelopes(pipeline.structure(data, "--modulus"), studies=False)
-    document = pipeline.results.document()
-    write_answer(options, document["envelopes"]["all"], out, run_text(document))
+    parts = Parts.of(pipeline.results)
+    write_answer(options, dict(parts.envelopes["all"]), out, run_text(parts))
     return 0
 
 
@@ -134,10 +141,9 @@ def identify(options: argparse.Namespace, out: TextIO) -> int:
     content = read_case(options).content
     if content.identify is None or content.frame is None or content.envelope is None:
         raise RefusedError("identify", None, "sections [identify], [frame] and [envelope]")
-    document, _ = identify_inputs(
-        content.identify, content.frame.structure(), content.envelope.alpha
-    )
-    write_answer(options, document, out, run_text({"update": document}))
+    alpha, structure = content.envelope.alpha, content.frame.nominal
+    learned, _ = identify_inputs(content.identify, structure, alpha)
+    write_answer(options, dict(learned), out, run_text(Parts(update=learned)))
     return 0
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
@@ -18,11 +19,9 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import require
 from alphacut.fuzzy.result import Nature
 from alphacut.fuzzy.sets.numbers import Interval
-from alphacut.io.columns import columns_text
+from alphacut.io.arrays import columns_text
 from alphacut.io.files import Document, locked
-from alphacut.io.manifest import ResultsFolder
-from alphacut.io.netcdf import dataset_of
-from alphacut.stages.store import put_text
+from alphacut.io.results import ResultsFolder
 
 if TYPE_CHECKING:
     import xarray
@@ -39,11 +38,11 @@ def verify(options: argparse.Namespace, out: TextIO) -> int:
     path = Path(options.folder)
     folder = ResultsFolder.read(path)
     document: Document = {}
-    names = [name for name in folder.stage_files if name.startswith("envelope_")]
+    names = [x.removesuffix(".nc") for x in folder.files if re.fullmatch(r"envelope_.*\.nc", x)]
     require(bool(names), "FOLDER", value=str(path), allowed="results of a run with an envelope")
     with locked("FOLDER", path):
         for name in names:
-            data = dataset_of(folder.content(f"{name}.nc"))
+            data = folder.dataset(f"{name}.nc")
             if "motion_inputs" not in data:  # which proved envelopes alone store
                 document[name] = {"nature": str(data.attrs["nature"]), "motions_tested": 0}
                 continue
@@ -72,7 +71,7 @@ def verify_envelope(data: xarray.Dataset, name: str, folder: ResultsFolder) -> D
     try:
         trial.require_agreement(points, motions)
     except ContradictionError as error:
-        put_text(folder, "contradiction.csv", columns_text(error.table))
+        folder.put_text("contradiction.csv", columns_text(error.table))
         raise
     # points are compared as bytes, in which + 0.0 leaves no negative zero
     indices = {point.tobytes(): k for k, point in enumerate(points + 0.0)}
@@ -83,7 +82,7 @@ def verify_envelope(data: xarray.Dataset, name: str, folder: ResultsFolder) -> D
     motions_shown = motions_table(trial, [motions[k] for k in shown])
     files = {f"{name}_motions.csv": motions_shown, f"{name}_inputs.csv": inputs}
     for file, columns in files.items():
-        put_text(folder, file, columns_text(columns))
+        folder.put_text(file, columns_text(columns))
     tested = {"motions_tested": len(points), "files": list(files)}
     return {"nature": str(data.attrs["nature"]), **tested}
 

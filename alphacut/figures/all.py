@@ -9,17 +9,16 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from alphacut.export.mesh import draw_mesh
 from alphacut.figures import answers, envelope, follower, frame, fuzzy_numbers, material, overview
-from alphacut.figures.style import report_style, save
 from alphacut.fuzzy import FuzzyNumber, PiecewiseLinear
 from alphacut.fuzzy.campaign.workers import submit
 from alphacut.io.provenance import NESTED, version_of
 from alphacut.stages.cell import GPA, modal_cell
+from alphacut.stages.identify import IdentifiedResult
 from alphacut.stages.results import Results
-from alphacut.stages.store import Stage, StageContext, StageResult, StageStore
+from alphacut.stages.store import Computed, Stage, StageContext, StageStore
+from alphacut.stochastic.figures.style import figure_style, save
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -32,13 +31,12 @@ def drawings(results: Results) -> Iterator[Drawing]:
     """Yields the name of each figure that the results allow, and the function that draws it."""
     yield from _material_figures(results)
     yield from _structure_figures(results)
-    if results.learned is not None and "refuted" not in results.learned:
+    if isinstance(results.learned, IdentifiedResult):
         yield "update-inputs", partial(envelope.identified_inputs, results.learned)
     if results.suite is not None:
         yield "spectra", partial(envelope.spectra, results.suite)
-    for key, draw in answers.DRAWINGS.items():
-        if key in results.answers:
-            yield key, partial(draw, results.answers[key])
+    for key, answer in results.answers.items():
+        yield key, partial(answers.DRAWINGS[key], answer)
     for task in results.tasks:
         yield from envelope.drawings(task, results)
 
@@ -56,9 +54,9 @@ def _material_figures(results: Results) -> Iterator[Drawing]:
     if (data := results.modulus) is not None and results.is_paper:
         inclusion = content.radius_and_phases[1].inclusion_modulus
         if isinstance(inclusion, FuzzyNumber):
-            cuts = data.document["E_GPa"]
-            bounds = (GPA * np.array(cuts[side]) for side in ("lower", "upper"))
-            effective = PiecewiseLinear(tuple(data.document["alpha"]), *map(tuple, bounds))
+            cuts = data.numbers.E_GPa
+            bounds = (GPA * cuts.lower, GPA * cuts.upper)
+            effective = PiecewiseLinear(tuple(data.numbers.alpha), *map(tuple, bounds))
             yield (
                 "fig36-fuzzy-numbers",
                 partial(fuzzy_numbers.kinds_of_numbers, inclusion, effective),
@@ -98,16 +96,18 @@ def draw_figures(results: Results, store: StageStore, executor: Executor | None)
     Returns the paths of the files, relative to the folder of the results.
     """
     inputs = [results.content, results.answers]
-    inputs += [sorted(x.fingerprint for x in results.stages.values())]
+    inputs += [sorted(results.fingerprints.values())]
     inputs += [version_of(name) for name in ("matplotlib", "pyvista")]
     compute = partial(draw_all, results, executor)
-    figures = store.take(Stage("figures", inputs, (*NESTED, "alphacut"), compute))
-    before = [] if results.microstructure is None else results.microstructure.figures
-    return [*before, *figures.figures]
+    figures = store.take(Stage("figures", inputs, (*NESTED, "alphacut"), list[str], compute))
+    before = () if results.microstructure is None else results.microstructure.files
+    return [name for name in (*before, *figures.files) if name.startswith("figures/")]
 
 
-def draw_all(results: Results, executor: Executor | None, context: StageContext) -> StageResult:
-    """Draws all figures by `PARTS` tasks; the document of the result has the names of the files."""
+def draw_all(
+    results: Results, executor: Executor | None, context: StageContext
+) -> Computed[list[str]]:
+    """Draws all figures by `PARTS` tasks; returns the names of the files."""
     assert context.folder is not None
     folder = context.folder
     mesh_futures = _submit_mesh(results, folder, executor)
@@ -118,12 +118,12 @@ def draw_all(results: Results, executor: Executor | None, context: StageContext)
         if context.tick:
             context.tick(count / PARTS)
     drawn_meshes = [name for name, future in mesh_futures.items() if future.result()]
-    return StageResult({"figures": [*sorted(names), *drawn_meshes]})
+    return Computed([*sorted(names), *drawn_meshes])
 
 
 def draw_part(results: Results, folder: Path, part: int) -> list[str]:
     """Draws the figures whose index modulo `PARTS` is `part`; returns their paths in `folder`."""
-    with report_style():
+    with figure_style():
         return [
             str(path.relative_to(folder))
             for name, draw in list(drawings(results))[part::PARTS]

@@ -13,10 +13,12 @@ import numpy as np
 from alphacut.figures import style
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.arrays import Array
-from alphacut.io.files import Document
 from alphacut.io.quantity import engineering
 from alphacut.stages.envelope import EnvelopeTask
+from alphacut.stages.identify import IdentifiedResult
 from alphacut.stages.results import Results
+from alphacut.stages.suite import SuiteResult
+from alphacut.stochastic.figures.style import BLUE, GREY, INK, ORANGE
 
 if TYPE_CHECKING:
     import xarray
@@ -43,8 +45,8 @@ def envelope(dataset: xarray.Dataset, output: Output, task: EnvelopeTask) -> Fig
         band = shown.isel(alpha=level)
         axes.fill_between(time, band["lower"], band["upper"], color=shade, lw=0)
     for side in ("lower", "upper"):
-        axes.plot(time, shown.isel(alpha=-1)[side], color=style.INK, lw=0.8)
-        axes.plot(time, shown.isel(alpha=0)[side], color=style.INK, lw=0.3)
+        axes.plot(time, shown.isel(alpha=-1)[side], color=INK, lw=0.8)
+        axes.plot(time, shown.isel(alpha=0)[side], color=INK, lw=0.3)
     nature = str(dataset.attrs["nature"])
     error = draw_error_band(axes, time, shown.isel(alpha=0), nature, output.unit)
     time_axes(axes, time, output)
@@ -60,7 +62,7 @@ def draw_error_band(axes: Axes, time: Array, lowest: xarray.Dataset, nature: str
         return ""
     error = lowest["error"]
     for end in (lowest["lower"] - error, lowest["upper"] + error):
-        axes.plot(time, end, color=style.GREY, lw=0.7, ls="--")
+        axes.plot(time, end, color=GREY, lw=0.7, ls="--")
     return f", ± {engineering(float(error.max()), unit, digits=2)} (dashed)"
 
 
@@ -86,50 +88,51 @@ def mapping(results: Results, *, count: int = 40, duration: float = 5.0) -> Figu
     points = np.random.default_rng(0).uniform(lower, upper, (count, len(inputs)))
     curves = flow.values(points)[:, :, list(flow.outputs).index(output)]
     figure, axes = style.figure()
-    axes.plot(flow.time, curves.T, color=style.BLUE, lw=0.5, alpha=0.5)
+    axes.plot(flow.time, curves.T, color=BLUE, lw=0.5, alpha=0.5)
     shown = dataset.sel(output=output).isel(time=slice(0, len(flow.time)))
     for side in ("lower", "upper"):
-        axes.plot(flow.time, shown[side], color=style.INK, lw=1.3)
+        axes.plot(flow.time, shown[side], color=INK, lw=1.3)
     time_axes(axes, flow.time, Output(output, structure.unit(output)))
     level = f"α = {float(dataset['alpha']):g}"
     style.title(axes, f"{output} at {level}: {count} random motions (blue) and their envelope")
     return figure
 
 
-def identified_inputs(document: Document) -> Figure:
+def identified_inputs(result: IdentifiedResult) -> Figure:
     """Draws each input's prior interval and its identified cuts, over the prior's middle."""
-    names, alpha = list(document["inputs"]), np.asarray(document["alpha"], float)
+    names, alpha = list(result.inputs), result.alpha
     figure, axes = style.figure(height=0.9 + 0.32 * len(names))
     rows = np.arange(len(names), dtype=float)[::-1]
-    prior = np.array([document["prior"][name] for name in names], float)  # (inputs, 2)
+    prior = np.array([result.prior[name] for name in names], float)  # (inputs, 2)
     middles = prior.mean(axis=1)[:, None]
     before = prior / middles
-    wide: style.Look = {"height": 0.7, "color": style.GREY, "alpha": 0.45, "label": "before"}
+    wide: style.Look = {"height": 0.7, "color": GREY, "alpha": 0.45, "label": "before"}
     axes.barh(rows, np.ptp(before, axis=1), left=before[:, 0], lw=0, **wide)
-    cuts = document["inputs"].values()
-    lower, upper = (np.array([cut[side] for cut in cuts]) / middles for side in ("lower", "upper"))
+    cuts = result.inputs.values()
+    lower, upper = (
+        np.array([getattr(x, end) for x in cuts]) / middles for end in ("lower", "upper")
+    )
     for k, level in enumerate(alpha):
         label = f"after, α = {level:g}" if k in (0, len(alpha) - 1) else None
         bar: style.Look = {"height": 0.5 - 0.3 * level, "alpha": 0.35 + 0.6 * level, "label": label}
         widths = upper[:, k] - lower[:, k]
-        axes.barh(rows, widths, left=lower[:, k], lw=0, color=style.BLUE, **bar)
+        axes.barh(rows, widths, left=lower[:, k], lw=0, color=BLUE, **bar)
     axes.set_yticks(rows, names)
     axes.set_xlabel("value over the middle of what it was before")
     axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return figure
 
 
-def spectra(suite: Document) -> Figure:
+def spectra(suite: SuiteResult) -> Figure:
     """Draws the response spectra of the records of a suite, their mean, and T1."""
     figure, axes = style.figure(7.2, 3.6)
-    periods = np.asarray(suite["spectra"]["period_s"], float)
-    names = [name for name in suite["spectra"] if name != "period_s"]
-    curves = np.array([suite["spectra"][name] for name in names], float)
-    axes.plot(periods, curves.T, color=style.GREY, lw=0.6)
-    axes.plot(periods, curves.mean(0), color=style.BLUE, lw=1.6, label="mean")
-    axes.axvline(suite["period_s"], color=style.ORANGE, lw=1.2, ls="--", label="T1")
+    periods = suite.spectra["period_s"]
+    curves = np.array([suite.spectra[name] for name in suite.records])
+    axes.plot(periods, curves.T, color=GREY, lw=0.6)
+    axes.plot(periods, curves.mean(0), color=BLUE, lw=1.6, label="mean")
+    axes.axvline(suite.period_s, color=ORANGE, lw=1.2, ls="--", label="T1")
     axes.set(
-        xscale="log", xlabel="period [s]", ylabel=f"Sa [m/s²], damping {suite['damping_ratio']:.3g}"
+        xscale="log", xlabel="period [s]", ylabel=f"Sa [m/s²], damping {suite.damping_ratio:.3g}"
     )
     axes.legend(fontsize=8)
     return figure

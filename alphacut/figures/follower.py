@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from alphacut.figures.style import BLUE, GREY, INK, ORANGE, Look, prefix_axis
+from alphacut.figures.style import Look, prefix_axis
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.methods.graph_follower import Followed, GraphFollower
 from alphacut.frame.structures.quantities import Output
 from alphacut.stages.envelope import EnvelopeTask
 from alphacut.stages.results import Results
+from alphacut.stochastic.figures.style import BLUE, GREY, INK, ORANGE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,8 +8,9 @@ import numpy as np
 
 from alphacut.case.structure import Frame
 from alphacut.figures import style
-from alphacut.figures.style import BLUE, GREY, INK, ORANGE, Look
+from alphacut.figures.style import Look
 from alphacut.fuzzy import Crisp
+from alphacut.stochastic.figures.style import BLUE, GREY, INK, ORANGE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

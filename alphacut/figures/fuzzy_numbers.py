@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from alphacut.figures import style
-from alphacut.figures.style import BLUE, INK, ORANGE
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal
 from alphacut.io.quantity import axis_prefix
+from alphacut.stochastic.figures.style import BLUE, INK, ORANGE
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -12,8 +12,10 @@ from alphacut.case.structure import Frame
 from alphacut.figures import style
 from alphacut.fuzzy.arrays import Array
 from alphacut.stages.cell import GPA
+from alphacut.stages.modulus import ModulusResult
 from alphacut.stages.store import StageResult
 from alphacut.stochastic import HermiteMap
+from alphacut.stochastic.figures.style import BLUE, GREY, INK, ORANGE, PURPLE
 
 if TYPE_CHECKING:
     import xarray
@@ -53,12 +55,12 @@ def p_box(section: RadiusMapSection) -> Figure:
     at = np.asarray(np.linspace(low, high, 600), float)
     family = np.array([distribution(radius, at) for radius in corners])
     axes.fill_between(
-        at, family.min(0), family.max(0), color=style.PURPLE, alpha=0.15, lw=0, label="p-box, α = 0"
+        at, family.min(0), family.max(0), color=PURPLE, alpha=0.15, lw=0, label="p-box, α = 0"
     )
-    axes.plot(at, family.min(0), color=style.INK, lw=1)
-    axes.plot(at, family.max(0), color=style.INK, lw=1)
+    axes.plot(at, family.min(0), color=INK, lw=1)
+    axes.plot(at, family.max(0), color=INK, lw=1)
     modal = distribution(modal_map(section), at)
-    axes.plot(at, modal, color=style.PURPLE, lw=1.8, label="modal map")
+    axes.plot(at, modal, color=PURPLE, lw=1.8, label="modal map")
     axes.set(xlabel="reduced radius r$_n$ = r/a", ylabel="cumulative distribution", ylim=(0, 1.02))
     axes.legend(loc="lower right")
     return figure
@@ -77,16 +79,16 @@ def cone(section: RadiusMapSection) -> Figure:
         r * np.cos(angle),
         r * np.sin(angle),
         np.broadcast_to(theta[:, None], (80, 80)),
-        color=style.PURPLE,
+        color=PURPLE,
         alpha=0.65,
         lw=0,
     )
     for level in np.linspace(theta[0], theta[-1], 5):
-        axes.plot([-1, 1, 1, -1, -1], [-1, -1, 1, 1, -1], level, color=style.GREY, lw=0.8)
+        axes.plot([-1, 1, 1, -1, -1], [-1, -1, 1, 1, -1], level, color=GREY, lw=0.8)
         x, y = radius(level) * np.cos(angle), radius(level) * np.sin(angle)
-        axes.plot(x, y, level, color=style.INK, lw=0.8)
+        axes.plot(x, y, level, color=INK, lw=0.8)
     for x, y in itertools.product((-1, 1), (-1, 1)):
-        axes.plot([x, x], [y, y], [theta[0], theta[-1]], color=style.GREY, lw=0.8)
+        axes.plot([x, x], [y, y], [theta[0], theta[-1]], color=GREY, lw=0.8)
     axes.set(xlabel="x$_1$/a", ylabel="x$_2$/a", zlabel="θ", xticks=[-1, 0, 1], yticks=[-1, 0, 1])
     axes.set_box_aspect((1, 1, 1.3), zoom=0.88)
     axes.view_init(elev=18, azim=-55)
@@ -114,7 +116,7 @@ def stress_curves(dataset: xarray.Dataset) -> Figure:
     """Fig. 16: homogenised stress σ₁₁ over θ, one curve a sample, coloured by its membership."""
     figure, axes = style.figure()
     alpha = dataset["alpha"].values
-    shades = dict(zip(alpha, [*style.colours(alpha)[:-1], style.INK], strict=True))
+    shades = dict(zip(alpha, [*style.colours(alpha)[:-1], INK], strict=True))
     membership = levels_of_samples(dataset)
     theta, stress_GPa = dataset["theta"].values, dataset["curve11"].values / GPA
     for sample in np.argsort(membership, kind="stable"):  # high memberships on top
@@ -129,32 +131,32 @@ def mean_stress(dataset: xarray.Dataset) -> Figure:
     """Fig. 17: mean homogenised stress σ₁₁ of each sample at its membership, and its α-cuts."""
     figure, axes = style.figure()
     means, levels = dataset["s11_sample"].values / GPA, levels_of_samples(dataset)
-    axes.plot(means, levels, ".", color=style.ORANGE, ms=4, zorder=4, label="samples")
+    axes.plot(means, levels, ".", color=ORANGE, ms=4, zorder=4, label="samples")
     style.shaded_cuts(axes, dataset["alpha"].values, *(dataset["s11"].values / GPA).T)
     style.membership_axes(axes, "mean homogenised σ$_{11}$(ε$^{(1)}$) (GPa)")
     axes.legend(loc="upper left")
     return figure
 
 
-def fuzzy_modulus(result: StageResult, frame: Frame | None) -> Figure:
+def fuzzy_modulus(result: StageResult[ModulusResult], frame: Frame | None) -> Figure:
     """Fig. 18: fuzzy Young's modulus, with the one that the case states, and Poisson's ratio ν."""
     import matplotlib.pyplot as plt
 
     size = (style.WIDTH, 1.75 * style.HEIGHT)
     figure, (axes, below) = plt.subplots(2, 1, figsize=size, height_ratios=(3, 2))
-    dataset, average = result.arrays, result.document["average"]
+    dataset, average = result.arrays, result.numbers.average
     alpha, modulus_GPa = dataset["alpha"].values, dataset["E"].values / GPA
     style.shaded_cuts(axes, alpha, *modulus_GPa.T)
     if frame is not None and frame.modulus is not None:
         cuts = np.array([frame.modulus.cut(level) for level in (0.0, 1.0)]) / GPA
         line: style.Look = {
-            "color": style.BLUE,
+            "color": BLUE,
             "lw": 1.2,
             "ls": "--",
             "label": "quoted in the case",
         }
         axes.plot(style.outline(*cuts.T), [0, 1, 1, 0], **line)
-        axes.plot([], [], color=style.INK, marker="o", ms=3.5, lw=1.2, label="computed here")
+        axes.plot([], [], color=INK, marker="o", ms=3.5, lw=1.2, label="computed here")
         axes.legend(loc="upper left")
     style.membership_axes(axes, f"effective Young's modulus E, {average} (GPa)")
     style.shaded_cuts(below, alpha, *dataset["nu"].transpose("bound", "alpha").values)
@@ -167,11 +169,11 @@ def membership(dataset: xarray.Dataset) -> Figure:
     figure, axes = style.figure()
     alpha, (left, right) = dataset["alpha"].values, dataset["E"].values.T / GPA
     lower, upper = (float(np.interp(SHOWN_LEVEL, alpha, side)) for side in (left, right))
-    axes.plot(style.outline(left, right), style.outline(alpha, alpha), color=style.INK, lw=1.5)
-    axes.plot([lower, upper], [SHOWN_LEVEL] * 2, color=style.ORANGE, lw=3, solid_capstyle="butt")
-    axes.vlines([lower, upper], 0, SHOWN_LEVEL, color=style.ORANGE, lw=0.8, ls=":")
+    axes.plot(style.outline(left, right), style.outline(alpha, alpha), color=INK, lw=1.5)
+    axes.plot([lower, upper], [SHOWN_LEVEL] * 2, color=ORANGE, lw=3, solid_capstyle="butt")
+    axes.vlines([lower, upper], 0, SHOWN_LEVEL, color=ORANGE, lw=0.8, ls=":")
     words, spot = f"α-cut at {SHOWN_LEVEL:g}: {lower:.2f} … {upper:.2f}", (lower + upper) / 2
-    axes.annotate(words, (spot, SHOWN_LEVEL + 0.03), ha="center", color=style.ORANGE)
+    axes.annotate(words, (spot, SHOWN_LEVEL + 0.03), ha="center", color=ORANGE)
     beside: style.Look = {"xytext": (8, -2), "textcoords": "offset points", "va": "center"}
     axes.annotate("core", ((left[-1] + right[-1]) / 2, 1.0), **beside)
     style.membership_axes(axes, "fuzzy parameter, here E (GPa)")

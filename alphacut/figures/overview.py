@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from alphacut.figures import style
-from alphacut.figures.style import BLUE, INK, ORANGE, PURPLE, Look
+from alphacut.figures.style import Look
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array, Mask, Rows
 from alphacut.rve.cell.cell import Cell
 from alphacut.stages.results import Results
+from alphacut.stochastic.figures.style import BLUE, INK, ORANGE, PURPLE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -158,9 +159,9 @@ def boxes_and_arrows(results: Results) -> tuple[list[tuple[str, list[str]]], lis
         boxes.append(("radius of the particle", lines))
         arrows.append("r(θ)")
     if (data := results.modulus) is not None:
-        cuts = data.document["E_GPa"]
-        lines = [f"method {data.document['method']}", f"{data.arrays.sizes['sample']} samples"]
-        lines += [f"E = {cuts['lower'][0]:.5g} … {cuts['upper'][0]:.5g} GPa"]
+        low, high = data.numbers.E_GPa[0]
+        lines = [f"method {data.numbers.method}", f"{data.numbers.samples} samples"]
+        lines += [f"E = {low:.5g} … {high:.5g} GPa"]
         boxes.append(("cell on the product domain", lines))
         arrows.append("fuzzy E")
     if results.structure is not None:

@@ -1,33 +1,23 @@
-"""Style of all figures: sizes, colours, the α scale, and saving as SVG and PNG."""
+"""What the figures of a run share: sizes, the α scale, axes with units and memberships."""
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.io.files import whole_file
 from alphacut.io.quantity import MINUS, axis_prefix
-from alphacut.stochastic.figures import style
+from alphacut.stochastic.figures.style import INK
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-INK, BLUE, ORANGE, GREY = style.INK, style.BLUE, style.ORANGE, style.GREY
-PURPLE = "#7b3294"  # differs from Okabe's and Ito's blue and orange in lightness
 WIDTH, HEIGHT = 7.2, 3.8  # inches
 Colour = tuple[float, float, float, float]
 Look = dict[str, Any]
 """Keywords of a drawing function of Matplotlib."""
-
-
-def report_style() -> AbstractContextManager[None]:
-    """The project's look, for the figures drawn inside the block."""
-    return style.figure_style({"axes.edgecolor": INK, "axes.labelcolor": INK})
 
 
 def figure(width: float = WIDTH, height: float = HEIGHT) -> tuple[Figure, Axes]:
@@ -36,19 +26,6 @@ def figure(width: float = WIDTH, height: float = HEIGHT) -> tuple[Figure, Axes]:
 
     figure, axes = plt.subplots(figsize=(width, height))
     return figure, axes
-
-
-def save(figure: Figure, stem: Path) -> list[Path]:
-    """Writes a figure to STEM.svg and STEM.png, and closes it; paths of the two files."""
-    import matplotlib.pyplot as plt
-
-    paths = [stem.with_name(stem.name + ending) for ending in (".svg", ".png")]
-    for path in paths:
-        with whole_file(path) as partial:
-            figure.savefig(partial, metadata={"Date": None} if path.suffix == ".svg" else None)
-        figure.set_layout_engine("none")  # laid out once, for both files
-    plt.close(figure)
-    return paths
 
 
 def colours(alpha: Array) -> list[Colour]:

@@ -1,8 +1,9 @@
-"""Arrays from the files that frame programs write: Matrix Market, NumPy and CSV."""
+"""Arrays from files of frame programs (Matrix Market, NumPy, CSV), and tables as texts."""
 
 from __future__ import annotations
 
 import csv
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -61,3 +62,19 @@ def _read_by_ending(path: Path, name: str) -> Array:
             what = f"array {name or 'not named'}"
             raise RefusedError(path.name, what, f"{path.name}:NAME, one of {', '.join(names)}")
         return np.asarray(file[chosen[0]])
+
+
+def columns_text(columns: Mapping[str, Array]) -> str:
+    """CSV of columns of one length by their titles, which state units; numbers in full."""
+    lines = [",".join(f'"{title}"' if "," in title else title for title in columns)]
+    rows = np.column_stack([np.asarray(column, float) for column in columns.values()])
+    lines += [",".join(map(repr, row)) for row in rows.tolist()]
+    return "\n".join(lines) + "\n"
+
+
+def text_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Lines of a table of texts: the first column to the left, the others to the right."""
+    lines = [[*head], *map(list, rows)]
+    first, *further_widths = (max(len(line[k]) for line in lines) for k in range(len(head)))
+    aligned = ([line[0].ljust(first), *map(str.rjust, line[1:], further_widths)] for line in lines)
+    return "".join(f"{'  '.join(line).rstrip()}\n" for line in aligned)

@@ -18,8 +18,8 @@ from types import FunctionType
 import numpy as np
 from pydantic import BaseModel
 
-FORMAT = 3
-"""Format of a folder of results. 3: a manifest, and JSON files beside the NetCDF files."""
+FORMAT = 4
+"""Format of a folder of results. 4: a manifest of files by name, JSON beside NetCDF files."""
 PACKAGES: tuple[str, ...] = ("fenics-dolfinx", "fenics-basix", "petsc4py", "mpi4py", "gmsh")
 PACKAGES += ("numpy", "scipy", "xarray")
 NESTED = ("stochastic", "rve", "fuzzy", "frame")  # packages in folders of their own

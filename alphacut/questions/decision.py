@@ -2,68 +2,76 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from alphacut.case.limits import DecisionSection
-from alphacut.frame.questions.peaks import ANY, Passing, Peaks, passing, verdict_words
-from alphacut.io.files import Document
+from alphacut.frame.questions.peaks import ANY, passing, verdict_words
+from alphacut.fuzzy.result import Nature
 from alphacut.io.quantity import engineering
 from alphacut.questions.question import (
+    Answer,
     FuzzyResponse,
-    NumberRow,
-    Question,
+    LimitAnswer,
+    Record,
     Row,
-    limit_words,
-    peak_document,
+    limit_fields,
 )
+from alphacut.stages.envelope import PeakResult, peak_results
+from alphacut.stages.store import Cuts, Values
 
 
-def _limit_document(name: str, answer: Passing, limit: float, peaks: Peaks) -> Document:
-    """Numbers on a limit in SI; the event that any limit is exceeded has no peak."""
-    peak = {} if name == ANY else peak_document(peaks, name) | {"proved": peaks.most(name).upper}
-    return {
-        "peak": peak,
-        "limit": limit,
-        "possibility": answer.possibility,
-        "necessity": answer.necessity,
-        "margin": {"lower": answer.margin[:, 0], "upper": answer.margin[:, 1]},
-        "verdict": answer.outcome,
-        "from_level": answer.lowest,
-        "nature": str(answer.nature),
-    }
+class LimitDecision(LimitAnswer):
+    """Degrees to which it is possible and necessary that a limit is exceeded, and what is left.
+
+    Args:
+        possibility: Lower and upper bound.
+        necessity: Lower and upper bound.
+        margin: What the greatest and the least peak leave of the limit on each level; of several
+            as fractions of the limits.
+        from_level: Lowest level computed, from which on the verdict holds.
+        peak: The limited peak; None of several.
+    """
+
+    possibility: tuple[float, float]
+    necessity: tuple[float, float]
+    margin: Cuts
+    verdict: str
+    from_level: float
+    nature: Nature
+    peak: PeakResult | None
+
+    @property
+    def verdict_words(self) -> str:
+        """The verdict, with the level from which on it holds if that is not 0."""
+        return verdict_words(self.verdict, self.from_level)
 
 
-def degree_text(ends: Row) -> str:
+def degree_text(ends: tuple[float, float]) -> str:
     """Bounds of a degree, or one number."""
-    return " … ".join(dict.fromkeys(f"{float(end):.4g}" for end in ends))
+    return " … ".join(dict.fromkeys(f"{end:.4g}" for end in ends))
 
 
-def _margin_text(limit: Document) -> str:
-    """Least that is left of a limit at the lowest level."""
-    margin = limit["margin"]["lower"][0]
-    if margin is None or not np.isfinite(margin):
+def _margin_text(limit: LimitDecision) -> str:
+    margin = float(limit.margin.lower[0])
+    if not np.isfinite(margin):
         return "not known"
-    return engineering(margin, limit["unit"]) if limit["unit"] else f"{margin:.1%}"
+    return engineering(margin, limit.unit) if limit.unit else f"{margin:.1%}"
 
 
-def _peak_texts(limit: Document) -> Row:
-    """Texts of the greatest peak at the lowest level: proved bound, reached, relative gap."""
-    if not limit.get("peak"):
+def _peak_texts(limit: LimitDecision) -> Row:
+    """Texts of the peak at the lowest level: proved bound, reached, relative gap."""
+    if limit.peak is None:
         return ("", "", "")
-    proved, reached = limit["peak"]["proved"][0], limit["peak"]["reached"][0]
-    if proved is None or not np.isfinite(proved):
-        return ("not known", engineering(reached, limit["unit"]), "")
-    gap = f"{(proved - reached) / abs(proved):.1%}" if proved else ""
-    return (*(engineering(peak, limit["unit"]) for peak in (proved, reached)), gap)
+    proved, reached = float(limit.peak.proved[0]), float(limit.peak.reached[0])
+    if not np.isfinite(proved):
+        return ("not known", engineering(reached, limit.unit), "")
+    gap = f"{abs((proved - reached) / proved):.1%}" if proved else ""
+    return engineering(proved, limit.unit), engineering(reached, limit.unit), gap
 
 
-@dataclass(frozen=True)
-class DecisionQuestion(Question):
-    """Possibility and necessity that limits are exceeded."""
+class DecisionAnswer(Answer):
+    """Possibility and necessity that limits are exceeded, by their names."""
 
-    section: DecisionSection
     key = "decision"
     title = "Can or must limits be exceeded?"
     caption = "Fuzzy peak of each limited output over its limit"
@@ -71,58 +79,74 @@ class DecisionQuestion(Question):
         *("limit", "verdict", "nature", "possibility", "necessity", "least margin"),
         *("peak at most", "peak reached", "gap"),
     )
+    alpha: Values
+    step: float
+    limits: dict[str, LimitDecision]
 
-    def answer(self, response: FuzzyResponse) -> Document:
-        """Possibility, necessity and margins of exceeding each limit, from the response's peaks."""
-        assert response.peaks is not None
-        limits = self.section.in_si(response.structure)
-        peaks = response.peaks.named(
-            {name: x.peak for name, x in self.section.limits_by_name.items()}
-        )
-        answers = passing(peaks, limits)
-        documents = {
-            name: _limit_document(name, answer, limits.get(name, 1.0), peaks)
-            | self.section.peak_and_unit(name, response.structure)
-            for name, answer in answers.items()
-        }
-        return {"alpha": response.alpha, "step": response.step, "limits": documents}
-
-    @staticmethod
-    def rows(document: Document) -> list[Row]:
-        """Table of the report, with the columns of `head`: a row for each limit."""
+    def rows(self) -> list[Row]:
+        """A row for each limit."""
         return [
             (
-                limit_words(limit["output"], limit["limit"], limit["unit"]),
-                verdict_words(limit["verdict"], limit["from_level"]),
-                limit["nature"],
-                degree_text(limit["possibility"]),
-                degree_text(limit["necessity"]),
+                limit.words,
+                limit.verdict_words,
+                limit.nature,
+                degree_text(limit.possibility),
+                degree_text(limit.necessity),
                 _margin_text(limit),
                 *_peak_texts(limit),
             )
-            for limit in document["limits"].values()
+            for limit in self.limits.values()
         ]
 
-    @staticmethod
-    def number_rows(document: Document) -> tuple[Row, list[NumberRow]]:
-        """Rows of the CSV: verdict, degrees of exceeding each limit, peaks of the lowest level."""
-        head: Row = ("limited output", "unit", "limit", "verdict", "from α", "nature")
-        head += ("least possibility", "greatest possibility", "least necessity")
-        head += ("greatest necessity", "least margin", "peak at most", "peak reached")
-        rows: list[NumberRow] = []
-        for name, limit in document["limits"].items():
-            peak = limit.get("peak") or {"proved": [None], "reached": [None]}
-            first = (name, limit["unit"], limit["limit"], limit["verdict"], limit["from_level"])
-            degrees = (*limit["possibility"], *limit["necessity"])
-            ends = (limit["margin"]["lower"][0], peak["proved"][0], peak["reached"][0])
-            rows.append((*first, limit["nature"], *degrees, *ends))
-        return head, rows
+    def records(self) -> list[Record]:
+        """A row for each limit; margin and peaks are those of the lowest level."""
+        return [
+            {
+                "limited output": name,
+                "unit": limit.unit,
+                "limit": limit.limit,
+                "verdict": limit.verdict,
+                "from α": limit.from_level,
+                "nature": limit.nature,
+                "least possibility": limit.possibility[0],
+                "greatest possibility": limit.possibility[1],
+                "least necessity": limit.necessity[0],
+                "greatest necessity": limit.necessity[1],
+                "least margin": float(limit.margin.lower[0]),
+                "peak at most": None if limit.peak is None else float(limit.peak.proved[0]),
+                "peak reached": None if limit.peak is None else float(limit.peak.reached[0]),
+            }
+            for name, limit in self.limits.items()
+        ]
 
-    @staticmethod
-    def words(document: Document) -> str:
+    def words(self) -> str:
         """Sentences on how to read the verdicts."""
         return (
             "A limit is not exceeded where no motion exceeds it, exceeded where every motion does,"
             " and can be exceeded where a motion is known that does."
             " Attained bounds show what is possible and exclude nothing."
         )
+
+
+def decide(section: DecisionSection, response: FuzzyResponse) -> DecisionAnswer:
+    """Possibility, necessity and margins of exceeding each limit, from the response's peaks."""
+    assert response.peaks is not None
+    limits = section.limits_by_name
+    peaks = response.peaks.named({name: limit.peak for name, limit in limits.items()})
+    by_peak = peak_results(response.peaks)
+    decisions = {
+        name: LimitDecision.model_validate(
+            {
+                **limit_fields(section, name, response.structure),
+                "possibility": answer.possibility,
+                "necessity": answer.necessity,
+                "margin": Cuts.of(answer.margin),
+                "verdict": answer.outcome,
+                "from_level": answer.lowest,
+                "nature": answer.nature,
+                "peak": None if name == ANY else by_peak[limits[name].peak],
+            }
+        )
+        for name, answer in passing(peaks, section.in_si(response.structure)).items()
+    }
+    return DecisionAnswer(alpha=np.array(response.alpha), step=response.step, limits=decisions)

@@ -2,129 +2,179 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from alphacut.case.limits import FragilitySection
-from alphacut.case.structure import Structure
 from alphacut.frame.questions.fragility import CriticalMeasures, of_any_limit
 from alphacut.frame.questions.peaks import ANY
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature
-from alphacut.io.files import Document
 from alphacut.io.quantity import engineering, range_text
-from alphacut.questions.question import FuzzyResponse, NumberRow, Question, Row, limit_words
+from alphacut.questions.question import (
+    Answer,
+    FuzzyResponse,
+    LimitAnswer,
+    Record,
+    Row,
+    limit_fields,
+)
+from alphacut.stages.store import Cuts, Numbers, Values
 
 POINTS = 60
 """Measures at which bands are drawn and tabulated."""
 UNITS = {"Sa(T1)": "m/s^2", "PGA": "m/s^2", "scale": ""}
 
 
-@dataclass(frozen=True)
-class FragilityQuestion(Question):
+class CriticalRanges(Numbers):
+    """Critical measures, (levels, records), as `CriticalMeasures` has them."""
+
+    low: Values
+    low_reached: Values
+    high_reached: Values
+    high: Values
+
+
+class LimitFragility(LimitAnswer):
+    """Measures of the records at which a limit is exceeded, and shares of the records by measure.
+
+    Args:
+        critical: Critical measures of the records.
+        measure: Measures of the bands, rising.
+        band: Bounds of the share of records, (levels, measures).
+        median: Bounds of the median of the critical measures.
+        dispersion: Bounds of the deviation of their logarithms; None of one record.
+        confidence: 95 % limits of the share if records are independent draws.
+    """
+
+    nature: Nature
+    critical: CriticalRanges
+    measure: Values
+    band: Cuts
+    median: Cuts
+    dispersion: Cuts | None
+    confidence: Cuts | None
+
+
+class FragilityAnswer(Answer):
     """Share of the suite's records under which limits are exceeded, over a measure of records."""
 
-    section: FragilitySection
     key = "fragility"
     title = "Under how many records are limits exceeded?"
     caption = "Band of the share of records under which the limit is exceeded, over their measure"
     head = ("limit", "median at the lowest α", "nature", "dispersion", "median at the highest α")
+    alpha: Values
+    measure: str
+    unit: str
+    period_s: float
+    damping_ratio: float
+    record_names: tuple[str, ...]
+    limits: dict[str, LimitFragility]
 
-    def answer(self, response: FuzzyResponse) -> Document:
-        """Critical measures, bands, medians and dispersions of each limit, and of any of them."""
-        if response.suite is None:
-            raise RefusedError("fragility", "without records", "a section [records]")
-        limits = self.section.in_si(response.structure)
-        names = {name: limit.peak for name, limit in self.section.limits_by_name.items()}
-        peaks = [x.named(names) for x in response.suite.peaks.values()]
-        measures = [sizes[self.section.measure] for sizes in response.suite.measures.values()]
-        critical = {
-            name: CriticalMeasures.from_peaks(peaks, measures, name, limit)
-            for name, limit in limits.items()
-        }
-        natures = {name: Nature.weakest(x.nature([name]) for x in peaks) for name in limits}
-        if len(limits) > 1:
-            critical[ANY] = of_any_limit(list(critical.values()))
-            natures[ANY] = Nature.weakest(natures.values())
-        return {
-            "alpha": response.alpha,
-            "measure": self.section.measure,
-            "unit": UNITS[self.section.measure],
-            "period_s": response.suite.period,
-            "damping_ratio": response.suite.ratio,
-            "records": list(response.suite.peaks),
-            "limits": {
-                name: self._document(measures_of_limit)
-                | {"limit": limits.get(name, 1.0), "nature": str(natures[name])}
-                | self._output_and_unit(name, response.structure)
-                for name, measures_of_limit in critical.items()
-            },
-        }
-
-    def _output_and_unit(self, name: str, structure: Structure) -> Document:
-        shown = self.section.peak_and_unit(name, structure)
-        return {"output": shown["output"], "output_unit": shown["unit"]}
-
-    def _document(self, critical: CriticalMeasures) -> Document:
-        """Numbers on one limit; arrays have shape (levels, records) or (levels, measures)."""
-        grid = measure_grid(critical)
-        bounds = {"band": critical.band(grid), "median": critical.median}
-        if self.section.independent:
-            bounds["confidence"] = critical.confidence_band(grid)
-        if len(critical.low) > 1:  # one record has no dispersion
-            bounds["dispersion"] = critical.dispersion
-        ends = ("low", "low_reached", "high_reached", "high")
-        return {
-            "critical": {end: getattr(critical, end).T for end in ends},
-            "measure": grid,
-            **{name: pair._asdict() for name, pair in bounds.items()},
-        }
-
-    @staticmethod
-    def rows(document: Document) -> list[Row]:
+    def rows(self) -> list[Row]:
         """A row for each limit: median and dispersion of the critical measures."""
         return [
             (
-                limit_words(limit["output"], limit["limit"], limit["output_unit"]),
-                _ends_text(limit["median"], 0, document["unit"]),
-                limit["nature"],
-                _ends_text(limit.get("dispersion"), 0, ""),
-                _ends_text(limit["median"], -1, document["unit"]),
+                limit.words,
+                _ends_text(limit.median[0], self.unit),
+                limit.nature,
+                "–" if limit.dispersion is None else _ends_text(limit.dispersion[0], ""),
+                _ends_text(limit.median[-1], self.unit),
             )
-            for limit in document["limits"].values()
+            for limit in self.limits.values()
         ]
 
-    @staticmethod
-    def number_rows(document: Document) -> tuple[Row, list[NumberRow]]:
-        """Titles of the columns, and a row for each limit and level."""
-        measure = f"{document['measure']} [{document['unit']}]" if document["unit"] else "scale"
-        head: Row = ("limited output", "unit", "limit", "α", f"least median {measure}")
-        head += (f"greatest median {measure}", "least dispersion", "greatest dispersion", "nature")
-        rows: list[NumberRow] = []
-        for name, limit in document["limits"].items():
-            spread = limit.get("dispersion")
-            for k, alpha in enumerate(document["alpha"]):
-                ends = [limit["median"][side][k] for side in ("lower", "upper")]
-                ends += [spread[side][k] if spread else None for side in ("lower", "upper")]
-                first = (name, limit["output_unit"], limit["limit"], alpha)
-                rows.append((*first, *ends, limit["nature"]))
-        return head, rows
+    def records(self) -> list[Record]:
+        """A row for each limit and level."""
+        measure = f"{self.measure} [{self.unit}]" if self.unit else "scale"
+        rows: list[Record] = []
+        for name, limit in self.limits.items():
+            for k, alpha in enumerate(self.alpha):
+                spread = (None, None) if limit.dispersion is None else limit.dispersion[k]
+                rows.append(
+                    {
+                        "limited output": name,
+                        "unit": limit.unit,
+                        "limit": limit.limit,
+                        "α": float(alpha),
+                        f"least median {measure}": limit.median[k][0],
+                        f"greatest median {measure}": limit.median[k][1],
+                        "least dispersion": spread[0],
+                        "greatest dispersion": spread[1],
+                        "nature": limit.nature,
+                    }
+                )
+        return rows
 
-    @staticmethod
-    def words(document: Document) -> str:
+    def words(self) -> str:
         """Sentences on the measure, and on how to read the bands."""
         text = (
-            f"Measure: {document['measure']}"
-            f" (T1 = {document['period_s']:.4g} s, ζ = {document['damping_ratio']:.3g}, at the most"
+            f"Measure: {self.measure}"
+            f" (T1 = {self.period_s:.4g} s, ζ = {self.damping_ratio:.3g}, at the most"
             " plausible inputs). No structure within the α-cut exceeds the limit for a share of"
             " this suite's records outside the band. α is a level of possibility, no probability."
             " This is damage limitation of a linear structure, not collapse."
         )
-        if any("confidence" in limit for limit in document["limits"].values()):
+        if any(limit.confidence for limit in self.limits.values()):
             text += " Dashed: pointwise 95 % limits if the records were independent draws."
         return text
+
+
+def _ends_text(ends: tuple[float, float], unit: str) -> str:
+    """Text of a range; its upper end may be infinite ("no end")."""
+    if not np.isfinite(ends[1]):
+        return f"{engineering(ends[0], unit)} … no end"
+    return f"{range_text(*ends, Nature.GUARANTEED, 3)} {unit}".strip()
+
+
+def fragility(section: FragilitySection, response: FuzzyResponse) -> FragilityAnswer:
+    """Critical measures, bands, medians and dispersions of each limit, and of any of them."""
+    if response.suite is None:
+        raise RefusedError("fragility", "without records", "a section [records]")
+    limits = section.in_si(response.structure)
+    names = {name: limit.peak for name, limit in section.limits_by_name.items()}
+    peaks = [x.named(names) for x in response.suite.peaks.values()]
+    measures = [sizes[section.measure] for sizes in response.suite.measures.values()]
+    critical = {
+        name: CriticalMeasures.from_peaks(peaks, measures, name, limit)
+        for name, limit in limits.items()
+    }
+    natures = {name: Nature.weakest(x.nature([name]) for x in peaks) for name in limits}
+    if len(limits) > 1:
+        critical[ANY] = of_any_limit(list(critical.values()))
+        natures[ANY] = Nature.weakest(natures.values())
+
+    def limit_fragility(name: str, critical: CriticalMeasures) -> LimitFragility:
+        grid = measure_grid(critical)
+        has_spread = len(critical.low) > 1  # one record has no dispersion
+        confidence = critical.confidence_band(grid) if section.independent else None
+        return LimitFragility.model_validate(
+            {
+                **limit_fields(section, name, response.structure),
+                "nature": natures[name],
+                "critical": CriticalRanges(
+                    low=critical.low.T,
+                    low_reached=critical.low_reached.T,
+                    high_reached=critical.high_reached.T,
+                    high=critical.high.T,
+                ),
+                "measure": grid,
+                "band": critical.band(grid)._asdict(),
+                "median": critical.median._asdict(),
+                "dispersion": critical.dispersion._asdict() if has_spread else None,
+                "confidence": None if confidence is None else confidence._asdict(),
+            }
+        )
+
+    return FragilityAnswer(
+        alpha=np.array(response.alpha),
+        measure=section.measure,
+        unit=UNITS[section.measure],
+        period_s=response.suite.period,
+        damping_ratio=response.suite.ratio,
+        record_names=tuple(response.suite.peaks),
+        limits={name: limit_fragility(name, x) for name, x in critical.items()},
+    )
 
 
 def measure_grid(critical: CriticalMeasures) -> Array:
@@ -132,13 +182,3 @@ def measure_grid(critical: CriticalMeasures) -> Array:
     finite = critical.high[np.isfinite(critical.high)]
     greatest = float(finite.max()) if finite.size else float(critical.low_reached.max())
     return np.asarray(np.linspace(0.8 * float(critical.low.min()), 1.1 * greatest, POINTS), float)
-
-
-def _ends_text(ends: Document | None, level: int, unit: str) -> str:
-    """Text of the range between both ends on a level; the upper one may be infinite ("no end")."""
-    if ends is None:
-        return "–"
-    low, high = ends["lower"][level], ends["upper"][level]
-    if high is None or not np.isfinite(high):
-        return f"{engineering(low, unit)} … no end"
-    return f"{range_text(low, high, Nature.GUARANTEED, 3)} {unit}".strip()

@@ -3,18 +3,169 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
 from alphacut.case.limits import ProbabilitySection
-from alphacut.frame.questions.probability import CONFIDENCE, Probability, probabilities
+from alphacut.frame.questions.probability import CONFIDENCE, probabilities
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.result import Nature
-from alphacut.io.files import Document
 from alphacut.io.quantity import range_text
-from alphacut.questions.question import FuzzyResponse, NumberRow, Question, Row, event_words
+from alphacut.questions.question import (
+    Answer,
+    FuzzyResponse,
+    LimitAnswer,
+    Record,
+    Row,
+    limit_fields,
+)
+from alphacut.stages.store import Cuts, Numbers, Values
+
+
+class Curve(Numbers):
+    """Bounds of the probability of exceeding other limits, (levels, limits)."""
+
+    limit: Values
+    lower: Values
+    upper: Values
+
+
+class LimitProbability(LimitAnswer):
+    """Bounds of the probability that a limit is exceeded, on each level.
+
+    Args:
+        error: What peaks between nodes may add.
+        interval: Ends that hold the probabilities of all fuzzy points, with `CONFIDENCE`.
+        curve: Probabilities of other limits; of several together over those of the case.
+    """
+
+    lower: Values
+    upper: Values
+    error: Values
+    interval: Cuts
+    nature: Nature = Nature.ATTAINED
+    evaluations: int
+    curve: Curve
+
+
+def bounds_text(event: LimitProbability, level: int) -> str:
+    """Bounds of a probability on a level."""
+    low, high = float(event.lower[level]), float(event.upper[level])
+    return range_text(low, high, event.nature, 3)
+
+
+class ProbabilityAnswer(Answer):
+    """Fuzzy probability that limits are exceeded, by their names."""
+
+    key = "probability"
+    title = "How probable is it that limits are exceeded?"
+    caption = "Fuzzy probability of exceeding a limit, over the limit"
+    head = (
+        "limit",
+        "at the lowest α",
+        "nature",
+        "at the highest α",
+        f"{CONFIDENCE:.0%} interval at the lowest α",
+        "between nodes",
+    )
+    fuzzy: tuple[str, ...]
+    random: tuple[str, ...]
+    samples: int
+    step: float
+    alpha: Values
+    events: dict[str, LimitProbability]
+
+    def rows(self) -> list[Row]:
+        """A row for each limit."""
+        return [
+            (
+                event.event,
+                bounds_text(event, 0),
+                event.nature,
+                bounds_text(event, -1),
+                range_text(*event.interval[0], Nature.GUARANTEED, 3),  # rounded outwards
+                f"{event.error.max():.2g}",
+            )
+            for event in self.events.values()
+        ]
+
+    def records(self) -> list[Record]:
+        """A row for each limit and level."""
+        return [
+            {
+                "limited output": name,
+                "unit": event.unit,
+                "limit": event.limit,
+                "α": float(alpha),
+                "at least": float(event.lower[k]),
+                "at most": float(event.upper[k]),
+                "nature": event.nature,
+                f"{CONFIDENCE:.0%} interval from": event.interval[k][0],
+                f"{CONFIDENCE:.0%} interval to": event.interval[k][1],
+                "between nodes": float(event.error[k]),
+            }
+            for name, event in self.events.items()
+            for k, alpha in enumerate(self.alpha)
+        ]
+
+    def words(self) -> str:
+        """Sentences on how the probability was computed, and on what its interval holds."""
+        random = ", ".join(self.random) or "no input"
+        return (
+            f"Random: {random}, with {self.samples} independent draws at each fuzzy point."
+            " The bounds are those of the fuzzy points tried; other points may have more or less."
+            f" With a probability of {CONFIDENCE:.0%} the interval holds the probabilities of all"
+            " fuzzy points at once (Clopper and Pearson, Bonferroni over the points). Peaks are"
+            f" those at nodes every {self.step:g} s; the last column says what lies between them."
+        )
+
+
+def probability(section: ProbabilitySection, response: FuzzyResponse) -> ProbabilityAnswer:
+    """Bounds of the probability of exceeding each limit, and any of several, by level."""
+    structure = response.structure
+    limits = section.in_si(structure)
+    random = structure.inputs(section.random, "probability.random")
+    fuzzy = {name: number for name, number in response.inputs.items() if name not in random}
+    crisp = {x: number for x, number in structure.numbers.items() if number.support.width == 0}
+    stand_in = dict([*crisp.items()][:1])  # for no fuzzy input
+    answers = probabilities(
+        structure.model_with_outputs("probability.limits", tuple(limits)),
+        fuzzy or stand_in,
+        {name: shaped_like(number) for name, number in random.items()},
+        limits,
+        duration=response.duration,
+        step=response.step,
+        alpha=response.alpha,
+        samples=section.samples,
+        rng=np.random.default_rng(0),
+        progress=response.progress,
+    )
+    return ProbabilityAnswer(
+        fuzzy=tuple(fuzzy),
+        random=tuple(random),
+        samples=section.samples,
+        step=response.step,
+        alpha=np.array(response.alpha),
+        events={
+            name: LimitProbability.model_validate(
+                {
+                    **limit_fields(section, name, structure),
+                    "lower": answer.lower,
+                    "upper": answer.upper,
+                    "error": answer.error,
+                    "interval": {"lower": answer.interval[0], "upper": answer.interval[1]},
+                    "evaluations": answer.evaluations,
+                    "curve": {
+                        "limit": answer.limits,
+                        "lower": answer.curve[0],
+                        "upper": answer.curve[1],
+                    },
+                }
+            )
+            for name, answer in answers.items()
+        },
+    )
 
 
 def shaped_like(number: FuzzyNumber) -> Callable[[np.random.Generator, int], Array]:
@@ -28,129 +179,3 @@ def shaped_like(number: FuzzyNumber) -> Callable[[np.random.Generator, int], Arr
         return np.asarray(np.interp(rng.random(count) * integral[-1], integral, grid))
 
     return draw
-
-
-def _event_document(answer: Probability, limit: float, unit: str) -> Document:
-    """Numbers on the event that a limit, in the SI unit `unit`, is exceeded, by level."""
-    return {
-        "limit": limit,
-        "unit": unit,
-        "lower": answer.lower,
-        "upper": answer.upper,
-        "error": answer.error,
-        "interval": {"lower": answer.interval[0], "upper": answer.interval[1]},
-        "nature": str(Nature.ATTAINED),
-        "evaluations": answer.evaluations,
-        "curve": {"limit": answer.limits, "lower": answer.curve[0], "upper": answer.curve[1]},
-    }
-
-
-def bounds_text(event: Document, level: int) -> str:
-    """Bounds of a probability on a level."""
-    return range_text(event["lower"][level], event["upper"][level], Nature.ATTAINED, 3)
-
-
-def interval_text(event: Document, level: int) -> str:
-    """Interval of a probability on a level that holds whatever the draws are, rounded outwards."""
-    ends = event["interval"]
-    return range_text(ends["lower"][level], ends["upper"][level], Nature.GUARANTEED, 3)
-
-
-@dataclass(frozen=True)
-class ProbabilityQuestion(Question):
-    """Fuzzy probability that limits are exceeded; inputs that are not random stay fuzzy."""
-
-    section: ProbabilitySection
-    key = "probability"
-    title = "How probable is it that limits are exceeded?"
-    caption = "Fuzzy probability of exceeding a limit, over the limit"
-    head = (
-        "limit",
-        "at the lowest α",
-        "nature",
-        "at the highest α",
-        f"{CONFIDENCE:.0%} interval at the lowest α",
-        "between nodes",
-    )
-
-    def answer(self, response: FuzzyResponse) -> Document:
-        """Bounds of the probability of exceeding each limit, and any of several, by level."""
-        structure = response.structure
-        limits = self.section.in_si(structure)
-        random = structure.inputs(self.section.random, "probability.random")
-        fuzzy = {name: number for name, number in response.inputs.items() if name not in random}
-        crisp = {x: number for x, number in structure.numbers.items() if number.support.width == 0}
-        stand_in = dict([*crisp.items()][:1])  # for no fuzzy input
-        answers = probabilities(
-            structure.model_with_outputs("probability.limits", tuple(limits)),
-            fuzzy or stand_in,
-            {name: shaped_like(number) for name, number in random.items()},
-            limits,
-            duration=response.duration,
-            step=response.step,
-            alpha=response.alpha,
-            samples=self.section.samples,
-            rng=np.random.default_rng(0),
-            progress=response.progress,
-        )
-        return {
-            "fuzzy": list(fuzzy),
-            "random": list(random),
-            "samples": self.section.samples,
-            "step": response.step,
-            "alpha": response.alpha,
-            "events": {
-                name: _event_document(
-                    answer,
-                    limits.get(name, 1.0),
-                    self.section.peak_and_unit(name, structure)["unit"],
-                )
-                for name, answer in answers.items()
-            },
-        }
-
-    @staticmethod
-    def rows(document: Document) -> list[Row]:
-        """Table of the report, with the columns of `head`: a row for each limit."""
-        return [
-            (
-                event_words(name, event["limit"], event["unit"]),
-                bounds_text(event, 0),
-                event["nature"],
-                bounds_text(event, -1),
-                interval_text(event, 0),
-                f"{max(event['error']):.2g}",
-            )
-            for name, event in document["events"].items()
-        ]
-
-    @staticmethod
-    def number_rows(document: Document) -> tuple[Row, list[NumberRow]]:
-        """Titles of the columns, and a row for each limit and level."""
-        head: Row = ("limited output", "unit", "limit", "α", "at least", "at most", "nature")
-        head += (
-            f"{CONFIDENCE:.0%} interval from",
-            f"{CONFIDENCE:.0%} interval to",
-            "between nodes",
-        )
-        rows: list[NumberRow] = []
-        for name, event in document["events"].items():
-            interval, first = event["interval"], (name, event["unit"], event["limit"])
-            for k, alpha in enumerate(document["alpha"]):
-                bounds = (event["lower"][k], event["upper"][k], event["nature"])
-                outer = (interval["lower"][k], interval["upper"][k], event["error"][k])
-                rows.append((*first, alpha, *bounds, *outer))
-        return head, rows
-
-    @staticmethod
-    def words(document: Document) -> str:
-        """Sentences on how the probability was computed, and on what its interval holds."""
-        random = ", ".join(document["random"]) or "no input"
-        return (
-            f"Random: {random}, with {document['samples']} independent draws at each fuzzy point."
-            " The bounds are those of the fuzzy points tried; other points may have more or less."
-            f" With a probability of {CONFIDENCE:.0%} the interval holds the probabilities of all"
-            " fuzzy points at once (Clopper and Pearson, Bonferroni over the points). Peaks are"
-            f" those at nodes every {document['step']:g} s; the last column says what lies between"
-            " them."
-        )

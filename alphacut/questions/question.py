@@ -1,47 +1,23 @@
-"""A question to the motion of a case: an answer, and the rows and words of the report."""
+"""What questions are about, and what is common to their answers."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from alphacut.case.limits import QuestionSection
+from alphacut.case.limits import QuestionSection, Side
 from alphacut.case.structure import Structure
 from alphacut.frame.questions.peaks import Peaks
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.progress_bar import Progress
-from alphacut.io.files import Document
 from alphacut.io.quantity import engineering
+from alphacut.stages.store import Numbers
 
-PEAK_ERROR = 5e-3
-"""Error of the peaks of limited outputs that is aimed at, as a share of each."""
-
-
-def limit_words(peak: str, limit: float, unit: str) -> str:
-    """Text of a limit, as "|drift1| ≤ 40.00 mm"; without a unit `peak` alone, as "any of them"."""
-    if not unit:
-        return peak
-    if peak.startswith("min "):  # whose limit is that of −q
-        return f"{peak} ≥ {engineering(-limit, unit)}"
-    if peak.startswith("max "):
-        return f"{peak} ≤ {engineering(limit, unit)}"
-    mean = "mean " if peak.startswith("mean ") else ""
-    return f"{mean}|{peak.removeprefix('mean ')}| ≤ {engineering(limit, unit)}"
-
-
-def event_words(output: str, limit: float, unit: str) -> str:
-    """The event that a limit is exceeded: "|drift1| > 40.00 mm", or "any of them exceeded"."""
-    return f"|{output}| > {engineering(limit, unit)}" if unit else f"{output} exceeded"
-
-
-def peak_document(peaks: Peaks, output: str) -> Document:
-    """Peak of an output on every level, in SI, as tables show it."""
-    column = peaks.outputs.index(output)
-    ends = {"lower": peaks.lower, "upper": peaks.upper, "error": peaks.error}
-    ends |= {"reached": peaks.reached}
-    return {end: values[:, column] for end, values in ends.items()}
+Row = tuple[str, ...]
+Record = dict[str, str | float | None]
+"""Numbers and texts of a row in SI, by the titles of their columns; for CSV."""
 
 
 @dataclass(frozen=True)
@@ -91,42 +67,73 @@ class FuzzyResponse:
         return self.structure.inputs(self.fuzzy)
 
 
-Row = tuple[str, ...]
-NumberRow = tuple[str | float | None, ...]
-
-
-@dataclass(frozen=True)
-class Question(ABC):
-    """A question about limits of outputs: its answer, and how that is read.
+class Answer(Numbers):
+    """Answer to a question about limits of outputs, in SI.
 
     `key` names its section, results and figure, `head` the columns of `rows`.
     """
 
-    section: QuestionSection
     key: ClassVar[str]
     title: ClassVar[str]
     caption: ClassVar[str]
     head: ClassVar[Row]
 
-    def require_answerable(self, response: FuzzyResponse) -> None:
-        """Refuses a response about which this question cannot be answered."""
-        self.section.check(response.structure)
+    @abstractmethod
+    def rows(self) -> list[Row]:
+        """The answer as a table of texts: what, answer, nature first."""
 
     @abstractmethod
-    def answer(self, response: FuzzyResponse) -> Document:
-        """Numbers of the answer, in SI, as JSON holds them."""
+    def records(self) -> list[Record]:
+        """The answer as numbers for CSV: titles with units, or with a column for them."""
 
-    @staticmethod
     @abstractmethod
-    def rows(document: Document) -> list[Row]:
-        """The answer as a table: what, answer, nature first."""
+    def words(self) -> str:
+        """Sentences on how to read it."""
 
-    @staticmethod
-    @abstractmethod
-    def number_rows(document: Document) -> tuple[Row, list[NumberRow]]:
-        """The answer as numbers in SI for CSV: titles with units, or with a column for them."""
 
-    @staticmethod
-    @abstractmethod
-    def words(document: Document) -> str:
-        """Sentence on how to read it."""
+class LimitAnswer(Numbers):
+    """Part of an answer about one limit, or about any of several, which have no unit.
+
+    Args:
+        side: "max" or "min" of the output itself, "" of its magnitude, "mean" of that over records.
+        output: The output, or what stands for several limits.
+        unit: SI unit of output and limit.
+        limit: The limit as the case gives it, in SI; 1 of several.
+    """
+
+    side: Side
+    output: str
+    unit: str
+    limit: float
+
+    @property
+    def peak_name(self) -> str:
+        """Name of the limited peak, such as "max q3"."""
+        return f"{self.side} {self.output}".strip()
+
+    @property
+    def words(self) -> str:
+        """Text of the limit, as "|drift1| ≤ 40.00 mm", or as "any of them"."""
+        return self._words("≤", "≥")
+
+    @property
+    def event(self) -> str:
+        """The event that it is exceeded: "|drift1| > 40.00 mm", or "any of them exceeded"."""
+        return self._words(">", "<") if self.unit else f"{self.output} exceeded"
+
+    def _words(self, above: str, below: str) -> str:
+        if not self.unit:
+            return self.output
+        output = f"|{self.output}|" if self.side in ("", "mean") else self.output
+        relation = below if self.side == "min" else above
+        return f"{self.side} {output} {relation} {engineering(self.limit, self.unit)}".strip()
+
+
+def limit_fields(section: QuestionSection, name: str, structure: Structure) -> dict[str, object]:
+    """Fields of `LimitAnswer` for a limit by its name in a section, or for several together."""
+    limit = section.limits_by_name.get(name)
+    if limit is None:
+        return {"side": "", "output": name, "unit": "", "limit": 1.0}
+    value = limit.value_in_si(structure, f"{section.key}.limits")
+    unit = structure.unit(limit.output)
+    return {"side": limit.side, "output": limit.output, "unit": unit, "limit": value}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from alphacut.case.limits import TolerancesSection
 from alphacut.frame.boxes import boxes
@@ -12,121 +11,132 @@ from alphacut.frame.questions.tolerances import scaled, tolerances
 from alphacut.frame.structures.quantities import of_storey_frame
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature, rounded
-from alphacut.io.files import Document
-from alphacut.io.quantity import engineering
-from alphacut.questions.question import (
-    PEAK_ERROR,
-    FuzzyResponse,
-    NumberRow,
-    Question,
-    Row,
-    peak_document,
-)
+from alphacut.io.quantity import MINUS, engineering
+from alphacut.questions.question import Answer, FuzzyResponse, Record, Row
+from alphacut.stages.envelope import PEAK_ERROR, PeakResults, peak_results
+from alphacut.stages.store import Numbers
 
 
-def _row(name: str, support: Document, document: Document) -> Row:
-    """Row of an input: its largest support with no limit exceeded, nature, and in % of modal."""
-    if document["kept"] is None:
-        return f"tolerance of {name}", "–", document["nature"], ""
-    ends, modal = support["kept"], support["modal"]
-    relative = f"about {modal:g}"
-    if modal:
-        relative = ", ".join(f"{end / modal - 1:+.2%}".replace("-", "−") for end in ends)
-    sides = zip(ends, ("lower", "upper"), strict=True)
-    inside = (rounded(end, side, Nature.ATTAINED) for end, side in sides)  # rounded inwards
-    text = " … ".join(engineering(end, of_storey_frame(name).unit) for end in inside)
-    return f"tolerance of {name}", text, document["nature"], relative
+class Support(Numbers):
+    """Nominal value of an input, its support in the case, and the one with no limit exceeded."""
+
+    modal: float
+    own: tuple[float, float]
+    kept: tuple[float, float]
 
 
-@dataclass(frozen=True)
-class TolerancesQuestion(Question):
-    """Largest scale of the supports of the fuzzy inputs at which no limit is exceeded."""
+class TolerancesAnswer(Answer):
+    """Scales of all supports, and the supports at the largest one with no limit exceeded.
 
-    section: TolerancesSection
+    Args:
+        limits: Of magnitudes, in SI.
+        peaks: Peaks of the limited outputs at scale 1.
+        kept: Largest scale with no limit exceeded; None if one is exceeded at every scale.
+        clear: Largest scale at which no motion is known to exceed a limit.
+        passed: Least scale known to exceed a limit.
+        most: Largest scale tried.
+    """
+
     key = "tolerances"
     title = "How far may tolerances go?"
     caption = "Supports of the inputs in the case, and at the scale that exceeds no limit"
     head = ("quantity", "no limit exceeded", "nature", "limit exceeded, or relative")
+    limits: dict[str, float]
+    peaks: PeakResults
+    kept: float | None
+    clear: float | None
+    passed: float | None
+    most: float
+    nature: Nature
+    envelopes: int
+    step: float
+    supports: dict[str, Support]
 
-    def require_answerable(self, response: FuzzyResponse) -> None:
-        """Refuses limits that do not fit, and a largest scale at which an input is inadmissible."""
-        super().require_answerable(response)
-        largest = self.section.most
-        try:
-            widest = boxes(scaled(response.inputs, largest), [0.0])
-            require_admissible(response.structure.model, widest)
-        except RefusedError as error:
-            value = f"{largest:g} times the supports: {error.key} is {error.value}"
-            key, cure = "tolerances.most", "a smaller scale"
-            raise RefusedError(key, value, error.allowed, cure) from None
-
-    def answer(self, response: FuzzyResponse) -> Document:
-        """Largest scale of all supports with no limit exceeded, and the supports there ("kept").
-
-        "passed" is the least scale known to exceed a limit; "own" is a support in the case.
-        """
-        assert response.peaks is not None
-        limits = self.section.in_si(response.structure)
-        scale = tolerances(
-            response.structure.model_with_outputs("tolerances.limits", tuple(limits)),
-            response.inputs,
-            limits,
-            duration=response.duration,
-            step=response.step,
-            most=self.section.most,
-            error=PEAK_ERROR,
-            at_one=response.peaks if response.alpha[0] == 0 else None,
-            progress=response.progress,
-        )
-        modal = {name: number.modal for name, number in response.inputs.items()}
-        supports = {
-            name: {"modal": modal[name], "own": response.inputs[name].support, "kept": ends}
-            for name, ends in scale.supports.items()
-        }
-        return {
-            "limits": limits,
-            "peaks": {name: peak_document(response.peaks, name) for name in limits},
-            "kept": scale.admissible,
-            "clear": scale.clear,
-            "passed": scale.passed if math.isfinite(scale.passed) else None,
-            "most": self.section.most,
-            "nature": str(scale.nature),
-            "envelopes": scale.envelopes,
-            "step": response.step,
-            "supports": supports,
-        }
-
-    @staticmethod
-    def rows(document: Document) -> list[Row]:
-        """Table of the report: the scale of all supports, then the tolerance of each input."""
-        largest, passed = document["kept"], document["passed"]  # without and with an exceedance
+    def rows(self) -> list[Row]:
+        """The scale of all supports, then the tolerance of each input."""
         scale = "none"
-        if largest is not None:
-            scale = f"up to {rounded(largest, 'upper', Nature.ATTAINED):.4g}"
-        exceeded = f"exceeded at {passed:.4g}" if passed is not None else "none is exceeded"
-        if passed is not None and document["clear"] is not None:
-            exceeded = f"no exceedance found up to {document['clear']:.4g}, {exceeded}"
-        head = ("scale of all ranges", scale, document["nature"], exceeded)
-        supports = document["supports"].items()
-        return [head, *(_row(name, support, document) for name, support in supports)]
+        if self.kept is not None:
+            scale = f"up to {rounded(self.kept, 'upper', Nature.ATTAINED):.4g}"
+        exceeded = "none is exceeded" if self.passed is None else f"exceeded at {self.passed:.4g}"
+        if self.passed is not None and self.clear is not None:
+            exceeded = f"no exceedance found up to {self.clear:.4g}, {exceeded}"
+        head = ("scale of all ranges", scale, self.nature, exceeded)
+        return [head, *(self._row(*item) for item in self.supports.items())]
 
-    @staticmethod
-    def number_rows(document: Document) -> tuple[Row, list[NumberRow]]:
-        """Titles of the columns; rows of the scale, then of the range of each input."""
-        head: Row = ("quantity", "unit", "from", "to", "from in the case", "to in the case")
-        head += ("most plausible", "nature")
-        scale = (None, document["kept"], None, 1.0, None, document["nature"])
-        rows: list[NumberRow] = [("scale of all ranges", "", *scale)]
-        for name, support in document["supports"].items():
-            unit, ends_in_case = of_storey_frame(name).unit, support["own"]
-            ends = (None, None) if document["kept"] is None else support["kept"]
-            rows.append((name, unit, *ends, *ends_in_case, support["modal"], document["nature"]))
-        return head, rows
+    def _row(self, name: str, support: Support) -> Row:
+        """Row of an input: its largest support with no limit exceeded, nature, % of modal."""
+        if self.kept is None:
+            return f"tolerance of {name}", "–", self.nature, ""
+        relative = f"about {support.modal:g}"
+        if support.modal:
+            relative = ", ".join(f"{end / support.modal - 1:+.2%}" for end in support.kept)
+        sides = zip(support.kept, ("lower", "upper"), strict=True)
+        inside = (rounded(end, side, Nature.ATTAINED) for end, side in sides)  # rounded inwards
+        text = " … ".join(engineering(end, of_storey_frame(name).unit) for end in inside)
+        return f"tolerance of {name}", text, self.nature, relative.replace("-", MINUS)
 
-    @staticmethod
-    def words(document: Document) -> str:
+    def records(self) -> list[Record]:
+        """A row of the scale, then one of the range of each input."""
+        names = (
+            *("quantity", "unit", "from", "to", "from in the case", "to in the case"),
+            *("most plausible", "nature"),
+        )
+        scale = ("scale of all ranges", "", None, self.kept, None, 1.0, None, self.nature)
+        rows: list[Record] = [dict(zip(names, scale, strict=True))]
+        for name, support in self.supports.items():
+            ends = (None, None) if self.kept is None else support.kept
+            unit = of_storey_frame(name).unit
+            row = (name, unit, *ends, *support.own, support.modal, self.nature)
+            rows.append(dict(zip(names, row, strict=True)))
+        return rows
+
+    def words(self) -> str:
         """How to read the scale."""
         return (
             "All supports are scaled together about their modal values; 1 is the case as it stands."
-            f" Scales up to {document['most']:g} were tried, each with an envelope of its own."
+            f" Scales up to {self.most:g} were tried, each with an envelope of its own."
         )
+
+
+def require_admissible_scale(section: TolerancesSection, response: FuzzyResponse) -> None:
+    """Refuses a largest scale at which an input is inadmissible."""
+    try:
+        widest = boxes(scaled(response.inputs, section.most), [0.0])
+        require_admissible(response.structure.model, widest)
+    except RefusedError as error:
+        value = f"{section.most:g} times the supports: {error.key} is {error.value}"
+        key, cure = "tolerances.most", "a smaller scale"
+        raise RefusedError(key, value, error.allowed, cure) from None
+
+
+def admissible_tolerances(section: TolerancesSection, response: FuzzyResponse) -> TolerancesAnswer:
+    """Largest scale of all supports with no limit exceeded, and the supports there."""
+    assert response.peaks is not None
+    limits = section.in_si(response.structure)
+    scale = tolerances(
+        response.structure.model_with_outputs("tolerances.limits", tuple(limits)),
+        response.inputs,
+        limits,
+        duration=response.duration,
+        step=response.step,
+        most=section.most,
+        error=PEAK_ERROR,
+        at_one=response.peaks if response.alpha[0] == 0 else None,
+        progress=response.progress,
+    )
+    inputs, peaks = response.inputs, peak_results(response.peaks)
+    return TolerancesAnswer(
+        limits=limits,
+        peaks={name: peaks[name] for name in limits},
+        kept=scale.admissible,
+        clear=scale.clear,
+        passed=scale.passed if math.isfinite(scale.passed) else None,
+        most=section.most,
+        nature=scale.nature,
+        envelopes=scale.envelopes,
+        step=response.step,
+        supports={
+            name: Support(modal=inputs[name].modal, own=inputs[name].support, kept=ends)
+            for name, ends in scale.supports.items()
+        },
+    )

@@ -1,24 +1,30 @@
-"""Results of a run as tables of text, for the console and for the page."""
+"""The key results of a run, and those of two side by side, as tables of texts and sentences."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from alphacut.frame.questions.peaks import output_of
-from alphacut.frame.structures.quantities import Output
-from alphacut.fuzzy.result import Nature, rounded
-from alphacut.io.files import Document
-from alphacut.io.quantity import STANDARD_GRAVITY, axis_prefix, range_text
-from alphacut.questions.all import QUESTIONS
-from alphacut.questions.question import Row
+import numpy as np
 
-Table = tuple[Row, list[Row]]
-"""Titles of the columns, and the rows."""
+from alphacut.fuzzy.result import Nature, rounded
+from alphacut.io.arrays import text_table
+from alphacut.io.quantity import STANDARD_GRAVITY, axis_prefix, engineering, range_text
+from alphacut.questions.question import Row
+from alphacut.questions.summary import Parts
+from alphacut.questions.tolerances import TolerancesAnswer
+from alphacut.report.tables import Table, unit_of
+from alphacut.stages.envelope import EnvelopeResult, PeakResult
+from alphacut.stages.identify import IdentifiedResult
+from alphacut.stages.image import ImageResult
+from alphacut.stages.modulus import ModulusResult
+from alphacut.stages.results import FrameResult
+from alphacut.stages.store import Cuts
+
 MATERIAL = ("material", "most plausible", "range at α = 0", "nature", "± error")
 MEANING = "Least … largest value if every input stays in its range; α = 1: most plausible"
 """First line of all results, for readers who do not know α-cuts; "nominal" is α = 1."""
 TOLERANCE_TABLE = "table on the page and in tolerances.csv"
-ANSWERS = ("question", "answer", "nature")
+ANSWER_HEAD = ("question", "answer", "nature")
 EXCEEDED = {
     "exceeded": "yes",
     "not exceeded": "no",
@@ -26,12 +32,27 @@ EXCEEDED = {
     "undecided": "unknown",
 }
 """Verdicts on a limit as they stand in a column."""
-GRAVITY = float(STANDARD_GRAVITY)
+COMPARED = ("at the lowest α", "first", "second", "second over first")
 
 
-def cut_text(ends: Document, level: int, nature: Nature, error: float = 0.0) -> str:
+def run_text(parts: Parts) -> str:
+    """The results of a run for the console: tables, then sentences, answers and main drivers."""
+    shown = [table for table in (material(parts), peak_table(parts)) if table.rows]
+    lines = [*natures(parts)]
+    if isinstance(parts.update, IdentifiedResult):
+        shown.append(learned(parts.update))
+    elif parts.update is not None:
+        lines.append(parts.update.refuted)
+    lines += [f"{row[0]}: {row[1]} ({row[2]})" for row in answers(parts)]
+    lines += drivers(parts)
+    heading = f"{MEANING}\n" if shown else ""
+    texts = [text_table(*table) for table in shown]
+    return heading + "".join(texts) + "".join(f"{line}\n" for line in lines)
+
+
+def cut_text(cuts: Cuts, level: int, nature: Nature, error: float = 0.0) -> str:
     """Text of one cut of a quantity with five digits; guaranteed ends contain the error."""
-    low, high = float(ends["lower"][level]), float(ends["upper"][level])
+    low, high = cuts[level]
     if nature is Nature.GUARANTEED:
         low, high = max(low - error, min(low, 0.0)), high + error  # the error makes no sign
     return range_text(low, high, nature, 5)
@@ -42,84 +63,115 @@ def error_text(error: float, nature: Nature) -> str:
     return "none" if nature is Nature.GUARANTEED else f"{error:.2g}"
 
 
-def material(summary: Document) -> Table:
+def material(parts: Parts) -> Table:
     """Table of the elastic constants and loss factors of cell and image, and of damping ratios.
 
     Each has its value at α = 1, the last level, its range at α = 0, the first, nature and error.
     """
-    rows: list[Row] = []
-    for part in (summary.get("modulus"), summary.get("image")):
-        if part is None:
-            continue
-        young = part["cuts"]["E_GPa"] if "cuts" in part else part["E_GPa"]
-        nature, name = Nature(part["nature"]), f"E, GPa ({part['average']})"
-        young_error = sum(part.get("error", {}).values()) * max(young["upper"])
-        cuts = cut_text(young, -1, nature), cut_text(young, 0, nature, young_error)
-        declares_error = part.get("particles") != "mesh"  # a mesh of one's own is not refined
-        error_cell = error_text(young_error, nature) if declares_error else "not declared"
-        rows.append((name, *cuts, str(nature), error_cell))
-        further = {"ν": part.get("nu_cuts"), "E_T, GPa": part.get("fibres", {}).get("E_T_GPa")}
-        for label, values in further.items():
-            if values:
-                cuts = cut_text(values, -1, nature), cut_text(values, 0, nature)
-                rows.append((label, *cuts, str(nature), ""))
-        if loss := part.get("loss"):
-            nature, loss_error = Nature(loss["nature"]), loss["error"].get("E")
-            cuts = cut_text(loss["E"], -1, nature), cut_text(loss["E"], 0, nature)
-            error_cell = "" if loss_error is None else error_text(loss_error, nature)
-            rows.append(("loss factor of E", *cuts, str(nature), error_cell))
-    for name, (low, modal, high) in summary.get("damping", {}).items():
+    rows = [row for part in (parts.modulus, parts.image) if part for row in _constants(part)]
+    for name, (low, modal, high) in parts.damping.items():
         cuts = range_text(modal, modal, Nature.ATTAINED), range_text(low, high, Nature.ATTAINED)
-        rows.append((f"damping ratio {name}", *cuts, str(Nature.ATTAINED), ""))
+        rows.append((f"damping ratio {name}", *cuts, Nature.ATTAINED, ""))
     return without_empty_columns(MATERIAL, rows)
+
+
+def _constants(part: ModulusResult | ImageResult) -> Iterator[Row]:
+    """Yields the row of E of a cell or an image, and those of ν, E_T and the loss factor."""
+    nature, further = part.nature, dict[str, Cuts]()
+    if isinstance(part, ImageResult):
+        young, error, declares_error = part.cuts.E_GPa, 0.0, True
+    else:
+        young, declares_error = part.E_GPa, part.particles != "mesh"  # which is not refined
+        error = sum(part.error.values()) * float(young.upper.max())
+        further = {"ν": part.nu_cuts}
+        if "E_T_GPa" in part.fibres:
+            further["E_T, GPa"] = part.fibres["E_T_GPa"]
+    cuts = cut_text(young, -1, nature), cut_text(young, 0, nature, error)
+    error_cell = error_text(error, nature) if declares_error else "not declared"
+    yield (f"E, GPa ({part.average})", *cuts, nature, error_cell)
+    for label, values in further.items():
+        yield (label, cut_text(values, -1, nature), cut_text(values, 0, nature), nature, "")
+    if (loss := part.loss) is not None:
+        cuts = cut_text(loss.E, -1, loss.nature), cut_text(loss.E, 0, loss.nature)
+        error_cell = error_text(loss.error["E"], loss.nature) if loss.error else ""
+        yield ("loss factor of E", *cuts, loss.nature, error_cell)
 
 
 def without_empty_columns(head: Row, rows: list[Row]) -> Table:
     """The table without columns whose cells are all empty or "none"."""
     columns = [k for k in range(len(head)) if any(row[k] not in ("", "none") for row in rows)]
-    return tuple(head[k] for k in columns), [tuple(row[k] for k in columns) for row in rows]
+    kept = [tuple(row[k] for k in columns) for row in rows]
+    return Table(tuple(head[k] for k in columns), kept)
 
 
-def width_text(image: Document) -> str:
-    """Width of E at the lowest level by what it comes from; empty without one."""
-    parts = (f"{source} {width:.3g} GPa" for source, width in image["widths_GPa"].items())
+def width_text(image: ImageResult) -> str:
+    """Width of E at the lowest level by what it comes from."""
+    parts = (f"{source} {width:.3g} GPa" for source, width in image.widths_GPa.items())
     return f"Width of E from {', '.join(parts)}"
 
 
-def peak_table(summary: Document) -> Table:
-    """Table of the peak of each output: its cuts, error or gap, limit and verdict.
-
-    Proved peaks have a gap; the others have the cut of a middle level as well.
-    """
-    studies = summary.get("envelopes", {})
-    if not studies:
-        return (), []
-    alpha = [float(x) for x in next(iter(studies.values()))["alpha"]]
-    peaks = [peak for study in studies.values() for peak in study["peak"].values()]
-    levels = [len(alpha) - 1, 0]
-    if not any(peak["nature"] == Nature.GUARANTEED for peak in peaks):
-        levels.insert(1, min(range(len(alpha)), key=lambda k: abs(alpha[k] - 0.5)))
-    levels = list(dict.fromkeys(levels))
-    limits, structure = least_limits(summary), summary.get("structure", {})
+def learned(result: IdentifiedResult) -> Table:
+    """Table of the inputs before and after measured modes were used, then of predicted modes."""
     rows: list[Row] = []
+    for name, cuts in result.inputs.items():
+        texts = (_outer_text(ends, result.units[name]) for ends in (result.prior[name], cuts[0]))
+        rows.append((name, *texts, f"{result.narrowed[name]:.0%} of the width"))
+    for mode in result.held_out:
+        verdict, predicted = (
+            "inside" if mode.inside else "outside",
+            _outer_text(mode.predicted, "Hz"),
+        )
+        rows.append((f"mode {mode.mode}", f"{mode.measured:.4g} Hz", predicted, verdict))
+    return Table(("input or mode", "before, measured", "learned, predicted", ""), rows)
+
+
+def _outer_text(ends: Sequence[float], unit: str) -> str:
+    sides = zip(ends, ("lower", "upper"), strict=True)
+    return " … ".join(engineering(rounded(x, y, Nature.GUARANTEED), unit) for x, y in sides)
+
+
+def peak_table(parts: Parts) -> Table:
+    """Table of the peak of each output: its cuts, error or gap, limits and verdicts.
+
+    Proved peaks have a gap; the others have the cut of a middle level as well. Each further limit
+    of a peak has a row of its own.
+    """
+    studies = parts.envelopes
+    if not studies:
+        return Table((), [])
+    alpha = next(iter(studies.values())).alpha
+    peaks = [peak for study in studies.values() for peak in study.peak.values()]
+    levels = [len(alpha) - 1, 0]
+    if not any(peak.nature is Nature.GUARANTEED for peak in peaks):
+        levels.insert(1, int(np.argmin(np.abs(alpha - 0.5))))
+    levels = list(dict.fromkeys(levels))
+    limits, has_core, rows = limits_by_peak(parts), bool(alpha[-1] == 1), list[Row]()
     for name, study in studies.items():
         suffix = f" ({name})" if len(studies) > 1 else ""
-        drawn = study.get("drawn") or study["peak"]
-        for output, peak in study["peak"].items():
-            units = display_units(output, unit_of(study, output), peak, structure)
-            for label, factor in units if output in drawn else ():
-                cells = peak_cells(peak, factor, levels, has_core=alpha[-1] == 1)
-                limit = limit_cells(limits.get(output), factor)
-                rows.append((label + suffix, *cells, *limit))
+        for peak_name, peak in shown_peaks(study):
+            units = display_units(peak_name, unit_of(study.units, peak_name), peak, parts.structure)
+            for label, factor in units:
+                first, *further = limits.get(peak_name, [None])
+                cells = peak_cells(peak, factor, levels, has_core=has_core)
+                rows.append((label + suffix, *cells, *limit_cells(first, factor)))
+                empty = ("",) * len(cells)
+                rows += [(label + suffix, *empty, *limit_cells(x, factor)) for x in further]
     titles = [f"α = {alpha[k]:g}" for k in levels]
-    if alpha[-1] == 1 and not any("…" in row[1] for row in rows):
+    if has_core and not any("…" in row[1] for row in rows):
         titles[0] = "nominal"
     head = ("peak of", *titles, "± error", "reached", "gap", "limit", "exceeded")
     return without_empty_columns(head, rows)
 
 
-def peak_cells(peak: Document, factor: float, levels: Sequence[int], *, has_core: bool) -> Row:
-    """Texts of a peak times a factor: its cut on each level, its error, what is reached, the gap.
+def shown_peaks(study: EnvelopeResult) -> Iterator[tuple[str, PeakResult]]:
+    """Yields the peaks of the outputs that are drawn, or all, by name."""
+    for name, peak in study.peak.items():
+        if name in (study.drawn or study.peak):
+            yield name, peak
+
+
+def peak_cells(peak: PeakResult, factor: float, levels: Sequence[int], *, has_core: bool) -> Row:
+    """Texts of a peak: its cut on each level, its error, what is reached, the gap.
 
     Args:
         peak: Bounds of the peak on all levels, in SI.
@@ -127,116 +179,164 @@ def peak_cells(peak: Document, factor: float, levels: Sequence[int], *, has_core
         levels: Indices of the levels, the highest first.
         has_core: Whether the highest level is 1, whose cut is shown by `nominal`.
     """
-    nature, cuts = Nature(peak["nature"]), list[str]()
+    nature, cuts = peak.nature, list[str]()
     for k in levels:
-        low, high = factor * float(peak["lower"][k]), factor * float(peak["upper"][k])
+        low, high = factor * float(peak.lower[k]), factor * float(peak.upper[k])
         cuts.append(range_text(low, high, nature, 3 if k > 0 else 4))
     if has_core:
-        cuts[0] = nominal(peak, factor, nature)
-    error = error_text(factor * max(peak["error"]), nature)
-    return (*cuts, error, *reached_and_gap(peak, factor))
+        cuts[0] = nominal(peak, factor)
+    error = error_text(factor * float(peak.error.max()), nature)
+    if nature is not Nature.GUARANTEED:
+        return (*cuts, error, "", "")
+    inner = "lower" if peak.is_least else "upper"
+    reached = rounded(factor * float(peak.reached[0]), inner, Nature.ATTAINED)
+    return (*cuts, error, number_text(reached), f"{peak.gap(0):.1%}")
 
 
-def limit_cells(limit: tuple[float, str] | None, factor: float) -> tuple[str, str]:
-    """Texts of a limit, in SI, times a factor, and of the verdict on it; empty without a limit."""
+def number_text(value: float) -> str:
+    """A number with four digits and the typographic minus."""
+    return engineering(value, "")
+
+
+def nominal(peak: PeakResult, factor: float) -> str:
+    """Text of a peak at α = 1: a number, or a range if that is wider than a hundredth of it."""
+    low, high = factor * float(peak.lower[-1]), factor * float(peak.upper[-1])
+    middle, is_narrow = (low + high) / 2, high - low <= 0.01 * abs(high)
+    if is_narrow:
+        return range_text(middle, middle, peak.nature)
+    return range_text(low, high, peak.nature, 3)
+
+
+Limit = tuple[float, str]
+"""A limit in SI, and the verdict on it, if there is one."""
+
+
+def limit_cells(limit: Limit | None, factor: float) -> tuple[str, str]:
+    """Texts of a limit times a factor, and of the verdict on it; empty without a limit."""
     if limit is None:
         return "", ""
-    return f"{limit[0] * factor:.4g}", EXCEEDED.get(limit[1], "")
+    return number_text(limit[0] * factor), EXCEEDED.get(limit[1], "")
 
 
-def unit_of(part: Document, output: str) -> str:
-    """SI unit of an output, or of its peak of one side, in a study or under a suite."""
-    return part.get("units", {}).get(output_of(output)) or Output(output).unit
-
-
-def reached_and_gap(peak: Document, factor: float) -> tuple[str, str]:
-    """Texts of the peak that a motion reaches, and of its gap to a proved bound; else empty."""
-    if Nature(peak["nature"]) is not Nature.GUARANTEED:
-        return "", ""
-    value = rounded(factor * float(peak["reached"][0]), "upper", Nature.ATTAINED)
-    return f"{value:.4g}", f"{peak_gap(peak, 0):.1%}"
-
-
-def peak_gap(peak: Document, level: int) -> float:
-    """Relative gap between the bound of a peak and what a motion reaches, on a level."""
-    upper = float(peak["upper"][level])
-    return 1 - float(peak["reached"][level]) / upper if upper > 0 else 0.0
-
-
-def nominal(peak: Document, factor: float, nature: Nature) -> str:
-    """Text of a peak at α = 1: a number, or a range if that is wider than a hundredth of it."""
-    low, high = (factor * float(peak[end][-1]) for end in ("lower", "upper"))
-    middle, is_narrow = (low + high) / 2, high - low <= 0.01 * abs(high)
-    return range_text(middle, middle, nature) if is_narrow else range_text(low, high, nature, 3)
-
-
-def display_units(
-    output: str, unit: str, peak: Document, structure: Document
-) -> Iterator[tuple[str, float]]:
-    """Yields the label and the factor from SI of each unit in which an output's peak is shown."""
-    if unit == "m/s^2":
-        yield f"{output}, g", 1 / GRAVITY
-        return
-    factor, prefixed = axis_prefix(float(peak["upper"][0]), unit)
-    yield f"{output}, {prefixed}", factor
-    if height := structure.get("heights_m", {}).get(output):
-        yield "  % of storey", 100 / height
-    if unit == "N" and (weight := structure.get("weight_N")):
-        yield "  % of weight", 100 / weight
-
-
-def least_limits(summary: Document) -> dict[str, tuple[float, str]]:
-    """Limit in SI of each peak, and the verdict on it; the least of several, of [decision] first.
-
-    Limits of other questions have no verdict.
-    """
-    limits: dict[str, tuple[float, str]] = {}
-    for name, limit in summary.get("tolerances", {}).get("limits", {}).items():
-        limits[name] = limit, ""
-    for name, event in summary.get("probability", {}).get("events", {}).items():
-        limits[name] = event["limit"], ""
-    decisions = summary.get("decision", {}).get("limits", {})
-    least_first = sorted(decisions.items(), key=lambda pair: pair[1]["limit"])
-    for name, answer in reversed(least_first):  # the least overwrites others of its peak
-        limits[answer.get("output", name)] = answer["limit"], answer.get("verdict", "")
+def limits_by_peak(parts: Parts) -> dict[str, list[Limit]]:
+    """Limits of each peak with their verdicts, of [decision], else of another question."""
+    limits: dict[str, list[Limit]] = {}
+    for decision in () if parts.decision is None else parts.decision.limits.values():
+        limits.setdefault(decision.peak_name, []).append((decision.limit, decision.verdict))
+    for event in () if parts.probability is None else parts.probability.events.values():
+        limits.setdefault(event.peak_name, [(event.limit, "")])
+    for name, limit in {} if parts.tolerances is None else parts.tolerances.limits.items():
+        limits.setdefault(name, [(limit, "")])
     return limits
 
 
-def natures(summary: Document) -> Iterator[str]:
+def display_units(
+    name: str, unit: str, peak: PeakResult, frame: FrameResult | None
+) -> Iterator[tuple[str, float]]:
+    """Yields the label and the factor from SI of each unit in which a peak is shown."""
+    if unit == "m/s^2":
+        yield f"{name}, g", 1 / float(STANDARD_GRAVITY)
+        return
+    factor, prefixed = axis_prefix(max(abs(float(peak.lower[0])), abs(float(peak.upper[0]))), unit)
+    yield f"{name}, {prefixed}", factor
+    if frame is not None and name in frame.heights_m:
+        yield "  % of storey", 100 / frame.heights_m[name]
+    if frame is not None and unit == "N":
+        yield "  % of weight", 100 / frame.weight_N
+
+
+def natures(parts: Parts) -> Iterator[str]:
     """Yields sentences on the nature of the peaks, and on the exact motions that tested them."""
-    studies = summary.get("envelopes", {}).values()
-    outputs_by_nature: dict[str, dict[str, None]] = {}
+    studies = parts.envelopes.values()
+    outputs: dict[Nature, dict[str, None]] = {}
     for study in studies:
-        for output, peak in study["peak"].items():
-            outputs_by_nature.setdefault(peak["nature"], {})[output] = None
-    groups = [f"{nature} ({', '.join(outputs)})" for nature, outputs in outputs_by_nature.items()]
+        for output, peak in study.peak.items():
+            outputs.setdefault(peak.nature, {})[output] = None
+    groups = [f"{nature} ({', '.join(names)})" for nature, names in outputs.items()]
     if len(groups) == 1:
-        groups = [f"all {nature}" for nature in outputs_by_nature]
+        groups = [f"all {nature}" for nature in outputs]
     if groups:
         yield "Peaks are largest magnitudes over time, " + ", ".join(groups)
-    if tested := sum(study.get("motions_tested", 0) for study in studies):
+    if tested := sum(study.motions_tested for study in studies):
         yield f"{tested} exact motions by another algorithm agree with what is guaranteed."
 
 
-def answers(summary: Document) -> list[Row]:
+def answers(parts: Parts) -> list[Row]:
     """Rows (what, answer, nature) of all answers to questions; inputs of tolerances share a row."""
     rows: list[Row] = []
-    for question in QUESTIONS:
-        if question.key in summary:
-            answer_rows = question.rows(summary[question.key])
-            if question.key == "tolerances":
-                scale, *inputs = answer_rows
-                answer_rows = [scale, ("ranges", f"of {len(inputs)} inputs", TOLERANCE_TABLE)]
-            rows += [(f"{question.key}: {row[0]}", *row[1:3]) for row in answer_rows]
+    for answer in parts.answers:
+        answer_rows = answer.rows()
+        if isinstance(answer, TolerancesAnswer):
+            scale, *inputs = answer_rows
+            answer_rows = [scale, ("ranges", f"of {len(inputs)} inputs", TOLERANCE_TABLE)]
+        rows += [(f"{answer.key}: {row[0]}", *row[1:3]) for row in answer_rows]
     return rows
 
 
-def drivers(summary: Document) -> Iterator[str]:
+def drivers(parts: Parts) -> Iterator[str]:
     """Yields sentences on the three inputs that widen E most, and the last output's peak most."""
-    shares = dict(summary.get("shares", {}))
-    peak_names = [name for name in shares if "peak" in name]
-    results = [name for name in shares if name == "E"] + peak_names[-1:]
-    for name in results:
-        largest, *next_two = sorted(shares[name].items(), key=lambda pair: -pair[1])[:3]
+    peaks = [name for name in parts.shares if name not in ("E", "ν")]
+    for name in [name for name in parts.shares if name == "E"] + peaks[-1:]:
+        (largest, share), *next_two = sorted(parts.shares[name].items(), key=lambda x: -x[1])[:3]
         more = "".join(f", {x} by {share:.0%}" for x, share in next_two)
-        yield f"Fixing {largest[0]} narrows {name} by {largest[1]:.0%}{more}"
+        yield f"Fixing {largest} narrows {name} by {share:.0%}{more}"
+
+
+def comparison(first: Parts, second: Parts) -> Table:
+    """Table of what both runs have: E, greatest peaks and their widths, verdicts on limits."""
+    rows = [*_compared_moduli(first, second), *_compared_peaks(first, second)]
+    return Table(COMPARED, [*rows, *_compared_limits(first, second)])
+
+
+def _compared_moduli(first: Parts, second: Parts) -> Iterator[Row]:
+    """Rows on the greatest E and the width of E, of a round cell and of an image."""
+    pairs = [
+        [x.modulus.E_GPa for x in (first, second) if x.modulus is not None],
+        [x.image.cuts.E_GPa for x in (first, second) if x.image is not None],
+    ]
+    for cuts in pairs:
+        if len(cuts) == 2:
+            ends = [1e9 * np.array(x[0]) for x in cuts]
+            yield _compared("greatest E", "Pa", *(high for _, high in ends))
+            yield _compared("width of E", "Pa", *(high - low for low, high in ends))
+
+
+def _compared_peaks(first: Parts, second: Parts) -> Iterator[Row]:
+    """Rows on the greatest peak and its width of each output, then on statistics of records."""
+    for study, result in first.envelopes.items():
+        others = second.envelopes[study].peak if study in second.envelopes else {}
+        for output, peak in result.peak.items():
+            if (other := others.get(output)) is not None:
+                name = output if study == "all" else f"{output} ({study})"
+                unit = unit_of(result.units, output)
+                ends = float(peak.far_end[0]), float(other.far_end[0])
+                widths = (float(x.upper[0] - x.lower[0]) for x in (peak, other))
+                yield _compared(f"greatest peak of {name}", unit, *ends)
+                yield _compared(f"width of the peak of {name}", unit, *widths)
+    if first.records is None or second.records is None:
+        return
+    for output, statistics in first.records.statistics.items():
+        if output in second.records.statistics:
+            unit, proved = unit_of(first.records.units, output), statistics.proved
+            for name, values in second.records.statistics[output].proved.items():  # mean …
+                ends = float(proved[name][0]), float(values[0])
+                yield _compared(f"{name} of the records' peaks of {output}", unit, *ends)
+
+
+def _compared_limits(first: Parts, second: Parts) -> Iterator[Row]:
+    """Rows on the verdicts on limits that both runs have, and on their scales of tolerances."""
+    if first.decision is not None and second.decision is not None:
+        for name, limit in first.decision.limits.items():
+            if (other := second.decision.limits.get(name)) is not None:
+                yield (limit.words, limit.verdict_words, other.verdict_words, "")
+                if limit.limit != other.limit:
+                    yield (other.words, "another limit", "this limit", "")
+    kept = [x.tolerances.kept for x in (first, second) if x.tolerances is not None]
+    scales = [scale for scale in kept if scale is not None]
+    if len(scales) == 2:
+        yield _compared("scale of tolerances", "", *scales)
+
+
+def _compared(what: str, unit: str, first: float, second: float) -> Row:
+    ratio = f"{second / first:.3f}" if first else ""
+    return (what, engineering(first, unit), engineering(second, unit), ratio)

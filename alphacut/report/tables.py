@@ -1,246 +1,299 @@
-"""Every result as a table of texts: for the console, the page and CSV files."""
+"""Every result as a data frame of numbers in SI: as CSV, and as tables of texts for the page."""
 
 from __future__ import annotations
 
-import csv
-import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import pandas as pd
 
 from alphacut.fuzzy.result import Nature, rounded
-from alphacut.io.columns import text_table
-from alphacut.io.files import Document, write_text
-from alphacut.io.manifest import ResultsFolder
-from alphacut.io.netcdf import dataset_of
-from alphacut.io.quantity import MINUS, end_texts, engineering
-from alphacut.questions.all import QUESTIONS
+from alphacut.io.files import write_text
+from alphacut.io.quantity import MINUS
+from alphacut.io.results import ResultsFolder
 from alphacut.questions.question import Row
-from alphacut.report.results import (
-    MEANING,
-    Table,
-    answers,
-    drivers,
-    material,
-    natures,
-    peak_gap,
-    peak_table,
-    unit_of,
-    without_empty_columns,
-)
+from alphacut.questions.summary import Parts
+from alphacut.stages.envelope import EnvelopeResult
+from alphacut.stages.identify import IdentifiedResult
+from alphacut.stages.image import ImageResult
+from alphacut.stages.modulus import ModulusResult
+from alphacut.stages.suite import SuiteResult
 
 if TYPE_CHECKING:
     import xarray
 
 DIGITS = 6
-
-
-def run_text(summary: Document) -> str:
-    """The results of a run for the console: tables, then sentences, answers and main drivers."""
-    learned = summary.get("update", {})
-    shown = [table for table in (material(summary), peak_table(summary)) if table[1]]
-    if "inputs" in learned:
-        shown.append(update(learned))
-    lines = [*natures(summary)]
-    if "refuted" in learned:
-        lines.append(learned["refuted"])
-    lines += [f"{row[0]}: {row[1]} ({row[2]})" for row in answers(summary)]
-    lines += drivers(summary)
-    heading = f"{MEANING}\n" if shown else ""
-    texts = [text_table(*table) for table in shown]
-    return heading + "".join(texts) + "".join(f"{line}\n" for line in lines)
-
-
-def write_tables(summary: Document, results: ResultsFolder, folder: Path) -> list[Path]:
-    """Writes the results of a run as CSV files.
-
-    Args:
-        summary: Of the run.
-        results: Its results.
-        folder: Where the files go; made if it does not exist.
-
-    Returns:
-        The files.
-    """
-    tables_by_name = {name: table for name, table in tables(summary).items() if table[1]}
-    for question in QUESTIONS:
-        if question.key in summary:
-            head, rows = question.number_rows(summary[question.key])
-            tables_by_name[question.key] = head, [tuple(map(_csv_cell, row)) for row in rows]
-    for name, study in summary.get("envelopes", {}).items():
-        data = dataset_of(results.content(f"envelope_{name}.nc"))
-        for output in study["min"]:
-            unit = unit_of(study, output)
-            tables_by_name[f"envelope_{name}-{output}"] = over_time(data, output, unit)
-    if "records" in summary:
-        tables_by_name["spectra"] = spectra(summary["records"]["spectra"])
-    return write_csv(tables_by_name, folder)
-
-
-def write_csv(tables_by_name: Mapping[str, Table], folder: Path) -> list[Path]:
-    """Writes each table as a CSV file, with the minus of ASCII; returns the files."""
-    for name, (head, rows) in tables_by_name.items():
-        text = io.StringIO()
-        csv.writer(text, lineterminator="\n").writerows([head, *rows])
-        content = text.getvalue().replace(MINUS, "-")
-        write_text(folder / f"{name}.csv", content, follow_links=False)
-    return [folder / f"{name}.csv" for name in tables_by_name]
-
-
-def tables(summary: Document) -> dict[str, Table]:
-    """Tables of the results in a summary, by name: of stages as in `MAKERS`, then of questions.
-
-    A stage that is absent or was refuted by its measurements has none.
-    """
-    stage_tables = {
-        name: make(summary[key])
-        for name, (key, make) in MAKERS.items()
-        if summary.get(key) and "refuted" not in summary[key]
+ENDS = {
+    "E from [GPa]": "lower",
+    "E to [GPa]": "upper",
+    "ν from": "lower",
+    "ν to": "upper",
+    "least peak": "lower",
+    "greatest peak": "upper",
+    "from": "lower",
+    "to": "upper",
+}
+"""Columns that are rounded as the nature of their row allows, each with its side."""
+SPECIAL = str.maketrans(
+    {
+        **{x: f"\\{x}" for x in "&%$#_{}"},
+        "\\": r"\textbackslash{}",
+        "~": r"\textasciitilde{}",
+        "^": r"\textasciicircum{}",
+        "−": "$-$",
+        "…": r"\dots{}",
+        "≤": r"$\leq$",
+        "≥": r"$\geq$",
+        "±": r"$\pm$",
+        "²": r"$^2$",
+        "µ": r"\textmu{}",
+        **{x: f"${name}$" for x, name in (("α", r"\alpha"), ("ν", r"\nu"), ("ζ", r"\zeta"))},
     }
-    answers = {x.key: (x.head, x.rows(summary[x.key])) for x in QUESTIONS if x.key in summary}
-    return stage_tables | answers
+)
+"""What LaTeX reads otherwise, or fonts do not have."""
 
 
-def cut_texts(values: Document, level: int, nature: Nature) -> Row:
-    """Both ends of a cut, rounded as their nature allows."""
-    return end_texts(float(values["lower"][level]), float(values["upper"][level]), nature, DIGITS)
+class Table(NamedTuple):
+    """Titles of the columns, and rows of texts."""
+
+    head: Row
+    rows: list[Row]
 
 
-def radius_map(part: Document) -> Table:
-    """Table of the parameters a1 … a4 of the radius map: least, modal and greatest value."""
-    rows: list[Row] = []
+def frames(parts: Parts) -> dict[str, pd.DataFrame]:
+    """Numbers of all results as data frames by name: of stages, then of questions."""
+    found = {}
+    if parts.microstructure is not None:
+        found["radius_map"] = radius_map(parts.microstructure)
+    if parts.modulus is not None:
+        found["modulus"] = modulus(parts.modulus)
+    if parts.image is not None:
+        found["image"] = image(parts.image)
+    if isinstance(parts.update, IdentifiedResult):
+        found["update"] = update(parts.update)
+    if parts.envelopes:
+        found["peaks"] = peaks(parts.envelopes)
+    if parts.records is not None:
+        found["records"] = records(parts.records)
+    if parts.shares:
+        found["shares"] = shares(parts.shares)
+    return found | {answer.key: pd.DataFrame(answer.records()) for answer in parts.answers}
+
+
+def tables(parts: Parts) -> dict[str, Table]:
+    """Tables of texts of all results: numbers rounded as their nature allows, answers in words."""
+    texts = {name: shown(frame) for name, frame in frames(parts).items()}
+    return texts | {answer.key: Table(answer.head, answer.rows()) for answer in parts.answers}
+
+
+def radius_map(numbers: Mapping[str, Any]) -> pd.DataFrame:
+    """The parameters a1 … a4 of the radius map: least, modal and greatest value."""
+    rows = []
     for name in ("a1", "a2", "a3", "a4"):
-        corners = part[name] if isinstance(part[name], list) else [part[name]]  # three, or one
-        least, modal, greatest = corners[0], corners[len(corners) // 2], corners[-1]
-        rows.append((name, *map(_number_text, (least, modal, greatest))))
-    return ("parameter of the radius map", "least", "modal", "greatest"), rows
+        corners = np.atleast_1d(numbers[name])  # three, or one
+        rows.append((name, corners[0], corners[len(corners) // 2], corners[-1]))
+    return pd.DataFrame(rows, columns=["parameter of the radius map", "least", "modal", "greatest"])
 
 
-def _csv_cell(value: str | float | None) -> str:
-    if isinstance(value, str):
-        return value
-    return "" if value is None else repr(float(value))  # exact: a bound stays one
+def modulus(result: ModulusResult) -> pd.DataFrame:
+    """The α-cuts of E and of ν, with the error of E."""
+    error = sum(result.error.values())
+    return pd.DataFrame(
+        {
+            "α": result.alpha,
+            "E from [GPa]": result.E_GPa.lower,
+            "E to [GPa]": result.E_GPa.upper,
+            "ν from": result.nu_cuts.lower,
+            "ν to": result.nu_cuts.upper,
+            "± E [GPa]": error * result.E_GPa.upper if error else np.nan,
+            "nature": str(result.nature),
+        }
+    )
 
 
-def _number_text(value: float) -> str:
-    return f"{value:.{DIGITS}g}"
+def image(result: ImageResult) -> pd.DataFrame:
+    """The α-cuts of E of an image."""
+    cuts = result.cuts.E_GPa
+    columns = {"α": result.cuts.alpha, "E from [GPa]": cuts.lower, "E to [GPa]": cuts.upper}
+    return pd.DataFrame({**columns, "nature": str(result.nature)})
 
 
-def modulus(part: Document) -> Table:
-    """Table of the α-cuts of E and of ν, with the error of E, of a round cell or of an image."""
-    cuts, nature = part.get("cuts", part), Nature(part["nature"])
-    poisson, error = part.get("nu_cuts"), sum(part.get("error", {}).values())
-    rows: list[Row] = [
-        (
-            f"{alpha:g}",
-            *cut_texts(cuts["E_GPa"], level, nature),
-            *(cut_texts(poisson, level, nature) if poisson else ("", "")),
-            f"{error * cuts['E_GPa']['upper'][level]:.2g}" if error else "",
-            str(nature),
-        )
-        for level, alpha in enumerate(cuts["alpha"])
+def update(result: IdentifiedResult) -> pd.DataFrame:
+    """Inputs before and after measured modes were used, then the modes predicted and measured."""
+    inputs = [
+        (name, result.units[name], *result.prior[name], *cuts[0], result.narrowed[name], "")
+        for name, cuts in result.inputs.items()
     ]
-    head = ("α", "E from [GPa]", "E to [GPa]", "ν from", "ν to", "± E [GPa]", "nature")
-    return without_empty_columns(head, rows)
+    modes = [
+        (f"mode {x.mode}", "Hz", x.measured, x.measured, *x.predicted, np.nan, x.inside)
+        for x in result.held_out
+    ]
+    head = ["input or mode", "unit", "before or measured, from", "before or measured, to"]
+    head += ["from", "to", "narrowed by", "inside"]
+    return pd.DataFrame([*inputs, *modes], columns=head).replace(
+        {"inside": {True: "inside", False: "outside"}}
+    )
 
 
-def update(part: Document) -> Table:
-    """Table of the inputs before and after measured modes were used, then of predicted modes."""
-    rows: list[Row] = []
-    for name, identified in part["inputs"].items():
-        posterior, unit = (identified["lower"][0], identified["upper"][0]), part["units"][name]
-        texts = (_outer_text(ends, unit) for ends in (part["prior"][name], posterior))
-        rows.append((name, *texts, f"{part['narrowed'][name]:.0%} of the width"))
-    for mode in part["held_out"]:
-        verdict, measured = "inside" if mode["inside"] else "outside", f"{mode['measured']:.4g} Hz"
-        predicted = _outer_text(mode["predicted"], "Hz")
-        rows.append((f"mode {mode['mode']}", measured, predicted, verdict))
-    return ("input or mode", "before, measured", "learned, predicted", ""), rows
+def peaks(studies: Mapping[str, EnvelopeResult]) -> pd.DataFrame:
+    """The peaks of all studies, a row for each output and level."""
+    return pd.concat(
+        pd.DataFrame(
+            {
+                "study": name,
+                "output": output,
+                "unit": unit_of(study.units, output),
+                "α": study.alpha,
+                "least peak": peak.lower,
+                "greatest peak": peak.upper,
+                "error": peak.error,
+                "nature": str(peak.nature),
+                "peak reached": peak.reached,
+                "gap, share": [peak.gap(level) for level in range(len(study.alpha))],
+            }
+        )
+        for name, study in studies.items()
+        for output, peak in study.peak.items()
+    )
 
 
-def _outer_text(ends: Sequence[float], unit: str) -> str:
-    sides = zip(ends, ("lower", "upper"), strict=True)
-    return " … ".join(engineering(rounded(x, y, Nature.GUARANTEED), unit) for x, y in sides)
+def unit_of(units: Mapping[str, str], peak: str) -> str:
+    """SI unit of a peak such as "max q3", from those of the outputs."""
+    return units[peak.rpartition(" ")[2]]
 
 
-def peaks(studies: Document) -> Table:
-    """Table of the peaks of all studies, a row for each output and level, in SI."""
-    rows: list[Row] = []
-    for name, study in studies.items():
-        for output, peak in study["peak"].items():
-            nature = Nature(peak["nature"])
-            for level, alpha in enumerate(study["alpha"]):
-                values = end_texts(peak["lower"][level], peak["upper"][level], nature, DIGITS)
-                reached = rounded(peak["reached"][level], "upper", Nature.ATTAINED, DIGITS)
-                error = f"{peak['error'][level]:.2g}"
-                first = (name, output, unit_of(study, output), f"{alpha:g}")
-                last = _number_text(reached), f"{peak_gap(peak, level):.2g}"
-                rows.append((*first, *values, error, str(nature), *last))
-    head = ("study", "output", "unit", "α", "least peak", "greatest peak", "error", "nature")
-    return (*head, "peak reached", "gap, share"), rows
+def records(result: SuiteResult) -> pd.DataFrame:
+    """Measures of each record and its peaks farthest out on the lowest level, then statistics."""
+    rows = [
+        {
+            "record": name,
+            "PGA [m/s^2]": record.measures["PGA"],
+            "Sa(T1) [m/s^2]": record.measures["Sa(T1)"],
+            "output": output,
+            "unit": unit_of(result.units, output),
+            "farthest peak": peak.far_end[0],
+            "peak reached": peak.reached[0],
+            "nature": str(peak.nature),
+        }
+        for name, record in result.records.items()
+        for output, peak in record.peak.items()
+    ]
+    rows += [
+        {
+            "record": f"{statistic} of all",
+            "output": output,
+            "unit": unit_of(result.units, output),
+            "farthest peak": proved[0],
+            "peak reached": statistics.reached[statistic][0],
+        }
+        for output, statistics in result.statistics.items()
+        for statistic, proved in statistics.proved.items()  # mean, median …
+    ]
+    return pd.DataFrame(rows)
 
 
-def records(part: Document) -> Table:
-    """Table of each record's measures and peaks on the lowest level, then of statistics, in SI."""
-    rows: list[Row] = []
-    for name, record in part["records"].items():
-        measures = tuple(_number_text(record["measures"][x]) for x in ("PGA", "Sa(T1)"))
-        for output, peak in record["peak"].items():
-            ends: Row = (_number_text(peak["upper"][0]), _number_text(peak["reached"][0]))
-            rows.append((name, *measures, output, unit_of(part, output), *ends, peak["nature"]))
-    for output, statistics in part["statistics"].items():
-        for statistic in statistics["proved"]:  # mean, median …
-            ends = tuple(_number_text(statistics[x][statistic][0]) for x in ("proved", "reached"))
-            rows.append((f"{statistic} of all", "", "", output, unit_of(part, output), *ends, ""))
-    head = ("record", "PGA [m/s^2]", "Sa(T1) [m/s^2]", "output", "unit")
-    return (*head, "greatest peak", "peak reached", "nature"), rows
+def spectra(result: SuiteResult) -> pd.DataFrame:
+    """Pseudo-accelerations of each record, and their mean, by period."""
+    curves = {f"{name} [m/s^2]": result.spectra[name] for name in result.records}
+    frame = pd.DataFrame({"period [s]": result.spectra["period_s"], **curves})
+    return frame.assign(**{"mean [m/s^2]": frame[[*curves]].mean(axis=1)})
 
 
-def spectra(part: Document) -> Table:
-    """Table of response spectra: pseudo-acceleration of each record, and their mean, by period."""
-    names = [name for name in part if name != "period_s"]
-    columns = [part[name] for name in names]
-    rows: list[Row] = []
-    for k, period in enumerate(part["period_s"]):
-        values = [column[k] for column in columns]
-        numbers = (period, *values, sum(values) / len(values))
-        rows.append(tuple(map(_number_text, numbers)))
-    return ("period [s]", *(f"{name} [m/s^2]" for name in (*names, "mean"))), rows
-
-
-def shares(part: Document) -> Table:
-    """Table of each input's share in the width of each result at the lowest level, sorted."""
-    rows: list[Row] = [
-        (quantity, name, f"{share:.3f}")
-        for quantity, values in part.items()
+def shares(table: Mapping[str, Mapping[str, float]]) -> pd.DataFrame:
+    """Each input's share in the width of each result at the lowest level, the largest first."""
+    rows = [
+        (result, name, share)
+        for result, values in table.items()
         for name, share in sorted(values.items(), key=lambda pair: -pair[1])
     ]
-    return ("width of", "input", "share"), rows
+    return pd.DataFrame(rows, columns=["width of", "input", "share"])
 
 
-MAKERS = {
-    "radius_map": ("microstructure", radius_map),
-    "modulus": ("modulus", modulus),
-    "image": ("image", modulus),
-    "update": ("update", update),
-    "peaks": ("envelopes", peaks),
-    "records": ("records", records),
-    "shares": ("shares", shares),
-}
-"""Part of the summary of each table, and the function that makes it."""
-
-
-def over_time(data: xarray.Dataset, output: str, unit: str) -> Table:
-    """Table of the bounds of one output over time, with three columns for each level."""
-    series = data.sel(output=output)
-    nature = Nature(data.attrs["nature"])
+def over_time(data: xarray.Dataset, output: str, unit: str) -> pd.DataFrame:
+    """The bounds of one output over time, with three columns for each level."""
+    series, nature = data.sel(output=output), Nature(data.attrs["nature"])
     titles = {"lower": f"{nature} lower", "upper": f"{nature} upper"}
     titles["error"] = "gap to attained" if nature is Nature.GUARANTEED else "error"
-    columns = {"time [s]": [_number_text(time) for time in series["time"].values]}
+    columns = {"time [s]": series["time"].values}
     for level in series["alpha"].values:
-        at_level = series.sel(alpha=level)
         for kind, title in titles.items():
-            if kind in at_level:
-                values = (rounded(float(x), kind, nature, DIGITS) for x in at_level[kind].values)
-                columns[f"{title} at alpha {level:g} [{unit}]"] = [*map(_number_text, values)]
-    return tuple(columns), [*zip(*columns.values(), strict=True)]
+            if kind in series:
+                name = f"{title} at alpha {level:g} [{unit}]"
+                columns[name] = series[kind].sel(alpha=level).values
+    return pd.DataFrame(columns)
+
+
+def shown(frame: pd.DataFrame) -> Table:
+    """A data frame as texts, without columns that are empty."""
+    filled = frame.dropna(axis=1, how="all")
+    natures = filled["nature"] if "nature" in filled else [""] * len(filled)
+    columns = {
+        name: [
+            _text(value, ENDS.get(name, ""), nature)
+            for value, nature in zip(filled[name], natures, strict=True)
+        ]
+        for name in filled
+    }
+    return Table(tuple(columns), [*zip(*columns.values(), strict=True)])
+
+
+def _text(value: object, side: str, nature: str) -> str:
+    if isinstance(value, str):
+        return value
+    number = float(value)  # type: ignore[arg-type]
+    if side and nature:
+        number = rounded(number, side, Nature(nature), DIGITS)
+    return "" if np.isnan(number) else f"{number:.{DIGITS}g}".replace("-", MINUS)
+
+
+def write_tables(parts: Parts, results: ResultsFolder, folder: Path) -> list[Path]:
+    """Writes the results of a run as CSV files into a folder; returns the files."""
+    found = frames(parts)
+    for name, study in parts.envelopes.items():
+        data = results.dataset(f"envelope_{name}.nc")
+        for output in study.min:
+            found[f"envelope_{name}-{output}"] = over_time(data, output, study.units[output])
+    if parts.records is not None:
+        found["spectra"] = spectra(parts.records)
+    return write_csv(found, folder)
+
+
+def write_csv(found: Mapping[str, pd.DataFrame], folder: Path) -> list[Path]:
+    """Writes data frames as CSV files, exact so that a bound stays one; returns the files."""
+    for name, frame in found.items():
+        text = frame.to_csv(index=False, lineterminator="\n").replace(MINUS, "-")
+        write_text(folder / f"{name}.csv", text, follow_links=False)
+    return [folder / f"{name}.csv" for name in found]
+
+
+def write_markup(named: Mapping[str, Table], folder: Path) -> list[Path]:
+    """Writes each table as a file of Markdown and one of LaTeX; returns the files."""
+    texts = {
+        folder / f"{name}{ending}": write(table)
+        for name, table in named.items()
+        for ending, write in ((".md", markdown), (".tex", latex))
+        if table.rows
+    }
+    for path, text in texts.items():
+        write_text(path, text, follow_links=False)
+    return [*texts]
+
+
+def markdown(table: Table) -> str:
+    """A table in Markdown; the first column to the left, the others to the right."""
+    lines = [table.head, ("---", *["---:"] * (len(table.head) - 1)), *table.rows]
+    cells = ([cell.replace("|", "\\|") for cell in row] for row in lines)
+    return "".join(f"| {' | '.join(row)} |\n" for row in cells)
+
+
+def latex(table: Table) -> str:
+    """A tabular environment, with rules of the package booktabs."""
+
+    def lines(*rows: Row) -> Iterator[str]:
+        return (" & ".join(cell.translate(SPECIAL) for cell in row) + r" \\" for row in rows)
+
+    begin = rf"\begin{{tabular}}{{l{'r' * (len(table.head) - 1)}}}"
+    body = [begin, r"\toprule", *lines(table.head), r"\midrule", *lines(*table.rows)]
+    return "\n".join([*body, r"\bottomrule", r"\end{tabular}", ""])

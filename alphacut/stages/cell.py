@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
-from typing import Any, cast
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
+from typing_extensions import TypedDict
 
 from alphacut.case.material import Mesh, MeshedCell, ModulusSection, RoundCell
 from alphacut.case.radius import AnyRadius, ThetaSection
@@ -16,7 +19,7 @@ from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.io.files import Document
 from alphacut.io.problem import missing
 from alphacut.io.provenance import versions
-from alphacut.rve.cell.cell import STRAIN, Cell, Interphase, Phase
+from alphacut.rve.cell.cell import STRAIN, Cell, Interphase, Phase, VoigtPhase
 from alphacut.rve.cell.outline import circle
 from alphacut.rve.result import bounds
 from alphacut.rve.result.engineering_constants import NAMES, engineering_constants
@@ -26,8 +29,10 @@ from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.spheres import result as space_bounds
 from alphacut.rve.spheres.model import SphereSeriesModel
 from alphacut.rve.spheres.result import HomogenisedSpheres, hill_average, volume_fraction
-from alphacut.stages.meshed import MeshedSample, sample_at, solve_samples
-from alphacut.stochastic import gauss_rule
+from alphacut.stochastic import TruncatedNormal, gauss_rule
+
+if TYPE_CHECKING:
+    from alphacut.rve.prism.own_mesh import MeshModel
 
 GPA = 1e9
 TOLERANCE_PART = 0.4
@@ -38,10 +43,53 @@ BOUNDS_SLACK = 5e-3
 """Allowed relative distance of E outside its bounds: packings meet a fraction to 0.5 %."""
 MESH_OPTIONS = ("petsc", "parallel")
 """Options of elements that a mesh from a file takes."""
+
+
+@dataclass(frozen=True)
+class MeshedSample:
+    """Law of θ and phase of each physical group."""
+
+    law: TruncatedNormal
+    phases: Mapping[str, Phase | VoigtPhase]
+
+
+def sample_at(values: Mapping[str, float], law: ThetaSection, cell: MeshedCell) -> MeshedSample:
+    """The sample at crisp values of the inputs, in SI."""
+    phases = {
+        name: phase.phase(values.get(f"{name}_modulus")) for name, phase in cell.phases.items()
+    }
+    return MeshedSample(law.law, phases)
+
+
+def modal_sample(law: ThetaSection, cell: MeshedCell) -> MeshedSample:
+    """The sample at the modal values."""
+    return sample_at({name: x.modal for name, x in cell.constants.items()}, law, cell)
+
+
+def solve_samples(model: MeshModel, samples: Sequence[MeshedSample]) -> list[HomogenisedStiffness]:
+    """One result for each sample, in their order."""
+    return [model.solve(sample.law, sample.phases)[0] for sample in samples]
+
+
 AnyCell = RoundCell | MeshedCell
 AnySample = Cell | MeshedSample
 Solve = Callable[[Sequence[Any]], list[HomogenisedStiffness]]
 """A model of the cell: a result for each sample; the cells differ in their inclusion alone."""
+
+
+class References(TypedDict, total=False):
+    """References of a cell: mean particle fraction, as the case states it; bounds, estimate of E.
+
+    The classical bounds are those of isotropic composites, lower and upper, in GPa.
+    """
+
+    fraction: float
+    fraction_of_case: float
+    hashin_shtrikman_E_GPa: tuple[float, float]
+    mori_tanaka_E_GPa: float
+
+
+ISOTROPIC = "Hashin–Shtrikman bounds of an isotropic E"
 AVERAGES = {"axes": "eq. 16", "isotropic": "isotropic"}
 """Averages of a plane stiffness by their names in a case, in words."""
 
@@ -155,15 +203,13 @@ def solve(radius: AnyRadius | ThetaSection, cell: AnyCell, model: Solve) -> Homo
 
 def references(
     radius: AnyRadius | ThetaSection, cell: AnyCell, stated: float | None = None
-) -> Document:
+) -> References:
     """Particle fraction, Hashin–Shtrikman bounds and Mori–Tanaka estimate of E at modal inputs.
 
     The bounds are at the fraction `stated`, else at the mean fraction of the radius map.
 
-    Returns:
-        `fraction` (mean of the map), `fraction_of_case` (as stated), `hashin_shtrikman_E_GPa`
-        (lower, upper) and, of round particles, `mori_tanaka_E_GPa`. Only `fraction` of anisotropic
-        phases or with an interphase; empty for a mesh from a file.
+    Of anisotropic phases or with an interphase there is `fraction` alone; nothing of a mesh from a
+    file.
     """
     if isinstance(cell, MeshedCell):
         return {}
@@ -175,29 +221,35 @@ def references(
     mean_fraction = float(np.asarray(rule.mean(fractions)))
     if not isinstance(matrix, Phase) or not isinstance(inclusion, Phase) or modal.interphase:
         return {"fraction": mean_fraction}
-    of_case = {} if stated is None else {"fraction_of_case": stated}
+    found: References = {"fraction": mean_fraction}
+    if stated is not None:
+        found["fraction_of_case"] = stated
     fraction = np.asarray(mean_fraction if stated is None else stated)
     if spheres:
         moduli = space_bounds.hashin_shtrikman(fraction, matrix, inclusion).T
-        young_bounds = [_young(*bulk_and_shear) / GPA for bulk_and_shear in moduli]
+        low, high = (_young(*bulk_and_shear) / GPA for bulk_and_shear in moduli)
+        young_bounds = low, high
         estimate = _young(*space_bounds.mori_tanaka(fraction, matrix, inclusion))
     else:
         phase_fractions = np.array([1 - fraction, fraction])
         young_bounds = isotropic_bounds(phase_fractions, [matrix.stiffness, inclusion.stiffness])
         bulk, _, shear = bounds.mori_tanaka(fraction, matrix, inclusion)
         estimate = _transverse_young(bulk / 2, shear)
-    numbers = {"fraction": mean_fraction, **of_case, "hashin_shtrikman_E_GPa": young_bounds}
-    return numbers | ({"mori_tanaka_E_GPa": estimate / GPA} if modal.square or spheres else {})
+    found["hashin_shtrikman_E_GPa"] = young_bounds
+    if modal.square or spheres:
+        found["mori_tanaka_E_GPa"] = estimate / GPA
+    return found
 
 
-def isotropic_bounds(fractions: Array, stiffness: Sequence[Array]) -> list[float]:
+def isotropic_bounds(fractions: Array, stiffness: Sequence[Array]) -> tuple[float, float]:
     """Lower and upper Hashin–Shtrikman bound of the transverse Young's modulus in GPa.
 
     They are its values at the lower and at the upper bounds of the plane moduli K and G.
     Area fractions have shape (phases,), plane stiffnesses in Pa (3, 3) each.
     """
     moduli = bounds.hashin_shtrikman(fractions, stiffness).T
-    return [_transverse_young(*bulk_and_shear) / GPA for bulk_and_shear in moduli]
+    low, high = (_transverse_young(*bulk_and_shear) / GPA for bulk_and_shear in moduli)
+    return low, high
 
 
 def _transverse_young(bulk: float, shear: float) -> float:
@@ -254,15 +306,15 @@ def _constant(name: str, value: float, error: float) -> tuple[str, Document]:
     return key, {"value": value / unit, "error": None if np.isnan(error) else error / unit}
 
 
-def as_cut(bounds: Array) -> Document:
-    """Lower and upper bounds of a quantity on each level, from shape (levels, 2)."""
-    return {"lower": bounds[:, 0], "upper": bounds[:, 1]}
-
-
 def stiffness_errors(result: HomogenisedStiffness) -> Array | None:
     """Declared errors of the entries of a plane stiffness, in GPa; None where there are none."""
     errors = result.stiffness_errors if result.errors else None
     return None if errors is None else np.asarray(errors / GPA)
+
+
+def constant_label(key: str) -> str:
+    """Label of a constant: nu_LT as ν_LT, E_T_GPa as E_T, GPa."""
+    return key.replace("nu", "ν").replace("_GPa", ", GPa")
 
 
 def plane_constants(result: HomogenisedStiffness) -> Document:
@@ -288,7 +340,7 @@ def declared_errors(result: HomogenisedStiffness) -> Document | None:
 
 
 def require_bounds(
-    modulus_bounds: tuple[float, float], references: Document, particles: str
+    modulus_bounds: tuple[float, float], references: References, particles: str
 ) -> None:
     """Refuses E of spheres outside the Hashin–Shtrikman bounds of the fraction that a case states.
 
@@ -314,3 +366,20 @@ def require_tolerance(error: Mapping[str, float], tolerance: float | None) -> No
     if tolerance is not None and total > tolerance * (1 + 1e-9):
         what = f"the relative error of E is {total:.2g}; the case allows {tolerance:.2g}"
         raise FailedError(what, "method auto reaches it")
+
+
+def require_mesh(mesh: Mesh, law: ThetaSection, cell: MeshedCell) -> None:
+    """Refuses a mesh file that is no periodic cell of prisms, or does not fit [cell.phases]."""
+    try:
+        from alphacut.rve.mesh.file import read_grid
+        from alphacut.rve.mesh.periodicity import MeshError
+        from alphacut.rve.prism.own_mesh import mesh_phases
+    except ImportError as error:
+        raise RefusedError("mesh.file", mesh.file, "no mesh", missing(error)) from None
+    assert mesh.file is not None
+    try:
+        grid = read_grid(mesh.file)
+    except MeshError as error:
+        raise RefusedError("mesh.file", Path(mesh.file).name, error.what, error.cure) from None
+    sample = modal_sample(law, cell)
+    mesh_phases(grid, sample.law, sample.phases)  # refuses what does not fit

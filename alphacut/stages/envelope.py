@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,15 +18,89 @@ from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import FailedError, require
 from alphacut.fuzzy.result import Nature
-from alphacut.io.files import Document, say
-from alphacut.questions.question import PEAK_ERROR
-from alphacut.stages.store import Stage, StageContext, StageResult
+from alphacut.io.files import say
+from alphacut.stages.store import (
+    Computed,
+    Numbers,
+    Stage,
+    StageContext,
+    StageResult,
+    Values,
+)
+
+if TYPE_CHECKING:
+    import xarray
 
 DEFAULT_TOLERANCE = Tolerance(1e-3, "")
 """Tolerance where none is named: a fraction of each peak."""
 FOLLOWERS = ("graph-follower", "improved-graph-follower")
+PEAK_ERROR = 5e-3
+"""Error of the peaks of limited outputs that is aimed at, as a share of each."""
+
+
+class PeakResult(Numbers):
+    """Bounds of the peak of an output on each level, in SI, as `Peaks` has them.
+
+    The peak is the largest magnitude, or the greatest ("max q3") or least ("min q3") value. A least
+    value has its own sign here, and `lower` and `upper` change places. Unknown bounds are nan.
+
+    Args:
+        proved: Bound that no motion passes.
+        is_least: Whether it is a least value.
+    """
+
+    lower: Values
+    upper: Values
+    error: Values
+    reached: Values
+    least_proved: Values
+    least_reached: Values
+    proved: Values
+    nature: Nature
+    is_least: bool = False
+
+    @property
+    def far_end(self) -> Array:
+        """Bound on each level of the peaks farthest out: the upper one, or that of least values."""
+        return self.lower if self.is_least else self.upper
+
+    def gap(self, level: int) -> float:
+        """Relative gap between that bound and what a motion reaches, on a level."""
+        bound, reached = float(self.far_end[level]), float(self.reached[level])
+        return abs((bound - reached) / bound) if bound else 0.0
+
+
 PEAK_BOUNDS = ("lower", "upper", "error", "reached", "least_proved", "least_reached")
-"""Bounds of peaks as `Peaks` names them."""
+"""Bounds of peaks by the names of `Peaks`."""
+PeakResults = dict[str, PeakResult]
+"""Peaks by their names, such as q3 and max q3."""
+
+
+class EnvelopeResult(Numbers):
+    """An envelope in SI: extremes and errors at the lowest level, peaks, and cost.
+
+    Args:
+        min, max, mean_width, error: By output.
+        step: Distance of nodes, in s.
+        motions_tested: Exact motions that agree with what is guaranteed.
+        drawn: Outputs that are drawn; empty for all.
+    """
+
+    fuzzy: tuple[str, ...]
+    min: dict[str, float]
+    max: dict[str, float]
+    mean_width: dict[str, float]
+    error: dict[str, float]
+    alpha: Values
+    peak: PeakResults
+    trajectories: int
+    seconds: float
+    method: str
+    nature: Nature
+    motions_tested: int
+    step: float
+    units: dict[str, str]
+    drawn: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -72,10 +146,11 @@ class EnvelopeTask:
             return {}
         return {"tolerance": tolerance * (self.section.gain if method in FOLLOWERS else 1.0)}
 
-    def compute(self, structure: Structure, context: StageContext) -> StageResult:
+    def compute(self, structure: Structure, context: StageContext) -> Computed[EnvelopeResult]:
         """Computes the envelope as a dataset, and the fuzzy peak of each output as a document."""
         arguments = self.arguments(structure) | _store_and_progress(context)
         result = frame.envelope(**arguments, relative=not self.tolerance(structure).unit)
+        data = result.to_dataset()
         signed = [name for name in self.limited if name != output_of(name)]
         peak_bounds = peaks(result, [*map(str, result.outputs), *signed])
         # a second proof of many inputs is hardly tighter: the number of its parts ends it
@@ -84,13 +159,36 @@ class EnvelopeTask:
         if loose := loose_peaks(peak_bounds, self.limited, gap):
             tighter = replace(self, limited=loose).close_peaks(structure, context)
             peak_bounds = tightest(peak_bounds, tighter)
-        return StageResult({"peak": peaks_document(peak_bounds)}, result.to_dataset())
+        return Computed(self._result(data, peak_bounds, structure), data)
+
+    def _result(self, data: xarray.Dataset, peaks: Peaks, structure: Structure) -> EnvelopeResult:
+        lowest, names = data.isel(alpha=0), [*map(str, data["output"].values)]
+
+        def by_output(values: xarray.DataArray) -> dict[str, float]:
+            return dict(zip(names, map(float, values.values), strict=True))
+
+        return EnvelopeResult(
+            fuzzy=self.fuzzy,
+            min=by_output(lowest["lower"].min("time")),
+            max=by_output(lowest["upper"].max("time")),
+            mean_width=by_output((lowest["upper"] - lowest["lower"]).mean("time")),
+            error=by_output(lowest["error"].max("time")),
+            alpha=data["alpha"].values,
+            peak=peak_results(peaks),
+            trajectories=int(data.attrs["trajectories"]),
+            seconds=float(data.attrs["seconds"]),
+            method=str(data.attrs["method"]),
+            nature=Nature(data.attrs["nature"]),
+            motions_tested=int(data.attrs.get("motions_tested", 0)),
+            step=float(data["time"].values[1]),
+            units={x: structure.unit(x) for x in (*names, *outputs_of(peaks.outputs))},
+        )
 
     def compute_peaks(
         self, structure: Structure, context: StageContext, nodes: int = 1
-    ) -> StageResult:
+    ) -> Computed[PeakResults]:
         """Computes the peaks of the limited outputs alone, with some nodes in each step."""
-        return StageResult({"peak": peaks_document(self.close_peaks(structure, context, nodes))})
+        return Computed(peak_results(self.close_peaks(structure, context, nodes)))
 
     def arguments(self, structure: Structure) -> dict[str, Any]:
         """Arguments of `frame.envelope` and `frame.require_envelope`, by name, from the case."""
@@ -151,24 +249,41 @@ def loose_peaks(peaks: Peaks, outputs: Sequence[str], gap: float) -> tuple[str, 
     return tuple(loose)
 
 
-def peaks_document(peaks: Peaks) -> Document:
-    """Peaks of each output by its name, each with its bounds on all levels, in SI."""
-    return {
-        name: {bound: getattr(peaks, bound)[:, column] for bound in PEAK_BOUNDS}
-        | {"nature": str(peaks.natures[column])}
-        for column, name in enumerate(peaks.outputs)
-    }
+def peak_results(peaks: Peaks) -> PeakResults:
+    """Peaks as results, each by its name."""
+    results: PeakResults = {}
+    for column, name in enumerate(peaks.outputs):
+        bounds = {bound: getattr(peaks, bound)[:, column] for bound in PEAK_BOUNDS}
+        bounds["proved"] = peaks.most(name).upper
+        is_least = name.startswith("min ")  # which `Peaks` has as the greatest one of −q
+        results[name] = PeakResult(
+            **(_negative(bounds) if is_least else bounds),
+            nature=peaks.natures[column],
+            is_least=is_least,
+        )
+    return results
 
 
-def peaks_from_document(document: Document, alpha: Sequence[float]) -> Peaks:
-    """Peaks from the document of `peaks_document` on levels `alpha`; None is an infinite bound."""
-    bounds: dict[str, Array] = {}
+def peaks_of(results: PeakResults, alpha: Sequence[float]) -> Peaks:
+    """Peaks from their results on levels `alpha`."""
+    columns = []
+    for peak in results.values():
+        bounds = {bound: getattr(peak, bound) for bound in PEAK_BOUNDS}
+        columns.append(_negative(bounds) if peak.is_least else bounds)
+    stacked: dict[str, Array] = {}
     for bound in PEAK_BOUNDS:
-        infinite = -np.inf if bound in ("lower", "reached", "least_proved") else np.inf
-        levels = [[infinite if x is None else x for x in peak[bound]] for peak in document.values()]
-        bounds[bound] = np.array(levels).T
-    natures = tuple(Nature(peak["nature"]) for peak in document.values())
-    return Peaks(alpha=np.array(alpha), outputs=tuple(document), natures=natures, **bounds)
+        unknown = np.inf if bound in ("upper", "least_reached") else -np.inf
+        values = np.stack([column[bound] for column in columns], 1)
+        stacked[bound] = np.where(np.isnan(values), unknown, values)
+    natures = tuple(peak.nature for peak in results.values())
+    return Peaks(alpha=np.array(alpha), outputs=tuple(results), natures=natures, **stacked)
+
+
+def _negative(bounds: Mapping[str, Array]) -> dict[str, Array]:
+    """Bounds of the negative of a peak, whose error is the same."""
+    negative = {name: 0.0 - values for name, values in bounds.items()}
+    ends = {"lower": negative["upper"], "upper": negative["lower"]}
+    return negative | ends | {"error": bounds["error"]}
 
 
 def tasks(
@@ -187,37 +302,17 @@ def tasks(
     )
 
 
-def stage(structure: Structure, task: EnvelopeTask) -> Stage:
+def stage(structure: Structure, task: EnvelopeTask) -> Stage[EnvelopeResult]:
     """The stage of one study."""
     inputs = [structure.model, structure.numbers, task.fuzzy, task.duration, task.section]
     inputs += [task.limited]
     compute = partial(task.compute, structure)
-    return Stage(f"envelope_{task.name}", inputs, ("fuzzy", "frame"), compute)
+    return Stage(f"envelope_{task.name}", inputs, ("fuzzy", "frame"), EnvelopeResult, compute)
 
 
-def document(result: StageResult, fuzzy: Sequence[str]) -> Document:
-    """Numbers on an envelope in SI: extremes and errors at the lowest level, peaks, cost."""
-    data = result.arrays
-    lowest, facts = data.isel(alpha=0), ("trajectories", "seconds", "method", "nature")
-    columns = {
-        "min": lowest["lower"].min("time"),
-        "max": lowest["upper"].max("time"),
-        "mean_width": (lowest["upper"] - lowest["lower"]).mean("time"),
-        "error": lowest["error"].max("time"),
-    }
-    names = [*map(str, data["output"].values)]
-    return {
-        "fuzzy": list(fuzzy),
-        **{key: dict(zip(names, map(float, x.values), strict=True)) for key, x in columns.items()},
-        "alpha": data["alpha"].values,
-        "peak": result.document["peak"],
-        **{name: data.attrs[name] for name in facts},
-        "motions_tested": int(data.attrs.get("motions_tested", 0)),
-        "step": float(data["time"].values[1]),
-    }
-
-
-def require_tolerance(result: StageResult, task: EnvelopeTask, structure: Structure) -> None:
+def require_tolerance(
+    result: StageResult[EnvelopeResult], task: EnvelopeTask, structure: Structure
+) -> None:
     """Requires the declared errors of an envelope within the tolerance, where the case names one.
 
     A larger error of a Graph Follower is a warning: it takes the tolerance only as the least gain
@@ -228,9 +323,9 @@ def require_tolerance(result: StageResult, task: EnvelopeTask, structure: Struct
     allowed, data = task.tolerance(structure), result.arrays
     errors = data["error"].max(("alpha", "time")).values
     for name, error in zip(map(str, data["output"].values), errors, strict=True):
-        has_unit = allowed.unit in ("", Output(name).unit)
+        has_unit = allowed.unit in ("", result.numbers.units[name])
         if not allowed.unit:
-            error = error / max(result.document["peak"][name]["upper"])
+            error = error / result.numbers.peak[name].upper.max()
         if has_unit and error > allowed.value * (1 + 1e-9):
             what = f"the error of {name} is {error:.2g}; the case allows {allowed.value:.2g}"
             cure = "method auto, or a smaller envelope.step, reaches it"

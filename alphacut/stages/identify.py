@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from alphacut.case.motion import Identify
 from alphacut.case.structure import Structure
 from alphacut.frame.identify import (
-    Identified,
     MeasuredMode,
     RefutedError,
     identify,
@@ -18,29 +19,68 @@ from alphacut.frame.structures.quantities import of_storey_frame
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.refused import require
 from alphacut.fuzzy.result import Ends
-from alphacut.io.files import Document
 from alphacut.io.measured import ModeRows, mode_rows
 from alphacut.records.uff import ENDINGS, uff_mode_rows
+from alphacut.stages.store import Cuts, Numbers, Values
+
+
+class Prediction(Numbers):
+    """Measured frequency of a mode, and its predicted bounds on the lowest level, in Hz."""
+
+    mode: int
+    measured: float
+    predicted: tuple[float, float]
+    inside: bool
+
+
+class IdentifiedResult(Numbers):
+    """Identified inputs: α-cuts in SI, and the share of its width by which each is narrowed."""
+
+    alpha: Values
+    inputs: dict[str, Cuts]
+    narrowed: dict[str, float]
+    units: dict[str, str]
+    empty_from: float | None
+    claim: str
+    held_out: tuple[Prediction, ...]
+    prior: dict[str, tuple[float, float]]
+
+
+class RefutedResult(Numbers):
+    """How measurements refute the frame."""
+
+    refuted: str
+
+
+LearnedResult = IdentifiedResult | RefutedResult
 
 
 def identify_inputs(
     section: Identify, structure: Structure, alpha: tuple[float, ...]
-) -> tuple[Document, Structure]:
+) -> tuple[LearnedResult, Structure]:
     """Numbers of the inputs identified from measured modes, in SI, and the updated structure.
 
-    Where the measurement refutes the frame, the document says so and the structure is as before.
+    Where the measurement refutes the frame, the result says so and the structure is as before.
     """
     rows, learned_modes, prior = require_learnable(section, structure, alpha)
     assert structure.frame is not None
     try:
         posterior = identify(structure.frame, prior, learned_modes, alpha=alpha)
     except RefutedError as error:
-        return {"refuted": str(error)}, structure
+        return RefutedResult(refuted=str(error)), structure
     modes = sorted(mode for mode in section.held_out if mode <= structure.frame.floors)
-    predicted = [_prediction(rows[mode], posterior.predictions()) for mode in modes]
-    document = {**_document(posterior), "held_out": predicted}
-    document["prior"] = {name: list(widest_cut(number)) for name, number in prior.items()}
-    return document, replace(structure, numbers={**structure.numbers, **posterior.numbers})
+    cuts = np.stack([posterior.lower, posterior.upper], axis=-1)  # (levels, inputs, 2)
+    result = IdentifiedResult(
+        alpha=posterior.alpha,
+        inputs={name: Cuts.of(cuts[:, k]) for k, name in enumerate(posterior.names)},
+        narrowed=dict(posterior.narrowed),
+        units={name: of_storey_frame(name).unit for name in posterior.names},
+        empty_from=posterior.empty,
+        claim=str(posterior.claim),
+        held_out=tuple(_prediction(rows[mode], posterior.predictions()) for mode in modes),
+        prior={name: widest_cut(number) for name, number in prior.items()},
+    )
+    return result, replace(structure, numbers={**structure.numbers, **posterior.numbers})
 
 
 def require_learnable(
@@ -83,22 +123,8 @@ def _measured_mode(section: Identify, row: ModeRows) -> MeasuredMode:
     )
 
 
-def _document(posterior: Identified) -> Document:
-    """Numbers on the identified inputs: α-cuts in SI, and how much each is narrowed."""
-    cuts = zip(posterior.names, posterior.lower.T, posterior.upper.T, strict=True)
-    return {
-        "alpha": posterior.alpha,
-        "inputs": {name: {"lower": lower, "upper": upper} for name, lower, upper in cuts},
-        "narrowed": dict(posterior.narrowed),
-        "units": {name: of_storey_frame(name).unit for name in posterior.names},
-        "empty_from": posterior.empty,
-        "claim": str(posterior.claim),
-    }
-
-
-def _prediction(row: ModeRows, frequencies: Ends) -> Document:
-    """Measured frequency of a mode, and its predicted bounds on the lowest level, in Hz."""
+def _prediction(row: ModeRows, frequencies: Ends) -> Prediction:
     low, high = (float(bounds[0, row.mode - 1]) for bounds in frequencies)  # (levels, modes)
     measured = float(row.frequencies.mean())
     inside = low <= measured <= high
-    return {"mode": row.mode, "measured": measured, "predicted": [low, high], "inside": inside}
+    return Prediction(mode=row.mode, measured=measured, predicted=(low, high), inside=inside)

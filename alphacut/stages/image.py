@@ -16,7 +16,6 @@ from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.refused import require
 from alphacut.fuzzy.result import Nature
-from alphacut.io.files import Document
 from alphacut.io.provenance import file_digest
 from alphacut.rve.cell.cell import Phase
 from alphacut.rve.image.bounds import Ends
@@ -25,13 +24,13 @@ from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.model import ImageCut, ImageModel, usual_division
 from alphacut.rve.image.phases import ModuliImages, ModuliInterval, moduli_images, threshold_ranges
 from alphacut.rve.image.read import read_grey, require_phases
-from alphacut.rve.result.engineering_constants import NAMES
+from alphacut.rve.result.engineering_constants import NAMES, PLANE_STRAIN
 from alphacut.rve.result.loss_factors import CONSTANTS, bulk_and_shear_losses, first_order
 from alphacut.rve.result.moduli import plane_constants
 from alphacut.rve.result.result import PhaseEnergies
-from alphacut.stages.cell import AVERAGES, GPA, as_cut, isotropic_bounds
-from alphacut.stages.losses import LossCuts, loss_document
-from alphacut.stages.store import Stage, StageContext, StageResult
+from alphacut.stages.cell import AVERAGES, GPA, References, isotropic_bounds
+from alphacut.stages.losses import LossCuts, LossResult
+from alphacut.stages.store import Computed, Cuts, Numbers, Stage, StageContext, Values
 from alphacut.stochastic.segmentation import segment
 
 if TYPE_CHECKING:
@@ -39,7 +38,7 @@ if TYPE_CHECKING:
 
 ACCURACY = 1e-5
 """Relative energy that the solver may leave."""
-NATURE = "guaranteed"
+NATURE = Nature.GUARANTEED
 """Nature of all bounds: proved of the image as segmented, if it repeats itself."""
 AXES = ["11", "22", "12"]
 AlphaLevel = float | None
@@ -48,16 +47,57 @@ PhaseRanges = Callable[[AlphaLevel], tuple[Rows, Rows]]
 """Least and greatest phase of each pixel at a level."""
 
 
-def stage(cell: ImageCell, alpha: tuple[float, ...], average: str) -> Stage:
+class Range(Numbers):
+    """Lower and upper bound of a number."""
+
+    lower: float
+    upper: float
+
+
+class ImageCuts(Numbers):
+    """α-cuts of E in GPa."""
+
+    alpha: Values
+    E_GPa: Cuts
+
+
+class ImageResult(Numbers):
+    """Proved bounds of an image, moduli in GPa: on the highest level, and as α-cuts.
+
+    Args:
+        lower_GPa, upper_GPa: Bounds of the plane stiffness in the sense of Loewner, (3, 3).
+        plane: Cuts of the constants along x and y by definition and name, as E_x_GPa.
+        widths_GPa: Widths of E on the lowest level by what causes them.
+        fractions: Area fraction of each phase.
+    """
+
+    lower_GPa: Values
+    upper_GPa: Values
+    E_GPa: Range
+    nu: Range
+    G_T_GPa: Range
+    average: str
+    plane: dict[str, dict[str, Cuts]]
+    nature: Nature
+    cuts: ImageCuts
+    seconds: float
+    widths_GPa: dict[str, float]
+    fractions: dict[str, float]
+    division: int
+    references: References
+    loss: LossResult | None
+
+
+def stage(cell: ImageCell, alpha: tuple[float, ...], average: str) -> Stage[ImageResult]:
     """The stage of an image, on some levels; E and ν are of an average of its stiffness."""
     inputs = [cell, alpha, average, file_digest(cell.image)]
     compute = partial(compute_cuts, cell, alpha, average)
-    return Stage("image", inputs, ("stochastic", "rve", "fuzzy"), compute)
+    return Stage("image", inputs, ("stochastic", "rve", "fuzzy"), ImageResult, compute)
 
 
 def compute_cuts(
     cell: ImageCell, alpha: tuple[float, ...], average: str, context: StageContext
-) -> StageResult:
+) -> Computed[ImageResult]:
     """Computes α-cuts of E and of the stiffness of an image, and how its sources widen E."""
     start, tick = perf_counter(), context.tick or (lambda fraction: None)
     study, aspect = image_study(cell), cell.pixel[-1] / cell.pixel[0]
@@ -77,24 +117,45 @@ def compute_cuts(
         return float(cut.modulus[1] - cut.modulus[0])
 
     widths = _widths(study, alpha[0], width)
-    facts = {
-        **_document(alpha, cuts, average),
-        "seconds": perf_counter() - start,
-        "widths_GPa": {name: value / GPA for name, value in widths.items()},
-        "fractions": study.fractions,
-        "division": model.division,
-        "references": {"hashin_shtrikman_E_GPa": study.isotropic_bounds},
-    }
-    losses: dict[str, Array] = {}
+    phase = study.phase_ranges(None)[0]
+    losses, loss = dict[str, Array](), None
     if cell.losses:
-        phase, count = study.phase_ranges(None)[0], len(cell.pairs)
-        energies = phase_energies(crisp, modal, phase, count=count, aspect=aspect)
+        energies = phase_energies(crisp, modal, phase, count=len(cell.pairs), aspect=aspect)
         phase_cuts = LossCuts.from_phases(cell.losses, alpha)
         bounds, errors = image_loss_bounds(energies, phase_cuts, average)
         losses = {name: bounds[..., k] for k, name in enumerate(CONSTANTS)}
         errors_by_name = dict(zip(CONSTANTS, map(float, errors), strict=True))
-        facts["loss"] = loss_document(losses, errors_by_name, Nature.ESTIMATED)
-    return StageResult(facts, _dataset(alpha, cuts, study.phase_ranges(None)[0], losses))
+        loss = LossResult.of(losses, errors_by_name, Nature.ESTIMATED)
+    top, constants = cuts[-1], np.array([cut.constants for cut in cuts])  # (levels, constants, 2)
+    result = ImageResult(
+        lower_GPa=np.asarray(top.bounds.lower / GPA, float),
+        upper_GPa=np.asarray(top.bounds.upper / GPA, float),
+        E_GPa=_range(top.modulus, GPA),
+        nu=_range(top.poisson),
+        G_T_GPa=_range(top.bounds.shear(average), GPA),
+        average=AVERAGES[average],
+        plane={PLANE_STRAIN: dict(map(_cuts_entry, NAMES, np.moveaxis(constants, 1, 0)))},
+        nature=NATURE,
+        cuts=ImageCuts(
+            alpha=np.array(alpha), E_GPa=Cuts.of(np.array([cut.modulus for cut in cuts]) / GPA)
+        ),
+        seconds=perf_counter() - start,
+        widths_GPa={name: value / GPA for name, value in widths.items()},
+        fractions=study.fractions,
+        division=model.division,
+        references={"hashin_shtrikman_E_GPa": study.isotropic_bounds},
+        loss=loss,
+    )
+    return Computed(result, _dataset(alpha, cuts, phase, losses))
+
+
+def _range(bounds: Ends, size: float = 1.0) -> Range:
+    return Range(lower=bounds[0] / size, upper=bounds[1] / size)
+
+
+def _cuts_entry(name: str, bounds: Array) -> tuple[str, Cuts]:
+    """Key and cuts, (levels, 2), of a constant: a modulus in GPa, a ratio as it is."""
+    return (name, Cuts.of(bounds)) if name == "nu_xy" else (f"{name}_GPa", Cuts.of(bounds / GPA))
 
 
 def _dataset(
@@ -115,7 +176,7 @@ def _dataset(
         "phase": (("y", "x"), phase.astype(np.float32)),
     }
     axes = {"alpha": list(alpha), "bound": ["lower", "upper"], "row": AXES, "column": AXES}
-    return xarray.Dataset(variables, axes, {"nature": NATURE})
+    return xarray.Dataset(variables, axes, {"nature": str(NATURE)})
 
 
 def image_loss_bounds(energies: PhaseEnergies, cuts: LossCuts, average: str) -> tuple[Array, Array]:
@@ -145,31 +206,6 @@ def _widths(
     if study.fuzzy_phases:
         widths["phases"] = max(0.0, width(None, lowest) - base)
     return dict(sorted(widths.items(), key=lambda pair: -pair[1]))
-
-
-def _document(alpha: tuple[float, ...], cuts: Sequence[ImageCut], average: str) -> Document:
-    """Numbers on an image: bounds on the highest level, α-cuts of its constants; moduli in GPa."""
-    top, constants = cuts[-1], np.array([cut.constants for cut in cuts])  # (levels, constants, 2)
-    young = np.array([cut.modulus for cut in cuts])
-    plane: Document = {}
-    for k, name in enumerate(NAMES):
-        size, key = (1.0, name) if name == "nu_xy" else (GPA, f"{name}_GPa")
-        plane[key] = as_cut(constants[:, k] / size)
-    return {
-        "lower_GPa": top.bounds.lower / GPA,
-        "upper_GPa": top.bounds.upper / GPA,
-        "E_GPa": _pair(top.modulus),
-        "nu": {"lower": top.poisson[0], "upper": top.poisson[1]},
-        "G_T_GPa": _pair(top.bounds.shear(average)),
-        "average": AVERAGES[average],
-        "plane": plane,
-        "nature": NATURE,
-        "cuts": {"alpha": alpha, "E_GPa": as_cut(young / GPA), "nature": [NATURE] * len(cuts)},
-    }
-
-
-def _pair(bounds: Ends) -> dict[str, float]:
-    return {"lower": bounds[0] / GPA, "upper": bounds[1] / GPA}
 
 
 def cut_at(number: FuzzyNumber, level: AlphaLevel) -> tuple[float, float]:
@@ -205,7 +241,7 @@ class ImageStudy:
         return moduli_images(*self.phase_ranges(threshold), moduli)
 
     @property
-    def isotropic_bounds(self) -> list[float]:
+    def isotropic_bounds(self) -> tuple[float, float]:
         """Hashin and Shtrikman's bounds of an isotropic E in GPa at the modal values."""
         phases = [Phase(young.modal, nu.modal).stiffness for young, nu in self.cell.pairs]
         return isotropic_bounds(np.array([*self.fractions.values()]), phases)

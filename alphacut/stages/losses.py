@@ -12,7 +12,6 @@ import numpy as np
 from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.result import Nature
-from alphacut.io.files import Document
 from alphacut.rve.result.loss_factors import (
     CONSTANTS,
     MAX_FIRST_ORDER,
@@ -20,7 +19,26 @@ from alphacut.rve.result.loss_factors import (
     loss_factors,
 )
 from alphacut.rve.result.result import HomogenisedStiffness
-from alphacut.stages.cell import as_cut
+from alphacut.stages.store import Cuts, Numbers
+
+
+class LossResult(Numbers):
+    """α-cuts of the loss factors of E, G and K; their errors by name, where they are declared."""
+
+    E: Cuts
+    G: Cuts
+    K: Cuts
+    error: dict[str, float]
+    nature: Nature
+
+    @classmethod
+    def of(
+        cls, cuts: Mapping[str, Array], errors: Mapping[str, float], nature: Nature
+    ) -> LossResult:
+        """The result of cuts (levels, 2) by the names of `CONSTANTS`."""
+        named = {name: Cuts.of(cuts[name]) for name in CONSTANTS}
+        return cls(**named, error=dict(errors), nature=nature)
+
 
 Losses = tuple[FuzzyNumber, FuzzyNumber | None]
 """Loss factor of a phase's Young's modulus, and of its bulk modulus where that is another."""
@@ -80,11 +98,3 @@ def loss_bounds(result: HomogenisedStiffness, cuts: LossCuts) -> tuple[Array, Ar
     for corner in product(*map(range, bounds.shape)):
         bounds[corner] = loss_factors(result, corners[corner]).values[CONSTANTS[corner[-1]]]
     return bounds, np.array(errors)
-
-
-def loss_document(
-    cuts: Mapping[str, Array], errors: Mapping[str, float], nature: Nature
-) -> Document:
-    """α-cuts of loss factors by the names of `CONSTANTS`, (levels, 2) each; errors and nature."""
-    documents = {name: as_cut(cut) for name, cut in cuts.items()}
-    return {**documents, "error": errors, "nature": str(nature)}

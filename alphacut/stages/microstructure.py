@@ -10,25 +10,25 @@ import numpy as np
 from alphacut.case.microstructure import MicrostructureSection
 from alphacut.case.radius import RadiusMapSection
 from alphacut.fuzzy.campaign.workers import pool
-from alphacut.io.columns import columns_text
+from alphacut.io.arrays import columns_text
 from alphacut.io.files import Document, write_text
 from alphacut.io.provenance import file_digest
-from alphacut.stages.store import Stage, StageContext, StageResult
+from alphacut.stages.store import Computed, Stage, StageContext, StageResult
 from alphacut.stochastic.microstructure import Microstructure, study
 from alphacut.stochastic.microstructure_summary import fragment, summary, to_dataset
 
 
-def stage(section: MicrostructureSection, spheres: bool, figures: bool = True) -> Stage:
+def stage(section: MicrostructureSection, spheres: bool, figures: bool = True) -> Stage[Document]:
     """The stage that computes the radius map of particles, and writes radius.toml and figures."""
     file = section.sources[0].file
     inputs = [section, spheres, file and file_digest(file)]
     compute = partial(compute_map, section, spheres, figures)
-    return Stage("microstructure", inputs, ("stochastic",), compute)
+    return Stage("microstructure", inputs, ("stochastic",), Document, compute)
 
 
 def compute_map(
     section: MicrostructureSection, spheres: bool, figures: bool, context: StageContext
-) -> StageResult:
+) -> Computed[Document]:
     """Computes the fuzzy radius map of particles, and writes its files if there is a folder.
 
     The result does not depend on the number of workers.
@@ -38,12 +38,12 @@ def compute_map(
     numbers = summary(result)
     if context.folder is not None:
         write_files(result, numbers, context.folder, figures=figures)
-    return StageResult(numbers, to_dataset(result))
+    return Computed(numbers, to_dataset(result))
 
 
-def radius_of(result: StageResult) -> RadiusMapSection:
+def radius_of(result: StageResult[Document]) -> RadiusMapSection:
     """The section [radius] that the particles give."""
-    return RadiusMapSection.model_validate(result.document["radius"])
+    return RadiusMapSection.model_validate(result.numbers["radius"])
 
 
 def write_files(result: Microstructure, numbers: Document, folder: Path, *, figures: bool) -> None:

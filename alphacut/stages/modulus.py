@@ -1,65 +1,41 @@
-"""Stage modulus: the fuzzy modulus of a round cell, by samples arranged into α-cuts."""
+"""The fuzzy modulus of a cell: α-cuts of its constants, as numbers, as a dataset and as inputs."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from collections.abc import Mapping
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from alphacut.case.material import Mesh, MeshedCell, ModulusSection
-from alphacut.case.radius import AnyRadius, ThetaSection
-from alphacut.fuzzy import (
-    Crisp,
-    Extended,
-    FuzzyNumber,
-    General,
-    Knowledge,
-    Reduced,
-    Signed,
-    propagate,
-)
-from alphacut.fuzzy.arrays import Array, on_one_blas_thread
-from alphacut.fuzzy.plans.design import Plan
-from alphacut.fuzzy.refused import FailedError, require
+from alphacut.fuzzy import Crisp, FuzzyNumber
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import require
 from alphacut.fuzzy.result import Bounds, Nature
 from alphacut.fuzzy.sets.numbers import outer_steps
-from alphacut.io.files import Document
-from alphacut.io.provenance import file_digest, source_digest, versions
+from alphacut.rve.result.engineering_constants import (
+    FREE,
+    NAMES,
+    PLANE_STRAIN,
+    engineering_constants,
+)
 from alphacut.rve.result.loss_factors import CONSTANTS
 from alphacut.rve.result.result import HomogenisedStiffness
-from alphacut.rve.series.fibre_constants import fibre_constants
-from alphacut.rve.series.model import SeriesModel
-from alphacut.stages.cell import (
-    GPA,
-    SPHERE_TOLERANCE,
-    AnyCell,
-    Solve,
-    as_cut,
-    average_name,
-    cell_at,
-    inputs_of,
-    model_of,
-    references,
-    solve,
-)
-from alphacut.stages.losses import LossCuts, loss_bounds, loss_document
-from alphacut.stages.plane import PLANE, plane_outputs
-from alphacut.stages.store import Stage, StageContext, StageResult
-from alphacut.stochastic.theta.quadrature import between_nodes
+from alphacut.stages.cell import GPA, References
+from alphacut.stages.losses import LossResult
+from alphacut.stages.store import Cuts, Numbers, Values
 
 if TYPE_CHECKING:
     import xarray
 
-TEST_TOLERANCE_FACTOR = 100.0
-"""Multiple of the tolerance at which guaranteed cuts are tested."""
-MAX_TEST_SIZE = 0.7
-"""Largest elements that they are tested with, over half the cell's side."""
-CURVE_POINTS = 61
-"""Points over θ of a stored stress curve."""
+SUFFIXES = {PLANE_STRAIN: "", FREE: "_free"}
+"""What is added to the name of a constant along x and y as an output, by definition."""
+ABOUT = {
+    "E_x": ("Pa", "Young's modulus along x"),
+    "E_y": ("Pa", "Young's modulus along y"),
+    "nu_xy": ("1", "Poisson's ratio of a pull along x"),
+    "G_xy": ("Pa", "shear modulus between x and y"),
+}
 BOUNDS = {
     "E": ("Pa", "effective Young's modulus"),
     "nu": ("1", "effective Poisson's ratio"),
@@ -73,229 +49,103 @@ FIBRES = {
     "G_T": ("Pa", "shear modulus across the fibres"),
     "G_L": ("Pa", "shear modulus along the fibres"),
 }
-"""Constants of cylinders besides; see rve.series.fibre_constants."""
+"""Constants of cylinders besides; see rve.fibre_constants."""
+PLANE = {
+    name + suffix: (unit, f"{about}, {definition}")
+    for definition, suffix in SUFFIXES.items()
+    for name, (unit, about) in ABOUT.items()
+}
 QUANTITIES = BOUNDS | FIBRES | PLANE
 """Unit and meaning of each output that has α-cuts."""
 CUT = ("alpha", "bound")
-OUTPUTS = ("E", "nu")
-PLANS: dict[str, Plan] = {
-    "general": General(),
-    "reduced": Reduced(),
-    "extended": Extended(outputs=OUTPUTS),
-    "signed": Signed(outputs=OUTPUTS),
-}
 
 
-@dataclass(frozen=True)
-class CellTask:
-    """Samples of the cell that share all but the inclusion's modulus, for any process.
+class ModulusResult(Numbers):
+    """α-cuts of a cell, moduli in GPa; their nature, relative errors of E, references and cost.
 
-    `crisp` has the inputs that are not fuzzy, by name, in SI.
+    Args:
+        fibres: Constants of cylinders by name, as E_T_GPa.
+        plane: Constants along x and y by definition and name, as E_x_GPa.
+        average: Average of the stiffness that gives E and ν, in words.
+        error: Largest relative error of E by source.
+        checks: Largest violation of each property.
     """
 
-    model: Solve
-    radius: AnyRadius | ThetaSection
-    cell: AnyCell
-    crisp: Mapping[str, float]
-    losses: LossCuts | None = None
-
-    @on_one_blas_thread
-    def __call__(self, points: Sequence[Mapping[str, float]]) -> list[dict[str, float | Array]]:
-        """Outputs of the cell at each point of the fuzzy inputs, by name, in SI."""
-        cells = [cell_at({**self.crisp, **point}, self.radius, self.cell) for point in points]
-        return [self._outputs(result) for result in self.model(cells)]
-
-    def _outputs(self, result: HomogenisedStiffness) -> dict[str, float | Array]:
-        """Outputs of a cell by name, in SI; the stress curve has shape (CURVE_POINTS,)."""
-        curve = result.curve
-        fibres = fibre_constants(result).values if self.cell.is_fibre else {}
-        losses = {} if self.losses is None else loss_outputs(result, self.losses)
-        return {
-            "E": result.modulus,
-            "nu": result.poisson,
-            **dict(zip(("s11", "s12"), curve.mean, strict=True)),
-            **{name: fibres[name] for name in FIBRES if name in fibres},
-            **plane_outputs(result),
-            "systems": len(result.iterations),
-            "curve11": between_nodes(curve.theta, curve.s11, theta_of(self.radius)),
-            **{f"error:{name}": result.error.get(name, 0.0) for name in ("space", "theta")},
-            **{f"check:{name}": value for name, value in result.checks.items()},
-            **losses,
-        }
+    alpha: Values
+    E_GPa: Cuts
+    nu_cuts: Cuts
+    fibres: dict[str, Cuts]
+    plane: dict[str, dict[str, Cuts]]
+    method: str
+    plan: str
+    samples: int
+    solves: int
+    seconds: float
+    nature: Nature
+    particles: str
+    average: str
+    error: dict[str, float]
+    checks: dict[str, float]
+    references: References
+    loss: LossResult | None
 
 
-def theta_of(radius: AnyRadius | ThetaSection) -> Array:
-    """The θ at which stress curves are stored, shape (CURVE_POINTS,)."""
-    return np.asarray(np.linspace(*radius.theta, CURVE_POINTS))
+def plane_outputs(result: HomogenisedStiffness) -> dict[str, float]:
+    """Values by the names of `PLANE`, moduli in Pa; those of the definitions that are known."""
+    return {
+        name + SUFFIXES[definition]: float(value)
+        for definition, constants in engineering_constants(result).items()
+        for name, value in zip(NAMES, constants.values, strict=True)
+    }
 
 
-@dataclass(frozen=True)
-class CellCampaign:
-    """Samples that the sections of a case ask for, by a solver with PETSc's options."""
+def cuts_of(result: Bounds, names: Mapping[str, str]) -> dict[str, Cuts]:
+    """α-cuts of those outputs that a result has, moduli in GPa by NAME_GPa.
 
-    radius: AnyRadius | ThetaSection
-    cell: AnyCell
-    mesh: Mesh
-    modulus: ModulusSection
-    petsc: Mapping[str, str] = field(default_factory=dict)
-    stated_fraction: float | None = None
-
-    @cached_property
-    def inputs(self) -> dict[str, FuzzyNumber]:
-        """Fuzzy inputs by name, in SI; one crisp modulus where none is fuzzy."""
-        numbers = inputs_of(self.radius, self.cell)
-        names = ("inclusion_modulus", "matrix_modulus", *numbers)
-        stand_in = next(name for name in names if name in numbers)
-        fuzzy = {name: number for name, number in numbers.items() if number.support.width > 0}
-        return fuzzy or {stand_in: numbers[stand_in]}
-
-    def model(self, *, estimate: bool = False) -> Solve:
-        """The function that solves cells; with `estimate`, prisms declare errors at extra cost."""
-        support, modulus = None, self.cell.constants.get("inclusion_modulus")
-        if modulus is not None:
-            support = (modulus.support.lower, modulus.support.upper)
-        options = {"estimate": estimate, "moduli": support, "petsc": self.petsc}
-        return model_of(self.cell, self.mesh, self.modulus, **options)
-
-    @property
-    def identity(self) -> Document:
-        """All but the fuzzy inputs that the outputs of a sample depend on: the key of its store."""
-        crisp = {name: repr(x) for name, x in inputs_of(self.radius, self.cell).items()}
-        sections = {
-            "modulus": self.modulus.model_dump(exclude={"plan", "alpha"}),
-            "mesh": self.mesh.model_dump(exclude={"file"}),
-            "mesh_file": self.mesh.file and file_digest(self.mesh.file),
-            "petsc": dict(self.petsc),
-            "particles": self.cell.particles,
-            "inputs": crisp,
-            "theta": self.radius.theta,
-            "stiffness": repr(self.cell.model_dump(include={"inclusion_modulus", "phases"})),
-            "losses": repr((self.cell.losses, self.modulus.alpha)) if self.cell.losses else "",
-        }
-        return {**sections, "source": source_digest(("stochastic", "rve")), "versions": versions()}
-
-    @property
-    def propagation(self) -> Callable[..., Bounds]:
-        """The function from fuzzy inputs and a plan to the α-cuts of all outputs."""
-        shared = tuple(x for x in self.inputs if x != "inclusion_modulus") or tuple(self.inputs)
-        return partial(propagate, self.task, alpha=self.modulus.alpha, shared=shared)
-
-    @property
-    def task(self) -> CellTask:
-        """The function from points of the fuzzy inputs to all outputs."""
-        numbers = inputs_of(self.radius, self.cell)
-        crisp = {name: x.modal for name, x in numbers.items() if name not in self.inputs}
-        return CellTask(self.model(), self.radius, self.cell, crisp, self.losses)
-
-    def run(self, context: StageContext) -> StageResult:
-        """Computes all samples and the α-cuts; stored samples of an interrupted run are taken."""
-        result = self.propagation(
-            self.inputs,
-            PLANS[self.modulus.plan],
-            workers=context.workers,
-            progress=context.tick or False,
-            knowledge=self.knowledge,
-            store=context.samples,
-            identity=self.identity if context.samples else None,
-        )
-        self.require_consistent(result)
-        return stage_result(result, self)
-
-    def require_consistent(self, result: Bounds) -> None:
-        """Requires that a coarser model agrees with guaranteed cuts of E at points inside them.
-
-        The points are the middles of the narrowest and of the widest cut of the inputs. The
-        tolerance is `TEST_TOLERANCE_FACTOR` times as large, elements are twice as large.
-        """
-        if result.nature_of("E") is not Nature.GUARANTEED:
-            return
-        modulus, size = self.modulus, min(2 * self.mesh.size, MAX_TEST_SIZE)
-        default = SPHERE_TOLERANCE if self.cell.particles == "spheres" else SeriesModel.accuracy
-        tolerance = TEST_TOLERANCE_FACTOR * (modulus.tolerance or default)
-        coarse_campaign = replace(
-            self,
-            mesh=self.mesh.model_copy(update={"size": size}),
-            modulus=modulus.model_copy(update={"tolerance": tolerance}),
-        )
-        cuts, error = np.stack(result.bounds("E"), 1), sum(self.errors(result).values())
-        levels = result.alpha[[-1, 0]]
-        inputs = result.inputs.items()
-        points = [{name: float(np.mean(x.cut(alpha))) for name, x in inputs} for alpha in levels]
-        for alpha, sample in zip(levels, coarse_campaign.task(points), strict=True):
-            value = float(np.asarray(sample["E"]))
-            slack = value * (error + sample["error:space"] + sample["error:theta"])
-            for low, high in cuts[result.alpha <= alpha]:
-                if not low - slack <= value <= high + slack:
-                    what = f"E of a cell inside a cut is {value / GPA:.9g} GPa, the cut"
-                    what += f" {low / GPA:.9g} … {high / GPA:.9g} GPa"
-                    raise FailedError(f"the proof is wrong: {what}", "keep the case and report it")
-
-    @property
-    def losses(self) -> LossCuts | None:
-        """Cuts of the phases' loss factors; None where the case has none."""
-        if not self.cell.losses:
-            return None
-        return LossCuts.from_phases(self.cell.losses, self.modulus.alpha)
-
-    @property
-    def knowledge(self) -> Knowledge:
-        """Signs of the inputs' effects on E, where mechanics proves them; else none.
-
-        If both phases have one crisp Poisson's ratio ν ≥ 0 and one phase is the stiffer for all
-        values, more of it can only stiffen the cell: A = 2 C33 and B = C11 + C12 of fibres rise
-        (the paper's eq. 16), and with them E = 3A/2 − A²/(2B); of spheres the bulk modulus and both
-        averages of the shear modulus. The radius Σ a_i h_i(θ) rises with a1, a2 and a3, h_i ≥ 0,
-        and falls with a4, h4 ≤ 0 (the paper's eq. 12).
-        """
-        if not self.cell.has_series or self.modulus.method == "prism":
-            return Knowledge()
-        supports = {name: number.support for name, number in self.cell.constants.items()}
-        matrix, inclusion = supports["matrix_modulus"], supports["inclusion_modulus"]
-        poisson = supports["matrix_poisson"]
-        is_stiffer, is_softer = inclusion.lower >= matrix.upper, inclusion.upper <= matrix.lower
-        is_same = poisson == supports["inclusion_poisson"] and not poisson.width
-        if not is_same or poisson.lower < 0 or not (is_stiffer or is_softer):
-            return Knowledge()
-        effect = 1 if is_stiffer else -1  # of more inclusion on E
-        signs = {"a1": effect, "a2": effect, "a3": effect, "a4": -effect, "fraction": effect}
-        signs |= {"matrix_modulus": 1, "inclusion_modulus": 1}
-        of_inputs = {name: {"E": sign} for name, sign in signs.items() if name in self.inputs}
-        return Knowledge(signs=of_inputs, source="as mechanics proves of exact cells", tests=2)
-
-    def loss_errors(self, result: Bounds) -> dict[str, float]:
-        """Largest errors of the loss factors of E, G and K; of prisms those of the modal cell."""
-        assert self.losses is not None
-        assert result.samples is not None
-        if isinstance(self.cell, MeshedCell):
-            return {}
-        if self.modulus.method == "prism":
-            reference = solve(self.radius, self.cell, self.model(estimate=True))
-            return dict(zip(CONSTANTS, loss_bounds(reference, self.losses)[1], strict=True))
-        largest = result.samples.values.output("loss_error").max(axis=0)
-        return dict(zip(CONSTANTS, map(float, largest), strict=True))
-
-    def errors(self, result: Bounds) -> dict[str, float]:
-        """Relative error of E by source: the largest of all samples, or that of the modal one."""
-        errors = {name: error for name, error in _largest(result, "error").items() if error}
-        if errors or self.modulus.method != "prism" or isinstance(self.cell, MeshedCell):
-            return errors
-        return dict(solve(self.radius, self.cell, self.model(estimate=True)).error)
+    `names` has the name of each constant by that of its output.
+    """
+    cuts: dict[str, Cuts] = {}
+    for output, name in names.items():
+        if output in result.outputs:
+            size, key = (GPA, f"{name}_GPa") if QUANTITIES[output][0] == "Pa" else (1.0, name)
+            cuts[key] = Cuts.of(np.stack(result.bounds(output), axis=1) / size)
+    return cuts
 
 
-def stage(campaign: CellCampaign) -> Stage:
-    """The stage that computes the α-cuts of a cell by samples."""
-    plan, alpha = campaign.modulus.plan, campaign.modulus.alpha
-    inputs = [campaign.identity, campaign.inputs, campaign.stated_fraction, plan, alpha]
-    return Stage("modulus", inputs, ("stochastic", "rve", "fuzzy"), campaign.run, has_samples=True)
+def plane_cuts(result: Bounds) -> dict[str, dict[str, Cuts]]:
+    """α-cuts of the constants along x and y by definition, of those that a result has."""
+    cuts = {
+        definition: cuts_of(result, {name + suffix: name for name in NAMES})
+        for definition, suffix in SUFFIXES.items()
+    }
+    return {definition: constants for definition, constants in cuts.items() if constants}
 
 
-def stage_result(result: Bounds, campaign: CellCampaign) -> StageResult:
-    """The α-cuts with all samples as a dataset, and the numbers of `document`."""
-    losses = {} if campaign.losses is None else loss_cuts(result)
-    return StageResult(document(result, campaign, losses), dataset(result, campaign, losses))
+def loss_cuts(result: Bounds) -> dict[str, Array]:
+    """α-cuts of the loss factors by the names of `CONSTANTS`, shape (levels, 2) each.
+
+    They run from the least loss_lower[level][constant] of the samples to the greatest loss_upper.
+    """
+    cuts: dict[str, Array] = {name: np.empty((len(result.alpha), 2)) for name in CONSTANTS}
+    for (constant, name), level in product(enumerate(CONSTANTS), range(len(result.alpha))):
+        lower_column = result.column(f"loss_lower[{level}][{constant}]")
+        upper_column = result.column(f"loss_upper[{level}][{constant}]")
+        cuts[name][level] = result.lower[level, lower_column], result.upper[level, upper_column]
+    return cuts
 
 
-def dataset(result: Bounds, campaign: CellCampaign, losses: Mapping[str, Array]) -> xarray.Dataset:
+def largest(result: Bounds, kind: str) -> dict[str, float]:
+    """Largest value over all samples of each output KIND:NAME, by NAME."""
+    assert result.samples is not None
+    values = result.samples.values
+    return {
+        name.partition(":")[2]: float(values.output(name).max())
+        for name, _ in values.layout
+        if name.startswith(f"{kind}:")
+    }
+
+
+def dataset(result: Bounds, theta: Array, losses: Mapping[str, Array]) -> xarray.Dataset:
     """Dataset in SI: α-cuts NAME, inputs NAME_at that reach them, and samples NAME_sample."""
     import xarray
 
@@ -316,80 +166,9 @@ def dataset(result: Bounds, campaign: CellCampaign, losses: Mapping[str, Array])
     variables["point"] = (("sample", "parameter"), samples.points, about_points)
     attributes = {"units": "Pa", "long_name": "homogenised stress 11 over θ"}
     variables["curve11"] = (("sample", "theta"), samples.values.output("curve11"), attributes)
-    coordinates = {"theta": theta_of(campaign.radius), "alpha": result.alpha}
+    coordinates = {"theta": theta, "alpha": result.alpha}
     axes = {"bound": ["lower", "upper"], "parameter": list(result.inputs)}
     return xarray.Dataset(variables, coordinates | axes)
-
-
-def document(result: Bounds, campaign: CellCampaign, losses: Mapping[str, Array]) -> Document:
-    """Numbers on a modulus: α-cuts, moduli in GPa; their nature, errors, references and cost."""
-    assert result.samples is not None
-    cuts = cut_documents(result, BOUNDS)
-    numbers: Document = {
-        "alpha": result.alpha,
-        "E_GPa": cuts["E_GPa"],
-        "nu_cuts": cuts["nu"],
-        "fibres": cut_documents(result, FIBRES),
-        "plane": cut_documents(result, PLANE),
-        "method": campaign.modulus.method,
-        "plan": result.method,
-        "samples": result.evaluations,
-        "solves": int(result.samples.values.output("systems").sum()),
-        "seconds": result.seconds,
-        "nature": str(result.nature_of("E")),
-        "particles": campaign.cell.particles,
-        "average": average_name(campaign.cell, campaign.modulus),
-        "error": campaign.errors(result),
-        "checks": _largest(result, "check"),
-        "references": references(campaign.radius, campaign.cell, campaign.stated_fraction),
-    }
-    if losses:
-        numbers["loss"] = loss_document(losses, campaign.loss_errors(result), Nature.ATTAINED)
-    return numbers
-
-
-def cut_documents(result: Bounds, quantities: Mapping[str, tuple[str, str]]) -> Document:
-    """α-cuts of those quantities that a result has, moduli in GPa by NAME_GPa."""
-    cuts: Document = {}
-    for name, (unit, _) in quantities.items():
-        if name in result.outputs:
-            size, key = (GPA, f"{name}_GPa") if unit == "Pa" else (1.0, name)
-            cuts[key] = as_cut(np.asarray(np.stack(result.bounds(name), axis=1) / size, float))
-    return cuts
-
-
-def loss_outputs(result: HomogenisedStiffness, cuts: LossCuts) -> dict[str, Array]:
-    """Outputs of a sample: bounds of the loss factors on each level, and their errors."""
-    bounds, errors = loss_bounds(result, cuts)
-    return {
-        "loss_lower": bounds[:, 0],
-        "loss_upper": bounds[:, 1],
-        "loss_error": np.nan_to_num(errors),
-    }
-
-
-def loss_cuts(result: Bounds) -> dict[str, Array]:
-    """α-cuts of the loss factors by the names of `CONSTANTS`, shape (levels, 2) each.
-
-    They run from the least loss_lower[level][constant] of the samples to the greatest loss_upper.
-    """
-    cuts: dict[str, Array] = {name: np.empty((len(result.alpha), 2)) for name in CONSTANTS}
-    for (constant, name), level in product(enumerate(CONSTANTS), range(len(result.alpha))):
-        lower_column = result.column(f"loss_lower[{level}][{constant}]")
-        upper_column = result.column(f"loss_upper[{level}][{constant}]")
-        cuts[name][level] = result.lower[level, lower_column], result.upper[level, upper_column]
-    return cuts
-
-
-def _largest(result: Bounds, kind: str) -> dict[str, float]:
-    """Largest value over all samples of each output KIND:NAME, by NAME."""
-    assert result.samples is not None
-    values = result.samples.values
-    return {
-        name.partition(":")[2]: float(values.output(name).max())
-        for name, _ in values.layout
-        if name.startswith(f"{kind}:")
-    }
 
 
 def require_levels(alpha: tuple[float, ...], key: str) -> None:
@@ -400,9 +179,7 @@ def require_levels(alpha: tuple[float, ...], key: str) -> None:
 
 def fuzzy_loss(data: xarray.Dataset) -> FuzzyNumber | None:
     """The fuzzy loss factor of E; None where the phases have none."""
-    if "loss_E" not in data:
-        return None
-    return _stepped(data, "loss_E")
+    return _stepped(data, "loss_E") if "loss_E" in data else None
 
 
 def fuzzy_modulus(data: xarray.Dataset, key: str = "modulus") -> FuzzyNumber:

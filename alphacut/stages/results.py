@@ -1,8 +1,9 @@
-"""Results of a run as objects, and their summary in numbers."""
+"""Results of a run, for what is drawn and told of them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -12,12 +13,22 @@ from alphacut.frame import StoreyFrame
 from alphacut.frame.structures.linear import frequencies
 from alphacut.io.files import Document
 from alphacut.io.quantity import STANDARD_GRAVITY
-from alphacut.stages import envelope
-from alphacut.stages.envelope import EnvelopeTask
-from alphacut.stages.store import StageResult
+from alphacut.stages.envelope import EnvelopeResult, EnvelopeTask
+from alphacut.stages.identify import LearnedResult
+from alphacut.stages.image import ImageResult
+from alphacut.stages.modulus import ModulusResult
+from alphacut.stages.shares import ShareTable
+from alphacut.stages.store import Numbers, StageResult, Values
+from alphacut.stages.suite import SuiteResult
 
-NAMES = ("microstructure", "modulus", "image", "shares")
-"""Stages with one result."""
+
+class FrameResult(Numbers):
+    """A frame at its nominal inputs, with the height of the storey of each drift."""
+
+    omega_rad_per_s: Values
+    period_s: float
+    weight_N: float
+    heights_m: dict[str, float]
 
 
 @dataclass
@@ -33,22 +44,22 @@ class Results:
         tasks: The studies.
         envelopes: Their envelopes by name.
         learned: Inputs after measured modes.
+        suite: Peaks under each record of a suite.
         answers: Answers to the questions of the case, by their keys.
         shares: Shares of the inputs in the widths.
-        suite: Peaks under each record of a suite.
     """
 
     content: Content
-    microstructure: StageResult | None = None
-    modulus: StageResult | None = None
-    image: StageResult | None = None
+    microstructure: StageResult[Document] | None = None
+    modulus: StageResult[ModulusResult] | None = None
+    image: StageResult[ImageResult] | None = None
     structure: Structure | None = None
     tasks: tuple[EnvelopeTask, ...] = ()
-    envelopes: dict[str, StageResult] = field(default_factory=dict)
-    learned: Document | None = None
-    answers: dict[str, Document] = field(default_factory=dict)
-    shares: StageResult | None = None
-    suite: Document | None = None
+    envelopes: dict[str, StageResult[EnvelopeResult]] = field(default_factory=dict)
+    learned: LearnedResult | None = None
+    suite: SuiteResult | None = None
+    answers: dict[str, Numbers] = field(default_factory=dict)
+    shares: StageResult[ShareTable] | None = None
 
     @property
     def is_paper(self) -> bool:
@@ -56,50 +67,48 @@ class Results:
         return any(task.figures for task in self.tasks)
 
     @property
-    def stages(self) -> dict[str, StageResult]:
-        """Every result by the name of its stage."""
-        results = {name: getattr(self, name) for name in NAMES}
-        results |= {f"envelope_{name}": data for name, data in self.envelopes.items()}
-        return {name: data for name, data in results.items() if data is not None}
+    def single(self) -> dict[str, StageResult[Any]]:
+        """Results of the stages that have one, by name."""
+        results = {
+            "microstructure": self.microstructure,
+            "modulus": self.modulus,
+            "image": self.image,
+            "shares": self.shares,
+        }
+        return {name: result for name, result in results.items() if result is not None}
 
     @property
-    def _units(self) -> dict[str, str]:
-        """SI unit of each output of the structure."""
-        assert self.structure is not None
-        return {str(name): self.structure.unit(name) for name in self.structure.outputs}
+    def fingerprints(self) -> dict[str, str]:
+        """Digest of what each result was made from, by the name of its stage."""
+        studies = {f"envelope_{name}": result for name, result in self.envelopes.items()}
+        return {name: x.fingerprint for name, x in {**self.single, **studies}.items()}
 
-    def document(self) -> Document:
-        """Numbers of all results, in the parts of summary.json."""
-        results = {name: getattr(self, name) for name in NAMES}
-        numbers = {name: result.document for name, result in results.items() if result is not None}
-        if self.structure is not None and self.structure.frame is not None:
-            numbers["structure"] = frame_properties(self.structure, self.structure.frame)
-        tasks = {task.name: task for task in self.tasks}
-        if self.structure is not None and self.content.has_material_damping:
-            numbers["damping"] = {
-                name: (number.support.lower, number.modal, number.support.upper)
-                for name, number in self.structure.numbers.items()
-                if name.startswith("zeta")
-            }
-        if self.envelopes:
-            numbers["envelopes"] = {
-                name: envelope.document(data, tasks[name].fuzzy)
-                | {"drawn": list(tasks[name].figures), "units": self._units}
-                for name, data in self.envelopes.items()
-            }
-        if self.suite is not None:
-            numbers["records"] = self.suite | {"units": self._units}
-        if self.learned is not None:
-            numbers["update"] = self.learned
-        return {**numbers, **self.answers}
+    @property
+    def frame_result(self) -> FrameResult | None:
+        """Numbers on the frame; None of another structure."""
+        if self.structure is None or self.structure.frame is None:
+            return None
+        return frame_result(self.structure, self.structure.frame)
+
+    @property
+    def damping(self) -> dict[str, tuple[float, float, float]]:
+        """Least, nominal and greatest damping ratios that the material gives, by name."""
+        if self.structure is None or not self.content.has_material_damping:
+            return {}
+        return {
+            name: (number.support.lower, number.modal, number.support.upper)
+            for name, number in self.structure.numbers.items()
+            if name.startswith("zeta")
+        }
 
 
-def frame_properties(structure: Structure, frame: StoreyFrame) -> Document:
-    """Natural frequencies, first period, weight, and the height of the storey of each drift."""
+def frame_result(structure: Structure, frame: StoreyFrame) -> FrameResult:
+    """Natural frequencies, first period and weight of a frame, and the heights of its storeys."""
     omega, drifts = frequencies(frame), set(structure.outputs)
-    return {
-        "omega_rad_per_s": omega,
-        "period_s": 2 * np.pi / omega[0],
-        "weight_N": sum(frame.masses) * float(STANDARD_GRAVITY),
-        "heights_m": {x: height.modal for x, height in structure.heights.items() if x in drifts},
-    }
+    heights = {x: height.modal for x, height in structure.heights.items() if x in drifts}
+    return FrameResult(
+        omega_rad_per_s=omega,
+        period_s=float(2 * np.pi / omega[0]),
+        weight_N=sum(frame.masses) * float(STANDARD_GRAVITY),
+        heights_m=heights,
+    )

@@ -21,19 +21,20 @@ from alphacut.fuzzy import Crisp, FuzzyNumber, Reduced
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.propagation import Shares, width_shares
 from alphacut.fuzzy.result import Nature
-from alphacut.io.files import Document
 from alphacut.io.provenance import NESTED
+from alphacut.stages.campaign import OUTPUTS, CellCampaign
 from alphacut.stages.envelope import EnvelopeTask
-from alphacut.stages.modulus import OUTPUTS, CellCampaign
-from alphacut.stages.store import Stage, StageContext, StageResult
+from alphacut.stages.store import Computed, Stage, StageContext
 
+ShareTable = dict[str, dict[str, float]]
+"""Share of each input by result, such as E, then by input."""
 ACCURACY = 2e-3
 """Relative error of each peak that shares of two digits need where widths are a fifth of peaks."""
 
 
 def stage(
     campaign: CellCampaign | None, structure: Structure | None, task: EnvelopeTask | None
-) -> Stage:
+) -> Stage[ShareTable]:
     """The stage of the shares of a cell's inputs in its modulus, and of a study's in its peaks."""
     inputs: list[object] = [None, None]
     if campaign is not None:
@@ -41,7 +42,7 @@ def stage(
     if structure is not None:
         inputs[1] = [structure.model, structure.numbers, task]
     compute = partial(compute_shares, campaign, structure, task)
-    return Stage("shares", inputs, (*NESTED, "alphacut"), compute)
+    return Stage("shares", inputs, (*NESTED, "alphacut"), ShareTable, compute)
 
 
 def compute_shares(
@@ -49,12 +50,12 @@ def compute_shares(
     structure: Structure | None,
     task: EnvelopeTask | None,
     context: StageContext,
-) -> StageResult:
+) -> Computed[ShareTable]:
     """Computes each input's share in the widths of E, ν and peaks on the lowest level.
 
-    The document has them by result, then by input; a result of one input has none.
+    A result of one input has none.
     """
-    shares: Document = {}
+    shares: ShareTable = {}
     if campaign is not None and len(campaign.inputs) > 1:
         cell = cell_shares(campaign)
         shares = {x: _by_input(cell, cell.share[:, 0, k]) for k, x in enumerate(("E", "ν"))}
@@ -62,7 +63,7 @@ def compute_shares(
         peak = peak_shares(structure.frame, structure, task)
         for column, name in enumerate(structure.outputs):
             shares[f"the peak of {name}"] = _by_input(peak, peak.share[:, column])
-    return StageResult(shares)
+    return Computed(shares)
 
 
 def _by_input(shares: Shares, values: Array) -> dict[str, float]:

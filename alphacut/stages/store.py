@@ -1,4 +1,4 @@
-"""Results of stages in files, taken from there while their fingerprint and digests hold."""
+"""Results of stages: typed numbers beside arrays, taken from files while they are what was made."""
 
 from __future__ import annotations
 
@@ -8,31 +8,75 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, as_completed
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from shutil import rmtree
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Generic, NamedTuple, TypeVar
 
-from alphacut.frame.verification.self_test import ContradictionError
-from alphacut.fuzzy.arrays import on_one_blas_thread
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    PlainSerializer,
+    PlainValidator,
+    TypeAdapter,
+    ValidationError,
+)
+
+from alphacut.fuzzy.arrays import Array, on_one_blas_thread
 from alphacut.fuzzy.progress_bar import Progress, progress_reporter
 from alphacut.fuzzy.refused import FailedError, require
-from alphacut.io.columns import columns_text
-from alphacut.io.files import Document, as_json, rank, say, write_text
-from alphacut.io.manifest import ResultsFolder
-from alphacut.io.netcdf import dataset_of
+from alphacut.io.arrays import columns_text
+from alphacut.io.files import as_json, rank, say, write_text
 from alphacut.io.provenance import fingerprint, origin
-
-LOG = logging.getLogger(__name__)
+from alphacut.io.results import Listed, ResultsFolder
 
 if TYPE_CHECKING:
     import xarray
 
+LOG = logging.getLogger(__name__)
 SAMPLES = "samples.db"
 """Store of the samples of a campaign, beside the results."""
 PARTS = "parts"
 """Folder of the bounds of parts of boxes while a proof runs, beside the results."""
+
+
+class Numbers(BaseModel):
+    """Numbers and texts of a result by name, as JSON holds them; null where one is not finite."""
+
+    model_config = ConfigDict(frozen=True, arbitrary_types_allowed=True, extra="forbid")
+
+
+def _finite(values: object) -> Array:
+    array = np.asarray(values, float)
+    return np.where(np.isfinite(array), array, np.nan)
+
+
+Values = Annotated[Array, PlainValidator(_finite), PlainSerializer(np.ndarray.tolist)]
+"""Numbers of any shape; those that are not finite, as unknown bounds, are nan."""
+
+
+class Cuts(Numbers):
+    """α-cuts of a quantity: its lower and its upper bound on each level, rising."""
+
+    lower: Values
+    upper: Values
+
+    @classmethod
+    def of(cls, bounds: ArrayLike) -> Cuts:
+        """The cuts of bounds (lower, upper) in the last axis."""
+        lower, upper = np.moveaxis(np.asarray(bounds, float), -1, 0)
+        return cls(lower=lower, upper=upper)
+
+    def __getitem__(self, level: int) -> tuple[float, float]:
+        """Both ends on a level."""
+        return float(self.lower[level]), float(self.upper[level])
+
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -54,18 +98,18 @@ class StageContext:
     parts: Path | None = None
 
 
+class Computed(NamedTuple, Generic[T]):
+    """What a stage computes: numbers, and arrays with their axes if it has some."""
+
+    numbers: T
+    data: xarray.Dataset | None = None
+
+
 @dataclass(frozen=True)
-class StageResult:
-    """Result of a stage.
+class StageResult(Generic[T]):
+    """Result of a stage, with the names of its files and the digest of what it was made from."""
 
-    Args:
-        document: Numbers and texts, as JSON holds them.
-        data: Arrays with their axes; None for none.
-        files: Names of all its files in the folder of results.
-        fingerprint: Digest of everything that it depends on.
-    """
-
-    document: Document
+    numbers: T
     data: xarray.Dataset | None = None
     files: tuple[str, ...] = ()
     fingerprint: str = ""
@@ -76,20 +120,16 @@ class StageResult:
         assert self.data is not None
         return self.data
 
-    @property
-    def figures(self) -> list[str]:
-        """Names of the figures among its files."""
-        return [name for name in self.files if name.startswith("figures/")]
-
 
 @dataclass(frozen=True)
-class Stage:
+class Stage(Generic[T]):
     """A function from objects to a result.
 
     Args:
         name: Its files are NAME.json and NAME.nc.
         inputs: Everything that the result depends on.
         packages: Packages of this project whose source it depends on.
+        kind: Type of its numbers.
         compute: The function.
         has_samples: Whether it stores samples on the way.
     """
@@ -97,16 +137,17 @@ class Stage:
     name: str
     inputs: object
     packages: tuple[str, ...]
-    compute: Callable[[StageContext], StageResult]
+    kind: type[T]
+    compute: Callable[[StageContext], Computed[T]]
     has_samples: bool = False
 
-    @property
+    @cached_property
     def key(self) -> str:
-        """Fingerprint of inputs, source and libraries."""
-        return fingerprint(self.inputs, self.packages)
+        """Digest of name, inputs, source and libraries."""
+        return fingerprint([self.name, self.inputs], self.packages)
 
     @on_one_blas_thread
-    def run(self, context: StageContext) -> StageResult:
+    def run(self, context: StageContext) -> Computed[T]:
         """The result, computed."""
         return self.compute(context)
 
@@ -136,20 +177,18 @@ class StageStore:
         """True where progress is shown, by the first rank alone."""
         return not self.quiet and rank() == 0
 
-    def take(self, stage: Stage) -> StageResult:
+    def take(self, stage: Stage[T]) -> StageResult[T]:
         """The result of a stage: from its files where these are up to date, else computed."""
-        return self._read_if_current(stage) or self._compute(stage)
+        return self._read(stage) or self._compute(stage)
 
     def take_all(
-        self, stages: Sequence[Stage], executor: Executor | None
-    ) -> dict[str, StageResult]:
-        """The results of stages by name: from files that are up to date, else computed in parallel.
+        self, stages: Sequence[Stage[T]], executor: Executor | None
+    ) -> dict[str, StageResult[T]]:
+        """The results of stages by name, as of `take`; without further files, in parallel.
 
-        Args:
-            stages: The stages, those that take longest first; they write no further files.
-            executor: Processes; None: this process computes all.
+        The stages that take longest come first; without executor this process computes all.
         """
-        stored = {stage.name: self._read_if_current(stage) for stage in stages}
+        stored = {stage.name: self._read(stage) for stage in stages}
         results = {name: result for name, result in stored.items() if result is not None}
         stale = [stage for stage in stages if stage.name not in results]
         if executor is None or self.folder is None or len(stale) == 1:
@@ -158,60 +197,53 @@ class StageStore:
         with progress_reporter(self.shows_progress) as tick:
             for count, future in enumerate(as_completed(stage_of_future), start=1):
                 stage = stage_of_future[future]
-                with self._report_failures(stage):
-                    result = future.result()
+                with self._report_failures(stage.name):
+                    computed = future.result()
                 with TemporaryDirectory() as scratch:
-                    results[stage.name] = self._write(stage, result, Path(scratch))
+                    results[stage.name] = self._write(stage, computed, Path(scratch))
                 if tick:
                     tick(count / len(stage_of_future))
         return results
 
-    def _read_if_current(self, stage: Stage) -> StageResult | None:
+    def _read(self, stage: Stage[T]) -> StageResult[T] | None:
         """The result in the files of a stage; None where these are missing, changed or outdated."""
-        if self.folder is None or self.fresh or stage.name not in self.folder.stage_files:
+        folder, key, name = self.folder, stage.key, f"{stage.name}.json"
+        if folder is None or self.fresh or name not in folder.files:
             return None
-        part = self.folder.stage_files[stage.name]
-        if part.fingerprint != stage.key:
+        if folder.files[name].source != key:
             return None
-        if problem := self.folder.problem(stage.name):
+        files = folder.made_from(key)
+        if problem := folder.problem(key):
             say(f"warning: {problem}; {stage.name} is computed anew")
+            return None
+        try:
+            document = json.loads(folder.content(name))["result"]
+            numbers = TypeAdapter(stage.kind).validate_python(document)
+        except ValidationError:  # of a front door that named numbers otherwise
             return None
         self.up_to_date.append(stage.name)
         LOG.info("stage %s is taken from its files", stage.name)
-        return self._read(stage.name)
+        arrays = f"{stage.name}.nc"
+        return StageResult(numbers, folder.dataset(arrays) if arrays in files else None, files, key)
 
-    def _read(self, name: str) -> StageResult:
-        """The result in the files of a stage, NAME.json and perhaps NAME.nc."""
-        assert self.folder is not None
-        part = self.folder.stage_files[name]
-        document = json.loads(self.folder.content(f"{name}.json"))["result"]
-        has_data = f"{name}.nc" in part.files
-        data = dataset_of(self.folder.content(f"{name}.nc")) if has_data else None
-        return StageResult(document, data, tuple(part.files), part.fingerprint)
-
-    def _compute(self, stage: Stage) -> StageResult:
-        """Computes the result of a stage, and writes it into its files if there is a folder."""
+    def _compute(self, stage: Stage[T]) -> StageResult[T]:
+        """The result of a stage, computed and written."""
         LOG.info("stage %s is computed", stage.name)
-        if self.folder is None:
-            with progress_reporter(self.shows_progress) as tick:
-                result = stage.run(StageContext(workers=self.workers, tick=tick))
-            return replace(result, document=json.loads(as_json(result.document)))
-        self.folder.require_free(f"{stage.name}.json")
-        self.folder.require_free(f"{stage.name}.nc")
-        samples = self._sample_store(self.folder) if stage.has_samples else None
-        with TemporaryDirectory() as scratch, self._proof_folder(self.folder, stage) as parts:
-            with progress_reporter(self.shows_progress) as tick, self._report_failures(stage):
-                result = stage.run(StageContext(Path(scratch), samples, self.workers, tick, parts))
-            return self._write(stage, result, Path(scratch))
+        folder, workers = self.folder, self.workers
+        with progress_reporter(self.shows_progress) as tick, self._report_failures(stage.name):
+            if folder is None:
+                return StageResult(*stage.run(StageContext(workers=workers, tick=tick)))
+            for ending in (".json", ".nc"):
+                folder.require_free(f"{stage.name}{ending}")
+            samples = self._sample_store(folder) if stage.has_samples else None
+            with TemporaryDirectory() as place, self._proof_folder(folder, stage.key) as parts:
+                context = StageContext(Path(place), samples, workers, tick, parts)
+                return self._write(stage, stage.run(context), Path(place))
 
     @contextmanager
-    def _proof_folder(self, folder: ResultsFolder, stage: Stage) -> Iterator[Path | None]:
-        """Yields the folder of the parts of a stage's proof, which is removed if the stage ends.
-
-        It is named by the stage's fingerprint, so that no other code or case takes what is in it.
-        None where somebody has put a link in its place.
-        """
-        path = folder.path / PARTS / stage.key[:32]
+    def _proof_folder(self, folder: ResultsFolder, key: str) -> Iterator[Path | None]:
+        """Yields the folder of the parts of a stage's proof, which is removed if the stage ends."""
+        path = folder.path / PARTS / key[:32]  # so that no other code or case takes what is in it
         if path.is_symlink() or path.parent.is_symlink():
             yield None
             return
@@ -227,60 +259,45 @@ class StageStore:
                     folder_of_parts.rmdir()
 
     def _sample_store(self, folder: ResultsFolder) -> Path:
-        """Path of the store of samples.
-
-        If there is none yet, the manifest lists it now, so that an interrupted run owns its file.
-
-        Raises:
-            RefusedError: The run is fresh, and there is a store that no manifest lists.
-        """
-        path, is_listed = folder.path / SAMPLES, SAMPLES in folder.stage_files
+        """Path of the store of samples; a fresh run refuses one that no manifest lists."""
+        path, is_listed = folder.path / SAMPLES, SAMPLES in folder.files
         exists = os.path.lexists(path)
         is_allowed = is_listed or not exists or not self.fresh
         cure = "move it away, or leave out --fresh"
         require(is_allowed, str(path), value="listed in no manifest", allowed="none", cure=cure)
         if rank() == 0 and not is_listed and not exists:
-            # without checksums, since the store changes
-            folder.list_files(SAMPLES, "", {SAMPLES: "", f"{SAMPLES}-journal": ""})
+            # listed now, so that an interrupted run owns it; without digests, since it changes
+            folder.add(dict.fromkeys((SAMPLES, f"{SAMPLES}-journal"), Listed("", "")))
         return path
 
-    def _write(self, stage: Stage, result: StageResult, scratch: Path) -> StageResult:
-        """Writes a result and the files in `scratch` into the folder; returns it as read again."""
+    def _write(self, stage: Stage[T], computed: Computed[T], place: Path) -> StageResult[T]:
+        """Writes a result beside the other files of its stage in `place`, into the folder."""
         assert self.folder is not None
-        document = {**origin(self.case_text, stage.key), "result": result.document}
+        name, key = f"{stage.name}.json", stage.key
         if rank() != 0:
-            return replace(result, document=json.loads(as_json(document))["result"])
-        write_text(scratch / f"{stage.name}.json", as_json(document, indent=1))
-        if result.data is not None:
-            result.data.to_netcdf(scratch / f"{stage.name}.nc")
-        self.folder.put(stage.name, stage.key, scratch)
-        return self._read(stage.name)
+            return StageResult(*computed, fingerprint=key)
+        document = {**origin(self.case_text, key), "result": computed.numbers}
+        write_text(place / name, as_json(document, indent=1))
+        if computed.data is not None:
+            computed.data.to_netcdf(place / f"{stage.name}.nc")
+        before = self.folder.files[name].source if name in self.folder.files else ""
+        self.folder.put(key, place, before)
+        return StageResult(*computed, self.folder.made_from(key), key)
 
     @contextmanager
-    def _report_failures(self, stage: Stage) -> Iterator[None]:
-        """Adds the stage to errors in the block, and writes a motion that contradicts a proof.
-
-        Raises:
-            FailedError: A worker process died.
-            ContradictionError: A motion contradicts a proof.
-        """
+    def _report_failures(self, name: str) -> Iterator[None]:
+        """Adds the stage to errors in the block, and writes a motion that contradicts a proof."""
         try:
             yield
         except BrokenExecutor as error:
             cure = "out of memory, or a crash in compiled code; the stages that are done stay"
-            raise FailedError(f"a worker process died in stage {stage.name}", cure) from error
-        except ContradictionError as error:
-            self.put_text("contradiction.csv", columns_text(error.table))
+            raise FailedError(f"a worker process died in stage {name}", cure) from error
+        except FailedError as error:
+            if (table := getattr(error, "table", None)) is not None:  # of a motion
+                self.put_text("contradiction.csv", columns_text(table))
             raise
 
     def put_text(self, name: str, text: str) -> None:
         """Writes a text file of the run itself, such as summary.json."""
         if self.folder is not None and rank() == 0:
-            put_text(self.folder, name, text)
-
-
-def put_text(folder: ResultsFolder, name: str, text: str) -> None:
-    """Writes a text file into a folder of results, and lists it."""
-    with TemporaryDirectory() as scratch:
-        write_text(Path(scratch) / name, text)
-        folder.put(name, "", Path(scratch))
+            self.folder.put_text(name, text)

@@ -18,16 +18,14 @@ from alphacut.frame.structures.linear import modal_damping_ratios
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.fuzzy.result import Nature
-from alphacut.io.files import Document
-from alphacut.questions.question import SuiteResponse
 from alphacut.records.recording import arias_shares
 from alphacut.records.spectrum import spectral_acceleration
-from alphacut.stages.envelope import PEAK_BOUNDS, EnvelopeTask, peaks_document, peaks_from_document
-from alphacut.stages.store import Stage, StageResult
+from alphacut.stages.envelope import PEAK_BOUNDS, EnvelopeTask, PeakResults
+from alphacut.stages.store import Numbers, Stage, Values
 
 FREE_PERIODS = 5
 """Natural periods of free motion after a record: by then 5 % damping leaves a fifth."""
-PERIODS = np.geomspace(0.05, 4.0, 45)
+PERIODS: Array = np.array(np.geomspace(0.05, 4.0, 45), float)
 """Periods of response spectra, in s."""
 NODES = 2
 """Nodes in a step at which peaks are bounded; the error between nodes falls with its square."""
@@ -136,42 +134,28 @@ def with_record(structure: Structure, record: SuiteRecord) -> Structure:
     return replace(structure, model=replace(structure.linear, ground=record.ground))
 
 
-def stages(structure: Structure, task: EnvelopeTask, records: Sequence[SuiteRecord]) -> list[Stage]:
+def stages(
+    structure: Structure, task: EnvelopeTask, records: Sequence[SuiteRecord]
+) -> list[Stage[PeakResults]]:
     """A stage for each record, the longest first."""
     longest = sorted(records, key=lambda record: -record.duration)
     return [_record_stage(structure, task, record) for record in longest]
 
 
-def _record_stage(structure: Structure, task: EnvelopeTask, record: SuiteRecord) -> Stage:
+def _record_stage(
+    structure: Structure, task: EnvelopeTask, record: SuiteRecord
+) -> Stage[PeakResults]:
     """The stage that computes the peaks of a structure under a record."""
     loaded = with_record(structure, record)
     record_task = replace(task, name=record.name, duration=record.duration)
     inputs = [loaded.model, loaded.numbers, record_task]
     compute = partial(record_task.compute_peaks, loaded, nodes=NODES)
-    return Stage(stage_name(record), inputs, ("fuzzy", "frame"), compute)
+    return Stage(stage_name(record), inputs, ("fuzzy", "frame"), PeakResults, compute)
 
 
 def stage_name(record: SuiteRecord) -> str:
     """Name of the files of a record's result."""
     return f"record_{record.name}"
-
-
-def peaks_by_record(
-    results: Mapping[str, StageResult], records: Sequence[SuiteRecord], alpha: Sequence[float]
-) -> dict[str, Peaks]:
-    """Peaks under each record by its name."""
-    return {
-        record.name: peaks_from_document(results[stage_name(record)].document["peak"], alpha)
-        for record in records
-    }
-
-
-def suite_response(
-    peaks: Mapping[str, Peaks], records: Sequence[SuiteRecord], mode: NominalMode
-) -> SuiteResponse:
-    """Motions under all records, to which questions are put."""
-    measures = {record.name: record.measures for record in records}
-    return SuiteResponse(mode.period, mode.ratio, measures, peaks)
 
 
 def worst_peaks(peaks: Mapping[str, Peaks]) -> Peaks:
@@ -209,37 +193,69 @@ def with_means(worst: Peaks, peaks: Mapping[str, Peaks]) -> Peaks:
     return joined(worst, mean)
 
 
-def document(
-    peaks: Mapping[str, Peaks], records: Sequence[SuiteRecord], mode: NominalMode
-) -> Document:
-    """Numbers on a suite: measures and peaks of each record, statistics of peaks, and spectra."""
+class RecordResult(Numbers):
+    """Peaks under a record, and its measures in m/s² but for "scale", 1."""
+
+    duration_s: float
+    cut_share: float
+    measures: dict[str, float]
+    peak: PeakResults
+
+
+class Statistics(Numbers):
+    """Mean and quantiles over the records by name, on each level: proved, and reached."""
+
+    proved: dict[str, Values]
+    reached: dict[str, Values]
+
+
+class SuiteResult(Numbers):
+    """Measures and peaks of each record, statistics of peaks, and response spectra in m/s²."""
+
+    period_s: float
+    damping_ratio: float
+    alpha: Values
+    records: dict[str, RecordResult]
+    statistics: dict[str, Statistics]
+    spectra: dict[str, Values]
+    units: dict[str, str]
+
+
+def suite_result(
+    peaks: Mapping[str, PeakResults],
+    records: Sequence[SuiteRecord],
+    mode: NominalMode,
+    alpha: Sequence[float],
+    units: Mapping[str, str],
+) -> SuiteResult:
+    """Numbers on a suite, from the peaks under each record by its name."""
     first = next(iter(peaks.values()))
-    outputs = {
-        name: {
-            "proved": statistics(np.stack([x.most(name).upper for x in peaks.values()])),
-            "reached": statistics(np.stack([x.most(name).lower for x in peaks.values()])),
-        }
-        for name in first.outputs
-    }
-    return {
-        "period_s": mode.period,
-        "damping_ratio": mode.ratio,
-        "alpha": first.alpha,
-        "records": {
-            record.name: {
-                "duration_s": record.duration,
-                "cut_share": record.cut_share,
-                "measures": dict(record.measures),
-                "peak": peaks_document(peaks[record.name]),
-            }
+    return SuiteResult(
+        period_s=mode.period,
+        damping_ratio=mode.ratio,
+        alpha=np.array(alpha),
+        records={
+            record.name: RecordResult(
+                duration_s=record.duration,
+                cut_share=record.cut_share,
+                measures=dict(record.measures),
+                peak=peaks[record.name],
+            )
             for record in records
         },
-        "statistics": outputs,
-        "spectra": {
+        statistics={
+            name: Statistics(
+                proved=statistics([x[name].proved for x in peaks.values()], peak.is_least),
+                reached=statistics([x[name].reached for x in peaks.values()], peak.is_least),
+            )
+            for name, peak in first.items()
+        },
+        spectra={
             "period_s": PERIODS,
             **{record.name: spectrum(record.ground, mode) for record in records},
         },
-    }
+        units=dict(units),
+    )
 
 
 def spectrum(ground: Accelerogram, mode: NominalMode) -> Array:
@@ -248,9 +264,13 @@ def spectrum(ground: Accelerogram, mode: NominalMode) -> Array:
     return np.array([spectral_acceleration(ground, float(x), ratio) for x in PERIODS])
 
 
-def statistics(values: Array) -> Document:
-    """Mean and quantiles over records of values (records, levels), each by level."""
+def statistics(values: Sequence[Array], is_least: bool) -> dict[str, Array]:
+    """Mean and quantiles by name over records of values (levels,); of least values from above."""
+    sign = -1.0 if is_least else 1.0
+    rows = sign * np.stack(values)
     return {
-        name: values.mean(0) if share is None else np.quantile(values, share, axis=0)
-        for name, share in QUANTILES.items()
+        name: np.asarray(
+            sign * (rows.mean(0) if x is None else np.quantile(rows, x, axis=0)), float
+        )
+        for name, x in QUANTILES.items()
     }

@@ -1,11 +1,10 @@
-"""Style of the microstructure's figures, and their files: SVG and PNG, replaced at once."""
+"""Style of all figures of the project, and their files: SVG and PNG, replaced at once."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -14,6 +13,7 @@ if TYPE_CHECKING:
 
 # Okabe & Ito
 INK, BLUE, ORANGE, GREEN = "#1a1a1a", "#0072b2", "#d55e00", "#009e73"
+PURPLE = "#7b3294"  # differs from blue and orange in lightness
 GREY, PALE, LIGHT = "#8c8c8c", "#dce9f2", "#9ecae1"
 SETTINGS: dict[str, Any] = {
     "font.size": 10,
@@ -23,6 +23,8 @@ SETTINGS: dict[str, Any] = {
     "grid.color": "#e6e6e6",
     "grid.linewidth": 0.6,
     "axes.axisbelow": True,
+    "axes.edgecolor": INK,
+    "axes.labelcolor": INK,
     "legend.frameon": False,
     "figure.constrained_layout.use": True,
     "svg.fonttype": "none",
@@ -32,12 +34,12 @@ SETTINGS: dict[str, Any] = {
 
 
 @contextmanager
-def figure_style(more: Mapping[str, object] = MappingProxyType({})) -> Iterator[None]:
-    """Context manager that sets this style; `more` are further settings of Matplotlib."""
+def figure_style() -> Iterator[None]:
+    """Context manager that sets this style."""
     import matplotlib as mpl
 
     mpl.use("Agg")
-    with mpl.rc_context({**SETTINGS, **more}):
+    with mpl.rc_context(SETTINGS):
         yield
 
 
@@ -59,8 +61,9 @@ def save(figure: Figure, stem: Path) -> list[Path]:
     stem.parent.mkdir(parents=True, exist_ok=True)
     files = []
     for kind in ("svg", "png"):
-        partial, file = stem.with_suffix(f".partial.{kind}"), stem.with_suffix(f".{kind}")
+        partial, file = (stem.with_name(f"{stem.name}{x}.{kind}") for x in (".partial", ""))
         figure.savefig(partial, metadata={"Date": None} if kind == "svg" else None)
         files.append(partial.replace(file))
+        figure.set_layout_engine("none")  # laid out once, for both files
     plt.close(figure)
     return files

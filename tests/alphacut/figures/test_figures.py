@@ -14,6 +14,7 @@ from alphacut.fuzzy import Triangular
 from alphacut.report.page import caption
 from alphacut.rve import Cell, Phase
 from alphacut.stochastic import HermiteMap
+from alphacut.stochastic.figures.style import figure_style
 from tests.alphacut.one_case import run
 
 
@@ -62,7 +63,7 @@ def study(nature, **more):
 @pytest.mark.parametrize(("nature", "lines"), [("estimated", 2), ("guaranteed", 0)])
 def test_the_error_is_drawn_outside_bounds_that_it_may_pass(nature, lines):
     data = study(nature, error=0.25 * np.ones((2, 11, 1)))
-    with style.report_style():
+    with figure_style():
         _, axes = style.figure()
         words = envelope.draw_error_band(
             axes, data["time"].values, data.sel(output="q1").isel(alpha=0), nature, "m"
@@ -103,7 +104,7 @@ def test_an_image_shows_its_phases_and_the_cuts_of_its_modulus():
         },
         {"alpha": [0.0, 1.0], "bound": ["lower", "upper"]},
     )
-    with style.report_style():
+    with figure_style():
         picture, cuts = material.image(data).axes
     assert picture.images[0].get_array().shape == (4, 4)
     ends = np.concatenate([line.get_xdata() for line in cuts.lines])
@@ -112,7 +113,7 @@ def test_an_image_shows_its_phases_and_the_cuts_of_its_modulus():
 
 def test_numbers_and_bounds_are_drawn_with_their_own_ends():
     number = Triangular(1.0, 2.0, 4.0)
-    with style.report_style():
+    with figure_style():
         _, axes = style.figure()
         (line,) = number.plot(axes, color="red").lines
         assert line.get_xydata().tolist() == [[1, 0], [1, 0], [2, 1], [2, 1], [4, 0], [4, 0]]
@@ -131,7 +132,7 @@ def test_numbers_and_bounds_are_drawn_with_their_own_ends():
 
 def test_a_mesh_and_six_cuts_are_those_of_the_case():
     cell = Cell(Phase(20e9), Phase(80e9), HermiteMap(0.2, 0.1, 0.6, 0.1))
-    with style.report_style():
+    with figure_style():
         plane, density, prisms = overview.domains(cell, 0.5, 3).axes
         cuts = fuzzy_numbers.alpha_cuts(Triangular(75e9, 80e9, 85e9))
     assert "3 layers" in density.get_title(loc="left")

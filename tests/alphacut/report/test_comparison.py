@@ -7,7 +7,7 @@ import re
 import pytest
 
 from alphacut.entry import main
-from alphacut.report.markup import latex, markdown
+from alphacut.report.tables import Table, latex, markdown
 from tests.alphacut.one_case import run
 
 
@@ -69,7 +69,7 @@ def test_what_cannot_be_compared_is_said_in_one_line(runs, words, message, capsy
 
 
 def test_special_letters_are_those_of_the_language():
-    table = ("a_b", "50 %"), [("x|y", "1 … 2")]
+    table = Table(("a_b", "50 %"), [("x|y", "1 … 2")])
     assert markdown(table) == "| a_b | 50 % |\n| --- | ---: |\n| x\\|y | 1 … 2 |\n"
     assert r"a\_b & 50 \%" in latex(table)
     assert r"1 \dots{} 2" in latex(table)

@@ -5,10 +5,10 @@ from dataclasses import replace
 import pytest
 
 from alphacut.case.load import load
+from alphacut.commands.pipeline import campaign_of
 from alphacut.fuzzy.refused import FailedError
 from alphacut.fuzzy.result import Nature
-from alphacut.stages.modulus import PLANS
-from alphacut.stages.readiness import campaign_of
+from alphacut.stages.campaign import PLANS
 from tests.alphacut.small import CELL, written
 
 MODELS = {

@@ -11,21 +11,22 @@ from types import FunctionType
 import numpy as np
 import pytest
 import xarray
+from pydantic import TypeAdapter
 
 import alphacut
 from alphacut.case.content import Content
 from alphacut.case.load import Case, load
+from alphacut.commands.pipeline import Pipeline
 from alphacut.entry import main
 from alphacut.frame.questions.peaks import Peaks
 from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import as_json
-from alphacut.io.manifest import ResultsFolder
-from alphacut.io.netcdf import read_summary, require_same_run
+from alphacut.io.results import ResultsFolder
+from alphacut.questions.summary import Summary
 from alphacut.stages import envelope, modulus
-from alphacut.stages.pipeline import Pipeline
 from alphacut.stages.results import Results
-from alphacut.stages.store import Stage, StageResult, StageStore
+from alphacut.stages.store import Computed, Stage, StageStore
 from tests.alphacut.small import CELL, FRAME, SMALLER, written
 
 ROOT = Path(alphacut.__file__).resolve().parents[1]
@@ -37,9 +38,9 @@ def counted():
 
     def compute(work):
         calls.append(work)
-        return StageResult({"count": len(calls)}, xarray.Dataset({"x": ((), len(calls))}))
+        return Computed({"count": len(calls)}, xarray.Dataset({"x": ((), len(calls))}))
 
-    return calls, lambda inputs: Stage("thing", inputs, ("fuzzy",), compute)
+    return calls, lambda inputs: Stage("thing", inputs, ("fuzzy",), dict[str, int], compute)
 
 
 def store_in(folder, **options):
@@ -52,7 +53,7 @@ def test_a_stage_is_computed_once_until_its_inputs_change(tmp_path):
     store = store_in(tmp_path)
     results = [store.take(of(value)) for value in (1, 1, 2, 2)]
     assert [int(result.arrays.x) for result in results] == [1, 1, 2, 2]
-    assert [result.document["count"] for result in results] == [1, 1, 2, 2]
+    assert [result.numbers["count"] for result in results] == [1, 1, 2, 2]
     assert len(calls) == 2
     assert int(store_in(tmp_path, fresh=True).take(of(2)).arrays.x) == 3
     assert json.loads((tmp_path / "thing.json").read_text())["case"] == "the case"
@@ -81,7 +82,7 @@ def test_a_stage_that_fails_leaves_no_file(tmp_path):
         raise RuntimeError("no convergence")
 
     with pytest.raises(RuntimeError, match="no convergence"):
-        store_in(tmp_path).take(Stage("thing", 1, ("fuzzy",), compute))
+        store_in(tmp_path).take(Stage("thing", 1, ("fuzzy",), dict, compute))
     assert not list(tmp_path.iterdir())
 
 
@@ -94,15 +95,15 @@ def test_parts_of_a_proof_stay_until_the_stage_ends_and_are_its_own(tmp_path):
         (work.parts / f"part-{len(seen)}.npz").touch()
         if len(seen) < 3:
             raise FailedError("killed")
-        return StageResult({})
+        return Computed({})
 
     for inputs in (1, 2):
         with pytest.raises(FailedError, match="killed"):
-            store_in(tmp_path).take(Stage("thing", inputs, ("fuzzy",), compute))
-    store_in(tmp_path).take(Stage("thing", 1, ("fuzzy",), compute))
+            store_in(tmp_path).take(Stage("thing", inputs, ("fuzzy",), dict, compute))
+    store_in(tmp_path).take(Stage("thing", 1, ("fuzzy",), dict, compute))
     assert seen == [[], [], ["part-1.npz"]]
     assert len(list((tmp_path / "parts").iterdir())) == 1
-    store_in(tmp_path, fresh=True).take(Stage("thing", 2, ("fuzzy",), compute))
+    store_in(tmp_path, fresh=True).take(Stage("thing", 2, ("fuzzy",), dict, compute))
     assert seen[-1] == []
     assert not (tmp_path / "parts").exists()
 
@@ -112,10 +113,12 @@ def test_a_link_in_place_of_the_parts_is_not_followed(tmp_path):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "parts").symlink_to(tmp_path / "elsewhere")
     folders = []
-    stage = Stage(
-        "thing", 1, ("fuzzy",), lambda work: folders.append(work.parts) or StageResult({})
-    )
-    store_in(tmp_path / "out").take(stage)
+
+    def compute(work):
+        folders.append(work.parts)
+        return Computed({})
+
+    store_in(tmp_path / "out").take(Stage("thing", 1, ("fuzzy",), dict, compute))
     assert folders == [None]
     assert (tmp_path / "elsewhere").is_dir()
 
@@ -135,7 +138,7 @@ def test_a_worker_that_dies_names_its_stage(tmp_path):
     def compute(work):
         raise BrokenExecutor("killed")
 
-    stage = Stage("thing", 1, ("fuzzy",), compute)
+    stage = Stage("thing", 1, ("fuzzy",), dict, compute)
     with pytest.raises(FailedError, match="a worker process died in stage thing; out of memory"):
         store_in(tmp_path).take(stage)
 
@@ -161,7 +164,7 @@ def test_a_modulus_is_handed_to_the_structure(tmp_path):
     results = Pipeline(Results(content), store_in(tmp_path / "out")).run()
     number = modulus.fuzzy_modulus(results.modulus.arrays)
     assert results.structure.numbers["E"] == number
-    assert results.document()["envelopes"]["all"]["fuzzy"] == ["E", "m"]
+    assert results.envelopes["all"].numbers.fuzzy == ("E", "m")
 
 
 @pytest.mark.slow
@@ -209,17 +212,17 @@ def test_a_borrowed_folder_is_not_believed(tmp_path):
     folder = tmp_path / "out"
     assert main(["run", str(written(tmp_path, CELL)), "--out", str(folder), "--no-figures"]) == 0
     results = ResultsFolder.read(folder)
-    summary = read_summary(results)
-    require_same_run(summary, results)
+    summary = Summary.read(results)
+    summary.require_run_of(results)
     with pytest.raises(RefusedError, match="of another run"):
-        require_same_run({**summary, "fingerprints": {"modulus": "other"}}, results)
+        summary.model_copy(update={"fingerprints": {"modulus": "other"}}).require_run_of(results)
     for text in ("", "[]", "{}", "[" * 100_000, '{"case": 1}', "null"):
         (folder / "summary.json").write_text(text)
         with pytest.raises(RefusedError, match="damaged"):
-            read_summary(ResultsFolder.read(folder))
+            Summary.read(ResultsFolder.read(folder))
 
 
-def test_peaks_pass_through_a_document_with_their_infinite_bounds():
+def test_peaks_pass_through_json_with_their_infinite_bounds():
     """An unknown bound never excludes a peak: of "max q1" the least one may be −∞."""
     row = np.array([[1.0, 2.0]])
     peaks = Peaks(
@@ -233,7 +236,7 @@ def test_peaks_pass_through_a_document_with_their_infinite_bounds():
         least_reached=np.array([[1.5, np.inf]]),
         natures=(Nature.GUARANTEED, Nature.ATTAINED),
     )
-    document = json.loads(as_json(envelope.peaks_document(peaks)))
-    again = envelope.peaks_from_document(document, [0.0])
+    kind, text = TypeAdapter(envelope.PeakResults), as_json(envelope.peak_results(peaks))
+    again = envelope.peaks_of(kind.validate_json(text), [0.0])
     for name in ("lower", "upper", "error", "reached", "least_proved", "least_reached"):
         assert getattr(again, name).tolist() == getattr(peaks, name).tolist(), name

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from alphacut.entry import main
-from alphacut.io.manifest import ResultsFolder
+from alphacut.io.results import Listed, ResultsFolder
 from tests.alphacut.small import CELL, written
 
 
@@ -156,8 +156,9 @@ def check_damage(finished, place, seed, kinds, capfd):
         assert numbers(copy) == numbers(finished[1]), label
         assert not ResultsFolder.read(copy).is_damaged, label
         listed = ResultsFolder.read(copy)
-        stages = listed.stage_files.keys() - {"report.html", "samples.db"}
-        assert not list(filter(None, map(listed.problem, stages))), label
+        sources = {entry.source for entry in listed.files.values()} - {""}
+        assert sources, label
+        assert not list(filter(None, map(listed.problem, sources))), label
     return statuses, label
 
 
@@ -192,16 +193,16 @@ def test_what_was_changed_or_is_no_file_is_not_removed(tmp_path):
     for name in names:
         (source / name).write_text(name)
     folder = ResultsFolder(out)
-    folder.put("figures", "1", source)
+    folder.put("1", source)
     (out / "changed").write_text("precious")
     (out / "pipe").unlink()
     os.mkfifo(out / "pipe")
     for name in names:
         (source / name).unlink()
     (source / "other").write_text("other")
-    folder.put("figures", "2", source)
+    folder.put("2", source, before="1")
     assert sorted(x.name for x in out.iterdir()) == ["changed", "manifest.json", "other", "pipe"]
-    folder.list_files("figures", "3", {"pipe": ""})
+    folder.add({"pipe": Listed("", "3")})
     folder.clear()
     assert (out / "pipe").is_fifo()
 
@@ -209,7 +210,7 @@ def test_what_was_changed_or_is_no_file_is_not_removed(tmp_path):
 def test_a_manifest_lists_no_file_outside(tmp_path):
     (tmp_path / "precious").write_text("precious")
     (tmp_path / "out").mkdir()
-    ResultsFolder(tmp_path / "out").list_files("figures", "1", {"../precious": ""})
+    ResultsFolder(tmp_path / "out").add({"../precious": Listed("", "1")})
     folder = ResultsFolder.read(tmp_path / "out")
     folder.clear()
     assert (tmp_path / "precious").exists()

@@ -1,0 +1,298 @@
+"""The stages of a case, one after the other; and what they need, so that `check` refuses it too."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Executor
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from alphacut import frame
+from alphacut.case.content import Content
+from alphacut.case.limits import QuestionSection
+from alphacut.case.loads import RecordsSection
+from alphacut.case.structure import Structure
+from alphacut.frame.questions.peaks import Peaks
+from alphacut.fuzzy import Crisp, FuzzyNumber, Triangular
+from alphacut.fuzzy.refused import RefusedError, require
+from alphacut.io.files import Document, say
+from alphacut.questions.decision import decide
+from alphacut.questions.fragility import fragility
+from alphacut.questions.probability import probability
+from alphacut.questions.question import Answer, FuzzyResponse, SuiteResponse
+from alphacut.questions.summary import ANSWERS
+from alphacut.questions.tolerances import admissible_tolerances, require_admissible_scale
+from alphacut.stages import campaign, cell, envelope, identify, image, microstructure, shares, suite
+from alphacut.stages.campaign import CellCampaign
+from alphacut.stages.envelope import EnvelopeTask, PeakResults, peaks_of
+from alphacut.stages.modulus import fuzzy_loss, fuzzy_modulus, require_levels
+from alphacut.stages.results import Results
+from alphacut.stages.store import Computed, Stage, StageContext, StageResult, StageStore
+from alphacut.stochastic.sections import Simulated
+
+if TYPE_CHECKING:
+    import xarray
+
+QUESTIONS: dict[str, Callable[[Any, FuzzyResponse], Answer]] = {
+    "probability": probability,
+    "decision": decide,
+    "tolerances": admissible_tolerances,
+    "fragility": fragility,
+}
+"""Function from the section of each question and a response to the answer, by the section's key."""
+
+
+@dataclass
+class Pipeline:
+    """A run of the stages of a case; envelopes are computed side by side by `executor`."""
+
+    results: Results
+    store: StageStore
+    petsc: Mapping[str, str] = field(default_factory=dict)
+    figures: bool = True
+    executor: Executor | None = None
+
+    @property
+    def content(self) -> Content:
+        """The sections of the case."""
+        return self.results.content
+
+    def run(self) -> Results:
+        """Computes every stage of the case; returns their results."""
+        results, stages = self.results, self.content.stages
+        if "microstructure" in stages:
+            results.microstructure = self.compute_microstructure()
+            radius = microstructure.radius_of(results.microstructure)
+            results.content = self.content.model_copy(update={"radius": radius})
+        if "modulus" in stages:
+            self.compute_modulus()
+        if "envelope" in stages:
+            data = results.modulus or results.image
+            self._compute_motion(self.structure(None if data is None else data.arrays))
+        cells = self.campaign if results.modulus is not None else None
+        richest_task = max(results.tasks, key=lambda x: (len(x.fuzzy), x.duration), default=None)
+        results.shares = self.store.take(shares.stage(cells, results.structure, richest_task))
+        return results
+
+    def compute_microstructure(self) -> StageResult[Document]:
+        """Result of stage microstructure: the radius map of the particles."""
+        section = self.content.microstructure
+        if section is None:
+            raise RefusedError("microstructure", None, "a section [microstructure]")
+        stage = microstructure.stage(section, self.content.has_spheres, self.figures)
+        return self.store.take(stage)
+
+    @property
+    def campaign(self) -> CellCampaign:
+        """Samples of a round cell."""
+        return campaign_of(self.content, self.petsc)
+
+    def compute_modulus(self) -> None:
+        """Computes stage modulus, of an image or of samples of a cell, and checks its errors."""
+        results, section = self.results, self.content.modulus
+        if self.content.image_cell is not None:
+            stage = image.stage(self.content.image_cell, section.alpha, section.average)
+            results.image = self.store.take(stage)
+            return
+        results.modulus = result = self.store.take(campaign.stage(self.campaign))
+        cell.require_tolerance(result.numbers.error, section.tolerance)
+        young = result.arrays["E"].transpose("alpha", "bound").values[-1]
+        particles = self.campaign.cell.particles
+        cell.require_bounds((young[0], young[1]), result.numbers.references, particles)
+
+    def structure(self, data: xarray.Dataset | None, key: str = "modulus") -> Structure:
+        """The structure of the case with modulus and loss factor of stage modulus, else as stated.
+
+        `key` is the option or key that names the data, for messages.
+        """
+        content, structure = self.content, self.content.structure
+        young = None if data is None else fuzzy_modulus(data, key)
+        loss = None if data is None else fuzzy_loss(data)
+        if structure is None or content.envelope is None:
+            raise RefusedError("envelope", None, "a structure and a section [envelope]")
+        has_modulus = young is not None or content.has_stated_modulus
+        allowed = "a modulus, or --modulus FILE.nc"
+        require(has_modulus, "frame.modulus", value=None, allowed=allowed)
+        has_damping = loss is not None or not content.has_material_damping
+        allowed = "loss factors of the cell, or a number"
+        require(has_damping, "frame.damping_ratio", value="material", allowed=allowed)
+        return structure if data is None else content.structure_of(young, loss)
+
+    def compute_envelopes(self, structure: Structure, studies: bool = True) -> None:
+        """Computes the envelopes of all studies, or of [envelope] alone, into the results."""
+        results, section, content = self.results, self.content.envelope, self.content
+        assert section is not None
+        results.structure = structure
+        for warning in cut_record_warnings(content, structure):
+            say(f"warning: {warning}")
+        limited = content.limited_outputs
+        results.tasks = envelope.tasks(section, content.study if studies else (), limited)
+        longest_first = sorted(results.tasks, key=lambda task: -len(task.fuzzy) * task.duration)
+        stages = [envelope.stage(structure, task) for task in longest_first]
+        outcomes = self.store.take_all(stages, self.executor)
+        for task in results.tasks:
+            result = outcomes[f"envelope_{task.name}"]
+            envelope.require_tolerance(result, task, structure)
+            results.envelopes[task.name] = result
+
+    def _compute_motion(self, structure: Structure) -> None:
+        """Computes the identified inputs, then the suite of records or envelopes, and answers."""
+        results, content = self.results, self.content
+        assert content.envelope is not None
+        (task,) = envelope.tasks(content.envelope, ())  # of [envelope] itself
+        if content.identify is not None:
+            measured, alpha = content.identify, task.section.alpha
+            results.learned, structure = identify.identify_inputs(measured, structure, alpha)
+        if content.records is not None:
+            self._compute_suite(content.records, structure, task)
+            return
+        self.compute_envelopes(structure)
+        peaks = self._limited_peaks(replace(task, limited=content.limited_outputs), structure)
+        self._answer(response_of(structure, task, peaks))
+
+    def _answer(self, response: FuzzyResponse) -> None:
+        """Answers all questions of the case about a response, into the results."""
+        for kind in ANSWERS:
+            if (section := self.content.questions.get(kind.key)) is not None:
+                compute, inputs = partial(answer_of, section, response), [section, response]
+                packages = ("fuzzy", "frame", "alphacut")
+                stage = Stage(section.key, inputs, packages, kind, compute)
+                self.results.answers[section.key] = self.store.take(stage).numbers
+
+    def _compute_suite(
+        self, section: RecordsSection, structure: Structure, task: EnvelopeTask
+    ) -> None:
+        """Computes peaks under each record of a suite, and answers about them, into the results."""
+        results, alpha = self.results, task.section.alpha
+        results.structure = structure
+        mode = suite.nominal_mode(structure)
+        records = suite.suite_records(section, task.section, structure)
+        for warning in suite.suite_warnings(records):
+            say(f"warning: {warning}")
+        limited = self.content.limited_outputs or structure.outputs
+        stages = suite.stages(structure, replace(task, limited=limited), records)
+        outcomes = self.store.take_all(stages, self.executor)
+        by_record = {record.name: outcomes[suite.stage_name(record)].numbers for record in records}
+        units = {name: structure.unit(name) for name in envelope.outputs_of(limited)}
+        results.suite = suite.suite_result(by_record, records, mode, alpha, units)
+        peaks = {name: peaks_of(result, alpha) for name, result in by_record.items()}
+        worst = suite.with_means(suite.worst_peaks(peaks), peaks)
+        measures = {record.name: record.measures for record in records}
+        motions = SuiteResponse(mode.period, mode.ratio, measures, peaks)
+        self._answer(replace(response_of(structure, task, worst), suite=motions))
+
+    def _limited_peaks(self, task: EnvelopeTask, structure: Structure) -> Peaks | None:
+        """Peaks for questions: of the study with [envelope]'s motion, else computed alone."""
+        alpha = task.section.alpha
+        for study in self.results.tasks:
+            if study.has_motion_of(task.section):
+                return peaks_of(self.results.envelopes[study.name].numbers.peak, alpha)
+        if not task.limited:
+            return None
+        inputs = [structure.model, structure.numbers, task]
+        compute = partial(task.compute_peaks, structure)
+        stage = Stage("peaks", inputs, ("fuzzy", "frame"), PeakResults, compute)
+        return peaks_of(self.store.take(stage).numbers, alpha)
+
+
+def answer_of(
+    section: QuestionSection, response: FuzzyResponse, context: StageContext
+) -> Computed[Answer]:
+    """The answer to the question of a section about a response."""
+    return Computed(QUESTIONS[section.key](section, replace(response, progress=context.tick)))
+
+
+def response_of(
+    structure: Structure, task: EnvelopeTask, peaks: Peaks | None = None
+) -> FuzzyResponse:
+    """The fuzzy response of [envelope], about which questions are asked."""
+    alpha, step = task.section.alpha, task.section.step
+    return FuzzyResponse(structure, task.fuzzy, alpha, task.duration, step, peaks)
+
+
+def campaign_of(content: Content, petsc: Mapping[str, str] | None = None) -> CellCampaign:
+    """Samples of a cell that is no image, by a solver with options of PETSc."""
+    sections = *content.random_cell, content.mesh, content.modulus
+    return CellCampaign(*sections, petsc or {}, content.stated_fraction)
+
+
+def require_runnable(content: Content) -> None:
+    """Reads and builds all that the stages of a case need, so that `check` refuses it too."""
+    stages = content.stages
+    if "microstructure" in stages and content.microstructure is not None:
+        study = content.microstructure.study(spheres=content.has_spheres)
+        if not isinstance(study.source, Simulated):
+            study.source.read()
+    if "modulus" in stages:
+        _require_material(content)
+    if "envelope" in stages:
+        _require_motion(content)
+
+
+def _require_material(content: Content) -> None:
+    """Requires a mesh, an image or a model of the cell that stage modulus can use."""
+    if "envelope" in content.stages and not content.has_stated_modulus:
+        require_levels(content.modulus.alpha, "modulus.alpha")
+    if content.mesh_cell is not None:
+        cell.require_mesh(content.mesh, *content.law_and_phases)
+    if content.image_cell is not None:
+        image.image_study(content.image_cell)
+    elif "microstructure" not in content.stages:
+        _ = campaign_of(content).propagation  # builds the model and the plan
+    elif content.particle_cell is not None:
+        cell.model_of(content.particle_cell, content.mesh, content.modulus)
+
+
+def _require_motion(content: Content) -> None:
+    """Requires that identification, each study's envelope and each question can be computed."""
+    if content.structure is None or content.envelope is None:
+        return
+    alpha, structure = content.envelope.alpha, _with_stand_ins(content, content.structure)
+    if content.identify is not None:
+        identify.require_learnable(content.identify, structure, alpha)
+    if content.records is not None:
+        records = suite.suite_records(content.records, content.envelope, structure)
+        structure = suite.with_record(structure, records[0])  # which stands for all
+    for task in envelope.tasks(content.envelope, content.study):
+        frame.require_envelope(**task.arguments(structure))
+    if content.tolerances is not None:
+        (own_task,) = envelope.tasks(content.envelope, ())  # of [envelope], as questions are
+        require_admissible_scale(content.tolerances, response_of(structure, own_task))
+
+
+def _with_stand_ins(content: Content, structure: Structure) -> Structure:
+    """The structure with numbers as fuzzy as those that stage modulus will compute."""
+    if "modulus" not in content.stages:
+        return structure
+    numbers, is_crisp = dict(structure.numbers), content.modulus.alpha == (1.0,)
+    is_fuzzy = content.image_cell is not None or "microstructure" in content.stages
+    if not is_fuzzy:
+        inputs = campaign_of(content).inputs.values()
+        is_fuzzy = any(number.support.width > 0 for number in inputs)
+    if "E" in numbers:
+        numbers["E"] = _stand_in(numbers["E"], 0.01 if is_fuzzy and not is_crisp else 0.0)
+    losses = [x for pair in content.cell.losses for x in pair if x] if content.cell else []
+    is_fuzzy = is_fuzzy or any(x.support.width > 0 for x in losses)
+    if content.has_material_damping and is_fuzzy and not is_crisp:
+        ratios = {name for name in numbers if re.fullmatch(r"zeta\d*", name)}
+        numbers |= {name: _stand_in(numbers[name], 0.1) for name in ratios}
+    return replace(structure, numbers=numbers)
+
+
+def _stand_in(number: FuzzyNumber, share: float) -> FuzzyNumber:
+    """A number with the same modal value, fuzzy by a share of it."""
+    modal = number.modal
+    return Triangular((1 - share) * modal, modal, (1 + share) * modal) if share else Crisp(modal)
+
+
+def cut_record_warnings(content: Content, structure: Structure) -> Iterator[str]:
+    """Yields a warning if the structure's record goes on after the end of all motions."""
+    linear = structure.linear
+    if linear is None or linear.ground is None or content.envelope is None:
+        return
+    length = linear.ground.step * (len(linear.ground.acceleration) - 1)
+    longest = max(task.duration for task in envelope.tasks(content.envelope, content.study))
+    if length > longest * (1 + 1e-9):
+        yield f"the record lasts {length:g} s, and the motion is computed for {longest:g} s"

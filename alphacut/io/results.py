@@ -1,0 +1,255 @@
+"""A folder of results, each known by its digest: nothing else is believed, followed or removed.
+
+The list, manifest.json, has for every file its SHA-256 and the digest of what it was made from. A
+file is compared with the former before a library opens it, and none is read or written through a
+link. The list is written before the files take their places: a run that is killed leaves no file
+of unknown origin, at worst one that does not match and is computed anew.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+import stat
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Self
+
+from pydantic import AfterValidator, TypeAdapter, ValidationError
+
+from alphacut.fuzzy.refused import RefusedError, require
+from alphacut.io.files import as_json, whole_file
+from alphacut.io.provenance import FORMAT, door
+
+if TYPE_CHECKING:
+    import xarray
+
+MANIFEST = "manifest.json"
+PLAIN = re.compile(r"(figures/)?(?!.*\.\.)[\w+-][\w.+-]{0,100}")
+"""Names of files in a folder of results or its folder of figures, which lead to no other."""
+READ_ONLY = os.O_RDONLY | sum(
+    getattr(os, flag, 0) for flag in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY")
+)
+RUN = door("run", "CASE.toml")
+COMPLETE = "whole results of a run"
+"""Allowed state of a folder of results."""
+RUN_AGAIN = f"make it anew by {RUN}"
+"""Cure of files that were changed."""
+
+
+def plain_name(name: str) -> str:
+    """The name of a file in a folder of results or its folder of figures; ValueError of others."""
+    if PLAIN.fullmatch(name) is None:
+        raise ValueError("no plain name")
+    return name
+
+
+class Listed(NamedTuple):
+    """What is known of a file.
+
+    Args:
+        digest: SHA-256 of its content; "" of a store of samples, whose rows have checksums.
+        source: Digest of everything that it was made from; "" of a text of the run itself.
+    """
+
+    digest: str
+    source: str
+
+
+FILES = TypeAdapter(dict[Annotated[str, AfterValidator(plain_name)], Listed])
+
+
+@dataclass
+class ResultsFolder:
+    """A folder of results, which may be a link itself, and what is known of its files by name.
+
+    Where its list is damaged a run replaces files although none lists them.
+    """
+
+    path: Path
+    files: dict[str, Listed] = field(default_factory=dict)
+    is_damaged: bool = False
+
+    @classmethod
+    def read(cls, path: Path) -> Self:
+        """The folder with what manifest.json lists; nothing where that is missing or damaged.
+
+        Raises:
+            RefusedError: The list is of another format or program, or no regular file.
+        """
+        file = path / MANIFEST
+        if not os.path.lexists(file):
+            return cls(path)
+        try:
+            document = json.loads(read_regular(file))
+        except OSError as error:
+            raise RefusedError(str(file), str(error), "a regular file of this program") from None
+        except (ValueError, RecursionError):
+            return cls(path, is_damaged=True)
+        if not isinstance(document, dict):
+            return cls(path, is_damaged=True)
+        version = document.get("format_version")
+        value, allowed = f"of format {version}", f"files of format {FORMAT}"
+        cure = "name another folder" if version is None else RUN_AGAIN
+        require(version == FORMAT, str(file), value=value, allowed=allowed, cure=cure)
+        try:
+            files = FILES.validate_python(document.get("files"))
+        except ValidationError:
+            return cls(path, is_damaged=True)
+        is_whole = document.get("checksum") == digest_of(json.dumps(files).encode())
+        return cls(path, files) if is_whole else cls(path, is_damaged=True)
+
+    def made_from(self, source: str) -> tuple[str, ...]:
+        """Names of the files that were made from what has this digest."""
+        return tuple(name for name, entry in self.files.items() if entry.source == source)
+
+    def problem(self, source: str) -> str:
+        """What is wrong with a file made from this, such as "modulus.nc was changed"; else ""."""
+        for name in self.made_from(source):
+            try:
+                self.content(name)
+            except RefusedError as error:
+                return f"{name} {error.value}"
+        return ""
+
+    def content(self, name: str) -> bytes:
+        """The content of a listed file, which is what was written.
+
+        Raises:
+            RefusedError: The file is not listed, missing, changed, or a link.
+        """
+        if name not in self.files:
+            what = f"without {name} in its manifest"
+            raise RefusedError(str(self.path), what, COMPLETE, RUN_AGAIN)
+        file, digest = self.path / name, self.files[name].digest
+        try:
+            self._require_real_parents(name)
+            content = read_regular(file)
+        except OSError as error:
+            state = "is missing" if isinstance(error, FileNotFoundError) else "is no regular file"
+            raise RefusedError(str(file), state, COMPLETE, RUN_AGAIN) from None
+        is_same = digest in ("", digest_of(content))
+        require(is_same, str(file), value="was changed", allowed=COMPLETE, cure=RUN_AGAIN)
+        return content
+
+    def dataset(self, name: str) -> xarray.Dataset:
+        """The dataset in a listed NetCDF file."""
+        import netCDF4
+        import xarray
+
+        backends: Any = xarray.backends  # whose classes have no types
+        file = netCDF4.Dataset("results", memory=self.content(name))  # which loading closes
+        return xarray.load_dataset(backends.NetCDF4DataStore(file))
+
+    def require_free(self, name: str) -> None:
+        """Refuses a name that an unlisted file, a pipe or a folder has, so that none is lost.
+
+        A link with a listed name is free: the file will replace it, not its target.
+        """
+        file, allowed = self.path / name, "a place for a file of this run"
+        cure = "move it away, or name another folder"
+        try:
+            self._require_real_parents(name)
+            mode = os.lstat(file).st_mode
+        except FileNotFoundError:
+            return
+        except NotADirectoryError as error:
+            raise RefusedError(str(file), str(error), allowed, cure) from None
+        is_listed, is_regular = self.is_damaged or name in self.files, stat.S_ISREG(mode)
+        kind = "a file that no manifest lists" if is_regular else "no regular file"
+        is_free = is_listed and (is_regular or stat.S_ISLNK(mode))
+        require(is_free, str(file), value=kind, allowed=allowed, cure=cure)
+
+    def put(self, source: str, folder: Path, before: str = "") -> None:
+        """Copies all files below a folder here and lists them as made from `source`.
+
+        Other files that were made from `before` are removed.
+
+        Raises:
+            RefusedError: Something else is in the place of one.
+        """
+        paths = (path for path in sorted(folder.rglob("*")) if path.is_file())
+        contents = {path.relative_to(folder).as_posix(): path.read_bytes() for path in paths}
+        for name in contents:
+            self.require_free(name)
+        old = {x: self.files.pop(x) for x in self.made_from(before)} if before else {}
+        self.add({name: Listed(digest_of(x), source) for name, x in contents.items()})
+        for name, content in contents.items():
+            with whole_file(self.path / name, follow_links=False) as partial:
+                partial.write_bytes(content)
+        for name in old.keys() - contents.keys():
+            self._remove(name, old[name].digest)
+
+    def put_text(self, name: str, text: str) -> None:
+        """Writes a text of the run itself, such as summary.json, and lists it."""
+        self.require_free(name)
+        self.add({name: Listed(digest_of(text.encode()), "")})
+        with whole_file(self.path / name, follow_links=False) as partial:
+            partial.write_bytes(text.encode())
+
+    def add(self, files: Mapping[str, Listed]) -> None:
+        """Writes the list with further files, and with a checksum of its own."""
+        self.files |= files
+        document = {
+            "format_version": FORMAT,
+            "about": "SHA-256 of every file, and of what it was made from; --fresh removes them",
+            "checksum": digest_of(json.dumps(self.files).encode()),
+            "files": self.files,
+        }
+        with whole_file(self.path / MANIFEST, follow_links=False) as partial:
+            partial.write_text(as_json(document, indent=1), encoding="utf-8")
+
+    def clear(self) -> None:
+        """Removes every file that is listed, and the list; links are removed, not followed."""
+        for name in self.files:
+            self._remove(name)
+        self.files, self.is_damaged = {}, False
+        self.add({})
+
+    def _remove(self, name: str, digest: str = "") -> None:
+        """Removes a link, or a regular file with this digest ("": any); leaves everything else."""
+        file = self.path / name
+        try:
+            self._require_real_parents(name)
+            is_link = stat.S_ISLNK(os.lstat(file).st_mode)
+            if is_link or digest in ("", digest_of(read_regular(file))):
+                file.unlink()
+        except OSError:
+            return
+
+    def _require_real_parents(self, name: str) -> None:
+        """Raises NotADirectoryError if a folder between this one and a file is a link."""
+        for parent in PurePosixPath(name).parents[:-1]:
+            if not stat.S_ISDIR(os.lstat(self.path / parent).st_mode):
+                raise NotADirectoryError(f"{parent} is no folder")
+
+
+def read_dataset(path: Path, key: str) -> xarray.Dataset:
+    """Reads a NetCDF file that the manifest beside it lists, as an option `key` names it.
+
+    Raises:
+        RefusedError: There is no such file or manifest, or the file was changed.
+    """
+    folder, is_dataset = ResultsFolder.read(path.parent), path.suffix == ".nc"
+    allowed = "a NetCDF file in the results of this program"
+    cure = "its folder holds it with manifest.json, which tells whether it is as it was written"
+    is_listed = is_dataset and path.name in folder.files
+    require(is_listed, key, value=str(path), allowed=allowed, cure=cure)
+    return folder.dataset(path.name)
+
+
+def read_regular(file: Path) -> bytes:
+    """The content of a regular file; OSError of a link, a device, a pipe or a folder."""
+    if stat.S_ISREG(os.lstat(file).st_mode):  # before it is opened, and then what was opened
+        with open(os.open(file, READ_ONLY), "rb") as stream:
+            if stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
+                return stream.read()
+    raise OSError("no regular file")
+
+
+def digest_of(content: bytes) -> str:
+    """SHA-256 of a content in hexadecimal digits."""
+    return hashlib.sha256(content).hexdigest()
