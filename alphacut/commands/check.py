@@ -21,6 +21,7 @@ from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal, Triangular
 from alphacut.io.arrays import text_table
 from alphacut.io.quantity import STANDARD_GRAVITY, engineering
 from alphacut.stages.cell import model_of, solve
+from alphacut.stages.image import image_study
 from alphacut.stages.suite import SuiteRecord, suite_records, suite_warnings
 
 GRAVITY = float(STANDARD_GRAVITY)
@@ -41,6 +42,9 @@ def run(options: argparse.Namespace, out: TextIO) -> int:
         "inputs": [dict(zip(("key", "value", "kind"), row, strict=True)) for row in rows],
     }
     text = text_table(("key", "value", "kind"), rows)
+    if content.image_cell is not None:
+        shares = image_study(content.image_cell).fractions.items()
+        text += f"phases: {', '.join(f'{name} {share:.2%}' for name, share in shares)}\n"
     if period:
         text += f"first natural period: {period:.4g} s, at the most plausible values\n"
     if linear and (record := linear.ground):

@@ -12,6 +12,7 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
 
 PLANE_MODES = ("1", "L", "I;16", "I;16B", "I;16L", "I", "F")
+PHOTOMETRIC, WHITE_IS_ZERO = 262, 0  # tag of TIFF and its value
 BYTES_PER_PIXEL = 2500  # of both sides together, measured at 1024 × 1024
 
 
@@ -57,7 +58,14 @@ def _picture(path: Path, square: bool) -> Array:
             what = f"of pixels {dpi_x:g} by {dpi_y:g} per inch"
             raise RefusedError(path.name, what, "square ones", "give cell.pixel = [width, height]")
         require_memory(picture.height, picture.width)
-        return np.asarray(picture)
+        values = np.asarray(picture)
+        tags = getattr(picture, "tag_v2", {})
+        greys = np.unique(values) if tags.get(PHOTOMETRIC) == WHITE_IS_ZERO else []
+        if len(greys) == 2:  # tifffile writes masks so, and readers exchange the phases
+            value = f"two-valued with white as zero, bright on {np.mean(values == greys[1]):.4g}"
+            cure = "save it as .npy or PNG, and look at the fractions that check prints"
+            raise RefusedError(path.name, value, "masks that all programs read alike", cure)
+        return values
 
 
 def require_memory(rows: int, columns: int) -> None:

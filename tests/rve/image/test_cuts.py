@@ -125,6 +125,19 @@ def test_grey_values_are_read_as_they_are(tmp_path, name, kind):
     assert np.array_equal(read_grey(path), values[::-1])
 
 
+def test_a_mask_whose_white_is_zero_is_refused_with_its_fraction(tmp_path):
+    """Readers of such a TIFF disagree on which of both values is bright: tifffile writes masks so."""
+    image = pytest.importorskip("PIL.Image")
+    mask = image.fromarray(np.arange(32 * 32).reshape(32, 32) < 256)
+    for photometric in (1, 0):
+        mask.save(tmp_path / "mask.tif", tiffinfo={262: photometric})
+        if photometric:
+            assert read_grey(tmp_path / "mask.tif").mean() == 0.25
+            continue
+        with pytest.raises(RefusedError, match=r"white as zero, bright on 0\.25"):
+            read_grey(tmp_path / "mask.tif")
+
+
 BROKEN = {
     "colour.png": np.zeros((4, 4, 3), np.uint8),
     "nan.npy": np.array([[1.0, np.nan], [0.0, 1.0]]),
