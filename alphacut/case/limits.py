@@ -26,12 +26,8 @@ Side = Literal["", "max", "min", "mean"]
 class Limit:
     """Largest magnitude allowed of an output, or its greatest or least value.
 
-    Args:
-        side: "max" or "min" of the output itself, "" of its magnitude, "mean" of that over records.
-        output: The output of the structure.
-        value: In the SI unit of the output, or as a fraction of the storey's height.
-        is_relative: Whether it is such a fraction.
-        text: The limit as the user wrote it.
+    `side` is "max" or "min" of the output itself, "" of its magnitude, "mean" of that over records;
+    the value is in SI or, if relative, a fraction of the storey's height.
     """
 
     side: Side
@@ -111,9 +107,6 @@ class QuestionSection(Section):
         """Value of each peak's limit in the SI unit of its output, by `limits_by_name`.
 
         The peak of a least value is that of the output's negative, and so is its limit.
-
-        Raises:
-            RefusedError: The structure has no such output, or a limit stands there twice.
         """
         key, limits = f"{self.key}.limits", self.limits_by_name
         # 0.0 − 0.0 is no negative zero

@@ -33,12 +33,9 @@ HISTORY = (
 
 @dataclass(frozen=True)
 class ForceHistory:
-    """Time history of a force, and the unit of its amplitudes.
+    """Time history of a force (None: impulse), and the SI unit of its amplitudes, empty of factors.
 
-    Args:
-        history: The time history; None of an impulse.
-        unit: SI unit of the amplitudes; empty where they are factors.
-        size: SI value of an amplitude of 1: the largest magnitude in a file with a unit, else 1.
+    `size` is the SI value of an amplitude of 1: the largest magnitude in a file with a unit.
     """
 
     history: History | None
@@ -141,9 +138,6 @@ def with_forces(
     """The structure with the forces of a case, whose amplitudes become its parameters.
 
     `unknowns` names the degrees of freedom of a structure from matrices; a frame has floors.
-
-    Raises:
-        RefusedError: It takes no forces, or has no such floor.
     """
     if not sections:
         return structure

@@ -104,12 +104,9 @@ DampingRatio = Annotated[
 
 @dataclass(frozen=True)
 class Structure:
-    """A storey frame, a structure from matrices or a pendulum.
+    """A storey frame, a structure from matrices or a pendulum: the model at its modal values.
 
-    Args:
-        model: The model at modal values.
-        numbers: Every parameter, crisp or fuzzy, in SI.
-        heights: Height of the storey of each drift of a frame that has lengths, in m.
+    `numbers` has every parameter, crisp or fuzzy, in SI; `heights` the storey's of each drift.
     """
 
     model: StoreyFrame | MatrixStructure | LagrangianSystem
@@ -132,11 +129,7 @@ class Structure:
         return units.get(output) or Output(output).unit
 
     def members(self, name: str, key: str = "envelope.fuzzy") -> tuple[str, ...]:
-        """Fuzzy parameters that a name stands for: "m" for all masses of a frame, "m1" for itself.
-
-        Raises:
-            RefusedError: The name stands for no parameter, or for crisp ones alone.
-        """
+        """Fuzzy parameters of a name: "m" of all masses of a frame, "m1" of itself."""
         allowed, cure = "inputs that are fuzzy", f"{name} is one number"
         try:
             members = self.frame.group(name) if self.frame else (name,)
@@ -177,11 +170,7 @@ class Structure:
     def model_with_outputs(
         self, key: str, outputs: tuple[str, ...]
     ) -> StoreyFrame | MatrixStructure | LagrangianSystem:
-        """The model reduced to some outputs; one that is not linear always computes all of them.
-
-        Raises:
-            RefusedError: The model lacks one of the outputs; the message names the case's `key`.
-        """
+        """The model reduced to some outputs; one that is not linear always computes all of them."""
         self.require_quantities(key, outputs)
         if isinstance(self.model, StoreyFrame):
             return replace(self.model, outputs=outputs)
@@ -308,9 +297,6 @@ class Frame(Section):
 
         `modulus` is Young's in Pa, by default the section's own or a stand-in; `loss` the loss
         factor of its material, or a stand-in.
-
-        Raises:
-            RefusedError: Its values make no frame.
         """
         young: FuzzyNumber | None = modulus or self.modulus or STAND_IN
         if self.stiffness:  # which needs no modulus

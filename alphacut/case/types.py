@@ -42,16 +42,9 @@ class Section(BaseModel):
 
 @dataclass(frozen=True)
 class Quantity:
-    """A quantity of a key, with its SI unit and the range of every value of it.
+    """A quantity of a key, with its SI unit (empty for none) and the range of every value of it.
 
-    Args:
-        si: SI unit; empty for a number without one.
-        above: Values are greater than this.
-        least: Values are this or greater.
-        below: Values are less than this.
-        most: Values are this or less.
-        fuzzy: Whether it may be a fuzzy number.
-        is_integer: Whether it is a whole number.
+    The range is open at `above` and `below`, closed at `least` and `most`.
     """
 
     si: str = ""

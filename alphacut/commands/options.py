@@ -21,13 +21,7 @@ PETSC_LOG = "-log_view"
 
 @dataclass(frozen=True)
 class Command:
-    """A command.
-
-    Args:
-        about: What it does, in a line.
-        arguments: Adds its options to a parser.
-        run: Computes and writes to a stream, from the options; returns the exit status.
-    """
+    """A command: what it does in a line, its options, and its run from them to the exit status."""
 
     about: str
     arguments: Callable[[argparse.ArgumentParser], None]
@@ -114,12 +108,7 @@ def require_case_petsc(petsc: Mapping[str, str], content: CellContent) -> None:
 
 
 def read_cell(options: argparse.Namespace) -> CellContent:
-    """The sections of the cell in the case file that the options name, with changes of ``--set``.
-
-    Raises:
-        BadInput: They have problems.
-        RefusedError: There are options of PETSc, and the case solves no prisms.
-    """
+    """The sections of the cell in the case file that the options name, changed by ``--set``."""
     content = parse(CellContent, options.case, options.set).content
     require_case_petsc(options.petsc, content)
     return content

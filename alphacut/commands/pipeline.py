@@ -14,7 +14,7 @@ from alphacut.case.content import Content
 from alphacut.case.limits import QuestionSection
 from alphacut.case.loads import RecordsSection
 from alphacut.case.structure import Structure
-from alphacut.frame.questions.peaks import Peaks
+from alphacut.frame.questions.peaks import Peaks, output_of
 from alphacut.fuzzy import Crisp, FuzzyNumber, Triangular
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io.files import Document, say
@@ -171,14 +171,18 @@ class Pipeline:
         records = suite.suite_records(section, task.section, structure)
         for warning in suite.suite_warnings(records):
             say(f"warning: {warning}")
-        limited = self.content.limited_outputs or structure.outputs
+        limited = tuple(dict.fromkeys((*structure.outputs, *self.content.limited_outputs)))
         stages = suite.stages(structure, replace(task, limited=limited), records)
         outcomes = self.store.take_all(stages, self.executor)
         by_record = {record.name: outcomes[suite.stage_name(record)].numbers for record in records}
         units = {name: structure.unit(name) for name in envelope.outputs_of(limited)}
         results.suite = suite.suite_result(by_record, records, mode, alpha, units)
         peaks = {name: peaks_of(result, alpha) for name, result in by_record.items()}
-        worst = suite.with_means(suite.worst_peaks(peaks), peaks)
+        worst = suite.worst_peaks(peaks)
+        if any(limit.side == "mean" for x in self.content.questions.values() for limit in x.limits):
+            plain = [name for name in worst.outputs if name == output_of(name)]
+            reached = suite.means_reached(structure, task, records, plain)
+            worst = suite.with_means(worst, peaks, reached)
         measures = {record.name: record.measures for record in records}
         motions = SuiteResponse(mode.period, mode.ratio, measures, peaks)
         self._answer(replace(response_of(structure, task, worst), suite=motions))

@@ -17,12 +17,7 @@ from alphacut.stages.store import StageStore
 
 
 def read_case(options: argparse.Namespace) -> Case:
-    """The case file that the options name, with the changes of ``--set``.
-
-    Raises:
-        BadInput: The case has problems.
-        RefusedError: There are options of PETSc, and the case solves no prisms.
-    """
+    """The case file that the options name, with the changes of ``--set``."""
     case = load(options.case, options.set)
     require_case_petsc(options.petsc, case.content)
     return case

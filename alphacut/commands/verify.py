@@ -60,11 +60,8 @@ def verify(options: argparse.Namespace, out: TextIO) -> int:
 def verify_envelope(data: xarray.Dataset, name: str, folder: ResultsFolder) -> Document:
     """Tests a stored envelope, and writes inputs and motions at its peaks to two CSV files.
 
-    Returns:
-        The nature of the envelope, the number of motions tested, and the names of the files.
-
-    Raises:
-        ContradictionError: A motion lies outside the envelope; contradiction.csv holds it.
+    Returns its nature, the number of motions tested, and the names of the files; a motion outside
+    raises ContradictionError and goes to contradiction.csv.
     """
     points, motions = stored_motions(data)
     trial = Trial(envelope_of(data), np.moveaxis(data["cut"].values, -1, 0))

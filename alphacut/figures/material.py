@@ -96,11 +96,7 @@ def cone(section: RadiusMapSection) -> Figure:
 
 
 def levels_of_samples(dataset: xarray.Dataset) -> Array:
-    """Membership of each sample: the highest level whose cuts hold all its inputs, (samples,).
-
-    The cut of an input spans the points at which the bounds of E are reached: its ends are two of
-    them where E is monotone in it.
-    """
+    """Membership of each sample: the highest level whose cuts hold all its inputs, (samples,)."""
     points, alpha = dataset["point"].values, dataset["alpha"].values
     extreme_points = dataset["E_at"].values  # (alpha, bound, parameter)
     low, high = extreme_points.min(axis=1), extreme_points.max(axis=1)  # (alpha, parameter)

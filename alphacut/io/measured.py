@@ -25,7 +25,6 @@ class ModeRows:
     """All measurements of one mode.
 
     Args:
-        mode: Its number.
         frequencies: In Hz, shape (rows,).
         amplitudes: By floor, each of shape (rows,), to any scale.
         frequency_deviation: Standard deviation over the mean; None where the file states none.

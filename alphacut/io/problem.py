@@ -17,8 +17,6 @@ class InputProblem:
     Args:
         key: Name of the key or option, such as ``cell.matrix_modulus``.
         what: Statement of what is wrong; empty where `value` and `allowed` say it.
-        value: The value as the user wrote it; empty where there is none.
-        allowed: Values that are allowed instead.
         cure: Advice where `allowed` does not give it.
         file: Case file; empty for a command line.
         line: Line in the file, from 1; 0 where it is not known.

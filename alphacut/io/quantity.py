@@ -87,11 +87,7 @@ def registry() -> pint.UnitRegistry:
 
 @cache
 def factor(unit: str, si: str) -> Decimal:
-    """Value of one `unit` in the SI unit `si`, as 1000 of "kN" in "N".
-
-    Raises:
-        ValueError: The unit is unknown, or measures something else.
-    """
+    """Value of one `unit` in the SI unit `si`, as 1000 of "kN" in "N"; ValueError of others."""
     if unit in UNITS_HERE.get(si, {}):
         return UNITS_HERE[si][unit]
     if unit in POWERS_OF_TEN.get(si, {}):

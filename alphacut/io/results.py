@@ -228,11 +228,7 @@ class ResultsFolder:
 
 
 def read_dataset(path: Path, key: str) -> xarray.Dataset:
-    """Reads a NetCDF file that the manifest beside it lists, as an option `key` names it.
-
-    Raises:
-        RefusedError: There is no such file or manifest, or the file was changed.
-    """
+    """Reads a NetCDF file, named by an option `key`, as the manifest beside it lists it."""
     folder, is_dataset = ResultsFolder.read(path.parent), path.suffix == ".nc"
     allowed = "a NetCDF file in the results of this program"
     cure = "its folder holds it with manifest.json, which tells whether it is as it was written"

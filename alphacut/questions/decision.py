@@ -23,13 +23,8 @@ from alphacut.stages.store import Cuts, Values
 class LimitDecision(LimitAnswer):
     """Degrees to which it is possible and necessary that a limit is exceeded, and what is left.
 
-    Args:
-        possibility: Lower and upper bound.
-        necessity: Lower and upper bound.
-        margin: What the greatest and the least peak leave of the limit on each level; of several
-            as fractions of the limits.
-        from_level: Lowest level computed, from which on the verdict holds.
-        peak: The limited peak; None of several.
+    The margin is what the greatest and the least peak leave of the limit on each level, of several
+    limits as fractions of them. The verdict holds from a level on, the lowest one computed.
     """
 
     possibility: tuple[float, float]
@@ -121,11 +116,17 @@ class DecisionAnswer(Answer):
 
     def words(self) -> str:
         """Sentences on how to read the verdicts."""
-        return (
+        text = (
             "A limit is not exceeded where no motion exceeds it, exceeded where every motion does,"
             " and can be exceeded where a motion is known that does."
             " Attained bounds show what is possible and exclude nothing."
         )
+        if any(limit.side == "mean" for limit in self.limits.values()):
+            text += (
+                " Of a mean over records the proved end is the mean of each record's greatest peak;"
+                " what is reached is the mean of one structure."
+            )
+        return text
 
 
 def decide(section: DecisionSection, response: FuzzyResponse) -> DecisionAnswer:

@@ -36,15 +36,10 @@ class CriticalRanges(Numbers):
 
 
 class LimitFragility(LimitAnswer):
-    """Measures of the records at which a limit is exceeded, and shares of the records by measure.
+    """Critical measures of the records for a limit, and bounds of the share of records by measure.
 
-    Args:
-        critical: Critical measures of the records.
-        measure: Measures of the bands, rising.
-        band: Bounds of the share of records, (levels, measures).
-        median: Bounds of the median of the critical measures.
-        dispersion: Bounds of the deviation of their logarithms; None of one record.
-        confidence: 95 % limits of the share if records are independent draws.
+    Dispersion is that of the measures' logarithms, of two records or more; `confidence` has 95 %
+    limits of the share if records are independent draws.
     """
 
     nature: Nature

@@ -34,10 +34,8 @@ class Curve(Numbers):
 class LimitProbability(LimitAnswer):
     """Bounds of the probability that a limit is exceeded, on each level.
 
-    Args:
-        error: What peaks between nodes may add.
-        interval: Ends that hold the probabilities of all fuzzy points, with `CONFIDENCE`.
-        curve: Probabilities of other limits; of several together over those of the case.
+    Peaks between nodes may add `error`; `interval` holds the probabilities of all fuzzy points
+    with `CONFIDENCE`; the curve is over other limits.
     """
 
     lower: Values

@@ -22,13 +22,9 @@ Record = dict[str, str | float | None]
 
 @dataclass(frozen=True)
 class SuiteResponse:
-    """Peaks of the structure under the records of a suite.
+    """Peaks of the structure under each record of a suite, and the records' measures, by name.
 
-    Args:
-        period: First natural period at the most plausible inputs, in s.
-        ratio: Damping ratio of that mode.
-        measures: Measures of each record by its name, such as {"PGA": 2.1}.
-        peaks: Peaks under each record by its name.
+    `period` in s and damping `ratio` are those of the first mode at the most plausible inputs.
     """
 
     period: float
@@ -42,14 +38,9 @@ class FuzzyResponse:
     """Fuzzy response of the structure, as section [envelope] names it: what questions are about.
 
     Args:
-        structure: The structure.
         fuzzy: Names of the fuzzy inputs.
-        alpha: Levels.
-        duration: Length, in s.
-        step: Distance of nodes, in s.
         peaks: Peaks of the outputs, under a suite of any record; None where no question reads them.
         suite: Records that move the structure one by one; None where there are none.
-        progress: Takes the share done.
     """
 
     structure: Structure
@@ -94,11 +85,7 @@ class Answer(Numbers):
 class LimitAnswer(Numbers):
     """Part of an answer about one limit, or about any of several, which have no unit.
 
-    Args:
-        side: "max" or "min" of the output itself, "" of its magnitude, "mean" of that over records.
-        output: The output, or what stands for several limits.
-        unit: SI unit of output and limit.
-        limit: The limit as the case gives it, in SI; 1 of several.
+    `side` is that of a `Limit`, the limit as the case gives it, in SI; 1 of several.
     """
 
     side: Side

@@ -81,14 +81,7 @@ class Parts(Numbers):
 
 
 class Summary(Parts):
-    """Numbers of a run with their origin.
-
-    Args:
-        case: Name of the case, and `case_text` its file.
-        changes: Changes of the command line.
-        figures: Files of the figures.
-        fingerprints: Digest of what each result was made from, by the name of its stage.
-    """
+    """Numbers of a run with their origin; `changes` are those of the command line."""
 
     format_version: int
     case: str
@@ -108,11 +101,7 @@ class Summary(Parts):
 
     @classmethod
     def read(cls, folder: ResultsFolder) -> Self:
-        """The summary in a folder of results.
-
-        Raises:
-            RefusedError: There is none, it is damaged, or its format is another one.
-        """
+        """The summary in a folder of results; RefusedError where it is missing or damaged."""
         if not (folder.path / SUMMARY).exists():
             raise damaged(folder, f"without {SUMMARY}")
         try:

@@ -53,11 +53,7 @@ WORDS: dict[str, str] = _TABLES["words"]
 
 
 def render_page(folder: ResultsFolder) -> str:
-    """The page for the results in a folder.
-
-    Raises:
-        RefusedError: The folder holds no results of a run, or of two, or of another program.
-    """
+    """The page for the results in a folder, or RefusedError where they are not of one run."""
     summary = Summary.read(folder)
     summary.require_run_of(folder)
     return render_template(

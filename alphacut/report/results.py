@@ -171,13 +171,9 @@ def shown_peaks(study: EnvelopeResult) -> Iterator[tuple[str, PeakResult]]:
 
 
 def peak_cells(peak: PeakResult, factor: float, levels: Sequence[int], *, has_core: bool) -> Row:
-    """Texts of a peak: its cut on each level, its error, what is reached, the gap.
+    """Texts of a peak times a factor: its cut on some levels, its error, what is reached, the gap.
 
-    Args:
-        peak: Bounds of the peak on all levels, in SI.
-        factor: From SI to the unit shown.
-        levels: Indices of the levels, the highest first.
-        has_core: Whether the highest level is 1, whose cut is shown by `nominal`.
+    Levels are indices, the highest first; with `has_core` that is 1, shown by `nominal`.
     """
     nature, cuts = peak.nature, list[str]()
     for k in levels:

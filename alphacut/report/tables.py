@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from alphacut.fuzzy.result import Nature, rounded
-from alphacut.io.files import write_text
+from alphacut.io.files import Document, write_text
 from alphacut.io.quantity import MINUS
 from alphacut.io.results import ResultsFolder
 from alphacut.questions.question import Row
@@ -88,7 +88,7 @@ def tables(parts: Parts) -> dict[str, Table]:
     return texts | {answer.key: Table(answer.head, answer.rows()) for answer in parts.answers}
 
 
-def radius_map(numbers: Mapping[str, Any]) -> pd.DataFrame:
+def radius_map(numbers: Document) -> pd.DataFrame:
     """The parameters a1 … a4 of the radius map: least, modal and greatest value."""
     rows = []
     for name in ("a1", "a2", "a3", "a4"):

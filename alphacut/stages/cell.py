@@ -117,9 +117,6 @@ def model_of(cell: AnyCell, mesh: Mesh, modulus: ModulusSection, **elements: Any
     """The function that solves cells by the model that the sections of a case name.
 
     `elements` are options of the product-space elements: petsc, parallel, estimate, moduli.
-
-    Raises:
-        RefusedError: It needs what is not installed, or an option is out of range.
     """
     is_averaged = average_name(cell, modulus) == "isotropic"  # of the whole plane stiffness
     options = {"stiffness": is_averaged, **elements}

@@ -18,7 +18,7 @@ from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import FailedError, require
 from alphacut.fuzzy.result import Nature
-from alphacut.io.files import say
+from alphacut.io.files import Document, say
 from alphacut.stages.store import (
     Computed,
     Numbers,
@@ -77,13 +77,9 @@ PeakResults = dict[str, PeakResult]
 
 
 class EnvelopeResult(Numbers):
-    """An envelope in SI: extremes and errors at the lowest level, peaks, and cost.
+    """An envelope in SI: extremes and errors by output at the lowest level, peaks, and cost.
 
-    Args:
-        min, max, mean_width, error: By output.
-        step: Distance of nodes, in s.
-        motions_tested: Exact motions that agree with what is guaranteed.
-        drawn: Outputs that are drawn; empty for all.
+    `drawn` are the outputs that are drawn, all if empty; `step` is the distance of nodes.
     """
 
     fuzzy: tuple[str, ...]
@@ -108,10 +104,7 @@ class EnvelopeTask:
     """One envelope to be computed.
 
     Args:
-        name: Name of the study.
         fuzzy: Fuzzy inputs as the user names them: E, m, m1 …
-        duration: Length of the simulation, in s.
-        section: Levels, method, step.
         figures: Outputs that are drawn, each with its number in the paper; empty for all.
         limited: Outputs whose peak a question compares with a limit.
     """
@@ -137,7 +130,7 @@ class EnvelopeTask:
         same_inputs = set(self.fuzzy) == set(section.fuzzy)
         return same_inputs and self.duration == section.duration
 
-    def options(self, structure: Structure) -> dict[str, Any]:
+    def options(self, structure: Structure) -> Document:
         """Options of the method of [envelope]: its tolerance, if it has one."""
         method, tolerance = self.section.method, self.tolerance(structure).value
         # without a tolerance in the case, method auto takes any gap that is proved
@@ -190,7 +183,7 @@ class EnvelopeTask:
         """Computes the peaks of the limited outputs alone, with some nodes in each step."""
         return Computed(peak_results(self.close_peaks(structure, context, nodes)))
 
-    def arguments(self, structure: Structure) -> dict[str, Any]:
+    def arguments(self, structure: Structure) -> Document:
         """Arguments of `frame.envelope` and `frame.require_envelope`, by name, from the case."""
         return {
             **self._motion(structure),

@@ -86,11 +86,7 @@ def identify_inputs(
 def require_learnable(
     section: Identify, structure: Structure, alpha: tuple[float, ...]
 ) -> tuple[dict[int, ModeRows], list[MeasuredMode], dict[str, FuzzyNumber]]:
-    """Data of an identification, which are read and checked.
-
-    Returns:
-        Measurements by mode; the modes to learn from, without held-out ones; the prior inputs.
-    """
+    """Measurements by mode; the modes to learn from, without held-out ones; the prior inputs."""
     require(alpha[0] > 0, "envelope.alpha", value=list(alpha), allowed="levels above 0")
     rows = {row.mode: row for row in _measured_rows(section)}
     allowed, held_out = f"some of modes {[*rows]}, not all", section.held_out

@@ -64,11 +64,8 @@ class ImageCuts(Numbers):
 class ImageResult(Numbers):
     """Proved bounds of an image, moduli in GPa: on the highest level, and as α-cuts.
 
-    Args:
-        lower_GPa, upper_GPa: Bounds of the plane stiffness in the sense of Loewner, (3, 3).
-        plane: Cuts of the constants along x and y by definition and name, as E_x_GPa.
-        widths_GPa: Widths of E on the lowest level by what causes them.
-        fractions: Area fraction of each phase.
+    `lower_GPa` and `upper_GPa` bound the plane stiffness in the sense of Loewner, (3, 3); `plane`
+    has the constants along x and y by definition and name; `widths_GPa` those of E by cause.
     """
 
     lower_GPa: Values
@@ -215,12 +212,9 @@ def cut_at(number: FuzzyNumber, level: AlphaLevel) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class ImageStudy:
-    """An image with its phases, ready to be solved.
+    """An image ready to be solved: the phases that each pixel may be of, at a level.
 
-    Args:
-        cell: The section of the case.
-        phase_ranges: Phases that each pixel may be of, at a level.
-        fuzzy_threshold: Whether the phases of the pixels depend on the level.
+    `fuzzy_threshold` says whether they depend on the level.
     """
 
     cell: ImageCell

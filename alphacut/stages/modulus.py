@@ -63,12 +63,8 @@ CUT = ("alpha", "bound")
 class ModulusResult(Numbers):
     """α-cuts of a cell, moduli in GPa; their nature, relative errors of E, references and cost.
 
-    Args:
-        fibres: Constants of cylinders by name, as E_T_GPa.
-        plane: Constants along x and y by definition and name, as E_x_GPa.
-        average: Average of the stiffness that gives E and ν, in words.
-        error: Largest relative error of E by source.
-        checks: Largest violation of each property.
+    `fibres` has the constants of cylinders by name, as E_T_GPa; `plane` those along x and y by
+    definition and name. Errors by source and checks are the largest of all samples.
     """
 
     alpha: Values

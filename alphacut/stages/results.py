@@ -21,6 +21,9 @@ from alphacut.stages.shares import ShareTable
 from alphacut.stages.store import Numbers, StageResult, Values
 from alphacut.stages.suite import SuiteResult
 
+AnyResult = StageResult[Any]
+"""Result of one of several stages; its reader knows the type of its numbers."""
+
 
 class FrameResult(Numbers):
     """A frame at its nominal inputs, with the height of the storey of each drift."""
@@ -35,18 +38,8 @@ class FrameResult(Numbers):
 class Results:
     """Results of a run; None or empty where the case has no such stage.
 
-    Args:
-        content: Sections of the case.
-        microstructure: Particles and their map.
-        modulus: Fuzzy modulus of a round cell.
-        image: Proved modulus of an image.
-        structure: The structure with its modulus, and with what was learned.
-        tasks: The studies.
-        envelopes: Their envelopes by name.
-        learned: Inputs after measured modes.
-        suite: Peaks under each record of a suite.
-        answers: Answers to the questions of the case, by their keys.
-        shares: Shares of the inputs in the widths.
+    The structure has its modulus and what was learned; `tasks` are the studies, `envelopes` their
+    results by name; answers stand by the keys of their questions.
     """
 
     content: Content
@@ -67,7 +60,7 @@ class Results:
         return any(task.figures for task in self.tasks)
 
     @property
-    def single(self) -> dict[str, StageResult[Any]]:
+    def single(self) -> dict[str, AnyResult]:
         """Results of the stages that have one, by name."""
         results = {
             "microstructure": self.microstructure,

@@ -86,7 +86,6 @@ class StageContext:
     Args:
         folder: Empty folder for further files of the stage; None to write none.
         samples: Store of samples; None for none.
-        workers: Processes.
         tick: Takes the share done; None to show nothing.
         parts: Folder from which a proof that was killed goes on; None for none.
     """
@@ -123,14 +122,11 @@ class StageResult(Generic[T]):
 
 @dataclass(frozen=True)
 class Stage(Generic[T]):
-    """A function from objects to a result.
+    """A function from objects to a result of type `kind`, in files NAME.json and NAME.nc.
 
     Args:
-        name: Its files are NAME.json and NAME.nc.
         inputs: Everything that the result depends on.
         packages: Packages of this project whose source it depends on.
-        kind: Type of its numbers.
-        compute: The function.
         has_samples: Whether it stores samples on the way.
     """
 
@@ -154,13 +150,11 @@ class Stage(Generic[T]):
 
 @dataclass(frozen=True)
 class StageStore:
-    """The results of a run, in a folder or in memory alone.
+    """The results of a run, in a folder or, without one, in memory alone.
 
     Args:
-        folder: The folder; None to write nothing.
         case_text: The case, which every result states.
         fresh: Whether everything is computed anew.
-        quiet: Whether nothing is shown.
         workers: Processes of a stage.
         up_to_date: Names of the stages whose files were up to date.
     """

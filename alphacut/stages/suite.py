@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import islice, product
 from math import ceil, pi
 
 import numpy as np
@@ -13,6 +14,7 @@ from alphacut.case.loads import NamedRecording, RecordsSection
 from alphacut.case.motion import EnvelopeSection
 from alphacut.case.structure import Structure
 from alphacut.frame import Accelerogram
+from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.questions.peaks import Peaks, joined, output_of
 from alphacut.frame.structures.linear import modal_damping_ratios
 from alphacut.fuzzy.arrays import Array
@@ -27,6 +29,8 @@ FREE_PERIODS = 5
 """Natural periods of free motion after a record: by then 5 % damping leaves a fifth."""
 PERIODS: Array = np.array(np.geomspace(0.05, 4.0, 45), float)
 """Periods of response spectra, in s."""
+MAX_CORNERS = 64
+"""Corners of each cut whose means over records are computed; more take time, none is a bound."""
 NODES = 2
 """Nodes in a step at which peaks are bounded; the error between nodes falls with its square."""
 MAX_OFFSET = 0.01
@@ -45,16 +49,13 @@ class NominalMode:
 
 @dataclass(frozen=True, eq=False)
 class SuiteRecord:
-    """A record of the suite as it moves the structure.
+    """A record of the suite as it moves the structure, corrected, trimmed and scaled.
 
     Args:
-        name: Name of its file without ending.
-        ground: The record, corrected, trimmed and scaled.
         duration: Length of the motion, in s.
         measures: "PGA" and "Sa(T1)" of the scaled record, in m/s², and "scale", 1.
         cut_share: Share of the Arias intensity after the end of the motion.
         offset_share: Mean of the record over its peak, after the correction.
-        doubts: What is unusual in its file, one clause each.
     """
 
     name: str
@@ -171,13 +172,40 @@ def worst_peaks(peaks: Mapping[str, Peaks]) -> Peaks:
     return replace(first, natures=tuple(map(Nature.weakest, columns)), **bounds)
 
 
-def with_means(worst: Peaks, peaks: Mapping[str, Peaks]) -> Peaks:
+def means_reached(
+    structure: Structure, task: EnvelopeTask, records: Sequence[SuiteRecord], outputs: Sequence[str]
+) -> Array:
+    """Greatest mean over the records of a structure's peaks, of those tried, (levels, outputs).
+
+    Tried are the nominal structure and those at corners of each cut. Peaks are read at nodes, so
+    that the structure's own mean is no smaller.
+    """
+    inputs = structure.inputs(task.fuzzy)
+    names, step = tuple(inputs), task.section.step / NODES
+    points = [[number.modal for number in inputs.values()]]
+    for alpha in task.section.alpha:
+        corners = product(*(dict.fromkeys(number.cut(alpha)) for number in inputs.values()))
+        points += [list(corner) for corner in islice(corners, MAX_CORNERS)]
+    means: Array = np.zeros((len(points), len(outputs)))
+    for record in records:
+        model = with_record(structure, record).model_with_outputs("records", tuple(outputs))
+        flow = make_flow(model, names, record.duration, step, "exact")
+        columns = [[*map(str, flow.outputs)].index(output) for output in outputs]
+        means += np.abs(flow.values(np.array(points))).max(axis=1)[:, columns] / len(records)
+    rows = []
+    for alpha in task.section.alpha:
+        cuts = np.array([number.cut(alpha) for number in inputs.values()])
+        inside = ((np.array(points) >= cuts[:, 0]) & (np.array(points) <= cuts[:, 1])).all(axis=1)
+        rows.append(means[inside].max(axis=0, initial=0.0))
+    return np.array(rows)
+
+
+def with_means(worst: Peaks, peaks: Mapping[str, Peaks], reached: Array) -> Peaks:
     """The worst peaks, and beside them "mean q3" …, bounds of the mean over the records.
 
     The mean of each structure lies between the means of the least and of the greatest peaks. No
-    structure is known to reach the latter, as each record has its own worst one. But a structure of
-    any higher cut has at least the mean of that cut's least peaks, and at most that of its
-    greatest: these are reached.
+    structure may reach the latter, as each record has its own worst one; `reached` has the greatest
+    mean that a structure is known to have, of each magnitude, (levels, outputs).
     """
     plain = [name for name in worst.outputs if name == output_of(name)]
     columns = {f"mean {name}": name for name in plain}
@@ -187,7 +215,8 @@ def with_means(worst: Peaks, peaks: Mapping[str, Peaks]) -> Peaks:
     }
     least = np.maximum(means["lower"] - means["error"], means["least_proved"])
     most = means["upper"] + means["error"]
-    means["reached"] = np.maximum.accumulate(least[::-1])[::-1]
+    # a structure of any higher cut has at least the mean of that cut's least peaks
+    means["reached"] = np.maximum(np.maximum.accumulate(least[::-1])[::-1], reached)
     means["least_reached"] = np.minimum.accumulate(most[::-1])[::-1]
     mean = replace(worst.named(columns), **means)
     return joined(worst, mean)

@@ -270,6 +270,7 @@ class Passing:
             −inf where nothing excludes a greater peak. Of any limit: as fractions of the limits.
         lowest: Lowest level computed; below it nothing is known.
         nature: Nature of the bounds that both degrees rest on.
+        is_reached: Whether a motion in some cut is known to exceed it, if only at level 0.
     """
 
     possibility: tuple[float, float]
@@ -277,6 +278,7 @@ class Passing:
     margin: Array
     lowest: float
     nature: Nature
+    is_reached: bool
 
     @property
     def outcome(self) -> str:
@@ -285,7 +287,7 @@ class Passing:
             return "not exceeded"
         if self.necessity[0] >= 1 - self.lowest:
             return "exceeded"
-        return "can be exceeded" if self.possibility[0] > 0 else "undecided"
+        return "can be exceeded" if self.is_reached else "undecided"
 
     @property
     def verdict(self) -> str:
@@ -334,6 +336,7 @@ def _passing_of(peaks: Peaks, output: str, limit: float) -> Passing:
         margin=limit - np.stack([most.upper, least.lower], axis=1),
         lowest=float(alpha[0]),
         nature=peaks.nature([output]),
+        is_reached=bool((most.lower > limit).any()),
     )
 
 
@@ -356,6 +359,7 @@ def _any(answers: Mapping[str, Passing], limits: Mapping[str, float]) -> Passing
         margin=np.min(relative_margins, axis=0),
         lowest=passings[0].lowest,
         nature=Nature.weakest(x.nature for x in passings),
+        is_reached=any(x.is_reached for x in passings),
     )
 
 

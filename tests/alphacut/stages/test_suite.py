@@ -159,7 +159,8 @@ def test_the_mean_over_records_lies_between_means_of_ends(tmp_path):
         period = 2 * np.pi * np.sqrt(20e3 / k)
         peaks = [spectral_acceleration(x, period, 0.05) / (k / 20e3) for x in grounds]
         means.append(np.mean(peaks))
-    assert peak["reached"][0] <= max(means)
+    # a structure has it, not each record its own; peaks of spectra are read 0.3 % low at most
+    assert 0.99 * max(means) <= peak["reached"][0] <= 1.004 * max(means)
     assert max(means) * 0.996 <= peak["proved"][0]
     assert (out / "figures/spectra.svg").is_file()
     spectra = records["spectra"]

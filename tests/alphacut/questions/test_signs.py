@@ -1,0 +1,111 @@
+"""Limits and peaks are told with the sign of the output: of the greatest, the least, the magnitude."""
+
+import re
+
+import numpy as np
+import pytest
+
+from alphacut.case.limits import parse_limit
+from alphacut.frame.questions.peaks import Peaks, passing
+from alphacut.fuzzy.result import Nature
+from alphacut.questions.decision import LimitDecision
+from alphacut.questions.summary import Parts
+from alphacut.report.results import limit_cells, number_text, peak_cells
+from alphacut.report.tables import peaks as peak_frame
+from alphacut.report.tables import shown
+from alphacut.stages.envelope import EnvelopeResult, peak_results, peaks_of
+from alphacut.stages.store import Cuts
+
+SIDES = ("max", "min", "")
+
+
+def drawn(rng):
+    """A limit, and bounds of an output's peak with its own sign: outer, reached, by side."""
+    side = SIDES[rng.integers(3)]
+    limit = rng.normal() * 10.0 ** rng.integers(-3, 3)
+    limit = abs(limit) + 1e-6 if side == "" else limit
+    low, high = np.sort(limit + abs(limit) * rng.normal(size=2))
+    if side == "":
+        low, high = np.sort(np.abs([low, high]))
+    reached = low + 0.9 * (high - low) if side != "min" else high - 0.9 * (high - low)
+    return side, limit, low, high, reached
+
+
+def peaks_with(side, low, high, reached):
+    """Peaks as the frame has them: of the negative of the output for its least value."""
+    if side == "min":
+        low, high, reached = -high, -low, -reached
+    ends = {"lower": low, "upper": high, "error": 0.0, "reached": reached, "least_proved": low}
+    arrays = {name: np.array([[value]]) for name, value in ends.items()}
+    name = f"{side} q1".strip()
+    return name, Peaks(
+        np.zeros(1), (name,), **arrays, least_reached=np.array([[high]]),
+        natures=(Nature.GUARANTEED,),
+    )  # fmt: skip
+
+
+def number(text):
+    return float(text.replace("−", "-").replace(" m", ""))
+
+
+def test_every_number_on_a_limit_has_the_sign_of_the_output(rng):
+    for _ in range(700):
+        side, limit, low, high, reached = drawn(rng)
+        relation = ">=" if side == "min" else "<="
+        parsed = parse_limit(f"{side} q1 {relation} {float(limit)!r} m".strip())
+        assert (parsed.side, parsed.value) == (side, pytest.approx(limit))
+        name, peaks = peaks_with(side, low, high, reached)
+        peak = peak_results(peaks)[name]
+        assert (peak.lower[0], peak.upper[0], peak.reached[0]) == pytest.approx(
+            (low, high, reached)
+        )
+        again = peaks_of({name: peak}, [0.0])
+        assert again.upper[0, 0] == pytest.approx(peaks.upper[0, 0])
+        assert again.lower[0, 0] == pytest.approx(peaks.lower[0, 0])
+        far = low if side == "min" else high
+        assert peak.proved[0] == pytest.approx(far)
+        assert peak.far_end[0] == pytest.approx(far)
+        answer = passing(peaks, {name: parsed.sign * parsed.value})[name]
+        breaks = reached < limit if side == "min" else reached > limit
+        may_break = far < limit if side == "min" else far > limit
+        must_break = (high if side == "min" else low) * parsed.sign > limit * parsed.sign
+        expected = "exceeded" if must_break else "can be exceeded" if breaks else "undecided"
+        assert answer.outcome == (expected if may_break else "not exceeded")
+        told = LimitDecision(
+            side=side, output="q1", unit="m", limit=parsed.value, possibility=(0, 1),
+            necessity=(0, 1), margin=Cuts.of([[0.0, 0.0]]), verdict=answer.outcome, from_level=0,
+            nature=Nature.GUARANTEED, peak=peak,
+        )  # fmt: skip
+        sign = "≥" if side == "min" else "≤"
+        shown_name = "|q1|" if side == "" else f"{side} q1"
+        assert told.words.startswith(f"{shown_name} {sign} ")
+        assert told.words.count("−") == (limit < 0)
+        # terminal and page
+        cells = peak_cells(peak, 1.0, [0], has_core=False)
+        ends = [number(x) for x in re.split(" … ", cells[0])]
+        assert ends == pytest.approx([low, high], rel=2e-3)
+        assert number(cells[2]) == pytest.approx(reached, rel=2e-3)
+        assert number(limit_cells((parsed.value, ""), 1.0)[0]) == pytest.approx(limit, rel=2e-3)
+        assert number(number_text(far)) == pytest.approx(far, rel=2e-3)
+
+
+def test_the_csv_of_peaks_is_exact_and_signed(rng):
+    for side in SIDES:
+        for _ in range(20):
+            _, _, low, high, reached = drawn(rng)
+            if side == "":
+                low, high = np.sort(np.abs([low, high]))
+            _, peaks = peaks_with(side, low, high, reached)
+            study = EnvelopeResult(
+                fuzzy=("k1",), min={}, max={}, mean_width={}, error={}, alpha=[0.0],
+                peak=peak_results(peaks), trajectories=1, seconds=1.0, method="proof",
+                nature=Nature.GUARANTEED, motions_tested=0, step=0.1, units={"q1": "m"},
+            )  # fmt: skip
+            frame = peak_frame(Parts(envelopes={"all": study}).envelopes)
+            row = frame.iloc[0]
+            assert (row["least peak"], row["greatest peak"], row["peak reached"]) == (
+                low, high, reached,
+            )  # fmt: skip
+            texts = dict(zip(*[shown(frame).head, shown(frame).rows[0]], strict=True))
+            assert number(texts["least peak"]) <= low
+            assert number(texts["greatest peak"]) >= high

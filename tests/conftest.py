@@ -1,0 +1,63 @@
+"""What all tests share: random numbers whose seed a failure tells, and shipped cases run once."""
+
+import json
+import os
+import secrets
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.fixture
+def rng():
+    """Random numbers; the seed is printed, and given by SEED."""
+    seed = int(os.environ.get("SEED", secrets.randbelow(10**9)))
+    print(f"SEED={seed}")
+    return np.random.default_rng(seed)
+
+
+@pytest.fixture(scope="session")
+def shipped_run(tmp_path_factory, worker_id):
+    """A function (case, changes) to the folder of a shipped case's results, run once a session.
+
+    Processes of one session share the folders, which tests only read.
+    """
+    base = tmp_path_factory.getbasetemp()
+    place = (base if worker_id == "master" else base.parent) / "shipped"
+    place.mkdir(exist_ok=True)
+
+    def run(case, changes=()):
+        name = f"{case}-{abs(hash_of((case, changes)))}"
+        folder, lock = place / name, place / f"{name}.lock"
+        with lock.open("w") as handle:
+            import fcntl
+
+            fcntl.flock(handle, fcntl.LOCK_EX)
+            if not (folder / "summary.json").is_file():
+                sets = [f"--set={change}" for change in changes]
+                words = ["-m", "alphacut", "run", f"cases/{case}.toml", f"--out={folder}"]
+                done = subprocess.run(
+                    [sys.executable, *words, *sets, "--no-figures"],
+                    cwd=ROOT,
+                    capture_output=True,
+                    text=True,
+                    env=os.environ | {"OMP_NUM_THREADS": "1"},
+                )
+                assert done.returncode == 0, done.stderr
+                told = (done.stdout + done.stderr).splitlines()
+                (folder / "told.json").write_text(json.dumps(told), encoding="utf-8")
+        return folder
+
+    return run
+
+
+def hash_of(key):
+    """A number that is the same in every process."""
+    import hashlib
+
+    return int(hashlib.sha256(repr(key).encode()).hexdigest()[:12], 16)
