@@ -3,7 +3,6 @@
 import json
 import shutil
 import tomllib
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,7 +14,6 @@ from alphacut.fuzzy.refused import RefusedError
 from alphacut.stochastic import microstructure
 from alphacut.stochastic.figures.all import draw
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
-from alphacut.stochastic.fit.pbox import PBox, least_pbox
 from alphacut.stochastic.microstructure import MicrostructureStudy, fit_map, study
 from alphacut.stochastic.microstructure_summary import fragment, summary
 from alphacut.stochastic.particles.measured import CircleFile, SectionImage
@@ -24,6 +22,7 @@ from alphacut.stochastic.particles.particles import SPHERES, Particles
 from alphacut.stochastic.particles.radius_laws import LogNormalRadii, MeasuredRadii
 from alphacut.stochastic.sections import Simulated, reduced_radii, with_cells
 from alphacut.stochastic.tessellation.apollonius import apollonius, counted_cells, neighbours
+from benchmarks.stochastic import paper_data, sphere_map
 
 EQUAL, TENFOLD = LogNormalRadii(1e-3, 1e-3), LogNormalRadii(1e-3, 1e-2)
 SOURCE = Simulated(Packing(300, 0.2, TENFOLD), 12)
@@ -238,31 +237,6 @@ def test_slopes_that_differ_by_round_off_alone_are_crisp(result):
         assert (len(set(slopes)) == 1) is crisp
 
 
-def test_narrower_band_gives_a_wider_pbox(result):
-    crisp = PBox(result.pbox.fit, (result.pbox.a2[1],) * 3, (result.pbox.a4[1],) * 3)
-    least = crisp.excess(result.truncated)
-    boxes = [least_pbox(crisp.fit, result.truncated, band * least) for band in (1.2, 0.9, 0.8)]
-    areas = [box.area for box in boxes]
-    assert areas[0] == pytest.approx(0, abs=1e-9)
-    assert areas == sorted(areas)
-    assert areas[2] > 1e-5
-    assert boxes[2].excess(result.truncated) <= 0.8 * least + 1e-6 < least
-
-
-def test_supports_hold_what_chance_may_do_to_the_slopes(result):
-    for slope, band in ((result.pbox.a2, result.slopes.a2), (result.pbox.a4, result.slopes.a4)):
-        assert slope[0] <= max(band[0], 0) + 1e-9
-        assert slope[2] >= band[2] - 1e-9
-    alone = least_pbox(result.pbox.fit, result.truncated, result.band)
-    assert result.pbox.area > alone.area
-
-
-def test_study_is_the_same_whatever_the_workers(result):
-    with ThreadPoolExecutor(3) as pool:
-        again = study(SMALL, executor=pool)
-    assert fragment(summary(again)) == fragment(summary(result))
-
-
 def test_study_of_measured_circles(tmp_path):
     packing = Packing(900, 0.2, TENFOLD).make(np.random.default_rng(8))
     table = 1e3 * np.column_stack([packing.centres, packing.radii])
@@ -321,9 +295,8 @@ def test_spheres_take_the_same_way_and_keep_their_fraction(tmp_path):
     result = study(MicrostructureStudy(Simulated(spheres, 6), seed=2))
     numbers = summary(result)
     assert numbers["mean_volume_fraction_of_map"] == pytest.approx(0.2, rel=6e-3)
-    assert numbers["volume_fraction_of_cells"] == pytest.approx(
-        numbers["volume_fraction"], rel=1e-5
-    )
+    fraction = pytest.approx(numbers["volume_fraction"], rel=1e-5)
+    assert numbers["volume_fraction_of_cells"] == fraction
     for section in result.sections:
         assert section.cells.sum() == pytest.approx(section.particles.measure, rel=1e-5)
     assert "13_pbox" in draw(result, tmp_path)
@@ -335,3 +308,17 @@ def test_a_cubic_array_of_spheres_has_cubes_for_cells():
     section = with_cells(Particles(grid, np.full(27, 0.4), (3, 3, 3)))
     assert section.cells == pytest.approx(np.ones(27), rel=1e-5)
     assert section.reduced_radii == pytest.approx(np.full(27, 0.8), rel=1e-5)
+
+
+def test_the_papers_data_as_described(tmp_path, capsys):
+    options = ["--discs", "200", "--packings", "5", "--out", str(tmp_path)]
+    paper_data.main(options)
+    table = capsys.readouterr().out.splitlines()
+    assert len(table) == 6
+    assert (tmp_path / "paper_data.svg").is_file()
+
+
+@needs_voro
+def test_the_map_of_spheres(capsys):
+    sphere_map.main(["--spheres", "100", "--packings", "5"])
+    assert "volume fraction of this map at its modal values: 0.2" in capsys.readouterr().out

@@ -7,6 +7,7 @@ import pytest
 from scipy import integrate, stats
 
 from alphacut.stochastic import HermiteMap, TruncatedNormal, gauss_rule, layered_rule
+from alphacut.stochastic.theta.quadrature import between_nodes
 
 PAPER = dict(a1=0.1337, a2=0.1, a3=0.8663, a4=0.1692)
 SUPPORTS = [(-3.0, 3.0), (-1.0, 4.0), (5.0, 8.0), (-9.0, -6.5)]
@@ -30,13 +31,9 @@ def test_density_is_normalised_on_its_support():
 
 def test_samples_follow_the_law():
     law = TruncatedNormal(-1, 2)
-    assert stats.kstest(law.sample(20_000, np.random.default_rng(1)), law.cdf).pvalue > 1e-4
-    assert (
-        stats.kstest(
-            law.sample(20_000, np.random.default_rng(1)), TruncatedNormal(-1.1, 2).cdf
-        ).pvalue
-        < 1e-4
-    )
+    sample = law.sample(20_000, np.random.default_rng(1))
+    assert stats.kstest(sample, law.cdf).pvalue > 1e-4
+    assert stats.kstest(sample, TruncatedNormal(-1.1, 2).cdf).pvalue < 1e-4
 
 
 @pytest.mark.parametrize("support", [(3, -3), (0, 0), (np.nan, 1), (0, np.inf)])
@@ -45,14 +42,13 @@ def test_bad_support_is_refused(support):
         TruncatedNormal(*support)
 
 
-def test_support_without_probability_is_refused():
+def test_what_the_law_gives_no_probability_is_refused():
     with pytest.raises(ValueError, match="no probability"):
         TruncatedNormal(50, 51)
-
-
-def test_probability_outside_its_range_is_refused():
     with pytest.raises(ValueError, match=r"1\.5; allowed: values in"):
         TruncatedNormal().quantile([0.5, 1.5])
+    with pytest.raises(ValueError, match="from 1 on"):
+        gauss_rule(TruncatedNormal(), points=0)
 
 
 def test_map_takes_its_ends_and_slopes():
@@ -64,15 +60,10 @@ def test_map_takes_its_ends_and_slopes():
 
 def test_map_equals_the_printed_hermite_functions():
     xi = np.linspace(0, 1, 11)
-    printed = [
-        (1 + 2 * xi) * (1 - xi) ** 2,
-        xi * (1 - xi) ** 2,
-        xi**2 * (3 - 2 * xi),
-        xi**2 * (xi - 1),
-    ]
-    assert HermiteMap(**PAPER)(6 * xi - 3) == pytest.approx(
-        np.dot(list(PAPER.values()), printed), abs=1e-15
-    )
+    h1, h2 = (1 + 2 * xi) * (1 - xi) ** 2, xi * (1 - xi) ** 2
+    h3, h4 = xi**2 * (3 - 2 * xi), xi**2 * (xi - 1)
+    printed = np.dot(list(PAPER.values()), [h1, h2, h3, h4])
+    assert HermiteMap(**PAPER)(6 * xi - 3) == pytest.approx(printed, abs=1e-15)
 
 
 @pytest.mark.parametrize(
@@ -95,9 +86,9 @@ def test_radius_outside_the_cell_is_refused(change):
 
 def test_mean_area_fraction_of_the_paper():
     radius, law = HermiteMap(**PAPER), TruncatedNormal()
-    exact = integrate.quad(lambda t: np.pi / 4 * radius(t) ** 2 * law.pdf(t), -3, 3, epsabs=1e-14)[
-        0
-    ]
+    exact, _ = integrate.quad(
+        lambda t: np.pi / 4 * radius(t) ** 2 * law.pdf(t), -3, 3, epsabs=1e-14
+    )
     rule = gauss_rule(law, points=4)  # r² f_Θ needs degree 6
     assert rule.mean(np.pi / 4 * radius(rule.nodes) ** 2) == pytest.approx(exact, abs=1e-14)
     assert exact == pytest.approx(0.2092, abs=5e-5)
@@ -107,18 +98,12 @@ def test_mean_area_fraction_of_the_paper():
 @pytest.mark.parametrize("points", [1, 2, 5, 12])
 def test_gauss_rule_has_its_degree_and_no_more(support, points):
     law = TruncatedNormal(*support)
-    rule, middle, half = (
-        gauss_rule(law, points=points),
-        sum(support) / 2,
-        (support[1] - support[0]) / 2,
-    )
-    fine = layered_rule(law, layers=40, points=20)
+    middle, half = sum(support) / 2, (support[1] - support[0]) / 2
+    rules = gauss_rule(law, points=points), layered_rule(law, layers=40, points=20)
 
     def error(degree: int) -> float:
-        return abs(
-            rule.mean(((rule.nodes - middle) / half) ** degree)
-            - fine.mean(((fine.nodes - middle) / half) ** degree)
-        )
+        first, second = (x.mean(((x.nodes - middle) / half) ** degree) for x in rules)
+        return abs(first - second)
 
     assert max(error(k) for k in range(2 * points)) < 1e-13
     assert error(2 * points) > 1e-10
@@ -143,6 +128,34 @@ def test_means_of_arrays_and_constants():
     assert (np.diff(rule.nodes) > 0).all()
 
 
-def test_rules_without_nodes_are_refused():
-    with pytest.raises(ValueError, match="from 1 on"):
-        gauss_rule(TruncatedNormal(), points=0)
+AT = np.linspace(-3, 3, 61)
+
+
+def wave(theta):
+    return 1 / (1 + np.exp(-theta))
+
+
+@pytest.mark.parametrize(("points", "error"), [(10, 3e-3), (14, 4e-4), (20, 3e-5)])
+def test_the_error_falls_with_the_nodes_of_a_gauss_rule(points, error):
+    nodes = gauss_rule(TruncatedNormal(), points=points).nodes
+    assert np.abs(between_nodes(nodes, wave(nodes), AT) - wave(AT)).max() < error
+
+
+@pytest.mark.parametrize(
+    "nodes",
+    [
+        layered_rule(TruncatedNormal(), layers=12, points=3).nodes,
+        np.linspace(-2.9, 2.9, 25),
+        AT[::10],
+    ],
+)
+def test_other_nodes_are_joined_without_overshoot(nodes):
+    curve = between_nodes(nodes, np.sign(nodes), AT)
+    assert np.abs(curve[(nodes[0] <= AT) & (nodes[-1] >= AT)]).max() <= 1 + 1e-12
+
+
+def test_a_curve_between_nodes_is_the_same_to_the_last_bit_each_time():
+    nodes = gauss_rule(TruncatedNormal(), points=14).nodes
+    curves = {between_nodes(nodes, wave(nodes), AT).tobytes() for _ in range(20)}
+    assert len(curves) == 1
+    assert (between_nodes(nodes, wave(nodes), nodes) == wave(nodes)).all()

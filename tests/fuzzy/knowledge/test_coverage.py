@@ -6,7 +6,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-import alphacut.fuzzy.knowledge.from_data as own
 from alphacut.fuzzy import RefusedError, from_data
 from alphacut.fuzzy.knowledge.from_data import from_scatter
 from alphacut.fuzzy.knowledge.order_statistics import windows
@@ -89,19 +88,6 @@ def test_the_mean_by_student_and_within_bounds():
     assert bounded.cut(0.0) == (0, 4)
     known = from_scatter(0.0, 1.0, 4).cut(0.05)
     assert known == pytest.approx(np.array([-1, 1]) * stats.norm.ppf(0.975) / 2)
-
-
-def test_the_band_of_a_mean_is_between_hoeffding_and_the_law_of_large_numbers():
-    """The margin √(log(2/α) / 2n) is met from below, and by no more than a quarter."""
-    data = np.random.default_rng(3).random(50)
-    for alpha in (0.01, 0.1, 0.5):
-        reach = np.sqrt(np.log(2 / alpha) / 100)
-        low, high = from_data(data, "mean", bounds=(0, 1)).cut(alpha)
-        assert max(0, data.mean() - reach) <= low + 1e-12
-        assert high <= min(1, data.mean() + reach) + 1e-12
-        band = own._band_half_width(50)[np.searchsorted(own.LEVELS, alpha - 1e-12)]
-        assert 0.75 * reach < band <= reach
-        assert band > np.sqrt(np.log(1 / alpha) / 100)  # one tail in place of two
 
 
 @pytest.mark.parametrize(

@@ -48,18 +48,11 @@ def first_passage(number, level, index, alpha):
     for q in range(level + 1, top + 1):
         steps = q - level
         to_left, to_right = index, top - level - index
-        if (
-            steps >= to_left
-            # the last step is a left one; before it, to_left − 1 left ones and too few right ones to
-            # have stopped
-        ):
-            right = steps - to_left
-            if right < to_right:
-                total += comb(steps - 1, to_left - 1) / 2**steps * ends[q].lower
-        if steps >= to_right:
-            left = steps - to_right
-            if left < to_left:
-                total += comb(steps - 1, to_right - 1) / 2**steps * ends[q].upper
+        # the last step is a left one; before it, to_left − 1 left ones and too few right ones to stop
+        if 0 <= steps - to_left < to_right:
+            total += comb(steps - 1, to_left - 1) / 2**steps * ends[q].lower
+        if 0 <= steps - to_right < to_left:
+            total += comb(steps - 1, to_right - 1) / 2**steps * ends[q].upper
     return total
 
 
@@ -80,20 +73,15 @@ def test_points_of_many_levels_take_no_time():
 
 
 def test_fuzzy_intervals_start_from_two_points_and_crisp_inputs_from_one():
-    assert [len(points) for points in hanss_points(Trapezoidal(0, 1, 2, 4), levels(3))] == [
-        5,
-        4,
-        3,
-        2,
-    ]
-    assert [len(points) for points in hanss_points(Interval(0, 1), levels(3))] == [5, 4, 3, 2]
-    assert [len(points) for points in hanss_points(Crisp(1.0), levels(3))] == [1, 1, 1, 1]
+    for number, counts in (
+        (Trapezoidal(0, 1, 2, 4), [5, 4, 3, 2]),
+        (Interval(0, 1), [5, 4, 3, 2]),
+        (Crisp(1.0), [1, 1, 1, 1]),
+    ):
+        assert [len(points) for points in hanss_points(number, levels(3))] == counts
 
 
-@pytest.mark.parametrize(
-    ("method", "evaluations"),
-    [(General(), 225), (Reduced(), 33)],
-)
+@pytest.mark.parametrize(("method", "evaluations"), [(General(), 225), (Reduced(), 33)])
 def test_counts_of_the_papers_case(method, evaluations):
     assert propagate(monotone, PAPER, method).evaluations == evaluations
 
