@@ -57,13 +57,6 @@ def test_fit_equals_brute_force_least_squares(weighted):
     assert FIT.slopes(sample) == pytest.approx(staircase_fit(sample), abs=1e-4)
 
 
-def test_fit_returns_the_map_of_its_own_quantiles():
-    share = (np.arange(200_000) + 0.5) / 200_000
-    assert FIT.slopes(AreaWeighted.from_values(TRUE(LAW.quantile(share)))) == pytest.approx(
-        (0.3, 0.5), abs=2e-4
-    )
-
-
 def rises(radius):
     """Whether a cubic map never falls: the least of its slope at the ends and where it turns."""
     slope = np.polynomial.Polynomial(radius.monomials).deriv()

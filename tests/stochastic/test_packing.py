@@ -15,7 +15,6 @@ from alphacut.stochastic.particles.particles import DISCS, SPHERES, Particles
 from alphacut.stochastic.particles.radius_laws import LogNormalRadii, MeasuredRadii
 from alphacut.stochastic.sections import Simulated
 from alphacut.stochastic.theta.quadrature import gauss_rule
-from benchmarks.stochastic.sphere_map import unfolded
 
 EQUAL, TENFOLD = LogNormalRadii(1e-3, 1e-3), LogNormalRadii(1e-3, 1e-2)
 
@@ -128,15 +127,3 @@ def test_a_measured_law_takes_its_values_in_equal_shares():
     radii = law.sample(20_000, np.random.default_rng(1))
     assert (radii.min(), radii.max()) == pytest.approx((1e-3, 3e-3), rel=1e-3)
     assert MeasuredRadii((1e-3,)).sample(3, np.random.default_rng(1)).tolist() == [1e-3] * 3
-
-
-def test_circles_of_spheres_unfold_to_their_law():
-    """A sphere of radius R is hit in proportion to R, at a uniform height."""
-    rng, law = np.random.default_rng(3), LogNormalRadii(1.0, 3.0)
-    spheres = law.sample(400_000, rng)
-    hit = spheres[rng.random(len(spheres)) < spheres / 3]
-    circles = hit * np.sqrt(1 - rng.random(len(hit)) ** 2)
-    unfolded_law = unfolded(circles[circles > 1], visible=1.0, largest=3.0)
-    share = np.linspace(0.1, 0.9, 9)
-    expected = np.quantile(spheres, share)
-    assert np.quantile(unfolded_law.values, share) == pytest.approx(expected, rel=0.03)

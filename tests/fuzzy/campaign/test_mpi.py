@@ -49,10 +49,6 @@ def reference(folder):
     return bits(folder, "1", [sys.executable])
 
 
-def test_any_number_of_workers(folder, reference):
-    assert bits(folder, "5", [sys.executable]) == reference
-
-
 @pytest.mark.skipif(shutil.which("mpirun") is None, reason="there is no mpirun")
 @pytest.mark.parametrize("processes", [1, 3])
 def test_any_number_of_mpi_processes(folder, reference, processes):

@@ -118,32 +118,12 @@ def test_intervals_hold_the_widest_scatter_that_they_allow():
 def test_censored_values_are_intervals_without_an_end():
     number = from_data([1.0, 2.0, (3.0, np.inf), (2.5, np.inf)], "next value", bounds=(0, None))
     assert number.decided == 1
+    assert "decide no cut count as containing" in str(number.claim)
     more = [1.0, 2.0, 2.2, 2.4, 2.5, 2.6, (3.0, np.inf)]
     assert from_data(more, "next value", bounds=(0, None)).cut(0.5).upper == 2.6
     assert from_data([1.0, 2.0, (3.0, np.inf)], "next value", bounds=(0, 9)).cut(0.5) == (1, 9)
     rounded = from_data([(1.5, 2.5), (2.5, 3.5)], "next value", bounds=(0, 9))
     assert rounded.cut(2 / 3) == (1.5, 3.5)
-
-
-def test_the_coverage_under_censoring_counts_undecided_samples():
-    """Waiting times censored at 1.2: of the cuts that are decided far fewer contain the next one."""
-    rng, decided, contained = np.random.default_rng(5), [], []
-    for *times, following in rng.exponential(size=(600, 7)):
-        values = [time if time < 1.2 else (1.2, np.inf) for time in times]
-        number = from_data(values, "next value", bounds=(0, None))
-        says = "decide no cut count as containing" in str(number.claim)
-        assert says == (max(times) >= 1.2)
-        decided.append(number.decided <= 0.3)
-        cut = number.cut(0.3) if decided[-1] else (0, np.inf)
-        contained.append(cut[0] <= following <= cut[1])
-        bounded = from_data(values, "next value", bounds=(0, 50))
-        assert bounded.decided == 0
-        assert "decide no cut" not in str(bounded.claim)
-    share, of_decided = np.mean(contained), np.mean(np.array(contained)[decided])
-    print(np.mean(decided), share, of_decided)
-    spread = 4 * np.sqrt(0.7 * 0.3 / 600)
-    assert share > 0.7 - spread
-    assert of_decided < 0.7 - spread
 
 
 @pytest.mark.parametrize("high", [1, 100, 0.3])

@@ -7,13 +7,12 @@ import pytest
 from scipy.optimize import minimize_scalar
 from scipy.special import gamma
 
-from alphacut.fuzzy import Automatic, Interval, Nature, Triangular, propagate
+from alphacut.fuzzy import Interval, Nature, Triangular, propagate
 from alphacut.fuzzy.campaign.call import Call
 from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.plans.cut import Bound, CutSearch
 from alphacut.fuzzy.plans.single_linkage import (
     FIRST_STEP,
-    SingleLinkage,
     critical_distance,
     linkage_starts,
     uncovered_fraction,
@@ -113,25 +112,6 @@ def test_a_descent_ends_in_the_basin_of_its_start(width):
     assert cut.descend(start, Bound("y", 1.0)).point[0] == 0
 
 
-@pytest.mark.parametrize(
-    ("function", "humps"),
-    [
-        (lambda x, y: (x - 0.4) ** 2 + (y - 0.6) ** 2, 1),
-        (lambda x, y: np.cos(9 * x) + 4 * (y - 0.5) ** 2, 2),
-    ],
-)
-def test_a_second_optimum_that_is_no_corner_halves_sigma(function, humps):
-    campaign = Campaign(Call(function, ("x", "y"), vectorised=True))
-    unit = np.random.default_rng(3).random((100, 2))
-    linkage = SingleLinkage(campaign, Domain(SQUARE, (0.0,)), ("y",), uncovered=0.002, seed=0)
-    linkage.run(unit)
-    state = linkage.states[0, Bound("y", 1.0)]
-    assert state.samples == 100
-    assert state.n_humps(linkage.cuts[0]) == humps
-    starts = linkage_starts(unit, function(*unit.T), critical_distance(100, 2, sigma=2.0))
-    assert (set(starts.tolist()) <= state.started) == (humps == 2)
-
-
 @pytest.mark.parametrize("function", [
     lambda x, y: np.clip(3 * x - 1.5, -0.4, 0.5) + np.maximum(0, 1 - 20 * np.hypot(x, y - 0.5)),
     lambda x, y: np.maximum((x - 0.5) ** 2 + (y - 0.5) ** 2, 0.1),
@@ -202,14 +182,3 @@ def test_corners_bound_a_monotone_function_at_little_cost():
 def test_corners_that_do_not_suffice_are_seen(function):
     result = propagate(function, SQUARE, alpha=[0.0], vectorised=True)
     assert not any(note.startswith("corners") for note in result.notes)
-
-
-def test_seeds_differ_and_agree_within_both_errors():
-    function = HUMPS["sines"][0]
-    one, other = (
-        propagate(function, SQUARE, Automatic(seed=seed), alpha=[0.0, 0.5], vectorised=True)
-        for seed in (1, 2)
-    )
-    assert one.evaluations != other.evaluations
-    assert (np.abs(one.lower - other.lower) <= one.error + other.error).all()
-    assert (np.abs(one.upper - other.upper) <= one.error + other.error).all()
