@@ -11,6 +11,7 @@ from alphacut.frame import Accelerogram, Exact, LinearFlow, Midpoint, StoreyFram
 from alphacut.frame.bounds.branch_and_bound import Frontier, Tree, enclosed
 from alphacut.frame.bounds.certificate import certify
 from alphacut.frame.bounds.kernel import stays_below
+from alphacut.frame.bounds.model_error import proved_error
 from alphacut.frame.bounds.newton import Optima, first_optima
 from alphacut.frame.bounds.remainder import (
     Remainder,
@@ -21,6 +22,7 @@ from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.calculus.polynomial import Polynomial
 from alphacut.frame.modes.modal_model import ModalModel
 from alphacut.frame.response.duhamel import responses_at_nodes
+from alphacut.frame.response.load_tables import left_out
 from alphacut.frame.verification.step_error import MARGIN, step_error
 from alphacut.fuzzy import Interval
 
@@ -99,6 +101,32 @@ def test_the_model_error_counts_on_both_sides_of_the_gap_asked_for() -> None:
     assert 2 * 0.004 < gap <= 0.01
     with pytest.raises(ValueError, match="twice the model error"):
         certify(model, gap=0.0079, model_error=error, scale=np.ones(1))
+
+
+def test_an_error_that_rises_and_falls_within_a_step_is_in_what_is_between() -> None:
+    """Kicked just after the node before, it has decayed by exp(−h) at the next one."""
+    frame = StoreyFrame((1.0,), stiffness=(2.0,), rayleigh=(2.0, 0.0), q0=(1.0,))
+    flow = LinearFlow(frame, ("k1",), 3.0, 0.5, Exact())
+    model = ModalModel.of_degree(flow, boxes({"k1": Interval(1.999, 2.001)}, (0,)), 3)
+    error = np.zeros((7, 1))
+    error[3] = 1e-3 * np.exp(-0.5)
+    plain, kicked = (
+        certify(model, gap=1e-2, model_error=x, scale=np.ones(1)).between
+        for x in (0 * error, error)
+    )
+    assert 1 <= (kicked - plain)[3, 0] / 1e-3 <= 1.01
+
+
+def test_what_a_series_of_a_load_leaves_out_is_in_the_proved_error() -> None:
+    """A series that is cut short is off by a fifth of the bound."""
+    model, unit = spring(1.0, PULSE, 6.0, 0.1), np.array([[-1.0], [1.0]])
+    assert proved_error(model)[-1, 0] < 1e-10
+    (table,) = model.loads[0].tables
+    phase = float(np.abs(model.eigenvalue.coefficients[1:]).sum()) / table.scale
+    table.moment, table.truncation = table.moment[:, :2], 2 * left_out(phase, 2)
+    truth = UnitFlow(model.flow, model.boxes).values(unit)[:, -1, 0]
+    off = np.abs(model.value_at(unit, np.full(2, 60), np.zeros(2, int)) - truth).max()
+    assert 0.1 < off / proved_error(model)[-1, 0] <= 1
 
 
 def cube(square: float = 0.0) -> ModalModel:
