@@ -1,12 +1,12 @@
 """Spatial branch and bound for the modal model (Adjiman, Floudas 1998), up to the gap asked for.
 
-All nodes, outputs and sides share one tree of boxes, and each box its polynomials. A box is closed
-for a problem by one of five tests, all but the third on the quadratic Taylor model with the
-remainder of `remainder`: 1. the output is monotone along an axis, and the neighbouring box, or the
-face, covers it; 2. its bound lies below the best known value; 3. so does that of modes which turn
-at rates linear in the parameters, with a remainder that holds only what else they do; 4. a concave
-function above the quadratic model has no higher point; 5. near the best point the same holds for
-the Taylor model there, made less concave by the remainder. Else it is halved.
+All nodes, outputs and sides share one tree of boxes, and each box its polynomials. A box is
+fathomed for a problem by one of five tests, all but the third on the quadratic Taylor model with
+the remainder of `remainder`: 1. the output is monotone along an axis, and the neighbouring box, or
+the face, covers it; 2. its bound lies below the incumbent; 3. so does that of modes whose phase is
+linear in the inputs, with a remainder that holds only what else they do; 4. a concave function
+above the quadratic model (αBB) has no higher point; 5. near the best point the same holds for the
+Taylor model there, made less concave by the remainder. Else it is bisected.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from alphacut.frame.bounds.newton import Optima, refine
 from alphacut.frame.bounds.remainder import Remainder
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.modes.modal_model import ModalModel
+from alphacut.fuzzy.arrays import Rows
 from alphacut.fuzzy.progress_bar import Progress
 
 PIECE = 30_000
@@ -65,11 +67,18 @@ def enclosed(
     tree = Tree(model, lower, upper, optima, gap)
     frontier, n_problems = Frontier.of_box(len(lower), tree.numbers), len(tree.numbers)
     examined = 0
-    while len(frontier) and examined + len(frontier) <= budget * n_problems:
-        examined += len(frontier)
-        frontier = tree.next_frontier(frontier, workers)
-        if progress:
-            progress(1 - len(np.unique(frontier.problem)) / n_problems)
+    with ThreadPoolExecutor(workers) as pool:
+        while len(frontier) and examined + len(frontier) <= budget * n_problems:
+            examined += len(frontier)
+            pieces = zip(*frontier.pieces(PIECE), strict=True)
+            results = pool.map(partial(tree.examine, frontier), *pieces)
+            code, value, _ = (np.concatenate(x) for x in zip(*results, strict=True))
+            higher = np.flatnonzero(value > tree.best[frontier.problem] + HIGHER)
+            if len(higher):  # the incumbent is the best of centres, refined
+                tree.improve(frontier, higher[np.argsort(value[higher])], value)
+            frontier = frontier.children(code)
+            if progress:
+                progress(1 - len(np.unique(frontier.problem)) / n_problems)
     return tree.proved(frontier), examined  # boxes that are still open keep their own bounds
 
 
@@ -82,8 +91,7 @@ class Tree:
         optima: N problems with their best points, which improve.
         numbers: Their numbers, shape (N,).
         remainder: Of quadratic Taylor models over the domain.
-        best: Side × output at the best points so far, of all problems of the model by number; those
-            without a place in `optima` are idle.
+        best: Side × output at the best points so far by number; idle without a place in `optima`.
         point: These points, shape (…, d).
         jets: Value, gradient and Hessian (upper triangle) of the outputs there, shape (…, q).
         gap: What the bounds may lie above the best values by.
@@ -100,23 +108,6 @@ class Tree:
         self.best, self.point = np.zeros(total), np.zeros((total, d))
         self.jets = np.zeros((total, 1 + d + d * (d + 1) // 2))
         self._renew(np.arange(len(self.numbers)))
-
-    def next_frontier(self, frontier: Frontier, workers: int) -> Frontier:
-        """Halves and faces of a frontier's boxes, with the items still open after examination.
-
-        An item is a box with a problem. Best points improve where a centre has a higher value.
-        """
-
-        def outcome_of(part: tuple[slice, slice]) -> tuple[Array, Array, Array]:
-            return self.examine(frontier, *part)
-
-        with ThreadPoolExecutor(workers) as pool:
-            results = list(pool.map(outcome_of, frontier.pieces(PIECE)))
-        code, value, _ = (np.concatenate(arrays) for arrays in zip(*results, strict=True))
-        higher = np.flatnonzero(value > self.best[frontier.problem] + HIGHER)
-        if len(higher):
-            self._improve(frontier, higher[np.argsort(value[higher])], value)
-        return frontier.children(code)
 
     def proved(self, frontier: Frontier) -> Array:
         """Upper bounds of all problems, where the boxes of a frontier are left open, (N,)."""
@@ -161,12 +152,8 @@ class Tree:
         )
         return outcome
 
-    def _improve(self, frontier: Frontier, items: Array, value: Array) -> None:
-        """Replace best points by the centres of higher items, and refine them by Newton's method.
-
-        `items` are the indices of these by rising value, so that the highest is written last;
-        `value` is side × output at the centres of all items.
-        """
+    def improve(self, frontier: Frontier, items: Rows, value: Array) -> None:
+        """Replace incumbents by the centres of higher `items`, rising, and refine them (Newton)."""
         row_of_problem = np.zeros(len(self.best), np.int64)
         row_of_problem[self.numbers] = np.arange(len(self.numbers))
         rows = row_of_problem[frontier.problem[items]]
@@ -265,15 +252,8 @@ class Frontier:
         items = np.unique(child[np.searchsorted(distinct_keys, keys)] * n_problems + problem)
         return Frontier(positions, *np.divmod(items, n_problems))
 
-    def _places(self, keys: Array, count: int) -> Array:
-        """Positions of child boxes, shape (K, d), in the form of `position`.
-
-        Args:
-            keys: For each child its parent box × `count` + a number: 2 axis + (0 or 1) for the
-                lower or upper half, 2 d + a ternary code for faces, whose digit of each axis is
-                0: all of it, 1: lower end, 2: upper end.
-            count: Numbers a box, 2 d + 3^d.
-        """
+    def _places(self, keys: Rows, count: int) -> Rows:
+        """Positions (K, d) of child boxes by key: parent × `count` + number."""
         d = self.position.shape[1]
         positions: Array = self.position[keys // count].copy()
         number = keys % count
@@ -296,19 +276,10 @@ def _distinct(rows: Array) -> tuple[Array, Array]:
 
 
 def _tables(rate: Array, C: Array, d: int) -> Array:
-    """Factors of the waves w, w′, w″ in an output's value, gradient and Hessian, at B points.
+    """Factors of the waves w, w′, w″ in outputs, their gradients and Hessians at B points.
 
-    The output is 2 Re Σ_k C_k w(λ_k) over n modes and P parts (free motion and loads); q = 1 + d +
-    d (d + 1)/2 numbers are a value, a gradient and a Hessian's upper triangle.
-
-    Args:
-        rate: λ_k with derivatives, shape (q, B, n).
-        C: C_k with derivatives, shape (q, B, P, n, m).
-        d: Number of parameters.
-
-    Returns:
-        Shape (B, m, 6 P n, q); the third axis runs over parts, orders of the wave's derivative and
-        modes, each with its real and imaginary part.
+    Of 2 Re Σ_k C_k w(λ_k), λ (q, B, n) and C (q, B, P, n, m) with derivatives: (B, m, 6 P n, q),
+    the third axis over parts, orders of w's derivative, modes, and real and imaginary parts.
     """
     rate = rate[..., None, :, None]
     out = np.zeros((*C.shape[1:3], 3, *C.shape[3:], len(C)), complex)  # (B, P, 3, n, m, q)

@@ -118,11 +118,8 @@ def certify(
 
 
 def _between(model: ModalModel) -> Array:
-    """Bound of the interpolation error of outputs in the step to each node, shape (T, m).
-
-    It is h²/8 times a bound of the second time derivative, h/4 times a kink where a load jumps, and
-    of outputs on which a load acts directly that of its history. R is a mode's response to a load.
-    """
+    """Bound of the interpolation error of the model's outputs in the step to each node, (T, m)."""
+    # h²/8 times |q̈|, h/4 times a kink where a load jumps; of outputs that a load feeds, its own
     reach, h = np.ones(len(model.boxes.names)), model.flow.step
     rate, growth = suprema(model.eigenvalue, reach)[0], largest_growth(model.eigenvalue, reach)
     curve = np.zeros((len(model.time), len(model.outputs)))
@@ -153,15 +150,8 @@ def _between(model: ModalModel) -> Array:
 
 
 def _growth(model: ModalModel, margin: Array) -> Array:
-    """Bound of what the model's error inside the step to each node adds to its smaller end, (T, m).
-
-    An error that decays no faster than exp(g t) is inside the step at most exp(−g h) times its
-    value at the end.
-
-    Args:
-        model: The modal model.
-        margin: Bound of its error at the nodes, shape (T, m).
-    """
+    """Bound of what the model's error in the step to a node exceeds its smaller end by, (T, m)."""
+    # it decays no faster than exp(g t): inside it is at most exp(−g h) times what it is at the end
     exponent = largest_growth(model.eigenvalue, np.ones(len(model.boxes.names)))
     swell = float(np.exp(np.maximum(-exponent, 0.0).max() * model.flow.step))
     added = np.zeros_like(margin)

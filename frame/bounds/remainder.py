@@ -157,16 +157,8 @@ class Remainder:
 
 
 def _rounding_bound(model: ModalModel, rate: Array, load: LoadTables | None) -> Array:
-    """Bound of the relative rounding error of each mode's motion at each node, shape (T, n).
-
-    It is ε times a count of operations. The rounding of λ enters exp(λ t) times |λ| t. A load's
-    response is a Taylor series in λ, whose terms may exceed its sum by the factor exp(REACH).
-
-    Args:
-        model: The modal model.
-        rate: Bounds of |λ_k|, shape (n,), in 1/s.
-        load: The load; None for the free motion.
-    """
+    """Relative rounding error of each mode's motion at each node, (T, n): ε times operations."""
+    # that of λ enters exp(λ t) times |λ| t; terms of a load's series exceed its sum by exp(REACH)
     n_terms, d = model.eigenvalue.index.shape
     of_polynomial = n_terms + model.degree + 2
     phase = rate * model.time[:, None]
@@ -177,11 +169,7 @@ def _rounding_bound(model: ModalModel, rate: Array, load: LoadTables | None) -> 
 
 
 def _initial_third_derivatives(model: ModalModel, reach: Array) -> Array:
-    """Bounds of the outputs' third derivatives by u at t = 0, |u_i| ≤ reach_i, shape (m, d, d, d).
-
-    The polynomials 2 Re C_k are summed over the modes before they are bounded, since most of the
-    sum cancels.
-    """
+    """Bounds of the outputs' third derivatives at t = 0, (m, d, d, d), where most modes cancel."""
     coefficients = model.coefficient.coefficients
     mode_sum = 2 * coefficients.reshape(len(coefficients), model.count, -1).sum(1).real
     third = suprema(Polynomial(model.coefficient.index, mode_sum), reach)[3]

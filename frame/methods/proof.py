@@ -169,14 +169,7 @@ class Proof:
     def _model_with_gap(
         self, flow: LinearFlow, boxes: Boxes, scale: Array
     ) -> tuple[ModalModel, Array, float]:
-        """Return a modal model of a part, its proved error (T, m), and the gap that this allows.
-
-        Gaps are tried from the narrowest; the error may take a fifth of the gap.
-
-        Raises:
-            GapError: It takes too much of all gaps.
-            UnprovedError: No degree can help, or a proof needs more than is affordable.
-        """
+        """Modal model of a box, its proved error (T, m), and the narrowest gap that this allows."""
         refusal = UnprovedError("no gap is asked for")
         for gap in self._gaps:
             try:
@@ -189,12 +182,7 @@ class Proof:
     def _accurate_model(
         self, flow: LinearFlow, boxes: Boxes, scale: Array, gap: float
     ) -> tuple[ModalModel, Array]:
-        """Modal model of a box whose proved error, (T, m), is a fifth of the gap at most.
-
-        Raises:
-            GapError: No affordable degree suffices.
-            UnprovedError: Nor would bisections help, or no error is proved.
-        """
+        """Modal model of a box whose proved error, (T, m), is a fifth of the gap at most."""
         degree, max_degree, step, before = LEAST_DEGREE, _max_degree(len(boxes.names)), 0, np.inf
         while True:
             model = ModalModel.of_degree(flow, boxes, degree, LEFT_OUT * gap * scale)
@@ -211,17 +199,13 @@ class Proof:
             degree, before = degree + step, excess
 
     def _refusal(self, model: ModalModel, excess: float, decay: float) -> UnprovedError:
-        """Error to raise if a model's error is so many times too large and decays so with degrees.
-
-        Halving the inputs that contribute to it divides the error of degree N by 2^(N + 1). A
-        `GapError` names the input to bisect; where too many bisections are needed it is a
-        `BisectionError`.
-        """
+        """A `GapError` with the input to bisect; a `BisectionError` if too many are needed."""
         what = f"the proved error of the modes, {MAX_ERROR_FRACTION * excess:.3g} of it,"
         what += " takes too much of the gap"
         cure = "narrower or fewer fuzzy inputs, or a wider gap, can be proved"
         input_shares, max_degree = tail_shares(model), _max_degree(len(model.boxes.names))
         with_all_degrees = np.log2(excess) + (max_degree - model.degree) * np.log2(decay)
+        # halving the inputs that contribute divides the error of degree N by 2^(N + 1)
         halvings = max(1.0, np.ceil(with_all_degrees / (max_degree + 1)))
         if not halvings / (input_shares**2).sum() <= np.log2(self.parts):
             return BisectionError(what, cure)

@@ -216,10 +216,7 @@ def needed_modes(
 
 
 def _middle_modes(structure: DampedStructure) -> tuple[Array, Array, Array]:
-    """λ, unit shapes φ and φᵀ (2 λ M + D) φ in the middle, shapes (2N,), (2N, N) and (2N,).
-
-    Those with Im λ > 0 come first, then real ones, each by rising |λ|.
-    """
+    """λ (2N,), unit shapes φ as rows and φᵀ (2 λ M + D) φ in the middle; Im λ > 0 first, by |λ|."""
     omega, n = structure.omega, len(structure.omega)
     D = _middle_damping(structure)
     lower = np.hstack([-np.diag(omega**2), -D])
@@ -244,13 +241,8 @@ def norm_of(vectors: Array) -> Array:
 def _eigen_series(
     structure: DampedStructure, D: TaylorModel, chosen: Rows
 ) -> tuple[TaylorModel, TaylorModel]:
-    """λ (n,) and φ (n, N) with (λ² M + λ D + K) φ = 0 to the order of M, about the middle.
-
-    In degree m, (λ₀² M₀ + λ₀ D₀ + K₀) φ_m + λ_m (2 λ₀ M₀ + D₀) φ₀ is known, and φ₀* φ_m = 0.
-
-    Raises:
-        ModalError: A mode does not oscillate, or has the frequency of another one.
-    """
+    """λ (n,) and φ (n, N) with (λ² M + λ D + K) φ = 0 to the order of M, about the middle."""
+    # in degree m, (λ₀² M₀ + λ₀ D₀ + K₀) φ_m + λ_m (2 λ₀ M₀ + D₀) φ₀ is known, and φ₀* φ_m = 0
     M, K = structure.mass, structure.stiffness
     rates, shapes, _ = _middle_modes(structure)
     lam, phi = rates[chosen], shapes[chosen]

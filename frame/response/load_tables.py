@@ -156,21 +156,8 @@ def left_out(phase: float, order: int) -> float:
 def _moments(
     history: History, middle: complex, time: Array, length: int, phase: float, order: int
 ) -> Array:
-    """Taylor coefficients by λ of R = ∫ exp(λ (t − s)) a(s) ds over a node's window, (T, order).
-
-    The windows cut time into parts of `length` steps, and the integral begins with the window of t.
-    Coefficients follow from Cauchy's integral over a circle of radius `phase` in the variable x =
-    (λ − middle) × window length, at as many points as coefficients; its error is made of those of
-    higher order.
-
-    Args:
-        history: a, the load.
-        middle: λ about which the series is.
-        time: Nodes, shape (T,), in s.
-        length: Steps of a window.
-        phase: Largest change of phase over the box within a window, or more.
-        order: Number of coefficients.
-    """
+    """Taylor coefficients by λ of R over a node's window, (T, order), by Cauchy's integral."""
+    # over a circle of radius `phase` in x = (λ − middle) × window length, at `order` points
     unit_circle = np.exp(2j * np.pi / order * np.arange(order))
     rate = middle + phase * unit_circle / (length * (time[1] - time[0]))
     (values,), _ = responses_at_nodes(rate, history, time, window=length)
