@@ -98,7 +98,8 @@ class MotionModels:
                 more, straying, ends = coupling_of(structure, of_block, found, excitation)
                 by_sums = rest_of_block(structure, found, of_block, ends, excitation)
                 scale = np.maximum(more.max(0) if allowed is None else allowed, 1e-300)
-                if (by_sums.width / scale).max() < (more.max(0) / scale).max():
+                is_narrower = (by_sums.width / scale).max() < (more.max(0) / scale).max()
+                if is_narrower and (single or of_block is not shares[-1]):  # one oscillator is left
                     truncated.append(by_sums)
                     continue
                 added, deviation = added + more, deviation + straying

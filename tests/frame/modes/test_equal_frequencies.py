@@ -1,0 +1,129 @@
+"""A building alike in x and y: modes of equal frequencies, and an output that stays at rest."""
+
+import numpy as np
+import pytest
+from scipy.linalg import eigh
+
+from alphacut.frame import Accelerogram, DualProof, Force, History, MatrixStructure, envelope
+from alphacut.frame.bounds.box import over_box, sources
+from alphacut.frame.calculus.jet import Jet
+from alphacut.frame.modes.models import MotionModels
+from alphacut.frame.structures.linear import histories, modal_damping
+from alphacut.fuzzy import Interval
+
+EYE = np.eye(4)
+CHAIN = np.array([[2.0, -1], [-1, 1]])
+BOTH = np.kron(EYE[:2, :2], CHAIN)
+RECORD = Accelerogram(0.02, np.sin(8 * np.arange(0, 2.001, 0.02)))
+GIVEN = {"duration": 3.0, "step": 0.01, "alpha": [0], "progress": False}
+
+
+def building(angle=0.0):
+    """Two equal chains of two unit masses with springs k, in axes turned by an angle."""
+    turn = np.kron([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]], EYE[:2, :2])
+    springs = turn @ BOTH @ turn.T
+    return MatrixStructure(
+        {"k": 610.0},
+        [(1.0, EYE)],
+        [("k", (springs + springs.T) / 2)],
+        {"qx": EYE[1], "qy": EYE[3]},
+        ratios=(0.02,),
+        ground=RECORD,
+        pattern=np.array([1.0, 1, 0, 0]),
+    )
+
+
+@pytest.mark.parametrize("angle", [0.0, np.pi / 6])
+def test_double_modes_are_proved_and_the_output_at_rest_has_no_gap(angle):
+    found = envelope(building(angle), {"k": Interval(600, 620)}, method=DualProof(), **GIVEN)
+    assert found.nature == "guaranteed"
+    # the peak of the same building with y twice as stiff, by an independent calculation
+    assert found.upper[0, :, 0].max() == pytest.approx(0.009445, rel=1e-3)
+    assert found.inner.upper[0, :, 0].max() == pytest.approx(0.009445, rel=1e-4)
+    assert np.abs(found.upper[0, :, 1]).max() < 1e-6
+    assert np.abs(found.lower[0, :, 1]).max() < 1e-6
+    assert found.facts["gap_of_peaks"] < 2e-3
+
+
+def test_an_oscillator_is_left_where_all_blocks_are_narrower_by_sums():
+    """Two floors in x, y and torsion; one of x and torsion coupled, and the force in y."""
+    K, masses = CHAIN, [1.1667, 1.0533]
+
+    def block(a, b, c, d=0.0):
+        zero = np.zeros((2, 2))
+        return np.block([[a * K, zero, d * K], [zero, b * K, zero], [d * K, zero, c * K]])
+
+    stiffness = [
+        (lambda p: p["g0"] * p["l"] ** -3, block(1, 0, 0)),
+        (1.0, block(0, 1, 0)),
+        (1.0, block(0, 0, 1.7)),
+        ("g3", block(0, 0, 0, 0.07988)),
+    ]
+    mass = [
+        ("ra", np.diag(masses + masses[:1] + [0] * 3)),
+        ("rb", np.diag([0] * 3 + masses[1:] + masses)),
+    ]
+    rng = np.random.default_rng(5)
+    ground = Accelerogram(0.449, rng.normal(size=130))
+    history = History(3.86, rng.normal(size=6), start=15.73)
+    system = MatrixStructure(
+        {"g0": 1.0, "g3": 1.0, "ra": 1.0, "rb": 1.0, "l": 1.0},
+        mass,
+        stiffness,
+        {"y0": np.eye(6)[1], "y1": np.eye(6)[4]},
+        ratios=(0.03,),
+        ground=ground,
+        loads=[Force(np.eye(6)[1], 1.3, history)],
+    )
+    names, time = ("rb", "l", "g3", "g0", "ra"), 1.533 * np.arange(41)
+    structure = over_box(system, names, np.full(5, 0.92), np.full(5, 1.06))
+    excitation = histories(system), time, sources(system, structure)
+    assert MotionModels.from_structure(structure, excitation, np.full(2, 1e-2)).oscillators
+
+
+def test_damping_by_ratios_is_smooth_where_modes_of_one_ratio_meet():
+    """Derivatives of M Φ diag(2 ζ ω) Φᵀ M agree with difference quotients at a double mode."""
+    seed = np.random.SeedSequence().entropy
+    rng = np.random.default_rng(seed)
+    change = rng.normal(size=(2, 4, 4))
+    change = change + change.swapaxes(1, 2)
+    middle, h, ratios = np.diag([1.0, 1, 4, 9]), 1e-3, np.array([0.02, 0.02, 0.05, 0.05])
+
+    def damping(x, y):
+        squared, shape = eigh(middle + x * change[0] + y * change[1])
+        return shape @ np.diag(2 * ratios * np.sqrt(squared)) @ shape.T
+
+    none = np.zeros((2, 2, 1, 4, 4))
+    mass = Jet(np.eye(4)[None], none[0], none)
+    stiffness = Jet(middle[None], change[:, None], none)
+    zeta = [Jet(np.full(1, x), np.zeros((2, 1)), np.zeros((2, 2, 1))) for x in ratios]
+    found = modal_damping(mass, stiffness, zeta)
+    assert found.value[0] == pytest.approx(damping(0, 0), abs=1e-12), seed
+    slope = (damping(h, 0) - damping(-h, 0)) / (2 * h)
+    assert found.first[0, 0] == pytest.approx(slope, abs=1e-4), seed
+    bend = (damping(h, h) - damping(h, -h) - damping(-h, h) + damping(-h, -h)) / (4 * h * h)
+    assert found.second[0, 1, 0] == pytest.approx(bend, abs=1e-3), seed
+
+
+@pytest.mark.parametrize("dashpots", [0.5 * np.diag([1.0, 0, 1, 0]), 0.5 * EYE])
+def test_dashpots_alike_in_both_directions_are_proved(dashpots):
+    system = MatrixStructure(
+        {"a": 610.0, "b": 610.0},
+        [(1.0, EYE)],
+        [("a", np.kron(np.diag([1.0, 0]), CHAIN)), ("b", np.kron(np.diag([0, 1.0]), CHAIN))],
+        {"qx": EYE[1], "qy": EYE[3]},
+        damping=[(1.0, dashpots)],
+        q0=np.array([0.01, 0.02, 0.01, 0.02]),
+    )
+    inputs = {name: Interval(600, 620) for name in "ab"}
+    found = envelope(system, inputs, **{**GIVEN, "duration": 1.0})
+    assert found.nature == "guaranteed"
+    time = found.time
+    for k in (600.0, 607.0, 620.0):
+        state = np.block([[np.zeros((4, 4)), EYE], [-k * BOTH, -dashpots]])
+        values, shapes = np.linalg.eig(state)
+        modal = np.linalg.solve(shapes, np.append(system.q0, np.zeros(4)))
+        motion = ((shapes[[1, 3]] * modal) @ np.exp(values[:, None] * time)).real.T
+        assert (motion <= found.upper[0] + 1e-12).all()
+        assert (motion >= found.lower[0] - 1e-12).all()
+    assert np.ptp(found.upper[0], axis=1).max() < 1e-3 * found.upper.max()
