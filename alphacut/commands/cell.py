@@ -54,7 +54,8 @@ def run(options: argparse.Namespace, out: TextIO) -> int:
     result = cell.solve(radius, phases, model)
     cell.require_tolerance(result.error, content.modulus.tolerance)
     references = cell.references(radius, phases, content.stated_fraction)
-    cell.require_bounds((result.modulus, result.modulus), references, phases.particles)
+    if result.has_isotropic_constants:
+        cell.require_bounds((result.modulus, result.modulus), references, phases.particles)
     document = {**cell.document(result), "references": references}
     if options.cross_check:
         method, methods = options.cross_check, {*phases.methods} - {"auto", result.method}
@@ -109,7 +110,9 @@ def summary(result: HomogenisedStiffness, document: Document) -> str:
         values = (errors["E_GPa"], errors["nu"], *errors["stress_GPa"].values())
         error_texts = [f"{value:.1e}" for value in values]
     names = ("E, GPa", "ν", "mean σ11, GPa", "mean σ12, GPa")
-    value_texts = [f"{document['E_GPa']:#.8g}", f"{document['nu']:.6f}"]
+    value_texts = ["none: 2 G_T > 3 (C11 + C12)"] * 2
+    if result.has_isotropic_constants:
+        value_texts = [f"{document['E_GPa']:#.8g}", f"{document['nu']:.6f}"]
     value_texts += [f"{stress['s11']:#.9g}", f"{stress['s12']:#.9g}"]
     rows = [*zip(names, value_texts, error_texts, strict=True)]
     for key, number in document["fibres"].items():

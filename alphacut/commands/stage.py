@@ -33,6 +33,7 @@ from alphacut.stages.results import Results
 from alphacut.stages.store import Cuts
 from alphacut.stochastic.microstructure_summary import fragment
 
+GALERKIN = "Error not declared: with crisp phases an upper bound of C, lower on a finer mesh\n"
 ONLY = "Plane strain alone: the other definition is for one particle of two isotropic phases"
 
 
@@ -81,6 +82,7 @@ def modulus_text(result: ModulusResult) -> str:
         + (plane_text(plane, alpha, Nature.ATTAINED) if plane else "")
         + loss_text(result.loss)
         + bounds_text(result.references)
+        + ("" if result.error else GALERKIN)
         + f"{result.samples} samples, {result.solves} linear systems,"
         f" {result.seconds:.1f} s, {result.method}\n"
     )

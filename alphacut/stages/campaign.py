@@ -31,6 +31,7 @@ from alphacut.stages.cell import (
     inputs_of,
     model_of,
     references,
+    require_isotropic,
     solve,
 )
 from alphacut.stages.losses import LossCuts, LossResult, loss_bounds
@@ -83,6 +84,7 @@ class CellTask:
 
     def _outputs(self, result: HomogenisedStiffness) -> dict[str, float | Array]:
         """Outputs of a cell by name, in SI; the stress curve has shape (CURVE_POINTS,)."""
+        require_isotropic(result)
         curve = result.curve
         fibres = fibre_constants(result).values if self.cell.is_fibre else {}
         losses = {} if self.losses is None else loss_outputs(result, self.losses)
@@ -182,6 +184,7 @@ class CellCampaign:
     def _numbers(self, result: Bounds, losses: Mapping[str, Array]) -> ModulusResult:
         assert result.samples is not None
         errors = self.loss_errors(result) if losses else {}
+        is_own_mesh = isinstance(self.cell, MeshedCell)  # without a declared error
         return ModulusResult(
             alpha=result.alpha,
             E_GPa=cuts_of(result, {"E": "E"})["E_GPa"],
@@ -193,7 +196,7 @@ class CellCampaign:
             samples=result.evaluations,
             solves=int(result.samples.values.output("systems").sum()),
             seconds=result.seconds,
-            nature=result.nature_of("E"),
+            nature=Nature.ATTAINED if is_own_mesh else result.nature_of("E"),
             particles=self.cell.particles,
             average=average_name(self.cell, self.modulus),
             error=self.errors(result),

@@ -262,9 +262,10 @@ def _young(bulk: float, shear: float) -> float:
 def document(result: HomogenisedStiffness) -> Document:
     """The result of a cell as a JSON document; moduli and stresses in GPa."""
     s11, s12 = result.curve.mean
+    is_isotropic = result.has_isotropic_constants
     return {
-        "E_GPa": result.modulus / GPA,
-        "nu": result.poisson,
+        "E_GPa": result.modulus / GPA if is_isotropic else None,
+        "nu": result.poisson if is_isotropic else None,
         "stress_GPa": {"s11": s11 / GPA, "s12": s12 / GPA},
         "fibres": fibres(result),
         "stiffness_GPa": None if result.stiffness is None else result.stiffness / GPA,
@@ -334,6 +335,13 @@ def declared_errors(result: HomogenisedStiffness) -> Document | None:
         modulus, nu = result.estimated_error * result.modulus, result.poisson_error
         s11, s12 = np.abs(result.curve.mean) * result.modulus_errors[[0, 2]]
     return {"E_GPa": modulus / GPA, "nu": nu, "stress_GPa": {"s11": s11 / GPA, "s12": s12 / GPA}}
+
+
+def require_isotropic(result: HomogenisedStiffness) -> None:
+    """Refuses E and ν of a cell whose stiffness no isotropic solid has."""
+    if not result.has_isotropic_constants:
+        value, cure = f"{result.modulus / GPA:.4g} GPa", "take the stiffness of `alphacut cell`"
+        raise FailedError(f"E would be {value}: 2 G_T exceeds 3 (C11 + C12)", cure)
 
 
 def require_bounds(

@@ -14,7 +14,7 @@ import numpy as np
 from alphacut.case.material import ImageCell
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array, Rows
-from alphacut.fuzzy.refused import require
+from alphacut.fuzzy.refused import FailedError, require
 from alphacut.fuzzy.result import Nature
 from alphacut.io.provenance import file_digest
 from alphacut.rve.cell.cell import Phase
@@ -23,7 +23,7 @@ from alphacut.rve.image.energies import phase_energies
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.model import ImageCut, ImageModel, usual_division
 from alphacut.rve.image.phases import ModuliImages, ModuliInterval, moduli_images, threshold_ranges
-from alphacut.rve.image.read import read_grey, require_phases
+from alphacut.rve.image.read import read_grey, require_memory, require_phases
 from alphacut.rve.result.engineering_constants import NAMES, PLANE_STRAIN
 from alphacut.rve.result.loss_factors import CONSTANTS, bulk_and_shear_losses, first_order
 from alphacut.rve.result.moduli import plane_constants
@@ -100,12 +100,15 @@ def compute_cuts(
     study, aspect = image_study(cell), cell.pixel[-1] / cell.pixel[0]
     modal = study.images(None, None)  # at modal thresholds and moduli
     division, solver = usual_division(modal), ConjugateGradient(ACCURACY)
+    rows, columns = modal.bulk[0].shape
+    require_memory(rows, columns, division)
     model = ImageModel(aspect, division=division, solver=solver, average=average)
     crisp = model.solve(modal)
     tick(0.2)
     images = [study.images(level, level) for level in alpha]
     cuts = model.cuts(images, (modal, crisp))
     model.require_consistent(images, cuts)
+    _require_isotropic(cuts[0])
     tick(0.8)
 
     def width(threshold: AlphaLevel, phases: AlphaLevel) -> float:
@@ -153,6 +156,16 @@ def _range(bounds: Ends, size: float = 1.0) -> Range:
 def _cuts_entry(name: str, bounds: Array) -> tuple[str, Cuts]:
     """Key and cuts, (levels, 2), of a constant: a modulus in GPa, a ratio as it is."""
     return (name, Cuts.of(bounds)) if name == "nu_xy" else (f"{name}_GPa", Cuts.of(bounds / GPA))
+
+
+def _require_isotropic(widest: ImageCut) -> None:
+    """Refuses E and ν of an image for which the bounds do not tell that E is positive."""
+    low, high = (end / GPA for end in widest.modulus)
+    if low <= 0:
+        x_low, x_high, y_low, y_high = map(float, widest.constants[:2].ravel() / GPA)
+        along_axes = f"E_x {x_low:.4g} … {x_high:.4g} GPa, E_y {y_low:.4g} … {y_high:.4g} GPa"
+        what = f"the bounds of E, {low:.4g} … {high:.4g} GPa, do not tell that it is positive"
+        raise FailedError(what, f"take a finer image, or {along_axes}")
 
 
 def _dataset(

@@ -19,7 +19,9 @@ from alphacut.rve.mesh.columns import grid_of
 from alphacut.rve.mesh.gmsh_prisms import Prisms
 from alphacut.rve.mesh.periodicity import SAME_PLACE, MeshError, partners
 from alphacut.rve.mesh.prism_grid import PrismGrid
+from alphacut.rve.mesh.wedge import prism_rule, wedge
 
+FILLED = 1e-6  # of the cell that prisms may leave or take twice
 UPSIDE_DOWN = [3, 4, 5, 0, 1, 2, 12, 13, 8, 14, 10, 11, 6, 7, 9]
 MIRRORED = [0, 2, 1, 3, 5, 4, 7, 6, 8, 9, 11, 10, 13, 12, 14]
 """Orders of a prism's nodes that put its upper triangle first, and that exchange two vertices."""
@@ -41,7 +43,9 @@ def read_grid(path: Path | str) -> PrismGrid:
             raise RefusedError("mesh.file", path, allowed, str(error)) from None
         prisms = orient(gmsh_prisms.read(gmsh))
     grid = grid_of(prisms, 0.0, is_fixed=True)
+    _require_filled(grid)
     _require_periodic_square(grid)
+    _require_joined_columns(grid)
     return grid
 
 
@@ -55,6 +59,52 @@ def orient(prisms: Prisms) -> Prisms:
     is_clockwise = a[:, 0] * b[:, 1] < a[:, 1] * b[:, 0]
     cells[is_clockwise] = cells[is_clockwise][:, MIRRORED]
     return replace(prisms, cells=cells)
+
+
+def _require_filled(grid: PrismGrid) -> None:
+    """Refuse voids, overlaps and folded prisms, by det J at the quadrature points."""
+    assert grid.fixed is not None
+    points, weights = prism_rule()
+    slopes = np.array(wedge(1).tabulate(1, points)[1:]).reshape(3, len(points), -1)
+    prisms = grid.fixed[grid.cells]
+    determinants = np.linalg.det(np.einsum("aqn,cnb->cqab", slopes, prisms))
+    if (determinants <= 0).any():
+        x, y, theta = prisms[np.argmin(determinants.min(axis=1)), 0]
+        what = f"the prism at ({x:.4g}, {y:.4g}, θ = {theta:.4g}) is folded"
+        cure = "put middle nodes near the middles of their edges: Mesh.HighOrderOptimize = 2"
+        raise MeshError(what, cure)
+    low, high = grid.fixed.min(axis=0), grid.fixed.max(axis=0)
+    filled = float((determinants @ weights).sum() / np.prod(high - low))
+    is_square = max(abs(low[:2] + 1).max(), abs(high[:2] - 1).max()) <= SAME_PLACE
+    if is_square and abs(filled - 1) > FILLED:
+        cure = "give holes a phase of their own, soft as air"
+        if filled > 1:
+            cure = "split surfaces that lie on one another: occ.fragment, both objects removed"
+        raise MeshError(f"the prisms fill {filled:.2%} of the cell, not 100 %", cure)
+
+
+def _require_joined_columns(grid: PrismGrid) -> None:
+    """Refuse slits, and columns of prisms whose phase changes along θ."""
+    triangles, points = grid.plane.triangles[:, :3], grid.plane.points
+    ends, edges, _ = square.edges(triangles, grid.plane.inside)
+    middles = points[ends].mean(axis=1)
+    is_inside = abs(middles).max(axis=1) < 1 - SAME_PLACE
+    is_open = (np.bincount(edges.ravel()) == 1) & is_inside
+    if is_open.any():
+        x, y = middles[np.argmax(is_open)]
+        what = f"the edge at ({x:.4g}, {y:.4g}) has a prism on one side alone: a slit"
+        raise MeshError(what, "let both surfaces share their curve: occ.fragment, or Coherence")
+    phase = grid.phase.reshape(grid.layers, -1)
+    changes = phase[1:] != phase[:-1]
+    if changes.any():
+        layer, column = np.argwhere(changes)[0]
+        x, y = points[triangles[column]].mean(axis=0)
+        below, above = (grid.names[phase[k, column]] for k in (layer, layer + 1))
+        raise MeshError(
+            f"the column at ({x:.4g}, {y:.4g}) is {below} in a layer of θ and {above} in the next",
+            "extrude each phase through all layers; a cell that changes at a level is two meshes,"
+            " averaged by the weights of θ",
+        )
 
 
 def _require_periodic_square(grid: PrismGrid) -> None:

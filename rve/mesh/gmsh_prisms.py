@@ -94,6 +94,9 @@ def read(gmsh: Any) -> Prisms:
     Raises:
         MeshError: A volume is in no physical group or in two, or has other elements.
     """
+    if parts := gmsh.model.getNumberOfPartitions():
+        cure = "write the mesh before it is divided among processes"
+        raise MeshError(f"the mesh is partitioned into {parts} parts", cure)
     tags, xyz, _ = gmsh.model.mesh.getNodes()
     number_of_tag = np.zeros(int(tags.max(initial=0)) + 1, np.int64)
     number_of_tag[tags] = np.arange(len(tags))

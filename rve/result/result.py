@@ -212,6 +212,11 @@ class HomogenisedStiffness:
         return float(self.constants_of(self.moduli)[1])
 
     @property
+    def has_isotropic_constants(self) -> bool:
+        """Whether an isotropic solid has these moduli: of the plane 2 G_T < 3 (C11 + C12)."""
+        return self.modulus > 0
+
+    @property
     def shear(self) -> float:
         """Shear modulus of the average, in Pa: G_T of fibres."""
         return self.shear_of(self.moduli)

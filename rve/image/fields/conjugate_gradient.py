@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
+from scipy.linalg.blas import daxpy
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import FailedError
@@ -91,8 +92,9 @@ class ConjugateGradient:
                 return x, number
             Ap = system.operator.apply(p)
             alpha = _ratio(gamma, inner(p, Ap))
-            x += _per_load(alpha) * p
-            r -= _per_load(alpha) * Ap
+            _add_multiple(x, alpha, p)
+            _add_multiple(r, -alpha, Ap)
+            del Ap  # memory for the preconditioner
             z = system.preconditioner.apply(r)
             last_gamma, gamma = gamma, inner(r, z)
             beta = _ratio(gamma, last_gamma)
@@ -118,6 +120,12 @@ def _radau(excess: Array, beta: Array, least: float) -> Array:
     """Next factor of the energy error's bound by the Gauss–Radau rule (Meurant, Tichý 2013)."""
     sharper = _ratio(excess, least * excess + beta)
     return np.where(excess > 0, sharper, 1 / least)
+
+
+def _add_multiple(fields: Array, factors: Array, other: Array) -> None:
+    """Add the other fields, times a factor a load, in place and without a copy."""
+    for own, factor, added in zip(fields, factors, other, strict=True):
+        daxpy(added.reshape(-1), own.reshape(-1), a=factor)
 
 
 def _per_load(factors: Array) -> Array:

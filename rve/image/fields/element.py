@@ -41,6 +41,8 @@ class Element:
         twice_shear: Factor from the Voigt component 12 to twice the tensor component.
         anchors: For each local unknown the ones to subtract from it, which takes a field without
             strain or stress away.
+        places: Of each unknown its y and x in a pixel of side 1, and whether it changes its sign
+            where the pixel is turned by 180°.
         stress: Whether the modes are those of a stress, else of a strain.
     """
 
@@ -51,6 +53,7 @@ class Element:
     constants: tuple[int, int, int]
     twice_shear: float
     anchors: tuple[tuple[int, ...], ...]
+    places: tuple[tuple[float, float, bool], ...]
     stress: bool
 
     @property
@@ -86,6 +89,7 @@ def displacement_element(aspect: float = 1.0) -> Element:
         constants=constants,
         twice_shear=1.0,
         anchors=tuple((9 * c,) for c, _, _ in nodes),  # the lower left node moves rigidly
+        places=tuple((y / 2, x / 2, False) for _, y, x in product(range(2), repeat=3)),
         stress=False,
     )
 
@@ -121,6 +125,7 @@ def airy_element(aspect: float = 1.0) -> Element:
         constants=constants,
         twice_shear=2.0,
         anchors=tuple(tuple(anchors(*node)) for node in nodes),
+        places=tuple((0.0, 0.0, dy != dx) for dy, dx in product(range(2), repeat=2)),
         stress=True,
     )
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient, System
-from alphacut.rve.image.fields.element import Element, Operator
+from alphacut.rve.image.fields.element import Element, Operator, blocks
 from alphacut.rve.image.fields.energy import Energies, energies
 from alphacut.rve.image.fields.preconditioner import FourierPreconditioner, Reference
 
@@ -64,12 +64,13 @@ def solve_side(
     """
     pixel_coefficients, parts = coefficients(element, bulk, shear), np.ones((division, division))
     trace, deviator = (np.asarray(np.kron(x, parts)) for x in pixel_coefficients)
-    guess = None if start is None else np.tensordot(SOLVED_LOADS, start, axes=1)
-    fields, iterations = _solve_loads(element, trace, deviator, solver, guess)
-    unit_fields = np.asarray(np.tensordot(np.linalg.inv(SOLVED_LOADS), fields, axes=1), float)
+    fields, iterations = _solve_loads(element, trace, deviator, solver, start)
+    to_unit_loads = np.linalg.inv(SOLVED_LOADS)
+    for rows in blocks(fields.shape):  # in place
+        fields[:, :, rows] = np.tensordot(to_unit_loads, fields[:, :, rows], axes=1)
     weights = list(zip(element.parts, (trace, deviator), strict=True))
-    energy = energies(element, unit_fields, element.mean_modes(UNIT_LOADS), weights)
-    return SideSolution(unit_fields, energy, iterations)
+    energy = energies(element, fields, element.mean_modes(UNIT_LOADS), weights)
+    return SideSolution(fields, energy, iterations)
 
 
 def _solve_loads(
@@ -84,16 +85,15 @@ def _solve_loads(
     scale = least_energy(element, trace, deviator, modes)
     least = constant.lowest_energy_ratio(trace, deviator)
     n_together = len(SOLVED_LOADS) if trace.size <= SMALL else 1  # to save memory
-    fields, iterations = [], []
+    fields, iterations = np.empty((len(SOLVED_LOADS), element.unknowns, rows, columns)), []
     for first in range(0, len(SOLVED_LOADS), n_together):
         part = slice(first, first + n_together)
-        guess = None if start is None else start[part]
+        guess = None if start is None else np.tensordot(SOLVED_LOADS[part], start, axes=1)
         load = operator.load(modes[:, part])
         system = System(operator, preconditioner, load, scale[part], least, guess)
-        solution, number = solver.solve(system)
-        fields.append(solution)
+        fields[part], number = solver.solve(system)
         iterations.append(number)
-    return np.concatenate(fields), max(iterations)
+    return fields, max(iterations)
 
 
 def least_energy(element: Element, trace: Array, deviator: Array, modes: Array) -> Array:

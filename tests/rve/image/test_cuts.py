@@ -1,5 +1,7 @@
 """Guaranteed cuts: fuzzy threshold, fuzzy phases, phases without order; reading of images."""
 
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +16,7 @@ from alphacut.rve.image.phases import (
     moduli_images,
     threshold_ranges,
 )
-from alphacut.rve.image.read import read_grey, require_memory, require_phases
+from alphacut.rve.image.read import needed_memory, read_grey, require_memory, require_phases
 
 ALPHA = (0.0, 0.5, 1.0)
 
@@ -160,6 +162,18 @@ def test_files_that_are_no_plane_grey_image_are_refused(tmp_path, name):
     with pytest.raises(RefusedError) as error:
         read_grey(path)
     assert error.value.key == name
+
+
+def test_memory_is_foreseen_within_a_third():
+    program = """
+import resource, numpy as np
+from alphacut.rve.image.model import solve_image
+bulk = np.where(np.random.default_rng(1).random((256, 256)) < 0.5, 1e9, 5e9)
+solve_image(bulk, bulk / 2)
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
+"""
+    found = subprocess.run([sys.executable, "-c", program], capture_output=True, check=True)
+    assert 1 / 1.3 < needed_memory(256, 256) / int(found.stdout) < 1.3
 
 
 def test_an_image_too_large_for_memory_is_refused_with_a_piece_that_fits():

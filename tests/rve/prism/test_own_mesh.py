@@ -98,28 +98,57 @@ def test_sides_that_do_not_match_are_refused_with_side_and_level():
         solve("unlike-sides.msh", matrix=SOFT, particle=HARD)
 
 
-def moved(grid, change):
-    points = grid.positions(HermiteMap(0.4, 0, 0.4, 0)).copy()
-    return change(points)
-
-
-def lifted(points):
+def lifted(points, cells, phase):
     points[0, 2] += 0.1
-    return points
+    return points, cells, phase
 
 
-def stretched(points):
-    return points * [1.1, 1, 1]
+def stretched(points, cells, phase):
+    return points * [1.1, 1, 1], cells, phase
+
+
+def with_a_hole(points, cells, phase):
+    per_layer = len(phase) // 2
+    kept = np.arange(len(phase)) % per_layer != np.flatnonzero(phase)[0]
+    return points, cells[kept], phase[kept]
+
+
+def twice_the_particle(points, cells, phase):
+    copies = cells[phase == 1] + len(points)
+    return np.tile(points, (2, 1)), np.vstack([cells, copies]), np.append(phase, [1] * len(copies))
+
+
+def cut_out(points, cells, phase):
+    return np.tile(points, (2, 1)), cells + len(points) * phase[:, None], phase
+
+
+def dented(points, cells, phase):
+    inner = np.flatnonzero(abs(points[cells[:, 6], :2]).max(axis=1) < 0.9)[0]
+    points[cells[inner, 6], 0] += 1.0
+    return points, cells, phase
+
+
+def begun_late(points, cells, phase):
+    return points, cells, phase * (np.arange(len(phase)) >= len(phase) // 2)
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
-    [(lifted, "does not stand on one level"), (stretched, "the level θ = -3 spans -1.1 … 1.1")],
+    [
+        (lifted, "does not stand on one level"),
+        (stretched, "the level θ = -3 spans -1.1 … 1.1"),
+        (with_a_hole, r"the prisms fill 9\d\.\d+% .* give holes a phase of their own"),
+        (twice_the_particle, r"the prisms fill 112\.\d+% .* occ.fragment"),
+        (cut_out, "has a prism on one side alone: a slit; .* Coherence"),
+        (dented, "is folded; put middle nodes .* Mesh.HighOrderOptimize"),
+        (begun_late, "is matrix in a layer of θ and inclusion in the next; .* two meshes"),
+    ],
 )
 def test_prisms_that_are_no_cell_are_refused(tmp_path, change, message):
     grid = extrude(size=0.6, radius=0.4, layers=2)
-    points = moved(grid, change)
-    write(tmp_path / "bad.msh", points, grid.cells, grid.phase, grid.names)
+    points = grid.positions(HermiteMap(0.4, 0, 0.4, 0)).copy()
+    changed = change(points, grid.cells, grid.phase)
+    write(tmp_path / "bad.msh", *changed, grid.names)
     with pytest.raises(MeshError, match=message):
         read_grid(tmp_path / "bad.msh")
 
