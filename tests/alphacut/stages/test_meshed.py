@@ -41,12 +41,32 @@ def test_fuzzy_phases_of_a_mesh_run_to_a_report(tmp_path, capsys):
     assert main(["check", str(case)]) == 0
     assert "cell.phases" in capsys.readouterr().out
     assert main(["run", str(case), "--out", str(tmp_path / "out")]) == 0
-    assert "not declared" in capsys.readouterr().out
+    text = capsys.readouterr().out
+    assert "not declared" in text
+    assert "guaranteed" not in text
     cuts = json.loads((tmp_path / "out/summary.json").read_text())["modulus"]["E_GPa"]
     ends = [cuts["lower"][0], cuts["lower"][1], cuts["upper"][0]]
     assert ends == pytest.approx([modulus(e) / 1e9 for e in (75e9, 80e9, 85e9)], rel=1e-9)
     assert main(["report", str(tmp_path / "out")]) == 0
     assert "Two particles" in (tmp_path / "out/report.html").read_text(encoding="utf-8")
+
+
+AUXETIC = [
+    [f"{x} GPa" for x in row] for row in ((10, -8, 0), (-8, 10, 0), (0, 0, 10))
+]  # 2 G_T = 20 GPa > 3 (C11 + C12) = 6 GPa
+
+
+def test_e_and_nu_of_no_isotropic_solid_are_refused_and_c_is_kept(tmp_path, capsys):
+    phase = f"{{ modulus = {AUXETIC} }}".replace("'", '"')
+    text = TEXT.partition("[cell.phases]")[0] + f"[cell.phases]\nmatrix = {phase}\n"
+    case = written(tmp_path, f"{text}particles = {phase}\n")
+    assert main(["cell", str(case), "--json", str(tmp_path / "c.json")]) == 0
+    assert "none: 2 G_T > 3 (C11 + C12)" in capsys.readouterr().out
+    found = json.loads((tmp_path / "c.json").read_text())
+    assert found["E_GPa"] is found["nu"] is None
+    assert found["stiffness_GPa"][0] == pytest.approx([10, -8, 0], abs=1e-9)
+    assert main(["modulus", str(case)]) != 0
+    assert "E would be -61.54 GPa" in capsys.readouterr().err
 
 
 def solved(case, path, *options):
