@@ -16,13 +16,7 @@ _FORETOLD = 0.05  # share of the work from which the time left is told; less for
 
 
 def subprogress(progress: Progress | None, first: float, last: float) -> Progress:
-    """Return a function that reports the progress of a part of a task to `progress`.
-
-    Args:
-        progress: Takes the completed fraction of the task; None for no report.
-        first: Fraction of the task at which the part begins.
-        last: Fraction at which it ends.
-    """
+    """Return a function that reports the progress of a part of a task, from `first` to `last`."""
     if progress is None:
         return lambda done: None
     return lambda done: progress(first + (last - first) * done)

@@ -70,12 +70,7 @@ class RefusedError(ValueError):
 
 
 class FailedError(RuntimeError):
-    """A computation that ended without an answer.
-
-    Args:
-        what: What failed, with its numbers.
-        cure: What the caller can change.
-    """
+    """A computation that ended without an answer: what failed, and what the caller can change."""
 
     def __init__(self, what: str, cure: str = "") -> None:
         self.what, self.cure = what, cure

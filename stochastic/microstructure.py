@@ -97,8 +97,7 @@ class Microstructure:
         truncated: The part of it within the limits.
         pbox: Fuzzy radius map.
         slopes: Bootstrap band of the fitted slopes.
-        band: Half width of the simultaneous bootstrap band of the distribution function, in
-            probability.
+        band: Half width of that of the distribution function, in probability.
     """
 
     study: MicrostructureStudy
@@ -144,10 +143,7 @@ def study(
 ) -> Microstructure:
     """Fuzzy radius map of a microstructure, with the cells, reduced radii r_n and p-box behind it.
 
-    Args:
-        case: The settings.
-        executor: Runs the packings; one after the other if None. The result is the same.
-        progress: Called with the completed fraction, 0 to 1.
+    `executor` runs the packings, with the same result; `progress` takes the completed fraction.
 
     Raises:
         RefusedError: Measured data are not allowed, or cells are too tight.

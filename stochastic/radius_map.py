@@ -56,13 +56,13 @@ def require_map(radius_map: RadiusMap) -> None:
 
 @dataclass(frozen=True)
 class HermiteMap:
-    """Cubic Hermite map r(θ) = Σ a_i h_i(ξ), ξ ∈ [0, 1] (eq. 12).
+    """Cubic Hermite map r(θ) = Σ a_i h_i(ξ), ξ ∈ [0, 1] (eq. 12), of radii over half a side.
 
     Args:
-        a1: Radius at the lower end of θ, dimensionless (radius over half the side of the cell).
-        a2: Slope dr/dξ at the lower end.
+        a1: Radius at the lower end of θ.
+        a2: Slope dr/dξ there.
         a3: Radius at the upper end.
-        a4: Slope dr/dξ at the upper end.
+        a4: Slope dr/dξ there.
         distribution: Law of θ.
 
     Raises:

@@ -88,10 +88,8 @@ class Simulated:
 def reduced_radii(sections: Sequence[ParticleCells]) -> AreaWeighted:
     """Sample of r_n of all counted cells, weighted by area or volume, grouped for the bootstrap.
 
-    A group is a section, or one of 5 × 5 patches if there is a single section.
-
-    Raises:
-        RefusedError: A cell is smaller than its particle, so that particles overlap.
+    A group is a section, or one of 5 × 5 patches if there is a single section. A cell smaller than
+    its particle is refused.
     """
     if len(sections) == 1:
         groups = [_patches(sections[0])]
@@ -144,9 +142,7 @@ def cell_volumes(spheres: Particles) -> Array:
     volumes = np.zeros(count)
     volumes[cells[:, 0].astype(int)] = cells[:, 1]
     if not (volumes > 0).all() or abs(volumes.sum() - 1) > 1e-5:  # Voro++ prints six digits
-        raise FailedError(
-            f"the power cells of {count} spheres fill {volumes.sum():.6f} of the cube, and"
-            f" {int((volumes <= 0).sum())} spheres have none",
-            "take spheres that do not overlap",
-        )
+        what = f"the power cells of {count} spheres fill {volumes.sum():.6f} of the cube"
+        what += f", and {int((volumes <= 0).sum())} spheres have none"
+        raise FailedError(what, "take spheres that do not overlap")
     return volumes * side**3

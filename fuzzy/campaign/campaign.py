@@ -38,13 +38,7 @@ _FIRST_POINTS = 16  # points that are tried, where samples may fail, to learn th
 
 
 class CampaignError(FailedError):
-    """Some samples failed; the others were run.
-
-    Args:
-        failures: Inputs of each failed sample, by name, with its error.
-        total: Samples of the batch.
-        cure: What the caller can change.
-    """
+    """Some samples of `total` failed: `failures` has the inputs of each and its error."""
 
     def __init__(self, failures: list[tuple[dict[str, float], str]], total: int, cure: str) -> None:
         self.failures, self.total = failures, total

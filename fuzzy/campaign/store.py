@@ -38,14 +38,9 @@ _ACCESS_ERRORS = ("BUSY", "LOCKED", "FULL", "READONLY", "CANTOPEN", "PERM", "NOM
 
 
 class Row(NamedTuple):
-    """A sample as it is stored.
+    """A sample as it is stored: inputs and layout as JSON, outputs as little-endian doubles.
 
-    Args:
-        model: Key of the model.
-        point: Inputs by name as JSON, exact to the last bit, in the order of their names.
-        layout: Names and shapes of the outputs as JSON.
-        outputs: Outputs as bytes of little-endian doubles.
-        checksum: Of all that.
+    `point` has the inputs by name, exact to the last bit, in the order of their names.
     """
 
     model: bytes

@@ -93,14 +93,13 @@ def negligible(values: Array) -> Array:
 def contradiction(points: Array, values: Array, signs: Signs) -> tuple[Array, Array] | None:
     """Return the pair of samples that contradicts the signs of an output most, None without one.
 
+    By the signs the output cannot be smaller at the second point, but it is.
+
     Args:
         points: Samples, shape (n, inputs); of more than 400 a choice spread over the values.
         values: Output at the samples, shape (n,).
         signs: +1, −1, or 0 where nothing is stated, shape (inputs,); inputs without a sign must be
             equal in both samples.
-
-    Returns:
-        Two points (inputs,): by the signs the output cannot be smaller at the second, but it is.
     """
     rows = np.argsort(values)[: np.count_nonzero(~np.isnan(values))]  # NaN are sorted last
     evenly = np.linspace(0, len(rows) - 1, min(len(rows), _MAX_COMPARED)).astype(int)

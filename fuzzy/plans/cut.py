@@ -102,13 +102,8 @@ class CutSearch:
     def descend(self, start: Array, bound: Bound, first_step: float = inf) -> Optimum:
         """Return the local optimum that a descent by L-BFGS-B reaches inside the cut.
 
-        The gradient is one of differences; all samples stay in the campaign.
-
-        Args:
-            start: Point in unit coordinates, shape (uncertain inputs,).
-            bound: Output and sign that are minimised.
-            first_step: Longest first step in unit coordinates: a short one does not leave the basin
-                of its start. Without limit it mostly reaches a face at once.
+        The gradient is one of differences. `first_step` limits the first step in unit coordinates:
+        a short one does not leave the basin of the start (uncertain inputs,).
         """
         from scipy.optimize import minimize
 

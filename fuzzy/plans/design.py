@@ -87,12 +87,9 @@ def bounds_of_samples(domain: Domain, samples: Samples, method: str) -> Bounds:
 
 
 def guaranteed_bounds(bounds: Bounds, campaign: Campaign, proved: Mask) -> Bounds:
-    """Copy of bounds, guaranteed for outputs that the knowledge covers, after tests by samples.
+    """Copy of bounds at corners, guaranteed for the outputs `proved` (outputs,) by the knowledge.
 
-    Args:
-        bounds: Bounds attained at the corners that the knowledge names.
-        campaign: All samples of the model, and the knowledge about it.
-        proved: Outputs that the knowledge covers on all levels, shape (outputs,).
+    It is tested by further samples inside the cuts.
 
     Raises:
         RefusedError: A sample contradicts the knowledge.

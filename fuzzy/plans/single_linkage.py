@@ -77,12 +77,9 @@ def uncovered_fraction(samples: int, optima: int) -> float:
 
 
 def linkage_starts(unit: Array, values: Array, distance: float) -> Rows:
-    """Rows of the samples without a better sample within a distance: descents start there.
+    """Rows of the samples (n, d), in unit coordinates, without a better one within a distance.
 
-    Args:
-        unit: Samples, shape (n, d), in unit coordinates.
-        values: Values that are minimised, shape (n,); infinite ones start no descent.
-        distance: Critical distance.
+    Descents start there; infinite values (n,) start none.
     """
     from scipy.spatial import cKDTree
 
@@ -170,13 +167,6 @@ class BoundSearch:
 class SingleLinkage:
     """Search of some outputs' bounds in all cuts of a domain.
 
-    Args:
-        campaign: The model.
-        domain: Inputs and levels.
-        outputs: Outputs whose bounds are searched.
-        uncovered: Share of a cut below which its search ends.
-        seed: Seed of the samples.
-
     Attributes:
         cuts: Cuts that have a width, from the widest on.
         bounds: Bounds that are searched.
@@ -207,10 +197,8 @@ class SingleLinkage:
     def run(self, first: Array) -> None:
         """Sample and descend, cut by cut in rounds, until every bound meets the stopping rule.
 
-        Without outputs to search each cut gets `MIN_SAMPLES` samples and no descents.
-
-        Args:
-            first: Uniform samples of the widest cut in unit coordinates, (n, uncertain inputs).
+        `first` are uniform samples of the widest cut in unit coordinates. Without outputs to search
+        each cut gets `MIN_SAMPLES` samples and no descents.
 
         Raises:
             SpentError: The budget ended the search.

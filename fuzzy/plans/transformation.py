@@ -258,15 +258,10 @@ class Effects:
 
 
 def verify(campaign: Campaign, domain: Domain, outputs: tuple[str, ...] = ()) -> Effects:
-    """Return the sign of every input's effect on every output, level by level.
+    """Return the sign of every input's effect on every output, all or those named, level by level.
 
     Stated signs are tested at pairs of points; the others are observed at probes, from the widest
     box to the narrowest. A sign holds on all narrower boxes.
-
-    Args:
-        campaign: The model with the knowledge about it.
-        domain: Inputs and levels.
-        outputs: Outputs that matter; all if none is named.
     """
     columns = campaign.output_names(domain)
     for name in outputs:

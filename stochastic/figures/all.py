@@ -218,15 +218,13 @@ def draw_map(result: Microstructure) -> Figure:
     fit, box = result.pbox.fit, result.pbox
     law = fit.distribution
     theta = np.asarray(np.linspace(law.lower, law.upper, 601), float)
-    axes.step(
-        theta, result.truncated.quantile(fit.distribution.cdf(theta)), color=BLUE, label="sample"
-    )
+    quantiles = result.truncated.quantile(law.cdf(theta))
+    axes.step(theta, quantiles, color=BLUE, label="sample")
     fitted = fit.map((box.a2[1], box.a4[1]))
     label = f"$a_2$ = {fitted.a2:.4f}, $a_4$ = {fitted.a4:.4f}"
     axes.plot(theta, fitted(theta), color=ORANGE, ls="--", label=label)
-    axes.fill_between(
-        theta, *box.bounds(theta), color=GREY, alpha=0.4, lw=0, label="fuzzy $a_2$, $a_4$"
-    )
+    fuzzy = {"color": GREY, "alpha": 0.4, "lw": 0, "label": "fuzzy $a_2$, $a_4$"}
+    axes.fill_between(theta, *box.bounds(theta), **fuzzy)
     axes.set(xlabel="θ, standard deviations", ylabel=REDUCED, ylim=(0, 1))
     axes.legend()
     return figure

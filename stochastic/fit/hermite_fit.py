@@ -174,9 +174,8 @@ def slope_band(
 ) -> SlopeBand:
     """Fitted slopes and their joint band of confidence `level` in (0, 1), by the bootstrap.
 
-    The half width is a quantile of Student's t times the bootstrap standard error. The probability
-    of error is halved between the two slopes (Bonferroni); t has one degree of freedom less than
-    there are groups to draw.
+    The half width is a quantile of Student's t, with one degree of freedom less than there are
+    groups, times the bootstrap standard error; the probability of error is halved (Bonferroni).
     """
     from scipy.special import stdtrit
 

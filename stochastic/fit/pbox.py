@@ -126,8 +126,6 @@ def _least_area_supports(
         bounds=limits,
     )
     if result.status != 0:
-        raise FailedError(
-            f"no p-box of monotone cubics from {fit.a1:g} to {fit.a3:g} contains the distribution",
-            "widen the limits, or the band",
-        )
+        what = f"no p-box of monotone cubics from {fit.a1:g} to {fit.a3:g}"
+        raise FailedError(f"{what} contains the distribution", "widen the limits, or the band")
     return [float(x) for x in result.x]

@@ -24,12 +24,9 @@ NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 
 
 def length_columns(path: Path, columns: Sequence[str]) -> tuple[Rows, Array]:
-    """Read columns of lengths from a CSV file.
+    """Read columns of lengths from a CSV file, separated by commas, semicolons or tabs.
 
-    Args:
-        path: The file; separated by commas, semicolons or tabs; empty lines and comments behind #
-            are skipped.
-        columns: Names of the columns; a column d of diameters may stand in for "r".
+    Empty lines and comments behind # are skipped. A column d of diameters may stand in for "r".
 
     Returns:
         Row numbers as an editor shows them, shape (n,), and the columns in m, shape (n, columns).

@@ -115,10 +115,8 @@ class SectionImage:
     def circles(self, picture: Array) -> Particles:
         """Return the circles, of equal area and centroid, of the particles in a grey image, in m.
 
-        Particles that touch the image's edge are left out.
-
-        Raises:
-            RefusedError: Noise or light hide the particles, or too many of them are not round.
+        Those that touch its edge are left out. An image whose particles noise or light hide, or of
+        which too many are not round, is refused.
         """
         from skimage import measure
 
@@ -134,14 +132,12 @@ class SectionImage:
             else:
                 circles.append((*piece.centroid, piece.equivalent_diameter_area / 2))
         fraction = not_round_area / max(phase.sum(), 1)
-        require(
-            bool(circles) and fraction <= MAX_NOT_ROUND,
-            self.path.name,
-            value=f"{fraction:.1%} of the particles' area in pieces that are not"
-            f" round, beside {len(circles)} that are",
-            allowed=f"images with round particles, up to {MAX_NOT_ROUND:.0%} of others",
-            cure="take the image itself as the cell: cell.image",
-        )
+        value = f"{fraction:.1%} of the particles' area in pieces that are not round, beside"
+        value += f" {len(circles)} that are"
+        is_round = bool(circles) and fraction <= MAX_NOT_ROUND
+        allowed = f"images with round particles, up to {MAX_NOT_ROUND:.0%} of others"
+        cure = "take the image itself as the cell: cell.image"
+        require(is_round, self.path.name, value=value, allowed=allowed, cure=cure)
         row, column, radius = np.array(circles).T
         centres = np.stack([column + 0.5, rows - row - 0.5], axis=1)  # y from the lower edge
         size = np.array([columns, rows]) * self.pixel

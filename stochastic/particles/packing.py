@@ -40,9 +40,6 @@ class Packing:
         fraction: Share of the square or cube that they take, above 0 and below `Shape.densest`.
         radii: Law of the radii, by number.
         shape: Discs or spheres.
-
-    Raises:
-        RefusedError: A value lies outside its range.
     """
 
     number: int
@@ -87,18 +84,10 @@ class Packing:
 
 
 def random_sequential(radii: Array, box: Array, generator: np.random.Generator) -> Array | None:
-    """Centres (n, d), in m, of particles in a periodic box, by random sequential addition.
+    """Centres (n, d) of particles without overlap, by random sequential addition; None if it fails.
 
-    Particles are added from the largest down, in blocks; each one that overlaps is proposed again
-    at a new centre, uniform in the box.
-
-    Args:
-        radii: shape (n,), in m.
-        box: Sides of the box, shape (d,), in m.
-        generator: Random number generator.
-
-    Returns:
-        The centres; None if `MAX_PROPOSALS` proposals for a particle all overlap.
+    Particles are added from the largest down, in blocks, to a periodic box with sides (d,); each
+    one that overlaps is proposed again at a new centre, at most `MAX_PROPOSALS` times.
     """
     order = np.argsort(-radii, kind="stable")
     sorted_radii = radii[order]
@@ -216,11 +205,9 @@ def _push(particles: Particles, growth: float) -> Particles:
             step = max(0.5 * step, 0.02)
         velocity = velocity + step * force
         centres = centres + step * velocity
-    raise FailedError(
-        f"{particles.shape.particles} on a share {particles.fraction:.3f} of the box still overlap"
-        f" by {overlap:.3g} m after {MAX_STEPS} steps",
-        "lower the fraction",
-    )
+    kind = f"{particles.shape.particles} on a share {particles.fraction:.3f} of the box"
+    what = f"{kind} still overlap by {overlap:.3g} m after {MAX_STEPS} steps"
+    raise FailedError(what, "lower the fraction")
 
 
 def _repulsion(

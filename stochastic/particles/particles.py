@@ -20,8 +20,7 @@ class Shape:
         cells: Measure of a cell: area or volume.
         dimensions: 2 or 3.
         factor: Share of a cell of side 2 that a particle of radius 1 takes.
-        reach: Greatest r_n that a map may have; a cell as tight holds a particle that almost
-            touches its sides.
+        reach: Greatest r_n that a map may have: the particle almost touches its cell's sides.
         sequential: Share of the box up to which random sequential addition is quick.
         densest: Share of the box that packed particles may take, below random close packing.
     """
@@ -64,12 +63,10 @@ class Particles:
         centres: shape (n, 2) or (n, 3), in m, inside the rectangle or box.
         radii: shape (n,), in m, not negative.
         size: Sides of the rectangle or box, shape (2,) or (3,), in m.
-        periodic: Whether it repeats itself in all directions; otherwise it is a window on a larger
-            section.
+        periodic: Whether it repeats itself; otherwise it is a window on a larger section.
 
     Raises:
-        RefusedError: A shape is wrong, a number is not finite, or a particle has a negative radius
-            or lies outside.
+        RefusedError: A shape is wrong, a number is not finite, or a particle lies outside.
     """
 
     centres: Array
@@ -78,7 +75,6 @@ class Particles:
     periodic: bool = True
 
     def __post_init__(self) -> None:
-        """Check the shapes and values, wrap centres into a periodic box, and store float arrays."""
         size = np.array(self.size, float).ravel()
         centres: Array = np.array(self.centres, float).reshape(-1, len(size))
         radii = np.array(self.radii, float).ravel()

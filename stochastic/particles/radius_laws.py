@@ -28,11 +28,7 @@ def require_radii(key: str, radii: ArrayLike) -> None:
 
 @dataclass(frozen=True)
 class LogNormalRadii:
-    """r(θ) = exp(μ_r + σ_r θ), θ truncated normal, between the limits (eq. 11).
-
-    Args:
-        smallest: Radius at the lower end of θ, in m.
-        largest: Radius at the upper end, in m; equal to `smallest` for particles of one size.
+    """r(θ) = exp(μ_r + σ_r θ), θ truncated normal, from `smallest` to `largest` in m (eq. 11).
 
     Raises:
         RefusedError: The radii are out of range or not in order.

@@ -36,13 +36,12 @@ ANGLES = 33
 
 @dataclass(frozen=True, eq=False)
 class Apollonius:
-    """Cells of discs and the arcs that bound them.
+    """Cells of discs and the arcs that bound them, those of a cell in the order of their angle.
 
     Args:
         discs: The discs.
         areas: Area of each cell, shape (n,), in m².
-        cell: Disc whose cell each arc bounds, shape (m,), rising; arcs of a cell in the order of
-            their angle.
+        cell: Disc whose cell each arc bounds, shape (m,), rising.
         neighbour: Disc on the other side, shape (m,); the disc itself for its own image; −1 at the
             edge of a window.
         offset: Vector from the centre to that image of the neighbour, shape (m, 2), in m.
@@ -168,24 +167,24 @@ def _bounding_pairs(discs: Particles, portion: Rows) -> Pairs:
 
 
 def counted_cells(diagram: Apollonius) -> tuple[Rows, Array]:
-    """Cells that no disc outside the window can change, and their weights.
+    """Cells that no disc outside the window can change, and the number that each stands for.
 
-    A disc beyond the window's edge, no larger than the largest one seen, cannot reach deeper into
-    the window than that one's radius. If all beyond the edge were one such disc, the wall towards
-    it would be a parabola, ρ = (D + r)/(1 + cos ψ), D the distance from the centre to the edge less
-    the largest radius: the cell is unchanged if ρ (1 + cos ψ) − r ≤ D all around, for all four
-    edges. Large cells fail this more often than small ones; each counted cell therefore stands for
-    1/p cells, p the fraction of positions in the window where an equal cell would count (Miles
-    1974, Lantuéjoul 1978). This holds for a homogeneous section, with every disc listed whose
-    centre lies in the window.
+    Large cells are changed more often than small ones; each counted cell therefore stands for 1/p
+    cells, p the fraction of positions in the window where an equal cell would count (Miles 1974,
+    Lantuéjoul 1978). This holds for a homogeneous section, with every disc listed whose centre lies
+    in the window.
 
     Returns:
-        Indices of their discs, shape (k,), and the number of cells that each stands for, shape
-        (k,); all and 1 in a periodic box.
+        Indices of their discs and weights, shape (k,) each; all and 1 in a periodic box.
 
     Raises:
         RefusedError: There is no such cell.
     """
+    # A disc beyond the window's edge, no larger than the largest one seen, cannot reach deeper into
+    # the window than that one's radius. If all beyond the edge were one such disc, the wall towards
+    # it would be a parabola, ρ = (D + r)/(1 + cos ψ), D the distance from the centre to the edge
+    # less the largest radius: the cell is unchanged if ρ (1 + cos ψ) − r ≤ D all around, for all
+    # four edges
     discs = diagram.discs
     if discs.periodic:
         return np.arange(len(discs), dtype=np.intp), np.ones(len(discs))

@@ -27,16 +27,11 @@ def anomaly(psi: Array, near: Array, far: Array) -> Array:
 
 
 def sector_area(start: Array, end: Array, near: Array, far: Array) -> Array:
-    """Area between a disc's centre and its hyperbolic wall over an arc, shape (m,).
+    """Area between a disc's centre and its hyperbolic wall over an arc of anomalies, shape (m,).
 
     The wall is 1/ρ = M cos ψ + C with M + C = 2/near and M − C = 2/far, ρ the distance from the
-    disc's centre, ψ the angle from the direction of the neighbour.
-
-    Args:
-        start: Hyperbolic anomaly at the beginning of the arc, shape (m,).
-        end: Anomaly at its end, shape (m,).
-        near: Twice the distance of the wall's nearest point from the centre, shape (m,).
-        far: The same from the neighbour's centre, shape (m,).
+    disc's centre, ψ the angle from the direction of the neighbour: `near` is twice the distance of
+    its nearest point from the centre, `far` the same from the neighbour's centre.
     """
     middle, half = (start + end) / 2, (end - start) / 2
     M_plus_C, M_minus_C = 2 / near, 2 / far
@@ -127,9 +122,7 @@ def _sweep(
             open_rows, limit = open_rows[is_open], limit[is_open]
         if not len(open_rows):
             return _arcs_between(crossings, table, group)
-    raise FailedError(
-        "an envelope did not close after four times as many steps as it has functions"
-    )
+    raise FailedError("an envelope did not close after four times as many steps as functions")
 
 
 def _arcs_between(

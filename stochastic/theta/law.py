@@ -20,11 +20,6 @@ class ThetaLaw(Protocol):
     """Law of θ on a bounded support, with a density.
 
     Laws that can be hashed (frozen dataclasses) have their quadrature rules kept.
-
-    Example:
-        >>> law: ThetaLaw = TruncatedNormal(-2.0, 2.0)
-        >>> law.cdf([-2.0, 0.0, 2.0])
-        array([0. , 0.5, 1. ])
     """
 
     @property
@@ -46,10 +41,7 @@ class ThetaLaw(Protocol):
 
 
 def require_support(lower: float, upper: float, unit: float = 0.0) -> None:
-    """Refuse a support of θ that is not finite, not in order, or too narrow for its rounding.
-
-    Rounding counts beside `unit`, the size of θ, if it is larger than the ends.
-    """
+    """Refuse a support of θ that is not finite, not in order, or too narrow for its rounding."""
     least = MIN_WIDTH * max(abs(lower), abs(upper), unit)
     is_ordered = np.isfinite(lower) and np.isfinite(upper) and lower < upper
     is_wide = is_ordered and upper - lower >= 0.999 * least  # 9.999 … 10 is wide enough

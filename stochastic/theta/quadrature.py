@@ -18,9 +18,7 @@ _HALVINGS, _MOST_PANELS = 48, 400
 _FIRST_PANELS = 64
 _NEGLIGIBLE = 1e-200  # weight of nodes so far off that polynomials overflow there
 FEWEST_NODES = 10  # nodes, from which on a polynomial through those of a Gauss rule beats pieces
-LARGEST_LEBESGUE = (
-    30.0  # Lebesgue constant of a polynomial that is trusted; rules in layers have far more
-)
+LARGEST_LEBESGUE = 30.0  # of a polynomial that is trusted; rules in layers have far more
 MOST_NODES = 40  # nodes of a polynomial
 
 
