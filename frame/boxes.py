@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array, Jet
-from alphacut.frame.calculus.low_discrepancy import corners
 from alphacut.frame.dynamics.flow import Flow
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.structures.quantities import Output, units_of
@@ -19,6 +18,7 @@ from alphacut.fuzzy.arrays import Mask, Rows
 from alphacut.fuzzy.knowledge.joint import joined_inputs
 from alphacut.fuzzy.refused import require, require_numbers
 from alphacut.fuzzy.result import Nature
+from alphacut.fuzzy.sets.boxes import corners
 from alphacut.fuzzy.sets.numbers import checked_levels
 
 ALPHA = (0.0, 0.25, 0.5, 0.75, 1.0)

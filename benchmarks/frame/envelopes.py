@@ -26,9 +26,9 @@ from alphacut.frame import (
     StoreyFrame,
     envelope,
 )
-from alphacut.frame.calculus.low_discrepancy import corners
 from alphacut.fuzzy import Interval, Triangular
 from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.sets.boxes import corners
 from benchmarks.rows import write
 
 FRAME = StoreyFrame(

@@ -10,6 +10,8 @@ from alphacut.frame.calculus.jet import Array
 
 FACES_UP_TO = 6
 """Number of parameters up to which all faces of the box are enumerated."""
+SHIFT = 1e-13
+"""Share of |H| by which a block is made more concave before it is solved, so that it is regular."""
 
 
 def gain(g: Array, H: Array, x: Array) -> Array:
@@ -75,10 +77,7 @@ def _newton(g: Array, H: Array, lower: Array, upper: Array, x: Array) -> Array:
     slope = g + np.einsum("nij,nj->ni", H, x)
     free = ~(((x <= lower) & (slope <= 0)) | ((x >= upper) & (slope >= 0)))
     eye = np.eye(g.shape[1])
-    reduced = (
-        np.where(free[:, :, None] & free[:, None, :], H, -eye)
-        - 1e-13 * np.abs(H).max((1, 2), keepdims=True) * eye
-    )
+    reduced = _regular(np.where(free[:, :, None] & free[:, None, :], H, -eye))
     step = -np.linalg.solve(reduced, np.where(free, slope, 0.0)[..., None])[..., 0]
     best, top = x, gain(g, H, x)
     for length in (1.0, 0.5, 0.25):
@@ -127,10 +126,15 @@ def _face_points(g: Array, H: Array, lower: Array, upper: Array, free: tuple[int
         )
     if free:
         f = list(free)
-        block = H[:, f][:, :, f]
-        # a little more concave, so that a singular block can be solved
-        block = block - 1e-13 * (np.abs(block).max((1, 2), keepdims=True) + 1e-300) * np.eye(len(f))
+        block = _regular(H[:, f][:, :, f])
         slope = g[:, None, f] + np.einsum("nij,ncj->nci", H[:, f], points)
         stationary = -np.linalg.solve(block, slope.swapaxes(1, 2)).swapaxes(1, 2)
         points[:, :, f] = np.clip(stationary, lower[:, None, f], upper[:, None, f])
     return points
+
+
+def _regular(H: Array) -> Array:
+    """Symmetric matrices (N, k, k) a little more concave, and by rounding not singular."""
+    # also where H is zero: then a slope of any size leads out of the box, and is clipped to it
+    size = np.abs(H).max((1, 2), keepdims=True) + 1e-100
+    return np.asarray(H - SHIFT * size * np.eye(H.shape[-1]))

@@ -17,7 +17,6 @@ import numpy as np
 
 from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.calculus.box_quadratic import global_maximum, local_maximum
-from alphacut.frame.calculus.low_discrepancy import chebyshev_points
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.graph_storage import Places, Storage
 from alphacut.frame.methods.independent import SAFETY, independent_excess, trajectories_diverge
@@ -25,6 +24,7 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.progress_bar import Progress, subprogress
 from alphacut.fuzzy.refused import checked_number
 from alphacut.fuzzy.result import Nature
+from alphacut.fuzzy.sets.boxes import chebyshev_points
 
 MAX_NUMBERS = 64e6
 """Most numbers of Taylor models computed at a time: 512 MB."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from alphacut.frame.boxes import UnitFlow
-from alphacut.frame.calculus.low_discrepancy import chebyshev_points, corners
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.progress_bar import Progress
+from alphacut.fuzzy.sets.boxes import chebyshev_points, corners
 
 SAMPLES = 64
 """Points of a kind on each level."""

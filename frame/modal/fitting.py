@@ -13,7 +13,6 @@ import numpy as np
 
 from alphacut.frame.boxes import Boxes
 from alphacut.frame.calculus.jet import Array, Jet
-from alphacut.frame.calculus.low_discrepancy import chebyshev_points
 from alphacut.frame.calculus.polynomial import Polynomial, fit, terms
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
@@ -30,6 +29,7 @@ from alphacut.frame.structures.modes import (
     require_single,
     state_matrix,
 )
+from alphacut.fuzzy.sets.boxes import chebyshev_points
 
 MANY = 6
 """Number of parameters up to which polynomials may replace trajectories; beyond, they only guide

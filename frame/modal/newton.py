@@ -6,11 +6,11 @@ import numpy as np
 
 from alphacut.frame.calculus.box_quadratic import gain, global_maximum, local_maximum
 from alphacut.frame.calculus.jet import Array
-from alphacut.frame.calculus.low_discrepancy import chebyshev_points
 from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.modal.optima import Optima, Response, best_of, trajectories
 from alphacut.fuzzy.arrays import Rows
 from alphacut.fuzzy.progress_bar import Progress, subprogress
+from alphacut.fuzzy.sets.boxes import chebyshev_points
 
 SAMPLES = 256
 """Trajectories of the model that the first optima begin at."""

@@ -17,7 +17,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.frame.boxes import ALPHA, Boxes, boxes
-from alphacut.frame.calculus.low_discrepancy import chebyshev_points, corners
 from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.questions.peaks import ANY, require_limits, within_steps
 from alphacut.frame.structures.lagrangian import LagrangianSystem
@@ -27,6 +26,7 @@ from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.progress_bar import Progress
 from alphacut.fuzzy.refused import require
+from alphacut.fuzzy.sets.boxes import chebyshev_points, corners
 
 LIMITS = 201
 """Limits for which the probability is computed besides."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
@@ -43,6 +44,17 @@ def quasi_random_points(dimension: int, count: int, *, skip: int = 0) -> Array:
     step = root ** -np.arange(1.0, dimension + 1)
     k = np.arange(skip + 1, skip + count + 1)[:, None]
     return np.asarray((0.5 + k * step) % 1.0)
+
+
+def chebyshev_points(dimension: int, count: int, *, skip: int = 0) -> Array:
+    """Return `quasi_random_points` of [−1, 1]^d, denser towards its faces (Chebyshev density)."""
+    return np.asarray(-np.cos(np.pi * quasi_random_points(dimension, count, skip=skip)))
+
+
+def corners(lower: Array, upper: Array) -> Array:
+    """Return all corners of a box, shape (2^d, d); axes without width count once."""
+    pairs = zip(lower, upper, strict=True)
+    return np.array(list(product(*[dict.fromkeys(pair) for pair in pairs])))
 
 
 def fuzzy_inputs(inputs: Mapping[str, FuzzyNumber | float]) -> dict[str, FuzzyNumber]:

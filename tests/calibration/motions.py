@@ -9,8 +9,8 @@ import numpy as np
 from scipy.optimize import minimize
 
 from alphacut.frame import Accelerogram, Exact, LagrangianFlow, LinearFlow, StoreyFrame
-from alphacut.frame.calculus.low_discrepancy import corners
 from alphacut.fuzzy import FuzzyNumber, Interval, Nature
+from alphacut.fuzzy.sets.boxes import corners
 
 POINTS = 1000
 """Random points of a box, beside its corners."""
