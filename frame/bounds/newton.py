@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.frame.calculus.box_quadratic import gain, global_maximum, local_maximum
-from alphacut.frame.calculus.low_discrepancy import chebyshev_points
 from alphacut.frame.modes.modal_model import ModalModel
 from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.sets.boxes import chebyshev_points
 
 SAMPLES = 256
 """Trajectories of the model that the first optima begin at."""
