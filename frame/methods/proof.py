@@ -1,8 +1,8 @@
 """Proof: guaranteed bounds of linear structures with up to six fuzzy inputs.
 
 1. Displacements oscillate in the inputs; the modes' eigenvalues λ_k(p) and shares C_k(p) do not
-   (section 7). Polynomials of them, fitted to eigen-analyses, give q(t; p) = 2 Re Σ C_k exp(λ_k t),
-   and likewise the motion under a record (`frame.modal`).
+   (section 7). Their series about the middle of a box give q(t; p) = 2 Re Σ C_k exp(λ_k t), and
+   likewise the motion under a record (`frame.modes.damped`).
 2. What these polynomials miss in the equations of motion is bounded over the whole box, and with it
    the error of the motion (`frame.bounds.model_error`). The degree rises until that takes a
    fifth of the gap wanted. Where it does not, the part is refused and bisected
@@ -115,7 +115,7 @@ class Proof:
         """Return the expected work on the box, in evaluations of a mode's motion at a node.
 
         Raises:
-            UnprovedError: There are too many inputs, or matrices are no polynomials of them.
+            UnprovedError: There are too many inputs, or the structure is not known to lose energy.
         """
         n_inputs = int((boxes.upper[0] > boxes.lower[0]).sum())
         if n_inputs > MOST_PARAMETERS:
@@ -135,7 +135,13 @@ class Proof:
             UnprovedError: The error of the modal model cannot be bounded within the tolerance.
             ModalError: The structure has no smooth oscillating modes over the part.
         """
-        model, error, gap = self._model_with_gap(flow, boxes, goal.scale)
+        for gap in self._gaps:  # the narrowest first
+            try:
+                model, error = self._accurate_model(flow, boxes, goal.scale, gap)
+                break
+            except (GapError, BisectionError):
+                if gap == self._gaps[-1]:
+                    raise
         proof = certify(
             model,
             gap=gap,
@@ -165,19 +171,6 @@ class Proof:
             )
             for outer, inner, at in zip(proof.outer, proof.bounds, inputs, strict=True)
         ]
-
-    def _model_with_gap(
-        self, flow: LinearFlow, boxes: Boxes, scale: Array
-    ) -> tuple[ModalModel, Array, float]:
-        """Modal model of a box, its proved error (T, m), and the narrowest gap that this allows."""
-        refusal = UnprovedError("no gap is asked for")
-        for gap in self._gaps:
-            try:
-                model, error = self._accurate_model(flow, boxes, scale, gap)
-                return model, error, gap
-            except (GapError, BisectionError) as failure:
-                refusal = failure
-        raise refusal
 
     def _accurate_model(
         self, flow: LinearFlow, boxes: Boxes, scale: Array, gap: float
