@@ -223,8 +223,8 @@ def draw_map(result: Microstructure) -> Figure:
     fitted = fit.map((box.a2[1], box.a4[1]))
     label = f"$a_2$ = {fitted.a2:.4f}, $a_4$ = {fitted.a4:.4f}"
     axes.plot(theta, fitted(theta), color=ORANGE, ls="--", label=label)
-    fuzzy = {"color": GREY, "alpha": 0.4, "lw": 0, "label": "fuzzy $a_2$, $a_4$"}
-    axes.fill_between(theta, *box.bounds(theta), **fuzzy)
+    low, high = box.bounds(theta)
+    axes.fill_between(theta, low, high, color=GREY, alpha=0.4, lw=0, label="fuzzy $a_2$, $a_4$")
     axes.set(xlabel="θ, standard deviations", ylabel=REDUCED, ylim=(0, 1))
     axes.legend()
     return figure
