@@ -35,21 +35,6 @@ def test_an_interruption_waits_for_the_end_of_the_block():
     assert done == ["block"]
 
 
-def test_an_inner_block_leaves_it_to_the_outer():
-    done = []
-
-    @uninterrupted()
-    def outer():
-        with uninterrupted():
-            interrupt()
-            done.append("inner")
-        done.append("outer")
-
-    with pytest.raises(KeyboardInterrupt):
-        outer()
-    assert done == ["inner", "outer"]
-
-
 def test_an_interruption_goes_before_the_error_of_its_block():
     @uninterrupted()
     def block():

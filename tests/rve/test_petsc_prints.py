@@ -73,3 +73,17 @@ def test_a_complex_build_ends_in_one_line_before_dolfinx_is_imported(tmp_path):
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
     assert "PETSc is built for complex numbers" in done.stderr
+
+
+def test_a_sample_of_the_cell_loads_nothing_of_structures():
+    program = """
+import sys
+from alphacut.entry import main
+status = main(["solve", "cases/paper.toml", "--quiet"], program="rve", names={"solve": "cell"})
+modules = [name for name in sys.modules if name.split(".")[0] == "alphacut"]
+print(status, len(modules), any("frame" in name for name in modules), "pint" in sys.modules)
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=ROOT)
+    status, count, *unneeded = done.stdout.split()
+    assert (status, *unneeded) == ("0", "False", "False"), done.stderr
+    assert int(count) <= 110

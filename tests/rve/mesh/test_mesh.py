@@ -126,19 +126,6 @@ def test_a_corner_that_no_edge_length_makes_sound_is_refused():
         plane_mesh(0.4, size=0.3, outline=lambda angle: 1 + 0.4 * (angle % 2 > 1))
 
 
-def test_meshes_of_round_particles_stay_as_they_were():
-    mesh = plane_mesh(0.3, size=0.4)
-    assert (len(mesh.points), len(mesh.triangles), int(mesh.triangles.sum())) == (73, 124, 14556)
-    assert (mesh.points**2).sum() == pytest.approx(41.55259703641136, rel=1e-12)
-
-
-def test_the_sign_of_z_marks_the_cone():
-    grid = extrude(size=0.5, radius=0.0, layers=2)
-    cone = HermiteMap(0.2, 0, 0.8, 0)
-    points = np.array([[0.49, 0, 0.0], [0.51, 0, 0.0], [0.3, 0, -3], [0.3, 0, 3]])
-    assert grid.particle_indicator(points, cone).tolist() == [1, 0, 0, 1]
-
-
 @pytest.mark.parametrize(
     ("outline", "radius"), [(circle, 0.9996), (Ellipse(4.0), 0.51), (lambda a: np.cos(a), 0.5)]
 )

@@ -8,12 +8,10 @@ import pytest
 pytest.importorskip("dolfinx")
 
 from alphacut.rve.cell.outline import Ellipse, circle
-from alphacut.rve.fenicsx import MPI
 from alphacut.rve.mesh import gmsh_prisms, square
 from alphacut.rve.mesh.columns import extrude, grid_of
 from alphacut.rve.mesh.periodicity import MeshError
 from alphacut.rve.mesh.wedge import prism_rule, wedge
-from alphacut.rve.prism.problem import PrismForm
 from alphacut.stochastic import HermiteMap
 
 MAP = HermiteMap(0.3, 0, 0.6, 0)
@@ -39,12 +37,6 @@ def test_a_prism_that_gmsh_does_not_return_is_missed_by_its_volume(outline):
     assert lost == pytest.approx(each[17], rel=1e-10)
     with pytest.raises(MeshError, match=r"layers of prisms differ|do not pass all levels"):
         grid_of(rest, 0.4, outline)
-
-
-def test_dolfinx_takes_all_prisms_of_gmsh():
-    form = PrismForm(extrude(size=0.5, radius=0.4, layers=3), MPI.COMM_SELF)
-    form.move_to(MAP)
-    assert form.areas.sum() == pytest.approx(4.0 * 3 * 3, rel=1e-12)  # slices of all layers
 
 
 def test_nodes_are_numbered_level_by_level():
@@ -79,29 +71,6 @@ def particle_volume():
     """∫ π r² dθ of the map."""
     nodes, weights = np.polynomial.legendre.leggauss(20)
     return 3 * weights @ (np.pi * MAP(3 * nodes) ** 2)
-
-
-def test_phases_sides_and_levels_have_names():
-    seen = {}
-
-    def groups(gmsh):
-        for dimension, tag in gmsh.model.getPhysicalGroups():
-            name = gmsh.model.getPhysicalName(dimension, tag)
-            seen[name] = gmsh.model.mesh.getNodesForPhysicalGroup(dimension, tag)[1].reshape(-1, 3)
-        return original(gmsh)
-
-    original = gmsh_prisms.read
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(gmsh_prisms, "read", groups)
-        gmsh_prisms.extruded(0.5, 0.4, circle, 2)
-    for name, (axis, place) in gmsh_prisms.SIDES.items():
-        assert seen[name][:, axis] == pytest.approx(np.full(len(seen[name]), place), abs=1e-12)
-        assert np.ptp(seen[name][:, 2]) == 1.0
-    for name, height in zip(gmsh_prisms.LEVELS, (0.0, 1.0), strict=True):
-        assert seen[name][:, 2] == pytest.approx(np.full(len(seen[name]), height), abs=1e-12)
-    radius = np.hypot(*seen["inclusion"].T[:2])
-    assert radius.max() == pytest.approx(0.4, rel=1e-12)
-    assert {*seen} == {"matrix", "inclusion", *gmsh_prisms.SIDES, *gmsh_prisms.LEVELS}
 
 
 def test_a_volume_without_a_name_is_refused():

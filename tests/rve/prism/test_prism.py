@@ -13,7 +13,6 @@ from alphacut.rve.mesh.wedge import slice_weights
 from alphacut.rve.prism.model import PrismModel
 from alphacut.rve.prism.problem import FoldedMeshError
 from alphacut.rve.result.bounds import reuss, voigt
-from alphacut.rve.result.checks import CertificateError
 from alphacut.rve.result.engineering_constants import PLANE_STRAIN, engineering_constants
 from alphacut.rve.result.loss_factors import loss_factors
 from alphacut.rve.series.model import SeriesModel
@@ -103,12 +102,6 @@ def test_projected_samples_are_those_solved_whatever_their_company():
     assert len(model.solve(PAPER, MATRIX, [Phase(90e9)])[0].iterations) == 2
 
 
-def test_a_range_too_wide_for_two_solutions_is_solved_sample_by_sample():
-    wide = PrismModel(0.4, 3, moduli=(1e9, 400e9)).solve(PAPER, MATRIX, [PARTICLE])[0]
-    assert wide.modulus == solve(mesh_size=0.4, layers=3).modulus
-    assert len(wide.iterations) == 2
-
-
 MUMPS = {
     "ksp_type": "preonly",
     "pc_type": "cholesky",
@@ -191,12 +184,6 @@ def test_a_stiffness_lies_within_the_bounds_of_its_phases(turned_ellipse):
     assert result.checks["reuss"] == result.checks["voigt"] == 0
 
 
-def test_a_stiffness_and_its_isotropic_equal_are_one():
-    options = {"mesh_size": 0.4, "layers": 3}
-    equal = solve(particle=VoigtPhase(PARTICLE.stiffness.tolist()), estimate=False, **options)
-    assert equal.modulus == pytest.approx(solve(**options).modulus, rel=1e-12)
-
-
 @pytest.mark.parametrize(
     ("options", "radius_map", "particle"),
     [
@@ -234,18 +221,6 @@ def test_a_mesh_that_folds_over_is_refused_with_its_cure():
     assert solve(bent, mesh_size=0.4, layers=8).modulus > 20e9
 
 
-def test_a_map_that_folds_the_mesh_leaves_the_model_as_it_was(monkeypatch):
-    problem = PrismModel(0.4, 2).problem(HermiteMap(0.3, 0, 0.5, 0))
-    form = problem.form
-    before = form.mesh.geometry.x.copy(), form.areas.copy(), form.slice_rule()[0].copy()
-    mirrored = form.grid.positions(HermiteMap(0.2, 0, 0.6, 0)) * [-1, 1, 1]
-    monkeypatch.setattr(type(form.grid), "positions", lambda *_: mirrored)
-    with pytest.raises(FoldedMeshError):
-        form.move_to(HermiteMap(0.2, 0, 0.6, 0))
-    after = form.mesh.geometry.x, form.areas, form.slice_rule()[0]
-    assert all(np.array_equal(x, y) for x, y in zip(before, after, strict=True))
-
-
 @pytest.mark.parametrize(
     ("petsc", "error", "message"),
     [
@@ -259,14 +234,6 @@ def test_a_map_that_folds_the_mesh_leaves_the_model_as_it_was(monkeypatch):
 def test_what_petsc_does_not_take_or_reach_is_an_error(petsc, error, message):
     with pytest.raises(error, match=message):
         solve(mesh_size=0.4, layers=3, petsc=petsc)
-
-
-def test_levels_are_solved_by_what_options_say():
-    exact = solve(mesh_size=0.3, layers=4)
-    gamg = {"level_pc_type": "gamg", "level_ksp_type": "cg", "level_ksp_rtol": "1e-9"}
-    by_cycles = solve(mesh_size=0.3, layers=4, petsc=gamg)
-    assert by_cycles.modulus == pytest.approx(exact.modulus, rel=1e-9)
-    assert max(by_cycles.iterations) <= max(exact.iterations) + 1
 
 
 @pytest.mark.parametrize(
@@ -285,12 +252,3 @@ def test_an_option_out_of_range_is_refused(options, message):
 def test_nearly_incompressible_phases_are_referred_to_the_series():
     with pytest.raises(RefusedError, match=r"Poisson's ratio is 0.46; .* take the series"):
         solve(particle=Phase(80e9, 0.46))
-
-
-def test_a_result_below_its_bounds_is_not_given(monkeypatch):
-    from alphacut.rve.prism.problem import SliceStrains
-
-    own = SliceStrains.stress
-    monkeypatch.setattr(SliceStrains, "stress", lambda *a: 0.7 * own(*a))
-    with pytest.raises(CertificateError, match="do not use this result"):
-        solve(mesh_size=0.4, layers=3, estimate=False)
