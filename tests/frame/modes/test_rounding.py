@@ -1,29 +1,14 @@
 """Taylor models of modes are off by their rests, where these are rounding alone, against mpmath."""
 
-from itertools import combinations_with_replacement
-
 import mpmath as mp
 import numpy as np
 import pytest
 
 from alphacut.frame.bounds.box import Box
-from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF, gamma
-from alphacut.frame.calculus.taylor_model import TaylorModel, solve
+from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.modes.clusters import _diagonal
+from tests.frame.calculus.test_taylor_model import exact_value
 from tests.frame.modes.test_attained import IDLE, RECORD, drawn
-
-
-def exact_value(model, u):
-    """The polynomial of a Taylor model, V = (), at u by 40 digits."""
-    total = mp.mpf(0)
-    for degree, part in enumerate(model.parts):
-        lists = sorted(
-            combinations_with_replacement(range(model.inputs), degree), key=lambda x: x[::-1]
-        )
-        for coefficient, variables in zip(part, lists, strict=True):
-            if coefficient:
-                total += mp.mpf(float(coefficient)) * mp.fprod(u[i] for i in variables)
-    return total
 
 
 def exact_modes(springs, masses, ratio):
@@ -67,69 +52,8 @@ def test_modes_over_a_narrow_box_are_off_by_their_rounding_at_most(stiff):
         assert IDLE <= np.max(values) <= 1
 
 
-def exact_inputs(rng):
-    """Three functions of three inputs to first order, of which nothing is left out."""
-    parts = rng.uniform(1, 2, (1, 3)), 0.1 * rng.normal(size=(3, 3))
-    return TaylorModel(parts, np.zeros(3), 3)
-
-
-def exact_results(q, numbers, square, column):
-    """Results of arithmetic with values q of three functions, by 40 digits."""
-    A = [[q[0] * mp.mpf(float(x)) for x in row] for row in square]
-    b = [mp.mpf(float(x)) + q[1] for x in column]
-    determinant = A[0][0] * A[1][1] - A[0][1] * A[1][0]
-    return {
-        "sum": q[0] + q[1],
-        "multiple": q[0] * mp.mpf(0.1),
-        "product": q[0] * q[1],
-        "map": mp.fsum(x * mp.mpf(float(y)) for x, y in zip(q, numbers[:, 0], strict=True)),
-        "power": q[0] ** mp.mpf(-1.5),
-        "solve": (b[0] * A[1][1] - b[1] * A[0][1]) / determinant,
-    }
-
-
-def test_rests_of_arithmetic_are_rounding_and_no_hundred_times_more():
-    """At inputs so small that remainders vanish beside the rounding of the coefficients."""
-    rng, shares = np.random.default_rng(4), {}
-    for _ in range(30):
-        p, numbers = exact_inputs(rng), rng.normal(size=(3, 2))
-        square, column = rng.normal(size=(2, 2)) + 4 * np.eye(2), rng.normal(size=2)
-        low, high = np.sort(rng.uniform(-1, 1, (2, 3)), axis=0)
-        p = TaylorModel((p.parts[0], 1e-7 * p.parts[1]), p.remainder, 3)
-        product = p[0] * p[1]
-        both = TaylorModel(product.parts, np.zeros(()), 3)
-        made = {
-            "sum": p[0] + p[1],
-            "multiple": p[0] * 0.1,
-            "product": product,
-            "map": (p @ numbers)[0],
-            "power": p[0] ** -1.5,
-            "solve": solve(p[0] * square, p[1] + column[:, None])[0, 0],
-        }
-        u = [mp.mpf(float(x)) for x in rng.uniform(-1, 1, 3)]
-        with mp.workdps(40):
-            q = [exact_value(p[i], u) for i in range(3)]
-            exact = exact_results(q, numbers, square, column)
-            middle = [(mp.mpf(a) + mp.mpf(b)) / 2 for a, b in zip(low, high, strict=True)]
-            half = [(mp.mpf(b) - mp.mpf(a)) / 2 for a, b in zip(low, high, strict=True)]
-            moved = [m + h * x for m, h, x in zip(middle, half, u, strict=True)]
-            made["part"], exact["part"] = both.within(low, high), exact_value(both, moved)
-            for name, model in made.items():
-                off = float(abs(exact_value(model, u) - exact[name]))
-                shares.setdefault(name, []).append(off / float(model.remainder))
-    assert all(IDLE <= np.max(values) <= 1 for values in shares.values())
-
-
 def test_what_is_put_onto_a_diagonal_is_put_into_the_rest():
     matrix = TaylorModel.constant([[2.0, 1e-9], [-1e-9, 3.0]], 1)
     found = _diagonal(matrix, np.array([2.0, 3.5]))
     assert (np.abs(found.value - matrix.value) <= found.remainder).all()
     assert found.remainder == pytest.approx(np.array([[0, 1e-9], [1e-9, 0.5]]))
-
-
-def test_gamma_is_that_of_the_worst_sum():
-    assert gamma(1) == pytest.approx(UNIT_ROUNDOFF, rel=1e-9)
-    total = np.float64(1.0)
-    for _ in range(1000):
-        total += UNIT_ROUNDOFF  # each is rounded away
-    assert 0.9 * gamma(1000) <= 1000 * UNIT_ROUNDOFF / 1.0 - (total - 1) <= gamma(1000)

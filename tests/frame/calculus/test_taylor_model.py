@@ -1,0 +1,191 @@
+"""Taylor models hold the functions that they stand for, by high precision at many inputs."""
+
+from itertools import combinations_with_replacement
+
+import mpmath as mp
+import numpy as np
+import pytest
+
+from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF, gamma
+from alphacut.frame.calculus.taylor_model import TaylorModel, inverse_bound, solve
+
+IDLE = 0.01
+"""Share of a bound of rounding that the largest of some errors reaches at least."""
+
+
+def exact_value(model, u):
+    """The polynomial of a Taylor model, V = (), at u by 40 digits."""
+    total = mp.mpf(0)
+    for degree, part in enumerate(model.parts):
+        lists = sorted(
+            combinations_with_replacement(range(model.inputs), degree), key=lambda x: x[::-1]
+        )
+        for coefficient, variables in zip(part, lists, strict=True):
+            if coefficient:
+                total += mp.mpf(float(coefficient)) * mp.fprod(u[i] for i in variables)
+    return total
+
+
+def fresh_generator(record_property):
+    """A generator of a seed that is drawn anew and reported."""
+    seed = int(np.random.SeedSequence().generate_state(1)[0])
+    record_property("seed", seed)
+    print("seed", seed)
+    return np.random.default_rng(seed)
+
+
+OPERATIONS = {
+    "sum": lambda a, b, c: a + b * c,
+    "difference": lambda a, b, c: a - b - c,
+    "product": lambda a, b, c: a * b,
+    "quotient": lambda a, b, c: a / (b * b + 1),
+    "reciprocal": lambda a, b, c: c / (a * a + 1),
+    "power": lambda a, b, c: (a * a + 1) ** -1.5,
+    "root": lambda a, b, c: (b * b + 1) ** 0.5,
+    "negative": lambda a, b, c: c - a,
+}
+
+
+def random_program(rng):
+    """Some operations in a row, each on what three of the earlier ones and the inputs gave."""
+    rows = [(str(rng.choice([*OPERATIONS])), rng.integers(0, 3 + k, 3)) for k in range(6)]
+
+    def run(inputs, c):
+        values = [*inputs]
+        for name, (i, j, _) in rows:
+            values.append(OPERATIONS[name](values[i], values[j], c))
+        return values[-1]
+
+    return run
+
+
+def test_no_function_leaves_its_taylor_model(record_property):
+    """40 random programs of arithmetic; wide boxes, narrow ones, parts of them and lower orders."""
+    rng, shares = fresh_generator(record_property), []
+    for _ in range(40):
+        run, c, order = random_program(rng), float(rng.normal()), int(rng.integers(2, 6))
+        centre, radius = rng.uniform(-1, 1, 3), 10 ** rng.uniform(-6, -0.7) * np.ones(3)
+        inputs = TaylorModel.variables(centre, radius, order)
+        model = run([inputs[i] for i in range(3)], c)
+        low, high = np.sort(rng.uniform(-1, 1, (2, 3)), axis=0)
+        lower_bound, upper_bound = model.bounds()
+        cut, part = model.cut(order - 1), model.within(low, high)
+        with mp.workdps(40):
+            for u in (*rng.uniform(-1, 1, (3, 3)), np.sign(rng.normal(size=3))):
+                v, moved = ([mp.mpf(float(x)) for x in u] for _ in range(2))
+                p = [mp.mpf(m) + mp.mpf(r) * x for m, r, x in zip(centre, radius, v, strict=True)]
+                exact = run(p, mp.mpf(c))
+                for found in (model, cut):
+                    off = abs(exact_value(found, v) - exact)
+                    assert off <= found.remainder
+                assert lower_bound <= exact <= upper_bound
+                shares.append(float(off) / float(cut.remainder))
+                moved = [
+                    (mp.mpf(a) + mp.mpf(b)) / 2 + (mp.mpf(b) - mp.mpf(a)) / 2 * x
+                    for a, b, x in zip(low, high, v, strict=True)
+                ]
+                p = [
+                    mp.mpf(m) + mp.mpf(r) * x for m, r, x in zip(centre, radius, moved, strict=True)
+                ]
+                assert abs(exact_value(part, v) - run(p, mp.mpf(c))) <= part.remainder
+    assert max(shares) > IDLE
+
+
+def test_no_solution_leaves_its_taylor_model(record_property):
+    rng = fresh_generator(record_property)
+    for _ in range(8):
+        n, d = 3, 2
+        centre, slopes = np.eye(n) + 0.2 * rng.normal(size=(n, n)), rng.normal(size=(d, n, n))
+        slopes *= 10 ** rng.uniform(-4, -1.5)
+        right = rng.normal(size=(n, 1))
+        A = TaylorModel((centre[None], slopes), np.zeros((n, n)), d, 4)
+        b = TaylorModel((right[None], 0.1 * slopes[:, :, :1]), np.zeros((n, 1)), d, 4)
+        found, inverse, product = solve(A, b), inverse_bound(A), A @ A @ b
+        with mp.workdps(40):
+            for u in (*rng.uniform(-1, 1, (3, d)), np.sign(rng.normal(size=d))):
+                v = [mp.mpf(float(x)) for x in u]
+                at = [
+                    mp.matrix(n, x.shape[1])
+                    + mp.matrix(
+                        [[exact_value(x[i, j], v) for j in range(x.shape[1])] for i in range(n)]
+                    )
+                    for x in (A, b)
+                ]
+                solution, inverse_at = mp.lu_solve(*at), at[0] ** -1
+                doubled = at[0] * (at[0] * at[1])
+                for i in range(n):
+                    off = abs(exact_value(found[i, 0], v) - solution[i])
+                    assert off <= found.remainder[i, 0]
+                    assert (
+                        abs(exact_value(product[i, 0], v) - doubled[i]) <= product.remainder[i, 0]
+                    )
+                    assert all(abs(inverse_at[i, j]) <= inverse[i, j] for j in range(n))
+
+
+def test_a_matrix_that_may_be_singular_has_no_bound_of_its_inverse():
+    slope = np.array([[[0.0, 1.01], [1.01, 0.0]]])
+    assert inverse_bound(TaylorModel((np.eye(2)[None], slope), np.zeros((2, 2)), 1)) is None
+    assert (
+        inverse_bound(TaylorModel((np.eye(2)[None], 0.9 * slope), np.zeros((2, 2)), 1)) is not None
+    )
+
+
+def exact_inputs(rng):
+    """Three functions of three inputs to first order, of which nothing is left out."""
+    parts = rng.uniform(1, 2, (1, 3)), 0.1 * rng.normal(size=(3, 3))
+    return TaylorModel(parts, np.zeros(3), 3)
+
+
+def exact_results(q, numbers, square, column):
+    """Results of arithmetic with values q of three functions, by 40 digits."""
+    A = [[q[0] * mp.mpf(float(x)) for x in row] for row in square]
+    b = [mp.mpf(float(x)) + q[1] for x in column]
+    determinant = A[0][0] * A[1][1] - A[0][1] * A[1][0]
+    return {
+        "sum": q[0] + q[1],
+        "multiple": q[0] * mp.mpf(0.1),
+        "product": q[0] * q[1],
+        "map": mp.fsum(x * mp.mpf(float(y)) for x, y in zip(q, numbers[:, 0], strict=True)),
+        "power": q[0] ** mp.mpf(-1.5),
+        "solve": (b[0] * A[1][1] - b[1] * A[0][1]) / determinant,
+    }
+
+
+def test_rests_of_arithmetic_are_rounding_and_no_hundred_times_more():
+    """At inputs so small that remainders vanish beside the rounding of the coefficients."""
+    rng, shares = np.random.default_rng(4), {}
+    for _ in range(30):
+        p, numbers = exact_inputs(rng), rng.normal(size=(3, 2))
+        square, column = rng.normal(size=(2, 2)) + 4 * np.eye(2), rng.normal(size=2)
+        low, high = np.sort(rng.uniform(-1, 1, (2, 3)), axis=0)
+        p = TaylorModel((p.parts[0], 1e-7 * p.parts[1]), p.remainder, 3)
+        product = p[0] * p[1]
+        both = TaylorModel(product.parts, np.zeros(()), 3)
+        made = {
+            "sum": p[0] + p[1],
+            "multiple": p[0] * 0.1,
+            "product": product,
+            "map": (p @ numbers)[0],
+            "power": p[0] ** -1.5,
+            "solve": solve(p[0] * square, p[1] + column[:, None])[0, 0],
+        }
+        u = [mp.mpf(float(x)) for x in rng.uniform(-1, 1, 3)]
+        with mp.workdps(40):
+            q = [exact_value(p[i], u) for i in range(3)]
+            exact = exact_results(q, numbers, square, column)
+            middle = [(mp.mpf(a) + mp.mpf(b)) / 2 for a, b in zip(low, high, strict=True)]
+            half = [(mp.mpf(b) - mp.mpf(a)) / 2 for a, b in zip(low, high, strict=True)]
+            moved = [m + h * x for m, h, x in zip(middle, half, u, strict=True)]
+            made["part"], exact["part"] = both.within(low, high), exact_value(both, moved)
+            for name, model in made.items():
+                off = float(abs(exact_value(model, u) - exact[name]))
+                shares.setdefault(name, []).append(off / float(model.remainder))
+    assert all(IDLE <= np.max(values) <= 1 for values in shares.values())
+
+
+def test_gamma_is_that_of_the_worst_sum():
+    assert gamma(1) == pytest.approx(UNIT_ROUNDOFF, rel=1e-9)
+    total = np.float64(1.0)
+    for _ in range(1000):
+        total += UNIT_ROUNDOFF  # each is rounded away
+    assert 0.9 * gamma(1000) <= 1000 * UNIT_ROUNDOFF / 1.0 - (total - 1) <= gamma(1000)
