@@ -10,9 +10,7 @@ from alphacut.frame import StoreyFrame
 from alphacut.frame.bounds import dual_function
 from alphacut.frame.bounds.box import over_box
 from alphacut.frame.bounds.level import LevelModels, OutputBounds
-from alphacut.frame.calculus.monomials import convolve, monomials
-from alphacut.frame.calculus.taylor_model import TaylorModel, solve
-from alphacut.frame.calculus.unproved import UnprovedError
+from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.modes.clusters import centred_matrices, subspaces
 from alphacut.frame.modes.rest import inverse_form
 from alphacut.frame.modes.structure import classical
@@ -29,89 +27,8 @@ def points(d, count=400, seed=0):
     return np.vstack([np.sign(rng.normal(size=(count, d))), rng.uniform(-1, 1, (count, d))])
 
 
-def inputs(d, seed=0, radius=0.1):
-    rng = np.random.default_rng(seed)
-    return TaylorModel.variables(rng.uniform(1, 2, d), radius * rng.uniform(0.5, 1, d))
-
-
-@pytest.mark.parametrize(
-    ("law", "expected"),
-    [
-        (lambda x: x[0] * x[1] * x[2], lambda v: v[0] * v[1] * v[2]),
-        (lambda x: x[0] ** -3.0 * x[1], lambda v: v[1] / v[0] ** 3),
-        (lambda x: (x[0] * x[2]) ** 0.5 - x[1], lambda v: np.sqrt(v[0] * v[2]) - v[1]),
-        (lambda x: (x[0] + x[1] * 2.0 + 1.0) ** -1.0, lambda v: 1 / (v[0] + 2 * v[1] + 1)),
-    ],
-)
-def test_an_expansion_is_off_by_its_rest_at_most(law, expected):
-    own, u = inputs(3), points(3)
-    f = law(own)
-    off = np.abs(f.at(u) - expected(own.at(u).T))
-    assert off.max() <= f.remainder + 1e-12
-
-
-def test_a_matrix_product_of_expansions_contains_the_product():
-    own, u = inputs(4, 1, 0.3), points(4)
-    a = own.contract(np.eye(4).reshape(4, 2, 2))
-    cube = a @ a @ (a @ a)
-    values = own.at(u).reshape(-1, 2, 2)
-    assert (
-        np.abs(cube.at(u) - values @ values @ values @ values).max(0) <= cube.remainder * (1 + 1e-9)
-    ).all()
-    assert cube.remainder.min() > 0
-
-
-def test_a_power_of_what_may_be_zero_is_refused():
-    with pytest.raises(UnprovedError, match="take narrower inputs"):
-        TaylorModel.variables(np.ones(1), np.full(1, 1.1)) ** 0.5
-
-
-def test_products_of_homogeneous_polynomials_are_those_of_their_values():
-    rng, u = np.random.default_rng(0), np.random.default_rng(1).uniform(-1, 1, 5)
-    for degrees in ((2, 2), (1, 3), (3, 0)):
-        a, b = (rng.normal(size=len(monomials(5, degree))) for degree in degrees)
-        both = convolve(a, b, degrees, 5, np.multiply)
-
-        def at(part, degree):
-            return part @ u[monomials(5, degree)].prod(1)
-
-        expected = at(a, degrees[0]) * at(b, degrees[1])
-        assert at(both, sum(degrees)) == pytest.approx(expected, rel=1e-12)
-
-
 def is_tight(off, bound):
     return (TIGHT * bound < off).all() and (off <= bound * (1 + 1e-9)).all()
-
-
-def test_half_of_a_remainder_of_series_would_not_do():
-    def line(slope, rest):
-        return TaylorModel(
-            (np.ones((1, 1, 1)), np.full((1, 1, 1), slope)), np.full((1, 1), rest), 1
-        )
-
-    own, other = line(0.2, 0.01), line(-0.2, 0.01)
-    fourth = own * own * own * own
-    for made, exact in (
-        (solve(other, own), 1.21 / 0.79),
-        (fourth, 1.21**4),
-        (fourth.cut(2), 1.21**4),
-        (fourth @ np.array([[-2.0]]), -2 * 1.21**4),
-        (np.array([[-2.0]]) @ fourth, -2 * 1.21**4),
-        (-fourth, -(1.21**4)),
-        (fourth.contract(np.array([-2.0])), -2 * 1.21**4),
-    ):
-        assert is_tight(abs(exact - sum(part.sum() for part in made.parts)), made.remainder)
-
-
-def test_half_of_a_remainder_of_powers_would_not_do():
-    own = TaylorModel.variables(np.ones(1), np.full(1, 0.1)).loosened(0.01)
-    square = own * own
-    for made, u, exact in (
-        (square * square, 1.0, 1.11**4),
-        (own**0.5, -1.0, 0.89**0.5),
-        (own**-1.0, -1.0, 1 / 0.89),
-    ):
-        assert is_tight(np.abs(made.at(np.array([[u]])) - exact), made.remainder)
 
 
 def frame(storeys=4, width=0.05, **values):

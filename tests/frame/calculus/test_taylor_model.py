@@ -6,11 +6,15 @@ import mpmath as mp
 import numpy as np
 import pytest
 
+from alphacut.frame.calculus.monomials import convolve, monomials
 from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF, gamma
 from alphacut.frame.calculus.taylor_model import TaylorModel, inverse_bound, solve
+from alphacut.frame.calculus.unproved import UnprovedError
 
 IDLE = 0.01
 """Share of a bound of rounding that the largest of some errors reaches at least."""
+TIGHT = 0.5
+"""Share of a bound that something reaches: half the bound would be passed."""
 
 
 def exact_value(model, u):
@@ -59,22 +63,28 @@ def random_program(rng):
     return run
 
 
+def exact_inputs_at(rows, u):
+    """Inputs a + b u + e of rows (a, b, e) by 40 digits."""
+    return [mp.mpf(a) + mp.mpf(b) * x + mp.mpf(e) for (a, b, e), x in zip(rows, u, strict=True)]
+
+
 def test_no_function_leaves_its_taylor_model(record_property):
     """40 random programs of arithmetic; wide boxes, narrow ones, parts of them and lower orders."""
     rng, shares = fresh_generator(record_property), []
     for _ in range(40):
         run, c, order = random_program(rng), float(rng.normal()), int(rng.integers(2, 6))
         centre, radius = rng.uniform(-1, 1, 3), 10 ** rng.uniform(-6, -0.7) * np.ones(3)
-        inputs = TaylorModel.variables(centre, radius, order)
+        loose = radius * rng.choice([0.0, 0.1])  # what inputs leave out, at one end of it
+        inputs = TaylorModel.variables(centre, radius, order).loosened(loose)
         model = run([inputs[i] for i in range(3)], c)
         low, high = np.sort(rng.uniform(-1, 1, (2, 3)), axis=0)
         lower_bound, upper_bound = model.bounds()
+        rows = [*zip(centre, radius, loose, strict=True)]
         cut, part = model.cut(order - 1), model.within(low, high)
         with mp.workdps(40):
             for u in (*rng.uniform(-1, 1, (3, 3)), np.sign(rng.normal(size=3))):
-                v, moved = ([mp.mpf(float(x)) for x in u] for _ in range(2))
-                p = [mp.mpf(m) + mp.mpf(r) * x for m, r, x in zip(centre, radius, v, strict=True)]
-                exact = run(p, mp.mpf(c))
+                v = [mp.mpf(float(x)) for x in u]
+                exact = run(exact_inputs_at(rows, v), mp.mpf(c))
                 for found in (model, cut):
                     off = abs(exact_value(found, v) - exact)
                     assert off <= found.remainder
@@ -84,10 +94,8 @@ def test_no_function_leaves_its_taylor_model(record_property):
                     (mp.mpf(a) + mp.mpf(b)) / 2 + (mp.mpf(b) - mp.mpf(a)) / 2 * x
                     for a, b, x in zip(low, high, v, strict=True)
                 ]
-                p = [
-                    mp.mpf(m) + mp.mpf(r) * x for m, r, x in zip(centre, radius, moved, strict=True)
-                ]
-                assert abs(exact_value(part, v) - run(p, mp.mpf(c))) <= part.remainder
+                exact = run(exact_inputs_at(rows, moved), mp.mpf(c))
+                assert abs(exact_value(part, v) - exact) <= part.remainder
     assert max(shares) > IDLE
 
 
@@ -189,3 +197,56 @@ def test_gamma_is_that_of_the_worst_sum():
     for _ in range(1000):
         total += UNIT_ROUNDOFF  # each is rounded away
     assert 0.9 * gamma(1000) <= 1000 * UNIT_ROUNDOFF / 1.0 - (total - 1) <= gamma(1000)
+
+
+def test_a_power_of_what_may_be_zero_is_refused():
+    with pytest.raises(UnprovedError, match="take narrower inputs"):
+        TaylorModel.variables(np.ones(1), np.full(1, 1.1)) ** 0.5
+
+
+def test_products_of_homogeneous_polynomials_are_those_of_their_values():
+    rng, u = np.random.default_rng(0), np.random.default_rng(1).uniform(-1, 1, 5)
+    for degrees in ((2, 2), (1, 3), (3, 0)):
+        a, b = (rng.normal(size=len(monomials(5, degree))) for degree in degrees)
+        both = convolve(a, b, degrees, 5, np.multiply)
+
+        def at(part, degree):
+            return part @ u[monomials(5, degree)].prod(1)
+
+        expected = at(a, degrees[0]) * at(b, degrees[1])
+        assert at(both, sum(degrees)) == pytest.approx(expected, rel=1e-12)
+
+
+def is_tight(off, bound):
+    return (TIGHT * bound < off).all() and (off <= bound * (1 + 1e-9)).all()
+
+
+def test_half_of_a_remainder_of_series_would_not_do():
+    def line(slope, rest):
+        return TaylorModel(
+            (np.ones((1, 1, 1)), np.full((1, 1, 1), slope)), np.full((1, 1), rest), 1
+        )
+
+    own, other = line(0.2, 0.01), line(-0.2, 0.01)
+    fourth = own * own * own * own
+    for made, exact in (
+        (solve(other, own), 1.21 / 0.79),
+        (fourth, 1.21**4),
+        (fourth.cut(2), 1.21**4),
+        (fourth @ np.array([[-2.0]]), -2 * 1.21**4),
+        (np.array([[-2.0]]) @ fourth, -2 * 1.21**4),
+        (-fourth, -(1.21**4)),
+        (fourth.contract(np.array([-2.0])), -2 * 1.21**4),
+    ):
+        assert is_tight(abs(exact - sum(part.sum() for part in made.parts)), made.remainder)
+
+
+def test_half_of_a_remainder_of_powers_would_not_do():
+    own = TaylorModel.variables(np.ones(1), np.full(1, 0.1)).loosened(0.01)
+    square = own * own
+    for made, u, exact in (
+        (square * square, 1.0, 1.11**4),
+        (own**0.5, -1.0, 0.89**0.5),
+        (own**-1.0, -1.0, 1 / 0.89),
+    ):
+        assert is_tight(np.abs(made.at(np.array([[u]])) - exact), made.remainder)
