@@ -1,5 +1,6 @@
 # make run         the paper's case, from microstructure to fuzzy vibration, into results/paper/
 # make test        the tests (slower ones: make test-slow)
+# make quick ROOM=frame/bounds    the quick tests of one room, in seconds
 # make bench-solver, make bench-scaling, make charts, make stability    what the methods cost and where they end
 # make coverage    the lines of the five packages that the tests run, and those that they do not
 # make relations   contradictions of problems said otherwise and of cases run otherwise (RELATIONS="--seed 7")
@@ -14,13 +15,16 @@ IN = ./enter
 help:
 	@sed -n 's/^# //p' Makefile
 
-.PHONY: help run test test-slow coverage lint charts bench-solver bench-scaling stability relations findings docs pictures clean clean-env
+.PHONY: help run test quick test-slow coverage lint charts bench-solver bench-scaling stability relations findings docs pictures clean clean-env
 
 run:
 	$(IN) python -m alphacut run $(CASE) --out $(OUT) --workers $(WORKERS) $(if $(FRESH),--fresh)
 
 test:
-	$(IN) python -m pytest -m "not slow" -n $(WORKERS) --dist loadfile --timeout 400 $(PYTEST)
+	$(IN) python -m pytest -m "not slow" -n $(WORKERS) --dist worksteal --timeout 400 $(PYTEST)
+
+quick:
+	$(IN) python -m pytest -q --quick tests/$(ROOM) $(PYTEST)
 
 test-slow:
 	$(IN) python -m pytest -m slow --timeout 3000 $(PYTEST)

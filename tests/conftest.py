@@ -1,5 +1,7 @@
 """What all tests share: random numbers whose seed a failure tells, and shipped cases run once."""
 
+import fcntl
+import hashlib
 import json
 import os
 import secrets
@@ -10,7 +12,27 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.alphacut import one_case
+
 ROOT = Path(__file__).parents[1]
+
+
+def pytest_addoption(parser):
+    """Adds --quick, for `make quick`."""
+    parser.addoption("--quick", action="store_true", help="no slow test, no other process, no run")
+
+
+def pytest_collection_modifyitems(config, items):
+    """Leaves out, with --quick, slow tests and those of modules that start processes."""
+    if config.getoption("--quick"):
+        runs = {"shipped_run", "two_floors"}
+        items[:] = [
+            item
+            for item in items
+            if not item.get_closest_marker("slow")
+            and not runs & set(item.fixturenames)
+            and not hasattr(item.module, "subprocess")
+        ]
 
 
 @pytest.fixture
@@ -32,11 +54,9 @@ def shipped_run(tmp_path_factory, worker_id):
     place.mkdir(exist_ok=True)
 
     def run(case, changes=()):
-        name = f"{case}-{abs(hash_of((case, changes)))}"
+        name = f"{case}-{digest(tuple(changes))}"
         folder, lock = place / name, place / f"{name}.lock"
         with lock.open("w") as handle:
-            import fcntl
-
             fcntl.flock(handle, fcntl.LOCK_EX)
             if not (folder / "summary.json").is_file():
                 sets = [f"--set={change}" for change in changes]
@@ -56,8 +76,12 @@ def shipped_run(tmp_path_factory, worker_id):
     return run
 
 
-def hash_of(key):
-    """A number that is the same in every process."""
-    import hashlib
+@pytest.fixture(scope="session")
+def two_floors(tmp_path_factory):
+    """Folder of the results, with figures, of a frame of two floors that asks every question."""
+    return one_case.run(tmp_path_factory.mktemp("two-floors"))
 
-    return int(hashlib.sha256(repr(key).encode()).hexdigest()[:12], 16)
+
+def digest(key):
+    """A name that is the same in every process."""
+    return hashlib.sha256(repr(key).encode()).hexdigest()[:12]

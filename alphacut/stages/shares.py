@@ -1,7 +1,8 @@
 """Shares of the inputs in the widths of the modulus and of the peaks of a vibration.
 
-The share of an input is the width that is lost when it alone is fixed at its modal value. The cheap
-exact methods serve for it, whatever the case itself uses: the series and the modal method.
+The share of an input is the width that is lost when it alone is fixed at its modal value. Whatever
+the case uses, the cell is solved by `auto` (the series where it has a formula) with a reduced plan;
+peaks of a frame come from `Auto` to `ACCURACY`, on the lowest level, under a record at coarser steps.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Counts of the house, and the bound of each: ``python -m tests.environment.house`` prints them."""
+"""Counts of the house: ``python -m tests.environment.house`` prints them."""
 
 from __future__ import annotations
 
@@ -11,22 +11,6 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("stochastic", "rve", "fuzzy", "frame", "alphacut")
 TEXTS = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md")
-BOUNDS = {
-    "lines of the packages": 33_500,
-    "files of the packages": 235,
-    "lines of C": 700,
-    "files of C": 1,
-    "places of fmt: skip": 10,
-    "files in the largest folder": 14,
-    "public names of a package": 30,
-    "lines of tests": 15_500,
-    "lines of benchmarks": 3_000,
-    "lines of README, CHANGELOG and docs": 2_800,
-    "commands": 8,
-    "options of a command": 12,
-    "case keys": 118,
-    "places that raise": 350,
-}
 
 
 def package_files(pattern: str = "*.py") -> list[Path]:
@@ -79,20 +63,33 @@ def interface() -> dict[str, int]:
     }
 
 
+def kinds_of_lines(text: str) -> Counter[str]:
+    """Number of lines of code, docstrings and comments, and of empty ones, in a file."""
+    documented: set[int] = set()
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and node.body:
+            first = node.body[0]
+            if ast.get_docstring(node, clean=False) is not None:
+                documented |= set(range(first.lineno, (first.end_lineno or first.lineno) + 1))
+
+    def kind(number: int, line: str) -> str:
+        if number in documented:
+            return "docstring"
+        stripped = line.strip()
+        return "empty" if not stripped else "comment" if stripped.startswith("#") else "code"
+
+    return Counter(kind(number, line) for number, line in enumerate(text.splitlines(), 1))
+
+
 def counts() -> dict[str, int]:
-    """Every count by its name in `BOUNDS`."""
-    files, compiled = package_files(), package_files("*.c")
-    folders = Counter(
-        file.parent
-        for file in [*files, *(ROOT / "tests").rglob("*.py"), *(ROOT / "benchmarks").rglob("*.py")]
-    )
+    """Every count by its name."""
+    files = package_files()
+    folders = Counter(file.parent for file in files)
     texts = [file.read_text(encoding="utf-8") for file in files]
     public = [len(importlib.import_module(f"alphacut.{name}").__all__) for name in PACKAGES[:4]]
     return {
         "lines of the packages": lines(files),
         "files of the packages": len(files),
-        "lines of C": lines(compiled),
-        "files of C": len(compiled),
         "places of fmt: skip": sum(text.count("# fmt: skip") for text in texts),
         "files in the largest folder": max(folders.values()),
         "public names of a package": max(public),
@@ -105,14 +102,14 @@ def counts() -> dict[str, int]:
 
 
 def table() -> str:
-    """Each count beside its bound, a line each."""
-    present = counts()
-    rows = [f"{name:36} {present[name]:7,} of {bound:7,}" for name, bound in BOUNDS.items()]
-    per = {
-        name: lines(f for f in package_files() if f.is_relative_to(ROOT / name))
-        for name in PACKAGES
-    }
-    return "\n".join([*rows, ", ".join(f"{name} {count:,}" for name, count in per.items())])
+    """Each count on a line, then files and kinds of lines of each package."""
+    rows = [f"{name:36} {count:7,}" for name, count in counts().items()]
+    for package in PACKAGES:
+        files = [file for file in package_files() if file.is_relative_to(ROOT / package)]
+        kinds = sum((kinds_of_lines(x.read_text(encoding="utf-8")) for x in files), Counter[str]())
+        words = ", ".join(f"{kind} {count:,}" for kind, count in sorted(kinds.items()))
+        rows.append(f"{package:12} {kinds.total():7,} lines in {len(files)} files: {words}")
+    return "\n".join(rows)
 
 
 if __name__ == "__main__":

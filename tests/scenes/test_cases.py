@@ -2,39 +2,35 @@
 
 import json
 import math
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray
 
-from tests.alphacut import one_case
-
-ROOT = Path(__file__).parents[2]
 GOLDEN = json.loads((Path(__file__).parent / "golden.json").read_text(encoding="utf-8"))
 SERIES, LEVELS = ("modulus.method=series",), ("modulus.alpha=[0, 1]",)
+SHORT = ("envelope.duration=1 s", "envelope.step=0.02 s", "envelope.alpha=[0, 1]")
+SHORT_BUILDING = (
+    *SHORT,
+    "envelope.fuzzy=['E', 'm8', 'l1']",
+    "envelope.tolerance=2 mm",
+    "probability.samples=40",
+)
 QUICK = {  # case: changes that make it quick, and the results that it then has
     "porous": (LEVELS, {"modulus"}),
     "pendulum": ((), {"envelopes"}),
     "laboratory-frame": ((), {"envelopes", "decision", "update"}),
     "paper": (("stages=['modulus']", *SERIES, *LEVELS), {"modulus"}),
     "paper-3d": (("stages=['modulus']", *LEVELS), {"modulus"}),
-    "building": (("stages=['modulus']", *LEVELS), {"modulus"}),
+    "building": (SHORT_BUILDING, {"modulus"}),
 }
 WHOLE = ("paper", "paper-3d", "paper-literal", "building", "composite", "concrete")
 UNDECLARED = 0.02  # share of the peak by which attained bounds without an error may differ
 
 
-def summary_of(case, folder, changes=()):
-    """The summary of a run of a shipped case."""
-    sets = [f"--set={change}" for change in changes]
-    command = [sys.executable, "-m", "alphacut", "run", f"cases/{case}.toml", f"--out={folder}"]
-    run = subprocess.run(
-        [*command, *sets, "--quiet", "--no-figures"], cwd=ROOT, capture_output=True, text=True
-    )
-    assert run.returncode == 0, run.stderr
+def summary_of(folder):
+    """The summary in a folder of results."""
     return json.loads((folder / "summary.json").read_text(encoding="utf-8"))
 
 
@@ -173,24 +169,24 @@ def compare(new, old, parts):
 
 
 @pytest.mark.parametrize("case", QUICK)
-def test_a_case_has_its_golden_numbers(case, tmp_path):
+def test_a_case_has_its_golden_numbers(case, shipped_run):
     changes, parts = QUICK[case]
-    compare(summary_of(case, tmp_path / "out", changes), GOLDEN[case], parts)
-    attained_within_proved(tmp_path / "out")
+    folder = shipped_run(case, changes)
+    compare(summary_of(folder), GOLDEN[case], parts)
+    attained_within_proved(folder)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", WHOLE)
-def test_a_whole_case_has_its_golden_numbers(case, tmp_path):
-    parts = GOLDEN[case].keys() & PARTS.keys()
+def test_a_whole_case_has_its_golden_numbers(case, shipped_run):
+    parts, folder = GOLDEN[case].keys() & PARTS.keys(), shipped_run(case)
     assert parts
-    compare(summary_of(case, tmp_path / "out"), GOLDEN[case], parts)
-    attained_within_proved(tmp_path / "out")
+    compare(summary_of(folder), GOLDEN[case], parts)
+    attained_within_proved(folder)
 
 
-def test_answers_have_their_golden_numbers(tmp_path):
-    folder = one_case.run(tmp_path, "--no-figures")
-    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+def test_answers_have_their_golden_numbers(two_floors):
+    summary = summary_of(two_floors)
     golden = GOLDEN["two-floors"]
     assert golden.keys() == {"decision", "probability", "tolerances", "shares"}
     compare(summary, golden, golden)

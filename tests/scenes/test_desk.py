@@ -27,25 +27,15 @@ GOLDEN = {
 }
 
 
-def run(case, out, changes, *start):
-    """The summary of a run of a shipped case with changes."""
-    sets = [f"--set={change}" for change in changes]
-    words = ["-m", "alphacut", "run", f"cases/{case}.toml", f"--out={out}", "--no-figures"]
-    env = os.environ | {"OMP_NUM_THREADS": "1"}
-    command = [*start, sys.executable, *(["-m", "mpi4py.futures"] if start else []), *words, *sets]
-    made = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, env=env)
-    assert made.returncode == 0, made.stderr
-    return json.loads((out / "summary.json").read_text(encoding="utf-8"))
+@pytest.fixture(scope="module")
+def folders(shipped_run):
+    return {case: shipped_run(case, changes) for case, changes in QUICK.items()}
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    return tmp_path_factory.mktemp("desk")
-
-
-@pytest.fixture(scope="module")
-def summaries(folder):
-    return {case: run(case, folder / case, changes) for case, changes in QUICK.items()}
+def summaries(folders):
+    read = {case: folder / "summary.json" for case, folder in folders.items()}
+    return {case: json.loads(file.read_text(encoding="utf-8")) for case, file in read.items()}
 
 
 def test_a_suite_has_its_golden_fragility(summaries):
@@ -87,10 +77,9 @@ def is_number(text):
     return True
 
 
-def test_columns_of_csv_are_numbers_or_texts_and_name_units_of_the_case(
-    folder, summaries, tmp_path
-):
-    assert main(["report", str(folder / "plane-frame"), "--quiet", "--csv", str(tmp_path)]) == 0
+def test_columns_of_csv_are_numbers_or_texts_and_name_units_of_the_case(folders, tmp_path):
+    out = ["--csv", str(tmp_path), "--out", str(tmp_path / "page.html")]
+    assert main(["report", str(folders["plane-frame"]), "--quiet", *out]) == 0
     tables = {x.stem: [*csv.reader(x.open(encoding="utf-8"))] for x in tmp_path.glob("*.csv")}
     assert {"decision", "fragility", "records", "spectra"} <= set(tables)
     for name, (head, *rows) in tables.items():
@@ -108,6 +97,12 @@ def test_three_ranks_give_the_bits_of_one_process(summaries, tmp_path):
     ranks = ["mpirun", "--allow-run-as-root", "--oversubscribe", "-n", "3"]
     version = subprocess.run(["mpirun", "--version"], capture_output=True, text=True).stdout
     ranks = ranks if "Open MPI" in version else ["mpirun", "-n", "3"]
-    summary = run("suite", tmp_path / "out", QUICK["suite"], *ranks)
+    words = ["-m", "mpi4py.futures", "-m", "alphacut", "run", "cases/suite.toml", "--no-figures"]
+    sets = [f"--set={change}" for change in QUICK["suite"]]
+    command = [*ranks, sys.executable, *words, f"--out={tmp_path / 'out'}", *sets]
+    env = os.environ | {"OMP_NUM_THREADS": "1"}
+    made = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, env=env)
+    assert made.returncode == 0, made.stderr
+    summary = json.loads((tmp_path / "out/summary.json").read_text(encoding="utf-8"))
     assert summary["records"]["records"] == summaries["suite"]["records"]["records"]
     assert summary["fragility"] == summaries["suite"]["fragility"]

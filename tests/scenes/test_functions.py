@@ -22,8 +22,7 @@ def test_an_extreme_inside_the_box_is_seen():
     assert result.upper[0, 0] == pytest.approx(1.69, rel=1e-9)
 
 
-def test_cuts_from_data_hold_the_next_value_as_often_as_they_say():
-    rng = np.random.default_rng()
+def test_cuts_from_data_hold_the_next_value_as_often_as_they_say(rng):
     inside = []
     for values in rng.lognormal(size=(400, 20)):
         low, high = from_data(values[:-1], "next value").cut(0.25)

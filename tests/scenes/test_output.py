@@ -11,70 +11,58 @@ import pytest
 from scipy.signal import lsim
 
 from tests.alphacut.small import SMALLER, written
+from tests.scenes.test_cases import QUICK
 
 ROOT = Path(__file__).parents[2]
-SHORT = ("envelope.duration=1 s", "envelope.step=0.02 s", "envelope.alpha=[0, 1]")
-COARSE = {  # case: most lines, changes of its text, changes of its keys
-    "paper": (20, SMALLER, ()),
-    "building": (
-        25,
-        {},
-        (
-            *SHORT,
-            "envelope.fuzzy=['E', 'm8', 'l1']",
-            "envelope.tolerance=2 mm",
-            "probability.samples=40",
-        ),
-    ),
-    "composite": (
-        25,
-        {},
-        ("envelope.duration=1 s", "envelope.step=0.02 s", "modulus.alpha=[0, 0.5, 1]"),
-    ),
-    "laboratory-frame": (25, {}, ("envelope.duration=2 s",)),
+SHARED = {  # case: changes of its keys; runs that golden numbers are compared with, too
+    "building": QUICK["building"][0],
+    "composite": ("envelope.duration=1 s", "envelope.step=0.02 s", "modulus.alpha=[0, 0.5, 1]"),
+    "laboratory-frame": QUICK["laboratory-frame"][0],
 }
 
 
-@pytest.fixture(scope="module")
-def runs(tmp_path_factory):
-    """Lines and summary of a run of each case, computed when it is first needed."""
-    done = {}
+@pytest.fixture
+def run(shipped_run, tmp_path):
+    """A function from a case to the lines that its run prints at the end, and its summary."""
 
-    def of(name):
-        if name not in done:
-            done[name] = run(name, tmp_path_factory.mktemp(name))
-        return done[name]
+    def lines_and_summary(name):
+        if name == "paper":
+            return run_smaller_paper(tmp_path)
+        folder = shipped_run(name, SHARED[name])
+        told = json.loads((folder / "told.json").read_text(encoding="utf-8"))
+        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        return [line.replace(str(folder), f"results/{name}") for line in told], summary
 
-    return of
+    return lines_and_summary
 
 
-def run(name, folder):
-    """Lines that a run prints at its end, and its summary."""
-    _, texts, keys = COARSE[name]
+def run_smaller_paper(folder):
     for file in (ROOT / "cases").iterdir():
         (folder / file.name).symlink_to(file)
-    case = written(folder, (ROOT / "cases" / f"{name}.toml").read_text(encoding="utf-8"), **texts)
-    words = [sys.executable, "-m", "alphacut", "run", case.name, "--out", f"results/{name}"]
-    words += ["--no-figures", *(f"--set={key}" for key in keys)]
+    case = written(folder, (ROOT / "cases/paper.toml").read_text(encoding="utf-8"), **SMALLER)
+    words = [sys.executable, "-m", "alphacut", "run", case.name, "--out", "results/paper"]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    done = subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True)
+    done = subprocess.run(
+        [*words, "--no-figures"], cwd=folder, env=environment, capture_output=True, text=True
+    )
     assert done.returncode == 0, done.stderr
-    summary = json.loads((folder / "results" / name / "summary.json").read_text(encoding="utf-8"))
-    every = (done.stdout + done.stderr).splitlines()
-    lines = [x for x in every if not x.startswith("alphacut: warning: ")]
-    return lines, summary
+    summary = json.loads((folder / "results/paper/summary.json").read_text(encoding="utf-8"))
+    return (done.stdout + done.stderr).splitlines(), summary
 
 
 @pytest.mark.parametrize(
-    "name",
+    ("name", "most_lines"),
     [
-        pytest.param(name, marks=[pytest.mark.slow] * (name in ("composite", "paper")))
-        for name in COARSE
+        pytest.param("paper", 20, marks=pytest.mark.slow),
+        ("building", 25),
+        pytest.param("composite", 25, marks=pytest.mark.slow),
+        ("laboratory-frame", 25),
     ],
 )
-def test_the_closing_output_fits_on_a_screen(runs, name):
-    lines, _ = runs(name)
-    assert len(lines) <= COARSE[name][0], "\n".join(lines)
+def test_the_closing_output_fits_on_a_screen(run, name, most_lines):
+    told, _ = run(name)
+    lines = [x for x in told if not x.startswith("alphacut: warning: ") and "% after" not in x]
+    assert len(lines) <= most_lines, "\n".join(lines)
     assert max(map(len, lines)) <= 80, "\n".join(lines)
     assert any("peak of" in line for line in lines)
     assert "next: " in lines[-1]
@@ -101,9 +89,9 @@ def motion(young, roof, height, mass_damping=0.5, stiffness_damping=2.5e-3):
     return np.stack([q[:, 7], q[:, 0], stiff[0] * q[:, 0]], axis=1)
 
 
-def test_the_building_moves_as_another_program_computes_it(runs):
+def test_the_building_moves_as_another_program_computes_it(run, rng):
     """The nominal peaks agree; random motions of the box stay inside, and corners come near."""
-    _, summary = runs("building")
+    _, summary = run("building")
     peaks = summary["envelopes"]["all"]["peak"]
     names = ("q8", "drift1", "base_shear")
     modulus = summary["modulus"]["E_GPa"]
@@ -118,7 +106,7 @@ def test_the_building_moves_as_another_program_computes_it(runs):
         (1e9 * modulus["lower"][0], 1e9 * modulus["upper"][0]),
         (28e3, 34e3), (3.92, 4.08),
     ]  # fmt: skip
-    rng, box = np.random.default_rng(), np.array(ends).T
+    box = np.array(ends).T
     inside = box[0] + rng.random((60, 3)) * (box[1] - box[0])
     corners = np.array(np.meshgrid(*ends)).reshape(3, -1).T
     tried = np.array([np.abs(motion(*x)).max(axis=0) for x in (*inside, *corners)])

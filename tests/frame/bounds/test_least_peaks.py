@@ -60,8 +60,8 @@ def test_a_limit_below_the_least_peak_must_be_exceeded(found):
     assert answer.necessity[0] == 1.0
 
 
-def test_halves_cover_all_places_and_share_the_middle():
-    motion = np.random.default_rng().normal(size=(2, 3, 13, 41))
+def test_halves_cover_all_places_and_share_the_middle(rng):
+    motion = rng.normal(size=(2, 3, 13, 41))
     for ends in ([[0, 40, 0, 12], [0, 40, 0, 12]], [[3, 5, 2, 2], [4, 5, 2, 3]]):
         cell = least_peaks.PeakCell(0.0, 0, np.array(ends), 1, np.zeros(2))
         lower, upper = least_peaks._halves(cell, motion)

@@ -337,9 +337,9 @@ def test_scatter_that_chance_explains_is_not_refused(count: int) -> None:
 
 
 @pytest.mark.parametrize("known", [None, 0.1])
-def test_ratios_of_noisy_amplitudes_are_not_biased(known):
+def test_ratios_of_noisy_amplitudes_are_not_biased(known, rng):
     """A tenth of noise makes the mean ratio a hundredth too large, more than 1000 rows scatter."""
-    rng, inside = np.random.default_rng(), 0
+    inside = 0
     for _ in range(50):
         rows = {1: 0.6 + 0.1 * rng.normal(size=1000), 2: 1 + 0.1 * rng.normal(size=1000)}
         mode = measured_mode(1, 2 + 0.01 * rng.normal(size=1000), rows, shape_deviation=known)

@@ -174,14 +174,14 @@ def probable(frame=FRAME, inputs=INPUTS, limits=None, **changes):
     return probabilities(frame, inputs, {"v2_0": speed}, limits, **settings)
 
 
-def test_probabilities_are_nested_and_agree_with_independent_draws():
+def test_probabilities_are_nested_and_agree_with_independent_draws(rng):
     answers = probable()
     one = answers["drift2"]
     assert (np.diff(one.upper) <= 0).all()
     assert (np.diff(one.lower) >= 0).all()
     assert one.lower[-1] == one.upper[-1]
     assert (answers[ANY].upper >= one.upper).all()
-    draws = np.random.default_rng().normal(0.4, 0.1, 4000)
+    draws = rng.normal(0.4, 0.1, 4000)
     points = np.column_stack([np.full(4000, 25e9), np.full(4000, 7e3), draws])
     size = np.abs(LinearFlow(FRAME, ("E", "m2", "v2_0"), 4, 0.05, Exact()).values(points)).max(1)
     share = (size[:, 1] > 0.16).mean()
@@ -201,9 +201,9 @@ def test_the_interval_is_that_of_clopper_and_pearson_at_the_level_of_bonferroni(
     assert (answers["q1"].interval[1] == 1).all()
 
 
-def test_the_interval_of_every_point_holds_at_once_as_often_as_it_says():
+def test_the_interval_of_every_point_holds_at_once_as_often_as_it_says(rng):
     """Counts of common draws at 40 points, 400 times."""
-    rng, missed = np.random.default_rng(), 0
+    missed = 0
     true = np.linspace(0.01, 0.6, 40)
     for _ in range(400):
         counts = (rng.random(100)[:, None] < true).sum(axis=0)

@@ -46,22 +46,20 @@ def exact(k1, m3, zeta1, zeta3, duration=3.0, step=0.05):
     return motion.outputs(step * np.arange(round(duration / step) + 1))[0]
 
 
-def test_motions_are_those_of_an_independent_calculation():
+def test_motions_are_those_of_an_independent_calculation(rng):
     flow = LinearFlow(FRAME, tuple(FUZZY), 3.0, 0.05, Exact())
-    points = np.random.default_rng().uniform(
-        *np.array([x.support for x in FUZZY.values()]).T, (4, 4)
-    )
+    points = rng.uniform(*np.array([x.support for x in FUZZY.values()]).T, (4, 4))
     for point, motion in zip(points, flow.values(points), strict=True):
         reference = exact(*point)
         assert motion == pytest.approx(reference, abs=1e-9 * np.abs(reference).max())
 
 
-def test_bounds_hold_motions_and_are_near():
+def test_bounds_hold_motions_and_are_near(rng):
     given = {"duration": 3.0, "step": 0.05, "alpha": (0,), "progress": False}
     found = envelope(FRAME, FUZZY, **given)
     assert found.method == "dual"
     low, high = np.array([x.support for x in FUZZY.values()]).T
-    unit = np.random.default_rng().random((40, 4))
+    unit = rng.random((40, 4))
     unit[::2] = unit[::2].round()
     values = np.stack([exact(*point) for point in low + unit * (high - low)])
     slack = 1e-9 * np.abs(values).max()

@@ -60,9 +60,9 @@ def test_the_estimate_is_the_error_of_the_steps(step):
     assert (np.diff(found.error, axis=1) >= 0).all()  # an error at one node is one at all later
 
 
-def test_steps_are_judged_where_bounds_are_reached_and_a_resonance_may_be():
+def test_steps_are_judged_where_bounds_are_reached_and_a_resonance_may_be(rng):
     """A storey that resonates with a sine between the corners of its support, at a coarse step."""
-    omega, h = np.random.default_rng().uniform(2.9, 3.3), 0.03
+    omega, h = rng.uniform(2.9, 3.3), 0.03
     sine = Accelerogram(h, 0.7 * np.sin(omega * h * np.arange(1001)))
     frame = StoreyFrame([1e4], stiffness=[1.5e5], damping_ratio=0.01, ground=sine)
     motion = {**MOTION, "duration": 1000 * h, "step": h, "integrator": "midpoint"}

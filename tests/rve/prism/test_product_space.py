@@ -51,9 +51,8 @@ def test_a_form_of_the_user_gives_the_matrix_and_the_solutions_of_the_model(cell
         assert x.array == pytest.approx(y.array, rel=1e-7, abs=1e-9)
 
 
-def test_functions_take_reduced_unknowns_and_means_are_over_area_and_law(cell, elastic):
+def test_functions_take_reduced_unknowns_and_means_are_over_area_and_law(cell, elastic, rng):
     load, solution = cell.assemble_matrix(elastic).createVecs()
-    rng = np.random.default_rng()
     solution.array[:] = rng.standard_normal(len(solution.array))
     u = fem.Function(cell.space)
     cell.assign(u, solution)
@@ -81,10 +80,10 @@ def test_an_operator_without_symmetry_is_refused_and_not_solved_wrongly(cell, el
         cell.solve(matrix, [matrix.createVecLeft()])
 
 
-def test_the_preconditioner_serves_a_solver_of_the_user(cell, elastic):
+def test_the_preconditioner_serves_a_solver_of_the_user(cell, elastic, rng):
     matrix = cell.assemble_matrix(elastic)
     load, solution = matrix.createVecs()
-    load.array[:] = np.random.default_rng().standard_normal(len(load.array))
+    load.array[:] = rng.standard_normal(len(load.array))
     ksp = PETSc.KSP().create(matrix.comm)
     ksp.setOperators(matrix)
     ksp.setType("minres")

@@ -94,8 +94,7 @@ def test_a_cell_on_its_turned_mesh_has_the_turned_stiffness(motion, turn, inclus
 
 
 @pytest.mark.slow
-def test_series_and_finest_slices_agree_to_1e_7():
-    rng = np.random.default_rng()
+def test_series_and_finest_slices_agree_to_1e_7(rng):
     for _ in range(20):
         radius, contrast = rng.uniform(0.1, 0.85), 10 ** rng.uniform(-2, 2)
         matrix = Phase(20e9, rng.uniform(0, 0.45))

@@ -44,10 +44,9 @@ def test_the_reduced_stiffness_is_symmetric_and_definite(problem):
     assert np.linalg.eigvalsh(matrix)[0] > 1e-6 * abs(matrix).max()
 
 
-def test_the_preconditioner_is_exact_where_nothing_changes_with_theta(problem):
+def test_the_preconditioner_is_exact_where_nothing_changes_with_theta(problem, rng):
     inverse = ThetaPreconditioner(problem.matrix, problem.numbering, CRISP.distribution)
     solution, load = problem.matrix.createVecs()
-    rng = np.random.default_rng()
     # bubbles have linear triangles only: exact on hats, and on linear triangles
     solution.array[:] = rng.standard_normal(len(solution.array))
     problem.matrix.mult(solution, load)
@@ -85,11 +84,11 @@ def test_masses_along_theta_are_those_of_polynomials():
     assert mass.hats == pytest.approx(exact.diagonal(), abs=2e-4)
 
 
-def test_linear_fields_reach_edge_midpoints_by_their_mean(problem):
+def test_linear_fields_reach_edge_midpoints_by_their_mean(problem, rng):
     plane = problem.form.grid.plane
     period = identify(plane)
     injection = preconditioner._injection(problem.numbering)
-    values = np.random.default_rng().standard_normal((period.vertices, 2))
+    values = rng.standard_normal((period.vertices, 2))
     nodes = (injection @ values.ravel()).reshape(-1, 2)
     values = np.concatenate([values, np.zeros((1, 2))])  # the corner last
     for ends, unknown in zip(plane.ends, period.unknown[plane.vertices :], strict=True):
