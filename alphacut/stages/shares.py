@@ -2,7 +2,7 @@
 
 The share of an input is the width that is lost when it alone is fixed at its modal value. Whatever
 the case uses, the cell is solved by `auto` (the series where it has a formula) with a reduced plan;
-peaks of a frame come from `Auto` to `ACCURACY`, on the lowest level, under a record at coarser steps.
+peaks of a frame come from `Auto` to `ACCURACY`, on the lowest level, of a record at coarser steps.
 """
 
 from __future__ import annotations
