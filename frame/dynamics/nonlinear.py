@@ -39,14 +39,9 @@ def make_flow(
     step: float,
     integrator: str | Integrator = "midpoint",
 ) -> Flow:
-    """Create the flow of a linear structure or a Lagrangian system.
+    """Create the flow of a linear structure or a Lagrangian system (of "midpoint" steps alone).
 
-    Args:
-        model: The structure.
-        names: Its uncertain parameters.
-        duration: In s.
-        step: Length of a step, in s.
-        integrator: Name or method; of Lagrangian systems "midpoint" alone.
+    `names` are the uncertain parameters; duration and step are in s.
 
     Raises:
         RefusedError: The structure has no such parameter or integrator.
@@ -229,7 +224,6 @@ def _midpoint_step(
     for i in range(n_parameters):
         arguments[m + i] = p[i]
     arguments[m + n_parameters] = h
-    is_solved = False
     for _ in range(MAX_ITERATIONS):
         _evaluate(newton, arguments, flat)
         for i in range(n):
@@ -244,9 +238,8 @@ def _midpoint_step(
                 return False
             change, size = max(change, abs(residual[i, 0])), max(size, abs(arguments[i]))
         if change <= 1e-12 * (1 + size):
-            is_solved = True
             break
-    if not is_solved:
+    else:
         return False
     a = m + d
     flat = np.empty(m + (m * a + m * a * a if d else 0))

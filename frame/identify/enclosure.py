@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import linprog
@@ -75,8 +76,7 @@ def enclosure(
     return lower, upper
 
 
-@dataclass(frozen=True, eq=False)
-class Relaxation:
+class Relaxation(NamedTuple):
     """The linear program over a box, with the expressions to bound.
 
     Args:
@@ -86,7 +86,7 @@ class Relaxation:
     """
 
     program: LinearProgram
-    parameters: tuple[Linear, ...]
+    parameters: list[Linear]
     shapes: Mapping[tuple[int, int], Linear]
 
     def ends(self, expression: Linear) -> tuple[float, float]:
@@ -124,7 +124,7 @@ def relaxation(
             shape = {f: chains.rows.variable(*amplitude_ends[f]) for f in sorted(amplitude_ends)}
             shapes |= {(cut.mode, f): shape[f] for f in shape if f not in cut.shape}
             chains.require_balance(shape, chains.rows.variable(low / high, 1.0), high)
-    return Relaxation(chains.rows.program(), tuple(chains.logs), shapes)
+    return Relaxation(chains.rows.program(), chains.logs, shapes)
 
 
 class _Chains:

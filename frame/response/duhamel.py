@@ -178,13 +178,9 @@ def responses_at_nodes(
 def responses_at_given_nodes(
     sigma: Array, history: History, time: Array, node: Rows, derivatives: int
 ) -> tuple[Array, Array]:
-    """Return ρ(σ; t) = ∫₀ᵗ exp(σ τ) f(t − τ) dτ at one node for each row of σ, with derivatives.
+    """Return ρ and derivatives as `responses_at_nodes` at one node, of index (S,), per row of σ.
 
-    As `responses_at_nodes`, with σ of shape (S, n) and the index of each row's node, shape (S,).
-
-    Returns:
-        ρ and its derivatives, shape (1 + derivatives, S, n), and bounds of the rounding of ρ,
-        shape (S, n).
+    σ has shape (S, n), ρ with its derivatives (1 + derivatives, S, n), its rounding (S, n).
     """
 
     def response_to_g(shifted: Array) -> tuple[Array, Array]:
@@ -202,10 +198,7 @@ def responses_at_given_nodes(
 def require_in_range(sigma: Array, step: float, duration: float) -> None:
     """Refuse exponents σ (1/s) whose responses are not computed to round-off.
 
-    Args:
-        sigma: Exponents.
-        step: Longest interval h over which they are integrated at once, in s.
-        duration: Time over which they may grow, in s.
+    They are integrated over intervals of length `step` and may grow over `duration`, in s.
 
     Raises:
         UnprovedError: An exponent is not finite, |σ h| passes `MAX_PHASE`, or exp(σ t) grows by

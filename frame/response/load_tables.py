@@ -1,4 +1,7 @@
-"""Response of modes to a load, as Taylor series in λ over windows of time."""
+"""Duhamel integral of modes over a box of eigenvalues: Taylor series in λ over windows of time.
+
+R(t; λ) = ∫ exp(λ (t − s)) a(s) ds is ρ of `duhamel`, at one node and λ a point.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +33,8 @@ class LoadTable:
 
     Time is cut into windows so short that phases change little over the box within one. The part of
     R that arises in the window of t_j is Σ_i moment[j, i] x^i with x = (λ − middle) / scale; what
-    earlier windows leave behind goes on as exp(λ (t_j − their end)). Far nodes have more between.
+    earlier windows leave behind goes on as exp(λ (t_j − their end)). Nodes are added between nodes
+    that are too far apart.
 
     Args:
         history: a, the load.
@@ -63,10 +67,11 @@ class LoadTable:
         self.ends, self.truncation = np.arange(length, steps, length), 2 * left_out(phase, order)
 
     def response(self, rate: Array, node: Array) -> Array:
-        """R, dR/dλ and d²R/dλ² at one node per point, shape (3, N), for eigenvalues (N,)."""
-        where = (self.middle, self.scale, self.moment, self.ends, self.time)
-        waves: Array = window_series(np.ascontiguousarray(rate), self.every * node, *where)
-        return waves
+        """Return R, dR/dλ and d²R/dλ² at one node per point, (3, N), for eigenvalues (N,)."""
+        table = (self.middle, self.scale, self.moment, self.ends, self.time)
+        out: Array = np.empty((3, len(rate)), complex)
+        _responses(np.ascontiguousarray(rate), self.every * node, *table, out)
+        return out
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,9 +121,7 @@ class LoadTables:
     def response(self, rate: Array, node: Array) -> tuple[Array, Array, Array]:
         """R, dR/dλ and d²R/dλ² at one node per point, each shape (N, n), for eigenvalues (N, n)."""
         pairs = zip(self.tables, rate.T, strict=True)
-        R, slope, curve = np.stack(
-            [table.response(frequency, node) for table, frequency in pairs], -1
-        )
+        R, slope, curve = np.stack([table.response(x, node) for table, x in pairs], -1)
         return R, slope, curve
 
 
@@ -129,7 +132,7 @@ class Direct(LoadTables):
 
     @property
     def truncation(self) -> Array:
-        """Nothing is left out, shape (n,)."""
+        """Zero, shape (n,)."""
         return 0.0 * self.factor
 
     @property
@@ -165,7 +168,7 @@ def _moments(
 
 
 @compiled
-def window_series(
+def _responses(
     rate: Complex,
     node: Rows,
     middle: complex,
@@ -173,23 +176,11 @@ def window_series(
     moment: Complex,
     ends: Rows,
     time: Array,
-) -> Complex:
-    """R(t; λ) = ∫ exp(λ (t − s)) a(s) ds of a mode, dR/dλ and d²R/dλ² at N points, shape (3, N).
-
-    A point is a λ and a node t. The part of R that arises in the window of t is a Taylor series;
-    R at the end of earlier windows goes on as exp(λ τ). It is carried from window to window, and
-    from a point to the next one of the same λ at a later node.
-
-    Args:
-        rate: λ, shape (N,), complex.
-        node: Node of each point, shape (N,).
-        middle: λ about which the series are.
-        scale: Unit of the series' variable, in 1/s.
-        moment: Coefficients at the nodes, shape (T, order), complex.
-        ends: Last node of each window but the last, rising.
-        time: Nodes, shape (T,), in s.
-    """
-    out = np.zeros((3, len(rate)), np.complex128)
+    out: Complex,
+) -> None:
+    """Write R, dR/dλ and d²R/dλ² at N points, a λ and a node each, to `out` (3, N)."""
+    # `ends` are the last nodes of all windows but the last. R at the end of earlier windows is
+    # carried from window to window, and from a point to the next one of the same λ at a later node.
     R, slope, curve, start, window = 0j, 0j, 0j, 0, 0
     for p in range(len(rate)):
         if p == 0 or rate[p] != rate[p - 1] or node[p] < node[p - 1]:
@@ -204,12 +195,11 @@ def window_series(
                 h = h * x + g
                 g = g * x + f
                 f = f * x + moment[end, i]
-            wave = np.exp(rate[p] * tau)
-            f += wave * R
-            g = g / scale + wave * (slope + tau * R)
-            h = 2 * h / scale**2 + wave * (curve + 2 * tau * slope + tau * tau * R)
+            propagator = np.exp(rate[p] * tau)
+            f += propagator * R
+            g = g / scale + propagator * (slope + tau * R)
+            h = 2 * h / scale**2 + propagator * (curve + 2 * tau * slope + tau * tau * R)
             if is_last:
                 out[0, p], out[1, p], out[2, p] = f, g, h
                 break
             R, slope, curve, start, window = f, g, h, end, window + 1
-    return out
