@@ -11,13 +11,16 @@ from alphacut.frame.bounds.branch_and_bound import enclosed
 from alphacut.frame.bounds.newton import Optima, first_optima
 from alphacut.frame.bounds.remainder import Remainder, largest_growth, parts, suprema
 from alphacut.frame.calculus.jet import Array
-from alphacut.frame.calculus.polynomial import Polynomial
+from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.modal_model import ModalModel
 from alphacut.frame.response.load_tables import Direct
+from alphacut.frame.response.straying import line_deviations
 from alphacut.fuzzy.progress_bar import Progress, subprogress
 
 LOG = logging.getLogger(__name__)
 
+POINTS = (24, 3)
+"""Points along ω and g/ω of each mode at which its straying from lines between nodes is read."""
 NEWTON_GAP = 0.02
 """Share of the gap that Newton's method may leave."""
 
@@ -118,34 +121,28 @@ def certify(
 
 
 def _between(model: ModalModel) -> Array:
-    """Bound of the interpolation error of the model's outputs in the step to each node, (T, m)."""
-    # h²/8 times |q̈|, h/4 times a kink where a load jumps; of outputs that a load feeds, its own
-    reach, h = np.ones(len(model.boxes.names)), model.flow.step
-    rate, growth = suprema(model.eigenvalue, reach)[0], largest_growth(model.eigenvalue, reach)
-    curve = np.zeros((len(model.time), len(model.outputs)))
-    kink = np.zeros_like(curve)
-    feedthrough = np.zeros_like(curve)
+    """Bound of how far outputs stray from straight lines in the step to each node, (T, m)."""
+    reach, centre = np.ones(len(model.boxes.names)), model.eigenvalue.coefficients[0]
+    slopes = model.eigenvalue.coefficients[1:]
+    growth = largest_growth(model.eigenvalue, reach)
+    decay = -growth, np.abs(slopes.real).sum(0) - centre.real  # least and greatest of each mode
+    spread = np.abs(slopes.imag).sum(0)
+    omega = np.abs(centre.imag) - spread, np.abs(centre.imag) + spread
+    if (omega[0] <= 0).any():
+        raise UnprovedError("a mode may not oscillate", "take less damping")
+    deviation = np.zeros((len(model.time), len(model.outputs)))
     for part in parts(model, growth):
         size = suprema(part.share, reach)[0].reshape(model.count, -1)
+        load = None if part.load is None else part.load.history
         if isinstance(part.load, Direct):
-            feedthrough += 2 * part.load.history.line_deviation(model.time)[:, None] * size.sum(0)
+            deviation += 2 * part.load.history.line_deviation(model.time)[:, None] * size.sum(0)
             continue
-        wave = part.waves[0].copy()
-        if part.load is not None:  # R'' = λ² R + λ a + a', and a' acts on Σ C_k alone
-            # within a step a wave is at most exp(|g| h) times what it is at the end
-            wave *= np.exp(np.maximum(-growth, 0.0) * h)
-            largest_load, slope = part.load.history.extremes
-            jump = max((x for _, x in part.load.history.jumps), default=0.0)
-            coefficient_sum = Polynomial(
-                part.share.index,
-                2 * part.share.coefficients.reshape(-1, model.count, curve.shape[1]).sum(1).real,
-            )
-            curve += 2 * largest_load * rate @ size + slope * suprema(coefficient_sum, reach)[0]
-            kink += jump * suprema(coefficient_sum, reach)[0]
-        wave[1:] = np.maximum(wave[1:], wave[:-1])
-        curve += 2 * (wave * rate**2) @ size
-    deviation: Array = h**2 / 8 * curve + h / 4 * kink + feedthrough
-    deviation[0] = 0.0
+        for k in range(model.count):
+            q = min(decay[0][k] / w[k] for w in omega), max(decay[1][k] / w[k] for w in omega)
+            points = [np.linspace(omega[0][k], omega[1][k], POINTS[0]), np.linspace(*q, POINTS[1])]
+            sigma = (-points[1][:, None] + 1j) * points[0]
+            bent = line_deviations(sigma, load, model.time, 0)[0]
+            deviation += 2 * np.outer(bent, size[k])
     return deviation
 
 

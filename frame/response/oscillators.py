@@ -34,6 +34,7 @@ from alphacut.frame.response.duhamel import (
     require_in_range,
     responses_at_nodes,
 )
+from alphacut.frame.response.straying import line_deviations, with_power
 from alphacut.frame.structures.loads import History
 from alphacut.fuzzy.arrays import Array
 
@@ -119,7 +120,7 @@ class Oscillators:
         grid, is_start = self.grid, source == "start"
         sigma = grid.sigma.ravel()
         rho, rounding, bounds = self.forced.get(source, self.free)
-        G = _with_power(sigma, rho, order)
+        G = with_power(sigma, rho, order)
         omega, quotient = np.abs(sigma.imag), -sigma.real / sigma.imag
         # of the power and of what is read off
         rounding = np.abs(sigma) ** order * rounding
@@ -133,7 +134,7 @@ class Oscillators:
             rounding = rounding / omega + 8 * UNIT_ROUNDOFF * np.abs(direct)
         shape = (len(self.time), len(grid.quotient), len(grid.omega))
         error, largest = self._error(np.abs(G).max(-1), bounds, order, start=is_start)
-        error, deviation = error + rounding.max(-1), self._line_deviation(largest[0], source, order)
+        error, deviation = error + rounding.max(-1), self._line_deviation(source, order)
         table = value.reshape(shape)
         return ModalResponses(grid.omega, grid.quotient, table, error, deviation, largest)
 
@@ -163,28 +164,13 @@ class Oscillators:
             across = high * second
         return np.asarray((h**2 * along + k**2 * across) / 8), np.stack([zero, first])
 
-    def _line_deviation(self, size: Array, source: str, order: int) -> Array:
+    def _line_deviation(self, source: str, order: int) -> Array:
         """Bounds of how far responses stray from a line in the step to each node, (T,)."""
-        # A chord errs by at most h²/8 sup |ë|. Under a load a(t), ρ̇ = σ ρ + a and
-        # ρ̈ = σ² ρ + σ a + ȧ; where a jumps, ρ̇ does, which adds h/4 of the jump.
-        h = np.diff(self.time, prepend=self.time[0])
-        low, fastest = self.grid.omega[0], float(np.abs(self.grid.sigma).max())
-        before = np.append(size[:1], size[:-1])  # |σ^order ρ| at the step's beginning
-        if source == "start":
-            return np.asarray(h**2 / 8 * fastest**2 * before * (1 + self.grid.quotient[-1]))
-        if source not in self.loads:
-            return np.asarray(h**2 / 8 * fastest**2 * before / low)
-        load, power = self.loads[source], fastest**order
-        largest, slope = load.extremes
-        bend = fastest**2 * (before + h * power * largest) + power * (fastest * largest + slope)
-        kink = np.zeros(len(self.time))
-        for at, jump in load.jumps if order else ():
-            is_kinked = (self.time - h <= at * (1 + 1e-9)) & (self.time >= at * (1 - 1e-9))
-            kink += np.where(is_kinked, h / 4 * power * jump, 0.0)
-        deviation = (h**2 / 8 * bend + kink) / low
-        if _has_feedthrough(source, order):
-            deviation += load.line_deviation(self.time)
-        return np.asarray(deviation)
+        is_direct = _has_feedthrough(source, order)
+        modulus, read = line_deviations(
+            self.grid.sigma, self.loads.get(source), self.time, order, is_direct=is_direct
+        )
+        return modulus * (1 + self.grid.quotient[-1]) if source == "start" else read
 
 
 def feedthrough(source: str, loads: Mapping[str, History], order: int, time: Array) -> Array:
@@ -196,13 +182,6 @@ def feedthrough(source: str, loads: Mapping[str, History], order: int, time: Arr
 
 def _has_feedthrough(source: str, order: int) -> bool:
     return order == 2 and source.startswith("force")
-
-
-def _with_power(sigma: Array, rho: Array, order: int) -> Array:
-    """G = σ^order ρ and its first two derivatives by σ, shape (3, T, S), from those of ρ."""
-    power, first = sigma**order, order * sigma ** max(order - 1, 0)
-    second = order * (order - 1) * rho[0] + 2 * first * rho[1] + power * rho[2]
-    return np.stack([power * rho[0], first * rho[0] + power * rho[1], second])
 
 
 @dataclass(frozen=True, eq=False)

@@ -263,8 +263,9 @@ def test_a_chain_from_matrices_moves_as_the_frame_does():
     other = envelope(same, {"F": Interval(4.7e3, 5.3e3)}, **settings)
     peak = np.abs(one.upper).max()
     np.testing.assert_allclose(one.inner.upper, other.inner.upper, atol=1e-9 * peak)
-    # where a proof stops within its gap depends on rounding
-    np.testing.assert_allclose(one.upper, other.upper, atol=DualProof().gap * peak)
+    # where a proof stops within its gap, which is wider below a peak, depends on rounding
+    allowed = DualProof().gap * peak + DualProof().below * (one.upper.max(1)[:, None] - one.upper)
+    assert (np.abs(one.upper - other.upper) <= allowed).all()
 
 
 def test_stored_motions_come_back():

@@ -1,0 +1,50 @@
+"""Straying of motions between nodes is bounded, by three times the true one at coarse steps."""
+
+import numpy as np
+import pytest
+
+from alphacut.frame import Accelerogram, DualProof, Force, Proof, StoreyFrame, envelope
+from alphacut.frame.dynamics.flow import LinearFlow
+from alphacut.frame.dynamics.integrators import Exact
+from alphacut.frame.structures.loads import History
+from alphacut.fuzzy import Triangular
+
+FLOORS, PARTS = 4, 20
+NOISE = np.random.default_rng(800900).normal(size=300)
+LOADS = {
+    "ground": {"ground": Accelerogram(0.01, np.convolve(NOISE, np.ones(4) / 2, "same"))},
+    "start": {"v0": (0.0, 0.0, 0.0, 0.5)},
+    "sine": {"loads": [Force(4, 1e3, History.harmonic(3.0, 0.3))]},
+    "wind": {"loads": [Force(4, 1e3, History(0.35, NOISE[:9], 0.1))]},
+}
+CENTRE = {"k1": 4e7, "m4": 2e4}
+STIFFNESS = 2e3 * (2 * np.eye(FLOORS) - np.eye(FLOORS, k=1) - np.eye(FLOORS, k=-1))
+STIFFNESS[-1, -1] = 2e3
+SHORTEST_PERIOD = 2 * np.pi / np.sqrt(np.linalg.eigvalsh(STIFFNESS)[-1])
+
+
+@pytest.mark.parametrize("periods", [0.3, 1.0, 2.0])
+@pytest.mark.parametrize("load", LOADS)
+@pytest.mark.parametrize("proof", [DualProof(slabs=2, steps=4, peaks=1.0), Proof(tolerance=5e-2)])
+def test_between_is_at_most_three_times_the_true_straying(proof, load, periods):
+    frame = StoreyFrame(
+        [2e4] * FLOORS,
+        stiffness=[4e7] * FLOORS,
+        damping_ratio=0.03,
+        outputs=("q4", "a4"),
+        **LOADS[load],
+    )
+    step = periods * SHORTEST_PERIOD
+    steps = int(1.5 / step)
+    unit = np.random.default_rng(1).random((24, 2))
+    unit[::2] = unit[::2].round()
+    flow = LinearFlow(frame, tuple(CENTRE), steps * step, step / PARTS, Exact())
+    values = flow.values(np.array([*CENTRE.values()]) * (0.97 + 0.06 * unit))
+    nodes, x = values[:, ::PARTS, None], np.arange(PARTS)[:, None] / PARTS
+    chord = (1 - x) * nodes[:, :-1] + x * nodes[:, 1:]
+    off = np.abs(values[:, :-1].reshape(chord.shape) - chord).max((0, 2))
+    inputs = {name: Triangular(0.97 * value, value, 1.03 * value) for name, value in CENTRE.items()}
+    given = {"duration": steps * step, "step": step, "alpha": (0,), "progress": False}
+    between = envelope(frame, inputs, proof, **given).between
+    assert (off <= between[1:] * (1 + 1e-9)).all()
+    assert (between.max(0) <= (3.0 if periods >= 1 else 5.0) * off.max(0)).all()
