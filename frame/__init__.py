@@ -2,7 +2,7 @@
 
 Example:
     >>> sorted(INTEGRATORS), len(METHODS)  # by the words of a case file
-    (['exact', 'midpoint', 'rk4'], 7)
+    (['exact', 'midpoint', 'rk4'], 6)
 """
 
 from alphacut.frame.dynamics.flow import LinearFlow
@@ -15,7 +15,6 @@ from alphacut.frame.methods.graph_follower import GraphFollower
 from alphacut.frame.methods.improved_follower import ImprovedFollower
 from alphacut.frame.methods.proof import Proof
 from alphacut.frame.methods.sampled import Sampled
-from alphacut.frame.methods.search import Search
 from alphacut.frame.propagation import METHODS, envelope, require_envelope
 from alphacut.frame.structures.lagrangian import LagrangianSystem, pendulum
 from alphacut.frame.structures.loads import Accelerogram, Force, History
@@ -27,5 +26,5 @@ __all__ = [
     "INTEGRATORS", "METHODS", "Accelerogram", "Auto", "DualProof", "Envelope", "Exact", "Force",
     "GraphFollower", "History", "ImprovedFollower", "LagrangianFlow", "LagrangianSystem",
     "LinearFlow", "MatrixStructure", "Midpoint", "Output", "Parameter", "Proof", "RungeKutta4",
-    "Sampled", "Search", "StoreyFrame", "envelope", "pendulum", "require_envelope",
+    "Sampled", "StoreyFrame", "envelope", "pendulum", "require_envelope",
 ]  # fmt: skip

@@ -12,7 +12,7 @@ import numpy as np
 from alphacut.frame.calculus.jet import Array, Jet
 from alphacut.frame.dynamics.flow import Flow
 from alphacut.frame.envelope import Envelope
-from alphacut.frame.structures.quantities import Output, units_of
+from alphacut.frame.structures.quantities import units_of
 from alphacut.fuzzy import FuzzyNumber, Interval
 from alphacut.fuzzy.arrays import Mask, Rows
 from alphacut.fuzzy.knowledge.joint import joined_inputs
@@ -29,8 +29,6 @@ DEFAULT_TOLERANCE = 1e-3
 AT_REST = 1e-9
 """Peak of an output, as a share of what the energy of the motion allows it, up to which rounding
 alone moves it; rounding is some ε (ω_max/ω₁)² of the latter."""
-
-
 CORNERS = 16
 """Corners of the widest box that are looked at, at most."""
 
@@ -61,9 +59,8 @@ class Boxes:
     numbers: Mapping[str, FuzzyNumber] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        require(
-            bool(self.names), "inputs", value=None, allowed="fuzzy numbers by name, one at least"
-        )
+        allowed = "fuzzy numbers by name, one at least"
+        require(bool(self.names), "inputs", value=None, allowed=allowed)
         checked_levels(self.alpha)
 
     @property
@@ -73,12 +70,9 @@ class Boxes:
         return self.numbers or {name: Interval(low, high) for name, low, high in ends}
 
     def bisected(self, axis: int) -> list[tuple[Boxes, Rows]]:
-        """Return two halves along an input, each with the rows of the levels that intersect it.
-
-        The box is cut at the geometric mean of the ends where they are positive and far apart,
-        since frequencies are powers of stiffnesses and masses; else in the middle.
-        """
+        """Return two halves along an input, each with the rows of the levels that intersect it."""
         low, high = self.lower[0, axis], self.upper[0, axis]
+        # the geometric mean, since frequencies are powers of stiffnesses and masses
         middle = np.sqrt(low * high) if low > 0 and high > FAR_APART * low else (low + high) / 2
         halves = []
         for ends in ((-np.inf, middle), (middle, np.inf)):
@@ -166,9 +160,8 @@ def boxes(inputs: Mapping[str, FuzzyNumber | float], alpha: Sequence[float] = AL
     """
     require_numbers("alpha", alpha)
     levels, numbers = np.asarray(alpha, float), joined_inputs(inputs)
-    cuts = np.array(
-        [[number.cut(a) for number in numbers.values()] for a in levels], float
-    ).reshape(len(levels), len(numbers), 2)
+    cuts = np.array([[number.cut(a) for number in numbers.values()] for a in levels], float)
+    cuts = cuts.reshape(len(levels), len(numbers), 2)
     modal = np.array([number.modal for number in numbers.values()])
     return Boxes(tuple(numbers), levels, cuts[..., 0], cuts[..., 1], modal, numbers)
 
@@ -218,14 +211,7 @@ class UnitFlow:
     @property
     def reference(self) -> int:
         """Index of the output that a tolerance is meant for: the first displacement, else 0."""
-        return next(
-            (index for index, name in enumerate(self.outputs) if Output(name).unit == "m"), 0
-        )
-
-    def in_words(self, value: float) -> str:
-        """An error or gap in words, with the unit of a tolerance."""
-        unit = "of each peak" if self.relative else Output(self.outputs[self.reference]).unit
-        return f"{value:.3g} {unit}"
+        return self.units.index("m") if "m" in self.units else 0
 
     @cached_property
     def _peak_and_rest(self) -> tuple[Array, Mask]:
@@ -256,7 +242,7 @@ class UnitFlow:
         """
         if self.relative:
             return self.peak
-        if len({Output(name).unit for name in self.outputs}) == 1:
+        if len(set(self.units)) == 1:
             return np.ones(len(self.outputs))
         return np.asarray(self.peak / self.peak[self.reference])
 
@@ -281,18 +267,9 @@ class UnitFlow:
         facts: Mapping[str, float] | None = None,
         notes: tuple[str, ...] = (),
     ) -> Envelope:
-        """Return the envelope of given bounds of (−output, output), with all facts of its method.
+        """Return the envelope of upper bounds of (−output, output), shape (A, T, m, 2).
 
-        Args:
-            bounds: Upper bounds of (−output, output), shape (A, T, m, 2).
-            at: Unit coordinates that reach them, shape (A, T, m, 2, d).
-            error: Error of both bounds, shape (A, T, m); 0 if None.
-            method: Name of the method.
-            nature: Attained, estimated or guaranteed.
-            evaluations: Number of motions computed.
-            seconds: Wall time, in s.
-            facts: Further numbers by name.
-            notes: Remarks, one sentence each.
+        Unit coordinates `at` (A, T, m, 2, d) reach them; their `error` (A, T, m) is 0 if None.
         """
         inputs_at = self.boxes.to_physical(at)
         return Envelope(

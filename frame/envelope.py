@@ -34,9 +34,8 @@ class Envelope(Bounds):
             output where none is one, and a share of each peak where the tolerance was relative.
             `step_error`: what time stepping adds; `gain`: predicted gain worth a graph;
             `model_error`, `degree`: of the polynomials of the modes; `gap`, `boxes`, `parts`: of a
-            proof; `search_error`: what a search may have missed; `estimated_error`: the largest
-            error; `between_nodes`: the largest value of `between`;
-            `motions_tested`: exact motions that were compared with proved bounds.
+            proof; `estimated_error`: the largest error; `between_nodes`: the largest value of
+            `between`; `motions_tested`: exact motions that were compared with proved bounds.
         tested_structures: Their structures as arrays with axes, for `alphacut verify`.
 
     Example:
@@ -58,15 +57,13 @@ class Envelope(Bounds):
     @property
     def peak_words(self) -> str:
         """Text with the proved and the reached peak of each output in the widest cut."""
-        words = []
         units = self.units or ("",) * len(self.outputs)
-        proved_peaks, reached_peaks = (
+        peaks = [
             np.maximum(pair.upper, -pair.lower)[0].max(0) for pair in (self.proved, self.attained)
-        )
-        for name, unit, *peaks in zip(
-            self.outputs, units, proved_peaks, reached_peaks, strict=True
-        ):
-            proved, reached = (f"{float(peak):.4g} {unit}".rstrip() for peak in peaks)
+        ]
+        words = []
+        for name, unit, *values in zip(self.outputs, units, *peaks, strict=True):
+            proved, reached = (f"{float(peak):.4g} {unit}".rstrip() for peak in values)
             words.append(f"{name}: proved {proved}, reached {reached}")
         return "; ".join(words)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, ClassVar, Protocol
 
@@ -22,7 +22,6 @@ from alphacut.frame.methods.graph_follower import GraphFollower
 from alphacut.frame.methods.improved_follower import ImprovedFollower
 from alphacut.frame.methods.proof import Proof
 from alphacut.frame.methods.sampled import Sampled
-from alphacut.frame.methods.search import Search
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem, evaluate
 from alphacut.frame.structures.modes import ModalError, require_modal_order
@@ -56,9 +55,11 @@ class Method(Protocol):
 
 
 METHODS: dict[str, type[Any]] = {
-    x.name: x for x in (Auto, Proof, DualProof, Search, GraphFollower, ImprovedFollower, Sampled)
+    x.name: x for x in (Auto, Proof, DualProof, GraphFollower, ImprovedFollower, Sampled)
 }
 """The methods by the words that a case file has for them."""
+REMOVED_METHODS = {"search": "take auto, or improved-graph-follower with the integrator exact"}
+"""Cures by the words of methods that were removed."""
 
 
 @on_one_blas_thread
@@ -87,9 +88,9 @@ def envelope(
         duration: Length of the simulation, in s.
         step: Distance of the nodes and step of the integrator, in s.
         alpha: Levels, rising within [0, 1].
-        integrator: Time stepping of linear structures, an integrator or its name: exact (of auto,
-            proof and search unless given), midpoint (of all others), rk4. Of general Lagrangian
-            systems it is midpoint.
+        integrator: Time stepping of linear structures, an integrator or its name: exact (of auto
+            and proofs unless given), midpoint (of all others), rk4. Of general Lagrangian systems
+            it is midpoint.
         relative: Whether the method's tolerance is a fraction of each output's peak at the modal
             parameters and some corners, instead of a number in SI units.
         store: Folder in which a proof keeps the bounds of parts of the boxes, and from which it
@@ -117,13 +118,15 @@ def envelope(
         >>> str(bounds.nature)
         'guaranteed'
     """
-    problem = _problem(model, inputs, method, duration, step, alpha, integrator, options)
+    chosen, flow, levels, rows = _problem(
+        model, inputs, method, duration, step, alpha, integrator, options
+    )
     folder = None if store is None else Path(store)
-    flow = replace(problem.flow, relative=relative, store=folder, interruptible=interruptible)
+    flow = replace(flow, relative=relative, store=folder, interruptible=interruptible)
     steps = step_error(flow)
-    proof = _proof_beside(problem.method, flow)
+    proof = _proof_beside(chosen, flow)
     with progress_reporter(progress) as tick:
-        bounds = problem.method.run(flow, subprogress(tick, 0.0, 0.5) if proof else tick)
+        bounds = chosen.run(flow, subprogress(tick, 0.0, 0.5) if proof else tick)
         bounds = with_step_error(bounds, flow, steps)
         if proof:
             bounds = _with_proof(bounds, flow, proof, subprogress(tick, 0.5, 1.0))
@@ -132,24 +135,7 @@ def envelope(
             bounds = with_motions_tested(bounds, model)
         if tick:
             tick(1.0)
-    return _on_levels(bounds, problem.alpha, problem.rows)
-
-
-@dataclass(frozen=True, eq=False)
-class _Problem:
-    """An envelope that can be computed.
-
-    Args:
-        method: The method.
-        flow: The motion, with the boxes of different levels.
-        alpha: Levels that are asked for, shape (A,).
-        rows: Box of each of them, shape (A,).
-    """
-
-    method: Method
-    flow: UnitFlow
-    alpha: Array
-    rows: Rows
+    return _on_levels(bounds, levels, rows)
 
 
 def _problem(
@@ -161,25 +147,44 @@ def _problem(
     alpha: Sequence[float],
     integrator: str | Integrator | None,
     options: Mapping[str, object],
-) -> _Problem:
-    """Return the method, the trajectories over distinct cuts, and the row of each level's cut.
-
-    Raises:
-        RefusedError: As `envelope`.
-    """
+) -> tuple[Method, UnitFlow, Array, Rows]:
+    """Return the method, the motion over distinct cuts, the levels, and the cut of each level."""
     is_system = isinstance(model, LagrangianSystem) or hasattr(model, "assembly")
     allowed = "a StoreyFrame, a MatrixStructure or a LagrangianSystem"
     require(is_system, "model", value=type(model).__name__, allowed=allowed)
-    chosen_method = _method(model, method, options)
+    chosen = _method(model, method, options)
     if integrator is None:
-        uses_modes = isinstance(chosen_method, Auto | Proof | DualProof | Search)
-        is_linear = not isinstance(model, LagrangianSystem)
-        integrator = "exact" if uses_modes and is_linear else "midpoint"
+        is_exact = isinstance(chosen, Auto | Proof | DualProof)
+        integrator = "exact" if is_exact and not isinstance(model, LagrangianSystem) else "midpoint"
     cuts = boxes(inputs, alpha)
     flow = make_flow(model, cuts.names, duration, step, integrator)
     require_admissible(model, cuts)
     distinct_cuts, rows = cuts.distinct()
-    return _Problem(chosen_method, UnitFlow(flow, distinct_cuts), cuts.alpha, rows)
+    return chosen, UnitFlow(flow, distinct_cuts), cuts.alpha, rows
+
+
+def _method(
+    model: LinearSystem | LagrangianSystem,
+    method: Method | str | None,
+    options: Mapping[str, object],
+) -> Method:
+    """Return a method, given itself or by name and options; by default one that fits the model."""
+    if method is None:
+        method = "improved-graph-follower" if isinstance(model, LagrangianSystem) else "auto"
+    if not isinstance(method, str):
+        is_method = hasattr(method, "run") and not isinstance(method, type)
+        allowed = f"{', '.join(METHODS)}, or an object as Proof()"
+        require(is_method, "method", value=repr(method), allowed=allowed)
+        allowed = "none beside a method that is no name"
+        require(not options, "options", value=[*options], allowed=allowed)
+        return method
+    cure = REMOVED_METHODS.get(method, "")
+    require(method in METHODS, "method", value=method, allowed=", ".join(METHODS), cure=cure)
+    names = [field.name for field in fields(METHODS[method])]
+    for option in options:
+        require_choice(f"option of {method}", option, names)
+    chosen: Method = METHODS[method](**options)
+    return chosen
 
 
 def require_envelope(
@@ -205,16 +210,16 @@ def require_envelope(
         >>> frame = StoreyFrame(masses=[1e3], stiffness=[4e4], q0=[0.1])
         >>> require_envelope(frame, {"m1": Triangular(900, 1000, 1100)}, duration=0.5, step=0.1)
     """
-    problem = _problem(model, inputs, method, duration, step, alpha, integrator, options)
-    short_flow = replace(problem.flow.flow, duration=min(FIRST_STEPS * step, duration))
-    short_flow.values(problem.flow.boxes.probes)
-    if isinstance(problem.method, Proof | DualProof):
+    chosen, flow, _, _ = _problem(model, inputs, method, duration, step, alpha, integrator, options)
+    short_flow = replace(flow.flow, duration=min(FIRST_STEPS * step, duration))
+    short_flow.values(flow.boxes.probes)
+    if isinstance(chosen, Proof | DualProof):
         with refusing():
-            problem.method.forecast(exact_flow(problem.flow.flow), problem.flow.boxes)
+            chosen.forecast(exact_flow(flow.flow), flow.boxes)
 
 
 def _proof_beside(method: Method, over: UnitFlow) -> Proof | None:
-    """Return a proof for the motion that a follower has followed; None if it costs too much."""
+    """Return a proof of the motion that a follower has followed; None if it costs too much."""
     if not isinstance(method, GraphFollower | ImprovedFollower):
         return None
     if not isinstance(over.flow, LinearFlow) or len(over.boxes.names) > MAX_INPUTS:
@@ -223,16 +228,10 @@ def _proof_beside(method: Method, over: UnitFlow) -> Proof | None:
 
 
 def _with_proof(followed: Envelope, over: UnitFlow, proof: Proof, tick: Progress) -> Envelope:
-    """Return a follower's envelope with proved outer bounds and an error derived from them.
+    """Return a follower's envelope with the proved outer bounds of the exact motion, if there are.
 
-    The error is the largest distance from the proved bounds and from those that the proof attains,
-    between which the true ones lie. The envelope is unchanged if the proof fails.
-
-    Args:
-        followed: Envelope of the follower.
-        over: The motion, by any integrator.
-        proof: Proof of the exact motion.
-        tick: Called with the completed fraction of the proof.
+    Its error is the largest distance from these and from what the proof reaches, between which the
+    true bounds lie.
     """
     assert isinstance(over.flow, LinearFlow)
     exact = replace(over, flow=replace(over.flow, integrator=Exact()))
@@ -248,53 +247,26 @@ def _with_proof(followed: Envelope, over: UnitFlow, proof: Proof, tick: Progress
     return replace(followed, outer=proved.proved, between=proved.between, error=error, facts=facts)
 
 
-def _method(
-    model: LinearSystem | LagrangianSystem,
-    method: Method | str | None,
-    options: Mapping[str, object],
-) -> Method:
-    """Return a method, given itself or by name and options; by default one that fits the model."""
-    if method is None:
-        method = "improved-graph-follower" if isinstance(model, LagrangianSystem) else "auto"
-    if not isinstance(method, str):
-        is_method = hasattr(method, "run") and not isinstance(method, type)
-        allowed = f"{', '.join(METHODS)}, or an object as Proof()"
-        require(is_method, "method", value=repr(method), allowed=allowed)
-        allowed = "none beside a method that is no name"
-        require(not options, "options", value=[*options], allowed=allowed)
-        return method
-    require_choice("method", method, METHODS)
-    for option in options:
-        require_choice(
-            f"option of {method}", option, [field.name for field in fields(METHODS[method])]
-        )
-    chosen_method: Method = METHODS[method](**options)
-    return chosen_method
-
-
 def require_admissible(system: LinearSystem | LagrangianSystem, cuts: Boxes) -> None:
     """Refuse supports with values that are not allowed for their parameters.
 
     Raises:
         RefusedError: A support is not finite, leaves the range of its parameter, or is of
             another size than the structure's own value, as kN from N; or the weight may buckle a
-            storey, the mass matrix of a linear structure is not positive definite at the modal
-            parameters or a corner, or the structure stays at rest.
+            storey, the mass matrix of a linear structure is not positive definite at the nominal
+            parameters or a corner, modes of unequal damping ratio may change places, or the
+            structure stays at rest.
     """
     for name, low, high in zip(cuts.names, cuts.lower[0], cuts.upper[0], strict=True):
         parameter, key, shown = system.parameter(name), f"support of {name}", f"[{low:g}, {high:g}]"
         require(parameter.admits(low, high), key, value=shown, allowed=parameter.range or "finite")
-        nominal = abs(system.parameters.get(name, 0.0))
-        sizes = abs(low), abs(high)
-        is_same_unit = nominal == 0 or (
-            min(sizes) < OTHER_UNITS * nominal and OTHER_UNITS * max(sizes) > nominal
-        )
-        allowed = f"values of the size of {nominal:g}, the structure's own"
+        nominal, sizes = abs(system.parameters.get(name, 0.0)), (abs(low), abs(high))
+        is_same_unit = min(sizes) < OTHER_UNITS * nominal and OTHER_UNITS * max(sizes) > nominal
         require(
-            is_same_unit or not any(sizes),
+            is_same_unit or nominal == 0 or not any(sizes),
             key,
             value=shown,
-            allowed=allowed,
+            allowed=f"values of the size of {nominal:g}, the structure's own",
             cure="give both in SI units",
         )
     if isinstance(system, LagrangianSystem):
@@ -318,20 +290,13 @@ def require_admissible(system: LinearSystem | LagrangianSystem, cuts: Boxes) -> 
         )
         has_forces = matrices.forces is not None and matrices.forces.value.any()
         is_moved = is_moved or has_forces or matrices.start.value.any()
-    _require_modal_order(system, cuts)
     key, allowed = "q0, v0, ground and loads", "a start, a record or a force that moves something"
     require(is_moved, key, value="zero", allowed=allowed)
-
-
-def _require_modal_order(system: LinearSystem, cuts: Boxes) -> None:
-    """Refuse modes of unequal damping ratio whose frequencies may cross over the boxes."""
-    ratios = list(system.ratios)
-    if len(ratios) < 2:
-        return
-    values = [system.parameters[x] if isinstance(x, str) else x for x in ratios]
-    points = np.vstack([cuts.modal, cuts.probes])
-    matrices = evaluate(system, cuts.names, points, derivatives=False)[0]
-    require_modal_order(matrices.mass.value, matrices.stiffness.value, np.array(values))
+    if len(system.ratios) > 1:  # modes of unequal damping ratio must keep their order
+        values = [system.parameters[x] if isinstance(x, str) else x for x in system.ratios]
+        points = np.vstack([cuts.modal, cuts.probes])
+        matrices = evaluate(system, cuts.names, points, derivatives=False)[0]
+        require_modal_order(matrices.mass.value, matrices.stiffness.value, np.array(values))
 
 
 def _on_levels(bounds: Envelope, alpha: Array, which: Rows) -> Envelope:

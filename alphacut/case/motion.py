@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
-from pydantic import Field, ValidationInfo
+from pydantic import BeforeValidator, Field, ValidationInfo
 
 from alphacut.case.types import (
     ALPHA,
@@ -27,7 +27,6 @@ EnvelopeMethod = Literal[
     "auto",
     "proof",
     "dual",
-    "search",
     "graph-follower",
     "improved-graph-follower",
     "quasi-monte-carlo",
@@ -57,6 +56,13 @@ def _parse_tolerance(value: object, info: ValidationInfo) -> Tolerance:
     raise RefusedError("", value, allowed)
 
 
+def _not_removed(value: object) -> object:
+    if value == "search":
+        cure = 'take "auto", or "improved-graph-follower" with integrator = "exact"'
+        raise RefusedError("", value, ", ".join(get_args(EnvelopeMethod)), cure)
+    return value
+
+
 def _file_name(value: str) -> str:
     if not re.fullmatch(r"[A-Za-z0-9_+-][A-Za-z0-9_.+-]{0,63}", value) or ".." in value:
         raise RefusedError("", value, "up to 64 letters, digits and . _ + -, as a file's name")
@@ -82,7 +88,9 @@ class EnvelopeSection(Section):
         " k (stiffness), d, q0, v0, zeta (damping_ratio), rayleigh_mass, rayleigh_stiffness"
     )
     alpha: Levels = Field(default=ALPHA, description="α-levels")
-    method: EnvelopeMethod = Field(default="auto", description="method of the envelope")
+    method: Annotated[EnvelopeMethod, BeforeValidator(_not_removed)] = Field(
+        default="auto", description="method of the envelope"
+    )
     integrator: Literal["midpoint", "rk4", "exact"] | None = Field(
         default=None, description="time stepping; by the method if left out"
     )

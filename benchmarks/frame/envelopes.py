@@ -22,7 +22,6 @@ from alphacut.frame import (
     ImprovedFollower,
     Proof,
     Sampled,
-    Search,
     StoreyFrame,
     envelope,
 )
@@ -75,7 +74,6 @@ METHODS = [
     *(GraphFollower(tolerance=x) for x in (1e-2, 1e-3, 1e-4)),
     GraphFollower(order=1, tolerance=1e-3),
     *(ImprovedFollower(x) for x in (1e-2, 1e-3, 7e-5)),
-    *(Search(x) for x in (1e-2, 1e-3, 1e-4)),
     *(Proof(x) for x in (1e-2, 1e-3, 1e-4, 1e-5)),
     Vertex(16),
     *(MonteCarlo(n) for n in (100, 1000, 10000)),

@@ -46,7 +46,7 @@ def drawn(chance: Chance) -> Problem:
     n = int(chance.integers(1, 4))
     masses, stiffness = chance.uniform(1e4, 3e4, n), chance.uniform(1e7, 4e7, n)
     names = [f"{kind}{z + 1}" for kind in "km" for z in range(n)]
-    method = str(chance.choice(["proof", "dual", "search"]))
+    method = str(chance.choice(["proof", "dual"]))
     count, widest = (3, 0.3) if method == "dual" else (int(chance.integers(1, 3)), 0.1)
     damping: tuple[float, ...] = (float(chance.uniform(0.01, 0.1)),)
     names.append("zeta")

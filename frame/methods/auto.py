@@ -2,11 +2,11 @@
 
 1. Up to six fuzzy inputs the branch and bound is a proof, for any number the dual bound is. The one
    with less forecast work comes first, the other where it refuses or leaves a wide gap. The branch
-   and bound is first tried on the box as it is, and on parts of it where nothing else is left.
-2. A guarantee with a gap of more than a tenth of a peak is not the only answer: at the nodes that
-   may hold the peak a search looks for motions that attain more. Where a named tolerance is not
-   proved, the search estimates the envelope, and proved bounds stand outside it.
-3. Without a proof the search remains; where there are no oscillating modes, the follower.
+   and bound is first tried on the box as it is, and on parts of it where nothing else remains.
+2. A guarantee with a gap of more than a tenth of a peak is not the only answer: the improved
+   follower looks for motions that reach more. Where a named tolerance is not proved, it estimates
+   the envelope, and proved bounds stand outside it.
+3. Without a proof the follower remains.
 """
 
 from __future__ import annotations
@@ -25,12 +25,11 @@ from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import LinearFlow, exact_flow
 from alphacut.frame.envelope import Ends, Envelope
 from alphacut.frame.methods.dual import DualProof
-from alphacut.frame.methods.improved_follower import ImprovedFollower
+from alphacut.frame.methods.improved_follower import ImprovedFollower, PassBounds
 from alphacut.frame.methods.proof import Proof
-from alphacut.frame.methods.search import Search
 from alphacut.frame.numbers import WIDE
 from alphacut.frame.structures.modes import ModalError
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Mask
 from alphacut.fuzzy.progress_bar import Progress
 from alphacut.fuzzy.refused import checked_number
 
@@ -42,8 +41,10 @@ FEW_INPUTS = 4
 """Inputs up to which the dual bound closes the gaps of peaks to the usual tolerance."""
 FINEST = 1e-4
 """Gap of peaks, as a share of each, below which the dual bound takes too long."""
+FOLLOWED = 0.25
+"""Share of the tolerance that is worth a graph: a follower's error is some four times as much."""
 ROUNDING = 1e-9
-"""Share of a peak by which a searched motion may be off."""
+"""Share of a peak by which a motion that is followed may be off."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,7 @@ class Auto:
     Args:
         tolerance: Error wanted, as a share of each output's peak or, where the envelope is not
             relative, in m or the unit of the first output; 1e-3 of each peak unless given.
-        seed: Of the search and the follower.
+        seed: Of the follower.
         workers: Threads of the proof, which do not change the result; all cores unless given.
         peaks: Whether the error is that of the peaks, and a proof with a wider gap is kept.
         magnitudes: Whether nothing is read off bounds below the peaks, which may be wide then.
@@ -81,129 +82,100 @@ class Auto:
         if self.tolerance is not None:
             checked_number("tolerance", self.tolerance, positive=True)
 
-    def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
-        """Return the envelope on all levels, by a proof if possible; its first note says why.
+    @property
+    def is_for_all_nodes(self) -> bool:
+        """Whether a tolerance holds for all bounds, and not for the peaks alone."""
+        return self.tolerance is not None and not self.peaks
 
-        Where the gap is too wide, a search attains larger values inside the proved bounds, or
-        estimates the envelope; without oscillating modes the follower does.
-        """
-        follower = ImprovedFollower(0.7 * flow.tolerance(self.tolerance), seed=self.seed)
+    def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
+        """Return the envelope on all levels, by a proof if possible; its first note says why."""
+        tolerance = flow.tolerance(self.tolerance)
+        allowed = (1 + 1e-9) * tolerance * flow.scale  # a little more for rounding
         if not isinstance(flow.flow, LinearFlow):
-            return _noted(follower.run(flow, progress), "improved-graph-follower: not linear")
-        reasons: list[str] = []
-        proved: Envelope | None = None
+            follower = ImprovedFollower(0.7 * tolerance, seed=self.seed)
+            return _noted(follower.run(flow, progress), f"{follower.name}: not linear")
+        follower = ImprovedFollower(FOLLOWED * tolerance, seed=self.seed)
+        reasons, proved = list[str](), list[Envelope]()
         for proof in self._proofs(flow, reasons):
             try:
-                found = proof.run(flow, progress)
+                proved.append(proof.run(flow, progress))
             except (UnprovedError, ModalError) as error:
                 reasons.append(f"{proof.name}: {error}")
                 continue
-            proved = found if proved is None or _gap(found, flow) < _gap(proved, flow) else proved
-            if self._is_close(found, flow):
-                return _noted(found, "; ".join([f"{proof.name} succeeded", *reasons]))
+            if self._is_close(proved[-1], flow, allowed):
+                return _noted(proved[-1], "; ".join([f"{proof.name} succeeded", *reasons]))
             reasons.append(f"{proof.name}: its gap is wider than the tolerance")
-        # a tolerance that holds for all bounds, not for the peaks alone
-        needs_tolerance = self.tolerance is not None and not self.peaks
-        if proved is not None and not needs_tolerance and _gap(proved, flow) <= WIDE:
-            return _noted(proved, "; ".join([f"{proved.method} succeeded", *reasons]))
-        search = Search(self.tolerance, seed=self.seed)
-        try:
-            if proved is not None and not needs_tolerance:
-                nodes = _possible_peaks(proved)
-                searched = search.attained(flow, nodes, progress)
-                return _noted(
-                    with_attained(proved, flow, nodes, *searched), f"{proved.method} and search"
-                )
-            estimate = search.run(flow, progress)
-        except ModalError as error:
-            reasons.append(f"no search: {error}")
-            if proved is None:
-                why = f"improved-graph-follower; unproved: {'; '.join(reasons)}"
-                return _noted(follower.run(flow, progress), why)
-            return _noted(proved, "; ".join([f"{proved.method} succeeded", *reasons]))
-        outer = None if proved is None else proved.proved
-        why = f"search; unproved: {'; '.join(reasons)}"
-        return _noted(replace(estimate, outer=outer), why)
+        best = min(proved, key=lambda found: _gap(found, flow), default=None)
+        if best is not None and not self.is_for_all_nodes:
+            if _gap(best, flow) <= WIDE:
+                return _noted(best, "; ".join([f"{best.method} succeeded", *reasons]))
+            followed = follower.run_pass(flow, progress, asked=_above_peaks(best))
+            return _noted(_with_reached(best, flow, followed), f"{best.method} and {follower.name}")
+        found = follower.run(flow, progress, allowed if self.is_for_all_nodes else None)
+        found = replace(found, outer=best.proved if best else None)
+        return _noted(found, f"{follower.name}; unproved: {'; '.join(reasons)}")
 
     def _proofs(self, flow: UnitFlow, reasons: list[str]) -> Iterator[Proof | DualProof]:
-        """Yield the proofs to try, by rising forecast work; refusals are appended to `reasons`.
-
-        Branch and bound (`Proof`) comes first if a tolerance holds at all nodes, not only at peaks.
-        If the dual bound can be tried, too, branch and bound is tried on the undivided box, and if
-        it was the first, again with the box in parts at the end.
-        """
-        tolerance, inputs = self.tolerance or DEFAULT_TOLERANCE, len(flow.boxes.names)
+        """Yield the proofs to try, in their order; refusals are appended to `reasons`."""
         proof = Proof(None, self.tolerance, BOXES, workers=self.workers)
-        dual = DualProof(workers=self.workers)
-        if self.magnitudes:  # nothing is read off bounds below the peaks
-            dual = replace(dual, below=1.0)
-        if self.tolerance and not self.peaks:
-            pass  # the dual bound leaves wide gaps below the peaks in any case
-        elif flow.relative and inputs <= (MOST_PARAMETERS if self.tolerance else FEW_INPUTS):
-            dual = replace(dual, gap=max(tolerance, FINEST), peaks=max(tolerance, FINEST))
-        elif self.tolerance:
-            dual = replace(dual, peaks=WIDE)
-        works = list[tuple[float, Proof | DualProof]]()  # forecast work of each method
-        for method in (proof, dual) if inputs <= MOST_PARAMETERS else (dual,):
+        work = dict[str, float]()  # that is forecast
+        for method in (proof, self._dual(flow)):
+            if method is proof and len(flow.boxes.names) > MOST_PARAMETERS:
+                continue
             try:
                 with refusing():
-                    works.append((method.forecast(exact_flow(flow.flow), flow.boxes), method))
+                    work[method.name] = method.forecast(exact_flow(flow.flow), flow.boxes)
             except UnprovedError as error:
                 reasons.append(f"{method.name}: {error}")
-        if self.tolerance and not self.peaks and len(works) == 2:
-            works = [(0.0, proof), works[1]]  # first, since it has the same gap at all nodes
-        works.sort(key=lambda pair: pair[0])
-        methods = [method for _, method in works]
-        without_parts = replace(proof, parts=1)
-        for method in methods:
-            yield without_parts if method is proof and len(methods) == 2 else method
-        if len(methods) == 2 and methods[0] is proof:
-            yield proof
+        both = len(work) == 2
+        # the branch and bound has the same gap at all nodes
+        proof_first = both and (self.is_for_all_nodes or work["proof"] <= work["dual"])
+        table: tuple[tuple[bool, Proof | DualProof], ...] = (
+            (proof_first, replace(proof, parts=1)),
+            ("dual" in work, self._dual(flow)),
+            (both and not proof_first, replace(proof, parts=1)),
+            ("proof" in work and (proof_first or not both), proof),  # in parts of the box
+        )
+        return (method for applies, method in table if applies)
 
-    def _is_close(self, proved: Envelope, flow: UnitFlow) -> bool:
+    def _dual(self, flow: UnitFlow) -> DualProof:
+        """Return the dual bound with the gaps that are wanted."""
+        tolerance, inputs = max(self.tolerance or DEFAULT_TOLERANCE, FINEST), len(flow.boxes.names)
+        few = flow.relative and inputs <= (MOST_PARAMETERS if self.tolerance else FEW_INPUTS)
+        dual = DualProof(workers=self.workers, below=1.0 if self.magnitudes else DualProof.below)
+        table = (
+            (self.is_for_all_nodes, dual),  # gaps below the peaks stay wide in any case
+            (few, replace(dual, gap=tolerance, peaks=tolerance)),
+            (self.tolerance is not None, replace(dual, peaks=WIDE)),
+            (True, dual),
+        )
+        return next(method for applies, method in table if applies)
+
+    def _is_close(self, proved: Envelope, flow: UnitFlow, allowed: Array) -> bool:
         """Return whether the gap of a proof is as narrow as asked for.
 
         A tolerance for all bounds must be met by all. Else the gap at the peaks counts: at most
         twice a tolerance that is meant for peaks and for few inputs, or `WIDE`.
         """
-        if self.tolerance is not None and not self.peaks:
-            return bool((proved.error <= self._allowed(flow)).all())
+        if self.is_for_all_nodes:
+            return bool((proved.error <= allowed).all())
         if self.tolerance is not None and flow.relative and len(flow.boxes.names) <= FEW_INPUTS:
             return _gap(proved, flow) <= 2 * self.tolerance
         return _gap(proved, flow) <= WIDE
 
-    def _allowed(self, flow: UnitFlow) -> Array:
-        """Error allowed of each output, shape (m,), in its unit; a little more for rounding."""
-        return (1 + 1e-9) * flow.tolerance(self.tolerance) * flow.scale
 
-
-def with_attained(
-    proved: Envelope, flow: UnitFlow, nodes: Rows, values: Array, at: Array
-) -> Envelope:
-    """Return a guaranteed envelope with larger attained values inside it.
-
-    Args:
-        proved: The guaranteed envelope.
-        flow: The motion and its boxes.
-        nodes: Nodes with attained values, shape (J,).
-        values: Attained values of (−output, output), shape (A, J, m, 2).
-        at: Unit coordinates that attain them, shape (A, J, m, 2, d).
-
-    Returns:
-        The envelope with tighter inner bounds and errors, and a note on both peaks.
-    """
+def _with_reached(proved: Envelope, flow: UnitFlow, followed: PassBounds) -> Envelope:
+    """Return a guaranteed envelope with larger values inside it that graphs reach."""
     assert proved.inner is not None
-    physical = flow.boxes.to_physical(at)
-    values = values - ROUNDING * np.abs(values).max((0, 1, 3))[:, None]
-    ends, inputs = [], []  # lower ones, then upper ones
-    for index, (sign, name) in enumerate(((-1, "lower"), (1, "upper"))):
-        inner, inputs_at = getattr(proved.inner, name).copy(), getattr(proved, f"{name}_at").copy()
-        better = values[..., index] > sign * inner[:, nodes]
-        inner[:, nodes] = np.where(better, sign * values[..., index], inner[:, nodes])
-        better_inputs = physical[..., index, :]
-        inputs_at[:, nodes] = np.where(better[..., None], better_inputs, inputs_at[:, nodes])
-        ends.append(inner)
-        inputs.append(inputs_at)
+    values = followed.bounds - ROUNDING * np.abs(followed.bounds).max((0, 1, 3))[:, None]
+    physical = flow.boxes.to_physical(followed.points)
+    ends, inputs = list[Array](), list[Array]()  # lower ones, then upper ones
+    for index, (sign, inner, at) in enumerate(
+        ((-1, proved.inner.lower, proved.lower_at), (1, proved.inner.upper, proved.upper_at))
+    ):
+        better = values[..., index] > sign * inner
+        ends.append(np.where(better, sign * values[..., index], inner))
+        inputs.append(np.where(better[..., None], physical[..., index, :], at))
     combined = replace(
         proved,
         inner=Ends(*ends),
@@ -215,22 +187,24 @@ def with_attained(
     return replace(combined, facts=facts, notes=(combined.peak_words, *combined.notes))
 
 
-def _possible_peaks(proved: Envelope) -> Rows:
-    """Return the nodes at which a proved bound lies above the attained peak, shape (J,)."""
+def _sides(proved: Envelope) -> tuple[Array, Array]:
+    """Return proved and reached upper bounds of (−output, output), shape (A, T, m, 2) each."""
     assert proved.inner is not None
-    ends = ((proved.upper, proved.inner.upper), (-proved.lower, -proved.inner.lower))
-    above = [outer > inner.max(1, keepdims=True) for outer, inner in ends]
-    return np.flatnonzero(np.logical_or(*above).any((0, 2)))
+    outer = np.stack([-proved.lower, proved.upper], -1)
+    return outer, np.stack([-proved.inner.lower, proved.inner.upper], -1)
+
+
+def _above_peaks(proved: Envelope) -> Mask:
+    """Return the mask of bounds above the reached peak of their output and side, (A, T, m, 2)."""
+    outer, inner = _sides(proved)
+    return np.asarray(outer > inner.max(1, keepdims=True))
 
 
 def _gap(proved: Envelope, flow: UnitFlow) -> float:
-    """Return the largest gap between proved and attained peak, as a fraction of the peak."""
-    assert proved.inner is not None
-    ends = ((proved.upper, proved.inner.upper), (-proved.lower, -proved.inner.lower))
-    peak = np.maximum(*(outer.max(1) for outer, _ in ends))  # (A, m), as of the gaps
-    peak = np.where(flow.at_rest, flow.peak, peak)
-    gaps = [outer.max(1) - inner.max(1) for outer, inner in ends]
-    return float((np.maximum(*gaps) / np.maximum(peak, 1e-300)).max())
+    """Return the largest gap between proved and reached peak, as a fraction of the peak."""
+    outer, inner = (bounds.max(1) for bounds in _sides(proved))  # (A, m, 2)
+    peak = np.where(flow.at_rest, flow.peak, outer.max(-1))
+    return float(((outer - inner).max(-1) / np.maximum(peak, 1e-300)).max())
 
 
 def _noted(envelope: Envelope, why: str) -> Envelope:

@@ -9,20 +9,106 @@ more than an explicit tolerance.
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
 from alphacut.frame.boxes import UnitFlow
-from alphacut.frame.calculus.box_quadratic import local_maximum
+from alphacut.frame.calculus.box_quadratic import gain, local_maximum
 from alphacut.frame.envelope import Envelope
-from alphacut.frame.methods.graph_storage import Index, Places, Storage
-from alphacut.frame.methods.independent import SAFETY, independent_excess, trajectories_diverge
-from alphacut.fuzzy.arrays import Array
+from alphacut.frame.methods.sampled import SAFETY, independent_excess
+from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.progress_bar import Progress, subprogress
 from alphacut.fuzzy.refused import checked_number, require
 from alphacut.fuzzy.result import Nature
+
+MAX_RATIO = 8.0
+"""Slope along a half width of the box, as a share of the output's range, from which on neighbouring
+trajectories part."""
+
+Places = tuple[Rows, ...]
+"""Indices of nodes, outputs and sides, one of each for a place."""
+
+
+class Storage:
+    """All graphs (trajectories) computed so far, and the best of them at each place.
+
+    Arrays over places have shape (T, m, 2): node, output, and side (−output, output).
+
+    Attributes:
+        flow: Computes graphs.
+        points: Their unit coordinates, shape (G, d).
+        top: The best value at each place.
+        best: Which graph has it, the first where several do.
+        first: First derivatives of that graph's output, shape (T, m, 2, d).
+        second: Second ones, shape (T, m, 2, d, d).
+        steepest: Largest slope of any graph along a coordinate, shape (m,).
+    """
+
+    def __init__(self, flow: UnitFlow) -> None:
+        d, shape = len(flow.boxes.names), (len(flow.time), len(flow.outputs), 2)
+        self.flow, self.steepest = flow, np.zeros(shape[1])
+        self.points: Array = np.empty((0, d))
+        self.top, self.best = np.full(shape, -np.inf), np.zeros(shape, np.int64)
+        self.first, self.second = np.zeros((*shape, d)), np.zeros((*shape, d, d))
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    @property
+    def all_places(self) -> Places:
+        """All places."""
+        return tuple(np.indices(self.top.shape).reshape(3, -1))
+
+    def holds(self, point: Array, near: float = 1e-9) -> bool:
+        """Return whether a graph at `point` (d,) is stored, up to the distance `near`."""
+        return bool((np.abs(self.points - point).max(1, initial=0.0) < near).any())
+
+    def add(self, points: Array) -> Places:
+        """Compute and store the graphs at unit coordinates (S, d); return where one is now best."""
+        jet, top = self.flow.taylor(points), self.top.reshape(-1)
+        self.steepest = np.maximum(self.steepest, np.abs(jet.first).max((0, 1, 2)))
+        best_new = np.full(top.shape, -1)  # which of them is the best; −1 for none
+        for s, value in enumerate(jet.value):
+            signed = np.stack([-value, value], -1).ravel()
+            better = np.flatnonzero(signed > top)
+            top[better], best_new[better] = signed[better], s
+        improved = np.flatnonzero(best_new >= 0)
+        places: Places = np.unravel_index(improved, self.top.shape)
+        entries = best_new[improved], *places[:2]  # graph, node and output
+        self.best[places] = len(self) + best_new[improved]
+        self.first[places] = np.moveaxis(jet.first, 0, -1)[entries]
+        self.second[places] = np.moveaxis(jet.second, (0, 1), (-2, -1))[entries]
+        self.points = np.vstack([self.points, points])
+        return places
+
+    def predicted(
+        self,
+        places: Places,
+        box: tuple[Array, Array],
+        maximise: Callable[..., Array],
+        *,
+        bend: float = 1.0,
+        reach: Array | float = np.inf,
+    ) -> tuple[Array, Array]:
+        """Return the maxima of the best graphs' Taylor models over a box at K places (eq. 22).
+
+        Args:
+            places: Node, output and side of each place.
+            box: Lower and upper ends of the unit coordinates, each (d,).
+            maximise: Maximum of g·x + x·H·x/2 over boxes, from g, H and their ends.
+            bend: Factor on second derivatives; 0 for linear models.
+            reach: Distance from each graph's parameters up to which its model is trusted.
+
+        Returns:
+            Predicted values, shape (K,), and their unit coordinates, shape (K, d).
+        """
+        side, at = 2.0 * places[2] - 1, self.points[self.best[places]]
+        g, H = side[:, None] * self.first[places], bend * side[:, None, None] * self.second[places]
+        x = maximise(g, H, np.maximum(box[0] - at, -reach), np.minimum(box[1] - at, reach))
+        return self.top[places] + gain(g, H, x), np.clip(at + x, *box)
 
 
 @dataclass(eq=False)
@@ -31,7 +117,7 @@ class Followed:
 
     Args:
         bounds: Upper bounds of (−output, output) after post-processing, shape (A, T, m, 2).
-        best: Index of the graph that attains each, shape (A, T, m, 2).
+        best: Index of the graph that reaches each, shape (A, T, m, 2).
         predicted_gain: Gain over the bounds that Taylor models still predict, same shape.
         guess: Index of the best stored graph when a node was reached, same shape (Figs. 21 to 23).
         new: Index of the graph computed there, or −1 where the guess stays, same shape.
@@ -39,10 +125,10 @@ class Followed:
     """
 
     bounds: Array
-    best: Index
+    best: Rows
     predicted_gain: Array
-    guess: Index
-    new: Index
+    guess: Rows
+    new: Rows
     storage: Storage
 
 
@@ -61,14 +147,6 @@ class GraphFollower:
 
     Raises:
         RefusedError: A switch is out of its range.
-
-    Example:
-        >>> from alphacut.frame import StoreyFrame, envelope
-        >>> from alphacut.fuzzy import Triangular
-        >>> frame = StoreyFrame(masses=[1e3], stiffness=[4e4], q0=[0.1])
-        >>> inputs = {"m1": Triangular(900, 1000, 1100)}
-        >>> str(envelope(frame, inputs, GraphFollower(), duration=0.5, step=0.1).nature)
-        'estimated'
     """
 
     name: ClassVar[str] = "graph-follower"
@@ -76,13 +154,8 @@ class GraphFollower:
     tolerance: float = 1e-3
 
     def __post_init__(self) -> None:
-        """Refuse an order other than 1 and 2 and a tolerance that is not positive."""
-        require(
-            self.order in (1, 2),
-            "order",
-            value=self.order,
-            allowed="1 and 2, the degrees of a Taylor model",
-        )
+        allowed = "1 and 2, the degrees of a Taylor model"
+        require(self.order in (1, 2), "order", value=self.order, allowed=allowed)
         checked_number("tolerance", self.tolerance, positive=True)
 
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
@@ -112,75 +185,44 @@ class GraphFollower:
         """Return bounds on all levels by Taylor models, from the narrowest box to the widest."""
         storage = Storage(flow)
         storage.add(flow.boxes.to_unit(flow.boxes.modal)[None])
-        levels = len(flow.boxes.alpha)
-        shape = (levels, *storage.top.shape)
-        out = Followed(
-            bounds=np.empty(shape),
-            best=np.full(shape, 0),
-            predicted_gain=np.zeros(shape),
-            guess=np.full(shape, 0),
-            new=np.full(shape, -1),
-            storage=storage,
-        )
+        levels, (n_nodes, m, _) = len(flow.boxes.alpha), storage.top.shape
+        shape = (levels, n_nodes, m, 2)
+        zeros, none = np.zeros(shape), np.full(shape, -1)
+        out = Followed(zeros.copy(), none.copy(), zeros, none.copy(), none, storage)
+        limit, bend = self.tolerance * flow.scale[:, None], float(self.order > 1)
         for done, level in enumerate(reversed(range(levels))):
-            self._sweep(out, level, subprogress(progress, done / levels, (done + 1) / levels))
+            tick = subprogress(progress, done / levels, (done + 1) / levels)
+            box = flow.boxes.unit(level)
+            predicted, target = storage.predicted(storage.all_places, box, local_maximum, bend=bend)
+            predicted, target = predicted.reshape(shape[1:]), target.reshape(*shape[1:], -1)
+            for node in range(n_nodes):
+                tick(node / n_nodes)
+                out.guess[level, node] = storage.best[node]
+                points = list[Array]()
+                for entry in np.argwhere(predicted[node] > storage.top[node] + limit):
+                    point = target[node, *entry]
+                    if storage.holds(point) or any(np.abs(point - x).max() <= 1e-9 for x in points):
+                        continue
+                    out.new[level, node, *entry] = len(storage) + len(points)
+                    points.append(point)
+                if points:  # predict anew where they are the best graphs now
+                    improved = storage.add(np.array(points))
+                    later = tuple(indices[improved[0] > node] for indices in improved)
+                    predicted[later], target[later] = storage.predicted(
+                        later, box, local_maximum, bend=bend
+                    )
             # post-processing: the best of all graphs at every node (Fig. 24)
             out.bounds[level], out.best[level] = storage.top, storage.best
+            out.predicted_gain[level] = np.clip(predicted - storage.top, 0.0, limit)
         return out
 
-    def _sweep(self, out: Followed, level: int, progress: Progress) -> None:
-        """Compute new graphs (trajectories) node by node where a gain over the bounds is predicted.
 
-        They are added to the storage; `guess`, `new` and `predicted_gain` of the level are set.
-        """
-        storage, box = out.storage, out.storage.flow.boxes.unit(level)
-        if not (box[1] > box[0]).any():
-            return
-        nodes = out.bounds.shape[1]
-        predicted, target = storage.top.copy(), np.zeros((*storage.top.shape, len(box[0])))
-        all_places = tuple(np.indices(predicted.shape).reshape(3, -1))
-        self._predict(storage, all_places, box, predicted, target)
-        for node in range(nodes):
-            progress(node / nodes)
-            out.guess[level, node] = storage.best[node]
-            points = self._new_graphs(out, level, node, predicted, target)
-            if points:  # predict anew where they are now the best graphs
-                improved = storage.add(np.array(points))
-                later = tuple(indices[improved[0] > node] for indices in improved)
-                self._predict(storage, later, box, predicted, target)
-        limit = self.tolerance * storage.flow.scale[:, None]
-        out.predicted_gain[level] = np.clip(predicted - storage.top, 0.0, limit)
+def trajectories_diverge(steepest: Array, bounds: Array) -> bool:
+    """Return whether neighbouring trajectories diverge, so that Taylor models predict nothing.
 
-    def _new_graphs(
-        self, out: Followed, level: int, node: int, predicted: Array, target: Array
-    ) -> list[Array]:
-        """Return the inputs whose trajectories (graphs) are to be computed for bounds at a node.
-
-        They are those, in unit coordinates (d,), at which a bound is predicted to gain more than
-        the tolerance. The numbers that the storage will give them are written to `out.new`. Taylor
-        models predict values (T, m, 2) at targets (T, m, 2, d).
-        """
-        storage, points = out.storage, list[Array]()
-        limit = self.tolerance * storage.flow.scale[:, None]
-        for entry in np.argwhere(predicted[node] > storage.top[node] + limit):
-            point = target[node, *entry]
-            if not storage.holds(point) and all(np.abs(point - x).max() > 1e-9 for x in points):
-                out.new[level, node, *entry] = len(storage) + len(points)
-                points.append(point)
-        return points
-
-    def _predict(
-        self,
-        storage: Storage,
-        places: Places,
-        box: tuple[Array, Array],
-        predicted: Array,
-        target: Array,
-    ) -> None:
-        """Maximise the Taylor models of the best graphs at some places (node, output, side).
-
-        Predicted values and their unit coordinates are written to `predicted` and `target`.
-        """
-        bend = float(self.order > 1)
-        predicted[places], optima = storage.predicted(places, box, local_maximum, bend=bend)
-        target[places] = np.clip(optima, *box)
+    Args:
+        steepest: Largest slope of each output along a unit coordinate, shape (m,).
+        bounds: Upper bounds of (−output, output), shape (T, m, 2).
+    """
+    width = (bounds[..., 0].max(0) + bounds[..., 1].max(0)) / 2
+    return bool((steepest > MAX_RATIO * width).any())

@@ -4,23 +4,27 @@ The same idea as `graph_follower` (storage, Taylor models, tolerance, post-proce
 around: instead of one node after the other, every round asks the models of the best graphs at all
 nodes, takes the proposal of largest predicted gain in each window of time, and advances these
 graphs together as arrays. Nodes before and after a discovery profit alike, which is what backward
-sweeps are for; the points spread at the start look for basins independently of any model.
+sweeps are for; the points spread at the start look for basins independently of any model. Peaks,
+which are read more than other nodes, are followed to a smaller gain.
 """
 
 from __future__ import annotations
 
 import time
 from dataclasses import dataclass, replace
+from math import isqrt
 from typing import ClassVar
 
 import numpy as np
 
 from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.calculus.box_quadratic import global_maximum, local_maximum
+from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.envelope import Envelope
-from alphacut.frame.methods.graph_storage import Places, Storage
-from alphacut.frame.methods.independent import SAFETY, independent_excess, trajectories_diverge
-from alphacut.fuzzy.arrays import Array
+from alphacut.frame.methods.graph_follower import Places, Storage, trajectories_diverge
+from alphacut.frame.methods.sampled import SAFETY, independent_excess, largest_values, spread_points
+from alphacut.frame.structures.linear import frequencies
+from alphacut.fuzzy.arrays import Array, Mask
 from alphacut.fuzzy.progress_bar import Progress, subprogress
 from alphacut.fuzzy.refused import checked_number
 from alphacut.fuzzy.result import Nature
@@ -38,8 +42,17 @@ TRIES = 40
 """Proposals looked at per window of time."""
 SPACING = 0.02
 """Distance in unit coordinates between graphs of one batch."""
+NEAR_PEAK, PEAK_SHARE = 0.02, 0.02
+"""Distance from a peak, as a share of it, within which a gain of this share of the tolerance is
+worth a graph: a Newton step or two for each peak."""
+LEAST_GAIN = 1e-10
+"""Gain, as a share of a peak, that may be rounding."""
+MOST_PASSES = 4
+"""Passes after which an error that is not allowed is declared."""
 SPREAD = 64
 """Graphs on a spread of points per level that start the search."""
+EXPLORED = 256
+"""Motions of a kind per level whose values alone are looked at, for basins that no model shows."""
 SEED_STEP = 100_003
 """Points of the sequence between those that two seeds spread."""
 
@@ -57,14 +70,6 @@ class ImprovedFollower:
 
     Raises:
         RefusedError: A switch is out of its range.
-
-    Example:
-        >>> from alphacut.frame import StoreyFrame, envelope
-        >>> from alphacut.fuzzy import Triangular
-        >>> frame = StoreyFrame(masses=[1e3], stiffness=[4e4], q0=[0.1])
-        >>> inputs = {"m1": Triangular(900, 1000, 1100)}
-        >>> str(envelope(frame, inputs, ImprovedFollower(), duration=0.5, step=0.1).nature)
-        'estimated'
     """
 
     name: ClassVar[str] = "improved-graph-follower"
@@ -76,76 +81,96 @@ class ImprovedFollower:
         checked_number("tolerance", self.tolerance, positive=True)
         checked_number("budget", self.budget, whole=True, least=1)
 
-    def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
+    def run(
+        self, flow: UnitFlow, progress: Progress | None = None, allowed: Array | None = None
+    ) -> Envelope:
         """Return the envelope of two passes from different points, with an estimated error.
 
         The error is twice what the Taylor models still predict and what an independent sample finds
-        beyond the bounds, and twice the difference of the two passes. Where neighbouring
+        beyond the bounds, and twice the difference of the two best passes. Where neighbouring
         trajectories diverge there is none, and the bounds are attained only.
+
+        Args:
+            flow: The motion and its boxes.
+            progress: Called with the completed fraction.
+            allowed: Error of each output, shape (m,), in its unit, above which further passes are
+                made for the bounds that have a larger one.
         """
-        start_time, second_pass = time.perf_counter(), replace(self, seed=self.seed + 1)
-        first = self.run_pass(flow, subprogress(progress, 0.0, 0.4))
-        second = second_pass.run_pass(flow, subprogress(progress, 0.4, 0.8))
-        better = second.bounds > first.bounds
-        bounds = np.where(better, second.bounds, first.bounds)
-        points = np.where(better[..., None], second.points, first.points)
-        missed, count = independent_excess(flow, bounds, subprogress(progress, 0.8, 1.0))
-        steepest = np.maximum(first.storage.steepest, second.storage.steepest)
-        diverges = trajectories_diverge(steepest, bounds[0])
+        start_time, passes, errors = time.perf_counter(), list[PassBounds](), np.empty(0)
+        asked = np.ones((len(flow.boxes.alpha), len(flow.time), len(flow.outputs), 2), bool)
         limit = self.tolerance * flow.scale[:, None]
-        is_stopped = any((x.predicted_gain > limit).any() for x in (first, second))
+        predicted, is_stopped = np.zeros(asked.shape), False
+        while len(passes) < 2 or (len(passes) < MOST_PASSES and asked.any()):
+            # progress of two passes, and by halves of the remainder for further ones
+            ends = [0.8 * (1 - 0.5**k) if k else 0.0 for k in (len(passes), len(passes) + 1)]
+            seeded = replace(self, seed=self.seed + len(passes))
+            found = seeded.run_pass(flow, subprogress(progress, *ends), asked)
+            gain = np.where(asked, found.predicted_gain, 0.0)
+            # gains above the tolerance, which remain where the budget ended a pass, come on top
+            small, large = (np.where(x, gain, 0.0) for x in (gain <= limit, gain > limit))
+            predicted = np.maximum(predicted, small) + large
+            is_stopped = is_stopped or bool(large.any())
+            passes.append(found)
+            if len(passes) > 1:
+                values = np.sort([x.bounds for x in passes], axis=0)
+                difference = smoothed_maximum((values[-1] - values[-2]).max(-1))
+                errors = SAFETY * (predicted.max(-1) + limit[:, 0] / 2 + difference)
+                asked &= False if allowed is None else (errors > allowed)[..., None]
+        bounds, points = passes[0].bounds, passes[0].points
+        for further in passes[1:]:
+            points = np.where((further.bounds > bounds)[..., None], further.points, points)
+            bounds = np.maximum(bounds, further.bounds)
+        missed, count = independent_excess(flow, bounds, subprogress(progress, 0.8, 1.0))
+        steepest = np.max([x.storage.steepest for x in passes], axis=0)
+        diverges = trajectories_diverge(steepest, bounds[0])
         note = f"stopped at the budget of {self.budget} trajectories"
         return flow.envelope(
             bounds,
             points,
-            None if diverges else self._error(first, second, missed, flow.scale),
+            None if diverges else errors + SAFETY * missed[:, None],
             method=self.name,
             nature=Nature.ATTAINED if diverges else Nature.ESTIMATED,
-            evaluations=len(first.storage) + len(second.storage) + count,
+            evaluations=sum(x.evaluations for x in passes) + count,
             seconds=time.perf_counter() - start_time,
             facts={"gain": self.tolerance, "order": 2},
             notes=(note,) if is_stopped else (),
         )
 
-    def _error(self, first: PassBounds, second: PassBounds, missed: Array, scale: Array) -> Array:
-        """Return the estimated error of the better bounds of two passes, shape (A, T, m).
+    def run_pass(
+        self, flow: UnitFlow, progress: Progress | None = None, asked: Mask | None = None
+    ) -> PassBounds:
+        """Return the bounds of one pass on all levels, from the narrowest box to the widest.
 
         Args:
-            first: Bounds of one pass, with the gain (A, T, m, 2) that models still predict.
-            second: Those of the other.
-            missed: How far an independent sample exceeds the bounds, shape (A, m).
-            scale: Factor of each output from a tolerance to the allowed error, shape (m,).
+            flow: The motion and its boxes.
+            progress: Called with the completed fraction.
+            asked: Bounds whose gain counts, shape (A, T, m, 2); all unless given.
         """
-        gains, limit = [first.predicted_gain, second.predicted_gain], self.tolerance * scale
-        small = [np.where(gain <= limit[:, None], gain, 0.0) for gain in gains]
-        # gains above the tolerance, which remain where the budget ended a pass, come on top
-        large = [np.where(gain > limit[:, None], gain, 0.0) for gain in gains]
-        predicted = np.maximum(*small) + np.maximum(*large)
-        difference = smoothed_maximum(np.abs(second.bounds - first.bounds).max(-1))
-        total_error = predicted.max(-1) + limit / 2 + difference + missed[:, None]
-        return np.asarray(SAFETY * total_error)
-
-    def run_pass(self, flow: UnitFlow, progress: Progress) -> PassBounds:
-        """Return the bounds of one pass on all levels, from the narrowest box to the widest."""
         levels, storage = len(flow.boxes.alpha), Storage(flow)
-        d, places = len(flow.boxes.names), storage.top.size // 2
+        d = len(flow.boxes.names)
         bounds, gains = np.zeros((2, levels, *storage.top.shape))
         out = PassBounds(bounds, np.zeros((*bounds.shape, d)), gains, storage)
-        chunk_size = int(np.clip(MAX_NUMBERS / (places * (1 + d + d * d)), 1, BATCH))
+        chunk_size = int(np.clip(MAX_NUMBERS / (_size_of_graph(flow) * (1 + d + d * d)), 1, BATCH))
         for done, level in enumerate(reversed(range(levels))):
-            search = _Level(storage, flow.boxes.unit(level), self.tolerance)
+            box, skip = flow.boxes.unit(level), SEED_STEP * (levels * self.seed + level + 1)
+            has_width = bool((box[1] > box[0]).any())
+            explored = spread_points(*box, EXPLORED, skip) if has_width else box[0][None]
+            models = _LevelModels(storage, box, explored)
+            out.evaluations += len(explored)
             tick = subprogress(progress, done / levels, (done + 1) / levels)
             # graphs at the end of the level, at most, and at its beginning
             limit, first = self.budget * (done + 1) // levels, len(storage)
-            points = self._start(storage, *search.box)[: max(1, limit - len(storage))]
+            points = self._start(storage, *models.box)[: max(1, limit - len(storage))]
             while len(points):
                 for chunk in np.array_split(points, -(-len(points) // chunk_size)):
-                    search.predict(storage.add(chunk))
+                    models.predict(storage.add(chunk))
                     tick(min(1.0, (len(storage) - first) / max(1, limit - first)))
-                points = search.proposals(min(BATCH, limit - len(storage)))
+                least = self._least_gains(storage, True if asked is None else asked[level])
+                points = models.proposals(least, min(BATCH, limit - len(storage)))
             # post-processing of the level
             out.bounds[level], out.points[level] = storage.top, storage.points[storage.best]
-            out.predicted_gain[level] = np.maximum(search.predicted - storage.top, 0.0)
+            out.predicted_gain[level] = np.maximum(models.gains, 0.0)
+        out.evaluations += len(storage)
         return out
 
     def _start(self, storage: Storage, lower: Array, upper: Array) -> Array:
@@ -160,40 +185,58 @@ class ImprovedFollower:
         spread = chebyshev_points(len(lower), SPREAD, skip=skip)
         return np.vstack([nominal, middle + half * spread])
 
+    def _least_gains(self, storage: Storage, asked: Mask | bool) -> Array:
+        """Return the gain of each bound that is worth a graph, shape (T, m, 2)."""
+        top = storage.top
+        near_peak = top >= (1 - NEAR_PEAK) * np.maximum(top.max(0), 0.0)
+        share = np.where(near_peak, PEAK_SHARE, 1.0)
+        least = self.tolerance * storage.flow.scale[:, None] * share
+        return np.where(asked, np.maximum(least, LEAST_GAIN * storage.flow.peak[:, None]), np.inf)
 
-@dataclass(frozen=True, eq=False)
+
+@dataclass(eq=False)
 class PassBounds:
     """Bounds of one pass, and the graphs (trajectories) behind them.
 
     Args:
-        bounds: Attained bounds of (−output, output), shape (A, T, m, 2).
+        bounds: Reached bounds of (−output, output), shape (A, T, m, 2).
         points: Their unit coordinates, shape (A, T, m, 2, d).
         predicted_gain: Gain over the bounds that the models still predict, shape (A, T, m, 2);
             more than the tolerance where the budget ended the search.
         storage: All graphs.
+        evaluations: Number of graphs and of motions whose values alone were looked at.
     """
 
     bounds: Array
     points: Array
     predicted_gain: Array
     storage: Storage
+    evaluations: int = 0
 
 
-class _Level:
+class _LevelModels:
     """Predictions of the stored graphs' Taylor models in one box, by place (T, m, 2).
+
+    Motions at further points (S, d) count as predictions where they exceed these.
 
     Attributes:
         predicted: Predicted values of (−output, output), shape (T, m, 2).
         target: Their unit coordinates, shape (T, m, 2, d).
     """
 
-    def __init__(self, storage: Storage, box: tuple[Array, Array], tolerance: float) -> None:
-        self.storage, self.box, self.tolerance = storage, box, tolerance
+    def __init__(self, storage: Storage, box: tuple[Array, Array], points: Array) -> None:
+        self.storage, self.box = storage, box
         self.reach = REACH * np.maximum((box[1] - box[0]) / 2, 1e-300)
-        self.predicted = storage.top.copy()
-        self.target = np.zeros((*storage.top.shape, len(box[0])))
+        self.sampled, index = largest_values(storage.flow, points)
+        self.sampled_at = points[index]
+        self.predicted, self.target = storage.top.copy(), np.zeros(self.sampled_at.shape)
         if len(storage):
-            self.predict(tuple(np.indices(storage.top.shape).reshape(3, -1)))
+            self.predict(storage.all_places)
+
+    @property
+    def gains(self) -> Array:
+        """Predicted gains over the stored graphs, shape (T, m, 2)."""
+        return np.asarray(np.maximum(self.predicted, self.sampled) - self.storage.top)
 
     def predict(self, places: Places) -> None:
         """Set the predictions at places from the Taylor models of the best graphs there."""
@@ -202,27 +245,37 @@ class _Level:
             optima = self.storage.predicted(places, self.box, maximise, reach=self.reach)
             self.predicted[places], self.target[places] = optima
 
-    def proposals(self, count: int) -> Array:
+    def proposals(self, least: Array, count: int) -> Array:
         """Return the points of largest predicted gain, one per window of time, (≤ count, d).
 
-        A gain must exceed the tolerance; points near stored or other new ones are left out.
+        A gain must exceed the `least` of its place; points near stored or other new ones are left
+        out.
         """
-        chosen, top = list[Array](), self.storage.top
-        windows = np.array_split(np.arange(len(top)), max(1, min(count, len(top))))
+        chosen, gains = list[Array](), self.gains / least
+        windows = np.array_split(np.arange(len(gains)), max(1, min(count, len(gains))))
         for window in windows:
-            gains = (self.predicted - top)[window] / self.storage.flow.scale[:, None]
-            for k in np.argsort(-gains, axis=None)[:TRIES]:
-                t, o, side = np.unravel_index(k, gains.shape)
-                entry = (window[t], o, side)
-                if gains[t, o, side] <= self.tolerance:
+            for k in np.argsort(-gains[window], axis=None)[:TRIES]:
+                t, o, side = np.unravel_index(k, gains[window].shape)
+                place = (window[t], o, side)
+                if gains[place] <= 1:
                     break
-                point = np.clip(self.target[entry], *self.box)
+                is_sampled = self.sampled[place] > self.predicted[place]
+                point = (self.sampled_at if is_sampled else self.target)[place]
                 if self.storage.holds(point, near=1e-7):
-                    self.predicted[entry] = top[entry]  # the model was wrong
+                    self.predicted[place] = self.storage.top[place]  # the model was wrong
                 elif all(np.abs(point - neighbour).max() > SPACING for neighbour in chosen):
                     chosen.append(point)
                     break
         return np.array(chosen)[:count].reshape(-1, len(self.box[0]))
+
+
+def _size_of_graph(flow: UnitFlow) -> int:
+    """Return the largest number of values that a graph is computed from."""
+    count, states = len(flow.time), 0
+    if isinstance(flow.flow, LinearFlow):
+        states = 2 * len(frequencies(flow.flow.system))
+    # outputs at all nodes, and the powers of the step map within a block of nodes
+    return max(count * len(flow.outputs), (isqrt(count) + 1) * states**2)
 
 
 def smoothed_maximum(gap: Array) -> Array:

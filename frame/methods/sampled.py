@@ -1,4 +1,4 @@
-"""Envelope of a sample of each box: points of a Sobol sequence, denser towards the faces."""
+"""Sampled motions: the envelope of a quasi-random sample, and what one finds beyond bounds."""
 
 from __future__ import annotations
 
@@ -10,13 +10,20 @@ import numpy as np
 
 from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.envelope import Envelope
-from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.progress_bar import Progress
 from alphacut.fuzzy.refused import checked_number
 from alphacut.fuzzy.result import Nature
+from alphacut.fuzzy.sets.boxes import chebyshev_points, corners
 
 MAX_NUMBERS = 16e6
 """Most numbers of trajectories at a time: 128 MB."""
+BATCH = 256
+"""Most trajectories at a time."""
+SAMPLES = 64
+"""Independent points of a kind on each level."""
+SAFETY = 2.0
+"""Factor on what they find beyond the bounds, and on the gain that models still predict."""
 
 
 @dataclass(frozen=True)
@@ -25,14 +32,6 @@ class Sampled:
 
     Raises:
         RefusedError: No trajectory is asked for.
-
-    Example:
-        >>> from alphacut.frame import StoreyFrame, envelope
-        >>> from alphacut.fuzzy import Triangular
-        >>> frame = StoreyFrame(masses=[1e3], stiffness=[4e4], q0=[0.1])
-        >>> inputs = {"m1": Triangular(900, 1000, 1100)}
-        >>> str(envelope(frame, inputs, Sampled(samples=64), duration=0.5, step=0.1).nature)
-        'attained'
     """
 
     name: ClassVar[str] = "quasi-monte-carlo"
@@ -54,16 +53,16 @@ class Sampled:
         start_time, levels = time.perf_counter(), len(flow.boxes.alpha)
         shape = (levels, len(flow.time), len(flow.outputs), 2)
         bounds, at = np.full(shape, -np.inf), np.zeros((*shape, len(flow.boxes.names)))
-        chunk_size = int(np.clip(MAX_NUMBERS / (shape[1] * shape[2]), 1, 256))
         for done, level in enumerate(reversed(range(levels))):
             if level + 1 < levels:  # what a narrower box attains
                 bounds[level], at[level] = bounds[level + 1], at[level + 1]
             points = self.points(*flow.boxes.unit(level))
-            chunks = np.array_split(points, -(-len(points) // chunk_size))
-            for count, chunk in enumerate(chunks, start=1):
-                update_bounds(flow.values(chunk), chunk, bounds[level], at[level])
+            for number, chunk in enumerate(np.array_split(points, -(-len(points) // BATCH))):
+                values, index = largest_values(flow, chunk)
+                better = values > bounds[level]
+                bounds[level][better], at[level][better] = values[better], chunk[index][better]
                 if progress:
-                    progress((done + count / len(chunks)) / levels)
+                    progress((done + number * BATCH / len(points)) / levels)
         return flow.envelope(
             bounds,
             at,
@@ -74,17 +73,49 @@ class Sampled:
         )
 
 
-def update_bounds(values: Array, points: Array, bounds: Array, at: Array) -> None:
-    """Update attained bounds and their inputs in place by a batch of trajectories.
+def independent_excess(flow: UnitFlow, bounds: Array, progress: Progress) -> tuple[Array, int]:
+    """Return how far outputs of an independent sample exceed the bounds on each level.
 
     Args:
-        values: Outputs, shape (S, T, m).
-        points: Their unit coordinates, shape (S, d).
-        bounds: Largest values of (−output, output) so far, shape (T, m, 2).
-        at: Unit coordinates of these, shape (T, m, 2, d).
+        flow: The motion and its boxes.
+        bounds: Upper bounds of (−output, output), shape (A, T, m, 2).
+        progress: Called with the completed fraction.
+
+    Returns:
+        Largest excess of each output over time, shape (A, m), and the number of motions.
     """
-    signed = np.stack([-values, values], -1)
-    best = signed.argmax(0)  # trajectory of the largest value
-    largest = np.take_along_axis(signed, best[None], 0)[0]
-    better = largest > bounds
-    bounds[better], at[better] = largest[better], points[best][better]
+    largest, count = np.zeros((len(bounds), len(flow.outputs))), 0
+    for level in range(len(bounds)):
+        points = spread_points(*flow.boxes.unit(level), SAMPLES, 100_003 * (level + 1))
+        values, _ = largest_values(flow, points)
+        largest[level] = np.maximum((values - bounds[level]).max((0, 2)), 0.0)
+        count += len(points)
+        progress((level + 1) / len(bounds))
+    return largest, count
+
+
+def spread_points(lower: Array, upper: Array, count: int, skip: int) -> Array:
+    """Return points (S, d) of a box: `count` inside, on faces and edges, and of the corners each.
+
+    The first `skip` points of the sequence are left out.
+    """
+    d = len(lower)
+    inside, wide, ends = (chebyshev_points(d, count, skip=skip + k * count) for k in range(3))
+    ends = np.sign(ends) if 2**d > count else corners(-np.ones(d), np.ones(d))
+    points = np.concatenate([inside, np.clip(2 * wide, -1, 1), ends])
+    return np.asarray((lower + upper) / 2 + (upper - lower) / 2 * points)
+
+
+def largest_values(flow: UnitFlow, points: Array) -> tuple[Array, Rows]:
+    """Return the largest (−output, output) of motions, shape (T, m, 2), and which has it."""
+    largest: Array = np.full((len(flow.time), len(flow.outputs), 2), -np.inf)
+    index: Rows = np.zeros(largest.shape, np.int64)
+    size = int(np.clip(MAX_NUMBERS / largest.size, 1, BATCH))
+    for first in range(0, len(points), size):
+        values = flow.values(points[first : first + size])
+        signed = np.stack([-values, values], -1)
+        best = signed.argmax(0)
+        value = np.take_along_axis(signed, best[None], 0)[0]
+        better = value > largest
+        largest[better], index[better] = value[better], first + best[better]
+    return largest, index

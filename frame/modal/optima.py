@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array
-from alphacut.frame.modal.exact_response import ExactResponse
 from alphacut.frame.modal.model import ModalModel
 
-Response = ModalModel | ExactResponse
+Response = ModalModel
 NEAR, DECADES = 8, 8.0
 """One in how many fresh points lies near the faces, and how near: decades of the box's width."""
 

@@ -52,7 +52,7 @@ duration = "0.4 s"
 [envelope]
 fuzzy = ["E", "m1"]
 alpha = [0, 1]
-method = "search"
+method = "proof"
 duration = "0.4 s"
 step = "0.04 s"
 """

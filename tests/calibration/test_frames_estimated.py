@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from alphacut.frame import GraphFollower, ImprovedFollower, Search, envelope
+from alphacut.frame import GraphFollower, ImprovedFollower, envelope
 from alphacut.frame.structures.linear import frequencies
 from alphacut.fuzzy import Interval
 from alphacut.fuzzy.result import Nature
@@ -13,7 +13,7 @@ from tests.calibration.declared import Calibration, free_seed
 from tests.calibration.motions import exact_flow, judged, random_frame, reached
 
 TOLERANCE = 1e-3
-METHODS = [Search(TOLERANCE), GraphFollower(tolerance=TOLERANCE), ImprovedFollower(TOLERANCE)]
+METHODS = [GraphFollower(tolerance=TOLERANCE), ImprovedFollower(TOLERANCE)]
 
 
 def usual(rng):

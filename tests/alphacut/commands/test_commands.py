@@ -151,7 +151,7 @@ def test_debug_shows_the_traceback_and_what_is_done(tmp_path, capfd):
 
 
 @pytest.mark.parametrize(
-    ("method", "integrator", "status"), [("search", "exact", 1), ("graph-follower", "midpoint", 0)]
+    ("method", "integrator", "status"), [("auto", "exact", 1), ("graph-follower", "midpoint", 0)]
 )
 def test_a_tolerance_that_is_missed_fails_but_for_a_graph_follower(
     tmp_path, capfd, method, integrator, status

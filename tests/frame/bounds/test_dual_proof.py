@@ -250,7 +250,7 @@ def test_it_agrees_with_the_branch_and_bound():
             "dual",
             "dual succeeded; proof: its gap is wider than the tolerance",
         ),
-        (1e-2, {"dual": 1.0, "proof": 0.5}, "proof", "proof and search"),
+        (1e-2, {"dual": 1.0, "proof": 0.5}, "proof", "proof and improved-graph-follower"),
     ],
 )
 def test_auto_takes_the_cheaper_proof_that_is_near_enough(share, gaps, method, why, monkeypatch):
