@@ -98,7 +98,7 @@ class ImprovedFollower:
         """
         start_time, passes, errors = time.perf_counter(), list[PassBounds](), np.empty(0)
         asked = np.ones((len(flow.boxes.alpha), len(flow.time), len(flow.outputs), 2), bool)
-        limit = self.tolerance * flow.scale[:, None]
+        limit = self._limit(flow)
         predicted, is_stopped = np.zeros(asked.shape), False
         while len(passes) < 2 or (len(passes) < MOST_PASSES and asked.any()):
             # progress of two passes, and by halves of the remainder for further ones
@@ -189,9 +189,13 @@ class ImprovedFollower:
         """Return the gain of each bound that is worth a graph, shape (T, m, 2)."""
         top = storage.top
         near_peak = top >= (1 - NEAR_PEAK) * np.maximum(top.max(0), 0.0)
-        share = np.where(near_peak, PEAK_SHARE, 1.0)
-        least = self.tolerance * storage.flow.scale[:, None] * share
+        least = self._limit(storage.flow) * np.where(near_peak, PEAK_SHARE, 1.0)
         return np.where(asked, np.maximum(least, LEAST_GAIN * storage.flow.peak[:, None]), np.inf)
+
+    def _limit(self, flow: UnitFlow) -> Array:
+        """Return the gain of each output that is left aside, shape (m, 1), rounding at least."""
+        allowed = np.maximum(self.tolerance * flow.scale, LEAST_GAIN * flow.peak)
+        return np.asarray(allowed[:, None])
 
 
 @dataclass(eq=False)
