@@ -255,7 +255,7 @@ def test_it_agrees_with_the_branch_and_bound():
 )
 def test_auto_takes_the_cheaper_proof_that_is_near_enough(share, gaps, method, why, monkeypatch):
     own = auto._gap
-    monkeypatch.setattr(auto, "_gap", lambda proved: gaps.get(proved.method, own(proved)))
+    monkeypatch.setattr(auto, "_gap", lambda found, flow: gaps.get(found.method, own(found, flow)))
     model = storeys(4, damping_ratio=0.03, v0=(0.0, 0.0, 0.0, 0.3), outputs=("drift1",))
     fuzzy = {f"k{z + 1}": near(1.2e8, 0.04) for z in range(4)}
     way = Auto(share, peaks=True)
