@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from math import ceil, inf, log2
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 import numpy as np
 
@@ -23,7 +23,6 @@ from alphacut.frame.calculus.jet import Array, Jet, concatenate, inverse
 from alphacut.frame.structures.linear import Matrices
 from alphacut.frame.structures.loads import History
 from alphacut.frame.structures.modes import state_matrix
-from alphacut.fuzzy.arrays import Rows
 
 SAME = 1e-12
 """Distance of a sample from a node, as a share of the step, that is rounding."""
@@ -195,36 +194,39 @@ def substeps_of(fastest: float, step: float) -> int:
     return substeps
 
 
-class Segments(NamedTuple):
-    """A load over equal steps from t = 0 on, cut at all nodes and samples into L segments.
+@lru_cache(maxsize=8)
+def load_moments(history: History, step: float, count: int, order: int) -> Array:
+    """Return ∫ s^k f dt of a load f over each of `count` steps, k < `order`, shape (count, order).
 
-    Args:
-        step: Step in which each segment lies, rising from 0, shape (L,).
-        start: Time from the beginning of its step, shape (L,), in s.
-        length: Shape (L,), in s.
-        first: Load just after its beginning, without a sine, shape (L,).
-        last: Load just before its end, shape (L,); it is linear between.
+    s falls from 1 at a step's beginning to 0 at its end.
     """
-
-    step: Rows
-    start: Array
-    length: Array
-    first: Array
-    last: Array
-
-
-def load_segments(history: History, step: float, count: int) -> Segments:
-    """Return the segments of a load over `count` steps of length `step`."""
+    # segments between neighbouring nodes and samples: their steps, rising, and times in these
     samples = history.start + np.arange(len(history.samples)) * history.step
     nearest = np.round(samples / step)
     inner = (np.abs(samples - nearest * step) > SAME * step) & (samples < count * step)
     home = np.concatenate([np.arange(count), np.floor(samples[inner] / step).astype(int)])
     start = np.concatenate([np.zeros(count), samples[inner] - home[count:] * step])
-    order = np.lexsort((start, home))
-    home, start = home[order], start[order]
+    in_time = np.lexsort((start, home))
+    home, start = home[in_time], start[in_time]
     end = np.append(start[1:], 0.0)
     end[np.append(np.diff(home) > 0, True)] = step
-    return Segments(home, start, end - start, *_end_values(history, home * step, start, end))
+    first, last = _end_values(history, home * step, start, end)
+    # Gauss quadrature in each, exact, with a sine to round-off
+    points, weights = np.polynomial.legendre.leggauss(
+        order // 2 + 1 + (SINE_POINTS if history.frequency else 0)
+    )
+    share, length = (points + 1) / 2, (end - start)[:, None]
+    since = start[:, None] + length * share
+    load = first[:, None] * (1 - share) + last[:, None] * share
+    if history.frequency:
+        load = load * history.wave(home[:, None] * step + since)
+    load = load * (length / 2 * weights)
+    first_segment = np.searchsorted(home, np.arange(count))  # of each step
+    moments: Array = np.empty((count, order))
+    for k in range(order):
+        moments[:, k] = np.add.reduceat(load.sum(1), first_segment)
+        load = load * (1 - since / step)
+    return moments
 
 
 def _end_values(history: History, node: Array, start: Array, end: Array) -> tuple[Array, Array]:
@@ -237,41 +239,6 @@ def _end_values(history: History, node: Array, start: Array, end: Array) -> tupl
     outside = np.where(is_after & np.array(history.is_held), a[-1], 0.0)
     first, last = (a[k] + slope * (node + x - history.start - k * h) for x in (start, end))
     return np.where(is_sampled, first, outside), np.where(is_sampled, last, outside)
-
-
-def absolute_integrals(history: History, step: float, count: int) -> Array:
-    """Return ∫ |f| dt over each of `count` steps, shape (count,); an upper bound with a sine."""
-    segments = load_segments(history, step, count)
-    a, b = np.abs(segments.first), np.abs(segments.last)
-    crosses_zero = segments.first * segments.last < 0  # then |f| is two triangles
-    triangles = (a**2 + b**2) / np.where(crosses_zero, a + b, 1.0)
-    mean = np.where(crosses_zero, triangles, a + b) / 2
-    return np.bincount(segments.step, segments.length * mean, count)
-
-
-@lru_cache(maxsize=8)
-def load_moments(history: History, step: float, count: int, order: int) -> Array:
-    """Return ∫ s^k f dt of a load f over each of `count` steps, k < `order`, shape (count, order).
-
-    s falls from 1 at a step's beginning to 0 at its end.
-    """
-    segments = load_segments(history, step, count)
-    # exact, with a sine to round-off
-    points, weights = np.polynomial.legendre.leggauss(
-        order // 2 + 1 + (SINE_POINTS if history.frequency else 0)
-    )
-    share = (points + 1) / 2  # of a segment
-    since = segments.start[:, None] + segments.length[:, None] * share
-    load = segments.first[:, None] * (1 - share) + segments.last[:, None] * share
-    if history.frequency:
-        load = load * history.wave(segments.step[:, None] * step + since)
-    load = load * (segments.length[:, None] / 2 * weights)
-    first_segment = np.searchsorted(segments.step, np.arange(count))  # of each step
-    moments: Array = np.empty((count, order))
-    for k in range(order):
-        moments[:, k] = np.add.reduceat(load.sum(1), first_segment)
-        load = load * (1 - since / step)
-    return moments
 
 
 def linear_loads(loads: Sequence[History], step: float, count: int) -> Array:
