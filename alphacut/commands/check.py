@@ -13,8 +13,7 @@ from alphacut.case.loads import RecordsSection
 from alphacut.case.structure import Structure
 from alphacut.case.types import Section
 from alphacut.commands.options import Command, add_common, write_answer
-from alphacut.commands.pipeline import cut_record_warnings, require_runnable
-from alphacut.commands.results import read_case
+from alphacut.commands.pipeline import cut_record_warnings, read_case, require_runnable
 from alphacut.frame import MatrixStructure, StoreyFrame
 from alphacut.frame.structures.linear import frequencies
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal, Triangular

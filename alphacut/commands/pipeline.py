@@ -1,23 +1,29 @@
-"""The stages of a case, one after the other; and what they need, so that `check` refuses it too."""
+"""The case and results of a command; the stages of a case, one after the other, and their needs."""
 
 from __future__ import annotations
 
+import argparse
 import re
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from alphacut import frame
 from alphacut.case.content import Content
 from alphacut.case.limits import QuestionSection
+from alphacut.case.load import Case, load
 from alphacut.case.loads import RecordsSection
 from alphacut.case.structure import Structure
+from alphacut.commands.options import require_case_petsc
 from alphacut.frame.questions.peaks import Peaks, output_of
 from alphacut.fuzzy import Crisp, FuzzyNumber, Triangular
 from alphacut.fuzzy.refused import RefusedError, require
-from alphacut.io.files import Document, say
+from alphacut.io.files import Document, locked, rank, require_writable, say
+from alphacut.io.results import MANIFEST, ResultsFolder
 from alphacut.questions.decision import decide
 from alphacut.questions.fragility import fragility
 from alphacut.questions.probability import probability
@@ -34,6 +40,40 @@ from alphacut.stochastic.sections import Simulated
 
 if TYPE_CHECKING:
     import xarray
+
+
+def read_case(options: argparse.Namespace) -> Case:
+    """The case file that the options name, with the changes of ``--set``."""
+    case = load(options.case, options.set)
+    require_case_petsc(options.petsc, case.content)
+    return case
+
+
+@contextmanager
+def open_results(
+    options: argparse.Namespace, folder: str = ""
+) -> Iterator[tuple[Case, StageStore]]:
+    """Yields the case and the store of its results, whose folder is locked during the block.
+
+    `folder` is that of the results where ``--out`` is left out; empty to write nothing.
+    """
+    allowed = "a whole number 1 or more"
+    require(options.workers >= 1, "--workers", value=options.workers, allowed=allowed)
+    case, path = read_case(options), options.out or folder
+    fresh = getattr(options, "fresh", False)
+    store = StageStore(None, case.text, fresh, options.quiet, options.workers)
+    if not path:
+        yield case, store
+        return
+    require_writable("--out", path, folder=True)
+    with locked("--out", Path(path)) if rank() == 0 else nullcontext():
+        results = ResultsFolder.read(Path(path))
+        if results.is_damaged:
+            say(f"warning: {results.path / MANIFEST} is damaged; everything is computed anew")
+        if fresh and rank() == 0:
+            results.clear()
+        yield case, replace(store, folder=results)
+
 
 QUESTIONS: dict[str, Callable[[Any, FuzzyResponse], Answer]] = {
     "probability": probability,

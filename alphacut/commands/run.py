@@ -12,8 +12,7 @@ import pandas as pd
 
 from alphacut.case.load import Case
 from alphacut.commands.options import Command, add_quiet, add_run, write_answer
-from alphacut.commands.pipeline import Pipeline
-from alphacut.commands.results import open_results
+from alphacut.commands.pipeline import Pipeline, open_results
 from alphacut.figures.all import draw_figures
 from alphacut.fuzzy.campaign.workers import pool
 from alphacut.fuzzy.refused import require

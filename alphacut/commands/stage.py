@@ -13,8 +13,7 @@ from alphacut.commands.options import (
     add_run,
     write_answer,
 )
-from alphacut.commands.pipeline import Pipeline
-from alphacut.commands.results import open_results, read_case
+from alphacut.commands.pipeline import Pipeline, open_results, read_case
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from alphacut.export.mesh import draw_mesh
-from alphacut.figures import answers, envelope, follower, frame, fuzzy_numbers, material, overview
+from alphacut.figures import answers, envelope, follower, frame, material, overview
 from alphacut.fuzzy import FuzzyNumber, PiecewiseLinear
 from alphacut.fuzzy.campaign.workers import submit
 from alphacut.io.provenance import NESTED, version_of
@@ -59,9 +59,9 @@ def _material_figures(results: Results) -> Iterator[Drawing]:
             effective = PiecewiseLinear(tuple(data.numbers.alpha), *map(tuple, bounds))
             yield (
                 "fig36-fuzzy-numbers",
-                partial(fuzzy_numbers.kinds_of_numbers, inclusion, effective),
+                partial(overview.kinds_of_numbers, inclusion, effective),
             )
-            yield "fig37-alpha-cuts", partial(fuzzy_numbers.alpha_cuts, inclusion)
+            yield "fig37-alpha-cuts", partial(overview.alpha_cuts, inclusion)
     if (data := results.modulus) is not None:
         yield "fig16-stress-curves", partial(material.stress_curves, data.arrays)
         yield "fig17-mean-stress", partial(material.mean_stress, data.arrays)

@@ -1,4 +1,4 @@
-"""The paper's first figures: the three domains of the cell (Fig. 1) and the chain (Fig. 2)."""
+"""The paper's own figures: domains (Fig. 1), stages (Fig. 2), fuzzy numbers (Figs. 36, 37)."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ import numpy as np
 
 from alphacut.figures import style
 from alphacut.figures.style import Look
-from alphacut.fuzzy import FuzzyNumber
+from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal
 from alphacut.fuzzy.arrays import Array, Mask, Rows
+from alphacut.io.quantity import axis_prefix
 from alphacut.rve.cell.cell import Cell
 from alphacut.stages.results import Results
 from alphacut.stochastic.figures.style import BLUE, INK, ORANGE, PURPLE
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from alphacut.rve.mesh.prism_grid import PrismGrid
 
 MATRIX, PARTICLE = "#f6d9b8", "#b79ad9"
+
 BOX_WIDTH, PITCH = 2.4, 3.3
 """Width of a stage's box in Fig. 2, and distance of the boxes."""
 
@@ -181,3 +183,67 @@ def boxes_and_arrows(results: Results) -> tuple[list[tuple[str, list[str]]], lis
 def ends_and_modal(number: FuzzyNumber) -> list[float]:
     """Support and modal value of a fuzzy number, each once, rising."""
     return sorted({number.support.lower, number.modal, number.support.upper})
+
+
+CUTS = 6
+"""Levels in Fig. 37."""
+
+
+def number_of_each_kind(given: FuzzyNumber, result: FuzzyNumber) -> dict[str, FuzzyNumber]:
+    """A fuzzy number of each kind, by its name: four made of an input, and a computed result."""
+    half, three_quarters = given.cut(0.5), given.cut(0.75)
+    ends = (given.support.lower, *three_quarters, given.support.upper)
+    return {
+        "crisp": Crisp(given.modal),
+        "interval": Interval(*half),
+        "triangular": given,
+        "trapezoidal": Trapezoidal(*ends),
+        "piecewise linear": result,
+    }
+
+
+def kinds_of_numbers(given: FuzzyNumber, result: FuzzyNumber) -> Figure:
+    """Fig. 36: membership functions of crisp, interval, triangular … numbers, side by side.
+
+    Four are made of the particle's Young's modulus in Pa, `given`; the last is the cell's.
+    """
+    import matplotlib.pyplot as plt
+
+    numbers = number_of_each_kind(given, result)
+    figure, panels = plt.subplots(1, len(numbers), figsize=(11.0, 2.6), sharey=True)
+    for axes, (name, number) in zip(panels, numbers.items(), strict=True):
+        number.plot(axes, color=BLUE, lw=1.6)
+        margin = 0.15 * (number.support.width or given.support.width)
+        axes.set(
+            xlim=(number.support.lower - margin, number.support.upper + margin), ylim=(0, 1.08)
+        )
+        style.title(axes, name)
+        source = "E" if number.modal == result.modal else "E$_i$"
+        style.prefix_axis(axes, source, "Pa", across=True)
+    panels[0].set_ylabel("membership μ")
+    return figure
+
+
+def alpha_cuts(number: FuzzyNumber) -> Figure:
+    """Fig. 37: the particle's Young's modulus in Pa, a triangular number, in six α-cuts."""
+    figure, axes = style.figure()
+    alpha = np.linspace(0, 1, CUTS)
+    number.plot(axes, color=INK, lw=1.4)
+    factor, unit = axis_prefix(number.support.upper, "Pa")
+    for level in alpha:
+        cut = number.cut(float(level))
+        axes.plot(cut, [level, level], color=ORANGE, lw=2.5, marker="o", ms=4)
+        words = f"{factor * cut.lower:.4g} … {factor * cut.upper:.4g} {unit}"
+        axes.annotate(
+            f"α = {level:.1f}: {words}" if cut.width else f"α = {level:.1f}",
+            (cut.upper, level),
+            xytext=(8, 0),
+            textcoords="offset points",
+            va="center",
+            fontsize=8,
+        )
+    axes.set_xlim(right=number.support.upper + 0.35 * number.support.width)
+    style.membership_axes(axes, "")
+    axes.set_ylim(-0.06, 1.06)
+    style.prefix_axis(axes, "fuzzy Young's modulus of the particle E$_i$", "Pa", across=True)
+    return figure

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import xarray
 
-from alphacut.figures import envelope, fuzzy_numbers, material, overview, style
+from alphacut.figures import envelope, material, overview, style
 from alphacut.frame import StoreyFrame, propagation
 from alphacut.fuzzy import Triangular
 from alphacut.report.page import caption
@@ -134,7 +134,7 @@ def test_a_mesh_and_six_cuts_are_those_of_the_case():
     cell = Cell(Phase(20e9), Phase(80e9), HermiteMap(0.2, 0.1, 0.6, 0.1))
     with figure_style():
         plane, density, prisms = overview.domains(cell, 0.5, 3).axes
-        cuts = fuzzy_numbers.alpha_cuts(Triangular(75e9, 80e9, 85e9))
+        cuts = overview.alpha_cuts(Triangular(75e9, 80e9, 85e9))
     assert "3 layers" in density.get_title(loc="left")
     assert len(prisms.collections) == 4
     assert plane.get_title(loc="left") == "physical domain, θ = -1"
