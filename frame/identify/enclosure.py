@@ -42,13 +42,8 @@ def enclosure(
     """Return the corners of a box proved to contain all parameters that agree with the modes.
 
     Each side is bounded by linear programs, in at most `MAX_PASSES` passes over ever smaller boxes.
-
-    Args:
-        chain: The frame.
-        lower: Lower corner of the first box, logarithms of parameters over nominal values, shape
-            (d,).
-        upper: Upper corner.
-        modes: Ranges of the measured modes at a level.
+    `modes` are ranges of the measured modes at a level, `lower` and `upper` corners (d,) of the
+    first box: logarithms of parameters over nominal values.
 
     Returns:
         Lower and upper corner, shape (d,) each; None where no parameters agree.
@@ -79,10 +74,8 @@ def enclosure(
 class Relaxation(NamedTuple):
     """The linear program over a box, with the expressions to bound.
 
-    Args:
-        program: The program.
-        parameters: Expression of each log parameter, over its nominal value.
-        shapes: Expression of each amplitude that was not measured, by mode and floor.
+    They are each log parameter, over its nominal value, and the amplitudes that were not measured,
+    by mode and floor.
     """
 
     program: LinearProgram
@@ -236,14 +229,7 @@ class _Chains:
 
 @dataclass(frozen=True, eq=False)
 class LinearProgram:
-    """A x <= b with l <= x <= u.
-
-    Args:
-        rows: A, shape (r, v), sparse.
-        right: b, shape (r,).
-        lower: l, shape (v,), finite.
-        upper: u, shape (v,), finite.
-    """
+    """A x <= b, A of shape (r, v), with finite ends l <= x <= u."""
 
     rows: csr_array
     right: Array
@@ -269,19 +255,12 @@ class LinearProgram:
         return float(multipliers @ self.right + terms.sum() - ROUND_OFF * size)
 
     def empty(self) -> bool:
-        """Return True if it is proved that no x in the box satisfies A x <= b.
-
-        Phase one: the least t with A x − t <= b for some x is proved to be positive.
-        """
-        size = self.rows.shape[0]
-        phase_one = LinearProgram(
-            csr_array(hstack([self.rows, csr_array(-np.ones((size, 1)))])),
-            self.right,
-            np.append(self.lower, 0.0),
-            np.append(self.upper, 1e3),
-        )
+        """Return True if it is proved that no x in the box satisfies A x <= b."""
+        # phase one: the least t with A x − t <= b for some x is proved to be positive
+        rows = csr_array(hstack([self.rows, csr_array(-np.ones((self.rows.shape[0], 1)))]))
+        lower, upper = np.append(self.lower, 0.0), np.append(self.upper, 1e3)
         cost = np.append(np.zeros(len(self.lower)), 1.0)
-        return phase_one.least(cost) > 0
+        return LinearProgram(rows, self.right, lower, upper).least(cost) > 0
 
 
 @dataclass(eq=False)

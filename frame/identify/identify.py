@@ -125,13 +125,7 @@ def widest_cut(number: FuzzyNumber) -> Cut:
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """Opinions and claims on a frame's parameters and on its modes.
-
-    Args:
-        chain: The frame.
-        prior: Fuzzy number of each parameter of the chain.
-        measured: Measured modes, by rising number.
-    """
+    """Opinions and claims on a frame's parameters and on its modes, these by rising number."""
 
     chain: Chain
     prior: Mapping[str, FuzzyNumber]
@@ -162,14 +156,9 @@ class Evidence:
         return [mode.ranges(lambda x: self.cut(x, alpha)) for mode in self.measured]
 
     def violation(self, points: Array, modes: list[ModeCut]) -> Array:
-        """Return how far modes lie outside their measured ranges, in half widths; ≤ 0 inside.
+        """Return how far modes at parameters (S, d) lie outside ranges, in half widths.
 
-        Args:
-            points: Parameters, shape (S, d), in SI units.
-            modes: Ranges of the measured modes at a level.
-
-        Returns:
-            One column for each frequency and measured amplitude, shape (S, q).
+        There is one column for each frequency and measured amplitude, shape (S, q), ≤ 0 inside.
         """
         values, vectors = self.chain.modes(points)
         columns = []
@@ -284,9 +273,9 @@ class Identified:
             if not holds.all():
                 sample = points[np.argmin(holds.all(1))]
                 pairs = zip(self.names, map(float, sample), strict=True)
-                values_text = ", ".join(f"{x} = {y!r}" for x, y in pairs)
-                text = f"the proof is wrong: {what} that agree with the modes lie outside, at "
-                raise FailedError(text + values_text, "keep the case and report it")
+                at = ", ".join(f"{x} = {y!r}" for x, y in pairs)
+                text = f"the proof is wrong: {what} that agree with the modes lie outside, at {at}"
+                raise FailedError(text, "keep the case and report it")
 
     def _eigenvalues(self, row: int) -> tuple[Array, Array]:
         nominal = self.evidence.chain.nominal

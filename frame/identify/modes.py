@@ -96,9 +96,8 @@ def chain_modes(stiffness: Array, mass: Array) -> tuple[Array, Array]:
     Stiffnesses (S, n) are in N/m, masses (S, n) in kg.
     """
     root = np.sqrt(mass)
-    values, vectors = np.linalg.eigh(
-        chain_matrix(stiffness) / root[..., :, None] / root[..., None, :]
-    )
+    symmetric = chain_matrix(stiffness) / root[..., :, None] / root[..., None, :]
+    values, vectors = np.linalg.eigh(symmetric)
     return values, vectors / root[..., None]
 
 
@@ -168,14 +167,9 @@ class MeasuredMode:
 
 @dataclass(frozen=True)
 class ModeCut:
-    """Ranges of a mode at a level.
+    """Ranges of a mode at a level: of its eigenvalue ω², in 1/s², and of amplitudes by floor.
 
-    Args:
-        mode: Its number by rising frequency, from 1.
-        low: Least eigenvalue ω², in 1/s².
-        high: Greatest.
-        shape: Interval of the amplitude by floor, the reference included; empty where no shape was
-            measured.
+    The reference floor is among the amplitudes; there are none where no shape was measured.
     """
 
     mode: int
@@ -267,11 +261,6 @@ def _mean(values: Array, deviation: float | None, what: str, key: str) -> Claime
     # chi-squared test of the scatter against the deviation
     is_plausible = (count - 1) * (scatter / deviation) ** 2 <= chdtri(max(count - 1, 1), CHANCE)
     value, allowed = f"{deviation:.3g}", f"values that explain the scatter, {scatter:.3g}"
-    require(
-        is_plausible,
-        f"{what}: {key} times the mean",
-        value=value,
-        allowed=allowed,
-        cure="leave it out",
-    )
+    name = f"{what}: {key} times the mean"
+    require(is_plausible, name, value=value, allowed=allowed, cure="leave it out")
     return from_scatter(float(values.mean()), deviation, count)
