@@ -3,7 +3,7 @@
 Displacements oscillate in the parameters, the more the later; λ_k and C_k do not. With them as
 polynomials every trajectory, derivative and envelope follows without solving the equations of
 motion again: q(t; p) = 2 Re Σ_k C_k(p) w(t; λ_k(p)), with w = exp(λ t) of the start, and the
-response R(t; λ) of `ground_response` under a record.
+response R(t; λ) of `load_tables` under a record.
 """
 
 from __future__ import annotations

@@ -11,6 +11,7 @@ from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.response.duhamel import (
     ERROR_OF_INTEGRALS,
     FROM_RECURRENCE,
+    absolute_moments,
     error_of_integrals,
     linear_pieces,
     responses_at_given_nodes,
@@ -162,6 +163,19 @@ def test_windows_begin_at_rest(node_step, ground):
     free = np.exp(sigma * (time - time[before])[:, None]) * whole[0, before]
     assert np.allclose(found + free, whole[0], atol=1e-13 * np.abs(whole).max(), rtol=1e-11)
     assert (found[0] == 0).all()
+
+
+@pytest.mark.parametrize("decay", [-0.4, 0.0, 3.0])
+def test_absolute_moments_are_bounds_and_sharp(decay):
+    """Against sums over 200 parts of a sample's interval; the integral of |f| itself is exact."""
+    time, part = np.array([0.0, 0.03, 0.4, 1.0, 1.37, 1.6]), RECORD.step / 200
+    bounds = absolute_moments(decay, RECORD, time)
+    for t, found in zip(time[1:], bounds.T[1:], strict=True):
+        tau = (np.arange(round(t / part)) + 0.5) * part
+        force = np.abs(RECORD.values(t - tau))
+        true = (tau ** np.arange(5)[:, None] * np.exp(-decay * tau) * force).sum(-1) * part
+        assert (found >= true * (1 - 1e-4)).all()
+        assert found[0] <= (1.001 if decay == 0 else 1.2) * true[0]
 
 
 def test_nodes_stay_where_they_are():
