@@ -15,7 +15,8 @@ from pydantic import TypeAdapter
 
 import alphacut
 from alphacut.case.content import Content
-from alphacut.case.load import Case, load
+from alphacut.case.load import load
+from alphacut.case.parse import ParsedCase
 from alphacut.commands.pipeline import Pipeline
 from alphacut.entry import main
 from alphacut.frame.questions.peaks import Peaks
@@ -181,7 +182,7 @@ def test_the_case_reaches_few_files(tmp_path):
         if code.co_qualname == "CellTask.__call__" and not before:
             before.append(len(files))
         held = sys._getframe(1).f_locals.values()
-        if any(isinstance(x, Case | Content | Pipeline | Results) for x in held):
+        if any(isinstance(x, ParsedCase | Content | Pipeline | Results) for x in held):
             files.append(name)
         return None
 

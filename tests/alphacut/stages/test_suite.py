@@ -147,8 +147,11 @@ def test_the_mean_over_records_lies_between_means_of_ends(tmp_path):
     path, out = written(tmp_path), tmp_path / "out"
     limits = 'limits = ["mean drift1 <= 9 mm"]'
     path.write_text(path.read_text() + f"\n[decision]\n{limits}\n", encoding="utf-8")
-    assert main(["run", str(path), "--out", str(out)]) == 0
+    asked = ["--set", "frame.outputs=['drift1', 'a1']"]
+    assert main(["run", str(path), "--out", str(out), *asked]) == 0
     summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    # what is asked for has peaks, limited or not
+    assert all(set(x["peak"]) == {"drift1", "a1"} for x in summary["records"]["records"].values())
     peak = summary["decision"]["limits"]["mean drift1"]["peak"]
     records = summary["records"]
     assert peak["proved"][0] == pytest.approx(
