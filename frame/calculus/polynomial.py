@@ -9,7 +9,6 @@ from math import comb
 
 import numpy as np
 
-from alphacut.frame.calculus.jet import Jet
 from alphacut.frame.calculus.monomials import count, exponents
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.fuzzy.arrays import Array
@@ -147,37 +146,3 @@ class Polynomial:
         counts = (terms(d, max(degree - k, 0)) for k in (1, 2))
         arrays_and_counts = zip(derivatives, counts, strict=True)
         return [x[:, :n].swapaxes(0, 1).reshape(n, -1) for x, n in arrays_and_counts]
-
-
-def fit(u: Array, data: Jet, degree: int) -> Polynomial:
-    """Fits K polynomials of total `degree` to values and derivatives by least squares.
-
-    Derivatives of order k weigh 1 / degree^k, which is how they grow with the degree.
-
-    Args:
-        u: Points of the unit box, shape (S, d).
-        data: Values, gradients and Hessians there, shape (S, K).
-        degree: Total degree.
-    """
-    index = np.concatenate([exponents(u.shape[1], k) for k in range(degree + 1)])
-    d, w = u.shape[1], 1 / max(degree, 1)  # w: weight of slopes, w² of second derivatives
-    B = basis(u, index)
-    pairs = [(i, j) for i in range(d) for j in range(i, d)]
-    slopes = [_differentiated(B, index, (i,)) for i in range(d)]
-    curves = [_differentiated(B, index, pair) for pair in pairs]
-    design = np.vstack([B, *(w * x for x in slopes), *(w * w * x for x in curves)])
-    second = [data.second[pair] for pair in pairs]
-    values = np.vstack([data.value, *(w * x for x in data.first), *(w * w * x for x in second)])
-    column_norms = np.linalg.norm(design, axis=0)
-    q, r = np.linalg.qr(design / column_norms)
-    solution = np.linalg.solve(r, product(q.T, values)) / column_norms[:, None]
-    return Polynomial(index, solution)
-
-
-def _differentiated(B: Array, index: Index, axes: tuple[int, ...]) -> Array:
-    """Values (S, terms) of the monomials' derivatives along `axes`, from their values B."""
-    position, factor = np.arange(len(index)), np.ones(len(index))
-    for axis in axes:
-        factor = factor * index[position, axis]
-        position = lowered(index.tobytes(), index.shape, axis)[position]
-    return B[:, position] * factor
