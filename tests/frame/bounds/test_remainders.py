@@ -258,3 +258,21 @@ def test_forms_of_inverses_stay_within_their_rests(order):
         off = np.abs(x @ np.linalg.inv(a) @ y.T - found.at(u[None])[0])
         shares.append((off / found.remainder).max())
     assert 3e-3 <= max(shares) <= 1
+
+
+def test_tables_of_the_dual_have_the_rounding_of_all_sums_they_enter():
+    _, _, _, _, structure = frame(2, ground=RECORD)
+    time, sources = np.arange(0, 2, 0.1), ("load", "velocity")
+    level = LevelModels.from_structure(structure, {"load": RECORD}, time, sources)
+    unit, d = np.finfo(float).eps / 2, 4
+    # a term enters sums over all variables, over pairs and single inputs, and over sources
+    count = 2 * len(level.oscillators) * (len(sources) + 2)
+    count += 2 * d**2 + 4 * d + 4 * len(sources) + 32
+    for k, grid in enumerate(level.tables.grids):
+        alone = Oscillators(grid, {"load": RECORD}, time)
+        for s, source in enumerate(sources):
+            response = alone.responses(source, 0)
+            added = level.tables.error[0][k, s] - response.error
+            size = np.abs(response.value).max((1, 2))
+            assert (added >= 1.9 * count * unit * size - 1e-18).all()
+            assert (added <= 2.1 * count * unit * size + 1e-18).all()
