@@ -21,10 +21,6 @@ ADDED = ("boxes", "evaluations")
 class Hull:
     """Bounds of (−output, output) on A levels, at T nodes, of m outputs, from those of boxes.
 
-    Args:
-        problem: Motion of the structure, and the levels' boxes.
-        flow: Its exact motion.
-
     Attributes:
         closed: Proved upper bounds of closed boxes, shape (A, T, m, 2).
         inner: Largest reached values, the same shape.

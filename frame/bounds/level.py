@@ -140,13 +140,8 @@ class LevelModels:
     ) -> LevelModels:
         """Models of a structure's motion over its box, and the response tables of its oscillators.
 
-        Args:
-            structure: The structure.
-            loads: Histories by name.
-            time: Nodes, shape (T,), in s.
-            sources: Names of what moves the structure.
-            allowed: Truncation error of each output that is allowed, shape (m,);
-                None to enclose as many modes as possible.
+        `allowed` is the truncation error of each output that is allowed, (m,); None to enclose as
+        many modes as possible.
 
         Raises:
             UnprovedError: None of its modes can be enclosed.

@@ -106,16 +106,9 @@ def bound_node(
 ) -> None:
     """Write the upper bound of side × output at one node, by best-first bisection of cells.
 
-    Args:
-        node: Node.
-        side: +1 or −1.
-        effort: When to stop.
-        constant: Added to the model's value for the motion's, and to both for the bound, (2,).
-        data: Models and tables of the output.
-        cells: Scratch.
-        mu: Multipliers to begin with; written: those of the undivided tables, shape (Z,).
-        u: Inputs to begin with; written: those of the largest model value, shape (L,).
-        out: Written: the bound and the largest model value, shape (2,).
+    `out` takes the bound and the largest model value, `u` (L,) the inputs of the latter and `mu`
+    (Z,) the multipliers of the undivided tables; the last two are where the search begins.
+    `constant` (2,) is that of the node, and `cells` is scratch.
     """
     cells.ends[0], cells.mu[0], cells.value[0] = data.ends.astype(np.int64), mu, np.inf
     model_value = ascend(u, node, side, data, effort.ascents)

@@ -102,11 +102,7 @@ def prove(proof: BoxProof, flow: UnitFlow, progress: Progress | None = None) -> 
 
 
 class Queue:
-    """Open boxes, best first, and the hull of the closed ones.
-
-    Args:
-        proof: Bounds the outputs over a box.
-        problem: Motion of a linear structure, and the levels' boxes, A of them.
+    """Open boxes, best first, and the hull of the closed ones, on A levels.
 
     Attributes:
         number: Boxes that a peak was bounded on, shape (A, m, 2).
@@ -395,12 +391,8 @@ def _axis(boxes: Boxes, votes: Array) -> int:
 
 
 def halvings(shares: Array, parts: int) -> Array:
-    """Return the mean number of bisections of an input, weighted by its share of a gap.
+    """Return the mean number of bisections of an input, weighted by its share of a gap (…, n).
 
     The log2(parts) bisections are distributed in proportion to the shares; 1 if all are zero.
-
-    Args:
-        shares: Fraction of each input in a gap, shape (…, n), their sum 1.
-        parts: Number of boxes.
     """
     return np.where(shares.any(-1), np.log2(parts) * (shares**2).sum(-1), 1.0)
