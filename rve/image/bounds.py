@@ -46,6 +46,7 @@ class StiffnessBounds:
 
     def young(self, average: str = AXES) -> Ends:
         """Lower and upper bound of Young's modulus E = 3 G − G²/K of an average, in Pa."""
+        # E rises with K; with G it rises up to G = 3/2 K and falls beyond
         (min_shear, max_shear), (min_bulk, max_bulk) = self.shear(average), self.bulk
         low = min(
             _young(shear, min_bulk) - _young_rounding(shear, min_bulk)
@@ -107,6 +108,7 @@ def inverse_above(matrix: Array) -> Array:
 
 def _inverse(matrix: Array) -> tuple[Array, Array]:
     """Computed symmetric inverse (…, n, n), and a bound of the norm of its error, (…, 1, 1)."""
+    # with R = I − X·matrix the true inverse is off by at most ‖R‖‖X‖/(1 − ‖R‖)
     inverse = np.linalg.inv(matrix)
     inverse = (inverse + np.swapaxes(inverse, -1, -2)) / 2
     residual_norm = residual_above(inverse, matrix).sum(axis=-1).max(axis=-1)

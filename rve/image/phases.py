@@ -1,6 +1,4 @@
-"""Elastic moduli of the phases of an image, as values and as intervals.
-
-Images of moduli, least and greatest, from phases that are not certain.
+"""Moduli of the phases of an image, and images of the least and the greatest moduli.
 
 The stiffness of a composite grows in the Loewner order with the tensor of every point. So the image
 of the least K + G/3 and the least G of each pixel, over all phases it may be and all moduli that
@@ -61,12 +59,7 @@ class PlaneModuli:
 
 @dataclass(frozen=True)
 class ModuliInterval:
-    """All materials between two.
-
-    Args:
-        lower: Least moduli.
-        upper: Greatest moduli, none below its least.
-    """
+    """All materials between the least and the greatest moduli."""
 
     lower: PlaneModuli
     upper: PlaneModuli
@@ -74,6 +67,7 @@ class ModuliInterval:
     @classmethod
     def of_young(cls, modulus: tuple[float, float], poisson: tuple[float, float]) -> ModuliInterval:
         """Least and greatest plane bulk and shear modulus over intervals of E (Pa) and of ν."""
+        # K + G/3 = E/(2 (1 + ν) (1 − 2 ν)) is convex in ν; G decreases
         (young_low, young_high), (nu_low, nu_high) = modulus, poisson
         nu_softest = min(max(nu_low, NU_AT_LEAST_BULK), nu_high)
         least_bulk = PlaneModuli.of_young(young_low, nu_softest).bulk
@@ -110,10 +104,7 @@ class ModuliImages:
 def threshold_ranges(grey: Array, thresholds: Sequence[tuple[float, float]]) -> tuple[Rows, Rows]:
     """Least and greatest number of the phase that each pixel may be of, (rows, columns) each.
 
-    Args:
-        grey: Grey values, shape (rows, columns).
-        thresholds: Least and greatest value of each threshold, rising; a pixel is of phase k if k
-            thresholds are ≤ its grey value.
+    A pixel is of phase k if k of the thresholds (least, greatest), rising, are ≤ its grey value.
     """
     least, greatest = np.array(thresholds).reshape(-1, 2).T
     first = np.searchsorted(greatest, grey, side="right")

@@ -28,13 +28,7 @@ MIRRORED = [0, 2, 1, 3, 5, 4, 7, 6, 8, 9, 11, 10, 13, 12, 14]
 
 
 def read_grid(path: Path | str) -> PrismGrid:
-    """Read the extruded prisms of a Gmsh file; nodes keep their positions, numbered by level.
-
-    Raises:
-        RefusedError: The file is none of Gmsh.
-        MeshError: It holds no extruded prisms with named phases over the cell [−1, 1]², or nodes of
-            a side have no partners on one of the levels.
-    """
+    """Extruded prisms of a Gmsh file, where they are, numbered by level; MeshError if no cell."""
     with square.model() as gmsh:
         try:
             gmsh.open(str(path))

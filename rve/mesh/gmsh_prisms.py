@@ -2,8 +2,6 @@
 
 Gmsh triangulates the cell and extrudes it along θ. Its 15-node prisms ("Prism 15", type 18) have
 Basix's order of nodes. Physical groups name phases, sides and the two ends of θ.
-
-Orders of the nodes of a quadratic wedge in other programs, from that of Basix.
 """
 
 from __future__ import annotations

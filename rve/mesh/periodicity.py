@@ -28,10 +28,7 @@ class MeshError(FailedError):
 class Periodicity:
     """Unknowns of a planar mesh after identification, vertices before edge midpoints.
 
-    Args:
-        unknown: Unknown of each planar node, −1 at the corners, shape (n,).
-        vertices: Number of unknowns on vertices.
-        count: Number of unknowns in all.
+    `unknown` of each planar node, −1 at the corners, (n,); `vertices` and `count` in all.
     """
 
     unknown: Rows

@@ -1,6 +1,4 @@
-"""Planar mesh under the prisms, at a reference radius.
-
-Prism mesh of the product space: the planar mesh extruded over θ around the cone.
+"""Prism mesh of the product space: a planar mesh at a reference radius, extruded over θ.
 
 Nodes are numbered level by level: on each of the layers + 1 levels of θ all planar nodes, then,
 half-way between levels, the planar vertices (a serendipity wedge has no midpoints there).
@@ -25,12 +23,7 @@ RING_THICKNESS = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Ring:
-    """Interphase around a round particle in a planar mesh.
-
-    Args:
-        thickness: In this mesh, in halves of the cell's side.
-        nodes: Whether a node belongs to it, its edges included, shape (n,).
-    """
+    """Interphase in a planar mesh: its thickness, and the mask of its nodes, (n,)."""
 
     thickness: float
     nodes: Mask

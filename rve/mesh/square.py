@@ -60,15 +60,14 @@ def surfaces(
 ) -> dict[int, list[int]]:
     """Add the cell's geometry to the current Gmsh model; return its surfaces by phase number.
 
+    Matrix 0, particle 1, interphase 2; absent phases have no key.
+
     Args:
         size: Edge length of elements, in halves of the cell's side.
         radius: Radius of the particle, 0 for none.
         outline: Outline of the particle; with an interphase it is a circle.
         thickness: Thickness of the interphase around it, 0 for none.
         sizes: Edge length at (x1, x2) for the arcs of the interphase; `size` if left out.
-
-    Returns:
-        Gmsh tags by phase: matrix 0, particle 1, interphase 2; absent phases have no key.
     """
     import gmsh
 
@@ -84,12 +83,7 @@ def surfaces(
 
 
 def edges(triangles: Rows, inside: Mask) -> tuple[Rows, Rows, Mask]:
-    """Edges of a triangulation and the mask of those between inside and outside.
-
-    Returns:
-        Vertices of each edge, (k, 2); edges of each triangle, (m, 3), in the order of `EDGES`; and
-        the mask, (k,).
-    """
+    """Vertices of edges, (k, 2), edges of triangles, (m, 3), and mask of the interface, (k,)."""
     vertex_pairs = np.sort(triangles[:, EDGES].reshape(-1, 2), axis=1)
     ends, number = np.unique(vertex_pairs, axis=0, return_inverse=True)
     number = number.reshape(-1, 3)

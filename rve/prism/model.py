@@ -150,10 +150,6 @@ class PrismModel:
     def problem(self, radius_map: RadiusMap, thickness: float = 0.0) -> PrismProblem:
         """Mesh and form for a radius map; cached, so that the next map moves the same mesh.
 
-        Args:
-            radius_map: Radius of the particle over θ.
-            thickness: Of the interphase, 0 for none.
-
         Raises:
             FoldedMeshError: The map bends more than the layers can follow.
             RefusedError: A radius does not fit into the cell.
@@ -255,11 +251,7 @@ def prism_result(
 ) -> HomogenisedStiffness:
     """Stress over θ, energies and checks (Hill–Mandel, symmetry, bounds), as measured.
 
-    Args:
-        strains: Of the slices.
-        phases: Materials.
-        loads: Macroscopic strains, shape (2 or 3, 3); three give the whole plane stiffness.
-        options: Linear solver.
+    `loads` are macroscopic strains, (2 or 3, 3); three give the whole plane stiffness.
     """
     stiffness = [phase.stiffness for phase in phases]
     stress, energy = strains.stress(stiffness), total_energy(strains.products, stiffness)

@@ -63,12 +63,8 @@ def modulus_basis(
 ) -> ModulusBasis:
     """Reduced basis of the solutions at two Chebyshev moduli of the particle, with its error.
 
-    Args:
-        problem: Mesh and form, moved to a map.
-        matrix: Phase outside the particle.
-        poisson: Of the particle.
-        ends: Least and greatest modulus of the particle, in Pa, not equal.
-        strains: Macroscopic strains, shape (loads, 3).
+    `ends` are the particle's least and greatest modulus in Pa, not equal, `poisson` its ratio,
+    `strains` macroscopic ones, shape (loads, 3).
     """
     low, high = ends
     phases = matrix.stiffness, Phase(high, poisson).stiffness

@@ -45,13 +45,7 @@ SAME_LEVEL = 1e-6
 
 @dataclass(frozen=True)
 class NamedPhases:
-    """Law and materials of a mesh.
-
-    Args:
-        law: Law of θ.
-        phases: Materials in the order of the mesh.
-        order: Number in the mesh of each material in the order of the user.
-    """
+    """Law and materials in the order of a mesh; `order` is that of the user's in the mesh."""
 
     law: FixedCell
     phases: tuple[AnyPhase, ...]
@@ -82,11 +76,8 @@ class _NamedModel:
                 "inclusion".
 
         Raises:
-            ConvergenceError: The linear solver stopped early.
-            CertificateError: A property that every right result has is violated.
             MeshError: The mesh is no cell of prisms.
-            RefusedError: Law or phases are not those of the mesh, or a Poisson's ratio is above
-                0.45.
+            RefusedError: Law or phases are not those of the mesh.
         """
         seconds: Seconds = {}
         with timed(seconds, "mesh"):
@@ -200,11 +191,7 @@ def _order_phases(law: FixedCell, names: Sequence[str], phases: object) -> Named
 
 
 def mesh_law(grid: PrismGrid, law: object) -> FixedCell:
-    """The law of θ for a mesh from a file, whose levels span its support.
-
-    Raises:
-        RefusedError: It has another support, or is no law.
-    """
+    """The law of θ for a mesh from a file, whose levels span its support, or a refusal."""
     assert grid.fixed is not None
     theta = grid.fixed[:, 2]
     low, high = theta.min(), theta.max()

@@ -36,20 +36,17 @@ class ProductSpace:
 
     Attributes:
         space: Displacements of two components in serendipity prisms.
-        dx: Measure of each phase by its name, "matrix" and "inclusion" or the physical groups of
-            the file, with the quadrature of the prisms.
+        dx: Measure of each phase by its name, with the quadrature of the prisms.
         density: f_Θ at the quadrature points.
 
     Raises:
-        RefusedError: The mesh of the model ignores the interface, so that no measure has phases,
-            or the law is not that of the file.
+        RefusedError: The mesh ignores the interface, so that no measure has phases.
         FoldedMeshError: The map bends more than the layers can follow.
 
     Example:
         >>> from alphacut.stochastic import HermiteMap
         >>> space = ProductSpace(PrismModel(0.5, 2), HermiteMap(0.2, 0.1, 0.6, 0.1))
-        >>> particle = space.mean(space.density * space.dx["inclusion"])
-        >>> 0.1 < particle < 0.15  # share of area, mean of π r² / 4
+        >>> 0.1 < space.mean(space.density * space.dx["inclusion"]) < 0.15  # mean of π r² / 4
         True
     """
 
@@ -102,10 +99,7 @@ class ProductSpace:
     ) -> Solutions:
         """Solve A x = b for each load, by default by conjugate gradients preconditioned along θ.
 
-        Args:
-            matrix: From `assemble_matrix`, symmetric positive definite.
-            loads: Right-hand sides b.
-            petsc_options: Options without their prefix `rve_`; the model's if left out.
+        `petsc_options` are without their prefix `rve_`; the model's if left out.
 
         Raises:
             RefusedError: The matrix is not symmetric, or PETSc does not use an option.

@@ -3,11 +3,10 @@
 In plane strain they are those of the inverse of C. Without stress along the fibres (generalised
 plane strain) they are those of the inverse of C − c cᵀ/C33 with c = (C13, C23, C63).
 
-What acts along the fibres, C13 and C33 of the cell, from its plane stiffness alone.
-
-With k the in-plane bulk modulus, l = C13 and n = C33 of the phases, Δ their differences and ⟨⟩
-their means by area, strains along the fibres and in the plane that leave both phases at one uniform
-strain (Hill, J. Mech. Phys. Solids 12, 199, 1964; Dvorak, Proc. R. Soc. A 431, 89, 1990) give
+C13 and C33 follow from the plane stiffness alone. With k the in-plane bulk modulus, l = C13 and
+n = C33 of the phases, Δ their differences and ⟨⟩ their means by area, strains along the fibres and
+in the plane that leave both phases at one uniform strain (Hill, J. Mech. Phys. Solids 12, 199,
+1964; Dvorak, Proc. R. Soc. A 431, 89, 1990) give
 
     (C13, C23, C63) = ⟨l⟩ (1, 1, 0) − z Δk Δl,   C33 = ⟨n⟩ − z̄ Δl²
     with C (1, 1, 0)/2 = ⟨k⟩ (1, 1, 0) − z Δk² and z̄ = (z1 + z2)/2

@@ -1,12 +1,11 @@
 """Constants of the cell as a material of aligned fibres, with their declared errors.
 
-With the in-plane bulk modulus k, l = C13 and n = C33 of `axial`
+With the in-plane bulk modulus k, l = C13 and n = C33 of `engineering_constants`
 
     E_L = n − l²/k,   ν_LT = l/(2 k),   1/E_T = 1/(4 G_T) + 1/(4 K_T) + ν_LT²/E_L
 
-G_T and K_T are those of the result's average, G_L is the shear modulus along the fibres.
-
-Shear modulus along the fibres of the square array, by Rayleigh's harmonic multipoles (1892).
+G_T and K_T are those of the result's average, G_L is the shear modulus along the fibres, of the
+square array by Rayleigh's harmonic multipoles (1892).
 """
 
 from __future__ import annotations

@@ -114,11 +114,9 @@ class PointStrains:
 
 
 def strain_products(strains: Array, weights: Array) -> Array:
-    """Integral of ε_a ⊗ ε_b over each phase, shape (phases, 3, fields, 3, fields).
+    """Integral of ε_a ⊗ ε_b over each phase, (phases, 3, fields, 3, fields).
 
-    Args:
-        strains: At n points, shape (n, 3, fields).
-        weights: Of the points in each phase, 0 outside it, shape (phases, n).
+    From strains at n points, (n, 3, fields), and weights in each phase, (phases, n).
     """
     fields = strains.shape[-1]
     flat = strains.reshape(-1, 3 * fields)

@@ -1,10 +1,8 @@
-"""PETSc options of the product-space cell, and how they are chosen.
+"""PETSc's solve of the reduced product-space system: options under one prefix, failure an error.
 
 The default is conjugate gradients with this project's preconditioner, for which ``pc_type python``
 stands. Options under the prefix ``-rve_`` override it, such as ``-rve_pc_type gamg``; those under
 ``-rve_level_`` are of the preconditioner's plane problems.
-
-PETSc's solve of the reduced product-space system: options under one prefix, failure an error.
 """
 
 from __future__ import annotations
@@ -118,7 +116,7 @@ def translations(matrix: PETSc.Mat) -> PETSc.NullSpace:
 
 @uninterrupted()
 def solve(ksp: PETSc.KSP, loads: Sequence[PETSc.Vec]) -> Solutions:
-    """Solve for each load; returns solutions, iterations and the largest true relative residual.
+    """Solve for each load.
 
     Raises:
         ConvergenceError: The tolerance was not reached, or a solution is not finite.

@@ -117,11 +117,7 @@ class LevelNumbering:
 
     @cached_property
     def pairs(self) -> Rows:
-        """Number p of each node's pair of displacements, unknowns 2p and 2p + 1, shape (nodes,).
-
-        It is −1 on the line along θ that is held. Nodes on all levels come first, then those
-        half-way between levels, above vertices alone.
-        """
+        """Number p of each node's pair of displacements, unknowns 2p and 2p + 1, −1 where held."""
         planar, layers = self.periodicity.unknown, self.grid.layers
         vertices = planar[: self.grid.plane.vertices]
         first_pair = np.arange(layers + 1)[:, None] * (self.stride // 2)  # of each level

@@ -109,6 +109,7 @@ def _dipoles(
     radius: Array, matrix: Material, inclusions: Sequence[Material], degree: int, *, shear: bool
 ) -> Array:
     """Force dipoles of n times m spheres over r³ under unit strains, shape (n, m, loads)."""
+    # singular amplitudes = T (regular amplitudes of the far field and of all images)
     poles = multipoles(degree, shear=shear)
     regular_scale, singular_scale = (radius[:, None] ** power for power in _powers(poles))
     images = couplings(degree, matrix.poisson, shear=shear)

@@ -1,14 +1,9 @@
-"""A stiffness of cubic symmetry, its three moduli and its isotropic average.
+"""Result of a cell with a sphere: cubic moduli, their isotropic average, and their bounds.
 
-Voigt order in three dimensions: 11, 22, 33, 23, 13, 12, shears with 2 ε.
-
-Bounds of the stiffness of two isotropic phases in three dimensions.
-
-Voigt and Reuss hold as matrices; Hashin and Shtrikman's (J. Mech. Phys. Solids 11, 127, 1963; with
-the extreme moduli of either phase, Walpole 1966) for the bulk modulus of any cubic or isotropic
-arrangement and for both moduli of an isotropic one.
-
-Result of a cell with a sphere: the plane's words, moduli in space.
+Voigt order in three dimensions: 11, 22, 33, 23, 13, 12, shears with 2 ε. Voigt and Reuss hold as
+matrices; Hashin and Shtrikman's (J. Mech. Phys. Solids 11, 127, 1963; with the extreme moduli of
+either phase, Walpole 1966) for the bulk modulus of any cubic or isotropic arrangement and for both
+moduli of an isotropic one.
 
 Stresses over θ are those of the plane loads, with ε33 = 0: σ11 under ε11 = ε22 = 0.01 and σ12
 under ε12 = 0.01. E and ν are Hill's isotropic average of the mean stiffness, not eq. 16.

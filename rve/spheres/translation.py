@@ -119,6 +119,7 @@ def _coupling(
 
 def _weighted_sum(sums: Array, pair: _Pair, lower: int) -> Array:
     """Σ_P f_N^M(P) (−1)^n w_N^M / (w_n^m w_k^j), N = n + k + `lower`, M = m − j, or 0."""
+    # f_N^M are irregular solid harmonics at P = 2p; w_n^m = √((n − m)! (n + m)!) makes them Racah's
     degree, order = pair.n + pair.k + lower, abs(pair.m - pair.j)
     exists = (order <= degree) & (degree >= 0)
     degree, order = np.where(exists, degree, 0), np.where(exists, order, 0)

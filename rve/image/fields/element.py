@@ -163,12 +163,9 @@ COLUMNS = 6144  # pixels times loads worked on at once: what the second cache ho
 
 @dataclass(frozen=True)
 class Operator:
-    """Stiffness of a pixel grid: sum of the element matrices times each pixel's coefficients.
+    """Stiffness of a pixel grid: element matrices times coefficients of trace and deviator.
 
-    Args:
-        element: Unknowns and modes of a pixel.
-        trace: Coefficient of the trace, shape (rows, columns), positive.
-        deviator: Coefficient of the deviator, same shape, positive.
+    Both coefficients are positive and have the shape (rows, columns).
     """
 
     element: Element
@@ -182,6 +179,7 @@ class Operator:
         matrix = np.hstack([trace_modes.T @ trace_modes, deviator_modes.T @ deviator_modes])
         for rows in blocks(fields.shape):
             local = gather(self.element, fields, rows)
+            # (trace Tᵀ T + deviator Dᵀ D) times the local unknowns of each pixel
             weighted = np.stack([self.trace[rows] * local, self.deviator[rows] * local])
             forces = matrix @ weighted.reshape(matrix.shape[1], -1)
             scatter(self.element, forces.reshape(local.shape), result, rows)

@@ -28,13 +28,7 @@ def coefficients(element: Element, bulk: Array, shear: Array) -> tuple[Array, Ar
 
 @dataclass(frozen=True, eq=False)
 class SideSolution:
-    """Fields of one side.
-
-    Args:
-        fields: Fluctuations for the unit loads, shape (3, unknowns, rows, columns).
-        energy: Mean energies with their rounding; their `upper` bounds the side's tensor.
-        iterations: Of the slowest load.
-    """
+    """Fields for the unit loads, (3, unknowns, rows, columns); energies whose `upper` bounds."""
 
     fields: Array
     energy: Energies
