@@ -276,13 +276,10 @@ def coupling_of(
     low, high = block.rate[j, j].bounds()  # the λ lie in Gershgorin's discs about L_jj
     lambda_low = max(float((low - off.sum(1)).min()), float(found.low[modes[0]]))
     lambda_high = min(float((high + off.sum(1)).max()), float(found.high[modes[-1]]))
+    lambda_low, lambda_high = min(lambda_low, float(low.min())), max(lambda_high, float(high.max()))
     (low_omega, high_omega), (least, most) = ends = damped_range(
         structure, lambda_low, lambda_high, modes
     )
-    # g = (a + b λ)/2 + ζ √λ and ω² = λ − g²
-    zeta, b = structure.ratio[modes].size().max(), structure.rayleigh[1].size()
-    decay_slope = float(b / 2 + zeta / (2 * np.sqrt(lambda_low)))
-    omega_slope = (1 + 2 * most * high_omega * decay_slope) / (2 * low_omega)
     reach = STEP * (least * low_omega + 2 / max(float(time[-1]), 1e-300))
     points = (high_omega - low_omega) / reach, (most - least) * high_omega / reach
     along, across = (int(np.clip(x, 1, MAX_POINTS)) + 1 for x in points)
@@ -292,12 +289,13 @@ def coupling_of(
         o = np.flatnonzero(structure.order == order)
         for s, source in enumerate(sources):
             response = table.responses(source, int(order))
-            G, G_slope = response.largest  # e = Re G + (g/ω) Im G of a start, ± Im G/ω of others
-            slope = G_slope * (decay_slope + omega_slope)  # |de/dλ|
-            if source == "start":
-                slope = (1 + most) * slope + G * (decay_slope + most * omega_slope) / low_omega
-            else:
-                slope = slope / low_omega + G * omega_slope / low_omega**2
+            G, G_slope = response.largest
+            # of g = (a + b λ)/2 + ζ √λ, ω² = λ − g²: 4 ω² |dσ/dλ|² = 1 + 4 g′ (g′ λ − g) ≤ 1, since
+            # g′ λ ≤ g, and 2 ω³ |d(g/ω)/dλ| = |2 g′ λ − g| ≤ g
+            if source == "start":  # e = Re G + (g/ω) Im G
+                slope = (1 + most) * G_slope / (2 * low_omega) + G * most / (2 * low_omega**2)
+            else:  # e = ± Im G/ω, with |dω/dλ| ≤ |dσ/dλ|
+                slope = G_slope / (2 * low_omega**2) + G / (2 * low_omega**3)
             half = np.ptp(response.value, axis=(1, 2)) / 2 + response.error
             bounds = np.outer(slope, by_slope[s, o]), 2 * np.outer(half, size[s, o])
             added[:, o] += np.minimum(*bounds)
