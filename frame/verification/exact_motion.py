@@ -41,7 +41,7 @@ class Course(NamedTuple):
         samples: Samples of g, linear between and zero outside, shape (R,).
         step: Time between samples, in s.
         start: Time of the first one, in s.
-        is_held: Whether the last one stays on; that of a sine, which is 1, does.
+        is_held: Whether the last one stays on.
         frequency: Ω, in rad/s.
         phase: In rad.
     """
@@ -64,6 +64,22 @@ class Course(NamedTuple):
         value[(position < 0) | has_ended] = 0.0
         sine = np.sin(self.frequency * since + self.phase) if self.frequency else 1.0
         return np.asarray(value * sine)
+
+    def kinks(self, time: float) -> list[tuple[float, float, float]]:
+        """Return times since the start where g leaves its line, with its jump and change of slope.
+
+        A kink (t₀, c, r) adds c + r (t − t₀) to g from t₀ on; those after `time` are left out.
+        """
+        slopes = np.diff(self.samples) / self.step
+        change = np.diff(slopes, prepend=0.0, append=0.0)
+        jump = np.zeros(len(self.samples))
+        jump[0] = self.samples[0]
+        if not self.is_held:
+            jump[-1] = -self.samples[-1]
+        moments = np.arange(len(self.samples)) * self.step
+        kinks = np.column_stack([moments, jump, change])
+        kinks = kinks[(moments <= time) & ((jump != 0) | (change != 0))]
+        return [(float(start), float(level), float(slope)) for start, level, slope in kinks]
 
     def until(self, time: float) -> Array:
         """Samples that reach up to a time after the start, in s, where the last one is held."""
@@ -203,24 +219,35 @@ class _EnergyState:
     def response_to_force(self, force: Array, course: Course, times: Array) -> tuple[Array, Array]:
         """Return outputs from rest under a force b f(t), and their round-off, (T, m) each.
 
-        `times` begin with the force. A sine's response is the steady state and a free motion that
-        cancels it at the start.
+        `times` begin with the force. A sine times g = a + r t answers from one sample to the next
+        as its particular motion Im (y + r z t) exp(iΩt) and a free motion that begins against it:
+        (iΩ − A) y = b a − r z with (iΩ − A) z = b. Where g changes its line, free motions begin.
         """
         n, zero_state = len(force), np.zeros(len(self.matrix))
         acceleration = solve_triangular(self.lower, force, lower=True) / self.highest
         push, no_record = np.append(np.zeros(n), acceleration), np.zeros(0)
+        last = float(times.max(initial=0.0))
         if not course.frequency:
-            record = course.until(float(times.max(initial=0.0)))
+            record = course.until(last)
             return self.response_to_record(zero_state, push, record, course.step, times)
         resolvent = 1j * course.frequency * np.eye(2 * n) - self.matrix
-        steady = np.linalg.solve(resolvent, push) * np.exp(1j * course.phase)
-        free, free_rounding = self.response_to_record(
-            -steady.imag, zero_state, no_record, 0.0, times
-        )
-        steady_states = steady * np.exp(1j * course.frequency * times)[:, None]
-        condition = float(np.linalg.cond(resolvent))
-        steady_rounding = self._rounding(np.abs(steady), times) * (1 + condition)
-        return free + steady_states.imag @ self.rows.T, free_rounding + steady_rounding
+        z = np.linalg.solve(resolvent, push)
+        zz, condition = np.linalg.solve(resolvent, z), float(np.linalg.cond(resolvent))
+        values, rounding = np.zeros((2, len(times), len(self.rows)))
+        for start, level, slope in course.kinks(last):
+            acts = times >= start - 1e-12 * last
+            since = np.maximum(times[acts] - start, 0.0)
+            turn = np.exp(1j * (course.frequency * start + course.phase))
+            constant, rising = turn * (level * z - slope * zz), turn * slope * z
+            free, free_rounding = self.response_to_record(
+                -constant.imag, zero_state, no_record, 0.0, since
+            )
+            wave = np.exp(1j * course.frequency * since)[:, None]
+            steady = (constant + rising * since[:, None]) * wave
+            values[acts] += free + steady.imag @ self.rows.T
+            size = np.abs(steady).max(0, initial=0.0) + np.abs(level * z) + np.abs(slope * zz)
+            rounding[acts] += free_rounding + self._rounding(size, since) * (1 + condition)
+        return values, rounding
 
     def _rounding(self, state: Array, times: Array) -> Array:
         """Return the round-off of outputs of states as large as `state` (2n,), shape (T, m)."""

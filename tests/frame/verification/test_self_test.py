@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from copy import copy
 from dataclasses import replace
 from functools import partial
 
@@ -14,7 +15,8 @@ from alphacut.frame.bounds import level
 from alphacut.frame.envelope import Ends
 from alphacut.frame.methods.dual import DualProof
 from alphacut.frame.methods.proof import Proof
-from alphacut.frame.structures.loads import Accelerogram
+from alphacut.frame.structures.loads import Accelerogram, Force, History
+from alphacut.frame.verification import self_test
 from alphacut.frame.verification.self_test import ContradictionError, Trial, cuts_of
 from alphacut.fuzzy import Crisp, Triangular
 from alphacut.fuzzy.refused import FailedError
@@ -45,6 +47,13 @@ def planted(monkeypatch, method, change):
 
 def narrower(found):
     return replace(found, lower=0.98 * found.lower, upper=0.98 * found.upper)
+
+
+def smaller(found):
+    """Proved bounds that are too small, past the comparison with what is attained."""
+    faulty = copy(found)
+    vars(faulty)["proved"] = Ends(found.proved.lower, 0.98 * found.proved.upper)
+    return faulty
 
 
 def straight(found):
@@ -134,6 +143,40 @@ def test_integrals_of_a_step_without_their_leading_term_raise(fault, words):
     script = [sys.executable, "-c", WITHOUT_LEADING_TERM.replace("FAULT", fault)]
     told = subprocess.run(script, env=environment, capture_output=True, text=True, check=True)
     assert words in told.stdout
+
+
+SINES = {
+    "ramp to a sine": History(0.5, [0.0, 1.0], is_held=True, frequency=20.0),
+    "sine that ends": History(0.5, [1.0, 1.0], frequency=20.0),
+    "amplitude 2": History(0.5, [2.0, 2.0], is_held=True, frequency=20.0),
+    "plain": History.harmonic(10.0 / np.pi),
+}
+
+
+@pytest.mark.parametrize("history", SINES.values(), ids=SINES)
+def test_right_proofs_under_a_sine_with_any_envelope_agree(history):
+    loads = [Force(1, 100.0, history)]
+    shaken = StoreyFrame([1e3], stiffness=[4e5], damping_ratio=0.02, loads=loads)
+    inputs = {"k1": Triangular(3.9e5, 4e5, 4.1e5)}
+    given = {"duration": 2.0, "step": 0.05, "alpha": (0, 1), "progress": False}
+    for method in (Proof(), DualProof()):
+        assert envelope(shaken, inputs, method, **given).facts["motions_tested"] >= 24
+
+
+@pytest.mark.parametrize(
+    ("change", "check"), [(smaller, "require_inside"), (straight, "require_line_deviation")]
+)
+def test_each_check_alone_sees_its_fault(change, check):
+    found = motion(frame(), INPUTS, method=METHODS[0])
+    faulty, others = change(found), {"require_inside", "require_line_deviation", "require_attained"}
+    points = Trial(found, cuts_of(found)).named()
+    with pytest.MonkeyPatch.context() as patch:
+        for other in others - {check}:
+            patch.setattr(self_test._Check, other, lambda *_: None)
+        with pytest.raises(ContradictionError):
+            Trial(faulty, cuts_of(faulty)).require_agreement(
+                points, self_test.structures_at(frame(), faulty, points)
+            )
 
 
 def test_names_output_time_inputs_and_difference(monkeypatch):
