@@ -354,12 +354,3 @@ def modal_damping_ratios(system: LinearSystem) -> tuple[Array, Array]:
     squared, shapes = undamped_modes(M, K)
     omega = np.sqrt(np.maximum(squared, 0.0))
     return omega, np.einsum("ik,ij,jk->k", shapes, D, shapes) / np.maximum(2 * omega, 1e-300)
-
-
-def round_off(largest: float, slowest: float, time: Array) -> Array:
-    """Error of a motion by rounding of its frequencies, over its peak, at times (T,).
-
-    Rounding of the `largest` ω² (1/s²) changes that of the `slowest` mode (ω in rad/s) by as much.
-    """
-    phase_per_change = np.minimum(time**2, time / max(slowest, 1e-300)) / 2
-    return np.asarray(np.finfo(float).eps * largest * phase_per_change)
