@@ -223,7 +223,7 @@ def composed(rate: Array, share: Array, waves: Waves, d: int) -> Array:
     """Value, gradient and Hessian of 2 Re Σ_k C_k w(λ_k) by the chain rule, shape (N, q).
 
     The q = 1 + d + d (d + 1)/2 numbers are a value, a gradient and a Hessian's upper triangle;
-    those of λ_k and C_k have shape (N, q, n), the waves are w, dw/dλ and d²w/dλ² at λ_k, each (N, n).
+    those of λ_k and C_k have shape (N, q, n), w, dw/dλ and d²w/dλ² at λ_k (N, n) each.
     """
     w, dw, ddw = (x[:, None] for x in waves)
     out = (share * w).real.sum(-1)
