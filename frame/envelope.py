@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.result import Bounds, Ends
+from alphacut.fuzzy.result import Bounds, Ends, Nature, rounded
 
 if TYPE_CHECKING:
     import xarray
@@ -56,15 +56,22 @@ class Envelope(Bounds):
 
     @property
     def peak_words(self) -> str:
-        """Text with the proved and the reached peak of each output in the widest cut."""
+        """Text with each output's proved peak over time, and the reached one, in the widest cut."""
         units = self.units or ("",) * len(self.outputs)
-        peaks = [
-            np.maximum(pair.upper, -pair.lower)[0].max(0) for pair in (self.proved, self.attained)
-        ]
+        bounds, reached = (
+            np.maximum(pair.upper, -pair.lower)[0] for pair in (self.proved, self.attained)
+        )  # at the nodes, (T, outputs)
+        if self.between is not None:  # what a motion may add between two nodes
+            bounds[1:] = np.maximum(bounds[1:], bounds[:-1]) + self.between[1:]
         words = []
-        for name, unit, *values in zip(self.outputs, units, *peaks, strict=True):
-            proved, reached = (f"{float(peak):.4g} {unit}".rstrip() for peak in values)
-            words.append(f"{name}: proved {proved}, reached {reached}")
+        for name, unit, *peaks in zip(
+            self.outputs, units, bounds.max(0), reached.max(0), strict=True
+        ):
+            natures = zip(peaks, (Nature.GUARANTEED, Nature.ATTAINED), strict=True)
+            proved, inner = (
+                f"{rounded(float(x), 'upper', nature):.4g} {unit}".rstrip() for x, nature in natures
+            )
+            words.append(f"{name}: proved {proved}, reached {inner}")
         return "; ".join(words)
 
     def to_dataset(self) -> xarray.Dataset:

@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 
 from alphacut.case.limits import parse_limit
+from alphacut.frame import Accelerogram, StoreyFrame, envelope
 from alphacut.frame.questions.peaks import Peaks, passing
+from alphacut.frame.questions.peaks import peaks as peaks_over_time
+from alphacut.fuzzy import Interval
 from alphacut.fuzzy.result import Nature
 from alphacut.questions.decision import LimitDecision
 from alphacut.questions.summary import Parts
@@ -109,3 +112,14 @@ def test_the_csv_of_peaks_is_exact_and_signed(rng):
             texts = dict(zip(*[shown(frame).head, shown(frame).rows[0]], strict=True))
             assert number(texts["least peak"]) <= low
             assert number(texts["greatest peak"]) >= high
+
+
+def test_python_says_the_bound_over_time_as_the_command_does():
+    ground = Accelerogram(0.02, np.sin(np.arange(60)))
+    frame = StoreyFrame(masses=[1.0], stiffness=[150.0], damping_ratio=0.02, ground=ground)
+    inputs = {"k1": Interval(149.0, 151.0)}
+    found = envelope(frame, inputs, duration=1.2, step=0.02, alpha=[0], progress=False)
+    proved = float(re.search(r"proved (\S+) m", found.peak_words)[1])
+    bound = peaks_over_time(found).upper[0, 0]
+    assert bound <= proved <= 1.001 * bound
+    assert bound > np.maximum(found.upper, -found.lower).max()  # that at the nodes
