@@ -35,6 +35,7 @@ DIRECT = {
     "mpmath": "python3-sympy",  # which depends on it
     "numba": "python3-numba",
     "numpy": "python3-numpy",
+    "pandas": "python3-xarray",  # which depends on it
     "petsc4py": "python3-petsc4py-real",
     "pint": "python3-pint",
     "pytest": "python3-pytest",
@@ -45,6 +46,7 @@ DIRECT = {
     "skimage": "python3-skimage",
     "sympy": "python3-sympy",
     "threadpoolctl": "python3-threadpoolctl",
+    "typing_extensions": "python3-typing-extensions",
     "ufl": "python3-dolfinx",
     "xarray": "python3-xarray",
 }
