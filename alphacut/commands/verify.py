@@ -13,8 +13,7 @@ import numpy as np
 from alphacut.commands.options import Command, add_quiet, write_answer
 from alphacut.frame.envelope import Ends, Envelope
 from alphacut.frame.verification.exact_motion import LinearMotion
-from alphacut.frame.verification.self_test import ContradictionError, Trial
-from alphacut.frame.verification.stored import stored_motions
+from alphacut.frame.verification.self_test import ContradictionError, Trial, stored_motions
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import require
 from alphacut.fuzzy.result import Nature

@@ -27,8 +27,7 @@ from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.modal_model import ModalModel
 from alphacut.frame.response.load_tables import Direct
 from alphacut.frame.structures.linear import evaluate
-from alphacut.frame.verification.self_test import structures_at
-from alphacut.frame.verification.stored import stored_motions, variables
+from alphacut.frame.verification.self_test import stored_motions, structures_at, variables
 from alphacut.fuzzy import Interval, Triangular
 from alphacut.fuzzy.refused import FailedError, RefusedError
 

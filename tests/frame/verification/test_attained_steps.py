@@ -7,7 +7,7 @@ from scipy.integrate import solve_ivp
 from alphacut.frame import Sampled, envelope, pendulum
 from alphacut.frame.dynamics.flow import StepError
 from alphacut.frame.dynamics.nonlinear import make_flow
-from alphacut.frame.verification.reference_motion import ReferenceMotion
+from alphacut.frame.verification.step_error import ReferenceMotion
 from alphacut.fuzzy import Interval
 
 
