@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from alphacut.export.mesh import COMPONENTS, wedge_mesh
+from alphacut.export.mesh import COMPONENTS, meshio_with_wedges, wedge_mesh
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.files import say, whole_file
@@ -75,11 +75,9 @@ def _point_fields(fields: CellFields) -> dict[str, Array]:
 
 def _abaqus_mesh(fields: CellFields) -> meshio.Mesh:
     """Mesh of meshio for Abaqus: interface nodes once, a set of elements for each phase."""
-    import meshio
-
     count = int(fields.node.max()) + 1  # nodes; a point of each phase has the same one
     points: Array = np.empty((count, 3))
     points[fields.node] = fields.points
     cells = fields.node[fields.cells][:, MESHIO_ORDER]
     sets = {name: [np.flatnonzero(fields.phase == k)] for k, name in enumerate(fields.names)}
-    return meshio.Mesh(points, [("wedge15", cells)], cell_sets=sets)
+    return meshio_with_wedges().Mesh(points, [("wedge15", cells)], cell_sets=sets)

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -46,12 +47,17 @@ def wedge_mesh(
         phase: Shape (m,).
         data: Fields at the points by name.
     """
+    meshio = meshio_with_wedges()
+    return meshio.Mesh(points, [("wedge15", cells[:, VTK_ORDER])], data, {"phase": [phase]})
+
+
+def meshio_with_wedges() -> ModuleType:
+    """Imports meshio, which reads and writes quadratic wedges, but 5.3 has no dimension of them."""
     import meshio
     from meshio._mesh import topological_dimension
 
-    # meshio 5.3 reads and writes this cell but has forgotten its dimension
     topological_dimension.setdefault("wedge15", 3)
-    return meshio.Mesh(points, [("wedge15", cells[:, VTK_ORDER])], data, {"phase": [phase]})
+    return meshio  # type: ignore[no-any-return]
 
 
 def prism_mesh(cell: Cell, size: float, layers: int) -> meshio.Mesh:

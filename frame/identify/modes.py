@@ -214,6 +214,8 @@ def measured_mode(
         return MeasuredMode(mode, number)
     means = {floor: abs(float(row.mean())) for floor, row in rows.items()}
     largest = max(means.values())
+    allowed = "a shape that moves a floor"
+    require(largest > 0, f"mode {mode}: amplitudes", value="0 at every floor", allowed=allowed)
     reference = max(floor for floor, mean in means.items() if mean >= NEAR * largest)
     # deviation of an amplitude, relative to that of the reference floor
     deviation = shape_deviation and shape_deviation * largest / means[reference]

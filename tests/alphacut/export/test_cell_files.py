@@ -100,6 +100,14 @@ def test_meshio_reads_xdmf_mirrored_and_abaqus_not(written):
     assert each[inside].sum() == pytest.approx(particle_volume(), rel=1e-10)
 
 
+def test_abaqus_is_the_first_format_that_a_process_writes(tmp_path, monkeypatch):
+    from meshio import _mesh
+
+    known = {kind: x for kind, x in _mesh.topological_dimension.items() if kind != "wedge15"}
+    monkeypatch.setattr(_mesh, "topological_dimension", known)
+    assert write_cell(fields(), tmp_path / "cell.inp")
+
+
 @pytest.mark.parametrize("written", [".msh"], indirect=True)
 def test_what_gmsh_was_given_is_a_mesh_of_ones_own(written):
     grid = read_grid(written)

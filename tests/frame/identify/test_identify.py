@@ -251,6 +251,10 @@ REFUSED = {
         r"scatter of floor 2 is .* of its amplitude; allowed: values up to 0.2",
     ),
     "counts": (modes_like([2.0, 2.1], {1: [1.0]}), r"amplitudes is \[1\]; allowed: 2 of each"),
+    "no amplitude": (
+        modes_like([2.0], {1: [0.0], 2: [0.0]}, frequency_deviation=0.01, shape_deviation=0.02),
+        r"amplitudes is 0 at every floor; allowed: a shape that moves a floor$",
+    ),
     "mode 0": (lambda: MeasuredMode(0, Interval(1, 2)), r"numbers from 1 on"),
     "negative frequency": (lambda: MeasuredMode(1, Interval(-2, -1)), r"positive values in Hz"),
     "reference": (
