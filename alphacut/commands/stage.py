@@ -29,7 +29,7 @@ from alphacut.stages.image import ImageResult
 from alphacut.stages.losses import LossResult
 from alphacut.stages.modulus import ModulusResult
 from alphacut.stages.results import Results
-from alphacut.stages.store import Cuts
+from alphacut.stages.store import CutsResult
 from alphacut.stochastic.microstructure_summary import fragment
 
 GALERKIN = "Error not declared: with crisp phases an upper bound of C, lower on a finer mesh\n"
@@ -93,7 +93,7 @@ def bounds_text(references: References) -> str:
     return f"{ISOTROPIC}: {bounds[0]:.4f} … {bounds[1]:.4f} GPa\n" if bounds else ""
 
 
-def cuts_text(title: str, cuts: Mapping[str, Cuts], alpha: Array, nature: Nature) -> str:
+def cuts_text(title: str, cuts: Mapping[str, CutsResult], alpha: Array, nature: Nature) -> str:
     """Table of the lowest and highest cut of each constant; empty where there are none."""
     rows = [
         (constant_label(x), cut_text(ends, 0, nature), cut_text(ends, -1, nature))
@@ -102,7 +102,7 @@ def cuts_text(title: str, cuts: Mapping[str, Cuts], alpha: Array, nature: Nature
     return text_table((title, f"α = {alpha[0]:g}", f"α = {alpha[-1]:g}"), rows) if rows else ""
 
 
-def plane_text(cuts: Mapping[str, Mapping[str, Cuts]], alpha: Array, nature: Nature) -> str:
+def plane_text(cuts: Mapping[str, Mapping[str, CutsResult]], alpha: Array, nature: Nature) -> str:
     """Constants along x and y, a table for each definition."""
     texts = [cuts_text(definition, x, alpha, nature) for definition, x in cuts.items()]
     return "".join(texts) + (f"{ONLY}\n" if len(texts) == 1 else "")

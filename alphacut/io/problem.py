@@ -39,11 +39,11 @@ class InputProblem:
 
     def __str__(self) -> str:
         """The problem as one line: ``FILE:LINE: KEY is VALUE; allowed: ALLOWED; CURE``."""
-        place = f"{self.file}:{self.line}" if self.line else self.file
+        location = f"{self.file}:{self.line}" if self.line else self.file
 
         def line(value: str, allowed: str) -> str:
             """The line without the cure; `fit_message` shortens both texts."""
-            text = f"{place}: {self.key}" if place else self.key
+            text = f"{location}: {self.key}" if location else self.key
             text += f" is {value}" if value else ""
             if self.what:
                 text += f": {self.what}" if value else f" {self.what}"

@@ -17,7 +17,7 @@ from alphacut.questions.question import (
     limit_fields,
 )
 from alphacut.stages.envelope import PeakResult, peak_results
-from alphacut.stages.store import Cuts, Values
+from alphacut.stages.store import CutsResult, Values
 
 
 class LimitDecision(LimitAnswer):
@@ -29,7 +29,7 @@ class LimitDecision(LimitAnswer):
 
     possibility: tuple[float, float]
     necessity: tuple[float, float]
-    margin: Cuts
+    margin: CutsResult
     verdict: str
     from_level: float
     nature: Nature
@@ -141,7 +141,7 @@ def decide(section: DecisionSection, response: FuzzyResponse) -> DecisionAnswer:
                 **limit_fields(section, name, response.structure),
                 "possibility": answer.possibility,
                 "necessity": answer.necessity,
-                "margin": Cuts.of(answer.margin),
+                "margin": CutsResult.of(answer.margin),
                 "verdict": answer.outcome,
                 "from_level": answer.lowest,
                 "nature": answer.nature,

@@ -19,7 +19,7 @@ from alphacut.questions.question import (
     Row,
     limit_fields,
 )
-from alphacut.stages.store import Cuts, Numbers, Values
+from alphacut.stages.store import CutsResult, Numbers, Values
 
 POINTS = 60
 """Measures at which bands are drawn and tabulated."""
@@ -45,10 +45,10 @@ class LimitFragility(LimitAnswer):
     nature: Nature
     critical: CriticalRanges
     measure: Values
-    band: Cuts
-    median: Cuts
-    dispersion: Cuts | None
-    confidence: Cuts | None
+    band: CutsResult
+    median: CutsResult
+    dispersion: CutsResult | None
+    confidence: CutsResult | None
 
 
 class FragilityAnswer(Answer):

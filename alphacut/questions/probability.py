@@ -20,7 +20,7 @@ from alphacut.questions.question import (
     Row,
     limit_fields,
 )
-from alphacut.stages.store import Cuts, Numbers, Values
+from alphacut.stages.store import CutsResult, Numbers, Values
 
 
 class Curve(Numbers):
@@ -41,7 +41,7 @@ class LimitProbability(LimitAnswer):
     lower: Values
     upper: Values
     error: Values
-    interval: Cuts
+    interval: CutsResult
     nature: Nature = Nature.ATTAINED
     evaluations: int
     curve: Curve

@@ -18,7 +18,7 @@ from alphacut.stages.identify import IdentifiedResult
 from alphacut.stages.image import ImageResult
 from alphacut.stages.modulus import ModulusResult
 from alphacut.stages.results import FrameResult
-from alphacut.stages.store import Cuts
+from alphacut.stages.store import CutsResult
 
 MATERIAL = ("material", "most plausible", "range at α = 0", "nature", "± error")
 MEANING = "Least … largest value if every input stays in its range; α = 1: most plausible"
@@ -50,7 +50,7 @@ def run_text(parts: Parts) -> str:
     return heading + "".join(texts) + "".join(f"{line}\n" for line in lines)
 
 
-def cut_text(cuts: Cuts, level: int, nature: Nature, error: float = 0.0) -> str:
+def cut_text(cuts: CutsResult, level: int, nature: Nature, error: float = 0.0) -> str:
     """Text of one cut of a quantity with five digits; guaranteed ends contain the error."""
     low, high = cuts[level]
     if nature is Nature.GUARANTEED:
@@ -77,7 +77,7 @@ def material(parts: Parts) -> Table:
 
 def _constants(part: ModulusResult | ImageResult) -> Iterator[Row]:
     """Yields the row of E of a cell or an image, and those of ν, E_T and the loss factor."""
-    nature, further = part.nature, dict[str, Cuts]()
+    nature, further = part.nature, dict[str, CutsResult]()
     if isinstance(part, ImageResult):
         young, error, declares_error = part.cuts.E_GPa, 0.0, True
     else:

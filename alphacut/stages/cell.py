@@ -26,9 +26,14 @@ from alphacut.rve.result.engineering_constants import NAMES, engineering_constan
 from alphacut.rve.result.result import HomogenisedStiffness, effective_modulus
 from alphacut.rve.series.fibre_constants import fibre_constants
 from alphacut.rve.series.model import SeriesModel
-from alphacut.rve.spheres import result as space_bounds
 from alphacut.rve.spheres.model import SphereSeriesModel
-from alphacut.rve.spheres.result import HomogenisedSpheres, hill_average, volume_fraction
+from alphacut.rve.spheres.result import (
+    HomogenisedSpheres,
+    hashin_shtrikman,
+    hill_average,
+    mori_tanaka,
+    volume_fraction,
+)
 from alphacut.stochastic import TruncatedNormal, gauss_rule
 
 if TYPE_CHECKING:
@@ -223,10 +228,10 @@ def references(
         found["fraction_of_case"] = stated
     fraction = np.asarray(mean_fraction if stated is None else stated)
     if spheres:
-        moduli = space_bounds.hashin_shtrikman(fraction, matrix, inclusion).T
+        moduli = hashin_shtrikman(fraction, matrix, inclusion).T
         low, high = (_young(*bulk_and_shear) / GPA for bulk_and_shear in moduli)
         young_bounds = low, high
-        estimate = _young(*space_bounds.mori_tanaka(fraction, matrix, inclusion))
+        estimate = _young(*mori_tanaka(fraction, matrix, inclusion))
     else:
         phase_fractions = np.array([1 - fraction, fraction])
         young_bounds = isotropic_bounds(phase_fractions, [matrix.stiffness, inclusion.stiffness])

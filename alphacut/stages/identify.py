@@ -21,7 +21,7 @@ from alphacut.fuzzy.refused import require
 from alphacut.fuzzy.result import Ends
 from alphacut.io.measured import ModeRows, mode_rows
 from alphacut.records.uff import ENDINGS, uff_mode_rows
-from alphacut.stages.store import Cuts, Numbers, Values
+from alphacut.stages.store import CutsResult, Numbers, Values
 
 
 class Prediction(Numbers):
@@ -37,7 +37,7 @@ class IdentifiedResult(Numbers):
     """Identified inputs: α-cuts in SI, and the share of its width by which each is narrowed."""
 
     alpha: Values
-    inputs: dict[str, Cuts]
+    inputs: dict[str, CutsResult]
     narrowed: dict[str, float]
     units: dict[str, str]
     empty_from: float | None
@@ -72,7 +72,7 @@ def identify_inputs(
     cuts = np.stack([posterior.lower, posterior.upper], axis=-1)  # (levels, inputs, 2)
     result = IdentifiedResult(
         alpha=posterior.alpha,
-        inputs={name: Cuts.of(cuts[:, k]) for k, name in enumerate(posterior.names)},
+        inputs={name: CutsResult.of(cuts[:, k]) for k, name in enumerate(posterior.names)},
         narrowed=dict(posterior.narrowed),
         units={name: of_storey_frame(name).unit for name in posterior.names},
         empty_from=posterior.empty,

@@ -30,7 +30,7 @@ from alphacut.rve.result.moduli import plane_constants
 from alphacut.rve.result.result import PhaseEnergies
 from alphacut.stages.cell import AVERAGES, GPA, References, isotropic_bounds
 from alphacut.stages.losses import LossCuts, LossResult
-from alphacut.stages.store import Computed, Cuts, Numbers, Stage, StageContext, Values
+from alphacut.stages.store import Computed, CutsResult, Numbers, Stage, StageContext, Values
 from alphacut.stochastic.segmentation import segment
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ class ImageCuts(Numbers):
     """α-cuts of E in GPa."""
 
     alpha: Values
-    E_GPa: Cuts
+    E_GPa: CutsResult
 
 
 class ImageResult(Numbers):
@@ -74,7 +74,7 @@ class ImageResult(Numbers):
     nu: Range
     G_T_GPa: Range
     average: str
-    plane: dict[str, dict[str, Cuts]]
+    plane: dict[str, dict[str, CutsResult]]
     nature: Nature
     cuts: ImageCuts
     seconds: float
@@ -137,7 +137,8 @@ def compute_cuts(
         plane={PLANE_STRAIN: dict(map(_cuts_entry, NAMES, np.moveaxis(constants, 1, 0)))},
         nature=NATURE,
         cuts=ImageCuts(
-            alpha=np.array(alpha), E_GPa=Cuts.of(np.array([cut.modulus for cut in cuts]) / GPA)
+            alpha=np.array(alpha),
+            E_GPa=CutsResult.of(np.array([cut.modulus for cut in cuts]) / GPA),
         ),
         seconds=perf_counter() - start,
         widths_GPa={name: value / GPA for name, value in widths.items()},
@@ -153,9 +154,13 @@ def _range(bounds: Ends, size: float = 1.0) -> Range:
     return Range(lower=bounds[0] / size, upper=bounds[1] / size)
 
 
-def _cuts_entry(name: str, bounds: Array) -> tuple[str, Cuts]:
+def _cuts_entry(name: str, bounds: Array) -> tuple[str, CutsResult]:
     """Key and cuts, (levels, 2), of a constant: a modulus in GPa, a ratio as it is."""
-    return (name, Cuts.of(bounds)) if name == "nu_xy" else (f"{name}_GPa", Cuts.of(bounds / GPA))
+    return (
+        (name, CutsResult.of(bounds))
+        if name == "nu_xy"
+        else (f"{name}_GPa", CutsResult.of(bounds / GPA))
+    )
 
 
 def _require_isotropic(widest: ImageCut) -> None:

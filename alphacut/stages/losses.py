@@ -19,15 +19,15 @@ from alphacut.rve.result.loss_factors import (
     loss_factors,
 )
 from alphacut.rve.result.result import HomogenisedStiffness
-from alphacut.stages.store import Cuts, Numbers
+from alphacut.stages.store import CutsResult, Numbers
 
 
 class LossResult(Numbers):
     """α-cuts of the loss factors of E, G and K; their errors by name, where they are declared."""
 
-    E: Cuts
-    G: Cuts
-    K: Cuts
+    E: CutsResult
+    G: CutsResult
+    K: CutsResult
     error: dict[str, float]
     nature: Nature
 
@@ -36,7 +36,7 @@ class LossResult(Numbers):
         cls, cuts: Mapping[str, Array], errors: Mapping[str, float], nature: Nature
     ) -> LossResult:
         """The result of cuts (levels, 2) by the names of `CONSTANTS`."""
-        named = {name: Cuts.of(cuts[name]) for name in CONSTANTS}
+        named = {name: CutsResult.of(cuts[name]) for name in CONSTANTS}
         return cls(**named, error=dict(errors), nature=nature)
 
 

@@ -23,7 +23,7 @@ from alphacut.rve.result.loss_factors import CONSTANTS
 from alphacut.rve.result.result import HomogenisedStiffness
 from alphacut.stages.cell import GPA, References
 from alphacut.stages.losses import LossResult
-from alphacut.stages.store import Cuts, Numbers, Values
+from alphacut.stages.store import CutsResult, Numbers, Values
 
 if TYPE_CHECKING:
     import xarray
@@ -68,10 +68,10 @@ class ModulusResult(Numbers):
     """
 
     alpha: Values
-    E_GPa: Cuts
-    nu_cuts: Cuts
-    fibres: dict[str, Cuts]
-    plane: dict[str, dict[str, Cuts]]
+    E_GPa: CutsResult
+    nu_cuts: CutsResult
+    fibres: dict[str, CutsResult]
+    plane: dict[str, dict[str, CutsResult]]
     method: str
     plan: str
     samples: int
@@ -95,20 +95,20 @@ def plane_outputs(result: HomogenisedStiffness) -> dict[str, float]:
     }
 
 
-def cuts_of(result: Bounds, names: Mapping[str, str]) -> dict[str, Cuts]:
+def cuts_of(result: Bounds, names: Mapping[str, str]) -> dict[str, CutsResult]:
     """α-cuts of those outputs that a result has, moduli in GPa by NAME_GPa.
 
     `names` has the name of each constant by that of its output.
     """
-    cuts: dict[str, Cuts] = {}
+    cuts: dict[str, CutsResult] = {}
     for output, name in names.items():
         if output in result.outputs:
             size, key = (GPA, f"{name}_GPa") if QUANTITIES[output][0] == "Pa" else (1.0, name)
-            cuts[key] = Cuts.of(np.stack(result.bounds(output), axis=1) / size)
+            cuts[key] = CutsResult.of(np.stack(result.bounds(output), axis=1) / size)
     return cuts
 
 
-def plane_cuts(result: Bounds) -> dict[str, dict[str, Cuts]]:
+def plane_cuts(result: Bounds) -> dict[str, dict[str, CutsResult]]:
     """α-cuts of the constants along x and y by definition, of those that a result has."""
     cuts = {
         definition: cuts_of(result, {name + suffix: name for name in NAMES})

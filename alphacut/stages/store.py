@@ -59,14 +59,14 @@ Values = Annotated[Array, PlainValidator(_finite), PlainSerializer(np.ndarray.to
 """Numbers of any shape; those that are not finite, as unknown bounds, are nan."""
 
 
-class Cuts(Numbers):
+class CutsResult(Numbers):
     """α-cuts of a quantity: its lower and its upper bound on each level, rising."""
 
     lower: Values
     upper: Values
 
     @classmethod
-    def of(cls, bounds: ArrayLike) -> Cuts:
+    def of(cls, bounds: ArrayLike) -> CutsResult:
         """The cuts of bounds (lower, upper) in the last axis."""
         lower, upper = np.moveaxis(np.asarray(bounds, float), -1, 0)
         return cls(lower=lower, upper=upper)
@@ -230,9 +230,9 @@ class StageStore:
             for ending in (".json", ".nc"):
                 folder.require_free(f"{stage.name}{ending}")
             samples = self._sample_store(folder) if stage.has_samples else None
-            with TemporaryDirectory() as place, self._proof_folder(folder, stage.key) as parts:
-                context = StageContext(Path(place), samples, workers, tick, parts)
-                return self._write(stage, stage.run(context), Path(place))
+            with TemporaryDirectory() as temporary, self._proof_folder(folder, stage.key) as parts:
+                context = StageContext(Path(temporary), samples, workers, tick, parts)
+                return self._write(stage, stage.run(context), Path(temporary))
 
     @contextmanager
     def _proof_folder(self, folder: ResultsFolder, key: str) -> Iterator[Path | None]:
@@ -264,18 +264,18 @@ class StageStore:
             folder.add(dict.fromkeys((SAMPLES, f"{SAMPLES}-journal"), Listed("", "")))
         return path
 
-    def _write(self, stage: Stage[T], computed: Computed[T], place: Path) -> StageResult[T]:
-        """Writes a result beside the other files of its stage in `place`, into the folder."""
+    def _write(self, stage: Stage[T], computed: Computed[T], files: Path) -> StageResult[T]:
+        """Writes a result beside the other files of its stage in `files`, into the folder."""
         assert self.folder is not None
         name, key = f"{stage.name}.json", stage.key
         if rank() != 0:
             return StageResult(*computed, fingerprint=key)
         document = {**origin(self.case_text, key), "result": computed.numbers}
-        write_text(place / name, as_json(document, indent=1))
+        write_text(files / name, as_json(document, indent=1))
         if computed.data is not None:
-            computed.data.to_netcdf(place / f"{stage.name}.nc")
+            computed.data.to_netcdf(files / f"{stage.name}.nc")
         before = self.folder.files[name].source if name in self.folder.files else ""
-        self.folder.put(key, place, before)
+        self.folder.put(key, files, before)
         return StageResult(*computed, self.folder.made_from(key), key)
 
     @contextmanager

@@ -130,11 +130,11 @@ def _padded(a: Jet, ndim: int) -> Jet:
     missing = ndim - a.value.ndim
     if missing <= 0:
         return a
-    ones, shape = (1,) * missing, a.value.shape
+    padding, shape = (1,) * missing, a.value.shape
     return Jet(
-        a.value.reshape(ones + shape),
-        a.first.reshape((a.directions, *ones, *shape)),
-        a.second.reshape((*a.second.shape[:2], *ones, *shape)),
+        a.value.reshape(padding + shape),
+        a.first.reshape((a.directions, *padding, *shape)),
+        a.second.reshape((*a.second.shape[:2], *padding, *shape)),
     )
 
 

@@ -127,14 +127,14 @@ class Auto:
                     work[method.name] = method.forecast(exact_flow(flow.flow), flow.boxes)
             except UnprovedError as error:
                 reasons.append(f"{method.name}: {error}")
-        both = len(work) == 2
+        has_two_proofs = len(work) == 2
         # the branch and bound has the same gap at all nodes
-        proof_first = both and (self.is_for_all_nodes or work["proof"] <= work["dual"])
+        proof_first = has_two_proofs and (self.is_for_all_nodes or work["proof"] <= work["dual"])
         table: tuple[tuple[bool, Proof | DualProof], ...] = (
             (proof_first, replace(proof, parts=1)),
             ("dual" in work, self._dual(flow)),
-            (both and not proof_first, replace(proof, parts=1)),
-            ("proof" in work and (proof_first or not both), proof),  # in parts of the box
+            (has_two_proofs and not proof_first, replace(proof, parts=1)),
+            ("proof" in work and (proof_first or not has_two_proofs), proof),  # in parts of the box
         )
         return (method for applies, method in table if applies)
 

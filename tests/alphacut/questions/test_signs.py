@@ -17,7 +17,7 @@ from alphacut.report.results import limit_cells, number_text, peak_cells
 from alphacut.report.tables import peaks as peak_frame
 from alphacut.report.tables import shown
 from alphacut.stages.envelope import EnvelopeResult, peak_results, peaks_of
-from alphacut.stages.store import Cuts
+from alphacut.stages.store import CutsResult
 
 SIDES = ("max", "min", "")
 
@@ -76,7 +76,7 @@ def test_every_number_on_a_limit_has_the_sign_of_the_output(rng):
         assert answer.outcome == (expected if may_break else "not exceeded")
         told = LimitDecision(
             side=side, output="q1", unit="m", limit=parsed.value, possibility=(0, 1),
-            necessity=(0, 1), margin=Cuts.of([[0.0, 0.0]]), verdict=answer.outcome, from_level=0,
+            necessity=(0, 1), margin=CutsResult.of([[0.0, 0.0]]), verdict=answer.outcome, from_level=0,
             nature=Nature.GUARANTEED, peak=peak,
         )  # fmt: skip
         sign = "≥" if side == "min" else "≤"

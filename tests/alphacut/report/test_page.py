@@ -23,7 +23,7 @@ from alphacut.report.results import (
 from alphacut.report.tables import write_tables
 from alphacut.stages.envelope import EnvelopeResult, PeakResult
 from alphacut.stages.results import FrameResult
-from alphacut.stages.store import Cuts
+from alphacut.stages.store import CutsResult
 
 
 def summary_of(folder):
@@ -106,7 +106,7 @@ def test_peaks_are_stated_in_the_units_that_engineers_compare():
     }
     limit = LimitDecision(
         side="", output="drift1", unit="m", limit=0.02, possibility=(0, 0), necessity=(0, 0),
-        margin=Cuts.of([[0.0, 0.0]]), verdict="not exceeded", from_level=0, nature="estimated",
+        margin=CutsResult.of([[0.0, 0.0]]), verdict="not exceeded", from_level=0, nature="estimated",
         peak=None,
     )  # fmt: skip
     decision = DecisionAnswer(alpha=[0, 0.5, 1], step=0.1, limits={"drift1": limit})
