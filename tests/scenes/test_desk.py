@@ -22,7 +22,7 @@ QUICK = {
 }
 GOLDEN = {
     "suite": (6.417, 10.327),  # median of Sa(T1) in m/s² at α = 0
-    "wind": {"drift1": 4.4389e-3, "a4": 0.45191, "base_shear": 129.04e3},
+    "wind": {"drift1": 4.3510e-3, "a4": 0.41193, "base_shear": 126.26e3},
     "plane-frame": 7.6653e-3,
 }
 

@@ -101,9 +101,9 @@ def test_columns_without_a_head_have_step_and_unit_from_the_case(tmp_path):
 
 
 def test_all_bad_files_of_a_folder_are_named_at_once(tmp_path):
-    for name in ("bad1.AT2", "bad2.AT2", "bad3.AT2"):
+    for name in ("1.AT2", "2.AT2", "3.AT2"):
         (tmp_path / name).write_text("no record\n")
-    with pytest.raises(BadInput, match=r"bad1\.AT2 .*bad2\.AT2, bad3\.AT2"):
+    with pytest.raises(BadInput, match=r"1\.AT2 .*2\.AT2, 3\.AT2"):
         records_of(tmp_path, '"one.csv"', '"*.AT2"')
 
 
