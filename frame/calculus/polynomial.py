@@ -124,7 +124,7 @@ class Polynomial:
                 out[i, j] = out[j, i] = derivative(self.index, j, self.gradient[i])
         return out
 
-    def divided(self, scale: Array) -> Polynomial:
+    def divided_by(self, scale: Array) -> Polynomial:
         """The polynomials, each divided by its entry of `scale` (K,)."""
         return Polynomial(self.index, self.coefficients / scale)
 
@@ -134,12 +134,12 @@ class Polynomial:
 
     def jets(self, u: Array) -> Array:
         """Values, gradients and Hessians (upper triangle) at (S, d), shape (S, q, K)."""
-        B, parts = basis(u, self.index), [self.coefficients, *self._packed]
+        B, parts = basis(u, self.index), [self.coefficients, *self._derivative_tables]
         tables = np.hstack([product(B[:, : len(part)], part) for part in parts])
         return tables.reshape(len(u), -1, self.coefficients.shape[1])
 
     @cached_property
-    def _packed(self) -> list[Array]:
+    def _derivative_tables(self) -> list[Array]:
         """Coefficients of all first and all second derivatives side by side, without zero rows."""
         d, degree = self.index.shape[1], int(self.index.sum(1).max())
         derivatives = (self.gradient, self.hessian[np.triu_indices(d)])

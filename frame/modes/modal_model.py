@@ -124,7 +124,7 @@ class ModalModel:
 
     def in_units(self, scale: Array) -> ModalModel:
         """Model with every output divided by its scale (m,)."""
-        coefficient = self.coefficient.divided(np.tile(scale, self.count))
+        coefficient = self.coefficient.divided_by(np.tile(scale, self.count))
         loads = tuple(load.in_units(scale) for load in self.loads)
         return replace(self, coefficient=coefficient, loads=loads)
 

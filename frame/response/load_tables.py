@@ -100,7 +100,7 @@ class LoadTables:
     def in_units(self, scale: Array) -> LoadTables:
         """The same for outputs divided by their scale (m,)."""
         return replace(
-            self, share=self.share.divided(np.tile(scale, self.rate.coefficients.shape[1]))
+            self, share=self.share.divided_by(np.tile(scale, self.rate.coefficients.shape[1]))
         )
 
     @property
