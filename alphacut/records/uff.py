@@ -5,9 +5,11 @@ pyuff is an optional extra: ``pip install 'alphacut[uff]'``.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -27,6 +29,11 @@ HEAD_LINES, BIG_ENDIAN, DOUBLE, COMPLEX = 11, 2, (4, 6), (5, 6)
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 MIN_COLLINEARITY = 0.9
 """Modal phase collinearity below which a complex shape has no real one (Pappa, Elliott 1993)."""
+COMPLEX_IN_SIX = re.compile(
+    rb"(?m)(?P<head>^ *-1 *\r?\n *55 *\r?\n(?:.*\n){5})(?P<kinds>(?: +\d+){4} +5 +6)"
+    rb"(?P<rest> *\r?\n.*\n.*\n)(?P<nodes>(?: *\d+ *\r?\n.*\n.*\n)+)"
+)
+"""A data set 55 of complex modes with rotations: a node has its line and two of six numbers."""
 EVEN = 1e-3
 """Share of a step by which times may be uneven besides the rounding of their digits."""
 
@@ -220,14 +227,28 @@ def phase_collinearity(shape: Array) -> float:
     return float(difference / total) if total > 0 else 1.0
 
 
+def _without_rotations(content: bytes) -> bytes:
+    """The content with modes in translations alone where complex, since pyuff reads no others."""
+
+    def translations(mode: re.Match[bytes]) -> bytes:
+        nodes = mode["nodes"].splitlines(keepends=True)
+        kept = b"".join(line for k, line in enumerate(nodes) if k % 3 < 2)
+        return mode["head"] + mode["kinds"][:-1] + b"3" + mode["rest"] + kept
+
+    return COMPLEX_IN_SIX.sub(translations, content)
+
+
 def _datasets(path: Path, kind: int) -> list[dict[str, Any]]:
     """Data sets of a kind in a universal file, as pyuff reads them."""
     import pyuff
 
     try:
-        file = pyuff.UFF(str(path))
-        indices = [k for k, set_kind in enumerate(file.get_set_types()) if set_kind == kind]
-        sets = file.read_sets(indices) if indices else []
+        with TemporaryDirectory() as folder:
+            copy = Path(folder, path.name)
+            copy.write_bytes(_without_rotations(path.read_bytes()))
+            file = pyuff.UFF(str(copy))
+            indices = [k for k, set_kind in enumerate(file.get_set_types()) if set_kind == kind]
+            sets = file.read_sets(indices) if indices else []
     except Exception as error:  # pyuff raises plain exceptions, and whatever NumPy does
         reason = str(error)[:80] or type(error).__name__
         raise RefusedError(path.name, reason, "a universal file (UFF)") from None

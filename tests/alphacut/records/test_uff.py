@@ -57,6 +57,21 @@ def test_a_complex_shape_is_turned_to_its_real_one_or_refused(tmp_path):
         uff_mode_rows(written(tmp_path / "b.uff", [complex_mode(1.2)]), FLOORS)
 
 
+def test_complex_modes_with_rotations_are_read_by_their_translations(tmp_path):
+    pytest.importorskip("pyuff")
+    values = [f"{x * np.cos(0.3):13.5E}{x * np.sin(0.3):13.5E}" for x in SHAPE]
+    zeros = f"{0:13.5E}" * 4
+    lines = ["    -1", "    55", *["NONE"] * 5, "".join(f"{k:10d}" for k in (1, 3, 3, 8, 5, 6))]
+    lines += ["".join(f"{k:10d}" for k in (2, 6, 0, 1)), f"{-0.1:13.5E}{6:13.5E}" + zeros]
+    for node, value in enumerate(values, start=11):
+        lines += [f"{node:10d}", value + zeros, f"{7:13.5E}" * 6]
+    path = saved(tmp_path, "\n".join([*lines, "    -1", ""]).encode())
+    (row,) = uff_mode_rows(path, FLOORS)
+    assert row.frequencies == pytest.approx([0.955065], rel=1e-5)
+    ratios = [row.amplitudes[k][0] / row.amplitudes[3][0] for k in (1, 2)]
+    assert ratios == pytest.approx(SHAPE[:2], rel=1e-5)  # six digits in the file
+
+
 WAVE = np.sin(9 * 0.005 * np.arange(400))
 
 
