@@ -168,7 +168,9 @@ class Oscillators:
         """Bounds of how far responses stray from a line in the step to each node, (T,)."""
         is_direct = _has_feedthrough(source, order)
         modulus, read = line_deviations(
-            self.grid.sigma, self.loads.get(source), self.time, order, is_direct=is_direct
+            *(self.grid.sigma, self.loads.get(source), self.time, order),
+            is_direct=is_direct,
+            at_nodes=self.forced.get(source, self.free),
         )
         return modulus * (1 + self.grid.quotient[-1]) if source == "start" else read
 

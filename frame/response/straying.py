@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from alphacut.frame.calculus.kernels import kernel
 from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF
 from alphacut.frame.response.duhamel import absolute_moments, responses_at_nodes
 from alphacut.frame.structures.loads import History
@@ -46,7 +47,13 @@ class Pieces(NamedTuple):
 
 
 def line_deviations(
-    sigma: Array, load: History | None, time: Array, order: int, *, is_direct: bool = False
+    sigma: Array,
+    load: History | None,
+    time: Array,
+    order: int,
+    *,
+    is_direct: bool = False,
+    at_nodes: tuple[Array, Array, Array] | None = None,
 ) -> Array:
     """Return how far σ^order ρ, and its imaginary part over ω, stray from lines between nodes.
 
@@ -56,6 +63,8 @@ def line_deviations(
         time: Nodes, shape (T,), in s.
         order: Power of σ.
         is_direct: Whether the load itself is added to the latter.
+        at_nodes: ρ with two derivatives at the nodes, its rounding, and bounds of its derivatives,
+            where they are known.
 
     Returns:
         Bounds in the step to each node, shape (2, T).
@@ -65,39 +74,46 @@ def line_deviations(
     pieces = _pieces(load, time, fast)
     times, d, node = pieces.time, np.diff(pieces.time), np.searchsorted(pieces.time, time)
     step = np.repeat(np.arange(len(time) - 1), np.diff(node))  # in which each piece lies
-    at_node: Array = np.zeros(len(time))
+    at_node: Array = is_direct * load.values(time) if load else np.zeros(len(time))
     slope = (pieces.last - pieces.first) / d
-    bounds = np.stack([times**n * np.exp(-decay * times) for n in range(5)])
-    if load is not None:
-        bounds, at_node = absolute_moments(decay, load, times), is_direct * load.values(time)
-    ends = []  # of pieces: where in the step, number, the load that is added
+    known = at_nodes if len(times) == len(time) else None
+    if known:
+        bounds = known[2]
+    elif load is None:
+        bounds = np.stack([times**n * np.exp(-decay * times) for n in range(5)])
+    else:
+        bounds = absolute_moments(decay, load, times)
+    ends = []  # of pieces: where in the step, the load that is added, numbers of those at no node
     for first, added in ((0, pieces.first), (1, pieces.last)):
-        at = np.arange(len(d)) + first
-        x = (times[at] - time[step]) / (time[step + 1] - time[step])
-        ends.append((x, at, is_direct * added - (1 - x) * at_node[step] - x * at_node[step + 1]))
+        x = (times[first : len(d) + first] - time[step]) / (time[step + 1] - time[step])
+        direct = is_direct * added - (1 - x) * at_node[step] - x * at_node[step + 1]
+        ends.append((x, direct, np.flatnonzero((x > 0) & (x < 1))))
     # largest magnitudes over the grid: of F = σ^order A and F″; of H, the responses off the line
     # at both ends, H″, Im H/ω with and without the load
-    amplitude, off = np.zeros((2, len(d))), np.zeros((4, 2, len(d)))
-    rounding = np.zeros(len(times))
-    for part in np.array_split(sigma.ravel(), -(-3 * len(times) * sigma.size // MAX_ENTRIES)):
-        if load is None:
+    amplitude, rounding = np.zeros((2, len(d))), np.zeros(len(times))
+    off = np.zeros((4, 2, len(d)))
+    off[2] = [np.where((x > 0) & (x < 1), 0.0, np.abs(direct)) for x, direct, _ in ends]
+    count = -(-3 * len(times) * sigma.size // MAX_ENTRIES)
+    for piece in np.array_split(np.arange(sigma.size), 1 if known else count):
+        part = sigma.ravel()[piece]
+        if known:
+            rho, error = known[:2]
+        elif load is None:
             rho = np.exp(part * times[:, None]) * times[:, None] ** np.arange(3)[:, None, None]
             error = UNIT_ROUNDOFF * (4 + np.abs(part) * times[:, None]) * np.abs(rho[0])
         else:
             rho, error = responses_at_nodes(part, load, times, 2)
-        lines = [pieces.first[:, None] / part + slope[:, None] / part**2]
-        lines.append(-pieces.first[:, None] / part**2 - 2 * slope[:, None] / part**3)
-        lines.append(2 * pieces.first[:, None] / part**3 + 6 * slope[:, None] / part**4)
-        F, G = with_power(part, rho[:, :-1] + lines, order), with_power(part, rho, order)
-        amplitude = np.maximum(amplitude, np.abs(F[::2]).max(2))
-        error = np.abs(part) ** order * error + 2 * (order + 9) * UNIT_ROUNDOFF * np.abs(G[0])
-        rounding = np.maximum(rounding, error.max(1))
-        for k, (x, at, direct) in enumerate(ends):
-            x, direct = x[:, None], direct[:, None]
-            H = G[::2, at] - (1 - x) * G[::2, node[step]] - x * G[::2, node[step + 1]]
+        _largest(part, rho, error, pieces.first, slope, order, amplitude, rounding)
+        for k, (x, direct, inner) in enumerate(ends):
+            if not len(inner):
+                continue
+            x, direct = x[inner, None], direct[inner, None]
+            left, right = node[step[inner]], node[step[inner] + 1]
+            line = (1 - x) * rho[:, left] + x * rho[:, right]
+            H = with_power(part, rho[:, inner + k] - line, order)[::2]
             read = H[0].imag / part.imag
             sizes = np.stack([np.abs(H[0]), np.abs(H[1]), np.abs(read + direct), np.abs(read)])
-            off[:, k] = np.maximum(off[:, k], sizes.max(2))
+            off[:, k, inner] = np.maximum(off[:, k, inner], sizes.max(2))
     # between the points of the grid F strays from what is bilinear by `between` |F″|
     h, k_step = (float(np.diff(np.sort(x)).max(initial=0.0)) for x in (omega, quotient))
     between = ((1 + quotient.max() ** 2) * h**2 + (omega.max() * k_step) ** 2) / 8
@@ -111,8 +127,8 @@ def line_deviations(
     bent = growth * np.minimum((fast * d) ** 2 / 8, 2.0) * size
     bent += growth * fast**order * 2 * d * pieces.bend
     at_ends = np.zeros((2, 2, len(d)))
-    for k, (x, at, _) in enumerate(ends):
-        is_inner = (x > 0) & (x < 1)
+    for k, (x, _, _) in enumerate(ends):
+        at, is_inner = np.arange(len(d)) + k, (x > 0) & (x < 1)
         chord = np.maximum(fourth[node[step]], fourth[node[step + 1]])
         missed = is_inner * between * (off[1, k] + between * (fourth[at] + chord))
         at_ends[:, k] = off[0, k] + missed, off[2, k] + (missed + is_inner * h * off[3, k]) / low
@@ -121,6 +137,46 @@ def line_deviations(
     deviation: Array = np.zeros((2, len(time)))
     deviation[:, 1:] = np.maximum.reduceat(total, node[:-1], axis=1)
     return deviation
+
+
+@kernel(fastmath={"reassoc", "contract"})
+def _largest(
+    sigma: Array,
+    rho: Array,
+    error: Array,
+    first: Array,
+    slope: Array,
+    order: int,
+    amplitude: Array,
+    rounding: Array,
+) -> None:
+    """Raise to the largest at S σ: |F|, |F″| of P pieces (2, P); σ^order ρ's rounding (P + 1,)."""
+    one, two = 1 / sigma, 1 / sigma**2
+    three, four = one * two, two * two
+    power, size = sigma**order, np.abs(sigma) ** order
+    power_first, power_second = 2 * order * sigma ** max(order - 1, 0), order * (order - 1.0)
+    relative = 2 * (order + 9) * UNIT_ROUNDOFF
+    for p in range(len(rounding)):
+        largest, largest_second, total, worst = 0.0, 0.0, 0.0, rounding[p]
+        a, b = (first[p], slope[p]) if p < len(first) else (0.0, 0.0)
+        for s in range(len(sigma)):
+            r = rho[0, p, s]
+            worst = max(worst, size[s] * (error[p, s] + relative * np.sqrt(r.real**2 + r.imag**2)))
+            A = r + a * one[s] + b * two[s]
+            A1 = rho[1, p, s] - a * two[s] - 2 * b * three[s]
+            A2 = rho[2, p, s] + 2 * a * three[s] + 6 * b * four[s]
+            F = power[s] * A
+            F2 = power_second * A + power_first[s] * A1 + power[s] * A2
+            square, square_second = F.real**2 + F.imag**2, F2.real**2 + F2.imag**2
+            largest, largest_second = max(largest, square), max(largest_second, square_second)
+            total += abs(F.real) + abs(F.imag) + abs(F2.real) + abs(F2.imag)
+        if not total < np.inf:  # NaN, which a maximum may pass over
+            largest = largest_second = worst = np.inf
+        rounding[p] = worst
+        if p < len(first):
+            lost = 1e-150 if total > 0 else 0.0  # squares of less may be zero
+            amplitude[0, p] = max(amplitude[0, p], np.sqrt(largest) + lost)
+            amplitude[1, p] = max(amplitude[1, p], np.sqrt(largest_second) + lost)
 
 
 def with_power(sigma: Array, rho: Array, order: int) -> Array:
