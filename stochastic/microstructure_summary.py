@@ -103,11 +103,12 @@ def fragment(numbers: Mapping[str, Any]) -> str:
     """The case section [radius] as TOML text, with fractions as comments, from a `summary`."""
     measure = "volume" if "mean_volume_fraction_of_map" in numbers else "area"
     stated, map_fraction = numbers["fraction_of_case"], numbers[f"mean_{measure}_fraction_of_map"]
-    case_words = "" if stated is None else f"; of the case: {stated:g}"
+    words = f"; of the particles: {numbers[f'{measure}_fraction']:.4f}"
+    words += "" if stated is None else f"; of the case: {stated:g}"
     lines = [
         f"[radius]  # from {numbers['cells']} cells; the limits keep"
         f" {numbers['share_kept']:.4%} of their {measure}",
-        f"# {measure} fraction of this map at its modal values: {map_fraction:.4f}{case_words}",
+        f"# {measure} fraction of this map at its modal values: {map_fraction:.4f}{words}",
     ]
     for name, value in numbers["radius"].items():
         is_fuzzy = isinstance(value, list)

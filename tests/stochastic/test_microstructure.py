@@ -224,7 +224,9 @@ def test_study_of_packings(result):
 
 
 def test_fragment_is_toml_that_gives_the_map(result):
-    radius = tomllib.loads(fragment(summary(result)))["radius"]
+    text = fragment(summary(result))
+    radius = tomllib.loads(text)["radius"]
+    assert f"of the particles: {summary(result)['area_fraction']:.4f}" in text
     assert (radius["a1"], radius["a3"], radius["theta"]) == (0.15, 0.85, [-3, 3])
     assert radius["a2"] == pytest.approx(result.pbox.a2, rel=1e-7)
 
