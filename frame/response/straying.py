@@ -76,9 +76,9 @@ def line_deviations(
     step = np.repeat(np.arange(len(time) - 1), np.diff(node))  # in which each piece lies
     at_node: Array = is_direct * load.values(time) if load else np.zeros(len(time))
     slope = (pieces.last - pieces.first) / d
-    known = at_nodes if len(times) == len(time) else None
-    if known:
-        bounds = known[2]
+    tables = at_nodes if len(times) == len(time) else None
+    if tables:
+        bounds = tables[2]
     elif load is None:
         bounds = np.stack([times**n * np.exp(-decay * times) for n in range(5)])
     else:
@@ -94,10 +94,10 @@ def line_deviations(
     off = np.zeros((4, 2, len(d)))
     off[2] = [np.where((x > 0) & (x < 1), 0.0, np.abs(direct)) for x, direct, _ in ends]
     count = -(-3 * len(times) * sigma.size // MAX_ENTRIES)
-    for piece in np.array_split(np.arange(sigma.size), 1 if known else count):
+    for piece in np.array_split(np.arange(sigma.size), 1 if tables else count):
         part = sigma.ravel()[piece]
-        if known:
-            rho, error = known[:2]
+        if tables:
+            rho, error = tables[:2]
         elif load is None:
             rho = np.exp(part * times[:, None]) * times[:, None] ** np.arange(3)[:, None, None]
             error = UNIT_ROUNDOFF * (4 + np.abs(part) * times[:, None]) * np.abs(rho[0])
@@ -151,8 +151,8 @@ def _largest(
     rounding: Array,
 ) -> None:
     """Raise to the largest at S σ: |F|, |F″| of P pieces (2, P); σ^order ρ's rounding (P + 1,)."""
-    one, two = 1 / sigma, 1 / sigma**2
-    three, four = one * two, two * two
+    inverse, inverse_2 = 1 / sigma, 1 / sigma**2
+    inverse_3, inverse_4 = inverse * inverse_2, inverse_2 * inverse_2
     power, size = sigma**order, np.abs(sigma) ** order
     power_first, power_second = 2 * order * sigma ** max(order - 1, 0), order * (order - 1.0)
     relative = 2 * (order + 9) * UNIT_ROUNDOFF
@@ -162,9 +162,9 @@ def _largest(
         for s in range(len(sigma)):
             r = rho[0, p, s]
             worst = max(worst, size[s] * (error[p, s] + relative * np.sqrt(r.real**2 + r.imag**2)))
-            A = r + a * one[s] + b * two[s]
-            A1 = rho[1, p, s] - a * two[s] - 2 * b * three[s]
-            A2 = rho[2, p, s] + 2 * a * three[s] + 6 * b * four[s]
+            A = r + a * inverse[s] + b * inverse_2[s]
+            A1 = rho[1, p, s] - a * inverse_2[s] - 2 * b * inverse_3[s]
+            A2 = rho[2, p, s] + 2 * a * inverse_3[s] + 6 * b * inverse_4[s]
             F = power[s] * A
             F2 = power_second * A + power_first[s] * A1 + power[s] * A2
             square, square_second = F.real**2 + F.imag**2, F2.real**2 + F2.imag**2
@@ -174,9 +174,9 @@ def _largest(
             largest = largest_second = worst = np.inf
         rounding[p] = worst
         if p < len(first):
-            lost = 1e-150 if total > 0 else 0.0  # squares of less may be zero
-            amplitude[0, p] = max(amplitude[0, p], np.sqrt(largest) + lost)
-            amplitude[1, p] = max(amplitude[1, p], np.sqrt(largest_second) + lost)
+            underflow = 1e-150 if total > 0 else 0.0  # squares of less may be zero
+            amplitude[0, p] = max(amplitude[0, p], np.sqrt(largest) + underflow)
+            amplitude[1, p] = max(amplitude[1, p], np.sqrt(largest_second) + underflow)
 
 
 def with_power(sigma: Array, rho: Array, order: int) -> Array:

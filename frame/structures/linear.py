@@ -329,17 +329,19 @@ def _divided_differences(omega: Array, inside: Mask) -> tuple[Array, Array]:
 
     Modes inside may have equal λ, not one inside and one outside.
     """
-    both, sums = inside[:, None] & inside, omega[:, :, None] + omega[:, None]
+    both_inside, sums = inside[:, None] & inside, omega[:, :, None] + omega[:, None]
     gaps = omega[:, :, None] ** 2 - omega[:, None] ** 2
-    apart = inside[:, None] != inside
-    f, safe = np.where(inside, 2 * omega, 0.0), np.where(apart, gaps, 1.0)
-    first = np.where(both, 2 / sums, np.where(apart, (f[:, :, None] - f[:, None]) / safe, 0.0))
+    one_inside = inside[:, None] != inside
+    f, safe = np.where(inside, 2 * omega, 0.0), np.where(one_inside, gaps, 1.0)
+    first = np.where(
+        both_inside, 2 / sums, np.where(one_inside, (f[:, :, None] - f[:, None]) / safe, 0.0)
+    )
     # f[x, y, z] = (f[x, y] − f[y, z]) / (x − z) by a pair of which one is inside, one outside
     i_k = (first[:, :, None] - first[:, None]) / safe[..., None]
     i_j = (first[..., None] - first[:, None]) / safe[:, :, None]
     closed = -2 / (sums[..., None] * sums[:, None] * sums[:, :, None])
-    mixed = np.where(apart[..., None], i_k, np.where(apart[:, None], i_j, 0.0))
-    return first, np.where(both[..., None] & inside, closed, mixed)
+    mixed = np.where(one_inside[..., None], i_k, np.where(one_inside[:, None], i_j, 0.0))
+    return first, np.where(both_inside[..., None] & inside, closed, mixed)
 
 
 def frequencies(system: LinearSystem) -> Array:
