@@ -224,10 +224,11 @@ def _read_files(value: object, info: ValidationInfo) -> tuple[NamedRecording, ..
     if len(errors) == 1:
         raise errors[0]
     if errors:  # all bad files of a folder at once, the first with its reason
+        # a cure is never cut off, a value is where the case lies in a long folder
         others = ", ".join(error.key.partition(",")[0] for error in errors[1:])
         first = errors[0]
-        value = f"{first.value}; bad as well: {others}"
-        raise RefusedError(first.key, value, first.allowed, first.cure)
+        cure = f"bad as well: {others}" + (f"; {first.cure}" if first.cure else "")
+        raise RefusedError(first.key, first.value, first.allowed, cure)
     return tuple(NamedRecording(*pair) for pair in zip(names, recordings, strict=True))
 
 
