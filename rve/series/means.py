@@ -5,10 +5,11 @@ Terms of the series at each radius, and nodes of the rule in θ, are as many as 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterator
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,10 +26,6 @@ _SAFETY = 1.6
 _NOISE = 1e-13  # of a declared error: what rounding leaves
 _ENERGY_NOISE = 1e-12  # of energies, over the modulus
 
-Solve = Callable[[Array, int], Array]
-"""Three moduli of k cells times m inclusions, shape (k, m, 3), from radii and number of terms."""
-SolveMaterials = Callable[[Array, Array, Array, int], Array]
-"""The same, shape (k, 1, 3), from radii, K and G of matrix and particle, and number of terms."""
 _cached_rule = lru_cache(maxsize=256)(gauss_rule)
 
 
@@ -38,6 +35,21 @@ class SeriesError(FailedError):
 
 class RuleError(FailedError):
     """No rule in θ reaches the wanted accuracy."""
+
+
+class ComplexMaterial(NamedTuple):
+    """K and G of an isotropic material, complex where it has losses, and its Poisson's ratio."""
+
+    bulk_and_shear: tuple[complex, complex]
+    poisson: complex
+
+    @classmethod
+    def of_bulk_and_shear(cls, bulk: complex, shear: complex) -> ComplexMaterial:
+        """The material with K of three dimensions and G, in Pa."""
+        return cls((bulk, shear), (3 * bulk - 2 * shear) / (6 * bulk + 2 * shear))
+
+
+Material = Phase | ComplexMaterial
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,31 +81,41 @@ def _error_terms(terms: int) -> tuple[int, int]:
 
 
 @dataclass(frozen=True)
-class Truncation:
-    """Numbers of terms of a series, its error estimate, and the words of its error message.
+class Series:
+    """A multipole series of one kind of cell, its error estimate, and its numbers of terms.
 
     Args:
+        moduli: Three moduli in Pa of n cells times m inclusions, shape (n, m, 3), from radii (n,),
+            the materials of the matrix and of the m inclusions, and a number of terms.
+        voigt: Stiffness from the three moduli.
         steps: Numbers of terms to try, rising.
         decay: d in: error ~ exp(−d · terms · arccosh(1/r)).
         unknowns: Of one linear system with so many terms.
         safety: Factor of the estimated error.
         round_off: Relative, of a modulus.
+        tolerance: Relative truncation error allowed by default.
         terms: Their name in the message, such as "harmonics".
         particles: Name of the particles that nearly touch.
-        voigt: Stiffness from the three moduli.
     """
 
+    moduli: Callable[[Array, Sequence[Material], int], Array]
+    voigt: Callable[[Array, Array, Array], Array]
     steps: tuple[int, ...]
     decay: float
     unknowns: Callable[[int], int]
     safety: float
     round_off: float
+    tolerance: float
     terms: str
     particles: str
-    voigt: Callable[[Array, Array, Array], Array]
 
     def converged_moduli(
-        self, radius: Array, inclusions: int, solve: Solve, *, tolerance: float
+        self,
+        radius: Array,
+        matrix: Phase,
+        inclusions: Sequence[Phase],
+        *,
+        tolerance: float | None = None,
     ) -> CellModuli:
         """Moduli of n cells times m inclusions, each with as many terms as its error asks.
 
@@ -101,18 +123,21 @@ class Truncation:
 
         Args:
             radius: Radii over half the cell's side, shape (n,), each in [0, 1).
-            inclusions: Number m of inclusions.
-            solve: Moduli by the series, from radii and number of terms.
-            tolerance: Relative error allowed, of the moduli.
+            matrix: Material outside the particle.
+            inclusions: Materials of the particle, m of them; moduli of 1e-12 and 1e12 of the
+                matrix's are a pore and a rigid particle to as many digits.
+            tolerance: Relative truncation error allowed, of each modulus.
 
         Raises:
-            SeriesError: The largest number of terms does not suffice.
+            SeriesError: The largest number of terms does not suffice: particles nearly touch.
+            RefusedError: A radius is outside [0, 1).
         """
-        radius, tolerance = np.atleast_1d(radius), max(tolerance, 2 * self.round_off)
+        radius = np.atleast_1d(radius)
+        tolerance = max(self.tolerance if tolerance is None else tolerance, 2 * self.round_off)
         if not ((radius >= 0) & (radius < 1)).all():
             worst = float(radius[np.argmax(np.abs(radius - 0.5))])
             raise RefusedError("radius", worst, "values in [0, 1) halves of the cell's side")
-        steps, shape = np.array(self.steps), (radius.size, inclusions)
+        steps, shape = np.array(self.steps), (radius.size, len(inclusions))
         moduli, errors = np.zeros((*shape, 3)), np.full((*shape, 3), np.inf)
         terms, unsolved = np.zeros(shape, int), np.arange(radius.size)
         rate = self.decay * np.arccosh(1 / np.maximum(radius, 1e-3))
@@ -124,9 +149,7 @@ class Truncation:
                 # results do not depend on which inclusions are solved together
                 is_open = errors[cells].max(axis=2) > tolerance
                 coarse, finer, finest = (
-                    np.concatenate(
-                        [solve(x, n) for x in self.batches(radius[cells], inclusions, n)]
-                    )
+                    self.solve(radius[cells], [matrix, *inclusions], n)
                     for n in (count, *_error_terms(count))
                 )
                 distance = _largest_distance(coarse, finer, finest)
@@ -146,10 +169,11 @@ class Truncation:
             step_index[unsolved] += 1
         return CellModuli(moduli, errors, terms, self.voigt)
 
-    def batches(self, radius: Array, inclusions: int, terms: int) -> Iterator[Array]:
-        """Radii in so many parts that matrices stay small."""
-        parts = -(-radius.size * inclusions * self.unknowns(terms) ** 2 // _BATCH)
-        yield from np.array_split(radius, min(radius.size, parts))
+    def solve(self, radius: Array, materials: Sequence[Material], terms: int) -> Array:
+        """Moduli (n, m, 3) by so many terms, solved in so many batches that matrices stay small."""
+        entries = radius.size * (len(materials) - 1) * self.unknowns(terms) ** 2
+        batches = np.array_split(radius, min(radius.size, -(-entries // _BATCH)))
+        return np.concatenate([self.moduli(batch, materials, terms) for batch in batches])
 
 
 def _largest_distance(coarse: Array, finer: Array, finest: Array) -> Array:
@@ -247,16 +271,14 @@ def _finer_count(count: int) -> int:
     return count + max(2, count // 3)
 
 
-def mean_energies(
-    cell: Cell, mean: Mean, solve: SolveMaterials, truncation: Truncation
-) -> PhaseEnergies:
+def mean_energies(series: Series, cell: Cell, mean: Mean) -> PhaseEnergies:
     """Mean parts X ∂c/∂X of K and G of both phases over θ, by complex steps of the series.
 
     Their error is the distance from means by two finer rules with more terms.
     """
     rule, terms = ThetaRule(mean.curve.theta, mean.curve.weights), mean.terms
     node_radii = cell.radius(rule.nodes)
-    values, distances = _rule_energies(cell, rule, terms, solve, truncation), []
+    values, distances = _rule_energies(series, cell, rule, terms), []
     order = np.argsort(node_radii)
     rising_terms = np.maximum.accumulate(terms[order])
     finer = rule
@@ -264,40 +286,31 @@ def mean_energies(
         finer = gauss_rule(cell.radius.distribution, points=_finer_count(finer.nodes.size))
         coarse_terms = np.interp(cell.radius(finer.nodes), node_radii[order], rising_terms)
         finer_terms = np.array([_error_terms(int(np.ceil(n)))[k] for n in coarse_terms])
-        distances.append(abs(values - _rule_energies(cell, finer, finer_terms, solve, truncation)))
+        distances.append(abs(values - _rule_energies(series, cell, finer, finer_terms)))
     errors = _SAFETY * np.max(distances, axis=0) + _ENERGY_NOISE * values.sum(axis=(0, 1))
-    moduli_at = partial(_mean_moduli, cell, rule, terms, solve, truncation)
+    moduli_at = partial(_mean_moduli, series, cell, rule, terms)
     return PhaseEnergies(values, errors, moduli_at)
 
 
-def _rule_energies(
-    cell: Cell, rule: ThetaRule, terms: Rows, solve: SolveMaterials, truncation: Truncation
-) -> Array:
+def _rule_energies(series: Series, cell: Cell, rule: ThetaRule, terms: Rows) -> Array:
     """Mean energies X ∂c/∂X, shape (2 phases, K and G, 3 moduli), in Pa."""
     moduli = np.array([phase.bulk_and_shear for phase in cell.phases if isinstance(phase, Phase)])
     energies = np.zeros((2, 2, 3))
     for phase, kind in product(range(2), repeat=2):
         stepped = moduli.astype(complex)
         stepped[phase, kind] *= 1 + 1j * STEP
-        means = _mean_moduli(cell, rule, terms, solve, truncation, *stepped.T)
+        means = _mean_moduli(series, cell, rule, terms, *stepped.T)
         energies[phase, kind] = means.imag / STEP
     return energies
 
 
 def _mean_moduli(
-    cell: Cell,
-    rule: ThetaRule,
-    terms: Rows,
-    solve: SolveMaterials,
-    truncation: Truncation,
-    bulk: Array,
-    shear: Array,
+    series: Series, cell: Cell, rule: ThetaRule, terms: Rows, bulk: Array, shear: Array
 ) -> Array:
     """Mean moduli over θ, (3,), with complex K and G of matrix and particle, (2,) each."""
     radii, total = cell.radius(rule.nodes), np.zeros(3, complex)
+    materials = [ComplexMaterial.of_bulk_and_shear(*x) for x in zip(bulk, shear, strict=True)]
     for count in np.unique(terms):
         nodes = np.flatnonzero(terms == count)
-        batches = truncation.batches(radii[nodes], 1, int(count))
-        moduli = np.concatenate([solve(x, bulk, shear, int(count))[:, 0] for x in batches])
-        total += rule.weights[nodes] @ moduli
+        total += rule.weights[nodes] @ series.solve(radii[nodes], materials, int(count))[:, 0]
     return total

@@ -7,17 +7,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from time import perf_counter
-from typing import ClassVar
+from typing import Any, ClassVar
 
-from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.cell.cell import Cell, Phase
 from alphacut.rve.cell.settings import require_parts, require_points
 from alphacut.rve.result.checks import with_checks
-from alphacut.rve.result.result import HomogenisedStiffness, PhaseEnergies
-from alphacut.rve.series.means import CellModuli, Mean, converged_means, mean_energies
-from alphacut.rve.series.multipoles import TRUNCATION, material_moduli, square_stiffness
+from alphacut.rve.result.result import HomogenisedStiffness
+from alphacut.rve.series.means import Series, converged_means, mean_energies
+from alphacut.rve.series.multipoles import CIRCLES
 from alphacut.stochastic import RadiusMap
 
 
@@ -46,6 +46,7 @@ class SeriesModel:
     energies: bool = False
     name: ClassVar[str] = "series"
     LEAST: ClassVar[float] = 1e-12
+    series: ClassVar[Series] = CIRCLES
 
     def __post_init__(self) -> None:
         require_points(self.points)
@@ -65,35 +66,29 @@ class SeriesModel:
         require_parts(radius_map, matrix, inclusions)
         start = perf_counter()
 
-        def moduli(radii: Array) -> CellModuli:
-            return self._moduli(radii, matrix, inclusions)
-
+        moduli = partial(
+            self.series.converged_moduli,
+            matrix=matrix,
+            inclusions=inclusions,
+            tolerance=self.accuracy,
+        )
         means = converged_means(radius_map, moduli, points=self.points, accuracy=self.accuracy)
         seconds = perf_counter() - start
         results = []
         for mean, inclusion in zip(means, inclusions, strict=True):
             cell = Cell(matrix, inclusion, radius_map)
-            result = self._result(mean, cell, seconds)
-            if self.energies:
-                result = replace(result, energies=self._energies(cell, mean))
-            results.append(result)
-        return results
-
-    def _moduli(self, radii: Array, matrix: Phase, inclusions: Sequence[Phase]) -> CellModuli:
-        return square_stiffness(radii, matrix, inclusions, tolerance=self.accuracy)
-
-    def _energies(self, cell: Cell, mean: Mean) -> PhaseEnergies:
-        return mean_energies(cell, mean, material_moduli, TRUNCATION)
-
-    def _result(self, mean: Mean, cell: Cell, seconds: float) -> HomogenisedStiffness:
-        """Result of one inclusion from its means over θ, with its checks."""
-        return with_checks(
-            HomogenisedStiffness(
+            result = self._checked_result(
                 curve=mean.curve,
                 method=self.name,
-                unknowns=int(mean.terms.max()),
+                unknowns=self.series.unknowns(int(mean.terms.max())),
                 seconds={"total": seconds},
                 errors=mean.errors,
                 cell=cell,
             )
-        )
+            if self.energies:
+                result = replace(result, energies=mean_energies(self.series, cell, mean))
+            results.append(result)
+        return results
+
+    def _checked_result(self, **parts: Any) -> HomogenisedStiffness:
+        return with_checks(HomogenisedStiffness(**parts))

@@ -29,10 +29,9 @@ import numpy as np
 from scipy.special import gammaln
 
 from alphacut.fuzzy.arrays import Array, Rows
-from alphacut.rve.cell.cell import Phase
 from alphacut.rve.result.moduli import square_voigt
 from alphacut.rve.series.lattice_sums import ZETA_PERIOD, LatticeSums, lattice_images, lattice_sums
-from alphacut.rve.series.means import CellModuli, Truncation
+from alphacut.rve.series.means import Material, Series
 
 MOST_HARMONICS = 160  # per potential and load; reaches r = 0.999
 LOADS = ("hydrostatic", "deviator", "shear")
@@ -48,18 +47,11 @@ class Contrast:
     mu_i: Array
 
     @classmethod
-    def of_phases(cls, matrix: Phase, inclusions: Sequence[Phase]) -> Contrast:
-        """From the phases, plane strain: κ = 3 − 4ν, μ = E / 2(1 + ν)."""
-        phases = (matrix, *inclusions)
-        kappa = np.array([3 - 4 * phase.poisson for phase in phases])
-        mu = np.array([phase.modulus / (2 * (1 + phase.poisson)) for phase in phases])
-        return cls(float(kappa[0]), float(mu[0]), kappa[1:], mu[1:])
-
-    @classmethod
-    def of_moduli(cls, bulk: Array, shear: Array) -> Contrast:
-        """From K and G of the matrix and of m inclusions, shape (1 + m,): κ = 1 + 2 G/(K + G/3)."""
-        kappa = 1 + 2 * shear / (bulk + shear / 3)
-        return cls(kappa[0], shear[0], kappa[1:], shear[1:])
+    def of_materials(cls, materials: Sequence[Material]) -> Contrast:
+        """From the matrix and m inclusions in plane strain: κ = 3 − 4ν, μ = G."""
+        kappa = np.array([3 - 4 * material.poisson for material in materials])
+        mu = np.array([material.bulk_and_shear[1] for material in materials])
+        return cls(kappa[0], mu[0], kappa[1:], mu[1:])
 
     @cached_property
     def ratio(self) -> Array:
@@ -202,51 +194,27 @@ def _sums() -> LatticeSums:
     return lattice_sums(12 * MOST_HARMONICS + 8)
 
 
-TRUNCATION = Truncation(
-    steps=(3, 4, 5, 6, 8, 10, 12, 16, 24, 32, 48, 64, 96, 128, MOST_HARMONICS),
-    decay=8.0,
-    unknowns=int,
-    safety=1.6,
-    round_off=2e-15,
-    terms="harmonics",
-    particles="particles",
-    voigt=square_voigt,
-)
-
-
-def square_stiffness(
-    radius: Array, matrix: Phase, inclusions: Sequence[Phase], *, tolerance: float = 1e-12
-) -> CellModuli:
-    """C11 + C12, C11 − C12 and C33 of n square cells times m inclusions, with declared errors.
-
-    Args:
-        radius: Radii over half the cell's side, shape (n,), each in [0, 1).
-        matrix: Material outside the particle.
-        inclusions: Materials of the particle, m of them.
-        tolerance: Relative truncation error allowed, at least 1e-13.
-
-    Raises:
-        SeriesError: The series does not reach `tolerance` (particles nearly in touch).
-    """
-    contrast = Contrast.of_phases(matrix, inclusions)
-
-    def solve(radii: Array, harmonics: int) -> Array:
-        return _plane_moduli(radii, contrast, harmonics)
-
-    return TRUNCATION.converged_moduli(radius, len(inclusions), solve, tolerance=tolerance)
-
-
-def material_moduli(radius: Array, bulk: Array, shear: Array, harmonics: int) -> Array:
-    """C11 + C12, C11 − C12 and C33, (n, m, 3), from K and G of the matrix, then of m inclusions.
-
-    K and G, shape (1 + m,), may be complex.
-    """
-    return _plane_moduli(radius, Contrast.of_moduli(bulk, shear), harmonics)
-
-
-def _plane_moduli(radius: Array, contrast: Contrast, harmonics: int) -> Array:
+def plane_moduli(radius: Array, materials: Sequence[Material], harmonics: int) -> Array:
+    """C11 + C12, C11 − C12 and C33 of n square cells times m inclusions, (n, m, 3), in Pa."""
+    contrast = Contrast.of_materials(materials)
     columns = [
         modulus(load, multipoles(load, radius, contrast, harmonics=harmonics), radius, contrast)
         for load in LOADS
     ]
     return np.stack(columns, axis=-1)
+
+
+CIRCLES = Series(
+    moduli=plane_moduli,
+    voigt=square_voigt,
+    steps=(3, 4, 5, 6, 8, 10, 12, 16, 24, 32, 48, 64, 96, 128, MOST_HARMONICS),
+    decay=8.0,
+    unknowns=int,
+    safety=1.6,
+    round_off=2e-15,
+    tolerance=1e-12,
+    terms="harmonics",
+    particles="particles",
+)
+square_stiffness = CIRCLES.converged_moduli
+"""C11 + C12, C11 − C12 and C33 of n square cells times m inclusions, with declared errors."""

@@ -5,18 +5,52 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.rve.cell.cell import Cell, Phase
-from alphacut.rve.result.result import PhaseEnergies
-from alphacut.rve.series.means import CellModuli, Mean, Truncation, mean_energies
+from alphacut.rve.series.means import Material, Series
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.spheres.result import HomogenisedSpheres, cubic_voigt, spheres_with_checks
-from alphacut.rve.spheres.scattering import Elastic, Material, t_matrices
+from alphacut.rve.spheres.scattering import t_matrices
 from alphacut.rve.spheres.translation import VOLUME, Multipoles, couplings
+
+
+def unknowns(degree: int) -> int:
+    """Amplitudes of one load up to a degree."""
+    return 3 * (degree + 2) ** 2 // 16
+
+
+def space_moduli(radius: Array, materials: Sequence[Material], degree: int) -> Array:
+    """K, (C11 − C12)/2 and C44 of n cubic cells times m spheres, (n, m, 3), in Pa.
+
+    They are the matrix's less the mean dipole stress.
+    """
+    matrix, *spheres = materials
+    (bulk, mu), nu = matrix.bulk_and_shear, matrix.poisson
+    axial = _dipoles(radius, matrix, spheres, degree, shear=False)
+    shear = _dipoles(radius, matrix, spheres, degree, shear=True)
+    # of hydrostatic and of tetragonal strain, (n, m, 2); the former in the latter's scale
+    dipoles = np.concatenate([axial / [-3 * (1 - 2 * nu), 1], shear], axis=-1)
+    scale = 8 * np.pi * mu * (1 - nu) * radius[:, None] ** 3 / VOLUME
+    return np.asarray(np.array([bulk, mu, mu]) - scale[..., None] * dipoles)
+
+
+SPHERES = Series(
+    moduli=space_moduli,
+    voigt=cubic_voigt,
+    steps=(4, 6, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 56, 64),  # reaches 1e-8 at r = 0.985
+    decay=2.0,
+    unknowns=unknowns,
+    safety=2.0,
+    round_off=2e-13,
+    tolerance=1e-10,
+    terms="degrees of multipoles",
+    particles="spheres",
+)
+cubic_stiffness = SPHERES.converged_moduli
+"""K, (C11 − C12)/2 and C44 of n cubic cells times m spheres, with declared errors."""
 
 
 @dataclass(frozen=True)
@@ -25,84 +59,10 @@ class SphereSeriesModel(SeriesModel):
 
     accuracy: float = 1e-9
     LEAST: ClassVar[float] = 1e-11
+    series: ClassVar[Series] = SPHERES
 
-    def _moduli(self, radii: Array, matrix: Phase, inclusions: Sequence[Phase]) -> CellModuli:
-        return cubic_stiffness(radii, matrix, inclusions, tolerance=self.accuracy)
-
-    def _energies(self, cell: Cell, mean: Mean) -> PhaseEnergies:
-        return mean_energies(cell, mean, material_moduli, TRUNCATION)
-
-    def _result(self, mean: Mean, cell: Cell, seconds: float) -> HomogenisedSpheres:
-        """Result of one inclusion from its means over θ, with its checks."""
-        return spheres_with_checks(
-            HomogenisedSpheres(
-                curve=mean.curve,
-                method=self.name,
-                unknowns=unknowns(int(mean.terms.max())),
-                seconds={"total": seconds},
-                errors=mean.errors,
-                cell=cell,
-            )
-        )
-
-
-def unknowns(degree: int) -> int:
-    """Amplitudes of one load up to a degree."""
-    return 3 * (degree + 2) ** 2 // 16
-
-
-TRUNCATION = Truncation(
-    steps=(4, 6, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 56, 64),  # reaches 1e-8 at r = 0.985
-    decay=2.0,
-    unknowns=unknowns,
-    safety=2.0,
-    round_off=2e-13,
-    terms="degrees of multipoles",
-    particles="spheres",
-    voigt=cubic_voigt,
-)
-
-
-def cubic_stiffness(
-    radius: Array, matrix: Phase, inclusions: Sequence[Phase], *, tolerance: float = 1e-10
-) -> CellModuli:
-    """K, (C11 − C12)/2 and C44 of n cubic cells times m spheres, with declared errors.
-
-    Args:
-        radius: Radii over half the cell's side, shape (n,), each in [0, 1).
-        matrix: Material outside the sphere.
-        inclusions: Materials of the sphere, m of them; moduli of 1e-12 and 1e12 of the matrix's are
-            a pore and a rigid sphere to as many digits.
-        tolerance: Relative truncation error allowed, at least 1e-12.
-
-    Raises:
-        SeriesError: The series does not reach `tolerance` (spheres nearly in touch).
-    """
-
-    def solve(radii: Array, degree: int) -> Array:
-        return _cubic_moduli(radii, matrix, inclusions, degree)
-
-    return TRUNCATION.converged_moduli(radius, len(inclusions), solve, tolerance=tolerance)
-
-
-def material_moduli(radius: Array, bulk: Array, shear: Array, degree: int) -> Array:
-    """K, (C11 − C12)/2 and C44, shape (n, m, 3), from K and G of the matrix and of m spheres."""
-    pairs = zip(bulk, shear, strict=True)
-    matrix, *spheres = (Elastic.of_bulk_and_shear(k, g) for k, g in pairs)
-    return _cubic_moduli(radius, matrix, spheres, degree)
-
-
-def _cubic_moduli(
-    radius: Array, matrix: Material, inclusions: Sequence[Material], degree: int
-) -> Array:
-    """K, (C11 − C12)/2 and C44, shape (n, m, 3): the matrix's less the mean dipole stress."""
-    (bulk, mu), nu = matrix.bulk_and_shear, matrix.poisson
-    axial = _dipoles(radius, matrix, inclusions, degree, shear=False)
-    shear = _dipoles(radius, matrix, inclusions, degree, shear=True)
-    # of hydrostatic and of tetragonal strain, (n, m, 2); the former in the latter's scale
-    dipoles = np.concatenate([axial / [-3 * (1 - 2 * nu), 1], shear], axis=-1)
-    scale = 8 * np.pi * mu * (1 - nu) * radius[:, None] ** 3 / VOLUME
-    return np.asarray(np.array([bulk, mu, mu]) - scale[..., None] * dipoles)
+    def _checked_result(self, **parts: Any) -> HomogenisedSpheres:
+        return spheres_with_checks(HomogenisedSpheres(**parts))
 
 
 def _dipoles(

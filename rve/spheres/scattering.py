@@ -7,33 +7,10 @@ systems for each degree, whatever the order m.
 
 from __future__ import annotations
 
-from typing import NamedTuple, Self
-
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.rve.cell.cell import Phase
-
-
-class Elastic(NamedTuple):
-    """Moduli of an isotropic material, complex where it has losses."""
-
-    bulk: complex
-    shear: complex
-    poisson: complex
-
-    @classmethod
-    def of_bulk_and_shear(cls, bulk: complex, shear: complex) -> Self:
-        """From K and G."""
-        return cls(bulk, shear, (3 * bulk - 2 * shear) / (6 * bulk + 2 * shear))
-
-    @property
-    def bulk_and_shear(self) -> tuple[complex, complex]:
-        """K and G."""
-        return self.bulk, self.shear
-
-
-Material = Phase | Elastic
+from alphacut.rve.series.means import Material
 
 
 def t_matrices(degrees: Array, matrix: Material, inclusion: Material) -> tuple[Array, Array]:

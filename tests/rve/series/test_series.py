@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,7 @@ from alphacut.rve.result.moduli import square_moduli
 from alphacut.rve.series.lattice_sums import lattice_sums
 from alphacut.rve.series.means import RuleError, SeriesError
 from alphacut.rve.series.model import SeriesModel
-from alphacut.rve.series.multipoles import TRUNCATION, square_stiffness
+from alphacut.rve.series.multipoles import CIRCLES, square_stiffness
 from alphacut.rve.slices.model import SlicesModel
 from alphacut.stochastic import HermiteMap, TruncatedNormal
 
@@ -199,10 +201,11 @@ def test_a_second_series_that_meets_the_first_by_chance_hides_no_error():
     """Of three lengths the second is off by as much as the first; the third, longer, tells."""
     lengths = []
 
-    def by_length(radius, length):
+    def by_length(radius, materials, length):
         lengths.append(length)
         return np.full((1, 1, 3), 1.001 if length in lengths[:2] else 1.0)
 
-    cell = TRUNCATION.converged_moduli(np.array([0.5]), 1, by_length, tolerance=1e-2)
+    series = replace(CIRCLES, moduli=by_length)
+    cell = series.converged_moduli(np.array([0.5]), MATRIX, [MATRIX], tolerance=1e-2)
     assert len(set(lengths)) == 3
     assert 1e-3 <= cell.errors.max() <= 1.8e-3
