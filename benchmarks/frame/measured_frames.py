@@ -21,8 +21,8 @@ from alphacut.case.load import load
 from alphacut.frame import StoreyFrame
 from alphacut.frame.identify import MeasuredMode, RefutedError, identify, measured_mode
 from alphacut.frame.identify.modes import Chain, eigenvalue_ranges
-from alphacut.fuzzy import FuzzyNumber, Interval
-from alphacut.stages.identify import identify_inputs
+from alphacut.fuzzy import Interval
+from alphacut.stages.identify import IdentifiedResult, identify_inputs
 from benchmarks.rows import write
 
 ROOT = Path(__file__).parents[2]
@@ -62,36 +62,20 @@ def tall_modes(modes: Sequence[int]) -> list[MeasuredMode]:
 def tall_rows() -> list[dict[str, object]]:
     """The third mode of the tall frame: predicted from the priors, and learned from with them."""
     frame = tall_frame()
-    prior: dict[str, FuzzyNumber] = {
-        f"c{z + 1}": Interval(0.7 * k, 1.3 * k) for z, k in enumerate(STIFFNESS / 12)
-    }
-    chain = Chain(frame, tuple(prior))
-    ends = eigenvalue_ranges(chain, np.full(18, np.log(0.7)), np.full(18, np.log(1.3)))
-    low, high = (float(np.sqrt(end[2]) / (2 * np.pi)) for end in ends)
-    try:
-        result = identify(frame, prior, tall_modes((1, 2)), alpha=(0.05,))
-        two = "agree"
-        low, high = (float(ends[0, 2]) for ends in result.predictions())
-    except RefutedError:
-        two = "refuted"
-    try:
-        identify(frame, prior, tall_modes((1, 2, 3)), alpha=(0.05,))
-        three = "agree"
-    except RefutedError:
-        three = "refuted"
-    inside = low <= FREQUENCIES[2] <= high
-    return [
-        {
-            "frame": "E-Defense, 18 storeys",
-            "mode": 3,
-            "low": low,
-            "high": high,
-            "measured": FREQUENCIES[2],
-            "inside": inside,
-            "learned_from": two,
-            "all_modes": three,
-        }
-    ]
+    prior = {f"c{z + 1}": Interval(0.7 * k, 1.3 * k) for z, k in enumerate(STIFFNESS / 12)}
+    ends = np.full(18, np.log(0.7)), np.full(18, np.log(1.3))
+    low, high = (np.sqrt(x[2]) / (2 * np.pi) for x in eigenvalue_ranges(Chain(frame, prior), *ends))
+    verdicts = []
+    for modes in ((1, 2), (1, 2, 3)):
+        try:
+            result = identify(frame, prior, tall_modes(modes), alpha=(0.05,))
+            verdicts.append("agree")
+        except RefutedError:
+            verdicts.append("refuted")
+            continue
+        if modes == (1, 2):
+            low, high = (end[0, 2] for end in result.predictions())
+    return [row("E-Defense, 18 storeys", 3, (float(low), float(high)), FREQUENCIES[2], *verdicts)]
 
 
 def laboratory_rows() -> list[dict[str, object]]:
@@ -102,32 +86,35 @@ def laboratory_rows() -> list[dict[str, object]]:
     found, _ = identify_inputs(
         content.identify, content.frame.structure(), (0.05, 0.25, 0.5, 0.75, 1.0)
     )
-    return [
-        {
-            "frame": "laboratory, 4 storeys",
-            "mode": x["mode"],
-            "low": x["predicted"][0],
-            "high": x["predicted"][1],
-            "measured": x["measured"],
-            "inside": x["inside"],
-            "learned_from": "agree",
-            "all_modes": "",
-        }
-        for x in found["held_out"]
-    ]
+    assert isinstance(found, IdentifiedResult)
+    name = "laboratory, 4 storeys"
+    return [row(name, x.mode, x.predicted, x.measured, "agree", "") for x in found.held_out]
+
+
+def row(
+    frame: str, mode: int, ends: tuple[float, float], measured: float, learned: str, together: str
+) -> dict[str, object]:
+    """A row of the table: ends of a mode's predicted frequency, and the verdicts on the frame."""
+    return {
+        "frame": frame,
+        "mode": mode,
+        "low": ends[0],
+        "high": ends[1],
+        "measured": measured,
+        "inside": ends[0] <= measured <= ends[1],
+        "learned_from": learned,
+        "all_modes": together,
+    }
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Predict, compare, print and write the table."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, default=Path(__file__).parents[1] / "results")
     options = parser.parse_args(arguments)
     rows = [*laboratory_rows(), *tall_rows()]
     write(rows, options.out / "measured_frames.csv")
-    for row in rows:
-        print(row)
+    print(*rows, sep="\n")
 
 
 if __name__ == "__main__":

@@ -3,18 +3,17 @@
 At each level the cuts of all priors and of all measured quantities leave a set of parameters. Where
 the claims among them hold together with P >= 1 − α, the set holds the true parameters with that
 probability, if the opinions and the model are right. A box encloses the set, proved by linear
-relaxations (`enclosure`). Samples (`Identified.samples`) fill the set and show how much narrower it
-is. Predictions (`Identified.predictions`) say what its frames vibrate like.
+relaxations (`enclosure`). Predictions (`Identified.predictions`) are the natural frequencies of its
+frames.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from alphacut.frame.identify.enclosure import enclosure
 from alphacut.frame.identify.modes import Chain, MeasuredMode, ModeCut, eigenvalue_ranges
@@ -23,23 +22,11 @@ from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.knowledge.joint import JointClaim
 from alphacut.fuzzy.refused import FailedError, require
-from alphacut.fuzzy.result import ROUND_OFF, Ends
+from alphacut.fuzzy.result import Ends
 from alphacut.fuzzy.sets.claimed import ClaimedNumber, CoverageClaim, JointRule
 from alphacut.fuzzy.sets.numbers import Cut, outer_steps
 
 ALPHA = (0.05, 0.1, 0.25, 0.5, 0.75, 1.0)
-LEEWAY = 0.1
-"""Share of the box's width by which samples may leave it; a larger one finds a wrong box that is
-much too narrow, but its walks meet the set less often."""
-STEPS, MIN_WALKS, MAX_TRIES = 60, 100, 50
-"""Steps of each random walk; walks at least, as they show one another the way; tries of a step."""
-STARTS = 10
-"""Starts of the search for a first sample."""
-MARGINS = (1.0, 0.5, 0.1, 1e-2, 1e-4)
-"""Distances from the ends of all ranges, in half widths, that the search asks for in turn."""
-
-Violation = Callable[[Array], Array]
-"""Distance of points (n, d) beyond each range of the set, (n, q), in half widths; <= 0 inside."""
 
 
 class RefutedError(FailedError):
@@ -155,22 +142,6 @@ class Evidence:
         """Return ranges of the measured modes at the joint level α."""
         return [mode.ranges(lambda x: self.cut(x, alpha)) for mode in self.measured]
 
-    def violation(self, points: Array, modes: list[ModeCut]) -> Array:
-        """Return how far modes at parameters (S, d) lie outside ranges, in half widths.
-
-        There is one column for each frequency and measured amplitude, shape (S, q), ≤ 0 inside.
-        """
-        values, vectors = self.chain.modes(points)
-        columns = []
-        for mode, cut in zip(self.measured, modes, strict=True):
-            shape = vectors[:, :, mode.mode - 1]
-            reference = shape[:, mode.reference - 1]
-            columns.append((values[:, mode.mode - 1], cut.low, cut.high))
-            columns += [(shape[:, z - 1] / reference, *cut.shape[z]) for z in mode.shape]
-        measured, low, high = (np.array(part) for part in zip(*columns, strict=True))
-        half = np.maximum((high - low) / 2, 1e-12 * np.abs(high))
-        return np.asarray(np.maximum(low - measured.T, measured.T - high) / half)
-
 
 @dataclass(frozen=True, eq=False)
 class Identified:
@@ -231,109 +202,9 @@ class Identified:
         widths = np.array([evidence.cut(evidence.prior[name], level).width for name in self.names])
         return dict(zip(self.names, map(float, (self.upper - self.lower)[0] / widths), strict=True))
 
-    def samples(self, number: int = 200, *, row: int = 0, seed: int = 0) -> Array:
-        """Return points (number, d) of the set at level `alpha[row]`, about uniform in logarithms.
-
-        The set is that of parameters whose modes lie in all measured cuts. The walks may leave the
-        box that is proved to hold it by `LEEWAY`, so that the points test the proof.
-
-        Raises:
-            FailedError: No point of the set was found, or one lies outside the box or has a
-                frequency outside the predictions: the proof is wrong.
-        """
-        evidence, level, rng = self.evidence, float(self.alpha[row]), np.random.default_rng(seed)
-        nominal, modes = evidence.chain.nominal, evidence.modes(level)
-        cuts = np.array([evidence.cut(prior, level) for prior in evidence.prior.values()]).T
-
-        def parameters_of(logs: Array) -> Array:
-            return np.asarray(np.clip(nominal * np.exp(logs), *cuts))
-
-        def violation(logs: Array) -> Array:
-            return evidence.violation(parameters_of(logs), modes)
-
-        box = Ends(np.log(self.lower[row] / nominal), np.log(self.upper[row] / nominal))
-        start = inner_point(violation, box, rng)
-        if start is None:
-            what = f"no parameters with modes in all measured cuts at α = {level:g} were met"
-            raise FailedError(what, "take samples of a lower level, or the box alone")
-        leeway = LEEWAY * (box.upper - box.lower)
-        wider = Ends(box.lower - leeway, box.upper + leeway)
-        points = parameters_of(random_walks(violation, start, wider, number, rng))
-        self._require_contained(points, row)
-        return points
-
-    def _require_contained(self, points: Array, row: int) -> None:
-        """Refuse points (S, d) outside the box of a level or its predicted frequencies."""
-        chain, factor = self.evidence.chain, 1 + ROUND_OFF  # for rounding
-        in_box = (points * factor >= self.lower[row]) & (points <= self.upper[row] * factor)
-        lower, upper = self._eigenvalues(row)
-        values = chain.modes(points)[0]
-        are_predicted = (values * factor >= lower) & (values <= upper * factor)
-        for what, holds in (("parameters", in_box), ("squared frequencies", are_predicted)):
-            if not holds.all():
-                sample = points[np.argmin(holds.all(1))]
-                pairs = zip(self.names, map(float, sample), strict=True)
-                at = ", ".join(f"{x} = {y!r}" for x, y in pairs)
-                text = f"the proof is wrong: {what} that agree with the modes lie outside, at {at}"
-                raise FailedError(text, "keep the case and report it")
-
-    def _eigenvalues(self, row: int) -> tuple[Array, Array]:
-        nominal = self.evidence.chain.nominal
-        logs = (np.log(ends[row] / nominal) for ends in (self.lower, self.upper))
-        return eigenvalue_ranges(self.evidence.chain, *logs)
-
     def predictions(self) -> Ends:
         """Return proved ends of all n natural frequencies on each level, (A, n) each, in Hz."""
-        ranges = np.array([self._eigenvalues(row) for row in range(len(self.alpha))])
-        lower, upper = np.sqrt(np.maximum(ranges, 0.0)).swapaxes(0, 1) / (2 * np.pi)
-        return Ends(lower, upper)
-
-
-def inner_point(violation: Violation, box: Ends, rng: np.random.Generator) -> Array | None:
-    """Return a point (d,) of a box at which no range is violated, by least squares; None if not."""
-    for start in range(STARTS):
-        unit_point = rng.random(len(box.lower)) if start else 0.5  # the middle first
-        point = box.lower + (box.upper - box.lower) * unit_point
-        for margin in MARGINS:
-            fitted = least_squares(
-                lambda x, margin=margin: np.maximum(violation(x[None])[0] + margin, 0.0),
-                point,
-                bounds=(box.lower - 1e-9, box.upper + 1e-9),  # a side may have no width
-                max_nfev=30,
-            )
-            point = np.clip(fitted.x, *box)
-            if (violation(point[None]) <= 0).all():
-                return np.asarray(point)
-    return None
-
-
-def random_walks(
-    violation: Violation, start: Array, box: Ends, number: int, rng: np.random.Generator
-) -> Array:
-    """Return points (number, d) of a set in a box, reached by random walks from a point (d,) of it.
-
-    Each step is a point of a random chord (hit and run), cut at points outside the set (shrinking
-    slice sampler; Neal, Annals of Statistics 31, 2003). Every second chord points from one walk to
-    another, as long and thin sets need (ter Braak, Statistics and Computing 16, 2006). The points
-    become uniform in a convex set; in others they reach the part in which such chords lie.
-    """
-    points, width = np.tile(start, (max(number, MIN_WALKS), 1)), box.upper - box.lower
-    chord_ends: Array = np.tile([[-1.0], [1.0]], len(points))
-    for step in range(STEPS):
-        direction = rng.standard_normal(points.shape) * width
-        if step % 2:
-            direction = rng.permutation(points) - rng.permutation(points)
-        longest = np.abs(direction / np.where(width > 0, width, 1.0)).max(axis=1, keepdims=True)
-        direction /= np.where(longest > 0, longest, 1.0)  # now as long as the box
-        (low, high), has_moved = chord_ends, np.full(len(points), False)
-        for _ in range(MAX_TRIES):
-            position = rng.uniform(low, high)  # on the chord, 0 at the point itself
-            candidate = points + position[:, None] * direction
-            is_inside = ((box.lower <= candidate) & (candidate <= box.upper)).all(axis=1)
-            is_accepted = is_inside & (violation(candidate) <= 0).all(axis=1) & ~has_moved
-            points[is_accepted], has_moved[is_accepted] = candidate[is_accepted], True
-            if has_moved.all():
-                break
-            low = np.where(position < 0, position, low)
-            high = np.where(position < 0, high, position)
-    return points[:number]
+        chain = self.evidence.chain
+        boxes = np.log(np.stack([self.lower, self.upper], axis=1) / chain.nominal)  # (A, 2, d)
+        ranges = np.array([eigenvalue_ranges(chain, *box) for box in boxes])
+        return Ends(*np.sqrt(np.maximum(ranges, 0.0)).swapaxes(0, 1) / (2 * np.pi))

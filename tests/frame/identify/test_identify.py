@@ -7,13 +7,9 @@ import pytest
 
 from alphacut.frame import StoreyFrame, envelope
 from alphacut.frame.identify import Identified, MeasuredMode, RefutedError, identify, measured_mode
-from alphacut.frame.identify.enclosure import CONSTANT, LinearProgram, Rows, relaxation
-from alphacut.frame.identify.identify import inner_point, random_walks
+from alphacut.frame.identify.enclosure import ChainRelaxation, LinearRelaxation
 from alphacut.frame.identify.modes import Chain, eigenvalue_ranges
 from alphacut.fuzzy import FuzzyNumber, Interval, Triangular, from_data
-from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import FailedError
-from alphacut.fuzzy.result import Ends
 from alphacut.fuzzy.sets.claimed import ClaimedNumber
 
 FRAME = StoreyFrame([20e3, 15e3, 10e3], [3.0, 2.8, 2.8], 30e9, 3e-4, q0=(0.01, 0.02, 0.03))
@@ -96,20 +92,14 @@ def test_modes_of_the_chain_are_those_of_the_frame() -> None:
 
 
 def test_linear_bounds_hold_for_any_multipliers_and_tell_empty_sets() -> None:
-    rows = Rows()
-    x, y = rows.variable(0.0, 2.0), rows.variable(-1.0, 3.0)
-    z = rows.product(x, y)
-    rows.at_most({**x, **y}, 1.0)
-    program: LinearProgram = rows.program()
-    cost = np.zeros(3)
-    cost[next(iter(z))] = 1.0
-    bound = program.least(cost)
-    assert bound == pytest.approx(-2.0, abs=1e-9)  # x = 2, y = −1
-    assert bound <= -2.0
-    assert not program.empty()
-    rows.at_most({next(iter(x)): -1.0, next(iter(y)): -1.0}, -1.5)  # x + y >= 1.5
-    assert rows.program().empty()
-    assert rows.program().least(cost) == np.inf
+    program = LinearRelaxation(4)
+    x, y = program.variable(0.0, 2.0), program.variable(-1.0, 3.0)
+    z = program.product(x, y)
+    program.require_nonpositive(x + y - program.one)
+    assert program.bounds(z)[0] == pytest.approx(-2.0, abs=1e-9)  # x = 2, y = −1
+    assert program.bounds(z)[0] <= -2.0
+    program.require_nonpositive(1.5 * program.one - x - y)
+    assert program.bounds(z) == (np.inf, -np.inf)
 
 
 @pytest.mark.parametrize("shown", [(1, 2, 3), (1, 3), ()])
@@ -117,9 +107,8 @@ def test_every_frame_of_the_box_with_such_modes_fulfils_the_relaxation(
     rng: np.random.Generator, shown: tuple[int, ...]
 ) -> None:
     """The true parameters and amplitudes are a point of the linear program."""
-    names = ("c1", "c2", "c3", "m2")
-    chain = Chain(FRAME, names)
-    for _ in range(8):
+    chain = Chain(FRAME, ("c1", "c2", "c3", "m2"))
+    for _ in range(4):
         lower, upper = np.log([0.8, 0.8, 0.8, 0.8]), np.log([1.2, 1.2, 1.2, 1.2])
         truth = chain.nominal * np.exp(rng.uniform(lower, upper))
         values, vectors = chain.modes(truth[None])
@@ -131,32 +120,48 @@ def test_every_frame_of_the_box_with_such_modes_fulfils_the_relaxation(
             reference = 3 if shown else 0
             modes.append(MeasuredMode(k + 1, Interval(0.99 * f, 1.02 * f), near, reference))
         cuts = [mode.ranges(lambda number: number.cut(0.0)) for mode in modes]
-        held = relaxation(chain, lower, upper, cuts, {})
-        assert held is not None
-        for at, expression in enumerate(held.parameters):
-            log = np.log(truth[at] / chain.nominal[at])
-            constant = expression.get(CONSTANT, 0.0)
-            low, high = held.ends(expression)
-            assert low + constant - 1e-12 <= log <= high + constant + 1e-12
-        for (mode, floor), one in held.shapes.items():
+        relaxation = ChainRelaxation.with_modes(chain, lower, upper, cuts, {})
+        assert relaxation is not None
+        values = dict(zip(range(4), np.log(truth / chain.nominal), strict=True))
+        expressions = dict(enumerate(relaxation.logs)) | relaxation.unmeasured
+        for mode, floor in relaxation.unmeasured:
             shape = vectors[0, :, mode - 1] / vectors[0, 2, mode - 1]
-            low, high = held.ends(one)
-            assert low - 1e-12 <= shape[floor - 1] <= high + 1e-12
+            values[mode, floor] = shape[floor - 1]
+        for key, expression in expressions.items():
+            low, high = relaxation.bounds(expression)
+            assert low - 1e-12 <= values[key] <= high + 1e-12
 
 
-def test_truth_is_covered_and_the_box_is_sharp(rng: np.random.Generator) -> None:
-    possible, inside, sharp = [], [], []
+def test_truth_is_covered(rng: np.random.Generator) -> None:
+    inside = []
     for _ in range(8):
         truth = rng.uniform(1.6, 2.4, 3)
         found = identify(FRAME, PRIOR, measured(truth, rng), alpha=(0.1,))
-        possible.append(bool(agree(found, truth[None], 0.1)[0]))
         inside.append(bool(((found.lower[0] <= truth) & (truth <= found.upper[0])).all()))
-        if possible[-1]:
+        if agree(found, truth[None], 0.1)[0]:
             assert inside[-1]  # the box holds the set
-        held = found.samples(100)
-        sharp.append(np.mean(np.ptp(held, axis=0) / (found.upper - found.lower)[0]))
-    assert np.mean(sharp) > 0.6
     assert np.mean(inside) >= 0.9 - 4 * np.sqrt(0.09 / 8)
+
+
+@pytest.mark.parametrize("shown", [{}, {"floors": (1, 3)}, {"floors": ()}, {"modes": (2,)}])
+def test_a_box_holds_all_that_agrees_and_is_sharp(
+    rng: np.random.Generator, shown: dict[str, tuple[int, ...]]
+) -> None:
+    """Frames drawn in a box wider by a tenth: those whose modes agree lie in it and its ranges."""
+    prior = {**PRIOR, "c1": Triangular(1.6, 1.9, 2.4)}
+    truth = np.array([1.9, 2.1, 2.2])
+    found = identify(FRAME, prior, measured(truth, rng, **shown), alpha=(0.05, 0.5))  # type: ignore[arg-type]
+    predicted, width = found.predictions(), found.upper - found.lower
+    for row, level in enumerate(found.alpha):
+        ends = found.lower[row] - 0.1 * width[row], found.upper[row] + 0.1 * width[row]
+        points = rng.uniform(*ends, (20000, 3))
+        points = points[agree(found, points, float(level))]
+        assert len(points) > 20
+        assert ((found.lower[row] <= points) & (points <= found.upper[row])).all()
+        hertz = np.sqrt(found.evidence.chain.modes(points)[0]) / (2 * np.pi)
+        assert ((predicted.lower[row] <= hertz) & (hertz <= predicted.upper[row])).all()
+        if shown != {"floors": ()}:
+            assert np.mean(np.ptp(points, axis=0) / width[row]) > 0.6
 
 
 def test_cuts_are_nested_inside_the_priors_and_feed_an_envelope(rng: np.random.Generator) -> None:
@@ -186,7 +191,9 @@ def test_a_common_factor_of_stiffnesses_and_masses_is_not_learned(
     prior = {name: Interval(0.8 * x, 1.2 * x) for name, x in zip(names, nominal, strict=True)}
     found = identify(FRAME, prior, measured(nominal, rng, names=names), alpha=(0.05,))
     assert min(found.narrowed.values()) > 0.7
-    assert (np.ptp(found.samples(), axis=0) > 0.7 * (found.upper - found.lower)[0]).all()
+    points = nominal * np.linspace(0.8, 1.2, 101)[:, None]
+    points = points[agree(found, points, 0.05)]
+    assert (np.ptp(points, axis=0) > 0.7 * (found.upper - found.lower)[0]).all()
     known = identify(FRAME, PRIOR, measured(np.full(3, 2.0), rng), alpha=(0.05,))
     assert max(known.narrowed.values()) < 0.5
 
@@ -288,7 +295,7 @@ def test_what_makes_no_sense_is_refused(case: str) -> None:
         make()
 
 
-@pytest.mark.parametrize(("count", "share"), [(1, 0.9), (3, -0.6), (2, 0.1)])
+@pytest.mark.parametrize(("count", "share"), [(1, 0.9), (3, -0.6)])
 def test_shapes_of_known_deviation_hold_the_truth_as_often_as_claimed(
     count: int, share: float
 ) -> None:
@@ -329,7 +336,6 @@ def test_at_level_1_a_prior_that_agrees_is_a_point() -> None:
     found = identify(frame, prior, modes, alpha=(0.05, 1.0))
     assert found.upper[1] == pytest.approx(found.lower[1], rel=1e-12)
     assert found.empty == 1.0
-    assert (found.samples(3, row=1) == 103510.0).all()
 
 
 @pytest.mark.parametrize("count", [1, 2, 5])
@@ -350,75 +356,3 @@ def test_ratios_of_noisy_amplitudes_are_not_biased(known, rng):
         low, high = mode.shape[1].cut(0.05)
         inside += low <= 0.6 <= high
     assert inside >= 42
-
-
-@pytest.mark.parametrize("shown", [{}, {"floors": (1, 3)}, {"floors": ()}, {"modes": (2,)}])
-def test_samples_are_in_the_set_and_their_modes_in_the_predictions(
-    rng: np.random.Generator, shown: dict[str, tuple[int, ...]]
-) -> None:
-    prior = {**PRIOR, "c1": Triangular(1.6, 1.9, 2.4)}
-    truth = np.array([1.9, 2.1, 2.2])
-    found = identify(FRAME, prior, measured(truth, rng, **shown), alpha=(0.05, 0.5))  # type: ignore[arg-type]
-    predicted = found.predictions()
-    for row, level in enumerate(found.alpha):
-        points = found.samples(80, row=row, seed=2)
-        assert points.shape == (80, 3)
-        assert agree(found, points, float(level)).all()
-        assert ((found.lower[row] <= points) & (points <= found.upper[row])).all()
-        hertz = np.sqrt(found.evidence.chain.modes(points)[0]) / (2 * np.pi)
-        assert ((predicted.lower[row] <= hertz) & (hertz <= predicted.upper[row])).all()
-    assert (found.samples(80, row=1, seed=2) == points).all()
-    assert (found.samples(80, row=1, seed=3) != points).any()
-
-
-def test_samples_outside_a_box_that_is_too_narrow_refuse_it(rng: np.random.Generator) -> None:
-    found = identify(FRAME, PRIOR, measured(np.array([1.9, 2.1, 2.0]), rng))
-    width = found.upper - found.lower
-    for change in ({"upper": found.upper - 0.1 * width}, {"lower": found.lower + 0.1 * width}):
-        with pytest.raises(FailedError, match="the proof is wrong: parameters that agree"):
-            replace(found, **change).samples(200)
-
-
-def test_samples_scatter_like_points_of_the_box_that_agree(rng: np.random.Generator) -> None:
-    found = identify(FRAME, PRIOR, measured(np.array([1.9, 2.1, 2.2]), rng), alpha=(0.05,))
-    low, high = np.log([found.lower[0], found.upper[0]])
-    points = np.exp(rng.uniform(low, high, (20000, 3)))
-    held = np.log(points[agree(found, points, 0.05)])
-    samples = np.log(found.samples(1000))
-    assert (np.abs(samples.mean(axis=0) - held.mean(axis=0)) < 0.2 * held.std(axis=0)).all()
-    assert samples.std(axis=0) == pytest.approx(held.std(axis=0), rel=0.1)
-
-
-def test_a_level_without_points_has_no_samples(rng: np.random.Generator) -> None:
-    prior = dict.fromkeys(NAMES, Triangular(1.6, 1.7, 2.4))
-    found = identify(FRAME, prior, measured(np.full(3, 2.0), rng), alpha=(0.05, 1.0))
-    assert len(found.samples(1)) == 1
-    with pytest.raises(FailedError, match=r"at α = 1 were met; take samples of a lower level"):
-        found.samples(row=1)
-
-
-def test_walks_fill_a_disc_and_no_more() -> None:
-    """They are uniform, as the mean square radius of 1/2 says; a side of the box has no width."""
-    box = Ends(np.array([-1.0, -1.5, 0.3]), np.array([1.0, 1.5, 0.3]))
-    start, rng = np.array([0.9, 0.0, 0.3]), np.random.default_rng(1)
-    points = random_walks(lambda x: (x**2).sum(axis=1, keepdims=True) - 1, start, box, 2000, rng)
-    assert (points[:, 2] == 0.3).all()
-    square = (points[:, :2] ** 2).sum(axis=1) / (1 - 0.3**2)
-    assert square.max() <= 1 + 1e-12
-    assert square.mean() == pytest.approx(0.5, abs=0.04)
-    assert points[:, :2].mean(axis=0) == pytest.approx([0, 0], abs=0.06)
-
-
-def test_a_small_and_thin_set_is_met_and_filled() -> None:
-    """The band |x − y| <= 1e-4 right of the middle, uniform along its length."""
-    box, rng = Ends(np.full(2, -1.0), np.ones(2)), np.random.default_rng(1)
-
-    def beyond(x: Array) -> Array:
-        return np.stack([1e4 * np.abs(x[:, 0] - x[:, 1]), 4 * np.abs(x[:, 0] - 0.75)], axis=1) - 1
-
-    start = inner_point(beyond, box, rng)
-    assert start is not None
-    points = random_walks(beyond, start, box, 1000, rng)
-    assert (beyond(points) <= 0).all()
-    assert points.mean(axis=0) == pytest.approx([0.75, 0.75], abs=0.02)
-    assert points.std(axis=0) == pytest.approx(np.full(2, 0.5 / 12**0.5), rel=0.08)
