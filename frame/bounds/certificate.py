@@ -122,17 +122,15 @@ def certify(
 
 def _between(model: ModalModel) -> Array:
     """Bound of how far outputs stray from straight lines in the step to each node, (T, m)."""
-    reach, centre = np.ones(len(model.boxes.names)), model.eigenvalue.coefficients[0]
-    slopes = model.eigenvalue.coefficients[1:]
-    growth = largest_growth(model.eigenvalue, reach)
-    decay = -growth, np.abs(slopes.real).sum(0) - centre.real  # least and greatest of each mode
-    spread = np.abs(slopes.imag).sum(0)
-    omega = np.abs(centre.imag) - spread, np.abs(centre.imag) + spread
+    reach, rate = np.ones(len(model.boxes.names)), model.eigenvalue
+    growth, spread = largest_growth(rate, reach), rate.imag.spread()
+    decay = -growth, rate.real.spread() - rate.value.real  # least and greatest of each mode
+    omega = np.abs(rate.value.imag) - spread, np.abs(rate.value.imag) + spread
     if (omega[0] <= 0).any():
         raise UnprovedError("a mode may not oscillate", "take less damping")
     deviation = np.zeros((len(model.time), len(model.outputs)))
     for part in parts(model, growth):
-        size = suprema(part.share, reach)[0].reshape(model.count, -1)
+        size = suprema(part.share, reach)[0]
         load = None if part.load is None else part.load.history
         if isinstance(part.load, Direct):
             deviation += 2 * part.load.history.line_deviation(model.time)[:, None] * size.sum(0)

@@ -40,24 +40,23 @@ def proved_error(model: ModalModel) -> Array:
         UnprovedError: The box is so wide that M or K may lose its definiteness.
     """
     structure, reach = model.structure, np.ones(len(model.boxes.names))
-    n, m = model.count, len(model.outputs)
     # what is proved are the polynomials that bounds are made of
-    modes = replace(model.modes, rate=model.eigenvalue.as_model((n,)))
+    modes = replace(model.modes, rate=model.eigenvalue)
     norms = EnergyNorms(structure)
     by_ratio = _ratio_errors(structure, modes, norms)
     energy_rate = _energy_rates(structure, modes, norms, by_ratio)
     start, outputs = _start_errors(structure, modes, norms), modes.outputs(structure)
-    deviation, output_error = np.zeros(len(model.time)), np.zeros((len(model.time), m))
+    deviation = np.zeros(len(model.time))
+    output_error = np.zeros((len(model.time), len(model.outputs)))
     for s, part in enumerate(parts(model, largest_growth(model.eigenvalue, reach))):
-        share = part.share.as_model((n, m))
         if isinstance(part.load, Direct):
             assert structure.feeds is not None
-            error = (structure.feeds[:, s - len(start)] - share.real[0] * 2.0).size()
+            error = (structure.feeds[:, s - len(start)] - part.share.real[0] * 2.0).size()
             output_error += part.waves[0][:, :1] * error
             continue
         deviation += part.push * start[s] + 2 * part.elapsed @ energy_rate[s]
-        share_error = (outputs[s] - share).size() + by_ratio[s][:, None] * norms.reading
-        largest = suprema(part.share, reach)[0].reshape(n, m)
+        share_error = (outputs[s] - part.share).size() + by_ratio[s][:, None] * norms.reading
+        largest = suprema(part.share, reach)[0]
         output_error += 2 * part.waves[0] @ (share_error + part.left_out[:, None] * largest)
     return (1 + ROUNDING) * (deviation[:, None] * norms.outputs + output_error)
 

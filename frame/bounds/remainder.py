@@ -12,7 +12,7 @@ from itertools import combinations_with_replacement, permutations
 
 import numpy as np
 
-from alphacut.frame.calculus.polynomial import Polynomial
+from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.modes.modal_model import ModalModel
 from alphacut.frame.response.duhamel import absolute_moments
 from alphacut.frame.response.load_tables import REACH, Direct, LoadTables
@@ -26,19 +26,20 @@ ROUNDING = 1e-9
 """Relative rounding of integrals over a load: of a million intervals at most."""
 
 
-def suprema(polynomial: Polynomial, reach: Array) -> list[Array]:
-    """Upper bounds of the |derivatives| of K polynomials over the box |u_i| ≤ reach_i.
+def suprema(polynomials: TaylorModel, reach: Array) -> list[Array]:
+    """Upper bounds of the |derivatives| of polynomials over the box |u_i| ≤ reach_i.
 
     Returns:
-        Of order 0 to 3, shapes (d,) * order + (K,): the derivatives of Σ |coefficient| u^e at u =
-        reach.
+        Of order 0 to 3, shapes (d,) * order + V, V the polynomials' shape: the derivatives of
+        Σ |coefficient| u^e at u = reach.
     """
-    size, (terms, d) = np.abs(polynomial.coefficients), polynomial.index.shape
+    size, index = np.abs(polynomials.coefficients), polynomials.exponents
+    terms, d = index.shape
     bounds = list[Array]()
     for order in range(4):
         weight: Array = np.zeros((d,) * order + (terms,))
         for axes in combinations_with_replacement(range(d), order):
-            exponent = polynomial.index.copy()
+            exponent = index.copy()
             factor: Array = np.ones(terms)
             for axis in axes:
                 factor = factor * exponent[:, axis]
@@ -46,13 +47,13 @@ def suprema(polynomial: Polynomial, reach: Array) -> list[Array]:
             factor *= np.prod(reach ** np.maximum(exponent, 0), axis=1)
             for permuted in set(permutations(axes)):
                 weight[permuted] = factor
-        bounds.append(weight @ size)
+        bounds.append(np.tensordot(weight, size, 1))
     return bounds
 
 
-def largest_growth(eigenvalue: Polynomial, reach: Array) -> Array:
+def largest_growth(eigenvalue: TaylorModel, reach: Array) -> Array:
     """Upper bounds of the growth rates Re λ_k over the box |u_i| ≤ reach_i, shape (n,), in 1/s."""
-    size = np.prod(reach**eigenvalue.index, axis=1)
+    size = np.prod(reach**eigenvalue.exponents, axis=1)
     real = eigenvalue.coefficients.real
     return np.asarray(real[0] + size[1:] @ np.abs(real[1:]))
 
@@ -62,7 +63,7 @@ class MotionPart:
     """The free part of a modal model, or what one load adds.
 
     Args:
-        share: Coefficients C_k, n m polynomials.
+        share: Coefficients C_k, polynomials, shape (n, m).
         waves: Bounds of the derivatives of w by λ, orders 0 to 3, shape (4, T, n).
         elapsed: Bounds of ∫ |w| from 0 to t, shape (T, n).
         push: Bound of the impulse ∫ |a| of the load up to t, shape (T,), in m/s; 1 of the free
@@ -71,7 +72,7 @@ class MotionPart:
         load: The load; None of the free part.
     """
 
-    share: Polynomial
+    share: TaylorModel
     waves: Array
     elapsed: Array
     push: Array
@@ -137,7 +138,7 @@ class Remainder:
         third = np.zeros((len(model.time), m, d, d, d))
         margin = np.zeros((len(model.time), m, 1 + d))
         for part in parts(model, growth):
-            share = [x.reshape((*x.shape[:-1], n, m)) for x in suprema(part.share, reach)]
+            share = suprema(part.share, reach)
             noise = _rounding_bound(model, rate[0], part.load)
             for k in range(n):
                 of_mode = [x[..., k, :] for x in share], [x[..., k] for x in rate]
@@ -159,21 +160,19 @@ class Remainder:
 def _rounding_bound(model: ModalModel, rate: Array, load: LoadTables | None) -> Array:
     """Relative rounding error of each mode's motion at each node, (T, n): ε times operations."""
     # that of λ enters exp(λ t) times |λ| t; terms of a load's series exceed its sum by exp(REACH)
-    n_terms, d = model.eigenvalue.index.shape
+    n_terms, d = model.eigenvalue.exponents.shape
     of_polynomial = n_terms + model.degree + 2
     phase = rate * model.time[:, None]
     operations = of_polynomial * (2 + phase) + 12 * model.count + 4 * d**3 + 50
     if load is not None:
-        operations = operations + (8 * load.longest + MOST_TERMS) * np.exp(REACH)
+        operations = operations + (8 * len(model.time) + MOST_TERMS) * np.exp(REACH)
     return np.finfo(float).eps * operations
 
 
 def _initial_third_derivatives(model: ModalModel, reach: Array) -> Array:
     """Bounds of the outputs' third derivatives at t = 0, (m, d, d, d), where most modes cancel."""
-    coefficients = model.coefficient.coefficients
-    mode_sum = 2 * coefficients.reshape(len(coefficients), model.count, -1).sum(1).real
-    third = suprema(Polynomial(model.coefficient.index, mode_sum), reach)[3]
-    return np.moveaxis(third, -1, 0)
+    sum_of_modes = np.full(model.count, 2.0) @ model.coefficient.real
+    return np.moveaxis(suprema(sum_of_modes, reach)[3], -1, 0)
 
 
 def leibniz(c: list[Array], r: list[Array], order: int) -> list[Array]:

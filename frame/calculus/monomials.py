@@ -64,6 +64,26 @@ def exponents(d: int, degree: int) -> Rows:
     return np.asarray((lists[:, :, None] == np.arange(d)).sum(1))
 
 
+@cache
+def _last_factors(d: int, degree: int) -> tuple[Rows, Rows]:
+    """The last variable of each monomial, and the place of the product of the others."""
+    lists = monomials(d, degree)
+    return lists[:, -1], places(lists[:, :-1], d)
+
+
+def monomial_values(u: Array, degree: int) -> Array:
+    """Values of all monomials up to a degree at points u (S, d), by degree, shape (S, terms)."""
+    d, points = u.shape[1], np.ascontiguousarray(u.T)
+    values: Array = np.ones((comb(d + degree, degree), len(u)))
+    lower, begin = 0, 1
+    for m in range(1, degree + 1):
+        variable, other_factors = _last_factors(d, m)
+        end = begin + len(variable)
+        values[begin:end] = values[lower + other_factors] * points[variable]
+        lower, begin = begin, end
+    return values.T
+
+
 def convolve(
     a: Array, b: Array, degrees: tuple[int, int], d: int, bilinear: Callable[[Array, Array], Array]
 ) -> Array:

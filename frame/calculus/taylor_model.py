@@ -11,7 +11,9 @@ section 3.1).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import combinations_with_replacement
 from math import comb
 from typing import Any
 
@@ -22,7 +24,9 @@ from alphacut.frame.calculus.monomials import (
     convolve,
     count,
     derivative,
+    exponents,
     matmul,
+    monomial_values,
     monomials,
     places,
 )
@@ -85,7 +89,7 @@ class TaylorModel:
     def T(self) -> TaylorModel:  # noqa: N802
         """Transposed matrices, shape (m, n) for (n, m)."""
         parts = tuple(part.swapaxes(-1, -2) for part in self.parts)
-        return TaylorModel(parts, self.remainder.swapaxes(-1, -2), self.inputs, self.order)
+        return replace(self, parts=parts, remainder=self.remainder.swapaxes(-1, -2))
 
     @staticmethod
     def stack(models: Sequence[TaylorModel]) -> TaylorModel:
@@ -118,15 +122,48 @@ class TaylorModel:
 
     def loosened(self, more: ArrayLike) -> TaylorModel:
         """Functions that may be off by `more`, shape V."""
-        return TaylorModel(self.parts, self.remainder + np.asarray(more), self.inputs, self.order)
+        return replace(self, remainder=self.remainder + np.asarray(more))
+
+    @cached_property
+    def coefficients(self) -> Array:
+        """Coefficients of all monomials by degree, as they stand in `monomial_values`."""
+        return np.concatenate(self.parts)
+
+    @property
+    def exponents(self) -> Rows:
+        """Exponents of these monomials, shape (terms, d)."""
+        return np.concatenate([exponents(self.inputs, k) for k in range(len(self.parts))])
 
     def at(self, u: Array) -> Array:
         """The polynomials' values at points u (S, d), shape (S, *V)."""
-        total: Array = np.zeros((len(u), *self.shape), self.parts[0].dtype)
-        for degree, part in enumerate(self.parts):
-            powers = u[:, monomials(self.inputs, degree)].prod(-1)
-            total += np.tensordot(powers, part, 1)
-        return total
+        powers = monomial_values(u, len(self.parts) - 1)
+        flat = self.coefficients.reshape(powers.shape[1], -1)
+        return _real_times(powers, flat).reshape(len(u), *self.shape)
+
+    def jets(self, u: Array) -> Array:
+        """Values, gradients and Hessians' upper triangles of K functions at points u (S, d).
+
+        Shape (S, q, K) with q = 1 + d + d (d + 1)/2.
+        """
+        powers = monomial_values(u, len(self.parts) - 1)
+        tables = [_real_times(powers[:, : len(x)], x) for x in self._derivative_tables]
+        return np.hstack(tables).reshape(len(u), -1, *self.shape)
+
+    @cached_property
+    def _derivative_tables(self) -> list[Array]:
+        """Coefficients of all values, first and second derivatives, shapes (terms, functions)."""
+        axes = np.eye(self.inputs)
+        by_axes: dict[tuple[int, ...], Sequence[Array]] = {(): self.parts}
+        tables = [self.coefficients]
+        for order in (1, 2):
+            derivatives = []
+            for chosen in combinations_with_replacement(range(self.inputs), order):
+                lower = enumerate(by_axes[chosen[:-1]][1:], 1)
+                parts = [derivative(part, degree, axes[chosen[-1]]) for degree, part in lower]
+                by_axes[chosen] = parts or [0 * self.parts[0]]
+                derivatives.append(np.concatenate(by_axes[chosen]))
+            tables.append(np.hstack(derivatives))
+        return tables
 
     def present(self) -> Rows:
         """Inputs that the functions depend on."""
@@ -145,7 +182,12 @@ class TaylorModel:
         return TaylorModel(parts, self.remainder, d, self.order)
 
     def among(self, inputs: Rows, d: int) -> TaylorModel:
-        """The same functions as functions of d inputs, of which theirs are at `inputs`, rising."""
+        """The same functions as functions of d inputs, of which theirs are at `inputs`, rising.
+
+        Functions of d inputs stay as they are.
+        """
+        if self.inputs == d:
+            return self
         parts = []
         for degree, part in enumerate(self.parts):
             full = np.zeros((count(d, degree), *self.shape))
@@ -156,26 +198,22 @@ class TaylorModel:
     @property
     def real(self) -> TaylorModel:
         """Real parts."""
-        parts = tuple(part.real for part in self.parts)
-        return TaylorModel(parts, self.remainder, self.inputs, self.order)
+        return replace(self, parts=tuple(part.real for part in self.parts))
+
+    @property
+    def imag(self) -> TaylorModel:
+        """Imaginary parts."""
+        return replace(self, parts=tuple(part.imag for part in self.parts))
 
     @property
     def polynomial(self) -> TaylorModel:
         """The polynomials alone, functions that have no remainder."""
-        return TaylorModel(self.parts, np.zeros(self.shape), self.inputs, self.order)
+        return replace(self, remainder=np.zeros(self.shape))
 
     def cut(self, order: int) -> TaylorModel:
-        """The same to a lower order, with the sizes of what is dropped in the rest."""
-        remainder = self.remainder + sum(self.sizes()[order + 1 :])
-        return TaylorModel(self.parts[: order + 1], np.asarray(remainder), self.inputs, order)
-
-    def to_order(self, order: int) -> TaylorModel:
-        """The same, whose products are kept to another order."""
-        return (
-            TaylorModel(self.parts, self.remainder, self.inputs, order)
-            if order >= self.order
-            else self.cut(order)
-        )
+        """The same, whose products are kept to `order`; sizes of higher parts go into the rest."""
+        remainder = np.asarray(self.remainder + sum(self.sizes()[order + 1 :]))
+        return TaylorModel(self.parts[: order + 1], remainder, self.inputs, order)
 
     def within(self, low: Array, high: Array) -> TaylorModel:
         """The model over the part low ≤ u ≤ high, (d,) each, in unit coordinates of the part."""
@@ -195,10 +233,15 @@ class TaylorModel:
         rounding = gamma((len(self.parts) + 1) * (self.inputs + 4)) * np.sum(self.sizes(), 0)
         return TaylorModel(tuple(parts), self.remainder + rounding, self.inputs, self.order)
 
+    def reshaped(self, *shape: int) -> TaylorModel:
+        """The same functions in another shape V."""
+        parts = tuple(part.reshape(len(part), *shape) for part in self.parts)
+        return replace(self, parts=parts, remainder=self.remainder.reshape(shape))
+
     def __getitem__(self, index: Any) -> TaylorModel:
         key = index if isinstance(index, tuple) else (index,)
         parts = tuple(part[(slice(None), *key)] for part in self.parts)
-        return TaylorModel(parts, self.remainder[key], self.inputs, self.order)
+        return replace(self, parts=parts, remainder=self.remainder[key])
 
     def __add__(self, other: TaylorModel | ArrayLike) -> TaylorModel:
         """Sum entry by entry, with its rounding in the remainder."""
@@ -217,9 +260,7 @@ class TaylorModel:
     __radd__ = __add__
 
     def __neg__(self) -> TaylorModel:
-        return TaylorModel(
-            tuple(-part for part in self.parts), self.remainder, self.inputs, self.order
-        )
+        return replace(self, parts=tuple(-part for part in self.parts))
 
     def __sub__(self, other: TaylorModel | ArrayLike) -> TaylorModel:
         return self + -(other if isinstance(other, TaylorModel) else _numbers(other))
@@ -322,22 +363,11 @@ def all_within(models: Sequence[TaylorModel], low: Array, high: Array) -> list[T
 
     All are restricted together, as one array of functions.
     """
-    flat = [
-        TaylorModel(
-            tuple(part.reshape(len(part), -1) for part in x.parts),
-            x.remainder.ravel(),
-            x.inputs,
-            x.order,
-        )
-        for x in models
-    ]
-    restricted = concatenate(flat, -1).within(low, high)
+    restricted = concatenate([x.reshaped(-1) for x in models], -1).within(low, high)
     end, found = 0, list[TaylorModel]()
     for x in models:
         begin, end = end, end + x.remainder.size
-        parts = tuple(part[:, begin:end].reshape(len(part), *x.shape) for part in restricted.parts)
-        remainder = restricted.remainder[begin:end].reshape(x.shape)
-        found.append(TaylorModel(parts, remainder, x.inputs, x.order))
+        found.append(replace(restricted[begin:end].reshaped(*x.shape), order=x.order))
     return found
 
 
@@ -386,6 +416,14 @@ def solve(matrix: TaylorModel, right: TaylorModel) -> TaylorModel:
 def _numbers(value: ArrayLike) -> Array:
     array = np.asarray(value)
     return array if np.iscomplexobj(array) else np.asarray(array, float)
+
+
+def _real_times(real: Array, coefficients: Array) -> Array:
+    """Product real @ coefficients (terms, K), in which `real` is not made complex."""
+    if not np.iscomplexobj(coefficients):
+        return np.asarray(real @ coefficients)
+    of_both_parts = np.ascontiguousarray(coefficients).view(float)
+    return np.asarray((real @ of_both_parts).view(complex))
 
 
 def _dtype(a: TaylorModel, b: TaylorModel) -> np.dtype[Any]:

@@ -210,11 +210,11 @@ def tail_shares(model: ModalModel) -> Array:
 
     It estimates the input's part in the model's error.
     """
-    index = model.eigenvalue.index  # exponents of the terms, (terms, d)
+    index = model.eigenvalue.exponents  # of the terms, (terms, d)
     top = index.sum(1) == model.degree
     weight = np.zeros(len(index))
-    for polynomial in (model.eigenvalue, model.coefficient):
-        size = np.abs(polynomial.coefficients)
+    for polynomials in (model.eigenvalue, model.coefficient):
+        size = np.abs(polynomials.coefficients).reshape(len(index), -1)
         weight += (size / np.maximum(size.max(0), 1e-300)).max(1)
     shares = weight[top] @ index[top]
     return np.asarray(shares / max(float(shares.sum()), 1e-300))

@@ -169,7 +169,7 @@ class DampedModes:
     @property
     def squared_frequency(self) -> TaylorModel:
         """|λ_k|², shape (n,)."""
-        real, imaginary = self.rate.real, (self.rate * -1j).real
+        real, imaginary = self.rate.real, self.rate.imag
         return real * real + imaginary * imaginary
 
     def outputs(self, structure: DampedStructure) -> TaylorModel:

@@ -141,10 +141,7 @@ def oscillators(structure: Classical, of_block: BlockShares, found: Subspaces) -
         UnprovedError: They have different damping ratios.
     """
     modes, d, order = of_block.block.modes, structure.start.inputs, structure.start.order
-    share, rate = (
-        x.cut(order) if x.inputs == d else x.cut(order).among(found.used, d)
-        for x in (of_block.share, of_block.block.rate)
-    )
+    share, rate = (x.cut(order).among(found.used, d) for x in (of_block.share, of_block.block.rate))
     ratio = structure.ratio[modes]
     if any((part[:, 1:] != part[:, :-1]).any() for part in ratio.parts):
         raise UnprovedError(

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from alphacut.frame.boxes import Boxes
-from alphacut.frame.calculus.polynomial import Polynomial
+from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.modes.damped import (
@@ -42,8 +42,8 @@ class ModalModel:
         boxes: The inputs' boxes.
         structure: The structure over the widest of them.
         modes: Its modes.
-        eigenvalue: λ_k, n polynomials, in 1/s.
-        coefficient: C_k of the free motion, n m polynomials.
+        eigenvalue: λ_k, polynomials without remainders, shape (n,), in 1/s.
+        coefficient: C_k of the free motion, the same, shape (n, m).
         loads: Responses to the loads, and what these add to outputs at once.
     """
 
@@ -51,8 +51,8 @@ class ModalModel:
     boxes: Boxes
     structure: DampedStructure
     modes: DampedModes
-    eigenvalue: Polynomial
-    coefficient: Polynomial
+    eigenvalue: TaylorModel
+    coefficient: TaylorModel
     loads: tuple[LoadTables, ...]
 
     @classmethod
@@ -60,20 +60,19 @@ class ModalModel:
         cls, flow: LinearFlow, boxes: Boxes, structure: DampedStructure, modes: DampedModes
     ) -> ModalModel:
         """The motion that modes of a structure have."""
-        rate = Polynomial.of_model(modes.rate)
-        free, *forced = (Polynomial.of_model(modes.share[s]) for s in range(modes.share.shape[0]))
+        free, *forced = (modes.share[s] for s in range(modes.share.shape[0]))
         courses = histories(flow.system).values()
         loads = [
-            LoadTables(history, flow.time, rate, share)
+            LoadTables(history, flow.time, modes.rate, share)
             for history, share in zip(courses, forced, strict=True)
         ]
         if structure.feeds is not None:  # 2 Re C_1 a(t) with half of it as C_1
             first = np.zeros((modes.share.shape[1], 1))
             first[0] = 0.5
             for h, history in enumerate(courses_of_forces(flow.system)):
-                share = Polynomial.of_model(structure.feeds[:, h] * first)
-                loads.append(Direct(history, flow.time, rate, share))
-        return cls(flow, boxes, structure, modes, rate, free, tuple(loads))
+                share = (structure.feeds[:, h] * first).polynomial
+                loads.append(Direct(history, flow.time, modes.rate, share))
+        return cls(flow, boxes, structure, modes, modes.rate, free, tuple(loads))
 
     @classmethod
     def of_degree(
@@ -115,38 +114,40 @@ class ModalModel:
     @property
     def count(self) -> int:
         """Number of modes n."""
-        return int(self.eigenvalue.coefficients.shape[1])
+        return len(self.eigenvalue.value)
 
     @property
     def degree(self) -> int:
         """Total degree of the polynomials."""
-        return int(self.eigenvalue.index.sum(1).max())
+        return len(self.eigenvalue.parts) - 1
 
     def in_units(self, scale: Array) -> ModalModel:
         """Model with every output divided by its scale (m,)."""
-        coefficient = self.coefficient.divided_by(np.tile(scale, self.count))
-        loads = tuple(load.in_units(scale) for load in self.loads)
-        return replace(self, coefficient=coefficient, loads=loads)
+        loads = tuple(replace(load, share=load.share * (1 / scale)) for load in self.loads)
+        return replace(self, coefficient=self.coefficient * (1 / scale), loads=loads)
 
     @cached_property
     def started(self) -> bool:
         """Whether the model has a free motion: an initial state, or no load at all."""
         return not self.loads or bool(self.coefficient.coefficients.any())
 
-    @cached_property
-    def together(self) -> Polynomial:
-        """Polynomials λ_k, n, then C_k, n m of the free motion (if any) and of each load."""
-        parts = [self.eigenvalue, *[self.coefficient] * self.started]
-        parts += [load.share for load in self.loads]
-        return Polynomial(parts[0].index, np.hstack([part.coefficients for part in parts]))
+    @property
+    def shares(self) -> list[TaylorModel]:
+        """C_k of the free motion (if any) and of each load, shape (n, m) each."""
+        return [self.coefficient] * self.started + [load.share for load in self.loads]
 
     @cached_property
-    def of_output(self) -> list[Polynomial]:
-        """For each output λ_k, n, then C_k, n of the free motion (if any) and of each load."""
-        n, m = self.count, len(self.outputs)
-        rate, amplitudes = np.split(self.together.coefficients, [n], axis=1)
-        index = self.together.index
-        return [Polynomial(index, np.hstack([rate, amplitudes[:, o::m]])) for o in range(m)]
+    def together(self) -> TaylorModel:
+        """Polynomials λ_k, n, then C_k of each part, n m."""
+        return concatenate([self.eigenvalue, *(share.reshaped(-1) for share in self.shares)], -1)
+
+    @cached_property
+    def of_output(self) -> list[TaylorModel]:
+        """For each output λ_k, n, then C_k of each part, n."""
+        outputs = range(len(self.outputs))
+        return [
+            concatenate([self.eigenvalue, *(x[:, o] for x in self.shares)], -1) for o in outputs
+        ]
 
     def values(self, unit: Array) -> Array:
         """Outputs at all nodes for unit coordinates (S, d), shape (S, T, m).
@@ -154,7 +155,7 @@ class ModalModel:
         They are 2 Re Σ_k C_k w(t; λ_k) over the free motion and each load.
         """
         n, time = self.count, self.time
-        variables = self.together(unit)  # λ_k, then C_k of each part
+        variables = self.together.at(unit)
         rate = variables[:, :n]
         waves = [np.exp(rate[:, None] * time[:, None])] if self.started else []
         waves += [load.at_nodes(rate) for load in self.loads]
@@ -195,7 +196,7 @@ class ModalModel:
         for o in np.unique(output):
             of_output = np.flatnonzero(output == o)
             for rows in np.array_split(of_output, -(-len(of_output) // PIECE)):
-                variables = self.of_output[o](unit[rows])  # λ_k, then C_k of each part
+                variables = self.of_output[o].at(unit[rows])
                 for number, wave in enumerate(self.waves(variables[:, :n], node[rows]), 1):
                     amplitude = variables[:, number * n : (number + 1) * n]
                     values[rows] += 2 * (amplitude * wave[0]).real.sum(1)

@@ -147,7 +147,7 @@ def _sums_over_modes(
         mass, stiffness = (x.among(found.used, d) for x in (mass, stiffness))
     else:
         excited = mass.like(excited.value).loosened(excited.remainder)
-    mass, stiffness = mass.to_order(order), stiffness.to_order(order)
+    mass, stiffness = mass.cut(order), stiffness.cut(order)
     rows = stiffness.like(read.value).loosened(read.remainder)
     massive, light = slice(0, centre.modes), slice(centre.modes, None)
     least_mass, least_stiffness = (1 - variation for variation in found.variation)
@@ -212,7 +212,7 @@ def _amplitude_bounds(
     """C and the bound of √(A B) for each power 0, ½, 1 of λ, with the outputs' factors."""
     d, order = structure.start.inputs, structure.start.order
     (C0, C1), (A0, A1), (B0, B1) = (
-        [x.cut(order) if x.inputs == d else x.cut(order).among(found.used, d) for x in pair]
+        [x.cut(order).among(found.used, d) for x in pair]
         for pair in (sums.shares, sums.outputs, sums.sources)
     )
     pairs = ((C0, A0, B0), (C0 * 0.0, A1, B0), (C1, A1, B1))

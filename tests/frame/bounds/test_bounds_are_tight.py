@@ -19,7 +19,7 @@ from alphacut.frame.bounds.remainder import (
     parts,
 )
 from alphacut.frame.boxes import UnitFlow, boxes
-from alphacut.frame.calculus.polynomial import Polynomial
+from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.modes.modal_model import ModalModel
 from alphacut.frame.response.duhamel import responses_at_nodes
 from alphacut.frame.response.load_tables import left_out
@@ -53,7 +53,7 @@ def test_bounds_of_waves_are_reached_by_a_pulse_on_a_soft_spring(order: int) -> 
     model = spring(1e-2, PULSE, 4.0, 0.1)
     growth = largest_growth(model.eigenvalue, np.ones(1))
     free, forced = parts(model, growth)
-    rate = model.eigenvalue(np.zeros((1, 1)))
+    rate = model.eigenvalue.at(np.zeros((1, 1)))
     time = model.time
     if order < 3:
         nodes = np.arange(len(time))
@@ -122,7 +122,7 @@ def test_what_a_series_of_a_load_leaves_out_is_in_the_proved_error() -> None:
     model, unit = spring(1.0, PULSE, 6.0, 0.1), np.array([[-1.0], [1.0]])
     assert proved_error(model)[-1, 0] < 1e-10
     (table,) = model.loads[0].tables
-    phase = float(np.abs(model.eigenvalue.coefficients[1:]).sum()) / table.scale
+    phase = float(model.eigenvalue.spread()[0]) / table.scale
     table.moment, table.truncation = table.moment[:, :2], 2 * left_out(phase, 2)
     truth = UnitFlow(model.flow, model.boxes).values(unit)[:, -1, 0]
     off = np.abs(model.value_at(unit, np.full(2, 60), np.zeros(2, int)) - truth).max()
@@ -132,11 +132,14 @@ def test_what_a_series_of_a_load_leaves_out_is_in_the_proved_error() -> None:
 def cube(square: float = 0.0) -> ModalModel:
     """A model of the motion x³ − square x² for all times; its third derivative is 6."""
     model = spring(1.0, None, 1.0, 1.0)
-    index = np.arange(4)[:, None]
-    half = np.array([0, 0, -square / 2, 0.5])[:, None] + 0j
-    return replace(
-        model, eigenvalue=Polynomial(index, 0 * half), coefficient=Polynomial(index, half)
-    )
+    half = polynomials(np.array([0, 0, -square / 2, 0.5])[:, None] + 0j)
+    return replace(model, eigenvalue=half * 0.0, coefficient=half[:, None])
+
+
+def polynomials(coefficients: np.ndarray) -> TaylorModel:
+    """Polynomials of one variable, coefficients (terms, n)."""
+    parts, degree = tuple(coefficients[:, None]), len(coefficients) - 1
+    return TaylorModel(parts, np.zeros(coefficients.shape[1]), 1, degree)
 
 
 @pytest.mark.parametrize(("start", "budget"), [(0.5, 4000), (0.0, 1)])
@@ -180,8 +183,8 @@ def least_closed(tree: Tree) -> np.ndarray:
 def turning() -> ModalModel:
     """The motion cos((1 + 0.05 u) t) + u, highest at an end whatever the phase."""
     rate, share = np.array([[1j, 0], [0.05j, 0]]), np.array([[0.5 + 0j, 0], [0, 0.5]])
-    index, plain = np.arange(2)[:, None], spring(1.0, None, 12.0, 0.1)
-    return replace(plain, eigenvalue=Polynomial(index, rate), coefficient=Polynomial(index, share))
+    plain = spring(1.0, None, 12.0, 0.1)
+    return replace(plain, eigenvalue=polynomials(rate), coefficient=polynomials(share)[:, None])
 
 
 @pytest.mark.parametrize("even", [True, False])
@@ -202,11 +205,11 @@ def test_rounding_of_late_phases_is_in_the_margin() -> None:
     model, narrow = spring(1.0, None, 1e8, 1e6), np.full(1, 1e-8)
     margin = Remainder(model, -narrow, narrow).margin[:, 0, 0]
     unit = np.random.default_rng(2).uniform(-narrow, narrow, (200, 1))
-    powers = np.longdouble(unit) ** model.eigenvalue.index[:, 0]
+    powers = np.longdouble(unit) ** model.eigenvalue.exponents[:, 0]
     phase = powers @ model.eigenvalue.coefficients[:, 0].imag
     growth = powers @ model.eigenvalue.coefficients[:, 0].real
     share = [
-        powers @ part[:, 0]
+        powers @ part[:, 0, 0]
         for part in (model.coefficient.coefficients.real, model.coefficient.coefficients.imag)
     ]
     nodes = np.array([1, 10, 100])

@@ -20,7 +20,7 @@ from alphacut.frame import (
 from alphacut.frame.bounds.model_error import EnergyNorms, _ratio_errors, proved_error
 from alphacut.frame.bounds.remainder import largest_growth, parts
 from alphacut.frame.boxes import UnitFlow, boxes
-from alphacut.frame.calculus.polynomial import Polynomial
+from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.damped import DampedModes, DampedStructure, require_dissipation
 from alphacut.frame.modes.modal_model import ModalModel
@@ -157,12 +157,10 @@ def test_the_damping_force_over_a_mass_is_bounded_closely() -> None:
     assert (np.sqrt(of_frame**2 - without**2) >= at_least).all()
 
 
-def wrong(polynomial: Polynomial) -> Polynomial:
-    """The same with its constant and its first slope a thousandth too large."""
-    coefficients = polynomial.coefficients.copy()
-    coefficients[1] *= 1.001
-    coefficients[0] *= 1.001
-    return Polynomial(polynomial.index, coefficients)
+def wrong(polynomials: TaylorModel) -> TaylorModel:
+    """The same with their constants and their slopes a thousandth too large."""
+    first, second, *others = polynomials.parts
+    return replace(polynomials, parts=(1.001 * first, 1.001 * second, *others))
 
 
 @pytest.mark.parametrize("kind", ["eigenvalue", "coefficient", "load"])
@@ -249,7 +247,7 @@ def test_waves_and_their_derivatives_stay_below_their_bounds() -> None:
     growth = largest_growth(found.eigenvalue, np.ones(2))
     forced = parts(found, growth)[1]
     unit = np.random.default_rng(6).uniform(-1, 1, (40, 2))
-    rate = found.eigenvalue(unit)
+    rate = found.eigenvalue.at(unit)
     nodes = np.arange(len(found.time))
     waves = found.loads[0].response(np.repeat(rate, len(nodes), 0), np.tile(nodes, len(rate)))
     for order, wave in enumerate(waves):
@@ -279,7 +277,7 @@ def test_series_leave_out_of_the_load_response_no_more_than_they_say() -> None:
     found = model(SHAKEN, {"E": Interval(20e9, 30e9)})
     (load,) = found.loads
     unit = np.linspace(-1, 1, 21)[:, None]
-    rate = found.eigenvalue(unit)
+    rate = found.eigenvalue.at(unit)
     (truth,), _ = responses_at_nodes(rate.ravel(), SHAKEN.ground, found.time, 0)
     truth = truth.reshape(len(found.time), *rate.shape)
     assert load.truncation.max() > 0
