@@ -58,8 +58,8 @@ def _mark_limit(axes: Axes, limit: float, limits: Array, unit: str) -> None:
 
 def draw_probability(answer: ProbabilityAnswer) -> Figure:
     """Draws the bounds of the exceedance probability of the last event over its limit, by level."""
-    event, alpha = [*answer.events.values()][-1], answer.alpha
-    limits, lower, upper = event.curve.limit, event.curve.lower, event.curve.upper
+    event, alpha = [*answer.limits.values()][-1], answer.alpha
+    limits, lower, upper = (event.curve[x] for x in ("limit", "lower", "upper"))
     figure, axes = style.figure(7.2, 3.6)
     # the highest level is drawn by lines, as its band may have no width
     for low, high, shade in zip(lower[:-1], upper[:-1], colours(alpha), strict=False):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from alphacut.case.limits import DecisionSection
@@ -9,15 +11,15 @@ from alphacut.frame.questions.peaks import ANY, passing, verdict_words
 from alphacut.fuzzy.result import Nature
 from alphacut.io.quantity import engineering
 from alphacut.questions.question import (
-    Answer,
     FuzzyResponse,
     LimitAnswer,
+    LimitsAnswer,
     Record,
-    Row,
+    Texts,
     limit_fields,
 )
 from alphacut.stages.envelope import PeakResult, peak_results
-from alphacut.stages.store import CutsResult, Values
+from alphacut.stages.store import CutsResult
 
 
 class LimitDecision(LimitAnswer):
@@ -40,79 +42,64 @@ class LimitDecision(LimitAnswer):
         """The verdict, with the level from which on it holds if that is not 0."""
         return verdict_words(self.verdict, self.from_level)
 
+    @property
+    def margin_text(self) -> str:
+        """The margin on the lowest level."""
+        margin = float(self.margin.lower[0])
+        if not np.isfinite(margin):
+            return "not known"
+        return engineering(margin, self.unit) if self.unit else f"{margin:.1%}"
+
+    def peak_texts(self) -> Texts:
+        """The peak on the lowest level: proved bound, reached, relative gap."""
+        proved, reached, gap = "", "", ""
+        if self.peak is not None:
+            bound, inner = float(self.peak.proved[0]), float(self.peak.reached[0])
+            reached = engineering(inner, self.unit)
+            proved = engineering(bound, self.unit) if np.isfinite(bound) else "not known"
+            gap = f"{abs((bound - inner) / bound):.1%}" if bound and np.isfinite(bound) else ""
+        return {"peak at most": proved, "peak reached": reached, "gap": gap}
+
 
 def degree_text(ends: tuple[float, float]) -> str:
     """Bounds of a degree, or one number."""
     return " … ".join(dict.fromkeys(f"{end:.4g}" for end in ends))
 
 
-def _margin_text(limit: LimitDecision) -> str:
-    margin = float(limit.margin.lower[0])
-    if not np.isfinite(margin):
-        return "not known"
-    return engineering(margin, limit.unit) if limit.unit else f"{margin:.1%}"
-
-
-def _peak_texts(limit: LimitDecision) -> Row:
-    """Texts of the peak at the lowest level: proved bound, reached, relative gap."""
-    if limit.peak is None:
-        return ("", "", "")
-    proved, reached = float(limit.peak.proved[0]), float(limit.peak.reached[0])
-    if not np.isfinite(proved):
-        return ("not known", engineering(reached, limit.unit), "")
-    gap = f"{abs((proved - reached) / proved):.1%}" if proved else ""
-    return engineering(proved, limit.unit), engineering(reached, limit.unit), gap
-
-
-class DecisionAnswer(Answer):
+class DecisionAnswer(LimitsAnswer[LimitDecision]):
     """Possibility and necessity that limits are exceeded, by their names."""
 
     key = "decision"
     title = "Can or must limits be exceeded?"
     caption = "Fuzzy peak of each limited output over its limit"
-    head = (
-        *("limit", "verdict", "nature", "possibility", "necessity", "least margin"),
-        *("peak at most", "peak reached", "gap"),
-    )
-    alpha: Values
     step: float
-    limits: dict[str, LimitDecision]
 
-    def rows(self) -> list[Row]:
-        """A row for each limit."""
-        return [
-            (
-                limit.words,
-                limit.verdict_words,
-                limit.nature,
-                degree_text(limit.possibility),
-                degree_text(limit.necessity),
-                _margin_text(limit),
-                *_peak_texts(limit),
-            )
-            for limit in self.limits.values()
-        ]
+    def texts_of(self, limit: LimitDecision) -> Texts:
+        """Verdict, degrees, and margin and peak on the lowest level."""
+        return {
+            "limit": limit.words,
+            "verdict": limit.verdict_words,
+            "nature": limit.nature,
+            "possibility": degree_text(limit.possibility),
+            "necessity": degree_text(limit.necessity),
+            "least margin": limit.margin_text,
+            **limit.peak_texts(),
+        }
 
-    def records(self) -> list[Record]:
-        """A row for each limit; margin and peaks are those of the lowest level."""
-        return [
-            {
-                "limited output": name,
-                "unit": limit.unit,
-                "limit": limit.limit,
-                "verdict": limit.verdict,
-                "from α": limit.from_level,
-                "nature": limit.nature,
-                "least possibility": limit.possibility[0],
-                "greatest possibility": limit.possibility[1],
-                "least necessity": limit.necessity[0],
-                "greatest necessity": limit.necessity[1],
-                "least margin": float(limit.margin.lower[0]),
-                "peak at most": None if limit.peak is None else float(limit.peak.proved[0]),
-                "peak reached": None if limit.peak is None else float(limit.peak.reached[0]),
-            }
-            for name, limit in self.limits.items()
-        ]
+    def numbers_of(self, limit: LimitDecision) -> Iterator[Record]:
+        """Yields one record; margin and peaks are those of the lowest level."""
+        yield {
+            "verdict": limit.verdict,
+            "from α": limit.from_level,
+            "nature": limit.nature,
+            "least possibility": limit.possibility[0],
+            "greatest possibility": limit.possibility[1],
+            "least necessity": limit.necessity[0],
+            "greatest necessity": limit.necessity[1],
+            "least margin": float(limit.margin.lower[0]),
+            "peak at most": None if limit.peak is None else float(limit.peak.proved[0]),
+            "peak reached": None if limit.peak is None else float(limit.peak.reached[0]),
+        }
 
     def words(self) -> str:
         """Sentences on how to read the verdicts."""

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import fields
+
 import numpy as np
 
 from alphacut.case.limits import FragilitySection
@@ -12,38 +15,30 @@ from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature
 from alphacut.io.quantity import engineering, range_text
 from alphacut.questions.question import (
-    Answer,
     FuzzyResponse,
     LimitAnswer,
+    LimitsAnswer,
     Record,
-    Row,
+    Texts,
     limit_fields,
 )
-from alphacut.stages.store import CutsResult, Numbers, Values
+from alphacut.stages.store import CutsResult, Values
 
 POINTS = 60
 """Measures at which bands are drawn and tabulated."""
 UNITS = {"Sa(T1)": "m/s^2", "PGA": "m/s^2", "scale": ""}
 
 
-class CriticalRanges(Numbers):
-    """Critical measures, (levels, records), as `CriticalMeasures` has them."""
-
-    low: Values
-    low_reached: Values
-    high_reached: Values
-    high: Values
-
-
 class LimitFragility(LimitAnswer):
     """Critical measures of the records for a limit, and bounds of the share of records by measure.
 
-    Dispersion is that of the measures' logarithms, of two records or more; `confidence` has 95 %
-    limits of the share if records are independent draws.
+    `critical` has the arrays of `CriticalMeasures` by name, (levels, records). Dispersion is that
+    of the measures' logarithms, of two records or more; `confidence` has 95 % limits of the share
+    if records are independent draws.
     """
 
     nature: Nature
-    critical: CriticalRanges
+    critical: dict[str, Values]
     measure: Values
     band: CutsResult
     median: CutsResult
@@ -51,55 +46,42 @@ class LimitFragility(LimitAnswer):
     confidence: CutsResult | None
 
 
-class FragilityAnswer(Answer):
+class FragilityAnswer(LimitsAnswer[LimitFragility]):
     """Share of the suite's records under which limits are exceeded, over a measure of records."""
 
     key = "fragility"
     title = "Under how many records are limits exceeded?"
     caption = "Band of the share of records under which the limit is exceeded, over their measure"
-    head = ("limit", "median at the lowest α", "nature", "dispersion", "median at the highest α")
-    alpha: Values
     measure: str
     unit: str
     period_s: float
     damping_ratio: float
     record_names: tuple[str, ...]
-    limits: dict[str, LimitFragility]
 
-    def rows(self) -> list[Row]:
-        """A row for each limit: median and dispersion of the critical measures."""
-        return [
-            (
-                limit.words,
-                _ends_text(limit.median[0], self.unit),
-                limit.nature,
-                "–" if limit.dispersion is None else _ends_text(limit.dispersion[0], ""),
-                _ends_text(limit.median[-1], self.unit),
-            )
-            for limit in self.limits.values()
-        ]
+    def texts_of(self, limit: LimitFragility) -> Texts:
+        """Median and dispersion of the critical measures."""
+        spread = "–" if limit.dispersion is None else _range_text(limit.dispersion[0], "")
+        return {
+            "limit": limit.words,
+            "median at the lowest α": _range_text(limit.median[0], self.unit),
+            "nature": limit.nature,
+            "dispersion": spread,
+            "median at the highest α": _range_text(limit.median[-1], self.unit),
+        }
 
-    def records(self) -> list[Record]:
-        """A row for each limit and level."""
+    def numbers_of(self, limit: LimitFragility) -> Iterator[Record]:
+        """Yields a record for each level."""
         measure = f"{self.measure} [{self.unit}]" if self.unit else "scale"
-        rows: list[Record] = []
-        for name, limit in self.limits.items():
-            for k, alpha in enumerate(self.alpha):
-                spread = (None, None) if limit.dispersion is None else limit.dispersion[k]
-                rows.append(
-                    {
-                        "limited output": name,
-                        "unit": limit.unit,
-                        "limit": limit.limit,
-                        "α": float(alpha),
-                        f"least median {measure}": limit.median[k][0],
-                        f"greatest median {measure}": limit.median[k][1],
-                        "least dispersion": spread[0],
-                        "greatest dispersion": spread[1],
-                        "nature": limit.nature,
-                    }
-                )
-        return rows
+        for k, alpha in enumerate(self.alpha):
+            spread = (None, None) if limit.dispersion is None else limit.dispersion[k]
+            yield {
+                "α": float(alpha),
+                f"least median {measure}": limit.median[k][0],
+                f"greatest median {measure}": limit.median[k][1],
+                "least dispersion": spread[0],
+                "greatest dispersion": spread[1],
+                "nature": limit.nature,
+            }
 
     def words(self) -> str:
         """Sentences on the measure, and on how to read the bands."""
@@ -115,7 +97,7 @@ class FragilityAnswer(Answer):
         return text
 
 
-def _ends_text(ends: tuple[float, float], unit: str) -> str:
+def _range_text(ends: tuple[float, float], unit: str) -> str:
     """Text of a range; its upper end may be infinite ("no end")."""
     if not np.isfinite(ends[1]):
         return f"{engineering(ends[0], unit)} … no end"
@@ -124,12 +106,12 @@ def _ends_text(ends: tuple[float, float], unit: str) -> str:
 
 def fragility(section: FragilitySection, response: FuzzyResponse) -> FragilityAnswer:
     """Critical measures, bands, medians and dispersions of each limit, and of any of them."""
-    if response.suite is None:
+    suite, limits = response.suite, section.in_si(response.structure)
+    if suite is None:
         raise RefusedError("fragility", "without records", "a section [records]")
-    limits = section.in_si(response.structure)
     names = {name: limit.peak for name, limit in section.limits_by_name.items()}
-    peaks = [x.named(names) for x in response.suite.peaks.values()]
-    measures = [sizes[section.measure] for sizes in response.suite.measures.values()]
+    peaks = [x.named(names) for x in suite.peaks.values()]
+    measures = [sizes[section.measure] for sizes in suite.measures.values()]
     critical = {
         name: CriticalMeasures.from_peaks(peaks, measures, name, limit)
         for name, limit in limits.items()
@@ -147,12 +129,7 @@ def fragility(section: FragilitySection, response: FuzzyResponse) -> FragilityAn
             {
                 **limit_fields(section, name, response.structure),
                 "nature": natures[name],
-                "critical": CriticalRanges(
-                    low=critical.low.T,
-                    low_reached=critical.low_reached.T,
-                    high_reached=critical.high_reached.T,
-                    high=critical.high.T,
-                ),
+                "critical": {x.name: getattr(critical, x.name).T for x in fields(critical)},
                 "measure": grid,
                 "band": critical.band(grid)._asdict(),
                 "median": critical.median._asdict(),
@@ -165,9 +142,9 @@ def fragility(section: FragilitySection, response: FuzzyResponse) -> FragilityAn
         alpha=np.array(response.alpha),
         measure=section.measure,
         unit=UNITS[section.measure],
-        period_s=response.suite.period,
-        damping_ratio=response.suite.ratio,
-        record_names=tuple(response.suite.peaks),
+        period_s=suite.period,
+        damping_ratio=suite.ratio,
+        record_names=tuple(suite.peaks),
         limits={name: limit_fragility(name, x) for name, x in critical.items()},
     )
 

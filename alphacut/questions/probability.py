@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
+from pydantic import Field
 
 from alphacut.case.limits import ProbabilitySection
 from alphacut.frame.questions.probability import CONFIDENCE, probabilities
@@ -13,29 +14,22 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.result import Nature
 from alphacut.io.quantity import range_text
 from alphacut.questions.question import (
-    Answer,
     FuzzyResponse,
     LimitAnswer,
+    LimitsAnswer,
     Record,
-    Row,
+    Texts,
     limit_fields,
 )
-from alphacut.stages.store import CutsResult, Numbers, Values
-
-
-class Curve(Numbers):
-    """Bounds of the probability of exceeding other limits, (levels, limits)."""
-
-    limit: Values
-    lower: Values
-    upper: Values
+from alphacut.stages.store import CutsResult, Values
 
 
 class LimitProbability(LimitAnswer):
     """Bounds of the probability that a limit is exceeded, on each level.
 
     Peaks between nodes may add `error`; `interval` holds the probabilities of all fuzzy points
-    with `CONFIDENCE`; the curve is over other limits.
+    with `CONFIDENCE`; `curve` has "limit", other limits (L,), and "lower" and "upper" bounds of the
+    probability of exceeding them, (levels, L).
     """
 
     lower: Values
@@ -43,69 +37,51 @@ class LimitProbability(LimitAnswer):
     error: Values
     interval: CutsResult
     nature: Nature = Nature.ATTAINED
-    evaluations: int
-    curve: Curve
+    curve: dict[str, Values]
+
+    def bounds_text(self, level: int) -> str:
+        """Bounds of the probability on a level."""
+        return range_text(float(self.lower[level]), float(self.upper[level]), self.nature, 3)
 
 
-def bounds_text(event: LimitProbability, level: int) -> str:
-    """Bounds of a probability on a level."""
-    low, high = float(event.lower[level]), float(event.upper[level])
-    return range_text(low, high, event.nature, 3)
-
-
-class ProbabilityAnswer(Answer):
+class ProbabilityAnswer(LimitsAnswer[LimitProbability]):
     """Fuzzy probability that limits are exceeded, by their names."""
 
     key = "probability"
     title = "How probable is it that limits are exceeded?"
     caption = "Fuzzy probability of exceeding a limit, over the limit"
-    head = (
-        "limit",
-        "at the lowest α",
-        "nature",
-        "at the highest α",
-        f"{CONFIDENCE:.0%} interval at the lowest α",
-        "between nodes",
-    )
+    limits: dict[str, LimitProbability] = Field(alias="events")
     fuzzy: tuple[str, ...]
     random: tuple[str, ...]
     samples: int
     step: float
-    alpha: Values
-    events: dict[str, LimitProbability]
 
-    def rows(self) -> list[Row]:
-        """A row for each limit."""
-        return [
-            (
-                event.event,
-                bounds_text(event, 0),
-                event.nature,
-                bounds_text(event, -1),
-                range_text(*event.interval[0], Nature.GUARANTEED, 3),  # rounded outwards
-                f"{event.error.max():.2g}",
-            )
-            for event in self.events.values()
-        ]
+    def texts_of(self, limit: LimitProbability) -> Texts:
+        """Bounds on the lowest and the highest level, and what they may miss."""
+        return {
+            "limit": limit.event,
+            "at the lowest α": limit.bounds_text(0),
+            "nature": limit.nature,
+            "at the highest α": limit.bounds_text(-1),
+            # rounded outwards
+            f"{CONFIDENCE:.0%} interval at the lowest α": range_text(
+                *limit.interval[0], Nature.GUARANTEED, 3
+            ),
+            "between nodes": f"{limit.error.max():.2g}",
+        }
 
-    def records(self) -> list[Record]:
-        """A row for each limit and level."""
-        return [
-            {
-                "limited output": name,
-                "unit": event.unit,
-                "limit": event.limit,
+    def numbers_of(self, limit: LimitProbability) -> Iterator[Record]:
+        """Yields a record for each level."""
+        for k, alpha in enumerate(self.alpha):
+            yield {
                 "α": float(alpha),
-                "at least": float(event.lower[k]),
-                "at most": float(event.upper[k]),
-                "nature": event.nature,
-                f"{CONFIDENCE:.0%} interval from": event.interval[k][0],
-                f"{CONFIDENCE:.0%} interval to": event.interval[k][1],
-                "between nodes": float(event.error[k]),
+                "at least": float(limit.lower[k]),
+                "at most": float(limit.upper[k]),
+                "nature": limit.nature,
+                f"{CONFIDENCE:.0%} interval from": limit.interval[k][0],
+                f"{CONFIDENCE:.0%} interval to": limit.interval[k][1],
+                "between nodes": float(limit.error[k]),
             }
-            for name, event in self.events.items()
-            for k, alpha in enumerate(self.alpha)
-        ]
 
     def words(self) -> str:
         """Sentences on how the probability was computed, and on what its interval holds."""
@@ -152,8 +128,7 @@ def probability(section: ProbabilitySection, response: FuzzyResponse) -> Probabi
                     "lower": answer.lower,
                     "upper": answer.upper,
                     "error": answer.error,
-                    "interval": {"lower": answer.interval[0], "upper": answer.interval[1]},
-                    "evaluations": answer.evaluations,
+                    "interval": CutsResult.of(answer.interval.T),
                     "curve": {
                         "limit": answer.limits,
                         "lower": answer.curve[0],

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Generic, TypeVar
 
 from alphacut.case.limits import QuestionSection, Side
 from alphacut.case.structure import Structure
@@ -13,9 +13,11 @@ from alphacut.frame.questions.peaks import Peaks
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.progress_bar import Progress
 from alphacut.io.quantity import engineering
-from alphacut.stages.store import Numbers
+from alphacut.stages.store import Numbers, Values
 
 Row = tuple[str, ...]
+Texts = dict[str, str]
+"""Texts of a row by the titles of their columns."""
 Record = dict[str, str | float | None]
 """Numbers and texts of a row in SI, by the titles of their columns; for CSV."""
 
@@ -24,7 +26,7 @@ Record = dict[str, str | float | None]
 class SuiteResponse:
     """Peaks of the structure under each record of a suite, and the records' measures, by name.
 
-    `period` in s and damping `ratio` are those of the first mode at the most plausible inputs.
+    `period` in s and damping `ratio` are those of the first mode at the nominal inputs.
     """
 
     period: float
@@ -59,19 +61,15 @@ class FuzzyResponse:
 
 
 class Answer(Numbers):
-    """Answer to a question about limits of outputs, in SI.
-
-    `key` names its section, results and figure, `head` the columns of `rows`.
-    """
+    """Answer to a question about limits of outputs, in SI; `key` names its section and results."""
 
     key: ClassVar[str]
     title: ClassVar[str]
     caption: ClassVar[str]
-    head: ClassVar[Row]
 
     @abstractmethod
-    def rows(self) -> list[Row]:
-        """The answer as a table of texts: what, answer, nature first."""
+    def rows(self) -> list[Texts]:
+        """The answer as a table of texts: what, answer and nature are the first three columns."""
 
     @abstractmethod
     def records(self) -> list[Record]:
@@ -80,6 +78,11 @@ class Answer(Numbers):
     @abstractmethod
     def words(self) -> str:
         """Sentences on how to read it."""
+
+    def table(self) -> tuple[Row, list[Row]]:
+        """Titles of the columns, and rows of texts."""
+        rows = self.rows()
+        return tuple(rows[0]), [tuple(row.values()) for row in rows]
 
 
 class LimitAnswer(Numbers):
@@ -114,6 +117,36 @@ class LimitAnswer(Numbers):
         output = f"|{self.output}|" if self.side in ("", "mean") else self.output
         relation = below if self.side == "min" else above
         return f"{self.side} {output} {relation} {engineering(self.limit, self.unit)}".strip()
+
+
+L = TypeVar("L", bound=LimitAnswer)
+
+
+class LimitsAnswer(Answer, Generic[L]):
+    """Answer with a part for each limit, and for any of several, by their names."""
+
+    alpha: Values
+    limits: dict[str, L]
+
+    @abstractmethod
+    def texts_of(self, limit: L) -> Texts:
+        """Row of texts of a limit."""
+
+    @abstractmethod
+    def numbers_of(self, limit: L) -> Iterator[Record]:
+        """Yields the numbers of a limit, a record a row; output, unit and limit stand before."""
+
+    def rows(self) -> list[Texts]:
+        """A row for each limit."""
+        return [self.texts_of(limit) for limit in self.limits.values()]
+
+    def records(self) -> list[Record]:
+        """The rows of each limit."""
+        return [
+            {"limited output": name, "unit": limit.unit, "limit": limit.limit, **record}
+            for name, limit in self.limits.items()
+            for record in self.numbers_of(limit)
+        ]
 
 
 def limit_fields(section: QuestionSection, name: str, structure: Structure) -> dict[str, object]:

@@ -12,7 +12,7 @@ from alphacut.frame.structures.quantities import of_storey_frame
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature, rounded
 from alphacut.io.quantity import MINUS, engineering
-from alphacut.questions.question import Answer, FuzzyResponse, Record, Row
+from alphacut.questions.question import Answer, FuzzyResponse, Record, Texts
 from alphacut.stages.envelope import PEAK_ERROR, PeakResults, peak_results
 from alphacut.stages.store import Numbers
 
@@ -40,7 +40,6 @@ class TolerancesAnswer(Answer):
     key = "tolerances"
     title = "How far may tolerances go?"
     caption = "Supports of the inputs in the case, and at the scale that exceeds no limit"
-    head = ("quantity", "no limit exceeded", "nature", "limit exceeded, or relative")
     limits: dict[str, float]
     peaks: PeakResults
     kept: float | None
@@ -48,47 +47,53 @@ class TolerancesAnswer(Answer):
     passed: float | None
     most: float
     nature: Nature
-    envelopes: int
-    step: float
     supports: dict[str, Support]
 
-    def rows(self) -> list[Row]:
+    def rows(self) -> list[Texts]:
         """The scale of all supports, then the tolerance of each input."""
-        scale = "none"
+        scale, exceeded = "none", "none is exceeded"
         if self.kept is not None:
             scale = f"up to {rounded(self.kept, 'upper', Nature.ATTAINED):.4g}"
-        exceeded = "none is exceeded" if self.passed is None else f"exceeded at {self.passed:.4g}"
-        if self.passed is not None and self.clear is not None:
-            exceeded = f"no exceedance found up to {self.clear:.4g}, {exceeded}"
-        head = ("scale of all ranges", scale, self.nature, exceeded)
-        return [head, *(self._row(*item) for item in self.supports.items())]
+        if self.passed is not None:
+            clear = "" if self.clear is None else f"no exceedance found up to {self.clear:.4g}, "
+            exceeded = f"{clear}exceeded at {self.passed:.4g}"
+        texts = [("scale of all ranges", scale, exceeded)]
+        texts += [(f"tolerance of {x}", *self._texts_of(x)) for x in self.supports]
+        return [
+            {
+                "quantity": quantity,
+                "no limit exceeded": kept,
+                "nature": self.nature,
+                "limit exceeded, or relative": relative,
+            }
+            for quantity, kept, relative in texts
+        ]
 
-    def _row(self, name: str, support: Support) -> Row:
-        """Row of an input: its largest support with no limit exceeded, nature, % of modal."""
+    def _texts_of(self, name: str) -> tuple[str, str]:
+        """Largest support of an input with no limit exceeded, and relative to its nominal value."""
         if self.kept is None:
-            return f"tolerance of {name}", "–", self.nature, ""
+            return "–", ""
+        support = self.supports[name]
         relative = f"about {support.modal:g}"
         if support.modal:
             relative = ", ".join(f"{end / support.modal - 1:+.2%}" for end in support.kept)
         sides = zip(support.kept, ("lower", "upper"), strict=True)
         inside = (rounded(end, side, Nature.ATTAINED) for end, side in sides)  # rounded inwards
         text = " … ".join(engineering(end, of_storey_frame(name).unit) for end in inside)
-        return f"tolerance of {name}", text, self.nature, relative.replace("-", MINUS)
+        return text, relative.replace("-", MINUS)
 
     def records(self) -> list[Record]:
         """A row of the scale, then one of the range of each input."""
-        names = (
-            *("quantity", "unit", "from", "to", "from in the case", "to in the case"),
-            *("most plausible", "nature"),
-        )
-        scale = ("scale of all ranges", "", None, self.kept, None, 1.0, None, self.nature)
-        rows: list[Record] = [dict(zip(names, scale, strict=True))]
+        rows = [("scale of all ranges", "", None, self.kept, None, 1.0, None)]
         for name, support in self.supports.items():
             ends = (None, None) if self.kept is None else support.kept
             unit = of_storey_frame(name).unit
-            row = (name, unit, *ends, *support.own, support.modal, self.nature)
-            rows.append(dict(zip(names, row, strict=True)))
-        return rows
+            rows.append((name, unit, *ends, *support.own, support.modal))
+        titles = (
+            *("quantity", "unit", "from", "to", "from in the case", "to in the case"),
+            *("most plausible", "nature"),
+        )
+        return [dict(zip(titles, (*row, self.nature), strict=True)) for row in rows]
 
     def words(self) -> str:
         """How to read the scale."""
@@ -133,8 +138,6 @@ def admissible_tolerances(section: TolerancesSection, response: FuzzyResponse) -
         passed=scale.passed if math.isfinite(scale.passed) else None,
         most=section.most,
         nature=scale.nature,
-        envelopes=scale.envelopes,
-        step=response.step,
         supports={
             name: Support(modal=inputs[name].modal, own=inputs[name].support, kept=ends)
             for name, ends in scale.supports.items()

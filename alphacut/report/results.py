@@ -219,7 +219,7 @@ def limits_by_peak(parts: Parts) -> dict[str, list[Limit]]:
     limits: dict[str, list[Limit]] = {}
     for decision in () if parts.decision is None else parts.decision.limits.values():
         limits.setdefault(decision.peak_name, []).append((decision.limit, decision.verdict))
-    for event in () if parts.probability is None else parts.probability.events.values():
+    for event in () if parts.probability is None else parts.probability.limits.values():
         limits.setdefault(event.peak_name, [(event.limit, "")])
     for name, limit in {} if parts.tolerances is None else parts.tolerances.limits.items():
         limits.setdefault(name, [(limit, "")])
@@ -261,7 +261,7 @@ def answers(parts: Parts) -> list[Row]:
     """Rows (what, answer, nature) of all answers to questions; inputs of tolerances share a row."""
     rows: list[Row] = []
     for answer in parts.answers:
-        answer_rows = answer.rows()
+        _, answer_rows = answer.table()
         if isinstance(answer, TolerancesAnswer):
             scale, *inputs = answer_rows
             answer_rows = [scale, ("ranges", f"of {len(inputs)} inputs", TOLERANCE_TABLE)]

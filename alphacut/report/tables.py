@@ -85,7 +85,7 @@ def frames(parts: Parts) -> dict[str, pd.DataFrame]:
 def tables(parts: Parts) -> dict[str, Table]:
     """Tables of texts of all results: numbers rounded as their nature allows, answers in words."""
     texts = {name: shown(frame) for name, frame in frames(parts).items()}
-    return texts | {answer.key: Table(answer.head, answer.rows()) for answer in parts.answers}
+    return texts | {answer.key: Table(*answer.table()) for answer in parts.answers}
 
 
 def radius_map(numbers: Document) -> pd.DataFrame:
