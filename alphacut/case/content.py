@@ -119,9 +119,10 @@ class Content(CellContent):
         section = self.structure_section
         ground = getattr(section, "accelerogram", None)
         is_loaded = self.records is not None or ground is not None or bool(self.force)
-        is_moved = is_loaded or getattr(section, "moves_at_start", True)
+        starts_at_rest = self.matrices or (self.frame and not self.frame.moves_at_start)
         allowed = "a start, an accelerogram, a section [records] or [[force]]"
         cure = "nothing moves the frame"
+        is_moved = is_loaded or not starts_at_rest
         require(is_moved, "frame.displacements", value=None, allowed=allowed, cure=cure)
         if self.records is None:
             is_absent, allowed = self.fragility is None, "beside [records]"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from typing import Annotated, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
@@ -61,6 +61,11 @@ class PhaseSection(Section):
 class MeshedCell(Section):
     """Phases of a mesh from a file, `mesh.file`, by the names of its physical groups."""
 
+    methods: ClassVar = ("auto", "prism")
+    particles: ClassVar = "mesh"  # in results
+    is_fibre: ClassVar = False
+    has_series: ClassVar = False
+
     phases: dict[str, PhaseSection] = Field(description="phase of each physical group of volumes")
 
     @property
@@ -88,26 +93,6 @@ class MeshedCell(Section):
         require(complete, key, value=None, allowed="a loss factor of each phase, 0 for none")
         return self
 
-    @property
-    def methods(self) -> tuple[str, ...]:
-        """Models that can solve it."""
-        return "auto", "prism"
-
-    @property
-    def particles(self) -> str:
-        """Kind of its particles, in results."""
-        return "mesh"
-
-    @property
-    def is_fibre(self) -> bool:
-        """False: constants along fibres need one round particle."""
-        return False
-
-    @property
-    def has_series(self) -> bool:
-        """False: a file may hold any phases."""
-        return False
-
 
 Thickness = Annotated[FuzzyNumber, Quantity(least=THINNEST, below=1, fuzzy=True)]
 
@@ -116,19 +101,6 @@ ELLIPSES = re.compile(r"^ellipses\(([^,]*),([^,]*)\)$")
 SHAPES = (
     'cylinders, spheres or ellipses(ratio of axes from 1/4 to 4, degrees), as "ellipses(2, 30)"'
 )
-
-
-def _outline(particles: str) -> Ellipse | None:
-    """The ellipse of a text such as "ellipses(2, 30)"; None of cylinders and spheres."""
-    if particles in ("cylinders", "spheres"):
-        return None
-    match = ELLIPSES.match(particles)
-    numbers = match.groups() if match else ()
-    try:
-        aspect, degrees = map(float, numbers)
-    except ValueError:  # not two, or no numbers
-        raise RefusedError("cell.particles", particles, SHAPES) from None
-    return Ellipse(aspect, degrees)
 
 
 class RoundCell(Section):
@@ -185,8 +157,15 @@ class RoundCell(Section):
 
     @property
     def outline(self) -> Ellipse | None:
-        """Outline of the particle, None for round ones."""
-        return _outline(self.particles)
+        """Outline of the particle, None for round ones; RefusedError of unknown shapes."""
+        if self.particles in ("cylinders", "spheres"):
+            return None
+        match = ELLIPSES.match(self.particles)
+        try:
+            aspect, degrees = map(float, match.groups() if match else ())
+        except ValueError:  # not two, or no numbers
+            raise RefusedError("cell.particles", self.particles, SHAPES) from None
+        return Ellipse(aspect, degrees)
 
     @property
     def stiffness(self) -> VoigtPhase | None:
@@ -195,14 +174,10 @@ class RoundCell(Section):
         return modulus if isinstance(modulus, VoigtPhase) else None
 
     @property
-    def is_round_isotropic(self) -> bool:
-        """True for round particles of an isotropic material."""
-        return self.outline is None and self.stiffness is None
-
-    @property
     def has_series(self) -> bool:
         """True where the series has a formula: round particles of one isotropic material."""
-        return self.is_round_isotropic and self.interphase_thickness is None
+        others = (self.outline, self.stiffness, self.interphase_thickness)
+        return all(x is None for x in others)
 
     @property
     def methods(self) -> tuple[str, ...]:
@@ -237,7 +212,7 @@ class RoundCell(Section):
     @model_validator(mode="after")
     def _check_phases(self) -> Self:
         """Refuses unknown shapes, a Poisson's ratio too few or too many, and touching particles."""
-        _outline(self.particles)  # refuses unknown shapes
+        outline = self.outline or circle  # refuses unknown shapes
         has_ratio, is_isotropic = self.inclusion_poisson is not None, self.stiffness is None
         value = "there" if has_ratio else "missing"
         allowed = "a number beside Young's modulus, none beside a stiffness"
@@ -245,7 +220,7 @@ class RoundCell(Section):
         fits, allowed = is_isotropic or self.particles != "spheres", "Young's modulus of spheres"
         require(fits, "cell.inclusion_modulus", value="a plane stiffness", allowed=allowed)
         if self.fraction is not None:
-            touching_radius = 1 / reach(self.outline or circle)
+            touching_radius = 1 / reach(outline)
             touching = float(self.shape.fractions(touching_radius))
             greatest = self.fraction.support.upper
             allowed = f"values below {touching:.6g}, where particles touch"

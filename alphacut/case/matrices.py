@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import cached_property
 from typing import Annotated, Self
 
 import numpy as np
@@ -13,10 +12,11 @@ from pydantic import Field, PlainValidator, ValidationInfo, model_validator
 from alphacut.case.structure import (
     LOSS_STAND_IN,
     RATIO_WORDS,
-    DampingRatio,
+    DampingRatios,
     MaterialDamping,
     Structure,
-    ratios_of,
+    StructureSection,
+    damping_ratios_by_name,
     read_accelerogram,
 )
 from alphacut.case.types import NotEmpty, Section, after, case_file, distinct, text
@@ -28,9 +28,6 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io.arrays import read_array
 from alphacut.io.quantity import fuzzy_of_any_unit
-
-RATIO = "zeta"
-"""Name of the parameter that a damping ratio is."""
 
 
 def _array_file(value: object, info: ValidationInfo) -> Array:
@@ -72,7 +69,7 @@ class ObservedRow(Section):
     )
 
 
-class MatricesSection(Section):
+class MatricesSection(StructureSection):
     """Linear structure from matrices in SI units, each times a product of powers of parameters.
 
     A modulus that a stage computes takes the place of parameter E.
@@ -87,7 +84,7 @@ class MatricesSection(Section):
         description="pairs [factor, file] of K"
     )
     damping: tuple[Term, ...] = Field(default=(), description="pairs [factor, file] of D")
-    damping_ratio: DampingRatio | None = Field(default=None, description=RATIO_WORDS)
+    damping_ratio: DampingRatios = Field(default=(), description=RATIO_WORDS)
     direction: str | dict[str, float] = Field(
         default="",
         description="direction of the ground: it moves all unknowns NODE.DIRECTION; or how it "
@@ -98,18 +95,12 @@ class MatricesSection(Section):
     )
     outputs: dict[str, ObservedRow] = Field(description="observed quantities by name")
 
-    @cached_property
-    def nominal(self) -> Structure:
-        """The structure with stand-ins for what is yet to be computed; built once."""
-        return self.structure()
-
     def structure(
         self, modulus: FuzzyNumber | None = None, loss: FuzzyNumber | None = None
     ) -> Structure:
-        """The structure from the matrices, or RefusedError.
+        """The structure from the matrices; `modulus` takes the place of parameter E.
 
-        `modulus` in Pa takes the place of parameter E; `loss` is the loss factor of this modulus,
-        for damping by the material, or None for a stand-in.
+        See `StructureSection`.
         """
         try:
             numbers = self._numbers(modulus)
@@ -128,17 +119,16 @@ class MatricesSection(Section):
     def _stated_ratios(self) -> dict[str, FuzzyNumber]:
         """Damping ratios that do not come from the material."""
         is_stated = not isinstance(self.damping_ratio, MaterialDamping)
-        return ratios_of(self.damping_ratio, None) if is_stated else {}
+        return damping_ratios_by_name(self.damping_ratio, None) if is_stated else {}
 
     def _numbers(self, modulus: FuzzyNumber | None) -> dict[str, FuzzyNumber]:
-        numbers = dict(self.parameters)
-        numbers |= self._stated_ratios
+        numbers = self.parameters | self._stated_ratios
         if modulus is not None and "E" in numbers:
             numbers["E"] = modulus
         return numbers or {"scale": Crisp(1.0)}
 
     def _model(self, numbers: Mapping[str, FuzzyNumber]) -> MatrixStructure:
-        """The structure at the modal values of its parameters."""
+        """The structure at the nominal values of its parameters."""
         rows: dict[str, Array] = {
             Output(name, row.unit): self._row(name, row) for name, row in self.outputs.items()
         }
@@ -162,9 +152,10 @@ class MatricesSection(Section):
         allowed = "a term of the stiffness with E"
         require(any(has_modulus), "damping_ratio", value="material", allowed=allowed)
         if all(has_modulus):
-            return {RATIO: damping.ratio(loss)}
+            return damping_ratios_by_name(damping, loss)
         shares = modal_energy_shares(model, np.flatnonzero(has_modulus))
-        return {f"{RATIO}{k}": damping.ratio(loss, x) for k, x in enumerate(shares, start=1)}
+        ratios = tuple(damping.damping_ratio(loss, share) for share in shares)
+        return damping_ratios_by_name(ratios, None)
 
     def _terms(
         self, terms: tuple[tuple[Monomial, Array], ...]
@@ -191,11 +182,6 @@ class MatricesSection(Section):
             return self._vector("direction", self.direction)
         pattern = [float(name.rpartition(".")[2] == self.direction) for name in self.unknowns]
         return np.array(pattern)
-
-    @property
-    def moves_at_start(self) -> bool:
-        """True if the structure moves without a record: it starts at rest."""
-        return False
 
     @model_validator(mode="after")
     def _check_rows(self) -> Self:

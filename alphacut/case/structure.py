@@ -1,4 +1,4 @@
-"""A structure at modal values with its fuzzy parameters, and the sections that give one."""
+"""A structure at nominal values with its fuzzy parameters, and the sections that give one."""
 
 from __future__ import annotations
 
@@ -7,14 +7,12 @@ import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal, Self, cast
 
 from pydantic import Field, PlainValidator, ValidationInfo, model_validator
 
 from alphacut.case.types import Modulus, OneOrMany, Quantity, Section, case_file, text
 from alphacut.frame import Accelerogram, MatrixStructure, StoreyFrame
-from alphacut.frame.dynamics.flow import Flow
-from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.structures.lagrangian import LagrangianSystem, pendulum
 from alphacut.frame.structures.quantities import Output
 from alphacut.frame.structures.storey import SYMBOLS
@@ -60,51 +58,44 @@ class MaterialDamping:
 
     joints: FuzzyNumber = ZERO
 
-    def ratio(self, loss: FuzzyNumber, energy_share: float = 1.0) -> FuzzyNumber:
+    def damping_ratio(self, loss: FuzzyNumber, energy_share: float = 1.0) -> FuzzyNumber:
         """Damping ratio ζ = sin(½ arctan(w η)) of a mode in free oscillation, plus the joints'.
 
         η is the loss factor of the material's Young's modulus, w the fraction of the mode's strain
         energy that is in the material.
         """
+
+        def ratio(loss: float, joints: float) -> float:
+            return math.sin(math.atan(energy_share * loss) / 2) + joints
+
         if loss.support.width == 0 and self.joints.support.width == 0:
-            return Crisp(_ratio_of_loss(loss.modal * energy_share) + self.joints.modal)
+            return Crisp(ratio(loss.modal, self.joints.modal))
         alpha = sorted({*loss.cuts.alpha, *self.joints.cuts.alpha})
-        cuts = [(loss.cut(level), self.joints.cut(level)) for level in alpha]
         # ζ rises with both numbers, so that the ends of their cuts give its ends
-        lower = [_ratio_of_loss(energy_share * eta.lower) + joint.lower for eta, joint in cuts]
-        upper = [_ratio_of_loss(energy_share * eta.upper) + joint.upper for eta, joint in cuts]
-        return PiecewiseLinear(tuple(alpha), tuple(lower), tuple(upper))
+        ends = [map(ratio, loss.cut(level), self.joints.cut(level)) for level in alpha]
+        return PiecewiseLinear(tuple(alpha), *zip(*ends, strict=True))
 
 
-def _ratio_of_loss(loss: float) -> float:
-    """Damping ratio of a freely oscillating mode with a loss factor."""
-    return math.sin(math.atan(loss) / 2)
-
-
-def _parse_damping_ratio(value: object) -> FuzzyNumber | MaterialDamping | tuple[FuzzyNumber, ...]:
+def _parse_damping_ratios(value: object) -> MaterialDamping | tuple[FuzzyNumber, ...]:
     """Parse damping ratios: "2 %" of all modes, ["2 %", "5 %"] of each, or "material + 1 %"."""
-    if isinstance(value, list) and any(isinstance(entry, str) for entry in value):
-        ratios = map(RATIO.read, value)
-        return tuple(ratio for ratio in ratios if isinstance(ratio, FuzzyNumber))
     word, plus, joints = value.partition("+") if isinstance(value, str) else ("", "", "")
-    by_material = word.strip() == "material"
-    if by_material and not plus:
-        return MaterialDamping()
-    ratio = RATIO.read(joints.strip() if by_material else value)
-    assert isinstance(ratio, FuzzyNumber)
-    return MaterialDamping(ratio) if by_material else ratio
+    if word.strip() != "material":
+        is_one_a_mode = isinstance(value, list) and any(isinstance(x, str) for x in value)
+        values = cast("list[object]", value) if is_one_a_mode else [value]
+        return tuple(cast("FuzzyNumber", RATIO.parse(entry)) for entry in values)
+    return MaterialDamping(cast("FuzzyNumber", RATIO.parse(joints.strip())) if plus else ZERO)
 
 
 RATIO = Quantity(least=0, below=1, fuzzy=True)
-DampingRatio = Annotated[
-    FuzzyNumber | MaterialDamping | tuple[FuzzyNumber, ...],
-    PlainValidator(_parse_damping_ratio, json_schema_input_type=float | list[float | str] | str),
+DampingRatios = Annotated[
+    MaterialDamping | tuple[FuzzyNumber, ...],
+    PlainValidator(_parse_damping_ratios, json_schema_input_type=float | list[float | str] | str),
 ]
 
 
 @dataclass(frozen=True)
 class Structure:
-    """A storey frame, a structure from matrices or a pendulum: the model at its modal values.
+    """A storey frame, a structure from matrices or a pendulum: the model at its nominal values.
 
     `numbers` has every parameter, crisp or fuzzy, in SI; `heights` the storey's of each drift.
     """
@@ -182,12 +173,6 @@ class Structure:
             return replace(self.model, observed=observed, row_factors=factors)
         return self.model
 
-    def flow(
-        self, names: Sequence[str], duration: float, step: float, integrator: str | None = None
-    ) -> Flow:
-        """Trajectories as a function of parameters, by the midpoint rule by default."""
-        return make_flow(self.model, names, duration, step, integrator or "midpoint")
-
 
 def read_accelerogram(value: object, info: ValidationInfo) -> Accelerogram:
     """Record of a file that the case names; warns of what is unusual in it."""
@@ -198,24 +183,39 @@ def read_accelerogram(value: object, info: ValidationInfo) -> Accelerogram:
     return recording.accelerogram()
 
 
-def ratios_of(
-    ratio: FuzzyNumber | MaterialDamping | tuple[FuzzyNumber, ...] | None, loss: FuzzyNumber | None
+def damping_ratios_by_name(
+    ratios: MaterialDamping | tuple[FuzzyNumber, ...], loss: FuzzyNumber | None
 ) -> dict[str, FuzzyNumber]:
     """Damping ratios by parameter: "zeta" of all modes, or "zeta1", "zeta2" … of each.
 
     `loss` is the loss factor of the material, for damping by it; None: a stand-in.
     """
-    if ratio is None:
-        return {}
-    if isinstance(ratio, tuple) and len(ratio) > 1:
-        return {f"zeta{mode}": number for mode, number in enumerate(ratio, start=1)}
-    number = ratio[0] if isinstance(ratio, tuple) else ratio
-    if isinstance(number, MaterialDamping):
-        number = number.ratio(loss or LOSS_STAND_IN)
-    return {"zeta": number}
+    if isinstance(ratios, MaterialDamping):
+        ratios = (ratios.damping_ratio(loss or LOSS_STAND_IN),)
+    names = ["zeta"] if len(ratios) == 1 else [f"zeta{mode + 1}" for mode in range(len(ratios))]
+    return dict(zip(names, ratios, strict=True))
 
 
-class Frame(Section):
+class StructureSection(Section):
+    """A section of the case that gives its structure."""
+
+    def structure(
+        self, modulus: FuzzyNumber | None = None, loss: FuzzyNumber | None = None
+    ) -> Structure:
+        """The structure with its fuzzy parameters; RefusedError where they make none.
+
+        `modulus` is Young's in Pa, by default the section's own or a stand-in; `loss` the loss
+        factor of the material, or a stand-in. A structure without them takes neither.
+        """
+        raise NotImplementedError
+
+    @cached_property
+    def nominal(self) -> Structure:
+        """The structure with stand-ins for what is yet to be computed; built once."""
+        return self.structure()
+
+
+class Frame(StructureSection):
     """Storey frame: rigid floors on elastic columns, numbered from the ground.
 
     A key with one value for each floor may hold one value for all of them.
@@ -237,7 +237,7 @@ class Frame(Section):
     stiffness: Annotated[tuple[Stiffness, ...], OneOrMany] | None = Field(
         default=None, description="stiffness of each storey, in place of columns and modulus"
     )
-    damping_ratio: DampingRatio | None = Field(default=None, description=RATIO_WORDS)
+    damping_ratio: DampingRatios = Field(default=(), description=RATIO_WORDS)
     dampers: Annotated[tuple[Damping, ...], OneOrMany] = Field(
         default=(ZERO,), description="viscous damper of each floor"
     )
@@ -253,8 +253,7 @@ class Frame(Section):
     rayleigh_mass: Rate = Field(default=ZERO, description="factor a of a damping a M + b K")
     rayleigh_stiffness: Delay = Field(default=ZERO, description="factor b of a damping a M + b K")
     accelerogram: Annotated[Accelerogram, text(read_accelerogram)] | None = Field(
-        default=None,
-        description="file of the ground's acceleration; motion is relative to it",
+        default=None, description="file of the ground's acceleration; motion is relative to it"
     )
     outputs: tuple[str, ...] = Field(
         default=(), description="observed quantities: q1, v1, a1, drift1, shear1 …, base_shear"
@@ -285,37 +284,29 @@ class Frame(Section):
         per_storey = values or ()
         return per_storey * self.floors if len(per_storey) == 1 else per_storey
 
-    @cached_property
-    def nominal(self) -> Structure:
-        """The frame with stand-ins for what is yet to be computed; built once."""
-        return self.structure()
-
     def structure(
         self, modulus: FuzzyNumber | None = None, loss: FuzzyNumber | None = None
     ) -> Structure:
         """The frame with its fuzzy parameters, and the storey heights by the names of the drifts.
 
-        `modulus` is Young's in Pa, by default the section's own or a stand-in; `loss` the loss
-        factor of its material, or a stand-in.
+        See `StructureSection`.
         """
         young: FuzzyNumber | None = modulus or self.modulus or STAND_IN
         if self.stiffness:  # which needs no modulus
             young = self.modulus
-        ratios = ratios_of(self.damping_ratio, loss)
+        ratios = damping_ratios_by_name(self.damping_ratio, loss)
         try:
             model = self._model(young, [x.modal for x in ratios.values()])
         except RefusedError as error:
             key = f"frame.{NAMES.get(error.key, error.key)}"
             raise RefusedError(key, error.value, error.allowed, error.cure) from None
         numbers = self._numbers(young) | ratios
-        heights = {
-            f"drift{storey}": height
-            for storey, height in enumerate(self.per_floor(self.lengths), start=1)
-        }
+        per_storey = enumerate(self.per_floor(self.lengths), start=1)
+        heights = {f"drift{storey}": height for storey, height in per_storey}
         return Structure(model, {name: numbers[name] for name in model.parameters}, heights)
 
     def _model(self, modulus: FuzzyNumber | None, ratios: list[float]) -> StoreyFrame:
-        """The frame at modal values, with a Young's modulus in Pa and damping ratios."""
+        """The frame at nominal values, with a Young's modulus in Pa and damping ratios."""
         return StoreyFrame(
             self._modal(self.masses),
             self._modal(self.lengths),
@@ -354,14 +345,10 @@ class Frame(Section):
     @model_validator(mode="after")
     def _check_damping(self) -> Self:
         """Refuses a frame without damping, with contradictory damping or impossible values."""
-        is_material = isinstance(self.damping_ratio, MaterialDamping)
-        is_from_columns = self.stiffness is None  # stiffness by columns of the material
-        require(
-            is_from_columns or not is_material,
-            "frame.damping_ratio",
-            value="material, beside stiffness",
-            allowed="columns of the material, or [matrices] if some storeys are of another one",
-        )
+        has_columns = self.stiffness is None or not isinstance(self.damping_ratio, MaterialDamping)
+        value = "material, beside stiffness"
+        allowed = "columns of the material, or [matrices] if some storeys are of another one"
+        require(has_columns, "frame.damping_ratio", value=value, allowed=allowed)
         is_placed = self.has_key("dampers") == (self.damper_placement is not None)
         allowed = "both dampers and damper_placement"
         require(is_placed, "frame.damper_placement", value=None, allowed=allowed)
@@ -372,7 +359,7 @@ class Frame(Section):
         return self
 
 
-class Pendulum(Section):
+class Pendulum(StructureSection):
     """Damped pendulum: a mass on a bar under gravity; the output is the force in the bar."""
 
     mass: Mass = Field(description="mass")
@@ -382,23 +369,16 @@ class Pendulum(Section):
     angle: Angle = Field(description="angle at the start, 0 hanging down")
     angular_velocity: Spin = Field(description="angular velocity at the start")
 
-    @cached_property
-    def nominal(self) -> Structure:
-        """The pendulum, built once."""
-        return self.structure()
-
     def structure(
         self, modulus: FuzzyNumber | None = None, loss: FuzzyNumber | None = None
     ) -> Structure:
-        """The pendulum; it takes neither modulus nor loss factor."""
-        model = pendulum(
-            mass=self.mass.modal,
-            length=self.length.modal,
-            damping=self.damping.modal,
-            gravity=self.gravity.modal,
-            phi0=self.angle.modal,
-            omega0=self.angular_velocity.modal,
+        """The pendulum; see `StructureSection`."""
+        numbers = (
+            *(self.mass, self.length, self.damping),
+            *(self.gravity, self.angle, self.angular_velocity),
         )
-        keys = ("mass", "length", "damping", "gravity", "angle", "angular_velocity")
-        numbers = {x: getattr(self, key) for x, key in zip(model.parameters, keys, strict=True)}
-        return Structure(replace(model, observed={"force": model.observed["force"]}), numbers)
+        arguments = ("mass", "length", "damping", "gravity", "phi0", "omega0")
+        values = {name: x.modal for name, x in zip(arguments, numbers, strict=True)}
+        model = pendulum(**values)
+        model = replace(model, observed={"force": model.observed["force"]})
+        return Structure(model, dict(zip(model.parameters, numbers, strict=True)))

@@ -65,7 +65,7 @@ class Quantity:
         words = " ".join([kind, *finite])
         return f'{words}, as "{example}"' if self.si else words
 
-    def read(self, value: object) -> object:
+    def parse(self, value: object) -> object:
         """The quantity in SI that a value of the case states, such as "80 GPa ± 5 %", in range."""
         cure = ""
         try:
@@ -92,8 +92,8 @@ class Quantity:
     def __get_pydantic_core_schema__(
         self, source: object, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        """The validation by `read`."""
-        return core_schema.no_info_plain_validator_function(self.read)
+        """The validation by `parse`."""
+        return core_schema.no_info_plain_validator_function(self.parse)
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler

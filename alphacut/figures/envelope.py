@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from alphacut.figures import style
+from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.arrays import Array
 from alphacut.io.quantity import engineering
@@ -82,8 +83,8 @@ def mapping(results: Results, *, count: int = 40, duration: float = 5.0) -> Figu
     output = names[-1] if "q" in names[-1] else names[0]  # the last one if it is a displacement
     inputs, step = structure.inputs(task.fuzzy), task.section.step
     end = round(min(duration, task.duration) / step) * step
-    scheme = task.section.integrator or ("exact" if structure.frame else None)
-    flow = structure.flow(tuple(inputs), end, step, scheme)
+    scheme = task.section.integrator or ("exact" if structure.frame else "midpoint")
+    flow = make_flow(structure.model, tuple(inputs), end, step, scheme)
     lower, upper = np.array([x.cut(float(dataset["alpha"])) for x in inputs.values()]).T
     points = np.random.default_rng(0).uniform(lower, upper, (count, len(inputs)))
     curves = flow.values(points)[:, :, list(flow.outputs).index(output)]

@@ -9,6 +9,7 @@ import numpy as np
 
 from alphacut.figures.style import Look, prefix_axis
 from alphacut.frame.boxes import UnitFlow, boxes
+from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.methods.graph_follower import Followed, GraphFollower
 from alphacut.frame.structures.quantities import Output
 from alphacut.stages.envelope import EnvelopeTask
@@ -101,7 +102,7 @@ def followed_run(results: Results, task: EnvelopeTask) -> tuple[Followed, int]:
     assert structure is not None
     cuts, tolerance = boxes(structure.inputs(task.fuzzy), (0.0,)), task.tolerance(structure)
     steps = max(1, min(round(DURATION / step), round(task.duration / step)))
-    motion = structure.flow(cuts.names, steps * step, step)
+    motion = make_flow(structure.model, cuts.names, steps * step, step)
     flow = UnitFlow(motion, cuts, not tolerance.unit)
     column = max(0, len([name for name in flow.outputs if name.startswith("q")]) - 1)
     for refinement in (1.0, 1e-2, 1e-4, 1e-8):  # until a new graph is computed, to have one to show

@@ -117,12 +117,12 @@ def test_a_material_without_losses_damps_no_frame(tmp_path):
 
 def test_joints_come_on_top_on_every_level():
     damping = MaterialDamping(Triangular(0.005, 0.01, 0.02))
-    ratio = damping.ratio(Triangular(0.01, 0.02, 0.04), 0.5)
+    ratio = damping.damping_ratio(Triangular(0.01, 0.02, 0.04), 0.5)
     for level in (0.0, 1.0):
         joints, loss = damping.joints.cut(level), Triangular(0.01, 0.02, 0.04).cut(level)
         expected = np.sin(np.arctan(np.array(loss) / 2) / 2) + joints
         assert np.allclose(ratio.cut(level), expected, rtol=1e-12)
-    assert MaterialDamping().ratio(Crisp(0.02)).modal == pytest.approx(0.01, rel=1e-3)
+    assert MaterialDamping().damping_ratio(Crisp(0.02)).modal == pytest.approx(0.01, rel=1e-3)
 
 
 def test_a_lossless_ground_storey_damps_modes_by_their_energy_elsewhere():
