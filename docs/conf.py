@@ -81,11 +81,11 @@ def with_keys(
     _app: Sphinx, _what: str, _name: str, documented: object, _options: object, lines: list[str]
 ) -> None:
     """Adds the keys of a section of a case as a table, from the model's own fields."""
-    from alphacut.case.load import allowed
+    from alphacut.case.parse import allowed_values
 
     fields = getattr(documented, "model_fields", {})
     rows = [
-        (f"``{key}``", described(field), allowed(field), default(field))
+        (f"``{key}``", described(field), allowed_values(field), default(field))
         for key, field in fields.items()
     ]
     if rows:

@@ -1,9 +1,12 @@
-"""The content of a case file: its sections, built once, and what they need of each other."""
+"""A whole case: its sections, built once, what they need of each other, and its JSON Schema."""
 
 from __future__ import annotations
 
+import json
 import re
+from collections.abc import Sequence
 from functools import cached_property
+from pathlib import Path
 from typing import Self
 
 from pydantic import model_validator
@@ -20,6 +23,7 @@ from alphacut.case.loads import ForceSection, RecordsSection, with_forces
 from alphacut.case.matrices import MatricesSection
 from alphacut.case.microstructure import MicrostructureSection
 from alphacut.case.motion import EnvelopeSection, Identify, Study
+from alphacut.case.parse import ParsedCase, parse
 from alphacut.case.structure import Frame, MaterialDamping, Pendulum, Structure
 from alphacut.case.types import require_alone
 from alphacut.fuzzy import FuzzyNumber
@@ -70,11 +74,16 @@ class Content(CellContent):
         """True if the structure needs no modulus of a stage."""
         return self.frame is None or self.frame.has_stated_modulus
 
+    @property
+    def structure_section(self) -> Frame | Pendulum | MatricesSection | None:
+        """The section of the structure, if the case has one."""
+        return self.frame or self.pendulum or self.matrices
+
     @cached_property
     def structure(self) -> Structure | None:
         """The structure, with stand-ins for what is yet to be computed; built once."""
         section = self.structure_section
-        return None if section is None else self._loaded(section.nominal)
+        return None if section is None else self._with_forces(section.nominal)
 
     def structure_of(
         self, modulus: FuzzyNumber | None = None, loss: FuzzyNumber | None = None
@@ -86,22 +95,17 @@ class Content(CellContent):
         """
         if self.structure_section is None:
             raise RefusedError("envelope", None, "a structure and a section [envelope]")
-        return self._loaded(self.structure_section.structure(modulus, loss))
+        return self._with_forces(self.structure_section.structure(modulus, loss))
 
-    def _loaded(self, structure: Structure) -> Structure:
+    def _with_forces(self, structure: Structure) -> Structure:
         unknowns = () if self.matrices is None else self.matrices.unknowns
         return with_forces(structure, self.force, unknowns)
 
     @property
     def has_material_damping(self) -> bool:
         """True if the structure takes damping from the loss factors of its material."""
-        ratio = getattr(self.structure_section, "damping_ratio", None)
-        return isinstance(ratio, MaterialDamping)
-
-    @property
-    def structure_section(self) -> Frame | Pendulum | MatricesSection | None:
-        """The section of the structure, if the case has one."""
-        return self.frame or self.pendulum or self.matrices
+        ratios = getattr(self.structure_section, "damping_ratio", None)
+        return isinstance(ratios, MaterialDamping)
 
     @model_validator(mode="after")
     def _check_material_damping(self) -> Self:
@@ -116,8 +120,7 @@ class Content(CellContent):
     @model_validator(mode="after")
     def _check_excitation(self) -> Self:
         """Refuses a structure at rest without loads, and what a suite of records cannot answer."""
-        section = self.structure_section
-        ground = getattr(section, "accelerogram", None)
+        ground = getattr(self.structure_section, "accelerogram", None)
         is_loaded = self.records is not None or ground is not None or bool(self.force)
         starts_at_rest = self.matrices or (self.frame and not self.frame.moves_at_start)
         allowed = "a start, an accelerogram, a section [records] or [[force]]"
@@ -175,3 +178,24 @@ class Content(CellContent):
         structure.inputs(stated, f"{key}.fuzzy")  # refuses unknown and crisp ones
         structure.require_outputs(f"{key}.figures", study.figures)
         envelope.require_steps(f"{key}.duration", study.duration)
+
+
+Case = ParsedCase[Content]
+
+
+def load(path: Path | str, changes: Sequence[str] = ()) -> Case:
+    """Reads a TOML case file, with changes ``KEY=VALUE`` such as ``cell.matrix_modulus=20 GPa``.
+
+    Raises:
+        BadInput: With every problem of the case.
+    """
+    return parse(Content, path, changes)
+
+
+def json_schema() -> str:
+    """The JSON Schema of a case file, for editors."""
+    return json.dumps(Content.model_json_schema(), indent=1, ensure_ascii=False) + "\n"
+
+
+if __name__ == "__main__":
+    print(json_schema(), end="")

@@ -14,7 +14,7 @@ from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-from alphacut.case.types import Section
+from alphacut.case.types import Quantity, Section
 from alphacut.fuzzy.refused import RefusedError, printable, require
 from alphacut.io.problem import BadInput, InputProblem, nearest, suggestion
 from alphacut.stochastic.particles.csv_columns import text_of
@@ -207,15 +207,28 @@ def sections_of(model: type[Section]) -> dict[str, SectionModels]:
 def _walk(prefix: str, model: type[Section]) -> Iterator[tuple[str, FieldInfo, SectionModels]]:
     """Yields each key below a section's class: full name, field, classes of a section or none."""
     for key, info in model.model_fields.items():
-        name, parts = f"{prefix}{key}", [info.annotation, *annotation_parts(info.annotation)]
+        name, parts = f"{prefix}{key}", [info.annotation, *_annotation_parts(info.annotation)]
         models = [x for x in parts if isinstance(x, type) and issubclass(x, Section)]
         yield name, info, models
         for inner in models:
             yield from _walk(f"{name}.", inner)
 
 
-def annotation_parts(annotation: Any) -> Iterator[Any]:
-    """Everything inside an annotation, what is annotated with it too."""
+def quantity_of(info: FieldInfo) -> Quantity | None:
+    """The quantity of a key, or of the entries of its array."""
+    parts = [*info.metadata, *_annotation_parts(info.annotation)]
+    return next((part for part in parts if isinstance(part, Quantity)), None)
+
+
+def allowed_values(info: FieldInfo) -> str:
+    """Allowed values of a key in words; empty where it takes any text."""
+    quantity = quantity_of(info)
+    choices = [part for part in _annotation_parts(info.annotation) if isinstance(part, str)]
+    return quantity.allowed if quantity else ", ".join(choices)
+
+
+def _annotation_parts(annotation: Any) -> Iterator[Any]:
+    """Yields everything inside an annotation, what is annotated with it too."""
     for part in (*get_args(annotation), *getattr(annotation, "__metadata__", ())):
         yield part
-        yield from annotation_parts(part)
+        yield from _annotation_parts(part)

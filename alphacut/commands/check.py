@@ -8,8 +8,8 @@ from math import pi
 from typing import TextIO
 
 from alphacut.case.content import Content
-from alphacut.case.load import quantity_of
 from alphacut.case.loads import RecordsSection
+from alphacut.case.parse import quantity_of
 from alphacut.case.structure import Structure
 from alphacut.case.types import Section
 from alphacut.commands.options import Command, add_common, write_answer

@@ -13,9 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from alphacut import frame
-from alphacut.case.content import Content
+from alphacut.case.content import Case, Content, load
 from alphacut.case.limits import QuestionSection
-from alphacut.case.load import Case, load
 from alphacut.case.loads import RecordsSection
 from alphacut.case.structure import Structure
 from alphacut.commands.options import require_case_petsc

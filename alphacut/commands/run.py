@@ -10,7 +10,7 @@ from typing import TextIO
 
 import pandas as pd
 
-from alphacut.case.load import Case
+from alphacut.case.content import Case
 from alphacut.commands.options import Command, add_quiet, add_run, write_answer
 from alphacut.commands.pipeline import Pipeline, open_results
 from alphacut.figures.all import draw_figures

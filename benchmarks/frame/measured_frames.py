@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from alphacut.case.load import load
+from alphacut.case.content import load
 from alphacut.frame import StoreyFrame
 from alphacut.frame.identify import MeasuredMode, RefutedError, identify, measured_mode
 from alphacut.frame.identify.modes import Chain, eigenvalue_ranges

@@ -18,7 +18,7 @@ from typing import Any
 
 import xarray as xr
 
-from alphacut.case.load import load
+from alphacut.case.content import load
 from alphacut.case.motion import EnvelopeSection
 from alphacut.fuzzy.refused import FailedError
 from benchmarks.relations.relation import Chance, Kind, Problem, Relation

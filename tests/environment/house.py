@@ -48,7 +48,8 @@ def written_docs() -> list[Path]:
 
 def interface() -> dict[str, int]:
     """Counts of the commands, their options, and the keys of a case."""
-    from alphacut.case.load import every_key
+    from alphacut.case.content import Content
+    from alphacut.case.parse import keys_of
     from alphacut.entry import COMMANDS, parsers
 
     each = parsers("alphacut", COMMANDS)[1]
@@ -59,7 +60,7 @@ def interface() -> dict[str, int]:
     return {
         "commands": len(each),
         "options of a command": max(options),
-        "case keys": len(every_key()),
+        "case keys": len(keys_of(Content)),
     }
 
 

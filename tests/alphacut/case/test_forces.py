@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from alphacut.case.load import load
+from alphacut.case.content import load
 from alphacut.io.problem import BadInput
 from tests.alphacut.small import written
 

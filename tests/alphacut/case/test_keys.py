@@ -7,7 +7,8 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from alphacut.case.load import allowed, every_key, json_schema, sections
+from alphacut.case.content import Content, json_schema
+from alphacut.case.parse import allowed_values, keys_of, sections_of
 
 ROOT = Path(__file__).parents[3]
 CASES = sorted((ROOT / "cases").glob("*.toml"))
@@ -16,12 +17,12 @@ VALIDATOR = jsonschema.Draft202012Validator(json.loads(SCHEMA))
 
 
 def test_each_key_says_what_it_is():
-    assert all(info.description for info in every_key().values())
+    assert all(info.description for info in keys_of(Content).values())
 
 
 def test_the_schema_is_that_of_the_models():
     text = (ROOT / "cases/case.schema.json").read_text(encoding="utf-8")
-    assert text == SCHEMA, "python -m alphacut.case.load > cases/case.schema.json"
+    assert text == SCHEMA, "python -m alphacut.case.content > cases/case.schema.json"
 
 
 @pytest.mark.parametrize("path", CASES, ids=lambda path: path.stem)
@@ -37,14 +38,14 @@ def test_the_schema_refuses_an_unknown_key():
 
 def test_the_page_has_every_section_of_the_models():
     page = (ROOT / "docs/case-format.md").read_text(encoding="utf-8")
-    for models in sections().values():
+    for models in sections_of(Content).values():
         for model in models:
             name = model.__name__
             assert f".{name}\n" in page
 
 
 def test_allowed_values_of_a_key_are_told_in_words():
-    keys = every_key()
-    assert allowed(keys["mesh.layers"]).startswith("whole number from 1")
-    assert "midpoint" in allowed(keys["envelope.integrator"])
-    assert allowed(keys["title"]) == ""
+    keys = keys_of(Content)
+    assert allowed_values(keys["mesh.layers"]).startswith("whole number from 1")
+    assert "midpoint" in allowed_values(keys["envelope.integrator"])
+    assert allowed_values(keys["title"]) == ""

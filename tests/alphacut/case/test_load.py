@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from alphacut.case.load import load
+from alphacut.case.content import load
 from alphacut.fuzzy import Interval, Triangular
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.problem import BadInput

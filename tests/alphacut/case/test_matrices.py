@@ -5,7 +5,7 @@ import pytest
 import scipy.io
 import scipy.sparse
 
-from alphacut.case.load import load
+from alphacut.case.content import load
 from alphacut.frame import Exact, LinearFlow, StoreyFrame
 from alphacut.frame.structures.matrix import Monomial
 from alphacut.fuzzy.refused import RefusedError

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import eigvals
 
-from alphacut.case.load import load
+from alphacut.case.content import load
 from alphacut.case.structure import MaterialDamping
 from alphacut.entry import main
 from alphacut.frame import MatrixStructure

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from alphacut.case.load import load
+from alphacut.case.content import load
 from alphacut.commands.pipeline import campaign_of
 from alphacut.fuzzy.refused import FailedError
 from alphacut.fuzzy.result import Nature

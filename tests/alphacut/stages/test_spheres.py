@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from alphacut.case.load import load
+from alphacut.case.content import load
 from alphacut.case.microstructure import PackingSection
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.stages.cell import model_of, references, require_bounds, solve

@@ -14,8 +14,7 @@ import xarray
 from pydantic import TypeAdapter
 
 import alphacut
-from alphacut.case.content import Content
-from alphacut.case.load import load
+from alphacut.case.content import Content, load
 from alphacut.case.parse import ParsedCase
 from alphacut.commands.pipeline import Pipeline
 from alphacut.entry import main

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from alphacut.case.load import load
+from alphacut.case.content import load
 from alphacut.entry import main
 from alphacut.io.problem import BadInput
 from alphacut.records.spectrum import spectral_acceleration
