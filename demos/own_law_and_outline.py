@@ -98,16 +98,16 @@ def picture(folder: Path) -> None:
     """Draw the particle and the shear stress, by PyVista."""
     import pyvista
 
-    cells = np.hstack([np.full((len(drawn.cells), 1), 15), drawn.vtk_cells])
-    wedges = pyvista.UnstructuredGrid(cells.ravel(), np.full(len(cells), 26), drawn.points)
-    assert (wedges.compute_cell_sizes()["Volume"] > 0).all()
-    wedges.point_data["stress 12 in MPa"] = drawn.stress[:, 2, 1] / 1e6
+    fields = drawn.in_tetrahedra()
+    grid = pyvista.UnstructuredGrid({pyvista.CellType.QUADRATIC_TETRA: fields.cells}, fields.points)
+    assert (grid.compute_cell_sizes()["Volume"] > 0).all()
+    grid.point_data["stress 12 in MPa"] = fields.stress[:, 2, 1] / 1e6
     plotter = pyvista.Plotter(off_screen=True, shape=(1, 2), window_size=(1300, 900))
-    plotter.add_mesh(wedges.extract_cells(drawn.phase == 1), color="steelblue", show_edges=True)
-    plotter.add_mesh(wedges.outline(), color="black")
+    plotter.add_mesh(grid.extract_cells(fields.phase == 1), color="steelblue", show_edges=True)
+    plotter.add_mesh(grid.outline(), color="black")
     plotter.add_text("three leaves, theta upwards", font_size=11)
     plotter.subplot(0, 1)
-    lower = wedges.extract_cells(wedges.cell_centers().points[:, 2] < 0)
+    lower = grid.extract_cells(grid.cell_centers().points[:, 2] < 0)
     plotter.add_mesh(lower, scalars="stress 12 in MPa", cmap="viridis", lighting=False)
     plotter.add_text("shear stress, cut at theta = 0", font_size=11)
     plotter.link_views()

@@ -132,18 +132,18 @@ def picture(folder: Path) -> None:
     """Write the fields, and draw the particle and the stress, by PyVista."""
     import pyvista
 
-    cells = np.hstack([np.full((len(drawn.cells), 1), 15), drawn.vtk_cells])
-    wedges = pyvista.UnstructuredGrid(cells.ravel(), np.full(len(cells), 26), drawn.points)
-    assert (wedges.compute_cell_sizes()["Volume"] > 0).all()
-    wedges.cell_data["phase"] = drawn.phase
-    wedges.point_data["stress 11 in MPa"] = drawn.stress[:, 0, 0] / 1e6
-    wedges.save(folder / "product_space_cell.vtu")
+    fields = drawn.in_tetrahedra()
+    grid = pyvista.UnstructuredGrid({pyvista.CellType.QUADRATIC_TETRA: fields.cells}, fields.points)
+    assert (grid.compute_cell_sizes()["Volume"] > 0).all()
+    grid.cell_data["phase"] = fields.phase
+    grid.point_data["stress 11 in MPa"] = fields.stress[:, 0, 0] / 1e6
+    grid.save(folder / "product_space_cell.vtu")
     plotter = pyvista.Plotter(off_screen=True, shape=(1, 2), window_size=(1300, 900))
-    plotter.add_mesh(wedges.extract_cells(drawn.phase == 1), color="goldenrod", show_edges=True)
-    plotter.add_mesh(wedges.outline(), color="black")
+    plotter.add_mesh(grid.extract_cells(fields.phase == 1), color="goldenrod", show_edges=True)
+    plotter.add_mesh(grid.outline(), color="black")
     plotter.add_text("the particle, theta upwards", font_size=11)
     plotter.subplot(0, 1)
-    half = wedges.extract_cells(wedges.cell_centers().points[:, 1] > 0)
+    half = grid.extract_cells(grid.cell_centers().points[:, 1] > 0)
     plotter.add_mesh(half, scalars="stress 11 in MPa", cmap="viridis", lighting=False)
     plotter.add_text("stress under equal strains of 0.01", font_size=11)
     plotter.link_views()

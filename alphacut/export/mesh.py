@@ -1,6 +1,6 @@
-"""The cell's mesh for other programs, with displacements and stresses, and its picture (Fig. 15).
+"""The picture of the cell's mesh (Fig. 15).
 
-PyVista draws in a process of its own: python -m alphacut.export.mesh MESH.vtu PICTURE.png
+PyVista draws in a process of its own: python -m alphacut.export.mesh MESH.npz PICTURE.png
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
-from types import ModuleType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,59 +20,18 @@ from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.refused import FailedError
 from alphacut.io.files import say, whole_file
 from alphacut.rve.cell.cell import Cell, thickness_of
-from alphacut.rve.mesh.gmsh_prisms import VTK_ORDER
+from alphacut.rve.mesh.gmsh_prisms import ABAQUS_ORDER
 
 if TYPE_CHECKING:
-    import meshio
     from pyvista import PolyData, UnstructuredGrid
 
-COMPONENTS = ("11", "22", "12")
 COLOURS = "#f0a860", "#b79ad9", "#7fb59a"
 """Of matrix and particle, orange and lilac as in the paper, and of an interphase."""
 PIXELS = (1000, 1100)
 FLATTENED = 0.6  # scale of the θ-axis in the picture
 EDGES = np.column_stack([[0, 1, 2, 3, 4, 5, 0, 1, 2], range(6, 15), [1, 2, 0, 4, 5, 3, 3, 4, 5]])
 """Nodes of a wedge's edges: an end, the middle, the other end."""
-
-
-def wedge_mesh(
-    points: Array, cells: Rows, phase: Rows, data: dict[str, Array] | None = None
-) -> meshio.Mesh:
-    """Quadratic wedges in VTK's order with their phase: matrix 0, particle 1, interphase 2.
-
-    Args:
-        points: (x1, x2, θ), shape (n, 3).
-        cells: Nodes in Basix's order, shape (m, 15).
-        phase: Shape (m,).
-        data: Fields at the points by name.
-    """
-    meshio = meshio_with_wedges()
-    return meshio.Mesh(points, [("wedge15", cells[:, VTK_ORDER])], data, {"phase": [phase]})
-
-
-def meshio_with_wedges() -> ModuleType:
-    """Imports meshio, which reads and writes quadratic wedges, but 5.3 has no dimension of them."""
-    import meshio
-    from meshio._mesh import topological_dimension
-
-    topological_dimension.setdefault("wedge15", 3)
-    return meshio  # type: ignore[no-any-return]
-
-
-def prism_mesh(cell: Cell, size: float, layers: int) -> meshio.Mesh:
-    """The mesh of prisms whose particle follows the radius map; `size` is in halves of the side."""
-    from alphacut.rve.mesh.columns import extrude
-    from alphacut.rve.mesh.prism_grid import RING_THICKNESS, reference_radius
-
-    thickness = thickness_of(cell.interphase)
-    grid = extrude(
-        size=size,
-        radius=reference_radius(cell.radius, cell.outline, thickness),
-        layers=layers,
-        outline=cell.outline,
-        thickness=RING_THICKNESS if thickness else 0.0,
-    )
-    return wedge_mesh(grid.positions(cell.radius, thickness), grid.cells, grid.phase)
+QUADRATIC_WEDGE = 26  # VTK's number of it
 
 
 def draw_mesh(cell: Cell, mesh: Mesh, path: Path) -> bool:
@@ -88,8 +46,9 @@ def draw_mesh(cell: Cell, mesh: Mesh, path: Path) -> bool:
             return False
         command = ["xvfb-run", "-a", *command]
     with tempfile.TemporaryDirectory() as folder, whole_file(path) as partial:
-        file = Path(folder) / "mesh.vtu"
-        prism_mesh(cell, mesh.size, mesh.layers).write(file, file_format="vtu")
+        file = Path(folder) / "mesh.npz"
+        points, cells, phase = prism_mesh(cell, mesh)
+        np.savez(file, points=points, cells=cells, phase=phase)
         words = [*command, str(file), str(partial)]
         process = subprocess.run(words, capture_output=True, text=True, check=False)
         if process.returncode or not partial.is_file():
@@ -98,11 +57,29 @@ def draw_mesh(cell: Cell, mesh: Mesh, path: Path) -> bool:
     return True
 
 
+def prism_mesh(cell: Cell, mesh: Mesh) -> tuple[Array, Rows, Rows]:
+    """Points (n, 3), cells (m, 15) in VTK's order and phases (m,) of the mesh of a case."""
+    from alphacut.rve.mesh.columns import extrude
+    from alphacut.rve.mesh.prism_grid import RING_THICKNESS, reference_radius
+
+    thickness = thickness_of(cell.interphase)
+    grid = extrude(
+        size=mesh.size,
+        radius=reference_radius(cell.radius, cell.outline, thickness),
+        layers=mesh.layers,
+        outline=cell.outline,
+        thickness=RING_THICKNESS if thickness else 0.0,
+    )
+    return grid.positions(cell.radius, thickness), grid.cells[:, ABAQUS_ORDER], grid.phase
+
+
 def draw_wedges(file: str, picture: str) -> None:
-    """Draws the phases of a mesh file with their edges to a PNG file, the matrix cut open."""
+    """Draws the phases of a mesh with their edges to a PNG file, the matrix cut open."""
     import pyvista
 
-    grid = pyvista.read(file)
+    mesh = np.load(file)
+    grid = pyvista.UnstructuredGrid({QUADRATIC_WEDGE: mesh["cells"]}, mesh["points"])
+    grid.cell_data["phase"] = mesh["phase"]
     plotter = pyvista.Plotter(off_screen=True, window_size=list(PIXELS))
     plotter.set_background("white")
     for phase in np.unique(grid.cell_data["phase"]):

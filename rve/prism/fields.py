@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import permutations
 
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.rve.cell.cell import THREE_LOADS, AnyPhase, Cell, Interphase, thickness_of
 from alphacut.rve.fenicsx import at_points, fem
-from alphacut.rve.mesh.gmsh_prisms import VTK_ORDER
 from alphacut.rve.mesh.wedge import vertices_and_midpoints
 from alphacut.rve.prism.model import PrismModel
 from alphacut.rve.prism.own_mesh import MeshModel
@@ -20,6 +20,12 @@ from alphacut.rve.solver.krylov import SolverOptions, solve
 from alphacut.stochastic import RadiusMap, ThetaLaw
 
 NODES = 15
+VERTICES = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [0, 1, 1]])
+EDGES = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 4), (2, 5), (3, 4), (3, 5), (4, 5)]
+SIDES = np.array(
+    [[0, 1, 3, 4, 6, 8, 10, 12], [0, 2, 3, 5, 7, 8, 11, 13], [1, 2, 4, 5, 9, 10, 11, 14]]
+)
+"""Corners of Basix's prism, ends of its edges, and of each side the corners and middle nodes."""
 
 
 @dataclass(frozen=True)
@@ -45,10 +51,45 @@ class CellFields:
     names: tuple[str, ...]
     node: Rows
 
-    @property
-    def vtk_cells(self) -> Rows:
-        """Nodes of the prisms in the order of VTK's quadratic wedge, shape (m, 15)."""
-        return self.cells[:, VTK_ORDER]
+    def in_tetrahedra(self) -> CellFields:
+        """The same with each prism as three quadratic tetrahedra in VTK's order, (3 m, 10).
+
+        Centres of the prisms' sides, where diagonals have their middle nodes, come last among the
+        points, with values interpolated as in the prism and −1 as their `node`.
+        """
+        columns = np.argsort(self.node[self.cells[:, :3]], axis=1)  # same diagonals from both sides
+        prism_sides = self.cells[:, SIDES].reshape(-1, 8)
+        corners = np.sort(prism_sides[:, :4], axis=1)
+        _, first, number = np.unique(corners, axis=0, return_index=True, return_inverse=True)
+        nodes = np.column_stack([self.cells, len(self.points) + number.reshape(-1, 3)])
+        cells = np.empty((len(nodes), 3, 10), int)
+        for order in permutations(range(3)):
+            chosen = (columns == order).all(axis=1)
+            cells[chosen] = nodes[chosen][:, _tetrahedra_nodes(order)]
+        sides = prism_sides[first]
+        points, displacement, stress = (
+            np.concatenate([x, x[sides[:, 4:]].sum(axis=1) / 2 - x[sides[:, :4]].sum(axis=1) / 4])
+            for x in (self.points, self.displacement, self.stress)
+        )
+        phase, names = np.repeat(self.phase, 3), self.names
+        node = np.concatenate([self.node, np.full(len(sides), -1)])
+        return CellFields(points, cells.reshape(-1, 10), phase, displacement, stress, names, node)
+
+
+def _tetrahedra_nodes(columns: tuple[int, ...]) -> Rows:
+    """Nodes, shape (3, 10), of a prism's tetrahedra; its diagonals rise along `columns`."""
+    lower, upper = list(columns), [3 + column for column in columns]
+    middles = {frozenset(edge): 6 + k for k, edge in enumerate(EDGES)}
+    for k, (a, b, c, d, *_) in enumerate(SIDES):
+        middles |= dict.fromkeys([frozenset((a, d)), frozenset((b, c))], 15 + k)
+    tetrahedra = []
+    for k in range(3):
+        corners = lower[: k + 1] + upper[k:]
+        if np.linalg.det(VERTICES[corners[1:]] - VERTICES[corners[0]]) < 0:
+            corners[:2] = corners[1], corners[0]
+        ends = [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)]
+        tetrahedra.append(corners + [middles[frozenset((corners[i], corners[j]))] for i, j in ends])
+    return np.array(tetrahedra)
 
 
 def cell_fields(

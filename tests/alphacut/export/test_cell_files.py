@@ -1,6 +1,7 @@
 """Files of a cell read back by their own programs' conventions: phases, volumes, fields."""
 
 import re
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -13,7 +14,7 @@ from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve import MeshModel, Phase, PrismModel
 from alphacut.rve.mesh import square
 from alphacut.rve.mesh.file import read_grid
-from alphacut.rve.mesh.gmsh_prisms import MESHIO_ORDER, VTK_OF_MESHIO
+from alphacut.rve.mesh.gmsh_prisms import ABAQUS_ORDER
 from alphacut.rve.prism.fields import cell_fields
 from alphacut.stochastic import HermiteMap
 from tests.rve.mesh.test_prisms import volumes
@@ -64,48 +65,54 @@ def test_gmsh_reads_its_jacobians_groups_and_fields(written):
         assert np.array(data).reshape(-1, 15) == pytest.approx(expected, rel=1e-12)
 
 
-@pytest.mark.parametrize("written", [".vtu"], indirect=True)
-def test_vtk_reads_wedges_of_positive_volume(written):
-    pyvista = pytest.importorskip("pyvista")
-    grid = pyvista.read(written)
+@pytest.mark.parametrize("ending", ["vtu", "xdmf"])
+def test_vtk_and_meshio_read_positive_volumes(ending, tmp_path):
+    meshio, pyvista = pytest.importorskip("meshio"), pytest.importorskip("pyvista")
+    path = tmp_path / f"cell.{ending}"
+    assert write_cell(fields(), path) > len(fields().points)
+    mesh = meshio.read(path)
+    grid = pyvista.UnstructuredGrid({24: mesh.cells_dict["tetra10"]}, mesh.points)
+    if ending == "vtu":
+        assert (pyvista.read(path).cells == grid.cells).all()
     sizes = grid.compute_cell_sizes(length=False, area=False)["Volume"]
     assert (sizes > 0).all()
-    assert sizes.sum() == pytest.approx(VOLUME, rel=1e-3)  # VTK takes wedges as straight pieces
-    assert sizes[grid.cell_data["phase"] == 1].sum() == pytest.approx(particle_volume(), rel=0.04)
-    assert "displacement_1_in_half_sides" in grid.point_data
+    assert sizes.sum() == pytest.approx(VOLUME, rel=1e-12)
+    inside = mesh.cell_data["phase"][0] == 1
+    assert sizes[inside].sum() == pytest.approx(particle_volume(), rel=0.03)
+    surface = grid.extract_surface(nonlinear_subdivision=0).triangulate()
+    assert surface.n_open_edges == 0  # neighbours have the same diagonals
+    assert surface.volume == pytest.approx(VOLUME, rel=1e-6)
+    stress = mesh.point_data["stress_2_12_Pa"][: len(fields().points)]
+    assert stress == pytest.approx(fields().stress[:, 2, 1])
+    assert "displacement_1_in_half_sides" in mesh.point_data
 
 
-@pytest.mark.parametrize("written", [".xdmf", ".inp"], indirect=True)
-def test_meshio_reads_xdmf_mirrored_and_abaqus_not(written):
+def test_centres_of_sides_take_the_value_of_the_prism():
+    fine, count = fields().in_tetrahedra(), len(fields().points)
+    square = fields().points[:, :2, None] ** 2  # which a prism with straight edges interpolates
+    values = replace(fields(), displacement=square).in_tetrahedra().displacement[..., 0]
+    centres = np.arange(len(fine.points)) >= count
+    flat = np.isclose(abs(fine.points[:, :2]), 1).any(axis=1)  # on sides of the cell
+    assert (fine.node[centres] == -1).all()
+    assert (flat & centres).sum() > 20
+    assert values[flat] == pytest.approx(fine.points[flat, :2] ** 2)
+
+
+def test_meshio_reads_abaqus(tmp_path):
     import meshio
     from meshio._mesh import topological_dimension
 
-    topological_dimension.setdefault("wedge15", 3)
-    mesh = meshio.read(written)
-    (block,) = mesh.cells
-    assert block.type == "wedge15"
-    order = (
-        np.array(MESHIO_ORDER)[VTK_OF_MESHIO]
-        if written.suffix == ".xdmf"
-        else np.array(MESHIO_ORDER)
-    )
-    each = volumes(mesh.points, block.data[:, np.argsort(order)])
-    assert (each > 0).all()
-    assert each.sum() == pytest.approx(VOLUME, rel=1e-10)
-    if written.suffix == ".xdmf":
-        inside = mesh.cell_data["phase"][0] == 1
-        assert "stress_2_12_Pa" in mesh.point_data
-    else:
-        (inside,) = mesh.cell_sets["inclusion"]
-    assert each[inside].sum() == pytest.approx(particle_volume(), rel=1e-10)
-
-
-def test_abaqus_is_the_first_format_that_a_process_writes(tmp_path, monkeypatch):
-    from meshio import _mesh
-
-    known = {kind: x for kind, x in _mesh.topological_dimension.items() if kind != "wedge15"}
-    monkeypatch.setattr(_mesh, "topological_dimension", known)
-    assert write_cell(fields(), tmp_path / "cell.inp")
+    path = tmp_path / "cell.inp"
+    assert write_cell(fields(), path) == fields().node.max() + 1
+    topological_dimension.setdefault("wedge15", 3)  # which meshio 5.3 forgets
+    mesh = meshio.read(path)
+    assert [block.type for block in mesh.cells] == ["wedge15", "wedge15"]
+    assert path.read_text().count("TYPE=C3D15,") == 2
+    for name, block in zip(mesh.cell_sets, mesh.cells, strict=True):
+        each = volumes(mesh.points, block.data[:, np.argsort(ABAQUS_ORDER)])
+        assert (each > 0).all()
+        whole = VOLUME - particle_volume() if name == "matrix" else particle_volume()
+        assert each.sum() == pytest.approx(whole, rel=1e-10)
 
 
 @pytest.mark.parametrize("written", [".msh"], indirect=True)
