@@ -1,4 +1,4 @@
-"""The one entry point: commands, exit statuses, and errors as single lines."""
+"""The one entry point: commands, signals, exit statuses, and errors as single lines."""
 
 from __future__ import annotations
 
@@ -7,10 +7,13 @@ import logging
 import os
 import signal
 import sys
+import threading
+import time
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib import import_module
+from types import FrameType
 
 from alphacut.commands.options import (
     PETSC_LOG,
@@ -25,8 +28,7 @@ from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.files import check_destinations, rank, ranks, say, standard_output
 from alphacut.io.problem import BadInput, InputProblem, missing
 from alphacut.io.provenance import own_version
-from alphacut.rve.interruption import uninterrupted
-from alphacut.signals import stoppable
+from alphacut.rve.interruption import STOP_SIGNALS, uninterrupted
 
 LOG = logging.getLogger(__name__)
 DEBUG = "--debug"
@@ -43,6 +45,8 @@ COMMANDS = {
     "verify": "verify",
 }
 """Commands by the names that a user writes, each with its file in `alphacut.commands`."""
+SAME_SIGNAL_SECONDS = 1.0
+"""Signals within this time count as one: batch systems signal a process and then its group."""
 STATUSES = """\
 exit status:
   0    done
@@ -124,6 +128,35 @@ def main(
             return _end(missing(error), 1)
         except (RuntimeError, ValueError, ArithmeticError, OSError, MemoryError, ImportError) as e:
             return _end(str(e) or type(e).__name__, 1)
+
+
+@contextmanager
+def stoppable() -> Iterator[list[int]]:
+    """Lets SIGTERM and SIGHUP interrupt the block as Ctrl-C does; ignored ones stay so (nohup).
+
+    Yields:
+        The list of the signal numbers received, which grows while the block runs.
+    """
+    received, last_time = list[int](), -SAME_SIGNAL_SECONDS
+    is_main = threading.current_thread() is threading.main_thread()  # others may set no handlers
+    handlers = {number: signal.getsignal(number) for number in STOP_SIGNALS if is_main}
+    previous = {k: x for k, x in handlers.items() if x not in (None, signal.SIG_IGN)}
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        nonlocal last_time
+        received.append(number)
+        interrupt, now = signal.getsignal(signal.SIGINT), time.monotonic()
+        if now - last_time >= SAME_SIGNAL_SECONDS:
+            last_time = now
+            (interrupt if callable(interrupt) else signal.default_int_handler)(number, frame)
+
+    for number in previous:
+        signal.signal(number, stop)
+    try:
+        yield received
+    finally:
+        for number, handler in previous.items():
+            signal.signal(number, handler)
 
 
 @contextmanager

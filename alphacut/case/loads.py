@@ -13,13 +13,12 @@ from pydantic import Field, ValidationInfo, model_validator
 
 from alphacut.case.structure import Structure
 from alphacut.case.types import NotEmpty, OneOrMany, Section, Time, case_file, text
-from alphacut.frame import Force, History, MatrixStructure, StoreyFrame
+from alphacut.frame import Force, History, StoreyFrame
 from alphacut.fuzzy import FuzzyNumber
-from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError, require, require_choice
 from alphacut.io import quantity
 from alphacut.records.read import read_recording
-from alphacut.records.recording import Baseline, Recording, Trim
+from alphacut.records.recording import Baseline, Recording
 from alphacut.records.tables import Layout, read_force_history
 from alphacut.records.text_file import ACCELERATION_UNITS, acceleration_factor
 
@@ -153,31 +152,20 @@ def with_forces(
     for unknown, _, _ in forces:
         require_choice("force.amplitude", unknown, tuple(map(str, floors)) or unknowns)
     if isinstance(model, StoreyFrame):
-        loads = [Force(int(floor), amplitude.modal, x) for floor, amplitude, x in forces]
+        loads = [
+            Force(int(floor), amplitude.modal, history) for floor, amplitude, history in forces
+        ]
         model = replace(model, loads=loads)
         names = model.force_names
     else:
         names = tuple(f"F{number}" for number in range(1, len(forces) + 1))
-        model = _with_forces_on_unknowns(model, forces, names, unknowns)
+        directions = [np.array([float(x == unknown) for x in unknowns]) for unknown, _, _ in forces]
+        histories = [history for _, _, history in forces]
+        loads = [Force(*x) for x in zip(directions, names, histories, strict=True)]
+        nominal = {name: x.modal for name, (_, x, _) in zip(names, forces, strict=True)}
+        model = replace(model, loads=loads, parameters={**model.parameters, **nominal})
     amplitudes = {name: amplitude for name, (_, amplitude, _) in zip(names, forces, strict=True)}
     return replace(structure, model=model, numbers={**structure.numbers, **amplitudes})
-
-
-NodalForces = Sequence[tuple[str, FuzzyNumber, History | None]]
-"""Floor or degree of freedom, amplitude in SI, and time history (None: impulse) of each force."""
-
-
-def _with_forces_on_unknowns(
-    model: MatrixStructure, forces: NodalForces, names: Sequence[str], unknowns: Sequence[str]
-) -> MatrixStructure:
-    """The structure with forces on `unknowns`, whose amplitudes become its parameters `names`."""
-    loads: list[Force] = []
-    modal: dict[str, float] = {}
-    for name, (unknown, amplitude, history) in zip(names, forces, strict=True):
-        direction: Array = np.array([float(x == unknown) for x in unknowns])
-        loads.append(Force(direction, name, history))
-        modal[name] = amplitude.modal
-    return replace(model, loads=loads, parameters={**model.parameters, **modal})
 
 
 MAX_RECORDS = 500
@@ -210,7 +198,7 @@ def _read_files(value: object, info: ValidationInfo) -> tuple[NamedRecording, ..
     is_relative = isinstance(value, str) and not pattern.startswith("/") and pattern.strip() != ""
     require(is_relative, "", value=value, allowed=allowed)
     paths = sorted(path for path in folder.glob(pattern) if path.is_file())
-    allowed = f"{allowed}; 1 to {MAX_RECORDS} files"
+    allowed += f"; 1 to {MAX_RECORDS} files"
     require(0 < len(paths) <= MAX_RECORDS, "", value=value, allowed=allowed)
     names = [ENDING.sub("_", path.stem) + (f"_{channel}" if channel else "") for path in paths]
     layout = Layout(info.data.get("step"), info.data.get("unit") or "")
@@ -221,14 +209,12 @@ def _read_files(value: object, info: ValidationInfo) -> tuple[NamedRecording, ..
             recordings.append(read_recording(path, channel, layout))
         except RefusedError as error:
             errors.append(error)
-    if len(errors) == 1:
-        raise errors[0]
     if errors:  # all bad files of a folder at once, the first with its reason
-        # a cure is never cut off, a value is where the case lies in a long folder
-        others = ", ".join(error.key.partition(",")[0] for error in errors[1:])
-        first = errors[0]
-        cure = f"bad as well: {others}" + (f"; {first.cure}" if first.cure else "")
-        raise RefusedError(first.key, first.value, first.allowed, cure)
+        first, *others = errors
+        names = [error.key.partition(",")[0] for error in others]
+        # in the cure, which is never cut off
+        cures = [f"bad as well: {', '.join(names)}"] * bool(names) + [first.cure] * bool(first.cure)
+        raise RefusedError(first.key, first.value, first.allowed, "; ".join(cures))
     return tuple(NamedRecording(*pair) for pair in zip(names, recordings, strict=True))
 
 
@@ -259,26 +245,13 @@ def _parse_scale(value: object, _: ValidationInfo) -> Scale:
     return scale
 
 
-def _parse_trim(value: object, _: ValidationInfo) -> Trim:
-    """Parse the part of a record to keep: "arias", or times such as ["2 s", "30 s"], as floats."""
-    allowed = '"arias" for 5 to 95 % of the Arias intensity, or two times as ["2 s", "30 s"]'
-    if value == "arias":
-        return "arias"
-    try:
-        first, last = (quantity.number(x, "s") for x in value)  # type: ignore[attr-defined]
-    except (TypeError, ValueError):
-        raise RefusedError("", value, allowed) from None
-    require(0 <= first < last, "", value=value, allowed=allowed)
-    return first, last
-
-
 Files = Annotated[tuple[NamedRecording, ...], text(_read_files)]
 
 
 class RecordsSection(Section):
     """Suite of records of the ground's acceleration: each moves the structure by itself.
 
-    Each record is corrected, then trimmed, then scaled. A motion lasts as long as its record and
+    Each record is corrected, then scaled. A motion lasts as long as its record and
     five natural periods, and at most envelope.duration.
     """
 
@@ -292,9 +265,6 @@ class RecordsSection(Section):
         description="files or patterns, as `records/*.AT2`; FILE#CHANNEL of several"
     )
     baseline: Baseline = Field(default="none", description="mean or straight line to subtract")
-    trim: Annotated[Trim, text(_parse_trim)] | None = Field(
-        default=None, description='times to keep, as ["2 s", "30 s"], or "arias"'
-    )
     scale: Annotated[Scale, text(_parse_scale)] = Field(
         default=Scale(), description='factor, "PGA = 0.3 g" or "Sa(T1) = 0.5 g"'
     )

@@ -1,4 +1,10 @@
-"""Records of networks with one channel a file: K-NET and KiK-net, ESM and ITACA, SMC."""
+"""Records of networks with one channel a file: PEER, K-NET and KiK-net, ESM and ITACA, SMC.
+
+PEER's files of type AT2 are read with all the heads that were written since 1999. The head names
+the unit and, in one of its first lines, the number of samples and their step: ``NPTS= 4000, DT=
+.0050 SEC``, with a comma at its end or without SEC, ``4000 .0050 NPTS, DT``, or the step alone.
+Behind the samples there may be text, such as ``*** End Data ***``.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +14,19 @@ from math import ceil
 from alphacut.records.recording import Recording
 from alphacut.records.text_file import ACCELERATION_UNITS, NUMBER, TextFile, acceleration_factor
 
+PEER_HEAD_LINES = 12
+"""Lines in which a head ends; most have four."""
+REAL = r"([0-9]*\.?[0-9]+(?:[eEdD][-+]?[0-9]+)?)"
+PEER_STEP = re.compile(
+    rf"(?:NPTS\s*=?\s*([0-9]+)\s*[,;]?\s*)?\bDT\s*=?\s*{REAL}\s*(?:S|SEC|SECONDS?)?\s*[,;.]?\s*",
+    re.I,
+)
+PEER_STEP_FIRST = re.compile(rf"([0-9]+)[\s,]+{REAL}[\s,]+NPTS\s*,?\s*DT\s*[,;.]?\s*", re.I)
+PEER_MARK = re.compile(r"\bNPTS\b|\bPEER\b.*\b(?:DATABASE|RECORD)\b", re.I)
+PEER_UNIT = re.compile(r"\bunits\s*(?:of|are|is|=|:)?\s*\(?\s*([^\s,;()]+)", re.I)
+PEER_IN_GRAVITY = re.compile(r"\bacceleration\b.*\bin\s+\(?(g(?:'s|s)?)\b", re.I)
+PEER_COMPONENT = re.compile(r".*,\s*([\w-]+)\s*(?:\(.*\))?\s*")
+PEER_HEAD = "a head with UNITS OF G and NPTS= 4000, DT= .0050 SEC, and as many numbers below it"
 SCALE = re.compile(r"\s*([0-9.]+)\s*\(gal\)\s*/\s*([0-9.]+)\s*", re.IGNORECASE)
 FREQUENCY = re.compile(r"\s*([0-9.]+)\s*Hz\s*", re.IGNORECASE)
 DURATION = re.compile(r"\s*([0-9.]+)\s*")
@@ -21,6 +40,51 @@ SMC_TEXT, SMC_INTEGERS, SMC_REALS = 11, 6, 10
 """Lines of the three heads of an SMC file."""
 VERTICAL_ANGLE, COMMENTS, POINTS, RATE = 13, 16, 17, 2
 """Entries of the integer head, from 1, and the one of the real head with samples in a second."""
+
+
+def is_peer(file: TextFile) -> bool:
+    """True if one of the first lines has NPTS, the step or PEER's name as files of type AT2 do."""
+    return any(_step_line(line) or PEER_MARK.search(line) for line in file.lines[:PEER_HEAD_LINES])
+
+
+def read_peer(file: TextFile) -> Recording:
+    """Recording of a file of type AT2.
+
+    Raises:
+        RefusedError: The head or the unit is missing, or the numbers are not those it states.
+    """
+    row = next((k for k, line in enumerate(file.lines[:PEER_HEAD_LINES]) if _step_line(line)), None)
+    if row is None:
+        raise file.refusal(min(3, len(file.lines) - 1), "without NPTS and DT", PEER_HEAD)
+    match = _step_line(file.lines[row])
+    assert match is not None
+    count, step = match[1] and int(match[1]), float(re.sub("[dD]", "e", match[2]))
+    if not 0 < step < 10:
+        raise file.refusal(row, f"a step of {step:g} s", "a step above 0 and below 10 s")
+    line, unit = _peer_unit(file, row)
+    factor = acceleration_factor(unit)
+    if factor is None or re.search(r"\b(velocity|displacement)\b", file.lines[line], re.I):
+        value = f"in units of {unit}" if unit else "without a unit"
+        raise file.refusal(line, value, f"accelerations in {ACCELERATION_UNITS}", PEER_HEAD)
+    samples = file.numbers(row + 1, len(file.lines), count=count or 0)
+    if count:
+        file.require_count(samples, count, row)
+    component = PEER_COMPONENT.fullmatch(file.lines[1]) if row > 1 else None
+    channel = component[1] if component else ""
+    return Recording("PEER AT2", unit, step, samples * factor, channel)
+
+
+def _peer_unit(file: TextFile, last: int) -> tuple[int, str]:
+    """Line that states the unit, and the unit; empty where no line up to `last` does."""
+    for pattern in (PEER_UNIT, PEER_IN_GRAVITY):
+        for row, line in enumerate(file.lines[: last + 1]):
+            if match := pattern.search(line):
+                return row, match[1].rstrip(".")
+    return last, ""
+
+
+def _step_line(line: str) -> re.Match[str] | None:
+    return PEER_STEP_FIRST.search(line) or PEER_STEP.search(line)
 
 
 def is_knet(file: TextFile) -> bool:

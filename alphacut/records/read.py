@@ -11,8 +11,16 @@ import numpy as np
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io.quantity import factor
 from alphacut.records.cosmos import is_cosmos, is_csmip, read_cosmos
-from alphacut.records.networks import is_esm, is_knet, is_smc, read_esm, read_knet, read_smc
-from alphacut.records.peer import is_peer, read_peer
+from alphacut.records.networks import (
+    is_esm,
+    is_knet,
+    is_peer,
+    is_smc,
+    read_esm,
+    read_knet,
+    read_peer,
+    read_smc,
+)
 from alphacut.records.recording import Recording
 from alphacut.records.tables import Layout, is_table, read_table
 from alphacut.records.text_file import TextFile, acceleration_factor, read_bytes

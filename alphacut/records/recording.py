@@ -1,23 +1,26 @@
-"""A recording of the ground's acceleration as its file holds it, and the record made of it."""
+"""A recording of the ground's acceleration as its file holds it, its record and its spectrum.
+
+Spectra are exact for accelerations that are linear between samples: an oscillator of period T and
+damping ratio ζ moves from sample to sample by the exponential of its state matrix (Nigam, Jennings
+1969); its peak is read at points of at most a fortieth of the period.
+"""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from math import ceil, pi
 from typing import Literal
 
 import numpy as np
 
 from alphacut.frame import Accelerogram
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import require
+from alphacut.fuzzy.refused import checked_number, require
 from alphacut.io.quantity import factor
 
 Baseline = Literal["none", "mean", "linear"]
-Trim = tuple[float, float] | Literal["arias"]
-ARIAS_SHARES = 0.05, 0.95
-"""Arias intensity before and after the significant duration (Trifunac, Brady 1975)."""
 LARGEST_PEAK = 5.0
 """In g; the largest that instruments have recorded on the ground is about 4."""
 USUAL_STEPS = 1e-4, 0.1
@@ -69,22 +72,14 @@ class Recording:
         if VERTICAL.fullmatch(self.channel):
             yield f"its channel {self.channel} is vertical"
 
-    def accelerogram(
-        self, *, baseline: Baseline = "none", trim: Trim | None = None, scale: float = 1.0
-    ) -> Accelerogram:
-        """Record of these samples: corrected, then trimmed, then scaled.
+    def accelerogram(self, baseline: Baseline = "none") -> Accelerogram:
+        """Record of these samples, without their mean or their straight line of least squares."""
+        if baseline == "none":
+            return Accelerogram(self.step, self.samples)
+        from scipy.signal import detrend  # which takes time to import
 
-        Args:
-            baseline: Subtracts nothing, the mean, or the straight line of least squares.
-            trim: First and last time to keep, in s, or "arias" for 5 to 95 % of the Arias
-                intensity; the record then begins at time 0.
-            scale: Factor of all samples.
-
-        Raises:
-            RefusedError: `trim` leaves fewer than two samples.
-        """
-        samples = _trim(_subtract_baseline(self.samples, baseline), self.step, trim)
-        return Accelerogram(self.step, scale * samples)
+        kind = {"mean": "constant", "linear": "linear"}[baseline]
+        return Accelerogram(self.step, detrend(self.samples, type=kind))
 
 
 def arias_shares(samples: Array, step: float) -> Array:
@@ -97,25 +92,53 @@ def arias_shares(samples: Array, step: float) -> Array:
     return np.asarray(intensity / intensity[-1] if intensity[-1] > 0 else intensity)
 
 
-def _subtract_baseline(samples: Array, baseline: Baseline) -> Array:
-    if baseline == "mean":
-        return np.asarray(samples - samples.mean())
-    if baseline == "linear":
-        time = np.linspace(-1.0, 1.0, len(samples))
-        return np.asarray(samples - np.polyval(np.polyfit(time, samples, 1), time))
-    return samples
+POINTS_PER_PERIOD = 40
+"""A peak of a sine read at points this far apart is low by at most 1 − cos(π/40) = 0.3 %."""
 
 
-def _trim(samples: Array, step: float, trim: Trim | None) -> Array:
-    """The samples between two times in s, or, of "arias", those of the significant duration."""
-    if trim is None:
-        return samples
-    if trim == "arias":
-        first, last = np.searchsorted(arias_shares(samples, step), ARIAS_SHARES)
-    else:  # a time that is a sample's but for rounding keeps that sample
-        first, last = np.ceil(trim[0] / step - 1e-6), np.floor(trim[1] / step + 1e-6)
-    kept_samples = samples[max(int(first), 0) : int(last) + 1]
-    value = trim if isinstance(trim, str) else f"{trim[0]:g} … {trim[1]:g} s"
-    allowed = f"times within 0 … {(len(samples) - 1) * step:g} s with two samples between them"
-    require(len(kept_samples) > 1, "trim", value=value, allowed=allowed)
-    return kept_samples
+def spectral_acceleration(ground: Accelerogram, period: float, ratio: float) -> float:
+    """Pseudo-acceleration ω² max |u| of an oscillator at rest at the start, in m/s².
+
+    The free motion after the record's end is included for one period.
+
+    Args:
+        ground: The record.
+        period: Undamped natural period T, in s, above 0.
+        ratio: Damping ratio ζ, from 0 and below 1.
+
+    Raises:
+        RefusedError: The period or the ratio is out of range.
+    """
+    checked_number("period", period, positive=True)
+    require(
+        0 <= checked_number("ratio", ratio) < 1, "ratio", value=ratio, allowed="from 0 and below 1"
+    )
+    from scipy.linalg import expm  # which takes time to import
+    from scipy.signal import lfilter
+
+    omega = 2 * pi / period
+    substeps = max(1, ceil(ground.step * POINTS_PER_PERIOD / period))
+    substep = ground.step / substeps
+    start, end = _substep_accelerations(ground, substeps, ceil(period / substep))
+    # x' = F x of x = (u, u', a, a'), with a the ground's acceleration and a' its constant slope
+    F = np.zeros((4, 4))
+    F[0, 1] = 1.0
+    F[1, :2] = -(omega**2), -2 * ratio * omega
+    F[1, 2], F[2, 3] = -1.0, 1.0
+    step_map = expm(F * substep)
+    A, b = step_map[:2, :2], step_map[:2, 2:]
+    load = b[:, :1] * start + b[:, 1:] * (end - start) / substep  # (2, steps)
+    # u[k+1] = tr(A) u[k] − det(A) u[k−1] + what the loads of both steps add, by Cayley and Hamilton
+    added = load[0].copy()
+    added[1:] += A[0, 1] * load[1, :-1] - A[1, 1] * load[0, :-1]
+    displacement = lfilter([1.0], [1.0, -np.trace(A), np.linalg.det(A)], added)
+    return float(omega**2 * np.abs(displacement).max())
+
+
+def _substep_accelerations(ground: Accelerogram, substeps: int, n_free: int) -> tuple[Array, Array]:
+    """Ground's acceleration at the start and at the end of each substep, then of `n_free` zeros."""
+    samples = ground.acceleration
+    positions = np.arange((len(samples) - 1) * substeps + 1) / substeps
+    values = np.interp(positions, np.arange(len(samples)), samples)
+    zeros = np.zeros(n_free)
+    return np.append(values[:-1], zeros), np.append(values[1:], zeros)

@@ -20,8 +20,7 @@ from alphacut.frame.structures.linear import modal_damping_ratios
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.fuzzy.result import Nature
-from alphacut.records.recording import arias_shares
-from alphacut.records.spectrum import spectral_acceleration
+from alphacut.records.recording import arias_shares, spectral_acceleration
 from alphacut.stages.envelope import PEAK_BOUNDS, EnvelopeTask, PeakResults
 from alphacut.stages.store import Numbers, Stage, Values
 
@@ -49,7 +48,7 @@ class NominalMode:
 
 @dataclass(frozen=True, eq=False)
 class SuiteRecord:
-    """A record of the suite as it moves the structure, corrected, trimmed and scaled.
+    """A record of the suite as it moves the structure, corrected and scaled.
 
     Args:
         duration: Length of the motion, in s.
@@ -87,8 +86,8 @@ def suite_records(
 def _suite_record(
     section: RecordsSection, envelope: EnvelopeSection, named: NamedRecording, mode: NominalMode
 ) -> SuiteRecord:
-    """A recording after correction, trimming and scaling, and the length of the motion under it."""
-    ground = named.recording.accelerogram(baseline=section.baseline, trim=section.trim)
+    """A recording after correction and scaling, and the length of the motion under it."""
+    ground = named.recording.accelerogram(section.baseline)
     measures = {
         "PGA": ground.extremes[0],
         "Sa(T1)": spectral_acceleration(ground, mode.period, min(mode.ratio, 0.999)),

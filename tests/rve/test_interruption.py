@@ -61,7 +61,7 @@ def test_where_ctrl_c_is_ignored_the_others_still_wait_for_the_end(number, ends)
     program = f"""
 import os, signal
 from alphacut.rve.interruption import uninterrupted
-from alphacut.signals import stoppable
+from alphacut.entry import stoppable
 signal.signal(signal.SIGINT, signal.SIG_IGN)
 try:
     with stoppable(), uninterrupted():

@@ -1,48 +1,58 @@
-"""Correction, trimming and scaling of a recording, against their definitions."""
+"""Correction of a recording and its response spectrum, against definitions and integration."""
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
+from alphacut.frame import Accelerogram
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.records.recording import Recording, arias_shares
+from alphacut.records.recording import Recording, arias_shares, spectral_acceleration
 
-STEP = 0.01
-TIME = STEP * np.arange(1001)
+TIME = 0.01 * np.arange(1001)
 
 
 def recording(samples):
-    return Recording("CSV", "m/s^2", STEP, np.asarray(samples, float))
+    return Recording("CSV", "m/s^2", 0.01, np.asarray(samples, float))
 
 
 def test_a_mean_or_a_straight_line_is_taken_away():
     wave = np.sin(2 * np.pi * TIME / 10)
-    mean = recording(wave + 3).accelerogram(baseline="mean").acceleration
-    assert mean == pytest.approx(wave, abs=1e-12)
-    line = recording(5 - 2 * TIME).accelerogram(baseline="linear").acceleration
+    assert recording(wave + 3).accelerogram("mean").acceleration == pytest.approx(wave, abs=1e-12)
+    line = recording(5 - 2 * TIME).accelerogram("linear").acceleration
     assert line == pytest.approx(np.zeros(1001), abs=1e-12)
     assert recording(wave + 3).offset_share == pytest.approx(0.75)
 
 
-def test_trimming_keeps_the_times_named():
-    kept = recording(TIME).accelerogram(trim=(1.0, 2.0)).acceleration
-    assert kept[[0, -1]] == pytest.approx([1.0, 2.0])
-    assert len(kept) == 101
-    with pytest.raises(RefusedError, match="trim"):
-        recording(TIME).accelerogram(trim=(20.0, 30.0))
-
-
-def test_arias_shares_are_those_of_the_piecewise_linear_record():
-    values = np.random.default_rng(3).normal(size=40)
+def test_arias_shares_are_those_of_the_piecewise_linear_record(rng):
+    values = rng.normal(size=40)
     fine = np.interp(np.linspace(0, 39, 39_001), np.arange(40), values)
     by_simpson = np.append(0, np.cumsum(fine[:-2:2] ** 2 + 4 * fine[1::2] ** 2 + fine[2::2] ** 2))
-    shares = arias_shares(values, STEP)
+    shares = arias_shares(values, 0.01)
     assert shares == pytest.approx((by_simpson / by_simpson[-1])[::500], abs=1e-12)
-    kept = recording(values).accelerogram(trim="arias").acceleration
-    first, last = np.flatnonzero(shares >= 0.05)[0], np.flatnonzero(shares >= 0.95)[0]
-    assert kept == pytest.approx(values[first : last + 1])
 
 
-def test_the_order_is_correction_trim_scale():
-    values = 3 + TIME
-    got = recording(values).accelerogram(baseline="mean", trim=(0.0, 5.0), scale=2.0)
-    assert got.acceleration == pytest.approx(2 * (values - values.mean())[:501])
+@pytest.mark.parametrize("period", [0.05, 0.3, 2.0])
+def test_peaks_are_those_of_a_dense_integration(period):
+    samples = np.random.default_rng(8).normal(size=61)
+    ground, omega, ratio = Accelerogram(0.02, samples), 2 * np.pi / period, 0.05
+
+    def rate(t, y):
+        load = np.interp(t, 0.02 * np.arange(61), samples, right=0.0)
+        return [y[1], -load - 2 * ratio * omega * y[1] - omega**2 * y[0]]
+
+    times = np.linspace(0, 1.2 + period, 4001)
+    step = min(0.002, period / 50)
+    motion = solve_ivp(rate, (0, times[-1]), [0, 0], t_eval=times, rtol=1e-9, max_step=step)
+    exact = omega**2 * abs(motion.y[0]).max()
+    assert spectral_acceleration(ground, period, ratio) == pytest.approx(exact, rel=4e-3)
+
+
+def test_a_constant_acceleration_has_twice_the_static_response():
+    ground = Accelerogram(0.01, np.full(400, 1.5))
+    assert spectral_acceleration(ground, 1.0, 0.0) == pytest.approx(3.0, rel=4e-3)
+
+
+@pytest.mark.parametrize(("period", "ratio"), [(0.0, 0.05), (1.0, 1.0), (1.0, -0.1)])
+def test_out_of_range_is_refused(period, ratio):
+    with pytest.raises(RefusedError):
+        spectral_acceleration(Accelerogram(0.01, np.ones(3)), period, ratio)

@@ -8,7 +8,7 @@ import pytest
 from alphacut.case.content import load
 from alphacut.entry import main
 from alphacut.io.problem import BadInput
-from alphacut.records.spectrum import spectral_acceleration
+from alphacut.records.recording import spectral_acceleration
 from alphacut.stages.suite import nominal_mode, suite_records, suite_warnings
 
 CASE = """
@@ -78,7 +78,6 @@ def test_each_record_has_its_length_and_five_periods_unless_cut(tmp_path):
         ('"two.csv"', '"one.csv"', "each file once"),
         ("[records]", "[records]\nscale = 0", "a factor above 0"),
         ("[records]", '[records]\nscale = "PGV = 1 m/s"', "a factor above 0"),
-        ("[records]", '[records]\ntrim = ["3 s", "1 s"]', "two times"),
         ('[records]\nfiles = ["one.csv", "two.csv"]', "", "nothing moves the frame"),
     ],
 )
