@@ -23,8 +23,7 @@ from alphacut.frame.methods.improved_follower import ImprovedFollower
 from alphacut.frame.methods.proof import Proof
 from alphacut.frame.methods.sampled import Sampled
 from alphacut.frame.structures.lagrangian import LagrangianSystem
-from alphacut.frame.structures.linear import LinearSystem, evaluate
-from alphacut.frame.structures.modes import ModalError, require_modal_order
+from alphacut.frame.structures.linear import LinearSystem, evaluate, require_modal_order
 from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.frame.verification.self_test import with_motions_tested
 from alphacut.frame.verification.step_error import (
@@ -237,7 +236,7 @@ def _with_proof(followed: Envelope, over: UnitFlow, proof: Proof, tick: Progress
     exact = replace(over, flow=replace(over.flow, integrator=Exact()))
     try:
         proved = proof.run(exact, tick)
-    except (UnprovedError, ModalError):
+    except UnprovedError:
         return followed
     gaps = [np.abs(followed.upper - ends.upper) for ends in (proved.proved, proved.attained)]
     gaps += [np.abs(followed.lower - ends.lower) for ends in (proved.proved, proved.attained)]

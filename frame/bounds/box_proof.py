@@ -18,7 +18,6 @@ import numpy as np
 from alphacut.frame.boxes import Boxes
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import LinearFlow
-from alphacut.frame.structures.modes import ModalError
 from alphacut.fuzzy.arrays import Array, Mask
 from alphacut.fuzzy.result import Ends
 
@@ -119,21 +118,18 @@ class BoxProof(Protocol):
 
         Raises:
             UnprovedError: All levels are refused.
-            ModalError: The structure has no smooth oscillating modes over the box.
         """
 
 
 @contextmanager
 def refusing() -> Iterator[None]:
-    """Context manager that turns errors of modes and matrices into a proof's refusal.
+    """Context manager that turns errors of matrices into a proof's refusal.
 
     Raises:
-        UnprovedError: The modes do not allow the proof, or a matrix is singular.
+        UnprovedError: A matrix is singular.
     """
     try:
         yield
-    except ModalError as error:
-        raise UnprovedError(error.what, error.cure) from None
     except np.linalg.LinAlgError as error:
         what = f"a matrix is singular ({str(error).lower()})"
         raise UnprovedError(what, "take improved-graph-follower") from None

@@ -7,7 +7,7 @@ polynomial is an array whose first axis runs over the monomials.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 from itertools import combinations_with_replacement
 from math import comb
@@ -115,6 +115,32 @@ def convolve(
         for y in np.flatnonzero(b.reshape(len(b), -1).any(1)):
             out[at[:, y]] += bilinear(a, b[y][None])
     return out
+
+
+def product_part(
+    a: Sequence[Array],
+    b: Sequence[Array],
+    degree: int,
+    d: int,
+    bilinear: Callable[[Array, Array], Array],
+    lowest: tuple[int, int] = (0, 0),
+) -> Array:
+    """Part of one degree of the product of two polynomials in d variables.
+
+    Args:
+        a: Parts of the first by degree; missing ones count as zero.
+        b: Parts of the second.
+        degree: Degree of the product's part.
+        d: Number of variables.
+        bilinear: Product of coefficients, as of `convolve`.
+        lowest: Least degrees of the parts of a and of b that are taken.
+    """
+    total = np.zeros(
+        (count(d, degree), *bilinear(a[0][0], b[0][0]).shape), np.result_type(a[0], b[0])
+    )
+    for k in range(max(lowest[1], degree - len(a) + 1), min(degree - lowest[0], len(b) - 1) + 1):
+        total += convolve(a[degree - k], b[k], (degree - k, k), d, bilinear)
+    return total
 
 
 @compiled

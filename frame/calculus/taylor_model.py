@@ -29,6 +29,7 @@ from alphacut.frame.calculus.monomials import (
     monomial_values,
     monomials,
     places,
+    product_part,
 )
 from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF, gamma
 from alphacut.frame.calculus.unproved import UnprovedError
@@ -391,13 +392,11 @@ def inverse_bound(matrix: TaylorModel) -> Array | None:
 def solution_series(matrix: TaylorModel, right: TaylorModel) -> TaylorModel:
     """Polynomials Y, degree by degree, of A Y ≈ B for A (n, n) and B (n, m); without remainders."""
     d, order = matrix.inputs, max(matrix.order, right.order) if matrix.inputs else 0
-    middle_inverse, parts = np.linalg.inv(matrix.value), list[Array]()
-    for degree in range(order + 1):
-        right_side = right.part(degree)
-        for k in range(1, min(degree, len(matrix.parts) - 1) + 1):
-            pair = (k, degree - k)
-            right_side = right_side - convolve(matrix.parts[k], parts[degree - k], pair, d, matmul)
-        parts.append(middle_inverse @ right_side)
+    middle_inverse = np.linalg.inv(matrix.value)
+    parts = [middle_inverse @ right.part(0)]
+    for degree in range(1, order + 1):
+        known = product_part(matrix.parts, parts, degree, d, matmul)
+        parts.append(middle_inverse @ (right.part(degree) - known))
     return TaylorModel(tuple(parts), np.zeros(right.shape), d, order)
 
 

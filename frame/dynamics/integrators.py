@@ -22,7 +22,6 @@ import numpy as np
 from alphacut.frame.calculus.jet import Array, Jet, concatenate, inverse
 from alphacut.frame.structures.linear import Matrices
 from alphacut.frame.structures.loads import History
-from alphacut.frame.structures.modes import state_matrix
 
 SAME = 1e-12
 """Distance of a sample from a node, as a share of the step, that is rounding."""
@@ -157,6 +156,15 @@ class Exact:
 
 Integrator = Midpoint | RungeKutta4 | Exact
 INTEGRATORS: dict[str, Integrator] = {m.name: m for m in (Midpoint(), RungeKutta4(), Exact())}
+
+
+def state_matrix(m: Matrices) -> Jet:
+    """Return the state matrix A of [q; v]˙ = A [q; v], shape (S, 2n, 2n) (eq. 17, eq. 23)."""
+    inverse_mass = m.inverse_mass
+    lower = concatenate([-(inverse_mass @ m.stiffness), -(inverse_mass @ m.damping)], -1)
+    n = m.mass.value.shape[-1]
+    upper = lower.like(np.broadcast_to(np.hstack([np.zeros((n, n)), np.eye(n)]), lower.value.shape))
+    return concatenate([upper, lower], -2)
 
 
 def exponential(z: Jet) -> Jet:

@@ -28,7 +28,6 @@ from alphacut.frame.methods.dual import DualProof
 from alphacut.frame.methods.improved_follower import ImprovedFollower, PassBounds
 from alphacut.frame.methods.proof import Proof
 from alphacut.frame.numbers import WIDE
-from alphacut.frame.structures.modes import ModalError
 from alphacut.fuzzy.arrays import Array, Mask
 from alphacut.fuzzy.progress_bar import Progress
 from alphacut.fuzzy.refused import checked_number
@@ -99,7 +98,7 @@ class Auto:
         for proof in self._proofs(flow, reasons):
             try:
                 proved.append(proof.run(flow, progress))
-            except (UnprovedError, ModalError) as error:
+            except UnprovedError as error:
                 reasons.append(f"{proof.name}: {error}")
                 continue
             if self._is_close(proved[-1], flow, allowed):

@@ -132,8 +132,8 @@ class Proof:
         """Return proved and attained bounds on each level of a part of the box.
 
         Raises:
-            UnprovedError: The error of the modal model cannot be bounded within the tolerance.
-            ModalError: The structure has no smooth oscillating modes over the part.
+            UnprovedError: The error of the modal model cannot be bounded within the tolerance, or
+                the structure has no smooth oscillating modes over the part.
         """
         for gap in self._gaps:  # the narrowest first
             try:

@@ -14,7 +14,7 @@ from math import comb
 
 import numpy as np
 
-from alphacut.frame.calculus.monomials import convolve, count, matmul
+from alphacut.frame.calculus.monomials import matmul, product_part
 from alphacut.frame.calculus.taylor_model import TaylorModel, inverse_bound
 from alphacut.frame.modes.pencil import Comparison
 from alphacut.fuzzy.arrays import Array, Rows
@@ -156,18 +156,10 @@ def subspace_series(
     rate, shape, mass_shape = (list(parts) for parts in lower)
     for m in range(len(rate), degree + 1):
         of_mass, of_stiffness = (
-            sum(
-                (
-                    convolve(shape[m - b], x.parts[b], (m - b, b), d, matmul)
-                    for b in range(1, min(m, len(x.parts) - 1) + 1)
-                ),
-                np.zeros((count(d, m), *shape[0].shape[1:])),
-            )
-            for x in (mass, stiffness)
+            product_part(shape, x.parts, m, d, matmul) for x in (mass, stiffness)
         )
         right = middle[:, None] * of_mass - of_stiffness
-        for a in range(1, m):
-            right += convolve(rate[a], mass_shape[m - a], (a, m - a), d, matmul)
+        right += product_part(rate, mass_shape, m, d, matmul, lowest=(1, 1))
         rate.append(-right[:, :, block])
         shape.append(right / gaps)
         mass_shape.append(of_mass + shape[m] * centre.has_mass)

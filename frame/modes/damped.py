@@ -14,16 +14,18 @@ import numpy as np
 from scipy.linalg import eigh
 
 from alphacut.frame.boxes import Boxes
-from alphacut.frame.calculus.monomials import convolve, count, matmul
-from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate, solve
+from alphacut.frame.calculus.monomials import matmul, product_part
+from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate, solution_series, solve
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.response.duhamel import absolute_moments
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.frame.structures.loads import History
 from alphacut.frame.structures.matrix import MatrixStructure
-from alphacut.frame.structures.modes import DOUBLE, ModalError, oscillating
 from alphacut.frame.structures.storey import StoreyFrame
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Mask, Rows
+
+EQUAL = 1e-6
+"""Relative distance of two eigenvalues below which they count as equal."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,8 +66,8 @@ class DampedStructure:
         """The structure over the widest of some boxes, as Taylor models of an order.
 
         Raises:
-            UnprovedError: The mass in the middle, or a quantity that must be positive, is not so.
-            ModalError: The structure can drift.
+            UnprovedError: The mass in the middle, or a quantity that must be positive, is not so,
+                or the structure can drift.
         """
         d, inputs = len(boxes.names), TaylorModel.variables(boxes.centre, boxes.radius, order)
         parameters = {x: TaylorModel.constant(v, d, order) for x, v in system.parameters.items()}
@@ -79,7 +81,7 @@ class DampedStructure:
         except np.linalg.LinAlgError:
             raise UnprovedError("the mean mass matrix is not positive definite") from None
         if not squared[0] > np.finfo(float).eps * squared[-1]:
-            raise ModalError("a mode does not oscillate: the stiffness lets the structure drift")
+            raise UnprovedError("a mode does not oscillate", "hold the structure by springs")
         M, D, K = (basis.T @ matrix @ basis for matrix in (full.mass, damping, full.stiffness))
         static, impulse = full.stiffness @ full.q0[:, None], full.mass @ full.v0[:, None]
         impulses = [impulse if full.impulse is None else impulse + full.impulse]
@@ -116,10 +118,8 @@ class DampedStructure:
         squared, root = solve(self.mass, self.stiffness), [np.diag(self.omega)[None]]
         sums = self.omega[:, None] + self.omega
         for m in range(1, squared.order + 1):  # R R = M⁻¹ K, in degree m (ω_i + ω_j) R_ij + known
-            right = squared.part(m)
-            for a in range(1, m):
-                right = right - convolve(root[a], root[m - a], (a, m - a), squared.inputs, matmul)
-            root.append(right / sums)
+            known = product_part(root, root, m, squared.inputs, matmul, lowest=(1, 1))
+            root.append((squared.part(m) - known) / sums)
         R = TaylorModel(tuple(root), 0 * sums, squared.inputs, squared.order)
         return self.damping + self.ratio * 2.0 * (self.mass @ R)
 
@@ -145,7 +145,7 @@ class DampedModes:
         """Series of the modes in places `chosen` (n,) by rising |λ|, about the middle of the box.
 
         Raises:
-            ModalError: One does not oscillate, or has the frequency of another one.
+            UnprovedError: One does not oscillate, or has the frequency of another one.
         """
         damping = structure.damping_series()
         rate, shape = _eigen_series(structure, damping, chosen)
@@ -221,7 +221,7 @@ def _middle_modes(structure: DampedStructure) -> tuple[Array, Array, Array]:
     D = _middle_damping(structure)
     lower = np.hstack([-np.diag(omega**2), -D])
     rate, X = np.linalg.eig(np.vstack([np.eye(n, 2 * n, n), lower]))
-    group = np.where(oscillating(rate), 0, np.where(oscillating(rate.conj()), 2, 1))
+    group = np.where(_oscillates(rate), 0, np.where(_oscillates(rate.conj()), 2, 1))
     order = np.lexsort((np.abs(rate), group))
     rate, shape = rate[order], X[:n, order].T
     shape = shape / norm_of(shape)[:, None]
@@ -254,69 +254,46 @@ def _eigen_series(
         bordered[k, :N, N] = (2 * x * M.value + D.value) @ phi[k]
         bordered[k, N, :N] = phi[k].conj()
     inverse = np.linalg.inv(bordered)
-    # by degree: λ, φ, w = λ φ and w M
-    L, P, W, U = (
-        [lam[None]],
-        [phi[None]],
-        [lam[:, None] * phi[None]],
-        [lam[:, None] * phi @ M.value],
-    )
+    # by degree: λ (n, 1), φ, w = λ φ and w M
+    L, P, W = [lam[None, :, None]], [phi[None]], [lam[:, None] * phi[None]]
+    U = [W[0] @ M.value]
     for m in range(1, M.order + 1):
-
-        def product(rows: list[Array], matrix: TaylorModel, first: int, m: int = m) -> Array:
-            found = np.zeros((count(d, m), *phi.shape), complex)
-            for b in range(first, min(m, len(matrix.parts) - 1) + 1):
-                found += convolve(rows[m - b], matrix.parts[b], (m - b, b), d, matmul)
-            return found
-
-        def scaled(rows: list[Array], m: int = m) -> Array:  # Σ λ_a rows_(m−a), 0 < a < m
-            found = np.zeros((count(d, m), *phi.shape), complex)
-            for a in range(1, m):
-                found += convolve(L[a][..., None], rows[m - a], (a, m - a), d, np.multiply)
-            return found
-
-        W.append(scaled(P))  # of lower degrees alone
-        U.append(product(W, M, 0))
-        known = lam[:, None] * U[m] + scaled(U) + product(W, D, 0) + product(P, K, 1)
+        W.append(product_part(L, P, m, d, np.multiply, lowest=(1, 1)))  # of lower degrees alone
+        U.append(product_part(W, M.parts, m, d, matmul))
+        known = lam[:, None] * U[m] + product_part(L, U, m, d, np.multiply, lowest=(1, 1))
+        known += product_part(W, D.parts, m, d, matmul) + product_part(P, K.parts, m, d, matmul)
         found = np.einsum("kij,mkj->mki", inverse[..., :N], -known)
         P.append(found[..., :N])
-        L.append(found[..., N])
-        added = lam[:, None] * P[m] + L[m][..., None] * phi
+        L.append(found[..., N:])
+        added = lam[:, None] * P[m] + L[m] * phi
         W[m] += added
         U[m] += added @ M.value
-    return (
-        TaylorModel(tuple(L), np.zeros(lam.shape), d, M.order),
-        TaylorModel(tuple(P), np.zeros(phi.shape), d, M.order),
-    )
+    rate = TaylorModel(tuple(L), np.zeros((len(lam), 1)), d, M.order)
+    return rate[:, 0], TaylorModel(tuple(P), np.zeros(phi.shape), d, M.order)
+
+
+def _oscillates(rate: Array) -> Mask:
+    """Whether eigenvalues are the upper ones of a conjugate pair."""
+    return np.asarray(rate.imag > 1e-9 * np.abs(rate))
 
 
 def _require_single(rates: Array, chosen: Rows) -> None:
     """Refuse chosen eigenvalues that do not oscillate, or are equal to others of `rates` (2N,)."""
-    if not oscillating(rates[chosen]).all():
-        raise ModalError(
-            "a mode does not oscillate: modal intervening variables need damping below critical in"
-            " every mode; use graph-follower"
-        )
+    if not _oscillates(rates[chosen]).all():
+        raise UnprovedError("a mode does not oscillate", "take less damping, or graph-follower")
     distance = np.abs(rates[chosen, None] - rates)
     distance[np.arange(len(chosen)), chosen] = np.inf
     for k, other in zip(chosen, distance.argmin(1), strict=True):
-        if np.abs(rates[k] - rates[other]) < DOUBLE * np.abs(rates[k]):
-            raise ModalError(
-                f"modal: modes {min(k, other) + 1} and {max(k, other) + 1} have the same frequency,"
-                f" {np.abs(rates[k]):.4g} rad/s, and so no smooth shapes; take the method auto or"
-                " improved-graph-follower"
-            )
+        if np.abs(rates[k] - rates[other]) < EQUAL * np.abs(rates[k]):
+            pair = f"modes {min(k, other) + 1} and {max(k, other) + 1}"
+            what = f"{pair} have the same frequency, {np.abs(rates[k]):.4g} rad/s"
+            raise UnprovedError(what, "take the method auto or improved-graph-follower")
 
 
 def _reciprocal(x: TaylorModel) -> TaylorModel:
     """Series of 1/x about the middle, entry by entry, without a remainder."""
-    parts = [1 / x.parts[0]]
-    for m in range(1, x.order + 1):
-        total = np.zeros((count(x.inputs, m), *x.shape), complex)
-        for b in range(1, m + 1):
-            total += convolve(x.part(b), parts[m - b], (b, m - b), x.inputs, np.multiply)
-        parts.append(-parts[0] * total)
-    return TaylorModel(tuple(parts), np.zeros(x.shape), x.inputs, x.order)
+    matrices = x[..., None, None]
+    return solution_series(matrices, x.like(np.ones_like(matrices.value)))[..., 0, 0]
 
 
 def require_dissipation(system: LinearSystem, boxes: Boxes) -> None:

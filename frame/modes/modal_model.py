@@ -15,8 +15,7 @@ import numpy as np
 
 from alphacut.frame.boxes import Boxes
 from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate
-from alphacut.frame.dynamics.flow import LinearFlow
-from alphacut.frame.dynamics.integrators import Exact
+from alphacut.frame.dynamics.flow import LinearFlow, exact_flow
 from alphacut.frame.modes.damped import (
     DampedModes,
     DampedStructure,
@@ -25,7 +24,6 @@ from alphacut.frame.modes.damped import (
 )
 from alphacut.frame.response.load_tables import Direct, LoadTables
 from alphacut.frame.structures.linear import courses_of_forces, histories
-from alphacut.frame.structures.modes import ModalError
 from alphacut.fuzzy.arrays import Array, Rows
 
 PIECE = 20_000
@@ -88,14 +86,11 @@ class ModalModel:
                 unless given.
 
         Raises:
-            ModalError: The motion is not that of the equations of motion, or a mode does not
-                oscillate or has the frequency of another one.
-            UnprovedError: The structure is not known to have a mass and to lose energy.
+            UnprovedError: The integrator is not the exact one, the structure is not known to have a
+                mass and to lose energy, or a mode does not oscillate or has the frequency of
+                another one.
         """
-        if not isinstance(flow.integrator, Exact):
-            name = flow.integrator.name
-            raise ModalError(f"modal: the integrator is {name}; take exact, or a graph follower")
-        require_dissipation(flow.system, boxes)
+        require_dissipation(exact_flow(flow).system, boxes)
         structure = DampedStructure.over_box(flow.system, boxes, degree)
         courses = [*histories(flow.system).values()]
         chosen = needed_modes(structure, courses, flow.time, allowed)

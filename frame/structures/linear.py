@@ -320,6 +320,32 @@ def modal_damping(mass: Jet, stiffness: Jet, ratios: Sequence[Jet]) -> Jet:
     return total
 
 
+def require_modal_order(mass: Array, stiffness: Array, ratios: Array) -> None:
+    """Refuse modes of unequal damping ratio that change places between parameter sets.
+
+    Args:
+        mass: M at S parameter sets, the nominal ones first, shape (S, n, n).
+        stiffness: K there.
+        ratios: ζ of the modes by rising frequency, shape (n,).
+
+    Raises:
+        RefusedError: Shapes of one set are those of the nominal set in another order.
+    """
+    shapes = undamped_modes(mass, stiffness)[1]
+    similarity = np.abs(shapes[0].T @ mass[0] @ shapes)  # of nominal shapes (rows) and others
+    nominal = similarity.argmax(1)  # the nominal mode that each mode is most like, (S, n)
+    for _, k in np.argwhere(ratios[nominal] != ratios):
+        pair = f"modes {min(k, nominal[:, k].min()) + 1} and {max(k, nominal[:, k].max()) + 1}"
+        cure = "give both the same ratio, or take narrower inputs"
+        require(
+            False,
+            "damping ratios",
+            value=f"unequal where {pair} may cross",
+            allowed="modes apart",
+            cure=cure,
+        )
+
+
 def _equal(x: Jet, y: Jet) -> bool:
     return all(np.array_equal(getattr(x, k), getattr(y, k)) for k in ("value", "first", "second"))
 
