@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 
@@ -174,15 +173,11 @@ class UnitFlow:
         flow: The motion as a function of physical parameters.
         boxes: The boxes; its names must be those of `flow`.
         relative: Whether tolerances are fractions of each output's peak instead of lengths.
-        store: Folder of the bounds of parts, from which a proof goes on; None for none.
-        interruptible: Whether an interruption of a proof leaves the bounds known so far.
     """
 
     flow: Flow
     boxes: Boxes
     relative: bool = True
-    store: Path | None = None
-    interruptible: bool = False
 
     @property
     def time(self) -> Array:

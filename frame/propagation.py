@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
-from pathlib import Path
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
@@ -72,8 +71,6 @@ def envelope(
     alpha: Sequence[float] = ALPHA,
     integrator: str | Integrator | None = None,
     relative: bool = True,
-    store: Path | str | None = None,
-    interruptible: bool = True,
     progress: Progress | bool | None = None,
     **options: object,
 ) -> Envelope:
@@ -92,10 +89,6 @@ def envelope(
             it is midpoint.
         relative: Whether the method's tolerance is a fraction of each output's peak at the modal
             parameters and some corners, instead of a number in SI units.
-        store: Folder in which a proof keeps the bounds of parts of the boxes, and from which it
-            goes on after it was killed; None to keep nothing.
-        interruptible: Whether Ctrl-C ends a proof with the best bounds so far and a note, if there
-            are any; it raises KeyboardInterrupt otherwise.
         progress: Called with the completed fraction; a bar on a terminal if not given, False for
             none.
         options: Options of a method that is named, or of auto.
@@ -120,8 +113,7 @@ def envelope(
     chosen, flow, levels, rows = _problem(
         model, inputs, method, duration, step, alpha, integrator, options
     )
-    folder = None if store is None else Path(store)
-    flow = replace(flow, relative=relative, store=folder, interruptible=interruptible)
+    flow = replace(flow, relative=relative)
     steps = step_error(flow)
     proof = _proof_beside(chosen, flow)
     with progress_reporter(progress) as tick:

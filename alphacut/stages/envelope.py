@@ -141,7 +141,7 @@ class EnvelopeTask:
 
     def compute(self, structure: Structure, context: StageContext) -> Computed[EnvelopeResult]:
         """Computes the envelope as a dataset, and the fuzzy peak of each output as a document."""
-        arguments = self.arguments(structure) | _store_and_progress(context)
+        arguments = self.arguments(structure) | {"progress": context.tick or False}
         result = frame.envelope(**arguments, relative=not self.tolerance(structure).unit)
         data = result.to_dataset()
         signed = [name for name in self.limited if name != output_of(name)]
@@ -201,7 +201,7 @@ class EnvelopeTask:
         model = structure.model_with_outputs("limits", outputs_of(self.limited))
         magnitudes = all(name == output_of(name) for name in self.limited)
         method = frame.Auto(PEAK_ERROR, peaks=True, magnitudes=magnitudes)
-        arguments = self._motion(structure) | _store_and_progress(context)
+        arguments = self._motion(structure) | {"progress": context.tick or False}
         arguments["step"] = self.section.step / nodes
         result = frame.envelope(model, method=method, relative=True, **arguments)
         return peaks(result, self.limited)
@@ -214,11 +214,6 @@ class EnvelopeTask:
             "step": self.section.step,
             "alpha": self.section.alpha,
         }
-
-
-def _store_and_progress(context: StageContext) -> dict[str, Any]:
-    """Arguments of `frame.envelope` on progress and on the folder of a proof's parts."""
-    return {"store": context.parts, "interruptible": False, "progress": context.tick or False}
 
 
 def outputs_of(peaks: Sequence[str]) -> tuple[str, ...]:

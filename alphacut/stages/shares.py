@@ -105,7 +105,7 @@ def peak_shares(model: frame.StoreyFrame, structure: Structure, task: EnvelopeTa
         fuzzy = {name: x for name, x in numbers.items() if not isinstance(x, Crisp)}
         method = frame.Auto(ACCURACY, peaks=True)
         options: dict[str, Any] = {"alpha": task.section.alpha[:1], "duration": task.duration}
-        options |= {"step": step, "method": method, "interruptible": False, "progress": False}
+        options |= {"step": step, "method": method, "progress": False}
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)
             peak_bounds = peaks(frame.envelope(model, fuzzy, **options))

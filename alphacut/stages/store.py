@@ -7,11 +7,10 @@ import logging
 import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, as_completed
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from shutil import rmtree
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated, Generic, NamedTuple, TypeVar
 
@@ -40,8 +39,6 @@ if TYPE_CHECKING:
 LOG = logging.getLogger(__name__)
 SAMPLES = "samples.db"
 """Store of the samples of a campaign, beside the results."""
-PARTS = "parts"
-"""Folder of the bounds of parts of boxes while a proof runs, beside the results."""
 
 
 class Numbers(BaseModel):
@@ -87,14 +84,12 @@ class StageContext:
         folder: Empty folder for further files of the stage; None to write none.
         samples: Store of samples; None for none.
         tick: Takes the share done; None to show nothing.
-        parts: Folder from which a proof that was killed goes on; None for none.
     """
 
     folder: Path | None = None
     samples: Path | None = None
     workers: int = 1
     tick: Progress | None = None
-    parts: Path | None = None
 
 
 class Computed(NamedTuple, Generic[T]):
@@ -230,27 +225,9 @@ class StageStore:
             for ending in (".json", ".nc"):
                 folder.require_free(f"{stage.name}{ending}")
             samples = self._sample_store(folder) if stage.has_samples else None
-            with TemporaryDirectory() as temporary, self._proof_folder(folder, stage.key) as parts:
-                context = StageContext(Path(temporary), samples, workers, tick, parts)
+            with TemporaryDirectory() as temporary:
+                context = StageContext(Path(temporary), samples, workers, tick)
                 return self._write(stage, stage.run(context), Path(temporary))
-
-    @contextmanager
-    def _proof_folder(self, folder: ResultsFolder, key: str) -> Iterator[Path | None]:
-        """Yields the folder of the parts of a stage's proof, which is removed if the stage ends."""
-        path = folder.path / PARTS / key[:32]  # so that no other code or case takes what is in it
-        if path.is_symlink() or path.parent.is_symlink():
-            yield None
-            return
-        if self.fresh:
-            rmtree(path, ignore_errors=True)
-        try:
-            yield path
-            if rank() == 0:
-                rmtree(path, ignore_errors=True)
-        finally:
-            for folder_of_parts in (path, path.parent):
-                with suppress(OSError):  # it holds parts
-                    folder_of_parts.rmdir()
 
     def _sample_store(self, folder: ResultsFolder) -> Path:
         """Path of the store of samples; a fresh run refuses one that no manifest lists."""

@@ -1,17 +1,11 @@
-"""What a proof of bounds over a box of inputs is asked for, what it answers, and their store."""
+"""What a proof of bounds over a box of inputs is asked for, and what it answers."""
 
 from __future__ import annotations
 
-import hashlib
-import json
-import os
-import tempfile
-import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Any, ClassVar, Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 
@@ -86,8 +80,6 @@ class BisectionError(UnprovedError):
 
 
 Answer = BoxBounds | UnprovedError
-TEXTS = ("facts", "what", "cure", "along")
-"""Fields of answers that are stored as text: of bounds, and those of a refusal."""
 
 
 class BoxProof(Protocol):
@@ -133,64 +125,3 @@ def refusing() -> Iterator[None]:
     except np.linalg.LinAlgError as error:
         what = f"a matrix is singular ({str(error).lower()})"
         raise UnprovedError(what, "take improved-graph-follower") from None
-
-
-@dataclass(frozen=True)
-class BoxStore:
-    """Answers in a folder, from which a proof that was killed goes on.
-
-    A file is named by all that the answers follow from: the problem, the box and the goal.
-
-    Args:
-        folder: Where the files are; made if it does not exist.
-        problem: Fingerprint of the proof and the structure.
-    """
-
-    folder: Path
-    problem: bytes
-
-    def path(self, boxes: Boxes, goal: Goal) -> Path:
-        """Return the file of the answers."""
-        digest = hashlib.sha256(self.problem)
-        goal_arrays = goal.needed, goal.outer, goal.incumbent, np.array(goal.last)
-        for array in (boxes.alpha, boxes.lower, boxes.upper, *goal_arrays):
-            digest.update(np.ascontiguousarray(array).tobytes())
-        return self.folder / f"part-{digest.hexdigest()[:32]}.npz"
-
-    def read(self, path: Path) -> list[Answer] | None:
-        """Return the stored answers of all levels, or None if there is no readable file."""
-        if path.is_symlink() or not path.is_file():  # a link may be anybody's
-            return None
-        try:
-            with np.load(path, allow_pickle=False) as arrays:
-                return [_answer(arrays, f"{k}.") for k in range(int(arrays["levels"]))]
-        except (OSError, EOFError, KeyError, TypeError, ValueError, zipfile.BadZipFile):
-            return None
-
-    def write(self, path: Path, answers: Sequence[Answer]) -> None:
-        """Write answers to a file, completely or not at all; without room nothing is written."""
-        arrays: dict[str, Array] = {"levels": np.array(len(answers))}
-        for k, answer in enumerate(answers):
-            values = dict(vars(answer))
-            texts = {key: values.pop(key) for key in TEXTS if key in values}
-            arrays[f"{k}.texts"] = np.array(json.dumps(texts))
-            arrays |= {f"{k}.{name}": np.asarray(x) for name, x in values.items() if x is not None}
-        with suppress(OSError):
-            self.folder.mkdir(parents=True, exist_ok=True)
-            with tempfile.TemporaryDirectory(dir=self.folder) as folder:
-                partial = Path(folder) / path.name
-                np.savez(partial, **arrays)  # type: ignore[arg-type]
-                os.replace(partial, path)
-
-
-def _answer(arrays: np.lib.npyio.NpzFile, prefix: str) -> Answer:
-    """The answer whose fields' names in a file begin with `prefix`."""
-    values: dict[str, Any] = {
-        name.removeprefix(prefix): arrays[name] for name in arrays if name.startswith(prefix)
-    }
-    texts = json.loads(str(values.pop("texts")))
-    if "what" in texts:
-        return UnprovedError(**texts)
-    if "least_peaks" in values:
-        values["least_peaks"] = Ends(*values["least_peaks"])
-    return BoxBounds(**values, **texts)

@@ -8,7 +8,6 @@ bound at a node is the largest over all boxes.
 
 from __future__ import annotations
 
-import hashlib
 import logging
 import os
 import time
@@ -25,7 +24,6 @@ from alphacut.frame.bounds.box_proof import (
     Answer,
     BisectionError,
     BoxProof,
-    BoxStore,
     Goal,
     refusing,
 )
@@ -116,12 +114,11 @@ class Queue:
         self.flow = exact_flow(problem.flow)
         with refusing():
             proof.forecast(self.flow, boxes)
-        self.store = None if problem.store is None else BoxStore(problem.store, self._fingerprint())
         self.hull = Hull(problem, self.flow)
         self.gap = proof.peak_gap(problem.scale, problem.peak)[:, None]
         self.wide = numbers.WIDE * problem.peak[:, None]
         self.workers = proof.workers or os.cpu_count() or 1
-        self.refusals, self.pushes, self.interrupted = 0, 0, 0
+        self.refusals, self.pushes = 0, 0
         self.heap: list[tuple[float, int, SubBox]] = []
         shape = self.hull.closed.shape
         levels, _, outputs, _ = shape
@@ -142,13 +139,9 @@ class Queue:
     def run(self, progress: Progress | None = None) -> None:
         """Bound and branch until all peaks are fathomed or abandoned.
 
-        Ctrl-C ends the work of an interruptible problem with the bounds known so far, if all boxes
-        have some; KeyboardInterrupt is raised otherwise.
-
         Raises:
             UnprovedError: The proof refuses too many boxes, or one that bisections would not help.
         """
-        batch: list[SubBox] = []
         pool = ThreadPoolExecutor(self.workers)
         try:
             while batch := self._next():
@@ -163,22 +156,11 @@ class Queue:
                     for child in children:
                         child.work = (1 - OWN_WORK) * box.work / len(children)
                         self._push(child)
-        except KeyboardInterrupt:
-            boxes = [*batch, *(box for *_, box in self.heap)]
-            if not (self.problem.interruptible and all(np.isfinite(x.outer).all() for x in boxes)):
-                raise
-            self.interrupted, self.hull.facts["interrupted"] = len(boxes), 1.0
-            self.abandoned[:] = True
-            for box in boxes:
-                self._fathom(box)
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
 
     def notes(self) -> Iterator[str]:
-        """Yield sentences on an interruption, and on the inputs to narrow where a gap remains."""
-        if self.interrupted:
-            left = f"{self.interrupted} parts left"
-            yield f"interrupted, with {left} whose bounds are wider than asked"
+        """Yield a sentence on the inputs to narrow where a gap remains."""
         gaps = np.minimum.accumulate(self.hull.closed.max(1), axis=0)
         gaps -= np.stack([self.hull.incumbent(level) for level in range(len(gaps))])
         gaps = np.where(self.number > 0, gaps, -np.inf) / self.problem.peak[:, None]
@@ -242,19 +224,12 @@ class Queue:
         )
 
     def _bound(self, box: SubBox, goal: Goal) -> Sequence[Answer]:
-        """Bounds or refusal on each level of a box, from the store or by the proof."""
-        path = None if self.store is None else self.store.path(box.boxes, goal)
-        if self.store is not None and path is not None and (stored := self.store.read(path)):
-            return stored
-        answers: Sequence[Answer]
+        """Bounds or refusal on each level of a box."""
         try:
             with refusing():
-                answers = self.proof.bounds(self.flow, box.boxes, goal)
+                return self.proof.bounds(self.flow, box.boxes, goal)
         except UnprovedError as refusal:
-            answers = [refusal] * len(box.levels)
-        if self.store is not None and path is not None:
-            self.store.write(path, answers)
-        return answers
+            return [refusal] * len(box.levels)
 
     def _take(self, box: SubBox, goal: Goal, answers: Sequence[Answer]) -> None:
         """Take over bounds and reached values; raise a refusal that bisections do not mend."""
@@ -371,14 +346,6 @@ class Queue:
         rows = np.flatnonzero(box.peaks.any((1, 2)))
         open_box = box.on_levels(rows)
         return open_box.bisected(_axis(open_box.boxes, votes))
-
-    def _fingerprint(self) -> bytes:
-        """Hash of the proof with its options and of the structure's motion at the probes."""
-        problem = self.problem
-        options = {name: value for name, value in vars(self.proof).items() if name != "workers"}
-        words = repr((self.proof.name, options, problem.boxes.names))
-        motions = problem.flow.values(problem.boxes.probes)
-        return hashlib.sha256(words.encode() + motions.tobytes() + problem.scale.tobytes()).digest()
 
 
 def _axis(boxes: Boxes, votes: Array) -> int:

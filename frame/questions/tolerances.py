@@ -106,7 +106,6 @@ def tolerances(
         step=step,
         alpha=[0.0],
         method=Auto(error, peaks=True),
-        interruptible=False,
         progress=False,
     )
     tried: dict[float, _Outcome] = {}

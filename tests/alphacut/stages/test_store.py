@@ -86,43 +86,6 @@ def test_a_stage_that_fails_leaves_no_file(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_parts_of_a_proof_stay_until_the_stage_ends_and_are_its_own(tmp_path):
-    seen = []
-
-    def compute(work):
-        seen.append(sorted(x.name for x in work.parts.glob("*")))
-        work.parts.mkdir(parents=True, exist_ok=True)
-        (work.parts / f"part-{len(seen)}.npz").touch()
-        if len(seen) < 3:
-            raise FailedError("killed")
-        return Computed({})
-
-    for inputs in (1, 2):
-        with pytest.raises(FailedError, match="killed"):
-            store_in(tmp_path).take(Stage("thing", inputs, ("fuzzy",), dict, compute))
-    store_in(tmp_path).take(Stage("thing", 1, ("fuzzy",), dict, compute))
-    assert seen == [[], [], ["part-1.npz"]]
-    assert len(list((tmp_path / "parts").iterdir())) == 1
-    store_in(tmp_path, fresh=True).take(Stage("thing", 2, ("fuzzy",), dict, compute))
-    assert seen[-1] == []
-    assert not (tmp_path / "parts").exists()
-
-
-def test_a_link_in_place_of_the_parts_is_not_followed(tmp_path):
-    (tmp_path / "elsewhere").mkdir()
-    (tmp_path / "out").mkdir()
-    (tmp_path / "out" / "parts").symlink_to(tmp_path / "elsewhere")
-    folders = []
-
-    def compute(work):
-        folders.append(work.parts)
-        return Computed({})
-
-    store_in(tmp_path / "out").take(Stage("thing", 1, ("fuzzy",), dict, compute))
-    assert folders == [None]
-    assert (tmp_path / "elsewhere").is_dir()
-
-
 def test_fingerprints_do_not_depend_on_where_functions_lie_in_memory():
     content = load(ROOT / "cases" / "pendulum.toml", ()).content
     (task,) = envelope.tasks(content.envelope, ())

@@ -1,7 +1,6 @@
 """The hull of parts holds every motion, refusals are bisected, and no thread changes a bound."""
 
 import re
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -193,41 +192,3 @@ def test_parts_left_after_a_refusal_have_bounds():
     assert found.facts["parts"] > 1
     assert found.facts["motions_tested"] >= 24
     assert np.isfinite(found.upper).all()
-
-
-class Killed(Lipschitz):
-    """Ends after some parts, as by Ctrl-C."""
-
-    def bounds(self, flow, cuts, goal):
-        if len(self.seen) == 6:
-            raise KeyboardInterrupt
-        return super().bounds(flow, cuts, goal)
-
-
-def test_an_interruption_leaves_the_best_bounds_so_far():
-    whole = prove(Lipschitz(), FLOW)
-    found = prove(Killed(), replace(FLOW, interruptible=True))
-    assert found.notes[0].startswith("interrupted, with ")
-    assert (found.upper >= whole.upper - 1e-12).all()
-    assert (FLOW.flow.values(points(0)) <= found.upper[0] + 1e-12).all()
-    with pytest.raises(KeyboardInterrupt):
-        prove(Killed(), FLOW)
-
-
-@pytest.mark.parametrize("method", [DualProof(peaks=1e-3), Proof(tolerance=1e-3)], ids=repr)
-def test_a_proof_goes_on_from_stored_parts(method, tmp_path, monkeypatch):
-    given = {"duration": 1.0, "step": 0.05, "alpha": (0, 1), "progress": False, "store": tmp_path}
-    fuzzy = {"s": Triangular(0.5, 1.0, 2.0)}
-    first = envelope(spring(), fuzzy, method=method, **given)
-    assert len(list(tmp_path.glob("part-*.npz"))) == first.facts["parts"]
-    monkeypatch.setattr(type(method), "bounds", None)  # not called
-    again = envelope(spring(), fuzzy, method=method, **given)
-    assert (again.upper == first.upper).all()
-    assert (again.lower_at == first.lower_at).all()
-    assert {**again.facts, "seconds": 0} == {**first.facts, "seconds": 0}
-    with pytest.raises(TypeError):
-        envelope(spring(), {"s": Triangular(0.5, 1.0, 2.1)}, method=method, **given)
-    for part in tmp_path.glob("part-*.npz"):  # a link may be anybody's
-        part.symlink_to(part.rename(tmp_path / f"of-{part.stem}"))
-    with pytest.raises(TypeError):
-        envelope(spring(), fuzzy, method=method, **given)
