@@ -34,8 +34,9 @@ class Envelope(Bounds):
             output where none is one, and a share of each peak where the tolerance was relative.
             `step_error`: what time stepping adds; `gain`: predicted gain worth a graph;
             `model_error`, `degree`: of the polynomials of the modes; `gap`, `boxes`, `parts`: of a
-            proof; `estimated_error`: the largest error; `between_nodes`: the largest value of
-            `between`; `motions_tested`: exact motions that were compared with proved bounds.
+            proof; `estimated_error`: the largest error, not of attained bounds, of which it is not
+            known how far other motions go; `between_nodes`: the largest value of `between`;
+            `motions_tested`: exact motions that were compared with proved bounds.
         tested_structures: Their structures as arrays with axes, for `alphacut verify`.
 
     Example:

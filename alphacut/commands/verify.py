@@ -13,7 +13,7 @@ import numpy as np
 from alphacut.commands.options import Command, add_quiet, write_answer
 from alphacut.frame.envelope import Ends, Envelope
 from alphacut.frame.verification.exact_motion import LinearMotion
-from alphacut.frame.verification.self_test import ContradictionError, Trial, stored_motions
+from alphacut.frame.verification.self_test import Trial, inputs_at_peaks, stored_motions
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import require
 from alphacut.fuzzy.result import Nature
@@ -60,22 +60,18 @@ def verify_envelope(data: xarray.Dataset, name: str, folder: ResultsFolder) -> D
     """Tests a stored envelope, and writes inputs and motions at its peaks to two CSV files.
 
     Returns its nature, the number of motions tested, and the names of the files; a motion outside
-    raises ContradictionError and goes to contradiction.csv.
+    raises ContradictionError.
     """
     points, motions = stored_motions(data)
-    trial = Trial(envelope_of(data), np.moveaxis(data["cut"].values, -1, 0))
-    try:
-        trial.require_agreement(points, motions)
-    except ContradictionError as error:
-        folder.put_text("contradiction.csv", columns_text(error.table))
-        raise
+    envelope = envelope_of(data)
+    Trial(envelope, *np.moveaxis(data["cut"].values, -1, 0)).require_agreement(points, motions)
     # points are compared as bytes, in which + 0.0 leaves no negative zero
     indices = {point.tobytes(): k for k, point in enumerate(points + 0.0)}
-    at_peaks = (point.tobytes() for point in trial.named() + 0.0)
+    at_peaks = (point.tobytes() for point in inputs_at_peaks(envelope, 0) + 0.0)
     shown = [indices[point] for point in at_peaks if point in indices]
     inputs: dict[str, Array] = {"motion": np.arange(1, len(shown) + 1).astype(float)}
-    inputs |= {f"{x} [SI]": points[shown, k] for k, x in enumerate(trial.envelope.inputs)}
-    motions_shown = motions_table(trial, [motions[k] for k in shown])
+    inputs |= {f"{x} [SI]": points[shown, k] for k, x in enumerate(envelope.inputs)}
+    motions_shown = motions_table(envelope, [motions[k] for k in shown])
     files = {f"{name}_motions.csv": motions_shown, f"{name}_inputs.csv": inputs}
     for file, columns in files.items():
         folder.put_text(file, columns_text(columns))
@@ -83,9 +79,9 @@ def verify_envelope(data: xarray.Dataset, name: str, folder: ResultsFolder) -> D
     return {"nature": str(data.attrs["nature"]), **tested}
 
 
-def motions_table(trial: Trial, motions: Sequence[LinearMotion]) -> dict[str, Array]:
+def motions_table(envelope: Envelope, motions: Sequence[LinearMotion]) -> dict[str, Array]:
     """Time and outputs of motions at the nodes, by titles of columns."""
-    envelope, table = trial.envelope, {"time [s]": trial.envelope.time}
+    table = {"time [s]": envelope.time}
     for k, motion in enumerate(motions, 1):
         values = motion.outputs(envelope.time)[0]
         table |= {f"motion {k}: {x}": values[:, o] for o, x in enumerate(envelope.named)}

@@ -28,7 +28,6 @@ from pydantic import (
 from alphacut.fuzzy.arrays import Array, on_one_blas_thread
 from alphacut.fuzzy.progress_bar import Progress, progress_reporter
 from alphacut.fuzzy.refused import FailedError, require
-from alphacut.io.arrays import columns_text
 from alphacut.io.files import as_json, rank, say, write_text
 from alphacut.io.provenance import fingerprint, origin
 from alphacut.io.results import Listed, ResultsFolder
@@ -257,16 +256,12 @@ class StageStore:
 
     @contextmanager
     def _report_failures(self, name: str) -> Iterator[None]:
-        """Adds the stage to errors in the block, and writes a motion that contradicts a proof."""
+        """Names the stage in whose block a worker process died."""
         try:
             yield
         except BrokenExecutor as error:
             cure = "out of memory, or a crash in compiled code; the stages that are done stay"
             raise FailedError(f"a worker process died in stage {name}", cure) from error
-        except FailedError as error:
-            if (table := getattr(error, "table", None)) is not None:  # of a motion
-                self.put_text("contradiction.csv", columns_text(table))
-            raise
 
     def put_text(self, name: str, text: str) -> None:
         """Writes a text file of the run itself, such as summary.json."""

@@ -4,10 +4,9 @@ This file must not be merged with what it judges. It shares no code with `Jet`, 
 `LinearFlow` or the modal models, and needs NumPy and SciPy alone, so that a
 fault in one of them does not hide itself.
 
-Method: the exponential of the state matrix from one substep to the next (Van Loan, 1978, for the
-load), and its Taylor series within a substep. Neither samples of the record nor substeps need to
-coincide with the times asked for. A force adds its own motion from rest; a sine its steady state,
-(iΩ − A) X = b, and a free motion that begins against it.
+Method: the exponential of the state matrix, with the load as further states (Van Loan 1978), from
+one substep to the next, and its Taylor series within a substep. Neither samples of loads nor
+substeps need to coincide with the times asked for.
 """
 
 from __future__ import annotations
@@ -35,7 +34,7 @@ CHUNK = 4096
 
 
 class Course(NamedTuple):
-    """A force over time: g(t) sin(Ω (t − start) + phase), or g(t) where Ω is 0.
+    """A load over time: g(t) sin(Ω (t − start) + phase), or g(t) where Ω is 0.
 
     Args:
         samples: Samples of g, linear between and zero outside, shape (R,).
@@ -48,13 +47,13 @@ class Course(NamedTuple):
 
     samples: Array
     step: float
-    start: float
-    is_held: bool
-    frequency: float
-    phase: float
+    start: float = 0.0
+    is_held: bool = False
+    frequency: float = 0.0
+    phase: float = 0.0
 
     def values(self, times: Array) -> Array:
-        """Return the force at times, shape (T,); at a jump its value after the jump."""
+        """Return the load at times, shape (T,); at a jump its value after the jump."""
         since = times - self.start
         position = since / self.step
         is_sample = np.abs(position - np.rint(position)) < 1e-9
@@ -65,26 +64,25 @@ class Course(NamedTuple):
         sine = np.sin(self.frequency * since + self.phase) if self.frequency else 1.0
         return np.asarray(value * sine)
 
-    def kinks(self, time: float) -> list[tuple[float, float, float]]:
-        """Return times since the start where g leaves its line, with its jump and change of slope.
+    def substep_loads(self, parts: int, count: int) -> Array:
+        """Return g sin θ, g cos θ, r sin θ, r cos θ at the start of each substep, (count, 4).
 
-        A kink (t₀, c, r) adds c + r (t − t₀) to g from t₀ on; those after `time` are left out.
+        g rises by r within a substep, of which there are `parts` between two samples; θ is the
+        angle of the sine, 90° without one.
         """
-        slopes = np.diff(self.samples) / self.step
-        change = np.diff(slopes, prepend=0.0, append=0.0)
-        jump = np.zeros(len(self.samples))
-        jump[0] = self.samples[0]
-        if not self.is_held:
-            jump[-1] = -self.samples[-1]
-        moments = np.arange(len(self.samples)) * self.step
-        kinks = np.column_stack([moments, jump, change])
-        kinks = kinks[(moments <= time) & ((jump != 0) | (change != 0))]
-        return [(float(start), float(level), float(slope)) for start, level, slope in kinks]
-
-    def until(self, time: float) -> Array:
-        """Samples that reach up to a time after the start, in s, where the last one is held."""
-        more = max(0, ceil(time / self.step) + 1 - len(self.samples)) * self.is_held
-        return np.append(self.samples, np.full(more, self.samples[-1]))
+        held = self.is_held * max(0, -(-count // parts) + 1 - len(self.samples))
+        samples = np.append(self.samples, np.full(held, self.samples[-1:]))
+        line = np.zeros((count, 2))
+        if len(samples) > 1:
+            rise = np.repeat(np.diff(samples), parts) / parts
+            begin = np.repeat(samples[:-1], parts) + rise * (np.arange(len(rise)) % parts)
+            n_loaded = min(count, len(rise))
+            line[:n_loaded] = np.column_stack([begin, rise])[:n_loaded]
+        angle: Array = np.full(count, np.pi / 2)
+        if self.frequency:
+            angle = self.frequency * self.step / parts * np.arange(count) + self.phase
+        wave = np.column_stack([np.sin(angle), np.cos(angle) if self.frequency else 0.0 * angle])
+        return np.reshape(line[:, :, None] * wave[:, None], (count, 4))
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,166 +121,92 @@ class LinearMotion:
         Rounded inputs are those of a structure whose M^(−1/2) K M^(−1/2) differs by n ε of its norm
         ω², so that the slowest mode ω_1 turns by up to n ε ω² min(t², t/ω_1) / 2 rad more or less.
         """
-        state = _EnergyState.from_motion(self)
-        values, rounding = state.response_to_record(
-            state.start, state.ground, self.record, self.record_step, times
+        n, lower = len(self.mass), cholesky(self.mass, lower=True)  # M = L Lᵀ
+
+        def reduced(matrix: Array) -> Array:
+            left = solve_triangular(lower, matrix, lower=True)
+            return np.asarray(solve_triangular(lower, left.T, lower=True).T)
+
+        # In states x = [Lᵀ q; Lᵀ q̇/ω], ω² = ‖L⁻¹ K L⁻ᵀ‖, the state matrix has the norm of the
+        # highest frequency, so that neither substeps nor rounding depend on units.
+        spring, damper = reduced(self.stiffness), reduced(self.damping)
+        squared = np.abs(np.linalg.eigvalsh(spring))
+        omega = float(np.sqrt(squared.max())) or 1.0
+        inverse = solve_triangular(lower, np.eye(n), lower=True)  # L⁻¹
+        system = _ScaledSystem(
+            matrix=np.block([[np.zeros((n, n)), omega * np.eye(n)], [-spring / omega, -damper]]),
+            rows=np.hstack([self.rows[:, :n] @ inverse.T, omega * self.rows[:, n:] @ inverse.T]),
+            lowest=max(float(np.sqrt(squared.min())), 1e-300),
+            highest=omega,
+            norm=omega + float(np.linalg.norm(damper)),
         )
-        for k, course in enumerate(self.courses):
+        start = np.concatenate([lower.T @ self.start[:n], lower.T @ self.start[n:] / omega])
+        ground = Course(self.record, self.record_step)
+        push = -(lower.T @ self.pattern) / omega
+        values, rounding = system.response(start, push, ground, times)
+        for force, feed, course in zip(self.forces.T, self.feeds.T, self.courses, strict=True):
             acts = times >= course.start - 1e-12 * times[-1]
-            if not acts.any():
-                continue
-            since = np.maximum(times[acts] - course.start, 0.0)
-            response, response_rounding = state.response_to_force(self.forces[:, k], course, since)
-            values[acts] += response
-            rounding[acts] += response_rounding
-            values += self.feeds[:, k] * course.values(times)[:, None]
+            if acts.any():
+                since = np.maximum(times[acts] - course.start, 0.0)
+                response = system.response(0.0 * start, inverse @ force / omega, course, since)
+                values[acts] += response[0]
+                rounding[acts] += response[1]
+            values += feed * course.values(times)[:, None]
         return values, rounding
 
 
 @dataclass(frozen=True, eq=False)
-class _EnergyState:
-    """x = [Lᵀ q; Lᵀ q̇/ω] with M = L Lᵀ and ω² the norm of L⁻¹ K L⁻ᵀ.
-
-    In these coordinates the state matrix has the norm of the highest frequency, so that neither
-    substeps nor rounding depend on units.
+class _ScaledSystem:
+    """ẋ = A x + [0; b] f(t) in the states x of `LinearMotion.outputs`.
 
     Args:
-        matrix: A of ẋ = A x + b a, shape (2n, 2n), in 1/s.
-        lower: L, shape (n, n).
-        ground: b of the ground's acceleration, shape (2n,).
+        matrix: A, shape (2n, 2n), in 1/s.
         rows: Outputs of x, shape (m, 2n).
-        start: x at t = 0.
         lowest: Least frequency, at least 1e-300 rad/s.
         highest: Greatest frequency ω, in rad/s.
         norm: Bound of the norm of A, in 1/s.
     """
 
     matrix: Array
-    lower: Array
-    ground: Array
     rows: Array
-    start: Array
     lowest: float
     highest: float
     norm: float
 
-    @classmethod
-    def from_motion(cls, motion: LinearMotion) -> _EnergyState:
-        """Return a motion in states x = [Lᵀ q; Lᵀ q̇/ω], with M = L Lᵀ and ω² = ‖L⁻¹ K L⁻ᵀ‖."""
-        n, lower = len(motion.mass), cholesky(motion.mass, lower=True)
-
-        def reduced(matrix: Array) -> Array:
-            left = solve_triangular(lower, matrix, lower=True)
-            return np.asarray(solve_triangular(lower, left.T, lower=True).T)
-
-        spring, damper = reduced(motion.stiffness), reduced(motion.damping)
-        squared = np.abs(np.linalg.eigvalsh(spring))
-        omega = float(np.sqrt(squared.max())) or 1.0
-        matrix = np.block([[np.zeros((n, n)), omega * np.eye(n)], [-spring / omega, -damper]])
-        push = -(lower.T @ motion.pattern) / omega
-        inverse = solve_triangular(lower, np.eye(n), lower=True)  # L⁻¹
-        q, v = motion.start[:n], motion.start[n:]
-        return cls(
-            matrix=matrix,
-            lower=lower,
-            ground=np.concatenate([np.zeros(n), push]),
-            rows=np.hstack(
-                [motion.rows[:, :n] @ inverse.T, omega * motion.rows[:, n:] @ inverse.T]
-            ),
-            start=np.concatenate([lower.T @ q, lower.T @ v / omega]),
-            lowest=max(float(np.sqrt(squared.min())), 1e-300),
-            highest=omega,
-            norm=omega + float(np.linalg.norm(damper)),
-        )
-
-    def response_to_record(
-        self, start: Array, push: Array, record: Array, step: float, times: Array
+    def response(
+        self, start: Array, push: Array, course: Course, times: Array
     ) -> tuple[Array, Array]:
-        """Return outputs of ẋ = A x + b a(t) at times and bounds of their round-off, (T, m) each.
+        """Return outputs at times from the load's start and their round-off, (T, m) each.
 
-        x(0) is `start` and b is `push`, (2n,) each; a has samples (R,) every `step` seconds from
-        t = 0 on, and is zero where there are none.
+        x(0) is `start` (2n,), and `push` (n,) is b of the load f, the `course`.
         """
         last = max(float(times.max(initial=0.0)), 1e-300)
-        interval = step if len(record) else last
-        parts = max(1, ceil(self.norm * interval / MAX_NORM))
+        interval = course.step if len(course.samples) else last
+        fastest = max(self.norm, course.frequency)
+        parts = max(1, ceil(fastest * interval / MAX_NORM))
         substep = interval / parts
         size = float(np.linalg.norm(push)) or 1.0
-        load = size * _substep_loads(record, parts, max(1, ceil(last / substep)))
-        flow = self._loaded_flow(substep, np.asarray(push / size))
-        exact_step = expm(flow)[: len(start)]  # columns of x, of a and of its increment
-        states = _recursion(exact_step[:, :-2], start, load @ exact_step[:, -2:].T)
-        degree, scaled = _degree(self.norm * substep), np.asarray(times / substep, float)
+        load = size * course.substep_loads(parts, max(1, ceil(last / substep)))
+        n = len(start)
+        flow = np.zeros((n + 4, n + 4))  # of x and the load's four numbers over a substep
+        flow[:n, :n] = self.matrix * substep
+        flow[n // 2 : n, n] = push / size * substep
+        turn = course.frequency * substep
+        flow[n:, n:] = np.kron(np.eye(2), [[0.0, turn], [-turn, 0.0]]) + np.eye(4, k=2)
+        exact_step = expm(flow)[:n]
+        states = _recursion(exact_step[:, :n], start, load @ exact_step[:, n:].T)
+        degree, scaled = _degree(fastest * substep), np.asarray(times / substep, float)
         values = _taylor(flow, degree, self.rows, np.hstack([states, load]), scaled)
-        return values, self._rounding(np.abs(states).max(0), times)
-
-    def response_to_force(self, force: Array, course: Course, times: Array) -> tuple[Array, Array]:
-        """Return outputs from rest under a force b f(t), and their round-off, (T, m) each.
-
-        `times` begin with the force. A sine times g = a + r t answers from one sample to the next
-        as its particular motion Im (y + r z t) exp(iΩt) and a free motion that begins against it:
-        (iΩ − A) y = b a − r z with (iΩ − A) z = b. Where g changes its line, free motions begin.
-        """
-        n, zero_state = len(force), np.zeros(len(self.matrix))
-        acceleration = solve_triangular(self.lower, force, lower=True) / self.highest
-        push, no_record = np.append(np.zeros(n), acceleration), np.zeros(0)
-        last = float(times.max(initial=0.0))
-        if not course.frequency:
-            record = course.until(last)
-            return self.response_to_record(zero_state, push, record, course.step, times)
-        resolvent = 1j * course.frequency * np.eye(2 * n) - self.matrix
-        z = np.linalg.solve(resolvent, push)
-        zz, condition = np.linalg.solve(resolvent, z), float(np.linalg.cond(resolvent))
-        values, rounding = np.zeros((2, len(times), len(self.rows)))
-        for start, level, slope in course.kinks(last):
-            acts = times >= start - 1e-12 * last
-            since = np.maximum(times[acts] - start, 0.0)
-            turn = np.exp(1j * (course.frequency * start + course.phase))
-            constant, rising = turn * (level * z - slope * zz), turn * slope * z
-            free, free_rounding = self.response_to_record(
-                -constant.imag, zero_state, no_record, 0.0, since
-            )
-            wave = np.exp(1j * course.frequency * since)[:, None]
-            steady = (constant + rising * since[:, None]) * wave
-            values[acts] += free + steady.imag @ self.rows.T
-            size = np.abs(steady).max(0, initial=0.0) + np.abs(level * z) + np.abs(slope * zz)
-            rounding[acts] += free_rounding + self._rounding(size, since) * (1 + condition)
-        return values, rounding
-
-    def _rounding(self, state: Array, times: Array) -> Array:
-        """Return the round-off of outputs of states as large as `state` (2n,), shape (T, m)."""
-        turn = self.highest**2 * np.minimum(times**2, times / self.lowest) / 2
-        rounding = len(self.lower) * EPSILON * (CONSTANT_ROUNDING + turn)
-        return np.asarray(rounding[:, None] * (np.abs(self.rows) @ state))
-
-    def _loaded_flow(self, substep: float, push: Array) -> Array:
-        """Return F (2n + 2, 2n + 2) with exp(F) the map of (x, a, rise of a) over a substep.
-
-        ẋ = A x + b a with b = `push` and a linear load a (Van Loan 1978).
-        """
-        size = len(self.matrix)
-        flow = np.zeros((size + 2, size + 2))
-        flow[:size, :size] = self.matrix * substep
-        flow[:size, size] = push * substep
-        flow[size, size + 1] = 1.0
-        return flow
-
-
-def _substep_loads(record: Array, parts: int, count: int) -> Array:
-    """Return the load at the start of each substep and its increment, shape (count, 2)."""
-    loads = np.zeros((count, 2))
-    if len(record) > 1:
-        rise = np.repeat(np.diff(record), parts) / parts
-        begin = np.repeat(record[:-1], parts) + rise * (np.arange(len(rise)) % parts)
-        n_loaded = min(count, len(rise))
-        loads[:n_loaded] = np.column_stack([begin, rise])[:n_loaded]
-    return loads
+        phase = self.highest**2 * np.minimum(times**2, times / self.lowest) / 2
+        phase += course.frequency * times
+        rounding = n / 2 * EPSILON * (CONSTANT_ROUNDING + phase)
+        return values, rounding[:, None] * (np.abs(self.rows) @ np.abs(states).max(0))
 
 
 def _degree(norm: float) -> int:
     """Return the degree from which terms of exp(A τ), ‖A‖ τ ≤ `norm`, are below `TRUNCATION`.
 
-    The load enters once and its increment twice, which costs two degrees.
+    The load enters once and its rise twice, which costs two degrees.
     """
     degree, term = 2, 1.0
     while term > TRUNCATION:
@@ -321,10 +245,10 @@ def _recursion(step: Array, start: Array, forcing: Array) -> Array:
 def _taylor(flow: Array, degree: int, rows: Array, states: Array, times: Array) -> Array:
     """Return outputs at times (T,), in substeps, by the Taylor series of exp(F τ), shape (T, m).
 
-    F, the `flow`, moves a state with its load and the load's increment, 2n + 2 numbers; `states`
-    are those at the beginning of each substep.
+    F, the `flow`, moves a state with four numbers of its load, 2n + 4 in all; `states` are those at
+    the beginning of each substep.
     """
-    series = [np.hstack([rows, np.zeros((len(rows), 2))])]
+    series = [np.hstack([rows, np.zeros((len(rows), 4))])]
     for i in range(1, degree + 1):
         series.append(series[-1] @ flow / i)
     terms, out = np.concatenate(series), []

@@ -14,6 +14,7 @@ from alphacut.frame.envelope import Envelope
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import FailedError
+from alphacut.fuzzy.result import Nature
 
 OPTIMA = 64
 """Points at which bounds are reached that are looked at besides, at most."""
@@ -24,10 +25,8 @@ DIVERGED = 10.0
 REFERENCES = 32
 """Points at peaks that are compared with a reference motion, at most."""
 COARSE = 0.02
-"""Error at such a point, as a share of the output's peak, from which on a step is refused: bounds
-are then attained by other motions than those they name. A tenth of it is enough."""
-FINEST = 64
-"""Most parts of a step that are tried to find a step which would do."""
+"""Error at such a point, as a fraction of the output's peak, from which on a step is refused:
+bounds are then attained by other motions than those they name."""
 CHUNK = 16
 """Trajectories that are held at once."""
 FLOOR = 0.1
@@ -72,7 +71,8 @@ def with_step_error(bounds: Envelope, flow: UnitFlow, steps: Array) -> Envelope:
     if steps.any():
         basis = (*basis, f"{flow.flow.method} steps of {flow.time[1]:g} s")
     facts = {"step_error": float(steps[:, has_reference_unit].max()), **bounds.facts}
-    facts["estimated_error"] = float((error / flow.scale).max())
+    if bounds.nature is not Nature.ATTAINED:  # else how far other motions go is not known
+        facts["estimated_error"] = float((error / flow.scale).max())
     return replace(bounds, error=error, basis=basis, facts=facts)
 
 
@@ -103,7 +103,7 @@ def _from_reference(bounds: Envelope, flow: LagrangianFlow, points: Array) -> Ar
     """Return the largest distance of trajectories at points (S, d) from reference motions, (T, m).
 
     Raises:
-        StepError: It passes `COARSE` of an output's peak; the message says which step would do.
+        StepError: It passes `COARSE` of an output's peak.
     """
     reference, parameters = ReferenceMotion(flow.system), flow.system.parameters
     truth = np.stack(
@@ -121,27 +121,8 @@ def _from_reference(bounds: Envelope, flow: LagrangianFlow, points: Array) -> Ar
         at = ", ".join(f"{x} = {y:.6g}" for x, y in zip(flow.names, points[worst], strict=True))
         what = f"step: {flow.step:g} s is too coarse where a bound is attained, at {at}: there"
         what += f" {flow.outputs[output]} is off by {error[worst, :, output].max():.3g}"
-        raise StepError(
-            what, _sufficient_step(flow, points[worst : worst + 1], truth[worst : worst + 1])
-        )
+        raise StepError(what, "take a smaller step, a shorter duration or narrower inputs")
     return np.asarray(error.max(0))
-
-
-def _sufficient_step(flow: LagrangianFlow, point: Array, truth: Array) -> str:
-    """Return a cure in words: the largest halved step with an error below COARSE / 10 of the peaks.
-
-    Args:
-        flow: The trajectories by the refused step.
-        point: Parameters, shape (1, d), in SI units.
-        truth: Reference response there, shape (1, T, m).
-    """
-    fine, parts = flow, 1
-    while parts < FINEST:
-        fine, parts = fine.finer()[0], 2 * parts
-        off = np.abs(fine.values(point)[:, ::parts] - truth).max(1)
-        if (off <= COARSE / 10 * np.abs(truth).max(1)).all():
-            return f"a step of {fine.step:g} s would do"
-    return f"no step down to {fine.step:g} s would do; take a shorter duration or narrower inputs"
 
 
 def with_node_deviation(bounds: Envelope, flow: UnitFlow) -> Envelope:

@@ -21,16 +21,14 @@ def angle(parameters, time):
     return solve_ivp(right, (0, time[-1]), start, t_eval=time, **accuracy).y[0]
 
 
-def test_a_step_too_coarse_near_the_upright_is_refused_and_a_finer_one_named():
+def test_a_step_too_coarse_near_the_upright_is_refused_and_a_finer_one_taken():
     near_upright, inputs = pendulum(phi0=3.0, damping=0.01), {"omega_0": Interval(0.4435, 0.4445)}
     motion = {"duration": 5.0, "alpha": (0,), "method": Sampled(32), "progress": False}
     with pytest.raises(
-        StepError, match=r"too coarse where a bound is attained, at omega_0 = "
-    ) as e:
+        StepError, match=r"too coarse where a bound is attained, at omega_0 = .*smaller step"
+    ):
         envelope(near_upright, inputs, step=0.05, **motion)
-    (finer,) = [float(x) for x in e.value.cure.split() if x.replace(".", "").isdigit()]
-    assert 0 < finer < 0.05
-    assert envelope(near_upright, inputs, step=finer, **motion).error.max() > 0
+    assert envelope(near_upright, inputs, step=0.00625, **motion).error.max() > 0
 
 
 @pytest.mark.parametrize("low", [2.6, 2.9])
