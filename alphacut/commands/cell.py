@@ -8,15 +8,25 @@ from pathlib import Path
 from typing import TextIO
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from alphacut.case.cell import CellContent
 from alphacut.commands.options import Command, add_common, read_cell, write_answer
-from alphacut.fuzzy.refused import FailedError, require
 from alphacut.io.arrays import text_table
 from alphacut.io.files import Document, ranks
+from alphacut.io.provenance import versions
+from alphacut.rve.cell.cell import STRAIN
+from alphacut.rve.result.engineering_constants import NAMES, engineering_constants
 from alphacut.rve.result.result import HomogenisedStiffness
-from alphacut.stages import cell
-from alphacut.stages.cell import ISOTROPIC, constant_label
+from alphacut.rve.series.fibre_constants import fibre_constants
+from alphacut.rve.spheres.result import HomogenisedSpheres, hill_average
+from alphacut.stages.cell import (
+    GPA,
+    ISOTROPIC,
+    CellProblem,
+    constant_label,
+    require_bounds,
+    require_tolerance,
+)
 
 KEYS = {
     "--a2": ("radius.a2", "slope of the radius at the lower end of θ"),
@@ -25,6 +35,8 @@ KEYS = {
     "--method": ("modulus.method", "prism, slices, series or auto"),
 }
 """Options that change a key of the case, each with its key and help."""
+PLANE_INDICES = "126"
+"""Of Voigt: 11, 22 and 12."""
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -36,117 +48,148 @@ def arguments(parser: argparse.ArgumentParser) -> None:
             option, dest="set", action="append", type=as_change, metavar="VALUE", help=about
         )
     parser.add_argument(
-        "--cross-check",
-        metavar="METHOD",
-        help="solve by a second method; fail if E differs by more than modulus.tolerance",
-    )
-    parser.add_argument(
         "--export", metavar="FILE", help="mesh, displacements, stresses: .msh, .vtu, .xdmf, .inp"
     )
 
 
 def run(options: argparse.Namespace, out: TextIO) -> int:
-    """Solves the cell at the modal values, checks and writes its result; returns exit status 0."""
+    """Solves the cell at the nominal values, checks and writes its result; exit status 0."""
     content = read_cell(options)
-    radius, phases = content.random_cell
-    elements = {"petsc": options.petsc, "parallel": ranks() > 1, "estimate": True}
-    model = cell.model_of(phases, content.mesh, content.modulus, **elements)
-    result = cell.solve(radius, phases, model)
-    cell.require_tolerance(result.error, content.modulus.tolerance)
-    references = cell.references(radius, phases, content.stated_fraction)
+    problem = CellProblem.of(content)
+    problem.require_mesh()
+    result = problem.solve(petsc=options.petsc, parallel=ranks() > 1, estimate=True)
+    require_tolerance(result.error, content.modulus.tolerance)
+    references = problem.references()
     if result.has_isotropic_constants:
-        cell.require_bounds((result.modulus, result.modulus), references, phases.particles)
-    document = {**cell.document(result), "references": references}
-    if options.cross_check:
-        method, methods = options.cross_check, {*phases.methods} - {"auto", result.method}
-        allowed = ", ".join(sorted(methods))
-        require(method in methods, "--cross-check", value=method, allowed=allowed)
-        modulus = content.modulus.model_copy(update={"method": method})
-        second = cell.solve(radius, phases, cell.model_of(phases, content.mesh, modulus))
-        document["difference"] = difference(result, second, content.modulus.tolerance or 1e-4)
+        require_bounds((result.modulus, result.modulus), references, problem.cell.particles)
+    document = {**document_of(result), "references": references}
     if options.export:
-        document["export"] = export(content, Path(options.export))
-    write_answer(options, document, out, summary(result, document))
+        document["export"] = export(problem, Path(options.export))
+    write_answer(options, document, out, summary(document, result.convention))
     return 0
 
 
-def difference(
-    first: HomogenisedStiffness, second: HomogenisedStiffness, tolerance: float
-) -> float:
-    """Relative difference of E between the results of two methods; above the tolerance it fails."""
-    gap = abs(first.modulus / second.modulus - 1)
-    if not gap <= tolerance:
-        values = (f"{x.method} gives E = {x.modulus:.10g} Pa" for x in (first, second))
-        raise FailedError(
-            f"{' and '.join(values)}: {gap:.2e} apart, {tolerance:.2e} is allowed",
-            "refine the coarser of the two or allow more",
-        )
-    return gap
-
-
-def export(content: CellContent, path: Path) -> Document:
+def export(problem: CellProblem, path: Path) -> Document:
     """Writes the mesh with displacements and stresses; returns the file and its number of nodes."""
     from alphacut.export.cell_files import write_cell
     from alphacut.rve.prism.fields import cell_fields, mesh_fields
     from alphacut.rve.prism.model import PrismModel
     from alphacut.rve.prism.own_mesh import MeshModel
 
-    mesh = content.mesh
+    mesh, nominal = problem.mesh, problem.nominal
     if mesh.file is not None:
-        sample = cell.modal_sample(*content.law_and_phases)
-        fields = mesh_fields(MeshModel(mesh.file), sample.law, sample.phases)
+        fields = mesh_fields(MeshModel(mesh.file), problem.radius.law, nominal)
     else:
-        modal = cell.modal_cell(*content.radius_and_phases)
-        model = PrismModel(mesh.size, mesh.layers, outline=modal.outline)
-        fields = cell_fields(model, modal.radius, modal.matrix, modal.inclusion, modal.interphase)
+        model = PrismModel(mesh.size, mesh.layers, outline=nominal.outline)
+        phases = nominal.matrix, nominal.inclusion, nominal.interphase
+        fields = cell_fields(model, nominal.radius, *phases)
     return {"file": str(path), "nodes": write_cell(fields, path)}
 
 
-def summary(result: HomogenisedStiffness, document: Document) -> str:
+def document_of(result: HomogenisedStiffness) -> Document:
+    """The result of a cell as a JSON document; moduli and stresses in GPa, errors beside them."""
+    curve, is_isotropic = result.curve, result.has_isotropic_constants
+    errors = result.stiffness_errors if result.errors else None
+    return {
+        "E_GPa": result.modulus / GPA if is_isotropic else None,
+        "nu": result.poisson if is_isotropic else None,
+        "stress_GPa": _stresses(curve.mean),
+        "fibres": fibres(result),
+        "stiffness_GPa": None if result.stiffness is None else result.stiffness / GPA,
+        "stiffness_error_GPa": None if errors is None else errors / GPA,
+        "plane": {
+            definition: dict(map(_constant, NAMES, constants.values, constants.errors))
+            for definition, constants in engineering_constants(result).items()
+        },
+        "curve": {
+            "theta": curve.theta,
+            "weights": curve.weights,
+            "s11": curve.s11 / GPA,
+            "s12": curve.s12 / GPA,
+        },
+        "unknowns": result.unknowns,
+        "iterations": list(result.iterations),
+        "seconds": dict(result.seconds),
+        "method": result.method,
+        "solver": result.solver,
+        "error": dict(result.error),
+        "declared_error": declared_errors(result),
+        "checks": dict(result.checks),
+        "versions": versions(),
+    }
+
+
+def fibres(result: HomogenisedStiffness) -> Document:
+    """Constants of fibres with their declared errors, moduli in GPa; empty for other particles."""
+    cell = result.cell
+    if isinstance(result, HomogenisedSpheres) or cell is None or not cell.square or cell.interphase:
+        return {}
+    constants = fibre_constants(result)
+    return dict(_constant(x, value, constants.errors[x]) for x, value in constants.values.items())
+
+
+def _constant(name: str, value: float, error: float) -> tuple[str, Document]:
+    """Key and entry of a constant: a modulus in GPa, a ratio as it is; error None if unknown."""
+    key, unit = (name, 1.0) if name.startswith("nu") else (f"{name}_GPa", GPA)
+    return key, {"value": value / unit, "error": None if np.isnan(error) else error / unit}
+
+
+def _stresses(values: ArrayLike) -> Document:
+    """Mean stresses in GPa by name, from those in Pa."""
+    return dict(zip(("s11", "s12"), np.asarray(values) / GPA, strict=True))
+
+
+def declared_errors(result: HomogenisedStiffness) -> Document | None:
+    """Declared absolute errors of E, ν and the mean stresses; None where there are none."""
+    if not result.errors:
+        return None
+    if isinstance(result, HomogenisedSpheres):
+        modulus, nu = result.error_of(hill_average)
+        # σ11 under ε11 = ε22 and σ12 under ε12, from the moduli m = K, (C11 − C12)/2 and C44
+        stresses = result.error_of(lambda m: STRAIN * np.array([2 * m[0] + 2 / 3 * m[1], 2 * m[2]]))
+    else:
+        modulus, nu = result.estimated_error * result.modulus, result.poisson_error
+        stresses = np.abs(result.curve.mean) * result.modulus_errors[[0, 2]]
+    return {"E_GPa": modulus / GPA, "nu": nu, "stress_GPa": _stresses(stresses)}
+
+
+def summary(document: Document, convention: str) -> str:
     """The result as a table, each number with its declared error."""
-    errors, stress = document["declared_error"], document["stress_GPa"]
-    error_texts = ["not declared"] * 4
-    if errors is not None:
-        values = (errors["E_GPa"], errors["nu"], *errors["stress_GPa"].values())
-        error_texts = [f"{value:.1e}" for value in values]
-    names = ("E, GPa", "ν", "mean σ11, GPa", "mean σ12, GPa")
-    value_texts = ["none: 2 G_T > 3 (C11 + C12)"] * 2
-    if result.has_isotropic_constants:
-        value_texts = [f"{document['E_GPa']:#.8g}", f"{document['nu']:.6f}"]
-    value_texts += [f"{stress['s11']:#.9g}", f"{stress['s12']:#.9g}"]
-    rows = [*zip(names, value_texts, error_texts, strict=True)]
-    for key, number in document["fibres"].items():
-        rows.append((constant_label(key), *_value_and_error(number)))
-    rows += plane_rows(document)
+    rows = [
+        (label, value, "not declared" if error is None else f"{error:.1e}")
+        for label, value, error in table_rows(document)
+    ]
     if bounds := document["references"].get("hashin_shtrikman_E_GPa"):
         rows.append((f"{ISOTROPIC}, GPa", f"{bounds[0]:.4f} … {bounds[1]:.4f}", ""))
-    if "difference" in document:
-        rows.append(("difference of both methods", f"{document['difference']:.1e}", ""))
-    iterations = ", ".join(map(str, result.iterations))
-    solver = f", {result.solver}, iterations {iterations}" if iterations else ""
-    table = text_table((result.convention, "value", "± error"), rows)
-    return f"{table}{result.method}, {result.unknowns} unknowns{solver}\n"
+    iterations = ", ".join(map(str, document["iterations"]))
+    solver = f", {document['solver']}, iterations {iterations}" if iterations else ""
+    table = text_table((convention, "value", "± error"), rows)
+    return f"{table}{document['method']}, {document['unknowns']} unknowns{solver}\n"
 
 
-def plane_rows(document: Document) -> Iterator[tuple[str, str, str]]:
-    """Rows (name, value, error) of the plane stiffness C_ij and of the constants along x and y."""
-    stiffness, errors = document["stiffness_GPa"], document["stiffness_error_GPa"]
+def table_rows(document: Document) -> Iterator[tuple[str, str, float | None]]:
+    """Yields (label, value, error) of E, ν, mean stresses, constants of fibres and of the plane."""
+    errors = document["declared_error"] or {"stress_GPa": {}}
+    for key, digits in (("E_GPa", "#.8g"), ("nu", ".6f")):
+        number, none = document[key], "none: 2 G_T > 3 (C11 + C12)"
+        text = none if number is None else f"{number:{digits}}"
+        yield constant_label(key), text, errors.get(key)
+    for key, stress in document["stress_GPa"].items():
+        yield f"mean {key.replace('s', 'σ')}, GPa", f"{stress:#.9g}", errors["stress_GPa"].get(key)
+    for key, number in document["fibres"].items():
+        yield constant_label(key), f"{number['value']:.6g}", number["error"]
     if not document["plane"]:
         return
+    stiffness, stiffness_errors = document["stiffness_GPa"], document["stiffness_error_GPa"]
     for i, j in zip(*np.triu_indices(3), strict=True):
-        error = "not declared" if errors is None else f"{errors[i, j]:.1e}"
-        yield f"C{PLANE_INDICES[i]}{PLANE_INDICES[j]}, GPa", f"{stiffness[i, j]:.6g}", error
+        error = None if stiffness_errors is None else stiffness_errors[i, j]
+        label = f"C{PLANE_INDICES[i]}{PLANE_INDICES[j]}, GPa"
+        yield label, f"{stiffness[i, j]:.6g}", error
     for definition, constants in document["plane"].items():
         for key, number in constants.items():
-            yield f"{constant_label(key)} ({definition})", *_value_and_error(number)
+            label = f"{constant_label(key)} ({definition})"
+            yield label, f"{number['value']:.6g}", number["error"]
 
 
-def _value_and_error(number: Document) -> tuple[str, str]:
-    """A constant and its declared error, for people."""
-    error = number["error"]
-    return f"{number['value']:.6g}", "not declared" if error is None else f"{error:.1e}"
-
-
-PLANE_INDICES = "126"  # of Voigt: 11, 22 and 12
 ABOUT = "effective modulus and stresses of the cell at the modal values"
 COMMANDS = dict.fromkeys(("cell", "solve"), Command(ABOUT, arguments, run))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from math import pi
 from typing import TextIO
 
@@ -19,7 +20,7 @@ from alphacut.frame.structures.linear import frequencies
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal, Triangular
 from alphacut.io.arrays import text_table
 from alphacut.io.quantity import STANDARD_GRAVITY, engineering
-from alphacut.stages.cell import model_of, solve
+from alphacut.stages.cell import CellProblem
 from alphacut.stages.image import image_study
 from alphacut.stages.suite import SuiteRecord, suite_records, suite_warnings
 
@@ -88,8 +89,8 @@ def nominal_structure(content: Content) -> StoreyFrame | MatrixStructure | None:
     if content.radius_map is None and content.particle_cell.fraction is None:
         return None
     section = content.modulus.model_copy(update={"method": "auto", "tolerance": 1e-4})
-    model = model_of(content.particle_cell, content.mesh, section)
-    return content.structure_of(Crisp(solve(*content.radius_and_phases, model).modulus)).linear
+    result = replace(CellProblem.of(content), modulus=section).solve()
+    return content.structure_of(Crisp(result.modulus)).linear
 
 
 def rows_of(prefix: str, section: Section) -> Iterator[Row]:

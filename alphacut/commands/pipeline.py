@@ -16,6 +16,7 @@ from alphacut import frame
 from alphacut.case.content import Case, Content, load
 from alphacut.case.limits import QuestionSection
 from alphacut.case.loads import RecordsSection
+from alphacut.case.radius import ThetaSection
 from alphacut.case.structure import Structure
 from alphacut.commands.options import require_case_petsc
 from alphacut.frame.questions.peaks import Peaks, output_of
@@ -126,7 +127,7 @@ class Pipeline:
     @property
     def campaign(self) -> CellCampaign:
         """Samples of a round cell."""
-        return campaign_of(self.content, self.petsc)
+        return CellCampaign.of(self.content, petsc=self.petsc)
 
     def compute_modulus(self) -> None:
         """Computes stage modulus, of an image or of samples of a cell, and checks its errors."""
@@ -135,6 +136,7 @@ class Pipeline:
             stage = image.stage(self.content.image_cell, section.alpha, section.average)
             results.image = self.store.take(stage)
             return
+        self.campaign.require_mesh()  # once, not by each sample
         results.modulus = result = self.store.take(campaign.stage(self.campaign))
         cell.require_tolerance(result.numbers.error, section.tolerance)
         young = result.arrays["E"].transpose("alpha", "bound").values[-1]
@@ -255,12 +257,6 @@ def response_of(
     return FuzzyResponse(structure, task.fuzzy, alpha, task.duration, step, peaks)
 
 
-def campaign_of(content: Content, petsc: Mapping[str, str] | None = None) -> CellCampaign:
-    """Samples of a cell that is no image, by a solver with options of PETSc."""
-    sections = *content.random_cell, content.mesh, content.modulus
-    return CellCampaign(*sections, petsc or {}, content.stated_fraction)
-
-
 def require_runnable(content: Content) -> None:
     """Reads and builds all that the stages of a case need, so that `check` refuses it too."""
     stages = content.stages
@@ -278,14 +274,14 @@ def _require_material(content: Content) -> None:
     """Requires a mesh, an image or a model of the cell that stage modulus can use."""
     if "envelope" in content.stages and not content.has_stated_modulus:
         require_levels(content.modulus.alpha, "modulus.alpha")
-    if content.mesh_cell is not None:
-        cell.require_mesh(content.mesh, *content.law_and_phases)
     if content.image_cell is not None:
         image.image_study(content.image_cell)
     elif "microstructure" not in content.stages:
-        _ = campaign_of(content).propagation  # builds the model and the plan
-    elif content.particle_cell is not None:
-        cell.model_of(content.particle_cell, content.mesh, content.modulus)
+        campaign = CellCampaign.of(content)
+        campaign.require_mesh()
+        _ = campaign.propagation  # builds the model and the plan
+    elif (particle := content.particle_cell) is not None:  # whose radius is not known yet
+        CellCampaign(ThetaSection(), particle, content.mesh, content.modulus).model()
 
 
 def _require_motion(content: Content) -> None:
@@ -312,7 +308,7 @@ def _with_stand_ins(content: Content, structure: Structure) -> Structure:
     numbers, is_crisp = dict(structure.numbers), content.modulus.alpha == (1.0,)
     is_fuzzy = content.image_cell is not None or "microstructure" in content.stages
     if not is_fuzzy:
-        inputs = campaign_of(content).inputs.values()
+        inputs = CellCampaign.of(content).inputs.values()
         is_fuzzy = any(number.support.width > 0 for number in inputs)
     if "E" in numbers:
         numbers["E"] = _stand_in(numbers["E"], 0.01 if is_fuzzy and not is_crisp else 0.0)

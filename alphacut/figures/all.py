@@ -14,7 +14,7 @@ from alphacut.figures import answers, envelope, follower, frame, material, overv
 from alphacut.fuzzy import FuzzyNumber, PiecewiseLinear
 from alphacut.fuzzy.campaign.workers import submit
 from alphacut.io.provenance import NESTED, version_of
-from alphacut.stages.cell import GPA, modal_cell
+from alphacut.stages.cell import GPA, CellProblem
 from alphacut.stages.identify import IdentifiedResult
 from alphacut.stages.results import Results
 from alphacut.stages.store import Computed, Stage, StageContext, StageStore
@@ -45,7 +45,7 @@ def _material_figures(results: Results) -> Iterator[Drawing]:
     """Figures of the radius map, the modulus, the stresses and the image, by name."""
     content, radius_map = results.content, results.content.radius_map
     if results.is_paper and content.modulus.method == "prism":
-        cell, mesh = modal_cell(*content.radius_and_phases), content.mesh
+        cell, mesh = CellProblem.of(content).nominal, content.mesh
         yield "fig01-domains", partial(overview.domains, cell, mesh.size, mesh.layers)
     if radius_map is not None and results.microstructure is None:  # which draws its own p-box
         yield "fig13-p-box", partial(material.p_box, radius_map)
@@ -144,5 +144,5 @@ def _submit_mesh(
     if results.modulus is None or not prisms:
         return {}
     name = f"figures/{file_stem('fig15-prism-mesh', results)}.png"
-    cell = modal_cell(*results.content.radius_and_phases)
+    cell = CellProblem.of(results.content).nominal
     return {name: submit(executor, draw_mesh, cell, results.content.mesh, folder / name)}

@@ -8,8 +8,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from alphacut.case.material import Mesh, MeshedCell, ModulusSection
-from alphacut.case.radius import AnyRadius, ThetaSection
+from alphacut.case.material import MeshedCell
 from alphacut.fuzzy import Extended, FuzzyNumber, General, Knowledge, Reduced, Signed, propagate
 from alphacut.fuzzy.arrays import Array, on_one_blas_thread
 from alphacut.fuzzy.plans.design import Plan
@@ -21,19 +20,7 @@ from alphacut.rve.result.loss_factors import CONSTANTS
 from alphacut.rve.result.result import HomogenisedStiffness
 from alphacut.rve.series.fibre_constants import fibre_constants
 from alphacut.rve.series.model import SeriesModel
-from alphacut.stages.cell import (
-    GPA,
-    SPHERE_TOLERANCE,
-    AnyCell,
-    Solve,
-    average_name,
-    cell_at,
-    inputs_of,
-    model_of,
-    references,
-    require_isotropic,
-    solve,
-)
+from alphacut.stages.cell import GPA, SPHERE_TOLERANCE, CellProblem, Solve, require_isotropic
 from alphacut.stages.losses import LossCuts, LossResult, loss_bounds
 from alphacut.stages.modulus import (
     FIBRES,
@@ -71,22 +58,21 @@ class CellTask:
     """
 
     model: Solve
-    radius: AnyRadius | ThetaSection
-    cell: AnyCell
+    problem: CellProblem
     crisp: Mapping[str, float]
     losses: LossCuts | None = None
 
     @on_one_blas_thread
     def __call__(self, points: Sequence[Mapping[str, float]]) -> list[dict[str, float | Array]]:
         """Outputs of the cell at each point of the fuzzy inputs, by name, in SI."""
-        cells = [cell_at({**self.crisp, **point}, self.radius, self.cell) for point in points]
+        cells = [self.problem.at({**self.crisp, **point}) for point in points]
         return [self._outputs(result) for result in self.model(cells)]
 
     def _outputs(self, result: HomogenisedStiffness) -> dict[str, float | Array]:
         """Outputs of a cell by name, in SI; the stress curve has shape (CURVE_POINTS,)."""
         require_isotropic(result)
         curve = result.curve
-        fibres = fibre_constants(result).values if self.cell.is_fibre else {}
+        fibres = fibre_constants(result).values if self.problem.cell.is_fibre else {}
         losses = {} if self.losses is None else loss_outputs(result, self.losses)
         return {
             "E": result.modulus,
@@ -95,50 +81,49 @@ class CellTask:
             **{name: fibres[name] for name in FIBRES if name in fibres},
             **plane_outputs(result),
             "systems": len(result.iterations),
-            "curve11": between_nodes(curve.theta, curve.s11, theta_of(self.radius)),
+            "curve11": between_nodes(curve.theta, curve.s11, curve_theta(self.problem)),
             **{f"error:{name}": result.error.get(name, 0.0) for name in ("space", "theta")},
             **{f"check:{name}": value for name, value in result.checks.items()},
             **losses,
         }
 
 
-def theta_of(radius: AnyRadius | ThetaSection) -> Array:
+def curve_theta(problem: CellProblem) -> Array:
     """The θ at which stress curves are stored, shape (CURVE_POINTS,)."""
-    return np.asarray(np.linspace(*radius.theta, CURVE_POINTS))
+    return np.asarray(np.linspace(*problem.radius.theta, CURVE_POINTS))
 
 
 @dataclass(frozen=True)
-class CellCampaign:
+class CellCampaign(CellProblem):
     """Samples that the sections of a case ask for, by a solver with PETSc's options."""
 
-    radius: AnyRadius | ThetaSection
-    cell: AnyCell
-    mesh: Mesh
-    modulus: ModulusSection
     petsc: Mapping[str, str] = field(default_factory=dict)
-    stated_fraction: float | None = None
 
     @cached_property
     def inputs(self) -> dict[str, FuzzyNumber]:
         """Fuzzy inputs by name, in SI; one crisp modulus where none is fuzzy."""
-        numbers = inputs_of(self.radius, self.cell)
+        numbers = self.numbers
         names = ("inclusion_modulus", "matrix_modulus", *numbers)
         stand_in = next(name for name in names if name in numbers)
         fuzzy = {name: number for name, number in numbers.items() if number.support.width > 0}
         return fuzzy or {stand_in: numbers[stand_in]}
 
-    def model(self, *, estimate: bool = False) -> Solve:
+    def campaign_model(self, *, estimate: bool = False) -> Solve:
         """The function that solves cells; with `estimate`, prisms declare errors at extra cost."""
         support, modulus = None, self.cell.constants.get("inclusion_modulus")
         if modulus is not None:
             support = (modulus.support.lower, modulus.support.upper)
-        options = {"estimate": estimate, "moduli": support, "petsc": self.petsc}
-        return model_of(self.cell, self.mesh, self.modulus, **options)
+        return self.model(estimate=estimate, moduli=support, petsc=self.petsc)
+
+    @cached_property
+    def nominal_estimate(self) -> HomogenisedStiffness:
+        """The cell at the nominal values of its inputs, with declared errors."""
+        return self.campaign_model(estimate=True)([self.nominal])[0]
 
     @property
     def identity(self) -> Document:
         """All but the fuzzy inputs that the outputs of a sample depend on: the key of its store."""
-        crisp = {name: repr(x) for name, x in inputs_of(self.radius, self.cell).items()}
+        crisp = {name: repr(x) for name, x in self.numbers.items()}
         sections = {
             "modulus": self.modulus.model_dump(exclude={"plan", "alpha"}),
             "mesh": self.mesh.model_dump(exclude={"file"}),
@@ -161,9 +146,9 @@ class CellCampaign:
     @property
     def task(self) -> CellTask:
         """The function from points of the fuzzy inputs to all outputs."""
-        numbers = inputs_of(self.radius, self.cell)
-        crisp = {name: x.modal for name, x in numbers.items() if name not in self.inputs}
-        return CellTask(self.model(), self.radius, self.cell, crisp, self.losses)
+        crisp = {name: x.modal for name, x in self.numbers.items() if name not in self.inputs}
+        problem = CellProblem(self.radius, self.cell, self.mesh, self.modulus)
+        return CellTask(self.campaign_model(), problem, crisp, self.losses)
 
     def run(self, context: StageContext) -> Computed[ModulusResult]:
         """Computes all samples and the α-cuts; stored samples of an interrupted run are taken."""
@@ -178,7 +163,7 @@ class CellCampaign:
         )
         self.require_consistent(result)
         losses = loss_cuts(result) if self.losses else {}
-        data = dataset(result, theta_of(self.radius), losses)
+        data = dataset(result, curve_theta(self), losses)
         return Computed(self._numbers(result, losses), data)
 
     def _numbers(self, result: Bounds, losses: Mapping[str, Array]) -> ModulusResult:
@@ -198,10 +183,10 @@ class CellCampaign:
             seconds=result.seconds,
             nature=Nature.ATTAINED if is_own_mesh else result.nature_of("E"),
             particles=self.cell.particles,
-            average=average_name(self.cell, self.modulus),
+            average=self.average_name,
             error=self.errors(result),
             checks=largest(result, "check"),
-            references=references(self.radius, self.cell, self.stated_fraction),
+            references=self.references(),
             loss=LossResult.of(losses, errors, Nature.ATTAINED) if losses else None,
         )
 
@@ -273,17 +258,17 @@ class CellCampaign:
         if isinstance(self.cell, MeshedCell):
             return {}
         if self.modulus.method == "prism":
-            reference = solve(self.radius, self.cell, self.model(estimate=True))
-            return dict(zip(CONSTANTS, loss_bounds(reference, self.losses)[1], strict=True))
-        largest = result.samples.values.output("loss_error").max(axis=0)
-        return dict(zip(CONSTANTS, map(float, largest), strict=True))
+            errors = loss_bounds(self.nominal_estimate, self.losses)[1]
+            return dict(zip(CONSTANTS, errors, strict=True))
+        largest_errors = result.samples.values.output("loss_error").max(axis=0)
+        return dict(zip(CONSTANTS, map(float, largest_errors), strict=True))
 
     def errors(self, result: Bounds) -> dict[str, float]:
         """Relative error of E by source: the largest of all samples, or that of the modal one."""
         errors = {name: error for name, error in largest(result, "error").items() if error}
         if errors or self.modulus.method != "prism" or isinstance(self.cell, MeshedCell):
             return errors
-        return dict(solve(self.radius, self.cell, self.model(estimate=True)).error)
+        return dict(self.nominal_estimate.error)
 
 
 def loss_outputs(result: HomogenisedStiffness, cuts: LossCuts) -> dict[str, Array]:

@@ -66,8 +66,6 @@ def test_a_cell_is_solved_at_its_modal_values(tmp_path, capfd):
     status, out, _ = spoken(capfd, "cell", case, "--json", "-", "--set", "modulus.tolerance=1e-3")
     assert status == 0
     assert json.loads(out)["E_GPa"] > 20
-    assert spoken(capfd, "cell", case, "--cross-check", "series")[0] == 2
-    assert spoken(capfd, "cell", case, "--cross-check", "magic")[0] == 2
 
 
 def test_e_is_the_isotropic_average_unless_the_axes_are_named(tmp_path, capfd):

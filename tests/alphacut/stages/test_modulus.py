@@ -5,10 +5,9 @@ from dataclasses import replace
 import pytest
 
 from alphacut.case.content import load
-from alphacut.commands.pipeline import campaign_of
 from alphacut.fuzzy.refused import FailedError
 from alphacut.fuzzy.result import Nature
-from alphacut.stages.campaign import PLANS
+from alphacut.stages.campaign import PLANS, CellCampaign
 from tests.alphacut.small import CELL, written
 
 MODELS = {
@@ -25,7 +24,7 @@ def test_cuts_agree_with_a_coarser_model_and_narrower_ones_do_not(tmp_path, mode
     if model == "slices":
         pytest.importorskip("dolfinx")
     changes = ("modulus.plan=signed", "cell.inclusion_poisson=0.3", *MODELS[model])
-    campaign = campaign_of(load(written(tmp_path, CELL), changes).content)
+    campaign = CellCampaign.of(load(written(tmp_path, CELL), changes).content)
     cuts = campaign.propagation(
         campaign.inputs, PLANS["signed"], knowledge=campaign.knowledge, progress=False
     )

@@ -1,5 +1,6 @@
 """Spheres of a stated fraction: E inside the bounds of what the case says, or refused."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 from alphacut.case.content import load
 from alphacut.case.microstructure import PackingSection
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.stages.cell import model_of, references, require_bounds, solve
+from alphacut.stages.cell import CellProblem, require_bounds
 from tests.alphacut.case.test_load import fraction_case
 
 
@@ -20,12 +21,10 @@ def case(folder: Path, fraction: float):
 
 @pytest.mark.parametrize("fraction", [0.1, 0.3, 0.4, 0.5])
 def test_spheres_of_one_size_hold_the_fraction_and_lie_within_its_bounds(tmp_path, fraction):
-    content = case(tmp_path, fraction)
-    radius, cell = content.radius_and_phases
-    result = solve(radius, cell, model_of(cell, content.mesh, content.modulus))
-    bounds = references(radius, cell, content.stated_fraction)
+    problem = CellProblem.of(case(tmp_path, fraction))
+    modulus, bounds = problem.solve().modulus, problem.references()
     assert bounds["fraction"] == pytest.approx(fraction, rel=1e-12)
-    require_bounds((result.modulus, result.modulus), bounds, cell.particles)
+    require_bounds((modulus, modulus), bounds, problem.cell.particles)
 
 
 @pytest.mark.parametrize(
@@ -35,8 +34,8 @@ def test_a_modulus_outside_the_bounds_of_the_stated_fraction_is_refused(
     tmp_path, fraction, low, modulus
 ):
     """Both moduli are those of maps that had lost a fifth of the spheres."""
-    radius, cell = case(tmp_path, 0.3).radius_and_phases
-    bounds = references(radius, cell, fraction)
+    problem = replace(CellProblem.of(case(tmp_path, 0.3)), stated_fraction=fraction)
+    bounds = problem.references()
     ends = np.array(bounds["hashin_shtrikman_E_GPa"])
     assert ends[0] == pytest.approx(low, rel=1e-7)
     with pytest.raises(RefusedError, match=f"E of spheres is .*set cell.fraction = {fraction:g}"):
