@@ -55,9 +55,7 @@ inclusion_modulus = [
 
 def test_an_ellipse_of_any_stiffness_is_a_case(tmp_path):
     (tmp_path / "case.toml").write_text(CELL.replace("ANGLE", "0"), encoding="utf-8")
-    result = json.loads(
-        alphacut("cell", tmp_path / "case.toml", "--set=mesh.size=0.6", *JSON[1:])
-    )
+    result = json.loads(alphacut("cell", tmp_path / "case.toml", "--set=mesh.size=0.6", *JSON[1:]))
     assert (result["method"], result["fibres"]) == ("slices", {})
     assert list(result["references"]) == ["fraction"]
 
