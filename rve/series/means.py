@@ -90,6 +90,7 @@ class Series:
         voigt: Stiffness from the three moduli.
         steps: Numbers of terms to try, rising.
         decay: d in: error ~ exp(−d · terms · arccosh(1/r)).
+        start: Part of the terms by this decay to begin with; mild contrasts need fewer than all.
         unknowns: Of one linear system with so many terms.
         safety: Factor of the estimated error.
         round_off: Relative, of a modulus.
@@ -102,6 +103,7 @@ class Series:
     voigt: Callable[[Array, Array, Array], Array]
     steps: tuple[int, ...]
     decay: float
+    start: float
     unknowns: Callable[[int], int]
     safety: float
     round_off: float
@@ -139,34 +141,37 @@ class Series:
             raise RefusedError("radius", worst, "values in [0, 1) halves of the cell's side")
         steps, shape = np.array(self.steps), (radius.size, len(inclusions))
         moduli, errors = np.zeros((*shape, 3)), np.full((*shape, 3), np.inf)
-        terms, unsolved = np.zeros(shape, int), np.arange(radius.size)
-        rate = self.decay * np.arccosh(1 / np.maximum(radius, 1e-3))
-        step_index = np.searchsorted(steps, np.log(1 / tolerance) / rate)
-        step_index = np.minimum(step_index, steps.size - 1)
-        while unsolved.size:
-            for step in np.unique(step_index[unsolved]):
-                cells, count = unsolved[step_index[unsolved] == step], int(steps[step])
-                # results do not depend on which inclusions are solved together
-                is_open = errors[cells].max(axis=2) > tolerance
+        terms, is_open = np.zeros(shape, int), np.full(shape, True)
+        rate = np.empty(shape)
+        rate[:] = self.decay * np.arccosh(1 / np.maximum(radius, 1e-3))[:, None]
+        # from exp(−4) on, half more terms leave under a seventh of the error to tell
+        first = np.searchsorted(steps, np.maximum(4, np.log(1 / tolerance) * self.start) / rate)
+        step_index = np.minimum(first, steps.size - 1)
+        while is_open.any():
+            for step in np.unique(step_index[is_open]):
+                # a pair of radius and inclusion has its number of terms, whatever the others need
+                chosen, count = is_open & (step_index == step), int(steps[step])
+                rows, columns = (np.flatnonzero(chosen.any(axis=axis)) for axis in (1, 0))
+                materials = [matrix, *(inclusions[column] for column in columns)]
                 coarse, finer, finest = (
-                    self.solve(radius[cells], [matrix, *inclusions], n)
-                    for n in (count, *_error_terms(count))
+                    self.solve(radius[rows], materials, n) for n in (count, *_error_terms(count))
                 )
-                distance = _largest_distance(coarse, finer, finest)
-                new_errors = self.safety * distance + self.round_off
-                moduli[cells] = np.where(is_open[..., None], coarse, moduli[cells])
-                errors[cells] = np.where(is_open[..., None], new_errors, errors[cells])
-                terms[cells] = np.where(is_open, count, terms[cells])
-            unsolved = unsolved[errors[unsolved].max(axis=(1, 2)) > tolerance]
-            failed = unsolved[step_index[unsolved] == steps.size - 1]
-            if failed.size:
+                i, j = np.nonzero(chosen[np.ix_(rows, columns)])
+                pairs, distance = (rows[i], columns[j]), _largest_distance(coarse, finer, finest)
+                moduli[pairs], terms[pairs] = coarse[i, j], count
+                errors[pairs] = self.safety * distance[i, j] + self.round_off
+            is_open = errors.max(axis=2) > tolerance
+            failed = is_open & (step_index == steps.size - 1)
+            if failed.any():
                 raise SeriesError(
-                    f"the series at r = {radius[failed].max():.6g} reaches a relative error of"
-                    f" {errors[failed].max():.1e} with {self.steps[-1]} {self.terms},"
+                    f"the series at r = {radius[failed.any(axis=1)].max():.6g} reaches a relative"
+                    f" error of {errors[failed].max():.1e} with {self.steps[-1]} {self.terms},"
                     f" {tolerance:.1e} is allowed: {self.particles} nearly touch",
                     "lower the radius or raise the tolerance",
                 )
-            step_index[unsolved] += 1
+            excess = np.log(errors.max(axis=2)[is_open] / tolerance)
+            enough = np.searchsorted(steps, steps[step_index[is_open]] + excess / rate[is_open])
+            step_index[is_open] = np.clip(enough, step_index[is_open] + 1, steps.size - 1)
         return CellModuli(moduli, errors, terms, self.voigt)
 
     def solve(self, radius: Array, materials: Sequence[Material], terms: int) -> Array:

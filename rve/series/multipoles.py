@@ -209,6 +209,7 @@ CIRCLES = Series(
     voigt=square_voigt,
     steps=(3, 4, 5, 6, 8, 10, 12, 16, 24, 32, 48, 64, 96, 128, MOST_HARMONICS),
     decay=8.0,
+    start=1.0,
     unknowns=int,
     safety=1.6,
     round_off=2e-15,

@@ -42,6 +42,7 @@ SPHERES = Series(
     voigt=cubic_voigt,
     steps=(4, 6, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 56, 64),  # reaches 1e-8 at r = 0.985
     decay=2.0,
+    start=1 / 3,  # terms cost their sixth power, so that a first try costs little
     unknowns=unknowns,
     safety=2.0,
     round_off=2e-13,

@@ -139,6 +139,15 @@ def test_a_radius_takes_a_tenth_of_a_second():
     assert np.median(seconds) <= 0.1
 
 
+def test_a_mild_contrast_stops_at_the_tolerance_asked():
+    loose, tight = (
+        cubic_stiffness([0.99], MATRIX, [Phase(80e9)], tolerance=tolerance)
+        for tolerance in (1e-5, 1e-7)
+    )
+    assert loose.terms < 0.75 * tight.terms  # seven times the time
+    assert 1e-7 < loose.errors.max() <= 1e-5
+
+
 @pytest.mark.parametrize("steps", [7, pytest.param(15, marks=pytest.mark.slow)])
 def test_nearly_touching_spheres_are_refused(steps):
     shorter = replace(SPHERES, steps=SPHERES.steps[:steps])
