@@ -4,6 +4,7 @@
 # make bench-solver, make bench-scaling, make charts, make stability    what the methods cost and where they end
 # make coverage    the lines of the five packages that the tests run, and those that they do not
 # make relations   contradictions of problems said otherwise and of cases run otherwise (RELATIONS="--seed 7")
+# make test-wheels    tests of rve, export, report and scenes with the newest wheels of PyPI that pyproject.toml allows
 # make findings    what packages of the field do that one would not guess, run anew (needs the network)
 # make docs, make lint, make pictures    documentation, style and types, the README's picture
 # The environment is made on first use; make clean-env removes it.
@@ -15,7 +16,7 @@ IN = ./enter
 help:
 	@sed -n 's/^# //p' Makefile
 
-.PHONY: help run test quick test-slow coverage lint charts bench-solver bench-scaling stability relations findings docs pictures clean clean-env
+.PHONY: help run test quick test-slow coverage lint charts bench-solver bench-scaling stability relations findings test-wheels docs pictures clean clean-env
 
 run:
 	$(IN) python -m alphacut run $(CASE) --out $(OUT) --workers $(WORKERS) $(if $(FRESH),--fresh)
@@ -57,6 +58,18 @@ stability:
 
 relations:
 	$(IN) python -m benchmarks.relations $(RELATIONS)
+
+WHEELS = build/wheels/bin
+NEEDS = 'import tomllib; project = tomllib.load(open("pyproject.toml", "rb"))["project"]; \
+	print(*project["dependencies"], *sum(project["optional-dependencies"].values(), []), sep="\n")'
+
+test-wheels:
+	$(IN) python -m venv --clear build/wheels
+	$(IN) python -c $(NEEDS) > build/wheels/requirements.txt
+	$(IN) $(WHEELS)/pip install --quiet --requirement build/wheels/requirements.txt pyvista
+	$(IN) $(WHEELS)/pip list
+	$(IN) env PATH=$(CURDIR)/$(WHEELS):/usr/bin:/bin python -m pytest -m "not slow" --timeout 400 $(PYTEST) \
+		tests/rve tests/alphacut/export tests/alphacut/report tests/scenes tests/environment/test_versions.py
 
 findings:
 	@set -e; for finding in findings/*.sh; do echo "$$finding"; $(IN) bash "$$finding"; done

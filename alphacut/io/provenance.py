@@ -47,8 +47,13 @@ def version_of(distribution: str) -> str:
 @cache
 def versions() -> dict[str, str]:
     """Versions of alphacut, Python and of the packages that are installed."""
-    first_versions = {"alphacut": own_version(), "python": platform.python_version()}
-    return first_versions | {name: version for name in PACKAGES if (version := version_of(name))}
+    names = {"alphacut": own_version(), "python": platform.python_version()}
+    names |= {name: version for name in PACKAGES if (version := version_of(name))}
+    if wheel := version_of("dolfinx-solver-real"):  # which holds both without their own metadata
+        import petsc4py
+
+        names |= {"fenics-dolfinx": wheel, "petsc4py": petsc4py.__version__}
+    return names
 
 
 @cache

@@ -2,7 +2,7 @@
 
 import pytest
 
-pytest.importorskip("dolfinx")
+pytest.importorskip("alphacut.rve.fenicsx")
 
 from benchmarks.rve import solvers
 

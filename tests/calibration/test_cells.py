@@ -9,7 +9,7 @@ from tests.calibration.declared import Calibration, free_seed
 @pytest.mark.slow
 @pytest.mark.parametrize(("draw", "cells"), [("round_cell", 30), ("any_cell", 8)])
 def test_declared_errors_of_random_cells_cover(draw, cells):
-    pytest.importorskip("dolfinx")
+    pytest.importorskip("alphacut.rve.fenicsx")
     from benchmarks.rve import random_cells
 
     seed = free_seed(draw)

@@ -21,7 +21,7 @@ def phases(rng):
 
 @pytest.mark.slow
 def test_moduli_lie_between_a_bound_and_finite_elements():
-    pytest.importorskip("dolfinx")
+    pytest.importorskip("alphacut.rve.fenicsx")
     from tests.rve.spheres.octant import Octant
 
     seed = free_seed("spheres")

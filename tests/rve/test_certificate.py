@@ -93,7 +93,7 @@ class TestProductSpace:
     """The same on the finite element model, broken on purpose."""
 
     def solve(self, **options):
-        pytest.importorskip("dolfinx")
+        pytest.importorskip("alphacut.rve.fenicsx")
         from alphacut.rve.prism.model import PrismModel
 
         options = {"mesh_size": 0.4, "layers": 3, "stiffness": True, **options}

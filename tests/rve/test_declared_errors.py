@@ -15,7 +15,7 @@ TIGHT = 1.0, 1.8
 
 def covered(draw, cells, seed):
     """Ratios of declared over true errors of random cells, by quantity; none lies outside."""
-    pytest.importorskip("dolfinx")
+    pytest.importorskip("alphacut.rve.fenicsx")
     from benchmarks.rve import random_cells
 
     ratios = {}
@@ -34,7 +34,7 @@ def test_finite_elements_cover_on_a_few_random_cells():
 
 
 def test_a_wrong_number_is_seen_by_the_judge():
-    pytest.importorskip("dolfinx")
+    pytest.importorskip("alphacut.rve.fenicsx")
     from benchmarks.rve.random_cells import judged
 
     exact = SeriesModel().solve(PAPER, MATRIX, [PARTICLE])[0]
@@ -65,7 +65,7 @@ def test_the_series_estimate_is_tight():
     [(0.68, 4e8, 0.69, 4), (0.88, 7e8, 0.56, 4), (0.67, 1e9, 0.99, 4), (0.6, 5e9, 1.0, 2)],
 )
 def test_the_estimate_of_a_slice_is_tight(radius, modulus, size, order):
-    pytest.importorskip("dolfinx")
+    pytest.importorskip("alphacut.rve.fenicsx")
     from alphacut.rve.slices.plane_cell import solve_slice
 
     phases = [Phase(modulus)]
@@ -84,7 +84,7 @@ def test_the_estimates_of_rules_in_theta_are_tight():
 
 
 def test_the_prism_estimate_is_tight():
-    pytest.importorskip("dolfinx")
+    pytest.importorskip("alphacut.rve.fenicsx")
     from alphacut.rve.prism.model import PrismModel
 
     model = PrismModel(mesh_size=0.5, layers=4, stiffness=True)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-pytest.importorskip("dolfinx")
+pytest.importorskip("alphacut.rve.fenicsx")
 
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.fenicsx import require_real

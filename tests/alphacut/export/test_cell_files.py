@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-pytest.importorskip("dolfinx")
+pytest.importorskip("alphacut.rve.fenicsx")
 
 from alphacut.export.cell_files import FORMATS, write_cell
 from alphacut.fuzzy.refused import RefusedError

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-pytest.importorskip("dolfinx")
+pytest.importorskip("alphacut.rve.fenicsx")
 
 from alphacut.entry import main
 from alphacut.rve import Interphase, Phase, SlicesModel

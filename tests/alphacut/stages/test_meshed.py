@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-pytest.importorskip("dolfinx")
+pytest.importorskip("alphacut.rve.fenicsx")
 
 from alphacut.entry import main
 from alphacut.rve import MeshModel, Phase

@@ -22,7 +22,7 @@ MODELS = {
 )
 def test_cuts_agree_with_a_coarser_model_and_narrower_ones_do_not(tmp_path, model):
     if model == "slices":
-        pytest.importorskip("dolfinx")
+        pytest.importorskip("alphacut.rve.fenicsx")
     changes = ("modulus.plan=signed", "cell.inclusion_poisson=0.3", *MODELS[model])
     campaign = CellCampaign.of(load(written(tmp_path, CELL), changes).content)
     cuts = campaign.propagation(

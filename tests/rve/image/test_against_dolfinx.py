@@ -5,7 +5,7 @@ import pytest
 
 from alphacut.rve.image.fields.element import Operator, displacement_element
 
-pytest.importorskip("dolfinx")
+pytest.importorskip("alphacut.rve.fenicsx")
 
 
 @pytest.mark.parametrize("shape", [(4, 3), (5, 6)])

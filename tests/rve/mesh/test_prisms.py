@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-pytest.importorskip("dolfinx")
+pytest.importorskip("alphacut.rve.fenicsx")
 
 from alphacut.rve.cell.outline import Ellipse, circle
 from alphacut.rve.mesh import gmsh_prisms, square

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-pytest.importorskip("dolfinx")
+pytest.importorskip("alphacut.rve.fenicsx")
 
 from alphacut.rve.cell.cell import LOADS, Phase
 from alphacut.rve.prism.fields import cell_fields

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-pytest.importorskip("dolfinx")
+pytest.importorskip("alphacut.rve.fenicsx")
 
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve import LevelSetModel, Phase, PrismModel

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial import KDTree
 
-pytest.importorskip("dolfinx")
+pytest.importorskip("alphacut.rve.fenicsx")
 
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve import MeshModel, Phase, PrismModel
@@ -185,4 +186,13 @@ def test_each_file_is_made_again_by_its_script(tmp_path, script):
         return
     made, stored = read_grid(tmp_path / name), read_grid(MESHES / name)
     assert made.names == stored.names
-    assert np.asarray(made.fixed) == pytest.approx(np.asarray(stored.fixed), abs=1e-9)
+    assert len(made.cells) == len(stored.cells)  # by place, as Gmsh 4.15 numbers nodes otherwise
+    for found, expected in ((made, stored), (stored, made)):
+        distance, nearest = KDTree(centres(expected)).query(centres(found))
+        assert distance.max() < 1e-9
+        assert (expected.phase[nearest] == found.phase).all()
+        assert KDTree(expected.fixed).query(found.fixed)[0].max() < 1e-9
+
+
+def centres(grid):
+    return grid.fixed[grid.cells].mean(axis=1)

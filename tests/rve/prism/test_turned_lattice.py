@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-pytest.importorskip("dolfinx")
+pytest.importorskip("alphacut.rve.fenicsx")
 pytest.importorskip("gmsh")
 
 from alphacut.rve import MeshModel, Phase, SeriesModel

@@ -14,7 +14,7 @@ from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.series.multipoles import square_stiffness
 from alphacut.stochastic import HermiteMap, gauss_rule
 
-pytest.importorskip("dolfinx")
+pytest.importorskip("alphacut.rve.fenicsx")
 
 from alphacut.rve.mesh.curved import plane_mesh
 from alphacut.rve.slices.model import SlicesModel, theta_error

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-pytest.importorskip("dolfinx")
+pytest.importorskip("alphacut.rve.fenicsx")
 
 from alphacut.rve.cell.cell import LOADS, Phase
 from alphacut.rve.fenicsx import MPI, PETSc

@@ -7,7 +7,7 @@ from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve import Phase
 from alphacut.rve.spheres.model import cubic_stiffness
 
-pytest.importorskip("dolfinx")
+pytest.importorskip("alphacut.rve.fenicsx")
 from tests.rve.spheres.octant import Octant
 
 MATRIX = Phase(20e9)
