@@ -39,7 +39,6 @@ COMMANDS = {
     "microstructure": "stage",
     "cell": "cell",
     "modulus": "stage",
-    "envelope": "stage",
     "identify": "stage",
     "report": "run",
     "verify": "verify",

@@ -10,12 +10,13 @@ from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from alphacut import frame
 from alphacut.case.content import Case, Content, load
 from alphacut.case.limits import QuestionSection
 from alphacut.case.loads import RecordsSection
+from alphacut.case.motion import EnvelopeSection
 from alphacut.case.radius import ThetaSection
 from alphacut.case.structure import Structure
 from alphacut.commands.options import require_case_petsc
@@ -37,9 +38,6 @@ from alphacut.stages.modulus import fuzzy_loss, fuzzy_modulus, require_levels
 from alphacut.stages.results import Results
 from alphacut.stages.store import Computed, Stage, StageContext, StageResult, StageStore
 from alphacut.stochastic.sections import Simulated
-
-if TYPE_CHECKING:
-    import xarray
 
 
 def read_case(options: argparse.Namespace) -> Case:
@@ -99,6 +97,11 @@ class Pipeline:
         """The sections of the case."""
         return self.results.content
 
+    @property
+    def campaign(self) -> CellCampaign:
+        """Samples of a cell that is no image."""
+        return CellCampaign.of(self.content, petsc=self.petsc)
+
     def run(self) -> Results:
         """Computes every stage of the case; returns their results."""
         results, stages = self.results, self.content.stages
@@ -109,8 +112,7 @@ class Pipeline:
         if "modulus" in stages:
             self.compute_modulus()
         if "envelope" in stages:
-            data = results.modulus or results.image
-            self._compute_motion(self.structure(None if data is None else data.arrays))
+            self._compute_motion()
         cells = self.campaign if results.modulus is not None else None
         richest_task = max(results.tasks, key=lambda x: (len(x.fuzzy), x.duration), default=None)
         results.shares = self.store.take(shares.stage(cells, results.structure, richest_task))
@@ -123,11 +125,6 @@ class Pipeline:
             raise RefusedError("microstructure", None, "a section [microstructure]")
         stage = microstructure.stage(section, self.content.has_spheres, self.figures)
         return self.store.take(stage)
-
-    @property
-    def campaign(self) -> CellCampaign:
-        """Samples of a round cell."""
-        return CellCampaign.of(self.content, petsc=self.petsc)
 
     def compute_modulus(self) -> None:
         """Computes stage modulus, of an image or of samples of a cell, and checks its errors."""
@@ -143,33 +140,37 @@ class Pipeline:
         particles = self.campaign.cell.particles
         cell.require_bounds((young[0], young[1]), result.numbers.references, particles)
 
-    def structure(self, data: xarray.Dataset | None, key: str = "modulus") -> Structure:
-        """The structure of the case with modulus and loss factor of stage modulus, else as stated.
-
-        `key` is the option or key that names the data, for messages.
-        """
-        content, structure = self.content, self.content.structure
-        young = None if data is None else fuzzy_modulus(data, key)
-        loss = None if data is None else fuzzy_loss(data)
-        if structure is None or content.envelope is None:
-            raise RefusedError("envelope", None, "a structure and a section [envelope]")
-        has_modulus = young is not None or content.has_stated_modulus
-        allowed = "a modulus, or --modulus FILE.nc"
-        require(has_modulus, "frame.modulus", value=None, allowed=allowed)
-        has_damping = loss is not None or not content.has_material_damping
-        allowed = "loss factors of the cell, or a number"
-        require(has_damping, "frame.damping_ratio", value="material", allowed=allowed)
-        return structure if data is None else content.structure_of(young, loss)
-
-    def compute_envelopes(self, structure: Structure, studies: bool = True) -> None:
-        """Computes the envelopes of all studies, or of [envelope] alone, into the results."""
-        results, section, content = self.results, self.content.envelope, self.content
+    def _compute_motion(self) -> None:
+        """Computes the identified inputs, then the suite of records or envelopes, and answers."""
+        results, content, section = self.results, self.content, self.content.envelope
         assert section is not None
+        data, structure = results.modulus or results.image, content.structure
+        if data is not None:
+            structure = content.structure_of(fuzzy_modulus(data.arrays), fuzzy_loss(data.arrays))
+        assert structure is not None
+        if content.identify is not None:
+            learned = identify.identify_inputs(content.identify, structure, section.alpha)
+            results.learned, structure = learned
         results.structure = structure
+        (task,) = envelope.tasks(section, ())  # of [envelope] itself
+        if content.records is not None:
+            response = self._suite_response(content.records, structure, task)
+        else:
+            self._compute_envelopes(structure, section)
+            peaks = self._limited_peaks(replace(task, limited=content.limited_outputs), structure)
+            response = response_of(structure, task, peaks)
+        for kind in ANSWERS:
+            if (question := content.questions.get(kind.key)) is not None:
+                compute, inputs = partial(answer_of, question, response), [question, response]
+                stage = Stage(kind.key, inputs, ("fuzzy", "frame", "alphacut"), kind, compute)
+                results.answers[kind.key] = self.store.take(stage).numbers
+
+    def _compute_envelopes(self, structure: Structure, section: EnvelopeSection) -> None:
+        """Computes the envelopes of all studies, or of [envelope] alone, into the results."""
+        results, content = self.results, self.content
         for warning in cut_record_warnings(content, structure):
             say(f"warning: {warning}")
-        limited = content.limited_outputs
-        results.tasks = envelope.tasks(section, content.study if studies else (), limited)
+        results.tasks = envelope.tasks(section, content.study, content.limited_outputs)
         longest_first = sorted(results.tasks, key=lambda task: -len(task.fuzzy) * task.duration)
         stages = [envelope.stage(structure, task) for task in longest_first]
         outcomes = self.store.take_all(stages, self.executor)
@@ -178,46 +179,21 @@ class Pipeline:
             envelope.require_tolerance(result, task, structure)
             results.envelopes[task.name] = result
 
-    def _compute_motion(self, structure: Structure) -> None:
-        """Computes the identified inputs, then the suite of records or envelopes, and answers."""
-        results, content = self.results, self.content
-        assert content.envelope is not None
-        (task,) = envelope.tasks(content.envelope, ())  # of [envelope] itself
-        if content.identify is not None:
-            measured, alpha = content.identify, task.section.alpha
-            results.learned, structure = identify.identify_inputs(measured, structure, alpha)
-        if content.records is not None:
-            self._compute_suite(content.records, structure, task)
-            return
-        self.compute_envelopes(structure)
-        peaks = self._limited_peaks(replace(task, limited=content.limited_outputs), structure)
-        self._answer(response_of(structure, task, peaks))
-
-    def _answer(self, response: FuzzyResponse) -> None:
-        """Answers all questions of the case about a response, into the results."""
-        for kind in ANSWERS:
-            if (section := self.content.questions.get(kind.key)) is not None:
-                compute, inputs = partial(answer_of, section, response), [section, response]
-                packages = ("fuzzy", "frame", "alphacut")
-                stage = Stage(section.key, inputs, packages, kind, compute)
-                self.results.answers[section.key] = self.store.take(stage).numbers
-
-    def _compute_suite(
+    def _suite_response(
         self, section: RecordsSection, structure: Structure, task: EnvelopeTask
-    ) -> None:
-        """Computes peaks under each record of a suite, and answers about them, into the results."""
-        results, alpha = self.results, task.section.alpha
-        results.structure = structure
+    ) -> FuzzyResponse:
+        """Computes peaks under each record of a suite into the results; returns the response."""
+        alpha, limited = task.section.alpha, self.content.limited_outputs
         mode = suite.nominal_mode(structure)
         records = suite.suite_records(section, task.section, structure)
         for warning in suite.suite_warnings(records):
             say(f"warning: {warning}")
-        limited = tuple(dict.fromkeys((*structure.outputs, *self.content.limited_outputs)))
+        limited = tuple(dict.fromkeys((*structure.outputs, *limited)))
         stages = suite.stages(structure, replace(task, limited=limited), records)
         outcomes = self.store.take_all(stages, self.executor)
         by_record = {record.name: outcomes[suite.stage_name(record)].numbers for record in records}
         units = {name: structure.unit(name) for name in envelope.outputs_of(limited)}
-        results.suite = suite.suite_result(by_record, records, mode, alpha, units)
+        self.results.suite = suite.suite_result(by_record, records, mode, alpha, units)
         peaks = {name: peaks_of(result, alpha) for name, result in by_record.items()}
         worst = suite.worst_peaks(peaks)
         if any(limit.side == "mean" for x in self.content.questions.values() for limit in x.limits):
@@ -226,7 +202,7 @@ class Pipeline:
             worst = suite.with_means(worst, peaks, reached)
         measures = {record.name: record.measures for record in records}
         motions = SuiteResponse(mode.period, mode.ratio, measures, peaks)
-        self._answer(replace(response_of(structure, task, worst), suite=motions))
+        return replace(response_of(structure, task, worst), suite=motions)
 
     def _limited_peaks(self, task: EnvelopeTask, structure: Structure) -> Peaks | None:
         """Peaks for questions: of the study with [envelope]'s motion, else computed alone."""

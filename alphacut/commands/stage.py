@@ -1,32 +1,24 @@
-"""Commands of one stage each: ``microstructure``, ``modulus``, ``envelope``, ``identify``."""
+"""Commands of one stage each: ``microstructure``, ``modulus``, ``identify``."""
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping
-from pathlib import Path
 from typing import TextIO
 
-from alphacut.commands.options import (
-    Command,
-    add_common,
-    add_run,
-    write_answer,
-)
+from alphacut.commands.options import Command, add_common, add_run, write_answer
 from alphacut.commands.pipeline import Pipeline, open_results, read_case
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature
 from alphacut.io.arrays import text_table
-from alphacut.io.results import read_dataset
 from alphacut.questions.summary import Parts
 from alphacut.report import tables
 from alphacut.report.results import cut_text, run_text, width_text
 from alphacut.report.tables import shown
-from alphacut.stages.cell import ISOTROPIC, References, constant_label
+from alphacut.stages.cell import ISOTROPIC, constant_label
 from alphacut.stages.identify import identify_inputs
 from alphacut.stages.image import ImageResult
-from alphacut.stages.losses import LossResult
 from alphacut.stages.modulus import ModulusResult
 from alphacut.stages.results import Results
 from alphacut.stages.store import CutsResult
@@ -64,33 +56,37 @@ def modulus(options: argparse.Namespace, out: TextIO) -> int:
 def image_text(result: ImageResult) -> str:
     """Lines on an image: its constants, area fractions, and what widens the bounds of E."""
     shares = (f"{name}: {share:.1%} of the area\n" for name, share in result.fractions.items())
-    return (
-        plane_text(result.plane, result.cuts.alpha, Nature.GUARANTEED)
-        + loss_text(result.loss)
-        + bounds_text(result.references)
-        + "".join(shares)
-        + f"{width_text(result)}\n"
-    )
+    constants = constants_text(result, result.cuts.alpha, Nature.GUARANTEED)
+    return f"{constants}{''.join(shares)}{width_text(result)}\n"
 
 
 def modulus_text(result: ModulusResult) -> str:
     """Lines on a modulus: constants on the lowest and highest level, references, and the cost."""
-    alpha, plane = result.alpha, result.plane
+    alpha = result.alpha
     return (
         cuts_text("of fibres", result.fibres, alpha, result.nature)
-        + (plane_text(plane, alpha, Nature.ATTAINED) if plane else "")
-        + loss_text(result.loss)
-        + bounds_text(result.references)
+        + constants_text(result, alpha, Nature.ATTAINED)
         + ("" if result.error else GALERKIN)
         + f"{result.samples} samples, {result.solves} linear systems,"
         f" {result.seconds:.1f} s, {result.method}\n"
     )
 
 
-def bounds_text(references: References) -> str:
-    """Line on the Hashin–Shtrikman bounds; empty where there are none."""
-    bounds = references.get("hashin_shtrikman_E_GPa")
-    return f"{ISOTROPIC}: {bounds[0]:.4f} … {bounds[1]:.4f} GPa\n" if bounds else ""
+def constants_text(part: ModulusResult | ImageResult, alpha: Array, nature: Nature) -> str:
+    """Constants along x and y by definition, loss factors, and the bounds of an isotropic E."""
+    text = "".join(cuts_text(name, cuts, alpha, nature) for name, cuts in part.plane.items())
+    if len(part.plane) == 1:
+        text += f"{ONLY}\n"
+    if (loss := part.loss) is not None:
+        rows = []
+        for name, cuts in (("E", loss.E), ("G", loss.G), ("K", loss.K)):
+            texts = (cut_text(cuts, level, Nature.ATTAINED) for level in (0, -1))
+            error = f"{loss.error[name]:.1e}" if loss.error else "not declared"
+            rows.append((f"loss factor of {name}", *texts, error))
+        text += text_table(("tan δ = 2 ζ", "α = 0", "α = 1", "± error"), rows)
+    if bounds := part.references.get("hashin_shtrikman_E_GPa"):
+        text += f"{ISOTROPIC}: {bounds[0]:.4f} … {bounds[1]:.4f} GPa\n"
+    return text
 
 
 def cuts_text(title: str, cuts: Mapping[str, CutsResult], alpha: Array, nature: Nature) -> str:
@@ -100,41 +96,6 @@ def cuts_text(title: str, cuts: Mapping[str, CutsResult], alpha: Array, nature: 
         for x, ends in cuts.items()
     ]
     return text_table((title, f"α = {alpha[0]:g}", f"α = {alpha[-1]:g}"), rows) if rows else ""
-
-
-def plane_text(cuts: Mapping[str, Mapping[str, CutsResult]], alpha: Array, nature: Nature) -> str:
-    """Constants along x and y, a table for each definition."""
-    texts = [cuts_text(definition, x, alpha, nature) for definition, x in cuts.items()]
-    return "".join(texts) + (f"{ONLY}\n" if len(texts) == 1 else "")
-
-
-def loss_text(loss: LossResult | None) -> str:
-    """Table of loss factors on the lowest and highest level; empty where there are none."""
-    if loss is None:
-        return ""
-    rows = []
-    for name, cuts in (("E", loss.E), ("G", loss.G), ("K", loss.K)):
-        texts = (cut_text(cuts, level, Nature.ATTAINED) for level in (0, -1))
-        error = f"{loss.error[name]:.1e}" if loss.error else "not declared"
-        rows.append((f"loss factor of {name}", *texts, error))
-    return text_table(("tan δ = 2 ζ", "α = 0", "α = 1", "± error"), rows)
-
-
-def add_envelope(parser: argparse.ArgumentParser) -> None:
-    """Adds the options of an envelope."""
-    add_run(parser)
-    parser.add_argument("--modulus", metavar="FILE.nc", help="fuzzy modulus of an earlier command")
-
-
-def envelope(options: argparse.Namespace, out: TextIO) -> int:
-    """Computes the envelope of section [envelope] alone, and prints it; returns exit status 0."""
-    data = read_dataset(Path(options.modulus), "--modulus") if options.modulus else None
-    with open_results(options) as (case, store):
-        pipeline = Pipeline(Results(case.content), store)
-        pipeline.compute_envelopes(pipeline.structure(data, "--modulus"), studies=False)
-    parts = Parts.of(pipeline.results)
-    write_answer(options, dict(parts.envelopes["all"]), out, run_text(parts))
-    return 0
 
 
 def identify(options: argparse.Namespace, out: TextIO) -> int:
@@ -155,8 +116,5 @@ COMMANDS = {
         microstructure,
     ),
     "modulus": Command("fuzzy effective modulus of the cell or of the image", add_run, modulus),
-    "envelope": Command(
-        "envelopes of the structure's vibration on every α-cut", add_envelope, envelope
-    ),
     "identify": Command("inputs of a frame from its measured natural modes", add_common, identify),
 }

@@ -227,16 +227,6 @@ class ResultsFolder:
                 raise NotADirectoryError(f"{parent} is no folder")
 
 
-def read_dataset(path: Path, key: str) -> xarray.Dataset:
-    """Reads a NetCDF file, named by an option `key`, as the manifest beside it lists it."""
-    folder, is_dataset = ResultsFolder.read(path.parent), path.suffix == ".nc"
-    allowed = "a NetCDF file in the results of this program"
-    cure = "its folder holds it with manifest.json, which tells whether it is as it was written"
-    is_listed = is_dataset and path.name in folder.files
-    require(is_listed, key, value=str(path), allowed=allowed, cure=cure)
-    return folder.dataset(path.name)
-
-
 def read_regular(file: Path) -> bytes:
     """The content of a regular file; OSError of a link, a device, a pipe or a folder."""
     if stat.S_ISREG(os.lstat(file).st_mode):  # before it is opened, and then what was opened

@@ -178,12 +178,11 @@ def fuzzy_loss(data: xarray.Dataset) -> FuzzyNumber | None:
     return _stepped(data, "loss_E") if "loss_E" in data else None
 
 
-def fuzzy_modulus(data: xarray.Dataset, key: str = "modulus") -> FuzzyNumber:
-    """The fuzzy Young's modulus in Pa that stored α-cuts with levels from 0 to 1 make."""
-    require("E" in data, key, value="without E", allowed="a modulus.nc of this program")
+def fuzzy_modulus(data: xarray.Dataset) -> FuzzyNumber:
+    """The fuzzy Young's modulus in Pa that α-cuts with levels from 0 to 1 make."""
     least = float(data["E"].min())
-    require(least > 0, key, value=f"{least / GPA:.3g} GPa", allowed="a modulus above 0")
-    require_levels(tuple(map(float, data["alpha"].values)), key)
+    require(least > 0, "modulus", value=f"{least / GPA:.3g} GPa", allowed="a modulus above 0")
+    require_levels(tuple(map(float, data["alpha"].values)), "modulus.alpha")
     return _stepped(data, "E")
 
 

@@ -82,16 +82,6 @@ def test_e_is_the_isotropic_average_unless_the_axes_are_named(tmp_path, capfd):
     assert values["isotropic"]["E_GPa"] > values["axes"]["E_GPa"]
 
 
-def test_a_modulus_goes_from_one_command_to_the_next(tmp_path, capfd):
-    file = tmp_path / "out" / "modulus.nc"
-    assert spoken(capfd, "modulus", written(tmp_path, CELL), "--out", file.parent)[0] == 0
-    status, out, _ = spoken(capfd, "envelope", written(tmp_path), "--modulus", file, "--json", "-")
-    assert status == 0
-    assert json.loads(out)["fuzzy"] == ["E", "m"]
-    for wrong in (tmp_path / "none.nc", tmp_path / "case.toml"):
-        assert spoken(capfd, "envelope", written(tmp_path), "--modulus", wrong)[0] == 2
-
-
 REFUSED = [
     ("rnu case.toml", "invalid choice: 'rnu' (choose from"),
     ("run case.toml --quik", "option is --quik"),
@@ -101,7 +91,7 @@ REFUSED = [
     ("run none.toml", "no such file"),
     ("run .", "is a directory"),
     ("run case.toml --out case.toml", "the name of a folder"),
-    ("envelope case.toml --out /proc/none", "nothing can be written"),
+    ("run case.toml --out /proc/none", "nothing can be written"),
     ("modulus case.toml", "a section [cell]"),
     ("identify case.toml", "sections [identify]"),
     ("microstructure case.toml", "[microstructure]"),
@@ -157,7 +147,7 @@ def test_a_tolerance_that_is_missed_fails_but_for_a_graph_follower(
     changes = {'"0.1 mm"': '"1e-20 mm"', '"exact"': f'"{integrator}"', "graph-follower": method}
     changes |= {'"2 s"': '"0.5 s"', "[0, 0.5, 1]": "[0, 1]"}
     case = written(tmp_path, **changes)
-    code, _, err = spoken(capfd, "envelope", case)
+    code, _, err = spoken(capfd, "run", case, "--no-figures", f"--out={tmp_path}/out")
     assert code == status
     assert "the case allows" in err
 
@@ -167,7 +157,9 @@ def test_a_full_disk_is_said_to_be_full(tmp_path, monkeypatch, capfd):
 
     monkeypatch.setattr(files, "MIN_FREE_BYTES", 1 << 60)
     monkeypatch.setattr(files.os, "replace", lambda *_: (_ for _ in ()).throw(OSError("HDF error")))
-    status, _, err = spoken(capfd, "envelope", written(tmp_path), "--out", tmp_path / "out")
+    status, _, err = spoken(
+        capfd, "run", written(tmp_path), "--out", tmp_path / "out", "--no-figures"
+    )
     assert status == 1
     assert "is full" in err
     assert not list(tmp_path.glob("out/*"))

@@ -8,7 +8,6 @@ import os
 import random
 import shutil
 import sqlite3
-from pathlib import Path
 
 import pytest
 
@@ -291,22 +290,6 @@ def test_the_page_does_not_embed_or_write_through_links(finished, tmp_path):
     assert main(["report", str(copy)]) == 0
     assert (copy / "report.html").read_text().count("data:image/png") == whole - 1
     assert (tmp_path / "outside.html").read_text() == "precious"
-
-
-def test_a_modulus_is_taken_with_its_manifest_alone(finished, tmp_path, capfd):
-    _, out, _ = finished
-    frame = written(tmp_path)
-    copy = tmp_path / "out"
-    shutil.copytree(out, copy)
-    assert main(["envelope", str(frame), "--modulus", str(copy / "modulus.nc")]) == 0
-    content = bytearray((copy / "modulus.nc").read_bytes())
-    content[len(content) // 2] ^= 1
-    (copy / "modulus.nc").write_bytes(content)
-    assert main(["envelope", str(frame), "--modulus", str(copy / "modulus.nc")]) == 2
-    assert "was changed" in capfd.readouterr().err
-    alone = Path(shutil.copy(out / "modulus.nc", tmp_path))
-    assert main(["envelope", str(frame), "--modulus", str(alone)]) == 2
-    assert "manifest.json" in capfd.readouterr().err
 
 
 def test_json_goes_to_standard_output_by_its_device(tmp_path, capfd):
