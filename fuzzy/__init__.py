@@ -5,7 +5,7 @@ from alphacut.fuzzy.knowledge.from_data import from_data
 from alphacut.fuzzy.knowledge.joint import jointly
 from alphacut.fuzzy.knowledge.known import Knowledge
 from alphacut.fuzzy.plans.automatic import Automatic
-from alphacut.fuzzy.plans.transformation import Extended, General, Reduced, Signed
+from alphacut.fuzzy.plans.transformation import General, Reduced, Signed
 from alphacut.fuzzy.propagation import propagate, width_shares
 from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.fuzzy.result import Bounds, Nature
@@ -20,8 +20,8 @@ from alphacut.fuzzy.sets.numbers import (
 )
 
 __all__ = [
-    "Automatic", "Bounds", "Crisp", "Extended", "FailedError", "FuzzyNumber", "General",
-    "Interval", "Knowledge", "Nature", "PiecewiseLinear", "Reduced", "RefusedError", "Signed",
+    "Automatic", "Bounds", "Crisp", "FailedError", "FuzzyNumber", "General", "Interval",
+    "Knowledge", "Nature", "PiecewiseLinear", "Reduced", "RefusedError", "Signed",
     "Store", "Trapezoidal", "Triangular", "from_data", "jointly", "levels", "propagate",
     "width_shares",
 ]  # fmt: skip

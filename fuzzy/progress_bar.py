@@ -12,7 +12,7 @@ _BAR_DELAY = 1.0  # seconds before a bar appears
 _BAR_PERIOD = 0.2  # seconds between its updates
 _LINE_PERIOD = 10.0  # seconds between lines where there is no terminal
 _WIDTH = 30  # letters of the bar
-_FORETOLD = 0.05  # share of the work from which the time left is told; less foretells nothing
+_FORETOLD = 0.05  # fraction of the work from which on the time left is told
 
 
 def subprogress(progress: Progress | None, first: float, last: float) -> Progress:
@@ -33,46 +33,37 @@ def progress_reporter(progress: Progress | bool | None) -> Iterator[Progress | N
     if callable(progress) or progress is False:
         yield progress if callable(progress) else None
         return
-    bar = _Bar() if sys.stderr.isatty() else _Lines()
+    display = _Display()
     try:
-        yield bar
+        yield display
     finally:
-        bar.close()
+        display.close()
 
 
-class _Bar:
-    """Progress bar on a terminal; it appears after a second and is removed in the end."""
-
-    def __init__(self) -> None:
-        self.begun, self.moved = monotonic(), 0.0
-
-    def __call__(self, share: float) -> None:
-        now = monotonic()
-        if now - self.begun >= _BAR_DELAY and now - self.moved >= _BAR_PERIOD:
-            self.moved, full = now, round(_WIDTH * share)
-            bar = "█" * full + "░" * (_WIDTH - full)
-            _write(f"\r\x1b[K{bar} {share:4.0%} {now - self.begun:.0f} s")
-
-    def close(self) -> None:
-        if self.moved:
-            _write("\r\x1b[K")
-
-
-class _Lines:
-    """Progress as a line every ten seconds, with the time left, for a file or a pipe."""
+class _Display:
+    """A bar on a terminal, removed in the end; elsewhere a line now and then with the time left."""
 
     def __init__(self) -> None:
+        self.is_terminal, self.has_bar = sys.stderr.isatty(), False
         self.begun = self.written = monotonic()
 
-    def __call__(self, share: float) -> None:
+    def __call__(self, fraction: float) -> None:
         now = monotonic()
-        if now - self.written >= _LINE_PERIOD:
-            self.written, elapsed = now, now - self.begun
-            left = f", some {elapsed / share - elapsed:.0f} s left" if share >= _FORETOLD else ""
-            _write(f"{share:4.0%} after {elapsed:.0f} s{left}\n")
+        elapsed, pause = now - self.begun, _BAR_PERIOD if self.is_terminal else _LINE_PERIOD
+        if elapsed < _BAR_DELAY or now - self.written < pause:
+            return
+        self.written, self.has_bar = now, self.is_terminal
+        if self.is_terminal:
+            full = round(_WIDTH * fraction)
+            bar = "█" * full + "░" * (_WIDTH - full)
+            _write(f"\r\x1b[K{bar} {fraction:4.0%} {elapsed:.0f} s")
+            return
+        left = f", some {elapsed / fraction - elapsed:.0f} s left" if fraction >= _FORETOLD else ""
+        _write(f"{fraction:4.0%} after {elapsed:.0f} s{left}\n")
 
     def close(self) -> None:
-        """Lines stay."""
+        if self.has_bar:
+            _write("\r\x1b[K")
 
 
 def _write(text: str) -> None:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal, Self
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from alphacut.case.radius import FractionMap, Number, Radius, RadiusMapSection, ThetaSection
 from alphacut.case.types import (
@@ -361,13 +361,20 @@ class Mesh(Section):
     )
 
 
+def _not_removed(value: object) -> object:
+    if value == "extended":
+        cure = 'take "signed", in which inputs without a sign take all points'
+        raise RefusedError("", value, "general, reduced, signed", cure)
+    return value
+
+
 class ModulusSection(Section):
     """Computation of the fuzzy modulus."""
 
     method: Literal["prism", "slices", "series", "auto"] = Field(
         default="auto", description="model of the cell; auto is the series"
     )
-    plan: Literal["general", "reduced", "extended", "signed"] = Field(
+    plan: Annotated[Literal["general", "reduced", "signed"], BeforeValidator(_not_removed)] = Field(
         default="general", description="samples of the transformation method"
     )
     alpha: Levels = Field(default=ALPHA, description="α-levels")

@@ -9,7 +9,7 @@ from functools import cached_property, partial
 import numpy as np
 
 from alphacut.case.material import MeshedCell
-from alphacut.fuzzy import Extended, FuzzyNumber, General, Knowledge, Reduced, Signed, propagate
+from alphacut.fuzzy import FuzzyNumber, General, Knowledge, Reduced, Signed, propagate
 from alphacut.fuzzy.arrays import Array, on_one_blas_thread
 from alphacut.fuzzy.plans.design import Plan
 from alphacut.fuzzy.refused import FailedError
@@ -45,7 +45,6 @@ OUTPUTS = ("E", "nu")
 PLANS: dict[str, Plan] = {
     "general": General(),
     "reduced": Reduced(),
-    "extended": Extended(outputs=OUTPUTS),
     "signed": Signed(outputs=OUTPUTS),
 }
 

@@ -71,7 +71,7 @@ class Campaign:
 
     Attributes:
         failed: Samples left out.
-        layout: Names and shapes of the outputs, as the first sample of the design has them.
+        layout: Names and shapes of the outputs, as the first sample has them.
 
     Raises:
         RefusedError: The budget is no positive whole number, or a fact names no input.
@@ -177,30 +177,17 @@ class Campaign:
         for row, outcome in batch.outcomes.items():
             if isinstance(outcome, Sample):
                 outputs[row] = outcome.row
-        if self._rows:
-            return outputs
-        # the order of the outputs is that of the first row, not of the row that ended first
-        values = Values(self.layout, outputs)
-        self.layout = batch.layouts[min(batch.layouts)]
-        columns = [values.output(name).reshape(len(points), -1) for name, _ in self.layout]
-        return np.concatenate(columns, axis=1)
+        return outputs
 
-    def in_order(self, outcome: Outcome) -> Outcome:
-        """Return a sample with its outputs in the campaign's order, or a failure if they differ.
-
-        The first sample of the campaign sets names, shapes and order.
-        """
+    def checked(self, outcome: Outcome) -> Outcome:
+        """Return an outcome; a failure if its outputs are named or shaped unlike the first ones."""
         if isinstance(outcome, Failure) or outcome.layout == self.layout:
             return outcome
-        if not self.layout:
-            self.layout = outcome.layout
-            self.knowledge.check_outputs(Values(outcome.layout, outcome.row[None]).columns)
-            return outcome
-        if sorted(outcome.layout) != sorted(self.layout):
+        if self.layout:
             return Failure(f"outputs are {outcome.layout} where others have {self.layout}")
-        values = Values(outcome.layout, outcome.row[None])
-        row = np.concatenate([values.output(name).ravel() for name, _ in self.layout])
-        return Sample(self.layout, row)
+        self.layout = outcome.layout
+        self.knowledge.check_outputs(Values(outcome.layout, outcome.row[None]).columns)
+        return outcome
 
     def report(self, fraction: float) -> None:
         """Report the completed fraction, which never falls."""
@@ -214,13 +201,11 @@ class _Batch:
 
     Attributes:
         outcomes: Sample or failure by row of the points.
-        layouts: Layout of each sample as the function returned it, by row.
     """
 
     def __init__(self, campaign: Campaign, points: Array) -> None:
         self.campaign, self.points = campaign, points
         self.outcomes: dict[int, Outcome] = {}
-        self.layouts: dict[int, Layout] = {}
         self._unwritten: dict[str, Sample] = {}
         self._written, self._write_seconds = perf_counter(), 0.0  # time and cost of the last write
 
@@ -233,12 +218,12 @@ class _Batch:
         if campaign.store is not None:
             for row in range(count):
                 if sample := campaign.store.get(campaign.model, self._key(row)):
-                    self._keep(row, sample)
+                    self.outcomes[row] = campaign.checked(sample)
         try:
             for rows, outcomes in completed(campaign.call, self._tasks(), campaign.executor):
-                for row, outcome in zip(rows, outcomes, strict=True):
-                    self._keep(row, outcome)
-                    if campaign.store and isinstance(outcome, Sample) and row in self.layouts:
+                for row, outcome in zip(rows, map(campaign.checked, outcomes), strict=True):
+                    self.outcomes[row] = outcome
+                    if campaign.store and isinstance(outcome, Sample):
                         self._unwritten[self._key(row)] = outcome
                 self._write()
                 # the first batch of a design is most of the work; later ones are not foreseen
@@ -255,11 +240,6 @@ class _Batch:
         for group in self.campaign.call.tasks(self.points):
             if rows := [row for row in group if row not in self.outcomes]:
                 yield rows, self.points[rows]
-
-    def _keep(self, row: int, outcome: Outcome) -> None:
-        self.outcomes[row] = self.campaign.in_order(outcome)
-        if isinstance(outcome, Sample) and isinstance(self.outcomes[row], Sample):
-            self.layouts[row] = outcome.layout
 
     def _write(self, *, now: bool = False) -> None:
         """Store new samples if `now`, or if storing has taken under a tenth of the time."""

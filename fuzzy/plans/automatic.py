@@ -21,9 +21,8 @@ from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.knowledge.known import Signs, contradiction, negligible
 from alphacut.fuzzy.plans.cut import CutSearch, cuts_with_width
 from alphacut.fuzzy.plans.design import bounds_of_samples
-from alphacut.fuzzy.plans.single_linkage import ROUNDING, VALUE_TOLERANCE, SingleLinkage
+from alphacut.fuzzy.plans.single_linkage import ROUNDING, SEED, VALUE_TOLERANCE, SingleLinkage
 from alphacut.fuzzy.plans.transformation import Reduced, corners_suffice
-from alphacut.fuzzy.refused import checked_number
 from alphacut.fuzzy.result import Bounds, Nature
 from alphacut.fuzzy.sets.boxes import Domain
 
@@ -44,10 +43,6 @@ class Automatic:
     then estimated, to 1e-5 of the range. They are attained where the budget ends the search, or
     where a bound lies at a kink or a jump. Of more than 12 outputs none is searched.
 
-    Args:
-        uncovered: Share of each cut up to which a search goes on, in (0, 1].
-        seed: Seed of all samples.
-
     Example:
         >>> from alphacut.fuzzy import Interval, propagate
         >>> bounds = propagate(lambda x: x * (1 - x), {"x": Interval(0, 1)}, Automatic(), alpha=[0])
@@ -55,14 +50,7 @@ class Automatic:
         (0.25, 'estimated')
     """
 
-    uncovered: float = 0.002
-    seed: int = 0
-
     name = "automatic"
-
-    def __post_init__(self) -> None:
-        checked_number("uncovered", self.uncovered, positive=True, most=1)
-        checked_number("seed", self.seed, whole=True)
 
     def run(self, campaign: Campaign, domain: Domain) -> Bounds:
         """Bounds of every output: by corners if the knowledge allows, else by a search."""
@@ -74,7 +62,7 @@ class Automatic:
         linkage, ended, notes = None, False, list[str]()
         if cuts := list(cuts_with_width(campaign, domain)):
             try:
-                walk = SignWalk(campaign, cuts[-1], self.seed)
+                walk = SignWalk(campaign, cuts[-1])
                 monotone = walk.corners_suffice()
                 if monotone.any():
                     which = f"keep their sign at {walk.n_points} points"
@@ -85,9 +73,7 @@ class Automatic:
                 if not monotone.all():
                     names = tuple(np.array(outputs)[~monotone])
                     searched = names if len(names) <= _MAX_SEARCHED else ()
-                    linkage = SingleLinkage(
-                        campaign, domain, searched, uncovered=self.uncovered, seed=self.seed
-                    )
+                    linkage = SingleLinkage(campaign, domain, searched)
                     linkage.run(walk.samples)
             except SpentError:
                 ended = True
@@ -133,13 +119,13 @@ class SignWalk:
             shape (steps + 1, uncertain inputs): a Latin hypercube sample of the cut.
     """
 
-    def __init__(self, campaign: Campaign, widest: CutSearch, seed: int) -> None:
+    def __init__(self, campaign: Campaign, widest: CutSearch) -> None:
         from scipy.stats import qmc
 
         self.campaign, self.cut = campaign, widest
         inputs = len(widest.uncertain_inputs)
         self.steps = _WALK if inputs > 1 else _WALK_OF_ONE
-        hypercube = qmc.LatinHypercube(inputs, rng=np.random.default_rng([seed, 0]))
+        hypercube = qmc.LatinHypercube(inputs, rng=np.random.default_rng([SEED, 0]))
         self.samples: Array = hypercube.random(self.steps + 1)
 
     @property

@@ -37,6 +37,10 @@ from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.plans.cut import Bound, CutSearch, Optimum, cuts_with_width
 from alphacut.fuzzy.sets.boxes import Domain
 
+SEED = 0
+"""Seed of all samples."""
+MAX_UNCOVERED = 0.002
+"""Share of each cut, not yet covered by basins that were seen, up to which a search goes on."""
 MIN_SAMPLES = 100
 """Samples N from which the rule of Boender and Rinnooy Kan decides: with fewer its prior does."""
 SIGMA_ONE_HUMP = 4.0
@@ -140,25 +144,27 @@ class BoundSearch:
         at_ends = [(x.point <= lower) | (x.point >= upper) for x in self.optima]
         return sum(not ends.all() for ends in at_ends)
 
-    def is_estimate(self, allowed: float) -> bool:
-        """Return whether the stopping rule is met and the output is smooth at the best optimum."""
-        return self.samples >= MIN_SAMPLES and self.uncovered < allowed and self.is_smooth
+    @property
+    def is_estimate(self) -> bool:
+        """Whether the stopping rule is met and the output is smooth at the best optimum."""
+        return self.samples >= MIN_SAMPLES and self.uncovered < MAX_UNCOVERED and self.is_smooth
 
-    def is_open(self, allowed: float) -> bool:
-        """Return whether the search goes on; kinks and jumps at the best optimum end it, too."""
+    @property
+    def is_open(self) -> bool:
+        """Whether the search goes on; kinks and jumps at the best optimum end it, too."""
         if self.plateau_samples >= MAX_ON_PLATEAUS:
             return False
         if self.samples < MIN_SAMPLES or not self.optima:
             return True
-        return self.uncovered >= allowed and self.is_smooth
+        return self.uncovered >= MAX_UNCOVERED and self.is_smooth
 
-    def next_samples(self, allowed: float) -> int:
-        """Samples with which W (W + 1) / (N (N − 1)) falls to `allowed` without a new optimum.
+    def next_samples(self) -> int:
+        """Samples with which W (W + 1) / (N (N − 1)) falls to `MAX_UNCOVERED` if W stays.
 
         With plateaus so many that `MAX_ON_PLATEAUS` lie on them; at most twice the present number.
         """
         W, present = len(self.optima), self.samples + self.plateau_samples
-        needed = ceil(0.5 + sqrt(0.25 + W * (W + 1) / allowed)) + 1
+        needed = ceil(0.5 + sqrt(0.25 + W * (W + 1) / MAX_UNCOVERED)) + 1
         if self.plateau_samples:
             needed = ceil(1.01 * MAX_ON_PLATEAUS * present / self.plateau_samples)
         return max(MIN_SAMPLES, min(max(needed, present + _MIN_NEW), 2 * present))
@@ -173,17 +179,8 @@ class SingleLinkage:
         states: State of each bound by the level of its cut.
     """
 
-    def __init__(
-        self,
-        campaign: Campaign,
-        domain: Domain,
-        outputs: tuple[str, ...],
-        *,
-        uncovered: float,
-        seed: int,
-    ) -> None:
+    def __init__(self, campaign: Campaign, domain: Domain, outputs: tuple[str, ...]) -> None:
         self.campaign, self.outputs = campaign, outputs
-        self.uncovered, self.seed = uncovered, seed
         self.cuts = list(cuts_with_width(campaign, domain))[::-1]
         self.bounds = [Bound(output, sign) for output, sign in product(outputs, (1.0, -1.0))]
         self.states = {
@@ -213,7 +210,7 @@ class SingleLinkage:
             rounds += 1
             for number, (cut, bounds) in enumerate(visits, start=1):
                 states = [self.states[cut.level, bound] for bound in bounds]
-                count = max(state.next_samples(self.uncovered) for state in states)
+                count = max(state.next_samples() for state in states)
                 self._sample_up_to(cut, count, rounds)
                 for bound in bounds:
                     self._descend(cut, bound)
@@ -222,7 +219,7 @@ class SingleLinkage:
     def is_estimate(self, output: str) -> bool:
         """Return whether both bounds of an output meet the stopping rule in all cuts."""
         states = [state for (_, bound), state in self.states.items() if bound.output == output]
-        return bool(states) and all(state.is_estimate(self.uncovered) for state in states)
+        return bool(states) and all(state.is_estimate for state in states)
 
     def is_rough(self, output: str) -> bool:
         """Return whether the best optimum of a bound of the output is at a kink or jump."""
@@ -249,7 +246,7 @@ class SingleLinkage:
             if values[best] < state.best.value - self._tolerance(bound):
                 self._descend_from(cut, bound, cut.unit(samples.points[inside][best][None])[0])
         states = [(bound, self.states[cut.level, bound]) for bound in self.bounds]
-        return [bound for bound, state in states if state.is_open(self.uncovered)]
+        return [bound for bound, state in states if state.is_open]
 
     def _descend(self, cut: CutSearch, bound: Bound) -> None:
         """Descend from the samples and corners of a cut that have no better one nearby.
@@ -334,7 +331,7 @@ class SingleLinkage:
         """Evaluate new uniform samples of a cut until it has `count` of them."""
         missing = count - len(self._rows(cut))
         if missing > 0:
-            rng = np.random.default_rng([self.seed, 1 + cut.level, rounds])
+            rng = np.random.default_rng([SEED, 1 + cut.level, rounds])
             self._add_samples(cut, rng.random((missing, len(cut.uncertain_inputs))))
 
     def _add_samples(self, cut: CutSearch, unit: Array) -> None:

@@ -1,10 +1,9 @@
-"""Transformation method: reduced, general and extended (Hanss, 2005), and the signed plan.
+"""Transformation method, reduced and general (Hanss, 2005), and the signed plan.
 
 Level j of m counts m + 1 − j points per input: the ends of its cut, and between them the midpoints
 of neighbouring points of the next level up. The general method runs the model on the grid of these
-points, the reduced method on the corners of each cut only, the extended method takes the ends only
-of those inputs in which the model is monotone. In the signed plan known signs of effects name the
-corner of each bound.
+points, the reduced method on the corners of each cut only. In the signed plan known signs of
+effects name the corner of each bound, and inputs without a sign take all points.
 
 A sign is *proved* where the caller states it and no sample contradicts it; samples in which one
 stated input changes alone test it. Otherwise it is *observed*: differences at probes of the box all
@@ -14,10 +13,11 @@ have it, with a margin. That is evidence, not proof, and bounds that rest on it 
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise, product
 from math import prod
+from typing import ClassVar
 
 import numpy as np
 
@@ -30,6 +30,7 @@ from alphacut.fuzzy.result import Bounds, Ends
 from alphacut.fuzzy.sets.boxes import Domain, quasi_random_points
 from alphacut.fuzzy.sets.numbers import FuzzyNumber
 
+Model = Callable[[Array], Array]
 # share of the support: points of two levels closer than this differ by round-off only
 _ROUND_OFF = 1e-13
 _PROBES = 4  # points inside a box, besides its extreme corners and the modal point
@@ -73,35 +74,10 @@ def _listed_point(x: float, points: list[float], width: float) -> float:
     return x
 
 
-def grids(domain: Domain, refined: Collection[str]) -> list[list[list[float]]]:
-    """Return the points of each level and input, rising, as a list by level of lists by input.
-
-    Points between the ends of a cut are added for inputs in `refined` only.
-    """
-    columns = [
-        hanss_points(number, domain.alpha, inner=name in refined)
-        for name, number in domain.inputs.items()
-    ]
+def level_grids(domain: Domain, *, inner: bool) -> list[list[list[float]]]:
+    """Return `hanss_points` of all inputs, as a list by level of lists by input."""
+    columns = [hanss_points(x, domain.alpha, inner=inner) for x in domain.inputs.values()]
     return [list(level) for level in zip(*columns, strict=True)]
-
-
-def _full_design(
-    campaign: Campaign, domain: Domain, refined: Collection[str], method: str
-) -> Design:
-    """Design with all combinations of the inputs' points on each level, within the budget."""
-    levels = grids(domain, refined)
-    require_budget(sum(prod(map(len, grid)) for grid in levels), campaign, method)
-    return Design.from_levels(domain, [np.array(list(product(*grid))) for grid in levels])
-
-
-def _bounds_of_combinations(
-    campaign: Campaign, domain: Domain, refined: Collection[str], method: str
-) -> Bounds:
-    """Evaluate all combinations of points; their bounds, guaranteed where corners suffice."""
-    design = _full_design(campaign, domain, refined, method)
-    bounds = design.bounds(campaign(design.points), method)
-    monotone = campaign.knowledge.monotone_in(domain.names, bounds.outputs)
-    return guaranteed_bounds(bounds, campaign, corners_suffice(domain, monotone))
 
 
 def corners_suffice(domain: Domain, monotone: Mask) -> Mask:
@@ -126,45 +102,24 @@ class General:
     """General transformation method: all combinations of the recursion's points."""
 
     name = "general"
+    takes_inner_points: ClassVar[bool] = True
 
     def run(self, campaign: Campaign, domain: Domain) -> Bounds:
-        """Evaluate the samples and rearrange them into α-cuts."""
-        return _bounds_of_combinations(campaign, domain, domain.names, self.name)
+        """Bounds by all combinations of points, guaranteed where corners are known to suffice."""
+        grids = level_grids(domain, inner=self.takes_inner_points)
+        require_budget(sum(prod(map(len, grid)) for grid in grids), campaign, self.name)
+        design = Design.from_levels(domain, [np.array(list(product(*grid))) for grid in grids])
+        bounds = design.bounds(campaign(design.points), self.name)
+        monotone = campaign.knowledge.monotone_in(domain.names, bounds.outputs)
+        return guaranteed_bounds(bounds, campaign, corners_suffice(domain, monotone))
 
 
 @dataclass(frozen=True)
-class Reduced:
+class Reduced(General):
     """Reduced transformation method: corners of each cut; exact where monotone."""
 
     name = "reduced"
-
-    def run(self, campaign: Campaign, domain: Domain) -> Bounds:
-        """Evaluate the samples and rearrange them into α-cuts."""
-        return _bounds_of_combinations(campaign, domain, (), self.name)
-
-
-@dataclass(frozen=True)
-class Extended:
-    """Extended transformation method: ends of monotone inputs, all points of the others.
-
-    Monotone are those that the caller names (`Knowledge`), and others of which probes show it.
-
-    Args:
-        outputs: Outputs whose bounds matter; all if none is named.
-    """
-
-    outputs: tuple[str, ...] = ()
-
-    name = "extended"
-
-    def run(self, campaign: Campaign, domain: Domain) -> Bounds:
-        """Find the monotone inputs, evaluate the samples, rearrange them into α-cuts."""
-        effects = verify(campaign, domain, self.outputs)
-        stated = campaign.knowledge.monotone_in(domain.names, effects.outputs)
-        monotone = ((effects.signs[0] != 0) | stated).all(axis=0)  # by input, for all outputs
-        refined = {name for name, x in zip(domain.names, monotone, strict=True) if not x}
-        design = _full_design(campaign, domain, refined, self.name)
-        return _bounds_by_effects(design, campaign, effects, self.name)
+    takes_inner_points = False
 
 
 @dataclass(frozen=True)
@@ -191,35 +146,32 @@ class Signed:
     name = "signed"
 
     def run(self, campaign: Campaign, domain: Domain) -> Bounds:
-        """Verify the signs, run the corners, rearrange them into α-cuts."""
-        effects = verify(campaign, domain, self.outputs)
-        require_budget(_sample_count(effects, domain), campaign, self.name)
-        levels = zip(effects.signs, grids(domain, domain.names), strict=True)
+        """Bounds by the corners that the signs name, guaranteed where all signs are stated."""
+        effects = find_effects(campaign, domain, self.outputs)
+        grids = level_grids(domain, inner=True)
+        require_budget(_sample_count(effects, grids), campaign, self.name)
+        levels = zip(effects.signs, grids, strict=True)
         points = [_level_points(np.unique(signs, axis=0), grid) for signs, grid in levels]
-        return _bounds_by_effects(Design.from_levels(domain, points), campaign, effects, self.name)
+        design = Design.from_levels(domain, points)
+        at_corners = design.bounds(campaign(design.points), self.name)
+        stated = campaign.knowledge.stated_signs(domain.names, at_corners.outputs) != 0
+        proved = corners_suffice(domain, stated) & np.isin(at_corners.outputs, effects.outputs)
+        guaranteed = guaranteed_bounds(at_corners, campaign, proved)
+        bounds = bounds_of_samples(domain, campaign.samples, self.name)
+        return replace(
+            bounds,
+            nature=guaranteed.nature,
+            natures=guaranteed.natures,
+            basis=guaranteed.basis,
+            inner=Ends(bounds.lower, bounds.upper),
+            notes=effects.notes(domain),
+        )
 
 
-def _bounds_by_effects(design: Design, campaign: Campaign, effects: Effects, method: str) -> Bounds:
-    """Evaluate a design; bounds of all samples, guaranteed where all signs are stated."""
-    at_corners = design.bounds(campaign(design.points), method)
-    stated = campaign.knowledge.stated_signs(design.domain.names, at_corners.outputs) != 0
-    proved = corners_suffice(design.domain, stated) & np.isin(at_corners.outputs, effects.outputs)
-    guaranteed = guaranteed_bounds(at_corners, campaign, proved)
-    bounds = bounds_of_samples(design.domain, campaign.samples, method)
-    return replace(
-        bounds,
-        nature=guaranteed.nature,
-        natures=guaranteed.natures,
-        basis=guaranteed.basis,
-        inner=Ends(bounds.lower, bounds.upper),
-        notes=effects.notes(design.domain),
-    )
-
-
-def _sample_count(effects: Effects, domain: Domain) -> float:
+def _sample_count(effects: Effects, grids: list[list[list[float]]]) -> float:
     """Number of samples of the signed plan, a float: there may be too many to list."""
     total = 0.0
-    for signs, grid in zip(effects.signs, grids(domain, domain.names), strict=True):
+    for signs, grid in zip(effects.signs, grids, strict=True):
         counts = np.array([len(points) for points in grid], float)
         patterns = np.unique(signs == 0, axis=0)
         total += 2 * np.where(patterns, counts, 1.0).prod(axis=1).sum()
@@ -257,7 +209,7 @@ class Effects:
         )
 
 
-def verify(campaign: Campaign, domain: Domain, outputs: tuple[str, ...] = ()) -> Effects:
+def find_effects(campaign: Campaign, domain: Domain, outputs: tuple[str, ...] = ()) -> Effects:
     """Return the sign of every input's effect on every output, all or those named, level by level.
 
     Stated signs are tested at pairs of points; the others are observed at probes, from the widest
@@ -271,13 +223,18 @@ def verify(campaign: Campaign, domain: Domain, outputs: tuple[str, ...] = ()) ->
     lowers, uppers = domain.boxes
     for column in np.flatnonzero(signs.any(axis=0)):
         campaign(_sign_test_points(domain.modal, signs, lowers[0], uppers[0], int(column)))
+
+    def model(points: Array) -> Array:
+        """The outputs at points (n, inputs), shape (n, outputs)."""
+        values = campaign(points)
+        return values.array[:, [values.column(name) for name in outputs]]
+
     levels = []
     for row in range(len(lowers)):
-        lower, upper = lowers[row], uppers[row]
-        signs = np.where(upper == lower, np.int8(1), signs)
+        box = lowers[row], uppers[row]
+        signs = np.where(box[1] == box[0], np.int8(1), signs)
         if (signs == 0).any():
-            observed = _Box(campaign, outputs, lower, upper).observed_signs(domain.modal, signs)
-            signs = np.where(signs == 0, observed, signs)
+            signs = np.where(signs == 0, _observed_signs(model, box, domain.modal, signs), signs)
         levels.append(signs)
     return Effects(outputs, np.array(levels))
 
@@ -297,48 +254,34 @@ def _extreme_corners(signs: Signs, lower: Array, upper: Array) -> Array:
     return np.concatenate([np.where(rises, lower, upper), np.where(rises, upper, lower)])
 
 
-@dataclass(frozen=True)
-class _Box:
-    """The box of a level, in which signs are observed."""
+def _observed_signs(model: Model, box: tuple[Array, Array], modal: Array, stated: Signs) -> Signs:
+    """Return the sign of the slopes at all probes of a box, shape (outputs, inputs).
 
-    campaign: Campaign
-    outputs: tuple[str, ...]
-    lower: Array
-    upper: Array
+    It is 0 where slopes differ in sign, or the smallest is below 5 % of their range, and 1 for an
+    input without any effect. Only inputs without a sign in `stated` are probed.
+    """
+    lower, upper = box
+    free = np.flatnonzero((stated == 0).any(axis=0))
+    first = np.nan_to_num(np.sign(_slopes(model, box, modal[None], free)[0])).astype(np.int8)
+    corners = _extreme_corners(np.where(stated != 0, stated, first), lower, upper)
+    inside = lower + quasi_random_points(len(lower), _PROBES) * (upper - lower)
+    slopes = _slopes(model, box, np.concatenate([modal[None], corners, inside]), free)
+    smallest, largest = slopes.min(axis=0), slopes.max(axis=0)
+    margin = _MARGIN * (largest - smallest)
+    rises = (smallest > 0) & (smallest >= margin)
+    falls = (largest < 0) & (-largest >= margin)
+    has_no_effect = (smallest == 0) & (largest == 0)  # either end will do
+    return np.asarray((rises | has_no_effect).astype(np.int8) - falls.astype(np.int8))
 
-    def observed_signs(self, modal: Array, stated: Signs) -> Signs:
-        """Return the sign of the slopes at all probes of the box, shape (outputs, inputs).
 
-        It is 0 where slopes differ in sign, or the smallest is below 5 % of their range, and 1 for
-        an input without any effect. Only inputs without a sign in `stated` are probed.
-        """
-        free = np.flatnonzero((stated == 0).any(axis=0))
-        first = np.nan_to_num(np.sign(self._slopes(modal[None], free)[0])).astype(np.int8)
-        signs = np.where(stated != 0, stated, first)
-        corners = _extreme_corners(signs, self.lower, self.upper)
-        unit = quasi_random_points(len(self.lower), _PROBES)
-        inside = self.lower + unit * (self.upper - self.lower)
-        probes = np.concatenate([modal[None], corners, inside])
-        slopes = self._slopes(probes, free)
-        least, greatest = slopes.min(axis=0), slopes.max(axis=0)
-        margin = _MARGIN * (greatest - least)
-        rises = (least > 0) & (least >= margin)
-        falls = (greatest < 0) & (-greatest >= margin)
-        has_no_effect = (least == 0) & (greatest == 0)  # either end will do
-        return np.asarray((rises | has_no_effect).astype(np.int8) - falls.astype(np.int8))
-
-    def _slopes(self, points: Array, inputs: Rows) -> Array:
-        """Return one-sided differences by some inputs inside the box, (n, outputs, inputs)."""
-        values = self._values(points)
-        slopes = np.zeros((*values.shape, points.shape[1]))
-        for column in inputs:
-            step = _STEP * (self.upper[column] - self.lower[column])
-            steps = np.where(points[:, column] + step > self.upper[column], -step, step)
-            stepped = points.copy()
-            stepped[:, column] += steps
-            slopes[:, :, column] = (self._values(stepped) - values) / steps[:, None]
-        return slopes
-
-    def _values(self, points: Array) -> Array:
-        values = self.campaign(points)
-        return values.array[:, [values.column(name) for name in self.outputs]]
+def _slopes(model: Model, box: tuple[Array, Array], points: Array, inputs: Rows) -> Array:
+    """Return one-sided differences by some inputs inside a box, (n, outputs, inputs)."""
+    (lower, upper), values = box, model(points)
+    slopes = np.zeros((*values.shape, points.shape[1]))
+    for column in inputs:
+        step = _STEP * (upper[column] - lower[column])
+        steps = np.where(points[:, column] + step > upper[column], -step, step)
+        stepped = points.copy()
+        stepped[:, column] += steps
+        slopes[:, :, column] = (model(stepped) - values) / steps[:, None]
+    return slopes

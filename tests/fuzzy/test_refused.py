@@ -6,15 +6,14 @@ import numpy as np
 import pytest
 
 from alphacut.fuzzy import (
-    Automatic,
     Crisp,
-    Extended,
     FailedError,
     General,
     Interval,
     Knowledge,
     PiecewiseLinear,
     RefusedError,
+    Signed,
     Trapezoidal,
     Triangular,
     from_data,
@@ -65,8 +64,7 @@ def run(function=lambda x: x, inputs=X, *args, **options):
         (lambda: run(knowledge=Knowledge({"y": 1})), "input of knowledge"),
         (lambda: run(knowledge=Knowledge({"x": {"z": 1}})), "output of knowledge"),
         (lambda: Knowledge({"x": 2}), "sign of x"),
-        (lambda: run(lambda x: x, X, Extended(outputs=("z",))), "output"),
-        (lambda: Automatic(uncovered=0), "uncovered"),
+        (lambda: run(lambda x: x, X, Signed(outputs=("z",))), "output"),
         (lambda: run(store="/proc/none/s.db", identity={"v": 1}), "store"),
         (lambda: run(store="s.db"), "identity"),
         (lambda: model_key({"f": abs}), "identity"),

@@ -5,7 +5,6 @@ import pytest
 
 from alphacut.fuzzy import (
     Automatic,
-    Extended,
     FailedError,
     General,
     Interval,
@@ -46,7 +45,7 @@ PROBLEMS = {
     "branin": (branin, {"x": Triangular(-5, 2, 10), "y": Triangular(0, 5, 15)}),
     "inside": (inside, {"x": Triangular(-2, 0.1, 2), "y": Triangular(-2, 0.0, 2)}),
 }
-COARSE = {method.name: method for method in (General(), Reduced(), Extended(), Signed())}
+COARSE = {method.name: method for method in (General(), Reduced(), Signed())}
 
 
 @pytest.fixture(scope="module")
@@ -180,7 +179,7 @@ def test_a_search_ends_at_its_budget_and_says_so():
     assert "of at most 60" in str(result)
 
 
-@pytest.mark.parametrize("method", [General(), Signed(), Extended()])
+@pytest.mark.parametrize("method", [General(), Signed()])
 def test_a_design_beyond_the_budget_is_refused_before_it_runs(method):
     inputs = {f"x{i}": Triangular(-1.0, 0.0, 2.0) for i in range(8)}
     with pytest.raises(RefusedError) as refused:

@@ -7,7 +7,6 @@ import pytest
 
 from alphacut.fuzzy import (
     Crisp,
-    Extended,
     General,
     Interval,
     Nature,
@@ -92,7 +91,7 @@ def test_general_method_shares_maps_and_moduli():
     assert len(np.unique(points[:, 2])) == 9
 
 
-@pytest.mark.parametrize("method", [General(), Reduced(), Extended()])
+@pytest.mark.parametrize("method", [General(), Reduced()])
 def test_every_method_is_exact_on_a_monotone_model(method):
     result = propagate(monotone, PAPER, method)
     lower, upper = result.bounds("E")
