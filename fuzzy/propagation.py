@@ -28,8 +28,7 @@ from alphacut.fuzzy.result import Bounds, Nature
 from alphacut.fuzzy.sets.boxes import Domain, fuzzy_inputs, levels
 from alphacut.fuzzy.sets.numbers import Crisp, FuzzyNumber
 
-BUDGET = 10_000
-"""Evaluations of the model that a call may take unless it says more."""
+BUDGET = 10_000  # evaluations of the model that a call may take unless it says more
 
 
 def propagate(

@@ -10,8 +10,7 @@ import numpy as np
 
 LONGEST = 300
 """Characters of a message; beyond it value and allowed values are cut, and never the cure."""
-LEAST_SHOWN = 20
-"""Characters that remain of a value or of allowed values."""
+LEAST_SHOWN = 20  # characters that remain of a value or of allowed values
 
 
 def printable(value: object, most: int = LONGEST) -> str:

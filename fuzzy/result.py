@@ -26,8 +26,7 @@ if TYPE_CHECKING:
 
 ROUND_OFF = 1e-9
 """Share of an output's size by which bounds may miss each other for reasons of rounding."""
-_MAX_LINES = 25
-"""Lines of a text, one for each level of an output."""
+_MAX_LINES = 25  # lines of a text, one for each level of an output
 
 
 class Nature(StrEnum):
@@ -148,11 +147,6 @@ class Bounds:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "alpha", np.array(checked_levels(self.alpha)))
-        self._check_shapes()
-        self._check_values()
-        self._check_proof()
-
-    def _check_shapes(self) -> None:
         middle = () if self.time is None else (len(self.time),)
         shape = (len(self.alpha), *middle, len(self.outputs))
         for name in ("lower", "upper", "error"):
@@ -163,14 +157,12 @@ class Bounds:
             _require_shape("inner and outer", end.shape, shape)
         for texts in filter(None, (self.natures, self.units)):
             _require_shape("natures, units", (len(texts),), shape[-1:])
-
-    def _check_values(self) -> None:
         finite = np.isfinite(self.lower) & np.isfinite(self.upper)
         plain = finite & ((self.error >= 0) | (np.isnan(self.error) & self._guaranteed))
+        key, value = "lower, upper and error", "not finite, or negative"
         allowed = "finite ends, errors of 0 or more, or NaN where guaranteed"
-        require(
-            plain.all(), "lower, upper and error", value="not finite, or negative", allowed=allowed
-        )
+        require(plain.all(), key, value=value, allowed=allowed)
+        self._check_proof()
 
     def _check_proof(self) -> None:
         """Raise `FailedError` if cuts are not nested or attained bounds lie outside proved ones."""

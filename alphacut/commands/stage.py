@@ -22,7 +22,7 @@ from alphacut.stages.image import ImageResult
 from alphacut.stages.modulus import ModulusResult
 from alphacut.stages.results import Results
 from alphacut.stages.store import CutsResult
-from alphacut.stochastic.microstructure_summary import fragment
+from alphacut.stochastic.microstructure import fragment
 
 GALERKIN = "Error not declared: with crisp phases an upper bound of C, lower on a finer mesh\n"
 ONLY = "Plane strain alone: the other definition is for one particle of two isotropic phases"

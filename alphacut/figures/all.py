@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from alphacut.export.mesh import draw_mesh
-from alphacut.figures import answers, envelope, follower, frame, material, overview
+from alphacut.figures import envelope, material, overview, structure
 from alphacut.fuzzy import FuzzyNumber, PiecewiseLinear
 from alphacut.fuzzy.campaign.workers import submit
 from alphacut.io.provenance import NESTED, version_of
@@ -36,7 +36,7 @@ def drawings(results: Results) -> Iterator[Drawing]:
     if results.suite is not None:
         yield "spectra", partial(envelope.spectra, results.suite)
     for key, answer in results.answers.items():
-        yield key, partial(answers.DRAWINGS[key], answer)
+        yield key, partial(envelope.DRAWINGS[key], answer)
     for task in results.tasks:
         yield from envelope.drawings(task, results)
 
@@ -80,13 +80,13 @@ def _structure_figures(results: Results) -> Iterator[Drawing]:
         yield "fig02-stages", partial(overview.stages, results)
     yield "fig20-mapping", partial(envelope.mapping, results)
     if (section := results.content.frame) is not None:
-        yield "fig26-frame", partial(frame.frame, section)
-        yield "fig27-chain", partial(frame.chain, section)
+        yield "fig26-frame", partial(structure.draw_frame, section)
+        yield "fig27-chain", partial(structure.draw_chain, section)
     widest_task = max(results.tasks, key=lambda task: len(task.fuzzy))
     if widest_task.section.method == "graph-follower":
         yield (
             "fig21-25-graph-follower",
-            partial(follower.graph_follower_steps, results, widest_task),
+            partial(structure.graph_follower_steps, results, widest_task),
         )
 
 

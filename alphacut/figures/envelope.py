@@ -1,12 +1,12 @@
-"""Envelopes (Figs. 28 to 35), the fuzzy mapping behind them (Fig. 20), inputs identified."""
+"""Envelopes (Figs. 28 to 35), the fuzzy mapping (Fig. 20), identified inputs, answers, spectra."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from textwrap import fill
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +15,10 @@ from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.arrays import Array
 from alphacut.io.quantity import engineering
+from alphacut.questions.decision import DecisionAnswer, degree_text
+from alphacut.questions.fragility import FragilityAnswer
+from alphacut.questions.probability import ProbabilityAnswer
+from alphacut.questions.tolerances import TolerancesAnswer
 from alphacut.stages.envelope import EnvelopeTask
 from alphacut.stages.identify import IdentifiedResult
 from alphacut.stages.results import Results
@@ -99,29 +103,32 @@ def mapping(results: Results, *, count: int = 40, duration: float = 5.0) -> Figu
     return figure
 
 
-def identified_inputs(result: IdentifiedResult) -> Figure:
-    """Draws each input's prior interval and its identified cuts, over the prior's middle."""
-    names, alpha = list(result.inputs), result.alpha
-    figure, axes = style.figure(height=0.9 + 0.32 * len(names))
-    rows = np.arange(len(names), dtype=float)[::-1]
-    prior = np.array([result.prior[name] for name in names], float)  # (inputs, 2)
-    middles = prior.mean(axis=1)[:, None]
-    before = prior / middles
-    wide: style.Look = {"height": 0.7, "color": GREY, "alpha": 0.45, "label": "before"}
-    axes.barh(rows, np.ptp(before, axis=1), left=before[:, 0], lw=0, **wide)
-    cuts = result.inputs.values()
-    lower, upper = (
-        np.array([getattr(x, end) for x in cuts]) / middles for end in ("lower", "upper")
-    )
-    for k, level in enumerate(alpha):
-        label = f"after, α = {level:g}" if k in (0, len(alpha) - 1) else None
-        bar: style.Look = {"height": 0.5 - 0.3 * level, "alpha": 0.35 + 0.6 * level, "label": label}
-        widths = upper[:, k] - lower[:, k]
-        axes.barh(rows, widths, left=lower[:, k], lw=0, color=BLUE, **bar)
-    axes.set_yticks(rows, names)
-    axes.set_xlabel("value over the middle of what it was before")
+def draw_bars(
+    intervals: Sequence[tuple[Array, style.Look]], names: Iterable[str], label: str
+) -> Figure:
+    """Draws intervals of inputs as bars, a row an input; each series (inputs, 2) has its look."""
+    rows = np.arange(len(intervals[0][0]), dtype=float)[::-1]
+    figure, axes = style.figure(height=0.9 + 0.36 * len(rows))
+    for ends, look in intervals:
+        axes.barh(rows, np.ptp(ends, axis=1), left=ends[:, 0], lw=0, **look)
+    axes.set_yticks(rows, list(names))
+    axes.set_xlabel(label)
     axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return figure
+
+
+def identified_inputs(result: IdentifiedResult) -> Figure:
+    """Draws each input's prior interval and its identified cuts, over the prior's middle."""
+    alpha, prior = result.alpha, np.array([result.prior[name] for name in result.inputs], float)
+    middles = prior.mean(axis=1)[:, None]
+    look: style.Look = {"height": 0.7, "color": GREY, "alpha": 0.45, "label": "before"}
+    intervals = [(prior / middles, look)]
+    for k, level in enumerate(alpha):
+        label = f"after, α = {level:g}" if k in (0, len(alpha) - 1) else None
+        look = {"height": 0.5 - 0.3 * level, "alpha": 0.35 + 0.6 * level, "label": label}
+        cuts = np.array([cuts[k] for cuts in result.inputs.values()])
+        intervals.append((cuts / middles, {"color": BLUE, **look}))
+    return draw_bars(intervals, result.inputs, "value over the middle of what it was before")
 
 
 def spectra(suite: SuiteResult) -> Figure:
@@ -137,3 +144,96 @@ def spectra(suite: SuiteResult) -> Figure:
     )
     axes.legend(fontsize=8)
     return figure
+
+
+def draw_decision(answer: DecisionAnswer) -> Figure:
+    """Draws bars from the smallest to the largest peak over its limit, of each limit and level."""
+    limits = [limit for limit in answer.limits.values() if limit.peak is not None]
+    figure, axes = style.figure(7.2, 1.2 + 0.7 * len(limits))
+    alpha, rows = answer.alpha, np.arange(len(limits))[::-1]  # the first limit on top
+    for row, limit in zip(rows, limits, strict=True):
+        size = max(abs(limit.limit), 1e-300)
+        # margin = limit − peak, so that the largest margin belongs to the smallest peak
+        lefts, rights = 1 - limit.margin.upper / size, 1 - limit.margin.lower / size
+        look: style.Look = {"height": 0.66 - 0.4 * alpha, "color": style.colours(alpha), "lw": 0}
+        axes.barh(row, rights - lefts, left=lefts, **look)
+        possible, necessary = degree_text(limit.possibility), degree_text(limit.necessity)
+        text = f"{limit.verdict_words} ({limit.nature}): possible to {possible}"
+        text += f", necessary to {necessary}"
+        axes.text(0.01, row + 0.4, text, fontsize=8, transform=axes.get_yaxis_transform())
+    axes.axvline(1.0, color=ORANGE, lw=1.4, ls="--")
+    axes.axvline(0.0, color=GREY, lw=0.4)
+    axes.set_ylim(-0.5, len(limits) - 0.2)
+    axes.set_yticks(rows, [limit.words for limit in limits], color=INK)
+    axes.set_xlabel("peak over its limit (dashed); the darker the higher α")
+    return figure
+
+
+def draw_probability_bands(
+    x: Array, bands: Sequence[Array], alpha: Array, label: str, *, in_steps: bool = False
+) -> tuple[Figure, Axes]:
+    """Draws lower and upper bounds of a probability over x, two arrays (levels, x)."""
+    figure, axes = style.figure(7.2, 3.6)
+    band: style.Look = {"step": "post"} if in_steps else {}
+    line: style.Look = {"drawstyle": "steps-post"} if in_steps else {}
+    for low, high, shade in zip(*bands, style.colours(alpha), strict=True):
+        axes.fill_between(x, low, high, color=shade, lw=0, **band)
+    for end in (bands[0][-1], bands[1][-1]):  # the highest band may have no width
+        axes.plot(x, end, color=INK, lw=1, **line)
+    axes.set(ylabel=label, ylim=(0, 1.02))
+    style.alpha_legend(axes, alpha)
+    return figure, axes
+
+
+def draw_probability(answer: ProbabilityAnswer) -> Figure:
+    """Draws the bounds of the exceedance probability of the last event over its limit, by level."""
+    event = [*answer.limits.values()][-1]
+    limits, *bands = (event.curve[x] for x in ("limit", "lower", "upper"))
+    label = "probability of exceeding it"
+    figure, axes = draw_probability_bands(limits, bands, answer.alpha, label)
+    limit_text = engineering(event.limit, event.unit) if event.unit else "1"
+    is_near = event.limit <= 2 * limits[-1]
+    if is_near:
+        axes.axvline(event.limit, color=ORANGE, lw=1.2, ls="--")
+    style.title(axes, f"limit {limit_text} ({'dashed' if is_near else 'far off'})")
+    title = f"limit of |{event.output}|" if event.unit else "all limits, over those of the case"
+    style.prefix_axis(axes, title, event.unit, across=True)
+    return figure
+
+
+def draw_tolerances(answer: TolerancesAnswer) -> Figure:
+    """Draws the supports of the inputs over nominal values: in the case, and with no exceedance."""
+    supports = answer.supports.values()
+    nominal = np.array([[x.modal or 1.0] for x in supports])
+    own = np.array([x.own for x in supports]) / nominal
+    kept = np.array([x.kept for x in supports]) / nominal
+    looks: list[style.Look] = [
+        {"color": GREY, "height": 0.7, "label": "in the case"},
+        {"color": BLUE, "height": 0.35, "label": "no limit exceeded"},
+    ]
+    intervals = list(zip((own, kept), looks, strict=True))
+    figure = draw_bars(intervals, answer.supports, "value over the nominal one")
+    figure.axes[0].axvline(1.0, color=INK, lw=0.8)
+    return figure
+
+
+def draw_fragility(answer: FragilityAnswer) -> Figure:
+    """Draws the bounds of the share of records that exceed the last limit over their measure."""
+    limit, label = [*answer.limits.values()][-1], "share of records that exceed it"
+    bands = (limit.band.lower, limit.band.upper)
+    figure, axes = draw_probability_bands(limit.measure, bands, answer.alpha, label, in_steps=True)
+    if limit.confidence is not None:
+        for end in (limit.confidence.lower, limit.confidence.upper):
+            axes.plot(limit.measure, end[0], color=BLUE, lw=0.9, ls="--")
+    style.title(axes, limit.words)
+    style.prefix_axis(axes, answer.measure, answer.unit, across=True)
+    return figure
+
+
+DRAWINGS: dict[str, Callable[[Any], Figure]] = {
+    "probability": draw_probability,
+    "decision": draw_decision,
+    "tolerances": draw_tolerances,
+    "fragility": draw_fragility,
+}
+"""Drawing of the answer to each question, by the question's key."""

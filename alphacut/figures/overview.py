@@ -23,8 +23,7 @@ if TYPE_CHECKING:
 
 MATRIX, PARTICLE = "#f6d9b8", "#b79ad9"
 
-BOX_WIDTH, PITCH = 2.4, 3.3
-"""Width of a stage's box in Fig. 2, and distance of the boxes."""
+BOX_WIDTH, PITCH = 2.4, 3.3  # width of a stage's box in Fig. 2, and distance of the boxes
 
 
 def domains(cell: Cell, size: float, layers: int) -> Figure:
@@ -185,8 +184,7 @@ def ends_and_modal(number: FuzzyNumber) -> list[float]:
     return sorted({number.support.lower, number.modal, number.support.upper})
 
 
-CUTS = 6
-"""Levels in Fig. 37."""
+CUTS = 6  # levels in Fig. 37
 
 
 def number_of_each_kind(given: FuzzyNumber, result: FuzzyNumber) -> dict[str, FuzzyNumber]:

@@ -9,9 +9,6 @@ import tomllib
 from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 
-import numpy as np
-
-from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document, say
@@ -45,6 +42,7 @@ TERMS = {
     **{str(nature).capitalize(): nature.sentence for nature in Nature},
 }
 """Terms of the page with their meaning."""
+SHARES = "Share of the width that is lost when an input is fixed at its nominal value."
 Piece = tuple[object, ...]
 """Name of a macro of ``report.html``, and what it shows."""
 _TABLES = tomllib.loads(Path(__file__).with_name("captions.toml").read_text(encoding="utf-8"))
@@ -82,14 +80,15 @@ def render_template(**parts: object) -> str:
 
 
 def plot(name: str, study: EnvelopeResult, folder: ResultsFolder) -> Document:
-    """Data of a study for the interactive plot: by level and output, base64 of values over time."""
+    """Data of a study for the interactive plot: values over time as base64 of 32-bit floats."""
     dataset = folder.dataset(f"envelope_{name}.nc")
     time = dataset["time"].values
     outputs = [str(output) for output in dataset["output"].values]
     bands = {side: dataset[side] for side in ("lower", "upper")}
     contains_error = study.nature is Nature.GUARANTEED
     bands["error"] = dataset["lower"] * 0.0 if contains_error else dataset["error"]
-    arrays = {side: band.transpose("alpha", "output", "time") for side, band in bands.items()}
+    axes = ("alpha", "output", "time")
+    arrays = {x: band.transpose(*axes).values.astype("<f4") for x, band in bands.items()}
     return {
         "name": name,
         "title": f"{name}: fuzzy {', '.join(study.fuzzy)}",
@@ -100,15 +99,10 @@ def plot(name: str, study: EnvelopeResult, folder: ResultsFolder) -> Document:
         "units": [study.units[output] for output in outputs],
         "step": float(time[1] - time[0]),
         **{
-            side: [[packed_numbers(row) for row in level] for level in array.values]
+            side: [[base64.b64encode(row.tobytes()).decode() for row in level] for level in array]
             for side, array in arrays.items()
         },
     }
-
-
-def packed_numbers(row: Array) -> str:
-    """Numbers as little-endian 32-bit floats in base64."""
-    return base64.b64encode(np.ascontiguousarray(row, "<f4").tobytes()).decode()
 
 
 class Page:
@@ -125,6 +119,9 @@ class Page:
 
         A piece is the name of a macro of the template, and what the macro shows.
         """
+        summary = self.summary
+        records = ["records"] if summary.records is not None else []
+        shares = [("text", SHARES), ("table", *self.tables["shares"])] if summary.shares else []
         for title, pieces in (
             ("Key results", self._key_pieces()),
             ("Microstructure", self._microstructure()),
@@ -132,9 +129,9 @@ class Page:
             ("How stiff is the image?", self._image()),
             ("What do the measured modes teach?", self._update()),
             ("How does the structure move?", self._envelopes()),
-            ("How far does it move under each record?", self._records()),
-            *((answer.title, self._answer(answer)) for answer in self.summary.answers),
-            ("What drives the width?", self._shares()),
+            ("How far does it move under each record?", map(self._folded_table, records)),
+            *((answer.title, self._answer(answer)) for answer in summary.answers),
+            ("What drives the width?", shares),
             ("Terms", [("glossary", TERMS.items())]),
             ("More", self._more()),
         ):
@@ -203,20 +200,10 @@ class Page:
         yield from _texts(*lines)
         yield self._folded_table("peaks")
 
-    def _records(self) -> Iterator[Piece]:
-        if self.summary.records is not None:
-            yield self._folded_table("records")
-
     def _answer(self, answer: Answer) -> Iterator[Piece]:
         yield from self._figures(answer.key)
         yield "text", answer.words()
         yield ("table", *self.tables[answer.key])
-
-    def _shares(self) -> Iterator[Piece]:
-        if self.summary.shares:
-            text = "Share of the width that is lost when an input is fixed at its modal value."
-            yield "text", text
-            yield ("table", *self.tables["shares"])
 
     def _folded_table(self, name: str) -> Piece:
         return "folded", "As a table", [("table", *self.tables[name])]
@@ -262,7 +249,7 @@ def _errors(part: ModulusResult) -> Table:
         rows.append(("Hashin–Shtrikman bounds, isotropic composites", text))
     if (estimate := part.references.get("mori_tanaka_E_GPa")) is not None:
         rows.append(("Mori–Tanaka, isotropic composites", f"{estimate:.5g} GPa"))
-    return Table(("source, property or reference at the modal values", "value"), rows)
+    return Table(("source, property or reference at the nominal values", "value"), rows)
 
 
 def in_words(name: str) -> str:
@@ -279,7 +266,6 @@ def caption(stem: str, *, paper: bool) -> str:
         text = f"Envelope of {output}" + ("" if study == "all" else f", study {study}")
     else:
         text = FIGURES.get(name.replace("_", "-"), name.replace("-", " "))
-    if not (paper and number):
-        return text
-    numbers = [str(int(figure)) for figure in number.split("-")]
-    return f"{'Figs.' if len(numbers) > 1 else 'Fig.'} {' to '.join(numbers)}: {text}"
+    numbers = [str(int(figure)) for figure in number.split("-") if paper and number]
+    prefix = f"{'Figs.' if len(numbers) > 1 else 'Fig.'} {' to '.join(numbers)}: "
+    return prefix + text if numbers else text

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -13,7 +14,7 @@ from alphacut.questions.question import Row
 from alphacut.questions.summary import Parts
 from alphacut.questions.tolerances import TolerancesAnswer
 from alphacut.report.tables import Table, unit_of
-from alphacut.stages.envelope import EnvelopeResult, PeakResult
+from alphacut.stages.envelope import PeakResult
 from alphacut.stages.identify import IdentifiedResult
 from alphacut.stages.image import ImageResult
 from alphacut.stages.modulus import ModulusResult
@@ -117,10 +118,8 @@ def learned(result: IdentifiedResult) -> Table:
         texts = (_outer_text(ends, result.units[name]) for ends in (result.prior[name], cuts[0]))
         rows.append((name, *texts, f"{result.narrowed[name]:.0%} of the width"))
     for mode in result.held_out:
-        verdict, predicted = (
-            "inside" if mode.inside else "outside",
-            _outer_text(mode.predicted, "Hz"),
-        )
+        verdict = "inside" if mode.inside else "outside"
+        predicted = _outer_text(mode.predicted, "Hz")
         rows.append((f"mode {mode.mode}", f"{mode.measured:.4g} Hz", predicted, verdict))
     return Table(("input or mode", "before, measured", "learned, predicted", ""), rows)
 
@@ -148,14 +147,15 @@ def peak_table(parts: Parts) -> Table:
     limits, has_core, rows = limits_by_peak(parts), bool(alpha[-1] == 1), list[Row]()
     for name, study in studies.items():
         suffix = f" ({name})" if len(studies) > 1 else ""
-        for peak_name, peak in shown_peaks(study):
+        for peak_name in (name for name in study.peak if name in (study.drawn or study.peak)):
+            peak = study.peak[peak_name]
             units = display_units(peak_name, unit_of(study.units, peak_name), peak, parts.structure)
             for label, factor in units:
-                first, *further = limits.get(peak_name, [None])
                 cells = peak_cells(peak, factor, levels, has_core=has_core)
-                rows.append((label + suffix, *cells, *limit_cells(first, factor)))
-                empty = ("",) * len(cells)
-                rows += [(label + suffix, *empty, *limit_cells(x, factor)) for x in further]
+                for limit, verdict in limits.get(peak_name, [(math.nan, "")]):
+                    limit_text = "" if math.isnan(limit) else engineering(limit * factor, "")
+                    rows.append((label + suffix, *cells, limit_text, EXCEEDED.get(verdict, "")))
+                    cells = ("",) * len(cells)  # of further limits of the same peak
     titles = [f"α = {alpha[k]:g}" for k in levels]
     if has_core and not any("…" in row[1] for row in rows):
         titles[0] = "nominal"
@@ -163,60 +163,34 @@ def peak_table(parts: Parts) -> Table:
     return without_empty_columns(head, rows)
 
 
-def shown_peaks(study: EnvelopeResult) -> Iterator[tuple[str, PeakResult]]:
-    """Yields the peaks of the outputs that are drawn, or all, by name."""
-    for name, peak in study.peak.items():
-        if name in (study.drawn or study.peak):
-            yield name, peak
-
-
 def peak_cells(peak: PeakResult, factor: float, levels: Sequence[int], *, has_core: bool) -> Row:
     """Texts of a peak times a factor: its cut on some levels, its error, what is reached, the gap.
 
-    Levels are indices, the highest first; with `has_core` that is 1, shown by `nominal`.
+    Levels are indices, the highest first; with `has_core` that is 1, shown by `nominal_text`.
     """
-    nature, cuts = peak.nature, list[str]()
-    for k in levels:
-        low, high = factor * float(peak.lower[k]), factor * float(peak.upper[k])
-        cuts.append(range_text(low, high, nature, 3 if k > 0 else 4))
+    nature, lower, upper = peak.nature, factor * peak.lower, factor * peak.upper
+    cuts = [range_text(float(lower[k]), float(upper[k]), nature, 3 if k else 4) for k in levels]
     if has_core:
-        cuts[0] = nominal(peak, factor)
+        cuts[0] = nominal_text(float(lower[-1]), float(upper[-1]), nature)
     error = error_text(factor * float(peak.error.max()), nature)
     if nature is not Nature.GUARANTEED:
         return (*cuts, error, "", "")
     inner = "lower" if peak.is_least else "upper"
     reached = rounded(factor * float(peak.reached[0]), inner, Nature.ATTAINED)
-    return (*cuts, error, number_text(reached), f"{peak.gap(0):.1%}")
+    return (*cuts, error, engineering(reached, ""), f"{peak.gap(0):.1%}")
 
 
-def number_text(value: float) -> str:
-    """A number with four digits and the typographic minus."""
-    return engineering(value, "")
+def nominal_text(low: float, high: float, nature: Nature) -> str:
+    """Text of a cut at α = 1: a number, or a range if that is wider than a hundredth of it."""
+    if high - low > 0.01 * abs(high):
+        return range_text(low, high, nature, 3)
+    middle = (low + high) / 2
+    return range_text(middle, middle, nature)
 
 
-def nominal(peak: PeakResult, factor: float) -> str:
-    """Text of a peak at α = 1: a number, or a range if that is wider than a hundredth of it."""
-    low, high = factor * float(peak.lower[-1]), factor * float(peak.upper[-1])
-    middle, is_narrow = (low + high) / 2, high - low <= 0.01 * abs(high)
-    if is_narrow:
-        return range_text(middle, middle, peak.nature)
-    return range_text(low, high, peak.nature, 3)
-
-
-Limit = tuple[float, str]
-"""A limit in SI, and the verdict on it, if there is one."""
-
-
-def limit_cells(limit: Limit | None, factor: float) -> tuple[str, str]:
-    """Texts of a limit times a factor, and of the verdict on it; empty without a limit."""
-    if limit is None:
-        return "", ""
-    return number_text(limit[0] * factor), EXCEEDED.get(limit[1], "")
-
-
-def limits_by_peak(parts: Parts) -> dict[str, list[Limit]]:
-    """Limits of each peak with their verdicts, of [decision], else of another question."""
-    limits: dict[str, list[Limit]] = {}
+def limits_by_peak(parts: Parts) -> dict[str, list[tuple[float, str]]]:
+    """Limits of each peak in SI with the verdict or "", of [decision], else of another question."""
+    limits: dict[str, list[tuple[float, str]]] = {}
     for decision in () if parts.decision is None else parts.decision.limits.values():
         limits.setdefault(decision.peak_name, []).append((decision.limit, decision.verdict))
     for event in () if parts.probability is None else parts.probability.limits.values():

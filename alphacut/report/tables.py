@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -64,21 +64,17 @@ class Table(NamedTuple):
 
 def frames(parts: Parts) -> dict[str, pd.DataFrame]:
     """Numbers of all results as data frames by name: of stages, then of questions."""
-    found = {}
-    if parts.microstructure is not None:
-        found["radius_map"] = radius_map(parts.microstructure)
-    if parts.modulus is not None:
-        found["modulus"] = modulus(parts.modulus)
-    if parts.image is not None:
-        found["image"] = image(parts.image)
-    if isinstance(parts.update, IdentifiedResult):
-        found["update"] = update(parts.update)
-    if parts.envelopes:
-        found["peaks"] = peaks(parts.envelopes)
-    if parts.records is not None:
-        found["records"] = records(parts.records)
-    if parts.shares:
-        found["shares"] = shares(parts.shares)
+    identified = parts.update if isinstance(parts.update, IdentifiedResult) else None
+    of_stages: tuple[tuple[str, Callable[[Any], pd.DataFrame], object], ...] = (
+        ("radius_map", radius_map, parts.microstructure),
+        ("modulus", modulus, parts.modulus),
+        ("image", image, parts.image),
+        ("update", update, identified),
+        ("peaks", peaks, parts.envelopes),
+        ("records", records, parts.records),
+        ("shares", shares, parts.shares),
+    )
+    found = {name: frame_of(part) for name, frame_of, part in of_stages if part}
     return found | {answer.key: pd.DataFrame(answer.records()) for answer in parts.answers}
 
 
@@ -89,12 +85,11 @@ def tables(parts: Parts) -> dict[str, Table]:
 
 
 def radius_map(numbers: Document) -> pd.DataFrame:
-    """The parameters a1 … a4 of the radius map: least, modal and greatest value."""
-    rows = []
-    for name in ("a1", "a2", "a3", "a4"):
-        corners = np.atleast_1d(numbers[name])  # three, or one
-        rows.append((name, corners[0], corners[len(corners) // 2], corners[-1]))
-    return pd.DataFrame(rows, columns=["parameter of the radius map", "least", "modal", "greatest"])
+    """The parameters a1 … a4 of the radius map: minimum, nominal value and maximum."""
+    corners = {name: np.atleast_1d(numbers[name]) for name in ("a1", "a2", "a3", "a4")}  # 3 or 1
+    rows = [(name, x[0], x[len(x) // 2], x[-1]) for name, x in corners.items()]
+    head = ["parameter of the radius map", "minimum", "nominal", "maximum"]
+    return pd.DataFrame(rows, columns=head)
 
 
 def modulus(result: ModulusResult) -> pd.DataFrame:

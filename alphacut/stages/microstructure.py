@@ -14,8 +14,7 @@ from alphacut.io.arrays import columns_text
 from alphacut.io.files import Document, write_text
 from alphacut.io.provenance import file_digest
 from alphacut.stages.store import Computed, Stage, StageContext, StageResult
-from alphacut.stochastic.microstructure import Microstructure, study
-from alphacut.stochastic.microstructure_summary import fragment, summary, to_dataset
+from alphacut.stochastic.microstructure import Microstructure, fragment, study, summary, to_dataset
 
 
 def stage(section: MicrostructureSection, spheres: bool, figures: bool = True) -> Stage[Document]:

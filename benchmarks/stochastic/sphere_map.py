@@ -17,8 +17,7 @@ import numpy as np
 from scipy.optimize import nnls
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.stochastic.microstructure import MicrostructureStudy, study
-from alphacut.stochastic.microstructure_summary import fragment, summary
+from alphacut.stochastic.microstructure import MicrostructureStudy, fragment, study, summary
 from alphacut.stochastic.particles.packing import Packing
 from alphacut.stochastic.particles.particles import SPHERES
 from alphacut.stochastic.particles.radius_laws import LogNormalRadii, MeasuredRadii

@@ -37,22 +37,19 @@ from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.plans.cut import Bound, CutSearch, Optimum, cuts_with_width
 from alphacut.fuzzy.sets.boxes import Domain
 
-SEED = 0
-"""Seed of all samples."""
+SEED = 0  # seed of all samples
 MAX_UNCOVERED = 0.002
 """Share of each cut, not yet covered by basins that were seen, up to which a search goes on."""
 MIN_SAMPLES = 100
 """Samples N from which the rule of Boender and Rinnooy Kan decides: with fewer its prior does."""
-SIGMA_ONE_HUMP = 4.0
-"""σ while at most one optimum is no corner: descents of one hump stay few."""
+SIGMA_ONE_HUMP = 4.0  # σ while at most one optimum is no corner: descents of one hump stay few
 SIGMA_SEVERAL_HUMPS = 2.0
 """σ from the second such optimum on: a smaller one starts more descents and hides fewer basins."""
 FIRST_STEP = 0.1
 """First step of a careful descent, of the width of the cut: a longer one passes over humps."""
 VALUE_TOLERANCE = 1e-5
 """Of an output's range in the widest cut: values that differ by less count as one."""
-ROUNDING = 1e-9
-"""The same of an output's size."""
+ROUNDING = 1e-9  # the same of an output's size
 MAX_ON_PLATEAUS = 1000
 """Samples on plateaus with which the search of a bound ends: 95 % find a cone of 0.3 % of them."""
 _EQUAL = 1e-13  # of an output's size: two samples that differ by less lie on a plateau

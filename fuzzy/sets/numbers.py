@@ -73,8 +73,9 @@ class FuzzyNumber(ABC):
         """Grade of membership μ in [0, 1] at `x`, any shape; NaN where `x` is NaN."""
         levels, lower, upper = map(np.asarray, self.cuts)
         x = np.asarray(x, float)
-        grade = np.minimum(_highest_level(x, levels, lower), _highest_level(-x, levels, -upper))
-        return np.where(np.isnan(x), np.nan, grade)
+        # of equal ends `interp` takes the last at them: the highest level
+        left, right = np.interp(x, lower, levels, left=0), np.interp(-x, -upper, levels, left=0)
+        return np.asarray(np.minimum(left, right))
 
     def plot(self, axes: Axes | None = None, **line: Any) -> Axes:
         """Draw the membership function on Matplotlib axes, new ones by default, and return them.
@@ -121,28 +122,15 @@ def _interpolate(alpha: float, levels: Sequence[float], ends: Sequence[float]) -
     return float(ends[right] - (1 - fraction) * rise)
 
 
-def _highest_level(x: Array, levels: Array, lower: Array) -> Array:
-    """Return the membership of x on the left flank, 0 where x lies below all cuts."""
-    count = np.searchsorted(lower, x, side="right")  # cuts with their lower end at or below x
-    right = np.clip(count, 1, len(lower) - 1)
-    left = right - 1
-    rise = lower[right] - lower[left]
-    fraction = np.divide(x - lower[left], rise, out=np.zeros_like(x), where=rise > 0)
-    interpolated = levels[left] + fraction * (levels[right] - levels[left])
-    return np.where(count == 0, 0.0, np.where(count == len(lower), 1.0, interpolated))
-
-
 @dataclass(frozen=True)
 class _Corners(FuzzyNumber):
     """Base of numbers with straight flanks: their fields are the corners in rising order."""
 
-    word: ClassVar[str]
-
     def __post_init__(self) -> None:
-        names = [corner.name for corner in fields(self)]
-        corners = [checked_number(self.word, getattr(self, name)) for name in names]
-        order = " <= ".join(names)
-        require((np.diff(corners) >= 0).all(), self.word, value=corners, allowed=order)
+        key, names = type(self).__name__, [corner.name for corner in fields(self)]
+        corners = [checked_number(key, getattr(self, name)) for name in names]
+        is_rising, order = (np.diff(corners) >= 0).all(), " <= ".join(names)
+        require(is_rising, key, value=corners, allowed=order)
 
     @cached_property
     def cuts(self) -> Cuts:
@@ -157,8 +145,6 @@ class Crisp(_Corners):
 
     value: float
 
-    word = "crisp number"
-
 
 @dataclass(frozen=True)
 class Interval(_Corners):
@@ -166,8 +152,6 @@ class Interval(_Corners):
 
     lower: float
     upper: float
-
-    word = "interval"
 
 
 @dataclass(frozen=True)
@@ -186,8 +170,6 @@ class Triangular(_Corners):
     modal: float = field()  # declared anew: the base class derives it from the cuts
     upper: float
 
-    word = "triangle"
-
 
 @dataclass(frozen=True)
 class Trapezoidal(_Corners):
@@ -197,8 +179,6 @@ class Trapezoidal(_Corners):
     left: float
     right: float
     upper: float
-
-    word = "trapezoid"
 
 
 @dataclass(frozen=True)

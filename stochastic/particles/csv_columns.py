@@ -18,8 +18,7 @@ METRES |= {"micron": 1e-6, "nm": 1e-9, "in": 0.0254, "inch": 0.0254, "ft": 0.304
 DIAMETERS, RADII = ("d", "diameter", "size"), ("r", "radius")
 HEADER = r"\s*(\w+)\s*(?:[\[(]\s*([^\])]*?)\s*[\])])?\s*"
 """Name of a column, and its unit in brackets."""
-LONGEST = 100
-"""Characters of a number; a longer field is none."""
+LONGEST = 100  # characters of a number; a longer field is none
 NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 
 

@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 from alphacut.fuzzy.arrays import Array, Mask, Rows
 from alphacut.fuzzy.refused import RefusedError, checked_number, require
 from alphacut.stochastic.particles.csv_columns import length_columns
-from alphacut.stochastic.particles.neighbour_search import close_pairs, surface_distance
-from alphacut.stochastic.particles.particles import Particles
+from alphacut.stochastic.particles.particles import Particles, close_pairs, surface_distance
 from alphacut.stochastic.particles.radius_laws import require_radii
 
 SMOOTHING = 1.5  # standard deviation, in pixels

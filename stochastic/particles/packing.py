@@ -16,12 +16,15 @@ from scipy.spatial import KDTree
 
 from alphacut.fuzzy.arrays import Array, Mask, Rows
 from alphacut.fuzzy.refused import FailedError, checked_number, require
-from alphacut.stochastic.particles.neighbour_search import (
+from alphacut.stochastic.particles.particles import (
+    DISCS,
+    Particles,
+    Shape,
     close_pairs,
+    nearest_image,
     points_in_balls,
     size_classes,
 )
-from alphacut.stochastic.particles.particles import DISCS, Particles, Shape, nearest_image
 from alphacut.stochastic.particles.radius_laws import RadiusLaw
 
 MAX_PROPOSALS = 1000  # for a particle, before random sequential addition ends without a packing

@@ -18,8 +18,7 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.refused import require
-from alphacut.stochastic.particles.neighbour_search import Pairs, pairs_within
-from alphacut.stochastic.particles.particles import Particles
+from alphacut.stochastic.particles.particles import Pairs, Particles, pairs_within
 from alphacut.stochastic.tessellation.circle_envelope import (
     Arcs,
     anomaly,

@@ -35,12 +35,12 @@ def run(function=lambda x: x, inputs=X, *args, **options):
 @pytest.mark.parametrize(
     ("make", "key"),
     [
-        (lambda: Triangular(2, 1, 3), "triangle"),
-        (lambda: Triangular(0, 1, np.inf), "triangle"),
-        (lambda: Triangular(0, True, 2), "triangle"),
-        (lambda: Interval(3, 2), "interval"),
-        (lambda: Trapezoidal(0, 2, 1, 3), "trapezoid"),
-        (lambda: Crisp("1"), "crisp number"),
+        (lambda: Triangular(2, 1, 3), "Triangular"),
+        (lambda: Triangular(0, 1, np.inf), "Triangular"),
+        (lambda: Triangular(0, True, 2), "Triangular"),
+        (lambda: Interval(3, 2), "Interval"),
+        (lambda: Trapezoidal(0, 2, 1, 3), "Trapezoidal"),
+        (lambda: Crisp("1"), "Crisp"),
         (lambda: PiecewiseLinear((0, 1), (0, 1), (1,)), "alpha"),
         (lambda: PiecewiseLinear((0, 0.5), (0, 1), (3, 2)), "alpha"),
         (lambda: PiecewiseLinear((0, 1), (0, 2), (3, 1)), "cuts"),

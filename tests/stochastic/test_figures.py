@@ -4,9 +4,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
-from alphacut.stochastic.figures.all import draw_neighbour_statistics
-from alphacut.stochastic.figures.cells import (
+from alphacut.stochastic.figures.all import (
     draw_cells,
+    draw_neighbour_statistics,
     draw_neighbours,
     draw_two_point,
     plot_cells,

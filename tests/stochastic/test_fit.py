@@ -11,8 +11,7 @@ from scipy import integrate
 from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.stochastic import HermiteMap, TruncatedNormal
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
-from alphacut.stochastic.fit.hermite_fit import HermiteFit, slope_band
-from alphacut.stochastic.fit.pbox import PBox, least_pbox
+from alphacut.stochastic.fit.hermite_fit import HermiteFit, PBox, least_pbox, slope_band
 
 LAW = TruncatedNormal()
 TRUE = HermiteMap(0.13, 0.3, 0.87, 0.5)

@@ -14,8 +14,13 @@ from alphacut.fuzzy.refused import RefusedError
 from alphacut.stochastic import microstructure
 from alphacut.stochastic.figures.all import draw
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
-from alphacut.stochastic.microstructure import MicrostructureStudy, fit_map, study
-from alphacut.stochastic.microstructure_summary import fragment, summary
+from alphacut.stochastic.microstructure import (
+    MicrostructureStudy,
+    fit_map,
+    fragment,
+    study,
+    summary,
+)
 from alphacut.stochastic.particles.measured import CircleFile, SectionImage
 from alphacut.stochastic.particles.packing import Packing
 from alphacut.stochastic.particles.particles import SPHERES, Particles

@@ -9,9 +9,8 @@ import pytest
 from scipy import stats
 
 from alphacut.fuzzy.refused import FailedError, RefusedError
-from alphacut.stochastic.particles.neighbour_search import close_pairs
 from alphacut.stochastic.particles.packing import Packing, random_sequential, relax_random_centres
-from alphacut.stochastic.particles.particles import DISCS, SPHERES, Particles
+from alphacut.stochastic.particles.particles import DISCS, SPHERES, Particles, close_pairs
 from alphacut.stochastic.particles.radius_laws import LogNormalRadii, MeasuredRadii
 from alphacut.stochastic.sections import Simulated
 from alphacut.stochastic.theta.quadrature import gauss_rule

@@ -10,7 +10,7 @@ from alphacut.case.content import Content
 from alphacut.case.limits import Limit, parse_limit
 from alphacut.commands.pipeline import QUESTIONS as PUT
 from alphacut.entry import main
-from alphacut.figures.answers import DRAWINGS
+from alphacut.figures.envelope import DRAWINGS
 from alphacut.frame.questions.peaks import Peaks
 from alphacut.fuzzy import Triangular
 from alphacut.fuzzy.refused import RefusedError
