@@ -5,14 +5,16 @@
    likewise the motion under a record (`frame.modes.damped`).
 2. What these polynomials miss in the equations of motion is bounded over the whole box, and with it
    the error of the motion (`frame.bounds.model_error`). The degree rises until that takes a
-   fifth of the gap wanted. Where it does not, the part is refused and bisected
+   fifth of the gap wanted. Where it does not, the box is refused and bisected
    (`frame.bounds.spatial_branch_and_bound`).
 3. Branch and bound encloses the polynomials' extremes at all nodes, for all outputs, sides and
-   levels, between a point that is attained and a bound that is proved (`frame.bounds`).
+   levels, between a point that is attained and a bound that is proved
+   (`frame.bounds.branch_and_bound`).
 """
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass, replace
 from math import comb
 from typing import ClassVar
@@ -20,9 +22,16 @@ from typing import ClassVar
 import numpy as np
 
 from alphacut.frame.bounds.box_proof import BisectionError, BoxBounds, Goal
-from alphacut.frame.bounds.certificate import certify
+from alphacut.frame.bounds.branch_and_bound import enclosed
 from alphacut.frame.bounds.model_error import proved_error
-from alphacut.frame.bounds.remainder import MOST_PARAMETERS
+from alphacut.frame.bounds.newton import Optima, first_optima
+from alphacut.frame.bounds.remainder import (
+    MOST_PARAMETERS,
+    Remainder,
+    largest_growth,
+    parts,
+    suprema,
+)
 from alphacut.frame.bounds.spatial_branch_and_bound import prove
 from alphacut.frame.boxes import DEFAULT_TOLERANCE, Boxes, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError
@@ -30,9 +39,13 @@ from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.modes.damped import require_dissipation
 from alphacut.frame.modes.modal_model import ModalModel
+from alphacut.frame.response.load_tables import Direct
+from alphacut.frame.response.straying import line_deviations
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.progress_bar import Progress
+from alphacut.fuzzy.progress_bar import Progress, subprogress
 from alphacut.fuzzy.refused import checked_number
+
+LOG = logging.getLogger(__name__)
 
 MAX_ERROR_FRACTION = 0.2
 """Fraction of the gap that the error of the modal model may take on either side."""
@@ -47,6 +60,10 @@ FIRST_DECAY = 0.1
 """Factor by which a degree more multiplies the error, before any is seen."""
 CAUTION = 0.8
 """Fraction of the degrees that the errors ask for which is taken at once."""
+POINTS = (24, 3)
+"""Points along ω and g/ω of each mode at which its straying from lines between nodes is read."""
+NEWTON_GAP = 0.02
+"""Fraction of the gap that Newton's method may leave."""
 
 
 class GapError(UnprovedError):
@@ -142,35 +159,7 @@ class Proof:
             except (GapError, BisectionError):
                 if gap == self._gaps[-1]:
                     raise
-        proof = certify(
-            model,
-            gap=gap,
-            model_error=error,
-            scale=goal.scale,
-            workers=goal.workers,
-            budget=self.boxes,
-            progress=goal.tick,
-        )
-        facts = {
-            "model_error": float((error / goal.scale).max()),
-            "degree": model.degree,
-            "boxes": proof.boxes / len(boxes.alpha),
-            "evaluations": 1 / len(boxes.alpha),
-        }
-        inputs = boxes.to_physical(proof.at)
-        shares = np.broadcast_to(tail_shares(model), inputs.shape[2:])
-        return [
-            BoxBounds(
-                outer=outer,
-                inner=inner,
-                at=at,
-                between=proof.between,
-                shares=shares,
-                attained_error=proof.attained_error,
-                facts=facts,
-            )
-            for outer, inner, at in zip(proof.outer, proof.bounds, inputs, strict=True)
-        ]
+        return bound_levels(model, error, goal.scale, gap, self.boxes, goal.workers, goal.tick)
 
     def _accurate_model(
         self, flow: LinearFlow, boxes: Boxes, scale: Array, gap: float
@@ -203,6 +192,116 @@ class Proof:
         if not halvings / (input_shares**2).sum() <= np.log2(self.parts):
             return BisectionError(what, cure)
         return GapError(what, cure, int(input_shares.argmax()))
+
+
+def bound_levels(
+    model: ModalModel,
+    model_error: Array,
+    scale: Array,
+    gap: float,
+    budget: float = 4000,
+    workers: int = 1,
+    progress: Progress | None = None,
+) -> list[BoxBounds]:
+    """Bounds of all outputs at each node and on each level of a modal model, by branch and bound.
+
+    The narrowest level comes first, whose best points are good ones of the wider levels too.
+
+    Args:
+        model: The modal model.
+        model_error: Bound of its distance from the exact motion, shape (T, m).
+        scale: Unit of the gap for each output, shape (m,).
+        gap: Wanted difference between proved and attained bound.
+        budget: Most boxes per bound on average.
+        workers: Threads.
+        progress: Called with the completed fraction.
+
+    Raises:
+        ValueError: The gap is not above twice the model error.
+    """
+    model, error = model.in_units(scale), model_error / scale
+    rounding = Remainder(model, *model.boxes.unit(0)).margin[..., 0]
+    # so that rounding does not lift the gap above what was asked for
+    least_gap = float((2 * error + rounding).max())
+    search_gap = (1 - 1e-6) * gap - least_gap
+    if search_gap <= 0:
+        raise ValueError(f"the gap {gap:.3g} is not above twice the model error, {least_gap:.3g}")
+    levels, of_levels = len(model.boxes.alpha), list[tuple[Optima, Array, int]]()
+    for level in reversed(range(levels)):
+        tick = subprogress(progress, len(of_levels) / levels, (len(of_levels) + 1) / levels)
+        lower, upper = model.boxes.unit(level)
+        optima = first_optima(model, lower, upper, NEWTON_GAP * search_gap)
+        if of_levels:  # what the level inside attains is attained here too
+            inside = of_levels[-1][0]
+            better = inside.value > optima.value
+            optima.value[better], optima.point[better] = inside.value[better], inside.point[better]
+        proved, used = enclosed(
+            *(model, lower, upper, optima),
+            gap=search_gap,
+            budget=budget,
+            workers=workers,
+            progress=tick,
+        )
+        LOG.debug("branch and bound: level %g took %d boxes", model.boxes.alpha[level], used)
+        of_levels.append((optima, proved, used))
+    between = (_line_deviation(model) + _error_between_nodes(model, error)) * scale
+    facts = {
+        "model_error": float(error.max()),
+        "degree": model.degree,
+        "boxes": sum(used for *_, used in of_levels) / levels,
+        "evaluations": 1 / levels,
+    }
+    shape, bounds, outer = (*error.shape, 2), list[BoxBounds](), np.full(2 * error.size, np.inf)
+    shares = np.broadcast_to(tail_shares(model), (*shape[1:], len(model.boxes.names)))
+    for optima, proved, _ in reversed(of_levels):
+        outer = np.minimum(outer, proved)  # what holds on a wider level holds on those inside it
+        inner = optima.value.reshape(shape) - (error + rounding)[..., None]
+        bounds.append(
+            BoxBounds(
+                outer=(outer.reshape(shape) + error[..., None]) * scale[:, None],
+                inner=inner * scale[:, None],
+                at=model.boxes.to_physical(optima.point.reshape(*shape, -1)),
+                between=between,
+                shares=shares,
+                attained_error=2 * (error + rounding) * scale,
+                facts=facts,
+            )
+        )
+    return bounds
+
+
+def _line_deviation(model: ModalModel) -> Array:
+    """Bound of how far outputs stray from straight lines in the step to each node, (T, m)."""
+    reach, rate = np.ones(len(model.boxes.names)), model.eigenvalue
+    growth, spread = largest_growth(rate, reach), rate.imag.spread()
+    decay = -growth, rate.real.spread() - rate.value.real  # least and greatest of each mode
+    omega = np.abs(rate.value.imag) - spread, np.abs(rate.value.imag) + spread
+    if (omega[0] <= 0).any():
+        raise UnprovedError("a mode may not oscillate", "take less damping")
+    deviation = np.zeros((len(model.time), len(model.outputs)))
+    for part in parts(model, growth):
+        size = suprema(part.share, reach)[0]
+        load = None if part.load is None else part.load.history
+        if isinstance(part.load, Direct):
+            deviation += 2 * part.load.history.line_deviation(model.time)[:, None] * size.sum(0)
+            continue
+        for k in range(model.count):
+            q = min(decay[0][k] / w[k] for w in omega), max(decay[1][k] / w[k] for w in omega)
+            points = [np.linspace(omega[0][k], omega[1][k], POINTS[0]), np.linspace(*q, POINTS[1])]
+            sigma = (-points[1][:, None] + 1j) * points[0]
+            bent = line_deviations(sigma, load, model.time, 0)[0]
+            deviation += 2 * np.outer(bent, size[k])
+    return deviation
+
+
+def _error_between_nodes(model: ModalModel, error: Array) -> Array:
+    """Bound of what the model's error in the step to a node exceeds its smaller end by, (T, m)."""
+    # it decays no faster than exp(g t): inside it is at most exp(−g h) times what it is at the end
+    exponent = largest_growth(model.eigenvalue, np.ones(len(model.boxes.names)))
+    swell = float(np.exp(np.maximum(-exponent, 0.0).max() * model.flow.step))
+    added = np.zeros_like(error)
+    added[1:] = swell * np.maximum(error[1:], error[:-1]) - np.minimum(error[1:], error[:-1])
+    return added
 
 
 def tail_shares(model: ModalModel) -> Array:

@@ -9,7 +9,6 @@ from scipy.integrate import cumulative_trapezoid
 
 from alphacut.frame import Accelerogram, Exact, LinearFlow, Midpoint, StoreyFrame
 from alphacut.frame.bounds.branch_and_bound import Frontier, Tree, enclosed
-from alphacut.frame.bounds.certificate import certify
 from alphacut.frame.bounds.kernel import stays_below
 from alphacut.frame.bounds.model_error import proved_error
 from alphacut.frame.bounds.newton import Optima, first_optima
@@ -20,6 +19,7 @@ from alphacut.frame.bounds.remainder import (
 )
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.calculus.taylor_model import TaylorModel
+from alphacut.frame.methods.proof import bound_levels
 from alphacut.frame.modes.modal_model import ModalModel
 from alphacut.frame.response.duhamel import responses_at_nodes
 from alphacut.frame.response.load_tables import left_out
@@ -75,7 +75,7 @@ def test_what_outputs_do_between_nodes_is_bounded_where_the_record_jumps() -> No
     flow = LinearFlow(frame, ("E",), 3.7 * 20 / 20, 3.7, Exact())
     model = ModalModel.of_degree(flow, boxes({"E": Interval(0.9e-6 / 24, 1e-6 / 24)}, (0,)), 8)
     values = model.values(np.zeros((1, 1)))[0]
-    proof = certify(model, gap=1e-2, model_error=np.zeros(values.shape), scale=np.ones(1))
+    (proof,) = bound_levels(model, np.zeros(values.shape), np.ones(1), gap=1e-2)
     fine = LinearFlow(frame, ("E",), 3.7, 3.7 / 200, Exact()).values(np.array([[1e-6 / 24]]))[0]
     line = np.linspace(fine[0], fine[-1], len(fine))
     assert 1 <= proof.between[1, 0] / np.abs(fine - line).max() <= 1.8
@@ -84,7 +84,7 @@ def test_what_outputs_do_between_nodes_is_bounded_where_the_record_jumps() -> No
 def test_what_a_free_wave_does_between_nodes_is_bounded_and_half_would_not_do() -> None:
     """A cosine strays from its chord by h² ω²/8 about its crest, as the bound says."""
     model = spring(1.0, None, 6.0, 0.2)
-    proof = certify(model, gap=1e-2, model_error=np.zeros((31, 1)), scale=np.ones(1))
+    (proof,) = bound_levels(model, np.zeros((31, 1)), np.ones(1), gap=1e-2)
     fine = np.cos(np.sqrt(1.1) * np.linspace(0, 6, 6001))  # of the fastest of the box
     line = np.interp(np.linspace(0, 6, 6001), model.time, fine[::200])
     off = np.abs(fine - line).max()
@@ -96,11 +96,11 @@ def test_the_model_error_counts_on_both_sides_of_the_gap_asked_for() -> None:
     """Bounds are raised and attained values lowered by it; both together stay within the gap."""
     model = spring(1.0, None, 6.0, 0.1)
     error = np.full((61, 1), 0.004)
-    proof = certify(model, gap=0.01, model_error=error, scale=np.ones(1))
-    gap = (proof.outer - proof.bounds).max()
+    (proof,) = bound_levels(model, error, np.ones(1), gap=0.01)
+    gap = (proof.outer - proof.inner).max()
     assert 2 * 0.004 < gap <= 0.01
     with pytest.raises(ValueError, match="twice the model error"):
-        certify(model, gap=0.0079, model_error=error, scale=np.ones(1))
+        bound_levels(model, error, np.ones(1), gap=0.0079)
 
 
 def test_an_error_that_rises_and_falls_within_a_step_is_in_what_is_between() -> None:
@@ -111,8 +111,7 @@ def test_an_error_that_rises_and_falls_within_a_step_is_in_what_is_between() -> 
     error = np.zeros((7, 1))
     error[3] = 1e-3 * np.exp(-0.5)
     plain, kicked = (
-        certify(model, gap=1e-2, model_error=x, scale=np.ones(1)).between
-        for x in (0 * error, error)
+        bound_levels(model, x, np.ones(1), gap=1e-2)[0].between for x in (0 * error, error)
     )
     assert 1 <= (kicked - plain)[3, 0] / 1e-3 <= 1.01
 
