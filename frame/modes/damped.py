@@ -225,6 +225,10 @@ def _middle_modes(structure: DampedStructure) -> tuple[Array, Array, Array]:
     order = np.lexsort((np.abs(rate), group))
     rate, shape = rate[order], X[:n, order].T
     shape = shape / norm_of(shape)[:, None]
+    for k in np.flatnonzero(_oscillates(rate)):
+        alike = _equal_modes(rate, k)
+        if len(alike) > 1 and k == alike[0]:
+            shape[alike] = _orthogonal_shapes(shape[alike], rate[k], D)
     return rate, shape, ((2 * rate[:, None] * shape + shape @ D) * shape).sum(1)
 
 
@@ -246,14 +250,21 @@ def _eigen_series(
     M, K = structure.mass, structure.stiffness
     rates, shapes, _ = _middle_modes(structure)
     lam, phi = rates[chosen], shapes[chosen]
-    _require_single(rates, chosen)
+    if not _oscillates(lam).all():
+        raise UnprovedError("a mode does not oscillate", "take less damping, or graph-follower")
     N, d = phi.shape[1], M.inputs
-    bordered = np.zeros((len(lam), N + 1, N + 1), complex)
+    # of modes of equal λ all φ border the matrix, which is singular else; the others' parts of the
+    # solution, `couplings`, are zero where one shape goes on through the whole box
+    inverse, couplings = np.empty((len(lam), N + 1, N), complex), dict[int, Array]()
     for k, x in enumerate(lam):
-        bordered[k, :N, :N] = x**2 * M.value + x * D.value + K.value
-        bordered[k, :N, N] = (2 * x * M.value + D.value) @ phi[k]
-        bordered[k, N, :N] = phi[k].conj()
-    inverse = np.linalg.inv(bordered)
+        alike = _equal_modes(rates, chosen[k])
+        border, zeros = shapes[alike], np.zeros((len(alike), len(alike)))
+        pencil = x**2 * M.value + x * D.value + K.value
+        columns = (2 * x * M.value + D.value) @ border.T
+        solved = np.linalg.inv(np.block([[pencil, columns], [border.conj(), zeros]]))[:, :N]
+        is_own = alike == chosen[k]
+        inverse[k] = np.vstack([solved[:N], solved[N:][is_own]])
+        couplings[k] = solved[N:][~is_own]
     # by degree: λ (n, 1), φ, w = λ φ and w M
     L, P, W = [lam[None, :, None]], [phi[None]], [lam[:, None] * phi[None]]
     U = [W[0] @ M.value]
@@ -262,7 +273,9 @@ def _eigen_series(
         U.append(product_part(W, M.parts, m, d, matmul))
         known = lam[:, None] * U[m] + product_part(L, U, m, d, np.multiply, lowest=(1, 1))
         known += product_part(W, D.parts, m, d, matmul) + product_part(P, K.parts, m, d, matmul)
-        found = np.einsum("kij,mkj->mki", inverse[..., :N], -known)
+        for k, rows in couplings.items():
+            _require_uncoupled(known[:, k] @ rows.T, lam[k])
+        found = np.einsum("kij,mkj->mki", inverse, -known)
         P.append(found[..., :N])
         L.append(found[..., N:])
         added = lam[:, None] * P[m] + L[m] * phi
@@ -277,17 +290,27 @@ def _oscillates(rate: Array) -> Mask:
     return np.asarray(rate.imag > 1e-9 * np.abs(rate))
 
 
-def _require_single(rates: Array, chosen: Rows) -> None:
-    """Refuse chosen eigenvalues that do not oscillate, or are equal to others of `rates` (2N,)."""
-    if not _oscillates(rates[chosen]).all():
-        raise UnprovedError("a mode does not oscillate", "take less damping, or graph-follower")
-    distance = np.abs(rates[chosen, None] - rates)
-    distance[np.arange(len(chosen)), chosen] = np.inf
-    for k, other in zip(chosen, distance.argmin(1), strict=True):
-        if np.abs(rates[k] - rates[other]) < EQUAL * np.abs(rates[k]):
-            pair = f"modes {min(k, other) + 1} and {max(k, other) + 1}"
-            what = f"{pair} have the same frequency, {np.abs(rates[k]):.4g} rad/s"
-            raise UnprovedError(what, "take the method auto or improved-graph-follower")
+def _equal_modes(rates: Array, k: int) -> Rows:
+    """Places of all eigenvalues that equal number k, itself among them."""
+    return np.flatnonzero(np.abs(rates - rates[k]) <= EQUAL * np.abs(rates[k]))
+
+
+def _orthogonal_shapes(shape: Array, rate: complex, D: Array) -> Array:
+    """Shapes φ (g, N) of the span of those of one λ, with φ_iᵀ (2 λ + D) φ_j = 0 for i ≠ j."""
+    basis = np.linalg.qr(shape.T)[0]
+    form, g = basis.T @ (2 * rate * basis + D @ basis), len(shape)
+    # Takagi's form V S Vᵀ of a complex symmetric matrix (Horn, Johnson 2013, section 4.4)
+    A, B = form.real, form.imag
+    vectors = np.linalg.eigh(np.block([[A, B], [B, -A]]))[1][:, g:]
+    V = vectors[:g] + 1j * vectors[g:]
+    return np.asarray((basis @ V.conj()).T)
+
+
+def _require_uncoupled(coupling: Array, rate: complex) -> None:
+    """Refuse modes of one eigenvalue between which a change of the inputs chooses the shapes."""
+    if (np.abs(coupling) > EQUAL * np.abs(rate)).any():
+        what = f"modes have the same frequency, {np.abs(rate):.4g} rad/s, and the inputs part them"
+        raise UnprovedError(what, "take the method auto or improved-graph-follower")
 
 
 def _reciprocal(x: TaylorModel) -> TaylorModel:

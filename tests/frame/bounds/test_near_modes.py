@@ -3,7 +3,15 @@
 import numpy as np
 import pytest
 
-from alphacut.frame import Envelope, Exact, LinearFlow, MatrixStructure, Proof, envelope
+from alphacut.frame import (
+    Accelerogram,
+    Envelope,
+    Exact,
+    LinearFlow,
+    MatrixStructure,
+    Proof,
+    envelope,
+)
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.fuzzy import Interval
 
@@ -47,3 +55,31 @@ def test_a_proof_holds_where_frequencies_come_near(coupling: float, widest: floa
 def test_a_proof_is_refused_where_frequencies_cross(coupling: float, width: float) -> None:
     with pytest.raises(UnprovedError):
         proof_of(coupling, width)
+
+
+@pytest.mark.parametrize("fuzzy", ["k", "d", "m"])
+def test_equal_modes_with_dashpots_are_proved_where_one_input_moves_both(fuzzy, rng):
+    """Two equal chains in axes turned by any angle, each with a dashpot that couples its modes."""
+    turn = np.kron(np.linalg.qr(rng.normal(size=(2, 2)))[0], np.eye(2))
+    chains, dashpots, mass = (
+        turn @ np.kron(np.eye(2), part) @ turn.T
+        for part in ([[2, -1], [-1, 1]], np.diag([1, 0]), np.eye(2))
+    )
+    system = MatrixStructure(
+        {"m": 1.0, "k": 610.0, "d": 0.5},
+        [("m", mass)],
+        [("k", chains)],
+        {"x": np.eye(4)[1], "y": np.eye(4)[3]},
+        damping=[("d", dashpots)],
+        q0=rng.normal(size=4),
+        ground=Accelerogram(0.05, rng.normal(size=40)),
+        pattern=rng.normal(size=4),
+    )
+    value = system.parameters[fuzzy]
+    inputs = {fuzzy: Interval(0.98 * value, 1.02 * value)}
+    found = envelope(system, inputs, Proof(), duration=2.0, step=0.05, alpha=(0,), progress=False)
+    points = np.linspace(0.98 * value, 1.02 * value, 81)[:, None]
+    motions = LinearFlow(system, (fuzzy,), 2.0, 0.05, Exact()).values(points)
+    assert found.facts["gap_of_peaks"] < 1e-3
+    assert (motions <= found.upper[0] + 1e-9).all()
+    assert (motions >= found.lower[0] - 1e-9).all()
