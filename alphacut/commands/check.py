@@ -22,7 +22,7 @@ from alphacut.io.arrays import text_table
 from alphacut.io.quantity import STANDARD_GRAVITY, engineering
 from alphacut.stages.cell import CellProblem
 from alphacut.stages.image import image_study
-from alphacut.stages.suite import SuiteRecord, suite_records, suite_warnings
+from alphacut.stages.suite import SuiteRecord, suite_records
 
 GRAVITY = float(STANDARD_GRAVITY)
 KINDS = {Crisp: "crisp", Interval: "interval", Triangular: "triangle", Trapezoidal: "trapezoid"}
@@ -72,7 +72,7 @@ def records_text(section: RecordsSection, records: Sequence[SuiteRecord]) -> str
         rows.append((*file_cells, *sample_cells, peak, *used, f"{record.duration:.4g} s"))
     head = ("record", "format", "unit", "step", "samples", "mean/peak", "peak", "PGA used")
     text = text_table((*head, "Sa(T1) used", "motion"), rows)
-    return text + "".join(f"warning: {sentence}\n" for sentence in suite_warnings(records))
+    return text + "".join(f"warning: {x}\n" for record in records for x in record.warnings)
 
 
 def nominal_structure(content: Content) -> StoreyFrame | MatrixStructure | None:

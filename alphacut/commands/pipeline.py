@@ -22,6 +22,7 @@ from alphacut.case.structure import Structure
 from alphacut.commands.options import require_case_petsc
 from alphacut.frame.questions.peaks import Peaks, output_of
 from alphacut.fuzzy import Crisp, FuzzyNumber, Triangular
+from alphacut.fuzzy.progress_bar import progress_reporter
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io.files import Document, locked, rank, require_writable, say
 from alphacut.io.results import MANIFEST, ResultsFolder
@@ -36,7 +37,14 @@ from alphacut.stages.campaign import CellCampaign
 from alphacut.stages.envelope import EnvelopeTask, PeakResults, peaks_of
 from alphacut.stages.modulus import fuzzy_loss, fuzzy_modulus, require_levels
 from alphacut.stages.results import Results
-from alphacut.stages.store import Computed, Stage, StageContext, StageResult, StageStore
+from alphacut.stages.store import (
+    Computed,
+    RunProgress,
+    Stage,
+    StageContext,
+    StageResult,
+    StageStore,
+)
 from alphacut.stochastic.sections import Simulated
 
 
@@ -57,20 +65,17 @@ def open_results(
     """
     allowed = "a whole number 1 or more"
     require(options.workers >= 1, "--workers", value=options.workers, allowed=allowed)
-    case, path = read_case(options), options.out or folder
-    fresh = getattr(options, "fresh", False)
-    store = StageStore(None, case.text, fresh, options.quiet, options.workers)
-    if not path:
-        yield case, store
-        return
-    require_writable("--out", path, folder=True)
-    with locked("--out", Path(path)) if rank() == 0 else nullcontext():
-        results = ResultsFolder.read(Path(path))
-        if results.is_damaged:
+    case, path, fresh = read_case(options), options.out or folder, getattr(options, "fresh", False)
+    if path:
+        require_writable("--out", path, folder=True)
+    lock = locked("--out", Path(path)) if path and rank() == 0 else nullcontext()
+    with progress_reporter(not options.quiet and rank() == 0) as tick, lock:
+        results = ResultsFolder.read(Path(path)) if path else None
+        if results is not None and results.is_damaged:
             say(f"warning: {results.path / MANIFEST} is damaged; everything is computed anew")
-        if fresh and rank() == 0:
+        if results is not None and fresh and rank() == 0:
             results.clear()
-        yield case, replace(store, folder=results)
+        yield case, StageStore(results, case.text, fresh, options.workers, RunProgress(tick))
 
 
 QUESTIONS: dict[str, Callable[[Any, FuzzyResponse], Answer]] = {
@@ -104,7 +109,11 @@ class Pipeline:
 
     def run(self) -> Results:
         """Computes every stage of the case; returns their results."""
-        results, stages = self.results, self.content.stages
+        results, stages, content = self.results, self.content.stages, self.content
+        n_motions = len(content.records.recordings) if content.records else len(content.study) or 1
+        # shares and figures come last
+        n_stages = len(stages) - 1 + n_motions + len(content.questions) + 1 + self.figures
+        self.store.progress.stages_left = n_stages
         if "microstructure" in stages:
             results.microstructure = self.compute_microstructure()
             radius = microstructure.radius_of(results.microstructure)
@@ -186,7 +195,7 @@ class Pipeline:
         alpha, limited = task.section.alpha, self.content.limited_outputs
         mode = suite.nominal_mode(structure)
         records = suite.suite_records(section, task.section, structure)
-        for warning in suite.suite_warnings(records):
+        for warning in (warning for record in records for warning in record.warnings):
             say(f"warning: {warning}")
         limited = tuple(dict.fromkeys((*structure.outputs, *limited)))
         stages = suite.stages(structure, replace(task, limited=limited), records)

@@ -114,8 +114,9 @@ def standard_output(*, alone: bool) -> Iterator[TextIO]:
 def say(message: str) -> None:
     """One line to people, on standard error; the first rank alone speaks."""
     if rank() == 0:
+        bar_end = "\r\x1b[K" if sys.stderr.isatty() else ""  # over a progress bar
         with suppress(OSError):
-            print(f"alphacut: {printable(message)}", file=sys.stderr, flush=True)
+            print(f"{bar_end}alphacut: {printable(message)}", file=sys.stderr, flush=True)
 
 
 def check_destinations(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:

@@ -181,7 +181,6 @@ def records(result: SuiteResult) -> pd.DataFrame:
             "output": output,
             "unit": unit_of(result.units, output),
             "farthest peak": proved[0],
-            "peak reached": statistics.reached[statistic][0],
         }
         for output, statistics in result.statistics.items()
         for statistic, proved in statistics.proved.items()  # mean, median …

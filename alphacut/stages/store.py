@@ -26,7 +26,7 @@ from pydantic import (
 )
 
 from alphacut.fuzzy.arrays import Array, on_one_blas_thread
-from alphacut.fuzzy.progress_bar import Progress, progress_reporter
+from alphacut.fuzzy.progress_bar import Progress, subprogress
 from alphacut.fuzzy.refused import FailedError, require
 from alphacut.io.files import as_json, rank, say, write_text
 from alphacut.io.provenance import fingerprint, origin
@@ -142,6 +142,27 @@ class Stage(Generic[T]):
         return self.compute(context)
 
 
+@dataclass
+class RunProgress:
+    """Progress of a run in one bar; each stage takes an equal part of what is left.
+
+    Args:
+        tick: Takes the share done; None to show nothing.
+        stages_left: Stages that are still to be taken.
+        done: Share done.
+    """
+
+    tick: Progress | None = None
+    stages_left: int = 1
+    done: float = 0.0
+
+    def next_part(self, count: int = 1) -> Progress | None:
+        """Progress of the next stages, `count` of them; None where nothing is shown."""
+        first, part = self.done, count / max(count, self.stages_left)
+        self.done, self.stages_left = first + part * (1 - first), self.stages_left - count
+        return subprogress(self.tick, first, self.done) if self.tick else None
+
+
 @dataclass(frozen=True)
 class StageStore:
     """The results of a run, in a folder or, without one, in memory alone.
@@ -156,18 +177,13 @@ class StageStore:
     folder: ResultsFolder | None
     case_text: str
     fresh: bool = False
-    quiet: bool = False
     workers: int = 1
+    progress: RunProgress = field(default_factory=RunProgress)
     up_to_date: list[str] = field(default_factory=list)
-
-    @property
-    def shows_progress(self) -> bool:
-        """True where progress is shown, by the first rank alone."""
-        return not self.quiet and rank() == 0
 
     def take(self, stage: Stage[T]) -> StageResult[T]:
         """The result of a stage: from its files where these are up to date, else computed."""
-        return self._read(stage) or self._compute(stage)
+        return self.take_all([stage], None)[stage.name]
 
     def take_all(
         self, stages: Sequence[Stage[T]], executor: Executor | None
@@ -176,21 +192,22 @@ class StageStore:
 
         The stages that take longest come first; without executor this process computes all.
         """
+        tick = self.progress.next_part(len(stages))
         stored = {stage.name: self._read(stage) for stage in stages}
         results = {name: result for name, result in stored.items() if result is not None}
         stale = [stage for stage in stages if stage.name not in results]
         if executor is None or self.folder is None or len(stale) == 1:
-            return results | {stage.name: self._compute(stage) for stage in stale}
+            for k, stage in enumerate(stale):
+                stage_tick = subprogress(tick, k / len(stale), (k + 1) / len(stale))
+                results[stage.name] = self._compute(stage, stage_tick if tick else None)
+            return results
         stage_of_future = {executor.submit(stage.run, StageContext()): stage for stage in stale}
-        with progress_reporter(self.shows_progress) as tick:
-            for count, future in enumerate(as_completed(stage_of_future), start=1):
-                stage = stage_of_future[future]
-                with self._report_failures(stage.name):
-                    computed = future.result()
-                with TemporaryDirectory() as scratch:
-                    results[stage.name] = self._write(stage, computed, Path(scratch))
-                if tick:
-                    tick(count / len(stage_of_future))
+        for count, future in enumerate(as_completed(stage_of_future), start=1):
+            stage = stage_of_future[future]
+            with _naming_dead_workers(stage.name), TemporaryDirectory() as scratch:
+                results[stage.name] = self._write(stage, future.result(), Path(scratch))
+            if tick:
+                tick(count / len(stale))
         return results
 
     def _read(self, stage: Stage[T]) -> StageResult[T] | None:
@@ -214,19 +231,18 @@ class StageStore:
         arrays = f"{stage.name}.nc"
         return StageResult(numbers, folder.dataset(arrays) if arrays in files else None, files, key)
 
-    def _compute(self, stage: Stage[T]) -> StageResult[T]:
+    def _compute(self, stage: Stage[T], tick: Progress | None) -> StageResult[T]:
         """The result of a stage, computed and written."""
         LOG.info("stage %s is computed", stage.name)
         folder, workers = self.folder, self.workers
-        with progress_reporter(self.shows_progress) as tick, self._report_failures(stage.name):
+        with _naming_dead_workers(stage.name), TemporaryDirectory() as temporary:
             if folder is None:
                 return StageResult(*stage.run(StageContext(workers=workers, tick=tick)))
             for ending in (".json", ".nc"):
                 folder.require_free(f"{stage.name}{ending}")
             samples = self._sample_store(folder) if stage.has_samples else None
-            with TemporaryDirectory() as temporary:
-                context = StageContext(Path(temporary), samples, workers, tick)
-                return self._write(stage, stage.run(context), Path(temporary))
+            context = StageContext(Path(temporary), samples, workers, tick)
+            return self._write(stage, stage.run(context), Path(temporary))
 
     def _sample_store(self, folder: ResultsFolder) -> Path:
         """Path of the store of samples; a fresh run refuses one that no manifest lists."""
@@ -254,16 +270,17 @@ class StageStore:
         self.folder.put(key, files, before)
         return StageResult(*computed, self.folder.made_from(key), key)
 
-    @contextmanager
-    def _report_failures(self, name: str) -> Iterator[None]:
-        """Names the stage in whose block a worker process died."""
-        try:
-            yield
-        except BrokenExecutor as error:
-            cure = "out of memory, or a crash in compiled code; the stages that are done stay"
-            raise FailedError(f"a worker process died in stage {name}", cure) from error
-
     def put_text(self, name: str, text: str) -> None:
         """Writes a text file of the run itself, such as summary.json."""
         if self.folder is not None and rank() == 0:
             self.folder.put_text(name, text)
+
+
+@contextmanager
+def _naming_dead_workers(stage: str) -> Iterator[None]:
+    """Names the stage in whose block a worker process died."""
+    try:
+        yield
+    except BrokenExecutor as error:
+        cure = "out of memory, or a crash in compiled code; the stages that are done stay"
+        raise FailedError(f"a worker process died in stage {stage}", cure) from error

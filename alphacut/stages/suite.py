@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import islice, product
 from math import ceil, pi
+from typing import NamedTuple
 
 import numpy as np
 
@@ -38,12 +39,15 @@ QUANTILES = {"mean": None, "median": 0.5, "84 %": 0.84}
 """Statistics of a suite's peaks; 84 % is one standard deviation of a normal law above the mean."""
 
 
-@dataclass(frozen=True)
-class NominalMode:
-    """First mode at the most plausible inputs: its period T1 in s, and damping ratio."""
+class NominalMode(NamedTuple):
+    """First mode at the nominal inputs: its period T1 in s, and damping ratio."""
 
     period: float
     ratio: float
+
+    def spectral_acceleration(self, ground: Accelerogram, period: float) -> float:
+        """Pseudo-acceleration of a record at a period with this damping, in m/s²."""
+        return spectral_acceleration(ground, period, min(self.ratio, 0.999))
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +58,7 @@ class SuiteRecord:
         duration: Length of the motion, in s.
         measures: "PGA" and "Sa(T1)" of the scaled record, in m/s², and "scale", 1.
         cut_share: Share of the Arias intensity after the end of the motion.
-        offset_share: Mean of the record over its peak, after the correction.
+        warnings: What is unusual in it.
     """
 
     name: str
@@ -62,12 +66,11 @@ class SuiteRecord:
     duration: float
     measures: Mapping[str, float]
     cut_share: float
-    offset_share: float
-    doubts: tuple[str, ...] = ()
+    warnings: tuple[str, ...]
 
 
 def nominal_mode(structure: Structure) -> NominalMode:
-    """First mode at the most plausible inputs of a linear structure."""
+    """First mode at the nominal inputs of a linear structure; RefusedError of another one."""
     if structure.linear is None:
         what = "with a system that is not linear"
         raise RefusedError("records", what, "linear structures")
@@ -87,45 +90,38 @@ def _suite_record(
     section: RecordsSection, envelope: EnvelopeSection, named: NamedRecording, mode: NominalMode
 ) -> SuiteRecord:
     """A recording after correction and scaling, and the length of the motion under it."""
-    ground = named.recording.accelerogram(section.baseline)
-    measures = {
+    ground, name = named.recording.accelerogram(section.baseline), named.name
+    sizes = {
         "PGA": ground.extremes[0],
-        "Sa(T1)": spectral_acceleration(ground, mode.period, min(mode.ratio, 0.999)),
-        "scale": 1.0,
+        "Sa(T1)": mode.spectral_acceleration(ground, mode.period),
     }
-    measure = measures.get(section.scale.measure, 1.0)
-    key, allowed = f"record {named.name}", "a record that moves something"
-    require(measure > 0, key, value="zero throughout", allowed=allowed)
+    measure = sizes.get(section.scale.measure, 1.0)
+    allowed = "a record that moves something"
+    require(measure > 0, f"record {name}", value="zero throughout", allowed=allowed)
     factor = section.scale.value / measure
     length = (len(ground.acceleration) - 1) * ground.step
     duration = min(envelope.duration, length + FREE_PERIODS * mode.period)
     steps = max(1, ceil(duration / envelope.step - 1e-9))
-    envelope.require_steps(f"envelope.duration of {named.name}", steps * envelope.step)
+    envelope.require_steps(f"envelope.duration of {name}", steps * envelope.step)
     shares = arias_shares(ground.acceleration, ground.step)
     end = min(int(duration / ground.step + 1e-9), len(shares) - 1)
     cut_share = 0.0 if duration >= length else float(1 - shares[end])
     offset = float(ground.samples.mean()) / ground.extremes[0]
-    scaled = Accelerogram(ground.step, factor * ground.acceleration)
-    measures |= {name: factor * measures[name] for name in ("PGA", "Sa(T1)")}
-    doubts = tuple(named.recording.doubts())
+    warnings = [f"of record {name} {doubt}" for doubt in named.recording.doubts()]
+    if abs(offset) > MAX_OFFSET:
+        what = f"the mean of record {name} is {offset:.1%} of its peak"
+        warnings.append(f'{what}; records.baseline = "mean" subtracts it')
+    if cut_share > 0:
+        what = f"{cut_share:.1%} of the Arias intensity of record {name}"
+        warnings.append(f"{what} lies after the end of its motion, {steps * envelope.step:g} s")
     return SuiteRecord(
-        named.name, scaled, steps * envelope.step, measures, cut_share, offset, doubts
+        name=name,
+        ground=Accelerogram(ground.step, factor * ground.acceleration),
+        duration=steps * envelope.step,
+        measures={x: factor * size for x, size in sizes.items()} | {"scale": 1.0},
+        cut_share=cut_share,
+        warnings=tuple(warnings),
     )
-
-
-def suite_warnings(records: Sequence[SuiteRecord]) -> Iterator[str]:
-    """Yields warnings on unusual records, large means, and records that outlast their motion."""
-    for record in records:
-        for doubt in record.doubts:
-            yield f"of record {record.name} {doubt}"
-        if abs(record.offset_share) > MAX_OFFSET:
-            yield (
-                f"the mean of record {record.name} is {record.offset_share:.1%} of its peak;"
-                ' records.baseline = "mean" subtracts it'
-            )
-        if record.cut_share > 0:
-            share = f"{record.cut_share:.1%} of the Arias intensity of record {record.name}"
-            yield f"{share} lies after the end of its motion, {record.duration:g} s"
 
 
 def with_record(structure: Structure, record: SuiteRecord) -> Structure:
@@ -137,20 +133,16 @@ def with_record(structure: Structure, record: SuiteRecord) -> Structure:
 def stages(
     structure: Structure, task: EnvelopeTask, records: Sequence[SuiteRecord]
 ) -> list[Stage[PeakResults]]:
-    """A stage for each record, the longest first."""
-    longest = sorted(records, key=lambda record: -record.duration)
-    return [_record_stage(structure, task, record) for record in longest]
-
-
-def _record_stage(
-    structure: Structure, task: EnvelopeTask, record: SuiteRecord
-) -> Stage[PeakResults]:
-    """The stage that computes the peaks of a structure under a record."""
-    loaded = with_record(structure, record)
-    record_task = replace(task, name=record.name, duration=record.duration)
-    inputs = [loaded.model, loaded.numbers, record_task]
-    compute = partial(record_task.compute_peaks, loaded, nodes=NODES)
-    return Stage(stage_name(record), inputs, ("fuzzy", "frame"), PeakResults, compute)
+    """The stages that compute the peaks of a structure under each record, the longest first."""
+    found = []
+    for record in sorted(records, key=lambda record: -record.duration):
+        loaded = with_record(structure, record)
+        record_task = replace(task, name=record.name, duration=record.duration)
+        inputs = [loaded.model, loaded.numbers, record_task]
+        compute = partial(record_task.compute_peaks, loaded, nodes=NODES)
+        packages = ("fuzzy", "frame")
+        found.append(Stage(stage_name(record), inputs, packages, PeakResults, compute))
+    return found
 
 
 def stage_name(record: SuiteRecord) -> str:
@@ -213,10 +205,9 @@ def with_means(worst: Peaks, peaks: Mapping[str, Peaks], reached: Array) -> Peak
         for end in ("lower", "upper", "error", "least_proved")
     }
     least = np.maximum(means["lower"] - means["error"], means["least_proved"])
-    most = means["upper"] + means["error"]
     # a structure of any higher cut has at least the mean of that cut's least peaks
     means["reached"] = np.maximum(np.maximum.accumulate(least[::-1])[::-1], reached)
-    means["least_reached"] = np.minimum.accumulate(most[::-1])[::-1]
+    means["least_reached"] = np.full_like(least, np.inf)  # no structure's mean is bounded so
     mean = replace(worst.named(columns), **means)
     return joined(worst, mean)
 
@@ -231,10 +222,9 @@ class RecordResult(Numbers):
 
 
 class Statistics(Numbers):
-    """Mean and quantiles over the records by name, on each level: proved, and reached."""
+    """Mean and quantiles over the records of the proved bounds of their peaks, on each level."""
 
     proved: dict[str, Values]
-    reached: dict[str, Values]
 
 
 class SuiteResult(Numbers):
@@ -258,6 +248,7 @@ def suite_result(
 ) -> SuiteResult:
     """Numbers on a suite, from the peaks under each record by its name."""
     first = next(iter(peaks.values()))
+    bounds = {name: np.stack([x[name].proved for x in peaks.values()]) for name in first}
     return SuiteResult(
         period_s=mode.period,
         damping_ratio=mode.ratio,
@@ -272,33 +263,25 @@ def suite_result(
             for record in records
         },
         statistics={
-            name: Statistics(
-                proved=statistics([x[name].proved for x in peaks.values()], peak.is_least),
-                reached=statistics([x[name].reached for x in peaks.values()], peak.is_least),
-            )
+            name: Statistics(proved=statistics(bounds[name], peak.is_least))
             for name, peak in first.items()
         },
-        spectra={
-            "period_s": PERIODS,
-            **{record.name: spectrum(record.ground, mode) for record in records},
-        },
+        spectra={"period_s": PERIODS, **{x.name: spectrum(x.ground, mode) for x in records}},
         units=dict(units),
     )
 
 
 def spectrum(ground: Accelerogram, mode: NominalMode) -> Array:
     """Pseudo-accelerations at `PERIODS` with the nominal damping, in m/s²."""
-    ratio = min(mode.ratio, 0.999)
-    return np.array([spectral_acceleration(ground, float(x), ratio) for x in PERIODS])
+    return np.array([mode.spectral_acceleration(ground, float(x)) for x in PERIODS])
 
 
-def statistics(values: Sequence[Array], is_least: bool) -> dict[str, Array]:
-    """Mean and quantiles by name over records of values (levels,); of least values from above."""
+def statistics(values: Array, is_least: bool) -> dict[str, Array]:
+    """Mean and quantiles by name over records of values (records, levels); of least from above."""
     sign = -1.0 if is_least else 1.0
-    rows = sign * np.stack(values)
     return {
         name: np.asarray(
-            sign * (rows.mean(0) if x is None else np.quantile(rows, x, axis=0)), float
+            values.mean(0) if x is None else sign * np.quantile(sign * values, x, axis=0), float
         )
         for name, x in QUANTILES.items()
     }

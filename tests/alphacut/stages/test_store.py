@@ -26,7 +26,7 @@ from alphacut.io.results import ResultsFolder
 from alphacut.questions.summary import Summary
 from alphacut.stages import envelope, modulus
 from alphacut.stages.results import Results
-from alphacut.stages.store import Computed, Stage, StageStore
+from alphacut.stages.store import Computed, RunProgress, Stage, StageStore
 from tests.alphacut.small import CELL, FRAME, SMALLER, written
 
 ROOT = Path(alphacut.__file__).resolve().parents[1]
@@ -45,7 +45,7 @@ def counted():
 
 def store_in(folder, **options):
     """A store as a new process opens it."""
-    return StageStore(ResultsFolder.read(folder), "the case", quiet=True, **options)
+    return StageStore(ResultsFolder.read(folder), "the case", **options)
 
 
 def test_a_stage_is_computed_once_until_its_inputs_change(tmp_path):
@@ -95,6 +95,26 @@ def test_fingerprints_do_not_depend_on_where_functions_lie_in_memory():
     moved = replace(structure, model=replace(structure.model, lagrangian=copied))
     assert copied is not function
     assert envelope.stage(moved, task).key == envelope.stage(structure, task).key
+
+
+def test_a_run_has_one_progress_that_ends_once(tmp_path):
+    """Whatever its stages are: one alone, several at once, or more than were foreseen."""
+    told = []
+
+    def compute(work):
+        for share in (0.0, 0.5, 1.0):
+            work.tick(share)
+        return Computed({})
+
+    stages = [Stage(f"stage{k}", k, ("fuzzy",), dict, compute) for k in range(6)]
+    store = store_in(tmp_path, progress=RunProgress(told.append, stages_left=5))
+    store.take(stages[0])
+    store.take_all(stages[1:4], None)
+    assert told[-1] == pytest.approx(0.8)
+    store.take(stages[4])
+    store.take(stages[5])
+    assert told == sorted(told)
+    assert told.count(1.0) == told[told.index(1.0) :].count(1.0) > 0
 
 
 def test_a_worker_that_dies_names_its_stage(tmp_path):

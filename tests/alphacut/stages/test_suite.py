@@ -9,7 +9,7 @@ from alphacut.case.content import load
 from alphacut.entry import main
 from alphacut.io.problem import BadInput
 from alphacut.records.recording import spectral_acceleration
-from alphacut.stages.suite import nominal_mode, suite_records, suite_warnings
+from alphacut.stages.suite import nominal_mode, suite_records
 
 CASE = """
 title = "One storey under two records"
@@ -109,7 +109,8 @@ def test_all_bad_files_of_a_folder_are_named_at_once(tmp_path):
 def test_what_is_unusual_in_a_record_is_a_warning(tmp_path):
     late = "".join(f"{10 + 0.02 * k:.2f},{60 * np.sin(k)}\n" for k in range(80))
     (tmp_path / "late.csv").write_text(f"time [s],acceleration [m/s^2]\n{late}")
-    warnings = "\n".join(suite_warnings(records_of(tmp_path, '"one.csv"', '"late.csv"')[0]))
+    records, _ = records_of(tmp_path, '"one.csv"', '"late.csv"')
+    warnings = "\n".join(warning for record in records for warning in record.warnings)
     assert "of record late its times begin at 10 s" in warnings
     assert "of record late its peak is 6.12 g" in warnings
 
