@@ -19,16 +19,11 @@ from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.io.problem import missing
 from alphacut.rve.cell.cell import STRAIN, AnyPhase, Cell, Interphase, Phase
 from alphacut.rve.cell.outline import circle
-from alphacut.rve.result import bounds
+from alphacut.rve.result.bounds import hashin_shtrikman, mori_tanaka
 from alphacut.rve.result.result import HomogenisedStiffness, effective_modulus
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.spheres.model import SphereSeriesModel
-from alphacut.rve.spheres.result import (
-    hashin_shtrikman,
-    hill_average,
-    mori_tanaka,
-    volume_fraction,
-)
+from alphacut.rve.spheres.result import hill_average, volume_fraction
 from alphacut.stochastic import TruncatedNormal, gauss_rule
 
 GPA = 1e9
@@ -193,19 +188,11 @@ class CellProblem:
         fraction = np.asarray(found["fraction"] if stated is None else stated)
         if stated is not None:
             found["fraction_of_case"] = stated
-        if spheres:
-            moduli = hashin_shtrikman(fraction, matrix, inclusion).T
-            low, high = (_young(*bulk_and_shear) / GPA for bulk_and_shear in moduli)
-            young_bounds = low, high
-            estimate = _young(*mori_tanaka(fraction, matrix, inclusion))
-        else:
-            shares = np.array([1 - fraction, fraction])
-            young_bounds = isotropic_bounds(shares, [matrix.stiffness, inclusion.stiffness])
-            bulk, _, shear = bounds.mori_tanaka(fraction, matrix, inclusion)
-            estimate = _transverse_young(bulk / 2, shear)
-        found["hashin_shtrikman_E_GPa"] = young_bounds
+        fractions, phases = np.array([1 - fraction, fraction]), [matrix, inclusion]
+        found["hashin_shtrikman_E_GPa"] = isotropic_bounds(fractions, phases, space=spheres)
         if nominal.square or spheres:
-            found["mori_tanaka_E_GPa"] = estimate / GPA
+            young = _young if spheres else _transverse_young
+            found["mori_tanaka_E_GPa"] = young(*mori_tanaka(fraction, phases, space=spheres)) / GPA
         return found
 
     def require_mesh(self) -> None:
@@ -226,14 +213,16 @@ class CellProblem:
         mesh_phases(grid, self.radius.law, self.nominal)  # refuses what does not fit
 
 
-def isotropic_bounds(fractions: Array, stiffness: Sequence[Array]) -> tuple[float, float]:
-    """Lower and upper Hashin–Shtrikman bound of the transverse Young's modulus in GPa.
+def isotropic_bounds(
+    fractions: Array, phases: Sequence[Phase], *, space: bool = False
+) -> tuple[float, float]:
+    """Lower and upper Hashin–Shtrikman bound of Young's modulus in GPa, of `space` or transverse.
 
-    They are its values at the lower and at the upper bounds of the plane moduli K and G.
-    Area fractions have shape (phases,), plane stiffnesses in Pa (3, 3) each.
+    They are its values at the lower and at the upper bounds of the moduli K and G. Fractions have
+    the shape (phases,).
     """
-    moduli = bounds.hashin_shtrikman(fractions, stiffness).T
-    low, high = (_transverse_young(*bulk_and_shear) / GPA for bulk_and_shear in moduli)
+    young = _young if space else _transverse_young
+    low, high = (young(*pair) / GPA for pair in hashin_shtrikman(fractions, phases, space=space).T)
     return low, high
 
 

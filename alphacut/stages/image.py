@@ -255,7 +255,7 @@ class ImageStudy:
     @property
     def isotropic_bounds(self) -> tuple[float, float]:
         """Hashin and Shtrikman's bounds of an isotropic E in GPa at the modal values."""
-        phases = [Phase(young.modal, nu.modal).stiffness for young, nu in self.cell.pairs]
+        phases = [Phase(young.modal, nu.modal) for young, nu in self.cell.pairs]
         return isotropic_bounds(np.array([*self.fractions.values()]), phases)
 
     @property

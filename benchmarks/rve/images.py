@@ -18,7 +18,7 @@ import numpy as np
 from alphacut.fuzzy.arrays import Array, Mask
 from alphacut.rve.cell.cell import Phase
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
-from alphacut.rve.image.model import ImageSolution, solve_between, solve_image
+from alphacut.rve.image.model import ImageModel, ImageSolution, solve_image
 from alphacut.rve.image.phases import ModuliInterval, PlaneModuli, moduli_images
 from alphacut.rve.series.multipoles import square_stiffness
 
@@ -68,7 +68,7 @@ def round_particle(size: int, radius: float, phases: list[PlaneModuli]) -> Image
     near, far = np.minimum(edge[1:], edge[:-1]), np.maximum(edge[1:], edge[:-1])
     inner, outer = (np.hypot(x, x[:, None]) <= radius for x in (far, near))
     intervals = [ModuliInterval(phase, phase) for phase in phases]
-    return solve_between(moduli_images(inner.astype(int), outer.astype(int), intervals))
+    return ImageModel().solve(moduli_images(inner.astype(int), outer.astype(int), intervals))
 
 
 def exact(radius: float, contrast: float) -> Array:

@@ -1,7 +1,4 @@
-"""The image as the cell: α-cuts of its stiffness, proved at every level.
-
-Both bounds of an image, or of all images between two.
-"""
+"""The image as the cell: both bounds of its stiffness, and their α-cuts, proved at every level."""
 
 from __future__ import annotations
 
@@ -9,6 +6,7 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from threading import Event
+from typing import Any
 
 import numpy as np
 
@@ -68,10 +66,44 @@ class ImageModel:
             raise RefusedError("height of a pixel over its width", f"{self.aspect:.3g}", allowed)
 
     def solve(self, images: ModuliImages, start: ImageSolution | None = None) -> ImageSolution:
-        """Bounds of every image between two."""
-        return solve_between(
-            images, aspect=self.aspect, solver=self.solver, division=self.division, start=start
-        )
+        """Proved bounds of the stiffness of all images with moduli between the least and greatest.
+
+        The lower bound is that of stresses with the least moduli, the upper one that of
+        displacements with the greatest; each is computed on a thread. The fields of `start`, a
+        solution of the same division, are the first guess.
+        """
+        is_stopped = Event()
+
+        def raise_if_stopped() -> None:
+            """Called before each iteration; ends this thread where the other one has ended."""
+            if is_stopped.is_set():
+                raise InterruptedError("the other side's solution was stopped")
+            try:
+                self.solver.watch()
+            except BaseException:
+                is_stopped.set()
+                raise
+
+        def solve(element: Element, end: int, guess: SideSolution | None) -> SideSolution:
+            """Fields of least energy with the least (end 0) or greatest (end 1) moduli."""
+            return solve_side(
+                element,
+                images.bulk[end],
+                images.shear[end],
+                solver=replace(self.solver, watch=raise_if_stopped),
+                division=self.division,
+                start=None if guess is None else guess.fields,
+            )
+
+        stresses, displacements = airy_element(self.aspect), displacement_element(self.aspect)
+        guesses = (None, None) if start is None else (start.lower, start.upper)
+        with ThreadPoolExecutor(2) as pool:
+            try:
+                lower, upper = pool.map(solve, (stresses, displacements), (0, 1), guesses)
+            finally:  # Ctrl-C and errors are not to wait for the other side
+                is_stopped.set()
+        bounds = StiffnessBounds(inverse_below(lower.energy.upper), upper.energy.upper)
+        return ImageSolution(bounds, upper, lower)
 
     def cuts(
         self, images: Sequence[ModuliImages], crisp: tuple[ModuliImages, ImageSolution]
@@ -88,14 +120,16 @@ class ImageModel:
             if not pair.equals(last_pair):
                 last_pair, solution = pair, self.solve(pair, solution)
             bounds.append(solution.bounds)
-        moduli = nested([level.young(self.average) for level in bounds])
-        ratios = nested([level.poisson(self.average) for level in bounds])
-        intervals = np.array([level.constants() for level in bounds])  # (levels, constants, 2)
-        lower = np.minimum.accumulate(intervals[..., 0])
-        upper = np.maximum.accumulate(intervals[..., 1])
-        constants = np.stack([lower, upper], axis=-1)
-        cuts = list(map(ImageCut, bounds, moduli, ratios, constants))
-        return cuts[::-1]
+        # of E, ν and the constants along x and y, (levels, 6, 2), each made to contain those before
+        intervals = np.array(
+            [[x.young(self.average), x.poisson(self.average), *x.constants()] for x in bounds]
+        )
+        np.minimum.accumulate(intervals[..., 0], out=intervals[..., 0])
+        np.maximum.accumulate(intervals[..., 1], out=intervals[..., 1])
+        return [
+            ImageCut(level, (x[0, 0], x[0, 1]), (x[1, 0], x[1, 1]), x[2:])
+            for level, x in zip(bounds[::-1], intervals[::-1], strict=True)
+        ]
 
     def require_consistent(self, images: Sequence[ModuliImages], cuts: Sequence[ImageCut]) -> None:
         """Refuse cuts, one a level of `images`, that contradict bounds of an image inside them.
@@ -125,13 +159,6 @@ def _require_overlap(name: str, inside: Ends, cut: Ends) -> None:
         raise FailedError(f"the proof is wrong: {what}", "keep the case and report it")
 
 
-def nested(intervals: Sequence[Ends]) -> list[Ends]:
-    """Intervals in the order of falling α, each widened to contain those before it."""
-    lows = np.minimum.accumulate([low for low, _ in intervals])
-    highs = np.maximum.accumulate([high for _, high in intervals])
-    return [(float(low), float(high)) for low, high in zip(lows, highs, strict=True)]
-
-
 def usual_division(images: ModuliImages) -> int:
     """Elements along each side of a pixel: 2 up to `MILD` contrast and `LARGE` pixels, else 1."""
     contrast = max(float(upper.max() / lower.min()) for lower, upper in (images.bulk, images.shear))
@@ -147,68 +174,9 @@ class ImageSolution:
     lower: SideSolution
 
 
-def solve_image(
-    bulk: Array,
-    shear: Array,
-    *,
-    aspect: float = 1.0,
-    solver: ConjugateGradient | None = None,
-    division: int = 1,
-) -> ImageSolution:
-    """Proved bounds of a periodic image of K + G/3 and G in Pa, row 0 at the bottom."""
-    images = ModuliImages((bulk, bulk), (shear, shear))
-    return solve_between(images, aspect=aspect, solver=solver, division=division)
+def solve_image(bulk: Array, shear: Array, **settings: Any) -> ImageSolution:
+    """Proved bounds of a periodic image of K + G/3 and G in Pa, row 0 at the bottom.
 
-
-def solve_between(
-    images: ModuliImages,
-    *,
-    aspect: float = 1.0,
-    solver: ConjugateGradient | None = None,
-    division: int = 1,
-    start: ImageSolution | None = None,
-) -> ImageSolution:
-    """Proved bounds of the stiffness of all images with moduli between the least and greatest.
-
-    The lower bound is that of stresses with the least moduli, the upper one that of displacements
-    with the greatest; each is computed on a thread.
-
-    Args:
-        images: Least and greatest moduli of each pixel.
-        aspect: Height of a pixel over its width.
-        solver: Stopping rule.
-        division: Elements along each side of a pixel.
-        start: Solution of the same division, whose fields are the first guess.
+    `settings` are those of `ImageModel`.
     """
-    rule, is_stopped = solver or ConjugateGradient(), Event()
-
-    def raise_if_stopped() -> None:
-        """Called before each iteration; ends this thread where the other one has ended."""
-        if is_stopped.is_set():
-            raise InterruptedError("the other side's solution was stopped")
-        try:
-            rule.watch()
-        except BaseException:
-            is_stopped.set()
-            raise
-
-    def solve(element: Element, end: int, guess: SideSolution | None) -> SideSolution:
-        """Fields of least energy with the least (end 0) or greatest (end 1) moduli."""
-        return solve_side(
-            element,
-            images.bulk[end],
-            images.shear[end],
-            solver=replace(rule, watch=raise_if_stopped),
-            division=division,
-            start=None if guess is None else guess.fields,
-        )
-
-    stresses, displacements = airy_element(aspect), displacement_element(aspect)
-    guesses = (None, None) if start is None else (start.lower, start.upper)
-    with ThreadPoolExecutor(2) as pool:
-        try:
-            lower, upper = pool.map(solve, (stresses, displacements), (0, 1), guesses)
-        finally:  # Ctrl-C and errors are not to wait for the other side
-            is_stopped.set()
-    bounds = StiffnessBounds(inverse_below(lower.energy.upper), upper.energy.upper)
-    return ImageSolution(bounds, upper, lower)
+    return ImageModel(**settings).solve(ModuliImages((bulk, bulk), (shear, shear)))

@@ -1,7 +1,7 @@
 """Gmsh's quadratic prisms of the product space, and their names: to and from its model.
 
 Gmsh triangulates the cell and extrudes it along θ. Its 15-node prisms ("Prism 15", type 18) have
-Basix's order of nodes. Physical groups name phases, sides and the two ends of θ.
+Basix's order of nodes. Physical groups name phases.
 """
 
 from __future__ import annotations
@@ -20,9 +20,6 @@ PRISM_15 = 18
 """Gmsh's type of the element."""
 MATRIX, INCLUSION, INTERPHASE = NAMES = "matrix", "inclusion", "interphase"
 """Names of the phases in their order."""
-SIDES = {"x1 = -1": (0, -1.0), "x1 = 1": (0, 1.0), "x2 = -1": (1, -1.0), "x2 = 1": (1, 1.0)}
-"""Sides by name: axis and coordinate."""
-LEVELS = "lowest level", "highest level"
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +60,6 @@ def extruded(
         phase_volumes = {phase: [next(volumes) for _ in tags] for phase, tags in surfaces.items()}
         for phase in sorted(phase_volumes):
             gmsh.model.addPhysicalGroup(3, phase_volumes[phase], name=NAMES[phase])
-        _name_surfaces(gmsh)
         if sizes:
             square.grade(gmsh, sizes)
         gmsh.option.setNumber("Mesh.ElementOrder", 2)
@@ -71,19 +67,6 @@ def extruded(
         gmsh.option.setNumber("Mesh.SecondOrderLinear", 1)  # nodes are moved to the cone later
         gmsh.model.mesh.generate(3)
         return read(gmsh)
-
-
-def _name_surfaces(gmsh: Any) -> None:
-    """Make physical groups of the surfaces of Gmsh's model on each side and at both ends of θ."""
-    ends = {LEVELS[0]: (2, 0.0), LEVELS[1]: (2, 1.0)}
-    for name, (axis, coordinate) in (SIDES | ends).items():
-        tags = []
-        for dimension, tag in gmsh.model.getEntities(2):
-            box = gmsh.model.getBoundingBox(dimension, tag)
-            offset = abs(box[axis] - coordinate) + abs(box[axis + 3] - coordinate)
-            if offset < 1e-5:  # Gmsh enlarges bounding boxes
-                tags.append(tag)
-        gmsh.model.addPhysicalGroup(2, tags, name=name)
 
 
 def read(gmsh: Any) -> Prisms:

@@ -86,29 +86,39 @@ def stress_checks(
         weights: Weights of the nodes, shape (n,).
         phases: Materials, in the order of their fractions.
     """
-    stiffness = [phase.stiffness for phase in phases]
     energy = loads @ mean(weights, stress)
-    reuss_energy, voigt_energy = (
-        loads @ mean(weights, bound(fractions, stiffness)) @ loads.T for bound in (reuss, voigt)
-    )
-    checks = order_checks(energy, reuss_energy, voigt_energy)
+    stiffness = [phase.stiffness for phase in phases]
+    checks = order_checks(energy, loads, fractions, weights, stiffness)
     if all(isinstance(phase, Phase) for phase in phases):
-        low, high = hashin_shtrikman(fractions, stiffness)[0] @ weights
         # factors of the loads that add up to ε11 = ε22 = 1
         equibiaxial = np.linalg.lstsq(loads.T, np.array([1.0, 1.0, 0.0]), rcond=None)[0]
-        bulk = equibiaxial @ energy @ equibiaxial / 4
-        checks["hashin_shtrikman"] = float(max(0.0, low - bulk, bulk - high) / bulk)
+        bulk = float(equibiaxial @ energy @ equibiaxial / 4)
+        checks |= bulk_check(bulk, hashin_shtrikman(fractions, phases)[0] @ weights)
     return checks
 
 
-def order_checks(energy: Array, reuss_energy: Array, voigt_energy: Array) -> dict[str, float]:
-    """Relative violations of symmetry and of Reuss ≤ energy ≤ Voigt, matrices of shape (k, k)."""
+def order_checks(
+    energy: Array, loads: Array, fractions: Array, weights: Array, stiffness: Sequence[Array]
+) -> dict[str, float]:
+    """Relative violations of symmetry and of Reuss ≤ energy ≤ Voigt, in the sense of Loewner.
+
+    Args as of `stress_checks`; `energy` is that of pairs of the loads, `stiffness` of each phase.
+    """
     scale = float(abs(energy).max())
+    reuss_energy, voigt_energy = (
+        loads @ mean(weights, bound(fractions, stiffness)) @ loads.T for bound in (reuss, voigt)
+    )
     return {
         "symmetry": float(abs(energy - energy.T).max()) / scale,
         "reuss": _below(energy - reuss_energy) / scale,
         "voigt": _below(voigt_energy - energy) / scale,
     }
+
+
+def bulk_check(bulk: float, bounds: Array) -> dict[str, float]:
+    """Relative violation of the lower and upper Hashin–Shtrikman bound by a bulk modulus, in Pa."""
+    low, high = bounds
+    return {"hashin_shtrikman": float(max(0.0, low - bulk, bulk - high) / bulk)}
 
 
 def mean(weights: Array, values: Array) -> Array:

@@ -176,7 +176,8 @@ def theta_error(cell: Cell, rule: ThetaRule, *, radii: Array, moduli: Array) -> 
     fine_radii = cell.radius(fine.nodes)
 
     def mori_tanaka_moduli(r: Array) -> Array:
-        return mori_tanaka(np.pi / 4 * r**2, cell.matrix, cell.inclusion)
+        bulk, shear = mori_tanaka(np.pi / 4 * r**2, [cell.matrix, cell.inclusion])
+        return np.stack([2 * bulk, 2 * shear, shear], axis=-1)
 
     scale = mori_tanaka_moduli(fine_radii)
     logarithm = np.log(moduli / mori_tanaka_moduli(radii))

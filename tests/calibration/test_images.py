@@ -5,7 +5,7 @@ import pytest
 from scipy.sparse import coo_array
 from scipy.sparse.linalg import splu
 
-from alphacut.rve.image.model import solve_between, solve_image
+from alphacut.rve.image.model import ImageModel, solve_image
 from alphacut.rve.image.phases import ModuliImages
 from tests.calibration.declared import Calibration, free_seed
 
@@ -115,7 +115,7 @@ def test_images_between_two():
         share = rng.choice([0.0, 1.0, rng.random()], size=(2, *bulk.shape))
         wide = 1 + rng.uniform(0, 0.3)
         images = ModuliImages((bulk, wide * bulk), (shear, wide * shear))
-        bounds = solve_between(images, aspect=aspect).bounds
+        bounds = ImageModel(aspect).solve(images).bounds
         inside = (m * (1 + (wide - 1) * s) for m, s in zip((bulk, shear), share, strict=True))
         beside(table, rng, bounds, truth(*inside, aspect), k, most=np.inf)
     table.judge()

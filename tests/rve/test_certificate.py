@@ -47,7 +47,7 @@ def test_bounds_enclose_a_laminate_and_close_at_the_ends(fraction):
 
 def test_hashin_shtrikman_lies_inside_reuss_and_voigt_and_in_order():
     fraction = np.linspace(0, 1, 11)
-    least, greatest = hashin_shtrikman(shares(fraction), PAIR)[0]
+    least, greatest = hashin_shtrikman(shares(fraction), (SOFT, HARD))[0]
     assert (least <= greatest * (1 + 1e-12)).all()
     assert (bulk_modulus(voigt(shares(fraction), PAIR)) >= greatest * (1 - 1e-12)).all()
     assert (bulk_modulus(reuss(shares(fraction), PAIR)) <= least * (1 + 1e-12)).all()

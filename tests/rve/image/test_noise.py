@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.rve.image.model import solve_between
+from alphacut.rve.image.model import ImageModel
 from alphacut.rve.image.phases import ModuliInterval, moduli_images
 from alphacut.stochastic.segmentation import segment
 from tests.stochastic.test_segmentation import picture
@@ -14,7 +14,7 @@ SURE = 0.02  # fraction, relative
 
 
 def bounds(first, last):
-    return solve_between(moduli_images(first, last, PHASES)).bounds
+    return ImageModel().solve(moduli_images(first, last, PHASES)).bounds
 
 
 def judged(grey):

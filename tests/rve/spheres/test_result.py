@@ -5,14 +5,13 @@ import pytest
 
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve import Phase
+from alphacut.rve.result.bounds import hashin_shtrikman, mori_tanaka
 from alphacut.rve.result.checks import CertificateError
 from alphacut.rve.spheres.model import SphereSeriesModel
 from alphacut.rve.spheres.result import (
     cubic_moduli,
     cubic_voigt,
-    hashin_shtrikman,
     hill_average,
-    mori_tanaka,
     space_stiffness,
     spheres_with_checks,
 )
@@ -39,11 +38,12 @@ def test_homogeneous_cell_is_the_matrix():
 
 def test_bounds_meet_the_phases_and_mori_and_tanaka():
     for share, phase in ((0.0, MATRIX), (1.0, STIFF)):
-        ends = hashin_shtrikman(np.array(share), MATRIX, STIFF)
+        ends = hashin_shtrikman(np.array([1 - share, share]), [MATRIX, STIFF], space=True)
         np.testing.assert_allclose(ends.T, np.broadcast_to(phase.bulk_and_shear, (2, 2)))
-    ends = hashin_shtrikman(np.array(0.2092), MATRIX, STIFF)
-    np.testing.assert_allclose(mori_tanaka(np.array(0.2092), MATRIX, STIFF), ends[:, 0])
-    np.testing.assert_allclose(mori_tanaka(np.array(0.7908), STIFF, MATRIX), ends[:, 1])
+    ends = hashin_shtrikman(np.array([0.7908, 0.2092]), [MATRIX, STIFF], space=True)
+    for k, (share, phases) in enumerate([(0.2092, [MATRIX, STIFF]), (0.7908, [STIFF, MATRIX])]):
+        estimate = mori_tanaka(np.array(share), phases, space=True)
+        np.testing.assert_allclose(estimate, ends[:, k])
     bulk, shear = ends[:, 0]
     assert hill_average(np.array([bulk, shear, shear]))[0] == pytest.approx(25.78e9, abs=5e6)
 

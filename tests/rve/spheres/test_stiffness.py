@@ -6,9 +6,10 @@ import pytest
 
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve import Phase
+from alphacut.rve.result.bounds import hashin_shtrikman
 from alphacut.rve.series.means import SeriesError
 from alphacut.rve.spheres.model import SPHERES, cubic_stiffness
-from alphacut.rve.spheres.result import hashin_shtrikman, space_stiffness, volume_fraction
+from alphacut.rve.spheres.result import space_stiffness, volume_fraction
 
 MATRIX = Phase(20e9)
 
@@ -98,7 +99,9 @@ def test_rigid_spheres_near_contact_follow_lubrication():
 def test_hashin_shtrikman_and_the_traces_enclose():
     for radius, matrix, inclusion in random_cells(40, 3, highest=0.95):
         bulk, deviator, shear = moduli(radius, matrix, inclusion, tolerance=1e-5)
-        limits = hashin_shtrikman(volume_fraction(radius), matrix, inclusion)
+        share = volume_fraction(radius)
+        shares = np.array([1 - share, share])
+        limits = hashin_shtrikman(shares, [matrix, inclusion], space=True)
         assert limits[0, 0] * (1 - 1e-9) <= bulk <= limits[0, 1] * (1 + 1e-9)
         reference = [min(p.bulk_and_shear[1] for p in (matrix, inclusion)), 0.0]
         mean = 5 / (2 / (deviator - reference[0]) + 3 / (shear - reference[0])) + reference[0]
