@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from importlib.util import find_spec
 from typing import Any
 
 import cffi
@@ -25,6 +26,12 @@ def require_real(scalar: type) -> None:
         cure = "install DOLFINx with real numbers, such as python3-dolfinx-real"
         raise RefusedError("PETSc", "built for complex numbers", "a build for real numbers", cure)
 
+
+if find_spec("dolfinx_solver"):  # a wheel whose HDF5 hides that of others loaded after it
+    with suppress(ImportError):
+        import h5py  # noqa: F401
+    with suppress(ImportError):
+        import netCDF4  # noqa: F401
 
 with uninterrupted():
     import petsc4py  # after MPI, and before DOLFINx: its wheels need that
