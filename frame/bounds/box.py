@@ -169,7 +169,7 @@ class Box:
         read = np.abs(modal.output_coefficients(np.zeros_like(outputs), outputs)[0])
         for k, sigma in enumerate(modal.sigma[0]):
             grid = Grid(np.array([sigma.imag]), np.array([-sigma.real / sigma.imag]))
-            oscillator = Oscillators(grid, self.loads, self.time)
+            oscillator = Oscillators(grid, self.loads, self.time, {int(x) for x in modal.order})
             for source, share in modal.share.items():
                 for o in outputs:
                     wave = oscillator.responses(source, int(modal.order[o]))

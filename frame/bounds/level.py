@@ -78,7 +78,7 @@ def response_tables(
     # of the sums that the responses enter
     rounding = 2 * gamma(roundings(len(grids), len(sources), oscillators[0].omega.inputs))
     for grid in grids:
-        tables = Oscillators(grid, loads, time)
+        tables = Oscillators(grid, loads, time, distinct)
         for order in distinct:
             waves = [tables.responses(source, order) for source in sources]
             table = np.stack([wave.value.reshape(len(time), -1) for wave in waves])

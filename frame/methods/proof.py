@@ -289,7 +289,7 @@ def _line_deviation(model: ModalModel) -> Array:
             q = min(decay[0][k] / w[k] for w in omega), max(decay[1][k] / w[k] for w in omega)
             points = [np.linspace(omega[0][k], omega[1][k], POINTS[0]), np.linspace(*q, POINTS[1])]
             sigma = (-points[1][:, None] + 1j) * points[0]
-            bent = line_deviations(sigma, load, model.time, 0)[0]
+            bent = line_deviations(sigma, load, model.time, (0,))[0][0]
             deviation += 2 * np.outer(bent, size[k])
     return deviation
 

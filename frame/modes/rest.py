@@ -283,12 +283,13 @@ def coupling_of(
     reach = STEP * (least * low_omega + 2 / max(float(time[-1]), 1e-300))
     points = (high_omega - low_omega) / reach, (most - least) * high_omega / reach
     along, across = (int(np.clip(x, 1, MAX_POINTS)) + 1 for x in points)
-    table = Oscillators(grid_over(*ends, (along, across)), loads, time)
+    orders = sorted({int(x) for x in structure.order})
+    table = Oscillators(grid_over(*ends, (along, across)), loads, time, orders)
     added, deviation = (np.zeros((len(time), len(structure.order))) for _ in range(2))
-    for order in np.unique(structure.order):
+    for order in orders:
         o = np.flatnonzero(structure.order == order)
         for s, source in enumerate(sources):
-            response = table.responses(source, int(order))
+            response = table.responses(source, order)
             G, G_slope = response.largest
             # of g = (a + b λ)/2 + ζ √λ, ω² = λ − g²: 4 ω² |dσ/dλ|² = 1 + 4 g′ (g′ λ − g) ≤ 1, since
             # g′ λ ≤ g, and 2 ω³ |d(g/ω)/dλ| = |2 g′ λ − g| ≤ g

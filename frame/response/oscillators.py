@@ -22,7 +22,7 @@ integral of |a|.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import comb, perm
 
@@ -93,10 +93,20 @@ def grid_over(
 
 
 class Oscillators:
-    """Analytic functions ρ and exp(σ t) on a grid, from which all responses are read."""
+    """Analytic functions ρ and exp(σ t) on a grid, from which all responses are read.
 
-    def __init__(self, grid: Grid, loads: Mapping[str, History], time: Array) -> None:
-        self.grid, self.loads, self.time = grid, loads, time
+    Args:
+        grid: Points of the oscillators.
+        loads: The loads by name.
+        time: Nodes, shape (T,), in s.
+        orders: Derivatives of the motion that are read.
+    """
+
+    def __init__(
+        self, grid: Grid, loads: Mapping[str, History], time: Array, orders: Collection[int]
+    ) -> None:
+        self.grid, self.loads, self.time, self.orders = grid, loads, time, orders
+        self._deviations = dict[str, dict[int, Array]]()
         sigma, t, duration = grid.sigma.ravel(), time[:, None], float(time[-1])
         require_in_range(sigma, duration, duration)
         free = np.exp(sigma * t)
@@ -115,7 +125,7 @@ class Oscillators:
 
         Args:
             source: Name of a load or force, "velocity" or "start".
-            order: Derivative ν of the motion that is read, 0 to 2.
+            order: Derivative ν of the motion that is read, one of `orders`.
         """
         grid, is_start = self.grid, source == "start"
         sigma = grid.sigma.ravel()
@@ -166,12 +176,13 @@ class Oscillators:
 
     def _line_deviation(self, source: str, order: int) -> Array:
         """Bounds of how far responses stray from a line in the step to each node, (T,)."""
-        is_direct = _has_feedthrough(source, order)
-        modulus, read = line_deviations(
-            *(self.grid.sigma, self.loads.get(source), self.time, order),
-            is_direct=is_direct,
-            at_nodes=self.forced.get(source, self.free),
-        )
+        if source not in self._deviations:
+            self._deviations[source] = line_deviations(
+                *(self.grid.sigma, self.loads.get(source), self.time, self.orders),
+                is_force=source.startswith("force"),
+                at_nodes=self.forced.get(source, self.free),
+            )
+        modulus, read = self._deviations[source][order]
         return modulus * (1 + self.grid.quotient[-1]) if source == "start" else read
 
 
@@ -222,7 +233,8 @@ def response_ranges(
     count = max(1, int(np.ceil(np.log(omega[1] / omega[0]) / np.log(RATIO))))
     ratio = (omega[1] / omega[0] * (1 + 1e-9)) ** (1 / count)
     for n in range(count):
-        piece = _Piece((omega[0] * ratio**n, omega[0] * ratio ** (n + 1)), quotient, loads, time)
+        ends = omega[0] * ratio**n, omega[0] * ratio ** (n + 1)
+        piece = _Piece(ends, quotient, loads, time, orders)
         for order, ranges in found.items():
             for s, source in enumerate(sources):
                 for k, (low, high, deviation) in enumerate(piece.bounds(source, order)):
@@ -241,6 +253,7 @@ class _Piece:
         quotient: tuple[float, float],
         loads: Mapping[str, History],
         time: Array,
+        orders: Sequence[int],
     ) -> None:
         self.omega, self.quotient, self.loads, self.time = omega, quotient, loads, time
         decay = quotient[0] * omega[0]
@@ -252,17 +265,17 @@ class _Piece:
         across = int(np.ceil((quotient[1] - quotient[0]) * omega[1] / distance)) + 1
         if loads and along <= MAX_POINTS[0]:
             points = max(along, 2), int(np.clip(across, 2, MAX_POINTS[1]))
-            self.table = Oscillators(grid_over(omega, quotient, points), loads, time)
+            self.table = Oscillators(grid_over(omega, quotient, points), loads, time, orders)
 
     def bounds(self, source: str, order: int) -> Iterator[tuple[Array, Array, Array]]:
         """Yield least, greatest and line deviation of λ^κ e at nodes, (T,) each, for each κ."""
         size, between = self._sizes(source, order)
         fastest = self.omega[1] * np.sqrt(1 + self.quotient[1] ** 2)
+        table = self.table.responses(source, order) if source in self.loads and self.table else None
         for power in POWERS:
             factor = fastest ** (2 * power)
             low, high, deviation = -factor * size, factor * size, 2 * factor * between
-            if source in self.loads and self.table is not None:
-                table = self.table.responses(source, order)
+            if table and self.table:
                 eigenvalue = np.abs(self.table.grid.sigma) ** 2
                 least, greatest = _bounds_over_cells(table.value, table.error, eigenvalue**power)
                 low, high = np.maximum(low, least), np.minimum(high, greatest)

@@ -11,6 +11,7 @@ the line from node to node is read off the responses there.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from math import comb, perm, prod
 from typing import NamedTuple
 
@@ -20,8 +21,9 @@ from alphacut.frame.calculus.kernels import kernel
 from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF
 from alphacut.frame.response.duhamel import absolute_moments, responses_at_nodes
 from alphacut.frame.structures.loads import History
-from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.arrays import Array, Rows
 
+compiled_fast = kernel(fastmath={"reassoc", "contract"})
 PHASE = 0.5
 """Phase in rad that a mode or a sine takes in a piece; a piece adds its square to the bound."""
 MAX_PARTS = 16
@@ -50,32 +52,38 @@ def line_deviations(
     sigma: Array,
     load: History | None,
     time: Array,
-    order: int,
+    orders: Collection[int],
     *,
-    is_direct: bool = False,
+    is_force: bool = False,
     at_nodes: tuple[Array, Array, Array] | None = None,
-) -> Array:
+) -> dict[int, Array]:
     """Return how far σ^order ρ, and its imaginary part over ω, stray from lines between nodes.
 
     Args:
         sigma: Points −g + iω of a grid over q = g/ω and ω that covers the oscillators, (Q, W).
         load: The load; None for ρ = exp(σ t).
         time: Nodes, shape (T,), in s.
-        order: Power of σ.
-        is_direct: Whether the load itself is added to the latter.
+        orders: Powers of σ.
+        is_force: Whether the load itself is added to the imaginary part of order 2.
         at_nodes: ρ with two derivatives at the nodes, its rounding, and bounds of its derivatives,
             where they are known.
 
     Returns:
-        Bounds in the step to each node, shape (2, T).
+        For each order bounds in the step to each node, shape (2, T).
     """
     omega, quotient = sigma[0].imag, -sigma[:, 0].real / sigma[:, 0].imag
     low, fast, decay = float(omega.min()), float(np.abs(sigma).max()), float(-sigma.real.max())
     pieces = _pieces(load, time, fast)
     times, d, node = pieces.time, np.diff(pieces.time), np.searchsorted(pieces.time, time)
-    step = np.repeat(np.arange(len(time) - 1), np.diff(node))  # in which each piece lies
-    at_node: Array = is_direct * load.values(time) if load else np.zeros(len(time))
     slope = (pieces.last - pieces.first) / d
+    # of each end of a piece: the nodes around it, and its place between them, 0 at a node
+    left = np.repeat(node, np.diff(node, append=node[-1] + 1))
+    right = np.append(np.repeat(node[1:], np.diff(node)), node[-1])
+    place = (times - times[left]) / np.maximum(times[right] - times[left], 1e-300)
+    # how far the load lies off the line between nodes, before and after each end
+    off_line = np.stack([np.append(0.0, pieces.last), np.append(pieces.first, 0.0)])
+    off_line -= np.interp(times, time, load.values(time) if load else np.zeros(len(time)))
+    off_line[0, 0] = off_line[1, -1] = 0.0
     tables = at_nodes if len(times) == len(time) else None
     if tables:
         bounds = tables[2]
@@ -83,19 +91,17 @@ def line_deviations(
         bounds = np.stack([times**n * np.exp(-decay * times) for n in range(5)])
     else:
         bounds = absolute_moments(decay, load, times)
-    ends = []  # of pieces: where in the step, the load that is added, numbers of those at no node
-    for first, added in ((0, pieces.first), (1, pieces.last)):
-        x = (times[first : len(d) + first] - time[step]) / (time[step + 1] - time[step])
-        direct = is_direct * added - (1 - x) * at_node[step] - x * at_node[step + 1]
-        ends.append((x, direct, np.flatnonzero((x > 0) & (x < 1))))
-    # largest magnitudes over the grid: of F = σ^order A and F″; of H, the responses off the line
-    # at both ends, H″, Im H/ω with and without the load
-    amplitude, rounding = np.zeros((2, len(d))), np.zeros(len(times))
-    off = np.zeros((4, 2, len(d)))
-    off[2] = [np.where((x > 0) & (x < 1), 0.0, np.abs(direct)) for x, direct, _ in ends]
-    count = -(-3 * len(times) * sigma.size // MAX_ENTRIES)
-    for piece in np.array_split(np.arange(sigma.size), 1 if tables else count):
-        part = sigma.ravel()[piece]
+    # for each order the largest magnitudes over the grid: of F = σ^order A and F″; rounding; of H,
+    # the responses off the line at ends, H″, Im H/ω, and that with the load before and after
+    added = {order: off_line * (is_force and order == 2) for order in orders}
+    largest = {
+        order: (np.zeros((2, len(d))), np.zeros(len(times)), np.zeros((5, len(times))))
+        for order in orders
+    }
+    for order in orders:
+        largest[order][2][3:] = np.where(place > 0, 0.0, np.abs(added[order]))
+    count = 1 if tables else -(-3 * len(times) * sigma.size // MAX_ENTRIES)
+    for part in np.array_split(sigma.ravel(), count):
         if tables:
             rho, error = tables[:2]
         elif load is None:
@@ -103,44 +109,41 @@ def line_deviations(
             error = UNIT_ROUNDOFF * (4 + np.abs(part) * times[:, None]) * np.abs(rho[0])
         else:
             rho, error = responses_at_nodes(part, load, times, 2)
-        _largest(part, rho, error, pieces.first, slope, order, amplitude, rounding)
-        for k, (x, direct, inner) in enumerate(ends):
-            if not len(inner):
-                continue
-            x, direct = x[inner, None], direct[inner, None]
-            left, right = node[step[inner]], node[step[inner] + 1]
-            line = (1 - x) * rho[:, left] + x * rho[:, right]
-            H = with_power(part, rho[:, inner + k] - line, order)[::2]
-            read = H[0].imag / part.imag
-            sizes = np.stack([np.abs(H[0]), np.abs(H[1]), np.abs(read + direct), np.abs(read)])
-            off[:, k, inner] = np.maximum(off[:, k, inner], sizes.max(2))
+        for order, (amplitude, rounding, off) in largest.items():
+            _raise_amplitudes(part, rho, error, pieces.first, slope, order, amplitude, rounding)
+            _raise_ends(part, rho, (left, right, place), added[order], order, off)
     # between the points of the grid F strays from what is bilinear by `between` |F″|
     h, k_step = (float(np.diff(np.sort(x)).max(initial=0.0)) for x in (omega, quotient))
     between = ((1 + quotient.max() ** 2) * h**2 + (omega.max() * k_step) ** 2) / 8
-    fourth = sum(
-        comb(4, j) * perm(order, j) * fast ** (order - j) * bounds[4 - j] for j in range(order + 1)
-    )
-    of_line = abs(prod(range(order - 4, order))) * np.abs(pieces.first) * low ** (order - 5)
-    of_line += abs(prod(range(order - 5, order - 1))) * np.abs(slope) * low ** (order - 6)
-    size = amplitude[0] + between * (amplitude[1] + between * (fourth[:-1] + of_line))
-    growth = np.exp(max(-decay, 0.0) * d)
-    bent = growth * np.minimum((fast * d) ** 2 / 8, 2.0) * size
-    bent += growth * fast**order * 2 * d * pieces.bend
-    at_ends = np.zeros((2, 2, len(d)))
-    for k, (x, _, _) in enumerate(ends):
-        at, is_inner = np.arange(len(d)) + k, (x > 0) & (x < 1)
-        chord = np.maximum(fourth[node[step]], fourth[node[step + 1]])
-        missed = is_inner * between * (off[1, k] + between * (fourth[at] + chord))
-        at_ends[:, k] = off[0, k] + missed, off[2, k] + (missed + is_inner * h * off[3, k]) / low
-    bent += 4 * np.max([rounding[:-1], rounding[1:], rounding[node[step]]], axis=0)
-    total = np.stack([bent, bent / low + is_direct * pieces.bend]) + at_ends.max(1)
-    deviation: Array = np.zeros((2, len(time)))
-    deviation[:, 1:] = np.maximum.reduceat(total, node[:-1], axis=1)
-    return deviation
+    growth, inside = np.exp(max(-decay, 0.0) * d), place > 0
+    found = dict[int, Array]()
+    for order, (amplitude, rounding, off) in largest.items():
+        fourth = sum(
+            comb(4, j) * perm(order, j) * fast ** (order - j) * bounds[4 - j]
+            for j in range(order + 1)
+        )
+        of_line = abs(prod(range(order - 4, order))) * np.abs(pieces.first) * low ** (order - 5)
+        of_line += abs(prod(range(order - 5, order - 1))) * np.abs(slope) * low ** (order - 6)
+        size = amplitude[0] + between * (amplitude[1] + between * (fourth[:-1] + of_line))
+        bent = growth * np.minimum((fast * d) ** 2 / 8, 2.0) * size
+        bent += growth * fast**order * 2 * d * pieces.bend
+        chord = np.maximum(fourth[left], fourth[right])
+        missed = inside * between * (off[1] + between * (fourth + chord))
+        at_ends = off[[0, 3, 4]]
+        at_ends[0] += missed
+        at_ends[1:] += (missed + inside * h * off[2]) / low
+        error = np.max([rounding, rounding[left], rounding[right]], axis=0)
+        bent += 4 * np.maximum(error[:-1], error[1:])
+        total = np.stack([bent, bent / low + added[order].any() * pieces.bend])
+        total[0] += np.maximum(at_ends[0, :-1], at_ends[0, 1:])
+        total[1] += np.maximum(at_ends[2, :-1], at_ends[1, 1:])
+        found[order] = np.zeros((2, len(time)))
+        found[order][:, 1:] = np.maximum.reduceat(total, node[:-1], axis=1)
+    return found
 
 
-@kernel(fastmath={"reassoc", "contract"})
-def _largest(
+@compiled_fast
+def _raise_amplitudes(
     sigma: Array,
     rho: Array,
     error: Array,
@@ -177,6 +180,49 @@ def _largest(
             underflow = 1e-150 if total > 0 else 0.0  # squares of less may be zero
             amplitude[0, p] = max(amplitude[0, p], np.sqrt(largest) + underflow)
             amplitude[1, p] = max(amplitude[1, p], np.sqrt(largest_second) + underflow)
+
+
+@compiled_fast
+def _raise_ends(
+    sigma: Array,
+    rho: Array,
+    around: tuple[Rows, Rows, Array],
+    added: Array,
+    order: int,
+    off: Array,
+) -> None:
+    """Raise to the largest at S σ of ends between nodes: |H|, |H″|, |Im H/ω|, with load (5, P + 1).
+
+    H is σ^order ρ less the line through it at the nodes around an end; `added` is the load, off
+    its own line, before and after the end, shape (2, P + 1).
+    """
+    left, right, place = around
+    power = sigma**order
+    power_first, power_second = order * sigma ** max(order - 1, 0), order * (order - 1.0)
+    for p in range(len(place)):
+        x, i, j = place[p], left[p], right[p]
+        if x == 0:
+            continue
+        largest, largest_second, total = 0.0, 0.0, 0.0
+        for s in range(len(sigma)):
+            r, r1, r2 = rho[0, p, s], rho[1, p, s], rho[2, p, s]
+            r -= (1 - x) * rho[0, i, s] + x * rho[0, j, s]
+            r1 -= (1 - x) * rho[1, i, s] + x * rho[1, j, s]
+            r2 -= (1 - x) * rho[2, i, s] + x * rho[2, j, s]
+            H = power[s] * r
+            H2 = power_second * r + 2 * power_first[s] * r1 + power[s] * r2
+            read = H.imag / sigma[s].imag
+            largest = max(largest, H.real**2 + H.imag**2)
+            largest_second = max(largest_second, H2.real**2 + H2.imag**2)
+            off[2, p] = max(off[2, p], abs(read))
+            off[3, p] = max(off[3, p], abs(read + added[0, p]))
+            off[4, p] = max(off[4, p], abs(read + added[1, p]))
+            total += abs(H.real) + abs(H.imag) + abs(H2.real) + abs(H2.imag)
+        if not total < np.inf:  # NaN, which a maximum may pass over
+            largest = largest_second = off[2, p] = off[3, p] = off[4, p] = np.inf
+        underflow = 1e-150 if total > 0 else 0.0  # squares of less may be zero
+        off[0, p] = max(off[0, p], np.sqrt(largest) + underflow)
+        off[1, p] = max(off[1, p], np.sqrt(largest_second) + underflow)
 
 
 def with_power(sigma: Array, rho: Array, order: int) -> Array:

@@ -191,8 +191,8 @@ def test_tables_miss_what_they_state_and_no_less_than_half(source, order):
     fine = Grid(np.linspace(9, 11, 81), np.linspace(0.02, 0.05, 81))
     for omega, quotient in ((16, 80), (80, 8), (16, 8)):
         coarse = Grid(fine.omega[:: 80 // omega], fine.quotient[:: 80 // quotient])
-        table = Oscillators(coarse, {"load": RECORD}, time).responses(source, order)
-        exact = Oscillators(fine, {"load": RECORD}, time).responses(source, order).value
+        table = Oscillators(coarse, {"load": RECORD}, time, {order}).responses(source, order)
+        exact = Oscillators(fine, {"load": RECORD}, time, {order}).responses(source, order).value
         at = table.value
         for axis, (own, grid) in enumerate(
             ((fine.quotient, coarse.quotient), (fine.omega, coarse.omega)), 1
@@ -208,7 +208,7 @@ def test_tables_miss_what_they_state_and_no_less_than_half(source, order):
 def test_what_second_derivatives_do_within_a_cell_is_in_the_error():
     """G″ = (σ − σ₁)(σ − σ₂) is zero at both ends of a cell, and G strays by 5 h⁴/384 within."""
     grid, h = Grid(np.array([10.0, 11.0]), np.zeros(1)), 1.0
-    oscillators = Oscillators(grid, {}, np.zeros(1))
+    oscillators = Oscillators(grid, {}, np.zeros(1), range(3))
     zero, fourth = np.zeros((3, 1)), np.array([[0.0], [0.0], [0.0], [0.0], [2.0]])
     error, _ = oscillators._error(zero, fourth, 0, start=True)
     exact = 5 * h**4 / 384
@@ -224,8 +224,8 @@ def test_responses_are_those_of_a_fine_march_and_stray_as_stated():
         coarse = step * (np.arange(120) + 0.5)
         time = coarse[0] + step / parts * np.arange(119 * parts + 1)
         for order in (0, 1, 2):
-            wide = Oscillators(grid, {"load": ground}, coarse).responses(source, order)
-            fine = Oscillators(grid, {"load": ground}, time).responses(source, order).value
+            wide = Oscillators(grid, {"load": ground}, coarse, {order}).responses(source, order)
+            fine = Oscillators(grid, {"load": ground}, time, {order}).responses(source, order).value
             assert np.allclose(fine[::parts], wide.value, atol=1e-12 * np.abs(fine).max())
             line = np.array([np.interp(time, coarse, x) for x in wide.value.reshape(120, -1).T]).T
             off = np.abs(fine.reshape(len(time), -1) - line)[1:].reshape(119, -1).max(1)
@@ -269,7 +269,7 @@ def test_tables_of_the_dual_have_the_rounding_of_all_sums_they_enter():
     count = 2 * len(level.oscillators) * (len(sources) + 2)
     count += 2 * d**2 + 4 * d + 4 * len(sources) + 32
     for k, grid in enumerate(level.tables.grids):
-        alone = Oscillators(grid, {"load": RECORD}, time)
+        alone = Oscillators(grid, {"load": RECORD}, time, {0})
         for s, source in enumerate(sources):
             response = alone.responses(source, 0)
             added = level.tables.error[0][k, s] - response.error

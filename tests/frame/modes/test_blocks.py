@@ -236,7 +236,7 @@ def test_modes_known_by_sums_stay_within_each_of_three_norms(power, monkeypatch)
         squared, shape = np.linalg.eigh(K)
         omega = np.sqrt(squared[1] * (1 - 0.03**2))
         point = grid_over((omega, omega), (0.03 / np.sqrt(1 - 0.03**2),) * 2, (2, 2))
-        wave = Oscillators(point, {"load": RECORD}, time).responses("load", 0).value[:, 0, 0]
+        wave = Oscillators(point, {"load": RECORD}, time, {0}).responses("load", 0).value[:, 0, 0]
         motion = shape[0, 1] * shape[:, 1].sum() * wave
         share, size = (x.at(u[None])[0, 0, 0] for x in (others.share, others.amplitude))
         width = (size + others.amplitude.remainder[0, 0]) * others.half[0, 0]
@@ -256,7 +256,7 @@ def test_ranges_hold_all_responses_times_powers_of_frequency(order):
     fine = grid_over(ends, quotient, (400, 4))
     squared = np.abs(fine.sigma) ** 2
     for s, source in enumerate(("load", "velocity")):
-        value = Oscillators(fine, {"load": RECORD}, time).responses(source, order).value
+        value = Oscillators(fine, {"load": RECORD}, time, {order}).responses(source, order).value
         for k, power in enumerate((0.0, 0.5, 1.0)):
             scaled = (value * squared**power).reshape(len(time), -1)
             assert (scaled.max(1) <= found.high[k, s] + 1e-9).all()
