@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -74,13 +75,14 @@ def suggestion(name: str, names: Iterable[str]) -> str:
     return f"did you mean {close}?" if (close := nearest(name, names)) else ""
 
 
+INSIDE = "ALPHACUT_INSIDE"
+"""Variable that ./enter sets."""
 ELEMENTS = ("dolfinx", "petsc4py", "mpi4py", "basix", "ufl", "cffi", "gmsh", "meshio", "h5py")
-EXTRAS = {"skimage": "particles", "pyuff": "uff", **dict.fromkeys(ELEMENTS, "cell")}
+EXTRAS = {"skimage": "particles", **dict.fromkeys(ELEMENTS, "cell")}
 
 
 def missing(error: ImportError) -> str:
     """Message for an import that failed, with its cure."""
     library = (error.name or "").partition(".")[0]
-    if library in EXTRAS:
-        return f"{error}; pip install '.[{EXTRAS[library]}]', or run inside ./enter"
-    return f"{error}; run inside ./enter, or install what brings {library}"
+    cure = f"pip install '.[{EXTRAS[library]}]'" if library in EXTRAS else f"install {library}"
+    return f"{error}; {cure}" + ("" if os.environ.get(INSIDE) else ", or run inside ./enter")

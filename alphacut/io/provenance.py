@@ -18,6 +18,8 @@ from types import FunctionType
 import numpy as np
 from pydantic import BaseModel
 
+from alphacut.io.problem import INSIDE
+
 FORMAT = 4
 """Format of a folder of results. 4: a manifest of files by name, JSON beside NetCDF files."""
 PACKAGES: tuple[str, ...] = ("fenics-dolfinx", "fenics-basix", "petsc4py", "mpi4py", "gmsh")
@@ -98,7 +100,7 @@ def _canonical(value: object) -> object:
 
 def door(*words: object) -> str:
     """This program here, ``./enter python -m alphacut`` or ``alphacut``, and words to paste."""
-    program = "./enter python -m alphacut" if os.environ.get("ALPHACUT_INSIDE") else "alphacut"
+    program = "./enter python -m alphacut" if os.environ.get(INSIDE) else "alphacut"
     return f"{program} {shlex.join(map(str, words))}"
 
 

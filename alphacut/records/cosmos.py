@@ -12,13 +12,14 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from math import ceil
 
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.records.recording import Recording
-from alphacut.records.text_file import ACCELERATION_UNITS, TextFile, acceleration_factor
+from alphacut.records.text_file import TextFile
 
 FORTRAN = r"\(\s*(\d*)\s*[A-Za-z](\d+)(?:\.\d+\w*)?\s*\)"
 """Numbers in a line and characters of one, as in (8f10.6)."""
@@ -89,16 +90,11 @@ def read_cosmos(file: TextFile, channel: str = "") -> Recording:
     return chosen[0].read()
 
 
-def _samples(
-    file: TextFile, line: int, count: int, unit: str, per_line: int, width: int
-) -> tuple[float, Array]:
-    """Factor of a unit to m/s², and the samples below the line that announces them."""
-    factor = acceleration_factor(unit)
-    if factor is None:
-        raise file.refusal(line, f"in units of {unit}", ACCELERATION_UNITS)
-    samples = file.numbers(line + 1, line + 1 + ceil(count / per_line), width=width)
+def _samples(file: TextFile, line: int, count: int, per_line: int, width: int) -> Array:
+    """The samples below the line that announces them."""
+    samples = file.numbers(line + 1, line + 1 + ceil(count / max(per_line, 1)), width=width)
     file.require_count(samples, count, line)
-    return factor, samples
+    return samples
 
 
 def _cosmos_channels(file: TextFile) -> Iterator[_Channel]:
@@ -113,22 +109,18 @@ def _cosmos_channels(file: TextFile) -> Iterator[_Channel]:
             ends = (CODE.fullmatch(x) for x in file.lines[row:] if "acc" in x.lower())
             code = next((match[1].lower() for match in ends if match), "")
             unique = tuple(dict.fromkeys(name for name in (*names, code) if name))
-            yield _Channel(unique, row, _cosmos_reader(file, row, reals, unique))
+            yield _Channel(unique, row, partial(_read_cosmos, file, row, reals, unique))
 
 
-def _cosmos_reader(
-    file: TextFile, line: int, reals: int, names: tuple[str, ...]
-) -> Callable[[], Recording]:
-    def read() -> Recording:
-        match = DATA.fullmatch(file.lines[line])
-        assert match is not None
-        count, unit, width = int(match[1]), match[3].rstrip("."), int(match[5])
-        step = _cosmos_step(file, line, reals, count, float(match[2]))
-        per_line = max(1, len(file.lines[line + 1].rstrip()) // width)
-        factor, samples = _samples(file, line, count, unit, per_line, width)
-        return Recording("COSMOS V2", unit, step, samples * factor, " ".join(names))
-
-    return read
+def _read_cosmos(file: TextFile, line: int, reals: int, names: tuple[str, ...]) -> Recording:
+    """Recording of the samples below a line, whose real header is announced by another."""
+    match = DATA.fullmatch(file.lines[line])
+    assert match is not None
+    count, unit, width = int(match[1]), match[3].rstrip("."), int(match[5])
+    step = _cosmos_step(file, line, reals, count, float(match[2]))
+    below = file.lines[line + 1].rstrip() if line + 1 < len(file.lines) else ""
+    samples = _samples(file, line, count, len(below) // max(width, 1), width)
+    return file.recording("COSMOS V2", line, unit, step, samples, " ".join(names))
 
 
 def _cosmos_step(file: TextFile, line: int, reals: int, count: int, duration: float) -> float:
@@ -157,23 +149,18 @@ def _csmip_channels(file: TextFile) -> Iterator[_Channel]:
         named = (CSMIP_CHANNEL.fullmatch(line) for line in block[:V1_TEXT])
         match = next(filter(None, named), None)
         names = tuple(x.lower() for x in match.groups() if x) if match else ()
-        yield _Channel(names, start, _csmip_reader(file, start, end, names))
+        yield _Channel(names, start, partial(_read_csmip, file, start, end, names))
 
 
-def _csmip_reader(
-    file: TextFile, start: int, end: int, names: tuple[str, ...]
-) -> Callable[[], Recording]:
-    def read() -> Recording:
-        for line in range(start, end):
-            if match := SERIES.fullmatch(file.lines[line]):
-                count, step = int(match[1]), float(match[2])
-                unit = (match[3] or match[4] or "").rstrip(".,")
-                per_line, width = int(match[5] or 8), int(match[6] or 10)
-                factor, samples = _samples(file, line, count, unit, per_line, width)
-                return Recording("CSMIP", unit, step, samples * factor, " ".join(names))
-        return _read_unannounced(file, start, end, names)
-
-    return read
+def _read_csmip(file: TextFile, start: int, end: int, names: tuple[str, ...]) -> Recording:
+    """Recording of the series that a line of a channel announces, else by its headers."""
+    for line in range(start, end):
+        if match := SERIES.fullmatch(file.lines[line]):
+            unit = (match[3] or match[4] or "").rstrip(".,")
+            per_line, width = int(match[5] or 8), int(match[6] or 10)
+            samples = _samples(file, line, int(match[1]), per_line, width)
+            return file.recording("CSMIP", line, unit, float(match[2]), samples, " ".join(names))
+    return _read_unannounced(file, start, end, names)
 
 
 def _read_unannounced(file: TextFile, start: int, end: int, names: tuple[str, ...]) -> Recording:
@@ -193,13 +180,11 @@ def _read_unannounced(file: TextFile, start: int, end: int, names: tuple[str, ..
         allowed = "a count and a duration above 0"
         raise file.refusal(first, f"{count} samples in {duration:g} s", allowed)
     if re.search("[A-Za-z]", file.lines[line]):
-        factor, samples = _samples(file, line, count, unit, 8, 9)
-        return Recording(
-            "CSMIP V1", unit, duration / (count - 1), samples * factor, " ".join(names)
-        )
-    factor, pairs = _samples(file, line - 1, 2 * count, unit, 10, 7)
-    steps = np.diff(pairs[::2])
-    if np.ptp(steps) > 0.1 * steps.mean() or not steps.mean() > 0:
-        raise file.refusal(line, "uneven times", "even steps", "resample to even steps")
-    samples = pairs[1::2]
-    return Recording("CSMIP V1", unit, float(steps.mean()), samples * factor, " ".join(names))
+        samples, step = _samples(file, line, count, 8, 9), duration / (count - 1)
+    else:
+        pairs = _samples(file, line - 1, 2 * count, 10, 7)
+        samples, steps = pairs[1::2], np.diff(pairs[::2])
+        step = float(steps.mean())
+        if np.ptp(steps) > 0.1 * step or not step > 0:
+            raise file.refusal(line, "uneven times", "even steps", "resample to even steps")
+    return file.recording("CSMIP V1", line, unit, step, samples, " ".join(names))

@@ -9,10 +9,11 @@ Behind the samples there may be text, such as ``*** End Data ***``.
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from math import ceil
 
 from alphacut.records.recording import Recording
-from alphacut.records.text_file import ACCELERATION_UNITS, NUMBER, TextFile, acceleration_factor
+from alphacut.records.text_file import ACCELERATION_UNITS, NUMBER, TextFile
 
 PEER_HEAD_LINES = 12
 """Lines in which a head ends; most have four."""
@@ -59,19 +60,15 @@ def read_peer(file: TextFile) -> Recording:
     match = _step_line(file.lines[row])
     assert match is not None
     count, step = match[1] and int(match[1]), float(re.sub("[dD]", "e", match[2]))
-    if not 0 < step < 10:
-        raise file.refusal(row, f"a step of {step:g} s", "a step above 0 and below 10 s")
     line, unit = _peer_unit(file, row)
-    factor = acceleration_factor(unit)
-    if factor is None or re.search(r"\b(velocity|displacement)\b", file.lines[line], re.I):
-        value = f"in units of {unit}" if unit else "without a unit"
-        raise file.refusal(line, value, f"accelerations in {ACCELERATION_UNITS}", PEER_HEAD)
+    if re.search(r"\b(velocity|displacement)\b", file.lines[line], re.I):
+        raise file.refusal(line, f"in units of {unit}", f"accelerations in {ACCELERATION_UNITS}")
     samples = file.numbers(row + 1, len(file.lines), count=count or 0)
     if count:
         file.require_count(samples, count, row)
     component = PEER_COMPONENT.fullmatch(file.lines[1]) if row > 1 else None
     channel = component[1] if component else ""
-    return Recording("PEER AT2", unit, step, samples * factor, channel)
+    return file.recording("PEER AT2", line, unit, step, samples, channel)
 
 
 def _peer_unit(file: TextFile, last: int) -> tuple[int, str]:
@@ -111,7 +108,7 @@ def read_knet(file: TextFile) -> Recording:
     counts = file.numbers(end + 1, len(file.lines))
     file.require_count(counts, round(float(duration[1]) * rate), line)
     channel = next((x[KNET_LABEL:].strip() for x in file.lines[:end] if x.startswith("Dir.")), "")
-    return Recording("K-NET", "gal", 1 / rate, counts * gal_per_count * 0.01, channel)
+    return file.recording("K-NET", line, "gal", 1 / rate, counts * gal_per_count, channel)
 
 
 def _knet_field(file: TextFile, name: str, end: int) -> tuple[re.Match[str], int]:
@@ -139,18 +136,14 @@ def read_esm(file: TextFile) -> Recording:
     """
     head = _esm_head(file)
     step, count = _positive_number(file, head, INTERVAL), int(_positive_number(file, head, COUNT))
-    if not 0 < step < 10:
-        raise file.refusal(head[INTERVAL][1], f"a step of {step:g} s", "above 0 and below 10 s")
     unit, line = head.get("UNITS", ("", head[INTERVAL][1]))
-    factor = acceleration_factor(unit)
-    kind = head.get(KIND, ("ACCELERATION", 0))[0]
-    if factor is None or "ACCELERATION" not in kind.upper():
-        value = f"{kind} in {unit or 'no unit'}"
-        raise file.refusal(line, value, f"accelerations in {ACCELERATION_UNITS}")
+    kind, kind_line = head.get(KIND, ("ACCELERATION", 0))
+    if "ACCELERATION" not in kind.upper():
+        raise file.refusal(kind_line, kind, f"accelerations in {ACCELERATION_UNITS}")
     first = 1 + max(row for _, row in head.values())
     samples = file.numbers(first, len(file.lines))
     file.require_count(samples, count, head[COUNT][1])
-    return Recording("ESM", unit, step, samples * factor, head.get("STREAM", ("", 0))[0])
+    return file.recording("ESM", line, unit, step, samples, head.get("STREAM", ("", 0))[0])
 
 
 def _esm_head(file: TextFile) -> dict[str, tuple[str, int]]:
@@ -195,11 +188,20 @@ def read_smc(file: TextFile) -> Recording:
         raise file.refusal(SMC_TEXT, value, allowed)
     count, comments = int(integers[POINTS - 1]), max(int(integers[COMMENTS - 1]), 0)
     rate = float(reals[RATE - 1])
-    if not (count > 1 and 0.1 < rate <= 1e5):
+    if not (count > 1 and rate > 0):
         value = f"{count} samples, {rate:g} in a second"
-        raise file.refusal(reals_line, value, "two or more, 0.1 to 1e5 in a second")
+        raise file.refusal(reals_line, value, "two or more, at a rate above 0")
     first = reals_line + SMC_REALS + comments
     samples = file.numbers(first, first + ceil(count / 8), width=10)
     file.require_count(samples, count, SMC_TEXT)
     channel = "vertical" if integers[VERTICAL_ANGLE - 1] in (0, 180) else ""
-    return Recording("SMC", "cm/s^2", 1 / rate, samples * 0.01, channel)
+    return file.recording("SMC", reals_line, "cm/s^2", 1 / rate, samples, channel)
+
+
+FORMATS: tuple[tuple[Callable[[TextFile], bool], Callable[[TextFile], Recording]], ...] = (
+    (is_knet, read_knet),
+    (is_smc, read_smc),
+    (is_esm, read_esm),
+    (is_peer, read_peer),
+)
+"""What tells a file of each format, and its reader."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -11,28 +10,12 @@ import numpy as np
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io.quantity import factor
 from alphacut.records.cosmos import is_cosmos, is_csmip, read_cosmos
-from alphacut.records.networks import (
-    is_esm,
-    is_knet,
-    is_peer,
-    is_smc,
-    read_esm,
-    read_knet,
-    read_peer,
-    read_smc,
-)
+from alphacut.records.networks import FORMATS
 from alphacut.records.recording import Recording
 from alphacut.records.tables import Layout, is_table, read_table
 from alphacut.records.text_file import TextFile, acceleration_factor, read_bytes
 from alphacut.records.uff import is_universal, read_uff_record
 
-FORMATS: tuple[tuple[Callable[[TextFile], bool], Callable[[TextFile], Recording]], ...] = (
-    (is_knet, read_knet),
-    (is_smc, read_smc),
-    (is_esm, read_esm),
-    (is_peer, read_peer),
-)
-"""Formats of one channel: what tells a file of it, and its reader."""
 READ = "PEER AT2, COSMOS, CSMIP, SMC, K-NET, ESM, miniSEED, SAC, UFF 58, CSV"
 MINISEED = re.compile(rb"[0-9 ]{6}[DRQM][ \0]|MS\x03")
 SAC_HEAD, SAC_VERSION, SAC_COUNT = 632, 304, 316

@@ -14,6 +14,7 @@ import numpy as np
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.quantity import factor
+from alphacut.records.recording import Recording
 
 NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eEdD][-+]?[0-9]+)?")
 """A number as C, Python or FORTRAN writes it; D stands for E."""
@@ -24,6 +25,8 @@ PER_SECOND_SQUARED = re.compile(
 LONGEST_LINE = 10_000
 """Letters of a line; formats have about 80, and searches of a line take their square."""
 ACCELERATION_UNITS = "g, gal, cm/s^2 or m/s^2"
+LONGEST_STEP = 10.0
+"""In s; a longer one is a slip."""
 
 
 @dataclass(frozen=True)
@@ -100,6 +103,19 @@ class TextFile:
         if len(samples) != count:
             what = f"{count} samples, and {len(samples)} follow"
             raise self.refusal(line, what, "as many samples as the head states", "load it anew")
+
+    def recording(
+        self, file_format: str, line: int, unit: str, step: float, samples: Array, channel: str = ""
+    ) -> Recording:
+        """Recording of samples in a unit of acceleration that a line states, their step in s."""
+        to_si = acceleration_factor(unit)
+        if to_si is None:
+            value = f"in units of {unit}" if unit else "without a unit"
+            raise self.refusal(line, value, f"accelerations in {ACCELERATION_UNITS}")
+        if not 0 < step < LONGEST_STEP:
+            allowed = f"a step above 0 and below {LONGEST_STEP:g} s"
+            raise self.refusal(line, f"a step of {step:g} s", allowed)
+        return Recording(file_format, unit, step, to_si * samples, channel)
 
 
 def read_bytes(path: Path) -> bytes:

@@ -1,16 +1,11 @@
-"""Universal files: mode shapes (data set 55, read by pyuff) and time histories (data set 58).
-
-pyuff is an optional extra: ``pip install 'alphacut[uff]'``.
-"""
+"""Universal files: mode shapes (data sets 55) and time histories (data sets 58, text or binary)."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from math import ceil
 from pathlib import Path
-from tempfile import TemporaryDirectory
-from typing import Any
 
 import numpy as np
 
@@ -18,24 +13,21 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io.measured import ModeRows
 from alphacut.records.recording import Recording
-from alphacut.records.text_file import ACCELERATION_UNITS, NUMBER, acceleration_factor
+from alphacut.records.text_file import ACCELERATION_UNITS, NUMBER, acceleration_factor, read_bytes
 
 ENDINGS = (".uff", ".unv")
+HEAD_LINES = {55: 8, 58: 11}
+"""Lines of the head of each data set that is read."""
 NORMAL_MODE, COMPLEX_MODES = 2, (3, 7)
 TIME_HISTORY, TIME = 1, 17
 """Function type of a time history, and type of an axis of times, in data set 58."""
-HEAD_LINES, BIG_ENDIAN, DOUBLE, COMPLEX = 11, 2, (4, 6), (5, 6)
-"""Lines of its head, and its codes of byte order and of ordinates."""
+BIG_ENDIAN, DOUBLE, COMPLEX = 2, (4, 6), (5, 6)
+"""Codes of byte order and of values."""
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 MIN_COLLINEARITY = 0.9
 """Modal phase collinearity below which a complex shape has no real one (Pappa, Elliott 1993)."""
-COMPLEX_IN_SIX = re.compile(
-    rb"(?m)(?P<head>^ *-1 *\r?\n *55 *\r?\n(?:.*\n){5})(?P<kinds>(?: +\d+){4} +5 +6)"
-    rb"(?P<rest> *\r?\n.*\n.*\n)(?P<nodes>(?: *\d+ *\r?\n.*\n.*\n)+)"
-)
-"""A data set 55 of complex modes with rotations: a node has its line and two of six numbers."""
 EVEN = 1e-3
-"""Share of a step by which times may be uneven besides the rounding of their digits."""
+"""Fraction of a step by which times may be uneven besides the rounding of their digits."""
 
 
 def uff_mode_rows(path: Path, floors: Mapping[str, int]) -> tuple[ModeRows, ...]:
@@ -49,17 +41,89 @@ def uff_mode_rows(path: Path, floors: Mapping[str, int]) -> tuple[ModeRows, ...]
         RefusedError: The file cannot be read, has no mode or one mode twice, a named unknown is not
             in it, or a shape is complex with a modal phase collinearity below `MIN_COLLINEARITY`.
     """
+    content = read_bytes(path)
+    try:
+        sets = [_parse_shape(*rows) for rows in _data_sets(content, 55)]
+    except (ValueError, IndexError) as error:
+        allowed = "data sets 55 of a universal file"
+        raise RefusedError(path.name, str(error)[:80], allowed) from None
     modes: dict[int, ModeRows] = {}  # by number
-    for dataset in _datasets(path, 55):
-        kind, key = dataset.get("analysis_type"), f"{path.name}, data set 55"
-        if kind not in (NORMAL_MODE, *COMPLEX_MODES):
-            continue
-        number = int(dataset["mode_n"])
-        require(number not in modes, key, value=f"mode {number} again", allowed="each mode once")
-        modes[number] = _mode_rows(path, dataset, number, floors)
+    for shape in filter(None, sets):
+        value, key = f"mode {shape.mode} again", f"{path.name}, data set 55"
+        require(shape.mode not in modes, key, value=value, allowed="each mode once")
+        modes[shape.mode] = _mode_rows(f"{path.name}, mode {shape.mode}", shape, floors)
     allowed = "a data set 55 of a normal or complex mode"
     require(bool(modes), path.name, value="without a mode", allowed=allowed)
     return tuple(modes[number] for number in sorted(modes))
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """A data set 55: number of the mode, frequency in Hz, amplitudes by NODE.DIRECTION."""
+
+    mode: int
+    frequency: float
+    amplitudes: dict[str, complex]
+
+
+def _parse_shape(head: list[str], values: bytes | list[str]) -> _Shape | None:
+    """The mode shape of a data set 55; None of another analysis."""
+    _, analysis, _, _, kind, size = (int(word) for word in head[5].split()[:6])
+    if analysis not in (NORMAL_MODE, *COMPLEX_MODES):
+        return None
+    reals, parts = _floats(head[7]), 2 if kind in COMPLEX else 1
+    # of a complex mode the eigenvalue s has |s|/2π
+    hertz = reals[0] if analysis == NORMAL_MODE else abs(complex(*reals[:2])) / (2 * np.pi)
+    amplitudes: dict[str, complex] = {}
+    lines = [str(line) for line in values if str(line).strip()]
+    step = 1 + ceil(parts * size / 6)  # lines of a node: its number, then six numbers a line
+    for start in range(0, len(lines), step):
+        numbers = _floats(" ".join(lines[start + 1 : start + step]))
+        if len(numbers) != parts * size:
+            raise ValueError(f"{len(numbers)} numbers at node {lines[start].strip()}")
+        shape = [complex(*numbers[k : k + parts]) for k in range(0, parts * size, parts)]
+        node = int(lines[start])
+        amplitudes |= {f"{node}.{axis}": x for axis, x in zip(DIRECTIONS, shape, strict=False)}
+    return _Shape(int(head[6].split()[3]), hertz, amplitudes)
+
+
+def _floats(line: str) -> list[float]:
+    return [float(number.upper().replace("D", "E")) for number in NUMBER.findall(line)]
+
+
+def _mode_rows(key: str, shape: _Shape, floors: Mapping[str, int]) -> ModeRows:
+    """Frequency of a mode, and its real amplitudes on the floors of the unknowns in `floors`."""
+    missing = [name for name in floors if name.lower() not in shape.amplitudes]
+    value, allowed = f"without {', '.join(missing)}", f"unknowns of {[*shape.amplitudes][:8]} …"
+    require(not missing, key, value=value, allowed=allowed)
+    is_positive, value = 0 < shape.frequency < np.inf, f"{shape.frequency:g} Hz"
+    require(is_positive, f"{key}: frequency", value=value, allowed="above 0 Hz")
+    values = np.array([shape.amplitudes[name.lower()] for name in floors])
+    are_finite = bool(np.isfinite(values).all())
+    require(are_finite, key, value="not finite", allowed="finite amplitudes")
+    collinearity = phase_collinearity(values)
+    is_real, value = collinearity >= MIN_COLLINEARITY, f"complex: {collinearity:.3f}"
+    allowed = f"a modal phase collinearity from {MIN_COLLINEARITY:g} on"
+    require(is_real, key, value=value, allowed=allowed)
+    # the real part, after a turn of all phases that makes it largest
+    turn = np.exp(-0.5j * np.angle((values**2).sum()))
+    pairs = zip(floors.values(), (values * turn).real, strict=True)
+    amplitudes = {floor: np.array([amplitude]) for floor, amplitude in pairs}
+    frequencies = np.array([shape.frequency])
+    return ModeRows(shape.mode, frequencies, amplitudes if len(amplitudes) > 1 else {})
+
+
+def phase_collinearity(shape: Array) -> float:
+    """Modal phase collinearity of a complex shape, 1 where all phases are equal or opposite.
+
+    (λ₁ − λ₂)²/(λ₁ + λ₂)² with the eigenvalues λ of the covariance of real and imaginary parts
+    (Pappa, Elliott 1993).
+    """
+    parts = np.stack([shape.real, shape.imag])
+    covariance = parts @ parts.T
+    difference = (covariance[0, 0] - covariance[1, 1]) ** 2 + 4 * covariance[0, 1] ** 2
+    total = np.trace(covariance) ** 2
+    return float(difference / total) if total > 0 else 1.0
 
 
 def is_universal(content: bytes) -> bool:
@@ -120,14 +184,17 @@ class _Series:
 def _series(name: str, content: bytes) -> Iterator[_Series]:
     """Yield the data sets 58 of a file."""
     try:
-        for head, values in _sets_58(content):
+        for head, values in _data_sets(content, 58):
             yield _parse_series(head, values)
     except (ValueError, IndexError) as error:
         raise RefusedError(name, str(error)[:80], "data sets 58 of a universal file") from None
 
 
-def _sets_58(content: bytes) -> Iterator[tuple[list[str], bytes | list[str]]]:
-    """Yield the eleven lines of the head of each data set 58, and its bytes or its lines."""
+def _data_sets(content: bytes, number: int) -> Iterator[tuple[list[str], bytes | list[str]]]:
+    """Yields the head of each data set of a number, and its values: lines, or bytes of a 58b.
+
+    The head of a data set in bytes ends with their byte order, < or >.
+    """
     position = 0
 
     def line() -> bytes:
@@ -141,9 +208,9 @@ def _sets_58(content: bytes) -> Iterator[tuple[list[str], bytes | list[str]]]:
         if line().strip() != b"-1":
             continue
         first = line()
-        if first[:7].strip() == b"58b":
+        if first[:7].strip() == b"58b" and number == 58:
             byte_order, _, _, size = (int(word) for word in first[7:].split()[:4])
-            head = [_text(line()) for _ in range(HEAD_LINES)]
+            head = [_text(line()) for _ in range(HEAD_LINES[58])]
             # some writers put an end of line between the head and the bytes
             starts = (position + extra for extra in range(3))
             ends = (x for x in starts if content[x + size :].lstrip()[:2] == b"-1")
@@ -153,8 +220,8 @@ def _sets_58(content: bytes) -> Iterator[tuple[list[str], bytes | list[str]]]:
         rows = []
         while position < len(content) and (row := line()).strip() != b"-1":
             rows.append(_text(row))
-        if first.strip() == b"58":
-            yield rows[:HEAD_LINES], rows[HEAD_LINES:]
+        if first.strip() == str(number).encode():
+            yield rows[: HEAD_LINES[number]], rows[HEAD_LINES[number] :]
 
 
 def _text(line: bytes) -> str:
@@ -173,15 +240,15 @@ def _parse_series(head: list[str], values: bytes | list[str]) -> _Series:
     parts = 2 if kind in COMPLEX else 1
     columns = parts if is_even else parts + 1
     if isinstance(values, bytes):
-        real = f"{head[HEAD_LINES]}f{8 if kind in DOUBLE else 4}"
-        time = f"{head[HEAD_LINES]}f4"  # a time is single, beside doubles as well
+        real = f"{head[-1]}f{8 if kind in DOUBLE else 4}"
+        time = f"{head[-1]}f4"  # a time is single, beside doubles as well
         row = np.dtype([("time", time)] * (not is_even) + [("value", real, (parts,))])
         table = np.frombuffer(values, row, min(count, len(values) // row.itemsize))
         times = None if is_even else table["time"].astype(float)
         with np.errstate(invalid="ignore"):  # damaged bytes, which are refused
             samples = table["value"][:, 0].astype(float)
     else:
-        numbers = np.array([float(x) for text in values for x in NUMBER.findall(text)])
+        numbers = np.array([number for line in values for number in _floats(line)])
         rows = numbers[: count * columns]  # what follows is padding
         rows = rows[: len(rows) // columns * columns].reshape(-1, columns)
         times = None if is_even else rows[:, 0]
@@ -212,83 +279,3 @@ def _even_step(key: str, series: _Series) -> float:
     rate = round(1 / step)  # of which the digits are often but a rounding
     is_whole = rate > 0 and abs(1 / rate - step) * (len(times) - 1) <= rounding[-1]
     return 1 / rate if is_whole else step
-
-
-def phase_collinearity(shape: Array) -> float:
-    """Modal phase collinearity of a complex shape, 1 where all phases are equal or opposite.
-
-    (λ₁ − λ₂)²/(λ₁ + λ₂)² with the eigenvalues λ of the covariance of real and imaginary parts
-    (Pappa, Elliott 1993).
-    """
-    parts = np.stack([shape.real, shape.imag])
-    covariance = parts @ parts.T
-    difference = (covariance[0, 0] - covariance[1, 1]) ** 2 + 4 * covariance[0, 1] ** 2
-    total = np.trace(covariance) ** 2
-    return float(difference / total) if total > 0 else 1.0
-
-
-def _without_rotations(content: bytes) -> bytes:
-    """The content with modes in translations alone where complex, since pyuff reads no others."""
-
-    def translations(mode: re.Match[bytes]) -> bytes:
-        nodes = mode["nodes"].splitlines(keepends=True)
-        kept = b"".join(line for k, line in enumerate(nodes) if k % 3 < 2)
-        return mode["head"] + mode["kinds"][:-1] + b"3" + mode["rest"] + kept
-
-    return COMPLEX_IN_SIX.sub(translations, content)
-
-
-def _datasets(path: Path, kind: int) -> list[dict[str, Any]]:
-    """Data sets of a kind in a universal file, as pyuff reads them."""
-    import pyuff
-
-    try:
-        with TemporaryDirectory() as folder:
-            copy = Path(folder, path.name)
-            copy.write_bytes(_without_rotations(path.read_bytes()))
-            file = pyuff.UFF(str(copy))
-            indices = [k for k, set_kind in enumerate(file.get_set_types()) if set_kind == kind]
-            sets = file.read_sets(indices) if indices else []
-    except Exception as error:  # pyuff raises plain exceptions, and whatever NumPy does
-        reason = str(error)[:80] or type(error).__name__
-        raise RefusedError(path.name, reason, "a universal file (UFF)") from None
-    return [sets] if isinstance(sets, dict) else list(sets)
-
-
-def _mode_rows(
-    path: Path, dataset: dict[str, Any], number: int, floors: Mapping[str, int]
-) -> ModeRows:
-    """Frequency of a mode, and its real amplitudes on the floors of the unknowns in `floors`."""
-    key = f"{path.name}, mode {number}"
-    nodes = [int(node) for node in dataset["node_nums"]]
-    values: dict[str, complex] = {}  # amplitude of each unknown
-    for axis, direction in enumerate(DIRECTIONS, start=1):
-        column = dataset.get(f"r{axis}")
-        if column is not None:
-            values |= {f"{n}.{direction}": complex(x) for n, x in zip(nodes, column, strict=True)}
-    missing = [name for name in floors if name.lower() not in values]
-    value, allowed = f"without {', '.join(missing)}", f"unknowns of {nodes[:8]} …"
-    require(not missing, key, value=value, allowed=allowed)
-    shape = np.array([values[name.lower()] for name in floors])
-    collinearity = phase_collinearity(shape)
-    is_real, value = collinearity >= MIN_COLLINEARITY, f"complex: {collinearity:.3f}"
-    allowed = f"a modal phase collinearity from {MIN_COLLINEARITY:g} on"
-    require(is_real, key, value=value, allowed=allowed)
-    pairs = zip(floors.values(), _real_shape(shape), strict=True)
-    amplitudes = {floor: np.array([amplitude]) for floor, amplitude in pairs}
-    frequency = _frequency(dataset)
-    require(frequency > 0, f"{key}: frequency", value=frequency, allowed="above 0 Hz")
-    return ModeRows(number, np.array([frequency]), amplitudes if len(amplitudes) > 1 else {})
-
-
-def _frequency(dataset: dict[str, Any]) -> float:
-    """Natural frequency in Hz; that of a complex eigenvalue s is |s|/2π."""
-    if dataset["analysis_type"] == NORMAL_MODE:
-        return float(dataset["freq"])
-    return float(abs(dataset["eig"])) / (2 * np.pi)
-
-
-def _real_shape(shape: Array) -> Array:
-    """Real part of a complex shape, after a turn of all phases that makes it largest."""
-    angle = 0.5 * np.angle((shape**2).sum())
-    return np.asarray((shape * np.exp(-1j * angle)).real)

@@ -70,7 +70,6 @@ INDIRECT = {  # imported by others on this project's behalf
     "sphinx": "python3-sphinx",
 }
 FROM_PYPI = {  # each is needed by one comparison, or is an optional extra
-    "pyuff": "alphacut/records/uff.py",
     "obspy": "alphacut/records/read.py",
     "openseespylinux": "benchmarks/frame/opensees.py",
 }

@@ -1,9 +1,11 @@
 """Files of one record in every format, written from its samples by the formats' own rules."""
 
+import re
+
 import numpy as np
 
 G = 9.80665
-COUNT, STEP = 2000, 0.005
+COUNT, STEP = 400, 0.005
 
 
 def samples() -> np.ndarray:
@@ -34,7 +36,7 @@ Station Long.     141.0217
 Station Height(m) 40
 Record Time       2011/03/11 14:46:36
 Sampling Freq(Hz) 200Hz
-Duration Time(s)  10
+Duration Time(s)  2
 Dir.              N-S
 Scale Factor      980.665(gal)/10000000
 Max. Acc. (gal)   632.226
@@ -51,7 +53,7 @@ def esm(unit: str = "cm/s^2") -> str:
     size = {"cm/s^2": 100 * G, "m/s^2": G, "g": 1.0}[unit]
     head = (
         "EVENT_NAME: TEST\nSTATION_CODE: MRN\nSTREAM: HNE\nSTATION_ELEVATION_M: 17\n"
-        f"SAMPLING_INTERVAL_S: {STEP:.6f}\nNDATA: {COUNT}\nDURATION_S: 9.995\nUNITS: {unit}\n"
+        f"SAMPLING_INTERVAL_S: {STEP:.6f}\nNDATA: {COUNT}\nDURATION_S: 1.995\nUNITS: {unit}\n"
         "DATE_TIME_FIRST_SAMPLE_YYYYMMDD_HHMMSS: 20120529_070000.000\nDATA_TYPE: ACCELERATION\nUSER5:\n"
     )
     return head + lines(size * samples(), "20.10E", 1)
@@ -75,10 +77,10 @@ def cosmos(step=STEP, processed=-999.0, names=("1: 90 deg", "2: Up"), width=15, 
             + f"{real_mark}\n"
             + lines(reals, "13.6f", 6)
             + '   1 Comment line(s) follow, each starting with a "|":\n|\n'
-            f"    2000 acceleration pts, approx   10 secs, units={unit}Format=(5E{width}.{width - 8})\n"
+            f"    {COUNT} acceleration pts, approx   2 secs, units={unit}Format=(5E{width}.{width - 8})\n"
             + lines(values, f"{width}.{width - 8}E", 5)
             + f"End-of-data for ChanHN{'EZ'[number - 1]} acceleration\n"
-            f"    2000 velocity pts, approx   10 secs, units=cm/sec (5), Format=(5E{width}.{width - 8})\n"
+            f"    {COUNT} velocity pts, approx   2 secs, units=cm/sec (5), Format=(5E{width}.{width - 8})\n"
             + lines(0 * values, f"{width}.{width - 8}E", 5)
             + f"End-of-data for ChanHN{'EZ'[number - 1]} velocity\n"
         )
@@ -147,3 +149,127 @@ def uff58(
     if not order:
         data = (lines(numbers, "13.5E", 6) if single else lines(numbers, "20.12E", 4)).encode()
     return "".join(f"{line:<80}\n" for line in head).encode() + data + b"    -1\n"
+
+
+def uff55(number, shape, *, nodes=(11, 12, 13, 40), frequency=1.5, eigenvalue=None, size=3) -> str:
+    """Data set 55: amplitudes of `shape` along x, 0 else; complex if it has an eigenvalue."""
+    is_complex = eigenvalue is not None
+    reals = (
+        [eigenvalue.real, eigenvalue.imag, 1, 0, 1, 0] if is_complex else [frequency, 1, 0.01, 0]
+    )
+    kinds = (1, 3 if is_complex else 2, 2 if size == 3 else 3, 8, 5 if is_complex else 2, size)
+    text = "    -1\n    55\n" + "NONE\n" * 5 + lines(kinds, "10d", 6)
+    text += lines((2, len(reals), 0, number), "10d", 8) + lines(reals, "13.5E", 6)
+    for node, amplitude in zip(nodes, shape, strict=True):
+        values = np.zeros(size, complex)
+        values[0] = amplitude
+        values = values.view(float) if is_complex else values.real
+        text += f"{node:10d}\n" + lines(values, "13.5E", 6)
+    return text + "    -1\n"
+
+
+def variant(name: str, number: int) -> tuple[bytes, str, float]:
+    """Number 0 … 9 of the variants of a format: the file, unit of the case, rounding in g."""
+
+    def pick(*options):
+        return options[number % len(options)]
+
+    values, plain = samples(), f"{COUNT}"
+    unit, rounding, text = "", 1e-6, ""
+    if name == "PEER":
+        steps = (
+            f"NPTS=   {plain}, DT=   .0050 SEC,",
+            f"NPTS=  {plain}, DT= .0050",
+            "DT= .0050 SEC",
+        )
+        steps += (f"NPTS={plain},DT=0.005SEC", f"NPTS = {plain} , DT = 5.0E-03 sec   ")
+        steps += (f"NPTS=  {plain}, DT= .5D-02 SEC", f" {plain}    0.0050    NPTS, DT")
+        plain = "ACCELERATION TIME SERIES IN UNITS OF G"
+        heads = (plain, "Acceleration time history; units are (g)", "The units are (g)")
+        heads += (
+            "ACCELERATION TIME HISTORY IN G'S",
+            plain + ". FILTER POINTS: HP=0.1 Hz LP=40.0 Hz",
+        )
+        numbers = lines(values, "15.7E", pick(5, 5, 1)).replace("E", pick("E", "D", "e"))
+        text = at2(pick(*steps), pick(*heads), numbers=numbers)
+        text += pick("", "*** End Data ***\n") if "NPTS" in pick(*steps) else ""
+        text = text.replace("S 0", pick("S 0", "Cañón"))
+    elif name == "K-NET":
+        text = (
+            knet()
+            .replace("N-S", pick("N-S", "E-W", "U-D"))
+            .replace("200Hz", pick("200Hz", "200 Hz"))
+        )
+        text = text.replace(
+            "980.665(gal)/10000000", pick("980.665(gal)/10000000", "98.0665(gal)/1000000")
+        )
+    elif name == "ESM":
+        text = esm(pick("cm/s^2", "g", "m/s^2")).replace("HNE", pick("HNE", "HNZ"))
+    elif name == "COSMOS":
+        marks = {"reals": pick(" 100 Real-header values follow on  17 lines, Format= (6F13.6)",
+                               " 100 Real-header values follow on 17 lines , Format = (6F13.6)")}  # fmt: skip
+        marks |= {"unit": pick("cm/sec2 (4), ", "cm/s2 (4),", "g.     (02)"), "width": pick(15, 16)}
+        step, processed = pick((STEP, -999.0), (5.0, -999.0), (0.02, 5.0))
+        text = cosmos(step, processed, pick(("1: 90 deg",), ("",)), **marks)
+    elif name == "CSMIP V2":
+        text = csmip(names=("1: 90 Deg",), unit=pick("cm/sec2", "g", "cm/sec/sec", "g/10"))
+        text = text.upper() if number % 3 else text
+    elif name == "CSMIP V1":
+        announced, rounding = number % 2 == 0, 1e-6 if number % 2 == 0 else 1e-5
+        text = csmip(announced, ("1: 90 Deg",), pick("g/10", "g", "cm/sec2", "g"), raw=True)
+    elif name == "SMC":
+        rounding = 1e-4
+        text = smc(pick("2 CORRECTED ACCELEROGRAM", "1 UNCORRECTED ACCELEROGRAM"), pick(90, 0, 180))
+    elif name == "CSV":
+        start, first = pick(0.0, 10.0, STEP), pick("", "# a comment\n", "A title\n\n")
+        text = first + csv_text(pick("g", "gal", "m/s^2", "cm/s^2"), pick(",", ";", "\t"), start)
+    elif name == "columns":
+        unit = pick("g", "gal", "m/s^2", "cm/s2")
+        two = csv_text(unit.replace("s2", "s^2"), pick(" ", ",", ";")).partition("\n")[2]
+        size = {"g": 1.0, "m/s^2": G}.get(unit, 100 * G)
+        text = pick("", "# a comment\n") + (two if number % 3 else lines(size * values, "18.9E", 1))
+    else:
+        changes = {
+            "order": pick("", "<", ">"),
+            "kind": pick(2, 4),
+            "unit": pick("m/s^2", "g", "m/s²"),
+        }
+        changes |= {"spec": pick(12, 0, 1, 15)}
+        if number % 4 == 3:  # times are single reals
+            changes |= {"times": STEP * np.arange(COUNT), "kind": 2}
+        return uff58(values * (1 if changes["unit"] == "g" else G), **changes), "", 1e-5
+    return text.replace("\n", pick("\n", "\r\n", "\n")).encode("latin-1"), unit, rounding
+
+
+FORMATS = (
+    "PEER",
+    "K-NET",
+    "ESM",
+    "COSMOS",
+    "CSMIP V2",
+    "CSMIP V1",
+    "SMC",
+    "CSV",
+    "columns",
+    "UFF 58",
+)
+
+
+def mutated(content: bytes, rng) -> bytes:
+    """A file with bytes dropped, lines cut, a number replaced, bytes written over, or an end cut."""
+    at = int(rng.integers(min(len(content), 6000)))
+    rows, row = content.split(b"\n"), int(rng.integers(content.count(b"\n") + 1))
+    match rng.integers(5):
+        case 0:
+            return content[:at] + content[at + int(rng.integers(1, 40)) :]
+        case 1:
+            return b"\n".join(rows[:row] + rows[row + int(rng.integers(1, 4)) :])
+        case 2:
+            other = rng.choice(
+                [b"0", b"-1", b"1e400", b"nan", b"9" * 400, b"x", b"1_0", b"\xd9\xa3"]
+            )
+            number = re.compile(rb"[-+.0-9eE]+").search(content, at)
+            return content[: number.start()] + other + content[number.end() :] if number else b""
+        case 3:
+            return content[:at] + rng.bytes(int(rng.integers(1, 20))) + content[at + 9 :]
+    return content[: int(rng.integers(len(content)))]
