@@ -35,13 +35,15 @@ def read_recording(path: Path, channel: str = "", layout: Layout | None = None) 
             do not fit; the message names the line.
     """
     try:
-        recording = _read_by_marks(path, channel, layout or Layout())
+        with np.errstate(over="ignore"):  # of damaged numbers, which are refused
+            recording = _read_by_marks(path, channel, layout or Layout())
     except RefusedError:
         raise
     except (ValueError, OverflowError) as error:  # of a head's integer of thousands of digits
         raise RefusedError(path.name, str(error), "numbers of a recording") from None
-    allowed = "two samples or more"
-    require(len(recording.samples) > 1, path.name, value=len(recording.samples), allowed=allowed)
+    samples, allowed = recording.samples, "two finite samples or more"
+    fits = len(samples) > 1 and bool(np.isfinite(samples).all())
+    require(fits, path.name, value=f"a record of {len(samples)} samples", allowed=allowed)
     return recording
 
 
