@@ -41,7 +41,7 @@ COMMANDS = {
     "modulus": "stage",
     "identify": "stage",
     "report": "run",
-    "verify": "verify",
+    "verify": "check",
 }
 """Commands by the names that a user writes, each with its file in `alphacut.commands`."""
 SAME_SIGNAL_SECONDS = 1.0

@@ -1,35 +1,47 @@
-"""Command ``alphacut check``: the case as it is read, and everything that is wrong with it."""
+"""Commands that check: ``check`` a case before it runs, ``verify`` proved envelopes after that."""
 
 from __future__ import annotations
 
 import argparse
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from math import pi
-from typing import TextIO
+from pathlib import Path
+from typing import TYPE_CHECKING, TextIO
+
+import numpy as np
 
 from alphacut.case.content import Content
 from alphacut.case.loads import RecordsSection
 from alphacut.case.parse import quantity_of
 from alphacut.case.structure import Structure
 from alphacut.case.types import Section
-from alphacut.commands.options import Command, add_common, write_answer
+from alphacut.commands.options import Command, add_common, add_quiet, write_answer
 from alphacut.commands.pipeline import cut_record_warnings, read_case, require_runnable
 from alphacut.frame import MatrixStructure, StoreyFrame
+from alphacut.frame.envelope import Ends, Envelope
 from alphacut.frame.structures.linear import frequencies
+from alphacut.frame.verification.self_test import Trial, stored_motions
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal, Triangular
+from alphacut.fuzzy.refused import require
+from alphacut.fuzzy.result import Nature
 from alphacut.io.arrays import text_table
 from alphacut.io.quantity import STANDARD_GRAVITY, engineering
+from alphacut.io.results import ResultsFolder
 from alphacut.stages.cell import CellProblem
 from alphacut.stages.image import image_study
 from alphacut.stages.suite import SuiteRecord, suite_records
+
+if TYPE_CHECKING:
+    import xarray
 
 GRAVITY = float(STANDARD_GRAVITY)
 KINDS = {Crisp: "crisp", Interval: "interval", Triangular: "triangle", Trapezoidal: "trapezoid"}
 Row = tuple[str, str, str]
 
 
-def run(options: argparse.Namespace, out: TextIO) -> int:
+def check(options: argparse.Namespace, out: TextIO) -> int:
     """Checks a case, and shows how it was read and its first period; returns exit status 0."""
     content = read_case(options).content
     require_runnable(content)
@@ -119,5 +131,75 @@ def _numbers(number: FuzzyNumber, unit: str) -> str:
     return " … ".join(engineering(x, unit) for x in corners)
 
 
-ABOUT = "check a case, and print what it was read as and its first natural period"
-COMMANDS = {"check": Command(ABOUT, add_common, run)}
+def add_folder(parser: argparse.ArgumentParser) -> None:
+    """Adds the folder."""
+    parser.add_argument("folder", metavar="FOLDER", help="results of a run, as results/building")
+    add_quiet(parser)
+
+
+def verify(options: argparse.Namespace, out: TextIO) -> int:
+    """Tests all proved envelopes in a folder by exact motions; returns exit status 0.
+
+    A motion outside one raises ContradictionError.
+    """
+    path = Path(options.folder)
+    folder, document, text = ResultsFolder.read(path), dict[str, object](), ""
+    names = [x.removesuffix(".nc") for x in folder.files if re.fullmatch(r"envelope_.*\.nc", x)]
+    require(bool(names), "FOLDER", value=str(path), allowed="results of a run with an envelope")
+    for name in names:
+        data, n_motions, verdict = folder.dataset(f"{name}.nc"), 0, "nothing in it is proved"
+        if "motion_inputs" in data:  # which proved envelopes alone store
+            points, motions = stored_motions(data)
+            trial = Trial(envelope_of(data), *np.moveaxis(data["cut"].values, -1, 0))
+            trial.require_agreement(points, motions)
+            n_motions = len(points)
+            verdict = f"{n_motions} exact motions agree with it"
+        nature = str(data.attrs["nature"])
+        document[name] = {"nature": nature, "motions_tested": n_motions}
+        text += f"{name}: {verdict} ({nature})\n"
+    write_answer(options, document, out, text)
+    return 0
+
+
+def envelope_of(data: xarray.Dataset) -> Envelope:
+    """The envelope that a dataset holds, with the supports of its fuzzy inputs as intervals."""
+    values = {name: variable.values for name, variable in data.data_vars.items()}
+    supports = values["cut"][0].tolist()
+
+    def stored_ends(name: str) -> Ends | None:
+        has_ends = f"{name}_lower" in values
+        return Ends(values[f"{name}_lower"], values[f"{name}_upper"]) if has_ends else None
+
+    labels = [str(label) for label in values["label"]]
+    return Envelope(
+        alpha=data["alpha"].values,
+        time=data["time"].values,
+        outputs=tuple(map(str, data["output"].values)),
+        inputs={str(x): Interval(*supports[k]) for k, x in enumerate(data["parameter"].values)},
+        nature=Nature(data.attrs["nature"]),
+        method=str(data.attrs["method"]),
+        units=tuple(x.partition("[")[2].rstrip("]") for x in labels),
+        between=values.get("between"),
+        attained_error=values.get("attained_error"),
+        lower=values["lower"],
+        upper=values["upper"],
+        lower_at=values["lower_at"],
+        upper_at=values["upper_at"],
+        error=values["error"],
+        inner=stored_ends("inner"),
+        outer=stored_ends("proved"),
+    )
+
+
+COMMANDS = {
+    "check": Command(
+        "check a case, and print what it was read as and its first natural period",
+        add_common,
+        check,
+    ),
+    "verify": Command(
+        "test the proved envelopes of a run by exact motions, without the proof",
+        add_folder,
+        verify,
+    ),
+}

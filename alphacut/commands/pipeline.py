@@ -30,13 +30,12 @@ from alphacut.questions.decision import decide
 from alphacut.questions.fragility import fragility
 from alphacut.questions.probability import probability
 from alphacut.questions.question import Answer, FuzzyResponse, SuiteResponse
-from alphacut.questions.summary import ANSWERS
+from alphacut.questions.summary import ANSWERS, Results
 from alphacut.questions.tolerances import admissible_tolerances, require_admissible_scale
 from alphacut.stages import campaign, cell, envelope, identify, image, microstructure, shares, suite
 from alphacut.stages.campaign import CellCampaign
 from alphacut.stages.envelope import EnvelopeTask, PeakResults, peaks_of
 from alphacut.stages.modulus import fuzzy_loss, fuzzy_modulus, require_levels
-from alphacut.stages.results import Results
 from alphacut.stages.store import (
     Computed,
     RunProgress,

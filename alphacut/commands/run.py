@@ -20,11 +20,10 @@ from alphacut.io.arrays import text_table
 from alphacut.io.files import locked, say, write_text
 from alphacut.io.provenance import FORMAT, command, door, versions
 from alphacut.io.results import ResultsFolder
-from alphacut.questions.summary import SUMMARY, Summary
+from alphacut.questions.summary import SUMMARY, Results, Summary
 from alphacut.report.page import comparison_page, render_page
 from alphacut.report.results import comparison, run_text
 from alphacut.report.tables import tables, write_csv, write_markup, write_tables
-from alphacut.stages.results import Results
 from alphacut.stages.store import StageStore
 
 PAGE = "report.html"

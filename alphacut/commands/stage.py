@@ -12,7 +12,7 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature
 from alphacut.io.arrays import text_table
-from alphacut.questions.summary import Parts
+from alphacut.questions.summary import Parts, Results
 from alphacut.report import tables
 from alphacut.report.results import cut_text, run_text, width_text
 from alphacut.report.tables import shown
@@ -20,7 +20,6 @@ from alphacut.stages.cell import ISOTROPIC, constant_label
 from alphacut.stages.identify import identify_inputs
 from alphacut.stages.image import ImageResult
 from alphacut.stages.modulus import ModulusResult
-from alphacut.stages.results import Results
 from alphacut.stages.store import CutsResult
 from alphacut.stochastic.microstructure import fragment
 

@@ -14,9 +14,9 @@ from alphacut.figures import envelope, material, overview, structure
 from alphacut.fuzzy import FuzzyNumber, PiecewiseLinear
 from alphacut.fuzzy.campaign.workers import submit
 from alphacut.io.provenance import NESTED, version_of
+from alphacut.questions.summary import Results
 from alphacut.stages.cell import GPA, CellProblem
 from alphacut.stages.identify import IdentifiedResult
-from alphacut.stages.results import Results
 from alphacut.stages.store import Computed, Stage, StageContext, StageStore
 from alphacut.stochastic.figures.style import figure_style, save
 

@@ -18,10 +18,10 @@ from alphacut.io.quantity import engineering
 from alphacut.questions.decision import DecisionAnswer, degree_text
 from alphacut.questions.fragility import FragilityAnswer
 from alphacut.questions.probability import ProbabilityAnswer
+from alphacut.questions.summary import Results
 from alphacut.questions.tolerances import TolerancesAnswer
 from alphacut.stages.envelope import EnvelopeTask
 from alphacut.stages.identify import IdentifiedResult
-from alphacut.stages.results import Results
 from alphacut.stages.suite import SuiteResult
 from alphacut.stochastic.figures.style import BLUE, GREY, INK, ORANGE
 

@@ -11,8 +11,8 @@ from alphacut.figures.style import Look
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal
 from alphacut.fuzzy.arrays import Array, Mask, Rows
 from alphacut.io.quantity import axis_prefix
+from alphacut.questions.summary import Results
 from alphacut.rve.cell.cell import Cell
-from alphacut.stages.results import Results
 from alphacut.stochastic.figures.style import BLUE, INK, ORANGE, PURPLE
 
 if TYPE_CHECKING:

@@ -15,8 +15,8 @@ from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.methods.graph_follower import Followed, GraphFollower
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy import Crisp
+from alphacut.questions.summary import Results
 from alphacut.stages.envelope import EnvelopeTask
-from alphacut.stages.results import Results
 from alphacut.stochastic.figures.style import BLUE, GREY, INK, ORANGE
 
 if TYPE_CHECKING:

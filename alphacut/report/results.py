@@ -11,14 +11,13 @@ from alphacut.fuzzy.result import Nature, rounded
 from alphacut.io.arrays import text_table
 from alphacut.io.quantity import STANDARD_GRAVITY, axis_prefix, engineering, range_text
 from alphacut.questions.question import Row
-from alphacut.questions.summary import Parts
+from alphacut.questions.summary import FrameResult, Parts
 from alphacut.questions.tolerances import TolerancesAnswer
 from alphacut.report.tables import Table, unit_of
 from alphacut.stages.envelope import PeakResult
 from alphacut.stages.identify import IdentifiedResult
 from alphacut.stages.image import ImageResult
 from alphacut.stages.modulus import ModulusResult
-from alphacut.stages.results import FrameResult
 from alphacut.stages.store import CutsResult
 
 MATERIAL = ("material", "most plausible", "range at α = 0", "nature", "± error")

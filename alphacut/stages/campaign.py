@@ -21,13 +21,15 @@ from alphacut.rve.result.result import HomogenisedStiffness
 from alphacut.rve.series.fibre_constants import fibre_constants
 from alphacut.rve.series.model import SeriesModel
 from alphacut.stages.cell import GPA, SPHERE_TOLERANCE, CellProblem, Solve, require_isotropic
-from alphacut.stages.losses import LossCuts, LossResult, loss_bounds
 from alphacut.stages.modulus import (
     FIBRES,
+    LossCuts,
+    LossResult,
     ModulusResult,
     cuts_of,
     dataset,
     largest,
+    loss_bounds,
     loss_cuts,
     plane_cuts,
     plane_outputs,

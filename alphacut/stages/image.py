@@ -29,7 +29,7 @@ from alphacut.rve.result.loss_factors import CONSTANTS, bulk_and_shear_losses, f
 from alphacut.rve.result.moduli import plane_constants
 from alphacut.rve.result.result import PhaseEnergies
 from alphacut.stages.cell import AVERAGES, GPA, References, isotropic_bounds
-from alphacut.stages.losses import LossCuts, LossResult
+from alphacut.stages.modulus import LossCuts, LossResult
 from alphacut.stages.store import Computed, CutsResult, Numbers, Stage, StageContext, Values
 from alphacut.stochastic.segmentation import segment
 

@@ -2,21 +2,13 @@
 
 from dataclasses import replace
 
-import numpy as np
-
-from alphacut.commands import verify
+from alphacut.commands import check
 from alphacut.entry import main
 from alphacut.frame import propagation
 from alphacut.frame.verification.self_test import with_motions_tested
 from tests.alphacut.small import written
 
 PROOF = ("--set", "envelope.method=auto")
-
-
-def columns(path):
-    """Titles and numbers of a CSV file."""
-    titles = path.read_text(encoding="utf-8").splitlines()[0].split(",")
-    return titles, np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
 
 
 def narrower(envelope):
@@ -31,22 +23,19 @@ def run(case, folder):
     return main(["run", str(case), "--out", str(folder), "--no-figures", "--quiet", *PROOF])
 
 
-def test_a_run_can_be_verified_and_gives_motions_to_other_programs(tmp_path, capfd, monkeypatch):
+def test_what_a_run_stored_is_verified_and_a_narrower_envelope_contradicted(
+    tmp_path, capfd, monkeypatch
+):
     folder = tmp_path / "out"
     assert run(written(tmp_path), folder) == 0
+    files = sorted(folder.iterdir())
     assert main(["verify", str(folder)]) == 0
     assert "exact motions agree with it (guaranteed)" in capfd.readouterr().out
-    titles, motions = columns(folder / "envelope_all_motions.csv")
-    inputs_titles, inputs = columns(folder / "envelope_all_inputs.csv")
-    assert titles[:2] == ["time [s]", "motion 1: q1 [m]"]
-    assert inputs_titles[0] == "motion"
-    assert len(inputs) >= 2
-    assert motions[0, 0] == 0
-    assert np.isfinite(motions).all()
-    stored = verify.envelope_of
-    monkeypatch.setattr(verify, "envelope_of", lambda data: narrower(stored(data)))
+    stored = check.envelope_of
+    monkeypatch.setattr(check, "envelope_of", lambda data: narrower(stored(data)))
     assert main(["verify", str(folder)]) == 1
     assert "the proof is wrong: q1 at t = " in capfd.readouterr().err
+    assert sorted(folder.iterdir()) == files
 
 
 def test_a_contradiction_ends_a_run(tmp_path, capfd, monkeypatch):

@@ -12,7 +12,7 @@ from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature, rounded
 from alphacut.io.results import ResultsFolder
 from alphacut.questions.decision import DecisionAnswer, LimitDecision
-from alphacut.questions.summary import Parts, Summary
+from alphacut.questions.summary import FrameResult, Parts, Summary
 from alphacut.report.page import render_page
 from alphacut.report.results import (
     answers,
@@ -22,7 +22,6 @@ from alphacut.report.results import (
 )
 from alphacut.report.tables import write_tables
 from alphacut.stages.envelope import EnvelopeResult, PeakResult
-from alphacut.stages.results import FrameResult
 from alphacut.stages.store import CutsResult
 
 

@@ -23,9 +23,8 @@ from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import as_json
 from alphacut.io.results import ResultsFolder
-from alphacut.questions.summary import Summary
+from alphacut.questions.summary import Results, Summary
 from alphacut.stages import envelope, modulus
-from alphacut.stages.results import Results
 from alphacut.stages.store import Computed, RunProgress, Stage, StageStore
 from tests.alphacut.small import CELL, FRAME, SMALLER, written
 
