@@ -6,31 +6,41 @@ import pytest
 
 from alphacut.frame import StoreyFrame, envelope
 from alphacut.frame.bounds.box import Box
+from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.methods.dual import DualProof
+from alphacut.frame.modes.clusters import _diagonal
 from alphacut.frame.structures.loads import Accelerogram
 from alphacut.frame.structures.matrix import MatrixStructure
 from alphacut.fuzzy import Crisp, Interval
+from tests.frame.calculus.test_taylor_model import exact_value
 from tests.frame.response.test_duhamel import exact_response
 
 IDLE = 0.01
 """Share of a bound of rounding that the largest of some errors reaches at least."""
 
 
-def exact_output(frame, springs, masses, time, output):
-    """An output of a shear frame at one time by 40 digits."""
-    n, z = len(springs), int(output[-1]) - 1
-    k, m = ([mp.mpf(float(x)) for x in values] for values in (springs, masses))
+def exact_modes(springs, masses):
+    """λ and shapes of unit mass, one a mode, of a shear frame by 40 digits."""
+    n = len(springs)
+    k, m = ([mp.mpf(x) for x in values] for values in (springs, masses))
     matrix = mp.zeros(n)
     for i in range(n):
         matrix[i, i] = (k[i] + (k[i + 1] if i + 1 < n else 0)) / m[i]
         if i:
             matrix[i, i - 1] = matrix[i - 1, i] = -k[i] / mp.sqrt(m[i] * m[i - 1])
     squared, vectors = mp.eigsy(matrix)
+    return squared, [[vectors[i, e] / mp.sqrt(m[i]) for i in range(n)] for e in range(n)]
+
+
+def exact_output(frame, springs, masses, time, output):
+    """An output of a shear frame at one time by 40 digits."""
+    n, z = len(springs), int(output[-1]) - 1
+    m = [mp.mpf(float(x)) for x in masses]
+    squared, shapes = exact_modes(springs, masses)
     order, total = {"v": 1, "a": 2}.get(output[0], 0), mp.mpf(0)
-    for e in range(n):
+    for e, x in enumerate(shapes):
         decay = mp.mpf(frame.damping_ratio) * mp.sqrt(squared[e])
         sigma = mp.mpc(-decay, mp.sqrt(squared[e] - decay**2))
-        x = [vectors[i, e] / mp.sqrt(m[i]) for i in range(n)]
         read = x[z] - (x[z - 1] if z and output.startswith("drift") else 0)
         free = sigma**order * mp.exp(sigma * mp.mpf(float(time)))
         start, speed = (
@@ -133,3 +143,37 @@ def test_rounding_of_attained_bounds_is_declared():
     given = {"duration": 0.4, "step": 0.02, "alpha": (0,), "progress": False}
     found = envelope(frame, inputs, method=DualProof(), **given)
     assert found.attained_error.max() > 1e-9 * np.abs(found.upper).max()
+
+
+@pytest.mark.parametrize("stiff", [1.0, 1e4])
+def test_modes_over_a_narrow_box_are_off_by_their_rounding_at_most(stiff):
+    """In 1e-9 of each input, what the series leave out is far below rounding."""
+    frame, box, rng = drawn(1, stiff, RECORD)
+    radius = 1e-9 * box.centre
+    narrow = Box(frame, box.names, box.time, box.centre - radius, box.centre + radius)
+    single = narrow.level().oscillators
+    assert len(single) == 3
+    ends = [
+        (mp.mpf(float(a)), mp.mpf(float(b))) for a, b in zip(narrow.low, narrow.high, strict=True)
+    ]
+    shares = {"omega": [], "share": []}
+    with mp.workdps(40):
+        for u in rng.uniform(-1, 1, (12, 6)):
+            unit = [mp.mpf(float(x)) for x in u]
+            p = [(a + b) / 2 + (b - a) / 2 * x for (a, b), x in zip(ends, unit, strict=True)]
+            for mode, squared, x in zip(single, *exact_modes(p[:3], p[3:]), strict=True):
+                omega = mp.sqrt(squared * (1 - mp.mpf(frame.damping_ratio) ** 2))
+                share = x[2] * mp.fsum(x[i] * p[3 + i] for i in range(3))
+                pairs = ("omega", mode.omega, omega), ("share", mode.share[0, 0], share)
+                for name, model, true in pairs:
+                    off = abs(exact_value(model, unit) - true)
+                    shares[name].append(float(off) / float(model.remainder))
+    for values in shares.values():
+        assert IDLE <= np.max(values) <= 1
+
+
+def test_what_is_put_onto_a_diagonal_is_put_into_the_rest():
+    matrix = TaylorModel.constant([[2.0, 1e-9], [-1e-9, 3.0]], 1)
+    found = _diagonal(matrix, np.array([2.0, 3.5]))
+    assert (np.abs(found.value - matrix.value) <= found.remainder).all()
+    assert found.remainder == pytest.approx(np.array([[0, 1e-9], [1e-9, 0.5]]))

@@ -19,13 +19,6 @@ def test_frequencies_are_those_of_the_chain_of_springs() -> None:
     )
 
 
-def test_two_columns_are_meant_where_nothing_is_said() -> None:
-    assert (
-        frequencies(StoreyFrame(MASSES, LENGTHS, 25e9, 1e-5)).tolist()
-        == frequencies(StoreyFrame(MASSES, LENGTHS, 25e9, 1e-5, columns=(2, 2, 2))).tolist()
-    )
-
-
 def test_the_shear_of_a_storey_is_its_stiffness_times_its_drift():
     frame = StoreyFrame(
         masses=[2e4, 1e4],

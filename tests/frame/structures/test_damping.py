@@ -4,9 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.linalg import eigh
 
-from alphacut.frame import Accelerogram, Exact, LinearFlow, MatrixStructure, StoreyFrame
+from alphacut.frame import LinearFlow, MatrixStructure, StoreyFrame
 from alphacut.frame.structures.linear import evaluate, frequencies
 
 FRAME = StoreyFrame(
@@ -89,63 +88,6 @@ def test_equal_frequencies_are_no_obstacle():
     assert np.allclose(found.value[0], 2 * 0.1 * 4 * eye)  # 2 ζ √(k m)
     assert np.allclose(found.first[:, 0], np.array([2 * 0.1 * 0.25, 8.0])[:, None, None] * eye)
     assert np.allclose(found.second[0, 0, 0], -2 * 0.1 * 4 / (4 * 64) * eye)
-
-
-def test_matrices_and_storeys_agree():
-    n = FRAME.floors
-    found = matrices(FRAME)
-    model = MatrixStructure(
-        {"E": FRAME.modulus, "zeta": 0.05},
-        [(1.0, found.mass.value[0])],
-        [(lambda p: p["E"] / FRAME.modulus, found.stiffness.value[0])],
-        {f"q{z + 1}": np.eye(n)[z] for z in range(n)},
-        q0=np.array(FRAME.q0),
-        v0=np.array(FRAME.v0),
-        ratios=("zeta",),
-    )
-    points = np.array([[24e9, 0.04], [26e9, 0.06]])
-    a, b = (
-        LinearFlow(x, ("E", "zeta"), 5, 0.05, Exact()).taylor(points)
-        for x in (model, replace(FRAME, damping_ratio=0.05))
-    )
-    for part in ("value", "first", "second"):
-        assert (
-            np.abs(getattr(a, part) - getattr(b, part)).max()
-            < 1e-9 * np.abs(getattr(b, part)).max()
-        )
-
-
-@pytest.mark.parametrize("record", [False, True])
-def test_modal_superposition_gives_the_same_motion(record):
-    """Uncoupled modes, each by the closed solution of a damped oscillator or by fine steps of its
-    own equation.
-    """
-    ground = Accelerogram(0.1, np.random.default_rng(2).standard_normal(51)) if record else None
-    model = replace(FRAME, damping_ratio=RATIO, ground=ground)
-    found = matrices(FRAME)
-    M, K = found.mass.value[0], found.stiffness.value[0]
-    squared, shape = eigh(K, M)
-    omega, time = np.sqrt(squared), np.arange(101) * 0.05
-    q0, v0 = shape.T @ M @ FRAME.q0, shape.T @ M @ FRAME.v0
-    zeta = RATIO
-    damped = omega * np.sqrt(1 - zeta**2)
-    wave = np.exp(-zeta * omega * time[:, None])
-    modal = wave * (
-        q0 * np.cos(damped * time[:, None])
-        + (v0 + zeta * omega * q0) / damped * np.sin(damped * time[:, None])
-    )
-    if ground is not None:
-        fine = np.arange(100 * 100 + 1) * 5e-4
-        load = -(shape.T @ M @ np.ones(3))
-        kernel = np.exp(-zeta * omega * fine[:, None]) * np.sin(damped * fine[:, None]) / damped
-        acceleration = np.interp(fine, np.arange(51) * 0.1, ground.acceleration, right=0.0)
-        for k in range(3):
-            modal[:, k] += (
-                load[k] * 5e-4 * np.convolve(kernel[:, k], acceleration)[: len(fine)][::100]
-            )
-    truth = modal @ shape.T
-    mine = LinearFlow(model, ("E",), 5, 0.05, Exact()).values(np.array([[FRAME.modulus]]))[0]
-    assert np.abs(mine - truth).max() < (1e-3 if record else 1e-10) * np.abs(truth).max()
 
 
 def test_group_and_messages():

@@ -5,10 +5,8 @@ import pytest
 from scipy.linalg import eigh
 
 from alphacut.frame import Accelerogram, MatrixStructure, StoreyFrame, envelope
-from alphacut.frame.calculus.jet import Jet
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
-from alphacut.frame.structures.linear import modal_damping
 from alphacut.frame.verification.exact_motion import LinearMotion
 from alphacut.fuzzy import Interval, Triangular
 from alphacut.fuzzy.refused import RefusedError
@@ -68,22 +66,6 @@ def test_bounds_hold_motions_and_are_near(rng):
     assert found.facts["gap_of_peaks"] <= 2e-3
 
 
-def test_equal_ratios_of_all_modes_are_the_ratio_of_all():
-    rng = np.random.default_rng(2)
-    root = rng.normal(size=(2, 4, 4))
-    M, K = (x @ x.T + 4 * np.eye(4) for x in root)
-    first = rng.normal(size=(2, 2, 1, 4, 4))
-    first = first + first.swapaxes(-1, -2)
-    bend = np.zeros((2, 2, 1, 4, 4))
-    mass, stiffness = (
-        Jet(x[None].copy(), slope, bend.copy()) for x, slope in zip((M, K), first, strict=True)
-    )
-    ratio = Jet(np.full(1, 0.04), np.array([[0.3], [0.0]]), np.zeros((2, 2, 1)))
-    one, four = (modal_damping(mass, stiffness, [ratio] * count) for count in (1, 4))
-    for part in ("value", "first", "second"):
-        assert getattr(four, part) == pytest.approx(getattr(one, part), abs=1e-9)
-
-
 def test_modes_of_unequal_ratios_must_not_cross():
     system = MatrixStructure(
         {"k": 1.0, "z": 0.02},
@@ -97,9 +79,3 @@ def test_modes_of_unequal_ratios_must_not_cross():
     with pytest.raises(RefusedError, match="unequal where modes 1 and 2 may cross"):
         envelope(system, {"k": Interval(0.8, 1.3)}, **given)
     assert envelope(system, {"k": Interval(0.9, 1.0)}, **given).nature == "guaranteed"
-
-
-@pytest.mark.parametrize("ratios", [(0.02, 0.03), (0.02, 0.03, 1.2), (0.02, 0.03, -0.1)])
-def test_lists_that_do_not_fit_are_refused(ratios):
-    with pytest.raises(RefusedError, match="damping_ratio"):
-        StoreyFrame((1.0,) * 3, stiffness=(1.0,) * 3, damping_ratio=ratios)

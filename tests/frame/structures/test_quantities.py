@@ -59,15 +59,3 @@ def test_names_with_floors_are_parameters_and_directions_of_a_field_are_none() -
     assert of_storey_frame("q2_0").unit == "m"
     assert of_storey_frame("zeta10").range == of_storey_frame("zeta").range
     assert (of_storey_frame("m_1").unit, of_storey_frame("m_1").range) == ("", "")
-
-
-def test_ends_of_ranges_are_in_or_out() -> None:
-    zeta, damper, mass, start = (of_storey_frame(name) for name in ("zeta1", "d1", "m1", "q1_0"))
-    assert zeta.admits(0.0, 0.999)
-    assert not zeta.admits(0.5, 1.0)
-    assert not zeta.admits(-1e-9, 0.5)
-    assert damper.admits(0.0, 1.0)
-    assert not damper.admits(-1e-9, 1.0)
-    assert not mass.admits(0.0, 1.0)
-    assert start.admits(-1.0, 1.0)
-    assert not start.admits(-np.inf, 1.0)
