@@ -9,8 +9,7 @@ import numpy as np
 from alphacut.frame.calculus.rounding import gamma
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.modes.blocks import Block, CentredMatrices, narrowest_block
-from alphacut.frame.modes.pencil import eigenvalue_drop
+from alphacut.frame.modes.blocks import Block, CentredMatrices, eigenvalue_drop, narrowest_block
 from alphacut.frame.structures.linear import undamped_modes
 from alphacut.fuzzy.arrays import Array, Mask, Rows
 

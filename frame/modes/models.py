@@ -20,9 +20,8 @@ from alphacut.frame.modes.intervening import (
 )
 from alphacut.frame.modes.rest import TruncatedModes, coupling_of, rest_of_block, rest_of_modes
 from alphacut.frame.modes.structure import Classical
-from alphacut.frame.modes.superposition import read_response
 from alphacut.frame.response.duhamel import responses_at_nodes
-from alphacut.frame.response.oscillators import POWERS, feedthrough
+from alphacut.frame.response.oscillators import POWERS, feedthrough, read_response
 from alphacut.fuzzy.arrays import Array
 
 MAX_NODES = 500

@@ -28,6 +28,7 @@ from alphacut.frame.response.duhamel import (
     responses_at_given_nodes,
     responses_at_nodes,
 )
+from alphacut.frame.response.oscillators import read_response
 from alphacut.frame.structures.linear import LinearSystem, evaluate, histories, undamped_modes
 from alphacut.frame.structures.loads import History
 from alphacut.fuzzy.arrays import Array, Mask, Rows
@@ -169,17 +170,6 @@ def load_at_nodes(sigma: Array, load: History, time: Array) -> LoadAtNodes:
     """Responses of oscillators σ (n,) to a load at all nodes."""
     responses = responses_at_nodes(sigma, load, time, 1)
     return LoadAtNodes(*responses, absolute_moments(0.0, load, time)[0], load.values(time))
-
-
-def read_response(source: str, sigma: Array, G: Array) -> Array:
-    """Response e of oscillators to a source by G = σ^order ρ(σ; t), without feedthrough.
-
-    It is Re G + (g/ω) Im G of a start, g = −Re σ, and Im G/ω of other sources, with the other sign
-    for the ground's acceleration, which acts as −M ι a.
-    """
-    if source == "start":
-        return np.asarray(G.real - sigma.real / sigma.imag * G.imag)
-    return np.asarray((-1.0 if source == "load" else 1.0) * G.imag / sigma.imag)
 
 
 def outputs_at(

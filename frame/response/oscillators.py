@@ -38,6 +38,7 @@ from alphacut.frame.response.straying import line_deviations, with_power
 from alphacut.frame.structures.loads import History
 from alphacut.fuzzy.arrays import Array
 
+Ends = tuple[float, float]
 POWERS = (0.0, 0.5, 1.0)
 """Powers κ of λ."""
 RATIO = 1.5
@@ -135,13 +136,10 @@ class Oscillators:
         # of the power and of what is read off
         rounding = np.abs(sigma) ** order * rounding
         rounding += 2 * (order + 3) * UNIT_ROUNDOFF * np.abs(G[0])
-        if is_start:
-            value = G[0].real + quotient * G[0].imag
-            rounding *= 1 + quotient
-        else:
-            direct = feedthrough(source, self.loads, order, self.time)[:, None]
-            value = direct + G[0].imag / omega * (-1.0 if source == "load" else 1.0)
-            rounding = rounding / omega + 8 * UNIT_ROUNDOFF * np.abs(direct)
+        direct = feedthrough(source, self.loads, order, self.time)[:, None]
+        value = direct + read_response(source, sigma, G[0])
+        rounding = rounding * (1 + quotient) if is_start else rounding / omega
+        rounding += 8 * UNIT_ROUNDOFF * np.abs(direct)
         shape = (len(self.time), len(grid.quotient), len(grid.omega))
         error, largest = self._error(np.abs(G).max(-1), bounds, order, start=is_start)
         error, deviation = error + rounding.max(-1), self._line_deviation(source, order)
@@ -184,6 +182,17 @@ class Oscillators:
             )
         modulus, read = self._deviations[source][order]
         return modulus * (1 + self.grid.quotient[-1]) if source == "start" else read
+
+
+def read_response(source: str, sigma: Array, G: Array) -> Array:
+    """Response e of oscillators to a source by G = σ^order ρ(σ; t), without feedthrough.
+
+    It is Re G + (g/ω) Im G of a start, g = −Re σ, and Im G/ω of other sources, with the other sign
+    for the ground's acceleration, which acts as −M ι a.
+    """
+    if source == "start":
+        return np.asarray(G.real - sigma.real / sigma.imag * G.imag)
+    return np.asarray((-1.0 if source == "load" else 1.0) * G.imag / sigma.imag)
 
 
 def feedthrough(source: str, loads: Mapping[str, History], order: int, time: Array) -> Array:
@@ -233,69 +242,63 @@ def response_ranges(
     count = max(1, int(np.ceil(np.log(omega[1] / omega[0]) / np.log(RATIO))))
     ratio = (omega[1] / omega[0] * (1 + 1e-9)) ** (1 / count)
     for n in range(count):
-        ends = omega[0] * ratio**n, omega[0] * ratio ** (n + 1)
-        piece = _Piece(ends, quotient, loads, time, orders)
-        for order, ranges in found.items():
-            for s, source in enumerate(sources):
-                for k, (low, high, deviation) in enumerate(piece.bounds(source, order)):
-                    ranges.low[k, s] = np.minimum(ranges.low[k, s], low)
-                    ranges.high[k, s] = np.maximum(ranges.high[k, s], high)
-                    ranges.line_deviation[k, s] = np.maximum(ranges.line_deviation[k, s], deviation)
+        piece = (omega[0] * ratio**n, omega[0] * ratio ** (n + 1)), quotient
+        for order, s, k, bounds in _piece_bounds(piece, loads, time, sources, orders):
+            ranges = found[order]
+            ranges.low[k, s] = np.minimum(ranges.low[k, s], bounds[0])
+            ranges.high[k, s] = np.maximum(ranges.high[k, s], bounds[1])
+            ranges.line_deviation[k, s] = np.maximum(ranges.line_deviation[k, s], bounds[2])
     return found
 
 
-class _Piece:
-    """Responses of oscillators of one piece of a range of frequencies."""
+def _piece_bounds(
+    ends: tuple[Ends, Ends],
+    loads: Mapping[str, History],
+    time: Array,
+    sources: Sequence[str],
+    orders: Collection[int],
+) -> Iterator[tuple[int, int, int, tuple[Array, Array, Array]]]:
+    """Yield bounds over one piece of the range of ω, `ends` those of ω and g/ω.
 
-    def __init__(
-        self,
-        omega: tuple[float, float],
-        quotient: tuple[float, float],
-        loads: Mapping[str, History],
-        time: Array,
-        orders: Sequence[int],
-    ) -> None:
-        self.omega, self.quotient, self.loads, self.time = omega, quotient, loads, time
-        decay = quotient[0] * omega[0]
-        self.decay_factor = np.exp(-decay * time)
-        self.integral = {name: absolute_moments(decay, x, time)[0] for name, x in loads.items()}
-        self.table: Oscillators | None = None
-        distance = STEP * (decay + 2 / max(float(time[-1]), 1e-300))
-        along = int(np.ceil((omega[1] - omega[0]) / distance)) + 1
-        across = int(np.ceil((quotient[1] - quotient[0]) * omega[1] / distance)) + 1
-        if loads and along <= MAX_POINTS[0]:
-            points = max(along, 2), int(np.clip(across, 2, MAX_POINTS[1]))
-            self.table = Oscillators(grid_over(omega, quotient, points), loads, time, orders)
-
-    def bounds(self, source: str, order: int) -> Iterator[tuple[Array, Array, Array]]:
-        """Yield least, greatest and line deviation of λ^κ e at nodes, (T,) each, for each κ."""
-        size, between = self._sizes(source, order)
-        fastest = self.omega[1] * np.sqrt(1 + self.quotient[1] ** 2)
-        table = self.table.responses(source, order) if source in self.loads and self.table else None
-        for power in POWERS:
-            factor = fastest ** (2 * power)
-            low, high, deviation = -factor * size, factor * size, 2 * factor * between
-            if table and self.table:
-                eigenvalue = np.abs(self.table.grid.sigma) ** 2
-                least, greatest = _bounds_over_cells(table.value, table.error, eigenvalue**power)
-                low, high = np.maximum(low, least), np.minimum(high, greatest)
-                deviation = np.minimum(deviation, factor * table.line_deviation)
-            yield low, high, deviation
-
-    def _sizes(self, source: str, order: int) -> tuple[Array, Array]:
-        """Bounds of |e| of any oscillator at nodes and in the step to each, (T,) each."""
-        q, (slowest, fastest) = self.quotient[1], self.omega
-        largest = (fastest * np.sqrt(1 + q**2)) ** order
-        if source in self.loads:
-            integral, size = self.integral[source], self.loads[source].extremes[0]
-            step = np.diff(self.time, prepend=self.time[0])
-            before = np.append(integral[:1], integral[:-1]) + step * size
-            direct = np.abs(feedthrough(source, self.loads, order, self.time))
-            in_step = np.maximum(before, integral) * largest / slowest + size * bool(direct.any())
-            return integral * largest / slowest + direct, in_step
-        factor = largest * (1 + q) if source == "start" else largest / slowest
-        before = np.append(self.decay_factor[:1], self.decay_factor[:-1])
-        return factor * self.decay_factor, factor * before
+    Each is an order, the places of a source and of a power κ, and least, greatest and line
+    deviation of λ^κ e at nodes, (T,) each.
+    """
+    omega, quotient = ends
+    decay, fastest = quotient[0] * omega[0], omega[1] * np.sqrt(1 + quotient[1] ** 2)
+    distance = STEP * (decay + 2 / max(float(time[-1]), 1e-300))
+    along = int(np.ceil((omega[1] - omega[0]) / distance)) + 1
+    across = int(np.ceil((quotient[1] - quotient[0]) * omega[1] / distance)) + 1
+    tables: Oscillators | None = None
+    if loads and along <= MAX_POINTS[0]:
+        points = max(along, 2), int(np.clip(across, 2, MAX_POINTS[1]))
+        tables = Oscillators(grid_over(omega, quotient, points), loads, time, orders)
+    # of |ρ| of any oscillator
+    size = {name: absolute_moments(decay, x, time)[0] for name, x in loads.items()}
+    for s, source in enumerate(sources):
+        rho = size.get(source, np.exp(-decay * time))
+        before, step = np.append(rho[:1], rho[:-1]), np.diff(time, prepend=time[0])
+        in_step = before
+        if source in loads:
+            in_step = np.maximum(before + step * loads[source].extremes[0], rho)
+        for order in orders:
+            factor = fastest**order * (1 + quotient[1] if source == "start" else 1 / omega[0])
+            direct = np.abs(feedthrough(source, loads, order, time))
+            size_at_nodes, size_in_step = factor * rho + direct, factor * in_step
+            if direct.any():
+                size_in_step = size_in_step + loads[source].extremes[0]
+            table = tables and source in loads and tables.responses(source, order)
+            for k, power in enumerate(POWERS):
+                scale = fastest ** (2 * power)
+                low, high = -scale * size_at_nodes, scale * size_at_nodes
+                deviation = 2 * scale * size_in_step
+                if tables and table:
+                    eigenvalue = np.abs(tables.grid.sigma) ** 2
+                    least, greatest = _bounds_over_cells(
+                        table.value, table.error, eigenvalue**power
+                    )
+                    low, high = np.maximum(low, least), np.minimum(high, greatest)
+                    deviation = np.minimum(deviation, scale * table.line_deviation)
+                yield order, s, k, (low, high, deviation)
 
 
 def _bounds_over_cells(value: Array, error: Array, factor: Array) -> tuple[Array, Array]:
