@@ -124,6 +124,8 @@ def same_inputs(new, old):
     for name, ends in old["inputs"].items():
         for side in ("lower", "upper"):
             assert new["inputs"][name][side] == pytest.approx(ends[side], rel=1e-6), name
+    assert new["held_out"]
+    assert all(mode["inside"] for mode in new["held_out"])
 
 
 def same_tolerances(new, old):

@@ -1,8 +1,9 @@
-"""Scenes without a case: a function of one's own and fuzzy numbers from data."""
+"""Scenes without a case: a function of one's own, fuzzy numbers from data, matrices in Python."""
 
 import numpy as np
 import pytest
 
+from alphacut.frame import MatrixStructure, envelope
 from alphacut.fuzzy import Triangular, from_data, propagate
 
 
@@ -29,3 +30,24 @@ def test_cuts_from_data_hold_the_next_value_as_often_as_they_say(rng):
         inside.append(low <= values[-1] <= high)
     assert np.mean(inside) > 0.75 - 4 * np.sqrt(0.75 * 0.25 / 400)
     assert np.mean(inside) < 0.75 + 1 / 20 + 4 * np.sqrt(0.75 * 0.25 / 400)
+
+
+def test_matrices_have_the_exact_envelope_of_their_motion():
+    """Two masses on like springs that start alike move as one: q = q0 cos(√(k/m) t)."""
+    structure = MatrixStructure(
+        {"m": 2.0, "k": 50.0, "c": 30.0},
+        mass=[("m", np.eye(2))],
+        stiffness=[("k", np.eye(2)), ("c", np.array([[1.0, -1], [-1, 1]]))],
+        observed={"q1": np.array([1.0, 0])},
+        q0=np.array([0.1, 0.1]),
+    )
+    inputs = {"k": Triangular(45, 50, 55), "m": Triangular(1.9, 2.0, 2.1)}
+    bounds = envelope(structure, inputs, duration=3.0, step=0.05, alpha=[0, 0.5, 1])
+    time = np.asarray(bounds.time)
+    for row, alpha in enumerate((0, 0.5, 1)):
+        slow, fast = (
+            np.sqrt((50 + s * 5 * (1 - alpha)) / (2 - s * 0.1 * (1 - alpha))) for s in (-1, 1)
+        )
+        motions = 0.1 * np.cos(np.linspace(slow, fast, 4001)[:, None] * time)
+        assert bounds.lower[row, :, 0] == pytest.approx(motions.min(axis=0), abs=1e-4)
+        assert bounds.upper[row, :, 0] == pytest.approx(motions.max(axis=0), abs=1e-4)

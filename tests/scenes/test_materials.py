@@ -2,13 +2,13 @@
 
 import json
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
+
+from alphacut.entry import main
 
 ROOT = Path(__file__).parents[2]
 SAMPLES = {  # a2, a4, modulus of the particles in GPa: E in GPa and ν at size 0.15 with 12 layers
@@ -19,26 +19,25 @@ SAMPLES = {  # a2, a4, modulus of the particles in GPa: E in GPa and ν at size 
 MICROGRAPH = [24.40941710097642, 26.508645442920326], [28.958025908990347, 26.51700242188462]
 
 
-def alphacut(*words):
-    """A command of the program that must succeed."""
-    command = [sys.executable, "-m", "alphacut", *map(str, words), "--quiet"]
-    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
-    assert run.returncode == 0, run.stderr
-    return run.stdout
+def alphacut(folder, *words):
+    """The document of a command of the program that must succeed."""
+    file = folder / "answer.json"
+    assert main([*map(str, words), "--quiet", "--json", str(file)]) == 0
+    return json.loads(file.read_text(encoding="utf-8"))
 
 
 @pytest.mark.parametrize("sample", SAMPLES)
-def test_a_sample_of_the_cell_has_its_golden_modulus(sample):
+def test_a_sample_of_the_cell_has_its_golden_modulus(sample, tmp_path):
     a2, a4, modulus = sample
     sets = f"radius.a2={a2}", f"radius.a4={a4}", f"cell.inclusion_modulus='{modulus} GPa'"
-    text = alphacut("cell", "cases/paper.toml", "--json", "-", *(f"--set={one}" for one in sets))
-    result = json.loads(text)
+    words = "cell", ROOT / "cases/paper.toml", *(f"--set={one}" for one in sets)
+    result = alphacut(tmp_path, *words)
     young, poisson = SAMPLES[sample]
     assert result["E_GPa"] == pytest.approx(young, rel=1e-6)
     assert result["nu"] == pytest.approx(poisson, rel=1e-6)
 
 
-JSON = "--set=modulus.tolerance=1e-3", "--json", "-"
+TOLERANCE = "--set=modulus.tolerance=1e-3"
 CELL = """
 title = "Any particle"
 stages = ["modulus"]
@@ -55,7 +54,7 @@ inclusion_modulus = [
 
 def test_an_ellipse_of_any_stiffness_is_a_case(tmp_path):
     (tmp_path / "case.toml").write_text(CELL.replace("ANGLE", "0"), encoding="utf-8")
-    result = json.loads(alphacut("cell", tmp_path / "case.toml", "--set=mesh.size=0.6", *JSON[1:]))
+    result = alphacut(tmp_path, "cell", tmp_path / "case.toml", "--set=mesh.size=0.6")
     assert (result["method"], result["fibres"]) == ("slices", {})
     assert list(result["references"]) == ["fraction"]
 
@@ -64,9 +63,10 @@ def test_an_ellipse_of_any_stiffness_is_a_case(tmp_path):
 def test_ellipses_of_two_models_agree_and_turn_their_stiffness(tmp_path):
     """Prisms agree with slices, which `auto` takes; turned by 90 degrees, C11 and C22 exchange."""
     results = []
-    for angle, options in ((0, JSON), (0, (*JSON, "--method", "prism")), (90, JSON)):
+    for angle, method in ((0, "slices"), (0, "prism"), (90, "slices")):
         (tmp_path / "case.toml").write_text(CELL.replace("ANGLE", str(angle)), encoding="utf-8")
-        results.append(json.loads(alphacut("cell", tmp_path / "case.toml", *options)))
+        words = "cell", tmp_path / "case.toml", TOLERANCE, f"--method={method}"
+        results.append(alphacut(tmp_path, *words))
     assert results[1]["E_GPa"] == pytest.approx(results[0]["E_GPa"], rel=1e-3)
     swap = np.ix_([1, 0, 2], [1, 0, 2])
     first, _, turned = (np.array(result["stiffness_GPa"]) for result in results)
@@ -95,8 +95,8 @@ def test_a_micrograph_has_its_proved_bounds(tmp_path):
     case.write_text(text, encoding="utf-8")
     out = tmp_path / "out"
     sets = "cell.threshold=['[120, 130, 140]']", "modulus.alpha=[0, 1]"
-    alphacut("run", case, "--no-figures", f"--out={out}", *(f"--set={one}" for one in sets))
-    image = json.loads((out / "summary.json").read_text(encoding="utf-8"))["image"]
+    words = "run", case, "--no-figures", f"--out={out}", *(f"--set={one}" for one in sets)
+    image = alphacut(tmp_path, *words)["image"]
     cuts = image["cuts"]
     lower, upper = (np.array(cuts["E_GPa"][side]) for side in ("lower", "upper"))
     old_lower, old_upper = np.array(MICROGRAPH)

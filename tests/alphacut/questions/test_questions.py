@@ -54,13 +54,8 @@ def test_decision_and_probability_agree(summary):
     assert (verdicts["q2"], verdicts["drift1"]) == ("not exceeded", "exceeded")
     assert max(events["q2"]["upper"]) == 0
     assert min(events["drift1"]["lower"]) == 1
-
-
-def test_margins_are_limits_less_peaks(summary):
-    peak = summary["envelopes"]["all"]["peak"]["q2"]
-    one = summary["decision"]["limits"]["q2"]
-    margin = one["limit"] - np.array(peak["upper"])
-    assert one["margin"]["lower"] == pytest.approx(margin, abs=2e-2 * one["limit"])
+    margin = limits["q2"]["limit"] - np.array(limits["q2"]["peak"]["upper"])
+    assert limits["q2"]["margin"]["lower"] == pytest.approx(margin)
 
 
 def test_tolerances_keep_what_the_decision_keeps(summary):
@@ -88,7 +83,11 @@ def test_limits_are_read(text, limit):
     assert parse_limit(text) == limit
 
 
-@pytest.mark.parametrize("text", ["q1", "q1 <= ", "q1 <= -1 m", "q1 <= 3 N", "q 1 <= 3 m", 7])
+WRONG = ["q1", "q1 <= ", "q1 <= -1 m", "q1 <= 3 N", "q 1 <= 3 m", 7]
+WRONG += ["max q3 >= 2 mm", "min q3 <= 2 mm", "q3 >= 2 mm"]
+
+
+@pytest.mark.parametrize("text", WRONG)
 def test_limits_without_a_meaning_are_refused(text):
     with pytest.raises(RefusedError):
         parse_limit(text)
@@ -154,9 +153,3 @@ def test_an_output_has_several_limits_of_each_side_and_of_its_magnitude(tmp_path
     assert words[2] == "max drift1 ≤ 60.00 mm"
     assert words[4] == "min drift1 ≥ −20.00 mm"
     assert words[5] == "min q2 ≥ 1.000 m"
-
-
-@pytest.mark.parametrize("limit", ["max q3 >= 2 mm", "min q3 <= 2 mm", "q3 <= -2 mm", "q3 >= 2 mm"])
-def test_limits_that_compare_the_wrong_way_are_refused(limit):
-    with pytest.raises(RefusedError):
-        parse_limit(limit)

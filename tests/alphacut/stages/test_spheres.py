@@ -19,7 +19,7 @@ def case(folder: Path, fraction: float):
     return load(path).content
 
 
-@pytest.mark.parametrize("fraction", [0.1, 0.3, 0.4, 0.5])
+@pytest.mark.parametrize("fraction", [0.1, 0.5])
 def test_spheres_of_one_size_hold_the_fraction_and_lie_within_its_bounds(tmp_path, fraction):
     problem = CellProblem.of(case(tmp_path, fraction))
     modulus, bounds = problem.solve().modulus, problem.references()
