@@ -2,16 +2,17 @@
 
 import fcntl
 import hashlib
+import io
 import json
 import os
 import secrets
-import subprocess
-import sys
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from alphacut.entry import main
 from tests.alphacut import one_case
 
 ROOT = Path(__file__).parents[1]
@@ -59,18 +60,13 @@ def shipped_run(tmp_path_factory, worker_id):
         with lock.open("w") as handle:
             fcntl.flock(handle, fcntl.LOCK_EX)
             if not (folder / "summary.json").is_file():
-                sets = [f"--set={change}" for change in changes]
-                words = ["-m", "alphacut", "run", f"cases/{case}.toml", f"--out={folder}"]
-                done = subprocess.run(
-                    [sys.executable, *words, *sets, "--no-figures"],
-                    cwd=ROOT,
-                    capture_output=True,
-                    text=True,
-                    env=os.environ | {"OMP_NUM_THREADS": "1"},
-                )
-                assert done.returncode == 0, done.stderr
-                told = (done.stdout + done.stderr).splitlines()
-                (folder / "told.json").write_text(json.dumps(told), encoding="utf-8")
+                words = ["run", f"{ROOT}/cases/{case}.toml", f"--out={folder}", "--no-figures"]
+                told = io.StringIO()
+                with redirect_stdout(told), redirect_stderr(told):
+                    status = main([*words, *(f"--set={change}" for change in changes)])
+                assert status == 0, told.getvalue()
+                lines = told.getvalue().splitlines()
+                (folder / "told.json").write_text(json.dumps(lines), encoding="utf-8")
         return folder
 
     return run
