@@ -77,9 +77,8 @@ def parsers(program: str, commands: Mapping[str, str]) -> tuple[Parser, dict[str
             name, help=command.about, description=about, allow_abbrev=False
         )
         command.arguments(by_name[name])
-        by_name[name].add_argument(
-            DEBUG, action="store_true", help="log what is done; a traceback with every error"
-        )
+        shown = "log what is done; a traceback with every error"
+        by_name[name].add_argument(DEBUG, action="store_true", help=shown)
     return parser, by_name
 
 
@@ -103,9 +102,10 @@ def main(
         names: File in `alphacut.commands` of each command, by the command's name.
     """
     words = sys.argv[1:] if arguments is None else arguments
-    with stoppable() as signals, logged(DEBUG in words):
+    with stoppable() as signals:
         try:
-            return _run_traced(words, program, names)
+            with logged(DEBUG in words):
+                return _run_command(words, program, names)
         except BadInput as error:
             for problem in error.problems:
                 say(str(problem))
@@ -160,28 +160,20 @@ def stoppable() -> Iterator[list[int]]:
 
 @contextmanager
 def logged(is_on: bool) -> Iterator[None]:
-    """Shows the log of the block, down to level DEBUG, on standard error if `is_on`."""
-    if not is_on:
-        yield
-        return
+    """Shows the log of the block, with the traceback of its error, on standard error if `is_on`."""
     logger, handler = logging.getLogger("alphacut"), logging.StreamHandler()
     level = logger.level
-    logger.addHandler(handler)
-    logger.setLevel(logging.DEBUG)
+    if is_on:
+        logger.addHandler(handler)
+        logger.setLevel(logging.DEBUG)
     try:
         yield
-    finally:
-        logger.setLevel(level)
-        logger.removeHandler(handler)
-
-
-def _run_traced(arguments: Sequence[str], program: str, names: Mapping[str, str]) -> int:
-    """Exit status of a command; an error leaves its traceback in the log."""
-    try:
-        return _run_command(arguments, program, names)
     except Exception:
         LOG.debug("the command ended by this error", exc_info=True)
         raise
+    finally:
+        logger.setLevel(level)
+        logger.removeHandler(handler)
 
 
 def _run_command(arguments: Sequence[str], program: str, names: Mapping[str, str]) -> int:

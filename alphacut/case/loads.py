@@ -261,7 +261,7 @@ class RecordsSection(Section):
     unit: Annotated[str, text(_parse_unit)] | None = Field(
         default=None, description="unit of files that have none: columns without a head, waveforms"
     )
-    files: Annotated[tuple[Files, ...], OneOrMany, NotEmpty] = Field(
+    files: Annotated[OneOrMany[Files], NotEmpty] = Field(
         description="files or patterns, as `records/*.AT2`; FILE#CHANNEL of several"
     )
     baseline: Baseline = Field(default="none", description="mean or straight line to subtract")

@@ -276,9 +276,7 @@ class ImageCell(Section):
     """An image of the phases of a periodic cell, of a material that is the same in depth."""
 
     image: CaseFile = Field(description="grey or labelled image, PNG, TIFF or .npy")
-    pixel: Annotated[tuple[Length, ...], OneOrMany] = Field(
-        description="side of a pixel, or its width and height"
-    )
+    pixel: OneOrMany[Length] = Field(description="side of a pixel, or its width and height")
     threshold: tuple[Number, ...] | None = Field(
         default=None, description="grey value from which on a pixel is of the next phase"
     )
@@ -286,10 +284,8 @@ class ImageCell(Section):
         default=None, description="value of each phase in a labelled image, instead of threshold"
     )
     modulus: tuple[Modulus, ...] = Field(description="Young's modulus of each phase, dark first")
-    poisson: Annotated[tuple[Ratio, ...], OneOrMany] = Field(
-        description="Poisson's ratio of each phase"
-    )
-    loss: Annotated[tuple[Loss, ...], OneOrMany] | None = Field(
+    poisson: OneOrMany[Ratio] = Field(description="Poisson's ratio of each phase")
+    loss: OneOrMany[Loss] | None = Field(
         default=None, description="loss factor tan δ of each phase's Young's modulus at real ν"
     )
 

@@ -221,33 +221,29 @@ class Frame(StructureSection):
     A key with one value for each floor may hold one value for all of them.
     """
 
-    masses: Annotated[tuple[Mass, ...], OneOrMany] = Field(description="mass of each floor")
-    lengths: Annotated[tuple[Span, ...], OneOrMany] | None = Field(
-        default=None, description="height of each storey"
-    )
+    masses: OneOrMany[Mass] = Field(description="mass of each floor")
+    lengths: OneOrMany[Span] | None = Field(default=None, description="height of each storey")
     modulus: Modulus | None = Field(
         default=None, description="Young's modulus where no stage computes it"
     )
-    second_moment: Annotated[tuple[Moment, ...], OneOrMany] | None = Field(
+    second_moment: OneOrMany[Moment] | None = Field(
         default=None, description="second moment of area of one column of each storey"
     )
-    columns: Annotated[tuple[Count, ...], OneOrMany] = Field(
+    columns: OneOrMany[Count] = Field(
         default=(Crisp(2.0),), description="clamped columns in each storey"
     )
-    stiffness: Annotated[tuple[Stiffness, ...], OneOrMany] | None = Field(
+    stiffness: OneOrMany[Stiffness] | None = Field(
         default=None, description="stiffness of each storey, in place of columns and modulus"
     )
     damping_ratio: DampingRatios = Field(default=(), description=RATIO_WORDS)
-    dampers: Annotated[tuple[Damping, ...], OneOrMany] = Field(
-        default=(ZERO,), description="viscous damper of each floor"
-    )
+    dampers: OneOrMany[Damping] = Field(default=(ZERO,), description="viscous damper of each floor")
     damper_placement: Literal["ground", "storey"] | None = Field(
         default=None, description="dampers to the ground, or between storeys"
     )
-    displacements: Annotated[tuple[Displacement, ...], OneOrMany] = Field(
+    displacements: OneOrMany[Displacement] = Field(
         default=(ZERO,), description="displacement of each floor at the start"
     )
-    velocities: Annotated[tuple[Velocity, ...], OneOrMany] = Field(
+    velocities: OneOrMany[Velocity] = Field(
         default=(ZERO,), description="velocity of each floor at the start"
     )
     rayleigh_mass: Rate = Field(default=ZERO, description="factor a of a damping a M + b K")

@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 from pydantic import (
     AfterValidator,
@@ -115,25 +115,24 @@ def text(read: Callable[[object, ValidationInfo], object]) -> PlainValidator:
     return PlainValidator(read, json_schema_input_type=str)
 
 
-def one_or_many(value: object) -> object:
-    """The entry of an array that may stand without brackets."""
-    return _not_empty(value) if isinstance(value, list | tuple) else [value]
-
-
 def _not_empty(value: object) -> object:
     if isinstance(value, list | tuple) and not value:
         raise RefusedError("", "[]", "one entry or more")
     return value
 
 
+def _as_array(value: object) -> object:
+    return _not_empty(value) if isinstance(value, list | tuple) else [value]
+
+
 class _OneOrMany:
-    """An array of which one entry may stand without brackets."""
+    """Validation and schema of `OneOrMany`."""
 
     def __get_pydantic_core_schema__(
         self, source: object, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
         """The validation of the array."""
-        return core_schema.no_info_before_validator_function(one_or_many, handler(source))
+        return core_schema.no_info_before_validator_function(_as_array, handler(source))
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
@@ -143,7 +142,9 @@ class _OneOrMany:
         return {"anyOf": [array["items"], array]}
 
 
-OneOrMany = _OneOrMany()
+T = TypeVar("T")
+OneOrMany = Annotated[tuple[T, ...], _OneOrMany()]
+"""An array of which one entry may stand without brackets."""
 NotEmpty = BeforeValidator(_not_empty)
 
 
@@ -177,7 +178,7 @@ def require_alone(key: str, is_there: bool, other: str) -> None:
 after = AfterValidator
 """A check of a value that has its type."""
 CaseFile = Annotated[Path, text(case_file)]
-Names = Annotated[tuple[str, ...], OneOrMany, after(distinct)]
+Names = Annotated[OneOrMany[str], after(distinct)]
 
 Modulus = Annotated[FuzzyNumber, Quantity("Pa", above=0, fuzzy=True)]
 

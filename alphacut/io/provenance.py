@@ -8,6 +8,7 @@ import os
 import platform
 import shlex
 import sys
+import tomllib
 from collections.abc import Sequence
 from dataclasses import fields, is_dataclass
 from functools import cache
@@ -27,23 +28,19 @@ PACKAGES += ("numpy", "scipy", "xarray")
 NESTED = ("stochastic", "rve", "fuzzy", "frame")  # packages in folders of their own
 
 
-@cache
-def own_version() -> str:
-    """Version of alphacut: from its installation, else from pyproject.toml beside it."""
-    if version := version_of("alphacut"):
-        return version
-    import tomllib
-
-    project = Path(__file__).resolve().parents[2] / "pyproject.toml"
-    return str(tomllib.loads(project.read_text(encoding="utf-8"))["project"]["version"])
-
-
 def version_of(distribution: str) -> str:
     """Version of an installed distribution; empty if it is not there."""
     try:
         return version(distribution)
     except PackageNotFoundError:
         return ""
+
+
+@cache
+def own_version() -> str:
+    """Version of alphacut: from its installation, else from pyproject.toml beside it."""
+    project = Path(__file__).resolve().parents[2] / "pyproject.toml"
+    return version_of("alphacut") or str(tomllib.loads(project.read_text())["project"]["version"])
 
 
 @cache
@@ -75,13 +72,17 @@ def source_digest(packages: tuple[str, ...]) -> str:
 def fingerprint(inputs: object, packages: Sequence[str]) -> str:
     """Digest of everything that a result depends on: inputs, source, library versions."""
     content = [inputs, source_digest(tuple(packages)), versions(), FORMAT]
-    text = json.dumps(content, sort_keys=True, default=_canonical)
-    return hashlib.sha256(text.encode()).hexdigest()
+    return digest_of(json.dumps(content, sort_keys=True, default=_canonical).encode())
+
+
+def digest_of(content: bytes) -> str:
+    """SHA-256 of a content in hexadecimal digits."""
+    return hashlib.sha256(content).hexdigest()
 
 
 def file_digest(path: Path) -> str:
-    """Digest of the content of a file."""
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+    """SHA-256 of the content of a file."""
+    return digest_of(path.read_bytes())
 
 
 def _canonical(value: object) -> object:
@@ -92,7 +93,7 @@ def _canonical(value: object) -> object:
         values = {field.name: getattr(value, field.name) for field in fields(value)}
         return [type(value).__name__, values]
     if isinstance(value, np.ndarray):
-        return [value.shape, str(value.dtype), hashlib.sha256(value.tobytes()).hexdigest()]
+        return [value.shape, str(value.dtype), digest_of(value.tobytes())]
     if isinstance(value, FunctionType):  # its source is part of the fingerprint elsewhere
         return f"{value.__module__}.{value.__qualname__}"
     return value.name if isinstance(value, Path) else str(value)

@@ -8,12 +8,11 @@ of unknown origin, at worst one that does not match and is computed anew.
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 import re
 import stat
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Self
@@ -22,7 +21,7 @@ from pydantic import AfterValidator, TypeAdapter, ValidationError
 
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io.files import as_json, whole_file
-from alphacut.io.provenance import FORMAT, door
+from alphacut.io.provenance import FORMAT, digest_of, door
 
 if TYPE_CHECKING:
     import xarray
@@ -88,7 +87,7 @@ class ResultsFolder:
         except OSError as error:
             raise RefusedError(str(file), str(error), "a regular file of this program") from None
         except (ValueError, RecursionError):
-            return cls(path, is_damaged=True)
+            document = None
         if not isinstance(document, dict):
             return cls(path, is_damaged=True)
         version = document.get("format_version")
@@ -107,12 +106,12 @@ class ResultsFolder:
         return tuple(name for name, entry in self.files.items() if entry.source == source)
 
     def problem(self, source: str) -> str:
-        """What is wrong with a file made from this, such as "modulus.nc was changed"; else ""."""
+        """What is wrong with a file made from this, such as "modulus.nc is changed"; else ""."""
         for name in self.made_from(source):
             try:
                 self.content(name)
             except RefusedError as error:
-                return f"{name} {error.value}"
+                return f"{name} is {error.value or 'missing'}"
         return ""
 
     def content(self, name: str) -> bytes:
@@ -129,10 +128,10 @@ class ResultsFolder:
             self._require_real_parents(name)
             content = read_regular(file)
         except OSError as error:
-            state = "is missing" if isinstance(error, FileNotFoundError) else "is no regular file"
+            state = None if isinstance(error, FileNotFoundError) else "no regular file"
             raise RefusedError(str(file), state, COMPLETE, RUN_AGAIN) from None
         is_same = digest in ("", digest_of(content))
-        require(is_same, str(file), value="was changed", allowed=COMPLETE, cure=RUN_AGAIN)
+        require(is_same, str(file), value="changed", allowed=COMPLETE, cure=RUN_AGAIN)
         return content
 
     def dataset(self, name: str) -> xarray.Dataset:
@@ -173,22 +172,27 @@ class ResultsFolder:
         """
         paths = (path for path in sorted(folder.rglob("*")) if path.is_file())
         contents = {path.relative_to(folder).as_posix(): path.read_bytes() for path in paths}
+        made_before = {x: self.files[x] for x in self.made_from(before)} if before else {}
+        self._write(source, contents, forget=made_before)
+        for name in made_before.keys() - contents.keys():
+            self._remove(name, made_before[name].digest)
+
+    def put_text(self, name: str, text: str) -> None:
+        """Writes a text of the run itself, such as summary.json, and lists it."""
+        self._write("", {name: text.encode()})
+
+    def _write(
+        self, source: str, contents: Mapping[str, bytes], forget: Iterable[str] = ()
+    ) -> None:
+        """Lists files as made from `source` in place of others, then writes them."""
         for name in contents:
             self.require_free(name)
-        old = {x: self.files.pop(x) for x in self.made_from(before)} if before else {}
+        for name in forget:
+            del self.files[name]
         self.add({name: Listed(digest_of(x), source) for name, x in contents.items()})
         for name, content in contents.items():
             with whole_file(self.path / name, follow_links=False) as partial:
                 partial.write_bytes(content)
-        for name in old.keys() - contents.keys():
-            self._remove(name, old[name].digest)
-
-    def put_text(self, name: str, text: str) -> None:
-        """Writes a text of the run itself, such as summary.json, and lists it."""
-        self.require_free(name)
-        self.add({name: Listed(digest_of(text.encode()), "")})
-        with whole_file(self.path / name, follow_links=False) as partial:
-            partial.write_bytes(text.encode())
 
     def add(self, files: Mapping[str, Listed]) -> None:
         """Writes the list with further files, and with a checksum of its own."""
@@ -234,8 +238,3 @@ def read_regular(file: Path) -> bytes:
             if stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
                 return stream.read()
     raise OSError("no regular file")
-
-
-def digest_of(content: bytes) -> str:
-    """SHA-256 of a content in hexadecimal digits."""
-    return hashlib.sha256(content).hexdigest()
