@@ -28,9 +28,8 @@ class CellContent(Section):
 
     title: str = Field(description="one line, for figures and the report")
     about: str = Field(default="", description="a paragraph: what the case shows")
-    stages: Annotated[tuple[Stage, ...], NotEmpty, after(distinct)] = Field(
-        description="stages that `alphacut run` computes"
-    )
+    stages: Annotated[tuple[Stage, ...], NotEmpty, after(distinct)]
+    """stages that `alphacut run` computes"""
     microstructure: object = None
     radius: AnyLaw | None = None
     cell: Cell | None = None

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Annotated, ClassVar, Literal, cast
 
 import numpy as np
-from pydantic import Field, PlainValidator
+from pydantic import PlainValidator
 
 from alphacut.case.structure import Structure
 from alphacut.case.types import NotEmpty, Quantity, Section
@@ -93,9 +93,8 @@ class QuestionSection(Section):
     key: ClassVar[str]
     reads_peaks: ClassVar[bool] = False
     needs_magnitudes: ClassVar[bool] = False
-    limits: Limits = Field(
-        description="limits of outputs, 'drift1 <= 0.5 %', 'max q3 <= 80 mm', 'min q3 >= -60 mm'"
-    )
+    limits: Limits
+    """limits of outputs, 'drift1 <= 0.5 %', 'max q3 <= 80 mm', 'min q3 >= -60 mm'"""
 
     @property
     def limits_by_name(self) -> dict[str, Limit]:
@@ -140,12 +139,10 @@ class ProbabilitySection(QuestionSection):
     key = "probability"
     needs_magnitudes = True
 
-    random: tuple[str, ...] = Field(
-        default=(), description="inputs that are random, with the shape of their membership"
-    )
-    samples: Annotated[int, Quantity(least=1, most=10_000, is_integer=True)] = Field(
-        default=200, description="random draws at each fuzzy point"
-    )
+    random: tuple[str, ...] = ()
+    """inputs that are random, with the shape of their membership"""
+    samples: Annotated[int, Quantity(least=1, most=10_000, is_integer=True)] = 200
+    """random draws at each fuzzy point"""
 
     def check(self, structure: Structure) -> None:
         """Refuses limits and random inputs that the structure does not have."""
@@ -160,9 +157,8 @@ class TolerancesSection(QuestionSection):
     needs_magnitudes = True
     reads_peaks = True
 
-    most: Annotated[float, Quantity(above=0, most=100)] = Field(
-        default=2.0, description="largest scale that is tried; 1 is that of the case"
-    )
+    most: Annotated[float, Quantity(above=0, most=100)] = 2.0
+    """largest scale that is tried; 1 is that of the case"""
 
 
 class FragilitySection(QuestionSection):
@@ -171,12 +167,10 @@ class FragilitySection(QuestionSection):
     key = "fragility"
     reads_peaks = True
 
-    measure: Literal["Sa(T1)", "PGA", "scale"] = Field(
-        default="Sa(T1)", description="measure of a record; T1 and ζ are the nominal structure's"
-    )
-    independent: bool = Field(
-        default=False, description="whether records count as independent draws: 95 % limits"
-    )
+    measure: Literal["Sa(T1)", "PGA", "scale"] = "Sa(T1)"
+    """measure of a record; T1 and ζ are the nominal structure's"""
+    independent: bool = False
+    """whether records count as independent draws: 95 % limits"""
 
     def check(self, structure: Structure) -> None:
         """Refuses structures whose motion is not proportional to the record, and unfit limits."""

@@ -100,12 +100,10 @@ class ForceSection(Section):
     unknowns, and their parameters are F1, F2 … in their order.
     """
 
-    history: Annotated[ForceHistory, text(_parse_history)] = Field(
-        description="step, harmonic with frequency and phase, impulse, or a file; then its start"
-    )
-    amplitude: dict[str, Amplitude] = Field(
-        description='amplitude by floor or unknown, as {3 = "8 kN"}; factor of a file with a unit'
-    )
+    history: Annotated[ForceHistory, text(_parse_history)]
+    """step, harmonic with frequency and phase, impulse, or a file; then its start"""
+    amplitude: dict[str, Amplitude]
+    """amplitude by floor or unknown, as {3 = "8 kN"}; factor of a file with a unit"""
 
     @property
     def amplitudes(self) -> dict[str, FuzzyNumber]:
@@ -255,15 +253,12 @@ class RecordsSection(Section):
     five natural periods, and at most envelope.duration.
     """
 
-    step: Time | None = Field(
-        default=None, description="time between the numbers of a file of one column"
-    )
-    unit: Annotated[str, text(_parse_unit)] | None = Field(
-        default=None, description="unit of files that have none: columns without a head, waveforms"
-    )
-    files: Annotated[OneOrMany[Files], NotEmpty] = Field(
-        description="files or patterns, as `records/*.AT2`; FILE#CHANNEL of several"
-    )
+    step: Time | None = None
+    """time between the numbers of a file of one column"""
+    unit: Annotated[str, text(_parse_unit)] | None = None
+    """unit of files that have none: columns without a head, waveforms"""
+    files: Annotated[OneOrMany[Files], NotEmpty]
+    """files or patterns, as `records/*.AT2`; FILE#CHANNEL of several"""
     baseline: Baseline = Field(default="none", description="mean or straight line to subtract")
     scale: Annotated[Scale, text(_parse_scale)] = Field(
         default=Scale(), description='factor, "PGA = 0.3 g" or "Sa(T1) = 0.5 g"'

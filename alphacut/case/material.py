@@ -32,12 +32,10 @@ from alphacut.stochastic.particles.particles import DISCS, SPHERES, Shape
 class PhaseSection(Section):
     """Elastic phase of a mesh."""
 
-    modulus: ModulusOrStiffness = Field(
-        description="Young's modulus, or three rows of the plane-strain stiffness"
-    )
-    poisson: Annotated[float, Quantity(above=-1, below=0.5)] | None = Field(
-        default=None, description="Poisson's ratio, beside Young's modulus"
-    )
+    modulus: ModulusOrStiffness
+    """Young's modulus, or three rows of the plane-strain stiffness"""
+    poisson: Annotated[float, Quantity(above=-1, below=0.5)] | None = None
+    """Poisson's ratio, beside Young's modulus"""
     loss: Loss | None = Field(default=None, description="loss factor tan δ of the stiffness")
 
     @model_validator(mode="after")
@@ -116,31 +114,22 @@ class RoundCell(Section):
         description="Young's modulus of the particle, or three rows of its plane-strain stiffness"
         " (11, 22, 12 with 2 ε12)"
     )
-    inclusion_poisson: Ratio | None = Field(
-        default=None, description="Poisson's ratio of the particle, beside its modulus"
-    )
-    matrix_loss: Loss | None = Field(
-        default=None, description="loss factor tan δ of the matrix's Young's modulus, as 2 %"
-    )
-    matrix_loss_bulk: Loss | None = Field(
-        default=None, description="that of its bulk modulus, where it is another"
-    )
-    inclusion_loss: Loss | None = Field(
-        default=None, description="loss factor of the particle's Young's modulus or stiffness"
-    )
-    inclusion_loss_bulk: Loss | None = Field(
-        default=None, description="that of its bulk modulus, where it is another"
-    )
-    interphase_thickness: Thickness | None = Field(
-        default=None,
-        description="thickness of a ring around the particle over half the cell's side",
-    )
-    interphase_modulus: Modulus | None = Field(
-        default=None, description="Young's modulus of the ring"
-    )
-    interphase_poisson: Ratio | None = Field(
-        default=None, description="Poisson's ratio of the ring"
-    )
+    inclusion_poisson: Ratio | None = None
+    """Poisson's ratio of the particle, beside its modulus"""
+    matrix_loss: Loss | None = None
+    """loss factor tan δ of the matrix's Young's modulus, as 2 %"""
+    matrix_loss_bulk: Loss | None = None
+    """that of its bulk modulus, where it is another"""
+    inclusion_loss: Loss | None = None
+    """loss factor of the particle's Young's modulus or stiffness"""
+    inclusion_loss_bulk: Loss | None = None
+    """that of its bulk modulus, where it is another"""
+    interphase_thickness: Thickness | None = None
+    """thickness of a ring around the particle over half the cell's side"""
+    interphase_modulus: Modulus | None = None
+    """Young's modulus of the ring"""
+    interphase_poisson: Ratio | None = None
+    """Poisson's ratio of the ring"""
     fraction: Radius | None = Field(
         default=None,
         description="area fraction, below π/4, or volume fraction of spheres, below π/6, of"
@@ -277,17 +266,14 @@ class ImageCell(Section):
 
     image: CaseFile = Field(description="grey or labelled image, PNG, TIFF or .npy")
     pixel: OneOrMany[Length] = Field(description="side of a pixel, or its width and height")
-    threshold: tuple[Number, ...] | None = Field(
-        default=None, description="grey value from which on a pixel is of the next phase"
-    )
-    labels: tuple[Annotated[float, Quantity()], ...] | None = Field(
-        default=None, description="value of each phase in a labelled image, instead of threshold"
-    )
+    threshold: tuple[Number, ...] | None = None
+    """grey value from which on a pixel is of the next phase"""
+    labels: tuple[Annotated[float, Quantity()], ...] | None = None
+    """value of each phase in a labelled image, instead of threshold"""
     modulus: tuple[Modulus, ...] = Field(description="Young's modulus of each phase, dark first")
     poisson: OneOrMany[Ratio] = Field(description="Poisson's ratio of each phase")
-    loss: OneOrMany[Loss] | None = Field(
-        default=None, description="loss factor tan δ of each phase's Young's modulus at real ν"
-    )
+    loss: OneOrMany[Loss] | None = None
+    """loss factor tan δ of each phase's Young's modulus at real ν"""
 
     @property
     def pairs(self) -> tuple[tuple[FuzzyNumber, FuzzyNumber], ...]:
@@ -349,12 +335,10 @@ class Mesh(Section):
         description="mesh of Gmsh, prisms of 15 nodes over [-1, 1]² and θ, in place of size and"
         " layers; its physical groups are the phases of [cell.phases]",
     )
-    layers: Annotated[int, Quantity(least=1, most=10_000, is_integer=True)] = Field(
-        default=12, description="element layers in θ, of method prism"
-    )
-    size: Annotated[float, Quantity(least=0.005, below=1)] = Field(
-        default=0.15, description="element size over half the cell's side"
-    )
+    layers: Annotated[int, Quantity(least=1, most=10_000, is_integer=True)] = 12
+    """element layers in θ, of method prism"""
+    size: Annotated[float, Quantity(least=0.005, below=1)] = 0.15
+    """element size over half the cell's side"""
 
 
 def _not_removed(value: object) -> object:
@@ -367,17 +351,14 @@ def _not_removed(value: object) -> object:
 class ModulusSection(Section):
     """Computation of the fuzzy modulus."""
 
-    method: Literal["prism", "slices", "series", "auto"] = Field(
-        default="auto", description="model of the cell; auto is the series"
+    method: Literal["prism", "slices", "series", "auto"] = "auto"
+    """model of the cell; auto is the series"""
+    plan: Annotated[Literal["general", "reduced", "signed"], BeforeValidator(_not_removed)] = (
+        "general"
     )
-    plan: Annotated[Literal["general", "reduced", "signed"], BeforeValidator(_not_removed)] = Field(
-        default="general", description="samples of the transformation method"
-    )
+    """samples of the transformation method"""
     alpha: Levels = Field(default=ALPHA, description="α-levels")
-    tolerance: Annotated[float, Quantity(least=1e-10, most=0.1)] | None = Field(
-        default=None, description="relative error of E that is allowed"
-    )
-    average: Literal["axes", "isotropic"] = Field(
-        default="isotropic",
-        description="E of a plane: isotropic, of the average over all directions; axes, of eq. 16",
-    )
+    tolerance: Annotated[float, Quantity(least=1e-10, most=0.1)] | None = None
+    """relative error of E that is allowed"""
+    average: Literal["axes", "isotropic"] = "isotropic"
+    """E of a plane: isotropic, of the average over all directions; axes, of eq. 16"""

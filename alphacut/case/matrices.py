@@ -60,9 +60,8 @@ class ObservedRow(Section):
     """One output of a structure from matrices: a row that acts on the unknowns."""
 
     unit: str = Field(default="m", description="SI unit of the output, as m, N or N*m")
-    row: dict[str, float] | None = Field(
-        default=None, description='entries of the row by unknown, as {"5.x" = 1}'
-    )
+    row: dict[str, float] | None = None
+    """entries of the row by unknown, as {"5.x" = 1}"""
     file: Vector | None = Field(default=None, description="the row as a file with one vector")
     factor: Annotated[Monomial, text(lambda x, _: Monomial.parse(str(x)))] = Field(
         default=Monomial(1.0, ()), description='factor of the row, as "E*I*l^-2"'
@@ -75,14 +74,12 @@ class MatricesSection(StructureSection):
     A modulus that a stage computes takes the place of parameter E.
     """
 
-    unknowns: Annotated[tuple[str, ...], NotEmpty, after(distinct)] = Field(
-        description="names of the unknowns in the order of the matrices, as NODE.DIRECTION"
-    )
+    unknowns: Annotated[tuple[str, ...], NotEmpty, after(distinct)]
+    """names of the unknowns in the order of the matrices, as NODE.DIRECTION"""
     parameters: Parameters = Field(description="quantities, crisp or fuzzy, by name")
     mass: Annotated[tuple[Term, ...], NotEmpty] = Field(description="pairs [factor, file] of M")
-    stiffness: Annotated[tuple[Term, ...], NotEmpty] = Field(
-        description="pairs [factor, file] of K"
-    )
+    stiffness: Annotated[tuple[Term, ...], NotEmpty]
+    """pairs [factor, file] of K"""
     damping: tuple[Term, ...] = Field(default=(), description="pairs [factor, file] of D")
     damping_ratio: DampingRatios = Field(default=(), description=RATIO_WORDS)
     direction: str | dict[str, float] = Field(
@@ -90,9 +87,8 @@ class MatricesSection(StructureSection):
         description="direction of the ground: it moves all unknowns NODE.DIRECTION; or how it "
         "moves each, by unknown",
     )
-    accelerogram: Annotated[Accelerogram, text(read_accelerogram)] | None = Field(
-        default=None, description="file of the ground's acceleration; motion is relative to it"
-    )
+    accelerogram: Annotated[Accelerogram, text(read_accelerogram)] | None = None
+    """file of the ground's acceleration; motion is relative to it"""
     outputs: dict[str, ObservedRow] = Field(description="observed quantities by name")
 
     def structure(

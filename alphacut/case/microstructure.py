@@ -22,20 +22,16 @@ class PackingSection(Section):
     Radii are log-normal between two ends (eq. 11), or those of a file.
     """
 
-    packings: Annotated[int, Quantity(least=5, most=10_000, is_integer=True)] = Field(
-        default=20, description="independent packings"
-    )
-    particles: Annotated[int, Quantity(least=10, most=1_000_000, is_integer=True)] = Field(
-        description="particles in each packing"
-    )
-    fraction: Annotated[float, Quantity(above=0, below=0.84)] = Field(
-        description="area fraction, or volume fraction, of the particles"
-    )
+    packings: Annotated[int, Quantity(least=5, most=10_000, is_integer=True)] = 20
+    """independent packings"""
+    particles: Annotated[int, Quantity(least=10, most=1_000_000, is_integer=True)]
+    """particles in each packing"""
+    fraction: Annotated[float, Quantity(above=0, below=0.84)]
+    """area fraction, or volume fraction, of the particles"""
     smallest_radius: Length | None = Field(default=None, description="lower end of the radii")
     largest_radius: Length | None = Field(default=None, description="upper end of the radii")
-    file: CaseFile | None = Field(
-        default=None, description="CSV file of radii or diameters, a column r [mm] or d [mm]"
-    )
+    file: CaseFile | None = None
+    """CSV file of radii or diameters, a column r [mm] or d [mm]"""
 
     def source(self, spheres: bool) -> Simulated:
         """The random packings to be computed: of spheres, or else of discs."""
@@ -87,12 +83,10 @@ class Photograph(Section):
 class MicrostructureSection(Section):
     """Particles from which the random radius comes: one of packing, circles and image."""
 
-    seed: Annotated[int, Quantity(least=0, most=1e18, is_integer=True)] = Field(
-        description="seed of everything left to chance"
-    )
-    limits: Annotated[tuple[Fraction, Fraction], after(rising)] | None = Field(
-        default=None, description="lower and upper limit of r/a"
-    )
+    seed: Annotated[int, Quantity(least=0, most=1e18, is_integer=True)]
+    """seed of everything left to chance"""
+    limits: Annotated[tuple[Fraction, Fraction], after(rising)] | None = None
+    """lower and upper limit of r/a"""
     packing: PackingSection | None = None
     circles: Circles | None = None
     image: Photograph | None = None

@@ -88,20 +88,14 @@ class EnvelopeSection(Section):
         " k (stiffness), d, q0, v0, zeta (damping_ratio), rayleigh_mass, rayleigh_stiffness"
     )
     alpha: Levels = Field(default=ALPHA, description="α-levels")
-    method: Annotated[EnvelopeMethod, BeforeValidator(_not_removed)] = Field(
-        default="auto", description="method of the envelope"
-    )
-    integrator: Literal["midpoint", "rk4", "exact"] | None = Field(
-        default=None, description="time stepping; by the method if left out"
-    )
-    tolerance: Annotated[Tolerance, text(_parse_tolerance)] | None = Field(
-        default=None,
-        description="error that is allowed: of displacements, of forces, or over each peak",
-    )
-    gain: Annotated[float, Quantity(least=1e-6, most=1)] = Field(
-        default=0.25,
-        description="gain worth a trajectory to a Graph Follower, as a fraction of the tolerance",
-    )
+    method: Annotated[EnvelopeMethod, BeforeValidator(_not_removed)] = "auto"
+    """method of the envelope"""
+    integrator: Literal["midpoint", "rk4", "exact"] | None = None
+    """time stepping; by the method if left out"""
+    tolerance: Annotated[Tolerance, text(_parse_tolerance)] | None = None
+    """error that is allowed: of displacements, of forces, or over each peak"""
+    gain: Annotated[float, Quantity(least=1e-6, most=1)] = 0.25
+    """gain worth a trajectory to a Graph Follower, as a fraction of the tolerance"""
     duration: Time = Field(description="length of the simulation")
     step: Time = Field(description="time step")
 
@@ -117,19 +111,15 @@ class EnvelopeSection(Section):
 class Identify(Section):
     """Measured natural modes, from which inputs are identified."""
 
-    measured: CaseFile = Field(
-        description="CSV file mode,frequency [Hz],q1,q2 …, or a universal file"
-    )
+    measured: CaseFile
+    """CSV file mode,frequency [Hz],q1,q2 …, or a universal file"""
     floors: dict[str, Annotated[int, Quantity(least=1, is_integer=True)]] = Field(
         default={}, description='floor of each unknown of a universal file, as {"12.x" = 1}'
     )
     learn: Names = Field(description="inputs that are identified, as c or k1")
-    held_out: tuple[Annotated[int, Quantity(least=1, is_integer=True)], ...] = Field(
-        default=(), description="modes that are predicted and not learned from"
-    )
-    frequency_deviation: Fraction | None = Field(
-        default=None, description="standard deviation of a frequency over its mean"
-    )
-    shape_deviation: Fraction | None = Field(
-        default=None, description="standard deviation of an amplitude, over the mode's largest"
-    )
+    held_out: tuple[Annotated[int, Quantity(least=1, is_integer=True)], ...] = ()
+    """modes that are predicted and not learned from"""
+    frequency_deviation: Fraction | None = None
+    """standard deviation of a frequency over its mean"""
+    shape_deviation: Fraction | None = None
+    """standard deviation of an amplitude, over the mode's largest"""

@@ -30,9 +30,8 @@ Theta = Annotated[float, Quantity(least=-10, most=10)]
 class ThetaSection(Section):
     """Law of θ alone, where a mesh from a file has the geometry."""
 
-    theta: Annotated[tuple[Theta, Theta], after(rising)] = Field(
-        default=(-3.0, 3.0), description="support of θ"
-    )
+    theta: Annotated[tuple[Theta, Theta], after(rising)] = (-3.0, 3.0)
+    """support of θ"""
 
     @property
     def law(self) -> TruncatedNormal:

@@ -223,37 +223,28 @@ class Frame(StructureSection):
 
     masses: OneOrMany[Mass] = Field(description="mass of each floor")
     lengths: OneOrMany[Span] | None = Field(default=None, description="height of each storey")
-    modulus: Modulus | None = Field(
-        default=None, description="Young's modulus where no stage computes it"
-    )
-    second_moment: OneOrMany[Moment] | None = Field(
-        default=None, description="second moment of area of one column of each storey"
-    )
-    columns: OneOrMany[Count] = Field(
-        default=(Crisp(2.0),), description="clamped columns in each storey"
-    )
-    stiffness: OneOrMany[Stiffness] | None = Field(
-        default=None, description="stiffness of each storey, in place of columns and modulus"
-    )
+    modulus: Modulus | None = None
+    """Young's modulus where no stage computes it"""
+    second_moment: OneOrMany[Moment] | None = None
+    """second moment of area of one column of each storey"""
+    columns: OneOrMany[Count] = (Crisp(2.0),)
+    """clamped columns in each storey"""
+    stiffness: OneOrMany[Stiffness] | None = None
+    """stiffness of each storey, in place of columns and modulus"""
     damping_ratio: DampingRatios = Field(default=(), description=RATIO_WORDS)
     dampers: OneOrMany[Damping] = Field(default=(ZERO,), description="viscous damper of each floor")
-    damper_placement: Literal["ground", "storey"] | None = Field(
-        default=None, description="dampers to the ground, or between storeys"
-    )
-    displacements: OneOrMany[Displacement] = Field(
-        default=(ZERO,), description="displacement of each floor at the start"
-    )
-    velocities: OneOrMany[Velocity] = Field(
-        default=(ZERO,), description="velocity of each floor at the start"
-    )
+    damper_placement: Literal["ground", "storey"] | None = None
+    """dampers to the ground, or between storeys"""
+    displacements: OneOrMany[Displacement] = (ZERO,)
+    """displacement of each floor at the start"""
+    velocities: OneOrMany[Velocity] = (ZERO,)
+    """velocity of each floor at the start"""
     rayleigh_mass: Rate = Field(default=ZERO, description="factor a of a damping a M + b K")
     rayleigh_stiffness: Delay = Field(default=ZERO, description="factor b of a damping a M + b K")
-    accelerogram: Annotated[Accelerogram, text(read_accelerogram)] | None = Field(
-        default=None, description="file of the ground's acceleration; motion is relative to it"
-    )
-    outputs: tuple[str, ...] = Field(
-        default=(), description="observed quantities: q1, v1, a1, drift1, shear1 …, base_shear"
-    )
+    accelerogram: Annotated[Accelerogram, text(read_accelerogram)] | None = None
+    """file of the ground's acceleration; motion is relative to it"""
+    outputs: tuple[str, ...] = ()
+    """observed quantities: q1, v1, a1, drift1, shear1 …, base_shear"""
 
     @property
     def has_dampers(self) -> bool:

@@ -31,9 +31,14 @@ from alphacut.rve.cell.cell import VoigtPhase
 
 
 class Section(BaseModel):
-    """One table of a case file; built, it does not change."""
+    """One table of a case file; built, it does not change.
 
-    model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
+    What a key is stands in its field, or in the line below it.
+    """
+
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, arbitrary_types_allowed=True, use_attribute_docstrings=True
+    )
 
     def has_key(self, key: str) -> bool:
         """True if the file gives the key, so that no default stands in."""
