@@ -61,7 +61,7 @@ class CellContent(Section):
     @property
     def has_spheres(self) -> bool:
         """True if the particles of the cell are spheres."""
-        return self.particle_cell is not None and self.particle_cell.particles == "spheres"
+        return self.cell is not None and self.cell.particles == "spheres"
 
     @property
     def stated_fraction(self) -> float | None:
@@ -160,8 +160,8 @@ class CellContent(Section):
         }
         first, *further = [name for name, is_there in is_source.items() if is_there] or [""]
         require_alone(first, bool(further), ", ".join(further))
-        method, cell = self.modulus.method, self.particle_cell or self.mesh_cell
-        methods = (method,) if cell is None else cell.methods
+        method = self.modulus.method
+        methods = (method,) if self.cell is None else self.cell.methods
         allowed = f"{', '.join(methods)} for this cell"
         require(method in methods, "modulus.method", value=method, allowed=allowed)
         return self

@@ -209,11 +209,10 @@ class RoundCell(Section):
         fits, allowed = is_isotropic or self.particles != "spheres", "Young's modulus of spheres"
         require(fits, "cell.inclusion_modulus", value="a plane stiffness", allowed=allowed)
         if self.fraction is not None:
-            touching_radius = 1 / reach(outline)
-            touching = float(self.shape.fractions(touching_radius))
-            greatest = self.fraction.support.upper
+            touching = float(self.shape.fractions(1 / reach(outline)))
+            fits, value = self.fraction.support.upper < touching, f"{self.fraction.support.upper:g}"
             allowed = f"values below {touching:.6g}, where particles touch"
-            require(greatest < touching, "cell.fraction", value=f"{greatest:g}", allowed=allowed)
+            require(fits, "cell.fraction", value=value, allowed=allowed)
         return self
 
     @model_validator(mode="after")
@@ -233,36 +232,32 @@ class RoundCell(Section):
     @model_validator(mode="after")
     def _check_losses(self) -> Self:
         """Refuses loss factors of one phase alone, and too large ones of the bulk moduli."""
-        phases = ("matrix", "inclusion")
-        keys = [f"{phase}_loss{end}" for phase in phases for end in ("", "_bulk")]
-        if all(getattr(self, key) is None for key in keys):
+        losses = {"matrix": self.matrix_loss, "inclusion": self.inclusion_loss}
+        bulk_losses = {"matrix": self.matrix_loss_bulk, "inclusion": self.inclusion_loss_bulk}
+        if all(x is None for x in (*losses.values(), *bulk_losses.values())):
             return self
-        for phase in phases:
-            loss, bulk, ratio = (
-                getattr(self, f"{phase}_{x}") for x in ("loss", "loss_bulk", "poisson")
-            )
-            allowed = "a loss of either phase, 0 for none"
-            require(loss is not None, f"cell.{phase}_loss", value=None, allowed=allowed)
-            if bulk is not None:
-                _require_bulk_loss(f"cell.{phase}_loss_bulk", loss, bulk, ratio)
+        for phase, loss in losses.items():
+            if loss is None:
+                raise RefusedError(f"cell.{phase}_loss", None, "a loss of either phase, 0 for none")
+            key, bulk = f"cell.{phase}_loss_bulk", bulk_losses[phase]
+            ratio = self.matrix_poisson if phase == "matrix" else self.inclusion_poisson
+            if bulk is None:
+                continue
+            if ratio is None:
+                raise RefusedError(key, "there", "none beside a stiffness")
+            # η_E = (1 − 2ν)/3 η_K + 2(1 + ν)/3 η_G, by 1/E = 1/(9K) + 1/(3G); η_G ≥ 0
+            bound = 3 * loss.support.lower / (1 - 2 * ratio.support.lower)
+            allowed = f"up to {bound:.4g}, where the shear modulus loses nothing"
+            fits, value = bulk.support.upper <= bound, f"{bulk.support.upper:g}"
+            require(fits, key, value=value, allowed=allowed)
         return self
-
-
-def _require_bulk_loss(
-    key: str, loss: FuzzyNumber, bulk: FuzzyNumber, ratio: FuzzyNumber | None
-) -> None:
-    """Refuses a loss factor of the bulk modulus K for which that of G would be negative."""
-    if ratio is None:
-        raise RefusedError(key, "there", "none beside a stiffness")
-    # η_E = (1 − 2ν)/3 η_K + 2(1 + ν)/3 η_G, by 1/E = 1/(9K) + 1/(3G); η_G ≥ 0
-    bound = 3 * loss.support.lower / (1 - 2 * ratio.support.lower)
-    greatest = bulk.support.upper
-    allowed = f"up to {bound:.4g}, where the shear modulus loses nothing"
-    require(greatest <= bound, key, value=f"{greatest:g}", allowed=allowed)
 
 
 class ImageCell(Section):
     """An image of the phases of a periodic cell, of a material that is the same in depth."""
+
+    methods: ClassVar = ("auto",)
+    particles: ClassVar = "image"
 
     image: CaseFile = Field(description="grey or labelled image, PNG, TIFF or .npy")
     pixel: OneOrMany[Length] = Field(description="side of a pixel, or its width and height")
