@@ -24,6 +24,7 @@ from alphacut.stages.cell import (
     ISOTROPIC,
     CellProblem,
     constant_label,
+    key_and_unit,
     require_bounds,
     require_tolerance,
 )
@@ -130,7 +131,7 @@ def fibres(result: HomogenisedStiffness) -> Document:
 
 def _constant(name: str, value: float, error: float) -> tuple[str, Document]:
     """Key and entry of a constant: a modulus in GPa, a ratio as it is; error None if unknown."""
-    key, unit = (name, 1.0) if name.startswith("nu") else (f"{name}_GPa", GPA)
+    key, unit = key_and_unit(name)
     return key, {"value": value / unit, "error": None if np.isnan(error) else error / unit}
 
 

@@ -236,6 +236,11 @@ def _young(bulk: float, shear: float) -> float:
     return float(hill_average(np.array([bulk, shear, shear]))[0])
 
 
+def key_and_unit(name: str) -> tuple[str, float]:
+    """Key of an elastic constant in results, and its unit in SI: E_x_GPa and 1e9, nu_xy and 1."""
+    return (name, 1.0) if name.startswith("nu") else (f"{name}_GPa", GPA)
+
+
 def constant_label(key: str) -> str:
     """Label of a constant: nu_LT as ν_LT, E_T_GPa as E_T, GPa."""
     return key.replace("nu", "ν").replace("_GPa", ", GPa")

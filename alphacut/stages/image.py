@@ -29,7 +29,7 @@ from alphacut.rve.result.loss_factors import CONSTANTS, bulk_and_shear_losses, f
 from alphacut.rve.result.moduli import plane_constants
 from alphacut.rve.result.result import PhaseEnergies
 from alphacut.stages.cell import AVERAGES, GPA, References, isotropic_bounds
-from alphacut.stages.modulus import LossCuts, LossResult
+from alphacut.stages.modulus import LossCuts, LossResult, constant_cuts
 from alphacut.stages.store import Computed, CutsResult, Numbers, Stage, StageContext, Values
 from alphacut.stochastic.segmentation import segment
 
@@ -47,13 +47,6 @@ PhaseRanges = Callable[[AlphaLevel], tuple[Rows, Rows]]
 """Least and greatest phase of each pixel at a level."""
 
 
-class Range(Numbers):
-    """Lower and upper bound of a number."""
-
-    lower: float
-    upper: float
-
-
 class ImageCuts(Numbers):
     """α-cuts of E in GPa."""
 
@@ -62,17 +55,17 @@ class ImageCuts(Numbers):
 
 
 class ImageResult(Numbers):
-    """Proved bounds of an image, moduli in GPa: on the highest level, and as α-cuts.
+    """Proved bounds of an image, moduli in GPa.
 
-    `lower_GPa` and `upper_GPa` bound the plane stiffness in the sense of Loewner, (3, 3); `plane`
-    has the constants along x and y by definition and name; `widths_GPa` those of E by cause.
+    On the highest level `lower_GPa` and `upper_GPa` bound the plane stiffness in the sense of
+    Loewner, (3, 3), `nu` and `G_T_GPa` those of its average. As α-cuts `plane` has the constants
+    along x and y by definition and name, `cuts` E; `widths_GPa` has the widths of E by cause.
     """
 
     lower_GPa: Values
     upper_GPa: Values
-    E_GPa: Range
-    nu: Range
-    G_T_GPa: Range
+    nu: dict[str, float]
+    G_T_GPa: dict[str, float]
     average: str
     plane: dict[str, dict[str, CutsResult]]
     nature: Nature
@@ -123,18 +116,17 @@ def compute_cuts(
         energies = phase_energies(crisp, modal, phase, count=len(cell.pairs), aspect=aspect)
         phase_cuts = LossCuts.from_phases(cell.losses, alpha)
         bounds, errors = image_loss_bounds(energies, phase_cuts, average)
-        losses = {name: bounds[..., k] for k, name in enumerate(CONSTANTS)}
+        losses = dict(zip(CONSTANTS, np.moveaxis(bounds, -1, 0), strict=True))
         errors_by_name = dict(zip(CONSTANTS, map(float, errors), strict=True))
         loss = LossResult.of(losses, errors_by_name, Nature.ESTIMATED)
     top, constants = cuts[-1], np.array([cut.constants for cut in cuts])  # (levels, constants, 2)
     result = ImageResult(
         lower_GPa=np.asarray(top.bounds.lower / GPA, float),
         upper_GPa=np.asarray(top.bounds.upper / GPA, float),
-        E_GPa=_range(top.modulus, GPA),
-        nu=_range(top.poisson),
-        G_T_GPa=_range(top.bounds.shear(average), GPA),
+        nu=_ends(top.poisson),
+        G_T_GPa=_ends(top.bounds.shear(average), GPA),
         average=AVERAGES[average],
-        plane={PLANE_STRAIN: dict(map(_cuts_entry, NAMES, np.moveaxis(constants, 1, 0)))},
+        plane={PLANE_STRAIN: dict(map(constant_cuts, NAMES, np.moveaxis(constants, 1, 0)))},
         nature=NATURE,
         cuts=ImageCuts(
             alpha=np.array(alpha),
@@ -150,17 +142,9 @@ def compute_cuts(
     return Computed(result, _dataset(alpha, cuts, phase, losses))
 
 
-def _range(bounds: Ends, size: float = 1.0) -> Range:
-    return Range(lower=bounds[0] / size, upper=bounds[1] / size)
-
-
-def _cuts_entry(name: str, bounds: Array) -> tuple[str, CutsResult]:
-    """Key and cuts, (levels, 2), of a constant: a modulus in GPa, a ratio as it is."""
-    return (
-        (name, CutsResult.of(bounds))
-        if name == "nu_xy"
-        else (f"{name}_GPa", CutsResult.of(bounds / GPA))
-    )
+def _ends(bounds: Ends, unit: float = 1.0) -> dict[str, float]:
+    """Both bounds of a number, in a unit."""
+    return {"lower": bounds[0] / unit, "upper": bounds[1] / unit}
 
 
 def _require_isotropic(widest: ImageCut) -> None:
@@ -273,38 +257,32 @@ class ImageStudy:
 
 
 def image_study(cell: ImageCell) -> ImageStudy:
-    """The study of an image cell, by its labels or by thresholds."""
+    """The study of an image cell, by its labels or by thresholds of its greys.
+
+    Raises:
+        RefusedError: A threshold or a label does not fit the image.
+    """
     grey = read_grey(cell.image, square=len(cell.pixel) == 1)
     if cell.labels:
-        return _study_by_labels(grey, cell, cell.labels)
-    return _study_by_thresholds(grey, cell)
-
-
-def _study_by_thresholds(grey: Array, cell: ImageCell) -> ImageStudy:
-    """The study of an image whose phases are told by thresholds of its greys."""
-    numbers = cell.threshold or ()
-    require_phases(grey, tuple(number.cut(0.0) for number in numbers))
-    modal = [number.modal for number in numbers]
-    segmentation = segment(grey, modal)
+        phase = np.full(grey.shape, -1)
+        for number, label in enumerate(cell.labels):
+            phase[grey == label] = number
+        values = {float(x) for x in np.unique(grey)}
+        wrong = ", ".join(f"{x:g}" for x in sorted(values ^ set(cell.labels))[:5])
+        allowed = "every value of the image, and no other"
+        require(not wrong, "cell.labels", value=wrong, allowed=allowed)
+        return ImageStudy(cell, lambda level: (phase, phase), False)
+    thresholds = cell.threshold or ()
+    require_phases(grey, tuple(number.cut(0.0) for number in thresholds))
+    segmentation = segment(grey, [number.modal for number in thresholds])
     segmentation.require_certain()
-    is_fuzzy = any(number.support.width > 0 for number in numbers)
+    is_fuzzy = any(number.support.width > 0 for number in thresholds)
 
     def phase_ranges(level: AlphaLevel) -> tuple[Rows, Rows]:
         """Least and greatest phase of each pixel at a level."""
         # noise and light leave phases open, unless a fuzzy threshold says all that is not known
         if level is not None and not is_fuzzy:
             return segmentation.ranges()
-        return threshold_ranges(grey, [cut_at(number, level) for number in numbers])
+        return threshold_ranges(grey, [cut_at(number, level) for number in thresholds])
 
     return ImageStudy(cell, phase_ranges, is_fuzzy or segmentation.open_fraction > 0)
-
-
-def _study_by_labels(grey: Array, cell: ImageCell, labels: tuple[float, ...]) -> ImageStudy:
-    """The study of an image in which the value of a pixel is the label of its phase."""
-    phase = np.full(grey.shape, -1)
-    for number, label in enumerate(labels):
-        phase[grey == label] = number
-    values = {float(x) for x in np.unique(grey)}
-    wrong = ", ".join(f"{x:g}" for x in sorted(values ^ set(labels))[:5])
-    require(not wrong, "cell.labels", value=wrong, allowed="every value of the image, and no other")
-    return ImageStudy(cell, lambda level: (phase, phase), False)

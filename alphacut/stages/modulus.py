@@ -27,7 +27,7 @@ from alphacut.rve.result.loss_factors import (
     loss_factors,
 )
 from alphacut.rve.result.result import HomogenisedStiffness
-from alphacut.stages.cell import GPA, References
+from alphacut.stages.cell import GPA, References, key_and_unit
 from alphacut.stages.store import CutsResult, Numbers, Values
 
 if TYPE_CHECKING:
@@ -118,17 +118,22 @@ def plane_outputs(result: HomogenisedStiffness) -> dict[str, float]:
     }
 
 
+def constant_cuts(name: str, bounds: Array) -> tuple[str, CutsResult]:
+    """Key and cuts of a constant, moduli in GPa, from bounds (levels, 2) in SI."""
+    key, unit = key_and_unit(name)
+    return key, CutsResult.of(bounds / unit)
+
+
 def cuts_of(result: Bounds, names: Mapping[str, str]) -> dict[str, CutsResult]:
     """α-cuts of those outputs that a result has, moduli in GPa by NAME_GPa.
 
     `names` has the name of each constant by that of its output.
     """
-    cuts: dict[str, CutsResult] = {}
-    for output, name in names.items():
-        if output in result.outputs:
-            size, key = (GPA, f"{name}_GPa") if QUANTITIES[output][0] == "Pa" else (1.0, name)
-            cuts[key] = CutsResult.of(np.stack(result.bounds(output), axis=1) / size)
-    return cuts
+    return dict(
+        constant_cuts(name, np.stack(result.bounds(output), axis=1))
+        for output, name in names.items()
+        if output in result.outputs
+    )
 
 
 def plane_cuts(result: Bounds) -> dict[str, dict[str, CutsResult]]:
