@@ -205,7 +205,7 @@ class Pipeline:
         peaks = {name: peaks_of(result, alpha) for name, result in by_record.items()}
         worst = suite.worst_peaks(peaks)
         if any(limit.side == "mean" for x in self.content.questions.values() for limit in x.limits):
-            plain = [name for name in worst.outputs if name == output_of(name)]
+            plain = [name for name in worst if name == output_of(name)]
             reached = suite.means_reached(structure, task, records, plain)
             worst = suite.with_means(worst, peaks, reached)
         measures = {record.name: record.measures for record in records}

@@ -120,7 +120,7 @@ def decide(section: DecisionSection, response: FuzzyResponse) -> DecisionAnswer:
     """Possibility, necessity and margins of exceeding each limit, from the response's peaks."""
     assert response.peaks is not None
     limits = section.limits_by_name
-    peaks = response.peaks.named({name: limit.peak for name, limit in limits.items()})
+    peaks = {name: response.peaks[limit.peak] for name, limit in limits.items()}
     by_peak = peak_results(response.peaks)
     decisions = {
         name: LimitDecision.model_validate(

@@ -109,14 +109,16 @@ def fragility(section: FragilitySection, response: FuzzyResponse) -> FragilityAn
     suite, limits = response.suite, section.in_si(response.structure)
     if suite is None:
         raise RefusedError("fragility", "without records", "a section [records]")
-    names = {name: limit.peak for name, limit in section.limits_by_name.items()}
-    peaks = [x.named(names) for x in suite.peaks.values()]
+    peaks = {
+        name: [x[limit.peak] for x in suite.peaks.values()]
+        for name, limit in section.limits_by_name.items()
+    }
     measures = [sizes[section.measure] for sizes in suite.measures.values()]
     critical = {
-        name: CriticalMeasures.from_peaks(peaks, measures, name, limit)
+        name: CriticalMeasures.from_peaks(peaks[name], measures, limit)
         for name, limit in limits.items()
     }
-    natures = {name: Nature.weakest(x.nature([name]) for x in peaks) for name in limits}
+    natures = {name: Nature.weakest(peak.nature for peak in peaks[name]) for name in limits}
     if len(limits) > 1:
         critical[ANY] = of_any_limit(list(critical.values()))
         natures[ANY] = Nature.weakest(natures.values())

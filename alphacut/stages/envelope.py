@@ -13,7 +13,7 @@ from alphacut import frame
 from alphacut.case.motion import EnvelopeSection, Study, Tolerance
 from alphacut.case.structure import Structure
 from alphacut.frame.bounds.remainder import MOST_PARAMETERS
-from alphacut.frame.questions.peaks import Peaks, output_of, peaks, tightest
+from alphacut.frame.questions.peaks import PEAK_BOUNDS, Peak, Peaks, output_of, peaks, tightest
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import FailedError, require
@@ -39,7 +39,7 @@ PEAK_ERROR = 5e-3
 
 
 class PeakResult(Numbers):
-    """Bounds of the peak of an output on each level, in SI, as `Peaks` has them.
+    """Bounds of the peak of an output on each level, in SI, as `Peak` has them.
 
     The peak is the largest magnitude, or the greatest ("max q3") or least ("min q3") value. A least
     value has its own sign here, and `lower` and `upper` change places. Unknown bounds are nan.
@@ -70,8 +70,6 @@ class PeakResult(Numbers):
         return abs((bound - reached) / bound) if bound else 0.0
 
 
-PEAK_BOUNDS = ("lower", "upper", "error", "reached", "least_proved", "least_reached")
-"""Bounds of peaks by the names of `Peaks`."""
 PeakResults = dict[str, PeakResult]
 """Peaks by their names, such as q3 and max q3."""
 
@@ -174,7 +172,7 @@ class EnvelopeTask:
             nature=Nature(data.attrs["nature"]),
             motions_tested=int(data.attrs.get("motions_tested", 0)),
             step=float(data["time"].values[1]),
-            units={x: structure.unit(x) for x in (*names, *outputs_of(peaks.outputs))},
+            units={x: structure.unit(x) for x in (*names, *outputs_of([*peaks]))},
         )
 
     def compute_peaks(
@@ -226,45 +224,38 @@ def loose_peaks(peaks: Peaks, outputs: Sequence[str], gap: float) -> tuple[str, 
 
     The gap is that between the proved and the reached peak, relative to the proved one.
     """
-    loose = []
-    for output in outputs:
-        column = peaks.outputs.index(output) if output in peaks.outputs else None
-        if column is not None and peaks.natures[column] is Nature.GUARANTEED:
-            upper, reached = peaks.upper[:, column], peaks.reached[:, column]
-            if (upper - reached <= gap * np.abs(upper)).all():
-                continue
-        loose.append(output)
-    return tuple(loose)
+
+    def is_close(peak: Peak) -> bool:
+        is_near = (peak.upper - peak.reached <= gap * np.abs(peak.upper)).all()
+        return peak.nature is Nature.GUARANTEED and bool(is_near)
+
+    return tuple(name for name in outputs if name not in peaks or not is_close(peaks[name]))
 
 
 def peak_results(peaks: Peaks) -> PeakResults:
     """Peaks as results, each by its name."""
     results: PeakResults = {}
-    for column, name in enumerate(peaks.outputs):
-        bounds = {bound: getattr(peaks, bound)[:, column] for bound in PEAK_BOUNDS}
-        bounds["proved"] = peaks.most(name).upper
-        is_least = name.startswith("min ")  # which `Peaks` has as the greatest one of −q
-        results[name] = PeakResult(
-            **(_negative(bounds) if is_least else bounds),
-            nature=peaks.natures[column],
-            is_least=is_least,
-        )
+    for name, peak in peaks.items():
+        bounds = {bound: getattr(peak, bound) for bound in PEAK_BOUNDS}
+        bounds["proved"] = peak.greatest_bounds.upper
+        is_least = name.startswith("min ")  # which `Peak` has as the greatest value of −q
+        bounds = _negative(bounds) if is_least else bounds
+        results[name] = PeakResult(**bounds, nature=peak.nature, is_least=is_least)
     return results
 
 
-def peaks_of(results: PeakResults, alpha: Sequence[float]) -> Peaks:
+def peaks_of(results: PeakResults, alpha: Sequence[float]) -> dict[str, Peak]:
     """Peaks from their results on levels `alpha`."""
-    columns = []
-    for peak in results.values():
+    peaks = {}
+    for name, peak in results.items():
         bounds = {bound: getattr(peak, bound) for bound in PEAK_BOUNDS}
-        columns.append(_negative(bounds) if peak.is_least else bounds)
-    stacked: dict[str, Array] = {}
-    for bound in PEAK_BOUNDS:
-        unknown = np.inf if bound in ("upper", "least_reached") else -np.inf
-        values = np.stack([column[bound] for column in columns], 1)
-        stacked[bound] = np.where(np.isnan(values), unknown, values)
-    natures = tuple(peak.nature for peak in results.values())
-    return Peaks(alpha=np.array(alpha), outputs=tuple(results), natures=natures, **stacked)
+        bounds = _negative(bounds) if peak.is_least else bounds
+        for bound, values in bounds.items():
+            unknown = np.inf if bound in ("upper", "least_reached") else -np.inf
+            bounds[bound] = np.where(np.isnan(values), unknown, values)
+        is_signed = name.startswith(("max ", "min "))
+        peaks[name] = Peak(np.array(alpha), **bounds, nature=peak.nature, is_signed=is_signed)
+    return peaks
 
 
 def _negative(bounds: Mapping[str, Array]) -> dict[str, Array]:

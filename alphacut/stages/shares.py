@@ -108,10 +108,9 @@ def peak_shares(model: frame.StoreyFrame, structure: Structure, task: EnvelopeTa
         options |= {"step": step, "method": method, "progress": False}
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)
-            peak_bounds = peaks(frame.envelope(model, fuzzy, **options))
-        is_proved = np.array([nature is Nature.GUARANTEED for nature in peak_bounds.natures])
-        greatest = np.where(is_proved, peak_bounds.reached[0], peak_bounds.upper[0])
-        return peak_bounds.lower[0], greatest
+            found = peaks(frame.envelope(model, fuzzy, **options)).values()
+        greatest = [x.reached[0] if x.nature is Nature.GUARANTEED else x.upper[0] for x in found]
+        return np.array([x.lower[0] for x in found]), np.array(greatest)
 
     return width_shares(bounds, structure.inputs(task.fuzzy), groups=groups)
 

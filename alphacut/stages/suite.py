@@ -16,13 +16,13 @@ from alphacut.case.motion import EnvelopeSection
 from alphacut.case.structure import Structure
 from alphacut.frame import Accelerogram
 from alphacut.frame.dynamics.nonlinear import make_flow
-from alphacut.frame.questions.peaks import Peaks, joined, output_of
+from alphacut.frame.questions.peaks import PEAK_BOUNDS, Peak, Peaks, output_of
 from alphacut.frame.structures.linear import modal_damping_ratios
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.fuzzy.result import Nature
 from alphacut.records.recording import arias_shares, spectral_acceleration
-from alphacut.stages.envelope import PEAK_BOUNDS, EnvelopeTask, PeakResults
+from alphacut.stages.envelope import EnvelopeTask, PeakResults
 from alphacut.stages.store import Numbers, Stage, Values
 
 FREE_PERIODS = 5
@@ -150,17 +150,18 @@ def stage_name(record: SuiteRecord) -> str:
     return f"record_{record.name}"
 
 
-def worst_peaks(peaks: Mapping[str, Peaks]) -> Peaks:
-    """Bounds of the largest of a structure's peaks over all records.
+def worst_peaks(peaks: Mapping[str, Peaks]) -> dict[str, Peak]:
+    """Bounds of the largest of a structure's peaks over all records, by the peak's name.
 
     The largest peak rises with the peak under each record, so that its bounds are the largest ones.
     """
-    first = next(iter(peaks.values()))
-    bounds = {
-        name: np.max([getattr(x, name) for x in peaks.values()], axis=0) for name in PEAK_BOUNDS
-    }
-    columns = zip(*(x.natures for x in peaks.values()), strict=True)
-    return replace(first, natures=tuple(map(Nature.weakest, columns)), **bounds)
+    worst = {}
+    for name, first in next(iter(peaks.values())).items():
+        of_records = [x[name] for x in peaks.values()]
+        nature = Nature.weakest(peak.nature for peak in of_records)
+        bounds = {x: np.max([getattr(peak, x) for peak in of_records], 0) for x in PEAK_BOUNDS}
+        worst[name] = replace(first, nature=nature, **bounds)
+    return worst
 
 
 def means_reached(
@@ -191,25 +192,26 @@ def means_reached(
     return np.array(rows)
 
 
-def with_means(worst: Peaks, peaks: Mapping[str, Peaks], reached: Array) -> Peaks:
+def with_means(worst: Peaks, peaks: Mapping[str, Peaks], reached: Array) -> dict[str, Peak]:
     """The worst peaks, and beside them "mean q3" …, bounds of the mean over the records.
 
     The mean of each structure lies between the means of the least and of the greatest peaks. No
     structure may reach the latter, as each record has its own worst one; `reached` has the greatest
     mean that a structure is known to have, of each magnitude, (levels, outputs).
     """
-    plain = [name for name in worst.outputs if name == output_of(name)]
-    columns = {f"mean {name}": name for name in plain}
-    means = {
-        end: np.mean([getattr(x.named(columns), end) for x in peaks.values()], axis=0)
-        for end in ("lower", "upper", "error", "least_proved")
-    }
-    least = np.maximum(means["lower"] - means["error"], means["least_proved"])
-    # a structure of any higher cut has at least the mean of that cut's least peaks
-    means["reached"] = np.maximum(np.maximum.accumulate(least[::-1])[::-1], reached)
-    means["least_reached"] = np.full_like(least, np.inf)  # no structure's mean is bounded so
-    mean = replace(worst.named(columns), **means)
-    return joined(worst, mean)
+    found = dict(worst)
+    magnitudes = [name for name in worst if name == output_of(name)]
+    for name, known in zip(magnitudes, reached.T, strict=True):
+        means = {
+            bound: np.mean([getattr(x[name], bound) for x in peaks.values()], axis=0)
+            for bound in ("lower", "upper", "error", "least_proved")
+        }
+        least = np.maximum(means["lower"] - means["error"], means["least_proved"])
+        # a structure of any higher cut has at least the mean of that cut's least peaks
+        means["reached"] = np.maximum(np.maximum.accumulate(least[::-1])[::-1], known)
+        means["least_reached"] = np.full_like(least, np.inf)  # no structure's mean is bounded so
+        found[f"mean {name}"] = replace(worst[name], **means)
+    return found
 
 
 class RecordResult(Numbers):

@@ -18,7 +18,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from alphacut.frame.questions.peaks import Peaks
+from alphacut.frame.questions.peaks import Peak
+from alphacut.frame.questions.probability import clopper_pearson
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import require
 from alphacut.fuzzy.result import Ends
@@ -51,37 +52,27 @@ class CriticalMeasures:
         """Refuse measures that are not positive or not in rising order."""
         ends = (self.low, self.low_reached, self.high_reached, self.high)
         rise = all((a <= b * (1 + 1e-9)).all() for a, b in pairwise(ends))
-        require(
-            rise and (self.low > 0).all(),
-            "critical measures",
-            value="not rising",
-            allowed="rising ends",
-        )
+        is_valid = rise and (self.low > 0).all()
+        require(is_valid, "critical measures", value="not rising", allowed="rising ends")
 
     @classmethod
     def from_peaks(
-        cls, peaks: Sequence[Peaks], measures: Sequence[float], output: str, limit: float
+        cls, peaks: Sequence[Peak], measures: Sequence[float], limit: float
     ) -> CriticalMeasures:
-        """Return the critical measures of records from the peaks under each record as it is.
+        """Return the critical measures of R records at a limit of a magnitude, in its SI unit.
 
         Args:
-            peaks: Peaks of each record, R of them on the same levels.
+            peaks: Peak of the limited output under each record as it is, R of them on A levels.
             measures: Measure of each record as it is, R of them.
-            output: Limited output.
-            limit: Limit of its magnitude, in the output's SI unit.
+            limit: The limit.
         """
-        # of each record, falling: bounds of the greatest peak, then of the least one
-        peak_bounds = [(*x.most(output)[::-1], *x.least(output)[::-1]) for x in peaks]
-        scale = np.asarray(measures)[:, None] * limit
+        ends = [(*x.greatest_bounds[::-1], *x.least_bounds[::-1]) for x in peaks]
+        falling = np.maximum(np.swapaxes([np.broadcast_arrays(*x) for x in ends], 0, 1), 0.0)
         with np.errstate(divide="ignore"):
-            low, low_reached, high_reached, high = (
-                # a structure that starts at rest has no negative peak
-                scale / np.maximum([row[k] for row in peak_bounds], 0.0)
-                for k in range(4)
-            )
+            measure_ends = np.asarray(measures)[:, None] * limit / falling  # (4, R, A)
+        low, low_reached, high_reached, high = measure_ends
         # the structure that reaches the greatest peak known is one of the cut
-        high_reached = np.maximum(high_reached, low_reached)
-        return cls(low=low, low_reached=low_reached, high_reached=high_reached, high=high)
+        return cls(low, low_reached, np.maximum(high_reached, low_reached), high)
 
     def band(self, measure: Array) -> Ends:
         """Return bounds of the fraction of the records under which a structure exceeds the limit.
@@ -98,14 +89,9 @@ class CriticalMeasures:
         exceed, and the upper limit of the greatest count (Clopper, Pearson 1934), of shape (A, X)
         each, for measures (X,).
         """
-        from scipy.special import betaincinv  # which takes time to import
-
-        total, tail = len(self.low), (1 - CONFIDENCE) / 2
         # numbers of records that exceed for all structures of the cut, and for some
-        least, most = _counts(self.high, measure), _counts(self.low, measure)
-        lower = betaincinv(np.maximum(least, 1), total - least + 1, tail)
-        upper = betaincinv(most + 1, np.maximum(total - most, 1), 1 - tail)
-        return Ends(np.where(least > 0, lower, 0.0), np.where(most < total, upper, 1.0))
+        counts = _counts(self.high, measure), _counts(self.low, measure)
+        return clopper_pearson(*counts, len(self.low), (1 - CONFIDENCE) / 2)
 
     @property
     def median(self) -> Ends:
@@ -141,9 +127,7 @@ def of_any_limit(limits: Sequence[CriticalMeasures]) -> CriticalMeasures:
         np.min([getattr(x, name) for x in limits], axis=0)
         for name in ("low", "low_reached", "high")
     )
-    return CriticalMeasures(
-        low=low, low_reached=reached, high_reached=reached, high=np.maximum(high, reached)
-    )
+    return CriticalMeasures(low, reached, reached, np.maximum(high, reached))
 
 
 def _counts(critical: Array, measure: Array) -> Array:

@@ -12,9 +12,8 @@ excludes the motion on its level and above. One that is attained above it proves
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import reduce
 
 import numpy as np
 
@@ -25,89 +24,72 @@ from alphacut.fuzzy.result import Ends, Nature
 
 ANY = "any of them"
 """Name of the event that any of several limits is exceeded."""
+PEAK_BOUNDS = ("lower", "upper", "error", "reached", "least_proved", "least_reached")
+"""Arrays of a `Peak` over the levels."""
 
 
 def output_of(peak: str) -> str:
-    """The output of a peak: "q3" of "max q3"."""
+    """Return the output of a peak: "q3" of "max q3"."""
     return peak.removeprefix("max ").removeprefix("min ").removeprefix("mean ")
 
 
 @dataclass(frozen=True, eq=False)
-class Peaks:
-    """Bounds of the largest magnitude of each output over time, or of its largest value.
-
-    The latter is named "max q3", or "min q3" for the largest value of −q3.
+class Peak:
+    """Bounds of the largest magnitude of an output over time, or of its largest value.
 
     Args:
         alpha: Levels, rising, shape (A,).
-        outputs: Names of the peaks, m of them.
-        lower: Least peak at the nodes over each cut, as the envelope bounds it, shape (A, m).
-        upper: Greatest peak at the nodes over each cut, as the envelope bounds it, shape (A, m).
+        lower: Least peak at the nodes over each cut, as the envelope bounds it, shape (A,).
+        upper: Greatest peak at the nodes over each cut, as the envelope bounds it.
         error: Distance by which peaks may lie outside `lower` and `upper`: that of the envelope and
-            of the steps between nodes, shape (A, m); 0 of guaranteed bounds, which contain it.
-        reached: Peak that some motion in the cut is known to reach, shape (A, m).
-        least_proved: Peak that each motion in the cut is proved to have at least, shape (A, m).
+            of the steps between nodes; 0 of guaranteed bounds, which contain it.
+        reached: Peak that some motion in the cut is known to reach.
+        least_proved: Peak that each motion in the cut is proved to have at least.
         least_reached: Peak that some motion in the cut is known not to exceed; infinite without
             one.
-        natures: Nature of each output's bounds, m of them.
+        nature: Nature of the bounds.
+        is_signed: Whether it is a largest value, which may be negative, instead of a magnitude.
     """
 
     alpha: Array
-    outputs: tuple[str, ...]
     lower: Array
     upper: Array
     error: Array
     reached: Array
     least_proved: Array
     least_reached: Array
-    natures: tuple[Nature, ...]
+    nature: Nature
+    is_signed: bool = False
 
-    def most(self, output: str) -> Ends:
-        """Return a lower and an upper bound of the greatest peak in each cut, shape (A,) each.
+    @property
+    def greatest_bounds(self) -> Ends:
+        """A lower and an upper bound of the greatest peak in each cut, shape (A,) each.
 
         If the envelope is only attained the upper one is infinite: other motions may peak higher.
         """
-        k = self.outputs.index(output)
-        is_attained = self.natures[k] is Nature.ATTAINED
-        upper_bound = self.upper[:, k] + (np.inf if is_attained else self.error[:, k])
-        return Ends(self.reached[:, k], upper_bound)
+        is_attained = self.nature is Nature.ATTAINED
+        return Ends(self.reached, self.upper + (np.inf if is_attained else self.error))
 
-    def least(self, output: str) -> Ends:
-        """Return a lower and an upper bound of the least peak in each cut, shape (A,) each.
+    @property
+    def least_bounds(self) -> Ends:
+        """A lower and an upper bound of the least peak in each cut, shape (A,) each.
 
         Each cut contains the narrowest one, whose greatest peak bounds the least peak from above.
         """
-        k = self.outputs.index(output)
-        smallest = -np.inf if self._is_signed(output) else 0.0  # of any peak
-        lower_bound = np.maximum(self.lower[:, k] - self.error[:, k], smallest)
-        if self.natures[k] is Nature.ATTAINED:
+        smallest = -np.inf if self.is_signed else 0.0  # of any peak
+        lower_bound = np.maximum(self.lower - self.error, smallest)
+        if self.nature is Nature.ATTAINED:
             lower_bound = np.full_like(lower_bound, smallest)
-        upper_bound = np.minimum(self.most(output).upper[-1:], self.least_reached[:, k])
-        return Ends(np.maximum(lower_bound, self.least_proved[:, k]), upper_bound)
-
-    @staticmethod
-    def _is_signed(output: str) -> bool:
-        return output.startswith(("max ", "min "))
-
-    def named(self, peaks: Mapping[str, str]) -> Peaks:
-        """Return a selection of these peaks under new names.
-
-        Args:
-            peaks: Peak by new name, such as several limits of one output.
-        """
-        columns = [self.outputs.index(peak) for peak in peaks.values()]
-        names = ("lower", "upper", "error", "reached", "least_proved", "least_reached")
-        ends = {name: getattr(self, name)[:, columns] for name in names}
-        natures = tuple(self.natures[k] for k in columns)
-        return replace(self, outputs=tuple(peaks), natures=natures, **ends)
-
-    def nature(self, outputs: Iterable[str]) -> Nature:
-        """Return the weakest nature of some peaks' bounds."""
-        return Nature.weakest(self.natures[self.outputs.index(name)] for name in outputs)
+        upper_bound = np.minimum(self.greatest_bounds.upper[-1:], self.least_reached)
+        return Ends(np.maximum(lower_bound, self.least_proved), upper_bound)
 
 
-def peaks(envelope: Envelope, names: Sequence[str] = ()) -> Peaks:
-    """Return the fuzzy peaks of an envelope's outputs: intervals of the peak over time by level.
+Peaks = Mapping[str, Peak]
+"""Peaks by name: "q3" of a magnitude, "max q3" of a value, "min q3" of the largest value of −q3."""
+
+
+def peaks(envelope: Envelope, names: Sequence[str] = ()) -> dict[str, Peak]:
+    """Return the fuzzy peaks of an envelope's outputs by name: intervals of the peak by level.
 
     Args:
         envelope: The envelope.
@@ -117,132 +99,94 @@ def peaks(envelope: Envelope, names: Sequence[str] = ()) -> Peaks:
     Returns:
         Bounds of the greatest and least peak in each cut, their error, and peaks that are reached.
     """
-    names = tuple(names) or tuple(map(str, envelope.outputs))
-    columns = [list(map(str, envelope.outputs)).index(output_of(name)) for name in names]
-    natures = tuple(
-        (envelope.natures or (envelope.nature,) * len(envelope.outputs))[k] for k in columns
+    return {name: _peak_of(envelope, name) for name in names or map(str, envelope.outputs)}
+
+
+def _peak_of(envelope: Envelope, name: str) -> Peak:
+    """Return one fuzzy peak of an envelope by its name."""
+    k = [*map(str, envelope.outputs)].index(output_of(name))
+    nature = envelope.natures[k] if envelope.natures else envelope.nature
+    is_proved, is_signed = nature is Nature.GUARANTEED, name != output_of(name)
+    smallest = -np.inf if is_signed else 0.0  # of any peak
+    error = 0.0 if is_proved else envelope.error[..., k]  # which proved bounds contain
+    band, attained = (
+        _oriented(ends.lower[..., k], ends.upper[..., k], name)  # (A, T) each
+        for ends in (envelope, envelope.attained)
     )
-    proved = np.array([nature is Nature.GUARANTEED for nature in natures])
-    error = np.where(proved, 0.0, envelope.error[..., columns])  # which proved bounds contain
-    between = None if envelope.between is None else envelope.between[:, columns]
-    most, least = _sided(Ends(envelope.lower, envelope.upper), names, columns)  # (A, T, m)
-    attained, _ = _sided(envelope.attained, names, columns)
-    signed = np.array([name != output_of(name) for name in names])
-    floor = np.where(signed, -np.inf, 0.0)  # no peak of a magnitude is lower
-    upper, lower = most.max(1), least.max(1)
-    above = within_steps(most + error, between).max(1) - upper
-    below = lower - np.maximum(least - error, floor).max(1)
-    least_proved = np.zeros_like(upper)
-    if envelope.least_peaks is not None:
-        least_proved = envelope.least_peaks.lower[:, columns]
-    least_proved = np.where(signed, -np.inf, least_proved)
-    lower = np.where(proved, np.maximum(lower, least_proved), lower)
-    upper = np.where(proved, upper + above, upper)
-    reached = np.where(np.isnan(attained), floor, attained).max(1)
-    least_reached = np.full(envelope.upper[:, 0].shape, np.inf)
-    if envelope.least_peaks is not None:
-        least_reached = envelope.least_peaks.upper
-    return Peaks(
+    upper, lower = band.upper.max(1), band.lower.max(1)
+    between = None if envelope.between is None else envelope.between[:, k]
+    above = within_steps(band.upper + error, between).max(1) - upper
+    below = lower - np.maximum(band.lower - error, smallest).max(1)
+    least_proved, least_reached = np.full_like(upper, smallest), np.full_like(upper, np.inf)
+    if envelope.least_peaks is not None and not is_signed:
+        least_proved, least_reached = (end[:, k] for end in envelope.least_peaks)
+    if is_proved:
+        lower, upper = np.maximum(lower, least_proved), upper + above
+    reached = np.where(np.isnan(attained.upper), smallest, attained.upper).max(1)
+    return Peak(
         alpha=np.asarray(envelope.alpha),
-        outputs=names,
         lower=lower,
         upper=upper,
-        error=np.where(proved, 0.0, np.maximum(above, below)),
-        reached=np.maximum(reached, floor),
+        error=0.0 * upper if is_proved else np.maximum(above, below),
+        reached=np.maximum(reached, smallest),
         least_proved=least_proved,
-        least_reached=np.where(signed, np.inf, least_reached[:, columns]),
-        natures=natures,
+        least_reached=least_reached,
+        nature=nature,
+        is_signed=is_signed,
     )
 
 
-def _sided(band: Ends, names: Sequence[str], columns: Sequence[int]) -> tuple[Array, Array]:
-    """Return upper and lower bounds of |q|, or of q ("max q") or −q ("min q"), each (A, T, m).
+def _oriented(low: Array, high: Array, name: str) -> Ends:
+    """Return bounds of |q|, or of q ("max q") or −q ("min q"), from those of the output q."""
+    if name.startswith("min "):
+        return Ends(-high, -low)
+    if name.startswith("max "):
+        return Ends(low, high)
+    return Ends(np.maximum(np.maximum(low, -high), 0.0), np.maximum(high, -low))
 
-    Args:
-        band: Lower and upper bounds of the outputs.
-        names: Names of the m peaks.
-        columns: Output of each peak.
+
+def tightest(first: Peaks, second: Peaks) -> dict[str, Peak]:
+    """Return the tightest bounds of peaks by two analyses of the same response, by name.
+
+    Guaranteed bounds are intersected and attained ones united; else the bounds of the stronger
+    nature or of the smaller error are taken. Peaks that either analysis reaches are kept.
     """
-    upper, lower = [], []
-    for name, k in zip(names, columns, strict=True):
-        low, high = band.lower[..., k], band.upper[..., k]
-        if name.startswith("min "):
-            low, high = -high, -low
-        elif name == output_of(name):  # a magnitude
-            low, high = np.maximum(np.maximum(low, -high), 0.0), np.maximum(high, -low)
-        upper.append(high)
-        lower.append(low)
-    return np.stack(upper, -1), np.stack(lower, -1)
+    both = {name: _tighter(first[name], second[name]) for name in first if name in second}
+    return {**first, **second, **both}
 
 
-def joined(first: Peaks, second: Peaks) -> Peaks:
-    """Return two sets of peaks on the same levels, with different names, as one set."""
-    names = ("lower", "upper", "error", "reached", "least_proved", "least_reached")
-    ends = {name: np.hstack([getattr(first, name), getattr(second, name)]) for name in names}
-    outputs, natures = (*first.outputs, *second.outputs), (*first.natures, *second.natures)
-    return replace(first, outputs=outputs, natures=natures, **ends)
-
-
-def tightest(first: Peaks, second: Peaks) -> Peaks:
-    """Return the tightest bounds of peaks by two analyses of the same response, by output.
-
-    Two proved bounds are intersected; else the bounds of the stronger nature or of the smaller
-    error are taken. Peaks that either analysis reaches are kept.
-
-    Args:
-        first: Peaks of all or some outputs.
-        second: Peaks of all or some outputs.
-    """
-    outputs = tuple(dict.fromkeys((*first.outputs, *second.outputs)))
-    columns = [_tightest_column(first, second, output) for output in outputs]
-    return reduce(joined, columns)
-
-
-def _column(peaks: Peaks, output: str) -> Peaks:
-    """Peaks of an output alone, arrays of shape (A, 1)."""
-    return peaks.named({output: output})
-
-
-def _tightest_column(first: Peaks, second: Peaks, output: str) -> Peaks:
-    """Return the peaks of one output by both of two sets.
-
-    Guaranteed bounds are intersected and attained ones united; else those of the smaller error or
-    of the stronger nature are returned. What either reaches is kept.
-    """
-    columns = [_column(x, output) for x in (first, second) if output in x.outputs]
-    if len(columns) == 1:
-        return columns[0]
-    left, right = columns
-    if left.natures == right.natures == (Nature.GUARANTEED,):
-        lower, upper = np.maximum(left.lower, right.lower), np.minimum(left.upper, right.upper)
-        better = replace(left, lower=lower, upper=upper)
-    elif left.natures == right.natures == (Nature.ATTAINED,):
-        lower, upper = np.minimum(left.lower, right.lower), np.maximum(left.upper, right.upper)
-        better = replace(left, lower=lower, upper=upper, error=np.maximum(left.error, right.error))
-    elif left.natures == right.natures:
-        better = min(left, right, key=lambda column: column.error.max())
+def _tighter(first: Peak, second: Peak) -> Peak:
+    natures = {first.nature, second.nature}
+    if natures == {Nature.GUARANTEED}:
+        lower, upper = np.maximum(first.lower, second.lower), np.minimum(first.upper, second.upper)
+        better = replace(first, lower=lower, upper=upper)
+    elif natures == {Nature.ATTAINED}:
+        lower, upper = np.minimum(first.lower, second.lower), np.maximum(first.upper, second.upper)
+        error = np.maximum(first.error, second.error)
+        better = replace(first, lower=lower, upper=upper, error=error)
+    elif len(natures) == 1:
+        better = min(first, second, key=lambda peak: peak.error.max())
     else:
-        better = max(left, right, key=lambda column: list(Nature).index(column.natures[0]))
+        better = max(first, second, key=lambda peak: list(Nature).index(peak.nature))
     return replace(
         better,
-        reached=np.maximum(left.reached, right.reached),
-        least_proved=np.maximum(left.least_proved, right.least_proved),
-        least_reached=np.minimum(left.least_reached, right.least_reached),
+        reached=np.maximum(first.reached, second.reached),
+        least_proved=np.maximum(first.least_proved, second.least_proved),
+        least_reached=np.minimum(first.least_reached, second.least_reached),
     )
 
 
 def within_steps(size: Array, between: Array | None) -> Array:
-    """Return upper bounds of a magnitude over the step before each node, shape (…, T, m).
+    """Return upper bounds of a magnitude over the step before each node, shape (…, T).
 
     Args:
-        size: The magnitude at the nodes, shape (…, T, m).
-        between: What it may exceed both ends of each step by, shape (T, m); None for nothing.
+        size: The magnitude at the time nodes, shape (…, T).
+        between: What it may exceed both ends of each step by, shape (…, T); None for nothing.
     """
     if between is None:
         return size
-    out = size.copy()
-    out[..., 1:, :] = np.maximum(size[..., 1:, :], size[..., :-1, :]) + between[1:]
-    return out
+    inside = np.maximum(size[..., 1:], size[..., :-1]) + between[..., 1:]
+    return np.concatenate([size[..., :1], inside], axis=-1)
 
 
 def require_limits(limits: Mapping[str, float], outputs: Sequence[str]) -> None:
@@ -314,33 +258,34 @@ def passing(peaks: Peaks, limits: Mapping[str, float]) -> dict[str, Passing]:
     Raises:
         RefusedError: There is no limit, one is not positive, or it names no output.
     """
-    require_limits(limits, peaks.outputs)
-    answers = {name: _passing_of(peaks, name, float(limit)) for name, limit in limits.items()}
+    require_limits(limits, [*peaks])
+    answers = {name: _passing_of(peaks[name], float(limit)) for name, limit in limits.items()}
     if len(answers) > 1:
-        answers[ANY] = _any(answers, limits)
+        answers[ANY] = _passing_of_any(answers, limits)
     return answers
 
 
-def _passing_of(peaks: Peaks, output: str, limit: float) -> Passing:
-    """Return the degrees to which it is possible and necessary that an output exceeds its limit.
+def _passing_of(peak: Peak, limit: float) -> Passing:
+    """Return the degrees to which it is possible and necessary that a peak exceeds its limit.
 
     The necessity of exceeding is 1 less the possibility of not exceeding (Dubois, Prade 1988).
     """
-    most, least, alpha = peaks.most(output), peaks.least(output), peaks.alpha
-    possibility = _highest(alpha, most.lower > limit), _excluded(alpha, most.upper <= limit)
+    greatest, least, alpha = peak.greatest_bounds, peak.least_bounds, peak.alpha
+    reaches, is_excluded = greatest.lower > limit, greatest.upper <= limit
+    possibility = _highest(alpha, reaches), _excluded(alpha, is_excluded)
     is_kept = np.broadcast_to(least.upper <= limit, alpha.shape)  # by some motion
     possibility_of_keeping = _highest(alpha, is_kept), _excluded(alpha, least.lower > limit)
     return Passing(
         possibility=possibility,
         necessity=(1 - possibility_of_keeping[1], 1 - possibility_of_keeping[0]),
-        margin=limit - np.stack([most.upper, least.lower], axis=1),
+        margin=limit - np.stack([greatest.upper, least.lower], axis=1),
         lowest=float(alpha[0]),
-        nature=peaks.nature([output]),
-        is_reached=bool((most.lower > limit).any()),
+        nature=peak.nature,
+        is_reached=bool(reaches.any()),
     )
 
 
-def _any(answers: Mapping[str, Passing], limits: Mapping[str, float]) -> Passing:
+def _passing_of_any(answers: Mapping[str, Passing], limits: Mapping[str, float]) -> Passing:
     """Return the degrees to which any of several limits is exceeded.
 
     The possibility is that of the limit most possibly exceeded. The necessity is at least that of

@@ -26,6 +26,7 @@ from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.progress_bar import Progress
 from alphacut.fuzzy.refused import require
+from alphacut.fuzzy.result import Ends
 from alphacut.fuzzy.sets.boxes import chebyshev_points, corners
 
 LIMITS = 201
@@ -34,9 +35,8 @@ SPREAD = 64
 """Points inside each α-cut."""
 LOOKED_AT = 4
 """Fuzzy points, and draws of each, whose motion between nodes is looked at."""
-MOST_CORNERS = 8
-"""Inputs of which the corners are tried."""
-
+MAX_CORNER_INPUTS = 8
+"""Most inputs of which all corners are tried."""
 CONFIDENCE = 0.95
 """Probability with which the intervals of all fuzzy points hold at once, for each limit."""
 
@@ -124,20 +124,23 @@ def probabilities(
     between = node_deviation(flow, few)
     step_error = MARGIN * np.maximum.accumulate(flow.deviations(few)[1].max(0), axis=0)
     columns, sizes = [list(model.outputs).index(x) for x in limits], np.array([*limits.values()])
+    step_error, between = step_error.T[columns], between.T[columns]  # (limits, T)
     ratios = []  # of peaks to limits: lower and upper bound at nodes, upper bound within steps
     for count, point in enumerate(points, start=1):
-        values = np.abs(flow.values(np.hstack([np.tile(point, (len(draws), 1)), draws])))
-        low, high = np.maximum(values - step_error, 0.0), values + step_error
-        bounds = low, high, within_steps(high, between)
-        ratios.append([x.max(1)[:, columns] / sizes for x in bounds])
+        values = flow.values(np.hstack([np.tile(point, (len(draws), 1)), draws]))
+        size = np.abs(np.moveaxis(values, 2, 0)[columns]).swapaxes(0, 1)  # (draws, limits, T)
+        low, high = np.maximum(size - step_error, 0.0), size + step_error
+        ratios.append([x.max(-1) / sizes for x in (low, high, within_steps(high, between))])
         if progress:
             progress(count / len(points))
-    by_point = np.moveaxis(np.array(ratios), 1, 0)  # (bounds, points, draws, limits)
+    by_limit = np.moveaxis(np.array(ratios), (3, 1), (0, 1))  # (limits, bounds, points, draws)
+    events = dict(zip(limits, zip(by_limit, sizes, strict=True), strict=True))
+    if len(limits) > 1:
+        events[ANY] = by_limit.max(0), 1.0
     level = np.repeat(np.arange(len(cuts.alpha)), [len(x) for x in points_of_levels])
-    events = [*np.moveaxis(by_point, -1, 0)] + ([by_point.max(-1)] if len(limits) > 1 else [])
     return {
-        name: _probability(event, level, scale, has_random=bool(random))
-        for name, event, scale in zip((*limits, ANY), events, (*sizes, 1.0), strict=False)
+        name: _probability(event, level, limit, has_random=bool(random))
+        for name, (event, limit) in events.items()
     }
 
 
@@ -147,70 +150,72 @@ def _tried(cuts: Boxes, level: int) -> Array:
     if not (upper > lower).any():
         return cuts.modal[None]
     inner = (lower + upper) / 2 + (upper - lower) / 2 * chebyshev_points(len(lower), SPREAD)
-    ends = corners(lower, upper) if len(lower) <= MOST_CORNERS else inner[:0]
+    ends = corners(lower, upper) if len(lower) <= MAX_CORNER_INPUTS else inner[:0]
     return np.asarray(cuts.to_physical(np.vstack([ends, inner])))
 
 
-def _probability(event: Array, level: Array, scale: float, *, has_random: bool) -> Probability:
+def _probability(event: Array, level: Array, limit: float, *, has_random: bool) -> Probability:
     """Return bounds of the probability that a ratio of peak to limit exceeds 1.
 
     Args:
         event: Ratios, shape (3, points, draws): lower bound and upper bound at the nodes, and upper
             bound within the steps.
         level: Row of the level of each point, shape (points,).
-        scale: The limit.
+        limit: The limit.
         has_random: Whether there are random inputs.
     """
     low_ratio, ratio, ratio_within_steps = event
     # the last limit is the one in question, a ratio of 1
     limits = np.append(np.linspace(0.95 * low_ratio.min(), 1.05 * ratio.max(), LIMITS), 1.0)
-    low, _ = _bounds(low_ratio, level, limits)
-    least, high = _bounds(ratio, level, limits)
-    larger = [ends[:, 0] for ends in _bounds(ratio_within_steps, level, np.ones(1))]
-    interval = np.stack([least[:, -1], high[:, -1]])
+    low = _over_points(_exceeding(low_ratio, limits), level).lower
+    least, high = _over_points(_exceeding(ratio, limits), level)
+    larger = _over_points(_exceeding(ratio_within_steps, np.ones(1)), level)
+    interval = Ends(least[:, -1], high[:, -1])
     if has_random:
-        n_least, n_most = ((x > 1).sum(axis=1) for x in (low_ratio, ratio_within_steps))
-        interval = _interval(n_least, n_most, ratio.shape[1], level)
+        tail = (1 - CONFIDENCE) / (2 * len(level))  # of either side at one point (Bonferroni)
+        surely, possibly = ((x > 1).sum(axis=1) for x in (low_ratio, ratio_within_steps))
+        ends = clopper_pearson(surely, possibly, ratio.shape[1], tail)
+        interval = Ends(
+            _over_points(ends.lower, level).lower, _over_points(ends.upper, level).upper
+        )
+    error = np.maximum(larger.lower[:, 0] - least[:, -1], larger.upper[:, 0] - high[:, -1])
     return Probability(
         lower=low[:, -1],
         upper=high[:, -1],
-        error=np.maximum(larger[0] - least[:, -1], larger[1] - high[:, -1]),
-        interval=interval,
-        limits=limits[:-1] * scale,
+        error=error,
+        interval=np.stack(interval),
+        limits=limits[:-1] * limit,
         curve=np.stack([low[:, :-1], high[:, :-1]]),
         evaluations=ratio.size,
     )
 
 
-def _interval(least: Array, most: Array, draws: int, level: Array) -> Array:
-    """Return the least lower and largest upper Clopper–Pearson limit over points, (2, A).
+def clopper_pearson(least: Array, most: Array, total: int, tail: float) -> Ends:
+    """Return exact limits of a probability from counts of events in independent draws.
 
     Args:
-        least: Number of draws that exceed the limit for sure, by point, shape (points,).
-        most: Number of draws that may exceed it, also between nodes, shape (points,).
-        draws: Independent draws at each point.
-        level: Row of the level of each point, shape (points,).
+        least: Number of draws that are events for sure.
+        most: Number of draws that may be events, same shape.
+        total: Number of draws.
+        tail: Probability with which each limit may be passed (Clopper, Pearson 1934).
     """
-    from scipy.stats import beta
+    from scipy.special import betaincinv  # which takes time to import
 
-    miss = (1 - CONFIDENCE) / (2 * len(level))  # of either side at one point (Bonferroni)
-    low = np.where(least > 0, beta.ppf(miss, least, draws - least + 1), 0.0)
-    high = np.where(most < draws, beta.ppf(1 - miss, most + 1, draws - most), 1.0)
-    inside = [level >= k for k in range(level.max() + 1)]
-    return np.array([[low[x].min() for x in inside], [high[x].max() for x in inside]])
+    lower = betaincinv(np.maximum(least, 1), total - least + 1, tail)
+    upper = betaincinv(most + 1, np.maximum(total - most, 1), 1 - tail)
+    return Ends(np.where(least > 0, lower, 0.0), np.where(most < total, upper, 1.0))
 
 
-def _bounds(peak: Array, level: Array, limits: Array) -> tuple[Array, Array]:
-    """Return least and greatest fraction of peaks above each limit, over points, (A, L) each.
+def _exceeding(peaks: Array, limits: Array) -> Array:
+    """Return the fraction of peaks (points, draws) above each limit (L,), shape (points, L)."""
+    rows = np.sort(peaks, axis=1)
+    return np.array([1 - np.searchsorted(x, limits, side="right") / len(x) for x in rows])
+
+
+def _over_points(values: Array, level: Array) -> Ends:
+    """Return least and greatest values (A, …) over the points (points, …) of each level.
 
     Points of higher levels count for the lower ones, so that the bounds are nested.
-
-    Args:
-        peak: Peaks, shape (points, draws).
-        level: Row of the level of each point, shape (points,).
-        limits: Limits, shape (L,).
     """
-    rows = np.sort(peak, axis=1)
-    share = np.array([1 - np.searchsorted(x, limits, side="right") / len(x) for x in rows])
-    parts = [share[level >= k] for k in range(level.max() + 1)]
-    return np.array([part.min(0) for part in parts]), np.array([part.max(0) for part in parts])
+    parts = [values[level >= k] for k in range(level.max() + 1)]
+    return Ends(np.array([x.min(0) for x in parts]), np.array([x.max(0) for x in parts]))

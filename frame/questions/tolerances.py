@@ -10,8 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 
@@ -99,65 +97,54 @@ def tolerances(
     checked_number("most", most, positive=True)
     checked_number("precision", precision, positive=True, most=1)
     require_limits(limits, model.outputs)
-    bounds = partial(
-        envelope,
-        model,
-        duration=duration,
-        step=step,
-        alpha=[0.0],
-        method=Auto(error, peaks=True),
-        progress=False,
-    )
-    tried: dict[float, _Outcome] = {}
+    tried = {1.0: at_one} if at_one is not None and most >= 1 else {}  # peaks by scale
 
-    def outcome_at(scale: float) -> _Outcome:
-        """Return whether limits are exceeded at a scale, computed once."""
+    def peaks_at(scale: float) -> Peaks:
+        """Return the peaks on the supports at a scale, computed once."""
         if scale not in tried:
-            tried[scale] = _outcome(peaks(bounds(scaled(inputs, scale))), limits)
+            bounds = envelope(
+                model,
+                scaled(inputs, scale),
+                Auto(error, peaks=True),
+                duration=duration,
+                step=step,
+                alpha=[0.0],
+                progress=False,
+            )
+            tried[scale] = peaks(bounds)
             if progress:
                 progress(min(1.0, len(tried) / (2 + np.log2(1 / precision))))
         return tried[scale]
 
+    def is_excluded(scale: float) -> bool:
+        """Return True if no motion exceeds a limit at a scale."""
+        found = peaks_at(scale)
+        return all(found[x].greatest_bounds.upper[0] <= limit for x, limit in limits.items())
+
+    def is_exceeded(scale: float) -> bool:
+        """Return True if a computed motion exceeds a limit at a scale."""
+        found = peaks_at(scale)
+        return any(found[x].greatest_bounds.lower[0] > limit for x, limit in limits.items())
+
     # the largest scale at which exceeding is excluded, from the largest one known
     near = precision * most
-    if at_one is not None and most >= 1:
-        tried[1.0] = _outcome(at_one, limits)
-    candidates = (most, *tried, 0.0)
-    low = next((scale for scale in candidates if outcome_at(scale).is_excluded), 0.0)
-    if low < most and tried[low].is_excluded:
-        high = min(scale for scale in tried if scale > low)
-        low = _bisected(lambda scale: outcome_at(scale).is_excluded, low, high, near)
+    low = next((scale for scale in (most, *tried, 0.0) if is_excluded(scale)), 0.0)
+    if low < most and is_excluded(low):
+        low = _bisected(is_excluded, low, min(scale for scale in tried if scale > low), near)
     # the same for scales at which a computed motion exceeds a limit
-    passed = min((scale for scale, outcome in tried.items() if outcome.is_exceeded), default=np.inf)
+    passed = min(filter(is_exceeded, tried), default=np.inf)
     clear = max((scale for scale in tried if scale < passed), default=None)
     if clear is not None and passed < np.inf:
-        clear = _bisected(lambda scale: not outcome_at(scale).is_exceeded, clear, passed, near)
-        passed = min(scale for scale, outcome in tried.items() if outcome.is_exceeded)
-    supports = {name: number.support for name, number in scaled(inputs, low).items()}
+        clear = _bisected(lambda scale: not is_exceeded(scale), clear, passed, near)
+        passed = min(filter(is_exceeded, tried))
     return Tolerances(
-        admissible=low if tried[low].is_excluded else None,
+        admissible=low if is_excluded(low) else None,
         clear=clear,
         passed=passed,
-        supports=supports,
-        nature=tried[low].nature,
+        supports={name: number.support for name, number in scaled(inputs, low).items()},
+        nature=Nature.weakest(peaks_at(low)[name].nature for name in limits),
         envelopes=len(tried),
     )
-
-
-class _Outcome(NamedTuple):
-    """Whether exceeding limits is excluded, whether a motion exceeds one, and their nature."""
-
-    is_excluded: bool
-    is_exceeded: bool
-    nature: Nature
-
-
-def _outcome(peaks: Peaks, limits: Mapping[str, float]) -> _Outcome:
-    """Return whether limits are exceeded, from the peaks on the lowest level."""
-    ends = [(peaks.most(name), limit) for name, limit in limits.items()]
-    is_excluded = all(most.upper[0] <= limit for most, limit in ends)
-    is_exceeded = any(most.lower[0] > limit for most, limit in ends)
-    return _Outcome(is_excluded, is_exceeded, peaks.nature(limits))
 
 
 def _bisected(holds: Callable[[float], bool], low: float, high: float, near: float) -> float:

@@ -11,7 +11,7 @@ from alphacut.case.limits import Limit, parse_limit
 from alphacut.commands.pipeline import QUESTIONS as PUT
 from alphacut.entry import main
 from alphacut.figures.envelope import DRAWINGS
-from alphacut.frame.questions.peaks import Peaks
+from alphacut.frame.questions.peaks import Peak
 from alphacut.fuzzy import Triangular
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature
@@ -29,18 +29,16 @@ def summary(results):
 
 
 def test_peaks_are_wide_where_the_gap_is_or_nothing_is_proved():
-    cuts = np.ones((2, 3))
-    bounds = Peaks(
-        alpha=np.array([0.0, 1.0]),
-        outputs=("q1", "q2", "q3"),
-        lower=cuts,
-        upper=np.array([[1.0, 1.1, 1.0], [1.0, 1.0, 1.0]]),
-        error=0 * cuts,
-        reached=cuts,
-        least_proved=cuts,
-        least_reached=cuts,
-        natures=(Nature.GUARANTEED, Nature.GUARANTEED, Nature.ESTIMATED),
-    )
+    one = np.ones(2)
+
+    def peak(upper, nature=Nature.GUARANTEED):
+        return Peak(np.array([0.0, 1.0]), one, upper, 0 * one, one, one, one, nature)
+
+    bounds = {
+        "q1": peak(one),
+        "q2": peak(np.array([1.1, 1.0])),
+        "q3": peak(one, Nature.ESTIMATED),
+    }
     assert loose_peaks(bounds, ("q1", "q2", "q3", "max q1"), 0.05) == ("q2", "q3", "max q1")
     assert loose_peaks(bounds, ("q1", "q2"), 0.1) == ()
 

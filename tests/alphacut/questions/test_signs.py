@@ -7,7 +7,7 @@ import pytest
 
 from alphacut.case.limits import parse_limit
 from alphacut.frame import Accelerogram, StoreyFrame, envelope
-from alphacut.frame.questions.peaks import Peaks, passing
+from alphacut.frame.questions.peaks import Peak, passing
 from alphacut.frame.questions.peaks import peaks as peaks_over_time
 from alphacut.fuzzy import Interval
 from alphacut.fuzzy.result import Nature
@@ -34,13 +34,10 @@ def peaks_with(side, low, high, reached):
     """Peaks as the frame has them: of the negative of the output for its least value."""
     if side == "min":
         low, high, reached = -high, -low, -reached
-    ends = {"lower": low, "upper": high, "error": 0.0, "reached": reached, "least_proved": low}
-    arrays = {name: np.array([[value]]) for name, value in ends.items()}
+    ends = [np.array([value]) for value in (low, high, 0.0, reached, low, high)]
+    peak = Peak(np.zeros(1), *ends, Nature.GUARANTEED, is_signed=bool(side))
     name = f"{side} q1".strip()
-    return name, Peaks(
-        np.zeros(1), (name,), **arrays, least_reached=np.array([[high]]),
-        natures=(Nature.GUARANTEED,),
-    )  # fmt: skip
+    return name, {name: peak}
 
 
 def test_every_number_on_a_limit_has_the_sign_of_the_output(rng):
@@ -55,8 +52,8 @@ def test_every_number_on_a_limit_has_the_sign_of_the_output(rng):
             (low, high, reached)
         )
         again = peaks_of({name: peak}, [0.0])
-        assert again.upper[0, 0] == pytest.approx(peaks.upper[0, 0])
-        assert again.lower[0, 0] == pytest.approx(peaks.lower[0, 0])
+        assert again[name].upper[0] == pytest.approx(peaks[name].upper[0])
+        assert again[name].lower[0] == pytest.approx(peaks[name].lower[0])
         far = low if side == "min" else high
         assert peak.proved[0] == pytest.approx(far)
         assert peak.far_end[0] == pytest.approx(far)
@@ -83,6 +80,6 @@ def test_python_says_the_bound_over_time_as_the_command_does():
     inputs = {"k1": Interval(149.0, 151.0)}
     found = envelope(frame, inputs, duration=1.2, step=0.02, alpha=[0], progress=False)
     proved = float(re.search(r"proved (\S+) m", found.peak_words)[1])
-    bound = peaks_over_time(found).upper[0, 0]
+    bound = peaks_over_time(found)["q1"].upper[0]
     assert bound <= proved <= 1.001 * bound
     assert bound > np.maximum(found.upper, -found.lower).max()  # that at the nodes

@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 
-from alphacut.frame.questions.peaks import Peaks, tightest
+from alphacut.frame.questions.peaks import Peak, tightest
 from alphacut.fuzzy.result import Nature
 from alphacut.io.quantity import axis_prefix, range_text
 from alphacut.io.results import ResultsFolder
@@ -62,8 +62,8 @@ def test_tolerances_agree_with_the_peak_at_scale_one(told):
 
 
 def peaks_of(lower, upper, reached, nature, error=0.0, outputs=("q1",)):
-    ends = [np.full((1, len(outputs)), x) for x in (lower, upper, error, reached, 0.0, np.inf)]
-    return Peaks(np.zeros(1), outputs, *ends, (nature,) * len(outputs))
+    ends = [np.array([x]) for x in (lower, upper, error, reached, 0.0, np.inf)]
+    return dict.fromkeys(outputs, Peak(np.zeros(1), *ends, nature))
 
 
 @pytest.mark.parametrize("order", [1, -1])
@@ -71,10 +71,10 @@ def test_the_tighter_proved_and_the_larger_reached_value_is_taken(order):
     first = peaks_of(1.0, 3.0, 2.0, Nature.GUARANTEED)
     second = peaks_of(0.5, 2.5, 2.2, Nature.GUARANTEED, outputs=("q1", "q2"))
     both = tightest(*(first, second)[::order])
-    assert set(both.outputs) == {"q1", "q2"}
-    k = both.outputs.index("q1")
-    assert (both.lower[0, k], both.upper[0, k], both.reached[0, k]) == (1.0, 2.5, 2.2)
+    assert set(both) == {"q1", "q2"}
+    peak = both["q1"]
+    assert (peak.lower[0], peak.upper[0], peak.reached[0]) == (1.0, 2.5, 2.2)
     weaker = peaks_of(1.5, 2.1, 2.4, Nature.ATTAINED)
-    mixed = tightest(*(first, weaker)[::order])
-    assert (mixed.lower[0, 0], mixed.upper[0, 0], mixed.reached[0, 0]) == (1.0, 3.0, 2.4)
-    assert mixed.natures == (Nature.GUARANTEED,)
+    mixed = tightest(*(first, weaker)[::order])["q1"]
+    assert (mixed.lower[0], mixed.upper[0], mixed.reached[0]) == (1.0, 3.0, 2.4)
+    assert mixed.nature is Nature.GUARANTEED

@@ -15,7 +15,7 @@ import alphacut
 from alphacut.case.content import load
 from alphacut.commands.pipeline import Pipeline
 from alphacut.entry import main
-from alphacut.frame.questions.peaks import Peaks
+from alphacut.frame.questions.peaks import Peak
 from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import as_json
@@ -162,19 +162,13 @@ def test_a_borrowed_folder_is_not_believed(tmp_path):
 
 def test_peaks_pass_through_json_with_their_infinite_bounds():
     """An unknown bound never excludes a peak: of "max q1" the least one may be −∞."""
-    row = np.array([[1.0, 2.0]])
-    peaks = Peaks(
-        alpha=np.array([0.0]),
-        outputs=("q1", "max q1"),
-        lower=row,
-        upper=np.array([[3.0, np.inf]]),
-        error=0 * row,
-        reached=np.array([[2.0, -np.inf]]),
-        least_proved=np.array([[0.5, -np.inf]]),
-        least_reached=np.array([[1.5, np.inf]]),
-        natures=(Nature.GUARANTEED, Nature.ATTAINED),
-    )
+    first = [np.array([x]) for x in (1.0, 3.0, 0.0, 2.0, 0.5, 1.5)]
+    second = [np.array([x]) for x in (2.0, np.inf, 0.0, -np.inf, -np.inf, np.inf)]
+    peaks = {
+        "q1": Peak(np.zeros(1), *first, Nature.GUARANTEED),
+        "max q1": Peak(np.zeros(1), *second, Nature.ATTAINED, is_signed=True),
+    }
     kind, text = TypeAdapter(envelope.PeakResults), as_json(envelope.peak_results(peaks))
     again = envelope.peaks_of(kind.validate_json(text), [0.0])
-    for name in ("lower", "upper", "error", "reached", "least_proved", "least_reached"):
-        assert getattr(again, name).tolist() == getattr(peaks, name).tolist(), name
+    for name in peaks:
+        assert {**vars(again[name])} == {**vars(peaks[name])}, name

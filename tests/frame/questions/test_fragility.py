@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import beta
 
 from alphacut.frame.questions.fragility import CriticalMeasures, of_any_limit
-from alphacut.frame.questions.peaks import Peaks
+from alphacut.frame.questions.peaks import Peak
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature
 
@@ -13,11 +13,9 @@ LIMIT = 0.02
 
 
 def peaks(lower, upper, reached):
-    """Peaks of one output q on one level, by what is proved and reached."""
-    rows = (np.array([[x]]) for x in (lower, upper))
-    nothing, natures = np.zeros((1, 1)), (Nature.GUARANTEED,)
-    least = nothing, np.full((1, 1), np.inf)
-    return Peaks(np.zeros(1), ("q",), *rows, nothing, np.array([[reached]]), *least, natures)
+    """Peak of an output on one level, by what is proved and reached."""
+    ends = (np.array([x]) for x in (lower, upper, 0.0, reached, 0.0, np.inf))
+    return Peak(np.zeros(1), *ends, Nature.GUARANTEED)
 
 
 def suite(count=12, seed=4):
@@ -29,7 +27,7 @@ def suite(count=12, seed=4):
 def test_every_structure_of_the_cut_lies_in_the_band():
     middle, each = suite()
     measures = np.full(len(middle), 2.0)
-    critical = CriticalMeasures.from_peaks(each, measures, "q", LIMIT)
+    critical = CriticalMeasures.from_peaks(each, measures, LIMIT)
     assert critical.low[:, 0] == pytest.approx(2 * LIMIT / (1.25 * middle))
     assert critical.high[:, 0] == pytest.approx(2 * LIMIT / (0.8 * middle))
     measure = np.linspace(0.5, 12, 200)
@@ -48,7 +46,7 @@ def test_every_structure_of_the_cut_lies_in_the_band():
 def test_crisp_inputs_give_the_empirical_curve():
     middle, _ = suite()
     each = [peaks(x, x, x) for x in middle]
-    critical = CriticalMeasures.from_peaks(each, np.ones(len(middle)), "q", LIMIT)
+    critical = CriticalMeasures.from_peaks(each, np.ones(len(middle)), LIMIT)
     measure = np.sort(LIMIT / middle)
     band = critical.band(measure * (1 + 1e-12))
     assert band.lower[0] == pytest.approx(np.arange(1, 13) / 12)
@@ -58,7 +56,7 @@ def test_crisp_inputs_give_the_empirical_curve():
 
 def test_confidence_limits_are_those_of_clopper_and_pearson():
     middle, each = suite()
-    critical = CriticalMeasures.from_peaks(each, np.ones(len(middle)), "q", LIMIT)
+    critical = CriticalMeasures.from_peaks(each, np.ones(len(middle)), LIMIT)
     measure = np.linspace(0.5, 6, 23)
     band, limits = critical.band(measure), critical.confidence_band(measure)
     for k in range(len(measure)):
@@ -71,21 +69,21 @@ def test_confidence_limits_are_those_of_clopper_and_pearson():
 
 def test_any_of_the_limits_is_the_least():
     _, each = suite()
-    one = CriticalMeasures.from_peaks(each, np.ones(12), "q", LIMIT)
-    two = CriticalMeasures.from_peaks(each, np.linspace(0.5, 2, 12), "q", LIMIT)
+    one = CriticalMeasures.from_peaks(each, np.ones(12), LIMIT)
+    two = CriticalMeasures.from_peaks(each, np.linspace(0.5, 2, 12), LIMIT)
     either = of_any_limit([one, two])
     assert either.low == pytest.approx(np.minimum(one.low, two.low))
     assert (either.high >= either.low_reached).all()
 
 
 def test_a_structure_that_may_stay_at_rest_has_no_upper_end():
-    critical = CriticalMeasures.from_peaks([peaks(0.0, 0.01, 0.01)] * 2, [1.0, 1.0], "q", LIMIT)
+    critical = CriticalMeasures.from_peaks([peaks(0.0, 0.01, 0.01)] * 2, [1.0, 1.0], LIMIT)
     assert np.isinf(critical.high).all()
     assert critical.band(np.array([5.0])).lower[0, 0] == 0.0
     assert np.isinf(critical.dispersion.upper[0])
 
 
 def test_one_record_has_no_dispersion():
-    critical = CriticalMeasures.from_peaks([peaks(0.01, 0.02, 0.015)], [1.0], "q", LIMIT)
+    critical = CriticalMeasures.from_peaks([peaks(0.01, 0.02, 0.015)], [1.0], LIMIT)
     with pytest.raises(RefusedError, match="two records"):
         _ = critical.dispersion

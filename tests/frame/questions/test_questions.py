@@ -9,9 +9,9 @@ import pytest
 from alphacut.frame import StoreyFrame, envelope
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
-from alphacut.frame.questions.peaks import ANY, Peaks, passing, peaks
-from alphacut.frame.questions.probability import _interval, probabilities
-from alphacut.frame.questions.tolerances import _outcome, scaled, tolerances
+from alphacut.frame.questions.peaks import ANY, Peak, passing, peaks
+from alphacut.frame.questions.probability import clopper_pearson, probabilities
+from alphacut.frame.questions.tolerances import scaled, tolerances
 from alphacut.fuzzy import Triangular
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Ends, Nature
@@ -49,19 +49,25 @@ def proved():
     return peaks(envelope(FRAME, INPUTS, duration=5, step=0.02, alpha=ALPHA))
 
 
+def bounds(found, name, level=0):
+    """Bounds of all peaks on a level, shape (m,)."""
+    return np.array([getattr(peak, name)[level] for peak in found.values()])
+
+
 @pytest.mark.parametrize("level", [0, 2])
 def test_no_motion_peaks_outside_the_fuzzy_peak(proved, level):
     size = motions(FRAME, INPUTS, 400, level=ALPHA[level])
-    assert (size <= proved.upper[level] + proved.error[level]).all()
-    assert (size >= proved.lower[level] - proved.error[level]).all()
-    assert size.max(0) == pytest.approx(proved.upper[level], rel=0.01)
+    upper, lower, error = (bounds(proved, name, level) for name in ("upper", "lower", "error"))
+    assert (size <= upper + error).all()
+    assert (size >= lower - error).all()
+    assert size.max(0) == pytest.approx(upper, rel=0.01)
 
 
 def test_the_limit_that_a_level_just_reaches_is_possible_to_that_level():
     inputs = {"m1": Triangular(900, 1000, 1100)}
     alpha = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
     of = peaks(envelope(ONE, inputs, duration=6, step=0.01, alpha=alpha))
-    assert set(of.natures) == {Nature.GUARANTEED}
+    assert of["q1"].nature is Nature.GUARANTEED
     middle = passing(of, {"q1": amplitude(1050)})["q1"]  # reached at the mass of level 0.5
     assert middle.possibility == (0.4, 0.6)
     assert middle.necessity == (0.0, 0.0)
@@ -75,33 +81,35 @@ def test_the_limit_that_a_level_just_reaches_is_possible_to_that_level():
 
 
 def test_a_limit_far_below_is_passed_by_all_motions(proved):
-    low = 0.9 * proved.lower[0]
-    answers = passing(proved, dict(zip(proved.outputs, low, strict=True)))
+    answers = passing(proved, {name: 0.9 * peak.lower[0] for name, peak in proved.items()})
     assert {one.verdict for one in answers.values()} == {"exceeded"}
     assert answers[ANY].necessity == (1.0, 1.0)
 
 
 def test_any_of_several_limits_is_as_possible_as_the_most_possible(proved):
-    upper = proved.upper
-    limits = {"q1": upper[1, 0] * 0.999, "drift2": upper[3, 1] * 0.999, "base_shear": 1e9}
+    q1, drift2 = (0.999 * proved[name].upper for name in ("q1", "drift2"))
+    limits = {"q1": q1[1], "drift2": drift2[3], "base_shear": 1e9}
     answers = passing(proved, limits)
     assert answers["base_shear"].possibility == (0.0, 0.0)
     assert answers[ANY].possibility == answers["drift2"].possibility
     assert answers[ANY].possibility[0] >= answers["q1"].possibility[0]
 
 
+def exact(peak):
+    """Bounds of a peak that every motion has."""
+    row = np.array([peak])
+    return Peak(np.zeros(1), row, row, 0 * row, row, row, row, Nature.GUARANTEED, is_signed=True)
+
+
 def test_the_margin_of_any_limit_is_the_least_share_and_a_limit_of_0_has_all_or_none():
     """Peaks of 0.5, −0.2 and 0.9 below limits of 2, 0 and 1: 75 % is left, all, and 10 %."""
-    row, nature = np.array([[0.5, -0.2, 0.9]]), (Nature.GUARANTEED,) * 3
-    found = Peaks(
-        np.zeros(1), ("q1", "max q2", "q3"), row, row, 0 * row, row, row, row + np.inf, nature
-    )
+    found = {name: exact(peak) for name, peak in (("q1", 0.5), ("max q2", -0.2), ("q3", 0.9))}
     limits = {"q1": 2.0, "max q2": 0.0, "q3": 1.0}
     assert passing(found, limits)[ANY].margin == pytest.approx(np.full((1, 2), 0.1))
     assert passing(found, {"q1": 2.0, "max q2": 0.0})[ANY].margin == pytest.approx(0.75)
     above = {"q1": 2.0, "max q2": -0.3}
     assert passing(found, above)[ANY].margin == pytest.approx(-1 / 3)
-    passed = replace(found, upper=row + 0.4, lower=row + 0.4, least_proved=row + 0.4)
+    passed = {name: exact(peak) for name, peak in (("q1", 0.9), ("max q2", 0.2), ("q3", 1.3))}
     assert passing(passed, limits | {"q3": 9.0})[ANY].margin == pytest.approx(-1.0)
 
 
@@ -110,10 +118,10 @@ def test_attained_bounds_exclude_nothing_and_say_so():
         FRAME, INPUTS, duration=5, step=0.02, alpha=(0, 1), method="quasi-monte-carlo"
     )
     of = peaks(motion)
-    assert set(of.natures) == {Nature.ATTAINED}
-    far = passing(of, {"q1": 10 * of.upper[0, 0]})["q1"]
+    assert {peak.nature for peak in of.values()} == {Nature.ATTAINED}
+    far = passing(of, {"q1": 10 * of["q1"].upper[0]})["q1"]
     assert (far.possibility, far.nature, far.verdict) == ((0, 1), Nature.ATTAINED, "undecided")
-    near = passing(of, {"q1": 0.9 * of.reached[1, 0]})["q1"]
+    near = passing(of, {"q1": 0.9 * of["q1"].reached[1]})["q1"]
     assert near.possibility == (1.0, 1.0)
     assert near.necessity == (0.0, 1.0)
 
@@ -149,18 +157,6 @@ def test_tolerances_at_their_ends(limit, kept, passed):
         ONE, {"m1": Triangular(900, 1000, 1100)}, {"q1": limit}, duration=2, step=0.01
     )
     assert (answer.admissible, answer.passed) == (kept, passed)
-
-
-@pytest.mark.parametrize(
-    ("limit", "kept", "passed"), [(1.5, False, False), (2.0, True, False), (0.9, False, True)]
-)
-def test_a_limit_between_what_is_reached_and_what_is_excluded_is_neither(limit, kept, passed):
-    """A motion is known to reach 1, none passes 2; kept is what no motion passes."""
-    one, name = np.ones((1, 1)), (Nature.GUARANTEED,)
-    found = Peaks(
-        np.zeros(1), ("q1",), 0 * one, 1.9 * one, 0.1 * one, one, 0 * one, np.inf * one, name
-    )
-    assert _outcome(found, {"q1": limit})[:2] == (kept, passed)
 
 
 def speed(rng, count):
@@ -203,12 +199,11 @@ def test_the_interval_is_that_of_clopper_and_pearson_at_the_level_of_bonferroni(
 
 def test_the_interval_of_every_point_holds_at_once_as_often_as_it_says(rng):
     """Counts of common draws at 40 points, 400 times."""
-    missed = 0
-    true = np.linspace(0.01, 0.6, 40)
+    missed, true = 0, np.linspace(0.01, 0.6, 40)
     for _ in range(400):
         counts = (rng.random(100)[:, None] < true).sum(axis=0)
-        low, high = _interval(counts, counts, 100, np.arange(40))  # points from k on at level k
-        missed += bool((low > true).any() or (high < true[-1]).any())
+        low, high = clopper_pearson(counts, counts, 100, 0.05 / (2 * 40))
+        missed += bool((low > true).any() or (high < true).any())
     assert missed <= 0.05 * 400 + 3 * np.sqrt(0.05 * 400)
 
 
@@ -239,12 +234,11 @@ def test_wrong_questions_are_refused(limits, random, key):
 def test_a_share_of_relative_tolerances_would_be_seen():
     """The error of an envelope widens its peaks: without it the reference would lie outside."""
     motion = envelope(FRAME, INPUTS, duration=5, step=0.02, alpha=(0, 1), method="graph-follower")
-    of = peaks(motion)
-    assert (of.error > 0).all()
-    assert (of.reached <= of.upper).all()
+    assert all((peak.error > 0).all() for peak in peaks(motion).values())
+    assert all((peak.reached <= peak.upper).all() for peak in peaks(motion).values())
     plain = {"between": None, "outer": None}
     shaken = replace(motion, error=np.zeros_like(motion.lower), **plain)
-    assert (peaks(shaken).error == 0).all()
+    assert (bounds(peaks(shaken), "error") == 0).all()
 
 
 def test_peaks_of_one_side_are_those_of_its_bounds():
@@ -263,9 +257,9 @@ def test_peaks_of_one_side_are_those_of_its_bounds():
         least_peaks=None,
     )
     found = peaks(exact, ["q1", "max q1", "min q1"])
-    assert found.upper.tolist() == [[5.0, 5.0, 3.0]]
-    assert found.lower.tolist() == [[2.0, 1.0, 2.0]]
-    assert found.reached.tolist() == [[5.0, 5.0, 3.0]]
-    assert found.most("min q1").upper == [3.0]
+    assert bounds(found, "upper").tolist() == [5.0, 5.0, 3.0]
+    assert bounds(found, "lower").tolist() == [2.0, 1.0, 2.0]
+    assert bounds(found, "reached").tolist() == [5.0, 5.0, 3.0]
+    assert found["min q1"].greatest_bounds.upper == [3.0]
     assert passing(found, {"min q1": 1.5})["min q1"].outcome == "exceeded"
     assert passing(found, {"max q1": 5.5})["max q1"].outcome == "not exceeded"
