@@ -27,7 +27,7 @@ def require_real(scalar: type) -> None:
         raise RefusedError("PETSc", "built for complex numbers", "a build for real numbers", cure)
 
 
-if find_spec("dolfinx_solver"):  # a wheel whose HDF5 hides that of others loaded after it
+if find_spec("dolfinx_solver"):  # where Numba is, this wheel hides the HDF5 of others after it
     with suppress(ImportError):
         import h5py  # noqa: F401
     with suppress(ImportError):

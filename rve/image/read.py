@@ -13,6 +13,7 @@ from alphacut.fuzzy.refused import RefusedError
 
 PLANE_MODES = ("1", "L", "I;16", "I;16B", "I;16L", "I", "F")
 PHOTOMETRIC, WHITE_IS_ZERO = 262, 0  # tag of TIFF and its value
+SAMPLE_FORMAT, SIGNED = 339, 2
 BYTES, BYTES_PER_ELEMENT = 1e8, 1450
 """Of the program, and of each element of the cuts' solutions with their first guess; within 1.25 of
 peaks measured at 128² … 512² pixels of two elements a side, and 512² and 1024² of one."""
@@ -67,6 +68,13 @@ def _picture(path: Path, square: bool) -> Array:
             value = f"two-valued with white as zero, bright on {np.mean(values == greys[1]):.4g}"
             cure = "save it as .npy or PNG, and look at the fractions that check prints"
             raise RefusedError(path.name, value, "masks that all programs read alike", cure)
+        is_signed = tags.get(SAMPLE_FORMAT, (1,)) == (SIGNED,)
+        is_changed = (
+            is_signed if mode == "L" else not is_signed and mode == "I" and values.min() < 0
+        )
+        if is_changed:
+            what = f"of integers whose sign Pillow changes, as {values.min()}"
+            raise RefusedError(path.name, what, "values from 0 to 2³¹ − 1", "save it as .npy")
         return values
 
 

@@ -79,6 +79,11 @@ def test_vtk_and_meshio_read_positive_volumes(ending, tmp_path):
     assert sizes.sum() == pytest.approx(VOLUME, rel=1e-12)
     inside = mesh.cell_data["phase"][0] == 1
     assert sizes[inside].sum() == pytest.approx(particle_volume(), rel=0.03)
+    grid["x"] = grid.points[:, 0]
+    points = grid.cell_centers().points
+    found = pyvista.PolyData(points).sample(grid)
+    assert found["vtkValidPointMask"].all()  # VTK finds no points in curved wedges
+    assert found["x"] == pytest.approx(points[:, 0], abs=2e-3)
     surface = grid.extract_surface(nonlinear_subdivision=0).triangulate()
     assert surface.n_open_edges == 0  # neighbours have the same diagonals
     assert surface.volume == pytest.approx(VOLUME, rel=1e-6)

@@ -1,0 +1,132 @@
+"""Guards against what other programs do, with harmless input: rows of docs/tools.md that no room tests."""
+
+import os
+import struct
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.io
+
+from alphacut.export import mesh
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.io.arrays import read_array
+from alphacut.io.quantity import number
+from alphacut.rve.image.read import read_grey
+
+ROOT = Path(__file__).parents[2]
+PAGE = ROOT / "docs" / "tools.md"
+
+
+def test_pint_s_yarn_count_and_gallon_are_no_moment_and_no_acceleration():
+    with pytest.raises(ValueError, match="no unit of moment"):
+        number("12 kNm", "N*m")
+    assert number("12 kN m", "N*m") == 12e3
+    assert number("98 gal", "m/s^2") == number("0.98 m/s^2", "m/s^2")
+    assert number("1 g", "m/s^2") == 9.80665
+
+
+@pytest.mark.parametrize("rows", [99, 100])
+def test_matrix_market_files_say_symmetric_or_general_and_give_the_same_matrix(tmp_path, rows):
+    stiffness = scipy.sparse.diags([2.0, -1.0, -1.0], [0, 1, -1], shape=(rows, rows))
+    scipy.io.mmwrite(tmp_path / "k.mtx", stiffness)
+    assert ("symmetric" in (tmp_path / "k.mtx").read_text().split("\n")[0]) == (rows < 100)
+    assert np.array_equal(read_array(tmp_path / "k.mtx"), stiffness.toarray())
+
+
+def test_a_thin_volume_saved_as_colour_or_as_pages_is_refused(tmp_path):
+    from PIL import Image
+
+    Image.fromarray(np.zeros((8, 8, 3), np.uint8)).save(tmp_path / "three.tif")
+    first, *others = (Image.fromarray(np.full((8, 8), k, np.uint8)) for k in range(5))
+    first.save(tmp_path / "five.tif", save_all=True, append_images=others)
+    for name, words in (("three.tif", "mode RGB"), ("five.tif", "5 pages")):
+        with pytest.raises(RefusedError, match=words):
+            read_grey(tmp_path / name)
+
+
+def test_pixels_that_the_file_says_are_not_square_are_refused(tmp_path):
+    from PIL import Image
+
+    picture = Image.fromarray(np.arange(64, dtype=np.uint8).reshape(8, 8))
+    picture.save(tmp_path / "a.tif", dpi=(100, 300))
+    with pytest.raises(RefusedError, match=r"100 by 300 per inch"):
+        read_grey(tmp_path / "a.tif")
+
+
+@pytest.mark.parametrize("kind", [np.uint32, np.int8])
+def test_integers_whose_sign_pillow_changes_are_refused(tmp_path, kind):
+    from PIL import Image
+
+    values = np.tile(np.array([[-5, 1]]).astype(kind), (4, 2))
+    picture = Image.fromarray(values.view(np.int32 if kind is np.uint32 else np.uint8))
+    picture.save(tmp_path / "labels.tif", tiffinfo={339: 2})  # tag of the sample format: signed
+    if kind is np.uint32:
+        content = (tmp_path / "labels.tif").read_bytes()
+        signed, unsigned = (struct.pack("<HHIHH", 339, 3, 1, x, 0) for x in (2, 1))
+        (tmp_path / "labels.tif").write_bytes(content.replace(signed, unsigned))
+    with pytest.raises(RefusedError, match="sign"):
+        read_grey(tmp_path / "labels.tif")
+
+
+def test_without_a_display_and_xvfb_there_is_no_picture_and_one_line(monkeypatch, capsys):
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.setenv("PATH", "")
+    assert not mesh.draw_mesh(None, None, Path("mesh.png"))
+    assert "a display or Xvfb" in capsys.readouterr().err
+
+
+def test_gmsh_takes_no_settings_of_the_caller(tmp_path):
+    (tmp_path / ".gmshrc").write_text("Mesh.ElementOrder = 3;\nGeometry.Tolerance = 0.1;\n")
+    program = """
+from alphacut.rve.mesh import square
+with square.model() as gmsh:
+    print(gmsh.option.getNumber("Mesh.ElementOrder"), gmsh.option.getNumber("Geometry.Tolerance"))
+"""
+    variables = os.environ | {"HOME": str(tmp_path)}
+    command = [sys.executable, "-c", program]
+    done = subprocess.run(command, env=variables, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["1.0", "1e-08"]
+
+
+def test_complete_quadratic_prisms_of_gmsh_are_refused_with_its_own_option():
+    pytest.importorskip("alphacut.rve.fenicsx")
+    from alphacut.rve.mesh import gmsh_prisms, square
+    from alphacut.rve.mesh.periodicity import MeshError
+
+    with square.model() as gmsh:
+        base = gmsh.model.occ.addRectangle(-1, -1, 0, 2, 2)
+        made = gmsh.model.occ.extrude([(2, base)], 0, 0, 1, numElements=[1], recombine=True)
+        gmsh.model.occ.synchronize()
+        gmsh.model.addPhysicalGroup(3, [tag for dim, tag in made if dim == 3], name="matrix")
+        gmsh.option.setNumber("Mesh.ElementOrder", 2)
+        gmsh.option.setNumber("Mesh.MeshSizeMin", 1)
+        gmsh.model.mesh.generate(3)
+        with pytest.raises(MeshError, match=r"Prism 18.*SecondOrderIncomplete = 1"):
+            gmsh_prisms.read(gmsh)
+
+
+def test_a_matrix_refuses_a_place_outside_of_its_pattern():
+    pytest.importorskip("alphacut.rve.fenicsx")
+    from alphacut.rve.fenicsx import MPI, PETSc
+    from alphacut.rve.solver.numbering import map_of, zero_matrix
+
+    pairs = np.array([[0, 1], [2, 3]])  # two cells without a common unknown
+    matrix = zero_matrix(pairs, map_of(np.arange(4), MPI.COMM_SELF), range(8), 8)
+    matrix.setValue(0, 3, 1.0)
+    matrix.assemble()
+    with pytest.raises(PETSc.Error):
+        matrix.setValue(0, 7, 1.0)
+
+
+def test_every_row_names_a_test_or_a_script_that_exists():
+    rows = [line for line in PAGE.read_text(encoding="utf-8").splitlines() if line.startswith("| ")]
+    holders = [row.split("|")[-2].strip(" `") for row in rows]
+    named = [holder for holder in holders if holder != "held by"]
+    assert len(named) >= 30
+    for holder in named:
+        path, _, test = holder.partition("::")
+        assert (ROOT / path).is_file(), holder
+        assert not test or f"def {test}(" in (ROOT / path).read_text(encoding="utf-8"), holder
