@@ -6,10 +6,12 @@ import ast
 import importlib
 from collections import Counter
 from collections.abc import Iterable
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("stochastic", "rve", "fuzzy", "frame", "alphacut")
+FOLDERS = (*PACKAGES, "tests", "benchmarks", "docs", "demos")
 TEXTS = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md")
 
 
@@ -21,6 +23,13 @@ def package_files(pattern: str = "*.py") -> list[Path]:
         for file in sorted((ROOT / package).rglob(pattern))
         if not any(folder.is_symlink() for folder in file.parents)
     ]
+
+
+@cache
+def trees() -> dict[Path, ast.Module]:
+    """Syntax trees of all Python files of the project."""
+    files = {path.resolve() for folder in FOLDERS for path in (ROOT / folder).rglob("*.py")}
+    return {file: ast.parse(file.read_text(encoding="utf-8")) for file in sorted(files)}
 
 
 def lines(files: Iterable[Path]) -> int:

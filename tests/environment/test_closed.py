@@ -34,13 +34,10 @@ CLOSING = (
 # name: what is planted below the home folder, variables that point to it, what is asked
 PLANTS = {
     "user site": ({f"{SITE}/numpy.py": FALSE, f"{SITE}/pint.py": FALSE}, {}, IMPORTS),
-    "usercustomize": ({f"{SITE}/usercustomize.py": FALSE}, {}, IMPORTS),
     "PYTHONPATH": ({"lib/pint.py": FALSE}, {"PYTHONPATH": "lib"}, IMPORTS),
-    "sitecustomize": ({"lib/sitecustomize.py": FALSE}, {"PYTHONPATH": "lib"}, IMPORTS),
     "PYTHONHOME": ({"lib/pint.py": FALSE}, {"PYTHONHOME": "lib"}, IMPORTS),
     "PYTHONUSERBASE": ({f"base/{SITE[7:]}/pint.py": FALSE}, {"PYTHONUSERBASE": "base"}, IMPORTS),
     "matplotlibrc": ({".config/matplotlib/matplotlibrc": "savefig.dpi: 7\n"}, {}, MATPLOTLIB),
-    "MATPLOTLIBRC": ({"my/matplotlibrc": "savefig.dpi: 7\n"}, {"MATPLOTLIBRC": "my"}, MATPLOTLIB),
     "MPLCONFIGDIR": ({"my/matplotlibrc": "savefig.dpi: 7\n"}, {"MPLCONFIGDIR": "my"}, MATPLOTLIB),
     "notebooks": ({".jupyter/x": "", ".ipython/x": ""}, {}, KERNEL),
 }

@@ -1,13 +1,18 @@
-"""Checks of the house that a person need not read: public types and the length of help."""
+"""Checks of the house that a person need not read: public types, kinds, imports, length of help.
+
+No kind is compared by identity, as a worker has copies; nothing is checked by assertions.
+"""
 
 import argparse
 import ast
 import os
+from collections.abc import Iterator
+from itertools import pairwise
 
 from tests.environment import house
+from tests.environment.house import PACKAGES, trees
 
 ANY = 18  # public functions with Any, for FEniCSx, Gmsh and keywords of Matplotlib
-TREES = {file: ast.parse(file.read_text(encoding="utf-8")) for file in house.package_files()}
 
 
 def uses_any(node: ast.expr | None) -> bool:
@@ -30,7 +35,7 @@ def signatures_with_any(tree: ast.Module) -> list[str]:
 
 
 def test_no_public_signature_has_any():
-    assert sum(len(signatures_with_any(tree)) for tree in TREES.values()) <= ANY
+    assert sum(len(signatures_with_any(trees()[file])) for file in house.package_files()) <= ANY
 
 
 def test_what_the_counts_look_for_would_be_seen():
@@ -47,3 +52,82 @@ def test_help_fits_on_one_screen():
     pages: dict[str, argparse.ArgumentParser] = {"alphacut": whole, **each}
     lines = {name: len(parser.format_help().splitlines()) for name, parser in pages.items()}
     assert not {name: count for name, count in lines.items() if count > 40}
+
+
+def program_trees() -> dict[str, ast.Module]:
+    """Syntax trees of all files but tests and pages, by their names."""
+    names = {file.relative_to(house.ROOT).as_posix(): tree for file, tree in trees().items()}
+    return {name: x for name, x in names.items() if not name.startswith(("tests/", "docs/"))}
+
+
+def is_enumeration(node: ast.AST) -> bool:
+    return isinstance(node, ast.ClassDef) and any("Enum" in ast.unparse(x) for x in node.bases)
+
+
+ENUMERATIONS = {
+    node.name for tree in trees().values() for node in ast.walk(tree) if is_enumeration(node)
+}
+
+
+def module_names(tree: ast.Module) -> set[str]:
+    """Names that a module binds at its top level: values, functions and imports."""
+    names: set[str] = set()
+    for node in tree.body:
+        if isinstance(node, ast.FunctionDef):
+            names.add(node.name)
+        elif isinstance(node, ast.Import | ast.ImportFrom):
+            names |= {alias.asname or alias.name for alias in node.names}
+        elif isinstance(node, ast.Assign | ast.AnnAssign):
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            names |= {x.id for y in targets for x in ast.walk(y) if isinstance(x, ast.Name)}
+    return names
+
+
+def is_unique(node: ast.expr) -> bool:
+    """Whether a process has one object of this value, as of None and members of enumerations."""
+    if isinstance(node, ast.Attribute):
+        return isinstance(node.value, ast.Name) and node.value.id in ENUMERATIONS
+    return isinstance(node, ast.Constant)
+
+
+def identities(tree: ast.Module) -> Iterator[str]:
+    """Comparisons by `is` of values that a copy does not share."""
+    names = module_names(tree)
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.Compare):
+            continue
+        sides = [node.left, *node.comparators]
+        for operator, pair in zip(node.ops, pairwise(sides), strict=True):
+            by_identity = isinstance(operator, ast.Is | ast.IsNot)
+            copied = [isinstance(x, ast.Attribute) or getattr(x, "id", "") in names for x in pair]
+            if by_identity and any(copied) and not any(map(is_unique, pair)):
+                yield ast.unparse(node)
+
+
+def test_kinds_are_compared_by_value():
+    found = {file: list(identities(tree)) for file, tree in program_trees().items()}
+    assert not {file: places for file, places in found.items() if places}
+
+
+def test_assertions_only_tell_mypy_a_type():
+    for file in house.package_files():
+        for node in filter(lambda x: isinstance(x, ast.Assert), ast.walk(trees()[file])):
+            text = ast.unparse(node.test)
+            assert text.endswith("is not None") or text.startswith("isinstance("), (file, text)
+
+
+def test_a_comparison_by_identity_would_be_seen():
+    assert "Nature" in ENUMERATIONS
+    assert len(program_trees()) > 200
+    lines = ("from m import DISCS", "BOX = object()", "def f(): return shape is DISCS")
+    more = ("x is not BOX", "x.shape is y.shape", "Nature.ATTAINED is x.nature", "a is None")
+    seen = set(identities(ast.parse("\n".join((*lines, *more)))))
+    assert seen == {"shape is DISCS", "x is not BOX", "x.shape is y.shape"}
+
+
+def test_all_imports_begin_with_alphacut():
+    for file, tree in trees().items():
+        for node in ast.walk(tree):
+            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            assert not {name.partition(".")[0] for name in names} & set(PACKAGES[:4]), file

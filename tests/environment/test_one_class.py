@@ -1,13 +1,11 @@
 """No class exists twice, though each package can be reached by two paths in a checkout."""
 
-import ast
 import json
 import subprocess
 import sys
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-PACKAGES = ("stochastic", "rve", "fuzzy", "frame", "alphacut")
 DOUBLED = """
 import inspect, json, os, sys
 seen = {{}}
@@ -45,16 +43,3 @@ def test_running_a_package_makes_no_second_class():
 
 def test_a_second_class_would_be_seen():
     assert "Cell" in doubled("import alphacut.rve.cell.cell, rve.cell.cell")[1]
-
-
-def test_all_imports_begin_with_alphacut():
-    folders = (*PACKAGES, "tests", "benchmarks", "docs")
-    for file in {path for folder in folders for path in (ROOT / folder).rglob("*.py")}:
-        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.Import):
-                tops = {alias.name.partition(".")[0] for alias in node.names}
-            elif isinstance(node, ast.ImportFrom):
-                tops = {(node.module or "").partition(".")[0]}
-            else:
-                continue
-            assert not tops & set(PACKAGES[:4]), file

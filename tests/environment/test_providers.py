@@ -8,18 +8,8 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
-FOLDERS = (
-    "stochastic",
-    "rve",
-    "fuzzy",
-    "frame",
-    "alphacut",
-    "tests",
-    "benchmarks",
-    "docs",
-    "demos",
-)
+from tests.environment.house import FOLDERS, ROOT, trees
+
 DIRECT = {
     "PIL": "python3-matplotlib",  # which depends on Pillow, by pip too
     "basix": "python3-dolfinx",
@@ -75,10 +65,10 @@ FROM_PYPI = {  # each is needed by one comparison, or is an optional extra
 }
 
 
-def imports_of(source: str) -> set[str]:
+def imports_of(tree: ast.Module) -> set[str]:
     """Top-level names that a file imports, by statement or by a name given to pytest or importlib."""
     found: set[str] = set()
-    for node in ast.walk(ast.parse(source)):
+    for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:
@@ -94,9 +84,7 @@ def imports_of(source: str) -> set[str]:
 
 def foreign_imports() -> set[str]:
     """Names that the files of the project import and that neither it nor Python has."""
-    files = [file for folder in FOLDERS for file in (ROOT / folder).rglob("*.py")]
-    assert len(files) > 200
-    names = set().union(*(imports_of(file.read_text(encoding="utf-8")) for file in set(files)))
+    names = set().union(*map(imports_of, trees().values()))
     return names - sys.stdlib_module_names - set(FOLDERS) - LOCAL
 
 
@@ -128,4 +116,4 @@ def test_the_environment_has_it_outside_the_home_folder(name):
 
 def test_imports_by_any_way_would_be_seen():
     source = "import a.b\nfrom c import d\npytest.importorskip('e.f')\nimport_module('g')\n"
-    assert imports_of(source) == {"a", "c", "e", "g"}
+    assert imports_of(ast.parse(source)) == {"a", "c", "e", "g"}
