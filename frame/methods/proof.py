@@ -280,7 +280,9 @@ def _line_deviation(model: ModalModel) -> Array:
         raise UnprovedError("a mode may not oscillate", "take less damping")
     deviation = np.zeros((len(model.time), len(model.outputs)))
     for part in parts(model, growth):
-        size = suprema(part.share, reach)[0]
+        size, real, imaginary = (
+            suprema(x, reach)[0] for x in (part.share, part.share.real, part.share.imag)
+        )
         load = None if part.load is None else part.load.history
         if isinstance(part.load, Direct):
             deviation += 2 * part.load.history.line_deviation(model.time)[:, None] * size.sum(0)
@@ -289,8 +291,10 @@ def _line_deviation(model: ModalModel) -> Array:
             q = min(decay[0][k] / w[k] for w in omega), max(decay[1][k] / w[k] for w in omega)
             points = [np.linspace(omega[0][k], omega[1][k], POINTS[0]), np.linspace(*q, POINTS[1])]
             sigma = (-points[1][:, None] + 1j) * points[0]
-            bent = line_deviations(sigma, load, model.time, (0,))[0][0]
-            deviation += 2 * np.outer(bent, size[k])
+            ((modulus, of_imaginary),) = line_deviations(sigma, load, model.time, (0,))
+            of_imaginary = np.minimum(omega[1][k] * of_imaginary, modulus)  # which is over ω
+            apart = np.outer(modulus, real[k]) + np.outer(of_imaginary, imaginary[k])
+            deviation += 2 * np.minimum(np.outer(modulus, size[k]), apart)
     return deviation
 
 

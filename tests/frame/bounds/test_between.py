@@ -23,7 +23,7 @@ STIFFNESS[-1, -1] = 2e3
 SHORTEST_PERIOD = 2 * np.pi / np.sqrt(np.linalg.eigvalsh(STIFFNESS)[-1])
 
 
-@pytest.mark.parametrize("periods", [0.3, 1.0, 2.0])
+@pytest.mark.parametrize("periods", [0.1, 1.0, 1.5, 2.0])
 @pytest.mark.parametrize("load", LOADS)
 @pytest.mark.parametrize("proof", [DualProof(slabs=2, steps=4, peaks=1.0), Proof(tolerance=5e-2)])
 def test_between_is_at_most_three_times_the_true_straying(proof, load, periods):
@@ -47,4 +47,4 @@ def test_between_is_at_most_three_times_the_true_straying(proof, load, periods):
     given = {"duration": steps * step, "step": step, "alpha": (0,), "progress": False}
     between = envelope(frame, inputs, proof, **given).between
     assert (off <= between[1:] * (1 + 1e-9)).all()
-    assert (between.max(0) <= (3.0 if periods >= 1 else 5.0) * off.max(0)).all()
+    assert (between.max(0) <= 3.0 * off.max(0)).all()
