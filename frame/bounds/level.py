@@ -17,7 +17,7 @@ from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate
 from alphacut.frame.modes.intervening import Excitation, Oscillator
 from alphacut.frame.modes.models import MotionModels
 from alphacut.frame.modes.structure import Classical
-from alphacut.frame.response.oscillators import Grid, Oscillators, grid_over
+from alphacut.frame.response.oscillators import Grid, ModalResponses, Oscillators, grid_over
 from alphacut.frame.structures.loads import History
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.progress_bar import Progress
@@ -63,10 +63,7 @@ def response_tables(
 ) -> ResponseTables:
     """Return tables of the responses of all oscillators to all sources, with bounds of errors.
 
-    Args:
-        oscillators: The oscillators.
-        excitation: The loads, the nodes and the names of the sources.
-        orders: Derivative of the motion that each output takes, shape (m,).
+    `orders` (m,) are the derivatives of the motion that outputs take.
 
     Raises:
         UnprovedError: A response is out of the range of the dual function.
@@ -74,22 +71,19 @@ def response_tables(
     loads, time, sources = excitation
     points, distinct = _points(oscillators, float(time[-1])), sorted(map(int, set(orders)))
     grids = [grid_over(mode.omega_range, mode.quotient_range, points) for mode in oscillators]
-    values, errors, deviations = ({order: list[Array]() for order in distinct} for _ in range(3))
-    # of the sums that the responses enter
-    rounding = 2 * gamma(roundings(len(grids), len(sources), oscillators[0].omega.inputs))
+    found = {order: list[list[ModalResponses]]() for order in distinct}
     for grid in grids:
         tables = Oscillators(grid, loads, time, distinct)
         for order in distinct:
-            waves = [tables.responses(source, order) for source in sources]
-            table = np.stack([wave.value.reshape(len(time), -1) for wave in waves])
-            misses = np.stack([wave.error for wave in waves]) + rounding * np.abs(table).max(-1)
-            values[order].append(table)
-            errors[order].append(misses)
-            deviations[order].append(np.stack([wave.line_deviation for wave in waves]))
-    value, error, deviation = (
-        {order: np.stack(arrays) for order, arrays in table.items()}
-        for table in (values, errors, deviations)
-    )
+            found[order].append([tables.responses(source, order) for source in sources])
+    # of the sums that the responses enter
+    rounding = 2 * gamma(roundings(len(grids), len(sources), oscillators[0].omega.inputs))
+    value, error, deviation = dict[int, Array](), dict[int, Array](), dict[int, Array]()
+    for order, modes in found.items():
+        value[order] = np.array([[x.value.reshape(len(time), -1) for x in mode] for mode in modes])
+        error[order] = np.array([[x.error for x in mode] for mode in modes])
+        error[order] += rounding * np.abs(value[order]).max(-1)
+        deviation[order] = np.array([[x.line_deviation for x in mode] for mode in modes])
     return ResponseTables(value, error, deviation, grids, time)
 
 
@@ -190,10 +184,9 @@ class OutputBounds:
         cls, level: LevelModels, o: int, s: int, wanted_gap: float, reached: float = 0.0
     ) -> OutputBounds:
         """Infinite bounds of output number o of a level's models, of −output where s = 0."""
-        n_nodes = len(level.tables.time)
         data, constant = _data(level, o, (-1.0, 1.0)[s])
-        out = np.stack([np.full(n_nodes, np.inf), np.full(n_nodes, UNKNOWN)])
-        at = np.zeros((n_nodes, data.linear.shape[1]))
+        out = np.zeros_like(constant) + np.array([[np.inf], [UNKNOWN]])
+        at = np.zeros((out.shape[1], data.linear.shape[1]))
         return cls((o, s), wanted_gap, reached, constant, data, out, at)
 
     @property
@@ -207,32 +200,19 @@ class OutputBounds:
 
     def open_nodes(self, slack_below_peak: float) -> Rows:
         """Nodes (J,) whose bound exceeds the model's value by more than suffices; see `Effort`."""
-        incumbent = max(self.out[1].max(), self.reached)
-        below_peak = np.maximum(incumbent - self.out[1], 0.0)
-        return np.flatnonzero(
-            self.out[0] - self.out[1] > self.wanted_gap + slack_below_peak * below_peak
-        )
+        bound, value = self.out
+        below_peak = np.maximum(max(value.max(), self.reached) - value, 0.0)
+        return np.flatnonzero(bound - value > self.wanted_gap + slack_below_peak * below_peak)
 
     def effort(
-        self,
-        cells: int,
-        steps: int,
-        slack_below_peak: float = 0.0,
-        remainder_multiple: float = 0.0,
+        self, cells: int, steps: int, slack_below_peak: float = 0.0, remainder_multiple: float = 0.0
     ) -> Effort:
         """Effort for a node, compared with the largest value so far; arguments are its fields."""
-        return Effort(
-            cells=cells,
-            steps=steps,
-            slack_below_peak=slack_below_peak,
-            remainder_multiple=remainder_multiple,
-            wanted_gap=self.wanted_gap,
-            incumbent=float(max(self.out[1].max(), self.reached)),
-            patience=int(numbers.PATIENCE),
-            ascents=(int(numbers.JUMPS), int(numbers.CLIMBS)),
-            grace=int(numbers.CELL_GRACE),
-            min_progress=numbers.MIN_CELL_PROGRESS,
-        )
+        incumbent = float(max(self.out[1].max(), self.reached))
+        ascents = int(numbers.JUMPS), int(numbers.CLIMBS)
+        tuned = int(numbers.PATIENCE), ascents, int(numbers.CELL_GRACE), numbers.MIN_CELL_PROGRESS
+        of_node = cells, steps, slack_below_peak, remainder_multiple
+        return Effort(*of_node, self.wanted_gap, incumbent, *tuned)
 
     def improve(self, nodes: Rows, effort: Effort) -> None:
         """Lower the bounds and raise the model's values at nodes (J,), reading no others."""

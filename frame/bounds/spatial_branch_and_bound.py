@@ -25,9 +25,9 @@ from alphacut.frame.bounds.box_proof import (
     BisectionError,
     BoxProof,
     Goal,
+    Hull,
     refusing,
 )
-from alphacut.frame.bounds.hull import Hull
 from alphacut.frame.boxes import Boxes, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import exact_flow
@@ -71,14 +71,9 @@ class SubBox:
 
     def on_levels(self, rows: Rows, boxes: Boxes | None = None) -> SubBox:
         """Copy on some levels, given by their rows, with the ends of `boxes` if given."""
-        return SubBox(
-            self.boxes.on_levels(rows) if boxes is None else boxes,
-            [self.levels[k] for k in rows],
-            self.peaks[rows],
-            self.outer[rows],
-            self.least[rows],
-            self.is_wide[rows],
-        )
+        levels, arrays = [self.levels[k] for k in rows], (self.peaks, self.outer, self.least)
+        boxes = self.boxes.on_levels(rows) if boxes is None else boxes
+        return SubBox(boxes, levels, *(x[rows] for x in arrays), self.is_wide[rows], self.work)
 
     def bisected(self, axis: int) -> list[SubBox]:
         """Both halves along an input, each with the levels that reach it."""
@@ -95,8 +90,7 @@ def prove(proof: BoxProof, flow: UnitFlow, progress: Progress | None = None) -> 
     start_time = time.perf_counter()
     queue = Queue(proof, flow)
     queue.run(progress)
-    notes = list(queue.notes())
-    return queue.hull.envelope(proof.name, time.perf_counter() - start_time, notes)
+    return queue.hull.envelope(proof.name, time.perf_counter() - start_time, queue.notes())
 
 
 class Queue:
@@ -111,30 +105,21 @@ class Queue:
 
     def __init__(self, proof: BoxProof, problem: UnitFlow) -> None:
         self.proof, self.problem, boxes = proof, problem, problem.boxes
-        self.flow = exact_flow(problem.flow)
+        self.flow, self.workers = exact_flow(problem.flow), proof.workers or os.cpu_count() or 1
         with refusing():
             proof.forecast(self.flow, boxes)
         self.hull = Hull(problem, self.flow)
         self.gap = proof.peak_gap(problem.scale, problem.peak)[:, None]
         self.wide = numbers.WIDE * problem.peak[:, None]
-        self.workers = proof.workers or os.cpu_count() or 1
         self.refusals, self.pushes = 0, 0
         self.heap: list[tuple[float, int, SubBox]] = []
-        shape = self.hull.closed.shape
-        levels, _, outputs, _ = shape
+        levels, _, outputs, _ = shape = self.hull.closed.shape
         peaks = (levels, outputs, 2)
         self.number, self.first_gap = np.zeros(peaks, int), np.full(peaks, np.nan)
         self.abandoned = np.zeros(peaks, bool)
         self.gap_shares = np.zeros((*peaks, len(boxes.names)))
-        root = SubBox(
-            boxes,
-            levels=[*range(levels)],
-            peaks=np.ones(peaks, bool),
-            outer=np.full(shape, np.inf),
-            least=np.zeros((levels, outputs)),
-            is_wide=np.ones(levels, bool),
-        )
-        self._push(root)
+        is_open, outer, least = np.ones(peaks, bool), np.full(shape, np.inf), np.zeros(peaks[:2])
+        self._push(SubBox(boxes, [*range(levels)], is_open, outer, least, np.ones(levels, bool)))
 
     def run(self, progress: Progress | None = None) -> None:
         """Bound and branch until all peaks are fathomed or abandoned.
@@ -192,7 +177,6 @@ class Queue:
             self._fathom(box)  # incumbents have risen since, and peaks were abandoned
             if box.peaks.any():
                 batch.append(box.on_levels(np.flatnonzero(box.peaks.any((1, 2)))))
-                batch[-1].work = box.work
         return batch
 
     def _tick(

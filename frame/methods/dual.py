@@ -1,13 +1,8 @@
 """Proved envelopes of linear structures with many fuzzy inputs: Lagrangian relaxation as a method.
 
-A linear structure with classical modes answers as Σ_k F_k(z_k(u)): z_k(u) are few intervening
-variables of mode k (section 7), its frequency, its decay and its shares, F_k the response of one
-oscillator. They bend little over the box: z = Z u + quadratic terms + R, |R| proved. For any
-multipliers μ
-
-    max Σ_k F_k(z_k(u)) ≤ Σ_k max (F_k − μ_k·z_k) + max μ·(z − R)(u) + |μ|·R
-
-(Geoffrion 1974; Lemaréchal 2001), so that nothing rests on how μ is found. The cost is one of
+A linear structure with classical modes answers as a sum over modes of functions of few intervening
+variables each (section 7 of the paper): frequency, decay and shares, which bend little over the
+box. `bounds.dual_function` states the bound, which holds for any multipliers. The cost is one of
 modes, tables and nodes, and hardly one of inputs.
 """
 
