@@ -46,3 +46,35 @@ REMAINDER_MULTIPLE, REMAINDER_MULTIPLE_AT_PEAKS = 1.0, 0.25
 """Multiples of the remainders' own part of a bound below which no gap is worth any effort."""
 TRUNCATION = 0.1
 """Fraction of a gap that modes may take which are not enclosed."""
+
+MAX_ERROR_FRACTION = 0.2
+"""Fraction of the gap that the error of the modal model may take on either side."""
+LEFT_OUT_MODES = 1 / 120
+"""Fraction of the gap that modes may be worth that are left out; their energy counts as error."""
+BOXES_OF_INPUT = 4.0
+"""Factor by which one more input multiplies the boxes of a branch and bound, about."""
+FIRST_DEGREE, MAX_DEGREE = 3, 20
+"""Degrees of the modal model that are tried."""
+MAX_TERMS = 3100
+"""Monomials of a polynomial: degree 13, 10 and 8 of 4, 5 and 6 inputs."""
+FIRST_DECAY = 0.1
+"""Factor by which a degree more multiplies the error, before any is seen."""
+DEGREE_CAUTION = 0.8
+"""Fraction of the degrees that the errors ask for which is taken at once."""
+DEVIATION_POINTS = 24
+"""Points along ω of each mode at which its straying from lines between nodes is read."""
+NEWTON_GAP = 0.02
+"""Fraction of the gap that Newton's method may leave."""
+NEWTON_SAMPLES = 256
+"""Trajectories of the model that the first optima begin at."""
+NEWTON_PIECE = 6000
+"""Most problems solved together, of six inputs; more would leave the cache."""
+NEWTON_LOCAL_STEPS = 6
+"""Newton steps by local maxima of the quadratic models; problems that need more lie on ridges, and
+their models are maximised over all faces of the box."""
+NEWTON_RADIUS = 0.4
+"""First radius of the trust region, in unit coordinates."""
+NEWTON_SOUND = 0.1
+"""Relative error of a predicted gain up to which the radius grows five times in place of twice."""
+NEWTON_STEPS = 300
+"""Newton steps after which a problem that has not converged is left as it is."""

@@ -9,28 +9,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from alphacut.frame import numbers
 from alphacut.frame.calculus.box_quadratic import gain, global_maximum, local_maximum
 from alphacut.frame.modes.modal_model import ModalModel
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.sets.boxes import chebyshev_points
 
-SAMPLES = 256
-"""Trajectories of the model that the first optima begin at."""
-MAX_PIECE = 6000
-"""Most problems solved together, of six inputs; more would leave the cache."""
-MIN_PIECE = 250
-"""Problems below which a piece costs more than it saves."""
-LOCAL_STEPS = 6
-"""Newton steps by local maxima of the quadratic models; problems that need more lie on ridges, and
-their models are maximised over all faces of the box."""
-FIRST_RADIUS = 0.4
-"""First radius of the trust region, in unit coordinates."""
-SOUND = 0.1
-"""Relative error of a predicted gain up to which the radius grows five times in place of twice."""
 BOX_WIDTH = 2.0
 """Width of the unit box [−1, 1]^d."""
-ITERATIONS = 300
-"""Newton steps after which a problem that has not converged is left as it is."""
 
 
 @dataclass(eq=False)
@@ -67,7 +53,7 @@ def first_optima(model: ModalModel, lower: Array, upper: Array, least_gain: floa
         They are ordered by node, then output, then side (−1, +1).
     """
     d, steps, m = len(lower), len(model.time), len(model.outputs)
-    unit = np.vstack([np.zeros((1, d)), chebyshev_points(d, SAMPLES)])
+    unit = np.vstack([np.zeros((1, d)), chebyshev_points(d, int(numbers.NEWTON_SAMPLES))])
     pool = (lower + upper) / 2 + (upper - lower) / 2 * unit
     values = np.concatenate([model.values(pool[k : k + 64]) for k in range(0, len(pool), 64)])
     columns = values.reshape(len(pool), -1)
@@ -92,8 +78,7 @@ def refine(
 
     A problem ends when its quadratic model predicts a gain of at most `least_gain`.
     """
-    half_of_all = -(-len(which) // 2)
-    size = min(MAX_PIECE * 6 // max(lower.size, 6), max(MIN_PIECE, half_of_all))
+    size = max(int(numbers.NEWTON_PIECE) * 6 // max(lower.size, 6), 1)
     for piece in np.array_split(which, -(-len(which) // size) or 1):
         _newton(model, optima, piece, lower, upper, least_gain)
 
@@ -101,14 +86,14 @@ def refine(
 def _newton(
     model: ModalModel, optima: Optima, which: Rows, lower: Array, upper: Array, least_gain: float
 ) -> None:
-    radius: Array = np.full(len(which), FIRST_RADIUS)
+    radius: Array = np.full(len(which), numbers.NEWTON_RADIUS)
     f, g, H = _signed(model, optima, optima.point[which], which)
-    for count in range(ITERATIONS):
+    for count in range(int(numbers.NEWTON_STEPS)):
         low = np.maximum(lower - optima.point[which], -radius[:, None])
         high = np.minimum(upper - optima.point[which], radius[:, None])
         step = (
             local_maximum(g, H, low, high, rounds=2)
-            if count < LOCAL_STEPS
+            if count < numbers.NEWTON_LOCAL_STEPS
             else global_maximum(g, H, low, high)
         )
         predicted = gain(g, H, step)
@@ -129,7 +114,7 @@ def _newton(
         optima.point[which[better]], optima.value[which[better]] = trial[better], f[better]
         g[better], H[better] = trial_g[better], trial_H[better]
         ratio = actual_gain / predicted
-        expansion = np.where(np.abs(ratio - 1) < SOUND, 5, 2)
+        expansion = np.where(np.abs(ratio - 1) < numbers.NEWTON_SOUND, 5, 2)
         wider, narrower = np.minimum(expansion * radius, BOX_WIDTH), 0.3 * np.abs(step).max(1)
         radius = np.where(ratio > 0.75, wider, np.where(ratio < 0.25, narrower, radius))
 

@@ -21,6 +21,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from alphacut.frame import numbers
 from alphacut.frame.bounds.box_proof import BisectionError, BoxBounds, Goal
 from alphacut.frame.bounds.branch_and_bound import enclosed
 from alphacut.frame.bounds.model_error import proved_error
@@ -46,24 +47,6 @@ from alphacut.fuzzy.progress_bar import Progress, subprogress
 from alphacut.fuzzy.refused import checked_number
 
 LOG = logging.getLogger(__name__)
-
-MAX_ERROR_FRACTION = 0.2
-"""Fraction of the gap that the error of the modal model may take on either side."""
-LEFT_OUT = 1 / 120
-"""Fraction of the gap that modes may be worth that are left out; their energy counts as error."""
-BOXES_OF_INPUT = 4.0
-"""Factor by which one more input multiplies the boxes of a branch and bound, about."""
-LEAST_DEGREE, MAX_DEGREE = 3, 20
-MAX_TERMS = 3100
-"""Monomials of a polynomial: degree 13, 10 and 8 of 4, 5 and 6 inputs."""
-FIRST_DECAY = 0.1
-"""Factor by which a degree more multiplies the error, before any is seen."""
-CAUTION = 0.8
-"""Fraction of the degrees that the errors ask for which is taken at once."""
-POINTS = (24, 3)
-"""Points along ω and g/ω of each mode at which its straying from lines between nodes is read."""
-NEWTON_GAP = 0.02
-"""Fraction of the gap that Newton's method may leave."""
 
 
 class GapError(UnprovedError):
@@ -143,7 +126,7 @@ class Proof:
         if len(flow.system.ratios) > 1:
             raise UnprovedError("damping by a ratio of each mode is no polynomial", "take dual")
         require_dissipation(flow.system, boxes)
-        return float(BOXES_OF_INPUT**n_inputs)
+        return float(numbers.BOXES_OF_INPUT**n_inputs)
 
     def bounds(self, flow: LinearFlow, boxes: Boxes, goal: Goal) -> list[BoxBounds]:
         """Return proved and attained bounds on each level of a part of the box.
@@ -165,24 +148,25 @@ class Proof:
         self, flow: LinearFlow, boxes: Boxes, scale: Array, gap: float
     ) -> tuple[ModalModel, Array]:
         """Modal model of a box whose proved error, (T, m), is a fifth of the gap at most."""
-        degree, max_degree, step, before = LEAST_DEGREE, _max_degree(len(boxes.names)), 0, np.inf
+        max_degree, step, before = _max_degree(len(boxes.names)), 0, np.inf
+        degree = min(int(numbers.FIRST_DEGREE), max_degree)
         while True:
-            model = ModalModel.of_degree(flow, boxes, degree, LEFT_OUT * gap * scale)
+            model = ModalModel.of_degree(flow, boxes, degree, numbers.LEFT_OUT_MODES * gap * scale)
             error = proved_error(model)
-            excess = float((error / scale).max()) / (MAX_ERROR_FRACTION * gap)
+            excess = float((error / scale).max()) / (numbers.MAX_ERROR_FRACTION * gap)
             if excess <= 1:
                 return model, error
             # factor of the error by a degree more, and how many degrees more it takes at that rate
-            decay = (excess / before) ** (1 / step) if step else FIRST_DECAY
+            decay = (excess / before) ** (1 / step) if step else numbers.FIRST_DECAY
             further = np.log(excess) / -np.log(decay) if decay < 1 else np.inf
             if degree == max_degree or (step and not degree + further < max_degree + 1):
                 raise self._refusal(model, excess, decay)
-            step = min(max(1, int(CAUTION * further)), max_degree - degree)
+            step = min(max(1, int(numbers.DEGREE_CAUTION * further)), max_degree - degree)
             degree, before = degree + step, excess
 
     def _refusal(self, model: ModalModel, excess: float, decay: float) -> UnprovedError:
         """A `GapError` with the input to bisect; a `BisectionError` if too many are needed."""
-        what = f"the proved error of the modes, {MAX_ERROR_FRACTION * excess:.3g} of it,"
+        what = f"the proved error of the modes, {numbers.MAX_ERROR_FRACTION * excess:.3g} of it,"
         what += " takes too much of the gap"
         cure = "narrower or fewer fuzzy inputs, or a wider gap, can be proved"
         input_shares, max_degree = tail_shares(model), _max_degree(len(model.boxes.names))
@@ -230,7 +214,7 @@ def bound_levels(
     for level in reversed(range(levels)):
         tick = subprogress(progress, len(of_levels) / levels, (len(of_levels) + 1) / levels)
         lower, upper = model.boxes.unit(level)
-        optima = first_optima(model, lower, upper, NEWTON_GAP * search_gap)
+        optima = first_optima(model, lower, upper, numbers.NEWTON_GAP * search_gap)
         if of_levels:  # what the level inside attains is attained here too
             inside = of_levels[-1][0]
             better = inside.value > optima.value
@@ -289,8 +273,8 @@ def _line_deviation(model: ModalModel) -> Array:
             continue
         for k in range(model.count):
             q = min(decay[0][k] / w[k] for w in omega), max(decay[1][k] / w[k] for w in omega)
-            points = [np.linspace(omega[0][k], omega[1][k], POINTS[0]), np.linspace(*q, POINTS[1])]
-            sigma = (-points[1][:, None] + 1j) * points[0]
+            along_omega = np.linspace(omega[0][k], omega[1][k], int(numbers.DEVIATION_POINTS))
+            sigma = (-np.linspace(*q, 3)[:, None] + 1j) * along_omega
             ((modulus, of_imaginary),) = line_deviations(sigma, load, model.time, (0,))
             of_imaginary = np.minimum(omega[1][k] * of_imaginary, modulus)  # which is over ω
             apart = np.outer(modulus, real[k]) + np.outer(of_imaginary, imaginary[k])
@@ -325,7 +309,7 @@ def tail_shares(model: ModalModel) -> Array:
 
 def _max_degree(d: int) -> int:
     """Greatest degree of polynomials in d inputs that are affordable."""
-    degree = MAX_DEGREE
-    while comb(d + degree, d) > MAX_TERMS:
+    degree = int(numbers.MAX_DEGREE)
+    while comb(d + degree, d) > numbers.MAX_TERMS:
         degree -= 1
     return degree
