@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import ClassVar, Protocol
@@ -178,7 +178,7 @@ class Hull:
             earlier = self.facts.get(name, 0)
             self.facts[name] = earlier + value if name in ADDED else max(earlier, value)
 
-    def envelope(self, method: str, seconds: float, notes: Sequence[str]) -> Envelope:
+    def envelope(self, method: str, seconds: float, notes: Iterable[str]) -> Envelope:
         """Return the guaranteed envelope; raise if a reached bound lies outside a proved one."""
         # what holds in a wider cut holds in a narrower one, whose motions are in the wider one too
         outer, inner, at = np.minimum.accumulate(self.closed, axis=0), self.inner, self.at

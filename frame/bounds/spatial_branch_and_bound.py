@@ -71,9 +71,9 @@ class SubBox:
 
     def on_levels(self, rows: Rows, boxes: Boxes | None = None) -> SubBox:
         """Copy on some levels, given by their rows, with the ends of `boxes` if given."""
-        levels, arrays = [self.levels[k] for k in rows], (self.peaks, self.outer, self.least)
         boxes = self.boxes.on_levels(rows) if boxes is None else boxes
-        return SubBox(boxes, levels, *(x[rows] for x in arrays), self.is_wide[rows], self.work)
+        levels, peaks, outer = [self.levels[k] for k in rows], self.peaks[rows], self.outer[rows]
+        return SubBox(boxes, levels, peaks, outer, self.least[rows], self.is_wide[rows], self.work)
 
     def bisected(self, axis: int) -> list[SubBox]:
         """Both halves along an input, each with the levels that reach it."""

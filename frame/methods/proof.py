@@ -274,8 +274,8 @@ def _line_deviation(model: ModalModel) -> Array:
         for k in range(model.count):
             q = min(decay[0][k] / w[k] for w in omega), max(decay[1][k] / w[k] for w in omega)
             along_omega = np.linspace(omega[0][k], omega[1][k], int(numbers.DEVIATION_POINTS))
-            sigma = (-np.linspace(*q, 3)[:, None] + 1j) * along_omega
-            ((modulus, of_imaginary),) = line_deviations(sigma, load, model.time, (0,))
+            sigma = np.multiply.outer(-np.linspace(*q, 3) + 1j, along_omega)
+            modulus, of_imaginary = line_deviations(sigma, load, model.time, (0,))[0]
             of_imaginary = np.minimum(omega[1][k] * of_imaginary, modulus)  # which is over ω
             apart = np.outer(modulus, real[k]) + np.outer(of_imaginary, imaginary[k])
             deviation += 2 * np.minimum(np.outer(modulus, size[k]), apart)
