@@ -266,7 +266,7 @@ def minimise(
     patience: int,
     target: float,
     model_value: float,
-    weight: Array,
+    disagreement: Array,
     u: Array,
 ) -> float:
     """Minimise the dual function D(μ) by deflected subgradient steps; return an upper bound.
@@ -276,28 +276,19 @@ def minimise(
     (Polyak 1969); less is expected after `patience` steps without a third of it. The bound is the
     least D that is met, with that of the Taylor models' cubic parts.
 
-    Args:
-        mu: Multipliers to begin with, shape (Z,); written: the best ones.
-        cell: First and last point along ω and along q of each mode's table, shape (K, 4).
-        node: Node.
-        side: +1 or −1.
-        data: Models and tables of the output.
-        steps: Most evaluations of D.
-        patience: Steps after which less is expected.
-        target: Value at which the minimisation ends.
-        model_value: The model's value at some inputs, which D cannot fall below.
-        weight: Written: by how much each intervening variable differs between the two maxima of D,
-            times its multiplier, shape (Z,).
-        u: Written: inputs that the best multipliers name.
+    At most `steps` values of D are taken; it ends at `target`, and D cannot fall below
+    `model_value`. Written are the best multipliers `mu` (Z,), from which it begins; `disagreement`
+    (Z,), |μ_z| times the distance of variable z between the two maxima of D, a mean that fades; and
+    `u` (L,), the inputs of the second maximum for the best multipliers.
     """
     gradient, direction, best = np.empty(len(mu)), np.zeros(len(mu)), mu.copy()
     here = np.empty(len(u))
     least, expected_drop, idle = np.inf, np.inf, 0
-    weight[:] = 0.0
+    disagreement[:] = 0.0
     for _ in range(steps):
         value = dual(mu, cell, node, side, data, gradient, here)
         for z in range(len(mu)):
-            weight[z] = 0.8 * weight[z] + abs(gradient[z] * mu[z])
+            disagreement[z] = 0.8 * disagreement[z] + abs(gradient[z] * mu[z])
         if value < least:
             if least - value > 0.3 * expected_drop:
                 idle = 0

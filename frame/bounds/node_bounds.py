@@ -52,15 +52,16 @@ class Cells(NamedTuple):
     """Parts of the modes' tables with their dual bounds, at most `Effort.cells` of them.
 
     Args:
-        ends: First and last point along ω and along q for each mode, shape (…, K, 4).
-        mu: Multipliers, shape (…, Z).
-        weight: By how much each variable differs between the two maxima of D, the same.
-        value: Bounds of the dual function, shape (…,).
+        ends: First and last point along ω and along q = g/ω of each mode's table, shape (…, K, 4).
+        mu: Multipliers μ, shape (…, Z).
+        disagreement: |μ_z| times the distance of variable z between the inputs of the maxima over
+            the tables and over the box in D(μ), shape (…, Z).
+        value: Upper bounds D(μ) over the cells, shape (…,).
     """
 
     ends: Rows
     mu: Array
-    weight: Array
+    disagreement: Array
     value: Array
 
 
@@ -68,16 +69,11 @@ class Cells(NamedTuple):
 def bound_nodes(
     nodes: Rows, side: float, effort: Effort, constant: Array, data: Data, out: Array, at: Array
 ) -> None:
-    """Write upper bounds of side × output at rising nodes; each begins where the last one ended.
+    """Write upper bounds of side × output at rising time nodes (J,), each begun from the last.
 
-    Args:
-        nodes: Nodes, shape (J,).
-        side: +1 for upper bounds of the output, −1 for lower ones.
-        effort: Effort for each node.
-        constant: Added to the model's value for the motion's, and to both for the bound, (2, T).
-        data: Models and tables of the output.
-        out: Written: bounds of side × output and the model's values of it, shape (2, J).
-        at: Written: inputs of the model's values, shape (J, L).
+    `constant` (2, T) is added to the model's value for the motion's, and to both for the bound.
+    Written are `out` (2, J), bounds of side × output and the model's values of it, and `at` (J, L),
+    the inputs of the latter.
     """
     count, Z = effort.cells, len(data.linear)
     cells = Cells(
@@ -104,7 +100,7 @@ def bound_node(
     u: Array,
     out: Array,
 ) -> None:
-    """Write the upper bound of side × output at one node, by best-first bisection of cells.
+    """Write the upper bound of side × output at one time node, by best-first bisection of cells.
 
     `out` takes the bound and the largest model value, `u` (L,) the inputs of the latter and `mu`
     (Z,) the multipliers of the undivided tables; the last two are where the search begins.
@@ -124,7 +120,7 @@ def bound_node(
         falls_slowly = count >= effort.grace and cells.value[worst] > start_value - fall
         if cells.value[worst] <= target or falls_slowly:
             break
-        if not halve_widest(cells, worst, count):
+        if not halve_cell(cells, worst, count):
             break
         for half in (worst, count):
             model_value = bound_cell(half, node, side, data, effort, target, cells, model_value, u)
@@ -135,7 +131,7 @@ def bound_node(
 
 @compiled
 def target_value(model_value: float, least_gap: float, effort: Effort, constant: Array) -> float:
-    """Value of the dual function at which a node's bound is tight enough."""
+    """Value of the dual function at which a node's bound is as tight as asked for."""
     below_peak = max(0.0, effort.incumbent - model_value - constant[0])
     gap = max(effort.wanted_gap, least_gap) + effort.slack_below_peak * below_peak
     return model_value + gap - constant[1]
@@ -154,10 +150,10 @@ def bound_cell(
     u: Array,
 ) -> float:
     """Improve the dual bound of a cell; return the largest model value so far, at inputs `u`."""
-    here, mu, weight = np.empty(len(u)), cells.mu[cell], cells.weight[cell]
-    steps, patience = effort.steps, effort.patience
+    here, steps, patience = np.empty(len(u)), effort.steps, effort.patience
+    ends, mu, disagreement = cells.ends[cell], cells.mu[cell], cells.disagreement[cell]
     value = minimise(
-        mu, cells.ends[cell], node, side, data, steps, patience, target, model_value, weight, here
+        mu, ends, node, side, data, steps, patience, target, model_value, disagreement, here
     )
     cells.value[cell] = min(value, cells.value[cell])
     if cells.value[cell] > target or cell == 0:
@@ -169,20 +165,21 @@ def bound_cell(
 
 
 @compiled
-def halve_widest(cells: Cells, halved: int, count: int) -> bool:
-    """Halve a cell along the ω or q = g/ω on which the maxima of the dual function differ most.
+def halve_cell(cells: Cells, halved: int, count: int) -> bool:
+    """Halve a cell along the ω, or g by q = g/ω, of largest disagreement (see `Cells`).
 
-    The upper half is written to number `count`. False if no such range has a point inside.
+    The cell keeps the lower half, and number `count` becomes the upper one. Returns False where no
+    range of ω or q has a point of its table between its ends.
     """
-    ends, weight = cells.ends[halved], cells.weight[halved]
-    n_variables = len(weight) // len(ends)  # of a mode: ω, g and its amplitudes
+    ends, disagreement = cells.ends[halved], cells.disagreement[halved]
+    n_variables = len(disagreement) // len(ends)  # of a mode: ω, g and its amplitudes
     largest, mode, axis = 0.0, -1, 0
     for k in range(len(ends)):
-        for direction in range(2):  # along ω, along q
+        for direction in range(2):  # ω and q
             n_intervals = ends[k, 2 * direction + 1] - ends[k, 2 * direction]
-            difference = weight[k * n_variables + direction]
-            if n_intervals >= 2 and difference > largest:
-                largest, mode, axis = difference, k, direction
+            of_variable = disagreement[k * n_variables + direction]
+            if n_intervals >= 2 and of_variable > largest:
+                largest, mode, axis = of_variable, k, direction
     if mode < 0:
         return False
     middle = (ends[mode, 2 * axis] + ends[mode, 2 * axis + 1]) // 2
