@@ -16,6 +16,7 @@ from alphacut.questions.question import (
     LimitsAnswer,
     Record,
     Texts,
+    input_text,
     limit_fields,
 )
 from alphacut.stages.envelope import PeakResult, peak_results
@@ -26,7 +27,8 @@ class LimitDecision(LimitAnswer):
     """Degrees to which it is possible and necessary that a limit is exceeded, and what is left.
 
     The margin is what the greatest and the least peak leave of the limit on each level, of several
-    limits as fractions of them. The verdict holds from a level on, the lowest one computed.
+    limits as fractions of them. The verdict holds from a level on, the lowest one computed; the
+    peak is reached under `record` where a suite moves the structure.
     """
 
     possibility: tuple[float, float]
@@ -36,11 +38,22 @@ class LimitDecision(LimitAnswer):
     from_level: float
     nature: Nature
     peak: PeakResult | None
+    record: str = ""
 
     @property
     def verdict_words(self) -> str:
         """The verdict, with the level from which on it holds if that is not 0."""
         return verdict_words(self.verdict, self.from_level)
+
+    @property
+    def verdict_and_motion(self) -> str:
+        """The verdict; where only some motions exceed the limit, with the inputs of one."""
+        inputs = {} if self.peak is None else self.peak.reached_at
+        if self.verdict != "can be exceeded" or not inputs:
+            return self.verdict_words
+        texts = [f"{name} = {input_text(name, value)}" for name, value in inputs.items()]
+        texts += [f"record {self.record}"] if self.record else []
+        return f"{self.verdict}, as at {', '.join(texts)}"
 
     @property
     def margin_text(self) -> str:
@@ -78,7 +91,7 @@ class DecisionAnswer(LimitsAnswer[LimitDecision]):
         """Verdict, degrees, and margin and peak on the lowest level."""
         return {
             "limit": limit.words,
-            "verdict": limit.verdict_words,
+            "verdict": limit.verdict_and_motion,
             "nature": limit.nature,
             "possibility": degree_text(limit.possibility),
             "necessity": degree_text(limit.necessity),
@@ -122,6 +135,15 @@ def decide(section: DecisionSection, response: FuzzyResponse) -> DecisionAnswer:
     limits = section.limits_by_name
     peaks = {name: response.peaks[limit.peak] for name, limit in limits.items()}
     by_peak = peak_results(response.peaks)
+
+    def record_at(peak: str) -> str:
+        """Record under which a peak is reached, of a suite."""
+        by_record = {} if response.suite is None else response.suite.peaks
+        reached = {
+            x: float(peaks[peak].reached[0]) for x, peaks in by_record.items() if peak in peaks
+        }
+        return max(reached, key=lambda x: reached[x], default="")
+
     decisions = {
         name: LimitDecision.model_validate(
             {
@@ -133,6 +155,7 @@ def decide(section: DecisionSection, response: FuzzyResponse) -> DecisionAnswer:
                 "from_level": answer.lowest,
                 "nature": answer.nature,
                 "peak": None if name == ANY else by_peak[limits[name].peak],
+                "record": "" if name == ANY else record_at(limits[name].peak),
             }
         )
         for name, answer in passing(peaks, section.in_si(response.structure)).items()

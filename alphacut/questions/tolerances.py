@@ -11,8 +11,8 @@ from alphacut.frame.questions.tolerances import scaled, tolerances
 from alphacut.frame.structures.quantities import of_storey_frame
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature, rounded
-from alphacut.io.quantity import MINUS, engineering
-from alphacut.questions.question import Answer, FuzzyResponse, Record, Texts
+from alphacut.io.quantity import MINUS
+from alphacut.questions.question import Answer, FuzzyResponse, Record, Texts, input_text
 from alphacut.stages.envelope import PEAK_ERROR, PeakResults, peak_results
 from alphacut.stages.store import Numbers
 
@@ -79,7 +79,7 @@ class TolerancesAnswer(Answer):
             relative = ", ".join(f"{end / support.modal - 1:+.2%}" for end in support.kept)
         sides = zip(support.kept, ("lower", "upper"), strict=True)
         inside = (rounded(end, side, Nature.ATTAINED) for end, side in sides)  # rounded inwards
-        text = " … ".join(engineering(end, of_storey_frame(name).unit) for end in inside)
+        text = " … ".join(input_text(name, end) for end in inside)
         return text, relative.replace("-", MINUS)
 
     def records(self) -> list[Record]:

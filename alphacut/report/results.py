@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from textwrap import wrap
 
 import numpy as np
 
@@ -43,7 +44,8 @@ def run_text(parts: Parts) -> str:
         shown.append(learned(parts.update))
     elif parts.update is not None:
         lines.append(parts.update.refuted)
-    lines += [f"{row[0]}: {row[1]} ({row[2]})" for row in answers(parts)]
+    for row in answers(parts):
+        lines += wrap(f"{row[0]}: {row[1]} ({row[2]})", 80, subsequent_indent="  ")
     lines += drivers(parts)
     heading = f"{MEANING}\n" if shown else ""
     texts = [text_table(*table) for table in shown]

@@ -8,6 +8,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from pydantic import Field
 
 from alphacut import frame
 from alphacut.case.motion import EnvelopeSection, Study, Tolerance
@@ -16,6 +17,7 @@ from alphacut.frame.bounds.remainder import MOST_PARAMETERS
 from alphacut.frame.questions.peaks import PEAK_BOUNDS, Peak, Peaks, output_of, peaks, tightest
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.progress_bar import subprogress
 from alphacut.fuzzy.refused import FailedError, require
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document, say
@@ -47,6 +49,7 @@ class PeakResult(Numbers):
     Args:
         proved: Bound that no motion passes.
         is_least: Whether it is a least value.
+        reached_at: Inputs in SI of the motion that reaches it on the lowest level, if known.
     """
 
     lower: Values
@@ -58,6 +61,7 @@ class PeakResult(Numbers):
     proved: Values
     nature: Nature
     is_least: bool = False
+    reached_at: dict[str, float] = Field(default={})
 
     @property
     def far_end(self) -> Array:
@@ -139,7 +143,9 @@ class EnvelopeTask:
 
     def compute(self, structure: Structure, context: StageContext) -> Computed[EnvelopeResult]:
         """Computes the envelope as a dataset, and the fuzzy peak of each output as a document."""
-        arguments = self.arguments(structure) | {"progress": context.tick or False}
+        tick = context.tick
+        first, second = (subprogress(tick, *ends) for ends in ((0.0, 0.5), (0.5, 1.0)))
+        arguments = self.arguments(structure) | {"progress": first if tick else False}
         result = frame.envelope(**arguments, relative=not self.tolerance(structure).unit)
         data = result.to_dataset()
         signed = [name for name in self.limited if name != output_of(name)]
@@ -148,7 +154,8 @@ class EnvelopeTask:
         has_many_inputs = len(structure.inputs(self.fuzzy)) > MOST_PARAMETERS
         gap = np.inf if has_many_inputs else PEAK_ERROR
         if loose := loose_peaks(peak_bounds, self.limited, gap):
-            tighter = replace(self, limited=loose).close_peaks(structure, context)
+            further = replace(context, tick=second if tick else None)
+            tighter = replace(self, limited=loose).close_peaks(structure, further)
             peak_bounds = tightest(peak_bounds, tighter)
         return Computed(self._result(data, peak_bounds, structure), data)
 
@@ -240,7 +247,8 @@ def peak_results(peaks: Peaks) -> PeakResults:
         bounds["proved"] = peak.greatest_bounds.upper
         is_least = name.startswith("min ")  # which `Peak` has as the greatest value of −q
         bounds = _negative(bounds) if is_least else bounds
-        results[name] = PeakResult(**bounds, nature=peak.nature, is_least=is_least)
+        kind = {"nature": peak.nature, "is_least": is_least, "reached_at": peak.reached_at}
+        results[name] = PeakResult.model_validate(bounds | kind)
     return results
 
 
@@ -254,7 +262,8 @@ def peaks_of(results: PeakResults, alpha: Sequence[float]) -> dict[str, Peak]:
             unknown = np.inf if bound in ("upper", "least_reached") else -np.inf
             bounds[bound] = np.where(np.isnan(values), unknown, values)
         is_signed = name.startswith(("max ", "min "))
-        peaks[name] = Peak(np.array(alpha), **bounds, nature=peak.nature, is_signed=is_signed)
+        kind: dict[str, Any] = {"is_signed": is_signed, "reached_at": peak.reached_at}
+        peaks[name] = Peak(np.array(alpha), **bounds, nature=peak.nature, **kind)
     return peaks
 
 

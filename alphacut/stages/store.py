@@ -160,7 +160,16 @@ class RunProgress:
         """Progress of the next stages, `count` of them; None where nothing is shown."""
         first, part = self.done, count / max(count, self.stages_left)
         self.done, self.stages_left = first + part * (1 - first), self.stages_left - count
-        return subprogress(self.tick, first, self.done) if self.tick else None
+        if (show := self.tick) is None:
+            return None
+        shown, last = first, self.done
+
+        def tick(share: float) -> None:
+            nonlocal shown
+            shown = max(shown, first + (last - first) * share)  # a second analysis begins at 0
+            show(shown)
+
+        return tick
 
 
 @dataclass(frozen=True)

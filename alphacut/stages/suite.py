@@ -156,11 +156,12 @@ def worst_peaks(peaks: Mapping[str, Peaks]) -> dict[str, Peak]:
     The largest peak rises with the peak under each record, so that its bounds are the largest ones.
     """
     worst = {}
-    for name, first in next(iter(peaks.values())).items():
+    for name in next(iter(peaks.values())):
         of_records = [x[name] for x in peaks.values()]
         nature = Nature.weakest(peak.nature for peak in of_records)
         bounds = {x: np.max([getattr(peak, x) for peak in of_records], 0) for x in PEAK_BOUNDS}
-        worst[name] = replace(first, nature=nature, **bounds)
+        farthest = max(of_records, key=lambda peak: float(peak.reached[0]))
+        worst[name] = replace(farthest, nature=nature, **bounds)
     return worst
 
 
@@ -210,7 +211,7 @@ def with_means(worst: Peaks, peaks: Mapping[str, Peaks], reached: Array) -> dict
         # a structure of any higher cut has at least the mean of that cut's least peaks
         means["reached"] = np.maximum(np.maximum.accumulate(least[::-1])[::-1], known)
         means["least_reached"] = np.full_like(least, np.inf)  # no structure's mean is bounded so
-        found[f"mean {name}"] = replace(worst[name], **means)
+        found[f"mean {name}"] = replace(worst[name], reached_at={}, **means)
     return found
 
 

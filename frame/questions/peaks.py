@@ -13,7 +13,7 @@ excludes the motion on its level and above. One that is attained above it proves
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -49,6 +49,8 @@ class Peak:
             one.
         nature: Nature of the bounds.
         is_signed: Whether it is a largest value, which may be negative, instead of a magnitude.
+        reached_at: Inputs in SI, by name, of the motion that reaches the peak on the lowest level;
+            empty where none is known.
     """
 
     alpha: Array
@@ -60,6 +62,7 @@ class Peak:
     least_reached: Array
     nature: Nature
     is_signed: bool = False
+    reached_at: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def greatest_bounds(self) -> Ends:
@@ -133,7 +136,23 @@ def _peak_of(envelope: Envelope, name: str) -> Peak:
         least_reached=least_reached,
         nature=nature,
         is_signed=is_signed,
+        reached_at=_inputs_at_peak(envelope, k, name),
     )
+
+
+def _inputs_at_peak(envelope: Envelope, k: int, name: str) -> dict[str, float]:
+    """Return inputs of the motion that reaches a peak of output k on the lowest level, if known."""
+    low, high = envelope.attained
+    ends = [(high, envelope.upper_at), (-low, envelope.lower_at)]
+    if name != output_of(name):  # of one side
+        ends = ends[:1] if name.startswith("max ") else ends[1:]
+    values = np.array([end[0, :, k] for end, _ in ends])  # (ends, T)
+    points = np.array([at[0, :, k] for _, at in ends])  # (ends, T, n)
+    values = np.where(np.isfinite(points).all(-1) & np.isfinite(values), values, -np.inf)
+    if not np.isfinite(values).any():
+        return {}
+    farthest = np.unravel_index(values.argmax(), values.shape)
+    return dict(zip(envelope.inputs, map(float, points[farthest]), strict=True))
 
 
 def _oriented(low: Array, high: Array, name: str) -> Ends:
@@ -168,8 +187,10 @@ def _tighter(first: Peak, second: Peak) -> Peak:
         better = min(first, second, key=lambda peak: peak.error.max())
     else:
         better = max(first, second, key=lambda peak: list(Nature).index(peak.nature))
+    farther = first if first.reached[0] >= second.reached[0] else second
     return replace(
         better,
+        reached_at=farther.reached_at,
         reached=np.maximum(first.reached, second.reached),
         least_proved=np.maximum(first.least_proved, second.least_proved),
         least_reached=np.minimum(first.least_reached, second.least_reached),

@@ -6,11 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from alphacut.case.content import Content
+from alphacut.case.content import Content, load
 from alphacut.case.limits import Limit, parse_limit
 from alphacut.commands.pipeline import QUESTIONS as PUT
 from alphacut.entry import main
 from alphacut.figures.envelope import DRAWINGS
+from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.questions.peaks import Peak
 from alphacut.fuzzy import Triangular
 from alphacut.fuzzy.refused import RefusedError
@@ -121,7 +122,7 @@ duration = "2 s"
 step = "0.02 s"
 [decision]
 limits = ["drift1 <= 1 %", "drift1 <= 3 %", "max drift1 <= 60 mm", "min drift1 >= -60 mm",
-          "min drift1 >= -20 mm", "min q2 >= 1 m", "q1 <= 1 m"]
+          "min drift1 >= -20 mm", "min drift1 >= -40.6 mm", "min q2 >= 1 m", "q1 <= 1 m"]
 """
 
 
@@ -139,6 +140,7 @@ def test_an_output_has_several_limits_of_each_side_and_of_its_magnitude(tmp_path
         "max drift1": "not exceeded",
         "min drift1 >= -60 mm": "not exceeded",
         "min drift1 >= -20 mm": "exceeded",
+        "min drift1 >= -40.6 mm": "can be exceeded",
         "min q2": "exceeded",
         "q1": "not exceeded",  # no output of the frame's own
         "any of them": "exceeded",
@@ -147,7 +149,14 @@ def test_an_output_has_several_limits_of_each_side_and_of_its_magnitude(tmp_path
     least = limits["min drift1 >= -60 mm"]["peak"]
     assert least["proved"][0] == pytest.approx(band["min"]["drift1"], rel=0.02)
     assert least["reached"][0] >= least["proved"][0]
-    words = [x["limit"] for x in DecisionAnswer.model_validate(summary["decision"]).rows()]
+    rows = DecisionAnswer.model_validate(summary["decision"]).rows()
+    words = [x["limit"] for x in rows]
     assert words[2] == "max drift1 ≤ 60.00 mm"
     assert words[4] == "min drift1 ≥ −20.00 mm"
-    assert words[5] == "min q2 ≥ 1.000 m"
+    assert words[6] == "min q2 ≥ 1.000 m"
+    # the inputs that the verdict names move so
+    stiffness = limits["min drift1 >= -40.6 mm"]["peak"]["reached_at"]["k1"]
+    assert rows[5]["verdict"] == f"can be exceeded, as at k1 = {stiffness / 1e3:.2f} kN/m"
+    flow = make_flow(load(case).content.structure.model, ("k1",), 2.0, 1e-3, "exact")
+    drift = [*map(str, flow.outputs)].index("drift1")
+    assert flow.values(np.array([[stiffness]])).min(axis=1)[0, drift] < -0.0406

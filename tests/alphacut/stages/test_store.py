@@ -98,7 +98,7 @@ def test_a_run_has_one_progress_that_ends_once(tmp_path):
     told = []
 
     def compute(work):
-        for share in (0.0, 0.5, 1.0):
+        for share in (0.0, 0.5, 0.2, 1.0):
             work.tick(share)
         return Computed({})
 

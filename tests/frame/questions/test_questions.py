@@ -250,6 +250,9 @@ def test_peaks_of_one_side_are_those_of_its_bounds():
         lower=band.lower,
         upper=band.upper,
         attained=band,
+        inputs={"k1": None},
+        lower_at=np.array([[[[1.0]], [[2.0]]]]),
+        upper_at=np.array([[[[3.0]], [[4.0]]]]),
         error=np.zeros((1, 2, 1)),
         natures=None,
         nature=Nature.GUARANTEED,
@@ -260,6 +263,8 @@ def test_peaks_of_one_side_are_those_of_its_bounds():
     assert bounds(found, "upper").tolist() == [5.0, 5.0, 3.0]
     assert bounds(found, "lower").tolist() == [2.0, 1.0, 2.0]
     assert bounds(found, "reached").tolist() == [5.0, 5.0, 3.0]
+    at = {name: peak.reached_at["k1"] for name, peak in found.items()}
+    assert at == {"q1": 4.0, "max q1": 4.0, "min q1": 1.0}
     assert found["min q1"].greatest_bounds.upper == [3.0]
     assert passing(found, {"min q1": 1.5})["min q1"].outcome == "exceeded"
     assert passing(found, {"max q1": 5.5})["max q1"].outcome == "not exceeded"
