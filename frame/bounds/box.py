@@ -105,9 +105,6 @@ class Box:
         """Exact values of one output at one node for each of S points, and their rounding, (S,).
 
         Points are unit coordinates (S, d); modes are found once for each distinct one.
-
-        Raises:
-            UnprovedError: A mode does not oscillate there.
         """
         points, index = np.unique(unit, axis=0, return_inverse=True)
         values_and_errors = np.empty((2, len(unit)))
@@ -127,14 +124,9 @@ class Box:
         return values_and_errors[0], values_and_errors[1]
 
     def centre_motion(self) -> tuple[Array, Array, Array]:
-        """Exact outputs at the nodes for inputs in the middle of the box.
+        """Exact outputs in the middle of the box, their rounding and their straying, (T, m) each.
 
-        Returns:
-            Values, bounds of their rounding, and bounds of how far outputs stray from a straight
-            line in the step to each node, (T, m) each.
-
-        Raises:
-            UnprovedError: A mode does not oscillate there.
+        The last two are bounds; straying is that from a straight line in the step to each node.
         """
         modal, count = self._modal(np.zeros((1, len(self.active)))), len(self.time)
         sigma, point = modal.sigma[0], np.zeros(count, int)
@@ -147,11 +139,7 @@ class Box:
         return value, error, self._line_deviation(modal)
 
     def peak_over_time(self, unit: Array) -> Array:
-        """Upper bound of each output's magnitude at one point (d,), between nodes too, shape (m,).
-
-        Raises:
-            UnprovedError: A mode does not oscillate there.
-        """
+        """Upper bound of each output's magnitude, (m,), at one point (d,), between nodes too."""
         point, steps = self.inputs(unit), SUBSTEPS * (len(self.time) - 1)
         time = np.linspace(self.time[0], self.time[-1], steps + 1)
         motion = replace(self, time=time, low=point, high=point)

@@ -58,11 +58,10 @@ def enclosed(
         gap: Wanted difference between proved and attained bound, in units of the outputs.
         budget: Most boxes per problem on average; where it ends first, gaps are wider than `gap`.
         workers: Threads; the result does not depend on their number.
-        progress: Called with the fraction done.
+        progress: Called with the completed fraction.
 
     Returns:
-        Proved upper bounds, shape (N,), and the number of boxes examined, each counted once for
-        each problem that needs it.
+        Proved upper bounds (N,), and the number of examined pairs of a box and a problem.
     """
     tree = Tree(model, lower, upper, optima, gap)
     frontier, n_problems = Frontier.of_box(len(lower), tree.numbers), len(tree.numbers)
@@ -118,12 +117,7 @@ class Tree:
         return np.asarray(upper[self.numbers])
 
     def examine(self, frontier: Frontier, boxes: slice, items: slice) -> tuple[Array, Array, Array]:
-        """Examine the items of some boxes by `kernel.examine`; an item is a box with a problem.
-
-        Returns:
-            What is done next with each item (codes of `kernel.examine`), side × output at its
-            centre, and its upper bound, each (I,).
-        """
+        """Codes, values at centres and upper bounds of items (I,) of boxes by `kernel.examine`."""
         model, over_domain, d = self.model, self.remainder, len(self.lower)
         n, m = model.count, len(model.outputs)
         centre, radius, edges = frontier.geometry(self.lower, self.upper, boxes)
@@ -231,11 +225,9 @@ class Frontier:
             start = stop
 
     def children(self, code: Array) -> Frontier:
-        """Halves and faces of boxes with the items left open by the codes of `kernel.examine`.
+        """Halves and faces of boxes with the items left open by their codes of `kernel.examine`.
 
-        Args:
-            code: Of each item (a box and a problem): 0 closed, 1 + i halve along axis i, `FACES`
-                and more confine to faces. A box is halved along the axis with most votes.
+        A box is halved along the axis that most of its items ask for.
         """
         d = self.position.shape[1]
         to_halve = np.flatnonzero((code > 0) & (code < FACES))

@@ -132,15 +132,11 @@ def contract(bound: Array, r: Array, out: Array) -> None:
 def linear_phase_remainder(reach: float, e: Array, c: Array) -> float:
     """Bound of what a mode C exp(λ t) differs from one of linear phase beyond second order in x.
 
-    The mode of linear phase has C = C₀ and λ = λ₀ + i ω·x. The bound is a sixth of one of the
-    difference's third derivative, by Leibniz' rule, divided by |exp(λ₀ t)|; infinite beyond
-    `MAX_PHASE` or `SWELL`.
-
-    Args:
-        reach: Largest change of phase |ω·x| t over the box.
-        e: Bounds over the box of the derivatives of λ t of order 0 to 3 times the radii; that of
-            order 1 is of the real part, that of order 0 is not read.
-        c: The same of C, with order 0.
+    The mode of linear phase has C = C₀ and λ = λ₀ + i ω·x, whose phase changes by at most `reach`
+    over the box. The bound is a sixth of one of the difference's third derivative, by Leibniz'
+    rule, divided by |exp(λ₀ t)|; infinite beyond `MAX_PHASE` or `SWELL`. `e` and `c` are bounds
+    over the box of the derivatives of λ t (order 1: of its real part; 0 is not read) and C, of
+    order 0 to 3, times the radii.
     """
     z0, z1 = e[1] + e[2] / 2, e[1] + e[2]
     if not (reach < MAX_PHASE and z0 < SWELL):

@@ -44,9 +44,7 @@ class PeakCell:
 def least_peak(level: LevelModels, output: int) -> tuple[float, Array]:
     """Return a lower bound of an output's smallest peak over a box, by best-first bisection.
 
-    Returns:
-        The bound, 0 or more, and coordinates that the dual bound of the lowest cell names, a guess
-        at those of the smallest peak, shape (d,).
+    Returned with it, 0 or more, are unit coordinates (d,) that the bound of the lowest cell names.
     """
     sides = [OutputBounds.initial(level, output, s, 0.0) for s in (0, 1)]
     data = sides[0].data

@@ -39,29 +39,21 @@ class Optima:
 
 
 def first_optima(model: ModalModel, lower: Array, upper: Array, least_gain: float) -> Optima:
-    """Local optima of all outputs, on both sides, at all nodes over the box [lower, upper].
+    """Local optima at all nodes, of all outputs, on both sides (in this order) over a box.
 
-    Each begins at the best of the centre and Chebyshev points, and is refined by Newton's method.
-
-    Args:
-        model: The modal model.
-        lower: Lower ends, shape (d,).
-        upper: Upper ends.
-        least_gain: Predicted gain below which Newton's method stops, in units of the outputs.
-
-    Returns:
-        They are ordered by node, then output, then side (−1, +1).
+    Each begins at the best of the centre and Chebyshev points, and is refined by Newton's method
+    until that predicts a gain below `least_gain`, in units of the outputs.
     """
-    d, steps, m = len(lower), len(model.time), len(model.outputs)
+    d, nodes, m = len(lower), len(model.time), len(model.outputs)
     unit = np.vstack([np.zeros((1, d)), chebyshev_points(d, int(numbers.NEWTON_SAMPLES))])
     pool = (lower + upper) / 2 + (upper - lower) / 2 * unit
     values = np.concatenate([model.values(pool[k : k + 64]) for k in range(0, len(pool), 64)])
     columns = values.reshape(len(pool), -1)
     best = np.stack([columns.argmin(0), columns.argmax(0)], 1).ravel()
-    side = np.tile([-1.0, 1.0], steps * m)
+    side = np.tile([-1.0, 1.0], nodes * m)
     optima = Optima(
-        node=np.repeat(np.arange(steps), 2 * m),
-        output=np.tile(np.repeat(np.arange(m), 2), steps),
+        node=np.repeat(np.arange(nodes), 2 * m),
+        output=np.tile(np.repeat(np.arange(m), 2), nodes),
         side=side,
         point=pool[best],
         value=side * columns[best, np.arange(len(best)) // 2],

@@ -64,14 +64,11 @@ def prune_ends(
 
 
 def remainder_addition(bounds: OutputBounds, node: int) -> tuple[float, Array]:
-    """Return the least addition of the Taylor remainders to a bound, and each input's part in it.
+    """Return what Taylor remainders add to a bound at least, and the inputs' fractions of it, (d,).
 
     At the maximum the multipliers are the slopes of the motion by the intervening variables.
     Remainders are of fourth degree: they are shared out by the squares of what the first and second
     degree of each variable have of an input.
-
-    Returns:
-        The addition, in the output's unit, and fractions of it, shape (d,), whose sum is 1.
     """
     data, d = bounds.data, bounds.data.linear.shape[1]
     slope = np.zeros(len(data.linear))  # of the response by each intervening variable

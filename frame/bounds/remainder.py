@@ -83,9 +83,7 @@ class MotionPart:
 def parts(model: ModalModel, growth: Array) -> list[MotionPart]:
     """The free part of a model's motion, then the part of each load, with bounds over time.
 
-    Args:
-        model: The modal model.
-        growth: Upper bounds g of Re λ_k, shape (n,), in 1/s.
+    `growth` (n,) are upper bounds of Re λ_k, in 1/s.
     """
     time = model.time[:, None]
     divisor = np.where(growth == 0, 1.0, growth)
@@ -176,15 +174,10 @@ def _initial_third_derivatives(model: ModalModel, reach: Array) -> Array:
 
 
 def leibniz(c: list[Array], r: list[Array], order: int) -> list[Array]:
-    """Bounds of the derivatives of C exp(λ t), divided by exp(λ t), as coefficients of powers of t.
+    """Bounds of derivatives of C exp(λ t) over exp(λ t), for each power of t from 0 to the order.
 
-    Args:
-        c: Bounds of the derivatives of C, shapes (d,) * its order + (m,).
-        r: The same of λ, shapes (d,) * its order.
-        order: Of the derivative.
-
-    Returns:
-        One array for each power of t from 0 to `order`, shape (d,) * order + (m,).
+    From bounds `c` of the derivatives of C, shapes (d,) * its order + (m,), and `r` of those of λ,
+    shapes (d,) * its order, by Leibniz' and Faà di Bruno's rules.
     """
     d, m = len(r[1]), c[0].shape[-1]
     out: list[Array] = [np.zeros((d,) * order + (m,)) for _ in range(order + 1)]

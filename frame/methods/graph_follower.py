@@ -59,7 +59,7 @@ class Storage:
 
     @property
     def all_places(self) -> Places:
-        """All places."""
+        """Indices of all places."""
         return tuple(np.indices(self.top.shape).reshape(3, -1))
 
     def holds(self, point: Array, near: float = 1e-9) -> bool:
@@ -93,17 +93,11 @@ class Storage:
         bend: float = 1.0,
         reach: Array | float = np.inf,
     ) -> tuple[Array, Array]:
-        """Return the maxima of the best graphs' Taylor models over a box at K places (eq. 22).
+        """Return maxima (K,) of the best graphs' Taylor models at places, and their points (K, d).
 
-        Args:
-            places: Node, output and side of each place.
-            box: Lower and upper ends of the unit coordinates, each (d,).
-            maximise: Maximum of g·x + x·H·x/2 over boxes, from g, H and their ends.
-            bend: Factor on second derivatives; 0 for linear models.
-            reach: Distance from each graph's parameters up to which its model is trusted.
-
-        Returns:
-            Predicted values, shape (K,), and their unit coordinates, shape (K, d).
+        They are those over a box of unit coordinates (eq. 22 of the paper) within the distance
+        `reach` of each graph, found by `maximise` from g and H of g·x + x·H·x/2 and the ends of x;
+        `bend` is a factor on H, 0 for linear models.
         """
         side, at = 2.0 * places[2] - 1, self.points[self.best[places]]
         g, H = side[:, None] * self.first[places], bend * side[:, None, None] * self.second[places]
@@ -220,9 +214,8 @@ class GraphFollower:
 def trajectories_diverge(steepest: Array, bounds: Array) -> bool:
     """Return whether neighbouring trajectories diverge, so that Taylor models predict nothing.
 
-    Args:
-        steepest: Largest slope of each output along a unit coordinate, shape (m,).
-        bounds: Upper bounds of (−output, output), shape (T, m, 2).
+    `steepest` (m,) is the largest slope of each output along a unit coordinate, `bounds` (T, m, 2)
+    are upper bounds of (−output, output).
     """
     width = (bounds[..., 0].max(0) + bounds[..., 1].max(0)) / 2
     return bool((steepest > MAX_RATIO * width).any())

@@ -141,10 +141,7 @@ class ImprovedFollower:
     ) -> PassBounds:
         """Return the bounds of one pass on all levels, from the narrowest box to the widest.
 
-        Args:
-            flow: The motion and its boxes.
-            progress: Called with the completed fraction.
-            asked: Bounds whose gain counts, shape (A, T, m, 2); all unless given.
+        `asked` (A, T, m, 2) are the bounds whose gain counts, all unless given.
         """
         levels, storage = len(flow.boxes.alpha), Storage(flow)
         d = len(flow.boxes.names)
@@ -252,8 +249,7 @@ class _LevelModels:
     def proposals(self, least: Array, count: int) -> Array:
         """Return the points of largest predicted gain, one per window of time, (≤ count, d).
 
-        A gain must exceed the `least` of its place; points near stored or other new ones are left
-        out.
+        A gain must exceed that of its place in `least` (T, m, 2); near points are left out.
         """
         chosen, gains = list[Array](), self.gains / least
         windows = np.array_split(np.arange(len(gains)), max(1, min(count, len(gains))))

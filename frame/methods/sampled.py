@@ -74,15 +74,10 @@ class Sampled:
 
 
 def independent_excess(flow: UnitFlow, bounds: Array, progress: Progress) -> tuple[Array, int]:
-    """Return how far outputs of an independent sample exceed the bounds on each level.
+    """Return how far independent motions exceed the bounds on each level, and their number.
 
-    Args:
-        flow: The motion and its boxes.
-        bounds: Upper bounds of (−output, output), shape (A, T, m, 2).
-        progress: Called with the completed fraction.
-
-    Returns:
-        Largest excess of each output over time, shape (A, m), and the number of motions.
+    `bounds` (A, T, m, 2) are upper bounds of (−output, output); the excess of each output is the
+    largest over time, shape (A, m).
     """
     largest, count = np.zeros((len(bounds), len(flow.outputs))), 0
     for level in range(len(bounds)):
