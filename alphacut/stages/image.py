@@ -19,9 +19,8 @@ from alphacut.fuzzy.result import Nature
 from alphacut.io.provenance import file_digest
 from alphacut.rve.cell.cell import Phase
 from alphacut.rve.image.bounds import Ends
-from alphacut.rve.image.energies import phase_energies
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
-from alphacut.rve.image.model import ImageCut, ImageModel, usual_division
+from alphacut.rve.image.model import ImageCut, ImageModel, phase_energies, usual_division
 from alphacut.rve.image.phases import ModuliImages, ModuliInterval, moduli_images, threshold_ranges
 from alphacut.rve.image.read import read_grey, require_memory, require_phases
 from alphacut.rve.result.engineering_constants import NAMES, PLANE_STRAIN

@@ -64,7 +64,7 @@ def families() -> dict[str, list[tuple[str, Way]]]:
         ]
     for name, solver, interface in (
         ("prism", "theta", "conforming"),
-        ("prism, MUMPS", "mumps", "conforming"),
+        ("prism, MUMPS", "MUMPS", "conforming"),
         ("prism, interface ignored", "theta", "sign"),
     ):
         lines[name] = [

@@ -20,7 +20,7 @@ from alphacut.rve.cell.cell import Phase
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.model import ImageModel, ImageSolution, solve_image
 from alphacut.rve.image.phases import ModuliInterval, PlaneModuli, moduli_images
-from alphacut.rve.series.multipoles import square_stiffness
+from alphacut.rve.series.model import square_stiffness
 
 RESULTS = Path(__file__).parents[1] / "results"
 DIVISIONS = (1, 2, 4)

@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -74,30 +75,21 @@ EDGES = (
 )
 
 
+def solved_by(model: Any) -> Solve:
+    """Function that solves one cell by a model of rve."""
+    return lambda radius_map, matrix, particle: model.solve(radius_map, matrix, [particle])[0]
+
+
 def models(*, small: bool) -> dict[str, Solve]:
     """Name → model at a resolution that suits a test (`small`) or the table."""
-
-    def series(radius_map: RadiusMap, matrix: Phase, particle: Phase) -> HomogenisedStiffness:
-        return SeriesModel().solve(radius_map, matrix, [particle])[0]
-
-    def slices(order: int, size: float) -> Solve:
-        from alphacut.rve.slices.model import SlicesModel
-
-        model = SlicesModel(order=order, mesh_size=size, points=8)
-        return lambda radius_map, matrix, particle: model.solve(radius_map, matrix, [particle])[0]
-
-    def prism(layers: int, size: float) -> Solve:
-        from alphacut.rve.prism.model import PrismModel
-
-        model = PrismModel(mesh_size=size, layers=layers)
-        return lambda radius_map, matrix, particle: model.solve(radius_map, matrix, [particle])[0]
+    from alphacut.rve import PrismModel, SlicesModel
 
     size = 0.5 if small else 0.25
     return {
-        "series": series,
-        "slices, order 2": slices(2, size),
-        "slices, order 4": slices(4, size),
-        "prism": prism(6 if small else 12, size),
+        "series": solved_by(SeriesModel()),
+        "slices, order 2": solved_by(SlicesModel(2, size, 8)),
+        "slices, order 4": solved_by(SlicesModel(4, size, 8)),
+        "prism": solved_by(PrismModel(size, 6 if small else 12)),
     }
 
 
@@ -119,55 +111,34 @@ class Row:
 
 def meet(edge: Edge, name: str, solve: Solve) -> Row:
     """Try one model on one edge."""
-    started = perf_counter()
+    cell, started = (edge.radius_map, edge.matrix, edge.particle), perf_counter()
     try:
-        found = solve(edge.radius_map, edge.matrix, edge.particle)
+        found = solve(*cell)
     except (RuntimeError, ValueError) as refusal:
-        return Row(
-            edge.name,
-            name,
-            "refuses",
-            np.nan,
-            np.nan,
-            perf_counter() - started,
-            str(refusal).splitlines()[0],
-        )
-    seconds = perf_counter() - started
+        words, seconds = str(refusal).splitlines()[0], perf_counter() - started
+        return Row(edge.name, name, "refuses", np.nan, np.nan, seconds, words)
+    seconds, declared = perf_counter() - started, found.estimated_error
     try:
-        exact = SeriesModel().solve(edge.radius_map, edge.matrix, [edge.particle])[0]
+        exact = solved_by(SeriesModel())(*cell)
     except RuntimeError as refusal:
-        return Row(
-            edge.name,
-            name,
-            "unjudged",
-            found.estimated_error,
-            np.nan,
-            seconds,
-            f"no truth: {refusal}",
-        )
+        return Row(edge.name, name, "unjudged", declared, np.nan, seconds, f"no truth: {refusal}")
     true = abs(found.modulus / exact.modulus - 1)
-    works = true <= found.estimated_error + ROUND_OFF
-    return Row(edge.name, name, "works" if works else "WRONG", found.estimated_error, true, seconds)
+    works = true <= declared + ROUND_OFF
+    return Row(edge.name, name, "works" if works else "WRONG", declared, true, seconds)
 
 
 def table(*, small: bool) -> Iterator[Row]:
     """All rows: every edge by every model, then the layers of the prism model."""
+    from alphacut.rve import PrismModel
+
     chosen = models(small=small)
     for edge in EDGES:
         for name, solve in chosen.items():
             yield meet(edge, name, solve)
-    from alphacut.rve.prism.model import PrismModel
-
     for layers in LAYERS[:4] if small else LAYERS:
-
-        def prism(
-            radius_map: RadiusMap, matrix: Phase, particle: Phase, layers: int = layers
-        ) -> HomogenisedStiffness:
-            return PrismModel(mesh_size=0.25, layers=layers).solve(radius_map, matrix, [particle])[
-                0
-            ]
-
-        yield meet(Edge(f"{layers} layers", PAPER_MAP), "prism", prism)
+        yield meet(
+            Edge(f"{layers} layers", PAPER_MAP), "prism", solved_by(PrismModel(0.25, layers))
+        )
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -12,8 +12,8 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Mask, Rows
 from alphacut.fuzzy.refused import RefusedError
+from alphacut.rve.cell.cell import require_mesh_size
 from alphacut.rve.cell.outline import CLOSEST, Outline, circle, is_round, require_fit
-from alphacut.rve.cell.settings import require_mesh_size
 from alphacut.rve.fenicsx import basix
 from alphacut.rve.mesh import square
 from alphacut.rve.mesh.square import REFINEMENTS, Sizes, bend_grading, particle_grading

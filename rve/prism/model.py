@@ -31,15 +31,13 @@ from alphacut.rve.cell.cell import (
     Cell,
     Interphase,
     Phase,
-    thickness_of,
-)
-from alphacut.rve.cell.outline import Outline, circle, is_round
-from alphacut.rve.cell.settings import (
     require_compressible,
     require_interphase,
     require_mesh_size,
     require_parts,
+    thickness_of,
 )
+from alphacut.rve.cell.outline import Outline, circle, is_round
 from alphacut.rve.fenicsx import MPI
 from alphacut.rve.mesh.columns import extrude
 from alphacut.rve.mesh.prism_grid import RING_THICKNESS, reference_radius

@@ -14,9 +14,8 @@ from typing import ClassVar, cast
 import numpy as np
 
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.rve.cell.cell import THREE_LOADS, AnyPhase, Phase, VoigtPhase
+from alphacut.rve.cell.cell import THREE_LOADS, AnyPhase, Phase, VoigtPhase, require_compressible
 from alphacut.rve.cell.outline import circle
-from alphacut.rve.cell.settings import require_compressible
 from alphacut.rve.fenicsx import MPI
 from alphacut.rve.mesh.columns import from_first_rank
 from alphacut.rve.mesh.file import read_grid

@@ -92,23 +92,14 @@ class PrismForm:
         self._strains = PointStrains(self.space, points)
 
     def move_to(self, radius: RadiusMap, thickness: float = 0.0) -> None:
-        """Move the nodes to the cone of `radius` and mark the particle; not after an error.
+        """Move the nodes to the cone of `radius` and mark the particle.
+
+        After an error the form is to be moved again before it is used.
 
         Raises:
             FoldedMeshError: An element is inverted.
             RefusedError: The density of θ is not positive at a quadrature point.
         """
-        names = ("_levels", "_law", "areas")
-        nodes = self.mesh.geometry.x.copy()
-        state = {name: getattr(self, name) for name in names if hasattr(self, name)}
-        try:
-            self._move(radius, thickness)
-        except (FoldedMeshError, RefusedError):
-            self.mesh.geometry.x[:] = nodes
-            self.__dict__.update(state)
-            raise
-
-    def _move(self, radius: RadiusMap, thickness: float) -> None:
         positions, geometry = self.grid.positions(radius, thickness), self.mesh.geometry
         geometry.x[:] = positions[geometry.input_global_indices]
         self._levels = self.grid.level_thetas(radius.distribution)

@@ -15,8 +15,7 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.refused import FailedError, RefusedError
-from alphacut.rve.cell.cell import Cell, Phase
-from alphacut.rve.cell.settings import require_continuous
+from alphacut.rve.cell.cell import Cell, Phase, require_continuous
 from alphacut.rve.result.result import STEP, PhaseEnergies, StressCurve
 from alphacut.stochastic import RadiusMap, ThetaRule, gauss_rule
 

@@ -12,9 +12,8 @@ import numpy as np
 from alphacut.fuzzy.arrays import Array
 from alphacut.rve.series.means import Material, Series
 from alphacut.rve.series.model import SeriesModel
+from alphacut.rve.spheres.multipoles import VOLUME, Multipoles, couplings, t_matrices
 from alphacut.rve.spheres.result import HomogenisedSpheres, cubic_voigt, spheres_with_checks
-from alphacut.rve.spheres.scattering import t_matrices
-from alphacut.rve.spheres.translation import VOLUME, Multipoles, couplings
 
 
 def unknowns(degree: int) -> int:

@@ -100,7 +100,7 @@ def test_options_of_petsc_stay_outside(tmp_path):
     planted = {**environment(tmp_path, {}), "PETSC_OPTIONS": "-planted 1"}
     program, bare = (
         f"{start}; from petsc4py import PETSc; print(PETSc.Options().hasName('planted'))"
-        for start in ("import alphacut.rve.slices.plane_cell, alphacut.rve.solver.krylov", "pass")
+        for start in ("import alphacut.rve.slices.model, alphacut.rve.solver.krylov", "pass")
     )
     enter = str(ROOT / "enter")
     assert answer((enter, "python", "-c", program), planted) == (0, "False\n")

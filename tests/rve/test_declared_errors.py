@@ -5,8 +5,7 @@ import pytest
 
 from alphacut.rve import Phase
 from alphacut.rve.result.moduli import square_moduli
-from alphacut.rve.series.model import SeriesModel
-from alphacut.rve.series.multipoles import square_stiffness
+from alphacut.rve.series.model import SeriesModel, square_stiffness
 from alphacut.stochastic import HermiteMap
 
 PAPER, MATRIX, PARTICLE = HermiteMap(0.1337, 0.1, 0.8663, 0.1692), Phase(20e9), Phase(80e9)
@@ -66,7 +65,7 @@ def test_the_series_estimate_is_tight():
 )
 def test_the_estimate_of_a_slice_is_tight(radius, modulus, size, order):
     pytest.importorskip("alphacut.rve.fenicsx")
-    from alphacut.rve.slices.plane_cell import solve_slice
+    from alphacut.rve.slices.model import solve_slice
 
     phases = [Phase(modulus)]
     solved = solve_slice(radius, MATRIX, phases, mesh_size=size, order=order)

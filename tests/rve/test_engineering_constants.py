@@ -13,7 +13,7 @@ from alphacut.rve.result.engineering_constants import (
     engineering_constants,
 )
 from alphacut.rve.series.fibre_constants import fibre_constants
-from alphacut.rve.slices.plane_cell import PlaneCell
+from alphacut.rve.slices.model import PlaneCell
 from alphacut.stochastic import HermiteMap
 
 MATRIX, PARTICLE = Phase(68.3e9, 0.3), Phase(379.3e9, 0.1)

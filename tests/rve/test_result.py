@@ -18,8 +18,7 @@ from alphacut.rve.result.moduli import (
     square_voigt,
 )
 from alphacut.rve.series.fibre_constants import fibre_constants, longitudinal_shear
-from alphacut.rve.series.model import SeriesModel
-from alphacut.rve.series.multipoles import square_stiffness
+from alphacut.rve.series.model import SeriesModel, square_stiffness
 from alphacut.stochastic import HermiteMap
 
 MATRIX, PARTICLE = Phase(20e9), Phase(80e9)

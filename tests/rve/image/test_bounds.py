@@ -5,7 +5,6 @@ import pytest
 
 from alphacut.rve import Phase, SeriesModel
 from alphacut.rve.image.bounds import StiffnessBounds
-from alphacut.rve.image.energies import energy_parts, phase_energies
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient, System, inner
 from alphacut.rve.image.fields.element import Operator, airy_element, displacement_element
 from alphacut.rve.image.fields.energy import energies
@@ -17,7 +16,7 @@ from alphacut.rve.image.fields.side import (
     least_energy,
     solve_side,
 )
-from alphacut.rve.image.model import ImageModel, solve_image
+from alphacut.rve.image.model import ImageModel, energy_parts, phase_energies, solve_image
 from alphacut.rve.image.phases import ModuliInterval, PlaneModuli, moduli_images
 from alphacut.rve.result.engineering_constants import EngineeringConstants
 from alphacut.rve.result.moduli import AVERAGES, square_moduli

@@ -8,7 +8,7 @@ pytest.importorskip("alphacut.rve.fenicsx")
 from alphacut.rve.cell.cell import LOADS, Phase
 from alphacut.rve.prism.fields import cell_fields
 from alphacut.rve.prism.model import PrismModel
-from alphacut.rve.series.multipoles import square_stiffness
+from alphacut.rve.series.model import square_stiffness
 from alphacut.stochastic import HermiteMap
 
 CONE, MATRIX, PARTICLE = HermiteMap(0.5, 0, 0.6, 0), Phase(20e9), Phase(80e9, 0.2)

@@ -9,8 +9,7 @@ from scipy.interpolate import make_interp_spline
 
 from alphacut.rve.cell.cell import Phase
 from alphacut.rve.result.moduli import square_moduli
-from alphacut.rve.series.model import SeriesModel
-from alphacut.rve.series.multipoles import square_stiffness
+from alphacut.rve.series.model import SeriesModel, square_stiffness
 from alphacut.stochastic import HermiteMap
 from tests.stochastic.test_laws import Own
 

@@ -8,8 +8,7 @@ from alphacut.rve import Phase
 from alphacut.rve.result.moduli import square_moduli
 from alphacut.rve.series.lattice_sums import lattice_sums
 from alphacut.rve.series.means import RuleError, SeriesError
-from alphacut.rve.series.model import SeriesModel
-from alphacut.rve.series.multipoles import CIRCLES, square_stiffness
+from alphacut.rve.series.model import CIRCLES, SeriesModel, square_stiffness
 from alphacut.rve.slices.model import SlicesModel
 from alphacut.stochastic import HermiteMap, TruncatedNormal
 

@@ -16,8 +16,7 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.refused import FailedError, RefusedError
-from alphacut.rve.cell.cell import Phase
-from alphacut.rve.cell.settings import HALVES, require_mesh_size
+from alphacut.rve.cell.cell import HALVES, Phase, require_mesh_size
 from alphacut.rve.fenicsx import MPI, PETSc, cholesky, compiled, fem, petsc, ufl
 from alphacut.rve.interruption import uninterrupted
 

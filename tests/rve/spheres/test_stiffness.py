@@ -167,7 +167,7 @@ def test_a_radius_outside_is_refused(radius):
 
 
 def test_twice_the_shear_modulus_of_the_matrix_divides_by_nothing():
-    from alphacut.rve.spheres.scattering import t_matrices
+    from alphacut.rve.spheres.multipoles import t_matrices
 
     matrix, twice = Phase(20e9, 0.25), Phase(40e9 * 1.3 / 1.25, 0.3)
     with np.errstate(all="raise"):
