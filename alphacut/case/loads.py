@@ -19,7 +19,7 @@ from alphacut.fuzzy.refused import RefusedError, require, require_choice
 from alphacut.io import quantity
 from alphacut.records.read import read_recording
 from alphacut.records.recording import Baseline, Recording
-from alphacut.records.tables import Layout, read_force_history
+from alphacut.records.tables import read_force_history
 from alphacut.records.text_file import ACCELERATION_UNITS, acceleration_factor
 
 KINDS = ("step", "harmonic", "impulse")
@@ -73,10 +73,10 @@ def _file_history(name: str, start: float, is_static: bool, info: ValidationInfo
         path = case_file(name, info)
     except RefusedError as error:
         raise RefusedError("", name, f"{HISTORY}; {error.allowed}") from None
-    series = read_force_history(path)
-    size = float(np.abs(series.samples).max()) if series.has_unit else 1.0
-    history = History(series.step, np.asarray(series.samples / size), start, is_static=is_static)
-    return ForceHistory(history, "" if series.has_unit else "N", size)
+    step, samples, has_unit = read_force_history(path)
+    size = float(np.abs(samples).max()) if has_unit else 1.0
+    history = History(step, np.asarray(samples / size), start, is_static=is_static)
+    return ForceHistory(history, "" if has_unit else "N", size)
 
 
 def _parse_amplitude(value: object, _: ValidationInfo) -> tuple[FuzzyNumber, str]:
@@ -179,15 +179,7 @@ class Scale:
     measure: str = ""
 
 
-@dataclass(frozen=True, eq=False)
-class NamedRecording:
-    """A recording by the name of its file without ending, which no other has."""
-
-    name: str
-    recording: Recording
-
-
-def _read_files(value: object, info: ValidationInfo) -> tuple[NamedRecording, ...]:
+def _read_files(value: object, info: ValidationInfo) -> tuple[Recording, ...]:
     """Recordings of all files below the case's folder that "records/*.AT2" or "a.v2#1" matches."""
     folder: Path = (info.context or {}).get("folder", Path())
     # the text after # is the channel of each file
@@ -198,13 +190,14 @@ def _read_files(value: object, info: ValidationInfo) -> tuple[NamedRecording, ..
     paths = sorted(path for path in folder.glob(pattern) if path.is_file())
     allowed += f"; 1 to {MAX_RECORDS} files"
     require(0 < len(paths) <= MAX_RECORDS, "", value=value, allowed=allowed)
-    names = [ENDING.sub("_", path.stem) + (f"_{channel}" if channel else "") for path in paths]
-    layout = Layout(info.data.get("step"), info.data.get("unit") or "")
+    end = f"_{channel}" if channel else ""
+    step, unit = info.data.get("step"), info.data.get("unit") or ""
     recordings: list[Recording] = []
     errors: list[RefusedError] = []
     for path in paths:
         try:
-            recordings.append(read_recording(path, channel, layout))
+            recording = read_recording(path, channel, step, unit)
+            recordings.append(replace(recording, name=ENDING.sub("_", path.stem) + end))
         except RefusedError as error:
             errors.append(error)
     if errors:  # all bad files of a folder at once, the first with its reason
@@ -213,18 +206,14 @@ def _read_files(value: object, info: ValidationInfo) -> tuple[NamedRecording, ..
         # in the cure, which is never cut off
         cures = [f"bad as well: {', '.join(names)}"] * bool(names) + [first.cure] * bool(first.cure)
         raise RefusedError(first.key, first.value, first.allowed, "; ".join(cures))
-    return tuple(NamedRecording(*pair) for pair in zip(names, recordings, strict=True))
+    return tuple(recordings)
 
 
 def _parse_unit(value: object, _: ValidationInfo) -> str:
     """Parse a unit of acceleration, such as g."""
-    unit = str(value)
-    try:
-        is_unit = acceleration_factor(unit) is not None or quantity.factor(unit, "m/s^2") > 0
-    except ValueError:
-        is_unit = False
+    is_unit = acceleration_factor(str(value)) is not None
     require(is_unit, "", value=value, allowed=f"a unit of {ACCELERATION_UNITS}")
-    return unit
+    return str(value)
 
 
 def _parse_scale(value: object, _: ValidationInfo) -> Scale:
@@ -232,18 +221,15 @@ def _parse_scale(value: object, _: ValidationInfo) -> Scale:
     allowed = 'a factor above 0 as 1.2, or "PGA = 0.3 g", or "Sa(T1) = 0.5 g"'
     measure, equals, size = (part.strip() for part in str(value).partition("="))
     try:
-        if not equals:
-            scale = Scale(quantity.number(value, ""))
-        else:
-            scale = Scale(quantity.number(size, "m/s^2"), measure)
+        number = quantity.number(*((size, "m/s^2") if equals else (value, "")))
     except ValueError as error:
         raise RefusedError("", value, allowed, str(error)) from None
-    fits = scale.value > 0 and scale.measure in ("", "PGA", "Sa(T1)")
+    fits = number > 0 and (measure in ("PGA", "Sa(T1)") or not equals)
     require(fits, "", value=value, allowed=allowed)
-    return scale
+    return Scale(number, measure if equals else "")
 
 
-Files = Annotated[tuple[NamedRecording, ...], text(_read_files)]
+Files = Annotated[tuple[Recording, ...], text(_read_files)]
 
 
 class RecordsSection(Section):
@@ -265,14 +251,14 @@ class RecordsSection(Section):
     )
 
     @property
-    def recordings(self) -> tuple[NamedRecording, ...]:
+    def recordings(self) -> tuple[Recording, ...]:
         """The recordings of all files."""
-        return tuple(named for group in self.files for named in group)
+        return tuple(recording for group in self.files for recording in group)
 
     @model_validator(mode="after")
     def _check_names(self) -> Self:
         """Refuses two files of the same name, which is that of their results."""
-        names = [named.name for named in self.recordings]
+        names = [recording.name for recording in self.recordings]
         repeated = ", ".join(sorted({name for name in names if names.count(name) > 1}))
         allowed = "each file once, by its name"
         require(not repeated, "records.files", value=repeated, allowed=allowed)

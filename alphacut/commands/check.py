@@ -75,9 +75,9 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
 def records_text(section: RecordsSection, records: Sequence[SuiteRecord]) -> str:
     """Table of a suite's records, as their files hold them and as they are used; then warnings."""
     rows = []
-    for named, record in zip(section.recordings, records, strict=True):
-        raw, measures = named.recording, record.measures
-        file_cells = (named.name, raw.file_format, raw.unit, f"{raw.step:g} s")
+    for raw, record in zip(section.recordings, records, strict=True):
+        measures = record.measures
+        file_cells = (raw.name, raw.file_format, raw.unit, f"{raw.step:g} s")
         sample_cells = (f"{len(raw.samples)}", f"{raw.offset_share:.2%}")
         peak = f"{raw.peak / GRAVITY:.3g} g"
         used = tuple(f"{measures[name] / GRAVITY:.3g} g" for name in ("PGA", "Sa(T1)"))

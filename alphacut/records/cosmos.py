@@ -19,7 +19,7 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.records.recording import Recording
-from alphacut.records.text_file import TextFile
+from alphacut.records.text_file import TextFile, choose_channel, recording_in_si
 
 FORTRAN = r"\(\s*(\d*)\s*[A-Za-z](\d+)(?:\.\d+\w*)?\s*\)"
 """Numbers in a line and characters of one, as in (8f10.6)."""
@@ -82,12 +82,8 @@ def read_cosmos(file: TextFile, channel: str = "") -> Recording:
             are not those of the format.
     """
     channels = list(_cosmos_channels(file) if is_cosmos(file) else _csmip_channels(file))
-    chosen = [entry for entry in channels if not channel or channel.lower() in entry.names]
-    if len(chosen) != 1:
-        names = "; ".join(" or ".join(entry.names) for entry in channels) or "accelerations"
-        line = channels[0].line if channels else 0
-        raise file.refusal(line, f"channel {channel or 'not named'}", f"one of: {names}")
-    return chosen[0].read()
+    place = file.place(channels[0].line if channels else 0)
+    return channels[choose_channel(place, channel, [x.names for x in channels])].read()
 
 
 def _samples(file: TextFile, line: int, count: int, per_line: int, width: int) -> Array:
@@ -120,7 +116,7 @@ def _read_cosmos(file: TextFile, line: int, reals: int, names: tuple[str, ...]) 
     step = _cosmos_step(file, line, reals, count, float(match[2]))
     below = file.lines[line + 1].rstrip() if line + 1 < len(file.lines) else ""
     samples = _samples(file, line, count, len(below) // max(width, 1), width)
-    return file.recording("COSMOS V2", line, unit, step, samples, " ".join(names))
+    return recording_in_si(file.place(line), "COSMOS V2", unit, step, samples, " ".join(names))
 
 
 def _cosmos_step(file: TextFile, line: int, reals: int, count: int, duration: float) -> float:
@@ -159,7 +155,9 @@ def _read_csmip(file: TextFile, start: int, end: int, names: tuple[str, ...]) ->
             unit = (match[3] or match[4] or "").rstrip(".,")
             per_line, width = int(match[5] or 8), int(match[6] or 10)
             samples = _samples(file, line, int(match[1]), per_line, width)
-            return file.recording("CSMIP", line, unit, float(match[2]), samples, " ".join(names))
+            return recording_in_si(
+                file.place(line), "CSMIP", unit, float(match[2]), samples, " ".join(names)
+            )
     return _read_unannounced(file, start, end, names)
 
 
@@ -187,4 +185,4 @@ def _read_unannounced(file: TextFile, start: int, end: int, names: tuple[str, ..
         step = float(steps.mean())
         if np.ptp(steps) > 0.1 * step or not step > 0:
             raise file.refusal(line, "uneven times", "even steps", "resample to even steps")
-    return file.recording("CSMIP V1", line, unit, step, samples, " ".join(names))
+    return recording_in_si(file.place(line), "CSMIP V1", unit, step, samples, " ".join(names))

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from math import ceil
 
 from alphacut.records.recording import Recording
-from alphacut.records.text_file import ACCELERATION_UNITS, NUMBER, TextFile
+from alphacut.records.text_file import ACCELERATION_UNITS, NUMBER, TextFile, recording_in_si
 
 PEER_HEAD_LINES = 12
 """Lines in which a head ends; most have four."""
@@ -68,7 +68,7 @@ def read_peer(file: TextFile) -> Recording:
         file.require_count(samples, count, row)
     component = PEER_COMPONENT.fullmatch(file.lines[1]) if row > 1 else None
     channel = component[1] if component else ""
-    return file.recording("PEER AT2", line, unit, step, samples, channel)
+    return recording_in_si(file.place(line), "PEER AT2", unit, step, samples, channel)
 
 
 def _peer_unit(file: TextFile, last: int) -> tuple[int, str]:
@@ -108,7 +108,9 @@ def read_knet(file: TextFile) -> Recording:
     counts = file.numbers(end + 1, len(file.lines))
     file.require_count(counts, round(float(duration[1]) * rate), line)
     channel = next((x[KNET_LABEL:].strip() for x in file.lines[:end] if x.startswith("Dir.")), "")
-    return file.recording("K-NET", line, "gal", 1 / rate, counts * gal_per_count, channel)
+    return recording_in_si(
+        file.place(line), "K-NET", "gal", 1 / rate, counts * gal_per_count, channel
+    )
 
 
 def _knet_field(file: TextFile, name: str, end: int) -> tuple[re.Match[str], int]:
@@ -143,7 +145,9 @@ def read_esm(file: TextFile) -> Recording:
     first = 1 + max(row for _, row in head.values())
     samples = file.numbers(first, len(file.lines))
     file.require_count(samples, count, head[COUNT][1])
-    return file.recording("ESM", line, unit, step, samples, head.get("STREAM", ("", 0))[0])
+    return recording_in_si(
+        file.place(line), "ESM", unit, step, samples, head.get("STREAM", ("", 0))[0]
+    )
 
 
 def _esm_head(file: TextFile) -> dict[str, tuple[str, int]]:
@@ -195,7 +199,7 @@ def read_smc(file: TextFile) -> Recording:
     samples = file.numbers(first, first + ceil(count / 8), width=10)
     file.require_count(samples, count, SMC_TEXT)
     channel = "vertical" if integers[VERTICAL_ANGLE - 1] in (0, 180) else ""
-    return file.recording("SMC", reals_line, "cm/s^2", 1 / rate, samples, channel)
+    return recording_in_si(file.place(reals_line), "SMC", "cm/s^2", 1 / rate, samples, channel)
 
 
 FORMATS: tuple[tuple[Callable[[TextFile], bool], Callable[[TextFile], Recording]], ...] = (

@@ -8,12 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from alphacut.fuzzy.refused import RefusedError, require
-from alphacut.io.quantity import factor
 from alphacut.records.cosmos import is_cosmos, is_csmip, read_cosmos
 from alphacut.records.networks import FORMATS
 from alphacut.records.recording import Recording
-from alphacut.records.tables import Layout, is_table, read_table
-from alphacut.records.text_file import TextFile, acceleration_factor, read_bytes
+from alphacut.records.tables import is_table, read_table
+from alphacut.records.text_file import TextFile, choose_channel, read_bytes, recording_in_si
 from alphacut.records.uff import is_universal, read_uff_record
 
 READ = "PEER AT2, COSMOS, CSMIP, SMC, K-NET, ESM, miniSEED, SAC, UFF 58, CSV"
@@ -22,13 +21,16 @@ SAC_HEAD, SAC_VERSION, SAC_COUNT = 632, 304, 316
 """Bytes of the head of a SAC file, and where its version (6 or 7) and number of samples stand."""
 
 
-def read_recording(path: Path, channel: str = "", layout: Layout | None = None) -> Recording:
+def read_recording(
+    path: Path, channel: str = "", step: float | None = None, unit: str = ""
+) -> Recording:
     """Reads a recording from a file of one of the formats in `READ`.
 
     Args:
         path: The file.
         channel: Channel of a file with several.
-        layout: Step and unit of files that do not say them.
+        step: Step in s of files that do not say it.
+        unit: Unit of files that do not say it.
 
     Raises:
         RefusedError: The file cannot be read, is of another format, or its head and its samples
@@ -36,7 +38,7 @@ def read_recording(path: Path, channel: str = "", layout: Layout | None = None) 
     """
     try:
         with np.errstate(over="ignore"):  # of damaged numbers, which are refused
-            recording = _read_by_marks(path, channel, layout or Layout())
+            recording = _read_by_marks(path, channel, step, unit)
     except RefusedError:
         raise
     except (ValueError, OverflowError) as error:  # of a head's integer of thousands of digits
@@ -47,13 +49,13 @@ def read_recording(path: Path, channel: str = "", layout: Layout | None = None) 
     return recording
 
 
-def _read_by_marks(path: Path, channel: str, layout: Layout) -> Recording:
+def _read_by_marks(path: Path, channel: str, step: float | None, unit: str) -> Recording:
     """Reads a recording by the format that the marks in a file's content show."""
     content = read_bytes(path)
     if is_universal(content):
         return read_uff_record(path.name, content, channel)
     if _is_waveform(content):
-        return _read_waveform(path, channel, layout)
+        return _read_waveform(path, channel, unit)
     file = TextFile.from_bytes(path.name, content)
     if is_cosmos(file) or is_csmip(file):
         return read_cosmos(file, channel)
@@ -61,7 +63,7 @@ def _read_by_marks(path: Path, channel: str, layout: Layout) -> Recording:
         if is_format(file):
             return read(file)
     if is_table(file):
-        return read_table(file, layout)
+        return read_table(file, step, unit)
     cure = 'one column is read with records.step = "0.005 s", records.unit = "g"'
     raise RefusedError(path.name, "of no format that is read", READ, cure)
 
@@ -79,7 +81,7 @@ def _is_waveform(content: bytes) -> bool:
     return False
 
 
-def _read_waveform(path: Path, channel: str, layout: Layout) -> Recording:
+def _read_waveform(path: Path, channel: str, unit: str) -> Recording:
     """Recording of a file of miniSEED or SAC, which have no unit: the case says it."""
     try:
         import obspy
@@ -91,16 +93,10 @@ def _read_waveform(path: Path, channel: str, layout: Layout) -> Recording:
     except Exception as error:  # readers of damaged files raise errors of many kinds
         reason = " ".join(str(error).split())[:80] or type(error).__name__
         raise RefusedError(path.name, reason, "miniSEED or SAC that obspy reads") from None
-    names = [str(trace.stats.channel).lower() for trace in traces]
-    chosen = [k for k, name in enumerate(names) if not channel or name == channel.lower()]
-    value = f"channel {channel or 'not named'}"
-    allowed = f"one of: {', '.join(dict.fromkeys(names))}; without gaps"
-    require(len(chosen) == 1, path.name, value=value, allowed=allowed)
-    trace = traces[chosen[0]]
-    require(bool(layout.unit), path.name, value="without a unit", allowed='records.unit = "m/s^2"')
-    to_si = acceleration_factor(layout.unit) or float(factor(layout.unit, "m/s^2"))
+    names = [(str(trace.stats.channel).lower(),) for trace in traces]
+    trace = traces[choose_channel(f"{path.name} without gaps", channel, names)]
+    require(bool(unit), path.name, value="without a unit", allowed='records.unit = "m/s^2"')
     samples, step = np.asarray(trace.data, float), float(trace.stats.delta)
-    are_plain = bool(np.isfinite(samples).all()) and step > 0
-    require(are_plain, path.name, value="not finite", allowed="finite samples, a step above 0")
     file_format = str(trace.stats.get("_format", "waveform"))
-    return Recording(file_format, layout.unit, step, to_si * samples, str(trace.stats.channel))
+    channel = str(trace.stats.channel)
+    return recording_in_si(path.name, file_format, unit, step, samples, channel)

@@ -42,6 +42,7 @@ class Recording:
         samples: Accelerations from the first sample on, shape (n,), in m/s².
         channel: The file's own name of the channel; empty if it has none.
         remarks: What reading left out or took for granted, one clause each.
+        name: Name of its results: that of the file without ending, and of a channel asked for.
     """
 
     file_format: str
@@ -50,6 +51,7 @@ class Recording:
     samples: Array
     channel: str = ""
     remarks: tuple[str, ...] = ()
+    name: str = ""
 
     @property
     def peak(self) -> float:

@@ -16,7 +16,13 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import require
 from alphacut.io.quantity import factor
 from alphacut.records.recording import Recording
-from alphacut.records.text_file import ACCELERATION_UNITS, TextFile, acceleration_factor
+from alphacut.records.text_file import (
+    ACCELERATION_UNITS,
+    TextFile,
+    acceleration_factor,
+    read_bytes,
+    recording_in_si,
+)
 from alphacut.stochastic.particles.csv_columns import NUMBER
 
 TIME = r"\W*(?:time|t)\b\W*([a-zµ]*)\W*[,;\s]\W*"
@@ -29,14 +35,6 @@ ALLOWED = "time [s],acceleration [m/s^2], [g] or [gal]"
 ALLOWED_FORCE = "time [s],force [kN], or time [s],force of a course without a unit"
 UNEVEN = 0.05
 """Fraction of a step by which a time may miss its place, as times that are rounded do."""
-
-
-@dataclass(frozen=True)
-class Layout:
-    """What a case says of files that do not: the step in s and the unit of their samples."""
-
-    step: float | None = None
-    unit: str = ""
 
 
 @dataclass(frozen=True)
@@ -78,10 +76,11 @@ def is_table(file: TextFile) -> bool:
     return bool(HEAD.fullmatch(table.head)) or is_row
 
 
-def read_table(file: TextFile, layout: Layout) -> Recording:
+def read_table(file: TextFile, step: float | None = None, unit: str = "") -> Recording:
     """Recording of a table with even steps: times and accelerations, or accelerations alone.
 
-    The case's unit stands in where no head states one; times without a unit are in s.
+    The case's unit, and of one column its step in s, stand in where no head states them; times
+    without a unit are in s.
 
     Raises:
         RefusedError: A unit is wrong or missing, a row is no pair of numbers, or the steps are not
@@ -92,25 +91,29 @@ def read_table(file: TextFile, layout: Layout) -> Recording:
     require(len(table.rows) > 1, file.name, value=f"{len(table.rows)} rows", allowed=allowed)
     columns = len(next(iter(table.rows.values())))
     match = HEAD.fullmatch(table.head) if columns == 2 else None
-    time_unit, unit = match.groups() if match else ("", "")
-    unit = unit or layout.unit
-    try:
-        to_s = float(factor(time_unit or "s", "s"))
-        to_si = acceleration_factor(unit) or float(factor(unit, "m/s^2"))
-    except ValueError:
-        to_si = 0.0
-    if columns > 2 or not to_si or (columns == 1 and layout.step is None):
+    time_unit, head_unit = match.groups() if match else ("", "")
+    unit, to_s = head_unit or unit, _factor_to_seconds(time_unit)
+    is_complete = to_s > 0 and acceleration_factor(unit) is not None
+    if columns > 2 or not is_complete or (columns == 1 and step is None):
         value = table.head[:80] or f"{columns} columns without a head"
         allowed = f"a unit of {ACCELERATION_UNITS}, and a step" if columns == 1 else ALLOWED
         cure = 'records.unit = "g"' + (', records.step = "0.005 s"' if columns == 1 else "")
         raise file.refusal(table.start, value, allowed, f"or say {cure}")
-    numbers = table.numbers(file, columns)
+    numbers, place = table.numbers(file, columns), file.place(table.start)
     if columns == 1:
-        return Recording("one column", unit, layout.step or 0.0, to_si * numbers[:, 0])
+        return recording_in_si(place, "one column", unit, step or 0.0, numbers[:, 0])
     step, remarks = _even_step(file, to_s * numbers[:, 0], [*table.rows])
     remarks += ("its times have no unit, taken as s",) * bool(match and not time_unit)
     name = "CSV" if match else "two columns"
-    return Recording(name, unit, step, to_si * numbers[:, 1], remarks=remarks)
+    return recording_in_si(place, name, unit, step, numbers[:, 1], "", remarks)
+
+
+def _factor_to_seconds(unit: str) -> float:
+    """Factor of a unit of time, by default s; 0 of others."""
+    try:
+        return float(factor(unit or "s", "s"))
+    except ValueError:
+        return 0.0
 
 
 def _even_step(
@@ -133,34 +136,23 @@ def _even_step(
     return step, (f"its times begin at {first:g} s, taken as 0",) if is_shifted else ()
 
 
-@dataclass(frozen=True, eq=False)
-class ForceSamples:
-    """Samples of a course.
+def read_force_history(path: Path) -> tuple[float, Array, bool]:
+    """Reads a force over time from a table with even steps from t = 0.
 
-    Args:
-        step: Time between samples, in s.
-        samples: Samples from t = 0 on, shape (n,), in N, or without a unit.
-        has_unit: Whether the head gives a unit.
-    """
-
-    step: float
-    samples: Array
-    has_unit: bool
-
-
-def read_force_history(path: Path) -> ForceSamples:
-    """Samples of a force in a CSV file with even steps from t = 0.
+    Returns:
+        Step in s; samples, shape (n,), in N or without a unit; whether the head gives a unit.
 
     Raises:
         RefusedError: A unit is wrong, a row is no pair of numbers, or the steps are not even.
     """
-    file = TextFile.read(path)
+    file = TextFile.from_bytes(path.name, read_bytes(path))
     table = _Table.of(file)
     match = FORCE_HEAD.fullmatch(table.head)
-    if match is None or not table.rows:
+    to_s = _factor_to_seconds(match[1]) if match and match[1] else 0.0
+    if match is None or not table.rows or to_s == 0:
         raise file.refusal(table.start, table.head[:80] or "without a head", ALLOWED_FORCE)
     try:
-        to_s, to_si = float(factor(match[1], "s")), float(factor(match[2], "N" if match[2] else ""))
+        to_si = float(factor(match[2], "N" if match[2] else ""))
     except ValueError as error:
         raise file.refusal(table.start, table.head[:80], ALLOWED_FORCE, str(error)) from None
     numbers = table.numbers(file, 2)
@@ -168,4 +160,4 @@ def read_force_history(path: Path) -> ForceSamples:
     samples = np.asarray(to_si * numbers[:, 1])
     if not samples.any():
         raise file.refusal(table.start, "zeros throughout", "a force that moves something")
-    return ForceSamples(step, samples, bool(match[2]))
+    return step, samples, bool(match[2])

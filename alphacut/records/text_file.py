@@ -12,7 +12,7 @@ from typing import Self
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io.quantity import factor
 from alphacut.records.recording import Recording
 
@@ -42,18 +42,13 @@ class TextFile:
     lines: tuple[str, ...]
 
     @classmethod
-    def read(cls, path: Path) -> Self:
-        """The lines of a file in UTF-8 or Latin-1.
+    def from_bytes(cls, name: str, content: bytes) -> Self:
+        """The lines of a content in UTF-8 or Latin-1; `name` is for messages.
 
         Raises:
-            RefusedError: The file cannot be read, holds bytes that no text has, or a line of more
-                than `LONGEST_LINE` letters.
+            RefusedError: It holds bytes that no text has, or a line of more than `LONGEST_LINE`
+                letters.
         """
-        return cls.from_bytes(path.name, read_bytes(path))
-
-    @classmethod
-    def from_bytes(cls, name: str, content: bytes) -> Self:
-        """The lines of a file's content; `name` is for messages."""
         if b"\0" in content:
             raise RefusedError(name, "no text", "a text file with a record")
         try:
@@ -68,9 +63,13 @@ class TextFile:
             raise file.refusal(longest, f"{lengths[longest]:,} letters long", allowed)
         return file
 
+    def place(self, line: int) -> str:
+        """Name of a line, counted from 0, for messages."""
+        return f"{self.name}, line {line + 1}"
+
     def refusal(self, line: int, value: object, allowed: str, cure: str = "") -> RefusedError:
         """Error about a line, counted from 0."""
-        return RefusedError(f"{self.name}, line {line + 1}", str(value)[:80], allowed, cure)
+        return RefusedError(self.place(line), str(value)[:80], allowed, cure)
 
     def numbers(self, first: int, last: int, *, width: int = 0, count: int = 0) -> Array:
         """All numbers from line `first` up to, but not with, line `last`, counted from 0.
@@ -104,18 +103,33 @@ class TextFile:
             what = f"{count} samples, and {len(samples)} follow"
             raise self.refusal(line, what, "as many samples as the head states", "load it anew")
 
-    def recording(
-        self, file_format: str, line: int, unit: str, step: float, samples: Array, channel: str = ""
-    ) -> Recording:
-        """Recording of samples in a unit of acceleration that a line states, their step in s."""
-        to_si = acceleration_factor(unit)
-        if to_si is None:
-            value = f"in units of {unit}" if unit else "without a unit"
-            raise self.refusal(line, value, f"accelerations in {ACCELERATION_UNITS}")
-        if not 0 < step < LONGEST_STEP:
-            allowed = f"a step above 0 and below {LONGEST_STEP:g} s"
-            raise self.refusal(line, f"a step of {step:g} s", allowed)
-        return Recording(file_format, unit, step, to_si * samples, channel)
+
+def recording_in_si(
+    place: str,
+    file_format: str,
+    unit: str,
+    step: float,
+    samples: Array,
+    channel: str = "",
+    remarks: tuple[str, ...] = (),
+) -> Recording:
+    """Recording of samples in a unit, their step in s; refuses other units and steps at a place."""
+    to_si = acceleration_factor(unit)
+    if to_si is None:
+        value = f"in units of {unit}" if unit else "without a unit"
+        raise RefusedError(place, value, f"accelerations in {ACCELERATION_UNITS}")
+    allowed = f"a step above 0 and below {LONGEST_STEP:g} s"
+    require(0 < step < LONGEST_STEP, place, value=f"a step of {step:g} s", allowed=allowed)
+    return Recording(file_format, unit, step, to_si * samples, channel, remarks)
+
+
+def choose_channel(place: str, channel: str, names: Sequence[tuple[str, ...]]) -> int:
+    """Index of the channel that has a name; of the only one where none is asked for."""
+    chosen = [k for k, own in enumerate(names) if not channel or channel.lower() in own]
+    allowed = "; ".join(dict.fromkeys(" or ".join(own) for own in names)) or "accelerations"
+    value = f"channel {channel or 'not named'}"
+    require(len(chosen) == 1, place, value=value, allowed=f"one of: {allowed}")
+    return chosen[0]
 
 
 def read_bytes(path: Path) -> bytes:
@@ -134,8 +148,12 @@ def acceleration_factor(unit: str) -> float | None:
         return float(factor("g", "m/s^2")) * {"": 1.0, "/10": 0.1}.get(match[1] or "", 10.0)
     if text.lower() in ("gal", "gals"):
         return float(factor("gal", "m/s^2"))
-    match = PER_SECOND_SQUARED.fullmatch(text)
-    return None if match is None else {"cm": 0.01, "m": 1.0}[match[1].lower()]
+    if match := PER_SECOND_SQUARED.fullmatch(text):
+        return {"cm": 0.01, "m": 1.0}[match[1].lower()]
+    try:
+        return float(factor(text, "m/s^2"))
+    except ValueError:
+        return None
 
 
 def _words(line: str, width: int) -> Sequence[str]:

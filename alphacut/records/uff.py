@@ -13,7 +13,7 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io.measured import ModeRows
 from alphacut.records.recording import Recording
-from alphacut.records.text_file import ACCELERATION_UNITS, NUMBER, acceleration_factor, read_bytes
+from alphacut.records.text_file import NUMBER, choose_channel, read_bytes, recording_in_si
 
 ENDINGS = (".uff", ".unv")
 HEAD_LINES = {55: 8, 58: 11}
@@ -145,23 +145,16 @@ def read_uff_record(name: str, content: bytes, channel: str = "") -> Recording:
         RefusedError: The file holds no such acceleration over even times in a known unit.
     """
     sets = {series.name: series for series in _series(name, content)}
-    names = [response for response in sets if not channel or response == channel.lower()]
-    value, allowed = f"channel {channel or 'not named'}", ", ".join(sets) or "none is there"
-    require(len(names) == 1, name, value=value, allowed=f"one of: {allowed}")
-    series, key = sets[names[0]], f"{name}, response {names[0]}"
+    series = [*sets.values()][choose_channel(name, channel, [(response,) for response in sets])]
+    key = f"{name}, response {series.name}"
     is_history = series.function == TIME_HISTORY or (series.function == 0 and series.axis == TIME)
     allowed = "a time history (1) of an acceleration"
     require(is_history, key, value=f"of function type {series.function}", allowed=allowed)
-    factor = acceleration_factor(series.unit)
-    if factor is None:
-        raise RefusedError(key, f"in units of {series.unit or 'none'}", ACCELERATION_UNITS)
     is_full = len(series.samples) == series.count > 1 and bool(np.isfinite(series.samples).all())
     value = f"{series.count} points, and {len(series.samples)} are there"
     require(is_full, key, value=value, allowed="two or more finite samples, as many as stated")
     step = _even_step(key, series) if series.times is not None else series.step
-    allowed = "a finite step above 0 s"
-    require(0 < step < np.inf, key, value=f"a step of {step:g} s", allowed=allowed)
-    return Recording("UFF 58", series.unit, step, factor * series.samples, names[0])
+    return recording_in_si(key, "UFF 58", series.unit, step, series.samples, series.name)
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from alphacut.case.loads import NamedRecording, RecordsSection
+from alphacut.case.loads import RecordsSection
 from alphacut.case.motion import EnvelopeSection
 from alphacut.case.structure import Structure
 from alphacut.frame import Accelerogram
@@ -21,7 +21,7 @@ from alphacut.frame.structures.linear import modal_damping_ratios
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.fuzzy.result import Nature
-from alphacut.records.recording import arias_shares, spectral_acceleration
+from alphacut.records.recording import Recording, arias_shares, spectral_acceleration
 from alphacut.stages.envelope import EnvelopeTask, PeakResults
 from alphacut.stages.store import Numbers, Stage, Values
 
@@ -83,14 +83,14 @@ def suite_records(
 ) -> tuple[SuiteRecord, ...]:
     """The records of a suite, in the order of the case."""
     mode = nominal_mode(structure)
-    return tuple(_suite_record(section, envelope, named, mode) for named in section.recordings)
+    return tuple(_suite_record(section, envelope, x, mode) for x in section.recordings)
 
 
 def _suite_record(
-    section: RecordsSection, envelope: EnvelopeSection, named: NamedRecording, mode: NominalMode
+    section: RecordsSection, envelope: EnvelopeSection, recording: Recording, mode: NominalMode
 ) -> SuiteRecord:
     """A recording after correction and scaling, and the length of the motion under it."""
-    ground, name = named.recording.accelerogram(section.baseline), named.name
+    ground, name = recording.accelerogram(section.baseline), recording.name
     sizes = {
         "PGA": ground.extremes[0],
         "Sa(T1)": mode.spectral_acceleration(ground, mode.period),
@@ -107,7 +107,7 @@ def _suite_record(
     end = min(int(duration / ground.step + 1e-9), len(shares) - 1)
     cut_share = 0.0 if duration >= length else float(1 - shares[end])
     offset = float(ground.samples.mean()) / ground.extremes[0]
-    warnings = [f"of record {name} {doubt}" for doubt in named.recording.doubts()]
+    warnings = [f"of record {name} {doubt}" for doubt in recording.doubts()]
     if abs(offset) > MAX_OFFSET:
         what = f"the mean of record {name} is {offset:.1%} of its peak"
         warnings.append(f'{what}; records.baseline = "mean" subtracts it')

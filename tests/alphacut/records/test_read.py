@@ -5,7 +5,6 @@ import pytest
 
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.records.read import read_recording
-from alphacut.records.tables import Layout
 from tests.alphacut.records import samples as written
 
 NAMED = "NPTS=   400, DT=   .0050 SEC,"
@@ -30,9 +29,9 @@ def test_variants_give_the_same_samples_and_mutations_one_line(tmp_path, name, r
     path = tmp_path / "record.txt"
     for number in range(10):
         content, unit, rounding = written.variant(name, number)
-        layout = Layout(written.STEP, unit) if unit else None
+        layout = (written.STEP, unit) if unit else ()
         path.write_bytes(content)
-        record = read_recording(path, "", layout)
+        record = read_recording(path, "", *layout)
         assert record.step == pytest.approx(written.STEP, rel=1e-9)
         expected = written.G * written.samples()
         assert record.samples == pytest.approx(expected, abs=written.G * rounding), number
@@ -49,7 +48,7 @@ def test_variants_give_the_same_samples_and_mutations_one_line(tmp_path, name, r
 
 def recording_or_message(path, layout):
     try:
-        return read_recording(path, "", layout)
+        return read_recording(path, "", *layout)
     except RefusedError as error:
         return str(error)
 
@@ -57,7 +56,7 @@ def recording_or_message(path, layout):
 @pytest.mark.parametrize("head", HEADS)
 def test_heads_of_another_wording_are_read_or_told_how(tmp_path, head):
     path = saved(tmp_path, head + "\n" + written.csv_text().partition("\n")[2])
-    record = read_recording(path, "", Layout(None, "g"))
+    record = read_recording(path, unit="g")
     assert record.samples == pytest.approx(written.G * written.samples(), abs=1e-6)
     if head.endswith("s g"):
         with pytest.raises(RefusedError, match=r'line 1 is s g; .*or say records\.unit = "g"'):
@@ -89,14 +88,14 @@ def test_channels_of_csmip_are_told_apart(tmp_path):
 @pytest.mark.parametrize(
     ("text", "layout"),
     [
-        (written.lines(written.samples(), "15.7E", 1), Layout(written.STEP, "g")),
-        (written.csv_text(mark=" ").partition("\n")[2], Layout(None, "g")),
-        (written.csv_text("cm/s^2").partition("\n")[2], Layout(None, "cm/s2")),
+        (written.lines(written.samples(), "15.7E", 1), (written.STEP, "g")),
+        (written.csv_text(mark=" ").partition("\n")[2], (None, "g")),
+        (written.csv_text("cm/s^2").partition("\n")[2], (None, "cm/s2")),
     ],
     ids=["one column", "two columns", "two with commas"],
 )
 def test_columns_without_a_head_are_read_with_the_cases_unit(tmp_path, text, layout):
-    record = read_recording(saved(tmp_path, text), "", layout)
+    record = read_recording(saved(tmp_path, text), "", *layout)
     assert record.step == pytest.approx(written.STEP, rel=1e-9)
     assert record.samples == pytest.approx(written.G * written.samples(), abs=1e-6)
     with pytest.raises(RefusedError, match=r"records\.unit"):
@@ -148,7 +147,7 @@ def test_waveforms_give_the_same_samples(tmp_path, file_format):
     trace = obspy.Trace(data, {"delta": written.STEP, "channel": "HNE"})
     path = tmp_path / "record"
     trace.write(str(path), format=file_format)
-    record = read_recording(path, "", Layout(None, "cm/s^2"))
+    record = read_recording(path, unit="cm/s^2")
     assert record.step == pytest.approx(written.STEP)
     assert record.samples == pytest.approx(written.G * written.samples(), abs=1e-5)
     with pytest.raises(RefusedError, match="without a unit"):

@@ -85,7 +85,7 @@ def test_text_and_bytes_of_single_and_double_reals_are_read(tmp_path, kind, orde
     assert read_recording(saved(tmp_path, several), "8.x").samples == pytest.approx(
         2 * WAVE, abs=2e-5
     )
-    with pytest.raises(RefusedError, match=r"one of: 7\.x, 8\.x"):
+    with pytest.raises(RefusedError, match=r"one of: 7\.x; 8\.x"):
         read_recording(saved(tmp_path, several))
 
 
