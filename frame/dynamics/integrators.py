@@ -218,35 +218,20 @@ def load_moments(history: History, step: float, count: int, order: int) -> Array
     home, start = home[in_time], start[in_time]
     end = np.append(start[1:], 0.0)
     end[np.append(np.diff(home) > 0, True)] = step
-    first, last = _end_values(history, home * step, start, end)
     # Gauss quadrature in each, exact, with a sine to round-off
     points, weights = np.polynomial.legendre.leggauss(
         order // 2 + 1 + (SINE_POINTS if history.frequency else 0)
     )
-    share, length = (points + 1) / 2, (end - start)[:, None]
-    since = start[:, None] + length * share
-    load = first[:, None] * (1 - share) + last[:, None] * share
-    if history.frequency:
-        load = load * history.wave(home[:, None] * step + since)
-    load = load * (length / 2 * weights)
+    length = (end - start)[:, None]
+    since = start[:, None] + length * (points + 1) / 2
+    time = home[:, None] * step + since
+    load = history.envelope(time) * history.wave(time) * (length / 2 * weights)
     first_segment = np.searchsorted(home, np.arange(count))  # of each step
     moments: Array = np.empty((count, order))
     for k in range(order):
         moments[:, k] = np.add.reduceat(load.sum(1), first_segment)
         load = load * (1 - since / step)
     return moments
-
-
-def _end_values(history: History, node: Array, start: Array, end: Array) -> tuple[Array, Array]:
-    """g, the load without its sine, just after starts and just before ends of segments, (L,)."""
-    a, h = history.samples, history.step
-    piece = np.floor((node + (start + end) / 2 - history.start) / h).astype(int)  # between samples
-    is_sampled, is_after = (piece >= 0) & (piece < len(a) - 1), piece >= len(a) - 1
-    k = np.where(is_sampled, piece, 0)
-    slope = (a[k + 1] - a[k]) / h
-    outside = np.where(is_after & np.array(history.is_held), a[-1], 0.0)
-    first, last = (a[k] + slope * (node + x - history.start - k * h) for x in (start, end))
-    return np.where(is_sampled, first, outside), np.where(is_sampled, last, outside)
 
 
 def linear_loads(loads: Sequence[History], step: float, count: int) -> Array:

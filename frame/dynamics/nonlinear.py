@@ -1,7 +1,7 @@
 """Trajectories of Lagrangian systems with derivatives by the inputs, compiled by Numba.
 
-A state is (q, π), coordinates and momenta, 2n numbers, with first derivatives (d, 2n) and second
-ones (d, d, 2n) by d inputs. The equations come as tapes (`calculus/tape.py`), so that one
+A state is (q, π), coordinates and momenta, 2n numbers, with first derivatives (2n, d) and second
+ones (2n, d, d) by d inputs. The equations come as tapes (`calculus/tape.py`), so that one
 compilation serves all systems. Loops are written out: they compile in a fraction of the time that
 array expressions take.
 """
@@ -138,12 +138,12 @@ class LagrangianFlow(Flow):
         inputs = np.ascontiguousarray(inputs, float)
         tapes = (self._newton, *(self._deep if d else self._plain))
         nodes = (len(points), len(self.time))
-        out = [np.empty((*nodes, *(d,) * order, len(self.outputs))) for order in range(3)]
+        out = [np.empty((*nodes, len(self.outputs), *(d,) * order)) for order in range(3)]
         if not _march(*tapes, self.system.coordinates, inputs, self.step, *out):
             what = f"a step of {self.step:g} s did not converge, or leaves the numbers"
             raise StepError(what, "take a smaller step, or parameters where the motion exists")
         # jets have the axes of the derivatives first
-        return Jet(out[0], np.moveaxis(out[1], 2, 0), np.moveaxis(out[2], (2, 3), (0, 1)))
+        return Jet(out[0], np.moveaxis(out[1], 3, 0), np.moveaxis(out[2], (3, 4), (0, 1)))
 
 
 @compiled
@@ -170,40 +170,32 @@ def _march(
         inputs: d inputs and then other parameters, shape (S, K).
         h: Length of a step, in s.
         out: Written: outputs, shape (S, T, m).
-        out1: Written: their first derivatives, shape (S, T, d, m).
-        out2: Written: their second ones, shape (S, T, d, d, m).
+        out1: Written: their first derivatives, shape (S, T, m, d).
+        out2: Written: their second ones, shape (S, T, m, d, d).
     """
-    size, d, m = 2 * n, out1.shape[2], out.shape[2]
+    size, d, m = 2 * n, out1.shape[3], out.shape[2]
     a = size + d
     flat, arguments = np.empty(m + (m * a + m * a * a if d else 0)), np.empty(size + len(inputs[0]))
-    start, x = np.empty(size * (1 + d + d * d)), np.empty(size)
-    x1, x2 = np.empty((d, size)), np.empty((d, d, size))
-    inner1, inner2 = np.zeros((d, a)), np.zeros((d, d, a))  # of state and inputs by the inputs
+    start = np.empty(size * (1 + d + d * d))
+    inner1, inner2 = np.zeros((a, d)), np.zeros((a, d, d))  # of state and inputs by the inputs
     for i in range(d):
-        inner1[i, size + i] = 1.0
+        inner1[size + i, i] = 1.0
     for s in range(len(inputs)):
-        p = inputs[s]
-        arguments[size:] = p
-        _evaluate(initial, p, start)
-        for c in range(size):
-            x[c] = start[c]
-            for i in range(d):
-                x1[i, c] = start[size + c * d + i]
-                for j in range(d):
-                    x2[i, j, c] = start[size + size * d + (c * d + i) * d + j]
+        arguments[size:] = inputs[s]
+        _evaluate(initial, inputs[s], start)
+        x = start[:size]
+        x1 = start[size : size + size * d].reshape(size, d)
+        x2 = start[size + size * d :].reshape(size, d, d)
         for t in range(out.shape[1]):
-            if t and not _midpoint_step(newton, step, n, p, h, x, x1, x2):
+            if t and not _midpoint_step(newton, step, n, inputs[s], h, x, x1, x2):
                 return False
             arguments[:size] = x
             _evaluate(observe, arguments, flat)
             out[s, t] = flat[:m]
             if d:
-                for i in range(d):
-                    for c in range(size):
-                        inner1[i, c] = x1[i, c]
-                        for j in range(d):
-                            inner2[i, j, c] = x2[i, j, c]
-                _chain_rule_second(flat, m, a, inner1, inner2, out1[s, t], out2[s, t])
+                inner1[:size] = x1
+                inner2[:size] = x2
+                _chain_rule(flat, inner1, inner2, out1[s, t], out2[s, t])
     return True
 
 
@@ -216,13 +208,11 @@ def _midpoint_step(
     Tape `newton` gives the momenta before the step, to equal those of the state, and their
     derivatives by the new coordinates, which Newton's method finds.
     """
-    d, m, n_parameters = len(x1), 2 * n, len(p)
+    d, m, n_parameters = x1.shape[1], 2 * n, len(p)
     arguments, flat = np.empty(m + n_parameters + 1), np.empty(n + n * n)
     residual, jacobian = np.empty((n, 1)), np.empty((n, n))
-    for i in range(n):
-        arguments[i] = arguments[n + i] = x[i]  # new coordinates, guessed, and old ones
-    for i in range(n_parameters):
-        arguments[m + i] = p[i]
+    arguments[:n] = arguments[n:m] = x[:n]  # new coordinates, guessed, and old ones
+    arguments[m : m + n_parameters] = p
     arguments[m + n_parameters] = h
     for _ in range(MAX_ITERATIONS):
         _evaluate(newton, arguments, flat)
@@ -244,8 +234,7 @@ def _midpoint_step(
     a = m + d
     flat = np.empty(m + (m * a + m * a * a if d else 0))
     _evaluate(step, arguments, flat)
-    for i in range(n):
-        x[i], x[n + i] = arguments[i], flat[n + i]
+    x[:n], x[n:] = arguments[:n], flat[n:m]
     if d:
         _step_derivatives(flat, n, x1, x2)
     return True
@@ -253,87 +242,72 @@ def _midpoint_step(
 
 @compiled
 def _step_derivatives(flat: Array, n: int, x1: Array, x2: Array) -> None:
-    """Advance derivatives x1 (d, 2n) and x2 (d, d, 2n) of a state by one midpoint step, in place.
+    """Advance derivatives x1 (2n, d) and x2 (2n, d, d) of a state by one midpoint step, in place.
 
     `flat` holds the momenta before and after the step, with first and second derivatives by new and
     old coordinates and the inputs. The momenta before the step, whose Jacobian by the new
     coordinates is J, determine these: one linear system with J gives their first derivatives,
     another one the second ones.
     """
-    d, m = len(x1), 2 * n
+    m, d = x1.shape
     a = m + d
     J = np.empty((n, n))
     # derivatives of the variables (new coordinates, old coordinates, inputs) by the inputs
-    inner1, inner2 = np.zeros((d, a)), np.zeros((d, d, a))
-    out1, out2 = np.empty((d, m)), np.empty((d, d, m))
+    inner1, inner2 = np.zeros((a, d)), np.zeros((a, d, d))
+    out1, out2 = np.empty((m, d)), np.empty((m, d, d))
     new_first, new_second = np.empty((n, d)), np.empty((n, d * d))
     for i in range(n):
         for j in range(n):
             J[i, j] = flat[m + i * a + j]
     for i in range(d):
-        inner1[i, m + i] = 1.0
-        for c in range(n):
-            inner1[i, n + c] = x1[i, c]
-            for j in range(d):
-                inner2[i, j, n + c] = x2[i, j, c]
-    # of both momenta while the new coordinates are held
-    _chain_rule_first(flat, m, a, inner1, out1)
-    for c in range(n):
-        for i in range(d):
-            new_first[c, i] = x1[i, n + c] - out1[i, c]
+        inner1[m + i, i] = 1.0
+    inner1[n:m] = x1[:n]
+    inner2[n:m] = x2[:n]
+    _chain_rule(flat, inner1, inner2, out1, out2)  # while the new coordinates are held
+    new_first[:] = x1[n:] - out1[:n]
     _solve(J, new_first)
-    for c in range(n):
-        for i in range(d):
-            inner1[i, c] = new_first[c, i]
-    _chain_rule_second(flat, m, a, inner1, inner2, out1, out2)
+    inner1[:n] = new_first
+    _chain_rule(flat, inner1, inner2, out1, out2)
     for c in range(n):
         for i in range(d):
             for j in range(d):
-                new_second[c, i * d + j] = x2[i, j, n + c] - out2[i, j, c]
+                new_second[c, i * d + j] = x2[n + c, i, j] - out2[c, i, j]
     _solve(J, new_second)
-    for i in range(d):  # coordinates and momenta after the step
-        for c in range(n):
-            x1[i, c], x1[i, n + c] = inner1[i, c], out1[i, n + c]
+    for c in range(n):  # coordinates and momenta after the step
+        for i in range(d):
+            x1[c, i], x1[n + c, i] = inner1[c, i], out1[n + c, i]
             for j in range(d):
-                x2[i, j, c] = new_second[c, i * d + j]
-                total = out2[i, j, n + c]
+                x2[c, i, j] = new_second[c, i * d + j]
+                total = out2[n + c, i, j]
                 for k in range(n):
                     total += flat[m + (n + c) * a + k] * new_second[k, i * d + j]
-                x2[i, j, n + c] = total
+                x2[n + c, i, j] = total
 
 
 @compiled
-def _chain_rule_first(flat: Array, m: int, a: int, inner1: Array, out1: Array) -> None:
-    """Write first derivatives of m functions by d inputs to `out1` (d, m), by the chain rule."""
-    # flat: the functions f (m,) and their derivatives (m, a) by a variables, one after the other;
-    # inner1 (d, a): derivatives of the variables by the inputs
-    for i in range(len(inner1)):
-        for c in range(m):
-            total = 0.0
-            for x in range(a):
-                total += flat[m + c * a + x] * inner1[i, x]
-            out1[i, c] = total
+def _chain_rule(flat: Array, inner1: Array, inner2: Array, out1: Array, out2: Array) -> None:
+    """Write first and second derivatives of m functions by d inputs to `out1` and `out2`.
 
-
-@compiled
-def _chain_rule_second(
-    flat: Array, m: int, a: int, inner1: Array, inner2: Array, out1: Array, out2: Array
-) -> None:
-    """Write first and second derivatives by d inputs to `out1` (d, m) and `out2` (d, d, m)."""
-    # as above, with (m, a, a) second derivatives in `flat` and inner2 (d, d, a)
-    _chain_rule_first(flat, m, a, inner1, out1)
-    d, hessian_row, hessian_at = len(inner1), np.empty(a), m + m * a
+    `flat` holds the functions (m,), their first derivatives (m, a) and their second ones (m, a, a)
+    by a variables; `inner1` (a, d) and `inner2` (a, d, d) those of the variables by the inputs.
+    """
+    m, d, a = len(out1), len(out1[0]), len(inner1)
+    hessian_row, hessian_at = np.empty(a), m + m * a
     for c in range(m):
         for i in range(d):
+            total = 0.0
+            for x in range(a):
+                total += flat[m + c * a + x] * inner1[x, i]
+            out1[c, i] = total
             for y in range(a):  # the Hessian of f_c times the derivatives by input i
                 hessian_row[y] = 0.0
                 for x in range(a):
-                    hessian_row[y] += flat[hessian_at + (c * a + x) * a + y] * inner1[i, x]
+                    hessian_row[y] += flat[hessian_at + (c * a + x) * a + y] * inner1[x, i]
             for j in range(i, d):
                 total = 0.0
                 for x in range(a):
-                    total += flat[m + c * a + x] * inner2[i, j, x] + hessian_row[x] * inner1[j, x]
-                out2[i, j, c] = out2[j, i, c] = total
+                    total += flat[m + c * a + x] * inner2[x, i, j] + hessian_row[x] * inner1[x, j]
+                out2[c, i, j] = out2[c, j, i] = total
 
 
 @compiled
