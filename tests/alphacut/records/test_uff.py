@@ -111,7 +111,7 @@ def test_times_that_are_even_but_for_their_digits_are_even(tmp_path, rate):
 
 @pytest.mark.parametrize(
     ("changes", "message"),
-    [({"unit": "Pa"}, "in units of Pa"), ({"unit": "NONE"}, "in units of none"),
+    [({"unit": "Pa"}, "in units of Pa"), ({"unit": "NONE"}, "without a unit"),
      ({"function": 4}, "of function type 4"), ({"step": 0.0}, "a step of 0 s")],
 )  # fmt: skip
 def test_what_is_no_acceleration_over_time_is_refused(tmp_path, changes, message):
