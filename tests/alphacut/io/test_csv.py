@@ -1,6 +1,5 @@
 """Files of modes: what is wrong has its line."""
 
-import numpy as np
 import pytest
 
 from alphacut.fuzzy.refused import RefusedError
@@ -27,13 +26,10 @@ def test_wrong_modes_are_refused(tmp_path, old, new):
 
 
 def test_deviations_of_an_operational_analysis_are_read(tmp_path):
-    """Four lines bring pyOMA2's arrays Fn, Fn_std, Phi and Phi_std into a file of modes."""
-    fn, fn_std = np.array([1.5, 4.0]), np.array([0.015, 0.08])
-    phi, phi_std = np.array([[0.5, -1.0], [1.0, 0.5]]), np.array([[0.01, 0.02], [0.03, 0.01]])
+    """Columns as the how-to writes them from pyOMA2's arrays Fn, Fn_std, Phi and Phi_std."""
     path = tmp_path / "modes.csv"
     head = "mode,frequency [Hz],frequency_std [Hz],shape_std,q1,q2"
-    columns = [np.arange(1, len(fn) + 1), fn, fn_std, abs(phi_std).max(0), *phi.real]
-    np.savetxt(path, np.column_stack(columns), delimiter=",", header=head, comments="")
+    path.write_text(f"{head}\n1,1.5,0.015,0.03,0.5,1\n2,4,0.08,0.02,-1,0.5\n")
     first, second = mode_rows(path)
     assert first.frequency_deviation == pytest.approx(0.01)
     assert second.frequency_deviation == pytest.approx(0.02)

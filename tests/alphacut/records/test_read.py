@@ -65,41 +65,37 @@ def test_heads_of_another_wording_are_read_or_told_how(tmp_path, head):
         assert read_recording(path).samples == pytest.approx(record.samples)
 
 
-def test_channels_of_cosmos_are_told_apart(tmp_path):
-    path = saved(tmp_path, written.cosmos())
-    for channel, size in (("1", 1.0), ("90 deg", 1.0), ("hne", 1.0), ("2", 0.5), ("HNZ", 0.5)):
+@pytest.mark.parametrize(
+    ("text", "channels", "words"),
+    [
+        (
+            written.cosmos(),
+            ("1", "90 deg", "hne", "2", "HNZ"),
+            "1 or 90 deg or hne; 2 or up or hnz",
+        ),
+        (written.csmip(), ("1", "90 deg", "2", "up"), "1 or 90 deg; 2 or up"),
+    ],
+    ids=["COSMOS", "CSMIP"],
+)
+def test_channels_are_told_apart(tmp_path, text, channels, words):
+    path = saved(tmp_path, text)
+    for channel in channels:
+        size = 0.5 if channel in ("2", "up", "HNZ") else 1.0
         record = read_recording(path, channel)
         assert record.samples == pytest.approx(size * written.G * written.samples(), abs=1e-5)
-    with pytest.raises(RefusedError, match="one of: 1 or 90 deg or hne; 2 or up or hnz"):
+    with pytest.raises(RefusedError, match=f"not named; allowed: one of: {words}"):
         read_recording(path)
     with pytest.raises(RefusedError, match="channel 7"):
         read_recording(path, "7")
 
 
-def test_channels_of_csmip_are_told_apart(tmp_path):
-    path = saved(tmp_path, written.csmip())
-    for channel, size in (("1", 1.0), ("2", 0.5), ("up", 0.5)):
-        record = read_recording(path, channel)
-        assert record.samples == pytest.approx(size * written.G * written.samples(), abs=1e-5)
-    with pytest.raises(RefusedError, match="one of: 1 or 90 deg; 2 or up"):
-        read_recording(path)
-
-
-@pytest.mark.parametrize(
-    ("text", "layout"),
-    [
-        (written.lines(written.samples(), "15.7E", 1), (written.STEP, "g")),
-        (written.csv_text(mark=" ").partition("\n")[2], (None, "g")),
-        (written.csv_text("cm/s^2").partition("\n")[2], (None, "cm/s2")),
-    ],
-    ids=["one column", "two columns", "two with commas"],
-)
-def test_columns_without_a_head_are_read_with_the_cases_unit(tmp_path, text, layout):
-    record = read_recording(saved(tmp_path, text), "", *layout)
-    assert record.step == pytest.approx(written.STEP, rel=1e-9)
-    assert record.samples == pytest.approx(written.G * written.samples(), abs=1e-6)
-    with pytest.raises(RefusedError, match=r"records\.unit"):
-        read_recording(saved(tmp_path, text))
+def test_columns_without_a_head_need_a_unit_and_one_column_a_step(tmp_path):
+    two = saved(tmp_path, written.csv_text(mark=" ").partition("\n")[2])
+    with pytest.raises(RefusedError, match=r"or say records\.unit"):
+        read_recording(two)
+    one = saved(tmp_path, written.lines(written.samples(), "15.7E", 1))
+    with pytest.raises(RefusedError, match=r"records\.step"):
+        read_recording(one, unit="g")
 
 
 def test_what_is_no_format_is_one_line_with_those_that_are_read(tmp_path):

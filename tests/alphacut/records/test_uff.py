@@ -65,14 +65,6 @@ def test_modes_that_are_not_there_are_refused(tmp_path):
 WAVE = np.sin(9 * 0.005 * np.arange(400))
 
 
-@pytest.mark.parametrize("spec", [0, 1, 12, 15])
-@pytest.mark.parametrize(("unit", "size"), [("m/s^2", 1.0), ("m/s²", 1.0), ("g", 9.80665)])
-def test_the_stated_unit_says_what_a_history_is(tmp_path, spec, unit, size):
-    record = read_recording(saved(tmp_path, uff58(WAVE, unit=unit, spec=spec)))
-    assert record.step == pytest.approx(0.005, rel=1e-9)
-    assert record.samples == pytest.approx(size * WAVE, abs=1e-4)
-
-
 @pytest.mark.parametrize("order", ["", "<", ">"])
 @pytest.mark.parametrize("kind", [2, 4])
 def test_text_and_bytes_of_single_and_double_reals_are_read(tmp_path, kind, order):
