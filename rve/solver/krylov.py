@@ -43,14 +43,20 @@ def _to_standard_error(name: str, value: str) -> str:
 
 @dataclass(frozen=True)
 class SolverOptions:
-    """The default with the PETSc options, without prefix, that override it."""
+    """The default with the PETSc options, without prefix, that override it.
+
+    Those of the environment, PETSC_OPTIONS, come after the default and before `overrides`.
+    """
 
     overrides: Mapping[str, str] = field(default_factory=dict)
+    environment: Mapping[str, str] = field(
+        default_factory=lambda: dict(PETSc.Options(PREFIX).getAll())
+    )
 
     @property
     def all(self) -> dict[str, str]:
         """Everything that is put to PETSc."""
-        chosen = {**DEFAULTS, **self.overrides}
+        chosen = {**DEFAULTS, **self.environment, **self.overrides}
         chosen = {name: _to_standard_error(name, value) for name, value in chosen.items()}
         most = MOST_ITERATIONS * (1 if chosen["pc_type"] == "python" else 10)
         return {"ksp_max_it": str(most), **chosen}
@@ -61,7 +67,8 @@ class SolverOptions:
         return self.all["pc_type"] == "python"
 
     def __str__(self) -> str:
-        words = [f"-{PREFIX}{name} {value}".strip() for name, value in self.overrides.items()]
+        changes = {**self.environment, **self.overrides}.items()
+        words = [f"-{PREFIX}{name} {value}".strip() for name, value in changes]
         return " ".join(["theta", *words] if self.by_levels else words)
 
 
@@ -146,15 +153,15 @@ def solve(ksp: PETSc.KSP, loads: Sequence[PETSc.Vec]) -> Solutions:
 def in_database(options: SolverOptions) -> Iterator[None]:
     """Context with the options in PETSc's database, which is restored at its end.
 
-    What the database has already comes before the defaults, overrides come before both.
+    What the environment gave stays there, unless an override has its place meanwhile.
 
     Raises:
         RefusedError: PETSc refuses an option, or has not used an override in the block.
     """
-    database = PETSc.Options(PREFIX)
-    existing = {name: database.getString(name) for name in options.all if database.hasName(name)}
-    overrides = {name: options.all[name] for name in options.overrides}
-    for name, value in (options.all | existing | overrides).items():
+    database, environment = PETSc.Options(PREFIX), options.environment
+    kept = environment.keys() - options.overrides.keys()
+    added = {name: value for name, value in options.all.items() if name not in kept}
+    for name, value in added.items():
         database[name] = value
     try:
         yield
@@ -165,10 +172,11 @@ def in_database(options: SolverOptions) -> Iterator[None]:
             raise RefusedError("PETSc", str(options), "what PETSc takes", reason) from failure
         raise ConvergenceError(f"PETSc cannot set up {options}: {reason}") from failure
     finally:
-        for name in options.all:
+        for name in added:
             database.delValue(name)
-        for name, value in existing.items():
-            database[name] = value
+        for name in environment.keys() & added.keys():
+            database[name] = environment[name]
+            database.getString(name)  # read, so that PETSc does not call it unused
     if unused:
         value = options.overrides[unused[0]]
         option = f"-{PREFIX}{unused[0]}"

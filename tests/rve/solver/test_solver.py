@@ -11,7 +11,7 @@ import scipy.sparse as sp
 pytest.importorskip("alphacut.rve.fenicsx")
 
 from alphacut.rve.cell.cell import LOADS, Phase
-from alphacut.rve.fenicsx import MPI, PETSc
+from alphacut.rve.fenicsx import MPI, PETSc, option_is_used
 from alphacut.rve.mesh.columns import extrude
 from alphacut.rve.mesh.periodicity import identify
 from alphacut.rve.prism.problem import PrismProblem
@@ -149,5 +149,13 @@ def test_options_of_the_caller_hold_and_stay(problem):
         assert ksp.getTolerances()[0] == 1e-13
         assert ksp.getTolerances()[3] == 99
         assert database.getString("rve_ksp_rtol") == "1e-13"
+        # as PETSC_OPTIONS puts them: named with the result, and not called unused at the end
+        database["rve_pc_type"] = "jacobi"
+        options = SolverOptions({"ksp_rtol": "1e-9"})
+        assert problem.solver(options).pc.getType() == "jacobi"
+        assert str(options) == "-rve_ksp_rtol 1e-9 -rve_pc_type jacobi"
+        assert option_is_used("rve_ksp_rtol")
+        assert option_is_used("rve_pc_type")
     finally:
         database.delValue("rve_ksp_rtol")
+        database.delValue("rve_pc_type")
