@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import signal
 import threading
 from collections.abc import Iterator
@@ -11,9 +12,25 @@ STOP_SIGNALS = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasat
 """Signals that end a program as Ctrl-C does, where the system has them."""
 
 
+def end_on_second(number: int) -> None:
+    """Lets a second signal end the process while the first waits for the end of compiled code.
+
+    The C library's one-shot handler, where it has one, is that of Python for the first signal and
+    the system's default after it.
+    """
+    library = ctypes.CDLL(None)
+    if hasattr(library, "sysv_signal"):
+        library.sysv_signal.restype = ctypes.c_void_p
+        library.sysv_signal.argtypes = (ctypes.c_int, ctypes.c_void_p)
+        handler = library.sysv_signal(number, int(signal.SIG_IGN))  # returns the one before
+        library.sysv_signal(number, handler)
+
+
 @contextmanager
-def uninterrupted() -> Iterator[None]:
+def uninterrupted(*, second_ends: bool = False) -> Iterator[None]:
     """Context that delays Ctrl-C to its end, and restores the signal handlers there.
+
+    With `second_ends` a second Ctrl-C, SIGTERM or SIGHUP ends the process at once.
 
     PETSc loses exceptions that Python raises below it; basix and DOLFINx abort while they are
     imported, and MPI replaces handlers. Does nothing outside the main thread.
@@ -25,6 +42,8 @@ def uninterrupted() -> Iterator[None]:
         yield
         return
     signal.signal(signal.SIGINT, lambda number, _: received.append(number))
+    for number in [signal.SIGINT, *STOP_SIGNALS] if second_ends else []:
+        end_on_second(number)
     try:
         yield
     finally:

@@ -102,7 +102,7 @@ def krylov_solver(
     ksp.setOptionsPrefix(PREFIX)
     ksp.setOperators(matrix)
     matrix.setNearNullSpace(translations(matrix))
-    with in_database(options), uninterrupted():
+    with in_database(options), uninterrupted(second_ends=True):
         ksp.setFromOptions()
         if options.by_levels:
             ksp.pc.setPythonContext(ThetaPreconditioner(matrix, numbering, law))
@@ -121,7 +121,7 @@ def translations(matrix: PETSc.Mat) -> PETSc.NullSpace:
     return PETSc.NullSpace().create(vectors=vectors, comm=matrix.comm)
 
 
-@uninterrupted()
+@uninterrupted(second_ends=True)
 def solve(ksp: PETSc.KSP, loads: Sequence[PETSc.Vec]) -> Solutions:
     """Solve for each load.
 

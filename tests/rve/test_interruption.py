@@ -4,6 +4,7 @@ import ast
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -54,6 +55,30 @@ def test_it_ends_with_the_usual_status_once_the_import_is_done(
         done.stderr
         == f"alphacut: {how}; a run continues from the stages and samples that it has finished\n"
     )
+
+
+COMPILED = """
+import numpy as np
+from alphacut.entry import stoppable
+from alphacut.rve.interruption import uninterrupted
+with stoppable(), uninterrupted(second_ends=True):
+    print("begun", flush=True)
+    np.linalg.svd(np.random.default_rng(0).random((6000, 6000)))
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_second_signal_ends_compiled_code_that_the_first_waits_for(number):
+    started = subprocess.Popen(
+        [sys.executable, "-c", COMPILED], stdout=subprocess.PIPE, text=True, cwd=ROOT
+    )
+    assert started.stdout.readline() == "begun\n"
+    time.sleep(0.3)
+    started.send_signal(number)
+    with pytest.raises(subprocess.TimeoutExpired):
+        started.wait(0.5)
+    started.send_signal(number)
+    assert started.wait(10) == -number
 
 
 @pytest.mark.parametrize(("number", "ends"), [("SIGINT", "True"), ("SIGTERM", "False")])
