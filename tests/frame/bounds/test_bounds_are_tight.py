@@ -141,29 +141,21 @@ def polynomials(coefficients: np.ndarray) -> TaylorModel:
     return TaylorModel(parts, np.zeros(coefficients.shape[1]), 1, degree)
 
 
-@pytest.mark.parametrize(("start", "budget"), [(0.5, 4000), (0.0, 1)])
-def test_branch_and_bound_needs_all_of_the_remainder(start: float, budget: float) -> None:
-    """About 0 nothing but the third derivative tells that x³ reaches 1."""
+@pytest.mark.parametrize(
+    ("square", "start", "gap", "budget", "truth"),
+    [
+        (0.0, 0.5, 1e-3, 4000, 1.0),  # about 0 the third derivative alone tells that x³ reaches 1
+        (0.0, 0.0, 1e-3, 1, 1.0),
+        (0.75, 0.0, 1e-3, 4000, 0.25),  # half of the remainder leaves x³ − 3 x²/4 concave up to 1
+        (0.0, 0.97, 0.1, 4000, 1.0),  # the first box of x³ holds no more than the gap
+    ],
+)
+def test_branch_and_bound_needs_all_of_the_remainder(square, start, gap, budget, truth) -> None:
+    """From a best point of a cubic, in which half of the remainder would hide the highest value."""
     one, best = np.ones(1, int), np.full((1, 1), start)
-    optima = Optima(one, 0 * one, np.ones(1), best, best[0] ** 3)
-    proved, _ = enclosed(cube(), -np.ones(1), np.ones(1), optima, gap=1e-3, budget=budget)
-    assert 1 <= proved[0] <= 1.01
-
-
-def test_the_best_point_is_not_trusted_beyond_its_remainder() -> None:
-    """About 0, a local maximum, half of the remainder would leave x³ − 3 x²/4 concave up to 1."""
-    one, best = np.ones(1, int), np.zeros((1, 1))
-    optima = Optima(one, 0 * one, np.ones(1), best, np.zeros(1))
-    proved, _ = enclosed(cube(0.75), -np.ones(1), np.ones(1), optima, gap=1e-3)
-    assert 0.25 <= proved[0] <= 0.252
-
-
-def test_boxes_given_up_within_the_gap_are_in_the_bound() -> None:
-    """Beside 0.97³ the first box of x³ holds no more than the gap: nothing is looked at, 1 is."""
-    one, best = np.ones(1, int), np.full((1, 1), 0.97)
-    optima = Optima(one, 0 * one, np.ones(1), best, best[0] ** 3)
-    proved, _ = enclosed(cube(), -np.ones(1), np.ones(1), optima, gap=0.1)
-    assert 1 <= proved[0] <= 1.02
+    optima = Optima(one, 0 * one, np.ones(1), best, best[0] ** 3 - square * best[0] ** 2)
+    proved, _ = enclosed(cube(square), -np.ones(1), np.ones(1), optima, gap=gap, budget=budget)
+    assert truth <= proved[0] <= truth + 0.02
 
 
 def least_closed(tree: Tree) -> np.ndarray:

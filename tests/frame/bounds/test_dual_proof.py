@@ -3,14 +3,13 @@
 import numpy as np
 import pytest
 
-from alphacut.frame import Auto, StoreyFrame, envelope
+from alphacut.frame import StoreyFrame, envelope
 from alphacut.frame.bounds import dual_function as kernel
 from alphacut.frame.bounds.box import Box
 from alphacut.frame.bounds.level import OutputBounds
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
-from alphacut.frame.methods import auto
 from alphacut.frame.methods.dual import DualProof
 from alphacut.frame.methods.proof import Proof
 from alphacut.frame.structures.loads import Accelerogram
@@ -140,13 +139,13 @@ def points(found, level, rng, count=300):
 def case(request):
     model, fuzzy = CASES[request.param]
     found = envelope(
-        model, fuzzy, duration=4.0, step=0.05, alpha=(0, 0.6, 1), method=DualProof(), progress=False
+        model, fuzzy, duration=3.0, step=0.05, alpha=(0, 1), method=DualProof(), progress=False
     )
-    return model, found, LinearFlow(model, list(fuzzy), 4.0, 0.05, Exact())
+    return found, LinearFlow(model, list(fuzzy), 3.0, 0.05, Exact())
 
 
 def test_no_exact_motion_leaves_a_bound(case):
-    _, found, flow = case
+    found, flow = case
     rng = np.random.default_rng(0)
     for level in range(len(found.alpha)):
         values = flow.values(points(found, level, rng))
@@ -157,9 +156,9 @@ def test_no_exact_motion_leaves_a_bound(case):
 
 
 def test_attained_bounds_are_attained_within_the_box(case):
-    _, found, flow = case
+    found, flow = case
     for ends, at in zip(found.inner, (found.upper_at, found.lower_at)[::-1], strict=True):
-        for node in (7, 30, 61):
+        for node in (7, 30, 51):
             values = flow.values(at[0, node].reshape(-1, at.shape[-1]))[:, node]
             own = np.diag(values)
             peak = np.abs(ends[0]).max(0)
@@ -170,20 +169,9 @@ def test_attained_bounds_are_attained_within_the_box(case):
 
 
 def test_gaps_of_peaks_are_small(case):
-    _, found, _ = case
+    found, _ = case
     assert found.facts["gap_of_peaks"] < 0.06
     assert (np.nanmedian(found.error[1], 0) <= 0.08 * np.abs(found.upper[1]).max(0)).all()
-
-
-def test_motions_between_nodes_stay_within_what_is_stated(case):
-    model, found, _ = case
-    fine = LinearFlow(model, list(found.inputs), 4.0, 0.0125, Exact())
-    values = fine.values(points(found, 0, np.random.default_rng(1), 60))
-    upper = np.maximum(found.upper[0, 1:], found.upper[0, :-1]) + found.between[1:]
-    lower = np.minimum(found.lower[0, 1:], found.lower[0, :-1]) - found.between[1:]
-    for part in (1, 2, 3):
-        assert (values[:, part::4] <= upper + 1e-12).all()
-        assert (values[:, part::4] >= lower - 1e-12).all()
 
 
 def level_of(model, fuzzy, time):
@@ -240,39 +228,15 @@ def test_it_agrees_with_the_branch_and_bound():
         assert (one.lower <= other.inner.lower + slack).all()
 
 
-@pytest.mark.parametrize(
-    ("share", "gaps", "method", "why"),
-    [
-        (1e-2, {}, "proof", "proof succeeded"),
-        (
-            1e-2,
-            {"proof": 1.0},
-            "dual",
-            "dual succeeded; proof: its gap is wider than the tolerance",
-        ),
-        (1e-2, {"dual": 1.0, "proof": 0.5}, "proof", "proof and improved-graph-follower"),
-    ],
-)
-def test_auto_takes_the_cheaper_proof_that_is_near_enough(share, gaps, method, why, monkeypatch):
-    own = auto._gap
-    monkeypatch.setattr(auto, "_gap", lambda found, flow: gaps.get(found.method, own(found, flow)))
-    model = storeys(4, damping_ratio=0.03, v0=(0.0, 0.0, 0.0, 0.3), outputs=("drift1",))
-    fuzzy = {f"k{z + 1}": near(1.2e8, 0.04) for z in range(4)}
-    way = Auto(share, peaks=True)
-    given = {"duration": 1.0, "step": 0.05, "alpha": (0,), "progress": False, "relative": True}
-    found = envelope(model, fuzzy, method=way, **given)
-    assert (found.method, found.notes[0]) == (method, why)
-
-
 def test_thirteen_inputs_of_six_storeys_are_proved():
     outputs = ("q6", "drift1", "base_shear")
     model = storeys(6, damping_ratio=0.03, ground=record(), outputs=outputs)
     fuzzy = each_storey(6) | {"zeta": Triangular(0.02, 0.03, 0.04)}
-    found = envelope(model, fuzzy, duration=6.0, step=0.1, alpha=(0, 0.5), progress=False)
+    found = envelope(model, fuzzy, duration=3.0, step=0.1, alpha=(0,), progress=False)
     assert (found.method, found.nature) == ("dual", Nature.GUARANTEED)
     peaks = np.maximum(found.upper.max(1), -found.lower.min(1))
     inner = np.maximum(found.inner.upper.max(1), -found.inner.lower.min(1))
-    assert (peaks <= inner * (1 + np.array([[0.03], [0.01]]))).all()
+    assert (peaks <= inner * 1.03).all()
     assert (inner <= peaks).all()
 
 
@@ -289,12 +253,12 @@ def test_what_is_not_covered_is_said(model, width, match):
         envelope(model, fuzzy, duration=1.0, step=0.1, method=DualProof(), progress=False)
 
 
-@pytest.mark.parametrize("unit", [1e-6, 7e-3, 3e5])
+@pytest.mark.parametrize("unit", [1e-6, 3e5])
 def test_a_motion_in_other_units_has_the_same_bounds(unit):
     def bounds(factor):
         shaken = Accelerogram(0.02, factor * record(2.0).acceleration)
         frame = storeys(3, damping_ratio=0.03, ground=shaken, outputs=("q3", "drift1", "a3"))
-        return envelope(frame, each_storey(3), DualProof(), duration=2.0, step=0.02, alpha=(0,))
+        return envelope(frame, each_storey(3), DualProof(), duration=1.0, step=0.02, alpha=(0,))
 
     metres, others = bounds(1.0), bounds(unit)
     allowed = 1e-9 * metres.upper.max((0, 1))

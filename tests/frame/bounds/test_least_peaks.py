@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from alphacut.frame import DualProof, Proof, StoreyFrame, envelope
-from alphacut.frame.bounds import least_peaks
 from alphacut.frame.bounds.box import Box
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
@@ -58,20 +57,6 @@ def test_a_limit_below_the_least_peak_must_be_exceeded(found):
     assert read_off < 0.9 * proved  # what the bounds at the nodes say
     answer = passing(peaks(found), {"q3": 0.95 * proved})["q3"]
     assert answer.necessity[0] == 1.0
-
-
-def test_halves_cover_all_places_and_share_the_middle(rng):
-    motion = rng.normal(size=(2, 3, 13, 41))
-    for ends in ([[0, 40, 0, 12], [0, 40, 0, 12]], [[3, 5, 2, 2], [4, 5, 2, 3]]):
-        cell = least_peaks.PeakCell(0.0, 0, np.array(ends), 1, np.zeros(2))
-        lower, upper = least_peaks._halves(cell, motion)
-        np.testing.assert_array_equal(np.minimum(lower, upper)[:, ::2], cell.ends[:, ::2])
-        np.testing.assert_array_equal(np.maximum(lower, upper)[:, 1::2], cell.ends[:, 1::2])
-        changed = np.argwhere(lower != cell.ends)
-        ((mode, place),) = changed
-        assert lower[mode, place] == upper[mode, place - 1]
-    atoms = least_peaks.PeakCell(0.0, 0, np.array([[7, 8, 0, 1]] * 2), 1, np.zeros(2))
-    assert least_peaks._halves(atoms, motion) == []
 
 
 @pytest.mark.parametrize("method", [Proof(workers=1), DualProof(workers=1)], ids=["proof", "dual"])

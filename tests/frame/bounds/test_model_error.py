@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.integrate import cumulative_trapezoid
 from scipy.linalg import sqrtm
 
 from alphacut.frame import (
@@ -18,14 +17,11 @@ from alphacut.frame import (
     StoreyFrame,
 )
 from alphacut.frame.bounds.model_error import EnergyNorms, _ratio_errors, proved_error
-from alphacut.frame.bounds.remainder import largest_growth, parts
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.damped import DampedModes, DampedStructure, require_dissipation
 from alphacut.frame.modes.modal_model import ModalModel
-from alphacut.frame.response.duhamel import responses_at_nodes
-from alphacut.frame.response.load_tables import left_out
 from alphacut.fuzzy import Interval, Triangular
 
 FRAME = StoreyFrame(
@@ -239,51 +235,6 @@ def test_energy_norms_hold_over_the_box() -> None:
     bounds = norms.of_displacement(x), norms.of_spring_force(x), norms.of_force(x)
     assert (reached <= bounds).all()
     assert (np.array(bounds) <= 1.3 * reached).all()
-
-
-def test_waves_and_their_derivatives_stay_below_their_bounds() -> None:
-    found = model(SHAKEN, {"E": Interval(24e9, 26e9), "m2": Interval(14e3, 16e3)})
-    growth = largest_growth(found.eigenvalue, np.ones(2))
-    forced = parts(found, growth)[1]
-    unit = np.random.default_rng(6).uniform(-1, 1, (40, 2))
-    rate = found.eigenvalue.at(unit)
-    nodes = np.arange(len(found.time))
-    waves = found.loads[0].response(np.repeat(rate, len(nodes), 0), np.tile(nodes, len(rate)))
-    for order, wave in enumerate(waves):
-        size = np.abs(wave).reshape(len(rate), len(nodes), -1).max(0)
-        assert (size <= forced.waves[order] * (1 + 1e-9) + 1e-15).all()
-        assert size.max() > 0.05 * forced.waves[order].max()  # and the bounds are not idle
-    (truth,), _ = responses_at_nodes(rate.ravel(), SHAKEN.ground, found.time, 0)
-    truth = truth.reshape(len(nodes), *rate.shape)
-    walked = cumulative_trapezoid(np.abs(truth), dx=found.flow.step, axis=0, initial=0)
-    assert (walked.max(1) <= 1.02 * forced.elapsed + 1e-12).all()
-
-
-@pytest.mark.parametrize(("phase", "order"), [(0.01, 4), (1.0, 8), (6.0, 20), (6.0, 35)])
-def test_remainder_of_the_exponential_series_is_bounded(phase, order) -> None:
-    x = phase * np.exp(1j * np.linspace(0, 2 * np.pi, 25))
-    terms = (
-        np.cumprod(
-            np.concatenate([np.ones((1, 25)), x / np.arange(order, order + 40)[:, None]]), axis=0
-        ).sum(0)
-        * x**order
-    )
-    remainder = np.abs(terms).max() / np.prod(np.arange(1.0, order + 1))
-    assert remainder <= left_out(phase, order) < 1e7 * remainder
-
-
-def test_series_leave_out_of_the_load_response_no_more_than_they_say() -> None:
-    found = model(SHAKEN, {"E": Interval(20e9, 30e9)})
-    (load,) = found.loads
-    unit = np.linspace(-1, 1, 21)[:, None]
-    rate = found.eigenvalue.at(unit)
-    (truth,), _ = responses_at_nodes(rate.ravel(), SHAKEN.ground, found.time, 0)
-    truth = truth.reshape(len(found.time), *rate.shape)
-    assert load.truncation.max() > 0
-    bound = load.truncation * parts(found, largest_growth(found.eigenvalue, np.ones(1)))[1].waves[0]
-    for node in (20, 60, 100):
-        got = load.response(rate, np.full(len(unit), node))[0]
-        assert (np.abs(got - truth[node]) <= bound[node] + 1e-13).all()
 
 
 def oscillator(omega: complex, shape: complex, velocity: complex, **start) -> ModalModel:

@@ -11,7 +11,6 @@ from alphacut.frame import Accelerogram, MatrixStructure, Proof, StoreyFrame, en
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.envelope import Ends
-from alphacut.frame.methods import graph_follower, improved_follower
 from alphacut.frame.methods.sampled import independent_excess
 from alphacut.fuzzy import Interval, Triangular
 from alphacut.fuzzy.refused import FailedError, RefusedError
@@ -94,16 +93,6 @@ def test_a_proof_contains_every_motion_and_nearly_attains_its_bounds(proofs, kin
         values = trajectories(system, inputs, drawn(inputs, alpha))
         assert (values <= found.upper[level] + 1e-12 * peak).all()
         assert (values >= found.lower[level] - 1e-12 * peak).all()
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_what_happens_between_nodes_is_in_the_bound_of_that(proofs, kind):
-    system, inputs = KINDS[kind]
-    found = proofs[kind]
-    fine = trajectories(system, inputs, drawn(inputs, 0.0, 60), step=0.005)
-    ends = np.maximum(found.upper[0, 1:], found.upper[0, :-1]) + found.between[1:]
-    top = fine[:, 1:].reshape(len(fine), -1, 10, len(found.outputs)).max((0, 2))
-    assert (top <= ends + 1e-9).all()
 
 
 @pytest.mark.parametrize("method", [frame.GraphFollower(tolerance=1e-3),
@@ -208,22 +197,6 @@ def test_progress_rises_to_one(name):
     assert told[-1] == 1.0
 
 
-FOLLOWERS = {
-    graph_follower: frame.GraphFollower(),
-    improved_follower: frame.ImprovedFollower(),
-}
-
-
-@pytest.mark.parametrize("module", FOLLOWERS)
-def test_what_an_independent_sample_reaches_beyond_the_bounds_counts_twice(monkeypatch, module):
-    monkeypatch.setattr(
-        module, "independent_excess", lambda flow, bounds, progress: (np.full((1, 2), 30.0), 5)
-    )
-    inputs, motion = {"l": Interval(0.99, 1.01)}, {"duration": 0.5, "step": 0.05, "alpha": (0,)}
-    error = envelope(frame.pendulum(), inputs, method=FOLLOWERS[module], **motion).error
-    assert error == pytest.approx(60, abs=2)
-
-
 def test_bounds_that_are_too_narrow_are_left_by_as_much():
     cut = boxes({"l": Interval(0.99, 1.01)}, (0,))
     flow = UnitFlow(frame.LagrangianFlow(frame.pendulum(), ("l",), 0.5, 0.05), cut)
@@ -249,9 +222,9 @@ def test_bounds_about_a_separatrix_are_attained_and_no_more(start, nature):
 def test_a_pendulum_is_followed_to_its_error():
     system = frame.pendulum()
     inputs = {"l": Triangular(0.95, 1, 1.05), "phi_0": Triangular(1.4, 1.5, 1.6)}
-    motion = {**MOTION, "relative": False, "step": 0.01, "duration": 5.0}
+    motion = {**MOTION, "relative": False, "step": 0.01, "duration": 2.5}
     found = envelope(system, inputs, method=frame.ImprovedFollower(1e-2), **motion)
-    flow = frame.LagrangianFlow(system, tuple(inputs), 5.0, 0.01)
+    flow = frame.LagrangianFlow(system, tuple(inputs), 2.5, 0.01)
     values = flow.values(drawn(inputs, 0.0, 2000))
     assert (values <= found.upper[0] + found.error[0]).all()
     assert (values >= found.lower[0] - found.error[0]).all()
@@ -308,7 +281,7 @@ def test_blas_threads_do_not_change_a_bit():
     building = StoreyFrame(masses=[4e4] * 8, outputs=("q8", "drift1", "base_shear"), **springs)
     inputs = {"k1": Interval(5.5e7, 6.5e7), "m8": Interval(3.6e4, 4.4e4)}
     inputs["rayleigh_mass"] = Interval(0.4, 0.6)
-    given = {"duration": 20, "step": 0.1, "alpha": (0,), "progress": False}
+    given = {"duration": 8, "step": 0.1, "alpha": (0,), "progress": False}
     bounds = []
     for threads in (1, 3):
         with threadpool_limits(limits=threads, user_api="blas"):
