@@ -271,3 +271,19 @@ def test_half_of_a_defect_would_not_do(output, given) -> None:
     assert (deviation <= bound + 1e-12).all()
     early = slice(1, 6)
     assert (bound[early] <= 1.2 * deviation[early]).all()
+
+
+def test_a_damping_force_of_a_wrong_frequency_is_in_the_acceleration() -> None:
+    """At once, an acceleration reads all of 2 ζ (ω − |λ|) v: half of the bound would be passed."""
+    frame = StoreyFrame((1.0,), stiffness=(1.0,), outputs=("a1",), damping_ratio=0.1, v0=(1.0,))
+    flow = LinearFlow(frame, ("k1",), 0.2, 0.05, Exact())
+    cuts = boxes({"k1": Interval(1 - 1e-12, 1 + 1e-12)}, (0,))
+    structure = DampedStructure.over_box(frame, cuts, 2)
+    rate, shape, velocity = np.array([0.9j]), np.array([[[-0.5j]]]), np.array([[[0.5 + 0j]]])
+    states = [structure.mass.like(x) for x in (rate, shape, velocity, velocity)]
+    modes = DampedModes(*states[:3], DampedModes(*states).outputs(structure).polynomial)
+    found = ModalModel.from_modes(flow, cuts, structure, modes)
+    truth = found.flow.values(np.ones((1, 1)))[0, 0, 0]
+    off = np.abs(found.values(np.zeros((1, 1)))[0, 0, 0] - truth)
+    assert off == pytest.approx(2 * 0.1 * 0.1)
+    assert off <= proved_error(found)[0, 0] * (1 + 1e-9) <= 1.2 * off
