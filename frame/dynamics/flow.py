@@ -11,7 +11,14 @@ import numpy as np
 
 from alphacut.frame.calculus.jet import Array, Jet, concatenate
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.dynamics.integrators import Exact, Integrator, Midpoint, StepMap
+from alphacut.frame.dynamics.integrators import (
+    Exact,
+    Integrator,
+    Midpoint,
+    StepMap,
+    state_matrix,
+)
+from alphacut.frame.dynamics.modal_trajectory import modal_trajectory
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import (
     LinearSystem,
@@ -21,6 +28,7 @@ from alphacut.frame.structures.linear import (
     frequencies,
     histories,
 )
+from alphacut.frame.structures.loads import History
 from alphacut.fuzzy.refused import (
     FailedError,
     RefusedError,
@@ -225,21 +233,36 @@ class LinearFlow(Flow):
             size += np.einsum("oi,ij,oj->o", row, inverse, row, optimize=True)
         return np.asarray(np.sqrt(np.maximum(size, 0.0) * max(float(energy.max()), 0.0)))
 
+    @property
+    def _loads(self) -> list[History]:
+        """Histories of the ground, if any, and of forces."""
+        return list(histories(self.system).values())
+
+    def _pushes(self, matrices: Matrices) -> Jet:
+        """Accelerations by a unit of each load, shape (S, n, L)."""
+        return matrices.pushes(ground=self.system.ground is not None)
+
     def _step_map(self, matrices: Matrices) -> StepMap:
-        loads, has_ground = list(histories(self.system).values()), self.system.ground is not None
-        pushes = matrices.pushes(ground=has_ground)  # accelerations by a unit of each load
-        steps = len(self.time) - 1
-        return self.integrator.step_map(matrices, pushes, loads, self.step, steps)
+        pushes, steps = self._pushes(matrices), len(self.time) - 1
+        return self.integrator.step_map(matrices, pushes, self._loads, self.step, steps)
 
     def _march(self, points: Array, *, derivatives: bool) -> Jet:
         """Outputs of x[k+1] = T x[k] + G load[k] at points (S, d), shape (S, T, outputs)."""
         matrices, rows = evaluate(self.system, self.names, points, derivatives=derivatives)
-        motion = trajectory(self._step_map(matrices), matrices.start, rows)
+        motion = self._from_modes(matrices, rows) if derivatives and self.exact else None
+        if motion is None:
+            motion = trajectory(self._step_map(matrices), matrices.start, rows)
         if matrices.feeds is None:
             return motion
         # accelerations among the outputs also hold the forces themselves, over the masses
         at_nodes = np.stack([x.values(self.time) for x in courses_of_forces(self.system)])
         return motion + (matrices.feeds @ at_nodes).map(lambda x: x.swapaxes(-1, -2))
+
+    def _from_modes(self, matrices: Matrices, rows: Jet) -> Jet | None:
+        """The same with two derivatives by complex modes; None where they are too near."""
+        pushes = self._pushes(matrices)
+        columns = concatenate([matrices.start, concatenate([pushes * 0.0, pushes], -2)], -1)
+        return modal_trajectory(state_matrix(matrices), columns, rows, self._loads, self.time)
 
 
 def trajectory(step_map: StepMap, start: Jet, rows: Jet) -> Jet:

@@ -5,8 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from alphacut.frame import Accelerogram, Exact, LinearFlow, Midpoint, StoreyFrame, envelope
+from alphacut.frame import (
+    Accelerogram,
+    Exact,
+    Force,
+    History,
+    LinearFlow,
+    Midpoint,
+    StoreyFrame,
+    envelope,
+)
 from alphacut.frame.boxes import boxes
+from alphacut.frame.dynamics.flow import trajectory
 from alphacut.frame.dynamics.integrators import Integrator, RungeKutta4, linear_loads
 from alphacut.frame.modes.modal_model import ModalModel
 from alphacut.frame.structures.linear import evaluate
@@ -85,6 +95,36 @@ def test_a_thousand_motions_under_any_record_are_exact() -> None:
     rng = np.random.default_rng(1)
     for _ in range(1000):
         assert deviation(random_structure(rng), float(rng.choice(NODES))) < 1e-10
+
+
+@pytest.mark.parametrize(
+    "dampers", [(3e3, 0.0, 8e2), (0.0, 6e5, 0.0)], ids=["swinging", "creeping"]
+)
+def test_derivatives_by_modes_are_those_of_the_steps(dampers: tuple[float, ...]) -> None:
+    """Of the ground, a sine, a start and accelerations; one mode creeps where a damper is strong."""
+    sine = Force(2, 4e3, History.harmonic(2.2, 0.3, start=0.4))
+    frame = StoreyFrame(
+        (2e3, 1.5e3, 1e3),
+        stiffness=(3e5, 2e5, 2e5),
+        dampers=dampers,
+        damper_placement="storey",
+        q0=(0.01, 0.0, 0.02),
+        outputs=("q3", "drift1", "v2", "a2"),
+        ground=random_record(np.random.default_rng(3)),
+        loads=(sine,),
+    )
+    flow = LinearFlow(frame, ("m2", "k1", "d2", "F2"), 3.0, 0.03, Exact())
+    points = np.array([[1.5e3, 3e5, dampers[1], 4e3], [1.6e3, 2.9e5, dampers[1] + 50, 3e3]])
+    matrices, rows = evaluate(frame, flow.names, points, derivatives=True)
+    found, by_steps = (
+        flow._from_modes(matrices, rows),
+        trajectory(flow._step_map(matrices), matrices.start, rows),
+    )
+    assert found is not None
+    for name in ("value", "first", "second"):
+        a, b = getattr(found, name), getattr(by_steps, name)
+        size = np.abs(b).max((-3, -2), keepdims=True)
+        assert (np.abs(a - b) <= 1e-9 * size).all()
 
 
 def test_tables_of_the_modes_are_exact_under_any_record() -> None:
