@@ -105,8 +105,8 @@ def _section(key: str) -> str:
 def _names(model: type[Section], key: str) -> list[str]:
     """Keys and sections beside a key."""
     inside = re.sub(r"\[\d+\]", "", _section(key))
-    names = (*keys_of(model), *sections_of(model))
-    return [name.rpartition(".")[2] for name in names if name and _section(name) == inside]
+    names = dict.fromkeys(name for name, _, _ in _walk("", model) if _section(name) == inside)
+    return [name.rpartition(".")[2] for name in names]
 
 
 def _suggested_key(model: type[Section], key: str) -> str:
@@ -187,29 +187,18 @@ def _value(text: str) -> object:
     return text
 
 
-SectionModels = list[type[Section]]
-"""Classes of a section; one that may have several kinds has a class for each."""
-
-
 @cache
 def keys_of(model: type[Section]) -> dict[str, FieldInfo]:
     """All keys below a section's class by their full names, sections left out."""
-    return {name: info for name, info, models in _walk("", model) if not models}
+    return {name: info for name, info, is_section in _walk("", model) if not is_section}
 
 
-@cache
-def sections_of(model: type[Section]) -> dict[str, SectionModels]:
-    """The classes of every section by its name; that of an image and of a round cell have one."""
-    models_by_section: dict[str, SectionModels] = {"": [model]}
-    return models_by_section | {name: models for name, _, models in _walk("", model) if models}
-
-
-def _walk(prefix: str, model: type[Section]) -> Iterator[tuple[str, FieldInfo, SectionModels]]:
-    """Yields each key below a section's class: full name, field, classes of a section or none."""
+def _walk(prefix: str, model: type[Section]) -> Iterator[tuple[str, FieldInfo, bool]]:
+    """Yields each key below a section's class: full name, field, whether it is a section."""
     for key, info in model.model_fields.items():
         name, parts = f"{prefix}{key}", [info.annotation, *_annotation_parts(info.annotation)]
         models = [x for x in parts if isinstance(x, type) and issubclass(x, Section)]
-        yield name, info, models
+        yield name, info, bool(models)
         for inner in models:
             yield from _walk(f"{name}.", inner)
 

@@ -104,17 +104,13 @@ def factor(unit: str, si: str) -> Decimal:
         raise ValueError(f'the unit "{unit}" is no unit of {QUANTITIES[si][0]}') from None
 
 
-def decimal(text: str) -> Decimal:
-    """A decimal number; a typographic minus is taken as one."""
-    return Decimal(text.replace("\u2212", "-"))
-
-
 def parse_number(text: str, si: str) -> Decimal:
     """The number in the SI unit `si` that a quantity such as "80 GPa" states, or ValueError."""
     match = SINGLE.fullmatch(text.strip())
     if match is None or match[2].startswith((",", "_")):
         raise ValueError(f'"{text.strip()}" does not begin with a number such as 1.5')
-    return decimal(match[1]) * factor(match[2].strip(), si)
+    number = Decimal(match[1].replace(MINUS, "-"))  # a typographic minus is one
+    return number * factor(match[2].strip(), si)
 
 
 def interval_of_spread(match: re.Match[str], si: str) -> tuple[Decimal, Decimal]:
@@ -123,7 +119,7 @@ def interval_of_spread(match: re.Match[str], si: str) -> tuple[Decimal, Decimal]
     middle = parse_number(f"{number} {unit}", si)
     # "2 % ± 1 %" is 1 % to 3 %: there the spread is no share of the middle
     if spread_unit == "%" and (si or unit != "%"):
-        half_width = abs(middle) * decimal(spread) / 100
+        half_width = abs(middle) * parse_number(spread, "") / 100
     else:
         half_width = parse_number(f"{spread} {spread_unit}", si)
     return middle - half_width, middle + half_width
@@ -212,20 +208,15 @@ def _exponent(largest: float) -> int:
     return min(9, max(-9, 3 * math.floor(math.log10(largest) / 3)))
 
 
-def end_texts(low: float, high: float, nature: Nature, digits: int = 4) -> tuple[str, str]:
-    """Texts of both ends of a range, rounded outwards or inwards as its nature demands."""
+def range_text(low: float, high: float, nature: Nature, digits: int = 4) -> str:
+    """A range rounded in- or outwards as its nature demands; one number where its ends agree."""
     is_crisp = high - low <= 1e-9 * abs(high)
     lower = low if is_crisp else rounded(low, "lower", nature, digits)
     upper = low if is_crisp else rounded(high, "upper", nature, digits)
     if lower > upper:  # rounded inwards past each other
-        return end_texts(low, high, nature, digits + 1)
-    low_text, high_text = (f"{end:#.{digits}g}".rstrip(".") for end in (lower, upper))
-    return low_text.replace("-", MINUS), high_text.replace("-", MINUS)
-
-
-def range_text(low: float, high: float, nature: Nature, digits: int = 4) -> str:
-    """A range rounded as its nature allows; one number where both ends are the same."""
-    return " … ".join(dict.fromkeys(end_texts(low, high, nature, digits)))
+        return range_text(low, high, nature, digits + 1)
+    texts = dict.fromkeys(f"{end:#.{digits}g}".rstrip(".") for end in (lower, upper))
+    return " … ".join(texts).replace("-", MINUS)
 
 
 def axis_prefix(largest: float, si: str) -> tuple[float, str]:

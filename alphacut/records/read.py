@@ -37,7 +37,7 @@ def read_recording(
             do not fit; the message names the line.
     """
     try:
-        with np.errstate(over="ignore"):  # of damaged numbers, which are refused
+        with np.errstate(over="ignore", invalid="ignore"):  # of damaged numbers, which are refused
             recording = _read_by_marks(path, channel, step, unit)
     except RefusedError:
         raise

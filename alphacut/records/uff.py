@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from io import BytesIO
+from itertools import takewhile
 from math import ceil
 from pathlib import Path
 
@@ -144,7 +146,11 @@ def read_uff_record(name: str, content: bytes, channel: str = "") -> Recording:
     Raises:
         RefusedError: The file holds no such acceleration over even times in a known unit.
     """
-    sets = {series.name: series for series in _series(name, content)}
+    try:
+        parsed = [_parse_series(*rows) for rows in _data_sets(content, 58)]
+    except (ValueError, IndexError) as error:
+        raise RefusedError(name, str(error)[:80], "data sets 58 of a universal file") from None
+    sets = {series.name: series for series in parsed}
     series = [*sets.values()][choose_channel(name, channel, [(response,) for response in sets])]
     key = f"{name}, response {series.name}"
     is_history = series.function == TIME_HISTORY or (series.function == 0 and series.axis == TIME)
@@ -174,54 +180,36 @@ class _Series:
     samples: Array
 
 
-def _series(name: str, content: bytes) -> Iterator[_Series]:
-    """Yield the data sets 58 of a file."""
-    try:
-        for head, values in _data_sets(content, 58):
-            yield _parse_series(head, values)
-    except (ValueError, IndexError) as error:
-        raise RefusedError(name, str(error)[:80], "data sets 58 of a universal file") from None
-
-
 def _data_sets(content: bytes, number: int) -> Iterator[tuple[list[str], bytes | list[str]]]:
     """Yields the head of each data set of a number, and its values: lines, or bytes of a 58b.
 
     The head of a data set in bytes ends with their byte order, < or >.
     """
-    position = 0
-
-    def line() -> bytes:
-        nonlocal position
-        end = content.find(b"\n", position)
-        end = len(content) if end < 0 else end
-        start, position = position, end + 1
-        return content[start:end]
-
-    while position < len(content):
-        if line().strip() != b"-1":
+    file = BytesIO(content)
+    while line := file.readline():
+        if line.strip() != b"-1":
             continue
-        first = line()
+        first = file.readline()
         if first[:7].strip() == b"58b" and number == 58:
             byte_order, _, _, size = (int(word) for word in first[7:].split()[:4])
-            head = [_text(line()) for _ in range(HEAD_LINES[58])]
+            head = [_text(file.readline()) for _ in range(HEAD_LINES[58])]
             # some writers put an end of line between the head and the bytes
-            starts = (position + extra for extra in range(3))
+            starts = (file.tell() + extra for extra in range(3))
             ends = (x for x in starts if content[x + size :].lstrip()[:2] == b"-1")
-            start = next(ends, position)
-            position = start + max(size, 0)
-            yield [*head, ">" if byte_order == BIG_ENDIAN else "<"], content[start:position]
-        rows = []
-        while position < len(content) and (row := line()).strip() != b"-1":
-            rows.append(_text(row))
+            start = next(ends, file.tell())
+            file.seek(start + max(size, 0))
+            yield [*head, ">" if byte_order == BIG_ENDIAN else "<"], content[start : file.tell()]
+        inside = takewhile(lambda x: x.strip() != b"-1", iter(file.readline, b""))
+        rows = [_text(row) for row in inside]
         if first.strip() == str(number).encode():
             yield rows[: HEAD_LINES[number]], rows[HEAD_LINES[number] :]
 
 
 def _text(line: bytes) -> str:
     try:
-        return line.decode().rstrip("\r")
+        return line.decode().rstrip("\r\n")
     except UnicodeDecodeError:
-        return line.decode("latin-1").rstrip("\r")
+        return line.decode("latin-1").rstrip("\r\n")
 
 
 def _parse_series(head: list[str], values: bytes | list[str]) -> _Series:
@@ -238,8 +226,7 @@ def _parse_series(head: list[str], values: bytes | list[str]) -> _Series:
         row = np.dtype([("time", time)] * (not is_even) + [("value", real, (parts,))])
         table = np.frombuffer(values, row, min(count, len(values) // row.itemsize))
         times = None if is_even else table["time"].astype(float)
-        with np.errstate(invalid="ignore"):  # damaged bytes, which are refused
-            samples = table["value"][:, 0].astype(float)
+        samples = table["value"][:, 0].astype(float)
     else:
         numbers = np.array([number for line in values for number in _floats(line)])
         rows = numbers[: count * columns]  # what follows is padding
