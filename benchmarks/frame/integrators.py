@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 from alphacut.frame import INTEGRATORS, Exact, LinearFlow, StoreyFrame
@@ -74,57 +75,33 @@ def growth(phase: Array) -> dict[str, Array]:
 def stability_limits(highest: float = 6.0) -> dict[str, float]:
     """The measured limit of ω h, up to `highest`; infinite where no growth is found below it."""
     phase = np.linspace(0.01, highest, 2000)
-    found = {}
-    for name, factor in growth(phase).items():
-        unstable = np.flatnonzero(factor > 1 + 1e-7)
-        found[name] = float(phase[unstable[0]]) if len(unstable) else np.inf
-    return found
-
-
-COLOURS = {
-    "midpoint": "#0072b2",
-    "rk4": "#d55e00",
-    "exact": "black",
-}
-STYLES = {"exact": ":"}
+    return {
+        name: float(phase[factor > 1 + 1e-7].min(initial=np.inf))
+        for name, factor in growth(phase).items()
+    }
 
 
 def draw(rows: list[dict[str, Any]], drifts: dict[str, Array], steps: int, path: Path) -> None:
     """Error over step size, growth per step, and energy drift."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
     figure, axes = plt.subplots(1, 3, figsize=(13, 4), layout="constrained")
-    look = {
-        name: {"color": COLOURS[name], "linestyle": STYLES.get(name, "-"), "label": name}
-        for name in INTEGRATORS
-    }
-    for name in INTEGRATORS:
-        points = [
-            (row["step_s"], row["error_m"])
-            for row in rows
-            if row["integrator"] == name and row["error_m"] > 0
-        ]
-        if points:
-            axes[0].loglog(*zip(*points, strict=True), marker="o", markersize=4, **look[name])
-    axes[0].set(xlabel="step, s", ylabel="largest error in 30 s, m")
     phase = np.linspace(0.01, 6, 600)
-    for name, factor in growth(phase).items():
-        axes[1].plot(phase, factor, **look[name])
-    axes[1].set(
-        xlabel="ω h, rad", ylabel="growth of an undamped oscillation per step", ylim=(0.5, 2)
-    )
-    for name, change in drifts.items():
-        axes[2].loglog(counts(steps), np.maximum(change, 1e-17), **look[name])
+    factors = growth(phase)
+    for colour, name in zip(("#0072b2", "#d55e00", "black"), INTEGRATORS, strict=True):
+        line = {"color": colour, "linestyle": ":" if name == "exact" else "-", "label": name}
+        own = [row for row in rows if row["integrator"] == name and row["error_m"] > 0]
+        points = [row["step_s"] for row in own], [row["error_m"] for row in own]
+        axes[0].loglog(*points, marker="o", markersize=4, **line)
+        axes[1].plot(phase, factors[name], **line)
+        axes[2].loglog(counts(steps), np.maximum(drifts[name], 1e-17), **line)
+    axes[0].set(xlabel="step, s", ylabel="largest error in 30 s, m")
+    label = "growth of an undamped oscillation per step"
+    axes[1].set(xlabel="ω h, rad", ylabel=label, ylim=(0.5, 2))
     axes[2].set(xlabel="steps", ylabel="largest relative change of energy so far")
     for axis in axes:
         axis.grid(alpha=0.3)
     axes[2].legend(fontsize=9)
     for ending in (".svg", ".png"):
         figure.savefig(path.with_suffix(ending), dpi=150)
-    plt.close(figure)
 
 
 def main() -> None:
@@ -132,7 +109,6 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--steps", type=int, default=10**6, help="steps of the energy test (1e6)")
     options = parser.parse_args()
-    RESULTS.mkdir(exist_ok=True)
     rows = list(errors([0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002], 30.0))
     for row in rows:
         print(f"{row['integrator']:10s} h = {row['step_s']:<6g} error {row['error_m']:.2e} m")

@@ -106,19 +106,19 @@ def growth(step: float, width: float) -> Iterator[dict[str, Any]]:
 
 def few(step: float, width: float, counts: Sequence[int]) -> Iterator[dict[str, Any]]:
     """Rows of both proofs with two to six inputs, stiffnesses, at gaps that are shares of peaks."""
-    frame, every = case(7, width)
-    for way in (DualProof(0.1, slabs=1), Proof(gap=0.1)):
-        bounded(frame, dict(list(every.items())[:2]), way, 0.5)  # compiles
+    frame, numbers = case(7, width)
+    for method in (DualProof(0.1, slabs=1), Proof(gap=0.1)):
+        bounded(frame, dict(list(numbers.items())[:2]), method, 0.5)  # compiles
     for count in counts:
-        inputs = dict(list(every.items())[:count])
+        inputs = dict(list(numbers.items())[:count])
         for gap in GAPS:
-            ways = DualProof(gap, peaks=gap), Proof(gap=gap)
-            made = [bounded(frame, inputs, way, step) for way in ways]
-            (_, one), (_, other) = made
-            if one is not None and other is not None:
-                made[0][0]["cover each other"] = covered(one, other) and covered(other, one)
-            for row, _ in made:
-                yield {"gap asked": gap} | row
+            (dual, first), (proof, second) = (
+                bounded(frame, inputs, x, step) for x in (DualProof(gap, peaks=gap), Proof(gap=gap))
+            )
+            if first is not None and second is not None:
+                dual["cover each other"] = covered(first, second) and covered(second, first)
+            yield {"gap asked": gap} | dual
+            yield {"gap asked": gap} | proof
 
 
 def covered(outer: Envelope, inner: Envelope) -> bool:

@@ -12,16 +12,18 @@ from __future__ import annotations
 
 import argparse
 import time
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from scipy.io import mmwrite
+from scipy.sparse import coo_array
 
 from alphacut.frame import DualProof, MatrixStructure, Output, envelope
-from alphacut.frame.structures.loads import Accelerogram
+from alphacut.frame.structures.loads import Accelerogram, Factor
 from alphacut.fuzzy import Interval
 from alphacut.fuzzy.arrays import Array
-from benchmarks.frame.matrix_case import MatrixCase
 from benchmarks.synthetic_record import SyntheticRecord
 
 SPAN, HEIGHT = 6.0, 3.2
@@ -33,6 +35,8 @@ SOIL = 1.2e8, 1.5e8, 6e7
 """Springs under a foot: horizontal and vertical, in N/m, and rotational, in N m."""
 FLOOR = 60e3
 """Mass of a floor, in kg."""
+DIGITS = 12
+"""Significant digits of an entry in a file, so that files do not differ by round-off."""
 
 
 def element(length: float, area: float, inertia: float) -> tuple[Array, Array, Array]:
@@ -134,6 +138,67 @@ limits = ["roof <= {roof}"]
 measure = "PGA"
 """
 """Other sections of the case that `--write` makes."""
+
+
+@dataclass(frozen=True)
+class MatrixCase:
+    """A case of a structure whose factors are numbers and names of parameters.
+
+    Args:
+        title: Title of the case.
+        structure: The structure.
+        unknowns: Names of its unknowns, NODE.DIRECTION.
+        quantities: Each parameter as a text, such as "1 ± 5 %".
+        direction: Direction of the ground.
+        sections: Text of all other sections.
+    """
+
+    title: str
+    structure: MatrixStructure
+    unknowns: Sequence[str]
+    quantities: Mapping[str, str]
+    direction: str
+    sections: str
+
+    def write(self, path: Path) -> None:
+        """Writes the case, and its arrays into a folder of the same name."""
+        folder = path.with_suffix("")
+        folder.mkdir(parents=True, exist_ok=True)
+        of, names = self.structure, ", ".join(f'"{name}"' for name in self.unknowns)
+        lines = [f'title = "{self.title}"', 'stages = ["envelope"]', "", "[matrices]"]
+        lines += [f"unknowns = [{names}]"]
+        for kind in ("mass", "stiffness", "damping"):
+            terms = [
+                f'["{_factor(factor)}", "{self._array(folder, f"{kind}{k}", array)}"]'
+                for k, (factor, array) in enumerate(getattr(of, kind), start=1)
+            ]
+            lines += [f"{kind} = [{', '.join(terms)}]"] * bool(terms)
+        lines += [f'direction = "{self.direction}"']
+        quantities = dict(self.quantities)
+        if ratio := quantities.pop("zeta", ""):
+            lines += [f'damping_ratio = "{ratio}"']
+        lines += ["", "[matrices.parameters]"]
+        lines += [f'{name} = "{text}"' for name, text in quantities.items()]
+        lines += ["", "[matrices.outputs]", *(self._row(name) for name in of.outputs)]
+        path.write_text("\n".join([*lines, "", self.sections]), encoding="utf-8")
+
+    def _array(self, folder: Path, name: str, array: Array) -> str:
+        mmwrite(folder / f"{name}.mtx", coo_array(array), precision=DIGITS)
+        return f"{folder.name}/{name}.mtx"
+
+    def _row(self, name: Output) -> str:
+        row = self.structure.observed[name]
+        entries = ", ".join(
+            f'"{self.unknowns[k]}" = {float(f"{row[k]:.{DIGITS}g}")!r}' for k in np.flatnonzero(row)
+        )
+        factor = _factor(self.structure.row_factors.get(name, 1.0))
+        return f'{name} = {{ row = {{ {entries} }}, unit = "{name.unit}", factor = "{factor}" }}'
+
+
+def _factor(factor: Factor | str | float) -> str:
+    """A factor as a text; a function is none."""
+    assert not callable(factor)
+    return factor if isinstance(factor, str) else f"{factor:.{DIGITS}g}"
 
 
 def case_of(frame: MatrixStructure, bays: int, soil: float, **texts: str) -> MatrixCase:

@@ -1,6 +1,10 @@
 import ast
 from pathlib import Path
 
+import numpy as np
+
+from alphacut.frame import MatrixStructure
+from benchmarks.frame.plane_frame import MatrixCase
 from benchmarks.rows import write
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
@@ -23,3 +27,12 @@ def test_each_kept_result_is_written_by_a_program_that_stands_here():
     results = sorted((BENCHMARKS / "results").iterdir())
     assert results
     assert [path.name for path in results if path.stem not in names] == []
+
+
+def test_a_structure_without_a_damping_ratio_is_a_case(tmp_path):
+    frame = MatrixStructure({"k": 1.0}, [(1.0, np.eye(1))], [("k", np.eye(1))], {"q": np.ones(1)})
+    MatrixCase("One mass", frame, ["1.x"], {"k": "1 ± 5 %"}, "x", "").write(tmp_path / "one.toml")
+    text = (tmp_path / "one.toml").read_text(encoding="utf-8")
+    assert 'k = "1 ± 5 %"' in text
+    assert "damping_ratio" not in text
+    assert (tmp_path / "one" / "mass1.mtx").is_file()
