@@ -192,5 +192,5 @@ def table_rows(document: Document) -> Iterator[tuple[str, str, float | None]]:
             yield label, f"{number['value']:.6g}", number["error"]
 
 
-ABOUT = "effective modulus and stresses of the cell at the modal values"
+ABOUT = "effective modulus and stresses of the cell at the nominal values"
 COMMANDS = dict.fromkeys(("cell", "solve"), Command(ABOUT, arguments, run))

@@ -88,7 +88,7 @@ def records_text(section: RecordsSection, records: Sequence[SuiteRecord]) -> str
 
 
 def nominal_structure(content: Content) -> StoreyFrame | MatrixStructure | None:
-    """The linear structure of the case at the modal values; None where there is none.
+    """The linear structure of the case at the nominal values; None where there is none.
 
     A modulus to be computed is taken from the series; None also where that does not fit the cell.
     """

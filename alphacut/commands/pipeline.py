@@ -17,7 +17,7 @@ from alphacut.case.content import Case, Content, load
 from alphacut.case.limits import QuestionSection
 from alphacut.case.loads import RecordsSection
 from alphacut.case.motion import EnvelopeSection
-from alphacut.case.radius import ThetaSection
+from alphacut.case.radius import RadiusMapSection, ThetaSection
 from alphacut.case.structure import Structure
 from alphacut.commands.options import require_case_petsc
 from alphacut.frame.questions.peaks import Peaks, output_of
@@ -115,7 +115,8 @@ class Pipeline:
         self.store.progress.stages_left = n_stages
         if "microstructure" in stages:
             results.microstructure = self.compute_microstructure()
-            radius = microstructure.radius_of(results.microstructure)
+            numbers = results.microstructure.numbers["radius"]
+            radius = RadiusMapSection.model_validate(numbers)
             results.content = self.content.model_copy(update={"radius": radius})
         if "modulus" in stages:
             self.compute_modulus()
@@ -305,7 +306,7 @@ def _with_stand_ins(content: Content, structure: Structure) -> Structure:
 
 
 def _stand_in(number: FuzzyNumber, share: float) -> FuzzyNumber:
-    """A number with the same modal value, fuzzy by a share of it."""
+    """A number with the same nominal value, fuzzy by a share of it."""
     modal = number.modal
     return Triangular((1 - share) * modal, modal, (1 + share) * modal) if share else Crisp(modal)
 

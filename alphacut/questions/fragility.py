@@ -154,5 +154,5 @@ def fragility(section: FragilitySection, response: FuzzyResponse) -> FragilityAn
 def measure_grid(critical: CriticalMeasures) -> Array:
     """Measures from below the least critical one to above the greatest that is finite."""
     finite = critical.high[np.isfinite(critical.high)]
-    greatest = float(finite.max()) if finite.size else float(critical.low_reached.max())
-    return np.asarray(np.linspace(0.8 * float(critical.low.min()), 1.1 * greatest, POINTS), float)
+    largest = float(finite.max()) if finite.size else float(critical.low_reached.max())
+    return np.asarray(np.linspace(0.8 * float(critical.low.min()), 1.1 * largest, POINTS), float)

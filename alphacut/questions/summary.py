@@ -10,7 +10,6 @@ from pydantic import AfterValidator, Field, ValidationError
 
 from alphacut.case.content import Content
 from alphacut.case.structure import Structure
-from alphacut.frame import StoreyFrame
 from alphacut.frame.structures.linear import frequencies
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io.files import Document, as_json
@@ -98,10 +97,18 @@ class Results:
 
     @property
     def frame_result(self) -> FrameResult | None:
-        """Numbers on the frame; None of another structure."""
-        if self.structure is None or self.structure.frame is None:
+        """Frequencies, first period, weight and heights of a frame; None of another structure."""
+        structure = self.structure
+        if structure is None or structure.frame is None:
             return None
-        return frame_result(self.structure, self.structure.frame)
+        omega, drifts = frequencies(structure.frame), set(structure.outputs)
+        heights = {x: height.modal for x, height in structure.heights.items() if x in drifts}
+        return FrameResult(
+            omega_rad_per_s=omega,
+            period_s=float(2 * np.pi / omega[0]),
+            weight_N=sum(structure.frame.masses) * float(STANDARD_GRAVITY),
+            heights_m=heights,
+        )
 
     @property
     def damping(self) -> dict[str, tuple[float, float, float]]:
@@ -113,18 +120,6 @@ class Results:
             for name, number in self.structure.numbers.items()
             if name.startswith("zeta")
         }
-
-
-def frame_result(structure: Structure, frame: StoreyFrame) -> FrameResult:
-    """Natural frequencies, first period and weight of a frame, and the heights of its storeys."""
-    omega, drifts = frequencies(frame), set(structure.outputs)
-    heights = {x: height.modal for x, height in structure.heights.items() if x in drifts}
-    return FrameResult(
-        omega_rad_per_s=omega,
-        period_s=float(2 * np.pi / omega[0]),
-        weight_N=sum(frame.masses) * float(STANDARD_GRAVITY),
-        heights_m=heights,
-    )
 
 
 class Parts(Numbers):

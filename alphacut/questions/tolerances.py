@@ -98,7 +98,7 @@ class TolerancesAnswer(Answer):
     def words(self) -> str:
         """How to read the scale."""
         return (
-            "All supports are scaled together about their modal values; 1 is the case as it stands."
+            "All supports are scaled together about nominal values; 1 is the case as it stands."
             f" Scales up to {self.most:g} were tried, each with an envelope of its own."
         )
 

@@ -27,10 +27,10 @@ from alphacut.stages.modulus import (
     LossResult,
     ModulusResult,
     cuts_of,
-    dataset,
-    largest,
+    largest_over_samples,
     loss_bounds,
     loss_cuts,
+    modulus_dataset,
     plane_cuts,
     plane_outputs,
 )
@@ -74,7 +74,7 @@ class CellTask:
         require_isotropic(result)
         curve = result.curve
         fibres = fibre_constants(result).values if self.problem.cell.is_fibre else {}
-        losses = {} if self.losses is None else loss_outputs(result, self.losses)
+        losses = {} if self.losses is None else loss_bound_outputs(result, self.losses)
         return {
             "E": result.modulus,
             "nu": result.poisson,
@@ -164,10 +164,11 @@ class CellCampaign(CellProblem):
         )
         self.require_consistent(result)
         losses = loss_cuts(result) if self.losses else {}
-        data = dataset(result, curve_theta(self), losses)
+        data = modulus_dataset(result, curve_theta(self), losses)
         return Computed(self._numbers(result, losses), data)
 
     def _numbers(self, result: Bounds, losses: Mapping[str, Array]) -> ModulusResult:
+        """The result of the campaign, from the cuts of all outputs and of the loss factors."""
         assert result.samples is not None
         errors = self.loss_errors(result) if losses else {}
         is_own_mesh = isinstance(self.cell, MeshedCell)  # without a declared error
@@ -186,7 +187,7 @@ class CellCampaign(CellProblem):
             particles=self.cell.particles,
             average=self.average_name,
             error=self.errors(result),
-            checks=largest(result, "check"),
+            checks=largest_over_samples(result, "check"),
             references=self.references(),
             loss=LossResult.of(losses, errors, Nature.ATTAINED) if losses else None,
         )
@@ -253,7 +254,7 @@ class CellCampaign(CellProblem):
         return Knowledge(signs=of_inputs, source="as mechanics proves of exact cells", tests=2)
 
     def loss_errors(self, result: Bounds) -> dict[str, float]:
-        """Largest errors of the loss factors of E, G and K; of prisms those of the modal cell."""
+        """Largest errors of the loss factors of E, G and K; of prisms those of the nominal cell."""
         assert self.losses is not None
         assert result.samples is not None
         if isinstance(self.cell, MeshedCell):
@@ -265,14 +266,16 @@ class CellCampaign(CellProblem):
         return dict(zip(CONSTANTS, map(float, largest_errors), strict=True))
 
     def errors(self, result: Bounds) -> dict[str, float]:
-        """Relative error of E by source: the largest of all samples, or that of the modal one."""
-        errors = {name: error for name, error in largest(result, "error").items() if error}
+        """Relative error of E by source: the largest of all samples, or that of the nominal one."""
+        errors = {
+            name: error for name, error in largest_over_samples(result, "error").items() if error
+        }
         if errors or self.modulus.method != "prism" or isinstance(self.cell, MeshedCell):
             return errors
         return dict(self.nominal_estimate.error)
 
 
-def loss_outputs(result: HomogenisedStiffness, cuts: LossCuts) -> dict[str, Array]:
+def loss_bound_outputs(result: HomogenisedStiffness, cuts: LossCuts) -> dict[str, Array]:
     """Outputs of a sample: bounds of the loss factors on each level, and their errors."""
     bounds, errors = loss_bounds(result, cuts)
     return {

@@ -160,6 +160,7 @@ class EnvelopeTask:
         return Computed(self._result(data, peak_bounds, structure), data)
 
     def _result(self, data: xarray.Dataset, peaks: Peaks, structure: Structure) -> EnvelopeResult:
+        """Extremes and errors on the lowest level, read off the dataset, and the peaks."""
         lowest, names = data.isel(alpha=0), [*map(str, data["output"].values)]
 
         def by_output(values: xarray.DataArray) -> dict[str, float]:
@@ -240,7 +241,7 @@ def loose_peaks(peaks: Peaks, outputs: Sequence[str], gap: float) -> tuple[str, 
 
 
 def peak_results(peaks: Peaks) -> PeakResults:
-    """Peaks as results, each by its name."""
+    """Peaks as results by name; a least value has its own sign."""
     results: PeakResults = {}
     for name, peak in peaks.items():
         bounds = {bound: getattr(peak, bound) for bound in PEAK_BOUNDS}

@@ -120,6 +120,7 @@ def _measured_mode(section: Identify, row: ModeRows) -> MeasuredMode:
 
 
 def _prediction(row: ModeRows, frequencies: Ends) -> Prediction:
+    """The measured frequency of a mode beside its predicted bounds on the lowest level."""
     low, high = (float(bounds[0, row.mode - 1]) for bounds in frequencies)  # (levels, modes)
     measured = float(row.frequencies.mean())
     inside = low <= measured <= high

@@ -41,7 +41,7 @@ NATURE = Nature.GUARANTEED
 """Nature of all bounds: proved of the image as segmented, if it repeats itself."""
 AXES = ["11", "22", "12"]
 AlphaLevel = float | None
-"""α-level, or None for the modal values alone."""
+"""α-level, or None for the nominal values alone."""
 PhaseRanges = Callable[[AlphaLevel], tuple[Rows, Rows]]
 """Least and greatest phase of each pixel at a level."""
 
@@ -90,29 +90,29 @@ def compute_cuts(
     """Computes α-cuts of E and of the stiffness of an image, and how its sources widen E."""
     start, tick = perf_counter(), context.tick or (lambda fraction: None)
     study, aspect = image_study(cell), cell.pixel[-1] / cell.pixel[0]
-    modal = study.images(None, None)  # at modal thresholds and moduli
-    division, solver = usual_division(modal), ConjugateGradient(ACCURACY)
-    rows, columns = modal.bulk[0].shape
+    nominal = study.images(None, None)  # at nominal thresholds and moduli
+    division, solver = usual_division(nominal), ConjugateGradient(ACCURACY)
+    rows, columns = nominal.bulk[0].shape
     require_memory(rows, columns, division)
     model = ImageModel(aspect, division=division, solver=solver, average=average)
-    crisp = model.solve(modal)
+    crisp = model.solve(nominal)
     tick(0.2)
     images = [study.images(level, level) for level in alpha]
-    cuts = model.cuts(images, (modal, crisp))
+    cuts = model.cuts(images, (nominal, crisp))
     model.require_consistent(images, cuts)
     _require_isotropic(cuts[0])
     tick(0.8)
 
     def width(threshold: AlphaLevel, phases: AlphaLevel) -> float:
         """Width of E in Pa at levels of the threshold and of the phases."""
-        (cut,) = model.cuts([study.images(threshold, phases)], (modal, crisp))
+        (cut,) = model.cuts([study.images(threshold, phases)], (nominal, crisp))
         return float(cut.modulus[1] - cut.modulus[0])
 
     widths = _widths(study, alpha[0], width)
     phase = study.phase_ranges(None)[0]
     losses, loss = dict[str, Array](), None
     if cell.losses:
-        energies = phase_energies(crisp, modal, phase, count=len(cell.pairs), aspect=aspect)
+        energies = phase_energies(crisp, nominal, phase, count=len(cell.pairs), aspect=aspect)
         phase_cuts = LossCuts.from_phases(cell.losses, alpha)
         bounds, errors = image_loss_bounds(energies, phase_cuts, average)
         losses = dict(zip(CONSTANTS, np.moveaxis(bounds, -1, 0), strict=True))
@@ -122,8 +122,8 @@ def compute_cuts(
     result = ImageResult(
         lower_GPa=np.asarray(top.bounds.lower / GPA, float),
         upper_GPa=np.asarray(top.bounds.upper / GPA, float),
-        nu=_ends(top.poisson),
-        G_T_GPa=_ends(top.bounds.shear(average), GPA),
+        nu=_bounds_by_side(top.poisson),
+        G_T_GPa=_bounds_by_side(top.bounds.shear(average), GPA),
         average=AVERAGES[average],
         plane={PLANE_STRAIN: dict(map(constant_cuts, NAMES, np.moveaxis(constants, 1, 0)))},
         nature=NATURE,
@@ -141,7 +141,7 @@ def compute_cuts(
     return Computed(result, _dataset(alpha, cuts, phase, losses))
 
 
-def _ends(bounds: Ends, unit: float = 1.0) -> dict[str, float]:
+def _bounds_by_side(bounds: Ends, unit: float = 1.0) -> dict[str, float]:
     """Both bounds of a number, in a unit."""
     return {"lower": bounds[0] / unit, "upper": bounds[1] / unit}
 
@@ -178,7 +178,7 @@ def _dataset(
 
 
 def image_loss_bounds(energies: PhaseEnergies, cuts: LossCuts, average: str) -> tuple[Array, Array]:
-    """Bounds of the loss factors of E, G, K at modal moduli, (levels, 2, 3), and errors, (3,)."""
+    """Bounds of the loss factors of E, G, K at nominal moduli, (levels, 2, 3), and errors, (3,)."""
 
     def constants_of(moduli: Array) -> Array:
         return plane_constants(moduli, average)
@@ -206,8 +206,8 @@ def _widths(
     return dict(sorted(widths.items(), key=lambda pair: -pair[1]))
 
 
-def cut_at(number: FuzzyNumber, level: AlphaLevel) -> tuple[float, float]:
-    """The cut of a number at a level, or its modal value twice."""
+def cut_or_nominal(number: FuzzyNumber, level: AlphaLevel) -> tuple[float, float]:
+    """The cut of a number at a level, or its nominal value twice."""
     return (number.modal, number.modal) if level is None else number.cut(level)
 
 
@@ -230,20 +230,20 @@ class ImageStudy:
     def images(self, threshold: AlphaLevel, phases: AlphaLevel) -> ModuliImages:
         """Least and greatest moduli of each pixel, at levels of threshold and phases."""
         moduli = [
-            ModuliInterval.of_young(cut_at(young, phases), cut_at(poisson, phases))
+            ModuliInterval.of_young(cut_or_nominal(young, phases), cut_or_nominal(poisson, phases))
             for young, poisson in self.cell.pairs
         ]
         return moduli_images(*self.phase_ranges(threshold), moduli)
 
     @property
     def isotropic_bounds(self) -> tuple[float, float]:
-        """Hashin and Shtrikman's bounds of an isotropic E in GPa at the modal values."""
+        """Hashin and Shtrikman's bounds of an isotropic E in GPa at the nominal values."""
         phases = [Phase(young.modal, nu.modal) for young, nu in self.cell.pairs]
         return isotropic_bounds(np.array([*self.fractions.values()]), phases)
 
     @property
     def fractions(self) -> dict[str, float]:
-        """Area fraction of each phase at the modal values by the phase's name, dark first."""
+        """Area fraction of each phase at the nominal values by the phase's name, dark first."""
         phase = self.phase_ranges(None)[0]
         shares = np.bincount(phase.ravel(), minlength=len(self.cell.pairs)) / phase.size
         if self.cell.labels is not None:
@@ -282,6 +282,6 @@ def image_study(cell: ImageCell) -> ImageStudy:
         # noise and light leave phases open, unless a fuzzy threshold says all that is not known
         if level is not None and not is_fuzzy:
             return segmentation.ranges()
-        return threshold_ranges(grey, [cut_at(number, level) for number in thresholds])
+        return threshold_ranges(grey, [cut_or_nominal(number, level) for number in thresholds])
 
     return ImageStudy(cell, phase_ranges, is_fuzzy or segmentation.open_fraction > 0)

@@ -8,12 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from alphacut.case.microstructure import MicrostructureSection
-from alphacut.case.radius import RadiusMapSection
 from alphacut.fuzzy.campaign.workers import pool
 from alphacut.io.arrays import columns_text
 from alphacut.io.files import Document, write_text
 from alphacut.io.provenance import file_digest
-from alphacut.stages.store import Computed, Stage, StageContext, StageResult
+from alphacut.stages.store import Computed, Stage, StageContext
 from alphacut.stochastic.microstructure import Microstructure, fragment, study, summary, to_dataset
 
 
@@ -40,11 +39,6 @@ def compute_map(
     return Computed(numbers, to_dataset(result))
 
 
-def radius_of(result: StageResult[Document]) -> RadiusMapSection:
-    """The section [radius] that the particles give."""
-    return RadiusMapSection.model_validate(result.numbers["radius"])
-
-
 def write_files(result: Microstructure, numbers: Document, folder: Path, *, figures: bool) -> None:
     """Writes radius.toml, a section of a case; figures if wanted, and circles.csv of an image."""
     from alphacut.stochastic.figures.all import draw
@@ -52,11 +46,7 @@ def write_files(result: Microstructure, numbers: Document, folder: Path, *, figu
     drawn = draw(result, folder / "figures") if figures else {}
     write_text(folder / "radius.toml", fragment(numbers))
     if "image_circles" in drawn:
-        write_text(folder / "circles.csv", _circles(result))
-
-
-def _circles(result: Microstructure) -> str:
-    """The circles seen in an image as a CSV file, lengths in m."""
-    discs = result.sections[0].particles
-    x, y = np.transpose(discs.centres)
-    return columns_text({"x [m]": x, "y [m]": y, "r [m]": discs.radii})
+        discs = result.sections[0].particles
+        x, y = np.transpose(discs.centres)
+        circles = columns_text({"x [m]": x, "y [m]": y, "r [m]": discs.radii})
+        write_text(folder / "circles.csv", circles)

@@ -158,7 +158,7 @@ def loss_cuts(result: Bounds) -> dict[str, Array]:
     return cuts
 
 
-def largest(result: Bounds, kind: str) -> dict[str, float]:
+def largest_over_samples(result: Bounds, kind: str) -> dict[str, float]:
     """Largest value over all samples of each output KIND:NAME, by NAME."""
     assert result.samples is not None
     values = result.samples.values
@@ -169,7 +169,7 @@ def largest(result: Bounds, kind: str) -> dict[str, float]:
     }
 
 
-def dataset(result: Bounds, theta: Array, losses: Mapping[str, Array]) -> xarray.Dataset:
+def modulus_dataset(result: Bounds, theta: Array, losses: Mapping[str, Array]) -> xarray.Dataset:
     """Dataset in SI: α-cuts NAME, inputs NAME_at that reach them, and samples NAME_sample."""
     import xarray
 
@@ -208,14 +208,14 @@ def fuzzy_loss(data: xarray.Dataset) -> FuzzyNumber | None:
 
 def fuzzy_modulus(data: xarray.Dataset) -> FuzzyNumber:
     """The fuzzy Young's modulus in Pa that α-cuts with levels from 0 to 1 make."""
-    least = float(data["E"].min())
-    require(least > 0, "modulus", value=f"{least / GPA:.3g} GPa", allowed="a modulus above 0")
+    minimum = float(data["E"].min())
+    require(minimum > 0, "modulus", value=f"{minimum / GPA:.3g} GPa", allowed="a modulus above 0")
     require_levels(tuple(map(float, data["alpha"].values)), "modulus.alpha")
     return _stepped(data, "E")
 
 
 def _stepped(data: xarray.Dataset, name: str) -> FuzzyNumber:
-    """Fuzzy number of stored α-cuts; between two levels the wider cut holds."""
+    """Fuzzy number of α-cuts in a dataset; between two levels the wider cut holds."""
     alpha, bounds = data["alpha"].values, data[name].transpose("alpha", "bound").values
     if tuple(alpha) == (1.0,):
         return Crisp(float(bounds.mean()))
@@ -261,8 +261,8 @@ class LossCuts:
         # level l, end e, constant c (E, G, K), phase p, modulus x (K, G), loss factor j (η_E, η_K)
         slopes = np.einsum("pxj,pxc->cpj", to_moduli, fractions)
         lower, upper = np.moveaxis(self.bounds[:, :, None], 1, 0)
-        least, most = np.where(slopes >= 0, lower, upper), np.where(slopes >= 0, upper, lower)
-        return np.asarray(np.einsum("pxj,elcpj->lecpx", to_moduli, np.array([least, most])))
+        minima, maxima = np.where(slopes >= 0, lower, upper), np.where(slopes >= 0, upper, lower)
+        return np.asarray(np.einsum("pxj,elcpj->lecpx", to_moduli, np.array([minima, maxima])))
 
 
 def loss_bounds(result: HomogenisedStiffness, cuts: LossCuts) -> tuple[Array, Array]:

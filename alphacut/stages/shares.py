@@ -1,8 +1,9 @@
 """Shares of the inputs in the widths of the modulus and of the peaks of a vibration.
 
-The share of an input is the width that is lost when it alone is fixed at its modal value. Whatever
-the case uses, the cell is solved by `auto` (the series where it has a formula) with a reduced plan;
-peaks of a frame come from `Auto` to `ACCURACY`, on the lowest level, of a record at coarser steps.
+The share of an input is the width that is lost when it alone is fixed at its nominal value.
+Whatever the case uses, the cell is solved by `auto` (the series where it has a formula) with a
+reduced plan; peaks of a frame come from `Auto` to `ACCURACY`, on the lowest level, of a record at
+coarser steps.
 """
 
 from __future__ import annotations
@@ -68,11 +69,12 @@ def compute_shares(
 
 
 def _by_input(shares: Shares, values: Array) -> dict[str, float]:
+    """Values of one result by the name of the input."""
     return dict(zip(shares.names, map(float, values), strict=True))
 
 
 def cell_shares(campaign: CellCampaign) -> Shares:
-    """Fractions of the widths of E and ν that are lost if an input of the cell is modal.
+    """Fractions of the widths of E and ν that are lost if an input of the cell is nominal.
 
     They have shape (inputs, levels, 2), and come from the series where it has a formula.
     """
@@ -89,7 +91,7 @@ def cell_shares(campaign: CellCampaign) -> Shares:
 
 
 def peak_shares(model: frame.StoreyFrame, structure: Structure, task: EnvelopeTask) -> Shares:
-    """Fractions of the width of each output's peak that are lost if an input is modal.
+    """Fractions of the width of each output's peak that are lost if an input is nominal.
 
     They have shape (inputs, outputs), by the inputs of a study.
     """

@@ -207,10 +207,12 @@ def with_means(worst: Peaks, peaks: Mapping[str, Peaks], reached: Array) -> dict
             bound: np.mean([getattr(x[name], bound) for x in peaks.values()], axis=0)
             for bound in ("lower", "upper", "error", "least_proved")
         }
-        least = np.maximum(means["lower"] - means["error"], means["least_proved"])
+        mean_minima = np.maximum(means["lower"] - means["error"], means["least_proved"])
         # a structure of any higher cut has at least the mean of that cut's least peaks
-        means["reached"] = np.maximum(np.maximum.accumulate(least[::-1])[::-1], known)
-        means["least_reached"] = np.full_like(least, np.inf)  # no structure's mean is bounded so
+        means["reached"] = np.maximum(np.maximum.accumulate(mean_minima[::-1])[::-1], known)
+        means["least_reached"] = np.full_like(
+            mean_minima, np.inf
+        )  # no structure's mean is bounded so
         found[f"mean {name}"] = replace(worst[name], reached_at={}, **means)
     return found
 
@@ -266,20 +268,23 @@ def suite_result(
             for record in records
         },
         statistics={
-            name: Statistics(proved=statistics(bounds[name], peak.is_least))
+            name: Statistics(proved=record_statistics(bounds[name], peak.is_least))
             for name, peak in first.items()
         },
-        spectra={"period_s": PERIODS, **{x.name: spectrum(x.ground, mode) for x in records}},
+        spectra={
+            "period_s": PERIODS,
+            **{x.name: response_spectrum(x.ground, mode) for x in records},
+        },
         units=dict(units),
     )
 
 
-def spectrum(ground: Accelerogram, mode: NominalMode) -> Array:
+def response_spectrum(ground: Accelerogram, mode: NominalMode) -> Array:
     """Pseudo-accelerations at `PERIODS` with the nominal damping, in m/s²."""
     return np.array([mode.spectral_acceleration(ground, float(x)) for x in PERIODS])
 
 
-def statistics(values: Array, is_least: bool) -> dict[str, Array]:
+def record_statistics(values: Array, is_least: bool) -> dict[str, Array]:
     """Mean and quantiles by name over records of values (records, levels); of least from above."""
     sign = -1.0 if is_least else 1.0
     return {
