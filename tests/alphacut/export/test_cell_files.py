@@ -3,6 +3,8 @@
 import re
 from dataclasses import replace
 from functools import cache
+from importlib import import_module
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -74,6 +76,12 @@ def test_vtk_and_meshio_read_positive_volumes(ending, tmp_path):
     grid = pyvista.UnstructuredGrid({24: mesh.cells_dict["tetra10"]}, mesh.points)
     if ending == "vtu":
         assert (pyvista.read(path).cells == grid.cells).all()
+    elif find_spec("vtkmodules.vtkIOXdmf2"):  # wheels have it, Debian not
+        reader = import_module("vtkmodules.vtkIOXdmf2").vtkXdmfReader()
+        reader.SetFileName(path)
+        reader.Update()
+        read = pyvista.wrap(reader.GetOutputDataObject(0))
+        assert (read.cells == grid.cells).all()
     sizes = grid.compute_cell_sizes(length=False, area=False)["Volume"]
     assert (sizes > 0).all()
     assert sizes.sum() == pytest.approx(VOLUME, rel=1e-12)
