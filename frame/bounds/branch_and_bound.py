@@ -64,15 +64,15 @@ def enclosed(
         Proved upper bounds (N,), and the number of examined pairs of a box and a problem.
     """
     tree = Tree(model, lower, upper, optima, gap)
-    frontier, n_problems = Frontier.of_box(len(lower), tree.numbers), len(tree.numbers)
-    examined = 0
+    examined, n_problems = 0, len(optima.value)
+    frontier = Frontier.of_box(len(lower), n_problems)
     with ThreadPoolExecutor(workers) as pool:
         while len(frontier) and examined + len(frontier) <= budget * n_problems:
             examined += len(frontier)
             pieces = zip(*frontier.pieces(PIECE), strict=True)
             results = pool.map(partial(tree.examine, frontier), *pieces)
             code, value, _ = (np.concatenate(x) for x in zip(*results, strict=True))
-            higher = np.flatnonzero(value > tree.best[frontier.problem] + HIGHER)
+            higher = np.flatnonzero(value > optima.value[frontier.problem] + HIGHER)
             if len(higher):  # the incumbent is the best of centres, refined
                 tree.improve(frontier, higher[np.argsort(value[higher])], value)
             frontier = frontier.children(code)
@@ -87,34 +87,28 @@ class Tree:
     A problem is an output at a node on a side: number node · 2 m + 2 output + (1 for upper bounds).
 
     Attributes:
-        optima: N problems with their best points, which improve.
-        numbers: Their numbers, shape (N,).
+        optima: Best points and values of all N problems so far, which improve.
+        jets: Value, gradient and Hessian (upper triangle) of the outputs there, shape (N, q).
         remainder: Of quadratic Taylor models over the domain.
-        best: Side × output at the best points so far by number; idle without a place in `optima`.
-        point: These points, shape (…, d).
-        jets: Value, gradient and Hessian (upper triangle) of the outputs there, shape (…, q).
         gap: What the bounds may lie above the best values by.
     """
 
     def __init__(
         self, model: ModalModel, lower: Array, upper: Array, optima: Optima, gap: float
     ) -> None:
-        m, d, total = len(model.outputs), len(lower), 2 * len(model.outputs) * len(model.time)
         self.model, self.lower, self.upper = model, lower, upper
-        self.optima, self.gap = optima, gap
-        self.numbers = (optima.node * m + optima.output) * 2 + (optima.side > 0)
+        self.optima, self.gap, d = optima, gap, len(lower)
         self.remainder = Remainder(model, lower, upper)
-        self.best, self.point = np.zeros(total), np.zeros((total, d))
-        self.jets = np.zeros((total, 1 + d + d * (d + 1) // 2))
-        self._renew(np.arange(len(self.numbers)))
+        self.jets = np.zeros((len(optima.value), 1 + d + d * (d + 1) // 2))
+        self._expand(np.arange(len(self.jets)))
 
     def proved(self, frontier: Frontier) -> Array:
         """Upper bounds of all problems, where the boxes of a frontier are left open, (N,)."""
-        upper = self.best + self.gap
+        upper = self.optima.value + self.gap
         for part in frontier.pieces(PIECE):
             bound = self.examine(frontier, *part)[2]
             np.maximum.at(upper, frontier.problem[part[1]], bound)
-        return np.asarray(upper[self.numbers])
+        return np.asarray(upper)
 
     def examine(self, frontier: Frontier, boxes: slice, items: slice) -> tuple[Array, Array, Array]:
         """Codes, values at centres and upper bounds of items (I,) of boxes by `kernel.examine`."""
@@ -140,7 +134,7 @@ class Tree:
             _in_planes(waves).reshape(len(begin), -1),
             model.time,
             tuple(np.ascontiguousarray(x, float) for x in bounds),
-            (self.best, self.point, self.jets),
+            (self.optima.value, self.optima.point, self.jets),
             self.gap,
             not model.loads,
         )
@@ -148,24 +142,19 @@ class Tree:
 
     def improve(self, frontier: Frontier, items: Rows, value: Array) -> None:
         """Replace incumbents by the centres of higher `items`, rising, and refine them (Newton)."""
-        row_of_problem = np.zeros(len(self.best), np.int64)
-        row_of_problem[self.numbers] = np.arange(len(self.numbers))
-        rows = row_of_problem[frontier.problem[items]]
-        centre = frontier.geometry(self.lower, self.upper)[0]
-        self.optima.point[rows] = centre[frontier.box[items]]
-        self.optima.value[rows] = value[items]
-        which = np.unique(rows)
+        problems, centre = frontier.problem[items], frontier.geometry(self.lower, self.upper)[0]
+        self.optima.point[problems] = centre[frontier.box[items]]
+        self.optima.value[problems] = value[items]
+        which = np.unique(problems)
         refine(self.model, self.optima, which, self.lower, self.upper, self.gap / 100)
-        self._renew(which)
+        self._expand(which)
 
-    def _renew(self, which: Array) -> None:
-        """Copy value, point and derivatives there of the optima in rows `which` to the tree."""
-        optima, numbers = self.optima, self.numbers[which]
-        point = optima.point[which]
-        f, g, H = self.model.at(point, optima.node[which], optima.output[which])
-        row, column = np.triu_indices(g.shape[1])
-        self.best[numbers], self.point[numbers] = optima.value[which], point
-        self.jets[numbers] = np.column_stack([f, g, H[:, row, column]])
+    def _expand(self, which: Rows) -> None:
+        """Set the jets of problems `which` at their best points."""
+        node, column = np.divmod(which, 2 * len(self.model.outputs))
+        f, g, H = self.model.at(self.optima.point[which], node, column // 2)
+        i, j = np.triu_indices(g.shape[1])
+        self.jets[which] = np.column_stack([f, g, H[:, i, j]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,9 +175,10 @@ class Frontier:
     problem: Array
 
     @classmethod
-    def of_box(cls, d: int, problems: Array) -> Frontier:
-        """The domain for all `problems` (N,)."""
-        return cls(np.ones((1, d), np.int64), np.zeros(len(problems), np.int64), problems)
+    def of_box(cls, d: int, n_problems: int) -> Frontier:
+        """The domain for all problems."""
+        box = np.zeros(n_problems, np.int64)
+        return cls(np.ones((1, d), np.int64), box, np.arange(n_problems))
 
     def __len__(self) -> int:
         return len(self.box)

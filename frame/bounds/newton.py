@@ -21,43 +21,30 @@ BOX_WIDTH = 2.0
 
 @dataclass(eq=False)
 class Optima:
-    """Best points so far of N problems.
+    """Best points so far of N problems: of each node, output and side (−1, +1), in this order.
 
     Args:
-        node: Time node of each problem, shape (N,).
-        output: Its output, shape (N,).
-        side: +1 for an upper bound, −1 for a lower, shape (N,).
         point: Unit coordinates, shape (N, d).
         value: side × output there, shape (N,).
     """
 
-    node: Rows
-    output: Rows
-    side: Array
     point: Array
     value: Array
 
 
 def first_optima(model: ModalModel, lower: Array, upper: Array, least_gain: float) -> Optima:
-    """Local optima at all nodes, of all outputs, on both sides (in this order) over a box.
+    """Local optima of all problems over a box.
 
     Each begins at the best of the centre and Chebyshev points, and is refined by Newton's method
     until that predicts a gain below `least_gain`, in units of the outputs.
     """
-    d, nodes, m = len(lower), len(model.time), len(model.outputs)
-    unit = np.vstack([np.zeros((1, d)), chebyshev_points(d, int(numbers.NEWTON_SAMPLES))])
+    unit = np.zeros((1, len(lower)))
+    unit = np.vstack([unit, chebyshev_points(len(lower), int(numbers.NEWTON_SAMPLES))])
     pool = (lower + upper) / 2 + (upper - lower) / 2 * unit
     values = np.concatenate([model.values(pool[k : k + 64]) for k in range(0, len(pool), 64)])
-    columns = values.reshape(len(pool), -1)
-    best = np.stack([columns.argmin(0), columns.argmax(0)], 1).ravel()
-    side = np.tile([-1.0, 1.0], nodes * m)
-    optima = Optima(
-        node=np.repeat(np.arange(nodes), 2 * m),
-        output=np.tile(np.repeat(np.arange(m), 2), nodes),
-        side=side,
-        point=pool[best],
-        value=side * columns[best, np.arange(len(best)) // 2],
-    )
+    values = values.reshape(len(pool), -1)
+    best = np.stack([values.argmin(0), values.argmax(0)], 1).ravel()
+    optima = Optima(pool[best], np.stack([-values.min(0), values.max(0)], 1).ravel())
     if (upper > lower).any():
         refine(model, optima, np.arange(len(best)), lower, upper, least_gain)
     return optima
@@ -79,7 +66,7 @@ def _newton(
     model: ModalModel, optima: Optima, which: Rows, lower: Array, upper: Array, least_gain: float
 ) -> None:
     radius: Array = np.full(len(which), numbers.NEWTON_RADIUS)
-    f, g, H = _signed(model, optima, optima.point[which], which)
+    f, g, H = _signed(model, optima.point[which], which)
     for count in range(int(numbers.NEWTON_STEPS)):
         low = np.maximum(lower - optima.point[which], -radius[:, None])
         high = np.minimum(upper - optima.point[which], radius[:, None])
@@ -100,7 +87,7 @@ def _newton(
         if not len(which):
             return
         trial = np.clip(optima.point[which] + step, lower, upper)
-        f, trial_g, trial_H = _signed(model, optima, trial, which)
+        f, trial_g, trial_H = _signed(model, trial, which)
         actual_gain = f - optima.value[which]
         better = actual_gain > 0
         optima.point[which[better]], optima.value[which[better]] = trial[better], f[better]
@@ -111,10 +98,9 @@ def _newton(
         radius = np.where(ratio > 0.75, wider, np.where(ratio < 0.25, narrower, radius))
 
 
-def _signed(
-    model: ModalModel, optima: Optima, points: Array, which: Rows
-) -> tuple[Array, Array, Array]:
+def _signed(model: ModalModel, points: Array, which: Rows) -> tuple[Array, Array, Array]:
     """Side × output (W,), its gradient and Hessian, of problems `which` at their points (W, d)."""
-    side = optima.side[which]
-    f, g, H = model.at(points, optima.node[which], optima.output[which])
+    node, column = np.divmod(which, 2 * len(model.outputs))
+    f, g, H = model.at(points, node, column // 2)
+    side = 2.0 * (column % 2) - 1
     return side * f, side[:, None] * g, side[:, None, None] * H

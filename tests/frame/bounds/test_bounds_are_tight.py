@@ -156,20 +156,20 @@ def polynomials(coefficients: np.ndarray) -> TaylorModel:
 )
 def test_branch_and_bound_needs_all_of_the_remainder(square, start, gap, budget, truth) -> None:
     """From a best point of a cubic, in which half of the remainder would hide the highest value."""
-    one, best = np.ones(1, int), np.full((1, 1), start)
-    optima = Optima(one, 0 * one, np.ones(1), best, best[0] ** 3 - square * best[0] ** 2)
+    best = np.full((4, 1), start)  # of two nodes and both sides
+    optima = Optima(best, np.array([-1, 1, -1, 1]) * (start**3 - square * start**2))
     proved, _ = enclosed(cube(square), -np.ones(1), np.ones(1), optima, gap=gap, budget=budget)
-    assert truth <= proved[0] <= truth + 0.02
+    assert truth <= proved[3] <= truth + 0.02
 
 
 def least_closed(tree: Tree) -> np.ndarray:
     """Of each problem the least target below which its whole box is closed, shape (N,)."""
-    frontier = Frontier.of_box(len(tree.lower), tree.numbers)
-    low, high = (np.full(len(tree.best), end) for end in (-2.5, 2.5))
+    frontier = Frontier.of_box(len(tree.lower), len(tree.jets))
+    low, high = (np.full(len(tree.jets), end) for end in (-2.5, 2.5))
     for _ in range(30):
         target = (low + high) / 2
         aimed = copy(tree)
-        aimed.best, aimed.gap = target, 0.0
+        aimed.optima, aimed.gap = replace(tree.optima, value=target), 0.0
         code = aimed.examine(frontier, slice(0, 1), slice(0, len(frontier)))[0]
         low, high = np.where(code, target, low), np.where(code, high, target)
     return high
