@@ -219,10 +219,9 @@ def _proof_beside(method: Method, over: UnitFlow) -> Proof | None:
 
 
 def _with_proof(followed: Envelope, over: UnitFlow, proof: Proof, tick: Progress) -> Envelope:
-    """Return a follower's envelope with the proved outer bounds of the exact motion, if there are.
+    """Return a follower's envelope with proved outer bounds of the exact motion, if there are.
 
-    Its error is the largest distance from these and from what the proof reaches, between which the
-    true bounds lie.
+    The true bounds lie between these and what the proof reaches: the error is the larger distance.
     """
     assert isinstance(over.flow, LinearFlow)
     exact = replace(over, flow=replace(over.flow, integrator=Exact()))
@@ -242,24 +241,18 @@ def require_admissible(system: LinearSystem | LagrangianSystem, cuts: Boxes) -> 
     """Refuse supports with values that are not allowed for their parameters.
 
     Raises:
-        RefusedError: A support is not finite, leaves the range of its parameter, or is of
-            another size than the structure's own value, as kN from N; or the weight may buckle a
-            storey, the mass matrix of a linear structure is not positive definite at the nominal
-            parameters or a corner, modes of unequal damping ratio may change places, or the
-            structure stays at rest.
+        RefusedError: A support leaves the range of its parameter or is in another unit than the
+            structure's own value; the weight may buckle a storey, or a mass matrix is not positive
+            definite; modes of unequal damping ratio may change places; or nothing moves.
     """
     for name, low, high in zip(cuts.names, cuts.lower[0], cuts.upper[0], strict=True):
         parameter, key, shown = system.parameter(name), f"support of {name}", f"[{low:g}, {high:g}]"
         require(parameter.admits(low, high), key, value=shown, allowed=parameter.range or "finite")
         nominal, sizes = abs(system.parameters.get(name, 0.0)), (abs(low), abs(high))
         is_same_unit = min(sizes) < OTHER_UNITS * nominal and OTHER_UNITS * max(sizes) > nominal
-        require(
-            is_same_unit or nominal == 0 or not any(sizes),
-            key,
-            value=shown,
-            allowed=f"values of the size of {nominal:g}, the structure's own",
-            cure="give both in SI units",
-        )
+        is_right, own = is_same_unit or nominal == 0 or not any(sizes), f"{nominal:g}"
+        allowed, cure = f"values of the size of {own}, the structure's own", "give both in SI units"
+        require(is_right, key, value=shown, allowed=allowed, cure=cure)
     if isinstance(system, LagrangianSystem):
         return
     if isinstance(system, StoreyFrame):
@@ -273,12 +266,8 @@ def require_admissible(system: LinearSystem | LagrangianSystem, cuts: Boxes) -> 
             is_positive = bool(np.linalg.eigvalsh(matrices.mass.value).min() > 0)
         except np.linalg.LinAlgError:  # from damping by a ratio, which divides by the mass
             is_positive = False
-        require(
-            is_positive,
-            "mass",
-            value=f"not positive definite at {at}",
-            allowed="a mass for every unknown",
-        )
+        value = f"not positive definite at {at}"
+        require(is_positive, "mass", value=value, allowed="a mass for every unknown")
         has_forces = matrices.forces is not None and matrices.forces.value.any()
         is_moved = is_moved or has_forces or matrices.start.value.any()
     key, allowed = "q0, v0, ground and loads", "a start, a record or a force that moves something"
@@ -293,7 +282,8 @@ def require_admissible(system: LinearSystem | LagrangianSystem, cuts: Boxes) -> 
 def _on_levels(bounds: Envelope, alpha: Array, which: Rows) -> Envelope:
     """Return the envelope on levels `alpha` (A,), the bounds of each copied from row `which`."""
     names = ("lower", "upper", "lower_at", "upper_at", "error")
-    rows = {name: getattr(bounds, name)[which] for name in names}
-    pairs = [x and Ends(x.lower[which], x.upper[which]) for x in (bounds.inner, bounds.outer)]
-    least = bounds.least_peaks and Ends(*(x[which] for x in bounds.least_peaks))
-    return replace(bounds, alpha=alpha, inner=pairs[0], outer=pairs[1], least_peaks=least, **rows)
+    changes: dict[str, Any] = {name: getattr(bounds, name)[which] for name in names}
+    for name in ("inner", "outer", "least_peaks"):
+        pair = getattr(bounds, name)
+        changes[name] = pair and Ends(*(x[which] for x in pair))
+    return replace(bounds, alpha=alpha, **changes)

@@ -13,7 +13,7 @@ from pydantic import Field
 from alphacut import frame
 from alphacut.case.motion import EnvelopeSection, Study, Tolerance
 from alphacut.case.structure import Structure
-from alphacut.frame.bounds.remainder import MOST_PARAMETERS
+from alphacut.frame.bounds.model_error import MAX_PARAMETERS
 from alphacut.frame.questions.peaks import PEAK_BOUNDS, Peak, Peaks, output_of, peaks, tightest
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.arrays import Array
@@ -151,7 +151,7 @@ class EnvelopeTask:
         signed = [name for name in self.limited if name != output_of(name)]
         peak_bounds = peaks(result, [*map(str, result.outputs), *signed])
         # a second proof of many inputs is hardly tighter: the number of its parts ends it
-        has_many_inputs = len(structure.inputs(self.fuzzy)) > MOST_PARAMETERS
+        has_many_inputs = len(structure.inputs(self.fuzzy)) > MAX_PARAMETERS
         gap = np.inf if has_many_inputs else PEAK_ERROR
         if loose := loose_peaks(peak_bounds, self.limited, gap):
             further = replace(context, tick=second if tick else None)

@@ -19,8 +19,8 @@ from functools import partial
 import numpy as np
 
 from alphacut.frame.bounds.kernel import FACES, examine
+from alphacut.frame.bounds.model_error import Remainder
 from alphacut.frame.bounds.newton import Optima, refine
-from alphacut.frame.bounds.remainder import Remainder
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.modes.modal_model import ModalModel
 from alphacut.fuzzy.arrays import Rows

@@ -1,4 +1,4 @@
-"""Proved bound of the error of a modal model, over the whole box and all times.
+"""Proved bounds of the error of a modal model, and of what its quadratic Taylor models leave out.
 
 Polynomials φ_k, w_k, λ_k make q(t) = 2 Re Σ φ_k exp(λ_k t) a motion that nearly obeys the
 equations. What it misses, λ_k φ_k − w_k and λ_k M w_k + D w_k + K φ_k, are Taylor models of which
@@ -9,25 +9,34 @@ solved anew, and nothing rests on a distance between eigenvalues.
 Damping by one ratio ζ, D₀ + 2 ζ M √(M⁻¹K), is no polynomial. For any μ > 0 and vector w, in the
 norm of M⁻¹, ‖2 ζ M √(M⁻¹K) w − 2 ζ √μ M w‖ ≤ 2 ζ ‖(K − μ M) w‖ / (√λ + √μ), λ the least eigenvalue
 of K against M. With μ = |λ_k|² the motion is measured with 2 ζ √μ M w in place of the damping.
+
+A part of a modal model is 2 Re Σ_k C_k(p) w(t; λ_k(p)) with w = exp(λ t) or w = R = ∫ exp(λ (t −
+s)) a(s) ds; its r-th derivative by λ is bounded by t^r exp(g t), or by ∫ τ^r exp(g τ) |a(t − τ)|
+dτ, with g a bound of Re λ. From these follow what quadratic Taylor models of it leave out.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import combinations_with_replacement, permutations
 
 import numpy as np
 
-from alphacut.frame.bounds.remainder import largest_growth, parts, suprema
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.damped import DampedModes, DampedStructure, norm_of
 from alphacut.frame.modes.modal_model import ModalModel
-from alphacut.frame.response.load_tables import Direct
+from alphacut.frame.response.duhamel import absolute_moments
+from alphacut.frame.response.load_tables import REACH, Direct, LoadTables
 from alphacut.fuzzy.arrays import Array
 
 ROUNDING = 1e-9
-"""Relative rounding of the norms, some thousand operations."""
+"""Relative rounding of norms and of integrals over a load, of a million intervals at most."""
+MAX_PARAMETERS = 6
+"""Tensors of third derivatives grow with the cube of the number of parameters."""
+SERIES_TERMS = 100
+"""Terms of the series of a wave under a load, at most, as rounding counts them."""
 
 
 def proved_error(model: ModalModel) -> Array:
@@ -175,3 +184,180 @@ def _sum_of_modes(x: TaylorModel) -> TaylorModel:
     """Sum over modes, (S, N) of (S, n, N)."""
     n = x.shape[1]
     return (np.ones((1, n)) @ x)[:, 0]
+
+
+def suprema(polynomials: TaylorModel, reach: Array) -> list[Array]:
+    """Upper bounds of the |derivatives| of polynomials over the box |u_i| ≤ reach_i.
+
+    Returns:
+        Of order 0 to 3, shapes (d,) * order + V, V the polynomials' shape: the derivatives of
+        Σ |coefficient| u^e at u = reach.
+    """
+    size, index = np.abs(polynomials.coefficients), polynomials.exponents
+    terms, d = index.shape
+    bounds = list[Array]()
+    for order in range(4):
+        weight: Array = np.zeros((d,) * order + (terms,))
+        for axes in combinations_with_replacement(range(d), order):
+            exponent = index.copy()
+            factor: Array = np.ones(terms)
+            for axis in axes:
+                factor = factor * exponent[:, axis]
+                exponent[:, axis] -= 1
+            factor *= np.prod(reach ** np.maximum(exponent, 0), axis=1)
+            for permuted in set(permutations(axes)):
+                weight[permuted] = factor
+        bounds.append(np.tensordot(weight, size, 1))
+    return bounds
+
+
+def largest_growth(eigenvalue: TaylorModel, reach: Array) -> Array:
+    """Upper bounds of the growth rates Re λ_k over the box |u_i| ≤ reach_i, shape (n,), in 1/s."""
+    size = np.prod(reach**eigenvalue.exponents, axis=1)
+    real = eigenvalue.coefficients.real
+    return np.asarray(real[0] + size[1:] @ np.abs(real[1:]))
+
+
+@dataclass(frozen=True, eq=False)
+class MotionPart:
+    """The free part of a modal model, or what one load adds.
+
+    Args:
+        share: Coefficients C_k, polynomials, shape (n, m).
+        waves: Bounds of the derivatives of w by λ, orders 0 to 3, shape (4, T, n).
+        elapsed: Bounds of ∫ |w| from 0 to t, shape (T, n).
+        push: Bound of the impulse ∫ |a| of the load up to t, shape (T,), in m/s; 1 of the free
+            part.
+        left_out: Bound of the model's error of w, over waves[0], shape (n,).
+        load: The load; None of the free part.
+    """
+
+    share: TaylorModel
+    waves: Array
+    elapsed: Array
+    push: Array
+    left_out: Array
+    load: LoadTables | None = None
+
+
+def parts(model: ModalModel, growth: Array) -> list[MotionPart]:
+    """The free part of a model's motion, then the part of each load, with bounds over time.
+
+    `growth` (n,) are upper bounds of Re λ_k, in 1/s.
+    """
+    time = model.time[:, None]
+    divisor = np.where(growth == 0, 1.0, growth)
+    free = MotionPart(
+        share=model.coefficient,
+        waves=time ** np.arange(4)[:, None, None] * np.exp(growth * time),
+        elapsed=np.where(growth == 0, time, np.expm1(growth * time) / divisor),
+        push=np.ones(len(time)),
+        left_out=np.zeros(model.count),
+    )
+    return [free, *(_forced_part(model, growth, load) for load in model.loads)]
+
+
+def _forced_part(model: ModalModel, growth: Array, load: LoadTables) -> MotionPart:
+    """Part of a model's motion that a load a(t) makes, w = R = ∫ exp(λ τ) a(t − τ) dτ."""
+    if isinstance(load, Direct):  # w of the first mode is a(t)
+        waves: Array = np.zeros((4, len(model.time), model.count))
+        waves[0] = np.abs(load.at_nodes(np.zeros((1, model.count)))[0])
+        return MotionPart(load.share, waves, 0 * waves[0], 0 * model.time, load.truncation, load)
+
+    def moments(decay: float) -> Array:  # of exp(−decay τ) |a(t − τ)|
+        return (1 + ROUNDING) * absolute_moments(decay, load.history, model.time)
+
+    undamped = moments(0.0)
+    of_modes = np.stack([moments(-float(g)) for g in growth], -1)  # (5, T, n)
+    # ∫₀ᵗ |R| ≤ ∫ |a(t − τ)| ∫₀^τ exp(g s) ds dτ, the inner one at most
+    # τ and 1/|g| where g < 0, else τ exp(g τ)
+    decaying = np.minimum(undamped[1], undamped[0] / np.maximum(-growth, 1e-300)[:, None]).T
+    elapsed = np.where(growth < 0, decaying, of_modes[1])
+    return MotionPart(load.share, of_modes[:4], elapsed, undamped[0], load.truncation, load)
+
+
+class Remainder:
+    """Bounds of what quadratic Taylor models of the outputs leave out in a box, and of rounding.
+
+    They follow for the box [lower, upper] by Leibniz' rule on C_k w(t; λ_k).
+
+    Attributes:
+        tensor: |∂³ output / ∂u_i ∂u_j ∂u_k| at most, shape (T, m, d, d, d), symmetric in the last
+            three.
+        margin: Rounding of values, and of slopes, at most, shape (T, m, 1 + d).
+        rate: Bounds of derivatives of the eigenvalues, orders 0 to 3, shapes (d,) * order + (n,).
+        share: The same of the shares of the last part, shapes (d,) * order + (n, m).
+    """
+
+    def __init__(self, model: ModalModel, lower: Array, upper: Array) -> None:
+        d, n, m = len(lower), model.count, len(model.outputs)
+        reach, width = np.maximum(np.abs(lower), np.abs(upper)), upper - lower
+        rate, growth = suprema(model.eigenvalue, reach), largest_growth(model.eigenvalue, reach)
+        third = np.zeros((len(model.time), m, d, d, d))
+        margin = np.zeros((len(model.time), m, 1 + d))
+        for part in parts(model, growth):
+            share = suprema(part.share, reach)
+            noise = _rounding_bound(model, rate[0], part.load)
+            for k in range(n):
+                of_mode = [x[..., k, :] for x in share], [x[..., k] for x in rate]
+                sizes = []
+                for order in range(4):
+                    bounds = np.stack(leibniz(*of_mode, order))
+                    waves = 2 * part.waves[: order + 1, :, k]
+                    sizes.append(np.tensordot(waves, bounds, (0, 0)))  # (T, d, …, m)
+                third += np.moveaxis(sizes[3], -1, 1)
+                slope_change = np.einsum("tijm,j->tim", sizes[2], width)
+                slopes, mean_slope = sizes[1] + slope_change, sizes[1] + slope_change / 2
+                values = sizes[0] + np.einsum("tim,i->tm", mean_slope, width)
+                margin[..., 0] += noise[:, k, None] * values
+                margin[..., 1:] += noise[:, k, None, None] * np.moveaxis(slopes, -1, 1)
+        third[model.time == 0] = _initial_third_derivatives(model, reach)
+        self.tensor, self.margin, self.rate, self.share = (1 + 1e-9) * third, margin, rate, share
+
+
+def _rounding_bound(model: ModalModel, rate: Array, load: LoadTables | None) -> Array:
+    """Relative rounding error of each mode's motion at each node, (T, n): ε times operations."""
+    # that of λ enters exp(λ t) times |λ| t; terms of a load's series exceed its sum by exp(REACH)
+    n_terms, d = model.eigenvalue.exponents.shape
+    of_polynomial = n_terms + model.degree + 2
+    phase = rate * model.time[:, None]
+    operations = of_polynomial * (2 + phase) + 12 * model.count + 4 * d**3 + 50
+    if load is not None:
+        operations = operations + (8 * len(model.time) + SERIES_TERMS) * np.exp(REACH)
+    return np.finfo(float).eps * operations
+
+
+def _initial_third_derivatives(model: ModalModel, reach: Array) -> Array:
+    """Bounds of the outputs' third derivatives at t = 0, (m, d, d, d), where most modes cancel."""
+    sum_of_modes = np.full(model.count, 2.0) @ model.coefficient.real
+    return np.moveaxis(suprema(sum_of_modes, reach)[3], -1, 0)
+
+
+def leibniz(c: list[Array], r: list[Array], order: int) -> list[Array]:
+    """Bounds of derivatives of C exp(λ t) over exp(λ t), for each power of t from 0 to the order.
+
+    From bounds `c` of the derivatives of C, shapes (d,) * its order + (m,), and `r` of those of λ,
+    shapes (d,) * its order, by Leibniz' and Faà di Bruno's rules.
+    """
+    d, m = len(r[1]), c[0].shape[-1]
+    out: list[Array] = [np.zeros((d,) * order + (m,)) for _ in range(order + 1)]
+    axes = "ijk"[:order]
+    for chosen in range(2**order):
+        first_axes = "".join(a for bit, a in enumerate(axes) if chosen >> bit & 1)
+        second_axes = [a for a in axes if a not in first_axes]
+        for blocks in _partitions(second_axes):
+            factors = [c[len(first_axes)], *(r[len(block)] for block in blocks)]
+            names = ",".join([first_axes + "z", *blocks])
+            out[len(blocks)] += np.einsum(f"{names}->{axes}z", *factors)
+    return out
+
+
+def _partitions(items: list[str]) -> list[list[str]]:
+    """All set partitions of distinct letters, each a list of blocks (Faà di Bruno's formula)."""
+    if not items:
+        return [[]]
+    first, found = items[0], []
+    for part in _partitions(items[1:]):
+        found.append([first, *part])
+        found += [[*part[:k], first + part[k], *part[k + 1 :]] for k in range(len(part))]
+    return found

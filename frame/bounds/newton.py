@@ -38,8 +38,8 @@ def first_optima(model: ModalModel, lower: Array, upper: Array, least_gain: floa
     Each begins at the best of the centre and Chebyshev points, and is refined by Newton's method
     until that predicts a gain below `least_gain`, in units of the outputs.
     """
-    unit = np.zeros((1, len(lower)))
-    unit = np.vstack([unit, chebyshev_points(len(lower), int(numbers.NEWTON_SAMPLES))])
+    samples = chebyshev_points(len(lower), int(numbers.NEWTON_SAMPLES))
+    unit = np.vstack([np.zeros((1, len(lower))), samples])
     pool = (lower + upper) / 2 + (upper - lower) / 2 * unit
     values = np.concatenate([model.values(pool[k : k + 64]) for k in range(0, len(pool), 64)])
     values = values.reshape(len(pool), -1)

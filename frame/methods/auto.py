@@ -19,7 +19,7 @@ from typing import ClassVar
 import numpy as np
 
 from alphacut.frame.bounds.box_proof import refusing
-from alphacut.frame.bounds.remainder import MOST_PARAMETERS
+from alphacut.frame.bounds.model_error import MAX_PARAMETERS
 from alphacut.frame.boxes import DEFAULT_TOLERANCE, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import LinearFlow, exact_flow
@@ -60,14 +60,6 @@ class Auto:
 
     Raises:
         RefusedError: The tolerance is not positive.
-
-    Example:
-        >>> from alphacut.frame import StoreyFrame, envelope
-        >>> from alphacut.fuzzy import Triangular
-        >>> frame = StoreyFrame(masses=[1e3], stiffness=[4e4], q0=[0.1])
-        >>> inputs = {"m1": Triangular(900, 1000, 1100)}
-        >>> str(envelope(frame, inputs, Auto(), duration=0.5, step=0.1).nature)
-        'guaranteed'
     """
 
     name: ClassVar[str] = "auto"
@@ -119,7 +111,7 @@ class Auto:
         proof = Proof(None, self.tolerance, BOXES, workers=self.workers)
         work = dict[str, float]()  # that is forecast
         for method in (proof, self._dual(flow)):
-            if method is proof and len(flow.boxes.names) > MOST_PARAMETERS:
+            if method is proof and len(flow.boxes.names) > MAX_PARAMETERS:
                 continue
             try:
                 with refusing():
@@ -140,7 +132,7 @@ class Auto:
     def _dual(self, flow: UnitFlow) -> DualProof:
         """Return the dual bound with the gaps that are wanted."""
         tolerance, inputs = max(self.tolerance or DEFAULT_TOLERANCE, FINEST), len(flow.boxes.names)
-        few = flow.relative and inputs <= (MOST_PARAMETERS if self.tolerance else FEW_INPUTS)
+        few = flow.relative and inputs <= (MAX_PARAMETERS if self.tolerance else FEW_INPUTS)
         dual = DualProof(workers=self.workers, below=1.0 if self.magnitudes else DualProof.below)
         table = (
             (self.is_for_all_nodes, dual),  # gaps below the peaks stay wide in any case

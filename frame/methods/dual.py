@@ -29,7 +29,7 @@ from alphacut.frame.envelope import Ends, Envelope
 from alphacut.frame.structures.linear import frequencies
 from alphacut.fuzzy.arrays import Array, Mask, Rows
 from alphacut.fuzzy.progress_bar import Progress, subprogress
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import checked_number
 
 DRIFT = 1e-6
 """Lowest frequency over the highest at which rounding of the stiffness may hide a drift."""
@@ -78,8 +78,7 @@ class DualProof:
 
     def __post_init__(self) -> None:
         for key in ("gap", "peaks", "below", "slabs", "steps", "parts"):
-            if not getattr(self, key) > 0:
-                raise RefusedError(key, getattr(self, key), "a positive number")
+            checked_number(key, getattr(self, key), positive=True)
 
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
         """Return the guaranteed envelope of all outputs on all levels.

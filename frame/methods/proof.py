@@ -24,15 +24,15 @@ import numpy as np
 from alphacut.frame import numbers
 from alphacut.frame.bounds.box_proof import BisectionError, BoxBounds, Goal
 from alphacut.frame.bounds.branch_and_bound import enclosed
-from alphacut.frame.bounds.model_error import proved_error
-from alphacut.frame.bounds.newton import Optima, first_optima
-from alphacut.frame.bounds.remainder import (
-    MOST_PARAMETERS,
+from alphacut.frame.bounds.model_error import (
+    MAX_PARAMETERS,
     Remainder,
     largest_growth,
     parts,
+    proved_error,
     suprema,
 )
+from alphacut.frame.bounds.newton import Optima, first_optima
 from alphacut.frame.bounds.spatial_branch_and_bound import prove
 from alphacut.frame.boxes import DEFAULT_TOLERANCE, Boxes, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError
@@ -69,14 +69,6 @@ class Proof:
 
     Raises:
         RefusedError: A value is not positive.
-
-    Example:
-        >>> from alphacut.frame import StoreyFrame, envelope
-        >>> from alphacut.fuzzy import Triangular
-        >>> frame = StoreyFrame(masses=[1e3], stiffness=[4e4], q0=[0.1])
-        >>> inputs = {"m1": Triangular(900, 1000, 1100)}
-        >>> str(envelope(frame, inputs, Proof(), duration=0.5, step=0.1).nature)
-        'guaranteed'
     """
 
     name: ClassVar[str] = "proof"
@@ -118,9 +110,9 @@ class Proof:
             UnprovedError: There are too many inputs, or the structure is not known to lose energy.
         """
         n_inputs = int((boxes.upper[0] > boxes.lower[0]).sum())
-        if n_inputs > MOST_PARAMETERS:
+        if n_inputs > MAX_PARAMETERS:
             raise UnprovedError(
-                f"proofs are affordable up to {MOST_PARAMETERS} fuzzy inputs, and there are"
+                f"proofs are affordable up to {MAX_PARAMETERS} fuzzy inputs, and there are"
                 f" {n_inputs}"
             )
         if len(flow.system.ratios) > 1:

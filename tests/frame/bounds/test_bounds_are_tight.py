@@ -10,13 +10,13 @@ from scipy.integrate import cumulative_trapezoid
 from alphacut.frame import Accelerogram, Exact, LinearFlow, Midpoint, StoreyFrame
 from alphacut.frame.bounds.branch_and_bound import Frontier, Tree, enclosed
 from alphacut.frame.bounds.kernel import stays_below
-from alphacut.frame.bounds.model_error import proved_error
-from alphacut.frame.bounds.newton import Optima, first_optima
-from alphacut.frame.bounds.remainder import (
+from alphacut.frame.bounds.model_error import (
     Remainder,
     largest_growth,
     parts,
+    proved_error,
 )
+from alphacut.frame.bounds.newton import Optima, first_optima
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.methods.proof import bound_levels

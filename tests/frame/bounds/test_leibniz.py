@@ -6,7 +6,7 @@ from math import exp
 import numpy as np
 import pytest
 
-from alphacut.frame.bounds.remainder import leibniz
+from alphacut.frame.bounds.model_error import leibniz
 
 RNG = np.random.default_rng(5)
 
