@@ -24,9 +24,10 @@ from alphacut.stochastic import ThetaRule, gauss_rule
 if TYPE_CHECKING:
     from alphacut.rve.result.result import HomogenisedStiffness
 from alphacut.rve.series.lattice_sums import ZETA_PERIOD, lattice_images, lattice_sums
+from alphacut.rve.series.means import SAFETY, finer_count
 
 CONSTANTS = ("E_T", "E_L", "nu_LT", "G_T", "G_L", "K_T")
-_FINE, _COARSER = 32, 24  # nodes in θ
+NODES = 32  # in θ
 _ROUND_OFF = 1e-12
 
 
@@ -86,9 +87,10 @@ def _mean_longitudinal_shear(cell: Cell) -> tuple[float, float]:
         total = float(rule.weights @ values)
         return total, float(rule.weights @ (values * relative_errors)) / total
 
-    value, error = mean(gauss_rule(cell.radius.distribution, points=_FINE))
-    coarser, _ = mean(gauss_rule(cell.radius.distribution, points=_COARSER))
-    return value, error + abs(coarser / value - 1)
+    counts = NODES, finer_count(NODES), finer_count(finer_count(NODES))
+    rules = (gauss_rule(cell.radius.distribution, points=count) for count in counts)
+    (value, error), (finer, _), (finest, _) = map(mean, rules)
+    return value, error + SAFETY * max(abs(value / finer - 1), abs(value / finest - 1))
 
 
 _FEWEST, _MOST, _CONVERGED = 4, 128, 1e-12

@@ -21,7 +21,7 @@ from alphacut.stochastic import RadiusMap, ThetaRule, gauss_rule
 
 _BATCH = 2_000_000  # entries of one batch of matrices
 _MOST_POINTS = 1200
-_SAFETY = 1.6
+SAFETY = 1.6  # of the distance of a rule in θ from two finer ones
 _NOISE = 1e-13  # of a declared error: what rounding leaves
 _ENERGY_NOISE = 1e-12  # of energies, over the modulus
 
@@ -245,13 +245,13 @@ def converged_means(
     averages: dict[int, _Averages] = {}
     means: dict[int, Mean] = {}
     while True:
-        counts = [count, _finer_count(count), _finer_count(_finer_count(count))]
+        counts = [count, finer_count(count), finer_count(finer_count(count))]
         for n in counts:
             if n not in averages:
                 rule = make_rule(law, points=n)
                 averages[n] = _Averages(rule, cells(radius_map(rule.nodes)))
         coarse, finer, finest = (averages[n] for n in counts)
-        errors = _SAFETY * _largest_distance(coarse.moduli, finer.moduli, finest.moduli) + _NOISE
+        errors = SAFETY * _largest_distance(coarse.moduli, finer.moduli, finest.moduli) + _NOISE
         for k in range(len(errors)):
             if k not in means and (points or errors[k].max() <= accuracy):
                 # each inclusion by itself, whatever the others need
@@ -270,7 +270,7 @@ def converged_means(
         count = counts[1]
 
 
-def _finer_count(count: int) -> int:
+def finer_count(count: int) -> int:
     """Nodes of the next finer rule: a third more."""
     return count + max(2, count // 3)
 
@@ -287,11 +287,11 @@ def mean_energies(series: Series, cell: Cell, mean: Mean) -> PhaseEnergies:
     rising_terms = np.maximum.accumulate(terms[order])
     finer = rule
     for k in range(2):
-        finer = gauss_rule(cell.radius.distribution, points=_finer_count(finer.nodes.size))
+        finer = gauss_rule(cell.radius.distribution, points=finer_count(finer.nodes.size))
         coarse_terms = np.interp(cell.radius(finer.nodes), node_radii[order], rising_terms)
         finer_terms = np.array([_error_terms(int(np.ceil(n)))[k] for n in coarse_terms])
         distances.append(abs(values - _rule_energies(series, cell, finer, finer_terms)))
-    errors = _SAFETY * np.max(distances, axis=0) + _ENERGY_NOISE * values.sum(axis=(0, 1))
+    errors = SAFETY * np.max(distances, axis=0) + _ENERGY_NOISE * values.sum(axis=(0, 1))
     moduli_at = partial(_mean_moduli, series, cell, rule, terms)
     return PhaseEnergies(values, errors, moduli_at)
 

@@ -58,17 +58,6 @@ def test_wedges_agree_with_slices_over_the_cone():
     assert result.energies.values.shape == (3, 2, 3)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("thickness", [0.05, 1e-3])
-def test_wedges_converge_with_order_three(thickness):
-    right, ring = by_slices(thickness, points=2).modulus, Interphase(thickness, RING)
-    errors = []
-    for size in (0.08, 0.04):
-        model = PrismModel(size, 2, stiffness=True, estimate=False)
-        errors.append(model.solve(STRAIGHT, SOFT, [HARD], ring)[0].modulus / right - 1)
-    assert np.log2(errors[0] / errors[1]) >= 3
-
-
 def test_the_modulus_is_inside_proved_bounds_of_an_image_with_mixed_pixels():
     half, size = 1 / 128, 128
     middles = (np.arange(size) + 0.5) * 2 * half - 1

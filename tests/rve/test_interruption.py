@@ -1,9 +1,11 @@
-"""Ctrl-C and SIGTERM while basix and DOLFINx are imported wait for their end; then, one line."""
+"""Ctrl-C and SIGTERM wait for the end of imports of DOLFINx and of PETSc's work; then, one line."""
 
 import ast
+import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -35,7 +37,6 @@ ENDS = {"SIGINT": (130, "interrupted"), "SIGTERM": (143, "ended by SIGTERM")}
     ("at", "method", "last", "signal"),
     [
         ("basix._basixcpp", "prism", "basix.quadrature", "SIGINT"),
-        ("basix._basixcpp", "slices", "basix.quadrature", "SIGTERM"),
         ("dolfinx.cpp", "slices", "dolfinx.fem", "SIGINT"),
         ("petsc4py.lib", "prism", "petsc4py.PETSc", "SIGTERM"),
     ],
@@ -131,3 +132,45 @@ def test_no_module_imports_them_without_holding_it_back():
         if name.split(".")[0] in ("basix", "dolfinx")
     ]
     assert bare == []
+
+
+def interrupt():
+    os.kill(os.getpid(), signal.SIGINT)
+
+
+@pytest.fixture
+def handler():
+    """Python's own handler, which a test must leave as it found it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    after = signal.signal(signal.SIGINT, before)
+    assert after is signal.default_int_handler
+
+
+@pytest.mark.parametrize("fails", [False, True])
+def test_an_interruption_waits_for_the_end_of_the_block_and_goes_before_its_error(handler, fails):
+    done = []
+
+    @uninterrupted()
+    def block():
+        interrupt()
+        done.append("block")
+        if fails:
+            raise RuntimeError("stopped early")
+
+    with pytest.raises(KeyboardInterrupt):
+        block()
+    assert done == ["block"]
+
+
+def test_other_threads_leave_the_handler_alone(handler):
+    seen = []
+
+    def work():
+        with uninterrupted():
+            seen.append(signal.getsignal(signal.SIGINT))
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert seen == [signal.default_int_handler]

@@ -12,13 +12,13 @@ from alphacut.rve.mesh.columns import extrude
 from alphacut.rve.mesh.wedge import slice_weights
 from alphacut.rve.prism.model import PrismModel
 from alphacut.rve.prism.problem import FoldedMeshError
-from alphacut.rve.result.bounds import reuss, voigt
 from alphacut.rve.result.engineering_constants import PLANE_STRAIN, engineering_constants
 from alphacut.rve.result.loss_factors import loss_factors
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.slices.model import SlicesModel
 from alphacut.rve.solver.krylov import ConvergenceError
 from alphacut.stochastic import HermiteMap
+from tests.stochastic.test_laws import Own
 
 PAPER = HermiteMap(0.1337, 0.1, 0.8663, 0.1692)
 MATRIX, PARTICLE = Phase(20e9), Phase(80e9)
@@ -102,29 +102,14 @@ def test_projected_samples_are_those_solved_whatever_their_company():
     assert len(model.solve(PAPER, MATRIX, [Phase(90e9)])[0].iterations) == 2
 
 
-MUMPS = {
-    "ksp_type": "preonly",
-    "pc_type": "cholesky",
-    "pc_factor_mat_solver_type": "mumps",
-}
-
-
-@pytest.mark.parametrize("petsc", [MUMPS, {"pc_type": "gamg"}])
-def test_every_solver_gives_the_same_modulus(petsc):
-    one = solve(mesh_size=0.3, layers=4, petsc=petsc).modulus
-    assert one == pytest.approx(solve(mesh_size=0.3, layers=4).modulus, rel=1e-9)
-
-
 @pytest.mark.parametrize(
     ("radius_map", "contrast", "layers", "most"),
     [
         (PAPER, 4, 12, 6),
         (HermiteMap(0.1337, 0.3145, 0.8663, 0.9975), 4, 12, 6),
-        (HermiteMap(0.1337, 0.001, 0.8663, 0.001), 4, 12, 6),
         (PAPER, 1e3, 12, 8),
         (PAPER, 1e-3, 12, 8),
         (HermiteMap(0.05, 0, 0.95, 0), 4, 12, 8),
-        (PAPER, 4, 24, 4),
         (PAPER, 4, 6, 12),
     ],
 )
@@ -172,18 +157,6 @@ def test_losses_of_any_stiffness_and_outline_agree_within_declared_errors(turned
         assert abs(value - slices.values[name]) <= prism.errors[name] + slices.errors[name]
 
 
-def test_a_stiffness_lies_within_the_bounds_of_its_phases(turned_ellipse):
-    result = turned_ellipse[0]
-    fraction = np.pi / 4 * SMALL(result.curve.theta) ** 2
-    for bound, sign in ((reuss, 1), (voigt, -1)):
-        bounds = bound(
-            np.stack([1 - fraction, fraction]), (MATRIX.stiffness, ORTHOTROPIC.stiffness)
-        )
-        mean = np.tensordot(result.curve.weights, bounds, axes=1)
-        assert np.linalg.eigvalsh(sign * (result.stiffness - mean))[0] > -1e-3 * mean.max()
-    assert result.checks["reuss"] == result.checks["voigt"] == 0
-
-
 @pytest.mark.parametrize(
     ("options", "radius_map", "particle"),
     [
@@ -193,6 +166,11 @@ def test_a_stiffness_lies_within_the_bounds_of_its_phases(turned_ellipse):
         ({"layers": 2}, HermiteMap(0.5, 2.0, 0.5, 2.0), PARTICLE),
         ({"mesh_size": 0.2, "layers": 5}, HermiteMap(0.02, 0, 0.02, 0), PARTICLE),
         ({"interface": "sign", "mesh_size": 0.4}, PAPER, PARTICLE),
+        (
+            {"mesh_size": 0.4, "layers": 4},
+            HermiteMap(0.2, 0.1, 0.8, 0.2, Own("beta", (2, 4))),
+            PARTICLE,
+        ),
     ],
 )
 def test_the_declared_error_covers_the_true_one(options, radius_map, particle):
@@ -252,3 +230,15 @@ def test_an_option_out_of_range_is_refused(options, message):
 def test_nearly_incompressible_phases_are_referred_to_the_series():
     with pytest.raises(RefusedError, match=r"Poisson's ratio is 0.46; .* take the series"):
         solve(particle=Phase(80e9, 0.46))
+
+
+class Empty(Own):
+    """A law without density in the lower half."""
+
+    def pdf(self, theta):
+        return np.where(np.asarray(theta) < 0.5, 0.0, 2.0)
+
+
+def test_layers_without_probability_are_refused():
+    with pytest.raises(RefusedError, match=r"density of θ at .* is 0; allowed: positive densities"):
+        solve(HermiteMap(0.2, 0.1, 0.8, 0.2, Empty()), mesh_size=0.3, layers=4)

@@ -2,7 +2,6 @@
 
 import os
 import signal
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,13 +12,10 @@ pytest.importorskip("alphacut.rve.fenicsx")
 from alphacut.rve.cell.cell import LOADS, Phase
 from alphacut.rve.fenicsx import MPI, PETSc, option_is_used
 from alphacut.rve.mesh.columns import extrude
-from alphacut.rve.mesh.periodicity import identify
 from alphacut.rve.prism.problem import PrismProblem
-from alphacut.rve.solver import theta_preconditioner as preconditioner
 from alphacut.rve.solver.krylov import SolverOptions, krylov_solver, solve
-from alphacut.rve.solver.numbering import LevelNumbering
-from alphacut.rve.solver.theta_preconditioner import ThetaPreconditioner, theta_mass
-from alphacut.stochastic import HermiteMap, TruncatedNormal
+from alphacut.rve.solver.theta_preconditioner import ThetaPreconditioner
+from alphacut.stochastic import HermiteMap
 
 CRISP = HermiteMap(0.5, 0, 0.5, 0)
 PHASES = Phase(20e9).stiffness, Phase(80e9).stiffness
@@ -36,12 +32,6 @@ def problem():
 def dense(matrix):
     starts, columns, values = matrix.getValuesCSR()
     return sp.csr_matrix((values, columns, starts), matrix.size).toarray()
-
-
-def test_the_reduced_stiffness_is_symmetric_and_definite(problem):
-    matrix = dense(problem.matrix)
-    assert abs(matrix - matrix.T).max() < 1e-12 * abs(matrix).max()
-    assert np.linalg.eigvalsh(matrix)[0] > 1e-6 * abs(matrix).max()
 
 
 def test_the_preconditioner_is_exact_where_nothing_changes_with_theta(problem, rng):
@@ -70,44 +60,6 @@ def test_the_preconditioner_is_symmetric_and_definite_where_the_radius_changes()
     assert abs(inverse - inverse.T).max() < 1e-12 * abs(inverse).max()
     values = np.linalg.eigvals(inverse @ dense(one.matrix)).real
     assert 0.3 < values.min() < 1 < values.max() < 3
-
-
-def test_masses_along_theta_are_those_of_polynomials():
-    law, levels = TruncatedNormal(), np.linspace(-3, 3, 7)
-    mass = theta_mass(law, levels)
-    theta, weights = np.polynomial.legendre.leggauss(60)
-    fine = np.concatenate([levels[k] + (theta + 1) / 2 for k in range(6)])
-    weights = np.tile(weights / 2, 6) * law.pdf(fine)
-    hats = np.array([np.interp(fine, levels, row) for row in np.eye(7)])
-    exact = (hats * weights) @ hats.T
-    assert np.linalg.inv(mass.inverse_root @ mass.inverse_root) == pytest.approx(exact, abs=2e-4)
-    assert mass.hats == pytest.approx(exact.diagonal(), abs=2e-4)
-
-
-def test_linear_fields_reach_edge_midpoints_by_their_mean(problem, rng):
-    plane = problem.form.grid.plane
-    period = identify(plane)
-    injection = preconditioner._injection(problem.numbering)
-    values = rng.standard_normal((period.vertices, 2))
-    nodes = (injection @ values.ravel()).reshape(-1, 2)
-    values = np.concatenate([values, np.zeros((1, 2))])  # the corner last
-    for ends, unknown in zip(plane.ends, period.unknown[plane.vertices :], strict=True):
-        assert nodes[unknown] == pytest.approx(values[period.unknown[ends]].mean(axis=0))
-
-
-@pytest.mark.parametrize("ranks", [1, 3, 5])
-def test_a_rank_takes_the_cells_of_its_own_rows_and_no_others(problem, ranks):
-    grid, rows = problem.form.grid, []
-    for rank in range(ranks):  # of 4 levels: the fifth rank has none
-        numbering = LevelNumbering(grid, SimpleNamespace(size=ranks, rank=rank))
-        first, last = numbering.rows.start // 2, numbering.rows.stop // 2
-        pairs = numbering.pairs[grid.cells]
-        layers = np.flatnonzero(((pairs >= first) & (pairs < last)).any(axis=1)) // (
-            len(grid.cells) // grid.layers
-        )
-        assert sorted({*layers}) == list(numbering.layers)
-        rows += numbering.rows
-    assert rows == list(range(problem.numbering.size))
 
 
 class Interrupted:
