@@ -13,7 +13,6 @@ from scipy.spatial import ConvexHull, Voronoi
 
 from alphacut.stochastic.particles.particles import Particles
 from alphacut.stochastic.tessellation.apollonius import apollonius
-from alphacut.stochastic.tessellation.circle_envelope import upper_envelopes
 
 
 def quadrature_area(discs: Particles, i: int) -> float:
@@ -157,37 +156,3 @@ def test_arcs_close_and_meet():
         assert diagram.end[arc[-1]] == pytest.approx(diagram.start[arc[0]] + 2 * np.pi, abs=1e-12)
         incoming, outgoing = diagram.walls(2)[1][:, arc]
         assert outgoing == pytest.approx(np.roll(incoming, -1), rel=1e-6)
-
-
-def test_walls_are_equally_far_from_both_discs():
-    discs = Particles(np.random.default_rng(2).random((40, 2)), np.linspace(0.01, 0.06, 40), (1, 1))
-    diagram = apollonius(discs)
-    angle, rho = (middle[1] for middle in diagram.walls(3))
-    beyond = rho[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1) - diagram.offset
-    towards = np.hypot(beyond[:, 0], beyond[:, 1]) - discs.radii[diagram.neighbour]
-    assert towards == pytest.approx(rho - discs.radii[diagram.cell], abs=1e-12)
-
-
-def test_envelope_against_dense_sampling():
-    rng = np.random.default_rng(5)
-    counts = rng.integers(2, 30, 40)
-    a, b, c = rng.normal(size=(3, counts.sum()))
-    arcs = upper_envelopes(a, b, c, counts)
-    inside = arcs.start + (arcs.end - arcs.start) * rng.random(len(arcs.start))
-    values = a * np.cos(inside[:, None]) + b * np.sin(inside[:, None]) + c
-    is_other = np.repeat(np.arange(len(counts)), counts) != arcs.owner[:, None]
-    uppermost = values[np.arange(len(inside)), arcs.function]
-    assert (uppermost >= np.where(is_other, -np.inf, values).max(axis=1) - 1e-12).all()
-
-
-def test_clusters_with_voids_between_them():
-    rng = np.random.default_rng(0)
-    middles = rng.random((8, 2))[rng.integers(0, 8, 400)]
-    centres = np.mod(middles + 0.01 * rng.standard_normal((400, 2)), 1)
-    discs = Particles(centres, np.full(400, 1e-4), (1, 1))
-    diagram = apollonius(discs)
-    assert diagram.areas.sum() == pytest.approx(1, abs=1e-12)
-    widest = np.argsort(diagram.areas)[-3:]
-    assert diagram.areas[widest] == pytest.approx(
-        [quadrature_area(discs, i) for i in widest], rel=1e-9
-    )

@@ -6,9 +6,6 @@ import pytest
 
 from alphacut.stochastic.figures.all import (
     draw_cells,
-    draw_neighbour_statistics,
-    draw_neighbours,
-    draw_two_point,
     plot_cells,
 )
 from alphacut.stochastic.particles.packing import Packing
@@ -59,13 +56,3 @@ def test_a_corner_of_a_section_has_the_cells_of_the_whole_and_says_so():
     shown = np.concatenate(axes.collections[1].get_segments())
     assert (shown.max(axis=0) > view).all()  # cells go on beyond the corner
     assert (shown.max(axis=0) < 1.5 * view).all()  # and no more of them than needed
-
-
-def test_pictures_of_equal_discs_say_that_they_are_not_the_section():
-    pictures = [
-        draw_neighbours(EQUAL),
-        draw_neighbour_statistics(EQUAL),
-        draw_two_point(EQUAL, np.random.default_rng(1)),
-    ]
-    title = "120 equal discs of the same area fraction, not those of the section"
-    assert {drawn.get_suptitle() for drawn in pictures} == {title}

@@ -4,10 +4,10 @@ import json
 import shutil
 import tomllib
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 from scipy.ndimage import gaussian_filter
 
 from alphacut.fuzzy.refused import RefusedError
@@ -64,7 +64,7 @@ def windows(number: int):
 
 def test_whole_cells_are_those_of_the_larger_section_and_weights_remove_their_bias():
     plain, weighted, truth = [], [], []
-    for window, areas in windows(60):
+    for window, areas in windows(25):
         diagram = apollonius(window)
         whole, weight = counted_cells(diagram)
         area = diagram.areas[whole]
@@ -77,18 +77,12 @@ def test_whole_cells_are_those_of_the_larger_section_and_weights_remove_their_bi
     assert np.mean(plain) / np.mean(truth) - 1 < -0.03
 
 
-def test_a_window_without_a_whole_cell_is_refused():
-    discs = Particles([(0.3, 0.5), (0.7, 0.5)], [0.1, 0.1], (1, 1), periodic=False)
-    with pytest.raises(RefusedError, match="larger section"):
-        counted_cells(apollonius(discs))
-
-
 GOOD = "x [mm],y [mm],r [mm]\n10,10,4\n30,12,5\n20,30,3\n"
 
 
 def circle_file(tmp_path, text: str, **options) -> CircleFile:
     path = tmp_path / "circles.csv"
-    path.write_text(text, encoding="utf-8")
+    path.write_text(text, encoding="utf-8", errors="surrogateescape")
     return CircleFile(path, **(dict(size=(0.04, 0.04)) | options))
 
 
@@ -111,8 +105,6 @@ def test_circles_from_a_file(tmp_path, text):
     [
         (GOOD + "11,11,4\n", "row 5", "do not overlap"),
         (GOOD + "35,35,-1\n", "row 5", "radii from"),
-        (GOOD + "35,35,1e-300\n", "row 5", "radii from"),
-        (GOOD + "35,35,1e308\n", "row 5", "radii from"),
         (GOOD + "35,,1\n", "row 5, column 2", "numbers"),
         (GOOD + "35,nan,1\n", "row 5, column 2", "numbers"),
         (GOOD + "35,1_0,1\n", "row 5, column 2", "numbers"),
@@ -123,6 +115,7 @@ def test_circles_from_a_file(tmp_path, text):
         (GOOD.replace("r [mm]", "q [mm]"), "header", "'d [mm]'"),
         (GOOD.replace(",", ";").replace("12", "1,2"), "row 3, column 2", "numbers"),
         ("", "circles.csv", "rows of numbers"),
+        ("\udcff", "circles.csv", "text files in UTF-8"),
     ],
 )
 def test_rows_without_meaning_are_refused(tmp_path, text, key, allowed):
@@ -131,13 +124,6 @@ def test_rows_without_meaning_are_refused(tmp_path, text, key, allowed):
     assert refused.value.key.endswith(key)
     assert allowed in refused.value.allowed
     assert len(str(refused.value)) < 250
-
-
-def test_files_that_are_no_tables_are_refused(tmp_path):
-    (tmp_path / "binary.csv").write_bytes(b"\x89PNG\xff")
-    for name in ("none.csv", "binary.csv"):
-        with pytest.raises(RefusedError, match="text files in UTF-8"):
-            CircleFile(tmp_path / name, (1, 1)).read()
 
 
 def picture(seed: int, *, noise: float, fraction: float = 0.3):
@@ -160,28 +146,17 @@ def picture(seed: int, *, noise: float, fraction: float = 0.3):
 @pytest.mark.parametrize(
     ("seed", "dark"), [pytest.param(0, False, marks=pytest.mark.slow), (1, True)]
 )
-def test_image_in_circles_out(seed, dark):
+def test_image_in_circles_out(tmp_path, seed, dark):
     grey, centres, radii = picture(seed, noise=1 / 5, fraction=[0.15, 0.3][seed % 2])
-    discs = SectionImage(Path("none"), 1.0).circles(1 - grey if dark else grey)
+    path, grey = tmp_path / "section.png", np.clip(1 - grey if dark else grey, -0.5, 1.5) + 0.5
+    Image.fromarray((127 * grey).astype(np.uint8)).save(path)
+    discs = SectionImage(path, 1.0).read()
     assert len(discs) == len(radii)
     apart = np.hypot(*np.moveaxis(discs.centres[:, None] - centres[None], -1, 0))
     match = np.argmin(apart, axis=0)
     assert len(set(match)) == len(radii)
     assert np.median(np.abs(discs.radii[match] - radii)) < 0.5
     assert np.median(apart.min(axis=0)) < 0.5
-
-
-def test_image_file_and_its_pixel(tmp_path):
-    from skimage import io
-
-    grey, _, radii = picture(0, noise=0.05)
-    whole = (255 * np.clip(grey, 0, 1)).astype(np.uint8)
-    io.imsave(tmp_path / "section.png", whole, check_contrast=False)
-    discs = SectionImage(tmp_path / "section.png", 1e-4).read()
-    assert np.sort(discs.radii) == pytest.approx(1e-4 * np.sort(radii), rel=0.04)
-    (tmp_path / "text.png").write_text("no image")
-    with pytest.raises(RefusedError, match="images that can be read"):
-        SectionImage(tmp_path / "text.png", 1e-4).read()
 
 
 def under_light() -> np.ndarray:
@@ -203,11 +178,14 @@ def labyrinth() -> np.ndarray:
         (np.random.default_rng(1).normal(size=(200, 200)), "3 standard deviations"),
         (labyrinth(), "round particles"),
         (under_light(), "values up to 0.2"),
+        ("no image", "images that can be read"),
     ],
 )
-def test_images_that_hide_their_particles_are_refused(image, allowed):
+def test_images_that_hide_their_particles_are_refused(tmp_path, image, allowed):
+    section = SectionImage(tmp_path / "image.png", 1.0)
+    section.path.write_text(str(image))
     with pytest.raises(RefusedError) as refused:
-        SectionImage(Path("image"), 1.0).circles(image)
+        section.read() if isinstance(image, str) else section.circles(image)
     assert allowed in refused.value.allowed
 
 
@@ -236,25 +214,18 @@ def test_fragment_is_toml_that_gives_the_map(result):
     assert radius["a2"] == pytest.approx(result.pbox.a2, rel=1e-7)
 
 
-def test_slopes_that_differ_by_round_off_alone_are_crisp(result):
-    a2, width = result.pbox.a2, result.pbox.fit.a3 - result.pbox.fit.a1
-    for near, crisp in ((1e-9, True), (1e-4, False)):
-        box = replace(result.pbox, a2=(a2[1] - near * width, a2[1], a2[1] + near * width))
-        slopes = tomllib.loads(fragment(summary(replace(result, pbox=box))))["radius"]["a2"]
-        assert (len(set(slopes)) == 1) is crisp
-
-
 def test_study_of_measured_circles(tmp_path):
-    packing = Packing(900, 0.2, TENFOLD).make(np.random.default_rng(8))
+    packing = Packing(600, 0.2, TENFOLD).make(np.random.default_rng(8))
     table = 1e3 * np.column_stack([packing.centres, packing.radii])
     rows = "".join(f"{x!r},{y!r},{r!r}\n" for x, y, r in table.tolist())
-    truth = study(MicrostructureStudy(Simulated(Packing(900, 0.2, TENFOLD), 6)))
+    truth = study(MicrostructureStudy(Simulated(Packing(600, 0.2, TENFOLD), 6)))
     text, size = "x [mm],y [mm],r [mm]\n" + rows, tuple(packing.size)
     measured = study(MicrostructureStudy(circle_file(tmp_path, text, size=size)))
     assert measured.sample.mean == pytest.approx(truth.sample.mean, abs=0.03)
-    far = replace(measured.study, source=circle_file(tmp_path, GOOD, size=(9.0, 9.0)))
-    with pytest.raises(RefusedError, match="larger section"):
-        study(far)
+    for discs, side in ((GOOD, 9.0), ("x [m],y [m],r [m]\n0.3,0.5,0.1\n0.7,0.5,0.1\n", 1.0)):
+        far = replace(measured.study, source=circle_file(tmp_path, discs, size=(side, side)))
+        with pytest.raises(RefusedError, match="larger section"):
+            study(far)
 
 
 def test_cells_as_tight_as_no_square_are_counted_or_refused():
@@ -298,7 +269,7 @@ def test_figures_are_drawn(result, tmp_path):
 @needs_voro
 def test_spheres_take_the_same_way_and_keep_their_fraction(tmp_path):
     law = MeasuredRadii(tuple(np.linspace(1e-3, 2e-3, 20)))
-    spheres = Packing(300, 0.2, law, shape=SPHERES)
+    spheres = Packing(150, 0.2, law, shape=SPHERES)
     result = study(MicrostructureStudy(Simulated(spheres, 6), seed=2))
     numbers = summary(result)
     assert numbers["mean_volume_fraction_of_map"] == pytest.approx(0.2, rel=6e-3)
@@ -307,14 +278,6 @@ def test_spheres_take_the_same_way_and_keep_their_fraction(tmp_path):
     for section in result.sections:
         assert section.cells.sum() == pytest.approx(section.particles.measure, rel=1e-5)
     assert "13_pbox" in draw(result, tmp_path)
-
-
-@needs_voro
-def test_a_cubic_array_of_spheres_has_cubes_for_cells():
-    grid = np.stack(np.meshgrid(*[np.arange(3)] * 3), axis=-1).reshape(-1, 3) + 0.5
-    section = with_cells(Particles(grid, np.full(27, 0.4), (3, 3, 3)))
-    assert section.cells == pytest.approx(np.ones(27), rel=1e-5)
-    assert section.reduced_radii == pytest.approx(np.full(27, 0.8), rel=1e-5)
 
 
 def test_the_papers_data_as_described(tmp_path, capsys):

@@ -10,7 +10,7 @@ from scipy import stats
 
 from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.stochastic.particles.packing import Packing, random_sequential, relax_random_centres
-from alphacut.stochastic.particles.particles import DISCS, SPHERES, Particles, close_pairs
+from alphacut.stochastic.particles.particles import DISCS, SPHERES, Particles
 from alphacut.stochastic.particles.radius_laws import LogNormalRadii, MeasuredRadii
 from alphacut.stochastic.sections import Simulated
 from alphacut.stochastic.theta.quadrature import gauss_rule
@@ -90,15 +90,6 @@ def test_particles_without_meaning_are_refused():
         with pytest.raises(RefusedError) as refused:
             Particles(**(good | change))
         assert refused.value.key == key
-
-
-def test_sequential_centres_are_uniform_and_without_direction():
-    packing = Packing(2000, 0.2, TENFOLD).make(np.random.default_rng(4))
-    assert stats.kstest((packing.centres / packing.size).ravel(), "uniform").pvalue > 1e-4
-    first, second = close_pairs(packing, 2e-3)
-    apart = packing.separation(first, second)
-    angle = np.mod(np.arctan2(apart[:, 1], apart[:, 0]), np.pi) / np.pi
-    assert stats.kstest(angle, "uniform").pvalue > 1e-4
 
 
 def test_log_normal_law():

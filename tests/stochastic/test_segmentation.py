@@ -35,10 +35,13 @@ def test_noise_and_light_are_measured(noise, drift):
 
 
 def test_a_clean_image_is_as_sharp_as_its_threshold():
-    grey, _ = picture(np.random.default_rng(0))
+    grey, cover = picture(np.random.default_rng(0))
     judged = segment(grey, [110])
     assert judged.open_fraction == 0
     assert judged.fractions[1] == np.mean(grey >= 110)
+    mask = segment(255 * (cover >= 0.5), [128])  # an image of two values is taken as it is
+    assert mask.open_fraction == 0
+    assert mask.fractions[1] == np.mean(cover >= 0.5)
 
 
 def test_a_border_is_open_by_the_deviations_of_the_noise():
@@ -74,19 +77,12 @@ def test_clipped_grey_values_are_refused(ends):
         segment(np.clip(grey, *ends), [110])
 
 
-@pytest.mark.parametrize("noise", [0.0, 0.002, 0.01, 0.1])
-@pytest.mark.parametrize("drift", [0.0, 0.05, 0.3])
+@pytest.mark.parametrize("noise", [0.0, 0.002, 0.1])
+@pytest.mark.parametrize("drift", [0.0, 0.3])
 def test_grey_values_that_are_rounded_are_not_clipped(noise, drift):
-    for seed in range(6):
+    for seed in range(3):
         rng = np.random.default_rng([seed, 7])
-        segment(picture(rng, noise=noise, drift=drift, blur=seed % 3)[0], [110])
-
-
-def test_an_image_of_two_values_is_taken_as_it_is():
-    _, cover = picture(np.random.default_rng(8))
-    judged = segment(255 * (cover >= 0.5), [128])
-    assert judged.open_fraction == 0
-    assert judged.fractions[1] == np.mean(cover >= 0.5)
+        segment(picture(rng, noise=noise, drift=drift, blur=seed)[0], [110])
 
 
 def salt_and_pepper(grey, rng):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import xarray
 
-from alphacut.figures import envelope, material, overview, style
+from alphacut.figures import envelope, overview, style
 from alphacut.frame import StoreyFrame, propagation
 from alphacut.fuzzy import Triangular
 from alphacut.report.page import caption
@@ -38,15 +38,14 @@ def test_figures_are_drawn_once_and_anew_where_the_case_changed(results, tmp_pat
 
 def test_every_figure_has_both_forms_and_a_caption(results):
     names = kept(results)["figures"]
-    assert {"figures/decision.svg", "figures/probability.png", "figures/tolerances.png"} <= set(
-        names
-    )
-    for name in names:
-        assert (results / name).stat().st_size > 1000
-        stem = name.removeprefix("figures/").rpartition(".")[0]
-        words = caption(stem, paper=False)
-        assert words[0].isupper()
-        assert words != stem
+    stems = {name.removeprefix("figures/").rpartition(".")[0] for name in names}
+    assert {"decision", "probability", "tolerances"} <= stems
+    assert set(names) == {f"figures/{stem}.{kind}" for stem in stems for kind in ("svg", "png")}
+    assert all((results / name).stat().st_size > 1000 for name in names)
+    assert all(caption(x, paper=False)[0].isupper() and caption(x, paper=False) != x for x in stems)
+    words = "Figs. 21 to 25: The Graph Follower, step by step"
+    assert caption("fig21-25-graph-follower", paper=True) == words
+    assert caption("fig28-envelope-E-5s-q1", paper=True) == "Fig. 28: Envelope of q1, study E-5s"
 
 
 def study(nature, **more):
@@ -71,44 +70,6 @@ def test_the_error_is_drawn_outside_bounds_that_it_may_pass(nature, lines):
         ends = sorted(float(line.get_ydata()[0]) for line in axes.lines)
     assert ends == [-1.25, 1.25][:lines]
     assert ("± 250 mm" in words) == bool(lines)
-
-
-def test_samples_have_the_membership_of_their_least_input():
-    places = np.array([[[0.0, 0.0], [1.0, 1.0]], [[0.5, 0.5], [0.5, 0.5]]])  # (alpha, bound, input)
-    points = np.array([[0.5, 0.5], [0.5, 1.0], [0.0, 0.5]])
-    data = xarray.Dataset(
-        {"point": (("sample", "input"), points), "E_at": (("alpha", "bound", "input"), places)},
-        {"alpha": [0.0, 1.0]},
-    )
-    assert material.levels_of_samples(data).tolist() == [1, 0, 0]
-
-
-@pytest.mark.parametrize(
-    ("stem", "paper", "words"),
-    [
-        ("fig21-25-graph-follower", True, "Figs. 21 to 25: The Graph Follower, step by step"),
-        ("fig18-modulus", True, "Fig. 18: Fuzzy effective modulus"),
-        ("envelope-all-q3", False, "Envelope of q3"),
-        ("fig28-envelope-E-5s-q1", True, "Fig. 28: Envelope of q1, study E-5s"),
-    ],
-)
-def test_captions(stem, paper, words):
-    assert caption(stem, paper=paper) == words
-
-
-def test_an_image_shows_its_phases_and_the_cuts_of_its_modulus():
-    data = xarray.Dataset(
-        {
-            "E": (("alpha", "bound"), [[20e9, 30e9], [24e9, 25e9]]),
-            "phase": (("y", "x"), np.eye(4)),
-        },
-        {"alpha": [0.0, 1.0], "bound": ["lower", "upper"]},
-    )
-    with figure_style():
-        picture, cuts = material.image(data).axes
-    assert picture.images[0].get_array().shape == (4, 4)
-    ends = np.concatenate([line.get_xdata() for line in cuts.lines])
-    assert (ends.min(), ends.max()) == pytest.approx((20, 30))
 
 
 def test_numbers_and_bounds_are_drawn_with_their_own_ends():

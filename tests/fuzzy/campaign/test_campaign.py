@@ -13,7 +13,6 @@ from alphacut.fuzzy import (
     Automatic,
     FailedError,
     General,
-    Interval,
     Reduced,
     RefusedError,
     Triangular,
@@ -78,26 +77,6 @@ def test_a_cluster_of_dask_is_an_executor():
         assert bits(run(executor=client.get_executor())) == bits(run())
         with pytest.raises(RefusedError, match=r"client.get_executor\(\)"):
             run(executor=client)
-
-
-def test_quick_samples_go_in_batches_and_no_more_than_keep_an_executor_busy():
-    sizes, waiting = [], []
-
-    class Counted(ThreadPoolExecutor):
-        def submit(self, function, call, batch):
-            sizes.append(len(batch))
-            waiting.append(self._work_queue.qsize())
-            return super().submit(function, call, batch)
-
-    inputs = {"a": Interval(0, 1), "b": Interval(0, 1)}
-    with Counted(2) as executor:
-        alpha = np.linspace(0, 1, 40)
-        propagate(
-            lambda a, b: a + b, inputs, General(), alpha=alpha, executor=executor, budget=10**5
-        )
-    assert sum(sizes) > 1500
-    assert max(sizes) > 50
-    assert max(waiting) <= 4
 
 
 @pytest.mark.parametrize("workers", [1, 2])

@@ -35,14 +35,9 @@ def test_joint_cuts_are_those_of_the_lower_levels(alpha):
     assert unknown["y"].cut(alpha) == SECOND.cut(alpha / 2)
     assert independent["y"].cut(alpha) == SECOND.cut(1 - np.sqrt(1 - alpha))
     assert jointly({"x": FIRST})["x"].cut(alpha) == FIRST.cut(alpha)
-
-
-def test_joining_twice_changes_nothing_and_new_claims_are_joined_again():
-    once = jointly({"x": FIRST, "y": SECOND}, independent=True)
-    result = propagate(total, once, Signed(), knowledge=RISING, alpha=[0.1, 0.5])
-    assert result.bounds().lower[1] == once["x"].cut(0.5).lower + once["y"].cut(0.5).lower
-    three = joined_inputs({**once, "z": FIRST})
+    three = joined_inputs({**independent, "z": FIRST})
     assert three["z"].joint.words == "3 sources of unknown dependence"
+    assert joined_inputs(independent) == independent
 
 
 def test_propagation_joins_and_prints_the_claim_with_its_conditions():

@@ -85,12 +85,6 @@ def test_counts_of_the_papers_case(method, evaluations):
     assert propagate(monotone, PAPER, method).evaluations == evaluations
 
 
-def test_general_method_shares_maps_and_moduli():
-    points = propagate(monotone, PAPER, General()).samples.points
-    assert len(np.unique(points[:, :2], axis=0)) == 55
-    assert len(np.unique(points[:, 2])) == 9
-
-
 @pytest.mark.parametrize("method", [General(), Reduced()])
 def test_every_method_is_exact_on_a_monotone_model(method):
     result = propagate(monotone, PAPER, method)
