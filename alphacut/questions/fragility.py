@@ -13,7 +13,7 @@ from alphacut.frame.questions.peaks import ANY
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature
-from alphacut.io.quantity import engineering, range_text
+from alphacut.io.quantity import STANDARD_GRAVITY, engineering, range_text
 from alphacut.questions.question import (
     FuzzyResponse,
     LimitAnswer,
@@ -63,11 +63,19 @@ class FragilityAnswer(LimitsAnswer[LimitFragility]):
         spread = "–" if limit.dispersion is None else _range_text(limit.dispersion[0], "")
         return {
             "limit": limit.words,
-            "median at the lowest α": _range_text(limit.median[0], self.unit),
+            "median at the lowest α": self._median_text(limit.median[0]),
             "nature": limit.nature,
             "dispersion": spread,
-            "median at the highest α": _range_text(limit.median[-1], self.unit),
+            "median at the highest α": self._median_text(limit.median[-1]),
         }
+
+    def _median_text(self, ends: tuple[float, float]) -> str:
+        """Range of a median with its measure; of accelerations in g, too."""
+        text = f"median {self.measure} {_range_text(ends, self.unit)}"
+        if self.unit != "m/s^2":
+            return text
+        low, high = (end / float(STANDARD_GRAVITY) for end in ends)
+        return f"{text} ({_range_text((low, high), 'g')})"
 
     def numbers_of(self, limit: LimitFragility) -> Iterator[Record]:
         """Yields a record for each level."""

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from textwrap import wrap
+from typing import TypeVar
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from alphacut.stages.image import ImageResult
 from alphacut.stages.modulus import ModulusResult
 from alphacut.stages.store import CutsResult
 
+T = TypeVar("T")
 MATERIAL = ("material", "most plausible", "range at α = 0", "nature", "± error")
 MEANING = "Least … largest value if every input stays in its range; α = 1: most plausible"
 """First line of all results, for readers who do not know α-cuts; "nominal" is α = 1."""
@@ -274,34 +276,33 @@ def _compared_moduli(first: Parts, second: Parts) -> Iterator[Row]:
 
 def _compared_peaks(first: Parts, second: Parts) -> Iterator[Row]:
     """Rows on the greatest peak and its width of each output, then on statistics of records."""
-    for study, result in first.envelopes.items():
-        others = second.envelopes[study].peak if study in second.envelopes else {}
-        for output, peak in result.peak.items():
-            if (other := others.get(output)) is not None:
-                name = output if study == "all" else f"{output} ({study})"
-                unit = unit_of(result.units, output)
-                ends = float(peak.far_end[0]), float(other.far_end[0])
-                widths = (float(x.upper[0] - x.lower[0]) for x in (peak, other))
-                yield _compared(f"greatest peak of {name}", unit, *ends)
-                yield _compared(f"width of the peak of {name}", unit, *widths)
-    if first.records is None or second.records is None:
-        return
-    for output, statistics in first.records.statistics.items():
-        if output in second.records.statistics:
-            unit, proved = unit_of(first.records.units, output), statistics.proved
-            for name, values in second.records.statistics[output].proved.items():  # mean …
-                ends = float(proved[name][0]), float(values[0])
+    for study, *results in _in_both(first.envelopes, second.envelopes):
+        for output, *peaks in _in_both(*(x.peak for x in results)):
+            name = output if study == "all" else f"{output} ({study})"
+            unit = unit_of(results[0].units, output)
+            widths = (float(x.upper[0] - x.lower[0]) for x in peaks)
+            yield _compared(f"greatest peak of {name}", unit, *(float(x.far_end[0]) for x in peaks))
+            yield _compared(f"width of the peak of {name}", unit, *widths)
+    if first.records is not None and second.records is not None:
+        for output, *both in _in_both(first.records.statistics, second.records.statistics):
+            unit = unit_of(first.records.units, output)
+            for name, *values in _in_both(*(x.proved for x in both)):  # mean, median …
+                ends = (float(x[0]) for x in values)
                 yield _compared(f"{name} of the records' peaks of {output}", unit, *ends)
+
+
+def _in_both(first: Mapping[str, T], second: Mapping[str, T]) -> Iterator[tuple[str, T, T]]:
+    """Yields name and values of what two results have, in the order of the first's file."""
+    return ((name, value, second[name]) for name, value in first.items() if name in second)
 
 
 def _compared_limits(first: Parts, second: Parts) -> Iterator[Row]:
     """Rows on the verdicts on limits that both runs have, and on their scales of tolerances."""
     if first.decision is not None and second.decision is not None:
-        for name, limit in first.decision.limits.items():
-            if (other := second.decision.limits.get(name)) is not None:
-                yield (limit.words, limit.verdict_words, other.verdict_words, "")
-                if limit.limit != other.limit:
-                    yield (other.words, "another limit", "this limit", "")
+        for _, limit, other in _in_both(first.decision.limits, second.decision.limits):
+            yield (limit.words, limit.verdict_words, other.verdict_words, "")
+            if limit.limit != other.limit:
+                yield (other.words, "another limit", "this limit", "")
     kept = [x.tolerances.kept for x in (first, second) if x.tolerances is not None]
     scales = [scale for scale in kept if scale is not None]
     if len(scales) == 2:

@@ -4,10 +4,14 @@ import csv
 import json
 import re
 
+import numpy as np
 import pytest
 
 from alphacut.entry import main
+from alphacut.questions.summary import Parts
+from alphacut.report.results import comparison
 from alphacut.report.tables import Table, latex, markdown
+from alphacut.stages.suite import Statistics, SuiteResult
 from tests.alphacut.one_case import run
 
 
@@ -34,6 +38,14 @@ def test_two_runs_stand_side_by_side(runs, capsys):
     assert ratio == pytest.approx(peaks[1] / peaks[0], abs=1e-3)
     assert rows["|q2| ≤ 300.0 mm"]["first"] == "not exceeded"
     assert "width of the peak of drift1" in rows
+
+
+def test_statistics_of_records_stand_in_the_order_of_their_file():
+    names = ["median", "84 %", "mean", "least"]
+    statistics = {"q1": Statistics(proved={name: np.ones(1) for name in names})}
+    facts = {"period_s": 1.0, "damping_ratio": 0.05, "alpha": np.zeros(1), "units": {"q1": "m"}}
+    parts = Parts(records=SuiteResult(**facts, records={}, statistics=statistics, spectra={}))
+    assert [row[0].partition(" of")[0] for row in comparison(parts, parts).rows] == names
 
 
 def test_the_comparison_and_all_tables_are_written(runs, tmp_path):

@@ -45,6 +45,14 @@ def test_the_page_asks_nothing_of_the_network_and_shows_each_figure_once(results
     assert page.count("data:image/png;base64,") == len(drawn) > 5
 
 
+def test_wide_tables_scroll_by_themselves(results):
+    page = render_page(ResultsFolder.read(results))
+    tables = re.findall(r'(<div class="scroll"[^>]*>)?<table>', page)
+    assert len(tables) > 5
+    assert all(tables)
+    assert re.search(r"^\.scroll \{[^}]*overflow-x: auto", page, re.MULTILINE)
+
+
 def test_texts_of_the_case_are_no_markup(results):
     page = render_page(ResultsFolder.read(results))
     assert "<script>alert" not in page

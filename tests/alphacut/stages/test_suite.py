@@ -1,6 +1,7 @@
 """A suite of records: measures, scaling, peaks by record, fragility against its closed form."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 from alphacut.case.content import load
 from alphacut.entry import main
 from alphacut.io.problem import BadInput
+from alphacut.questions.fragility import FragilityAnswer
 from alphacut.records.recording import spectral_acceleration
 from alphacut.stages.suite import nominal_mode, suite_records
 
@@ -129,6 +131,11 @@ def test_fragility_of_one_storey_holds_its_closed_form(tmp_path):
     summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
     answer, records = summary["fragility"]["limits"]["drift1"], summary["records"]["records"]
     assert answer["nature"] == "guaranteed"
+    words = FragilityAnswer.model_validate(summary["fragility"]).rows()[0]["median at the lowest α"]
+    (low_g, high_g), ends = re.search(r"\((.*) … (.*) g\)", words).groups(), answer["median"]
+    assert words.startswith("median PGA ")
+    assert float(low_g) * 9.80665 == pytest.approx(ends["lower"][0], rel=0.01)
+    assert float(high_g) * 9.80665 == pytest.approx(ends["upper"][0], rel=0.01)
     grounds = {r.name: r for r in records_of(tmp_path)[0]}
     for row, (name, record) in enumerate(records.items()):
         exact = []
