@@ -21,7 +21,13 @@ from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.knowledge.known import Signs, contradiction, negligible
 from alphacut.fuzzy.plans.cut import CutSearch, cuts_with_width
 from alphacut.fuzzy.plans.design import bounds_of_samples
-from alphacut.fuzzy.plans.single_linkage import ROUNDING, SEED, VALUE_TOLERANCE, SingleLinkage
+from alphacut.fuzzy.plans.single_linkage import (
+    EQUAL,
+    ROUNDING,
+    SEED,
+    VALUE_TOLERANCE,
+    SingleLinkage,
+)
 from alphacut.fuzzy.plans.transformation import Reduced, corners_suffice
 from alphacut.fuzzy.result import Bounds, Nature
 from alphacut.fuzzy.sets.boxes import Domain
@@ -70,8 +76,11 @@ class Automatic:
                         f"corners alone bound {_listed(np.array(outputs)[monotone])}:"
                         f" the differences of each input {which}"
                     )
-                if not monotone.all():
-                    names = tuple(np.array(outputs)[~monotone])
+                if walk.is_constant.any():
+                    constant = _listed(np.array(outputs)[walk.is_constant])
+                    notes.append(f"{constant} does not change along the walk, and is not searched")
+                if not (monotone | walk.is_constant).all():
+                    names = tuple(np.array(outputs)[~(monotone | walk.is_constant)])
                     searched = names if len(names) <= _MAX_SEARCHED else ()
                     linkage = SingleLinkage(campaign, domain, searched)
                     linkage.run(walk.samples)
@@ -117,6 +126,7 @@ class SignWalk:
         steps: Points along the walk at which each input is changed.
         samples: Points of the walk between which each input changes once, in unit coordinates,
             shape (steps + 1, uncertain inputs): a Latin hypercube sample of the cut.
+        is_constant: Outputs that are the same all along the walk, a mask (outputs,).
     """
 
     def __init__(self, campaign: Campaign, widest: CutSearch) -> None:
@@ -127,6 +137,7 @@ class SignWalk:
         self.steps = _WALK if inputs > 1 else _WALK_OF_ONE
         hypercube = qmc.LatinHypercube(inputs, rng=np.random.default_rng([SEED, 0]))
         self.samples: Array = hypercube.random(self.steps + 1)
+        self.is_constant: Mask = np.zeros(0, bool)
 
     @property
     def n_points(self) -> int:
@@ -139,7 +150,7 @@ class SignWalk:
         Evaluates those corners, which are samples of the campaign afterwards.
         """
         signs = self._signs_along_walk()
-        monotone: Mask = np.asarray((signs != 0).all(axis=1))
+        monotone: Mask = np.asarray((signs != 0).all(axis=1)) & ~self.is_constant
         for pattern in np.unique(signs[monotone], axis=0):
             self._evaluate_corners(pattern)
         samples = self.campaign.samples
@@ -164,6 +175,10 @@ class SignWalk:
         by_input = differences.reshape(self.steps, inputs, -1)
         falls, rises = (by_input < -tolerance).any(axis=0), (by_input > tolerance).any(axis=0)
         is_unknown = (falls & rises) | np.isnan(by_input).any(axis=0)
+        # an input with an effect here and none there: on a plateau corners tell nothing
+        is_tied = np.abs(by_input) <= EQUAL * np.abs(values).max(axis=0)
+        is_unknown |= is_tied.any(axis=0) & ~is_tied.all(axis=0)
+        self.is_constant = np.asarray(is_tied.all(axis=(0, 1)))
         return np.where(is_unknown, 0, np.where(falls, -1, 1)).astype(np.int8).T
 
     def _evaluate_corners(self, signs: Signs) -> None:

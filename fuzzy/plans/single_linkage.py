@@ -52,7 +52,7 @@ VALUE_TOLERANCE = 1e-5
 ROUNDING = 1e-9  # the same of an output's size
 MAX_ON_PLATEAUS = 1000
 """Samples on plateaus with which the search of a bound ends: 95 % find a cone of 0.3 % of them."""
-_EQUAL = 1e-13  # of an output's size: two samples that differ by less lie on a plateau
+EQUAL = 1e-13  # of an output's size: two samples that differ by less lie on a plateau
 _SAME_PLACE = 0.01  # of the width: optima of one value are the same there without a look between
 _BETWEEN = np.array([0.25, 0.5, 0.75])  # points of a line on which a hump is looked for
 _MIN_NEW = 15  # samples that a round adds
@@ -95,7 +95,7 @@ def on_plateaus(values: Array) -> Mask:
     order = np.argsort(values)
     ordered = values[order]
     with np.errstate(invalid="ignore"):  # ∞ − ∞ of failed samples
-        is_equal = np.diff(ordered) <= _EQUAL * np.abs(values[np.isfinite(values)]).max(initial=0)
+        is_equal = np.diff(ordered) <= EQUAL * np.abs(values[np.isfinite(values)]).max(initial=0)
     is_tied = np.zeros(len(values), bool)
     is_tied[order] = np.append(is_equal, False) | np.append(False, is_equal)
     return is_tied
@@ -257,7 +257,7 @@ class SingleLinkage:
         sampled = self._values[bound][rows]
         values = np.append(sampled, cut.values(cut.corners, bound))
         is_tied = np.append(on_plateaus(sampled), np.zeros(len(cut.corners), bool))
-        tolerance = _EQUAL * np.abs(values[np.isfinite(values)]).max(initial=0)
+        tolerance = EQUAL * np.abs(values[np.isfinite(values)]).max(initial=0)
         for sigma in (SIGMA_ONE_HUMP, SIGMA_SEVERAL_HUMPS):
             if sigma == SIGMA_SEVERAL_HUMPS and state.n_humps(cut) < 2:
                 continue

@@ -116,6 +116,48 @@ def test_a_plateau_is_not_taken_as_explored(function):
     assert result.evaluations < 6000
 
 
+def flat_with_a_cone(rng):
+    """Steps, or a wave cut at two values, and on its highest plateau a cone: with the apex's value."""
+    n, steps = int(rng.integers(1, 4)), int(rng.integers(0, 4))
+    names, ends = [f"x{k}" for k in range(n)], [1, 2] * rng.uniform(-1, -0.5, (n, 1)) + [0, 2.5]
+    turn, weights = rng.normal(size=(3, n)) / np.sqrt(n), rng.uniform(0.3, 1, 3)
+    points = rng.uniform(*ends.T, (2000, n)).T
+
+    def wave(x):
+        u, v, w = np.tensordot(turn, x, axes=1)
+        return weights @ [np.tanh(u), v**2, np.sin(1.5 * w + weights[0])]
+
+    cuts = np.quantile(wave(points), [rng.uniform(0.05, 0.4), rng.uniform(0.6, 0.95)])
+
+    def flat(x):
+        return np.floor(steps * wave(x)) / steps if steps else np.clip(wave(x), *cuts)
+
+    apex, radius, height = points[:, flat(points).argmax()], *rng.uniform([0.03, 0.02], [0.3, 1.5])
+
+    def function(**inputs):
+        x = np.array([inputs[name] for name in names])
+        distance = np.linalg.norm(x - apex.reshape(-1, *[1] * (x.ndim - 1)), axis=0)
+        return flat(x) + height * np.maximum(0, 1 - distance / radius)
+
+    inputs = {name: Interval(*sorted(x)) for name, x in zip(names, ends.tolist(), strict=True)}
+    return function, inputs, flat(points).max() + height
+
+
+def test_the_nature_of_bounds_covers_a_cone_on_a_plateau(rng):
+    for _ in range(12):
+        function, inputs, peak = flat_with_a_cone(rng)
+        result = propagate(function, inputs, alpha=[0.0], vectorised=True)
+        is_covered = peak <= (result.upper + result.error).item() + 1e-9
+        assert is_covered or result.nature is Nature.ATTAINED
+
+
+def test_what_never_changes_is_attained_without_a_search():
+    result = propagate(lambda x, y: {"u": x + y, "v": 0 * x}, SQUARE, alpha=[0], vectorised=True)
+    assert result.natures == (Nature.ESTIMATED, Nature.ATTAINED)
+    assert result.evaluations < 100
+    assert any(note.startswith("v does not change") for note in result.notes)
+
+
 def test_critical_distance_and_share_are_those_of_the_papers():
     for d, n in ((1, 100), (3, 200)):
         ball = np.pi ** (d / 2) / gamma(1 + d / 2) * critical_distance(n, d) ** d
