@@ -15,7 +15,6 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import FailedError, require, require_choice
 
 Function = Callable[..., object]
-Output = float | Sequence[float] | Mapping[str, ArrayLike] | ArrayLike
 Layout = tuple[tuple[str, tuple[int, ...]], ...]
 _BATCH = 1024  # points per call of a vectorised function
 
@@ -171,24 +170,22 @@ def named_point(names: Sequence[str], point: Array) -> dict[str, float]:
 
 
 def _outcome(output: Any) -> Outcome:
-    """Return the sample of a returned output, or a failure if it is an exception or no numbers."""
-    if isinstance(output, Exception):
-        return Failure(f"{type(output).__name__}: {output}")
+    """Return the sample of a number (`y`), an array (`y[0]`, …) or a mapping of names to them.
+
+    Of an exception, and of what is no number, a failure is returned.
+    """
     try:
-        return _flatten(output)
-    except (TypeError, ValueError) as error:
+        if isinstance(output, Exception):
+            raise output
+        named = output if isinstance(output, Mapping) else {"y": output}
+        arrays = {str(name): _finite_array(str(name), value) for name, value in named.items()}
+        layout = tuple((name, array.shape) for name, array in arrays.items())
+        columns = Values(layout, np.zeros((0, 0))).columns
+        are_distinct = bool(columns) and len(set(columns)) == len(columns)
+        allowed = "one number or more, all of different names"
+        require(are_distinct, "outputs", value=columns, allowed=allowed)
+    except Exception as error:
         return Failure(f"{type(error).__name__}: {error}")
-
-
-def _flatten(output: Output) -> Sample:
-    """Return a number (named `y`), an array (`y[0]`, …) or a mapping of names to them as sample."""
-    named = output if isinstance(output, Mapping) else {"y": output}
-    arrays = {str(name): _finite_array(str(name), value) for name, value in named.items()}
-    layout = tuple((name, array.shape) for name, array in arrays.items())
-    columns = Values(layout, np.zeros((0, 0))).columns
-    are_distinct = bool(columns) and len(set(columns)) == len(columns)
-    allowed = "one number or more, all of different names"
-    require(are_distinct, "outputs", value=columns, allowed=allowed)
     return Sample(layout, np.concatenate([array.ravel() for array in arrays.values()]))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from time import perf_counter
@@ -23,7 +23,7 @@ from alphacut.fuzzy.campaign.call import (
     named_point,
 )
 from alphacut.fuzzy.campaign.store import Store, point_key
-from alphacut.fuzzy.campaign.workers import Task, completed
+from alphacut.fuzzy.campaign.workers import completed
 from alphacut.fuzzy.knowledge.known import Knowledge
 from alphacut.fuzzy.refused import FailedError, checked_number
 from alphacut.fuzzy.sets.boxes import Domain, quasi_random_points
@@ -163,10 +163,9 @@ class Campaign:
 
     def _run(self, points: Array) -> Array:
         """Evaluate new points (n, inputs) and return their outputs (n, columns), NaN if failed."""
-        batch = _Batch(self, points)
-        batch.run()
+        outcomes = _evaluate(self, points)
         LOG.debug("%d samples, %d before", len(points), len(self))
-        failures = {row: x.error for row, x in batch.outcomes.items() if isinstance(x, Failure)}
+        failures = {row: x.error for row, x in outcomes.items() if isinstance(x, Failure)}
         if failures and not (self.skip and self.layout):
             names = self.call.names
             pairs = [(named_point(names, points[row]), failures[row]) for row in sorted(failures)]
@@ -174,7 +173,7 @@ class Campaign:
         self.failed += len(failures)
         width = len(Values(self.layout, np.zeros((0, 0))).columns)
         outputs = np.full((len(points), width), np.nan)
-        for row, outcome in batch.outcomes.items():
+        for row, outcome in outcomes.items():
             if isinstance(outcome, Sample):
                 outputs[row] = outcome.row
         return outputs
@@ -196,57 +195,35 @@ class Campaign:
             self.progress(fraction)
 
 
-class _Batch:
-    """Evaluation of new points (n, inputs) by the store and the workers.
+def _evaluate(campaign: Campaign, points: Array) -> dict[int, Outcome]:
+    """Sample or failure by row of new points (n, inputs), read from the store or evaluated.
 
-    Attributes:
-        outcomes: Sample or failure by row of the points.
+    What is evaluated is stored now and then, and in the end even if the evaluation is interrupted.
     """
-
-    def __init__(self, campaign: Campaign, points: Array) -> None:
-        self.campaign, self.points = campaign, points
-        self.outcomes: dict[int, Outcome] = {}
-        self._unwritten: dict[str, Sample] = {}
-        self._written, self._write_seconds = perf_counter(), 0.0  # time and cost of the last write
-
-    def run(self) -> None:
-        """Set `outcomes`: read stored samples, evaluate the others, and store what was evaluated.
-
-        Samples are stored even if the evaluation is interrupted.
-        """
-        campaign, count = self.campaign, len(self.points)
-        if campaign.store is not None:
-            for row in range(count):
-                if sample := campaign.store.get(campaign.model, self._key(row)):
-                    self.outcomes[row] = campaign.checked(sample)
-        try:
-            for rows, outcomes in completed(campaign.call, self._tasks(), campaign.executor):
-                for row, outcome in zip(rows, map(campaign.checked, outcomes), strict=True):
-                    self.outcomes[row] = outcome
-                    if campaign.store and isinstance(outcome, Sample):
-                        self._unwritten[self._key(row)] = outcome
-                self._write()
-                # the first batch of a design is most of the work; later ones are not foreseen
-                if not len(campaign) and count > 1:
-                    campaign.report(0.99 * len(self.outcomes) / count)
-        finally:
-            self._write(now=True)
-
-    def _key(self, row: int) -> str:
-        return point_key(self.campaign.call.names, self.points[row])
-
-    def _tasks(self) -> Iterator[Task]:
-        """Yield rows and points of each call for the points that are not in the store."""
-        for group in self.campaign.call.tasks(self.points):
-            if rows := [row for row in group if row not in self.outcomes]:
-                yield rows, self.points[rows]
-
-    def _write(self, *, now: bool = False) -> None:
-        """Store new samples if `now`, or if storing has taken under a tenth of the time."""
-        start, store = perf_counter(), self.campaign.store
-        is_due = start - self._written > max(_MIN_PAUSE, _MIN_PAUSE_RATIO * self._write_seconds)
-        if store and self._unwritten and (now or is_due):
-            store.put(self.campaign.model, self._unwritten)
-            self._unwritten = {}
-            self._written = perf_counter()
-            self._write_seconds = self._written - start
+    store, outcomes, unwritten = campaign.store, dict[int, Outcome](), dict[str, Sample]()
+    keys = [point_key(campaign.call.names, point) for point in points] if store else []
+    for row, key in enumerate(keys):
+        if store and (sample := store.get(campaign.model, key)):
+            outcomes[row] = campaign.checked(sample)
+    groups = ([x for x in rows if x not in outcomes] for rows in campaign.call.tasks(points))
+    tasks = ((rows, points[rows]) for rows in groups if rows)
+    written, write_seconds = perf_counter(), 0.0
+    try:
+        for rows, results in completed(campaign.call, tasks, campaign.executor):
+            for row, outcome in zip(rows, map(campaign.checked, results), strict=True):
+                outcomes[row] = outcome
+                if store and isinstance(outcome, Sample):
+                    unwritten[keys[row]] = outcome
+            start = perf_counter()
+            is_due = start - written > max(_MIN_PAUSE, _MIN_PAUSE_RATIO * write_seconds)
+            if store and unwritten and is_due:
+                store.put(campaign.model, unwritten)
+                unwritten, written = {}, perf_counter()
+                write_seconds = written - start
+            # the first batch of a design is most of the work; later ones are not foreseen
+            if not len(campaign) and len(points) > 1:
+                campaign.report(0.99 * len(outcomes) / len(points))
+    finally:
+        if store and unwritten:
+            store.put(campaign.model, unwritten)
+    return outcomes

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from alphacut.fuzzy.arrays import Array, Mask
+from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import checked_number, require, require_choice
 
 Signs = NDArray[np.int8]
@@ -24,8 +24,6 @@ class Knowledge:
     Args:
         signs: +1 for an input with which all outputs rise, −1 where all fall; or such a mapping by
             output, `{"load": {"deflection": 1}}`.
-        monotone: Inputs in which all outputs are monotone while the others are fixed, in either
-            direction; inputs with a sign need not be named again.
         source: Where the facts come from, named beside the guarantees that rest on them.
         tests: Points of each cut at which a guarantee is tested, as far as the budget goes.
 
@@ -34,11 +32,10 @@ class Knowledge:
 
     Example:
         >>> Knowledge(signs={"load": 1}, source="by statics").words
-        ('the signs of load hold, by statics',)
+        'the signs of load hold, by statics'
     """
 
     signs: Mapping[str, int | Mapping[str, int]] = field(default_factory=dict)
-    monotone: tuple[str, ...] = ()
     source: str = "as stated by the caller"
     tests: int = 16
 
@@ -50,17 +47,13 @@ class Knowledge:
                 require(value in (-1, 1), f"sign of {name}", value=value, allowed=allowed)
 
     @property
-    def words(self) -> tuple[str, ...]:
-        """The facts, one sentence each."""
-        facts = {
-            f"the signs of {', '.join(self.signs)} hold": self.signs,
-            f"the outputs are monotone in {', '.join(self.monotone)}": self.monotone,
-        }
-        return tuple(f"{fact}, {self.source}" for fact, names in facts.items() if names)
+    def words(self) -> str:
+        """The facts as a sentence."""
+        return f"the signs of {', '.join(self.signs)} hold, {self.source}"
 
     def check_inputs(self, inputs: Iterable[str]) -> None:
         """Refuse names that are no input."""
-        for name in (*self.signs, *self.monotone):
+        for name in self.signs:
             require_choice("input of knowledge", name, inputs)
 
     def check_outputs(self, outputs: Iterable[str]) -> None:
@@ -77,11 +70,6 @@ class Knowledge:
             for row, output in enumerate(outputs):
                 table[row, column] = sign.get(output, 0) if isinstance(sign, Mapping) else sign
         return table
-
-    def monotone_in(self, inputs: Sequence[str], outputs: Sequence[str]) -> Mask:
-        """Return whether each output is stated to be monotone in each input, (outputs, inputs)."""
-        named = np.array([name in self.monotone for name in inputs])
-        return np.asarray((self.stated_signs(inputs, outputs) != 0) | named)
 
 
 def negligible(values: Array) -> Array:

@@ -61,7 +61,7 @@ class Automatic:
     def run(self, campaign: Campaign, domain: Domain) -> Bounds:
         """Bounds of every output: by corners if the knowledge allows, else by a search."""
         outputs = campaign.output_names(domain)
-        stated = campaign.knowledge.monotone_in(domain.names, outputs)
+        stated = campaign.knowledge.stated_signs(domain.names, outputs)
         if corners_suffice(domain, stated).all():
             return replace(Reduced().run(campaign, domain), method=self.name)
         monotone: Mask = np.zeros(len(outputs), bool)

@@ -100,7 +100,7 @@ def guaranteed_bounds(bounds: Bounds, campaign: Campaign, proved: Mask) -> Bound
     samples, knowledge = campaign.samples, campaign.knowledge
     signs = knowledge.stated_signs(tuple(bounds.inputs), bounds.outputs)
     is_exceeded = _exceeded_outputs(bounds, samples)
-    words, allowed = repr("; ".join(knowledge.words)), "facts that hold over the whole supports"
+    words, allowed = repr(knowledge.words), "facts that hold over the whole supports"
     for column in np.flatnonzero(proved):
         pair = contradiction(samples.points, samples.values.array[:, column], signs[column])
         agrees, key = pair is None and not is_exceeded[column], bounds.outputs[column]
@@ -112,7 +112,7 @@ def guaranteed_bounds(bounds: Bounds, campaign: Campaign, proved: Mask) -> Bound
         bounds,
         natures=natures,
         nature=Nature.weakest(natures),
-        basis=tuple(f"{fact}, {evidence}" for fact in knowledge.words),
+        basis=(f"{knowledge.words}, {evidence}",),
         inner=Ends(bounds.lower, bounds.upper),
     )
 

@@ -80,13 +80,10 @@ def level_grids(domain: Domain, *, inner: bool) -> list[list[list[float]]]:
     return [list(level) for level in zip(*columns, strict=True)]
 
 
-def corners_suffice(domain: Domain, monotone: Mask) -> Mask:
-    """Return the outputs that are monotone in every input that has a width, a mask (outputs,).
-
-    `monotone` says whether each output is in each input, shape (outputs, inputs).
-    """
+def corners_suffice(domain: Domain, signs: Signs) -> Mask:
+    """Return the outputs with a sign of every input that has a width, a mask (outputs,)."""
     lower, upper = domain.boxes
-    return np.asarray((monotone | (lower[0] == upper[0])).all(axis=1))
+    return np.asarray(((signs != 0) | (lower[0] == upper[0])).all(axis=1))
 
 
 def require_budget(samples: float, campaign: Campaign, method: str) -> None:
@@ -110,8 +107,8 @@ class General:
         require_budget(sum(prod(map(len, grid)) for grid in grids), campaign, self.name)
         design = Design.from_levels(domain, [np.array(list(product(*grid))) for grid in grids])
         bounds = design.bounds(campaign(design.points), self.name)
-        monotone = campaign.knowledge.monotone_in(domain.names, bounds.outputs)
-        return guaranteed_bounds(bounds, campaign, corners_suffice(domain, monotone))
+        signs = campaign.knowledge.stated_signs(domain.names, bounds.outputs)
+        return guaranteed_bounds(bounds, campaign, corners_suffice(domain, signs))
 
 
 @dataclass(frozen=True)
@@ -154,7 +151,7 @@ class Signed:
         points = [_level_points(np.unique(signs, axis=0), grid) for signs, grid in levels]
         design = Design.from_levels(domain, points)
         at_corners = design.bounds(campaign(design.points), self.name)
-        stated = campaign.knowledge.stated_signs(domain.names, at_corners.outputs) != 0
+        stated = campaign.knowledge.stated_signs(domain.names, at_corners.outputs)
         proved = corners_suffice(domain, stated) & np.isin(at_corners.outputs, effects.outputs)
         guaranteed = guaranteed_bounds(at_corners, campaign, proved)
         bounds = bounds_of_samples(domain, campaign.samples, self.name)
