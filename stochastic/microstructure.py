@@ -127,17 +127,6 @@ class Microstructure:
         """Share of area or volume in cells tighter than `Shape.reach`, which are capped."""
         return 0.0 if self.study.limits else 1 - float(self.sample.cdf(self.study.shape.reach))
 
-    @property
-    def stated_fraction(self) -> float | None:
-        """Share of area or volume that the packings are specified with; None of measured ones."""
-        source = self.study.source
-        return source.packing.fraction if isinstance(source, Simulated) else None
-
-    @property
-    def fraction_of_map(self) -> float:
-        """Mean share of the cell that the particle takes, for the modal map."""
-        return _fraction(self.study.shape, self.pbox.fit, (self.pbox.a2[1], self.pbox.a4[1]))
-
 
 def study(
     case: MicrostructureStudy,
@@ -236,7 +225,7 @@ def summary(result: Microstructure) -> dict[str, object]:
     """All numbers of a microstructure study by the keys of its JSON file, lengths in m."""
     packings = [section.particles for section in result.sections]
     radii = np.concatenate([packing.radii for packing in packings])
-    shape = result.study.shape
+    shape, source, pbox = result.study.shape, result.study.source, result.pbox
     cell_fraction = float(result.sample.weights @ shape.fractions(result.sample.values))  # eq. 10
     numbers: dict[str, object] = {
         "particles": shape.particles,
@@ -244,14 +233,33 @@ def summary(result: Microstructure) -> dict[str, object]:
         shape.particles: len(radii),
         f"{shape.cells}_fraction": float(np.mean([packing.fraction for packing in packings])),
         f"{shape.cells}_fraction_of_cells": cell_fraction,
-        f"mean_{shape.cells}_fraction_of_map": result.fraction_of_map,
-        "fraction_of_case": result.stated_fraction,
+        f"mean_{shape.cells}_fraction_of_map": _fraction(shape, pbox.fit, (pbox.a2[1], pbox.a4[1])),
+        "fraction_of_case": source.packing.fraction if isinstance(source, Simulated) else None,
         "smallest_radius": float(radii.min()),
         "largest_radius": float(radii.max()),
         "share_capped": result.share_capped,
     }
-    neighbour_numbers, map_numbers = _neighbour_numbers(result), _map_numbers(result)
-    return numbers | neighbour_numbers | map_numbers | {"radius": radius_section(result)}
+    return {
+        **numbers,
+        **_neighbour_numbers(result),
+        "cells": len(result.sample.values),
+        "mean_r_n": result.sample.mean,
+        "largest_r_n": float(result.sample.values[-1]),
+        "limits": list(result.limits),
+        "share_kept": result.share_within,
+        "a1": pbox.fit.a1,
+        "a2": list(pbox.a2),
+        "a3": pbox.fit.a3,
+        "a4": list(pbox.a4),
+        "a2_band": list(result.slopes.a2),
+        "a4_band": list(result.slopes.a4),
+        "band": result.band,
+        "pbox_area": pbox.area,
+        "pbox_breach": pbox.excess(result.truncated),
+        "misfit": pbox.fit.misfit(result.truncated, (pbox.a2[1], pbox.a4[1])),
+        "seed": result.study.seed,
+        "radius": radius_section(result),
+    }
 
 
 def _neighbour_numbers(result: Microstructure) -> dict[str, object]:
@@ -270,29 +278,6 @@ def _neighbour_numbers(result: Microstructure) -> dict[str, object]:
             "mean_distance": float(distance.mean()) if len(distance) else None,
         },
         "correlation": float(np.mean([np.corrcoef(pairs)[0, 1] for pairs in sharing])),
-    }
-
-
-def _map_numbers(result: Microstructure) -> dict[str, object]:
-    """Numbers of the sample of r_n, of the fuzzy map, and how far the sample leaves its p-box."""
-    pbox, sample = result.pbox, result.sample
-    return {
-        "cells": len(sample.values),
-        "mean_r_n": sample.mean,
-        "largest_r_n": float(sample.values[-1]),
-        "limits": list(result.limits),
-        "share_kept": result.share_within,
-        "a1": pbox.fit.a1,
-        "a2": list(pbox.a2),
-        "a3": pbox.fit.a3,
-        "a4": list(pbox.a4),
-        "a2_band": list(result.slopes.a2),
-        "a4_band": list(result.slopes.a4),
-        "band": result.band,
-        "pbox_area": pbox.area,
-        "pbox_breach": pbox.excess(result.truncated),
-        "misfit": pbox.fit.misfit(result.truncated, (pbox.a2[1], pbox.a4[1])),
-        "seed": result.study.seed,
     }
 
 

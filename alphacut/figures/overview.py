@@ -82,35 +82,21 @@ def draw_prisms(axes: Any, grid: PrismGrid, positions: Array) -> None:
     from matplotlib.colors import to_rgb
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
-    plane, edges = grid.plane.points, boundary_edges(grid)
+    plane, triangles = grid.plane.points, grid.plane.triangles[:, :3]
+    pairs = np.concatenate([triangles[:, [0, 1]], triangles[:, [0, 2]], triangles[:, [1, 2]]])
+    edges = np.unique(np.sort(pairs, axis=1), axis=0)  # corners of each, shape (edges, 2)
     cone = layer_faces(positions, edges, grid.plane.arc)  # over edges between nodes on the particle
     axes.add_collection3d(Poly3DCollection(cone, facecolor=PARTICLE, edgecolor=PURPLE, lw=0.3))
-    matrix_triangles = grid.plane.triangles[~grid.plane.inside, :3]
     thin = {"facecolor": (*to_rgb(MATRIX), 0.15), "edgecolor": (*to_rgb(INK), 0.35), "lw": 0.2}
     for on_side in (plane[:, 1] <= -1 + 1e-9, plane[:, 0] >= 1 - 1e-9):
         axes.add_collection3d(Poly3DCollection(layer_faces(positions, edges, on_side), **thin))
-    bottom = positions[0][matrix_triangles]
+    bottom = positions[0][triangles[~grid.plane.inside]]
     axes.add_collection3d(Poly3DCollection(bottom, facecolor=MATRIX, ec=INK, lw=0.15))
-    axes.set(
-        xlim=(-1, 1),
-        ylim=(-1, 1),
-        zlim=(positions[0, 0, 2], positions[-1, 0, 2]),
-        xlabel="x$_1$/a",
-        ylabel="x$_2$/a",
-        zlabel="θ",
-        xticks=[-1, 0, 1],
-        yticks=[-1, 0, 1],
-    )
+    axes.set(xlabel="x$_1$/a", ylabel="x$_2$/a", zlabel="θ", xticks=[-1, 0, 1], yticks=[-1, 0, 1])
+    axes.set(xlim=(-1, 1), ylim=(-1, 1), zlim=(positions[0, 0, 2], positions[-1, 0, 2]))
     axes.set_box_aspect((1, 1, 1.2), zoom=0.85)
     axes.view_init(elev=25, azim=-55)
     axes.set_title(f"product domain, {len(grid.cells):,} prisms", loc="left", fontsize=10)
-
-
-def boundary_edges(grid: PrismGrid) -> Rows:
-    """Corners of every edge of the planar triangles, shape (edges, 2)."""
-    triangles = grid.plane.triangles[:, :3]
-    pairs = np.concatenate([triangles[:, [0, 1]], triangles[:, [0, 2]], triangles[:, [1, 2]]])
-    return np.asarray(np.unique(np.sort(pairs, axis=1), axis=0))
 
 
 def layer_faces(levels: Array, edges: Rows, nodes: Mask) -> Array:
@@ -156,7 +142,8 @@ def boxes_and_arrows(results: Results) -> tuple[list[tuple[str, list[str]]], lis
         numbers = getattr(content.radius, "numbers", {})
         lines = []
         for name, number in numbers.items():
-            lines.append(f"{name} = [{', '.join(f'{x:.4g}' for x in ends_and_modal(number))}]")
+            values = sorted({number.support.lower, number.modal, number.support.upper})
+            lines.append(f"{name} = [{', '.join(f'{x:.4g}' for x in values)}]")
         boxes.append(("radius of the particle", lines))
         arrows.append("r(θ)")
     if (data := results.modulus) is not None:
@@ -179,25 +166,7 @@ def boxes_and_arrows(results: Results) -> tuple[list[tuple[str, list[str]]], lis
     return boxes, arrows[:-1]
 
 
-def ends_and_modal(number: FuzzyNumber) -> list[float]:
-    """Support and modal value of a fuzzy number, each once, rising."""
-    return sorted({number.support.lower, number.modal, number.support.upper})
-
-
 CUTS = 6  # levels in Fig. 37
-
-
-def number_of_each_kind(given: FuzzyNumber, result: FuzzyNumber) -> dict[str, FuzzyNumber]:
-    """A fuzzy number of each kind, by its name: four made of an input, and a computed result."""
-    half, three_quarters = given.cut(0.5), given.cut(0.75)
-    ends = (given.support.lower, *three_quarters, given.support.upper)
-    return {
-        "crisp": Crisp(given.modal),
-        "interval": Interval(*half),
-        "triangular": given,
-        "trapezoidal": Trapezoidal(*ends),
-        "piecewise linear": result,
-    }
 
 
 def kinds_of_numbers(given: FuzzyNumber, result: FuzzyNumber) -> Figure:
@@ -207,7 +176,13 @@ def kinds_of_numbers(given: FuzzyNumber, result: FuzzyNumber) -> Figure:
     """
     import matplotlib.pyplot as plt
 
-    numbers = number_of_each_kind(given, result)
+    numbers: dict[str, FuzzyNumber] = {
+        "crisp": Crisp(given.modal),
+        "interval": Interval(*given.cut(0.5)),
+        "triangular": given,
+        "trapezoidal": Trapezoidal(given.support.lower, *given.cut(0.75), given.support.upper),
+        "piecewise linear": result,
+    }
     figure, panels = plt.subplots(1, len(numbers), figsize=(11.0, 2.6), sharey=True)
     for axes, (name, number) in zip(panels, numbers.items(), strict=True):
         number.plot(axes, color=BLUE, lw=1.6)

@@ -44,50 +44,37 @@ if TYPE_CHECKING:
 
 REDUCED = "reduced radius $r_n$ = r/a"
 """Name of the axis."""
-Figures = dict[str, Callable[[], "Figure"]]
 
 
 def draw(result: Microstructure, folder: Path) -> dict[str, list[Path]]:
-    """Write every figure of a microstructure as SVG and PNG; return the files of each name."""
-    figures = map_figures(result)
-    if result.study.shape == DISCS:
-        figures |= disc_figures(result)
-    with figure_style():
-        return {name: save(draw(), folder / name) for name, draw in sorted(figures.items())}
+    """Write every figure of a microstructure as SVG and PNG; return the files of each name.
 
-
-def map_figures(result: Microstructure) -> Figures:
-    """Functions that draw radii, cell areas, p-box and radius map, by figure name."""
-    source = result.study.source
+    Figures of direct neighbours show discs of one size at the same area fraction, as in the paper.
+    """
+    first, source = result.sections[0], result.study.source
     law = source.packing.radii if isinstance(source, Simulated) else None
-    return {
+    figures: dict[str, Callable[[], Figure]] = {
         "11_radii": lambda: draw_radii(result, law),
         "12_areas": lambda: draw_areas(result),
         "13_pbox": lambda: draw_pbox(result),
         "radius_map": lambda: draw_map(result),
     }
-
-
-def disc_figures(result: Microstructure) -> Figures:
-    """Functions that draw the figures of discs and their cells, by figure name.
-
-    Figures of direct neighbours show discs of one size at the same area fraction, as in the paper.
-    """
-    first, source = result.sections[0], result.study.source
-    generator = np.random.default_rng(result.study.seed)
-    few_equal, many_equal = _equal_discs(result, 120), _equal_discs(result, 4000)
-    figures: Figures = {
-        "03-04_two_point": lambda: draw_two_point(many_equal, generator),
-        "05-08_neighbours": lambda: draw_neighbours(few_equal),
-        "06-07_neighbour_statistics": lambda: draw_neighbour_statistics(many_equal),
-        "09_correlation": lambda: draw_correlation(result, apollonius(many_equal)),
-    }
+    if result.study.shape == DISCS:
+        generator = np.random.default_rng(result.study.seed)
+        few_equal, many_equal = _equal_discs(result, 120), _equal_discs(result, 4000)
+        figures |= {
+            "03-04_two_point": lambda: draw_two_point(many_equal, generator),
+            "05-08_neighbours": lambda: draw_neighbours(few_equal),
+            "06-07_neighbour_statistics": lambda: draw_neighbour_statistics(many_equal),
+            "09_correlation": lambda: draw_correlation(result, apollonius(many_equal)),
+        }
     if (diagram := first.diagram) is not None:
         figures["10_cells"] = lambda: draw_cells(diagram)
     if isinstance(source, SectionImage):
         picture = source.picture()
         figures["image_circles"] = lambda: draw_overlay(picture, first.particles)
-    return figures
+    with figure_style():
+        return {name: save(draw(), folder / name) for name, draw in sorted(figures.items())}
 
 
 def _equal_discs(result: Microstructure, number: int) -> Particles:

@@ -79,7 +79,6 @@ class HermiteFit:
     def _integrals(self, probability: Array) -> Array:
         """Integrals ∫ h_i f_Θ dθ of h2, h4 up to quantiles of probabilities (n,), (2, n)."""
         # the moments ∫ θ^k f_Θ dθ follow from each other by partial integration, as f' = −θ f
-        # the moments ∫ θ^k f_Θ dθ follow from each other by partial integration, as f' = −θ f
         law = self.distribution
         theta = law.quantile(probability)
         density, first = law.pdf(theta), law.pdf(law.lower)

@@ -121,8 +121,6 @@ def _mass_gaps(law: ThetaLaw, edges: Array, rule: tuple[Array, Array]) -> Array:
     """Error of a rule for the density f on each panel, (n,), by its distribution function F."""
     # the larger of the errors of ∫ f, which is [F], and of ∫ x f, x from −1 to 1 over the panel,
     # which is [x F] − ∫ F dx: a jump right in the middle of a panel shows in the second alone
-    # the larger of the errors of ∫ f, which is [F], and of ∫ x f, x from −1 to 1 over the panel,
-    # which is [x F] − ∫ F dx: a jump right in the middle of a panel shows in the second alone
     x, w = rule
     half = np.diff(edges)[:, None] / 2
     theta = edges[:-1, None] + half * (1 + x)
