@@ -9,7 +9,7 @@ import pytest
 from alphacut.frame import StoreyFrame, envelope
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
-from alphacut.frame.questions.peaks import ANY, Peak, passing, peaks
+from alphacut.frame.questions.peaks import ANY, Peak, passing, peaks, tightest
 from alphacut.frame.questions.probability import clopper_pearson, probabilities
 from alphacut.frame.questions.tolerances import scaled, tolerances
 from alphacut.fuzzy import Triangular
@@ -268,3 +268,22 @@ def test_peaks_of_one_side_are_those_of_its_bounds():
     assert found["min q1"].greatest_bounds.upper == [3.0]
     assert passing(found, {"min q1": 1.5})["min q1"].outcome == "exceeded"
     assert passing(found, {"max q1": 5.5})["max q1"].outcome == "not exceeded"
+
+
+def one_level(lower, upper, reached, nature, error=0.0, outputs=("q1",)):
+    ends = [np.array([x]) for x in (lower, upper, error, reached, 0.0, np.inf)]
+    return dict.fromkeys(outputs, Peak(np.zeros(1), *ends, nature))
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_the_tighter_proved_and_the_larger_reached_value_is_taken(order):
+    first = one_level(1.0, 3.0, 2.0, Nature.GUARANTEED)
+    second = one_level(0.5, 2.5, 2.2, Nature.GUARANTEED, outputs=("q1", "q2"))
+    both = tightest(*(first, second)[::order])
+    assert set(both) == {"q1", "q2"}
+    peak = both["q1"]
+    assert (peak.lower[0], peak.upper[0], peak.reached[0]) == (1.0, 2.5, 2.2)
+    weaker = one_level(1.5, 2.1, 2.4, Nature.ATTAINED)
+    mixed = tightest(*(first, weaker)[::order])["q1"]
+    assert (mixed.lower[0], mixed.upper[0], mixed.reached[0]) == (1.0, 3.0, 2.4)
+    assert mixed.nature is Nature.GUARANTEED
