@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from inspect import signature
 from pathlib import Path
 from time import perf_counter
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -163,29 +163,16 @@ def _units(units: Mapping[str, str], outputs: Sequence[str]) -> tuple[str, ...]:
     return tuple(units.get(name, units.get(array, "")) for name, array in pairs)
 
 
-@dataclass(frozen=True, eq=False)
-class Shares:
+class Shares(NamedTuple):
     """Contribution of each input, or group of inputs, to the width of a result (Figs. 34, 35).
 
-    Args:
-        names: Inputs or groups.
-        width: Width with all inputs fuzzy, shape (…, outputs).
-        reduction: Reduction of the width when an input is fixed at its nominal value, shape
-            (names, …, outputs). Reductions need not add up to the width: effects overlap.
+    `share` is the reduction of the width when an input of `names` is fixed at its nominal value,
+    over the width with all inputs fuzzy, shape (names, …, outputs); 0 where the width is 0. Shares
+    need not add up to 1: effects overlap. A negative one is an error of the bounds.
     """
 
     names: tuple[str, ...]
-    width: Array
-    reduction: Array
-
-    @property
-    def share(self) -> Array:
-        """Reduction over width, shape (names, …, outputs); 0 where the width is 0.
-
-        A narrower input cannot widen the true range: a negative value is an error of the bounds.
-        """
-        share: Array = np.zeros_like(self.reduction)
-        return np.divide(self.reduction, self.width, out=share, where=self.width > 0)
+    share: Array
 
 
 def width_shares(
@@ -223,4 +210,6 @@ def width_shares(
 
     width = width_with({})
     fixed = [{x: Crisp(numbers[x].modal) for x in group} for group in members.values()]
-    return Shares(tuple(members), width, np.array([width - width_with(crisp) for crisp in fixed]))
+    reduction = np.array([width - width_with(crisp) for crisp in fixed])
+    share = np.divide(reduction, width, out=np.zeros_like(reduction), where=width > 0)
+    return Shares(tuple(members), share)

@@ -287,7 +287,7 @@ def radius_section(result: Microstructure) -> dict[str, list[float] | float]:
     tolerance = CRISP_TOLERANCE * (box.fit.a3 - box.fit.a1)
 
     def triangle(ends: tuple[float, float, float]) -> list[float]:
-        """Lower end, modal value and upper end; ends at the modal value but for round-off on it."""
+        """Lower end, nominal value, upper end; ends that differ by round-off are that value."""
         snapped = (ends[1] if abs(end - ends[1]) <= tolerance else end for end in ends)
         return [float(f"{end:.8g}") for end in snapped]
 
@@ -309,7 +309,7 @@ def fragment(numbers: Mapping[str, Any]) -> str:
     lines = [
         f"[radius]  # from {numbers['cells']} cells; the limits keep"
         f" {numbers['share_kept']:.4%} of their {measure}",
-        f"# {measure} fraction of this map at its modal values: {map_fraction:.4f}{words}",
+        f"# {measure} fraction of this map at its nominal values: {map_fraction:.4f}{words}",
     ]
     for name, value in numbers["radius"].items():
         is_fuzzy = isinstance(value, list)

@@ -32,7 +32,7 @@ def maps(section: RadiusMapSection, alpha: float) -> list[HermiteMap]:
 
 
 def modal_map(section: RadiusMapSection) -> HermiteMap:
-    """The radius map at the modal values."""
+    """The radius map at the nominal values."""
     return section.at({name: number.modal for name, number in section.numbers.items()})
 
 
@@ -60,7 +60,7 @@ def p_box(section: RadiusMapSection) -> Figure:
     axes.plot(at, family.min(0), color=INK, lw=1)
     axes.plot(at, family.max(0), color=INK, lw=1)
     modal = distribution(modal_map(section), at)
-    axes.plot(at, modal, color=PURPLE, lw=1.8, label="modal map")
+    axes.plot(at, modal, color=PURPLE, lw=1.8, label="nominal map")
     axes.set(xlabel="reduced radius r$_n$ = r/a", ylabel="cumulative distribution", ylim=(0, 1.02))
     axes.legend(loc="lower right")
     return figure

@@ -126,7 +126,7 @@ def draw_damper(axes: Axes, start: Point, end: Point) -> None:
 
 DURATION = 5.0  # s
 TITLES = (
-    "initial guess, the modal trajectory",
+    "initial guess, the nominal trajectory",
     "optimum of the Taylor model, new trajectories",
     "at a later node the best stored one is the guess",
     "bounds left by the sweep, and the best of all",

@@ -33,7 +33,7 @@ from alphacut.fuzzy.sets.numbers import FuzzyNumber
 Model = Callable[[Array], Array]
 # share of the support: points of two levels closer than this differ by round-off only
 _ROUND_OFF = 1e-13
-_PROBES = 4  # points inside a box, besides its extreme corners and the modal point
+_PROBES = 4  # points inside a box, besides its extreme corners and the nominal point
 _MARGIN = 0.05  # of the range of the slopes over the probes, which the least slope must exceed
 _STEP = 1e-3  # of a finite difference, over the width of the box
 

@@ -111,7 +111,7 @@ class Domain:
 
     @property
     def modal(self) -> Array:
-        """Modal point of the inputs, shape (inputs,)."""
+        """Nominal point of the inputs, shape (inputs,)."""
         return np.array([number.modal for number in self.inputs.values()], float)
 
     def inside(self, points: Array) -> Mask:

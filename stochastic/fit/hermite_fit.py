@@ -54,7 +54,9 @@ class HermiteFit:
         probability = np.concatenate([[0.0], cumulated])
         probability[-1] = 1.0
         # normal equations: ∫ h_i (Q − a1 h1 − a3 h3) f_Θ dθ, Q constant between probabilities
-        right_side = np.diff(self._integrals(probability), axis=1) @ sample.values - self._ends
+        weights_at_nodes, shape = self._shapes_at_nodes
+        ends = shape[[1, 3]] * weights_at_nodes @ (self.a1 * shape[0] + self.a3 * shape[2])
+        right_side = np.diff(self._integrals(probability), axis=1) @ sample.values - ends
         best = np.asarray(np.linalg.solve(self._gram, right_side), float)
         a2, a4 = best if self.is_monotone(best) else self._nearest_monotone(best)
         return float(max(a2, 0)), float(max(a4, 0))
@@ -101,12 +103,6 @@ class HermiteFit:
         """Gram matrix ∫ h_i h_j f_Θ dθ of h2 and h4, shape (2, 2)."""
         weights, shape = self._shapes_at_nodes
         return np.asarray(shape[[1, 3]] * weights @ shape[[1, 3]].T)
-
-    @cached_property
-    def _ends(self) -> Array:
-        """Integrals ∫ h_i (a1 h1 + a3 h3) f_Θ dθ for h2 and h4, shape (2,)."""
-        weights, shape = self._shapes_at_nodes
-        return np.asarray(shape[[1, 3]] * weights @ (self.a1 * shape[0] + self.a3 * shape[2]))
 
     @property
     def base_slopes(self) -> Array:
@@ -190,7 +186,7 @@ def slope_band(
 
 @dataclass(frozen=True)
 class PBox:
-    """A Hermite map with fuzzy slopes a2, a4: lower end, modal value, upper end of each."""
+    """A Hermite map with fuzzy slopes a2, a4: lower end, nominal value, upper end of each."""
 
     fit: HermiteFit
     a2: tuple[float, float, float]
@@ -235,26 +231,23 @@ def least_pbox(
     Raises:
         FailedError: No p-box of monotone cubics with these ends contains the sample.
     """
-    modal = fit.slopes(sample)
-    limits = _support_limits(modal, None if required is None else required.monotone_part(fit))
+    a2, a4 = fit.slopes(sample)
+    part = SlopeBand((a2,) * 3, (a4,) * 3) if required is None else required.monotone_part(fit)
+    inner_a2, inner_a4 = (a2, *part.a2), (a4, *part.a4)  # which the supports contain
+    limits = [(0, min(inner_a2)), (max(inner_a2), None), (0, min(inner_a4)), (max(inner_a4), None)]
     ends = _least_area_supports(fit, limits, *_containment(fit, sample, band))
-    return PBox(fit, (ends[0], modal[0], ends[1]), (ends[2], modal[1], ends[3]))
-
-
-def _support_limits(
-    modal: tuple[float, float], required: SlopeBand | None
-) -> list[tuple[float, float | None]]:
-    """Limits of the supports (a2L, a2U, a4L, a4U) that contain modal and required slopes."""
-    bands = ((), ()) if required is None else (required.a2, required.a4)
-    a2, a4 = ((slope, *band) for slope, band in zip(modal, bands, strict=True))
-    return [(0, min(a2)), (max(a2), None), (0, min(a4)), (max(a4), None)]
+    return PBox(fit, (ends[0], a2, ends[1]), (ends[2], a4, ends[3]))
 
 
 def _containment(fit: HermiteFit, sample: AreaWeighted, band: float) -> tuple[Array, Array]:
     """Matrix (k, 4) and right side (k,) by which (a2L, a2U, a4L, a4U) contain the sample's band."""
     # at each step of the sample's distribution function the greatest radius must reach the value
     # where the band's lower edge rises, and the least must not pass it where the upper edge does
-    probability, values, is_lower_edge = _band_corners(sample, band)
+    steps, before, after = sample.steps
+    lower, upper = before + band < 1, after - band > 0
+    probability = np.concatenate([(before + band)[lower], (after - band)[upper]])
+    values = np.concatenate([steps[lower], steps[upper]])
+    is_lower_edge = np.arange(len(values)) < lower.sum()
     law = fit.distribution
     xi = (law.quantile(probability) - law.lower) / (law.upper - law.lower)
     h1, h2, h3, h4 = (polynomial.polyval(xi, h) for h in SHAPES)
@@ -263,17 +256,6 @@ def _containment(fit: HermiteFit, sample: AreaWeighted, band: float) -> tuple[Ar
     least = np.stack([h2, zero, zero, h4], axis=1)
     matrix = np.where(is_lower_edge[:, None], greatest, least)
     return matrix, np.where(is_lower_edge, -rest, rest)
-
-
-def _band_corners(sample: AreaWeighted, band: float) -> tuple[Array, Array, Array]:
-    """Probability, value of each corner of the sample's band, whether of the lower edge, (k,)."""
-    values, before, after = sample.steps
-    lower, upper = before + band < 1, after - band > 0
-    return (
-        np.concatenate([(before + band)[lower], (after - band)[upper]]),
-        np.concatenate([values[lower], values[upper]]),
-        np.arange(lower.sum() + upper.sum()) < lower.sum(),
-    )
 
 
 def _least_area_supports(

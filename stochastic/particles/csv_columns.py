@@ -42,8 +42,7 @@ def length_columns(path: Path, columns: Sequence[str]) -> tuple[Rows, Array]:
 
 def fields(path: Path) -> list[tuple[int, list[str]]]:
     """Return number and fields of each line of a CSV file that is neither empty nor a comment."""
-    text = text_of(path)
-    lines = [(row, line) for row, line in enumerate(text.splitlines(), 1)]
+    lines = [*enumerate(text_of(path).splitlines(), 1)]
     lines = [(row, line) for row, line in lines if line.strip() and not line.startswith("#")]
     if len(lines) < 2:
         allowed = "a header with units, and rows of numbers below it"

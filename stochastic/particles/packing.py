@@ -57,8 +57,11 @@ class Packing:
     def make(self, generator: np.random.Generator) -> Particles:
         """Return a random packing in a square or cube that it fills to `fraction`, if it can."""
         radii, side = self._radii(generator)
-        box = np.full(self.shape.dimensions, side)
-        return Particles(self._centres(radii, box, generator), radii, box)
+        box, is_loose = np.full(self.shape.dimensions, side), self.fraction <= self.shape.sequential
+        centres = random_sequential(radii, box, generator) if is_loose else None
+        if centres is None:
+            centres = relax_random_centres(radii, box, generator)
+        return Particles(centres, radii, box)
 
     def _radii(self, generator: np.random.Generator) -> tuple[Array, float]:
         """Draw radii until their box has room for the largest: radii (n,) and side, in m."""
@@ -78,12 +81,6 @@ class Packing:
             measure = float(self.shape.measure(radii).sum()) / self.fraction
             side = float(np.sqrt(measure) if self.shape == DISCS else np.cbrt(measure))
         return radii, side
-
-    def _centres(self, radii: Array, box: Array, generator: np.random.Generator) -> Array:
-        """Centres (n, d), in m, by random sequential addition if it succeeds, else relaxation."""
-        is_loose = self.fraction <= self.shape.sequential
-        centres = random_sequential(radii, box, generator) if is_loose else None
-        return relax_random_centres(radii, box, generator) if centres is None else centres
 
 
 def random_sequential(radii: Array, box: Array, generator: np.random.Generator) -> Array | None:

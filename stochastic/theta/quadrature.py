@@ -75,7 +75,10 @@ def gauss_rule(distribution: ThetaLaw, *, points: int) -> ThetaRule:
         0.9733
     """
     checked_number("points", points, whole=True, least=1)
-    fine = _fine_rule(distribution, 16 + 2 * points)
+    panels = min(math.ceil(distribution.upper - distribution.lower), _FIRST_PANELS)
+    levels = np.asarray(np.linspace(distribution.lower, distribution.upper, panels + 1), float)
+    legendre = np.polynomial.legendre.leggauss(16 + 2 * points)
+    fine = _weighted(distribution, _panel_edges(distribution, levels, legendre), legendre)
     relevant = fine.weights > _NEGLIGIBLE
     theta, weights = fine.nodes[relevant], fine.weights[relevant]
     alpha, beta = np.zeros(points), np.zeros(points + 1)  # of the recurrence; beta[0] = 0
@@ -89,14 +92,6 @@ def gauss_rule(distribution: ThetaLaw, *, points: int) -> ThetaRule:
     jacobi = np.diag(alpha) + np.diag(off_diagonal, 1) + np.diag(off_diagonal, -1)
     nodes, vectors = np.linalg.eigh(jacobi)
     return ThetaRule(nodes, vectors[0] ** 2)
-
-
-def _fine_rule(law: ThetaLaw, points: int) -> ThetaRule:
-    """Gauss–Legendre rule with `points` nodes in each panel that integrates f_Θ to round-off."""
-    panels = min(math.ceil(law.upper - law.lower), _FIRST_PANELS)
-    edges = np.asarray(np.linspace(law.lower, law.upper, panels + 1), float)
-    rule = np.polynomial.legendre.leggauss(points)
-    return _weighted(law, _panel_edges(law, edges, rule), rule)
 
 
 def _panel_edges(law: ThetaLaw, edges: Array, rule: tuple[Array, Array]) -> Array:

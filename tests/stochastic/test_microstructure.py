@@ -291,4 +291,4 @@ def test_the_papers_data_as_described(tmp_path, capsys):
 @needs_voro
 def test_the_map_of_spheres(capsys):
     sphere_map.main(["--spheres", "100", "--packings", "5"])
-    assert "volume fraction of this map at its modal values: 0.2" in capsys.readouterr().out
+    assert "volume fraction of this map at its nominal values: 0.2" in capsys.readouterr().out
