@@ -9,7 +9,7 @@ import pytest
 
 from alphacut.case.content import load
 from alphacut.case.limits import DecisionSection
-from alphacut.frame.questions.peaks import ANY, Peaks
+from alphacut.frame.questions.peaks import ANY, Peak
 from alphacut.fuzzy.result import Nature
 from alphacut.questions.decision import decide
 from alphacut.questions.question import FuzzyResponse
@@ -34,7 +34,7 @@ def quantity(text):
     return float(number) * SI[unit]
 
 
-class Peak:
+class Drawn:
     """The peak of a side of random motions: its values, bounds of them, and limits in SI."""
 
     def __init__(self, rng, output, side):
@@ -67,21 +67,16 @@ class Peak:
         return "exceeded" if nearest else "can be exceeded" if is_reached else "undecided"
 
 
-def parts_of(peaks_drawn, structure):
-    """Envelope and decision of the drawn bounds, which `Peaks` has for −q where side is min."""
-    columns = {
-        "lower": [x.proved[0] for x in peaks_drawn],
-        "upper": [x.proved[1] for x in peaks_drawn],
-        "least_proved": [x.proved[0] for x in peaks_drawn],
-        "reached": [x.farthest for x in peaks_drawn],
-        "least_reached": [x.nearest for x in peaks_drawn],
-        "error": [0.0] * len(peaks_drawn),
-    }
-    outwards = [x.outwards for x in peaks_drawn]
-    arrays = {name: np.array([values]) * outwards for name, values in columns.items()}
-    names, natures = tuple(x.name for x in peaks_drawn), (Nature.GUARANTEED,) * len(peaks_drawn)
-    peaks = Peaks(alpha=np.zeros(1), outputs=names, natures=natures, **arrays)
-    section = DecisionSection(limits=tuple(x.text(y) for x in peaks_drawn for y in x.limits))
+def parts_of(drawn, structure):
+    """Envelope and decision of the drawn bounds, which `Peak` has for −q where side is min."""
+    peaks = {}
+    for x in drawn:
+        ends = {"lower": x.proved[0], "upper": x.proved[1], "error": 0.0, "reached": x.farthest}
+        ends |= {"least_proved": x.proved[0], "least_reached": x.nearest}
+        bounds = {end: np.array([x.outwards * value]) for end, value in ends.items()}
+        is_signed = bool(x.side)
+        peaks[x.name] = Peak(np.zeros(1), **bounds, nature=Nature.GUARANTEED, is_signed=is_signed)
+    section = DecisionSection(limits=tuple(x.text(y) for x in drawn for y in x.limits))
     answer = decide(section, FuzzyResponse(structure, ("k1",), (0.0,), 1.0, 0.1, peaks))
     numbers = {key: {} for key in ("min", "max", "mean_width", "error")}
     study = EnvelopeResult(
@@ -154,7 +149,7 @@ def test_limits_and_peaks_have_the_sign_that_they_were_given(tmp_path, rng):
     structure = load(case).content.structure
     kinds = [(output, side) for output in OUTPUTS for side in ("max", "min", "")]
     for _ in range(LIMITS // (len(kinds) * LIMITS_OF_PEAK)):
-        drawn = [Peak(rng, *kind) for kind in kinds]
+        drawn = [Drawn(rng, *kind) for kind in kinds]
         limits = [(peak, limit) for peak in drawn for limit in peak.limits]
         parts = parts_of(drawn, structure)
         of_limits, of_peaks = tables(parts)["decision"], peak_table(parts)
