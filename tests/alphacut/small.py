@@ -40,18 +40,6 @@ alpha = [0, 1]
 tolerance = 1e-6
 """
 
-SMALLER = {
-    "layers = 12": "layers = 3",
-    "size = 0.15": "size = 0.4",
-    'plan = "general"': 'plan = "reduced"',
-    "[0, 0.25, 0.5, 0.75, 1]": "[0, 0.5, 1]",
-    '"1 mm"': '"50 mm"',
-    '"30 s"': '"2 s"',
-    '"5 s"': '"1 s"',
-    '"0.01 s"': '"0.05 s"',
-}
-"""Changes of the paper's case that leave its whole chain, and make it quick."""
-
 
 def written(folder, text=FRAME, **changes):
     """A case file with texts replaced, each of which must be there."""

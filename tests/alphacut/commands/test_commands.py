@@ -178,16 +178,3 @@ def test_ctrl_c_ends_a_run_and_the_same_run_goes_on(tmp_path):
         assert "continues from" in err
     again = subprocess.run(words, capture_output=True, text=True, check=True, timeout=120)
     assert "E, GPa" in again.stdout
-
-
-def test_no_library_is_needed_to_check(tmp_path):
-    program = (
-        "import sys; from alphacut.entry import main; main(['check', sys.argv[1]]);"
-        " print(*sys.modules, file=sys.stderr)"
-    )
-    run = subprocess.run(
-        [sys.executable, "-c", program, str(written(tmp_path, CELL))],
-        capture_output=True,
-        text=True,
-    )
-    assert not {"dolfinx", "petsc4py", "gmsh", "matplotlib.pyplot"} & set(run.stderr.split())

@@ -55,24 +55,6 @@ def test_a_stage_is_computed_once_until_its_inputs_change(tmp_path):
     assert json.loads((tmp_path / "thing.json").read_text())["case"] == "the case"
 
 
-@pytest.mark.parametrize("damage", [b"", b"no NetCDF", None])
-def test_a_damaged_file_is_computed_anew(tmp_path, damage):
-    calls, of = counted()
-    store_in(tmp_path).take(of(1))
-    path = tmp_path / "thing.nc"
-    path.write_bytes(path.read_bytes()[:200] if damage is None else damage)
-    assert int(store_in(tmp_path).take(of(1)).arrays.x) == len(calls) == 2
-
-
-def test_a_file_of_another_format_is_left_alone(tmp_path):
-    _, of = counted()
-    store_in(tmp_path).take(of(1))
-    manifest = json.loads((tmp_path / "manifest.json").read_text())
-    (tmp_path / "manifest.json").write_text(json.dumps({**manifest, "format_version": 99}))
-    with pytest.raises(RefusedError, match="format 99"):
-        store_in(tmp_path)
-
-
 def test_a_stage_that_fails_leaves_no_file(tmp_path):
     def compute(work):
         raise RuntimeError("no convergence")
