@@ -30,17 +30,12 @@ from alphacut.io.arrays import read_array
 from alphacut.io.quantity import fuzzy_of_any_unit
 
 
-def _array_file(value: object, info: ValidationInfo) -> Array:
-    """Array of a file that the case names, as "K.npz" or "K.npz:columns"."""
-    name, _, member = str(value).partition(":") if isinstance(value, str) else ("", "", "")
-    return read_array(case_file(name or value, info), member)
-
-
 def _term(value: object, info: ValidationInfo) -> tuple[Monomial, Array]:
-    """Factor and array of a pair of texts."""
+    """Factor and array of a pair of texts, a factor and a file as "K.npz" or "K.npz:columns"."""
     match value:
         case [str(factor), str(file)]:
-            return Monomial.parse(factor), _array_file(file, info)
+            name, _, member = file.partition(":")
+            return Monomial.parse(factor), read_array(case_file(name, info), member)
     raise RefusedError("", value, 'a pair [factor, file], as ["Ec*I", "columns.mtx"]')
 
 
@@ -52,7 +47,6 @@ def _parameter(value: object, _: ValidationInfo) -> FuzzyNumber:
 
 
 Term = Annotated[tuple[Monomial, Array], PlainValidator(_term, json_schema_input_type=list[str])]
-Vector = Annotated[Array, text(_array_file)]
 Parameters = dict[str, Annotated[FuzzyNumber, text(_parameter)]]
 
 
@@ -60,9 +54,7 @@ class ObservedRow(Section):
     """One output of a structure from matrices: a row that acts on the unknowns."""
 
     unit: str = Field(default="m", description="SI unit of the output, as m, N or N*m")
-    row: dict[str, float] | None = None
-    """entries of the row by unknown, as {"5.x" = 1}"""
-    file: Vector | None = Field(default=None, description="the row as a file with one vector")
+    row: dict[str, float] = Field(description='entries of the row by unknown, as {"5.x" = 1}')
     factor: Annotated[Monomial, text(lambda x, _: Monomial.parse(str(x)))] = Field(
         default=Monomial(1.0, ()), description='factor of the row, as "E*I*l^-2"'
     )
@@ -126,7 +118,8 @@ class MatricesSection(StructureSection):
     def _model(self, numbers: Mapping[str, FuzzyNumber]) -> MatrixStructure:
         """The structure at the nominal values of its parameters."""
         rows: dict[str, Array] = {
-            Output(name, row.unit): self._row(name, row) for name, row in self.outputs.items()
+            Output(name, output.unit): self._vector(f"outputs.{name}.row", output.row)
+            for name, output in self.outputs.items()
         }
         return MatrixStructure(
             {name: number.modal for name, number in numbers.items()},
@@ -158,11 +151,6 @@ class MatricesSection(StructureSection):
     ) -> list[tuple[Monomial | str | float, Array]]:
         return [(factor.simplest, array) for factor, array in terms]
 
-    def _row(self, name: str, row: ObservedRow) -> Array:
-        if row.file is not None:
-            return np.ravel(row.file)
-        return self._vector(f"outputs.{name}.row", row.row or {})
-
     def _vector(self, key: str, entries: Mapping[str, float]) -> Array:
         """A vector over the unknowns from its entries by unknown; `key` is for messages."""
         indices = {name: index for index, name in enumerate(self.unknowns)}
@@ -181,10 +169,7 @@ class MatricesSection(StructureSection):
 
     @model_validator(mode="after")
     def _check_rows(self) -> Self:
-        """Refuses outputs without exactly one row, and a record without a direction."""
-        for name, output in self.outputs.items():
-            has_one = (output.row is None) != (output.file is None)
-            require(has_one, f"matrices.outputs.{name}", value=None, allowed="one of row and file")
+        """Refuses a structure without outputs, and a record without a direction."""
         require(bool(self.outputs), "matrices.outputs", value=None, allowed="one output or more")
         if self.accelerogram is not None or self.direction:
             self.require_pattern()

@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Annotated, Literal, Self, cast
+from typing import Annotated, Any, Literal, Self, cast
 
 from pydantic import Field, PlainValidator, ValidationInfo, model_validator
 
@@ -278,56 +278,41 @@ class Frame(StructureSection):
 
         See `StructureSection`.
         """
-        young: FuzzyNumber | None = modulus or self.modulus or STAND_IN
-        if self.stiffness:  # which needs no modulus
-            young = self.modulus
+        # values by floor or storey, by the frame's own arguments
+        lists = {x: self.per_floor(getattr(self, NAMES.get(x, x))) for x in SYMBOLS}
+        lists["second_moment"] = self.second_moment or ()  # of all storeys, where it is one
+        if self.stiffness:  # which needs neither columns nor a modulus
+            lists["columns"], young = (), self.modulus
+        else:
+            young = modulus or self.modulus or STAND_IN
         ratios = damping_ratios_by_name(self.damping_ratio, loss)
+        nominal: dict[str, Any] = {x: tuple(y.modal for y in lists[x]) for x in lists}
+        nominal["second_moment"] = nominal["second_moment"] or None
+        nominal_ratios = tuple(x.modal for x in ratios.values())
         try:
-            model = self._model(young, [x.modal for x in ratios.values()])
+            model = StoreyFrame(
+                **nominal,
+                modulus=None if young is None else young.modal,
+                damper_placement=self.damper_placement or "ground",
+                outputs=self.outputs,
+                rayleigh=(self.rayleigh_mass.modal, self.rayleigh_stiffness.modal),
+                ground=self.accelerogram,
+                damping_ratio=nominal_ratios[0] if len(ratios) == 1 else nominal_ratios or None,
+            )
         except RefusedError as error:
             key = f"frame.{NAMES.get(error.key, error.key)}"
             raise RefusedError(key, error.value, error.allowed, error.cure) from None
-        numbers = self._numbers(young) | ratios
-        per_storey = enumerate(self.per_floor(self.lengths), start=1)
-        heights = {f"drift{storey}": height for storey, height in per_storey}
-        return Structure(model, {name: numbers[name] for name in model.parameters}, heights)
-
-    def _model(self, modulus: FuzzyNumber | None, ratios: list[float]) -> StoreyFrame:
-        """The frame at nominal values, with a Young's modulus in Pa and damping ratios."""
-        return StoreyFrame(
-            self._modal(self.masses),
-            self._modal(self.lengths),
-            None if modulus is None else modulus.modal,
-            tuple(x.modal for x in self.second_moment or ()) or None,
-            dampers=self._modal(self.dampers),
-            damper_placement=self.damper_placement or "ground",
-            q0=self._modal(self.displacements),
-            v0=self._modal(self.velocities),
-            outputs=self.outputs,
-            rayleigh=(self.rayleigh_mass.modal, self.rayleigh_stiffness.modal),
-            ground=self.accelerogram,
-            damping_ratio=ratios[0] if len(ratios) == 1 else tuple(ratios) or None,
-            columns=() if self.stiffness else self._modal(self.columns),
-            stiffness=self._modal(self.stiffness),
-        )
-
-    def _modal(self, values: tuple[FuzzyNumber, ...] | None) -> tuple[float, ...]:
-        return tuple(x.modal for x in self.per_floor(values))
-
-    def _numbers(self, modulus: FuzzyNumber | None) -> dict[str, FuzzyNumber]:
-        """Every parameter that a frame may have but damping ratios, crisp or fuzzy, by name."""
-        numbers: dict[str, FuzzyNumber] = {
-            "E": modulus or STAND_IN,
-            "rayleigh_mass": self.rayleigh_mass,
-            "rayleigh_stiffness": self.rayleigh_stiffness,
+        numbers = {
+            SYMBOLS[x].format(z): number
+            for x, values in lists.items()
+            for z, number in enumerate(values, start=1)
         }
-        if self.second_moment is not None:
-            numbers["I"] = self.second_moment[0]  # of all storeys, where it is one
-        for argument, symbol in SYMBOLS.items():  # symbol "m{}" of the frame's masses, for example
-            key = NAMES.get(argument, argument)  # of this section
-            per_storey = enumerate(self.per_floor(getattr(self, key)), start=1)
-            numbers |= {symbol.format(storey): value for storey, value in per_storey}
-        return numbers
+        if self.second_moment:
+            numbers["I"] = self.second_moment[0]
+        numbers |= {"E": young or STAND_IN, "rayleigh_mass": self.rayleigh_mass, **ratios}
+        numbers |= {"rayleigh_stiffness": self.rayleigh_stiffness}
+        heights = {f"drift{z}": height for z, height in enumerate(lists["lengths"], start=1)}
+        return Structure(model, {name: numbers[name] for name in model.parameters}, heights)
 
     @model_validator(mode="after")
     def _check_damping(self) -> Self:

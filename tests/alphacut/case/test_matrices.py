@@ -89,7 +89,7 @@ def test_matrices_and_the_storey_frame_move_alike(folder):
         ('direction = "x"', 'direction = "y"', "matrices.direction"),
         ('"1.x", "2.x"]\nmass', '"1.x", "2.x", "3.x"]\nmass', "of shape"),
         ('m = "20 t"', 'm = "20 parsec fuzz"', "a quantity"),
-        ('{ row = { "2.x" = 1.0 } }', "{ }", "one of row and file"),
+        ('{ row = { "2.x" = 1.0 } }', "{ }", "matrices.outputs.roof.row is missing"),
     ],
 )
 def test_what_makes_no_structure_is_one_line(folder, old, new, message):
