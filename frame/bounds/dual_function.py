@@ -164,7 +164,7 @@ def dot(a: Array, b: Array) -> float:
 
 
 @loops
-def dual(
+def dual_value(
     mu: Array, cell: Rows, node: int, side: float, data: Data, gradient: Array, u: Array
 ) -> float:
     """Value D(μ) of the dual function at multipliers μ (Z,), without constants and cubic parts.
@@ -283,35 +283,39 @@ def minimise(
     """
     gradient, direction, best = np.empty(len(mu)), np.zeros(len(mu)), mu.copy()
     here = np.empty(len(u))
-    least, expected_drop, idle = np.inf, np.inf, 0
+    lowest, expected_drop, idle = np.inf, np.inf, 0
     disagreement[:] = 0.0
     for _ in range(steps):
-        value = dual(mu, cell, node, side, data, gradient, here)
+        value = dual_value(mu, cell, node, side, data, gradient, here)
         for z in range(len(mu)):
             disagreement[z] = 0.8 * disagreement[z] + abs(gradient[z] * mu[z])
-        if value < least:
-            if least - value > 0.3 * expected_drop:
+        if value < lowest:
+            if lowest - value > 0.3 * expected_drop:
                 idle = 0
-            least = value
+            lowest = value
             best[:], u[:] = mu, here
-        if least <= target:
+        if lowest <= target:
             break
         if expected_drop == np.inf:
-            expected_drop = 0.7 * max(least - model_value, 0.0)
+            expected_drop = 0.7 * max(lowest - model_value, 0.0)
         idle += 1
         if idle > patience:  # back to the best multipliers
             expected_drop, idle = 0.5 * expected_drop, 0
             mu[:], direction[:] = best, 0.0
             if expected_drop < 0.1 * (target - model_value):
                 break
-        elif not step(mu, gradient, direction, value - least + expected_drop, data.grain[0]):
+        elif not subgradient_step(
+            mu, gradient, direction, value - lowest + expected_drop, data.grain[0]
+        ):
             break
     mu[:] = best
-    return least + remainder_bound(mu, data)
+    return lowest + remainder_bound(mu, data)
 
 
 @loops
-def step(mu: Array, gradient: Array, direction: Array, drop: float, grain: float) -> bool:
+def subgradient_step(
+    mu: Array, gradient: Array, direction: Array, drop: float, grain: float
+) -> bool:
     """Make a deflected subgradient step of the multipliers μ that aims at a fall of D by `drop`.
 
     `mu` and `direction` are written. Multipliers are rounded to multiples of `grain`: on a grid

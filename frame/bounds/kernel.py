@@ -31,7 +31,7 @@ SWELL = 1.7
 
 
 @compiled
-def separable(g: Array, H: Array, r: Array) -> float:
+def separable_bound(g: Array, H: Array, r: Array) -> float:
     """Upper bound of g·x + x·H·x/2 for |x| ≤ r, as a sum of bounds along each axis.
 
     Mixed terms are moved to the diagonal: 2 x_i x_j ≤ x_i² r_j/r_i + x_j² r_i/r_j.
@@ -115,7 +115,7 @@ def stays_below(
 
 
 @compiled
-def contract(bound: Array, r: Array, out: Array) -> None:
+def contract_bounds(bound: Array, r: Array, out: Array) -> None:
     """Write Σ_ij… bound[ij…] r_i r_j … to `out` (K,), for K tensors `bound` (d^order, K)."""
     d = len(r)
     out[:] = 0.0
@@ -183,7 +183,7 @@ def linear_phase_bound(
 
 
 @compiled
-def taylor(w: Array, table: Array, J: Array, H: Array) -> None:
+def expand_output(w: Array, table: Array, J: Array, H: Array) -> None:
     """Write an output's value, gradient and packed Hessian, Σ_k w_k table_k, to J; unpack it to H.
 
     J has shape (1 + d + d (d + 1)/2,), `table` (K, len(J)), the waves w (K,) and H (d, d).
@@ -192,11 +192,11 @@ def taylor(w: Array, table: Array, J: Array, H: Array) -> None:
     for k in range(len(w)):
         for a in range(len(J)):
             J[a] += w[k] * table[k, a]
-    unpacked(J, H)
+    unpack_hessian(J, H)
 
 
 @compiled
-def unpacked(J: Array, H: Array) -> None:
+def unpack_hessian(J: Array, H: Array) -> None:
     """Write the Hessian to H (d, d) from J: value, gradient, upper triangle by rows."""
     a = 1 + len(H)
     for i in range(len(H)):
@@ -256,13 +256,13 @@ def examine(
     for b in range(len(centre)):
         r = radius[b]
         if linear_phases and (b == 0 or (r != radius[b - 1]).any()):
-            contract(rate2, r, e[0])
-            contract(rate3, r, e[1])
+            contract_bounds(rate2, r, e[0])
+            contract_bounds(rate3, r, e[1])
             flat = c.reshape(4, n * m)
             flat[0] = share0
-            contract(share1, r, flat[1])
-            contract(share2, r, flat[2])
-            contract(share3, r, flat[3])
+            contract_bounds(share1, r, flat[1])
+            contract_bounds(share2, r, flat[2])
+            contract_bounds(share3, r, flat[3])
         for k in range(n):
             phase[k] = decay[k] = 0.0
             for i in range(d):
@@ -277,7 +277,7 @@ def examine(
                 problem = node * 2 * m + column[item]
                 noise = missing = margin[node, o, 0]  # missing: rounding and cubic terms
                 if o != before:
-                    taylor(waves[row], tables[b, o], J, H)
+                    expand_output(waves[row], tables[b, o], J, H)
                     before = o
                 for i in range(d):  # slope changes over the box: by H; twice that by third order
                     third_change[i] = second_change[i] = 0.0
@@ -301,7 +301,7 @@ def examine(
                             is_monotone_inside = True  # the neighbouring box holds higher points
                     stride *= 3
                 value[item] = f
-                bound[item] = f + separable(g, S, r) + missing
+                bound[item] = f + separable_bound(g, S, r) + missing
                 if is_monotone_inside or bound[item] <= target:
                     continue
                 if linear_phases:  # bound by modes of linear phase
@@ -309,7 +309,9 @@ def examine(
                     room -= linear_phase_bound(g, S, waves[row], time[node], side, modes, o)
                     for i in range(d):
                         low[i], high[i] = -r[i], r[i]
-                    if separable(g, S, r) <= room or stays_below(g, S, low, high, room, work, L):
+                    if separable_bound(g, S, r) <= room or stays_below(
+                        g, S, low, high, room, work, L
+                    ):
                         continue
                     for i in range(d):
                         g[i] = side * J[1 + i]
@@ -330,7 +332,7 @@ def examine(
                     span[i] = max(max(abs(low[i]), abs(high[i])), 1e-9)
                 if near:
                     jet = jets[problem]
-                    unpacked(jet, S)
+                    unpack_hessian(jet, S)
                     for i in range(d):
                         g[i], bend = side * jet[1 + i], 0.0
                         for j in range(d):

@@ -57,7 +57,7 @@ def proved_error(model: ModalModel) -> Array:
     start, outputs = _start_errors(structure, modes, norms), modes.outputs(structure)
     deviation = np.zeros(len(model.time))
     output_error = np.zeros((len(model.time), len(model.outputs)))
-    for s, part in enumerate(parts(model, largest_growth(model.eigenvalue, reach))):
+    for s, part in enumerate(motion_parts(model, largest_growth(model.eigenvalue, reach))):
         if isinstance(part.load, Direct):
             assert structure.feeds is not None
             error = (structure.feeds[:, s - len(start)] - part.share.real[0] * 2.0).size()
@@ -65,7 +65,7 @@ def proved_error(model: ModalModel) -> Array:
             continue
         deviation += part.push * start[s] + 2 * part.elapsed @ energy_rate[s]
         share_error = (outputs[s] - part.share).size() + by_ratio[s][:, None] * norms.reading
-        largest = suprema(part.share, reach)[0]
+        largest = derivative_bounds(part.share, reach)[0]
         output_error += 2 * part.waves[0] @ (share_error + part.left_out[:, None] * largest)
     return (1 + ROUNDING) * (deviation[:, None] * norms.outputs + output_error)
 
@@ -186,7 +186,7 @@ def _sum_of_modes(x: TaylorModel) -> TaylorModel:
     return (np.ones((1, n)) @ x)[:, 0]
 
 
-def suprema(polynomials: TaylorModel, reach: Array) -> list[Array]:
+def derivative_bounds(polynomials: TaylorModel, reach: Array) -> list[Array]:
     """Upper bounds of the |derivatives| of polynomials over the box |u_i| ≤ reach_i.
 
     Returns:
@@ -240,7 +240,7 @@ class MotionPart:
     load: LoadTables | None = None
 
 
-def parts(model: ModalModel, growth: Array) -> list[MotionPart]:
+def motion_parts(model: ModalModel, growth: Array) -> list[MotionPart]:
     """The free part of a model's motion, then the part of each load, with bounds over time.
 
     `growth` (n,) are upper bounds of Re λ_k, in 1/s.
@@ -292,11 +292,14 @@ class Remainder:
     def __init__(self, model: ModalModel, lower: Array, upper: Array) -> None:
         d, n, m = len(lower), model.count, len(model.outputs)
         reach, width = np.maximum(np.abs(lower), np.abs(upper)), upper - lower
-        rate, growth = suprema(model.eigenvalue, reach), largest_growth(model.eigenvalue, reach)
+        rate, growth = (
+            derivative_bounds(model.eigenvalue, reach),
+            largest_growth(model.eigenvalue, reach),
+        )
         third = np.zeros((len(model.time), m, d, d, d))
         margin = np.zeros((len(model.time), m, 1 + d))
-        for part in parts(model, growth):
-            share = suprema(part.share, reach)
+        for part in motion_parts(model, growth):
+            share = derivative_bounds(part.share, reach)
             noise = _rounding_bound(model, rate[0], part.load)
             for k in range(n):
                 of_mode = [x[..., k, :] for x in share], [x[..., k] for x in rate]
@@ -330,7 +333,7 @@ def _rounding_bound(model: ModalModel, rate: Array, load: LoadTables | None) -> 
 def _initial_third_derivatives(model: ModalModel, reach: Array) -> Array:
     """Bounds of the outputs' third derivatives at t = 0, (m, d, d, d), where most modes cancel."""
     sum_of_modes = np.full(model.count, 2.0) @ model.coefficient.real
-    return np.moveaxis(suprema(sum_of_modes, reach)[3], -1, 0)
+    return np.moveaxis(derivative_bounds(sum_of_modes, reach)[3], -1, 0)
 
 
 def leibniz(c: list[Array], r: list[Array], order: int) -> list[Array]:

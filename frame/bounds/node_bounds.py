@@ -191,7 +191,7 @@ def halve_cell(cells: Cells, halved: int, count: int) -> bool:
 
 
 @loops
-def model(u: Array, node: int, side: float, data: Data, gradient: Array) -> float:
+def model_and_gradient(u: Array, node: int, side: float, data: Data, gradient: Array) -> float:
     """Side × output in the model at inputs u (L,), without its constants; `gradient` is written."""
     bilinear, weight = np.empty(data.quadratic.shape[1]), np.zeros(len(data.linear))
     products(u, bilinear)
@@ -273,13 +273,13 @@ def ascend(u: Array, node: int, side: float, data: Data, steps: tuple[int, int])
     """
     d = len(u)
     slope, trial, trial_slope = np.empty(d), np.empty(d), np.empty(d)
-    value = model(u, node, side, data, slope)
+    value = model_and_gradient(u, node, side, data, slope)
     for _ in range(steps[0]):
         gained, length = False, 1.0
         for _ in range(3):
             for i in range(d):
                 trial[i] = u[i] + length * (np.sign(slope[i]) - u[i])
-            new = model(trial, node, side, data, trial_slope)
+            new = model_and_gradient(trial, node, side, data, trial_slope)
             if new > value + 1e-9 * abs(value):
                 value, gained = new, True
                 u[:], slope[:] = trial, trial_slope
@@ -304,7 +304,7 @@ def climb(
     for _ in range(steps):
         for i in range(d):
             trial[i] = np.rint(GRID * min(max(point[i] + size * slope[i], -1.0), 1.0)) / GRID
-        new = model(trial, node, side, data, trial_slope)
+        new = model_and_gradient(trial, node, side, data, trial_slope)
         along = bend = 0.0
         for i in range(d):
             step = trial[i] - point[i]

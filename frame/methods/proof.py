@@ -27,10 +27,10 @@ from alphacut.frame.bounds.branch_and_bound import enclosed
 from alphacut.frame.bounds.model_error import (
     MAX_PARAMETERS,
     Remainder,
+    derivative_bounds,
     largest_growth,
-    parts,
+    motion_parts,
     proved_error,
-    suprema,
 )
 from alphacut.frame.bounds.newton import Optima, first_optima
 from alphacut.frame.bounds.spatial_branch_and_bound import prove
@@ -255,9 +255,9 @@ def _line_deviation(model: ModalModel) -> Array:
     if (omega[0] <= 0).any():
         raise UnprovedError("a mode may not oscillate", "take less damping")
     deviation = np.zeros((len(model.time), len(model.outputs)))
-    for part in parts(model, growth):
+    for part in motion_parts(model, growth):
         size, real, imaginary = (
-            suprema(x, reach)[0] for x in (part.share, part.share.real, part.share.imag)
+            derivative_bounds(x, reach)[0] for x in (part.share, part.share.real, part.share.imag)
         )
         load = None if part.load is None else part.load.history
         if isinstance(part.load, Direct):

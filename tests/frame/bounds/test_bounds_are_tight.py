@@ -13,7 +13,7 @@ from alphacut.frame.bounds.kernel import stays_below
 from alphacut.frame.bounds.model_error import (
     Remainder,
     largest_growth,
-    parts,
+    motion_parts,
     proved_error,
 )
 from alphacut.frame.bounds.newton import Optima, first_optima
@@ -51,7 +51,7 @@ def test_bounds_of_waves_are_reached_by_a_pulse_on_a_soft_spring(order: int) -> 
     """Short of a turn all of the pulse adds up: R and its derivatives by λ are ∫ τ^r a."""
     model = spring(1e-2, PULSE, 4.0, 0.1)
     growth = largest_growth(model.eigenvalue, np.ones(1))
-    free, forced = parts(model, growth)
+    free, forced = motion_parts(model, growth)
     rate = model.eigenvalue.at(np.zeros((1, 1)))
     time = model.time
     if order < 3:
@@ -125,7 +125,7 @@ def test_what_a_series_of_a_load_leaves_out_is_in_the_proved_error() -> None:
     rate, at = model.eigenvalue.at(unit), (np.repeat(unit, 61, 0), np.tile(nodes, 21))
     series = load.response(np.repeat(rate, 61, 0), at[1])[0].reshape(21, 61)
     missed = load.at_nodes(rate)[..., 0] - series
-    largest = parts(model, largest_growth(model.eigenvalue, np.ones(1)))[1].waves[0][:, 0]
+    largest = motion_parts(model, largest_growth(model.eigenvalue, np.ones(1)))[1].waves[0][:, 0]
     table.truncation = (np.abs(missed[:, 1:]) / largest[1:]).max()
     truth = UnitFlow(model.flow, model.boxes).values(unit)[..., 0]
     off = np.abs(model.value_at(*at, 0 * at[1]).reshape(21, 61) - truth).max(0)

@@ -196,7 +196,7 @@ def test_any_multipliers_bound_any_motion():
             for node in range(1, len(time)):
                 size = np.abs(values[:, node, o]).max() * 10.0 ** rng.uniform(-2, 1)
                 mu = size * rng.normal(size=len(problem.data.linear))
-                bound = kernel.dual(
+                bound = kernel.dual_value(
                     mu, whole, node, side, problem.data, np.empty(len(mu)), np.empty(7)
                 )
                 bound += problem.constant[:, node].sum() + kernel.remainder_bound(mu, problem.data)

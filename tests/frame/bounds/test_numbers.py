@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from alphacut.frame import StoreyFrame, envelope
-from alphacut.frame.bounds.dual_function import require_in_range, step
+from alphacut.frame.bounds.dual_function import require_in_range, subgradient_step
 from alphacut.frame.bounds.level import OutputBounds
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.methods.dual import DualProof
@@ -113,10 +113,10 @@ def test_models_that_are_not_finite_are_refused(name, wrong):
 @pytest.mark.parametrize("gain", [np.nan, np.inf, 1e300])
 def test_a_descent_ends_before_its_multipliers_overflow(gain):
     mu, gradient = np.zeros(2), np.array([1e-6, 0.0])
-    assert not step(mu, gradient, np.zeros(2), gain, 1e-9)
+    assert not subgradient_step(mu, gradient, np.zeros(2), gain, 1e-9)
 
 
 def test_a_descent_goes_on_with_ordinary_multipliers():
     mu = np.zeros(2)
-    assert step(mu, np.array([1.0, 0.5]), np.zeros(2), 0.1, 1e-9)
+    assert subgradient_step(mu, np.array([1.0, 0.5]), np.zeros(2), 0.1, 1e-9)
     assert mu == pytest.approx([-0.08, -0.04])

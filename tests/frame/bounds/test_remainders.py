@@ -174,7 +174,7 @@ def test_half_of_the_cubic_part_would_not_do():
         LevelModels.from_structure(structure, {}, np.array([0.0, 0.1]), ("velocity",)), 0, 1, 1.0
     ).data
     whole, mu, u = np.array([[0, 0, 0, 0]]), np.array([1.0, 0, 0]), np.empty(1)
-    bound = dual_function.dual(mu, whole, 1, 1.0, data, np.empty(3), u) + data.omega[0, 0]
+    bound = dual_function.dual_value(mu, whole, 1, 1.0, data, np.empty(3), u) + data.omega[0, 0]
     bound += dual_function.remainder_bound(mu, data)
     e = data.share[0, 0] * data.table[0, 0, 1, 0] + abs(data.reach[0, 0] * data.table[0, 0, 1, 0])
     exact = (0.9**-0.5 - 1) * data.centre[0, 0] / data.radius[0, 0]
