@@ -65,7 +65,7 @@ class CellContent(Section):
 
     @property
     def stated_fraction(self) -> float | None:
-        """Fraction of the cell that the particles take as the case says, at its modal value."""
+        """Fraction of the cell that the particles take as the case says, at its nominal value."""
         if self.particle_cell is None or self.particle_cell.fraction is None:
             return None
         return float(self.particle_cell.fraction.modal)

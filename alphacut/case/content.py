@@ -64,7 +64,7 @@ class Content(CellContent):
 
     @property
     def stated_fraction(self) -> float | None:
-        """Fraction of the cell that the particles take as the case says, at its modal value."""
+        """Fraction of the cell that the particles take as the case says, at its nominal value."""
         if self.microstructure is not None and self.microstructure.packing is not None:
             return self.microstructure.packing.fraction
         return super().stated_fraction
@@ -162,7 +162,7 @@ class Content(CellContent):
             is_new = name not in names[:number]
             require(is_new, f"study[{number}].name", value=name, allowed="a name of its own")
         for section in self.questions.values():
-            section.check(structure)
+            section.require_answerable(structure)
         if self.identify is not None:
             structure.inputs(self.identify.learn, "identify.learn")
         return self

@@ -75,8 +75,8 @@ def parse_limit(value: object) -> Limit:
 def _number(text: str, unit: str) -> float:
     """A quantity in an SI unit, or in its own where the output's is not known here."""
     if unit != "SI":
-        return quantity.number(text, unit)
-    return float(quantity.fuzzy_of_any_unit(text).modal)
+        return quantity.parse_number(text, unit)
+    return float(quantity.parse_fuzzy_in_any_unit(text).modal)
 
 
 AnyLimit = Annotated[Limit, PlainValidator(parse_limit, json_schema_input_type=str)]
@@ -102,7 +102,7 @@ class QuestionSection(Section):
         peaks = [limit.peak for limit in self.limits]
         return {x.peak if peaks.count(x.peak) == 1 else x.text: x for x in self.limits}
 
-    def in_si(self, structure: Structure) -> dict[str, float]:
+    def limits_in_si(self, structure: Structure) -> dict[str, float]:
         """Value of each peak's limit in the SI unit of its output, by `limits_by_name`.
 
         The peak of a least value is that of the output's negative, and so is its limit.
@@ -116,9 +116,9 @@ class QuestionSection(Section):
         require(len(values) == len(self.limits), key, value=texts, allowed="each limit once")
         return values
 
-    def check(self, structure: Structure) -> None:
+    def require_answerable(self, structure: Structure) -> None:
         """Refuses outputs that the structure lacks, and limits that this question cannot take."""
-        self.in_si(structure)
+        self.limits_in_si(structure)
         if self.needs_magnitudes:
             is_one_each = all(name == x.output for name, x in self.limits_by_name.items())
             texts = ", ".join(limit.text for limit in self.limits)
@@ -141,12 +141,12 @@ class ProbabilitySection(QuestionSection):
 
     random: tuple[str, ...] = ()
     """inputs that are random, with the shape of their membership"""
-    samples: Annotated[int, Quantity(least=1, most=10_000, is_integer=True)] = 200
+    samples: Annotated[int, Quantity(minimum=1, maximum=10_000, is_integer=True)] = 200
     """random draws at each fuzzy point"""
 
-    def check(self, structure: Structure) -> None:
+    def require_answerable(self, structure: Structure) -> None:
         """Refuses limits and random inputs that the structure does not have."""
-        super().check(structure)
+        super().require_answerable(structure)
         structure.inputs([name for name in self.random if name != "E"], "probability.random")
 
 
@@ -157,7 +157,7 @@ class TolerancesSection(QuestionSection):
     needs_magnitudes = True
     reads_peaks = True
 
-    most: Annotated[float, Quantity(above=0, most=100)] = 2.0
+    most: Annotated[float, Quantity(above=0, maximum=100)] = 2.0
     """largest scale that is tried; 1 is that of the case"""
 
 
@@ -172,9 +172,9 @@ class FragilitySection(QuestionSection):
     independent: bool = False
     """whether records count as independent draws: 95 % limits"""
 
-    def check(self, structure: Structure) -> None:
+    def require_answerable(self, structure: Structure) -> None:
         """Refuses structures whose motion is not proportional to the record, and unfit limits."""
-        super().check(structure)
+        super().require_answerable(structure)
         linear = structure.linear
         is_free = linear is not None and not linear.loads
         is_at_rest = not any(np.any(getattr(linear, start, 0)) for start in ("q0", "v0"))

@@ -53,10 +53,10 @@ def _parse_history(value: object, info: ValidationInfo) -> ForceHistory:
     fits = len(numbers) in counts and len(static) + len(starts) <= max_options
     require(fits and not (static and kind == "harmonic"), "", value=value, allowed=HISTORY)
     try:
-        start = quantity.number(starts[0], "s") if starts else 0.0
+        start = quantity.parse_number(starts[0], "s") if starts else 0.0
         if kind == "harmonic":
-            phase = quantity.number(numbers[1], "rad") if numbers[1:] else 0.0
-            wave = History.harmonic(quantity.number(numbers[0], "1/s"), phase, start)
+            phase = quantity.parse_number(numbers[1], "rad") if numbers[1:] else 0.0
+            wave = History.harmonic(quantity.parse_number(numbers[0], "1/s"), phase, start)
             return ForceHistory(wave)
     except ValueError as error:
         raise RefusedError("", value, HISTORY, str(error)) from None
@@ -64,10 +64,12 @@ def _parse_history(value: object, info: ValidationInfo) -> ForceHistory:
         return ForceHistory(None, "N*s")
     if kind == "step":
         return ForceHistory(History.constant(start, is_static=bool(static)))
-    return _file_history(kind, start, bool(static), info)
+    return _read_history_file(kind, start, bool(static), info)
 
 
-def _file_history(name: str, start: float, is_static: bool, info: ValidationInfo) -> ForceHistory:
+def _read_history_file(
+    name: str, start: float, is_static: bool, info: ValidationInfo
+) -> ForceHistory:
     """Time history in a file, from `start` in s on; samples with a unit are scaled to at most 1."""
     try:
         path = case_file(name, info)
@@ -83,7 +85,7 @@ def _parse_amplitude(value: object, _: ValidationInfo) -> tuple[FuzzyNumber, str
     """Parse an amplitude: its value in SI, and its SI unit ("N", "N*s" or "" of a factor)."""
     for unit in ("N", "N*s", ""):
         try:
-            return quantity.fuzzy(value, unit), unit
+            return quantity.parse_fuzzy(value, unit), unit
         except ValueError:
             continue
     allowed = 'a force, an impulse or a number, as "8 kN ± 10 %", "0.3 kN s", "1 ± 10 %"'
@@ -179,7 +181,7 @@ class Scale:
     measure: str = ""
 
 
-def _read_files(value: object, info: ValidationInfo) -> tuple[Recording, ...]:
+def _read_recordings(value: object, info: ValidationInfo) -> tuple[Recording, ...]:
     """Recordings of all files below the case's folder that "records/*.AT2" or "a.v2#1" matches."""
     folder: Path = (info.context or {}).get("folder", Path())
     # the text after # is the channel of each file
@@ -221,7 +223,7 @@ def _parse_scale(value: object, _: ValidationInfo) -> Scale:
     allowed = 'a factor above 0 as 1.2, or "PGA = 0.3 g", or "Sa(T1) = 0.5 g"'
     measure, equals, size = (part.strip() for part in str(value).partition("="))
     try:
-        number = quantity.number(*((size, "m/s^2") if equals else (value, "")))
+        number = quantity.parse_number(*((size, "m/s^2") if equals else (value, "")))
     except ValueError as error:
         raise RefusedError("", value, allowed, str(error)) from None
     fits = number > 0 and (measure in ("PGA", "Sa(T1)") or not equals)
@@ -229,7 +231,7 @@ def _parse_scale(value: object, _: ValidationInfo) -> Scale:
     return Scale(number, measure if equals else "")
 
 
-Files = Annotated[tuple[Recording, ...], text(_read_files)]
+Files = Annotated[tuple[Recording, ...], text(_read_recordings)]
 
 
 class RecordsSection(Section):

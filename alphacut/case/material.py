@@ -92,7 +92,7 @@ class MeshedCell(Section):
         return self
 
 
-Thickness = Annotated[FuzzyNumber, Quantity(least=THINNEST, below=1, fuzzy=True)]
+Thickness = Annotated[FuzzyNumber, Quantity(minimum=THINNEST, below=1, fuzzy=True)]
 
 ELLIPSES = re.compile(r"^ellipses\(([^,]*),([^,]*)\)$")
 
@@ -330,9 +330,9 @@ class Mesh(Section):
         description="mesh of Gmsh, prisms of 15 nodes over [-1, 1]² and θ, in place of size and"
         " layers; its physical groups are the phases of [cell.phases]",
     )
-    layers: Annotated[int, Quantity(least=1, most=10_000, is_integer=True)] = 12
+    layers: Annotated[int, Quantity(minimum=1, maximum=10_000, is_integer=True)] = 12
     """element layers in θ, of method prism"""
-    size: Annotated[float, Quantity(least=0.005, below=1)] = 0.15
+    size: Annotated[float, Quantity(minimum=0.005, below=1)] = 0.15
     """element size over half the cell's side"""
 
 
@@ -353,7 +353,7 @@ class ModulusSection(Section):
     )
     """samples of the transformation method"""
     alpha: Levels = Field(default=ALPHA, description="α-levels")
-    tolerance: Annotated[float, Quantity(least=1e-10, most=0.1)] | None = None
+    tolerance: Annotated[float, Quantity(minimum=1e-10, maximum=0.1)] | None = None
     """relative error of E that is allowed"""
     average: Literal["axes", "isotropic"] = "isotropic"
     """E of a plane: isotropic, of the average over all directions; axes, of eq. 16"""

@@ -27,7 +27,7 @@ from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io.arrays import read_array
-from alphacut.io.quantity import fuzzy_of_any_unit
+from alphacut.io.quantity import parse_fuzzy_in_any_unit
 
 
 def _term(value: object, info: ValidationInfo) -> tuple[Monomial, Array]:
@@ -41,7 +41,7 @@ def _term(value: object, info: ValidationInfo) -> tuple[Monomial, Array]:
 
 def _parameter(value: object, _: ValidationInfo) -> FuzzyNumber:
     try:
-        return fuzzy_of_any_unit(value)
+        return parse_fuzzy_in_any_unit(value)
     except ValueError as error:
         raise RefusedError("", value, 'a quantity, as "30 GPa ± 5 %" or 1.2', str(error)) from None
 
@@ -91,10 +91,12 @@ class MatricesSection(StructureSection):
         See `StructureSection`.
         """
         try:
-            numbers = self._numbers(modulus)
-            model = self._model(numbers)
+            numbers = self._parameters_with_ratios(modulus)
+            model = self._nominal_model(numbers)
             if isinstance(self.damping_ratio, MaterialDamping):
-                ratios = self._material_ratios(self.damping_ratio, model, loss or LOSS_STAND_IN)
+                ratios = self._material_damping_ratios(
+                    self.damping_ratio, model, loss or LOSS_STAND_IN
+                )
                 numbers |= ratios
                 parameters = {name: number.modal for name, number in numbers.items()}
                 model = replace(model, parameters=parameters, ratios=tuple(ratios))
@@ -109,16 +111,16 @@ class MatricesSection(StructureSection):
         is_stated = not isinstance(self.damping_ratio, MaterialDamping)
         return damping_ratios_by_name(self.damping_ratio, None) if is_stated else {}
 
-    def _numbers(self, modulus: FuzzyNumber | None) -> dict[str, FuzzyNumber]:
+    def _parameters_with_ratios(self, modulus: FuzzyNumber | None) -> dict[str, FuzzyNumber]:
         numbers = self.parameters | self._stated_ratios
         if modulus is not None and "E" in numbers:
             numbers["E"] = modulus
         return numbers or {"scale": Crisp(1.0)}
 
-    def _model(self, numbers: Mapping[str, FuzzyNumber]) -> MatrixStructure:
+    def _nominal_model(self, numbers: Mapping[str, FuzzyNumber]) -> MatrixStructure:
         """The structure at the nominal values of its parameters."""
         rows: dict[str, Array] = {
-            Output(name, output.unit): self._vector(f"outputs.{name}.row", output.row)
+            Output(name, output.unit): self._vector_over_unknowns(f"outputs.{name}.row", output.row)
             for name, output in self.outputs.items()
         }
         return MatrixStructure(
@@ -128,12 +130,12 @@ class MatricesSection(StructureSection):
             damping=self._terms(self.damping),
             observed=rows,
             ground=self.accelerogram,
-            pattern=self._pattern(),
+            pattern=self._ground_pattern(),
             ratios=tuple(self._stated_ratios),
             row_factors={name: self.outputs[name].factor.simplest for name in rows},
         )
 
-    def _material_ratios(
+    def _material_damping_ratios(
         self, damping: MaterialDamping, model: MatrixStructure, loss: FuzzyNumber
     ) -> dict[str, FuzzyNumber]:
         """Ratio "zeta" of all modes if E is in every term of K; else "zeta1" … by energy shares."""
@@ -151,7 +153,7 @@ class MatricesSection(StructureSection):
     ) -> list[tuple[Monomial | str | float, Array]]:
         return [(factor.simplest, array) for factor, array in terms]
 
-    def _vector(self, key: str, entries: Mapping[str, float]) -> Array:
+    def _vector_over_unknowns(self, key: str, entries: Mapping[str, float]) -> Array:
         """A vector over the unknowns from its entries by unknown; `key` is for messages."""
         indices = {name: index for index, name in enumerate(self.unknowns)}
         vector = np.zeros(len(indices))
@@ -161,9 +163,9 @@ class MatricesSection(StructureSection):
             vector[indices[name]] = value
         return vector
 
-    def _pattern(self) -> Array:
+    def _ground_pattern(self) -> Array:
         if isinstance(self.direction, dict):
-            return self._vector("direction", self.direction)
+            return self._vector_over_unknowns("direction", self.direction)
         pattern = [float(name.rpartition(".")[2] == self.direction) for name in self.unknowns]
         return np.array(pattern)
 
@@ -180,5 +182,5 @@ class MatricesSection(StructureSection):
         """Refuses a direction in which the ground moves no unknown."""
         directions = sorted({name.rpartition(".")[2] for name in self.unknowns})
         allowed = f"one of {', '.join(directions[:8])}, or a table by unknown"
-        is_moved = bool(self._pattern().any())
+        is_moved = bool(self._ground_pattern().any())
         require(is_moved, "matrices.direction", value=self.direction or None, allowed=allowed)

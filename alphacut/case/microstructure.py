@@ -19,12 +19,12 @@ from alphacut.stochastic.sections import Simulated
 class PackingSection(Section):
     """Particles packed at random in a periodic box: discs, or spheres where the cell has spheres.
 
-    Radii are log-normal between two ends (eq. 11), or those of a file.
+    Radii are log-normal between two limits (the paper's eq. 11), or those of a file.
     """
 
-    packings: Annotated[int, Quantity(least=5, most=10_000, is_integer=True)] = 20
+    packings: Annotated[int, Quantity(minimum=5, maximum=10_000, is_integer=True)] = 20
     """independent packings"""
-    particles: Annotated[int, Quantity(least=10, most=1_000_000, is_integer=True)]
+    particles: Annotated[int, Quantity(minimum=10, maximum=1_000_000, is_integer=True)]
     """particles in each packing"""
     fraction: Annotated[float, Quantity(above=0, below=0.84)]
     """area fraction, or volume fraction, of the particles"""
@@ -83,7 +83,7 @@ class Photograph(Section):
 class MicrostructureSection(Section):
     """Particles from which the random radius comes: one of packing, circles and image."""
 
-    seed: Annotated[int, Quantity(least=0, most=1e18, is_integer=True)]
+    seed: Annotated[int, Quantity(minimum=0, maximum=1e18, is_integer=True)]
     """seed of everything left to chance"""
     limits: Annotated[tuple[Fraction, Fraction], after(rising)] | None = None
     """lower and upper limit of r/a"""

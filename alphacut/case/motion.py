@@ -47,7 +47,7 @@ def _parse_tolerance(value: object, info: ValidationInfo) -> Tolerance:
     """Parse a tolerance such as "0.2 mm" or "0.1 %"."""
     for unit in ("m", "N", ""):
         try:
-            number = quantity.number(value, unit)
+            number = quantity.parse_number(value, unit)
         except ValueError:
             continue
         if 0 < number < (1 if unit == "" else float("inf")):
@@ -94,7 +94,7 @@ class EnvelopeSection(Section):
     """time stepping; by the method if left out"""
     tolerance: Annotated[Tolerance, text(_parse_tolerance)] | None = None
     """error that is allowed: of displacements, of forces, or over each peak"""
-    gain: Annotated[float, Quantity(least=1e-6, most=1)] = 0.25
+    gain: Annotated[float, Quantity(minimum=1e-6, maximum=1)] = 0.25
     """gain worth a trajectory to a Graph Follower, as a fraction of the tolerance"""
     duration: Time = Field(description="length of the simulation")
     step: Time = Field(description="time step")
@@ -113,11 +113,11 @@ class Identify(Section):
 
     measured: CaseFile
     """CSV file mode,frequency [Hz],q1,q2 …, or a universal file"""
-    floors: dict[str, Annotated[int, Quantity(least=1, is_integer=True)]] = Field(
+    floors: dict[str, Annotated[int, Quantity(minimum=1, is_integer=True)]] = Field(
         default={}, description='floor of each unknown of a universal file, as {"12.x" = 1}'
     )
     learn: Names = Field(description="inputs that are identified, as c or k1")
-    held_out: tuple[Annotated[int, Quantity(least=1, is_integer=True)], ...] = ()
+    held_out: tuple[Annotated[int, Quantity(minimum=1, is_integer=True)], ...] = ()
     """modes that are predicted and not learned from"""
     frequency_deviation: Fraction | None = None
     """standard deviation of a frequency over its mean"""

@@ -63,7 +63,7 @@ def parse(model: type[C], path: Path | str, changes: Sequence[str] = ()) -> Pars
     except ValidationError as error:
         problems = [
             replace(x, file="command line" if _is_below(x.key, changed) else str(path))
-            for x in _problems(model, error)
+            for x in _list_problems(model, error)
         ]
         raise BadInput([*dict.fromkeys(problems)]) from None
     return ParsedCase(path, text, content, tuple(changes))
@@ -82,43 +82,45 @@ def _parse_toml(path: Path, text: str) -> dict[str, object]:
         raise BadInput(InputProblem(shown or "the file", what, file=str(path), line=line)) from None
 
 
-def _problems(model: type[Section], error: ValidationError) -> Iterator[InputProblem]:
+def _list_problems(model: type[Section], error: ValidationError) -> Iterator[InputProblem]:
     """The problem of each error that Pydantic reports; a misspelt key is not missing as well."""
-    details = [(_key(detail["loc"]), detail) for detail in error.errors(include_url=False)]
+    details = [(_full_key(detail["loc"]), detail) for detail in error.errors(include_url=False)]
     unknown = [key for key, detail in details if detail["type"] == "extra_forbidden"]
     suggested = {key: _suggested_key(model, key) for key in unknown}
     for key, detail in details:
         if key in suggested:
             kind = "section" if isinstance(detail["input"], dict) else "key"
-            close = suggested[key].removeprefix(f"{_section(key)}.")
-            names = ", ".join(_names(model, key))
+            close = suggested[key].removeprefix(f"{_section_name(key)}.")
+            names = ", ".join(_sibling_names(model, key))
             cure = f"did you mean {close}?" if close else ""
             yield InputProblem(key, f"is an unknown {kind}", "", "" if close else names, cure)
         elif key not in suggested.values():
-            yield _problem(model, key, detail)
+            yield _describe_problem(model, key, detail)
 
 
-def _section(key: str) -> str:
+def _section_name(key: str) -> str:
     return key.rpartition(".")[0]
 
 
-def _names(model: type[Section], key: str) -> list[str]:
+def _sibling_names(model: type[Section], key: str) -> list[str]:
     """Keys and sections beside a key."""
-    inside = re.sub(r"\[\d+\]", "", _section(key))
-    names = dict.fromkeys(name for name, _, _ in _walk("", model) if _section(name) == inside)
+    inside = re.sub(r"\[\d+\]", "", _section_name(key))
+    names = dict.fromkeys(
+        name for name, _, _ in _walk_keys("", model) if _section_name(name) == inside
+    )
     return [name.rpartition(".")[2] for name in names]
 
 
 def _suggested_key(model: type[Section], key: str) -> str:
     """Full name of the known key nearest to an unknown one; empty where none is near."""
     name = key.rpartition(".")[2]
-    if close := nearest(name, _names(model, key)):
-        return f"{_section(key)}.{close}".lstrip(".")
+    if close := nearest(name, _sibling_names(model, key)):
+        return f"{_section_name(key)}.{close}".lstrip(".")
     elsewhere = {x.rpartition(".")[2]: x for x in keys_of(model)}
     return elsewhere.get(nearest(name, elsewhere), "")
 
 
-def _problem(model: type[Section], key: str, detail: ErrorDetails) -> InputProblem:
+def _describe_problem(model: type[Section], key: str, detail: ErrorDetails) -> InputProblem:
     """The problem of a key whose value is wrong or missing, from the error of Pydantic."""
     cause = detail.get("ctx", {}).get("error")
     if isinstance(cause, RefusedError):
@@ -134,7 +136,7 @@ def _problem(model: type[Section], key: str, detail: ErrorDetails) -> InputProbl
     return InputProblem(key, what, value, allowed, cure)
 
 
-def _key(location: tuple[int | str, ...]) -> str:
+def _full_key(location: tuple[int | str, ...]) -> str:
     """Full name of a key, without the tags of unions, which stand in angle brackets."""
     parts = (f"[{part}]" if isinstance(part, int) else f".{part}" for part in location)
     return "".join(part for part in parts if not part.startswith(".<")).lstrip(".")
@@ -163,12 +165,12 @@ def apply_changes(
         allowed = "KEY=VALUE, each full key once, as cell.matrix_modulus='20 GPa'"
         is_new = key in full_keys and key not in keys
         require(is_new, "--set", value=change, allowed=allowed, cure=cure)
-        _put(table, key, _value(value))
+        _set_key(table, key, _parse_value(value))
         keys.append(key)
     return tuple(keys)
 
 
-def _put(table: object, key: str, value: object) -> None:
+def _set_key(table: object, key: str, value: object) -> None:
     *outer, last = key.split(".")
     for name in outer:
         table = table.setdefault(name, {}) if isinstance(table, dict) else None
@@ -176,31 +178,31 @@ def _put(table: object, key: str, value: object) -> None:
         table[last] = value
 
 
-def _value(text: str) -> object:
+def _parse_value(text: str) -> object:
     """Value that a text states: as TOML if it is TOML, words with commas as an array, else text."""
     try:
         return tomllib.loads(f"x = {text}")["x"]
     except (RecursionError, ValueError):
         pass
     if re.fullmatch(r"[\w .+-]+(,[\w .+-]+)+", text):
-        return [_value(part.strip()) for part in text.split(",")]
+        return [_parse_value(part.strip()) for part in text.split(",")]
     return text
 
 
 @cache
 def keys_of(model: type[Section]) -> dict[str, FieldInfo]:
     """All keys below a section's class by their full names, sections left out."""
-    return {name: info for name, info, is_section in _walk("", model) if not is_section}
+    return {name: info for name, info, is_section in _walk_keys("", model) if not is_section}
 
 
-def _walk(prefix: str, model: type[Section]) -> Iterator[tuple[str, FieldInfo, bool]]:
+def _walk_keys(prefix: str, model: type[Section]) -> Iterator[tuple[str, FieldInfo, bool]]:
     """Yields each key below a section's class: full name, field, whether it is a section."""
     for key, info in model.model_fields.items():
         name, parts = f"{prefix}{key}", [info.annotation, *_annotation_parts(info.annotation)]
         models = [x for x in parts if isinstance(x, type) and issubclass(x, Section)]
         yield name, info, bool(models)
         for inner in models:
-            yield from _walk(f"{name}.", inner)
+            yield from _walk_keys(f"{name}.", inner)
 
 
 def quantity_of(info: FieldInfo) -> Quantity | None:

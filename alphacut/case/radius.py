@@ -24,7 +24,7 @@ Radius = Annotated[FuzzyNumber, Quantity(above=0, below=1, fuzzy=True)]
 
 Number = Annotated[FuzzyNumber, Quantity(fuzzy=True)]
 
-Theta = Annotated[float, Quantity(least=-10, most=10)]
+Theta = Annotated[float, Quantity(minimum=-10, maximum=10)]
 
 
 class ThetaSection(Section):
@@ -40,7 +40,7 @@ class ThetaSection(Section):
 
 
 class RadiusMapSection(ThetaSection):
-    """Random radius of the particle over half the cell's side, as a map of θ (eq. 12)."""
+    """Random radius of the particle over half the cell's side, a map of θ (the paper's eq. 12)."""
 
     a1: Radius = Field(description="radius at the lower end of θ")
     a3: Radius = Field(description="radius at the upper end of θ")

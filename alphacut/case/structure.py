@@ -27,13 +27,13 @@ Span = Annotated[FuzzyNumber, Quantity("m", above=0, fuzzy=True)]
 Moment = Annotated[FuzzyNumber, Quantity("m^4", above=0, fuzzy=True)]
 Count = Annotated[FuzzyNumber, Quantity(above=0, fuzzy=True)]
 Stiffness = Annotated[FuzzyNumber, Quantity("N/m", above=0, fuzzy=True)]
-Damping = Annotated[FuzzyNumber, Quantity("N*s/m", least=0, fuzzy=True)]
+Damping = Annotated[FuzzyNumber, Quantity("N*s/m", minimum=0, fuzzy=True)]
 Displacement = Annotated[FuzzyNumber, Quantity("m", fuzzy=True)]
 Velocity = Annotated[FuzzyNumber, Quantity("m/s", fuzzy=True)]
-Rate = Annotated[FuzzyNumber, Quantity("1/s", least=0, fuzzy=True)]
-Delay = Annotated[FuzzyNumber, Quantity("s", least=0, fuzzy=True)]
+Rate = Annotated[FuzzyNumber, Quantity("1/s", minimum=0, fuzzy=True)]
+Delay = Annotated[FuzzyNumber, Quantity("s", minimum=0, fuzzy=True)]
 Acceleration = Annotated[FuzzyNumber, Quantity("m/s^2", above=0, fuzzy=True)]
-Turning = Annotated[FuzzyNumber, Quantity("N*m*s", least=0, fuzzy=True)]
+Turning = Annotated[FuzzyNumber, Quantity("N*m*s", minimum=0, fuzzy=True)]
 Angle = Annotated[FuzzyNumber, Quantity("rad", fuzzy=True)]
 Spin = Annotated[FuzzyNumber, Quantity("rad/s", fuzzy=True)]
 
@@ -71,9 +71,9 @@ class MaterialDamping:
         if loss.support.width == 0 and self.joints.support.width == 0:
             return Crisp(ratio(loss.modal, self.joints.modal))
         alpha = sorted({*loss.cuts.alpha, *self.joints.cuts.alpha})
-        # ζ rises with both numbers, so that the ends of their cuts give its ends
-        ends = [map(ratio, loss.cut(level), self.joints.cut(level)) for level in alpha]
-        return PiecewiseLinear(tuple(alpha), *zip(*ends, strict=True))
+        # ζ rises with both numbers, so that the bounds of their α-cuts give its bounds
+        bounds = [map(ratio, loss.cut(level), self.joints.cut(level)) for level in alpha]
+        return PiecewiseLinear(tuple(alpha), *zip(*bounds, strict=True))
 
 
 def _parse_damping_ratios(value: object) -> MaterialDamping | tuple[FuzzyNumber, ...]:
@@ -86,7 +86,7 @@ def _parse_damping_ratios(value: object) -> MaterialDamping | tuple[FuzzyNumber,
     return MaterialDamping(cast("FuzzyNumber", RATIO.parse(joints.strip())) if plus else ZERO)
 
 
-RATIO = Quantity(least=0, below=1, fuzzy=True)
+RATIO = Quantity(minimum=0, below=1, fuzzy=True)
 DampingRatios = Annotated[
     MaterialDamping | tuple[FuzzyNumber, ...],
     PlainValidator(_parse_damping_ratios, json_schema_input_type=float | list[float | str] | str),
@@ -119,8 +119,8 @@ class Structure:
         units = {str(name): Output(name).unit for name in self.outputs}
         return units.get(output) or Output(output).unit
 
-    def members(self, name: str, key: str = "envelope.fuzzy") -> tuple[str, ...]:
-        """Fuzzy parameters of a name: "m" of all masses of a frame, "m1" of itself."""
+    def fuzzy_members(self, name: str, key: str = "envelope.fuzzy") -> tuple[str, ...]:
+        """Fuzzy parameters of a name, "m" of all masses of a frame; RefusedError where none is."""
         allowed, cure = "inputs that are fuzzy", f"{name} is one number"
         try:
             members = self.frame.group(name) if self.frame else (name,)
@@ -134,7 +134,9 @@ class Structure:
     def inputs(self, names: Sequence[str], key: str = "envelope.fuzzy") -> dict[str, FuzzyNumber]:
         """The fuzzy inputs that the names stand for."""
         return {
-            member: self.numbers[member] for name in names for member in self.members(name, key)
+            member: self.numbers[member]
+            for name in names
+            for member in self.fuzzy_members(name, key)
         }
 
     def require_outputs(self, key: str, names: Iterable[str]) -> None:

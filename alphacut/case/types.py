@@ -49,14 +49,14 @@ class Section(BaseModel):
 class Quantity:
     """A quantity of a key, with its SI unit (empty for none) and the range of every value of it.
 
-    The range is open at `above` and `below`, closed at `least` and `most`.
+    The range is open at `above` and `below`, closed at `minimum` and `maximum`.
     """
 
     si: str = ""
     above: float = -math.inf
-    least: float = -math.inf
+    minimum: float = -math.inf
     below: float = math.inf
-    most: float = math.inf
+    maximum: float = math.inf
     fuzzy: bool = False
     is_integer: bool = False
 
@@ -65,7 +65,12 @@ class Quantity:
         """Allowed values in words."""
         kind, example = QUANTITIES[self.si]
         kind = "whole number" if self.is_integer else kind
-        bounds = {"above": self.above, "from": self.least, "below": self.below, "up to": self.most}
+        bounds = {
+            "above": self.above,
+            "from": self.minimum,
+            "below": self.below,
+            "up to": self.maximum,
+        }
         finite = [f"{word} {bound:g}" for word, bound in bounds.items() if math.isfinite(bound)]
         words = " ".join([kind, *finite])
         return f'{words}, as "{example}"' if self.si else words
@@ -84,7 +89,7 @@ class Quantity:
 
     def holds(self, value: float) -> bool:
         """True if a value is in the range."""
-        return self.above < value < self.below and self.least <= value <= self.most
+        return self.above < value < self.below and self.minimum <= value <= self.maximum
 
     def _parsed(self, value: object) -> FuzzyNumber | float | int:
         if self.is_integer and isinstance(value, int) and not isinstance(value, bool):
@@ -92,7 +97,11 @@ class Quantity:
         bare = not self.si and isinstance(value, str) and "%" not in value and "[" not in value
         if bare or self.is_integer:
             raise ValueError("a number stands without quotes")
-        return quantity.fuzzy(value, self.si) if self.fuzzy else quantity.number(value, self.si)
+        return (
+            quantity.parse_fuzzy(value, self.si)
+            if self.fuzzy
+            else quantity.parse_number(value, self.si)
+        )
 
     def __get_pydantic_core_schema__(
         self, source: object, handler: GetCoreSchemaHandler
@@ -191,7 +200,7 @@ Modulus = Annotated[FuzzyNumber, Quantity("Pa", above=0, fuzzy=True)]
 def _stiffness(rows: list[list[object]]) -> VoigtPhase:
     """Material of three rows of its plane-strain stiffness, as texts."""
     try:
-        return VoigtPhase(tuple(tuple(quantity.number(x, "Pa") for x in row) for row in rows))
+        return VoigtPhase(tuple(tuple(quantity.parse_number(x, "Pa") for x in row) for row in rows))
     except (TypeError, ValueError):
         allowed = 'three rows as ["90 GPa", "20 GPa", "0 GPa"], symmetric positive definite'
         raise RefusedError("", rows, allowed) from None
@@ -204,13 +213,13 @@ ModulusOrStiffness = Annotated[
     Annotated[Modulus, Tag("<modulus>")] | Annotated[Stiffness, Tag("<stiffness>")],
     Discriminator(lambda value: "<stiffness>" if isinstance(value, list) else "<modulus>"),
 ]
-Loss = Annotated[FuzzyNumber, Quantity(least=0, most=0.5, fuzzy=True)]
+Loss = Annotated[FuzzyNumber, Quantity(minimum=0, maximum=0.5, fuzzy=True)]
 Ratio = Annotated[FuzzyNumber, Quantity(above=-1, below=0.5, fuzzy=True)]
 
 Time = Annotated[float, Quantity("s", above=0)]
 Length = Annotated[float, Quantity("m", above=0)]
 Fraction = Annotated[float, Quantity(above=0, below=1)]
-Level = Annotated[float, Quantity(least=0, most=1)]
+Level = Annotated[float, Quantity(minimum=0, maximum=1)]
 Levels = Annotated[tuple[Level, ...], after(rising)]
 ALPHA = (0.0, 0.25, 0.5, 0.75, 1.0)
 """α-levels where a case names none."""

@@ -18,7 +18,7 @@ from alphacut.fuzzy.campaign.workers import pool
 from alphacut.fuzzy.refused import require
 from alphacut.io.arrays import text_table
 from alphacut.io.files import locked, say, write_text
-from alphacut.io.provenance import FORMAT, command, door, versions
+from alphacut.io.provenance import FORMAT, command_line, command_to_paste, versions
 from alphacut.io.results import ResultsFolder
 from alphacut.questions.summary import SUMMARY, Results, Summary
 from alphacut.report.page import comparison_page, render_page
@@ -46,7 +46,7 @@ def run(options: argparse.Namespace, out: TextIO) -> int:
         say(f"results are in {folder}, after {summary.seconds:.0f} s")
         if store.up_to_date:
             say(f"{len(store.up_to_date)} of the stages were up to date")
-        say(f"next: {door('report', folder)}")
+        say(f"next: {command_to_paste('report', folder)}")
     return 0
 
 
@@ -65,7 +65,7 @@ def compute_run(
         title=case.content.title,
         about=case.content.about,
         case_text=case.text,
-        command=command(),
+        command=command_line(),
         versions=versions(),
         changes=case.changes,
         figures=tuple(names),

@@ -48,7 +48,7 @@ def mode_rows(path: Path) -> tuple[ModeRows, ...]:
             amplitudes in one row and not in another.
     """
     (_, head), *rows = fields(path)
-    columns = _columns(path, head)
+    columns = _column_indices(path, head)
     positive = [columns[x] for x in ("frequency", "frequency_std", "shape_std") if x in columns]
     modes: dict[int, list[list[float]]] = defaultdict(list)
     for row, cells in rows:
@@ -60,10 +60,12 @@ def mode_rows(path: Path) -> tuple[ModeRows, ...]:
         fits = mode >= 1 and mode % 1 == 0 and all(values[column] > 0 for column in positive)
         require(fits, f"{path.name}, row {row}", value=",".join(cells)[:80], allowed=allowed)
         modes[int(mode)].append(values)
-    return tuple(_mode(path, mode, np.array(modes[mode]), columns) for mode in sorted(modes))
+    return tuple(
+        _measurements_of_mode(path, mode, np.array(modes[mode]), columns) for mode in sorted(modes)
+    )
 
 
-def _columns(path: Path, head: list[str]) -> dict[str, int]:
+def _column_indices(path: Path, head: list[str]) -> dict[str, int]:
     """Index of each column of a header by its name without the unit: "mode", "frequency", "q1"."""
     matches = [HEAD.fullmatch(cell) for cell in head]
     names = [match[1].partition("[")[0].strip() if match else "" for match in matches]
@@ -74,7 +76,9 @@ def _columns(path: Path, head: list[str]) -> dict[str, int]:
     return columns
 
 
-def _mode(path: Path, mode: int, values: Array, columns: dict[str, int]) -> ModeRows:
+def _measurements_of_mode(
+    path: Path, mode: int, values: Array, columns: dict[str, int]
+) -> ModeRows:
     """The measurements of one mode from its rows, (rows, columns), NaN where none was made."""
     floors = {int(name[1:]): k for name, k in columns.items() if name.startswith("q")}
     amplitudes = {floor: values[:, column] for floor, column in floors.items()}

@@ -99,25 +99,25 @@ def _canonical(value: object) -> object:
     return value.name if isinstance(value, Path) else str(value)
 
 
-def door(*words: object) -> str:
+def command_to_paste(*words: object) -> str:
     """This program here, ``./enter python -m alphacut`` or ``alphacut``, and words to paste."""
     program = "./enter python -m alphacut" if os.environ.get(INSIDE) else "alphacut"
     return f"{program} {shlex.join(map(str, words))}"
 
 
-def command() -> str:
+def command_line() -> str:
     """Command line of this process as it would be typed, without the program's path."""
     program = Path(sys.argv[0])
     name = f"python -m {program.parent.name}" if program.name == "__main__.py" else program.name
     return f"{name} {shlex.join(sys.argv[1:])}".strip()
 
 
-def origin(case_text: str, key: str) -> dict[str, object]:
+def build_provenance(case_text: str, key: str) -> dict[str, object]:
     """Origin of a result, which its JSON file states, from the case file and the fingerprint."""
     return {
         "format_version": FORMAT,
         "created_by": f"alphacut {own_version()}",
-        "command": command(),
+        "command": command_line(),
         "versions": versions(),
         "case": case_text,
         "fingerprint": key,

@@ -104,7 +104,7 @@ def factor(unit: str, si: str) -> Decimal:
         raise ValueError(f'the unit "{unit}" is no unit of {QUANTITIES[si][0]}') from None
 
 
-def parse_number(text: str, si: str) -> Decimal:
+def _parse_decimal(text: str, si: str) -> Decimal:
     """The number in the SI unit `si` that a quantity such as "80 GPa" states, or ValueError."""
     match = SINGLE.fullmatch(text.strip())
     if match is None or match[2].startswith((",", "_")):
@@ -113,19 +113,19 @@ def parse_number(text: str, si: str) -> Decimal:
     return number * factor(match[2].strip(), si)
 
 
-def interval_of_spread(match: re.Match[str], si: str) -> tuple[Decimal, Decimal]:
+def _parse_spread(match: re.Match[str], si: str) -> tuple[Decimal, Decimal]:
     """Both ends of "20 t ± 5 %" or "20 t ± 1 t", which matched `SPREAD`, in the SI unit `si`."""
     number, unit, spread, spread_unit = (text.strip() for text in match.groups())
-    middle = parse_number(f"{number} {unit}", si)
+    middle = _parse_decimal(f"{number} {unit}", si)
     # "2 % ± 1 %" is 1 % to 3 %: there the spread is no share of the middle
     if spread_unit == "%" and (si or unit != "%"):
-        half_width = abs(middle) * parse_number(spread, "") / 100
+        half_width = abs(middle) * _parse_decimal(spread, "") / 100
     else:
-        half_width = parse_number(f"{spread} {spread_unit}", si)
+        half_width = _parse_decimal(f"{spread} {spread_unit}", si)
     return middle - half_width, middle + half_width
 
 
-def numbers(value: object, si: str) -> tuple[float, ...]:
+def parse_numbers(value: object, si: str) -> tuple[float, ...]:
     """All numbers of a quantity in the SI unit `si`: one, an array, or the ends of a spread.
 
     `value` is text with a unit, or a bare number or array where no unit is needed.
@@ -143,11 +143,11 @@ def numbers(value: object, si: str) -> tuple[float, ...]:
     if match := LIST.fullmatch(text):
         items = (item.strip() for item in match[1].split(","))
         unit = f" {match[2]}" if match[2] else ""
-        values = tuple(parse_number(f"{item}{unit}", si) for item in items)
+        values = tuple(_parse_decimal(f"{item}{unit}", si) for item in items)
     elif match := SPREAD.fullmatch(text):
-        values = interval_of_spread(match, si)
+        values = _parse_spread(match, si)
     else:
-        values = (parse_number(text, si),)
+        values = (_parse_decimal(text, si),)
     return tuple(_checked_float(x) for x in values)
 
 
@@ -158,32 +158,32 @@ def _checked_float(value: Decimal) -> float:
     return float(value)
 
 
-def number(value: object, si: str) -> float:
-    """A single crisp quantity, in `si`; ValueError as of `numbers`, or of several values."""
-    values = numbers(value, si)
+def parse_number(value: object, si: str) -> float:
+    """A single crisp quantity, in `si`; ValueError as of `parse_numbers`, or of several values."""
+    values = parse_numbers(value, si)
     if len(values) != 1:
         raise ValueError(f"{len(values)} values stand where one is needed")
     return values[0]
 
 
-def fuzzy(value: object, si: str) -> FuzzyNumber:
+def parse_fuzzy(value: object, si: str) -> FuzzyNumber:
     """A quantity in the SI unit `si` as a fuzzy number: the count of its values says which kind.
 
     Raises:
-        ValueError: As of `numbers`, more than four values, or values that do not rise.
+        ValueError: As of `parse_numbers`, more than four values, or values that do not rise.
     """
-    values = numbers(value, si)
+    values = parse_numbers(value, si)
     if len(values) > len(SHAPES) or list(values) != sorted(values):
         raise ValueError(f"{len(values)} values stand where one to four that rise are needed")
     return SHAPES[len(values) - 1](*values)
 
 
-def fuzzy_of_any_unit(value: object) -> FuzzyNumber:
+def parse_fuzzy_in_any_unit(value: object) -> FuzzyNumber:
     """A quantity in the SI unit of `QUANTITIES` that its own unit fits, crisp or fuzzy."""
     reasons = []
     for si in QUANTITIES:
         try:
-            return fuzzy(value, si)
+            return parse_fuzzy(value, si)
         except ValueError as error:
             reasons.append(str(error))
     raise ValueError(reasons[0])

@@ -21,7 +21,7 @@ from pydantic import AfterValidator, TypeAdapter, ValidationError
 
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io.files import as_json, whole_file
-from alphacut.io.provenance import FORMAT, digest_of, door
+from alphacut.io.provenance import FORMAT, command_to_paste, digest_of
 
 if TYPE_CHECKING:
     import xarray
@@ -32,7 +32,7 @@ PLAIN = re.compile(r"(figures/)?(?!.*\.\.)[\w+-][\w.+-]{0,100}")
 READ_ONLY = os.O_RDONLY | sum(
     getattr(os, flag, 0) for flag in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY")
 )
-RUN = door("run", "CASE.toml")
+RUN = command_to_paste("run", "CASE.toml")
 COMPLETE = "whole results of a run"
 """Allowed state of a folder of results."""
 RUN_AGAIN = f"make it anew by {RUN}"
@@ -105,7 +105,7 @@ class ResultsFolder:
         """Names of the files that were made from what has this digest."""
         return tuple(name for name, entry in self.files.items() if entry.source == source)
 
-    def problem(self, source: str) -> str:
+    def describe_damage(self, source: str) -> str:
         """What is wrong with a file made from this, such as "modulus.nc is changed"; else ""."""
         for name in self.made_from(source):
             try:
@@ -162,7 +162,7 @@ class ResultsFolder:
         is_free = is_listed and (is_regular or stat.S_ISLNK(mode))
         require(is_free, str(file), value=kind, allowed=allowed, cure=cure)
 
-    def put(self, source: str, folder: Path, before: str = "") -> None:
+    def put_files(self, source: str, folder: Path, before: str = "") -> None:
         """Copies all files below a folder here and lists them as made from `source`.
 
         Other files that were made from `before` are removed.
@@ -189,12 +189,12 @@ class ResultsFolder:
             self.require_free(name)
         for name in forget:
             del self.files[name]
-        self.add({name: Listed(digest_of(x), source) for name, x in contents.items()})
+        self.add_to_list({name: Listed(digest_of(x), source) for name, x in contents.items()})
         for name, content in contents.items():
             with whole_file(self.path / name, follow_links=False) as partial:
                 partial.write_bytes(content)
 
-    def add(self, files: Mapping[str, Listed]) -> None:
+    def add_to_list(self, files: Mapping[str, Listed]) -> None:
         """Writes the list with further files, and with a checksum of its own."""
         self.files |= files
         document = {
@@ -211,7 +211,7 @@ class ResultsFolder:
         for name in self.files:
             self._remove(name)
         self.files, self.is_damaged = {}, False
-        self.add({})
+        self.add_to_list({})
 
     def _remove(self, name: str, digest: str = "") -> None:
         """Removes a link, or a regular file with this digest ("": any); leaves everything else."""

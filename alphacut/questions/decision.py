@@ -158,6 +158,6 @@ def decide(section: DecisionSection, response: FuzzyResponse) -> DecisionAnswer:
                 "record": "" if name == ANY else record_at(limits[name].peak),
             }
         )
-        for name, answer in passing(peaks, section.in_si(response.structure)).items()
+        for name, answer in passing(peaks, section.limits_in_si(response.structure)).items()
     }
     return DecisionAnswer(alpha=np.array(response.alpha), step=response.step, limits=decisions)

@@ -114,7 +114,7 @@ def _range_text(ends: tuple[float, float], unit: str) -> str:
 
 def fragility(section: FragilitySection, response: FuzzyResponse) -> FragilityAnswer:
     """Critical measures, bands, medians and dispersions of each limit, and of any of them."""
-    suite, limits = response.suite, section.in_si(response.structure)
+    suite, limits = response.suite, section.limits_in_si(response.structure)
     if suite is None:
         raise RefusedError("fragility", "without records", "a section [records]")
     peaks = {

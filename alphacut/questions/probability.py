@@ -98,7 +98,7 @@ class ProbabilityAnswer(LimitsAnswer[LimitProbability]):
 def probability(section: ProbabilitySection, response: FuzzyResponse) -> ProbabilityAnswer:
     """Bounds of the probability of exceeding each limit, and any of several, by level."""
     structure = response.structure
-    limits = section.in_si(structure)
+    limits = section.limits_in_si(structure)
     random = structure.inputs(section.random, "probability.random")
     fuzzy = {name: number for name, number in response.inputs.items() if name not in random}
     crisp = {x: number for x, number in structure.numbers.items() if number.support.width == 0}

@@ -117,7 +117,7 @@ def require_admissible_scale(section: TolerancesSection, response: FuzzyResponse
 def admissible_tolerances(section: TolerancesSection, response: FuzzyResponse) -> TolerancesAnswer:
     """Largest scale of all supports with no limit exceeded, and the supports there."""
     assert response.peaks is not None
-    limits = section.in_si(response.structure)
+    limits = section.limits_in_si(response.structure)
     scale = tolerances(
         response.structure.model_with_outputs("tolerances.limits", tuple(limits)),
         response.inputs,

@@ -60,7 +60,7 @@ class Recording:
 
     @property
     def offset_share(self) -> float:
-        """Mean acceleration as a share of the peak; 0 of a recording of zeros."""
+        """Mean acceleration over the peak; 0 of a recording of zeros."""
         return float(self.samples.mean()) / self.peak if self.peak > 0 else 0.0
 
     def doubts(self) -> Iterator[str]:
@@ -84,7 +84,7 @@ class Recording:
         return Accelerogram(self.step, detrend(self.samples, type=kind))
 
 
-def arias_shares(samples: Array, step: float) -> Array:
+def arias_fractions(samples: Array, step: float) -> Array:
     """Arias intensity up to each sample over that of the whole record, shape (n,).
 
     The integral of the squared piecewise linear acceleration is exact; of zeros it is zeros.

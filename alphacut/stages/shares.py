@@ -95,7 +95,7 @@ def peak_shares(model: frame.StoreyFrame, structure: Structure, task: EnvelopeTa
 
     They have shape (inputs, outputs), by the inputs of a study.
     """
-    groups, step = {name: structure.members(name) for name in task.fuzzy}, task.section.step
+    groups, step = {name: structure.fuzzy_members(name) for name in task.fuzzy}, task.section.step
     if model.ground is not None:
         step = coarser_step(task.duration, step)
 

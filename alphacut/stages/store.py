@@ -29,7 +29,7 @@ from alphacut.fuzzy.arrays import Array, on_one_blas_thread
 from alphacut.fuzzy.progress_bar import Progress, subprogress
 from alphacut.fuzzy.refused import FailedError, require
 from alphacut.io.files import as_json, rank, say, write_text
-from alphacut.io.provenance import fingerprint, origin
+from alphacut.io.provenance import build_provenance, fingerprint
 from alphacut.io.results import Listed, ResultsFolder
 
 if TYPE_CHECKING:
@@ -227,7 +227,7 @@ class StageStore:
         if folder.files[name].source != key:
             return None
         files = folder.made_from(key)
-        if problem := folder.problem(key):
+        if problem := folder.describe_damage(key):
             say(f"warning: {problem}; {stage.name} is computed anew")
             return None
         try:
@@ -262,7 +262,7 @@ class StageStore:
         require(is_allowed, str(path), value="listed in no manifest", allowed="none", cure=cure)
         if rank() == 0 and not is_listed and not exists:
             # listed now, so that an interrupted run owns it; without digests, since it changes
-            folder.add(dict.fromkeys((SAMPLES, f"{SAMPLES}-journal"), Listed("", "")))
+            folder.add_to_list(dict.fromkeys((SAMPLES, f"{SAMPLES}-journal"), Listed("", "")))
         return path
 
     def _write(self, stage: Stage[T], computed: Computed[T], files: Path) -> StageResult[T]:
@@ -271,12 +271,12 @@ class StageStore:
         name, key = f"{stage.name}.json", stage.key
         if rank() != 0:
             return StageResult(*computed, fingerprint=key)
-        document = {**origin(self.case_text, key), "result": computed.numbers}
+        document = {**build_provenance(self.case_text, key), "result": computed.numbers}
         write_text(files / name, as_json(document, indent=1))
         if computed.data is not None:
             computed.data.to_netcdf(files / f"{stage.name}.nc")
         before = self.folder.files[name].source if name in self.folder.files else ""
-        self.folder.put(key, files, before)
+        self.folder.put_files(key, files, before)
         return StageResult(*computed, self.folder.made_from(key), key)
 
     def put_text(self, name: str, text: str) -> None:

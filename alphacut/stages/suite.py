@@ -21,7 +21,7 @@ from alphacut.frame.structures.linear import modal_damping_ratios
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.fuzzy.result import Nature
-from alphacut.records.recording import Recording, arias_shares, spectral_acceleration
+from alphacut.records.recording import Recording, arias_fractions, spectral_acceleration
 from alphacut.stages.envelope import EnvelopeTask, PeakResults
 from alphacut.stages.store import Numbers, Stage, Values
 
@@ -103,7 +103,7 @@ def _suite_record(
     duration = min(envelope.duration, length + FREE_PERIODS * mode.period)
     steps = max(1, ceil(duration / envelope.step - 1e-9))
     envelope.require_steps(f"envelope.duration of {name}", steps * envelope.step)
-    shares = arias_shares(ground.acceleration, ground.step)
+    shares = arias_fractions(ground.acceleration, ground.step)
     end = min(int(duration / ground.step + 1e-9), len(shares) - 1)
     cut_share = 0.0 if duration >= length else float(1 - shares[end])
     offset = float(ground.samples.mean()) / ground.extremes[0]

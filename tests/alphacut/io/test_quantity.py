@@ -3,7 +3,7 @@
 import pytest
 
 from alphacut.fuzzy import Crisp, Interval, Trapezoidal, Triangular
-from alphacut.io.quantity import POWERS_OF_TEN, engineering, fuzzy, number, registry
+from alphacut.io.quantity import POWERS_OF_TEN, engineering, parse_fuzzy, parse_number, registry
 
 RIGHT = [
     ("80 GPa", "Pa", Crisp(80e9)),
@@ -23,7 +23,7 @@ RIGHT = [
 
 @pytest.mark.parametrize(("text", "unit", "value"), RIGHT)
 def test_a_quantity_is_read(text, unit, value):
-    assert fuzzy(text, unit) == value
+    assert parse_fuzzy(text, unit) == value
 
 
 WRONG = [
@@ -52,13 +52,13 @@ WRONG = [
 @pytest.mark.parametrize(("text", "unit", "words"), WRONG)
 def test_what_is_no_quantity_is_refused(text, unit, words):
     with pytest.raises(ValueError, match=words):
-        fuzzy(text, unit)
+        parse_fuzzy(text, unit)
 
 
 def test_one_number_is_one():
-    assert number("2.5 m", "m") == number("250 cm", "m") == 2.5
+    assert parse_number("2.5 m", "m") == parse_number("250 cm", "m") == 2.5
     with pytest.raises(ValueError, match="2 values"):
-        number("[1, 2] m", "m")
+        parse_number("[1, 2] m", "m")
 
 
 @pytest.mark.parametrize(

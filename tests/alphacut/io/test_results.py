@@ -140,7 +140,7 @@ def check_damage(finished, place, seed, kinds, capfd):
         assert not listed.is_damaged, label
         sources = {entry.source for entry in listed.files.values()} - {""}
         assert sources, label
-        assert not list(filter(None, map(listed.problem, sources))), label
+        assert not list(filter(None, map(listed.describe_damage, sources))), label
     print(status, label)
 
 
@@ -174,16 +174,16 @@ def test_what_was_changed_or_is_no_file_is_not_removed(tmp_path):
     for name in names:
         (source / name).write_text(name)
     folder = ResultsFolder(out)
-    folder.put("1", source)
+    folder.put_files("1", source)
     (out / "changed").write_text("precious")
     (out / "pipe").unlink()
     os.mkfifo(out / "pipe")
     for name in names:
         (source / name).unlink()
     (source / "other").write_text("other")
-    folder.put("2", source, before="1")
+    folder.put_files("2", source, before="1")
     assert sorted(x.name for x in out.iterdir()) == ["changed", "manifest.json", "other", "pipe"]
-    folder.add({"pipe": Listed("", "3")})
+    folder.add_to_list({"pipe": Listed("", "3")})
     folder.clear()
     assert (out / "pipe").is_fifo()
 
@@ -191,7 +191,7 @@ def test_what_was_changed_or_is_no_file_is_not_removed(tmp_path):
 def test_a_manifest_lists_no_file_outside(tmp_path):
     (tmp_path / "precious").write_text("precious")
     (tmp_path / "out").mkdir()
-    ResultsFolder(tmp_path / "out").add({"../precious": Listed("", "1")})
+    ResultsFolder(tmp_path / "out").add_to_list({"../precious": Listed("", "1")})
     folder = ResultsFolder.read(tmp_path / "out")
     folder.clear()
     assert (tmp_path / "precious").exists()

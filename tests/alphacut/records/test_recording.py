@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 
 from alphacut.frame import Accelerogram
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.records.recording import Recording, arias_shares, spectral_acceleration
+from alphacut.records.recording import Recording, arias_fractions, spectral_acceleration
 
 TIME = 0.01 * np.arange(1001)
 
@@ -23,11 +23,11 @@ def test_a_mean_or_a_straight_line_is_taken_away():
     assert recording(wave + 3).offset_share == pytest.approx(0.75)
 
 
-def test_arias_shares_are_those_of_the_piecewise_linear_record(rng):
+def test_arias_fractions_are_those_of_the_piecewise_linear_record(rng):
     values = rng.normal(size=40)
     fine = np.interp(np.linspace(0, 39, 39_001), np.arange(40), values)
     by_simpson = np.append(0, np.cumsum(fine[:-2:2] ** 2 + 4 * fine[1::2] ** 2 + fine[2::2] ** 2))
-    shares = arias_shares(values, 0.01)
+    shares = arias_fractions(values, 0.01)
     assert shares == pytest.approx((by_simpson / by_simpson[-1])[::500], abs=1e-12)
 
 
