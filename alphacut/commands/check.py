@@ -198,8 +198,6 @@ COMMANDS = {
         check,
     ),
     "verify": Command(
-        "test the proved envelopes of a run by exact motions, without the proof",
-        add_folder,
-        verify,
+        "test the proved envelopes of a run by exact motions, without the proof", add_folder, verify
     ),
 }

@@ -21,14 +21,7 @@ from alphacut.fuzzy.progress_bar import subprogress
 from alphacut.fuzzy.refused import FailedError, require
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document, say
-from alphacut.stages.store import (
-    Computed,
-    Numbers,
-    Stage,
-    StageContext,
-    StageResult,
-    Values,
-)
+from alphacut.stages.store import Computed, Numbers, Stage, StageContext, StageResult, Values
 
 if TYPE_CHECKING:
     import xarray

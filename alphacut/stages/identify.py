@@ -8,12 +8,7 @@ import numpy as np
 
 from alphacut.case.motion import Identify
 from alphacut.case.structure import Structure
-from alphacut.frame.identify import (
-    MeasuredMode,
-    RefutedError,
-    identify,
-    measured_mode,
-)
+from alphacut.frame.identify import MeasuredMode, RefutedError, identify, measured_mode
 from alphacut.frame.identify.identify import widest_cut
 from alphacut.frame.structures.quantities import of_storey_frame
 from alphacut.fuzzy import FuzzyNumber

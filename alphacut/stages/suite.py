@@ -91,10 +91,7 @@ def _suite_record(
 ) -> SuiteRecord:
     """A recording after correction and scaling, and the length of the motion under it."""
     ground, name = recording.accelerogram(section.baseline), recording.name
-    sizes = {
-        "PGA": ground.extremes[0],
-        "Sa(T1)": mode.spectral_acceleration(ground, mode.period),
-    }
+    sizes = {"PGA": ground.extremes[0], "Sa(T1)": mode.spectral_acceleration(ground, mode.period)}
     measure = sizes.get(section.scale.measure, 1.0)
     allowed = "a record that moves something"
     require(measure > 0, f"record {name}", value="zero throughout", allowed=allowed)
