@@ -20,7 +20,7 @@ from alphacut.case.motion import EnvelopeSection
 from alphacut.case.radius import RadiusMapSection, ThetaSection
 from alphacut.case.structure import Structure
 from alphacut.commands.options import require_case_petsc
-from alphacut.frame.questions.peaks import Peaks, output_of
+from alphacut.frame.questions.peaks import Peaks
 from alphacut.fuzzy import Crisp, FuzzyNumber, Triangular
 from alphacut.fuzzy.progress_bar import progress_reporter
 from alphacut.fuzzy.refused import RefusedError, require
@@ -206,9 +206,7 @@ class Pipeline:
         peaks = {name: peaks_of(result, alpha) for name, result in by_record.items()}
         worst = suite.worst_peaks(peaks)
         if any(limit.side == "mean" for x in self.content.questions.values() for limit in x.limits):
-            plain = [name for name in worst if name == output_of(name)]
-            reached = suite.means_reached(structure, task, records, plain)
-            worst = suite.with_means(worst, peaks, reached)
+            worst = suite.with_means(worst, peaks, structure, task, records)
         measures = {record.name: record.measures for record in records}
         motions = SuiteResponse(mode.period, mode.ratio, measures, peaks)
         return replace(response_of(structure, task, worst), suite=motions)

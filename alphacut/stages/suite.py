@@ -18,7 +18,8 @@ from alphacut.frame import Accelerogram
 from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.questions.peaks import PEAK_BOUNDS, Peak, Peaks, output_of
 from alphacut.frame.structures.linear import modal_damping_ratios
-from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy import FuzzyNumber
+from alphacut.fuzzy.arrays import Array, Mask
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.fuzzy.result import Nature
 from alphacut.records.recording import Recording, arias_fractions, spectral_acceleration
@@ -162,56 +163,59 @@ def worst_peaks(peaks: Mapping[str, Peaks]) -> dict[str, Peak]:
     return worst
 
 
-def means_reached(
-    structure: Structure, task: EnvelopeTask, records: Sequence[SuiteRecord], outputs: Sequence[str]
-) -> Array:
-    """Greatest mean over the records of a structure's peaks, of those tried, (levels, outputs).
-
-    Tried are the nominal structure and those at corners of each cut. Peaks are read at nodes, so
-    that the structure's own mean is no smaller.
-    """
-    inputs = structure.inputs(task.fuzzy)
-    names, step = tuple(inputs), task.section.step / NODES
-    points = [[number.modal for number in inputs.values()]]
-    for alpha in task.section.alpha:
-        corners = product(*(dict.fromkeys(number.cut(alpha)) for number in inputs.values()))
-        points += [list(corner) for corner in islice(corners, MAX_CORNERS)]
-    means: Array = np.zeros((len(points), len(outputs)))
-    for record in records:
-        model = with_record(structure, record).model_with_outputs("records", tuple(outputs))
-        flow = make_flow(model, names, record.duration, step, "exact")
-        columns = [[*map(str, flow.outputs)].index(output) for output in outputs]
-        means += np.abs(flow.values(np.array(points))).max(axis=1)[:, columns] / len(records)
-    rows = []
-    for alpha in task.section.alpha:
-        cuts = np.array([number.cut(alpha) for number in inputs.values()])
-        inside = ((np.array(points) >= cuts[:, 0]) & (np.array(points) <= cuts[:, 1])).all(axis=1)
-        rows.append(means[inside].max(axis=0, initial=0.0))
-    return np.array(rows)
-
-
-def with_means(worst: Peaks, peaks: Mapping[str, Peaks], reached: Array) -> dict[str, Peak]:
+def with_means(
+    worst: Peaks,
+    peaks: Mapping[str, Peaks],
+    structure: Structure,
+    task: EnvelopeTask,
+    records: Sequence[SuiteRecord],
+) -> dict[str, Peak]:
     """The worst peaks, and beside them "mean q3" …, bounds of the mean over the records.
 
     The mean of each structure lies between the means of the least and of the greatest peaks. No
-    structure may reach the latter, as each record has its own worst one; `reached` has the greatest
-    mean that a structure is known to have, of each magnitude, (levels, outputs).
+    structure may reach the latter, as each record has its own worst one. What is reached is the
+    greatest mean of those tried: of the nominal structure and those at corners of each cut. Their
+    peaks are read at time nodes, so that the structure's own mean is no smaller.
     """
+    magnitudes = tuple(name for name in worst if name == output_of(name))
+    inputs, levels = structure.inputs(task.fuzzy), task.section.alpha
+    points, inside = _tried_points(inputs, levels)
+    tried_means: Array = np.zeros((len(points), len(magnitudes)))
+    for record in records:
+        model = with_record(structure, record).model_with_outputs("records", magnitudes)
+        step = task.section.step / NODES
+        flow = make_flow(model, tuple(inputs), record.duration, step, "exact")
+        columns = [[*map(str, flow.outputs)].index(output) for output in magnitudes]
+        tried_means += np.abs(flow.values(points)).max(axis=1)[:, columns] / len(records)
     found = dict(worst)
-    magnitudes = [name for name in worst if name == output_of(name)]
-    for name, known in zip(magnitudes, reached.T, strict=True):
+    for name, tried in zip(magnitudes, tried_means.T, strict=True):
         means = {
             bound: np.mean([getattr(x[name], bound) for x in peaks.values()], axis=0)
             for bound in ("lower", "upper", "error", "least_proved")
         }
+        in_cuts = np.where(inside, tried, -np.inf)  # (levels, points)
         mean_minima = np.maximum(means["lower"] - means["error"], means["least_proved"])
         # a structure of any higher cut has at least the mean of that cut's least peaks
-        means["reached"] = np.maximum(np.maximum.accumulate(mean_minima[::-1])[::-1], known)
-        means["least_reached"] = np.full_like(
-            mean_minima, np.inf
-        )  # no structure's mean is bounded so
-        found[f"mean {name}"] = replace(worst[name], reached_at={}, **means)
+        means["reached"] = np.maximum(
+            np.maximum.accumulate(mean_minima[::-1])[::-1], in_cuts.max(axis=1)
+        )
+        means["least_reached"] = np.full_like(mean_minima, np.inf)  # nothing bounds one structure's
+        farthest = map(float, points[in_cuts[0].argmax()])
+        reached_at = dict(zip(inputs, farthest, strict=True))
+        found[f"mean {name}"] = replace(worst[name], reached_at=reached_at, **means)
     return found
+
+
+def _tried_points(inputs: Mapping[str, FuzzyNumber], levels: Sequence[float]) -> tuple[Array, Mask]:
+    """Nominal inputs and corners of cuts, (points, inputs); which lie in each, (levels, points)."""
+    rows = [tuple(number.modal for number in inputs.values())]
+    for alpha in levels:
+        corners = product(*(dict.fromkeys(number.cut(alpha)) for number in inputs.values()))
+        rows += islice(corners, MAX_CORNERS)
+    points = np.array(rows, float)
+    cuts = np.array([[number.cut(alpha) for number in inputs.values()] for alpha in levels])
+    is_inside = (points >= cuts[:, None, :, 0]) & (points <= cuts[:, None, :, 1])
+    return points, np.asarray(is_inside.all(axis=-1))
 
 
 class RecordResult(Numbers):

@@ -172,6 +172,10 @@ def test_the_mean_over_records_lies_between_means_of_ends(tmp_path):
     # a structure has it, not each record its own; peaks of spectra are read 0.3 % low at most
     assert 0.99 * max(means) <= peak["reached"][0] <= 1.004 * max(means)
     assert max(means) * 0.996 <= peak["proved"][0]
+    assert peak["reached_at"] == {"k1": pytest.approx([0.96, 1.04][means[-1] > means[0]] * 8e6)}
+    # no number is of different structures
+    assert peak["least_reached"] == [None, None]
+    assert set(records["statistics"]["drift1"]) == {"proved"}
     assert (out / "figures/spectra.svg").is_file()
     spectra = records["spectra"]
     exact = [
