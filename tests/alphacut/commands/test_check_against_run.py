@@ -47,9 +47,10 @@ seed = 1
 file = "circles.csv"
 size = ["10 mm", "10 mm"]
 """
+SHORT = '"0.6 s"'  # motions
 TEXTS = {
-    "frame": FRAME + QUESTIONS,
-    "both": BOTH,
+    "frame": FRAME.replace('"2 s"', SHORT) + QUESTIONS,
+    "both": BOTH.replace('"2 s"', SHORT),
     "identify": IDENTIFY,
     "image": IMAGE,
     "circles": PARTICLES,
