@@ -81,26 +81,16 @@ class CellContent(Section):
         return self.radius if isinstance(self.radius, RadiusMapSection) else None
 
     @property
-    def law_and_phases(self) -> tuple[ThetaSection, MeshedCell]:
-        """The law of θ and the phases of a mesh from a file, or RefusedError."""
-        if self.mesh_cell is None:
-            raise RefusedError("cell.phases", None, "a section for each physical group")
-        return self.radius or ThetaSection(), self.mesh_cell
-
-    @property
-    def radius_and_phases(self) -> tuple[AnyRadius, RoundCell]:
-        """The radius map and the phases of a round particle, or RefusedError."""
+    def random_cell(self) -> tuple[AnyRadius | ThetaSection, RoundCell | MeshedCell]:
+        """The radius map, or the law of θ of a mesh, and the phases; RefusedError without them."""
+        if self.mesh_cell is not None:
+            return self.radius or ThetaSection(), self.mesh_cell
         if self.particle_cell is None:
             raise RefusedError("cell", None, "a section [cell] with a particle")
         radius = self.radius_map or self.particle_cell.fraction_map
         if radius is None:
             raise RefusedError("radius", None, "a section [radius], or cell.fraction")
         return radius, self.particle_cell
-
-    @property
-    def random_cell(self) -> tuple[AnyRadius | ThetaSection, RoundCell | MeshedCell]:
-        """The radius map, or the law of θ of a mesh, and the phases of a cell that is no image."""
-        return self.radius_and_phases if self.mesh_cell is None else self.law_and_phases
 
     @model_validator(mode="after")
     def _check_mesh(self) -> Self:
@@ -128,11 +118,13 @@ class CellContent(Section):
     @model_validator(mode="after")
     def _check_interphase(self) -> Self:
         """Refuses an interphase that reaches the sides of the cell; lengths over half a side."""
-        thickness = None if self.particle_cell is None else self.particle_cell.interphase_thickness
-        has_map = self.radius_map is not None or self.stated_fraction is not None
-        if thickness is None or not has_map or "microstructure" in self.stages:
+        cell = self.particle_cell
+        law = None if cell is None else self.radius_map or cell.fraction_map
+        if cell is None or law is None or cell.interphase_thickness is None:
             return self
-        radius, thickest = self.radius_and_phases[0].largest_radius, thickness.support.upper
+        if "microstructure" in self.stages:  # which is yet to give the radius
+            return self
+        radius, thickest = law.largest_radius, cell.interphase_thickness.support.upper
         fits = radius + thickest < CLOSEST  # the largest outer radius that can be meshed
         allowed = f"values below {CLOSEST - radius:.4g}, beside radii up to {radius:.4g}"
         require(fits, "cell.interphase_thickness", value=f"{thickest:g}", allowed=allowed)

@@ -52,7 +52,7 @@ def _material_figures(results: Results) -> Iterator[Drawing]:
     if radius_map is not None:
         yield "fig14-cone", partial(material.cone, radius_map)
     if (data := results.modulus) is not None and results.is_paper:
-        inclusion = content.radius_and_phases[1].inclusion_modulus
+        inclusion = getattr(content.cell, "inclusion_modulus", None)
         if isinstance(inclusion, FuzzyNumber):
             cuts = data.numbers.E_GPa
             bounds = (GPA * cuts.lower, GPA * cuts.upper)
