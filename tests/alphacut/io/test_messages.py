@@ -7,7 +7,7 @@ from alphacut.entry import main
 from alphacut.frame import Accelerogram, MatrixStructure, Proof, StoreyFrame, envelope
 from alphacut.fuzzy import Crisp, FailedError, General, RefusedError, propagate
 from alphacut.fuzzy.refused import checked_number
-from alphacut.io.problem import InputProblem
+from alphacut.io.problem import InputProblem, missing
 from tests.alphacut.small import FRAME, written
 
 CURE = "take it from the head of the file"
@@ -24,6 +24,14 @@ def test_value_and_allowed_are_cut_and_never_the_cure():
     failed = FailedError("w" * 9000, CURE)
     assert len(str(failed)) <= 300
     assert str(failed).endswith(CURE)
+
+
+def test_a_missing_package_is_named_with_its_cure_here(monkeypatch):
+    error = ImportError("No module named 'skimage'", name="skimage.measure")
+    monkeypatch.setenv("ALPHACUT_INSIDE", "1")
+    assert missing(error) == f"{error}; pip install '.[particles]'"
+    monkeypatch.delenv("ALPHACUT_INSIDE")
+    assert missing(error).endswith(", or run inside ./enter")
 
 
 @pytest.mark.parametrize("digits", ["9" * 6000, "0x" + "f" * 6000])
