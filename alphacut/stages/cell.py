@@ -59,7 +59,7 @@ AVERAGES = {"axes": "eq. 16", "isotropic": "isotropic"}
 """Averages of a plane stiffness by their names in a case, in words."""
 
 
-def solve_cells(
+def _solve_cells(
     model: Any, law: TruncatedNormal, is_averaged: bool, samples: Sequence[Any]
 ) -> list[HomogenisedStiffness]:
     """Result of each sample by a model of rve; `is_averaged`: E and ν of the isotropic average."""
@@ -89,10 +89,10 @@ class CellProblem:
     stated_fraction: float | None = None
 
     @classmethod
-    def of(cls, content: CellContent, **further: Any) -> Self:
+    def of(cls, content: CellContent, **further: object) -> Self:
         """The cell of a case, with further fields of this class."""
         sections = *content.random_cell, content.mesh, content.modulus
-        return cls(*sections, content.stated_fraction, **further)
+        return cls(*sections, content.stated_fraction, **cast("dict[str, Any]", further))
 
     @property
     def numbers(self) -> dict[str, FuzzyNumber]:
@@ -104,7 +104,7 @@ class CellProblem:
         """Average of the stiffness that gives E and ν: "eq. 16", "isotropic" or "spheres"."""
         return "spheres" if self.cell.particles == "spheres" else AVERAGES[self.modulus.average]
 
-    def model(self, **elements: Any) -> Solve:
+    def model(self, **elements: object) -> Solve:
         """The function that solves cells by the model that the sections name.
 
         `elements` are options of the product-space elements: petsc, parallel, estimate, moduli.
@@ -118,11 +118,11 @@ class CellProblem:
 
                 assert self.mesh.file is not None
                 options = {name: x for name, x in elements.items() if name in MESH_OPTIONS}
-                model = MeshModel(self.mesh.file, **options)
+                model = MeshModel(self.mesh.file, **cast("dict[str, Any]", options))
         except ImportError as error:
             value, cure = self.modulus.method, missing(error)
             raise RefusedError("modulus.method", value, "series", cure) from None
-        return partial(solve_cells, model, self.radius.law, is_averaged)
+        return partial(_solve_cells, model, self.radius.law, is_averaged)
 
     def _particle_model(self, cell: RoundCell, prism_options: Mapping[str, Any]) -> Any:
         """The first of series, slices and prisms that the case allows."""
@@ -163,7 +163,7 @@ class CellProblem:
         """The cell at the nominal values of its inputs."""
         return self.at({name: number.modal for name, number in self.numbers.items()})
 
-    def solve(self, **elements: Any) -> HomogenisedStiffness:
+    def solve(self, **elements: object) -> HomogenisedStiffness:
         """The homogenised stiffness at the nominal values; `elements` as those of `model`."""
         return self.model(**elements)([self.nominal])[0]
 
