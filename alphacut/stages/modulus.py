@@ -35,33 +35,12 @@ if TYPE_CHECKING:
 
 SUFFIXES = {PLANE_STRAIN: "", FREE: "_free"}
 """What is added to the name of a constant along x and y as an output, by definition."""
-ABOUT = {
-    "E_x": ("Pa", "Young's modulus along x"),
-    "E_y": ("Pa", "Young's modulus along y"),
-    "nu_xy": ("1", "Poisson's ratio of a pull along x"),
-    "G_xy": ("Pa", "shear modulus between x and y"),
-}
-BOUNDS = {
-    "E": ("Pa", "effective Young's modulus"),
-    "nu": ("1", "effective Poisson's ratio"),
-    "s11": ("Pa", "mean homogenised stress 11 under ε11 = ε22 = 0.01"),
-    "s12": ("Pa", "mean homogenised stress 12 under ε12 = 0.01"),
-}
-FIBRES = {
-    "E_T": ("Pa", "Young's modulus across the fibres"),
-    "E_L": ("Pa", "Young's modulus along the fibres"),
-    "nu_LT": ("1", "Poisson's ratio of a pull along the fibres"),
-    "G_T": ("Pa", "shear modulus across the fibres"),
-    "G_L": ("Pa", "shear modulus along the fibres"),
-}
-"""Constants of cylinders besides; see rve.fibre_constants."""
-PLANE = {
-    name + suffix: (unit, f"{about}, {definition}")
-    for definition, suffix in SUFFIXES.items()
-    for name, (unit, about) in ABOUT.items()
-}
-QUANTITIES = BOUNDS | FIBRES | PLANE
-"""Unit and meaning of each output that has α-cuts."""
+FIBRES = ("E_T", "E_L", "nu_LT", "G_T", "G_L")
+"""Constants of cylinders across (T) and along (L) the fibres; see rve.fibre_constants."""
+PLANE = tuple(name + suffix for suffix in SUFFIXES.values() for name in NAMES)
+"""Constants along x and y as outputs, by both definitions."""
+QUANTITIES = ("E", "nu", "s11", "s12", *FIBRES, *PLANE)
+"""Outputs that have α-cuts; s11 and s12 are mean stresses under strains of 0.01."""
 CUT = ("alpha", "bound")
 
 
@@ -170,26 +149,25 @@ def largest_over_samples(result: Bounds, kind: str) -> dict[str, float]:
 
 
 def modulus_dataset(result: Bounds, theta: Array, losses: Mapping[str, Array]) -> xarray.Dataset:
-    """Dataset in SI: α-cuts NAME, inputs NAME_at that reach them, and samples NAME_sample."""
+    """Dataset in SI: α-cuts NAME, inputs NAME_at that reach them, and samples NAME_sample.
+
+    `point` has the inputs of the samples, `curve11` their stresses 11 over θ.
+    """
     import xarray
 
     samples = result.samples
     assert samples is not None
     variables: dict[str, Any] = {}
-    for name, (unit, about) in QUANTITIES.items():
-        if name in result.outputs:
-            attributes, column = {"units": unit, "long_name": about}, result.column(name)
-            points = np.stack([result.lower_at[:, column], result.upper_at[:, column]], axis=1)
-            about_points = {"long_name": f"inputs that reach the bounds of {name}, in SI"}
-            variables[name] = (CUT, np.stack(result.bounds(name), axis=1), attributes)
-            variables[f"{name}_at"] = ((*CUT, "parameter"), points, about_points)
-            variables[f"{name}_sample"] = ("sample", samples.values.output(name), attributes)
-    for name, cut in losses.items():
-        variables[f"loss_{name}"] = (CUT, cut, {"long_name": f"loss factor of {name}"})
-    about_points = {"long_name": "inputs, in SI"}
-    variables["point"] = (("sample", "parameter"), samples.points, about_points)
-    attributes = {"units": "Pa", "long_name": "homogenised stress 11 over θ"}
-    variables["curve11"] = (("sample", "theta"), samples.values.output("curve11"), attributes)
+    for name in (name for name in QUANTITIES if name in result.outputs):
+        units, column = {"units": "1" if name.startswith("nu") else "Pa"}, result.column(name)
+        points = np.stack([result.lower_at[:, column], result.upper_at[:, column]], axis=1)
+        variables[name] = (CUT, np.stack(result.bounds(name), axis=1), units)
+        variables[f"{name}_at"] = ((*CUT, "parameter"), points)
+        variables[f"{name}_sample"] = ("sample", samples.values.output(name), units)
+    variables |= {f"loss_{name}": (CUT, cut) for name, cut in losses.items()}
+    variables["point"] = (("sample", "parameter"), samples.points)
+    curves = samples.values.output("curve11")
+    variables["curve11"] = (("sample", "theta"), curves, {"units": "Pa"})
     coordinates = {"theta": theta, "alpha": result.alpha}
     axes = {"bound": ["lower", "upper"], "parameter": list(result.inputs)}
     return xarray.Dataset(variables, coordinates | axes)
