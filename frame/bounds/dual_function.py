@@ -2,7 +2,7 @@
 
 An output at a node is Σ_k F_k(z_k(u)): z_k are intervening variables of mode k, F_k the response of
 one oscillator. All z are scaled to [−1, 1] over the box: z = a·u + u·Q u ± R. For any multipliers μ
-the maximum of side × output over the inputs u is at most (Geoffrion 1974)
+the maximum of side × output over the inputs u is at most (Geoffrion 1974, Lemaréchal 2001)
 
     D(μ) = Σ_k max over the mode's table of [ Σ_s c e + |r e − μ_s| − μ_ω ω − μ_g g ]
          + max over u of [ Σ μ (a·u + u·Q u) + truncated modes ] + Σ |μ| R,
