@@ -100,14 +100,6 @@ class History:
         slope = float(np.abs(np.diff(self.samples)).max()) / self.step
         return size, slope + self.frequency * size
 
-    @property
-    def jumps(self) -> list[tuple[float, float]]:
-        """Pairs of a time after 0 at which f may jump, in s, and a bound of the jump."""
-        jumps = [(self.start, abs(float(self.samples[0])))] if self.start > 0 else []
-        if not self.is_held:
-            jumps.append((self.end, abs(float(self.samples[-1]))))
-        return jumps
-
     def values(self, time: Array) -> Array:
         """Values of f at times, the same shape."""
         times = np.asarray(time, float)
@@ -132,26 +124,25 @@ class History:
     def line_deviation(self, time: Array) -> Array:
         """Upper bounds of the distance of f from straight lines between nodes, shape (T,).
 
-        Row j is that of the step that ends at node j. Without a sine f deviates most at a sample,
-        just before or after it; with one by ω² h²/8 at most and by its jumps.
+        Row j is that of the step that ends at node j. g deviates most at a sample, just before or
+        after it; its chord g_c times the sine by h² max |(g_c sin)″| / 8 at most, h the step.
         """
-        h, values = np.diff(time, prepend=time[0]), self.values(time)
-        if self.frequency:
-            bound = np.minimum((self.frequency * h) ** 2 / 8, 2.0) * self.extremes[0]
-            for at, size in self.jumps:
-                bound[(time - h < at) & (at <= time)] += 2 * size
-            return np.asarray(bound)
+        h, g = np.diff(time, prepend=time[0]), self.envelope(time)
         breaks = self.start + np.arange(len(self.samples)) * self.step
         breaks = breaks[(breaks > time[0]) & (breaks <= time[-1] * (1 + 1e-12))]
         # node at the end of the step in which each sample lies
         node = np.minimum(np.searchsorted(time * (1 + 1e-12), breaks), len(time) - 1)
-        line = np.interp(breaks, time, values)
+        line = np.interp(breaks, time, g)
         bound = np.zeros(len(time))
         for side in (-1.0, 1.0):
             distance = np.abs(self.envelope(breaks, side) - line)
             # the value after a jump at a node belongs to the next step
             is_node = np.abs(breaks - time[node]) < 1e-9 * self.step
             np.maximum.at(bound, node, np.where(is_node & (side > 0), 0.0, distance))
+        if self.frequency:
+            size, rise = np.maximum(np.abs(g[1:]), np.abs(g[:-1])), np.abs(np.diff(g))
+            phase = self.frequency * h[1:]
+            bound[1:] += np.minimum(phase**2 / 8 * size + phase / 4 * rise, 2 * size)
         return np.where(bound > 1e-12 * self.extremes[0], bound, 0.0)
 
 

@@ -41,7 +41,8 @@ class StoreyFrame:
     and "zeta", or "zeta1" … of single modes, where there are damping ratios; "F3" of a force on
     floor 3, "F3_2" of a second one there, "J3" of an impulse.
     Outputs: "q1" … (displacement, m), "v1" … (velocity, m/s), "a1" … (absolute acceleration,
-    m/s²), "drift1" … (q_z − q_(z−1), m), "shear1" … (k_z drift_z, N); "base_shear" is "shear1".
+    m/s²), "drift1" … (q_z − q_(z−1), m), "shear1" … (k_z drift_z of the columns,
+    without dampers' forces, N); "base_shear" is "shear1".
 
     Args:
         masses: Floors from below, in kg.
