@@ -1,4 +1,6 @@
-"""Errors of time stepping are estimated as they are, and declared in every bound."""
+"""Errors of time steps and between nodes are estimated as they are, and declared in every bound."""
+
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,8 +17,12 @@ from alphacut.frame import (
     Sampled,
     StoreyFrame,
     envelope,
+    pendulum,
 )
-from alphacut.frame.verification.step_error import MARGIN
+from alphacut.frame.dynamics.flow import StepError
+from alphacut.frame.dynamics.nonlinear import make_flow
+from alphacut.frame.structures.linear import frequencies
+from alphacut.frame.verification.step_error import MARGIN, ReferenceMotion, node_deviation
 from alphacut.fuzzy import Interval, Triangular
 from alphacut.fuzzy.refused import FailedError, RefusedError
 
@@ -84,3 +90,92 @@ def test_motions_that_do_not_exist_and_steps_that_fail_are_named():
     motion = {**MOTION, "step": 0.1, "integrator": "rk4"}
     with pytest.raises(FailedError, match=r"passes the peak of q1.*take a smaller step"):
         envelope(frame, {"E": Interval(24e9, 26e9)}, method=Sampled(4), **motion)
+
+
+def angle(parameters, time):
+    """Angle of the pendulum, from its equation of motion written here."""
+    p = parameters
+    damping = p["d"] / (p["m"] * p["l"] ** 2)
+    right = lambda t, y: [y[1], -p["g"] / p["l"] * np.sin(y[0]) - damping * y[1]]  # noqa: E731
+    accuracy = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-12}
+    start = [p["phi_0"], p["omega_0"]]
+    return solve_ivp(right, (0, time[-1]), start, t_eval=time, **accuracy).y[0]
+
+
+def test_a_step_too_coarse_near_the_upright_is_refused_and_a_finer_one_taken():
+    near_upright, inputs = pendulum(phi0=3.0, damping=0.01), {"omega_0": Interval(0.4435, 0.4445)}
+    motion = {"duration": 5.0, "alpha": (0,), "method": Sampled(32), "progress": False}
+    with pytest.raises(
+        StepError, match=r"too coarse where a bound is attained, at omega_0 = .*smaller step"
+    ):
+        envelope(near_upright, inputs, step=0.05, **motion)
+    assert envelope(near_upright, inputs, step=0.00625, **motion).error.max() > 0
+
+
+@pytest.mark.parametrize("low", [2.6, 2.9])
+def test_declared_errors_hold_where_bounds_are_attained(low):
+    system, inputs = pendulum(phi0=3.0, damping=0.05), {"phi_0": Interval(low, 3.0)}
+    motion = {"duration": 5.0, "step": 0.01, "alpha": (0,), "progress": False}
+    found = envelope(system, inputs, method=Sampled(16), **motion)
+    output = list(found.outputs).index("phi")
+    for places, bounds in ((found.lower_at, found.lower), (found.upper_at, found.upper)):
+        for point in np.unique(places[0, :, output], axis=0):
+            named = (places[0, :, output] == point).all(-1)
+            exact = angle({**system.parameters, "phi_0": point[0]}, found.time)
+            off = np.abs(exact - bounds[0, :, output])[named]
+            assert (off <= found.error[0, named, output] + 1e-9).all()
+            assert found.error[0, -1, output] < 0.1  # the error is not simply large
+
+
+def test_reference_motion_is_that_of_the_equations():
+    system, time = pendulum(phi0=2.0), np.linspace(0, 4, 41)
+    values = ReferenceMotion(system).outputs(system.parameters, time)
+    assert values[:, 1] == pytest.approx(angle(system.parameters, time), abs=1e-8)
+    steps = make_flow(system, (), 4.0, 1e-3).values(np.zeros((1, 0)))[0, ::100]
+    assert values == pytest.approx(steps, abs=2e-4)
+
+
+def test_a_whole_swing_within_a_step_is_seen() -> None:
+    frame = StoreyFrame((1e4,), (3.0,), 25e9, 1e-6, v0=(0.1,))
+    turn = np.sqrt(24 * 25e9 * 1e-6 / 27 / 1e4)
+    period = 2 * np.pi / turn
+    found = node_deviation(
+        LinearFlow(frame, ("E",), 4 * period, period, Exact()), np.array([[25e9]])
+    )
+    assert found[0] == 0
+    ratio = found[1:, 0] / (0.1 / turn)  # amplitude over the straight line, which is zero
+    assert (ratio >= 1).all()
+    assert (ratio <= 1.8).all()
+
+
+def test_modes_that_turn_several_times_within_a_step_are_seen() -> None:
+    for seed in range(16):
+        random = np.random.default_rng(seed)
+        stiffness, start = 10 ** random.uniform(5, 6.5, 3), 0.01 * random.normal(size=3)
+        frame = StoreyFrame((1e4,) * 3, stiffness=stiffness, q0=start, damping_ratio=0.01)
+        step, point = random.uniform(15, 50) / frequencies(frame)[-1], np.empty((1, 0))
+        found = node_deviation(LinearFlow(frame, (), 12 * step, step, Exact()), point)
+        fine = LinearFlow(frame, (), 12 * step, step / 100, Exact()).values(point)[0]
+        fraction = np.linspace(0, 1, 101)[:, None]
+        for j in range(12):
+            inner = fine[100 * j : 100 * (j + 1) + 1]
+            off = abs(inner - inner[0] * (1 - fraction) - inner[-1] * fraction).max(0)
+            assert (off <= found[j + 1]).all(), seed
+        assert found.max() < 4 * abs(fine).max()
+
+
+def test_the_last_of_many_trajectories_counts() -> None:
+    frame = StoreyFrame((1e4,), stiffness=(1e6,), q0=(0.1,))
+    flow = LinearFlow(frame, ("q1_0",), 1.0, 0.1, Exact())
+    points = np.zeros((40, 1))
+    points[-1] = 0.1
+    assert node_deviation(flow, points) == pytest.approx(node_deviation(flow, points[-1:]))
+    assert node_deviation(flow, points).max() > 0
+
+
+def test_a_step_counts_its_neighbours_and_a_share_of_the_largest() -> None:
+    fine = np.zeros((2, 4 * 6 + 1, 1))
+    fine[1, 4 * 2 + 1, 0] = -2.0  # in the third of six steps, a quarter after its beginning
+    flow = SimpleNamespace(finer=lambda: (SimpleNamespace(values=lambda points: fine), 4))
+    found = node_deviation(flow, np.zeros((2, 1)))
+    assert found[:, 0] == pytest.approx([0, 0.3, 3, 3, 3, 0.3, 0.3])
