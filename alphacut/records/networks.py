@@ -101,27 +101,20 @@ def read_knet(file: TextFile) -> Recording:
     end = next((k for k, line in enumerate(file.lines) if line.startswith("Memo")), None)
     if end is None:
         raise file.refusal(len(file.lines) - 1, "without a line Memo.", "the head of a K-NET file")
-    fields = (_knet_field(file, name, end) for name in KNET_FIELDS)
-    (frequency, _), (duration, line), (scale, _) = fields
-    rate = float(frequency[1])  # samples in a second
-    gal_per_count = float(scale[1]) / float(scale[2])
+    head = {x[:KNET_LABEL].strip(): (k, x[KNET_LABEL:]) for k, x in enumerate(file.lines[:end])}
+    numbers: list[float] = []  # in the order of `KNET_FIELDS`
+    for name, pattern in KNET_FIELDS.items():
+        line, text = head.get(name, (end, ""))
+        match = pattern.fullmatch(text)
+        if match is None or any(float(number) <= 0 for number in match.groups()):
+            value = text.strip() or f"without {name}"
+            raise file.refusal(line, value, f"{name}, as in files of K-NET")
+        numbers += map(float, match.groups())
+    rate, duration, gal, full_scale = numbers
     counts = file.numbers(end + 1, len(file.lines))
-    file.require_count(counts, round(float(duration[1]) * rate), line)
-    channel = next((x[KNET_LABEL:].strip() for x in file.lines[:end] if x.startswith("Dir.")), "")
-    return recording_in_si(
-        file.place(line), "K-NET", "gal", 1 / rate, counts * gal_per_count, channel
-    )
-
-
-def _knet_field(file: TextFile, name: str, end: int) -> tuple[re.Match[str], int]:
-    """Match of the value of a name in the head, which has `end` lines, and its line from 0."""
-    for row, line in enumerate(file.lines[:end]):
-        if line.startswith(name):
-            match = KNET_FIELDS[name].fullmatch(line[min(KNET_LABEL, len(line)) :])
-            if match and all(float(number) > 0 for number in match.groups()):
-                return match, row
-            raise file.refusal(row, line.strip(), f"{name}, as in files of K-NET")
-    raise file.refusal(end, f"without {name}", "the head of a K-NET file")
+    file.require_count(counts, round(duration * rate), head["Duration Time(s)"][0])
+    place, channel = file.place(end), head.get("Dir.", (0, ""))[1].strip()
+    return recording_in_si(place, "K-NET", "gal", 1 / rate, counts * (gal / full_scale), channel)
 
 
 def is_esm(file: TextFile) -> bool:
