@@ -56,7 +56,7 @@ exit status:
 """
 
 
-def parsers(program: str, commands: Mapping[str, str]) -> tuple[Parser, dict[str, Parser]]:
+def build_parsers(program: str, commands: Mapping[str, str]) -> tuple[Parser, dict[str, Parser]]:
     """Parser of a program with commands (file by name), and the parser of each command by name."""
     parser = Parser(
         prog=program,
@@ -71,7 +71,7 @@ def parsers(program: str, commands: Mapping[str, str]) -> tuple[Parser, dict[str
     )
     by_name: dict[str, Parser] = {}
     for name, file in commands.items():
-        command = command_of(name, file)
+        command = import_command(name, file)
         about = f"{command.about[:1].upper()}{command.about[1:]}."
         by_name[name] = subparsers.add_parser(
             name, help=command.about, description=about, allow_abbrev=False
@@ -82,7 +82,7 @@ def parsers(program: str, commands: Mapping[str, str]) -> tuple[Parser, dict[str
     return parser, by_name
 
 
-def command_of(name: str, file: str) -> Command:
+def import_command(name: str, file: str) -> Command:
     """The command of a name, whose file is imported now."""
     command: Command = import_module(f"alphacut.commands.{file}").COMMANDS[name]
     return command
@@ -102,9 +102,9 @@ def main(
         names: File in `alphacut.commands` of each command, by the command's name.
     """
     words = sys.argv[1:] if arguments is None else arguments
-    with stoppable() as signals:
+    with interrupt_on_stop_signals() as signals:
         try:
-            with logged(DEBUG in words):
+            with show_log(DEBUG in words):
                 return _run_command(words, program, names)
         except BadInput as error:
             for problem in error.problems:
@@ -117,20 +117,20 @@ def main(
             number = signals[0] if signals else signal.SIGINT
             cause = f"ended by {signal.Signals(number).name}" if signals else "interrupted"
             message = f"{cause}; a run continues from the stages and samples that it has finished"
-            return _end(message, 128 + number)
+            return _end_with_message(message, 128 + number)
         except BrokenPipeError:  # as by `| head`: the interpreter's last flush must not fail
             os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
             return 0
         except CampaignError as error:
-            return _end(str(error), 3)
+            return _end_with_message(str(error), 3)
         except ModuleNotFoundError as error:
-            return _end(missing(error), 1)
+            return _end_with_message(missing(error), 1)
         except (RuntimeError, ValueError, ArithmeticError, OSError, MemoryError, ImportError) as e:
-            return _end(str(e) or type(e).__name__, 1)
+            return _end_with_message(str(e) or type(e).__name__, 1)
 
 
 @contextmanager
-def stoppable() -> Iterator[list[int]]:
+def interrupt_on_stop_signals() -> Iterator[list[int]]:
     """Lets SIGTERM and SIGHUP interrupt the block as Ctrl-C does; ignored ones stay so (nohup).
 
     Yields:
@@ -159,7 +159,7 @@ def stoppable() -> Iterator[list[int]]:
 
 
 @contextmanager
-def logged(is_on: bool) -> Iterator[None]:
+def show_log(is_on: bool) -> Iterator[None]:
     """Shows the log of the block, with the traceback of its error, on standard error if `is_on`."""
     logger, handler = logging.getLogger("alphacut"), logging.StreamHandler()
     level = logger.level
@@ -182,7 +182,7 @@ def _run_command(arguments: Sequence[str], program: str, names: Mapping[str, str
     # the parser of the named command alone saves the imports of the others
     named = {name: names[name] for name in words[:1] if name in names}
     with uninterrupted():  # a signal amid imports is not lost to what they run
-        parser, by_name = parsers(program, named or names)
+        parser, by_name = build_parsers(program, named or names)
     options, unknown = parser.parse_known_args(words)
     if unknown:
         first = next((word for word in unknown if word.startswith("-")), unknown[0])
@@ -194,8 +194,8 @@ def _run_command(arguments: Sequence[str], program: str, names: Mapping[str, str
         options.json = "-"
     check_destinations(by_name[options.command], options)
     with standard_output(alone=options.json == "-") as out, warnings.catch_warnings():
-        warnings.showwarning = _warn
-        command = command_of(options.command, names[options.command])
+        warnings.showwarning = _say_warning
+        command = import_command(options.command, names[options.command])
         if PETSC_LOG not in petsc:
             return command.run(options, out)
         if "case" in options:
@@ -207,11 +207,11 @@ def _run_command(arguments: Sequence[str], program: str, names: Mapping[str, str
             return command.run(options, out)
 
 
-def _warn(message: Warning | str, *_: object, **__: object) -> None:
+def _say_warning(message: Warning | str, *_: object, **__: object) -> None:
     say(f"warning: {message}")
 
 
-def _end(message: str, status: int) -> int:
+def _end_with_message(message: str, status: int) -> int:
     """Prints why a command ended, aborts other ranks under mpirun, and returns `status`."""
     say(message)
     if ranks() > 1 and "mpi4py.MPI" in sys.modules:

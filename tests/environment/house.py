@@ -59,9 +59,9 @@ def interface() -> dict[str, int]:
     """Counts of the commands, their options, and the keys of a case."""
     from alphacut.case.content import Content
     from alphacut.case.parse import keys_of
-    from alphacut.entry import COMMANDS, parsers
+    from alphacut.entry import COMMANDS, build_parsers
 
-    each = parsers("alphacut", COMMANDS)[1]
+    each = build_parsers("alphacut", COMMANDS)[1]
     options = [
         sum(bool(action.option_strings) and action.dest != "help" for action in parser._actions)
         for parser in each.values()

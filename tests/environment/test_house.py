@@ -45,10 +45,10 @@ def test_what_the_counts_look_for_would_be_seen():
 
 
 def test_help_fits_on_one_screen():
-    from alphacut.entry import COMMANDS, parsers
+    from alphacut.entry import COMMANDS, build_parsers
 
     os.environ["COLUMNS"] = "80"
-    whole, each = parsers("alphacut", COMMANDS)
+    whole, each = build_parsers("alphacut", COMMANDS)
     pages: dict[str, argparse.ArgumentParser] = {"alphacut": whole, **each}
     lines = {name: len(parser.format_help().splitlines()) for name, parser in pages.items()}
     assert not {name: count for name, count in lines.items() if count > 40}

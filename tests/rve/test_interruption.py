@@ -60,9 +60,9 @@ def test_it_ends_with_the_usual_status_once_the_import_is_done(
 
 COMPILED = """
 import numpy as np
-from alphacut.entry import stoppable
+from alphacut.entry import interrupt_on_stop_signals
 from alphacut.rve.interruption import uninterrupted
-with stoppable(), uninterrupted(second_ends=True):
+with interrupt_on_stop_signals(), uninterrupted(second_ends=True):
     print("begun", flush=True)
     np.linalg.svd(np.random.default_rng(0).random((6000, 6000)))
 """
@@ -87,10 +87,10 @@ def test_where_ctrl_c_is_ignored_the_others_still_wait_for_the_end(number, ends)
     program = f"""
 import os, signal
 from alphacut.rve.interruption import uninterrupted
-from alphacut.entry import stoppable
+from alphacut.entry import interrupt_on_stop_signals
 signal.signal(signal.SIGINT, signal.SIG_IGN)
 try:
-    with stoppable(), uninterrupted():
+    with interrupt_on_stop_signals(), uninterrupted():
         os.kill(os.getpid(), signal.{number})
         print("through", end=" ")
 except KeyboardInterrupt:
