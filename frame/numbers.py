@@ -20,8 +20,8 @@ TABLE_SPACING = 0.07
 """Distance of the points of a mode's table along ω and g, as a fraction of its decay."""
 PATIENCE = 12
 """Subgradient steps without a third of the expected fall of D after which less is expected."""
-JUMPS, CLIMBS = 4, 16
-"""Most steps of the model's ascent from one point: towards ends of the box, and along gradients."""
+ASCENTS = 20
+"""Most steps of the model's ascent from one point."""
 CELL_GRACE = 8
 """Cells of a node after which the fall of its gap counts."""
 MIN_CELL_PROGRESS = 0.5

@@ -1,12 +1,11 @@
 """Spatial branch and bound for the modal model (Adjiman, Floudas 1998), up to the gap asked for.
 
 All nodes, outputs and sides share one tree of boxes, and each box its polynomials. A box is
-fathomed for a problem by one of five tests, all but the third on the quadratic Taylor model with
-the remainder of `remainder`: 1. the output is monotone along an axis, and the neighbouring box, or
+fathomed for a problem by one of four tests, all but the third on its quadratic Taylor model and
+that one's `Remainder`: 1. the output is monotone along an axis, and the neighbouring box, or
 the face, covers it; 2. its bound lies below the incumbent; 3. so does that of modes whose phase is
 linear in the inputs, with a remainder that holds only what else they do; 4. a concave function
-above the quadratic model (αBB) has no higher point; 5. near the best point the same holds for the
-Taylor model there, made less concave by the remainder. Else it is bisected.
+above the quadratic model (αBB) has no higher point. Else it is bisected.
 """
 
 from __future__ import annotations
@@ -88,7 +87,6 @@ class Tree:
 
     Attributes:
         optima: Best points and values of all N problems so far, which improve.
-        jets: Value, gradient and Hessian (upper triangle) of the outputs there, shape (N, q).
         remainder: Of quadratic Taylor models over the domain.
         gap: What the bounds may lie above the best values by.
     """
@@ -97,10 +95,8 @@ class Tree:
         self, model: ModalModel, lower: Array, upper: Array, optima: Optima, gap: float
     ) -> None:
         self.model, self.lower, self.upper = model, lower, upper
-        self.optima, self.gap, d = optima, gap, len(lower)
+        self.optima, self.gap = optima, gap
         self.remainder = Remainder(model, lower, upper)
-        self.jets = np.zeros((len(optima.value), 1 + d + d * (d + 1) // 2))
-        self._expand(np.arange(len(self.jets)))
 
     def proved(self, frontier: Frontier) -> Array:
         """Upper bounds of all problems, where the boxes of a frontier are left open, (N,)."""
@@ -134,8 +130,7 @@ class Tree:
             _in_planes(waves).reshape(len(begin), -1),
             model.time,
             tuple(np.ascontiguousarray(x, float) for x in bounds),
-            (self.optima.value, self.optima.point, self.jets),
-            self.gap,
+            self.optima.value + self.gap,
             not model.loads,
         )
         return outcome
@@ -147,14 +142,6 @@ class Tree:
         self.optima.value[problems] = value[items]
         which = np.unique(problems)
         refine(self.model, self.optima, which, self.lower, self.upper, self.gap / 100)
-        self._expand(which)
-
-    def _expand(self, which: Rows) -> None:
-        """Set the jets of problems `which` at their best points."""
-        node, column = np.divmod(which, 2 * len(self.model.outputs))
-        f, g, H = self.model.at(self.optima.point[which], node, column // 2)
-        i, j = np.triu_indices(g.shape[1])
-        self.jets[which] = np.column_stack([f, g, H[:, i, j]])
 
 
 @dataclass(frozen=True, eq=False)

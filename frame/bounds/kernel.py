@@ -5,8 +5,8 @@ the output, times its side, is f + g·x + x·H·x/2 for |x| ≤ r, up to `rest`.
 
 - left to the neighbouring box, or confined to faces, where the output is monotone along axes;
 - closed, where a bound lies below its target, the best known value plus the gap: the bound of the
-  quadratic, that of modes which turn at rates linear in the inputs, that of a concave function
-  above the quadratic, or of one about the best point near by;
+  quadratic, that of modes which turn at rates linear in the inputs, or that of a concave function
+  above the quadratic;
 - else split, along the axis that adds most to what is not known.
 """
 
@@ -22,8 +22,6 @@ from alphacut.fuzzy.arrays import Array, Rows
 FACES = 16
 """Codes from here on confine an item to faces: plus 3^axis, once for lower and twice for upper."""
 SWEEPS = 8
-NEAR = 2.0
-"""Radii within which the best point counts as near."""
 MAX_PHASE = 4.0
 """Largest change of phase, in rad, over a box for which linear phases are used."""
 SWELL = 1.7
@@ -192,12 +190,6 @@ def expand_output(w: Array, table: Array, J: Array, H: Array) -> None:
     for k in range(len(w)):
         for a in range(len(J)):
             J[a] += w[k] * table[k, a]
-    unpack_hessian(J, H)
-
-
-@compiled
-def unpack_hessian(J: Array, H: Array) -> None:
-    """Write the Hessian to H (d, d) from J: value, gradient, upper triangle by rows."""
     a = 1 + len(H)
     for i in range(len(H)):
         for j in range(i, len(H)):
@@ -212,8 +204,7 @@ def examine(
     waves: Array,
     time: Array,
     remainder: tuple[Array, ...],
-    best: tuple[Array, ...],
-    gap: float,
+    target: Array,
     linear_phases: bool,
 ) -> tuple[Rows, Array, Array]:
     """Examine all items: what is done next with each, its value and its upper bound.
@@ -234,23 +225,19 @@ def examine(
         time: Nodes, shape (T,), in s.
         remainder: Bounds of third derivatives (T, m, d, d, d), of rounding (T, m, 1 + d), and along
             the axes of rates, orders 2 and 3, (d², n) and (d³, n), and shares, orders 0 to 3.
-        best: Best values by problem, their points and jets there.
-        gap: What the bounds may lie above the best values by.
+        target: Best value of each problem with the gap asked for.
         linear_phases: Whether modes with linear phases are tried as bounds.
     """
     row_start, item_start, nodes, column = frame
     centre, radius, edges, tables, shares, rates = boxes
     third, margin, rate2, rate3, share0, share1, share2, share3 = remainder
-    values, points, jets = best
     (d, m), n, q = (centre.shape[1], tables.shape[1]), shares.shape[1], tables.shape[3]
     code, value = np.zeros(len(column), np.int64), np.zeros(len(column))
     bound = np.zeros(len(column))
     J, H, g, S, third_change, second_change = (
         np.empty(q), np.empty((d, d)), np.empty(d), np.empty((d, d)), np.empty(d), np.empty(d),
     )  # fmt: skip
-    low, high, span, work, L = (
-        np.empty(d), np.empty(d), np.empty(d), np.empty((3, d)), np.empty((d, d)),
-    )  # fmt: skip
+    low, high, work, L = np.empty(d), np.empty(d), np.empty((3, d)), np.empty((d, d))
     e, c, phase, decay = np.empty((2, n)), np.empty((4, n, m)), np.empty(n), np.empty(n)
     slope = np.empty((n, d))
     for b in range(len(centre)):
@@ -274,7 +261,6 @@ def examine(
             node, before = nodes[row], -1
             for item in range(item_start[row], item_start[row + 1]):
                 o, side = column[item] // 2, 2.0 * (column[item] % 2) - 1
-                problem = node * 2 * m + column[item]
                 noise = missing = margin[node, o, 0]  # missing: rounding and cubic terms
                 if o != before:
                     expand_output(waves[row], tables[b, o], J, H)
@@ -286,7 +272,7 @@ def examine(
                         for k in range(d):
                             third_change[i] += third[node, o, i, j, k] * r[j] * r[k]
                     missing += third_change[i] * r[i] / 6
-                f, target = side * J[0], values[problem] + gap
+                f, aim = side * J[0], target[node * 2 * m + column[item]]
                 faces, stride, is_monotone_inside = 0, 1, False
                 for i in range(d):
                     g[i] = side * J[1 + i]
@@ -302,10 +288,10 @@ def examine(
                     stride *= 3
                 value[item] = f
                 bound[item] = f + separable_bound(g, S, r) + missing
-                if is_monotone_inside or bound[item] <= target:
+                if is_monotone_inside or bound[item] <= aim:
                     continue
                 if linear_phases:  # bound by modes of linear phase
-                    room = target - f - noise
+                    room = aim - f - noise
                     room -= linear_phase_bound(g, S, waves[row], time[node], side, modes, o)
                     for i in range(d):
                         low[i], high[i] = -r[i], r[i]
@@ -322,27 +308,8 @@ def examine(
                     continue
                 for i in range(d):  # bound by a concave function above the quadratic
                     low[i], high[i] = -r[i], r[i]
-                if stays_below(g, S, low, high, target - f - missing, work, L):
+                if stays_below(g, S, low, high, aim - f - missing, work, L):
                     continue
-                near = True  # bound by the quadratic about the best point, if that is near
-                for i in range(d):
-                    low[i] = centre[b, i] - r[i] - points[problem, i]
-                    high[i] = centre[b, i] + r[i] - points[problem, i]
-                    near &= max(low[i], -high[i]) <= NEAR * r[i] + 1e-12
-                    span[i] = max(max(abs(low[i]), abs(high[i])), 1e-9)
-                if near:
-                    jet = jets[problem]
-                    unpack_hessian(jet, S)
-                    for i in range(d):
-                        g[i], bend = side * jet[1 + i], 0.0
-                        for j in range(d):
-                            S[i, j] *= side
-                            for k in range(d):
-                                bend += third[node, o, i, j, k] * span[j] * span[k]
-                        S[i, i] += bend / span[i] / 3  # the cubic remainder: Σ bend_i x_i² / 6
-                    room = gap - noise - (side * jet[0] - values[problem])
-                    if stays_below(g, S, low, high, room, work, L):
-                        continue
                 largest_weight = -1.0  # bisect along the axis that adds most to what is not known
                 for i in range(d):
                     slope_margin = third_change[i] / 2 + margin[node, o, 1 + i]

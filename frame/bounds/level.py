@@ -209,8 +209,8 @@ class OutputBounds:
     ) -> Effort:
         """Effort for a node, compared with the largest value so far; arguments are its fields."""
         incumbent = float(max(self.out[1].max(), self.reached))
-        ascents = int(numbers.JUMPS), int(numbers.CLIMBS)
-        tuned = int(numbers.PATIENCE), ascents, int(numbers.CELL_GRACE), numbers.MIN_CELL_PROGRESS
+        steps_of_model, grace = int(numbers.ASCENTS), int(numbers.CELL_GRACE)
+        tuned = int(numbers.PATIENCE), steps_of_model, grace, numbers.MIN_CELL_PROGRESS
         of_node = cells, steps, slack_below_peak, remainder_multiple
         return Effort(*of_node, self.wanted_gap, incumbent, *tuned)
 

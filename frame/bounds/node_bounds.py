@@ -31,7 +31,7 @@ class Effort(NamedTuple):
         wanted_gap: Distance of bound and model value that suffices.
         incumbent: The largest reached value of side × output over time.
         patience: Steps of `minimise` after which less is expected.
-        ascents: Most steps of the model's ascent towards ends of the box, and along gradients.
+        ascents: Most steps of the model's ascent.
         grace: Cells after which the fall of the gap counts.
         min_progress: Least fall of the gap, as a fraction of an even fall to what suffices.
     """
@@ -43,7 +43,7 @@ class Effort(NamedTuple):
     wanted_gap: float
     incumbent: float
     patience: int
-    ascents: tuple[int, int]
+    ascents: int
     grace: int
     min_progress: float
 
@@ -265,41 +265,14 @@ def mode_response(z: Array, k: int, node: int, side: float, data: Data, weight: 
 
 
 @loops
-def ascend(u: Array, node: int, side: float, data: Data, steps: tuple[int, int]) -> float:
+def ascend(u: Array, node: int, side: float, data: Data, steps: int) -> float:
     """Raise the model's side × output from inputs u (L,), which are written; return its value.
 
-    Steps towards the corner of [−1, 1]^L that the gradient points to come first, then projected
-    gradient ascent; `steps` are the most of each.
+    It is a projected gradient ascent over [−1, 1]^L with steps by Barzilai and Borwein (1988).
     """
     d = len(u)
-    slope, trial, trial_slope = np.empty(d), np.empty(d), np.empty(d)
+    slope, trial, trial_slope, point = np.empty(d), np.empty(d), np.empty(d), u.copy()
     value = model_and_gradient(u, node, side, data, slope)
-    for _ in range(steps[0]):
-        gained, length = False, 1.0
-        for _ in range(3):
-            for i in range(d):
-                trial[i] = u[i] + length * (np.sign(slope[i]) - u[i])
-            new = model_and_gradient(trial, node, side, data, trial_slope)
-            if new > value + 1e-9 * abs(value):
-                value, gained = new, True
-                u[:], slope[:] = trial, trial_slope
-                break
-            length *= 0.35
-        if not gained:
-            break
-    return climb(u, node, side, data, value, slope, steps[1])
-
-
-@loops
-def climb(
-    u: Array, node: int, side: float, data: Data, value: float, slope: Array, steps: int
-) -> float:
-    """Raise the model's side × output by projected gradient ascent with Barzilai–Borwein steps.
-
-    `value` and `slope` are the model's at `u`; both arrays are written. Returns the largest value.
-    """
-    d = len(u)
-    point, trial, trial_slope = u.copy(), np.empty(d), np.empty(d)
     size = 0.3 / (np.abs(slope).max() + 1e-300)
     for _ in range(steps):
         for i in range(d):
