@@ -24,9 +24,9 @@ ALPHA = (0.0, 0.25, 0.5, 0.75, 1.0)
 FAR_APART = 1.5
 """Ratio of an input's ends from which on their geometric mean is its middle."""
 DEFAULT_TOLERANCE = 1e-3
-"""Error wanted unless one is given, as a share of each output's peak."""
+"""Error wanted unless one is given, as a fraction of each output's peak."""
 AT_REST = 1e-9
-"""Peak of an output, as a share of what the energy of the motion allows it, up to which rounding
+"""Peak of an output, as a fraction of what the energy of the motion allows it, up to which rounding
 alone moves it; rounding is some ε (ω_max/ω₁)² of the latter."""
 CORNERS = 16
 """Corners of the widest box that are looked at, at most."""

@@ -7,7 +7,7 @@ import math
 from alphacut.case.limits import TolerancesSection
 from alphacut.frame.boxes import boxes
 from alphacut.frame.propagation import require_admissible
-from alphacut.frame.questions.tolerances import scaled, tolerances
+from alphacut.frame.questions.tolerances import scale_supports, tolerances
 from alphacut.frame.structures.quantities import of_storey_frame
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature, rounded
@@ -106,7 +106,7 @@ class TolerancesAnswer(Answer):
 def require_admissible_scale(section: TolerancesSection, response: FuzzyResponse) -> None:
     """Refuses a largest scale at which an input is inadmissible."""
     try:
-        widest = boxes(scaled(response.inputs, section.most), [0.0])
+        widest = boxes(scale_supports(response.inputs, section.most), [0.0])
         require_admissible(response.structure.model, widest)
     except RefusedError as error:
         value = f"{section.most:g} times the supports: {error.key} is {error.value}"

@@ -46,7 +46,7 @@ MAX_PHASE = 0.8
 CURE = "keep the parameters where the motion exists, such as positive masses"
 
 
-def nodes(duration: float, step: float) -> Array:
+def time_nodes(duration: float, step: float) -> Array:
     """Return time nodes 0, step, 2 step … up to `duration`, shape (T,), in s.
 
     Raises:
@@ -91,7 +91,7 @@ class Flow(ABC):
     def __post_init__(self) -> None:
         for name in self.names:
             require_choice("parameter", name, self.system.parameters)
-        nodes(self.duration, self.step)
+        time_nodes(self.duration, self.step)
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -123,7 +123,7 @@ class Flow(ABC):
     @cached_property
     def time(self) -> Array:
         """Nodes t_j, shape (T,), in s."""
-        return nodes(self.duration, self.step)
+        return time_nodes(self.duration, self.step)
 
     def values(self, points: Array) -> Array:
         """Return trajectories of the outputs at parameters (S, d), shape (S, T, outputs).
@@ -171,6 +171,7 @@ class Flow(ABC):
         return np.asarray(points[0])
 
     def _point_words(self, point: Array) -> str:
+        """Return the parameters of a point (d,) as a text."""
         pairs = zip(self.names, point, strict=True)
         return ", ".join(f"{name} = {x:g}" for name, x in pairs) or "the nominal parameters"
 

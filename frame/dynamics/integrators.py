@@ -24,7 +24,7 @@ from alphacut.frame.structures.linear import Matrices
 from alphacut.frame.structures.loads import History
 
 SAME = 1e-12
-"""Distance of a sample from a node, as a share of the step, that is rounding."""
+"""Distance of a sample from a node, as a fraction of the step, that is rounding."""
 TERMS = 26
 """Terms of exp(A τ) where |λ| τ ≤ `MAX_PHASE`: the next is 2^26 / 26! = 2e-19."""
 MAX_PHASE = 2.0

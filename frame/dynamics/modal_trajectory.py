@@ -21,7 +21,7 @@ MIN_DISTANCE = 1e-4
 """Relative distance of two eigenvalues below which second derivatives of their modes lose more than
 eight digits."""
 ROUND_OFF = 1e-7
-"""The same as a share of the largest eigenvalue: double ones at 0 part by the root of rounding."""
+"""The same over the largest eigenvalue: double ones at 0 part by the root of rounding."""
 
 
 def modal_trajectory(

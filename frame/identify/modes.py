@@ -122,7 +122,7 @@ class MeasuredMode:
     Args:
         mode: Its number by rising frequency, from 1.
         frequency: Natural frequency, in Hz.
-        shape: Amplitude by floor, from 1, as a share of that of the reference floor, which is
+        shape: Amplitude by floor, from 1, as a fraction of that of the reference floor, which is
             left out.
         reference: The floor whose amplitude is 1; 0 where no shape was measured.
 

@@ -6,8 +6,8 @@ it is and p the inputs. Over an α-cut it ranges between m L over the greatest a
 peak, both of which are bounded from outside (proved) and from inside (reached).
 
 α is a level of possibility. It is no probability and is never multiplied with one: for each α the
-share of the suite's records under which a structure exceeds the limit lies in a band, whatever the
-structure within the α-cut.
+fraction of the suite's records under which a structure exceeds the limit lies in a band, for all
+structures within the α-cut.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from alphacut.fuzzy.refused import require
 from alphacut.fuzzy.result import Ends
 
 CONFIDENCE = 0.95
-"""Of the limits of a share if the records were independent draws."""
+"""Probability of the limits of a fraction if the records were independent draws."""
 
 
 @dataclass(frozen=True, eq=False)

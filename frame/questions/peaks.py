@@ -175,6 +175,7 @@ def tightest(first: Peaks, second: Peaks) -> dict[str, Peak]:
 
 
 def _tighter(first: Peak, second: Peak) -> Peak:
+    """Return the tighter bounds of one peak by two analyses, as `tightest` says."""
     natures = {first.nature, second.nature}
     if natures == {Nature.GUARANTEED}:
         lower, upper = np.maximum(first.lower, second.lower), np.minimum(first.upper, second.upper)

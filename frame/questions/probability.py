@@ -116,7 +116,7 @@ def probabilities(
     cuts = boxes(fuzzy, alpha)
     scheme = "midpoint" if isinstance(model, LagrangianSystem) else "exact"
     flow = make_flow(model, (*cuts.names, *random), duration, step, scheme)
-    points_of_levels = [_tried(cuts, level) for level in range(len(cuts.alpha))]
+    points_of_levels = [_points_of_cut(cuts, level) for level in range(len(cuts.alpha))]
     points = np.concatenate(points_of_levels)
     # errors between nodes and of time steps, from a few of the motions
     looked_at = points_of_levels[0][:: -(-len(points_of_levels[0]) // LOOKED_AT)]
@@ -144,7 +144,7 @@ def probabilities(
     }
 
 
-def _tried(cuts: Boxes, level: int) -> Array:
+def _points_of_cut(cuts: Boxes, level: int) -> Array:
     """Return corners of an α-cut and points inside it, shape (S, d), in SI units."""
     lower, upper = cuts.unit(level)
     if not (upper > lower).any():
@@ -167,16 +167,17 @@ def _probability(event: Array, level: Array, limit: float, *, has_random: bool) 
     low_ratio, ratio, ratio_within_steps = event
     # the last limit is the one in question, a ratio of 1
     limits = np.append(np.linspace(0.95 * low_ratio.min(), 1.05 * ratio.max(), LIMITS), 1.0)
-    low = _over_points(_exceeding(low_ratio, limits), level).lower
-    least, high = _over_points(_exceeding(ratio, limits), level)
-    larger = _over_points(_exceeding(ratio_within_steps, np.ones(1)), level)
+    low = _bounds_over_points(_fractions_above(low_ratio, limits), level).lower
+    least, high = _bounds_over_points(_fractions_above(ratio, limits), level)
+    larger = _bounds_over_points(_fractions_above(ratio_within_steps, np.ones(1)), level)
     interval = Ends(least[:, -1], high[:, -1])
     if has_random:
         tail = (1 - CONFIDENCE) / (2 * len(level))  # of either side at one point (Bonferroni)
         surely, possibly = ((x > 1).sum(axis=1) for x in (low_ratio, ratio_within_steps))
         ends = clopper_pearson(surely, possibly, ratio.shape[1], tail)
         interval = Ends(
-            _over_points(ends.lower, level).lower, _over_points(ends.upper, level).upper
+            _bounds_over_points(ends.lower, level).lower,
+            _bounds_over_points(ends.upper, level).upper,
         )
     error = np.maximum(larger.lower[:, 0] - least[:, -1], larger.upper[:, 0] - high[:, -1])
     return Probability(
@@ -206,13 +207,13 @@ def clopper_pearson(least: Array, most: Array, total: int, tail: float) -> Ends:
     return Ends(np.where(least > 0, lower, 0.0), np.where(most < total, upper, 1.0))
 
 
-def _exceeding(peaks: Array, limits: Array) -> Array:
+def _fractions_above(peaks: Array, limits: Array) -> Array:
     """Return the fraction of peaks (points, draws) above each limit (L,), shape (points, L)."""
     rows = np.sort(peaks, axis=1)
     return np.array([1 - np.searchsorted(x, limits, side="right") / len(x) for x in rows])
 
 
-def _over_points(values: Array, level: Array) -> Ends:
+def _bounds_over_points(values: Array, level: Array) -> Ends:
     """Return least and greatest values (A, …) over the points (points, …) of each level.
 
     Points of higher levels count for the lower ones, so that the bounds are nested.

@@ -47,7 +47,7 @@ class Tolerances:
     envelopes: int
 
 
-def scaled(inputs: Mapping[str, FuzzyNumber], scale: float) -> dict[str, FuzzyNumber]:
+def scale_supports(inputs: Mapping[str, FuzzyNumber], scale: float) -> dict[str, FuzzyNumber]:
     """Return inputs as their supports, scaled about nominal values; crisp numbers at scale 0."""
     middles = {name: (number.modal, number.support) for name, number in inputs.items()}
     return {
@@ -104,7 +104,7 @@ def tolerances(
         if scale not in tried:
             bounds = envelope(
                 model,
-                scaled(inputs, scale),
+                scale_supports(inputs, scale),
                 Auto(error, peaks=True),
                 duration=duration,
                 step=step,
@@ -141,7 +141,7 @@ def tolerances(
         admissible=low if is_excluded(low) else None,
         clear=clear,
         passed=passed,
-        supports={name: number.support for name, number in scaled(inputs, low).items()},
+        supports={name: number.support for name, number in scale_supports(inputs, low).items()},
         nature=Nature.weakest(peaks_at(low)[name].nature for name in limits),
         envelopes=len(tried),
     )

@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 MAX_NORM = 2.0
 """Largest norm of the state matrix times a substep; a larger one needs a higher degree."""
 TRUNCATION = 1e-18
-"""Truncation error of the Taylor series within a substep, as a share of the state; its degree is
+"""Truncation error of the Taylor series within a substep, as a fraction of the state; its degree is
 24 at most."""
 EPSILON = float(np.finfo(float).eps)
 CONSTANT_ROUNDING = 64.0

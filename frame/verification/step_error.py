@@ -30,9 +30,9 @@ bounds are then attained by other motions than those they name."""
 CHUNK = 16
 """Trajectories that are held at once."""
 FLOOR = 0.1
-"""Least stray of a step, as a share of the largest of all steps."""
+"""Least stray of a step, as a fraction of the largest of all steps."""
 RELATIVE = 1e-11
-"""Error of a step of the reference motion as a share of the state."""
+"""Error of a step of the reference motion as a fraction of the state."""
 
 
 def step_error(flow: UnitFlow) -> Array:

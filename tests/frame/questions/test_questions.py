@@ -11,7 +11,7 @@ from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.questions.peaks import ANY, Peak, passing, peaks, tightest
 from alphacut.frame.questions.probability import clopper_pearson, probabilities
-from alphacut.frame.questions.tolerances import scaled, tolerances
+from alphacut.frame.questions.tolerances import scale_supports, tolerances
 from alphacut.fuzzy import Triangular
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Ends, Nature
@@ -147,7 +147,8 @@ def test_the_scale_of_tolerances_is_kept_and_a_greater_one_passed():
         (1000 - 100 * answer.admissible, 1000 + 100 * answer.admissible)
     )
     assert (
-        motions(ONE, scaled(inputs, answer.admissible), 500, duration=6, step=0.01).max() <= limit
+        motions(ONE, scale_supports(inputs, answer.admissible), 500, duration=6, step=0.01).max()
+        <= limit
     )
 
 
