@@ -57,10 +57,7 @@ def _material_figures(results: Results) -> Iterator[Drawing]:
             cuts = data.numbers.E_GPa
             bounds = (GPA * cuts.lower, GPA * cuts.upper)
             effective = PiecewiseLinear(tuple(data.numbers.alpha), *map(tuple, bounds))
-            yield (
-                "fig36-fuzzy-numbers",
-                partial(overview.kinds_of_numbers, inclusion, effective),
-            )
+            yield ("fig36-fuzzy-numbers", partial(overview.kinds_of_numbers, inclusion, effective))
             yield "fig37-alpha-cuts", partial(overview.alpha_cuts, inclusion)
     if (data := results.modulus) is not None:
         yield "fig16-stress-curves", partial(material.stress_curves, data.arrays)

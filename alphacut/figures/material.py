@@ -145,12 +145,7 @@ def fuzzy_modulus(result: StageResult[ModulusResult], frame: Frame | None) -> Fi
     style.shaded_cuts(axes, alpha, *modulus_GPa.T)
     if frame is not None and frame.modulus is not None:
         cuts = np.array([frame.modulus.cut(level) for level in (0.0, 1.0)]) / GPA
-        line: style.Look = {
-            "color": BLUE,
-            "lw": 1.2,
-            "ls": "--",
-            "label": "quoted in the case",
-        }
+        line: style.Look = {"color": BLUE, "lw": 1.2, "ls": "--", "label": "quoted in the case"}
         axes.plot(style.outline(*cuts.T), [0, 1, 1, 0], **line)
         axes.plot([], [], color=INK, marker="o", ms=3.5, lw=1.2, label="computed here")
         axes.legend(loc="upper left")

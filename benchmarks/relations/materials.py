@@ -166,8 +166,7 @@ IMAGES = Kind(
     (
         OTHER_UNITS,
         Relation(
-            "turned",
-            lambda x, chance: {"mask": np.rot90(x["mask"]), "quarters": x["quarters"] + 1},
+            "turned", lambda x, chance: {"mask": np.rot90(x["mask"]), "quarters": x["quarters"] + 1}
         ),
         of_mask("tiled", lambda mask, chance: np.tile(mask, (1, 2))),
         of_mask("shifted", lambda mask, chance: np.roll(mask, chance.integers(1, 12, 2), (0, 1))),

@@ -51,11 +51,7 @@ class Kind:
     relations: Sequence[Relation]
 
     def checked(
-        self,
-        problem: Problem,
-        chance: Chance,
-        relations: Sequence[Relation] = (),
-        pairs: int = 0,
+        self, problem: Problem, chance: Chance, relations: Sequence[Relation] = (), pairs: int = 0
     ) -> Iterator[tuple[str, list[str]]]:
         """Names of the relations that apply with the contradictions found, a failure among them.
 

@@ -31,11 +31,7 @@ UNDECIDED = "samples whose censored values decide no cut count as containing it"
 
 
 def from_data(
-    values: Values,
-    claim: str,
-    *,
-    bounds: Limits | None = None,
-    law: Law | None = None,
+    values: Values, claim: str, *, bounds: Limits | None = None, law: Law | None = None
 ) -> ClaimedNumber:
     """Return the fuzzy number of measured values: P(claimed quantity in its α-cut) >= 1 − α.
 

@@ -4,10 +4,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
-from alphacut.stochastic.figures.all import (
-    draw_cells,
-    plot_cells,
-)
+from alphacut.stochastic.figures.all import draw_cells, plot_cells
 from alphacut.stochastic.particles.packing import Packing
 from alphacut.stochastic.particles.particles import Particles
 from alphacut.stochastic.particles.radius_laws import LogNormalRadii

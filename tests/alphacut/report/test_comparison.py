@@ -66,11 +66,7 @@ def test_the_comparison_and_all_tables_are_written(runs, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["{a}", "{a}", "{a}"], "3 folders"),
-        (["{a}", "nowhere"], "nowhere"),
-    ],
+    ("words", "message"), [(["{a}", "{a}", "{a}"], "3 folders"), (["{a}", "nowhere"], "nowhere")]
 )
 def test_what_cannot_be_compared_is_said_in_one_line(runs, words, message, capsys):
     named = dict(zip("ab", map(str, runs), strict=True))

@@ -14,12 +14,7 @@ from alphacut.io.results import ResultsFolder
 from alphacut.questions.decision import DecisionAnswer, LimitDecision
 from alphacut.questions.summary import FrameResult, Parts, Summary
 from alphacut.report.page import render_page
-from alphacut.report.results import (
-    answers,
-    drivers,
-    peak_table,
-    run_text,
-)
+from alphacut.report.results import answers, drivers, peak_table, run_text
 from alphacut.report.tables import write_tables
 from alphacut.stages.envelope import EnvelopeResult, PeakResult
 from alphacut.stages.store import CutsResult
