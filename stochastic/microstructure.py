@@ -166,7 +166,9 @@ def _sections(
     for number in range(MAX_PACKINGS):
         packing = replace(source.packing, fraction=fraction)
         sections = replace(source, packing=packing).sections(case.seed, executor=executor)
-        map_fraction = _mapped_fraction(case, reduced_radii(sections))
+        sample = reduced_radii(sections)
+        fit = HermiteFit(*case.limits_of(sample))
+        map_fraction = _fraction(case.shape, fit, fit.slopes(sample.truncated(fit.a1, fit.a3)))
         error = abs(map_fraction / target - 1)
         if error < least_error:
             best_sections, least_error = sections, error
@@ -203,13 +205,6 @@ def fit_map(
     slopes = slope_band(fit, truncated, level=CONFIDENCE, resamples=RESAMPLES, generator=slope_rng)
     pbox = least_pbox(fit, truncated, band, required=slopes if case.shape == DISCS else None)
     return truncated, pbox, slopes, band
-
-
-def _mapped_fraction(case: MicrostructureStudy, sample: AreaWeighted) -> float:
-    """Return the mean volume fraction of the cells for the map fitted to a sample of r_n."""
-    lower, upper = case.limits_of(sample)
-    fit = HermiteFit(lower, upper)
-    return _fraction(case.shape, fit, fit.slopes(sample.truncated(lower, upper)))
 
 
 def _fraction(shape: Shape, fit: HermiteFit, slopes: tuple[float, float]) -> float:

@@ -123,18 +123,14 @@ class CutSearch:
         slope = float(np.linalg.norm(change(start)[1]))
         factor = min(_STEEPNESS, first_step / max(slope, _FLAT))
 
-        def scaled_change(unit: Array) -> tuple[float, Array]:
-            value, gradient = change(unit)
-            return factor * value, factor * gradient
-
-        tolerances = {"ftol": _LEAST_CHANGE * factor, "gtol": _LEAST_SLOPE * factor}
+        options = {"ftol": _LEAST_CHANGE * factor, "gtol": _LEAST_SLOPE * factor}
         result = minimize(
-            scaled_change,
+            lambda unit: tuple(factor * x for x in change(unit)),
             start,
             jac=True,
             method="L-BFGS-B",
             bounds=[(0.0, 1.0)] * len(start),
-            options={"maxiter": _MAX_ITERATIONS, **tolerances},
+            options={"maxiter": _MAX_ITERATIONS, **options},
         )
         value = start_value + output_range * float(result.fun) / factor
         unit, gradient = result.x, result.jac / factor

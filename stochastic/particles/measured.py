@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from alphacut.fuzzy.arrays import Array, Mask, Rows
+from alphacut.fuzzy.arrays import Array, Mask
 from alphacut.fuzzy.refused import RefusedError, checked_number, require
 from alphacut.stochastic.particles.csv_columns import length_columns
 from alphacut.stochastic.particles.particles import Particles, close_pairs, surface_distance
@@ -56,23 +56,17 @@ class CircleFile:
                 allowed = f"places in the section of {width} × {height} mm"
                 raise RefusedError(f"{self.path.name}, row {row}", value, allowed)
         discs = Particles(centres, radii, np.array(self.size), periodic=False)
-        self._refuse_overlap(discs, rows)
-        return discs
-
-    def _refuse_overlap(self, discs: Particles, rows: Rows) -> None:
-        """Refuse the file if two circles overlap, with the rows of the worst pair."""
         first, second = close_pairs(discs, 0.0)
-        smaller = np.minimum(discs.radii[first], discs.radii[second])
-        overlap = -surface_distance(discs, first, second) / smaller
+        overlap = -surface_distance(discs, first, second) / np.minimum(radii[first], radii[second])
         if overlap.max(initial=0.0) > ROUNDING:
             worst = int(np.argmax(overlap))
             upper, lower = sorted(int(rows[k]) for k in (first[worst], second[worst]))
-            raise RefusedError(
-                f"{self.path.name}, row {lower}",
-                f"a circle that overlaps that of row {upper} by {overlap[worst]:.2g} of its radius",
-                "circles that do not overlap",
-                "mend the row",
+            value = (
+                f"a circle that overlaps that of row {upper} by {overlap[worst]:.2g} of its radius"
             )
+            key, allowed = f"{self.path.name}, row {lower}", "circles that do not overlap"
+            raise RefusedError(key, value, allowed, "mend the row")
+        return discs
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,5 @@
 """The transformation method: its points against a closed form, its counts, its bounds."""
 
-from math import comb
-
 import numpy as np
 import pytest
 
@@ -30,39 +28,12 @@ def monotone(a2, a4, E):
     return {"E": np.sqrt(1 + a2) * (E / 1e9) ** 0.2 / (1 + a4), "nu": a2 - a4}
 
 
-def first_passage(number, level, index, alpha):
-    """Point `index` of `level` as a mean of cut ends: a walk up the levels, left or right with
-    probability ½, until it meets an end.
-
-    The walk from (level, index) has met neither end before it stops at level q with r steps to the
-    right; the ballot count of such walks is the number of lattice paths that leave the strip for
-    the first time, here by the reflection-free recurrence on free paths.
-    """
-    top = len(alpha) - 1
-    ends = [number.cut(a) for a in alpha]
-    if index in (0, top - level):
-        return ends[level].lower if index == 0 else ends[level].upper
-    total = 0.0
-    # stops at level q at its left end (after `index` steps left) or at its right end
-    for q in range(level + 1, top + 1):
-        steps = q - level
-        to_left, to_right = index, top - level - index
-        # the last step is a left one; before it, to_left − 1 left ones and too few right ones to stop
-        if 0 <= steps - to_left < to_right:
-            total += comb(steps - 1, to_left - 1) / 2**steps * ends[q].lower
-        if 0 <= steps - to_right < to_left:
-            total += comb(steps - 1, to_right - 1) / 2**steps * ends[q].upper
-    return total
-
-
-@pytest.mark.parametrize("number", [*PAPER.values(), Triangular(-3.0, 1.0, 1.5)])
-@pytest.mark.parametrize("steps", [1, 4, 7])
-def test_points_are_first_passage_means_of_the_cut_ends(number, steps):
-    alpha = levels(steps)
-    for level, points in enumerate(hanss_points(number, alpha)):
-        assert len(points) == steps + 1 - level
-        expected = [first_passage(number, level, index, alpha) for index in range(len(points))]
-        np.testing.assert_allclose(points, expected, rtol=1e-13)
+def test_points_are_ends_and_midpoints_of_the_level_above():
+    """By hand: the cuts are 0 … 9, 1 … 7, 2 … 5 and 3."""
+    rows = hanss_points(Triangular(0, 3, 9), levels(3))
+    expected = [[0, 2.25, 5.25, 9], [1, 3.5, 7], [2, 5], [3]]
+    for row, points in zip(rows, expected, strict=True):
+        np.testing.assert_allclose(row, points, rtol=1e-13, atol=1e-13)
 
 
 @pytest.mark.timeout(60)  # 45,000 points; comparing each with all others takes minutes
