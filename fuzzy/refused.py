@@ -8,12 +8,12 @@ from numbers import Integral, Real
 
 import numpy as np
 
-LONGEST = 300
+MAX_LENGTH = 300
 """Characters of a message; beyond it value and allowed values are cut, and never the cure."""
-LEAST_SHOWN = 20  # characters that remain of a value or of allowed values
+MIN_SHOWN = 20  # characters that remain of a value or of allowed values
 
 
-def printable(value: object, most: int = LONGEST) -> str:
+def printable(value: object, most: int = MAX_LENGTH) -> str:
     """Return a value as one line of printable characters, cut off after `most` of them."""
     try:
         text = str(value)[: 4 * most]
@@ -26,16 +26,16 @@ def printable(value: object, most: int = LONGEST) -> str:
 def fit_message(
     value: str, allowed: str, compose: Callable[[str, str], str], cure: str = ""
 ) -> str:
-    """Return a message of at most `LONGEST` characters: `compose(value, allowed)`, then the cure.
+    """Return `compose(value, allowed)` and then the cure, of at most `MAX_LENGTH` characters.
 
     The value is cut off first, the allowed values next, the cure never.
     """
     end = f"; {cure}" if cure else ""
-    room = max(LONGEST - len(end), LEAST_SHOWN)
+    room = max(MAX_LENGTH - len(end), MIN_SHOWN)
     excess = max(len(compose(value, allowed)) - room, 0)
-    value = printable(value, max(LEAST_SHOWN, len(value) - excess))
+    value = printable(value, max(MIN_SHOWN, len(value) - excess))
     excess = max(len(compose(value, allowed)) - room, 0)
-    allowed = printable(allowed, max(LEAST_SHOWN, len(allowed) - excess))
+    allowed = printable(allowed, max(MIN_SHOWN, len(allowed) - excess))
     return printable(compose(value, allowed), room) + end
 
 

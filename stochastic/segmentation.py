@@ -23,7 +23,7 @@ from alphacut.fuzzy.arrays import Array, Mask, Rows
 from alphacut.fuzzy.refused import RefusedError, require
 
 CONFIDENT = 3.0  # deviations of the noise
-MOST_OPEN = 0.15  # area that may be open, over that of the smallest class
+MAX_OPEN = 0.15  # area that may be open, over that of the smallest class
 _MAX_ITERATIONS = 20
 _OF_NORMAL = 1.4826  # deviation of a normal law over the median of its magnitude
 _NEAR = 3.0  # deviations within which a pixel helps to fit levels and light
@@ -31,12 +31,13 @@ _BORDER = 3  # pixels from a border that do not help, if
 _ENOUGH = 0.1  # of each class is farther from it
 _NOISE_QUANTILE = 0.9  # of the residuals; rounding makes up to half of them zero
 _EXACT = 1e-9  # of the grey values: noise that is rounding
-_LEAST_PILE, _STEEPEST = 0.01, 3.0  # share at an end, and over that of the next value, if clipped
+_MIN_PILE, _STEEPEST = 0.01, 3.0  # share at an end, and over that of the next value, if clipped
 _FLAT = 0.95  # of a class at one value; where particles meet, a blurred image has others
 _MAX_FLAT, _FLAT_GAP = 3, 0.05  # greys of a clean class, and least gap over the contrast
 MIN_IMPULSES = 0.01
 """Share of pixels that are impulses from which on they count; noise alone has 0.003."""
-_AROUND, _MOST_AROUND = 7, (15, 85)  # pixels around, and percentiles; a line has 7 of 49 pixels
+_AROUND = 7  # pixels around; a line has 7 of 49
+_PERCENTILES_AROUND = 15, 85
 _MIN_PIXELS = 50  # of a class whose grey values are checked for clipping
 _MEDIAN = 5  # pixels of the median filter of the classes
 
@@ -95,7 +96,7 @@ class Segmentation:
         last = np.searchsorted(self.thresholds, self.grey + uncertainty, side="right")
         return first, last
 
-    def require_certain(self, most: float = MOST_OPEN) -> None:
+    def require_certain(self, most: float = MAX_OPEN) -> None:
         """Refuse a segmentation whose open area is more than `most` times that of a class."""
         fraction = self.open_fraction / float(self.fractions.min())
         impulses = float(np.mean(self.is_impulse))
@@ -140,7 +141,7 @@ def _impulses(grey: Array, levels: Array, noise: float) -> Mask:
     # beyond the noise of every class and of most pixels around, unlike those of a blurred border
     band = CONFIDENT * noise + _EXACT * float(np.abs(grey).max())
     is_outlier = np.abs(grey[..., None] - levels).min(axis=-1) > band
-    low, high = (percentile_filter(grey, q, _AROUND, mode="wrap") for q in _MOST_AROUND)
+    low, high = (percentile_filter(grey, q, _AROUND, mode="wrap") for q in _PERCENTILES_AROUND)
     impulses = is_outlier & ((grey < low - band) | (grey > high + band))
     return np.asarray(impulses & (impulses.mean() >= MIN_IMPULSES))
 
@@ -157,7 +158,7 @@ def _require_unclipped(values: Array, borders: tuple[float, ...], sound: Mask) -
             distance, counts = np.unique(np.abs(grey - end), return_counts=True)
             pile = counts[0] / grey.size if distance[0] == 0 else 0.0
             next_value = counts[1] / grey.size if len(counts) > 1 else 0.0
-            is_clipped = pile >= _LEAST_PILE and pile > _STEEPEST * next_value
+            is_clipped = pile >= _MIN_PILE and pile > _STEEPEST * next_value
             if is_clipped and not (is_flat and all(flat)):  # all flat: a clean image
                 what = f"{pile:.0%} of a phase at the end of the grey values, {end:g}"
                 cure = "take the image before its contrast was raised, or give cell.labels"

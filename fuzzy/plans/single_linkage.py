@@ -77,7 +77,7 @@ def uncovered_fraction(samples: int, optima: int) -> float:
     return optima * (optima + 1) / (samples * (samples - 1))
 
 
-def linkage_starts(unit: Array, values: Array, distance: float) -> Rows:
+def rows_without_better_neighbour(unit: Array, values: Array, distance: float) -> Rows:
     """Rows of the samples (n, d), in unit coordinates, without a better one within a distance.
 
     Descents start there; infinite values (n,) start none.
@@ -90,7 +90,7 @@ def linkage_starts(unit: Array, values: Array, distance: float) -> Rows:
     return np.setdiff1d(np.flatnonzero(np.isfinite(values)), worse)
 
 
-def on_plateaus(values: Array) -> Mask:
+def samples_on_plateaus(values: Array) -> Mask:
     """Mask of the samples whose value (n,) another sample has as well, to rounding."""
     order = np.argsort(values)
     ordered = values[order]
@@ -135,7 +135,7 @@ class BoundSearch:
         """Whether the output is smooth at the best optimum, so that the descent did not stall."""
         return bool(self.optima) and self.best.is_smooth
 
-    def n_humps(self, cut: CutSearch) -> int:
+    def n_optima_off_corners(self, cut: CutSearch) -> int:
         """Return the number of optima that are no corner of the cut."""
         lower, upper = cut.lower + cut.near, cut.upper - cut.near
         at_ends = [(x.point <= lower) | (x.point >= upper) for x in self.optima]
@@ -256,13 +256,13 @@ class SingleLinkage:
         keys = [*map(int, rows), *range(-len(cut.corners), 0)]  # N does not count corners
         sampled = self._values[bound][rows]
         values = np.append(sampled, cut.values(cut.corners, bound))
-        is_tied = np.append(on_plateaus(sampled), np.zeros(len(cut.corners), bool))
+        is_tied = np.append(samples_on_plateaus(sampled), np.zeros(len(cut.corners), bool))
         tolerance = EQUAL * np.abs(values[np.isfinite(values)]).max(initial=0)
         for sigma in (SIGMA_ONE_HUMP, SIGMA_SEVERAL_HUMPS):
-            if sigma == SIGMA_SEVERAL_HUMPS and state.n_humps(cut) < 2:
+            if sigma == SIGMA_SEVERAL_HUMPS and state.n_optima_off_corners(cut) < 2:
                 continue
             distance = critical_distance(len(rows), len(cut.uncertain_inputs), sigma)
-            for start in linkage_starts(unit, values, distance):
+            for start in rows_without_better_neighbour(unit, values, distance):
                 if is_tied[start]:
                     value = float(values[start])
                     if any(abs(value - known) <= tolerance for known in state.plateaus):

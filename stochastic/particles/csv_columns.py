@@ -18,7 +18,7 @@ METRES |= {"micron": 1e-6, "nm": 1e-9, "in": 0.0254, "inch": 0.0254, "ft": 0.304
 DIAMETERS, RADII = ("d", "diameter", "size"), ("r", "radius")
 HEADER = r"\s*(\w+)\s*(?:[\[(]\s*([^\])]*?)\s*[\])])?\s*"
 """Name of a column, and its unit in brackets."""
-LONGEST = 100  # characters of a number; a longer field is none
+MAX_LENGTH = 100  # characters of a number; a longer field is none
 NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 
 
@@ -72,7 +72,7 @@ def text_of(path: Path) -> str:
 def number(path: Path, row: int, cells: Sequence[str], column: int) -> float:
     """Return the number in a field of a row, in plain ASCII digits; refuse what is none."""
     text = cells[column].strip() if column < len(cells) else ""
-    if len(text) > LONGEST or not NUMBER.fullmatch(text) or not isfinite(float(text)):
+    if len(text) > MAX_LENGTH or not NUMBER.fullmatch(text) or not isfinite(float(text)):
         allowed = "numbers such as 1.25 or 1e-3"
         raise RefusedError(f"{path.name}, row {row}, column {column + 1}", repr(text[:40]), allowed)
     return float(text)

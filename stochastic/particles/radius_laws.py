@@ -15,15 +15,16 @@ from alphacut.fuzzy.refused import require
 from alphacut.stochastic.particles.csv_columns import length_columns
 from alphacut.stochastic.theta.law import TruncatedNormal
 
-LEAST, MOST = 1e-12, 1e6  # m; no particle of a material is smaller or larger
+MIN_RADIUS, MAX_RADIUS = 1e-12, 1e6  # m; no particle of a material is smaller or larger
 
 
 def require_radii(key: str, radii: ArrayLike) -> None:
     """Refuse an empty list and radii outside [1e-12, 1e6] m, which have a wrong unit or digit."""
     radii = np.atleast_1d(np.asarray(radii, float))
-    wrong = radii[~((radii >= LEAST) & (radii <= MOST))]
+    wrong = radii[~((radii >= MIN_RADIUS) & (radii <= MAX_RADIUS))]
     value, are_allowed = f"{wrong[0]:.6g} m" if len(wrong) else None, len(radii) and not len(wrong)
-    require(bool(are_allowed), key, value=value, allowed=f"radii from {LEAST:g} to {MOST:g} m")
+    allowed = f"radii from {MIN_RADIUS:g} to {MAX_RADIUS:g} m"
+    require(bool(are_allowed), key, value=value, allowed=allowed)
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,7 @@ class LogNormalRadii:
         radius = np.asarray(radius, float)
         if self.sigma == 0:
             return np.where(radius < self.smallest, 0.0, 1.0)
-        theta = (np.log(np.maximum(radius, LEAST**2)) - self.mu) / self.sigma
+        theta = (np.log(np.maximum(radius, MIN_RADIUS**2)) - self.mu) / self.sigma
         return self.distribution.cdf(theta)
 
     def sample(self, number: int, generator: np.random.Generator) -> Array:

@@ -14,12 +14,12 @@ from alphacut.stochastic.theta.law import ThetaLaw
 MASS_GAP = 1e-8
 """Most by which the integral of a density may miss the difference of its distribution function."""
 _PANEL_GAP = 1e-13
-_HALVINGS, _MOST_PANELS = 48, 400
+_HALVINGS, _MAX_PANELS = 48, 400
 _FIRST_PANELS = 64
 _NEGLIGIBLE = 1e-200  # weight of nodes so far off that polynomials overflow there
-FEWEST_NODES = 10  # nodes, from which on a polynomial through those of a Gauss rule beats pieces
-LARGEST_LEBESGUE = 30.0  # of a polynomial that is trusted; rules in layers have far more
-MOST_NODES = 40  # nodes of a polynomial
+MIN_NODES = 10  # nodes, from which on a polynomial through those of a Gauss rule beats pieces
+MAX_LEBESGUE = 30.0  # of a polynomial that is trusted; rules in layers have far more
+MAX_NODES = 40  # nodes of a polynomial
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ def _panel_edges(law: ThetaLaw, edges: Array, rule: tuple[Array, Array]) -> Arra
     for _ in range(_HALVINGS):
         gaps = _mass_gaps(law, edges, rule)
         coarse = np.flatnonzero(~(gaps <= _PANEL_GAP))  # also where a gap is not a number
-        if not coarse.size or len(edges) > _MOST_PANELS:
+        if not coarse.size or len(edges) > _MAX_PANELS:
             break
         edges = np.insert(edges, coarse + 1, (edges[coarse] + edges[coarse + 1]) / 2)
     total = float(_mass_gaps(law, edges, rule).sum())
@@ -135,10 +135,10 @@ def between_nodes(nodes: Array, values: Array, at: Array) -> Array:
     """
     from scipy.interpolate import BarycentricInterpolator, PchipInterpolator
 
-    if FEWEST_NODES <= len(nodes) <= MOST_NODES:
+    if MIN_NODES <= len(nodes) <= MAX_NODES:
         # the same digits each time: SciPy takes the nodes in a random order
         lagrange = BarycentricInterpolator(nodes, np.eye(len(nodes)), rng=0)(at)
         lebesgue_constant = np.abs(lagrange).sum(axis=-1).max()
-        if lebesgue_constant <= LARGEST_LEBESGUE:
+        if lebesgue_constant <= MAX_LEBESGUE:
             return np.asarray(lagrange @ values)
     return np.asarray(PchipInterpolator(nodes, values)(at))

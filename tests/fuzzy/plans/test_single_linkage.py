@@ -14,7 +14,7 @@ from alphacut.fuzzy.plans.cut import Bound, CutSearch
 from alphacut.fuzzy.plans.single_linkage import (
     FIRST_STEP,
     critical_distance,
-    linkage_starts,
+    rows_without_better_neighbour,
     uncovered_fraction,
 )
 from alphacut.fuzzy.sets.boxes import Domain
@@ -167,7 +167,7 @@ def test_critical_distance_and_share_are_those_of_the_papers():
 
 def test_descents_start_where_no_better_sample_is_near():
     line = np.array([[0.0], [0.1], [0.2], [0.8], [0.9]])
-    starts = linkage_starts(line, np.array([1.0, 3.0, 2.0, np.inf, 5.0]), 0.15)
+    starts = rows_without_better_neighbour(line, np.array([1.0, 3.0, 2.0, np.inf, 5.0]), 0.15)
     assert list(starts) == [0, 2, 4]
 
 
