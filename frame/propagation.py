@@ -110,7 +110,7 @@ def envelope(
         >>> str(bounds.nature)
         'guaranteed'
     """
-    chosen, flow, levels, rows = _problem(
+    chosen, flow, levels, rows = _build_problem(
         model, inputs, method, duration, step, alpha, integrator, options
     )
     flow = replace(flow, relative=relative)
@@ -129,7 +129,7 @@ def envelope(
     return _on_levels(bounds, levels, rows)
 
 
-def _problem(
+def _build_problem(
     model: LinearSystem | LagrangianSystem,
     inputs: Mapping[str, FuzzyNumber | float],
     method: Method | str | None,
@@ -201,7 +201,9 @@ def require_envelope(
         >>> frame = StoreyFrame(masses=[1e3], stiffness=[4e4], q0=[0.1])
         >>> require_envelope(frame, {"m1": Triangular(900, 1000, 1100)}, duration=0.5, step=0.1)
     """
-    chosen, flow, _, _ = _problem(model, inputs, method, duration, step, alpha, integrator, options)
+    chosen, flow, _, _ = _build_problem(
+        model, inputs, method, duration, step, alpha, integrator, options
+    )
     short_flow = replace(flow.flow, duration=min(FIRST_STEPS * step, duration))
     short_flow.values(flow.boxes.probes)
     if isinstance(chosen, Proof | DualProof):

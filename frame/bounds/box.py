@@ -53,7 +53,7 @@ class Box:
 
     @property
     def active(self) -> Rows:
-        """Places of the inputs that have a width, shape (d,)."""
+        """Indices of the inputs that have a width, shape (d,)."""
         return np.flatnonzero(self.high > self.low)
 
     @property

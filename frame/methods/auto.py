@@ -43,13 +43,13 @@ BOXES = 1000
 FEW_INPUTS = 4
 """Inputs up to which the dual bound closes the gaps of peaks to the usual tolerance."""
 FINEST = 1e-4
-"""Gap of peaks, as a share of each, below which the dual bound takes too long."""
+"""Gap of peaks, as a fraction of each, below which the dual bound takes too long."""
 FOLLOWED = 0.25
-"""Share of the tolerance that is worth a graph: a follower's error is some four times as much."""
+"""Fraction of the tolerance that is worth a graph: a follower's error is about four times it."""
 FOLLOWED_OF_MANY = 0.1
 """The same of more inputs than a follower's models are maximised over globally, which miss more."""
 ROUNDING = 1e-9
-"""Share of a peak by which a motion that is followed may be off."""
+"""Fraction of a peak by which a motion that is followed may be off."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class Auto:
     """The method and its options.
 
     Args:
-        tolerance: Error wanted, as a share of each output's peak or, where the envelope is not
+        tolerance: Error wanted, as a fraction of each output's peak or, where the envelope is not
             relative, in m or the unit of the first output; 1e-3 of each peak unless given.
         seed: Of the follower.
         workers: Threads of the proof, which do not change the result; all cores unless given.

@@ -46,10 +46,11 @@ class DualProof:
     """The method and its options.
 
     Args:
-        gap: Distance of proved and attained bounds that suffices, as a share of each output's peak;
-            what the remainders leave may be more.
+        gap: Distance of proved and attained bounds that suffices, as a fraction of each output's
+            peak; what the remainders leave may be more.
         peaks: The same of the bounds above a peak, above which the box of inputs is parted.
-        below: Gap that suffices below a peak, as a share of how far; at 1 peaks alone are bounded.
+        below: Gap that suffices below a peak, as a fraction of the distance from it; at 1 peaks
+            alone are bounded.
         slabs: Most parts of the modes' ranges for a bound.
         steps: Most evaluations of the dual function for each of them.
         parts: Most parts of the box that a peak is worth, and that are refused.

@@ -25,8 +25,8 @@ from alphacut.fuzzy.refused import checked_number, require
 from alphacut.fuzzy.result import Nature
 
 MAX_RATIO = 8.0
-"""Slope along a half width of the box, as a share of the output's range, from which on neighbouring
-trajectories part."""
+"""Slope along a half width of the box, as a fraction of the output's range, from which on
+neighbouring trajectories part."""
 
 Places = tuple[Rows, ...]
 """Indices of nodes, outputs and sides, one of each for a place."""
@@ -135,7 +135,7 @@ class GraphFollower:
 
     Args:
         order: Degree κ of the Taylor models, 1 or 2.
-        tolerance: Promised gain above which a new trajectory is computed, as a share of each
+        tolerance: Promised gain above which a new trajectory is computed, as a fraction of each
             output's peak, or in the unit of the first displacement (the first output without one)
             where the envelope is not relative.
 

@@ -37,16 +37,16 @@ BATCH = 32
 MAX_GLOBAL_INPUTS = 4
 """Inputs up to which Taylor models are maximised globally."""
 REACH = 0.6
-"""Trust region of a Taylor model, as a share of the half width of the box."""
+"""Trust region of a Taylor model, as a fraction of the half width of the box."""
 TRIES = 40
 """Proposals looked at per window of time."""
 SPACING = 0.02
 """Distance in unit coordinates between graphs of one batch."""
 NEAR_PEAK, PEAK_SHARE = 0.02, 0.02
-"""Distance from a peak, as a share of it, within which a gain of this share of the tolerance is
+"""Distance from a peak, as a fraction of it, within which a gain of this part of the tolerance is
 worth a graph: a Newton step or two for each peak."""
 LEAST_GAIN = 1e-10
-"""Gain, as a share of a peak, that may be rounding."""
+"""Gain, as a fraction of a peak, that may be rounding."""
 MOST_PASSES = 4
 """Passes after which an error that is not allowed is declared."""
 SPREAD = 64
@@ -63,7 +63,7 @@ class ImprovedFollower:
     """The method and its switches.
 
     Args:
-        tolerance: Predicted gain above which a new graph is computed, as a share of each
+        tolerance: Predicted gain above which a new graph is computed, as a fraction of each
             output's peak, or in the unit of the first displacement (the first output without one)
             where the envelope is not relative.
         budget: Most graphs over all levels.

@@ -61,7 +61,7 @@ class Proof:
         gap: Wanted distance of attained and proved bounds, as the tolerance; a tenth of that unless
             given.
         tolerance: Largest error allowed, what the gap may grow to where a smaller one is not
-            proved: a share of each output's peak, or in the unit of the first displacement (the
+            proved: a fraction of each output's peak, or in the unit of the first displacement (the
             first output without one) where the envelope is not relative; 1e-3 unless given.
         boxes: Most boxes looked at for each bound, on average; where they end, the gap is wider.
         parts: Most parts of the box that a peak is worth, and that are refused.
