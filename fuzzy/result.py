@@ -287,7 +287,7 @@ class Bounds:
             head = f"{self.named[column]}, α = {_digits(alpha)}: {' … '.join(map(_digits, ends))}"
             yield f"{head}, {error_name} {_digits(error)}{suffix}"
 
-    def plot(self, axes: Axes | None = None, output: str = "", **line: Any) -> Axes:
+    def plot(self, axes: Axes | None = None, output: str = "", **line: object) -> Axes:
         """Draw an output, the first by default: its membership function, or α-cuts over time.
 
         Args:

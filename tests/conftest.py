@@ -12,9 +12,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from alphacut.entry import main
-from tests.alphacut import one_case
-
 ROOT = Path(__file__).parents[1]
 
 
@@ -62,6 +59,8 @@ def shipped_run(tmp_path_factory, worker_id):
             if not (folder / "summary.json").is_file():
                 words = ["run", f"{ROOT}/cases/{case}.toml", f"--out={folder}", "--no-figures"]
                 told = io.StringIO()
+                from alphacut.entry import main  # here: xdist's first process runs no test
+
                 with redirect_stdout(told), redirect_stderr(told):
                     status = main([*words, *(f"--set={change}" for change in changes)])
                 assert status == 0, told.getvalue()
@@ -75,6 +74,8 @@ def shipped_run(tmp_path_factory, worker_id):
 @pytest.fixture(scope="session")
 def two_floors(tmp_path_factory):
     """Folder of the results, with figures, of a frame of two floors that asks every question."""
+    from tests.alphacut import one_case
+
     return one_case.run(tmp_path_factory.mktemp("two-floors"))
 
 

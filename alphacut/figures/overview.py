@@ -45,7 +45,7 @@ def domains(cell: Cell, size: float, layers: int) -> Figure:
     widths = figure.add_gridspec(1, 3, width_ratios=(1, 0.8, 1.2))
     draw_plane_mesh(figure.add_subplot(widths[0]), grid, levels[layers // 2])
     draw_density(figure.add_subplot(widths[1]), cell, levels[:, 0, 2])
-    draw_prisms(figure.add_subplot(widths[2], projection="3d"), grid, levels)
+    _draw_prisms(figure.add_subplot(widths[2], projection="3d"), grid, levels)
     return figure
 
 
@@ -74,7 +74,7 @@ def draw_density(axes: Axes, cell: Cell, levels: Array) -> None:
     style.title(axes, f"stochastic domain, {len(levels) - 1} layers")
 
 
-def draw_prisms(axes: Any, grid: PrismGrid, positions: Array) -> None:
+def _draw_prisms(axes: Any, grid: PrismGrid, positions: Array) -> None:
     """Draws the product domain: prisms on the particle's cone, two front sides and the bottom.
 
     `positions` are (x1, x2, θ) of the nodes, shape (values of θ, nodes, 3).

@@ -77,7 +77,7 @@ class FuzzyNumber(ABC):
         left, right = np.interp(x, lower, levels, left=0), np.interp(-x, -upper, levels, left=0)
         return np.asarray(np.minimum(left, right))
 
-    def plot(self, axes: Axes | None = None, **line: Any) -> Axes:
+    def plot(self, axes: Axes | None = None, **line: object) -> Axes:
         """Draw the membership function on Matplotlib axes, new ones by default, and return them.
 
         `line` has keywords of `Axes.plot`, such as `color`.
@@ -85,7 +85,8 @@ class FuzzyNumber(ABC):
         axes = new_axes() if axes is None else axes
         levels, lower, upper = map(np.asarray, self.cuts)
         values = np.concatenate([lower[:1], lower, upper[::-1], upper[:1]])
-        axes.plot(values, np.concatenate([[0.0], levels, levels[::-1], [0.0]]), **line)
+        drawn: dict[str, Any] = line
+        axes.plot(values, np.concatenate([[0.0], levels, levels[::-1], [0.0]]), **drawn)
         return axes
 
 

@@ -87,7 +87,7 @@ def test_the_plant_would_change_an_open_environment(name, unplanted, tmp_path):
 
 
 def test_a_command_answers_the_same(unplanted, tmp_path):
-    case = str(ROOT / "cases" / "pendulum.toml")
+    case = str(ROOT / "cases" / "porous.toml")
     command = (str(ROOT / "enter"), "python", "-m", "alphacut", "check", case)
     for name in PLANTS:
         plant(tmp_path, name)
