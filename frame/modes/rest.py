@@ -291,14 +291,26 @@ def coupling_of(
         for s, source in enumerate(sources):
             response = table.responses(source, order)
             G, G_slope = response.largest
-            # of g = (a + b λ)/2 + ζ √λ, ω² = λ − g²: 4 ω² |dσ/dλ|² = 1 + 4 g′ (g′ λ − g) ≤ 1, since
-            # g′ λ ≤ g, and 2 ω³ |d(g/ω)/dλ| = |2 g′ λ − g| ≤ g
-            if source == "start":  # e = Re G + (g/ω) Im G
-                slope = (1 + most) * G_slope / (2 * low_omega) + G * most / (2 * low_omega**2)
-            else:  # e = ± Im G/ω, with |dω/dλ| ≤ |dσ/dλ|
-                slope = G_slope / (2 * low_omega**2) + G / (2 * low_omega**3)
+            slope = response_slopes(source, G, G_slope, low_omega, most)
             half = np.ptp(response.value, axis=(1, 2)) / 2 + response.error
             bounds = np.outer(slope, by_slope[s, o]), 2 * np.outer(half, size[s, o])
             added[:, o] += np.minimum(*bounds)
             deviation[:, o] += np.outer(response.line_deviation, size[s, o])
     return added, deviation, ends
+
+
+def response_slopes(source: str, G: Array, G_slope: Array, omega: float, quotient: float) -> Array:
+    """Bounds of |de/dλ| of responses e to a source, in the shape of G and G_slope.
+
+    Args:
+        source: Name of a load, "velocity" or "start".
+        G: Bounds of |σ^ν ρ|.
+        G_slope: Bounds of its derivative by σ.
+        omega: Least ω.
+        quotient: Greatest g/ω.
+    """
+    # of g = (a + b λ)/2 + ζ √λ, ω² = λ − g²: 4 ω² |dσ/dλ|² = 1 + 4 g′ (g′ λ − g) ≤ 1, since
+    # g′ λ ≤ g, and 2 ω³ |d(g/ω)/dλ| = |2 g′ λ − g| ≤ g
+    if source == "start":  # e = Re G + (g/ω) Im G
+        return (1 + quotient) * G_slope / (2 * omega) + G * quotient / (2 * omega**2)
+    return G_slope / (2 * omega**2) + G / (2 * omega**3)  # e = ± Im G/ω, with |dω/dλ| ≤ |dσ/dλ|

@@ -9,6 +9,7 @@ from alphacut.frame.bounds.box import Box
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.methods.dual import DualProof
 from alphacut.frame.modes.clusters import _diagonal
+from alphacut.frame.modes.superposition import modes_at
 from alphacut.frame.structures.loads import Accelerogram
 from alphacut.frame.structures.matrix import MatrixStructure
 from alphacut.fuzzy import Crisp, Interval
@@ -96,6 +97,19 @@ def test_motions_are_off_by_their_rounding_at_most(stiff, ground, start):
             true = exact_output(frame, point[:3], point[3:], box.time[node[i]], name)
             shares.append(float(abs(true - mp.mpf(float(value[i])))) / error[i])
     assert IDLE <= np.max(shares) <= 1
+
+
+def test_eigenvalues_move_with_squared_frequencies_as_far_as_stated():
+    """Damped by the springs so that σ moves along the real axis alone: that is its decay's slope."""
+    stiffness = 50.0
+    frame = StoreyFrame([1.0], stiffness=[stiffness], rayleigh=(0, (2 / stiffness) ** 0.5))
+    box = Box(
+        frame, ("k1",), np.arange(2.0), np.array([0.9 * stiffness]), np.array([1.1 * stiffness])
+    )
+    unit = np.array([[-1e-5], [0.0], [1e-5]])
+    found = modes_at(frame, box.structure, ("k1",), box.inputs(unit), unit)
+    slope = np.abs(np.ptp(found.sigma.real) / np.ptp(found.squared))
+    assert slope <= found.sigma_slope[1, 0] * (1 + 1e-6) <= 1.001 * slope
 
 
 def test_crisp_bounds_hold_the_exact_motion_within_a_hundred_of_its_errors():

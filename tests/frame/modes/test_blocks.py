@@ -11,8 +11,13 @@ from alphacut.frame.modes import rest
 from alphacut.frame.modes.clusters import centred_matrices, subspaces
 from alphacut.frame.modes.intervening import BlockShares, oscillators, sources_of
 from alphacut.frame.modes.models import MotionModels, inverse
-from alphacut.frame.modes.rest import coupling_of
-from alphacut.frame.response.oscillators import Oscillators, grid_over, response_ranges
+from alphacut.frame.modes.rest import coupling_of, response_slopes
+from alphacut.frame.response.oscillators import (
+    Oscillators,
+    grid_over,
+    read_response,
+    response_ranges,
+)
 from alphacut.frame.structures.loads import Accelerogram
 
 TIGHT = 0.5
@@ -184,6 +189,23 @@ def test_what_couples_a_block_holds_and_half_would_not_do(ratio, source, widths,
         assert (np.abs(total) <= added + 1e-9).all()
         reached = np.maximum(reached, np.abs(total))
     assert (reached[1:] > (TIGHT if ratio < 0.1 else 0.3) * added[1:])[-40:].any()
+
+
+@pytest.mark.parametrize(
+    ("source", "quotient", "share"),
+    [("start", 15.0, 0.8), ("start", 0.05, 0.9), ("load", 0.3, 0.8)],
+)
+def test_no_response_falls_faster_with_its_eigenvalue(source, quotient, share):
+    """Damped by the masses, so that g/ω falls with λ; nearly critically, that is felt."""
+    omega, time = 2.0, np.linspace(0.05, 6, 400)
+    decay, h = quotient * omega, 1e-5
+    squared = omega**2 + decay**2 + np.array([-h, 0, h])[:, None]
+    sigma = -decay + 1j * np.sqrt(squared - decay**2)
+    rho = np.exp((sigma + decay) * time)  # of all decays alike, which exp(g t) undoes
+    e = read_response(source, sigma, rho)
+    bound = response_slopes(source, np.abs(rho[1]), time * np.abs(rho[1]), omega, quotient)
+    reached = np.abs(e[2] - e[0]) / (2 * h) / bound
+    assert share < reached.max() <= 1 + 1e-6
 
 
 def test_a_block_strays_from_lines_between_nodes_as_far_as_stated():
