@@ -44,7 +44,6 @@ class Modal:
     Args:
         squared: λ, shape (S, n), rising, in 1/s².
         sigma: Exponents −g + iω, shape (S, n), in 1/s.
-        sigma_slope: Bound of |dσ/dλ|, shape (S, n), in s.
         is_alike: Whether all modes of a point have one ratio of damping, shape (S,).
         shape: Displacements of the modes, of unit mass, shape (S, n, n).
         share: c of each source, by its name, shape (S, n).
@@ -58,7 +57,6 @@ class Modal:
 
     squared: Array
     sigma: Array
-    sigma_slope: Array
     is_alike: Mask
     shape: Array
     share: dict[str, Array]
@@ -68,6 +66,11 @@ class Modal:
     rows: Array
     order: Rows
     accelerated: Array
+
+    @property
+    def sigma_slope(self) -> Array:
+        """Bound of |dσ/dλ|, shape (S, n), in s; see `rest.response_slopes`."""
+        return np.asarray(1 / (2 * self.sigma.imag))
 
     def output_coefficients(self, point: Rows, output: Rows) -> tuple[Array, Array]:
         """Coefficients r of modes in outputs (N,) at points (N,), and their rounding, (N, n)."""
@@ -102,7 +105,6 @@ def modes_at(
     decay = (a + b * squared) / 2 + ratio * np.sqrt(positive)
     if not (squared > decay**2).all():
         raise UnprovedError("a mode may not oscillate", "take less damping, and hold the structure")
-    omega, decay_slope = np.sqrt(squared - decay**2), b / 2 + ratio / (2 * np.sqrt(positive))
     n, (q0, v0) = M.shape[-1], np.split(matrices.start.value[..., 0], 2, axis=-1)
     patterns, pushes = {"velocity": v0, "start": q0}, matrices.pushes(ground=False).value
     forces = [name for name in histories(system) if name != "load"]
@@ -119,8 +121,7 @@ def modes_at(
     of_stiffness += gamma(8) * squared[:, None] * np.eye(n)  # of σ from λ
     return Modal(
         squared=squared,
-        sigma=-decay + 1j * omega,
-        sigma_slope=decay_slope + np.abs(1 - 2 * decay * decay_slope) / (2 * omega),
+        sigma=-decay + 1j * np.sqrt(squared - decay**2),
         is_alike=(ratio == ratio[:, :1]).all(1),
         shape=shape,
         share=share,
