@@ -38,6 +38,7 @@ DIRECT = {
     "threadpoolctl": "python3-threadpoolctl",
     "typing_extensions": "python3-typing-extensions",
     "ufl": "python3-dolfinx",
+    "vtkmodules": "python3-pyvista",  # which depends on VTK
     "xarray": "python3-xarray",
 }
 LOCAL = {"_typeshed", "mpl_toolkits", "plane", "vtkmodules"}
