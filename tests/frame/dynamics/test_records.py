@@ -83,17 +83,10 @@ def deviation(frame: StoreyFrame, step: float) -> float:
     return max(float((np.abs(v - truth).max(0) / np.abs(truth).max(0)).max()) for v in ways)
 
 
-def test_motions_under_any_record_are_exact() -> None:
-    rng = np.random.default_rng(0)
-    for _ in range(12):
-        frame = random_structure(rng)
-        assert deviation(frame, float(rng.choice(NODES))) < 1e-10
-
-
-@pytest.mark.slow
-def test_a_thousand_motions_under_any_record_are_exact() -> None:
-    rng = np.random.default_rng(1)
-    for _ in range(1000):
+@pytest.mark.parametrize("count", [12, pytest.param(1000, marks=pytest.mark.slow)])
+def test_motions_under_any_record_are_exact(count: int) -> None:
+    rng = np.random.default_rng(count)
+    for _ in range(count):
         assert deviation(random_structure(rng), float(rng.choice(NODES))) < 1e-10
 
 

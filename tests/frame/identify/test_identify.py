@@ -300,7 +300,7 @@ def test_shapes_of_known_deviation_hold_the_truth_as_often_as_claimed(
     count: int, share: float
 ) -> None:
     rng, held = np.random.default_rng(count), 0
-    for _ in range(250):  # all floors scatter alike, that of the largest amplitude, too
+    for _ in range(125):  # all floors scatter alike, that of the largest amplitude, too
         rows = np.array([[share], [1.0]]) + 0.02 * rng.standard_normal((2, count))
         mode = measured_mode(
             1, 2 + 0.01 * rng.standard_normal(count), {1: rows[0], 2: rows[1]}, shape_deviation=0.02,
@@ -308,7 +308,7 @@ def test_shapes_of_known_deviation_hold_the_truth_as_often_as_claimed(
         )  # fmt: skip
         low, high = mode.shape[1].cut(0.1)
         held += low <= share <= high
-    assert 0.84 <= held / 250 <= 0.96
+    assert 0.84 <= held / 125 <= 0.96
 
 
 def test_a_reference_is_near_the_largest_and_its_size_counts() -> None:
@@ -341,7 +341,7 @@ def test_at_level_1_a_prior_that_agrees_is_a_point() -> None:
 @pytest.mark.parametrize("count", [1, 2, 5])
 def test_scatter_that_chance_explains_is_not_refused(count: int) -> None:
     rng = np.random.default_rng(count)
-    for _ in range(100):
+    for _ in range(40):
         values = 2.0 * (1 + 0.01 * rng.standard_normal(count))
         measured_mode(1, values, frequency_deviation=0.01)
 
@@ -350,9 +350,9 @@ def test_scatter_that_chance_explains_is_not_refused(count: int) -> None:
 def test_ratios_of_noisy_amplitudes_are_not_biased(known, rng):
     """A tenth of noise makes the mean ratio a hundredth too large, more than 1000 rows scatter."""
     inside = 0
-    for _ in range(50):
+    for _ in range(30):
         rows = {1: 0.6 + 0.1 * rng.normal(size=1000), 2: 1 + 0.1 * rng.normal(size=1000)}
         mode = measured_mode(1, 2 + 0.01 * rng.normal(size=1000), rows, shape_deviation=known)
         low, high = mode.shape[1].cut(0.05)
         inside += low <= 0.6 <= high
-    assert inside >= 42
+    assert inside >= 25
