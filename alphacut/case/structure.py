@@ -246,7 +246,7 @@ class Frame(StructureSection):
     accelerogram: Annotated[Accelerogram, text(read_accelerogram)] | None = None
     """file of the ground's acceleration; motion is relative to it"""
     outputs: tuple[str, ...] = ()
-    """observed quantities: q1, v1, a1, drift1, shear1 …, base_shear"""
+    """observed quantities: q1, v1, a1, drift1, shear1 … (columns without dampers), base_shear"""
 
     @property
     def has_dampers(self) -> bool:
