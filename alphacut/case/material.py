@@ -356,4 +356,4 @@ class ModulusSection(Section):
     tolerance: Annotated[float, Quantity(minimum=1e-10, maximum=0.1)] | None = None
     """relative error of E that is allowed"""
     average: Literal["axes", "isotropic"] = "isotropic"
-    """E of a plane: isotropic, of the average over all directions; axes, of eq. 16"""
+    """E of a plane: isotropic, of the average over all directions; axes, of the paper's eq. 16"""

@@ -97,11 +97,8 @@ class Quantity:
         bare = not self.si and isinstance(value, str) and "%" not in value and "[" not in value
         if bare or self.is_integer:
             raise ValueError("a number stands without quotes")
-        return (
-            quantity.parse_fuzzy(value, self.si)
-            if self.fuzzy
-            else quantity.parse_number(value, self.si)
-        )
+        parse = quantity.parse_fuzzy if self.fuzzy else quantity.parse_number
+        return parse(value, self.si)
 
     def __get_pydantic_core_schema__(
         self, source: object, handler: GetCoreSchemaHandler
