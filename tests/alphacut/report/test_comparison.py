@@ -16,13 +16,9 @@ from tests.alphacut.one_case import run
 
 
 @pytest.fixture(scope="module")
-def runs(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("designs")
-    (folder / "a").mkdir()
-    (folder / "b").mkdir()
-    first = run(folder / "a", "--no-figures")
+def runs(results, tmp_path_factory):
     stiffer = "frame.modulus='[44, 45, 46] GPa'"
-    return first, run(folder / "b", "--no-figures", "--set", stiffer)
+    return results, run(tmp_path_factory.mktemp("stiffer"), "--no-figures", "--set", stiffer)
 
 
 def test_two_runs_stand_side_by_side(runs, capsys):
