@@ -165,7 +165,10 @@ def summary(document: Document, convention: str) -> str:
     iterations = ", ".join(map(str, document["iterations"]))
     solver = f", {document['solver']}, iterations {iterations}" if iterations else ""
     table = text_table((convention, "value", "± error"), rows)
-    return f"{table}{document['method']}, {document['unknowns']} unknowns{solver}\n"
+    text = f"{table}{document['method']}, {document['unknowns']} unknowns{solver}\n"
+    if document["declared_error"] is None:  # Galerkin: fields of a finer mesh have less energy
+        text += "C is an upper bound of this mesh: that of a finer one is smaller\n"
+    return text
 
 
 def table_rows(document: Document) -> Iterator[tuple[str, str, float | None]]:

@@ -107,7 +107,7 @@ def timing(solver: str, size: float, layers: int = 12, repeat: int = 3) -> Timin
     model = PrismModel(size, layers, estimate=False)
     problem = model.problem(PAPER)
     named = {gmsh_prisms.MATRIX: MATRIX, gmsh_prisms.INCLUSION: PARTICLE}
-    stiffness = [named[name].stiffness for name in problem.form.grid.names]
+    stiffness = [named[name].stiffness for name in problem.grid.names]
     problem.assemble(stiffness)
     loads, runs = problem.loads(LOADS), []
     try:
@@ -177,7 +177,7 @@ def iterations(size: float) -> Iterator[tuple[str, float, int, int]]:
             gmsh_prisms.MATRIX: MATRIX,
             gmsh_prisms.INCLUSION: Phase(MATRIX.modulus * contrast),
         }
-        problem.assemble([named[phase].stiffness for phase in problem.form.grid.names])
+        problem.assemble([named[phase].stiffness for phase in problem.grid.names])
         solved = solve(problem.solver(model.options), problem.loads(LOADS))
         yield name, contrast, layers, max(solved.iterations)
 

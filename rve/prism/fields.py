@@ -120,11 +120,11 @@ def _solve_fields(
     problem: PrismProblem, stiffness: Sequence[Array], loads: Array, options: SolverOptions
 ) -> CellFields:
     """Solve for displacements and stresses under macroscopic strains of shape (loads, 3)."""
-    form, grid = problem.form, problem.form.grid
+    grid = problem.grid
     problem.assemble(stiffness)
     vectors = solve(problem.solver(options), problem.loads(loads)).vectors
-    fluctuation = fem.Function(form.space)
-    rank_cells = np.arange(len(form.wedge), dtype=np.int32)
+    fluctuation = fem.Function(problem.space)
+    rank_cells = np.arange(len(problem.wedge), dtype=np.int32)
     nodal_strain = at_points(strain(fluctuation), vertices_and_midpoints())
     positions = grid.positions(problem.map, problem.thickness)
     displacement = np.empty((grid.nodes, 2, len(vectors)))
@@ -132,10 +132,10 @@ def _solve_fields(
     for k, vector in enumerate(vectors):
         u, uniform = problem.field(vector), np.asarray(loads[k], float)
         tensor = np.array([[uniform[0], uniform[2] / 2], [uniform[2] / 2, uniform[1]]])
-        displacement[form.node, :, k] = u + positions[form.node, :2] @ tensor
+        displacement[problem.node, :, k] = u + positions[problem.node, :2] @ tensor
         fluctuation.x.array[:] = u.ravel()
-        strains = nodal_strain.eval(form.mesh, rank_cells).reshape(len(rank_cells), NODES, 3)
-        prism_strains[form.wedge, ..., k] = strains + uniform
+        strains = nodal_strain.eval(problem.mesh, rank_cells).reshape(len(rank_cells), NODES, 3)
+        prism_strains[problem.wedge, ..., k] = strains + uniform
     stress = np.stack(stiffness)[grid.phase][:, None] @ prism_strains
     # one point for each node and phase, since stresses jump at the interface
     point_keys = grid.cells + grid.phase[:, None] * grid.nodes

@@ -115,7 +115,7 @@ class MeshModel(_NamedModel):
     def problem_of(self, law: object, phases: object) -> tuple[PrismProblem, NamedPhases]:
         """Problem on the mesh, moved to the law, with law and materials checked."""
         problem = self.cached_problem()
-        named = mesh_phases(problem.form.grid, law, phases)
+        named = mesh_phases(problem.grid, law, phases)
         problem.move(named.law)
         return problem, named
 

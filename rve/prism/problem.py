@@ -38,11 +38,43 @@ class FoldedMeshError(FailedError):
     """The mesh folds over where it follows a map."""
 
 
-class PrismForm:
-    """Prism mesh, form and loads of one grid; positions and phases are set anew.
+@dataclass(frozen=True)
+class SliceStrains:
+    """Mean strains of the slices at the Gauss points of the layers, apart by phase.
 
     Args:
-        grid: Topology; the ranks divide its prisms among them.
+        theta: θ of the slices, shape (n,).
+        weights: Weights of the slices, sum 1, shape (n,).
+        strain: ⟨(ε11, ε22, 2 ε12)⟩ over the parts of the cell that the phases take, in the area of
+            the cell, shape (phases, n, 3, fields).
+        fractions: Area fractions of the phases, shape (phases, n).
+        products: Mean of ε_a ⊗ ε_b over the phases and θ, shape (phases, 3, fields, 3, fields).
+    """
+
+    theta: Array
+    weights: Array
+    strain: Array
+    fractions: Array
+    products: Array
+
+    def combined(self, coefficients: Array) -> SliceStrains:
+        """Those of sums of the fields, coefficients (fields, loads)."""
+        products = np.einsum("piajb,ak,bl->pikjl", self.products, coefficients, coefficients)
+        return SliceStrains(
+            self.theta, self.weights, self.strain @ coefficients, self.fractions, products
+        )
+
+    def stress(self, stiffness: Sequence[Array]) -> Array:
+        """Homogenised (σ11, σ22, σ12), shape (n, 3, fields), in Pa, for the phases' stiffness."""
+        stresses = [matrix @ strain for matrix, strain in zip(stiffness, self.strain, strict=True)]
+        return np.asarray(sum(stresses))
+
+
+class PrismProblem:
+    """The product-space problem of one grid; map and phases are set anew for each sample.
+
+    Args:
+        grid: Topology; the ranks divide its prisms and its levels among them.
         comm: Communicator.
 
     Attributes:
@@ -54,16 +86,27 @@ class PrismForm:
         dx: Measure of each phase by its name, with the rule of the prisms, for forms of the user.
         elastic: Stiffness and loads; `elastic.density` is f_Θ at the points.
         areas: Weights of the points in their slice, shape (cells, 3, points); a slice's sum is 4.
+        numbering: Reduced unknowns.
+        map: The radius map, whose interphase has a `thickness`.
+        matrix: The reduced stiffness.
+        local_map: Nodes of this rank to pairs of reduced unknowns.
     """
 
     def __init__(self, grid: PrismGrid, comm: MPI.Intracomm) -> None:
-        self.grid = grid
+        self.grid, self.comm = grid, comm
         self.mesh = mesh_of(comm, grid.cells, grid.nodes, wedge(3))
         self.space = fem.functionspace(self.mesh, wedge(2))
         self.wedge: Rows = np.asarray(self.mesh.topology.original_cell_index)
         self.layer = self.wedge // len(grid.plane.triangles)
         self.node = self._node_of_dof()
         self._compile_forms()
+        self.numbering = LevelNumbering(grid, comm)
+        pairs, rows = self.numbering.pairs, self.numbering.rows
+        self.local_map = map_of(pairs[self.node], comm)
+        layers = grid.cells.reshape(grid.layers, -1, grid.cells.shape[1])
+        cells = layers[self.numbering.layers].reshape(-1, layers.shape[-1])
+        self.matrix = zero_matrix(pairs[cells], self.local_map, rows, self.numbering.size)
+        self._to_nodes = NodeScatter(pairs[self.node], self.matrix.createVecRight())
 
     def _node_of_dof(self) -> Rows:
         sizes, geometry = self.space.dofmap.index_map, self.mesh.geometry
@@ -91,19 +134,19 @@ class PrismForm:
         self.elastic = CellForm(self.space, point_space, measures, mixed=ignores_interface)
         self._strains = PointStrains(self.space, points)
 
-    def move_to(self, radius: RadiusMap, thickness: float = 0.0) -> None:
-        """Move the nodes to the cone of `radius` and mark the particle.
+    def move(self, radius: RadiusMap, thickness: float = 0.0) -> None:
+        """Move the nodes to the interface r(θ) of a map and mark the particle (eq. 13, 14).
 
-        After an error the form is to be moved again before it is used.
+        `thickness` is that of the interphase. After an error it is to be moved again before use.
 
         Raises:
             FoldedMeshError: An element is inverted.
             RefusedError: The density of θ is not positive at a quadrature point.
         """
+        self.map, self.thickness = radius, thickness
         positions, geometry = self.grid.positions(radius, thickness), self.mesh.geometry
         geometry.x[:] = positions[geometry.input_global_indices]
         self._levels = self.grid.level_thetas(radius.distribution)
-        self._law = radius.distribution
         theta, _ = self.slice_rule()
         density = radius.distribution.pdf(theta)
         if not (density > 0).all():
@@ -152,7 +195,7 @@ class PrismForm:
 
     def slice_rule(self) -> tuple[Array, Array]:
         """θ and weights of the slices, the Gauss points of all layers, shape (3 layers,) each."""
-        rule = level_rule(self._law, self._levels, points=SLICES_PER_LAYER)
+        rule = level_rule(self.map.distribution, self._levels, points=SLICES_PER_LAYER)
         return rule.nodes, rule.weights
 
     def at_prisms(self, slice_values: Array) -> Array:
@@ -164,84 +207,17 @@ class PrismForm:
         member = np.equal.outer(np.arange(self.grid.layers), self.layer).astype(float)
         return np.asarray(np.tensordot(member, values, axes=1))
 
-
-@dataclass(frozen=True)
-class SliceStrains:
-    """Mean strains of the slices at the Gauss points of the layers, apart by phase.
-
-    Args:
-        theta: θ of the slices, shape (n,).
-        weights: Weights of the slices, sum 1, shape (n,).
-        strain: ⟨(ε11, ε22, 2 ε12)⟩ over the parts of the cell that the phases take, in the area of
-            the cell, shape (phases, n, 3, fields).
-        fractions: Area fractions of the phases, shape (phases, n).
-        products: Mean of ε_a ⊗ ε_b over the phases and θ, shape (phases, 3, fields, 3, fields).
-    """
-
-    theta: Array
-    weights: Array
-    strain: Array
-    fractions: Array
-    products: Array
-
-    def combined(self, coefficients: Array) -> SliceStrains:
-        """Those of sums of the fields, coefficients (fields, loads)."""
-        products = np.einsum("piajb,ak,bl->pikjl", self.products, coefficients, coefficients)
-        return SliceStrains(
-            self.theta, self.weights, self.strain @ coefficients, self.fractions, products
-        )
-
-    def stress(self, stiffness: Sequence[Array]) -> Array:
-        """Homogenised (σ11, σ22, σ12), shape (n, 3, fields), in Pa, for the phases' stiffness."""
-        stresses = [matrix @ strain for matrix, strain in zip(stiffness, self.strain, strict=True)]
-        return np.asarray(sum(stresses))
-
-
-class PrismProblem:
-    """The product-space problem of one grid; map and phases are set anew for each sample.
-
-    Args:
-        grid: Topology.
-        comm: Communicator; its ranks share the prisms and the levels.
-
-    Attributes:
-        form: Mesh and form.
-        numbering: Reduced unknowns.
-        map: The radius map.
-        matrix: The reduced stiffness.
-        local_map: Nodes of this rank to pairs of reduced unknowns.
-    """
-
-    def __init__(self, grid: PrismGrid, comm: MPI.Intracomm) -> None:
-        self.comm = comm
-        self.form = PrismForm(grid, comm)
-        self.numbering = LevelNumbering(grid, comm)
-        pairs, rows = self.numbering.pairs, self.numbering.rows
-        self.local_map = map_of(pairs[self.form.node], comm)
-        layers = grid.cells.reshape(grid.layers, -1, grid.cells.shape[1])
-        cells = layers[self.numbering.layers].reshape(-1, layers.shape[-1])
-        self.matrix = zero_matrix(pairs[cells], self.local_map, rows, self.numbering.size)
-        self._to_nodes = NodeScatter(pairs[self.form.node], self.matrix.createVecRight())
-
-    def move(self, radius_map: RadiusMap, thickness: float = 0.0) -> None:
-        """Move the nodes to the interface r(θ) of a map and mark the particle (eq. 13, 14).
-
-        `thickness` is that of the interphase. Raises as `PrismForm.move_to`.
-        """
-        self.map, self.thickness = radius_map, thickness
-        self.form.move_to(radius_map, thickness)
-
     def assemble(self, stiffness: Sequence[Array], parts: slice = ALL_PARTS) -> PETSc.Mat:
         """Assemble the reduced stiffness of eq. 7, of all phases or `parts`, and return it."""
-        self.form.elastic.set_phases(stiffness)
+        self.elastic.set_phases(stiffness)
         self.matrix.zeroEntries()
-        self.form.elastic.add_stiffness(self.matrix, parts)
+        self.elastic.add_stiffness(self.matrix, parts)
         return self.matrix
 
     def loads(self, strains: Array, parts: slice = ALL_PARTS) -> list[PETSc.Vec]:
         """Reduced forces −⟨Bᵀ C ε̄⟩ of macroscopic strains (loads, 3), for the phases as set."""
         num_rows, size = len(self.numbering.rows), self.numbering.size
-        forces = [self.form.elastic.load(strain, parts) for strain in strains]
+        forces = [self.elastic.load(strain, parts) for strain in strains]
         return [reduced_vector(force, self.local_map, num_rows, size) for force in forces]
 
     def solver(self, options: SolverOptions, matrix: PETSc.Mat | None = None) -> PETSc.KSP:
@@ -250,7 +226,7 @@ class PrismProblem:
         return krylov_solver(operator, self.numbering, self.map.distribution, options)
 
     def assemble_operator(self, form: fem.Form) -> PETSc.Mat:
-        """Reduced matrix Pᵀ A P of a bilinear form of the user on `form.space`."""
+        """Reduced matrix Pᵀ A P of a bilinear form of the user on `space`."""
         matrix = self.matrix.duplicate()
         for option in (PETSc.Mat.Option.SPD, PETSc.Mat.Option.SYMMETRIC):  # not known of this form
             matrix.setOption(option, False)
@@ -259,7 +235,7 @@ class PrismProblem:
         return matrix
 
     def assemble_forces(self, form: fem.Form) -> PETSc.Vec:
-        """Reduced vector Pᵀ b of a linear form of the user on `form.space`."""
+        """Reduced vector Pᵀ b of a linear form of the user on `space`."""
         values, numbering = fem.assemble_vector(form).array, self.numbering
         return reduced_vector(values, self.local_map, len(numbering.rows), numbering.size)
 
@@ -272,16 +248,16 @@ class PrismProblem:
 
         `fields` are pairs of a macroscopic strain (3,) and a fluctuation (nodes, 2), None for none.
         """
-        form, count = self.form, len(fields)
-        strain = np.empty((len(form.wedge), SLICES_PER_LAYER, POINTS_PER_SLICE, 3, count))
+        count = len(fields)
+        strain = np.empty((len(self.wedge), SLICES_PER_LAYER, POINTS_PER_SLICE, 3, count))
         for k, (uniform, u) in enumerate(fields):
-            strain[..., k] = uniform if u is None else form.strains(u) + uniform
-        areas = form.phase_areas() / AREA  # (phases, cells, 3, points)
+            strain[..., k] = uniform if u is None else self.strains(u) + uniform
+        areas = self.phase_areas() / AREA  # (phases, cells, 3, points)
         prism_means = np.einsum("pmsq,msqif->pmsif", areas, strain)
-        means = np.stack([form.sum_by_layer(phase_means) for phase_means in prism_means])
-        fractions = np.stack([form.sum_by_layer(phase.sum(axis=-1)) for phase in areas])
-        theta, weights = form.slice_rule()
-        point_weights = form.at_prisms(weights)[None, :, :, None] * areas
+        means = np.stack([self.sum_by_layer(phase_means) for phase_means in prism_means])
+        fractions = np.stack([self.sum_by_layer(phase.sum(axis=-1)) for phase in areas])
+        theta, weights = self.slice_rule()
+        point_weights = self.at_prisms(weights)[None, :, :, None] * areas
         point_weights = point_weights.reshape(len(areas), -1)
         products = strain_products(strain.reshape(-1, 3, count), point_weights)
         means, fractions, products = map(self.comm.allreduce, (means, fractions, products))

@@ -55,9 +55,9 @@ class ProductSpace:
             raise RefusedError("the interface", repr(model.interface), "'conforming'")
         self._petsc = model.petsc
         self._problem = _separate_problem(model, law)
-        self.space: fem.FunctionSpace = self._problem.form.space
-        self.dx: dict[str, ufl.Measure] = self._problem.form.dx
-        self.density: fem.Function = self._problem.form.elastic.density
+        self.space: fem.FunctionSpace = self._problem.space
+        self.dx: dict[str, ufl.Measure] = self._problem.dx
+        self.density: fem.Function = self._problem.elastic.density
         self._forms: dict[ufl.Form, fem.Form] = {}
 
     @staticmethod
@@ -120,11 +120,11 @@ def _separate_problem(model: PrismModel | MeshModel, law: RadiusMap | ThetaLaw) 
     """New problem for a map or law; the cached ones of the model would move to its next map."""
     if isinstance(model, MeshModel):
         cached = model.cached_problem()
-        radius: RadiusMap = mesh_law(cached.form.grid, law)
+        radius: RadiusMap = mesh_law(cached.grid, law)
     else:
         cached = model.problem(cast("RadiusMap", law))
         radius = cached.map
-    problem = PrismProblem(cached.form.grid, cached.comm)
+    problem = PrismProblem(cached.grid, cached.comm)
     problem.move(radius)
     return problem
 

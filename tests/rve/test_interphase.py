@@ -26,7 +26,7 @@ def test_a_ring_of_its_neighbour_is_the_cell_of_two_phases_on_the_same_mesh(tmp_
     model = PrismModel(0.5, 4, stiffness=True, estimate=False)
     ring = Interphase(0.1, phase)
     result = model.solve(CONE, SOFT, [HARD], ring)[0]
-    grid = model.problem(CONE, ring.thickness).form.grid
+    grid = model.problem(CONE, ring.thickness).grid
     two = np.where(grid.phase == 2, grid.names.index(name), grid.phase)
     points = grid.positions(CONE, ring.thickness)
     write(tmp_path / "two.msh", points, grid.cells, two, grid.names[:2])

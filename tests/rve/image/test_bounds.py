@@ -165,33 +165,6 @@ def test_a_homogeneous_image_is_exact():
     assert result.bounds.width < 1e-13
 
 
-def test_the_rounding_bound_covers_the_difference_to_a_sum_in_long_double():
-    rng = np.random.default_rng(9)
-    bulk, shear = image_of(discs(16, rng), ((40.0, 25.0), (7.0, 3.0)))
-    for element in (displacement_element(), airy_element()):
-        fields = 1e3 * rng.normal(size=(3, element.unknowns, 16, 16))
-        result = energies_of(element, bulk, shear, fields)
-        exact = long_energies(element, coefficients(element, bulk, shear), fields)
-        error = np.abs(result.value - exact)
-        assert (error <= result.rounding).all()
-        assert result.rounding.max() < 1e-12 * np.abs(exact).max()
-
-
-def long_energies(element, coefficients, fields):
-    """The mean energies of trace and deviator in extended precision, without anchors."""
-    local = [
-        np.roll(fields[:, kind], (-up, -right), axis=(1, 2)) for kind, up, right in element.local
-    ]
-    values = np.einsum(
-        "rn,nlyx->rlyx", *(np.array(x, np.longdouble) for x in (element.modes, local))
-    )
-    values += element.mean_modes(UNIT_LOADS)[:, :, None, None]
-    pairs = zip(element.parts, coefficients, strict=True)
-    return np.array(
-        [np.einsum("yx,rjyx,rkyx->jk", c, values[p], values[p]) / c.size for p, c in pairs]
-    )
-
-
 @pytest.mark.parametrize("average", AVERAGES)
 def test_e_and_nu_of_an_isotropic_material_are_its_own(average):
     moduli = PlaneModuli.of_young(20.0, 0.3)

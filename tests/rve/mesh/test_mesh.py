@@ -6,7 +6,7 @@ import pytest
 pytest.importorskip("alphacut.rve.fenicsx")
 
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.rve.cell.outline import Ellipse, area, circle, is_round
+from alphacut.rve.cell.outline import Ellipse, area, circle
 from alphacut.rve.fenicsx import basix
 from alphacut.rve.mesh.columns import extrude
 from alphacut.rve.mesh.curved import curved_nodes, jacobian_ratios, plane_mesh
@@ -140,12 +140,3 @@ def test_the_reference_radius_leaves_room_for_the_outline():
     assert reference_radius(HermiteMap(0.6, 0, 0.7, 0), Ellipse(2.0)) == pytest.approx(0.9 / 2**0.5)
     with pytest.raises(RefusedError, match=r"values in \(0, 0.7071\)"):
         reference_radius(HermiteMap(0.3, 0, 0.8, 0), Ellipse(2.0))
-
-
-def test_round_is_round_by_any_name():
-    assert is_round(circle)
-    assert is_round(Ellipse(1.0))
-    assert not is_round(flower)
-    assert area(Ellipse(3.0)) == pytest.approx(np.pi, rel=1e-9)
-    with pytest.raises(RefusedError, match=r"aspect of the ellipse is 9"):
-        Ellipse(9.0)

@@ -31,7 +31,7 @@ def solve(name, **phases):
 def test_a_written_cell_is_solved_bit_for_bit(tmp_path):
     model = PrismModel(0.5, 4, stiffness=True)
     right = model.solve(PAPER, SOFT, [HARD])[0]
-    grid = model.problem(PAPER).form.grid
+    grid = model.problem(PAPER).grid
     write(tmp_path / "a.msh", grid.positions(PAPER), grid.cells, grid.phase, grid.names)
     phases = {"inclusion": HARD, "matrix": SOFT}
     result = MeshModel(str(tmp_path / "a.msh")).solve(PAPER.distribution, phases)[0]

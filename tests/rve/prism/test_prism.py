@@ -184,12 +184,12 @@ def test_wedges_about_a_sharp_outline_are_sound_at_all_radii():
     """On the first mesh that follows the bends, wedges at some radius are nearly inverted."""
     model = PrismModel(0.6, 6, outline=lambda angle: 1 + 0.277 * np.cos(4 * angle))
     problem = model.problem(HermiteMap(0.078, 0, 0.405, 0))
-    determinants = problem.form.areas / slice_weights()
+    determinants = problem.areas / slice_weights()
     assert (determinants > 0.2 * determinants.mean(axis=(1, 2), keepdims=True)).all()
     first = extrude(
-        size=0.6, radius=problem.form.grid.plane.radius, outline=model.outline, layers=1
+        size=0.6, radius=problem.grid.plane.radius, outline=model.outline, layers=1
     ).plane
-    assert len(problem.form.grid.plane.triangles) > len(first.triangles)
+    assert len(problem.grid.plane.triangles) > len(first.triangles)
 
 
 def test_a_mesh_that_folds_over_is_refused_with_its_cure():

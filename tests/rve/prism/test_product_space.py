@@ -1,6 +1,5 @@
 """Doors for laws of the user: what they assemble, what they refuse, and that they stay as they are."""
 
-import doctest
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +10,6 @@ pytest.importorskip("alphacut.rve.fenicsx")
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve import LOADS, MeshModel, Phase, PrismModel, ProductSpace
 from alphacut.rve.fenicsx import PETSc, fem, ufl
-from alphacut.rve.prism import product_space
 from alphacut.rve.solver.krylov import solve
 from alphacut.stochastic import HermiteMap, TruncatedNormal
 
@@ -40,7 +38,7 @@ def elastic(cell):
 def test_a_form_of_the_user_gives_the_matrix_and_the_solutions_of_the_model(cell, elastic):
     problem = MODEL.problem(CONE)
     by_name = dict(zip(("matrix", "inclusion"), PHASES, strict=True))
-    expected = problem.assemble([by_name[name].stiffness for name in problem.form.grid.names])
+    expected = problem.assemble([by_name[name].stiffness for name in problem.grid.names])
     matrix = cell.assemble_matrix(elastic)
     gap = matrix.copy()
     gap.axpy(-1, expected)
@@ -107,13 +105,6 @@ def test_a_later_map_of_the_model_does_not_move_the_mesh(cell):
 def test_a_mesh_that_ignores_the_interface_has_no_measure_of_phases():
     with pytest.raises(RefusedError, match="conforming"):
         ProductSpace(PrismModel(0.6, 2, interface="sign"), CONE)
-
-
-def test_the_example_of_the_class_runs():
-    names = {"ProductSpace": ProductSpace, "PrismModel": PrismModel, "HermiteMap": HermiteMap}
-    failed, tried = doctest.testmod(product_space, extraglobs={**names, "ufl": ufl})
-    assert tried
-    assert not failed
 
 
 def test_a_mesh_from_a_file_has_its_measures_by_the_names_of_its_groups():

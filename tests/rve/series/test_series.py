@@ -6,7 +6,6 @@ import pytest
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve import Phase
 from alphacut.rve.result.moduli import square_moduli
-from alphacut.rve.series.lattice_sums import lattice_sums
 from alphacut.rve.series.means import RuleError, SeriesError
 from alphacut.rve.series.model import CIRCLES, SeriesModel, square_stiffness
 from alphacut.rve.slices.model import SlicesModel
@@ -164,21 +163,6 @@ def test_a_map_that_bends_has_its_error_declared_or_does_not_settle():
 def test_options_out_of_range(options, message):
     with pytest.raises(ValueError, match=message):
         SeriesModel(**options)
-
-
-def every_point(n, conjugate):
-    """Sum over all of |m|, |j| ≤ 8, whatever n."""
-    m = np.arange(-8.0, 9.0)
-    p = (m[:, None] + 1j * m).ravel()
-    p = p[p != 0]
-    return np.sum((p.conj() if conjugate else 1) * p ** -float(n)).real
-
-
-def test_far_points_left_out_of_lattice_sums_are_below_round_off():
-    sums = lattice_sums(903)
-    for n in range(40, 900, 4):
-        assert sums.plain[n] == pytest.approx(every_point(n, False), rel=1e-12)
-        assert sums.conjugate[n + 3] == pytest.approx(every_point(n + 3, True), rel=1e-12)
 
 
 def test_errors_of_the_rules_that_judge_are_declared_too():
