@@ -19,7 +19,7 @@ from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.io.problem import missing
 from alphacut.rve.cell.cell import STRAIN, AnyPhase, Cell, Interphase, Phase
 from alphacut.rve.cell.outline import circle
-from alphacut.rve.result.bounds import hashin_shtrikman, mori_tanaka
+from alphacut.rve.result.moduli import hashin_shtrikman, mori_tanaka
 from alphacut.rve.result.result import HomogenisedStiffness, effective_modulus
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.spheres.model import SphereSeriesModel
@@ -202,7 +202,7 @@ class CellProblem:
         try:
             from alphacut.rve.mesh.file import read_grid
             from alphacut.rve.mesh.periodicity import MeshError
-            from alphacut.rve.prism.own_mesh import mesh_phases
+            from alphacut.rve.prism.own_mesh import in_order_of, mesh_law
         except ImportError as error:
             raise RefusedError("mesh.file", self.mesh.file, "no mesh", missing(error)) from None
         try:
@@ -210,7 +210,8 @@ class CellProblem:
         except MeshError as error:
             value, allowed = f"{self.mesh.file.name}: {error.what}", "a periodic cell of prisms"
             raise RefusedError("mesh.file", value, allowed, error.cure) from None
-        mesh_phases(grid, self.radius.law, self.nominal)  # refuses what does not fit
+        mesh_law(grid, self.radius.law)  # both refuse what does not fit
+        in_order_of(grid.names, self.nominal)
 
 
 def isotropic_bounds(

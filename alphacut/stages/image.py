@@ -21,8 +21,15 @@ from alphacut.rve.cell.cell import Phase
 from alphacut.rve.image.bounds import Ends
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.model import ImageCut, ImageModel, phase_energies, usual_division
-from alphacut.rve.image.phases import ModuliImages, ModuliInterval, moduli_images, threshold_ranges
-from alphacut.rve.image.read import read_grey, require_memory, require_phases
+from alphacut.rve.image.phases import (
+    ModuliImages,
+    ModuliInterval,
+    moduli_images,
+    read_grey,
+    require_memory,
+    require_phases,
+    threshold_ranges,
+)
 from alphacut.rve.result.engineering_constants import NAMES, PLANE_STRAIN
 from alphacut.rve.result.loss_factors import CONSTANTS, bulk_and_shear_losses, first_order
 from alphacut.rve.result.moduli import plane_constants

@@ -15,8 +15,13 @@ from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.rve.image.bounds import Ends, StiffnessBounds, inverse_below
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.fields.element import Element, airy_element, displacement_element
-from alphacut.rve.image.fields.energy import energies
-from alphacut.rve.image.fields.side import UNIT_LOADS, SideSolution, coefficients, solve_side
+from alphacut.rve.image.fields.energy import (
+    UNIT_LOADS,
+    SideSolution,
+    coefficients,
+    energies,
+    solve_side,
+)
 from alphacut.rve.image.phases import ModuliImages
 from alphacut.rve.result.moduli import ISOTROPIC, require_average, square_moduli
 from alphacut.rve.result.result import PhaseEnergies

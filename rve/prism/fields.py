@@ -112,7 +112,7 @@ def cell_fields(
 def mesh_fields(model: MeshModel, law: ThetaLaw, phases: Mapping[str, AnyPhase]) -> CellFields:
     """Displacements and stresses at the nodes of a mesh from a file, under three unit strains."""
     problem, named = model.problem_of(law, phases)
-    stiffness = [phase.stiffness for phase in named.phases]
+    stiffness = [phase.stiffness for phase in named.values()]
     return _solve_fields(problem, stiffness, THREE_LOADS, model.options)
 
 

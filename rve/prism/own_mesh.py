@@ -42,23 +42,14 @@ SAME_LEVEL = 1e-6
 """Distance of an end of the law from the mesh's that is none, over the support."""
 
 
-@dataclass(frozen=True)
-class NamedPhases:
-    """Law and materials in the order of a mesh; `order` is that of the user's in the mesh."""
-
-    law: FixedCell
-    phases: tuple[AnyPhase, ...]
-    order: tuple[int, ...]
-
-
 class _NamedModel:
     """A model whose materials have names."""
 
     petsc: Mapping[str, str]
     name: ClassVar[str] = "prism"
 
-    def problem_of(self, law: object, phases: object) -> tuple[PrismProblem, NamedPhases]:
-        """Problem moved to the law, with its law and materials checked."""
+    def problem_of(self, law: object, phases: object) -> tuple[PrismProblem, dict[str, AnyPhase]]:
+        """Problem moved to the law, and the materials in the mesh's order, both checked."""
         raise NotImplementedError
 
     @property
@@ -81,11 +72,12 @@ class _NamedModel:
         seconds: Seconds = {}
         with timed(seconds, "mesh"):
             problem, named = self.problem_of(law, phases)
-        stiffness = [phase.stiffness for phase in named.phases]
+        stiffness = [phase.stiffness for phase in named.values()]
         strains, solved = solve_loads(problem, stiffness, THREE_LOADS, self.options, seconds)
-        result = prism_result(strains, named.phases, THREE_LOADS, self.options)
+        result = prism_result(strains, list(named.values()), THREE_LOADS, self.options)
         checks = {**result.checks, "residual": solved.residual}
-        energies, order = cast("PhaseEnergies", result.energies), list(named.order)
+        energies = cast("PhaseEnergies", result.energies)
+        order = [list(named).index(name) for name in phases]
         return [
             replace(
                 result,
@@ -112,12 +104,11 @@ class MeshModel(_NamedModel):
     petsc: Mapping[str, str] = field(default_factory=dict)
     parallel: bool = False
 
-    def problem_of(self, law: object, phases: object) -> tuple[PrismProblem, NamedPhases]:
+    def problem_of(self, law: object, phases: object) -> tuple[PrismProblem, dict[str, AnyPhase]]:
         """Problem on the mesh, moved to the law, with law and materials checked."""
         problem = self.cached_problem()
-        named = mesh_phases(problem.grid, law, phases)
-        problem.move(named.law)
-        return problem, named
+        problem.move(mesh_law(problem.grid, law))
+        return problem, in_order_of(problem.grid.names, phases)
 
     def cached_problem(self) -> PrismProblem:
         """Problem on the mesh, cached as long as the file does not change."""
@@ -156,23 +147,18 @@ class LevelSetModel(_NamedModel):
     def __post_init__(self) -> None:
         require_prisms(self.mesh_size, self.layers)
 
-    def problem_of(self, law: object, phases: object) -> tuple[PrismProblem, NamedPhases]:
+    def problem_of(self, law: object, phases: object) -> tuple[PrismProblem, dict[str, AnyPhase]]:
         """Problem on a cached mesh."""
         if not hasattr(law, "pdf"):
             raise RefusedError("law of θ", type(law).__name__, "a law, as TruncatedNormal(-3, 3)")
-        named = _order_phases(LevelSet(cast("ThetaLaw", law), self.z), NAMES[:2], phases)
+        named = in_order_of(NAMES[:2], phases)
         mesh = (self.mesh_size, 0.0, circle, REFINEMENTS[0], self.layers, self.parallel)
         problem = cached_problem(*mesh, 0.0)
-        problem.move(named.law)
+        problem.move(LevelSet(cast("ThetaLaw", law), self.z))
         return problem, named
 
 
-def mesh_phases(grid: PrismGrid, law: object, phases: object) -> NamedPhases:
-    """Law and materials of a mesh from a file, in its order of phases, or a refusal."""
-    return _order_phases(mesh_law(grid, law), grid.names, phases)
-
-
-def _order_phases(law: FixedCell, names: Sequence[str], phases: object) -> NamedPhases:
+def in_order_of(names: Sequence[str], phases: object) -> dict[str, AnyPhase]:
     """Materials in the order of `names`, those of the mesh: one for each, or a refusal."""
     listed = ", ".join(names)
     if not isinstance(phases, Mapping):
@@ -185,8 +171,7 @@ def _order_phases(law: FixedCell, names: Sequence[str], phases: object) -> Named
         if not isinstance(phases[name], Phase | VoigtPhase):
             raise RefusedError(f"phase {name!r}", repr(phases[name]), "a Phase or a VoigtPhase")
     require_compressible(*phases.values())
-    order = tuple(names.index(name) for name in phases)
-    return NamedPhases(law, tuple(phases[name] for name in names), order)
+    return {name: phases[name] for name in names}
 
 
 def mesh_law(grid: PrismGrid, law: object) -> FixedCell:

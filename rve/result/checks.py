@@ -10,7 +10,7 @@ import numpy as np
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import FailedError
 from alphacut.rve.cell.cell import AnyPhase, Phase
-from alphacut.rve.result.bounds import hashin_shtrikman, reuss, voigt
+from alphacut.rve.result.moduli import hashin_shtrikman, reuss, voigt
 from alphacut.rve.result.result import HomogenisedStiffness
 
 ROUND_OFF = 1e-9

@@ -35,9 +35,8 @@ from alphacut.rve.cell.outline import Outline, circle
 from alphacut.rve.fenicsx import MPI, basix, cholesky, fem, mesh_of
 from alphacut.rve.mesh.curved import PlaneMesh, curved_nodes, plane_mesh, quadrature_degree
 from alphacut.rve.mesh.periodicity import unknowns
-from alphacut.rve.result.bounds import mori_tanaka
 from alphacut.rve.result.checks import with_checks
-from alphacut.rve.result.moduli import axial_moduli, square_moduli
+from alphacut.rve.result.moduli import axial_moduli, mori_tanaka, square_moduli
 from alphacut.rve.result.result import HomogenisedStiffness, PhaseEnergies, StressCurve
 from alphacut.rve.solver.form import (
     CellForm,

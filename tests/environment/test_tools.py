@@ -14,7 +14,7 @@ from alphacut.export import mesh
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.arrays import read_array
 from alphacut.io.quantity import parse_number
-from alphacut.rve.image.read import read_grey
+from alphacut.rve.image.phases import read_grey
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "tools.md"

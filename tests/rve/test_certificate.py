@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from alphacut.rve.cell.cell import LOADS, Phase
-from alphacut.rve.result.bounds import bulk_modulus, hashin_shtrikman, reuss, voigt
 from alphacut.rve.result.checks import CertificateError, checks_within_limits, stress_checks
+from alphacut.rve.result.moduli import bulk_modulus, hashin_shtrikman, reuss, voigt
 from alphacut.stochastic import HermiteMap
 
 SOFT, HARD = Phase(20e9), Phase(80e9, 0.2)

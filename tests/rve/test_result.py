@@ -8,11 +8,11 @@ import pytest
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve import Phase, effective_modulus
 from alphacut.rve.cell.cell import STRAIN
-from alphacut.rve.result.bounds import hashin_shtrikman
 from alphacut.rve.result.moduli import (
     AVERAGES,
     AXES,
     ISOTROPIC,
+    hashin_shtrikman,
     plane_constants,
     square_moduli,
     square_voigt,

@@ -7,15 +7,15 @@ from alphacut.rve import Phase, SeriesModel
 from alphacut.rve.image.bounds import StiffnessBounds
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient, System, inner
 from alphacut.rve.image.fields.element import Operator, airy_element, displacement_element
-from alphacut.rve.image.fields.energy import energies
-from alphacut.rve.image.fields.preconditioner import FourierPreconditioner, Reference
-from alphacut.rve.image.fields.side import (
+from alphacut.rve.image.fields.energy import (
     SOLVED_LOADS,
     UNIT_LOADS,
     coefficients,
+    energies,
     least_energy,
     solve_side,
 )
+from alphacut.rve.image.fields.preconditioner import FourierPreconditioner, Reference
 from alphacut.rve.image.model import ImageModel, energy_parts, phase_energies, solve_image
 from alphacut.rve.image.phases import ModuliInterval, PlaneModuli, moduli_images
 from alphacut.rve.result.engineering_constants import EngineeringConstants

@@ -14,9 +14,12 @@ from alphacut.rve.image.phases import (
     ModuliInterval,
     PlaneModuli,
     moduli_images,
+    needed_memory,
+    read_grey,
+    require_memory,
+    require_phases,
     threshold_ranges,
 )
-from alphacut.rve.image.read import needed_memory, read_grey, require_memory, require_phases
 
 ALPHA = (0.0, 0.5, 1.0)
 

@@ -5,8 +5,8 @@ import pytest
 
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve import Phase
-from alphacut.rve.result.bounds import hashin_shtrikman, mori_tanaka
 from alphacut.rve.result.checks import CertificateError
+from alphacut.rve.result.moduli import hashin_shtrikman, mori_tanaka
 from alphacut.rve.spheres.model import SphereSeriesModel
 from alphacut.rve.spheres.result import (
     cubic_moduli,

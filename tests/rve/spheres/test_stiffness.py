@@ -7,7 +7,7 @@ import pytest
 
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve import Phase
-from alphacut.rve.result.bounds import hashin_shtrikman
+from alphacut.rve.result.moduli import hashin_shtrikman
 from alphacut.rve.series.means import SeriesError
 from alphacut.rve.spheres.lattice_sums import harmonics, lattice_sums
 from alphacut.rve.spheres.model import SPHERES, cubic_stiffness
