@@ -132,7 +132,7 @@ class CellProblem:
             if cell.particles == "spheres":
                 kind, tolerance = SphereSeriesModel, tolerance or SPHERE_TOLERANCE
             if tolerance is not None:
-                options["accuracy"] = max(TOLERANCE_PART * tolerance, kind.LEAST)
+                options["accuracy"] = max(TOLERANCE_PART * tolerance, kind.MIN_ACCURACY)
             return kind(**options)
         outline = cell.outline or circle
         if method in ("auto", "slices"):

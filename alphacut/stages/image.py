@@ -18,7 +18,7 @@ from alphacut.fuzzy.refused import FailedError, require
 from alphacut.fuzzy.result import Nature
 from alphacut.io.provenance import file_digest
 from alphacut.rve.cell.cell import Phase
-from alphacut.rve.image.bounds import Ends
+from alphacut.rve.image.bounds import Interval
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.model import ImageCut, ImageModel, phase_energies, usual_division
 from alphacut.rve.image.phases import (
@@ -148,7 +148,7 @@ def compute_cuts(
     return Computed(result, _dataset(alpha, cuts, phase, losses))
 
 
-def _bounds_by_side(bounds: Ends, unit: float = 1.0) -> dict[str, float]:
+def _bounds_by_side(bounds: Interval, unit: float = 1.0) -> dict[str, float]:
     """Both bounds of a number, in a unit."""
     return {"lower": bounds[0] / unit, "upper": bounds[1] / unit}
 

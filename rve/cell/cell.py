@@ -193,7 +193,7 @@ class Cell:
 HALVES = "in halves of the cell's side"
 JUMP = 0.01
 """Of radii over 1/2048 of the support of θ; twenty times as steep as maps of particles are."""
-STIFFEST = 0.45
+MAX_POISSON = 0.45
 """Poisson's ratio above which quadratic elements lock."""
 
 
@@ -225,9 +225,9 @@ def require_continuous(radius_map: RadiusMap) -> Array:
 def require_compressible(*phases: AnyPhase) -> None:
     """Refuse phases that are so incompressible that quadratic elements lock."""
     ratio = max((phase.poisson for phase in phases if isinstance(phase, Phase)), default=0.0)
-    if ratio > STIFFEST:
+    if ratio > MAX_POISSON:
         cure = "finite elements lock above: take the series"
-        raise RefusedError("Poisson's ratio", f"{ratio:g}", f"values up to {STIFFEST:g}", cure)
+        raise RefusedError("Poisson's ratio", f"{ratio:g}", f"values up to {MAX_POISSON:g}", cure)
 
 
 def require_interphase(interphase: Interphase | None, outline: Outline) -> None:

@@ -12,7 +12,7 @@ from alphacut.fuzzy.refused import FailedError
 from alphacut.rve.image.fields.energy import SAFETY, UNIT
 from alphacut.rve.result.moduli import AXES, shear_modulus, square_moduli
 
-Ends = tuple[float, float]
+Interval = tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,19 +32,19 @@ class StiffnessBounds:
         return float(eigh(self.upper, self.lower, eigvals_only=True)[-1] - 1)
 
     @property
-    def bulk(self) -> Ends:
+    def bulk(self) -> Interval:
         """Bounds of the plane-strain bulk modulus K_T = (C11 + C12)/2, in Pa."""
         low, high = (float(square_moduli(end)[0]) / 2 for end in (self.lower, self.upper))
         return low - 2 * self._rounding, high + 2 * self._rounding
 
-    def shear(self, average: str = AXES) -> Ends:
+    def shear(self, average: str = AXES) -> Interval:
         """Bounds of the shear modulus G_T of an average, in Pa."""
         ends = (square_moduli(end) for end in (self.lower, self.upper))
         low, high = (float(shear_modulus(moduli, average)) for moduli in ends)
         slack = 0.0 if average == AXES else 4 * self._rounding
         return low - slack, high + slack
 
-    def young(self, average: str = AXES) -> Ends:
+    def young(self, average: str = AXES) -> Interval:
         """Lower and upper bound of Young's modulus E = 3 G − G²/K of an average, in Pa."""
         # E rises with K; with G it rises up to G = 3/2 K and falls beyond
         (min_shear, max_shear), (min_bulk, max_bulk) = self.shear(average), self.bulk
@@ -55,7 +55,7 @@ class StiffnessBounds:
         stiffest = float(np.clip(1.5 * max_bulk, min_shear, max_shear))  # G of the largest E
         return low, _young(stiffest, max_bulk) + _young_rounding(stiffest, max_bulk)
 
-    def poisson(self, average: str = AXES) -> Ends:
+    def poisson(self, average: str = AXES) -> Interval:
         """Lower and upper bound of Poisson's ratio ν = (1 − G/K)/2 of an average."""
         (min_shear, max_shear), (min_bulk, max_bulk) = self.shear(average), self.bulk
         max_ratio, min_ratio = max_shear / min_bulk, min_shear / max_bulk

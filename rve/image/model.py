@@ -12,7 +12,7 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.refused import FailedError, RefusedError
-from alphacut.rve.image.bounds import Ends, StiffnessBounds, inverse_below
+from alphacut.rve.image.bounds import Interval, StiffnessBounds, inverse_below
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.fields.element import Element, airy_element, displacement_element
 from alphacut.rve.image.fields.energy import (
@@ -30,7 +30,7 @@ MILD = 10.0
 LARGE = 1 << 19
 COARSER = 10.0
 """Multiple of the solver's accuracy for a test; a larger one is cheaper and sees less."""
-FLATTEST = 1e-3  # least side of a pixel over the other; beyond, rounding spoils the fields
+MIN_SIDE_RATIO = 1e-3  # least side of a pixel over the other; beyond, rounding spoils the fields
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,8 +45,8 @@ class ImageCut:
     """
 
     bounds: StiffnessBounds
-    modulus: Ends
-    poisson: Ends
+    modulus: Interval
+    poisson: Interval
     constants: Array
 
 
@@ -68,8 +68,8 @@ class ImageModel:
 
     def __post_init__(self) -> None:
         require_average(self.average)
-        if not FLATTEST <= self.aspect <= 1 / FLATTEST:
-            allowed = f"{FLATTEST:g} to {1 / FLATTEST:g}"
+        if not MIN_SIDE_RATIO <= self.aspect <= 1 / MIN_SIDE_RATIO:
+            allowed = f"{MIN_SIDE_RATIO:g} to {1 / MIN_SIDE_RATIO:g}"
             raise RefusedError("height of a pixel over its width", f"{self.aspect:.3g}", allowed)
 
     def solve(self, images: ModuliImages, start: ImageSolution | None = None) -> ImageSolution:
@@ -158,7 +158,7 @@ class ImageModel:
                 _require_overlap("ν", poisson, cut.poisson)
 
 
-def _require_overlap(name: str, inside: Ends, cut: Ends) -> None:
+def _require_overlap(name: str, inside: Interval, cut: Interval) -> None:
     """Refuse the interval of an image inside a cut if it has no point in common with the cut's."""
     if not (inside[0] <= cut[1] and cut[0] <= inside[1]):
         what = f"{name} of an image inside a cut is {inside[0]:.9g} … {inside[1]:.9g}"

@@ -18,7 +18,7 @@ import numpy as np
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.refused import RefusedError
 
-LEAST, GREATEST = 1e-60, 1e60  # Pa; products of four moduli must be numbers
+MIN_MODULUS, MAX_MODULUS = 1e-60, 1e60  # Pa; products of four moduli must be numbers
 NU_AT_LEAST_BULK = -0.25  # Poisson's ratio of the least plane-strain bulk modulus at a fixed E
 
 
@@ -27,8 +27,8 @@ class PlaneModuli:
     """Moduli of an isotropic material in plane strain.
 
     Args:
-        bulk: Plane-strain bulk modulus K + G/3, in Pa, from `LEAST` to `GREATEST`; K is that of
-            three dimensions.
+        bulk: Plane-strain bulk modulus K + G/3, in Pa, from `MIN_MODULUS` to `MAX_MODULUS`; K is
+            that of three dimensions.
         shear: Shear modulus G, in Pa, of the same range.
 
     Raises:
@@ -39,10 +39,10 @@ class PlaneModuli:
     shear: float
 
     def __post_init__(self) -> None:
-        """Refuse moduli outside (`LEAST`, `GREATEST`)."""
+        """Refuse moduli outside (`MIN_MODULUS`, `MAX_MODULUS`)."""
         for name, value in (("plane-strain bulk", self.bulk), ("shear", self.shear)):
-            if not LEAST < value < GREATEST:
-                allowed = f"values in ({LEAST:g}, {GREATEST:g}) Pa"
+            if not MIN_MODULUS < value < MAX_MODULUS:
+                allowed = f"values in ({MIN_MODULUS:g}, {MAX_MODULUS:g}) Pa"
                 raise RefusedError(f"{name} modulus of a phase", f"{value:g} Pa", allowed)
 
     @classmethod
@@ -107,11 +107,11 @@ class ModuliImages:
 def threshold_ranges(grey: Array, thresholds: Sequence[tuple[float, float]]) -> tuple[Rows, Rows]:
     """Least and greatest number of the phase that each pixel may be of, (rows, columns) each.
 
-    A pixel is of phase k if k of the thresholds (least, greatest), rising, are ≤ its grey value.
+    A pixel is of phase k if k of the thresholds (lower, upper), rising, are ≤ its grey value.
     """
-    least, greatest = np.array(thresholds).reshape(-1, 2).T
-    first = np.searchsorted(greatest, grey, side="right")
-    last = np.searchsorted(least, grey, side="right")
+    lower, upper = np.array(thresholds).reshape(-1, 2).T
+    first = np.searchsorted(upper, grey, side="right")
+    last = np.searchsorted(lower, grey, side="right")
     return first, last
 
 
@@ -215,11 +215,11 @@ def require_memory(rows: int, columns: int, division: int = 1) -> None:
 
 
 def require_phases(grey: Array, thresholds: tuple[tuple[float, float], ...]) -> None:
-    """Refuse thresholds (least, greatest), rising, that may leave a phase without a pixel."""
+    """Refuse thresholds (lower, upper), rising, that may leave a phase without a pixel."""
     low, high = float(grey.min()), float(grey.max())
-    for least, greatest in thresholds:
-        if not (low < least and greatest <= high):
-            span = f"{least:g}" if least == greatest else f"[{least:g}, {greatest:g}]"
+    for lower, upper in thresholds:
+        if not (low < lower and upper <= high):
+            span = f"{lower:g}" if lower == upper else f"[{lower:g}, {upper:g}]"
             raise RefusedError("threshold", span, f"grey values of the image, {low:g} to {high:g}")
     for (_, lower), (upper, _) in pairwise(thresholds):  # of the pixels surely between both
         if not ((grey >= lower) & (grey < upper)).any():

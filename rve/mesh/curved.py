@@ -81,15 +81,15 @@ def plane_mesh(
     raise RefusedError(
         "outline",
         "so sharp that curved elements fold",
-        f"outlines with det J > {LEAST_RATIO} of its mean",
+        f"outlines with det J > {MIN_JACOBIAN_RATIO} of its mean",
         "round its corners, or take an image of it as the cell",
     )
 
 
 def is_sound(mesh: PlaneMesh, order: int) -> bool:
-    """True if det J of all elements of an order exceeds `LEAST_RATIO` of its mean."""
+    """True if det J of all elements of an order exceeds `MIN_JACOBIAN_RATIO` of its mean."""
     ratios = jacobian_ratios(*curved_nodes(mesh, order), order)
-    return bool((ratios > LEAST_RATIO).all())
+    return bool((ratios > MIN_JACOBIAN_RATIO).all())
 
 
 def _smaller_size(first: Sizes, second: Sizes, x: float, y: float) -> float:
@@ -187,7 +187,7 @@ def _bend_onto_outline(mesh: PlaneMesh, radius: float, ends: Rows, weights: Arra
     return np.asarray((arc - chord) * fade[:, None])
 
 
-LEAST_RATIO = 0.2
+MIN_JACOBIAN_RATIO = 0.2
 """Least det J over its mean in an element. Below, shape functions are far from polynomials of x and
 neither order nor mesh size tells the error; inverted elements have ratios below 0."""
 

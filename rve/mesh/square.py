@@ -139,8 +139,8 @@ def _square(geo: Any, size: float) -> list[int]:
 def _quarter_steps(inner: float, outer: float, sizes: Sizes) -> int:
     """Number of elements along a quarter of a ring, of the shortest edge of its outer circle."""
     angles = np.linspace(0, np.pi / 2, 181)
-    least = min(sizes(outer * np.cos(angle), outer * np.sin(angle)) for angle in angles)
-    return max(2, int(np.ceil(np.pi / 2 * inner / least)))
+    shortest = min(sizes(outer * np.cos(angle), outer * np.sin(angle)) for angle in angles)
+    return max(2, int(np.ceil(np.pi / 2 * inner / shortest)))
 
 
 def _particle_in_ring(
@@ -221,9 +221,9 @@ REFINEMENTS = (0.5, 0.75, 1.1, 1.7, 2.5, 4.0)
 
 def particle_grading(outline: Outline, radius: float, thickness: float = 0.0) -> Sizes:
     """Edge length at (x1, x2) near a particle and in gaps, over the nominal one."""
-    half_width, half_height, least = (radius * extent for extent in extents(outline))
+    half_width, half_height, min_distance = (radius * extent for extent in extents(outline))
     outer = half_width + thickness, half_height + thickness
-    return lambda x, y: _size_near_particle(x, y, *outer, least)
+    return lambda x, y: _size_near_particle(x, y, *outer, min_distance)
 
 
 def bend_grading(outline: Outline, radius: float, refinement: float) -> Sizes:
@@ -240,11 +240,11 @@ def bend_grading(outline: Outline, radius: float, refinement: float) -> Sizes:
 
 
 def _size_near_particle(
-    x: float, y: float, half_width: float, half_height: float, least: float
+    x: float, y: float, half_width: float, half_height: float, min_distance: float
 ) -> float:
     """Edge length at (x, y) over the nominal one; Gmsh calls this a point at a time: no NumPy."""
     x, y = abs(x), abs(y)
-    by_distance = _PER_RADIUS * max(hypot(x, y), least)
+    by_distance = _PER_RADIUS * max(hypot(x, y), min_distance)
     # width of the gap to the cell's side, which grows along it as beside a circle
     gap_beside = 1 - half_width + y * y / (2 * half_width) + max(0.0, half_width - x)
     gap_above = 1 - half_height + x * x / (2 * half_height) + max(0.0, half_height - y)

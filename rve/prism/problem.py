@@ -12,7 +12,7 @@ from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.rve.cell.cell import AREA
 from alphacut.rve.cell.outline import is_round
 from alphacut.rve.fenicsx import MPI, PETSc, basix, fem, mesh_of, petsc, ufl
-from alphacut.rve.mesh.curved import LEAST_RATIO
+from alphacut.rve.mesh.curved import MIN_JACOBIAN_RATIO
 from alphacut.rve.mesh.prism_grid import PrismGrid
 from alphacut.rve.mesh.wedge import (
     POINTS_PER_SLICE,
@@ -164,7 +164,7 @@ class PrismProblem:
         """Refuse inverted elements, and nearly inverted ones about outlines that are not round."""
         determinants = self.areas / slice_weights()
         means = determinants.mean(axis=(1, 2), keepdims=True)
-        least_ratio = 0.0 if is_round(self.grid.plane.outline) else LEAST_RATIO
+        least_ratio = 0.0 if is_round(self.grid.plane.outline) else MIN_JACOBIAN_RATIO
         is_folded = (means <= 0) | (determinants <= least_ratio * means)
         if self.mesh.comm.allreduce(int(is_folded.any())):
             where = f"where it follows the radius through {self.grid.layers} layers in θ"

@@ -20,7 +20,7 @@ from alphacut.rve.result.result import STEP, PhaseEnergies, StressCurve
 from alphacut.stochastic import RadiusMap, ThetaRule, gauss_rule
 
 _BATCH = 2_000_000  # entries of one batch of matrices
-_MOST_POINTS = 1200
+_MAX_POINTS = 1200
 SAFETY = 1.6  # of the distance of a rule in θ from two finer ones
 _NOISE = 1e-13  # of a declared error: what rounding leaves
 _ENERGY_NOISE = 1e-12  # of energies, over the modulus
@@ -236,7 +236,7 @@ def converged_means(
         accuracy: Relative error allowed for every mean modulus.
 
     Raises:
-        RuleError: No rule of up to `_MOST_POINTS` nodes converges.
+        RuleError: No rule of up to `_MAX_POINTS` nodes converges.
     """
     require_continuous(radius_map)
     count = points or max(6, int(np.ceil(1 - 0.75 * np.log10(accuracy))))
@@ -261,7 +261,7 @@ def converged_means(
                 means[k] = Mean(curve, by_source, coarse.cells.terms[:, k])
         if len(means) == len(errors):
             return [means[k] for k in range(len(errors))]
-        if counts[-1] >= _MOST_POINTS:
+        if counts[-1] >= _MAX_POINTS:
             raise RuleError(
                 f"the rule of {count} nodes in θ leaves a relative error of {errors.max():.1e};"
                 f" {accuracy:.1e} is allowed: the radius map is not smooth",

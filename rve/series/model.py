@@ -40,7 +40,7 @@ from alphacut.rve.series.lattice_sums import ZETA_PERIOD, LatticeSums, lattice_i
 from alphacut.rve.series.means import Material, Series, converged_means, mean_energies
 from alphacut.stochastic import RadiusMap
 
-MOST_HARMONICS = 160  # per potential and load; reaches r = 0.999
+MAX_HARMONICS = 160  # per potential and load; reaches r = 0.999
 LOADS = ("hydrostatic", "deviator", "shear")
 
 
@@ -198,7 +198,7 @@ def _dilatation_pole(a: Array, radius: Array, contrast: Contrast) -> Array:
 
 
 def _sums() -> LatticeSums:
-    return lattice_sums(12 * MOST_HARMONICS + 8)
+    return lattice_sums(12 * MAX_HARMONICS + 8)
 
 
 def plane_moduli(radius: Array, materials: Sequence[Material], harmonics: int) -> Array:
@@ -214,7 +214,7 @@ def plane_moduli(radius: Array, materials: Sequence[Material], harmonics: int) -
 CIRCLES = Series(
     moduli=plane_moduli,
     voigt=square_voigt,
-    steps=(3, 4, 5, 6, 8, 10, 12, 16, 24, 32, 48, 64, 96, 128, MOST_HARMONICS),
+    steps=(3, 4, 5, 6, 8, 10, 12, 16, 24, 32, 48, 64, 96, 128, MAX_HARMONICS),
     decay=8.0,
     start=1.0,
     unknowns=int,
@@ -236,7 +236,7 @@ class SeriesModel:
         points: Nodes of the rule, or None: as many as bring two successive rules within `accuracy`
             of one another.
         accuracy: Relative error allowed, of the series at each θ and, without `points`, of E by the
-            rule in θ; from `LEAST` to 0.1.
+            rule in θ; from `MIN_ACCURACY` to 0.1.
         energies: Whether to compute the energies of the phases, for loss factors.
 
     Example:
@@ -252,13 +252,13 @@ class SeriesModel:
     accuracy: float = 1e-11
     energies: bool = False
     name: ClassVar[str] = "series"
-    LEAST: ClassVar[float] = 1e-12
+    MIN_ACCURACY: ClassVar[float] = 1e-12
     series: ClassVar[Series] = CIRCLES
 
     def __post_init__(self) -> None:
         require_points(self.points)
-        if not self.LEAST <= self.accuracy <= 0.1:
-            allowed = f"values in [{self.LEAST:g}, 0.1]"
+        if not self.MIN_ACCURACY <= self.accuracy <= 0.1:
+            allowed = f"values in [{self.MIN_ACCURACY:g}, 0.1]"
             raise RefusedError("the accuracy of the series", f"{self.accuracy:g}", allowed)
 
     def solve(

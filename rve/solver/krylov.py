@@ -28,7 +28,7 @@ DEFAULTS = {
     "ksp_norm_type": "unpreconditioned",
     "pc_type": "python",
 }
-MOST_ITERATIONS = 500
+MAX_ITERATIONS = 500
 """Iterations by the preconditioner, which takes tens at most; others may take ten times as many."""
 
 PRINTS = re.compile(r"(_view|_monitor\w*|_converged_(reason|rate))$")
@@ -58,8 +58,8 @@ class SolverOptions:
         """Everything that is put to PETSc."""
         chosen = {**DEFAULTS, **self.environment, **self.overrides}
         chosen = {name: _to_standard_error(name, value) for name, value in chosen.items()}
-        most = MOST_ITERATIONS * (1 if chosen["pc_type"] == "python" else 10)
-        return {"ksp_max_it": str(most), **chosen}
+        max_iterations = MAX_ITERATIONS * (1 if chosen["pc_type"] == "python" else 10)
+        return {"ksp_max_it": str(max_iterations), **chosen}
 
     @property
     def by_levels(self) -> bool:

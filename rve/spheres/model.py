@@ -58,7 +58,7 @@ class SphereSeriesModel(SeriesModel):
     """As `SeriesModel`, for spheres; `accuracy` is that of the mean moduli."""
 
     accuracy: float = 1e-9
-    LEAST: ClassVar[float] = 1e-11
+    MIN_ACCURACY: ClassVar[float] = 1e-11
     series: ClassVar[Series] = SPHERES
 
     def _checked_result(self, **parts: Any) -> HomogenisedSpheres:

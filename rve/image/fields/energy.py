@@ -201,7 +201,7 @@ def _solve_loads(
     rows, columns = trace.shape
     preconditioner = FourierPreconditioner.of_material(element, constant, (rows, columns))
     operator = Operator(element, trace, deviator)
-    scale = least_energy(element, trace, deviator, modes)
+    scale = minimum_energy(element, trace, deviator, modes)
     least = constant.lowest_energy_ratio(trace, deviator)
     n_together = len(SOLVED_LOADS) if trace.size <= SMALL else 1  # to save memory
     fields, iterations = np.empty((len(SOLVED_LOADS), element.unknowns, rows, columns)), []
@@ -215,7 +215,7 @@ def _solve_loads(
     return fields, max(iterations)
 
 
-def least_energy(element: Element, trace: Array, deviator: Array, modes: Array) -> Array:
+def minimum_energy(element: Element, trace: Array, deviator: Array, modes: Array) -> Array:
     """Lower bound of the energy of any fields with given mean modes, shape (loads,)."""
     trace_squares, deviator_squares = (np.sum(modes[rows] ** 2, axis=0) for rows in element.parts)
     trace_energy = trace.size / np.mean(1 / trace) * trace_squares

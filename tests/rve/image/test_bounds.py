@@ -12,7 +12,7 @@ from alphacut.rve.image.fields.energy import (
     UNIT_LOADS,
     coefficients,
     energies,
-    least_energy,
+    minimum_energy,
     solve_side,
 )
 from alphacut.rve.image.fields.preconditioner import FourierPreconditioner, Reference
@@ -286,7 +286,7 @@ def system_of(element, trace, deviator):
     constant = Reference.of_image(trace, deviator, stress=element.stress)
     inverse = FourierPreconditioner.of_material(element, constant, trace.shape)
     operator, modes = Operator(element, trace, deviator), element.mean_modes(SOLVED_LOADS)
-    scale = least_energy(element, trace, deviator, modes)
+    scale = minimum_energy(element, trace, deviator, modes)
     least = constant.lowest_energy_ratio(trace, deviator)
     return System(operator, inverse, operator.load(modes), scale, least)
 
