@@ -73,7 +73,7 @@ def particle_volume():
     return 3 * weights @ (np.pi * MAP(3 * nodes) ** 2)
 
 
-def test_a_volume_without_a_name_is_refused():
+def test_a_volume_without_a_name_of_other_elements_or_in_parts_is_refused():
     with square.model() as gmsh:
         gmsh.model.geo.extrude([(2, square.surfaces(0.5, 0.0, circle)[0][0])], 0, 0, 1)
         gmsh.model.geo.synchronize()
@@ -82,4 +82,7 @@ def test_a_volume_without_a_name_is_refused():
             gmsh_prisms.read(gmsh)
         gmsh.model.addPhysicalGroup(3, [1], name="clay")
         with pytest.raises(MeshError, match="'clay' holds Tetrahedron 4"):
+            gmsh_prisms.read(gmsh)
+        gmsh.model.mesh.partition(2)
+        with pytest.raises(MeshError, match="partitioned into 2 parts; write the mesh before"):
             gmsh_prisms.read(gmsh)
