@@ -41,8 +41,8 @@ DIRECT = {
     "vtkmodules": "python3-pyvista",  # which depends on VTK
     "xarray": "python3-xarray",
 }
-LOCAL = {"_typeshed", "mpl_toolkits", "plane", "vtkmodules"}
-"""Names within others: of mypy, of Matplotlib, meshes/plane.py, and of PyVista, which brings VTK."""
+LOCAL = {"_typeshed", "mpl_toolkits", "plane"}
+"""Names within others: of mypy, of Matplotlib, and meshes/plane.py."""
 INDIRECT = {  # imported by others on this project's behalf
     "cffi": "python3-cffi",  # DOLFINx, to compile forms
     "h5py": "python3-h5py",  # meshio, to write .xdmf
