@@ -9,8 +9,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
 from alphacut.frame.calculus import kernels
 
 FILES = {
@@ -83,16 +81,3 @@ def test_what_kernels_read_from_other_files_is_in_their_digests() -> None:
                     assert f"\n{name} = " in source or f"\ndef {name}(" in source, name
                     found += 1
     assert found
-
-
-@pytest.mark.parametrize("failure", [RuntimeError, AttributeError])
-def test_without_a_cache_kernels_are_compiled_all_the_same(monkeypatch, failure) -> None:
-    made = kernels.njit
-
-    def uncached(**options: object):
-        if "cache" in options:
-            raise failure
-        return made(**options)
-
-    monkeypatch.setattr(kernels, "njit", uncached)
-    assert kernels.compiled(lambda x: x / 0.0)(1.0) == float("inf")
