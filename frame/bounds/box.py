@@ -11,7 +11,7 @@ import numpy as np
 from alphacut.frame.bounds.level import LevelModels
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.modes.structure import Classical, classical
+from alphacut.frame.modes.structure import Classical, classical_structure
 from alphacut.frame.modes.superposition import (
     Modal,
     load_at_given_nodes,
@@ -173,7 +173,7 @@ def over_box(system: LinearSystem, names: Sequence[str], low: Array, high: Array
     values = {**system.parameters, **centres}
     parameters = {name: TaylorModel.constant(x, d) for name, x in values.items()}
     parameters |= {names[int(i)]: inputs[column] for column, i in enumerate(active)}
-    return classical(system, parameters)
+    return classical_structure(system, parameters)
 
 
 def sources(system: LinearSystem, structure: Classical) -> tuple[str, ...]:

@@ -56,7 +56,7 @@ class Subspaces:
         return np.setdiff1d(np.arange(self.centre.modes), np.concatenate([[], *taken]))
 
 
-def subspaces(
+def enclose_subspaces(
     centre: CentredMatrices, used: Rows, wanted: int, tolerances: Array | None = None
 ) -> Subspaces:
     """Enclose the lowest modes over the box, in blocks, from below until one is not enclosed.

@@ -123,12 +123,12 @@ class BlockShares:
     @property
     def of_outputs(self) -> TaylorModel:
         """Sums a N⁻¹ aᵀ of each output, shape (m,)."""
-        return dots(self.read, solve(self.block.norm, self.read))
+        return column_products(self.read, solve(self.block.norm, self.read))
 
     @property
     def of_sources(self) -> TaylorModel:
         """β·N β of each source, shape (sources,)."""
-        return dots(self.source_forces, self.participation)
+        return column_products(self.source_forces, self.participation)
 
 
 def oscillators(structure: Classical, of_block: BlockShares, found: Subspaces) -> list[Oscillator]:
@@ -184,7 +184,7 @@ def damped_range(structure: Classical, low: float, high: float, modes: Rows) -> 
     return (float(slow * shrinkage), float(fast)), (least, float(greatest / shrinkage))
 
 
-def sources_of(structure: Classical, sources: Sequence[str]) -> TaylorModel:
+def source_patterns(structure: Classical, sources: Sequence[str]) -> TaylorModel:
     """Patterns of the sources on the unknowns, shape (sources, n), in their order."""
     vectors = {
         "load": structure.start[0] * 0.0 + structure.pattern,
@@ -195,7 +195,7 @@ def sources_of(structure: Classical, sources: Sequence[str]) -> TaylorModel:
     return concatenate([vectors[name][None] for name in sources], -2)
 
 
-def dots(a: TaylorModel, b: TaylorModel) -> TaylorModel:
+def column_products(a: TaylorModel, b: TaylorModel) -> TaylorModel:
     """Σ_j a_js b_js, shape (s,)."""
     return (a * b).T @ np.ones(a.shape[0])
 

@@ -10,15 +10,15 @@ from alphacut.frame.calculus.rounding import gamma
 from alphacut.frame.calculus.taylor_model import TaylorModel, all_within
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.blocks import CentredMatrices
-from alphacut.frame.modes.clusters import centred_matrices, subspaces
+from alphacut.frame.modes.clusters import centred_matrices, enclose_subspaces
 from alphacut.frame.modes.intervening import (
     BlockShares,
     Excitation,
     Oscillator,
     oscillators,
-    sources_of,
+    source_patterns,
 )
-from alphacut.frame.modes.rest import TruncatedModes, coupling_of, rest_of_block, rest_of_modes
+from alphacut.frame.modes.rest import TruncatedModes, coupling_bounds, rest_of_block, rest_of_modes
 from alphacut.frame.modes.structure import Classical
 from alphacut.frame.response.duhamel import responses_at_nodes
 from alphacut.frame.response.oscillators import POWERS, feedthrough, read_response
@@ -78,11 +78,13 @@ class MotionModels:
             UnprovedError: None of its modes can be enclosed.
         """
         centre, used = centred_matrices(structure.mass, structure.stiffness)
-        excited = sources_of(structure, excitation[2]) @ inverse(centre.basis, structure.start).T
+        excited = (
+            source_patterns(structure, excitation[2]) @ inverse(centre.basis, structure.start).T
+        )
         wanted, tolerances = centre.modes, np.asarray(np.zeros(centre.modes))  # all, closely
         if allowed is not None:
             wanted, tolerances = modes_wanted(structure, centre, excited, excitation, allowed)
-        found = subspaces(centre, used, wanted, tolerances)
+        found = enclose_subspaces(centre, used, wanted, tolerances)
         if not found.blocks:
             raise UnprovedError(
                 "no mode keeps clear of the others", "take narrower inputs", found.along
@@ -94,7 +96,7 @@ class MotionModels:
         for of_block in shares:
             of_modes = oscillators(structure, of_block, found)
             if len(of_modes) > 1:
-                more, straying, ends = coupling_of(structure, of_block, found, excitation)
+                more, straying, ends = coupling_bounds(structure, of_block, found, excitation)
                 by_sums = rest_of_block(structure, found, of_block, ends, excitation)
                 scale = np.maximum(more.max(0) if allowed is None else allowed, 1e-300)
                 is_narrower = (by_sums.width / scale).max() < (more.max(0) / scale).max()

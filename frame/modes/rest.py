@@ -29,7 +29,13 @@ import numpy as np
 
 from alphacut.frame.calculus.taylor_model import TaylorModel, solution_series, solve
 from alphacut.frame.modes.clusters import Subspaces
-from alphacut.frame.modes.intervening import BlockShares, Ends, Excitation, damped_range, dots
+from alphacut.frame.modes.intervening import (
+    BlockShares,
+    Ends,
+    Excitation,
+    column_products,
+    damped_range,
+)
 from alphacut.frame.modes.structure import Classical
 from alphacut.frame.response.oscillators import Oscillators, Ranges, grid_over, response_ranges
 from alphacut.fuzzy.arrays import Array
@@ -196,8 +202,8 @@ def _sums_over_block(of_block: BlockShares) -> _Sums:
     read_over_stiffness = solve(projected_stiffness, read)
     return _Sums(
         shares=(of_block.participation.T @ read, forces.T @ read_over_stiffness),
-        outputs=(of_block.of_outputs, dots(read, read_over_stiffness)),
-        sources=(of_block.of_sources, dots(forces, solve(projected_stiffness, forces))),
+        outputs=(of_block.of_outputs, column_products(read, read_over_stiffness)),
+        sources=(of_block.of_sources, column_products(forces, solve(projected_stiffness, forces))),
     )
 
 
@@ -254,7 +260,7 @@ def _with_best_powers(
     )
 
 
-def coupling_of(
+def coupling_bounds(
     structure: Classical, shares: BlockShares, found: Subspaces, excitation: Excitation
 ) -> tuple[Array, Array, tuple[Ends, Ends]]:
     """Bounds of what couples a block's oscillators, by L of K X = M X L off its diagonal.

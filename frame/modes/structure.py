@@ -47,7 +47,7 @@ class Classical:
     forced: dict[str, TaylorModel]
 
 
-def classical(system: LinearSystem, parameters: Mapping[str, TaylorModel]) -> Classical:
+def classical_structure(system: LinearSystem, parameters: Mapping[str, TaylorModel]) -> Classical:
     """Matrices, rows and damping of a structure, of parameters by name, each a scalar Taylor model.
 
     Raises:

@@ -11,9 +11,9 @@ from alphacut.frame.bounds import dual_function
 from alphacut.frame.bounds.box import over_box
 from alphacut.frame.bounds.level import LevelModels, OutputBounds
 from alphacut.frame.calculus.taylor_model import TaylorModel
-from alphacut.frame.modes.clusters import centred_matrices, subspaces
+from alphacut.frame.modes.clusters import centred_matrices, enclose_subspaces
 from alphacut.frame.modes.rest import inverse_form
-from alphacut.frame.modes.structure import classical
+from alphacut.frame.modes.structure import classical_structure
 from alphacut.frame.response.oscillators import Grid, Oscillators
 from alphacut.frame.structures.loads import Accelerogram
 from alphacut.frame.structures.matrix import MatrixStructure
@@ -55,7 +55,7 @@ def along(own, names, centre, radius, i):
 def modes(structure):
     """All blocks of a structure."""
     centre, used = centred_matrices(structure.mass, structure.stiffness)
-    return subspaces(centre, used, centre.modes)
+    return enclose_subspaces(centre, used, centre.modes)
 
 
 def exact_modes(own, names, centre, radius, u):
@@ -116,7 +116,7 @@ def test_half_of_the_range_of_eigenvalues_would_not_do():
     own, _, _, _, structure = frame(1, 0.1)
     p = {name: TaylorModel.constant(x, 1) for name, x in own.parameters.items()}
     loose = {name: p[name].loosened(0.1 * own.parameters[name]) for name in ("k1", "m1")}
-    for one in (structure, classical(own, p | loose)):
+    for one in (structure, classical_structure(own, p | loose)):
         found = modes(one)
         assert found.low[0] == pytest.approx(3e7 / 2e4 * 0.9 / 1.1)
         assert found.high[0] == pytest.approx(3e7 / 2e4 * 1.1 / 0.9)
@@ -134,7 +134,7 @@ def masses_on_springs(loose=0.0):
     )
     centre = np.array([1.0, 1.0, 3.0])
     p = TaylorModel.variables(centre, 1e-3 * centre).loosened(loose * centre)
-    return classical(own, {name: p[i] for i, name in enumerate("abc")})
+    return classical_structure(own, {name: p[i] for i, name in enumerate("abc")})
 
 
 def test_modes_that_cross_are_one_block_and_go_on_through_the_crossing():

@@ -8,10 +8,10 @@ from alphacut.frame import MatrixStructure
 from alphacut.frame.bounds.box import over_box, sources
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes import rest
-from alphacut.frame.modes.clusters import centred_matrices, subspaces
-from alphacut.frame.modes.intervening import BlockShares, oscillators, sources_of
+from alphacut.frame.modes.clusters import centred_matrices, enclose_subspaces
+from alphacut.frame.modes.intervening import BlockShares, oscillators, source_patterns
 from alphacut.frame.modes.models import MotionModels, inverse
-from alphacut.frame.modes.rest import coupling_of, response_slopes
+from alphacut.frame.modes.rest import coupling_bounds, response_slopes
 from alphacut.frame.response.oscillators import (
     Oscillators,
     grid_over,
@@ -31,7 +31,7 @@ def matrices(stiffness, parameters, observed, mass=None, **values):
 
 
 def over(structure, widths):
-    """The structure over a box about its modal values, and its inputs' centre and radius."""
+    """The structure over a box about its nominal values, and its inputs' centre and radius."""
     names = tuple(widths)
     centre = np.array([structure.parameters[name] for name in names])
     radius = np.array(list(widths.values()))
@@ -83,7 +83,7 @@ def test_blocks_hold_the_subspaces_of_modes_that_cross(coupling):
     widths = {"kc": 0.1, "kb": 0.1, "ks": 40.0}
     structure, centre, radius = over(own, widths)
     middle, used = centred_matrices(structure.mass, structure.stiffness)
-    found = subspaces(middle, used, 4)
+    found = enclose_subspaces(middle, used, 4)
     assert sum(len(block.modes) for block in found.blocks) == 4
     assert max(len(block.modes) for block in found.blocks) > 1
     for u in draws(3):
@@ -107,7 +107,7 @@ def test_half_of_a_remainder_of_a_block_would_not_do():
     )
     structure, centre, radius = over(own, {"a": 1e-9, "b": 1e-9, "c": 0.45})
     middle, used = centred_matrices(structure.mass, structure.stiffness)
-    block = subspaces(middle, used, 3).blocks[0]
+    block = enclose_subspaces(middle, used, 3).blocks[0]
     assert len(block.modes) == 2
     off = {name: np.zeros(getattr(block, name).shape) for name in ("rate", "shape")}
     for side in (-1.0, 1.0):
@@ -148,11 +148,11 @@ def crossing_pair(widths, ratio, source, read=0):
 def coupled(own, structure, time):
     """The only block of a structure: its oscillators and the bounds of what couples them."""
     middle, used = centred_matrices(structure.mass, structure.stiffness)
-    found, excitation = subspaces(middle, used, 2), ({}, time, sources(own, structure))
-    excited = sources_of(structure, excitation[2]) @ inverse(middle.basis, structure.start).T
+    found, excitation = enclose_subspaces(middle, used, 2), ({}, time, sources(own, structure))
+    excited = source_patterns(structure, excitation[2]) @ inverse(middle.basis, structure.start).T
     rows = structure.start.like(structure.rows) @ middle.basis
     shares = BlockShares.from_block(found.blocks[0], rows, excited, used)
-    bounds = coupling_of(structure, shares, found, excitation)
+    bounds = coupling_bounds(structure, shares, found, excitation)
     return oscillators(structure, shares, found), bounds[0][:, 0], bounds[1][:, 0]
 
 
