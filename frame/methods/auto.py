@@ -25,11 +25,7 @@ from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import LinearFlow, exact_flow
 from alphacut.frame.envelope import Ends, Envelope
 from alphacut.frame.methods.dual import DualProof
-from alphacut.frame.methods.improved_follower import (
-    MAX_GLOBAL_INPUTS,
-    ImprovedFollower,
-    PassBounds,
-)
+from alphacut.frame.methods.improved_follower import ImprovedFollower, PassBounds
 from alphacut.frame.methods.proof import Proof
 from alphacut.frame.numbers import WIDE
 from alphacut.fuzzy.arrays import Array, Mask
@@ -45,9 +41,13 @@ FEW_INPUTS = 4
 FINEST = 1e-4
 """Gap of peaks, as a fraction of each, below which the dual bound takes too long."""
 FOLLOWED = 0.25
+<<<<<<< HEAD
 """Fraction of the tolerance that is worth a graph: a follower's error is about four times it."""
 FOLLOWED_OF_MANY = 0.1
 """The same of more inputs than a follower's models are maximised over globally, which miss more."""
+=======
+"""Share of the tolerance that is worth a graph: a follower's error is some four times as much."""
+>>>>>>> parent of 81069543 (Follow many inputs in passes that agree, from more explored motions)
 ROUNDING = 1e-9
 """Fraction of a peak by which a motion that is followed may be off."""
 
@@ -108,10 +108,7 @@ class Auto:
                 return _noted(best, "; ".join([f"{best.method} succeeded", *reasons]))
             followed = follower.run_pass(flow, progress, asked=_above_peaks(best))
             return _noted(_with_reached(best, flow, followed), f"{best.method} and {follower.name}")
-        if has_many := len(flow.boxes.names) > MAX_GLOBAL_INPUTS:  # passes until they agree
-            follower = replace(follower, tolerance=FOLLOWED_OF_MANY * tolerance)
-        is_bounded = self.is_for_all_nodes or has_many
-        found = follower.run(flow, progress, allowed if is_bounded else None)
+        found = follower.run(flow, progress, allowed if self.is_for_all_nodes else None)
         found = replace(found, outer=best.proved if best else None)
         return _noted(found, f"{follower.name}; unproved: {'; '.join(reasons)}")
 

@@ -51,9 +51,8 @@ MOST_PASSES = 4
 """Passes after which an error that is not allowed is declared."""
 SPREAD = 64
 """Graphs on a spread of points per level that start the search."""
-EXPLORED, EXPLORED_OF_MANY = 256, 1024
-"""Motions of a kind per level whose values alone are looked at, for basins that no model shows; the
-latter of more than `MAX_GLOBAL_INPUTS` inputs, of which 1024 narrow stated errors to a half."""
+EXPLORED = 256
+"""Motions of a kind per level whose values alone are looked at, for basins that no model shows."""
 SEED_STEP = 100_003
 """Points of the sequence between those that two seeds spread."""
 
@@ -144,15 +143,15 @@ class ImprovedFollower:
 
         `asked` (A, T, m, 2) are the bounds whose gain counts, all unless given.
         """
-        levels, storage, d = len(flow.boxes.alpha), Storage(flow), len(flow.boxes.names)
-        count = EXPLORED if d <= MAX_GLOBAL_INPUTS else EXPLORED_OF_MANY
+        levels, storage = len(flow.boxes.alpha), Storage(flow)
+        d = len(flow.boxes.names)
         bounds, gains = np.zeros((2, levels, *storage.top.shape))
         out = PassBounds(bounds, np.zeros((*bounds.shape, d)), gains, storage)
         chunk_size = int(np.clip(MAX_NUMBERS / (_size_of_graph(flow) * (1 + d + d * d)), 1, BATCH))
         for done, level in enumerate(reversed(range(levels))):
             box, skip = flow.boxes.unit(level), SEED_STEP * (levels * self.seed + level + 1)
             has_width = bool((box[1] > box[0]).any())
-            explored = spread_points(*box, count, skip) if has_width else box[0][None]
+            explored = spread_points(*box, EXPLORED, skip) if has_width else box[0][None]
             models = _LevelModels(storage, box, explored)
             out.evaluations += len(explored)
             tick = subprogress(progress, done / levels, (done + 1) / levels)
