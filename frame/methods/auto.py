@@ -41,13 +41,7 @@ FEW_INPUTS = 4
 FINEST = 1e-4
 """Gap of peaks, as a fraction of each, below which the dual bound takes too long."""
 FOLLOWED = 0.25
-<<<<<<< HEAD
 """Fraction of the tolerance that is worth a graph: a follower's error is about four times it."""
-FOLLOWED_OF_MANY = 0.1
-"""The same of more inputs than a follower's models are maximised over globally, which miss more."""
-=======
-"""Share of the tolerance that is worth a graph: a follower's error is some four times as much."""
->>>>>>> parent of 81069543 (Follow many inputs in passes that agree, from more explored motions)
 ROUNDING = 1e-9
 """Fraction of a peak by which a motion that is followed may be off."""
 
