@@ -29,7 +29,7 @@ from alphacut.stochastic import HermiteMap
 
 # %% [markdown]
 # ## The random radius
-# The paper's map at its modal values (eq. 11, 12): the radius rises with θ from 0.13 to 0.87 of
+# The paper's map at its nominal values (eq. 11, 12): the radius rises with θ from 0.13 to 0.87 of
 # half the cell's side, and θ is normal, cut off at ±3.
 
 # %%

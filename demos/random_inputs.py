@@ -26,7 +26,7 @@ known = Knowledge({"load": 1, "stiffness": -1}, source="by statics")
 shares = []
 for (u,) in qmc.Sobol(1, rng=np.random.default_rng(0)).random_base2(8):
     z = deviation * NormalDist().inv_cdf(u)
-    load = Triangular(mean.lower + z, mean.modal + z, mean.upper + z)
+    load = Triangular(mean.lower + z, mean.nominal + z, mean.upper + z)
     inputs = {"load": load, "stiffness": stiffness}
     deflection = propagate(
         lambda load, stiffness: load / stiffness, inputs, Signed(), alpha=[0.0, 1.0],

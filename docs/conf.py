@@ -115,7 +115,7 @@ def _in_words(value: object) -> str:
     from alphacut.fuzzy import FuzzyNumber
 
     if isinstance(value, FuzzyNumber):
-        return f"{value.modal:g}"
+        return f"{value.nominal:g}"
     return f"{value.value:g} {value.unit}" if isinstance(value, Tolerance) else str(value)
 
 

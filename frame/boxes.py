@@ -13,7 +13,7 @@ from alphacut.frame.dynamics.flow import Flow
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.structures.quantities import units_of
 from alphacut.fuzzy import FuzzyNumber, Interval
-from alphacut.fuzzy.arrays import Mask, Rows
+from alphacut.fuzzy.arrays import Ints, Mask
 from alphacut.fuzzy.knowledge.joint import joined_inputs
 from alphacut.fuzzy.refused import require, require_numbers
 from alphacut.fuzzy.result import Nature
@@ -43,7 +43,7 @@ class Boxes:
         alpha: Levels, rising, shape (A,).
         lower: Lower ends, shape (A, d), in SI units.
         upper: Upper ends, shape (A, d).
-        modal: Values of membership 1, shape (d,).
+        nominal: Values of membership 1, shape (d,).
         numbers: Fuzzy numbers whose cuts they are, by name; intervals where there are none.
 
     Raises:
@@ -54,7 +54,7 @@ class Boxes:
     alpha: Array
     lower: Array
     upper: Array
-    modal: Array
+    nominal: Array
     numbers: Mapping[str, FuzzyNumber] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -68,7 +68,7 @@ class Boxes:
         ends = zip(self.names, self.lower[0].tolist(), self.upper[0].tolist(), strict=True)
         return self.numbers or {name: Interval(low, high) for name, low, high in ends}
 
-    def bisected(self, axis: int) -> list[tuple[Boxes, Rows]]:
+    def bisected(self, axis: int) -> list[tuple[Boxes, Ints]]:
         """Return two halves along an input, each with the rows of the levels that intersect it."""
         low, high = self.lower[0, axis], self.upper[0, axis]
         # the geometric mean, since frequencies are powers of stiffnesses and masses
@@ -82,18 +82,18 @@ class Boxes:
             halves.append((self.on_levels(levels).within(low, high), levels))
         return halves
 
-    def on_levels(self, levels: Rows | Sequence[int]) -> Boxes:
+    def on_levels(self, levels: Ints | Sequence[int]) -> Boxes:
         """Return the boxes of some levels, given by their rows."""
         levels = np.asarray(levels)
         ends = self.lower[levels], self.upper[levels]
-        return Boxes(self.names, self.alpha[levels], *ends, self.modal, self.numbers)
+        return Boxes(self.names, self.alpha[levels], *ends, self.nominal, self.numbers)
 
     def within(self, low: Array, high: Array) -> Boxes:
         """Return the intersections of the boxes with the box from `low` to `high`, (d,) each."""
-        lower, upper, modal = (
-            np.asarray(np.clip(x, low, high)) for x in (self.lower, self.upper, self.modal)
+        lower, upper, nominal = (
+            np.asarray(np.clip(x, low, high)) for x in (self.lower, self.upper, self.nominal)
         )
-        return Boxes(self.names, self.alpha, lower, upper, modal)
+        return Boxes(self.names, self.alpha, lower, upper, nominal)
 
     def distinct(self) -> tuple[Boxes, Array]:
         """Return the boxes without repetitions, and the row in them of the box of each level, (A,).
@@ -114,7 +114,7 @@ class Boxes:
         else:  # two opposite corners, others at random
             random_corners = np.random.default_rng(7).choice([-1.0, 1.0], (CORNERS - 2, d))
             ends = np.vstack([-np.ones(d), np.ones(d), random_corners])
-        return np.asarray(np.unique(np.vstack([self.modal, self.to_physical(ends)]), axis=0))
+        return np.asarray(np.unique(np.vstack([self.nominal, self.to_physical(ends)]), axis=0))
 
     @property
     def centre(self) -> Array:
@@ -161,8 +161,8 @@ def boxes(inputs: Mapping[str, FuzzyNumber | float], alpha: Sequence[float] = AL
     levels, numbers = np.asarray(alpha, float), joined_inputs(inputs)
     cuts = np.array([[number.cut(a) for number in numbers.values()] for a in levels], float)
     cuts = cuts.reshape(len(levels), len(numbers), 2)
-    modal = np.array([number.modal for number in numbers.values()])
-    return Boxes(tuple(numbers), levels, cuts[..., 0], cuts[..., 1], modal, numbers)
+    nominal = np.array([number.nominal for number in numbers.values()])
+    return Boxes(tuple(numbers), levels, cuts[..., 0], cuts[..., 1], nominal, numbers)
 
 
 @dataclass(frozen=True, eq=False)

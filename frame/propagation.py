@@ -31,7 +31,7 @@ from alphacut.frame.verification.step_error import (
     with_step_error,
 )
 from alphacut.fuzzy import FuzzyNumber
-from alphacut.fuzzy.arrays import Array, Rows, on_one_blas_thread
+from alphacut.fuzzy.arrays import Array, Ints, on_one_blas_thread
 from alphacut.fuzzy.progress_bar import Progress, progress_reporter, subprogress
 from alphacut.fuzzy.refused import require, require_choice
 
@@ -87,7 +87,7 @@ def envelope(
         integrator: Time stepping of linear structures, an integrator or its name: exact (of auto
             and proofs unless given), midpoint (of all others), rk4. Of general Lagrangian systems
             it is midpoint.
-        relative: Whether the method's tolerance is a fraction of each output's peak at the modal
+        relative: Whether the method's tolerance is a fraction of each output's peak at the nominal
             parameters and some corners, instead of a number in SI units.
         progress: Called with the completed fraction; a bar on a terminal if not given, False for
             none.
@@ -138,7 +138,7 @@ def _build_problem(
     alpha: Sequence[float],
     integrator: str | Integrator | None,
     options: Mapping[str, object],
-) -> tuple[Method, UnitFlow, Array, Rows]:
+) -> tuple[Method, UnitFlow, Array, Ints]:
     """Return the method, the motion over distinct cuts, the levels, and the cut of each level."""
     is_system = isinstance(model, LagrangianSystem) or hasattr(model, "assembly")
     allowed = "a StoreyFrame, a MatrixStructure or a LagrangianSystem"
@@ -276,12 +276,12 @@ def require_admissible(system: LinearSystem | LagrangianSystem, cuts: Boxes) -> 
     require(is_moved, key, value="zero", allowed=allowed)
     if len(system.ratios) > 1:  # modes of unequal damping ratio must keep their order
         values = [system.parameters[x] if isinstance(x, str) else x for x in system.ratios]
-        points = np.vstack([cuts.modal, cuts.probes])
+        points = np.vstack([cuts.nominal, cuts.probes])
         matrices = evaluate(system, cuts.names, points, derivatives=False)[0]
         require_modal_order(matrices.mass.value, matrices.stiffness.value, np.array(values))
 
 
-def _on_levels(bounds: Envelope, alpha: Array, which: Rows) -> Envelope:
+def _on_levels(bounds: Envelope, alpha: Array, which: Ints) -> Envelope:
     """Return the envelope on levels `alpha` (A,), the bounds of each copied from row `which`."""
     names = ("lower", "upper", "lower_at", "upper_at", "error")
     changes: dict[str, Any] = {name: getattr(bounds, name)[which] for name in names}

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-Rows = NDArray[np.intp]
+Ints = NDArray[np.intp]
 P = ParamSpec("P")
 T = TypeVar("T")
 

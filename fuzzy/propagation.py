@@ -209,7 +209,7 @@ def width_shares(
         return np.asarray(upper - np.asarray(lower))
 
     width = width_with({})
-    fixed = [{x: Crisp(numbers[x].modal) for x in group} for group in members.values()]
+    fixed = [{x: Crisp(numbers[x].nominal) for x in group} for group in members.values()]
     reduction = np.array([width - width_with(crisp) for crisp in fixed])
     share = np.divide(reduction, width, out=np.zeros_like(reduction), where=width > 0)
     return Shares(tuple(members), share)

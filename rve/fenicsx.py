@@ -15,7 +15,7 @@ from typing import Any
 import cffi
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.interruption import uninterrupted
 
@@ -75,7 +75,7 @@ def at_points(value: Any, points: Array) -> fem.Expression:
     return fem.Expression(value, points, jit_options=JIT)
 
 
-def mesh_of(comm: MPI.Intracomm, cells: Rows, nodes: int, element: Any) -> dolfinx.mesh.Mesh:
+def mesh_of(comm: MPI.Intracomm, cells: Ints, nodes: int, element: Any) -> dolfinx.mesh.Mesh:
     """DOLFINx mesh with all coordinates 0, to be set later; rank r gets the r-th part of the cells.
 
     Args:

@@ -12,7 +12,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.fuzzy.refused import FailedError, require
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
 from alphacut.stochastic.particles.packing import Packing
@@ -35,7 +35,7 @@ class ParticleCells:
     """
 
     particles: Particles
-    counted: Rows
+    counted: Ints
     cells: Array
     weight: Array
     diagram: Apollonius | None = None
@@ -111,7 +111,7 @@ def _packing_with_cells(packing: Packing, seed: np.random.SeedSequence) -> Parti
     return with_cells(packing.make(np.random.default_rng(seed)))
 
 
-def _patches(section: ParticleCells) -> Rows:
+def _patches(section: ParticleCells) -> Ints:
     """Return the number of the patch in which each counted cell lies, shape (k,)."""
     particles = section.particles
     patch = (PATCHES * particles.centres[section.counted] / particles.size).astype(int)

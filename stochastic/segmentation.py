@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import maximum_filter, median_filter, minimum_filter, percentile_filter
 
-from alphacut.fuzzy.arrays import Array, Mask, Rows
+from alphacut.fuzzy.arrays import Array, Ints, Mask
 from alphacut.fuzzy.refused import RefusedError, require
 
 CONFIDENT = 3.0  # deviations of the noise
@@ -85,7 +85,7 @@ class Segmentation:
         first, last = self.ranges()
         return float(np.mean(first < last))
 
-    def ranges(self) -> tuple[Rows, Rows]:
+    def ranges(self) -> tuple[Ints, Ints]:
         """Least and greatest class that each pixel may be of, shape (rows, columns) each.
 
         The grey value is varied by `CONFIDENT` deviations of the noise and by the light.
@@ -182,7 +182,7 @@ def _polynomials(shape: tuple[int, ...]) -> Array:
 
 
 def _fit_light(
-    values: Array, labels: Rows, shapes: Array, classes: int
+    values: Array, labels: Ints, shapes: Array, classes: int
 ) -> tuple[Array, Array, float]:
     """Fit levels (classes,), light (rows, columns) and noise by least squares without outliers."""
     inner = _inner_pixels(labels, classes).ravel()
@@ -200,7 +200,7 @@ def _fit_light(
     return fit[:classes], light.reshape(values.shape), noise if noise > rounding else 0.0
 
 
-def _inner_pixels(labels: Rows, classes: int) -> Mask:
+def _inner_pixels(labels: Ints, classes: int) -> Mask:
     """Mask of pixels 3 pixels from other classes, or nearer until a tenth of each class is left."""
     counts = np.bincount(labels.ravel(), minlength=classes)
     value, allowed = "beyond the grey values of a class", "values that leave each class some pixels"
@@ -212,7 +212,7 @@ def _inner_pixels(labels: Rows, classes: int) -> Mask:
     return np.ones(labels.shape, bool)
 
 
-def _interior(labels: Rows, reach: int) -> Mask:
+def _interior(labels: Ints, reach: int) -> Mask:
     """Mask of the pixels with no other class within `reach` pixels."""
     low, high = (f(labels, 2 * reach + 1, mode="wrap") for f in (minimum_filter, maximum_filter))
     return np.asarray(low == high)

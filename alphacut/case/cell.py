@@ -68,7 +68,7 @@ class CellContent(Section):
         """Fraction of the cell that the particles take as the case says, at its nominal value."""
         if self.particle_cell is None or self.particle_cell.fraction is None:
             return None
-        return float(self.particle_cell.fraction.modal)
+        return float(self.particle_cell.fraction.nominal)
 
     @property
     def mesh_cell(self) -> MeshedCell | None:

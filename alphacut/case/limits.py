@@ -76,7 +76,7 @@ def _number(text: str, unit: str) -> float:
     """A quantity in an SI unit, or in its own where the output's is not known here."""
     if unit != "SI":
         return quantity.parse_number(text, unit)
-    return float(quantity.parse_fuzzy_in_any_unit(text).modal)
+    return float(quantity.parse_fuzzy_in_any_unit(text).nominal)
 
 
 AnyLimit = Annotated[Limit, PlainValidator(parse_limit, json_schema_input_type=str)]

@@ -153,7 +153,7 @@ def with_forces(
         require_choice("force.amplitude", unknown, tuple(map(str, floors)) or unknowns)
     if isinstance(model, StoreyFrame):
         loads = [
-            Force(int(floor), amplitude.modal, history) for floor, amplitude, history in forces
+            Force(int(floor), amplitude.nominal, history) for floor, amplitude, history in forces
         ]
         model = replace(model, loads=loads)
         names = model.force_names
@@ -162,7 +162,7 @@ def with_forces(
         directions = [np.array([float(x == unknown) for x in unknowns]) for unknown, _, _ in forces]
         histories = [history for _, _, history in forces]
         loads = [Force(*x) for x in zip(directions, names, histories, strict=True)]
-        nominal = {name: x.modal for name, (_, x, _) in zip(names, forces, strict=True)}
+        nominal = {name: x.nominal for name, (_, x, _) in zip(names, forces, strict=True)}
         model = replace(model, loads=loads, parameters={**model.parameters, **nominal})
     amplitudes = {name: amplitude for name, (_, amplitude, _) in zip(names, forces, strict=True)}
     return replace(structure, model=model, numbers={**structure.numbers, **amplitudes})

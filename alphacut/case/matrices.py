@@ -98,7 +98,7 @@ class MatricesSection(StructureSection):
                     self.damping_ratio, model, loss or LOSS_STAND_IN
                 )
                 numbers |= ratios
-                parameters = {name: number.modal for name, number in numbers.items()}
+                parameters = {name: number.nominal for name, number in numbers.items()}
                 model = replace(model, parameters=parameters, ratios=tuple(ratios))
             return Structure(model, numbers)
         except RefusedError as error:
@@ -124,7 +124,7 @@ class MatricesSection(StructureSection):
             for name, output in self.outputs.items()
         }
         return MatrixStructure(
-            {name: number.modal for name, number in numbers.items()},
+            {name: number.nominal for name, number in numbers.items()},
             mass=self._terms(self.mass),
             stiffness=self._terms(self.stiffness),
             damping=self._terms(self.damping),

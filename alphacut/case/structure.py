@@ -69,7 +69,7 @@ class MaterialDamping:
             return math.sin(math.atan(energy_share * loss) / 2) + joints
 
         if loss.support.width == 0 and self.joints.support.width == 0:
-            return Crisp(ratio(loss.modal, self.joints.modal))
+            return Crisp(ratio(loss.nominal, self.joints.nominal))
         alpha = sorted({*loss.cuts.alpha, *self.joints.cuts.alpha})
         # ζ rises with both numbers, so that the bounds of their α-cuts give its bounds
         bounds = [map(ratio, loss.cut(level), self.joints.cut(level)) for level in alpha]
@@ -288,16 +288,16 @@ class Frame(StructureSection):
         else:
             young = modulus or self.modulus or STAND_IN
         ratios = damping_ratios_by_name(self.damping_ratio, loss)
-        nominal: dict[str, Any] = {x: tuple(y.modal for y in lists[x]) for x in lists}
+        nominal: dict[str, Any] = {x: tuple(y.nominal for y in lists[x]) for x in lists}
         nominal["second_moment"] = nominal["second_moment"] or None
-        nominal_ratios = tuple(x.modal for x in ratios.values())
+        nominal_ratios = tuple(x.nominal for x in ratios.values())
         try:
             model = StoreyFrame(
                 **nominal,
-                modulus=None if young is None else young.modal,
+                modulus=None if young is None else young.nominal,
                 damper_placement=self.damper_placement or "ground",
                 outputs=self.outputs,
-                rayleigh=(self.rayleigh_mass.modal, self.rayleigh_stiffness.modal),
+                rayleigh=(self.rayleigh_mass.nominal, self.rayleigh_stiffness.nominal),
                 ground=self.accelerogram,
                 damping_ratio=nominal_ratios[0] if len(ratios) == 1 else nominal_ratios or None,
             )
@@ -352,7 +352,7 @@ class Pendulum(StructureSection):
             *(self.gravity, self.angle, self.angular_velocity),
         )
         arguments = ("mass", "length", "damping", "gravity", "phi0", "omega0")
-        values = {name: x.modal for name, x in zip(arguments, numbers, strict=True)}
+        values = {name: x.nominal for name, x in zip(arguments, numbers, strict=True)}
         model = pendulum(**values)
         model = replace(model, observed={"force": model.observed["force"]})
         return Structure(model, dict(zip(model.parameters, numbers, strict=True)))

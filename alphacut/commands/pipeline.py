@@ -305,8 +305,9 @@ def _with_stand_ins(content: Content, structure: Structure) -> Structure:
 
 def _stand_in(number: FuzzyNumber, share: float) -> FuzzyNumber:
     """A number with the same nominal value, fuzzy by a share of it."""
-    modal = number.modal
-    return Triangular((1 - share) * modal, modal, (1 + share) * modal) if share else Crisp(modal)
+    nominal = number.nominal
+    ends = (1 - share) * nominal, (1 + share) * nominal
+    return Triangular(ends[0], nominal, ends[1]) if share else Crisp(nominal)
 
 
 def cut_record_warnings(content: Content, structure: Structure) -> Iterator[str]:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from alphacut.case.material import Mesh
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.fuzzy.refused import FailedError
 from alphacut.io.files import say, whole_file
 from alphacut.rve.cell.cell import Cell, thickness_of
@@ -57,7 +57,7 @@ def draw_mesh(cell: Cell, mesh: Mesh, path: Path) -> bool:
     return True
 
 
-def prism_mesh(cell: Cell, mesh: Mesh) -> tuple[Array, Rows, Rows]:
+def prism_mesh(cell: Cell, mesh: Mesh) -> tuple[Array, Ints, Ints]:
     """Points (n, 3), cells (m, 15) in VTK's order and phases (m,) of the mesh of a case."""
     from alphacut.rve.mesh.columns import extrude
     from alphacut.rve.mesh.prism_grid import RING_THICKNESS, reference_radius

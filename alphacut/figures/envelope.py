@@ -204,7 +204,7 @@ def draw_probability(answer: ProbabilityAnswer) -> Figure:
 def draw_tolerances(answer: TolerancesAnswer) -> Figure:
     """Draws the supports of the inputs over nominal values: in the case, and with no exceedance."""
     supports = answer.supports.values()
-    nominal = np.array([[x.modal or 1.0] for x in supports])
+    nominal = np.array([[x.nominal or 1.0] for x in supports])
     own = np.array([x.own for x in supports]) / nominal
     kept = np.array([x.kept for x in supports]) / nominal
     looks: list[style.Look] = [

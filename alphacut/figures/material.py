@@ -31,9 +31,9 @@ def maps(section: RadiusMapSection, alpha: float) -> list[HermiteMap]:
     return [section.at(dict(zip(numbers, corner, strict=True))) for corner in corners]
 
 
-def modal_map(section: RadiusMapSection) -> HermiteMap:
+def nominal_map(section: RadiusMapSection) -> HermiteMap:
     """The radius map at the nominal values."""
-    return section.at({name: number.modal for name, number in section.numbers.items()})
+    return section.at({name: number.nominal for name, number in section.numbers.items()})
 
 
 def distribution(radius: HermiteMap, at: Array) -> Array:
@@ -59,8 +59,8 @@ def p_box(section: RadiusMapSection) -> Figure:
     )
     axes.plot(at, family.min(0), color=INK, lw=1)
     axes.plot(at, family.max(0), color=INK, lw=1)
-    modal = distribution(modal_map(section), at)
-    axes.plot(at, modal, color=PURPLE, lw=1.8, label="nominal map")
+    nominal = distribution(nominal_map(section), at)
+    axes.plot(at, nominal, color=PURPLE, lw=1.8, label="nominal map")
     axes.set(xlabel="reduced radius r$_n$ = r/a", ylabel="cumulative distribution", ylim=(0, 1.02))
     axes.legend(loc="lower right")
     return figure
@@ -72,7 +72,7 @@ def cone(section: RadiusMapSection) -> Figure:
 
     figure = plt.figure(figsize=(5.0, 5.4))
     axes: Any = figure.add_subplot(projection="3d")
-    radius = modal_map(section)
+    radius = nominal_map(section)
     theta, angle = np.linspace(*section.theta, 80), np.linspace(0, 2 * np.pi, 80)
     r = radius(theta)[:, None]
     axes.plot_surface(

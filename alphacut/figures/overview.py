@@ -9,7 +9,7 @@ import numpy as np
 from alphacut.figures import style
 from alphacut.figures.style import Look
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal
-from alphacut.fuzzy.arrays import Array, Mask, Rows
+from alphacut.fuzzy.arrays import Array, Ints, Mask
 from alphacut.io.quantity import axis_prefix
 from alphacut.questions.summary import Results
 from alphacut.rve.cell.cell import Cell
@@ -99,7 +99,7 @@ def _draw_prisms(axes: Any, grid: PrismGrid, positions: Array) -> None:
     axes.set_title(f"product domain, {len(grid.cells):,} prisms", loc="left", fontsize=10)
 
 
-def layer_faces(levels: Array, edges: Rows, nodes: Mask) -> Array:
+def layer_faces(levels: Array, edges: Ints, nodes: Mask) -> Array:
     """Side faces of the prisms over the edges between chosen nodes, shape (n, 4, 3).
 
     `levels` are positions of the nodes at each θ, (levels, nodes, 3); edges have shape (edges, 2).
@@ -142,7 +142,7 @@ def boxes_and_arrows(results: Results) -> tuple[list[tuple[str, list[str]]], lis
         numbers = getattr(content.radius, "numbers", {})
         lines = []
         for name, number in numbers.items():
-            values = sorted({number.support.lower, number.modal, number.support.upper})
+            values = sorted({number.support.lower, number.nominal, number.support.upper})
             lines.append(f"{name} = [{', '.join(f'{x:.4g}' for x in values)}]")
         boxes.append(("radius of the particle", lines))
         arrows.append("r(θ)")
@@ -177,7 +177,7 @@ def kinds_of_numbers(given: FuzzyNumber, result: FuzzyNumber) -> Figure:
     import matplotlib.pyplot as plt
 
     numbers: dict[str, FuzzyNumber] = {
-        "crisp": Crisp(given.modal),
+        "crisp": Crisp(given.nominal),
         "interval": Interval(*given.cut(0.5)),
         "triangular": given,
         "trapezoidal": Trapezoidal(given.support.lower, *given.cut(0.75), given.support.upper),
@@ -191,7 +191,7 @@ def kinds_of_numbers(given: FuzzyNumber, result: FuzzyNumber) -> Figure:
             xlim=(number.support.lower - margin, number.support.upper + margin), ylim=(0, 1.08)
         )
         style.title(axes, name)
-        source = "E" if number.modal == result.modal else "E$_i$"
+        source = "E" if number.nominal == result.nominal else "E$_i$"
         style.prefix_axis(axes, source, "Pa", across=True)
     panels[0].set_ylabel("membership μ")
     return figure

@@ -32,7 +32,7 @@ def draw_frame(section: Frame) -> Figure:
     """Fig. 26: floors with mass m and displacement q, columns with length l or stiffness k."""
     default_lengths = (Crisp(3.0),)  # not to scale where only stiffnesses are given
     per_floor = section.per_floor(section.lengths or default_lengths)
-    lengths = [length.modal for length in per_floor]
+    lengths = [length.nominal for length in per_floor]
     height, level = sum(lengths), 0.0  # of the frame, and of the floor below, in m
     span = 0.45 * max(height, 6.0) if len(lengths) < 5 else 0.3 * height
     inches = min(9.0, 1.4 + 0.5 * height, 2.31 * height / span)
@@ -42,14 +42,14 @@ def draw_frame(section: Frame) -> Figure:
     for floor, (length, mass) in enumerate(zip(lengths, masses, strict=True), start=1):
         words = f"$l_{{{floor}}}$ = {length:.2f} m"
         if stiffness:
-            words = f"$k_{{{floor}}}$ = {stiffness[floor - 1].modal / 1e6:.4g} MN/m"
+            words = f"$k_{{{floor}}}$ = {stiffness[floor - 1].nominal / 1e6:.4g} MN/m"
         for x in (0.0, span):
             axes.plot([x, x], [level, level + length], color=INK, lw=1.4)
         axes.annotate(words, (-0.06 * span, level + length / 2), ha="right", fontsize=8)
         level += length
         axes.plot([-0.03 * span, 1.03 * span], [level, level], color=INK, lw=6)
         above: Look = {"xytext": (0, 6), "textcoords": "offset points", "ha": "center"}
-        words = f"$m_{{{floor}}}$ = {mass.modal / 1000:g} t"
+        words = f"$m_{{{floor}}}$ = {mass.nominal / 1000:g} t"
         axes.annotate(words, (span / 2, level), fontsize=8, **above)
         axes.annotate("", (1.32 * span, level), (1.08 * span, level), arrowprops=ARROW)
         axes.annotate(f"$q_{{{floor}}}$", (1.35 * span, level), va="center", color=ORANGE)

@@ -1,7 +1,7 @@
 """Quantities at the border: "80 GPa", "[75, 80, 85] GPa", "20 t ± 5 %" become SI, and SI text.
 
-One number is crisp, two are an interval, three a triangle (lower, modal, upper), four a trapezoid;
-a spread "± 5 %" is an interval. Units are Pint's, exactly, by way of
+One number is crisp, two are an interval, three a triangle (lower, nominal, upper), four a
+trapezoid; a spread "± 5 %" is an interval. Units are Pint's, exactly, by way of
 decimals; the common ones stand here.
 """
 

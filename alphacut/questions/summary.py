@@ -102,7 +102,7 @@ class Results:
         if structure is None or structure.frame is None:
             return None
         omega, drifts = frequencies(structure.frame), set(structure.outputs)
-        heights = {x: height.modal for x, height in structure.heights.items() if x in drifts}
+        heights = {x: height.nominal for x, height in structure.heights.items() if x in drifts}
         return FrameResult(
             omega_rad_per_s=omega,
             period_s=float(2 * np.pi / omega[0]),
@@ -116,7 +116,7 @@ class Results:
         if self.structure is None or not self.content.has_material_damping:
             return {}
         return {
-            name: (number.support.lower, number.modal, number.support.upper)
+            name: (number.support.lower, number.nominal, number.support.upper)
             for name, number in self.structure.numbers.items()
             if name.startswith("zeta")
         }

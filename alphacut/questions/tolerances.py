@@ -20,7 +20,7 @@ from alphacut.stages.store import Numbers
 class Support(Numbers):
     """Nominal value of an input, its support in the case, and the one with no limit exceeded."""
 
-    modal: float
+    nominal: float
     own: tuple[float, float]
     kept: tuple[float, float]
 
@@ -74,9 +74,9 @@ class TolerancesAnswer(Answer):
         if self.kept is None:
             return "–", ""
         support = self.supports[name]
-        relative = f"about {support.modal:g}"
-        if support.modal:
-            relative = ", ".join(f"{end / support.modal - 1:+.2%}" for end in support.kept)
+        relative = f"about {support.nominal:g}"
+        if support.nominal:
+            relative = ", ".join(f"{end / support.nominal - 1:+.2%}" for end in support.kept)
         sides = zip(support.kept, ("lower", "upper"), strict=True)
         inside = (rounded(end, side, Nature.ATTAINED) for end, side in sides)  # rounded inwards
         text = " … ".join(input_text(name, end) for end in inside)
@@ -88,7 +88,7 @@ class TolerancesAnswer(Answer):
         for name, support in self.supports.items():
             ends = (None, None) if self.kept is None else support.kept
             unit = of_storey_frame(name).unit
-            rows.append((name, unit, *ends, *support.own, support.modal))
+            rows.append((name, unit, *ends, *support.own, support.nominal))
         titles = (
             *("quantity", "unit", "from", "to", "from in the case", "to in the case"),
             *("most plausible", "nature"),
@@ -139,7 +139,7 @@ def admissible_tolerances(section: TolerancesSection, response: FuzzyResponse) -
         most=section.most,
         nature=scale.nature,
         supports={
-            name: Support(modal=inputs[name].modal, own=inputs[name].support, kept=ends)
+            name: Support(nominal=inputs[name].nominal, own=inputs[name].support, kept=ends)
             for name, ends in scale.supports.items()
         },
     )

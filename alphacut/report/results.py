@@ -73,8 +73,8 @@ def material(parts: Parts) -> Table:
     Each has its value at α = 1, the last level, its range at α = 0, the first, nature and error.
     """
     rows = [row for part in (parts.modulus, parts.image) if part for row in _constants(part)]
-    for name, (low, modal, high) in parts.damping.items():
-        cuts = range_text(modal, modal, Nature.ATTAINED), range_text(low, high, Nature.ATTAINED)
+    for name, (low, nominal, high) in parts.damping.items():
+        cuts = range_text(nominal, nominal, Nature.ATTAINED), range_text(low, high, Nature.ATTAINED)
         rows.append((f"damping ratio {name}", *cuts, Nature.ATTAINED, ""))
     return without_empty_columns(MATERIAL, rows)
 

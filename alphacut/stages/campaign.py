@@ -147,7 +147,7 @@ class CellCampaign(CellProblem):
     @property
     def task(self) -> CellTask:
         """The function from points of the fuzzy inputs to all outputs."""
-        crisp = {name: x.modal for name, x in self.numbers.items() if name not in self.inputs}
+        crisp = {name: x.nominal for name, x in self.numbers.items() if name not in self.inputs}
         problem = CellProblem(self.radius, self.cell, self.mesh, self.modulus)
         return CellTask(self.campaign_model(), problem, crisp, self.losses)
 

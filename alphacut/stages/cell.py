@@ -161,7 +161,7 @@ class CellProblem:
     @property
     def nominal(self) -> Any:
         """The cell at the nominal values of its inputs."""
-        return self.at({name: number.modal for name, number in self.numbers.items()})
+        return self.at({name: number.nominal for name, number in self.numbers.items()})
 
     def solve(self, **elements: object) -> HomogenisedStiffness:
         """The homogenised stiffness at the nominal values; `elements` as those of `model`."""

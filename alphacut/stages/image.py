@@ -13,7 +13,7 @@ import numpy as np
 
 from alphacut.case.material import ImageCell
 from alphacut.fuzzy import FuzzyNumber
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.fuzzy.refused import FailedError, require
 from alphacut.fuzzy.result import Nature
 from alphacut.io.provenance import file_digest
@@ -49,7 +49,7 @@ NATURE = Nature.GUARANTEED
 AXES = ["11", "22", "12"]
 AlphaLevel = float | None
 """α-level, or None for the nominal values alone."""
-PhaseRanges = Callable[[AlphaLevel], tuple[Rows, Rows]]
+PhaseRanges = Callable[[AlphaLevel], tuple[Ints, Ints]]
 """Least and greatest phase of each pixel at a level."""
 
 
@@ -164,7 +164,7 @@ def _require_isotropic(widest: ImageCut) -> None:
 
 
 def _dataset(
-    alpha: tuple[float, ...], cuts: Sequence[ImageCut], phase: Rows, losses: Mapping[str, Array]
+    alpha: tuple[float, ...], cuts: Sequence[ImageCut], phase: Ints, losses: Mapping[str, Array]
 ) -> xarray.Dataset:
     """Dataset of the bounds on each level, in SI, and of the phase of each pixel."""
     import xarray
@@ -215,7 +215,7 @@ def _widths(
 
 def cut_or_nominal(number: FuzzyNumber, level: AlphaLevel) -> tuple[float, float]:
     """The cut of a number at a level, or its nominal value twice."""
-    return (number.modal, number.modal) if level is None else number.cut(level)
+    return (number.nominal, number.nominal) if level is None else number.cut(level)
 
 
 @dataclass(frozen=True)
@@ -245,7 +245,7 @@ class ImageStudy:
     @property
     def isotropic_bounds(self) -> tuple[float, float]:
         """Hashin and Shtrikman's bounds of an isotropic E in GPa at the nominal values."""
-        phases = [Phase(young.modal, nu.modal) for young, nu in self.cell.pairs]
+        phases = [Phase(young.nominal, nu.nominal) for young, nu in self.cell.pairs]
         return isotropic_bounds(np.array([*self.fractions.values()]), phases)
 
     @property
@@ -256,7 +256,7 @@ class ImageStudy:
         if self.cell.labels is not None:
             names = [f"label {label:g}" for label in self.cell.labels]
         else:
-            greys = [f"{number.modal:g}" for number in self.cell.threshold or ()]
+            greys = [f"{number.nominal:g}" for number in self.cell.threshold or ()]
             between = (f"grey {a} … {b}" for a, b in pairwise(greys))
             names = [f"grey below {greys[0]}", *between, f"grey above {greys[-1]}"]
         return dict(zip(names, map(float, shares), strict=True))
@@ -280,11 +280,11 @@ def image_study(cell: ImageCell) -> ImageStudy:
         return ImageStudy(cell, lambda level: (phase, phase), False)
     thresholds = cell.threshold or ()
     require_phases(grey, tuple(number.cut(0.0) for number in thresholds))
-    segmentation = segment(grey, [number.modal for number in thresholds])
+    segmentation = segment(grey, [number.nominal for number in thresholds])
     segmentation.require_certain()
     is_fuzzy = any(number.support.width > 0 for number in thresholds)
 
-    def phase_ranges(level: AlphaLevel) -> tuple[Rows, Rows]:
+    def phase_ranges(level: AlphaLevel) -> tuple[Ints, Ints]:
         """Least and greatest phase of each pixel at a level."""
         # noise and light leave phases open, unless a fuzzy threshold says all that is not known
         if level is not None and not is_fuzzy:

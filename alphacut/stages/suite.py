@@ -208,7 +208,7 @@ def with_means(
 
 def _tried_points(inputs: Mapping[str, FuzzyNumber], levels: Sequence[float]) -> tuple[Array, Mask]:
     """Nominal inputs and corners of cuts, (points, inputs); which lie in each, (levels, points)."""
-    rows = [tuple(number.modal for number in inputs.values())]
+    rows = [tuple(number.nominal for number in inputs.values())]
     for alpha in levels:
         corners = product(*(dict.fromkeys(number.cut(alpha)) for number in inputs.values()))
         rows += islice(corners, MAX_CORNERS)

@@ -83,7 +83,7 @@ METHODS = [
 
 def measured(duration: float, step: float, wide: float) -> Iterator[dict[str, Any]]:
     """A row for each method: error (m), evaluations and seconds."""
-    ends = {name: (x.modal, *x.cut(0)) for name, x in INPUTS.items()}
+    ends = {name: (x.nominal, *x.cut(0)) for name, x in INPUTS.items()}
     inputs = {
         name: Interval(middle + wide * (low - middle), middle + wide * (high - middle))
         for name, (middle, low, high) in ends.items()

@@ -114,10 +114,11 @@ def _structure(problem: Problem) -> StoreyFrame:
 
 
 def _number(frame: StoreyFrame, name: str, share: float) -> FuzzyNumber:
-    """A triangular number about the modal value, or that value."""
-    modal = frame.parameters[name]
-    reach = share * modal
-    return Triangular(modal - reach, modal, modal + reach) if reach else Interval(modal, modal)
+    """A triangular number about the nominal value, or that value."""
+    nominal = frame.parameters[name]
+    reach = share * nominal
+    ends = nominal - reach, nominal + reach
+    return Triangular(ends[0], nominal, ends[1]) if reach else Interval(*ends)
 
 
 def _as_matrices(problem: Problem, frame: StoreyFrame) -> MatrixStructure:

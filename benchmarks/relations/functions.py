@@ -61,7 +61,7 @@ class Waves:
 
 
 def problem(waves: Waves, fuzzy: Mapping[str, tuple[float, float, float]], plan: str) -> Problem:
-    """α-cuts of a function by a plan of `PLANS`; inputs by name as (lower, modal, upper)."""
+    """α-cuts of a function by a plan of `PLANS`; inputs by name as (lower, nominal, upper)."""
     asked = {"alpha": (0.0, 0.5, 1.0), "outputs": ("waves", "rising"), "crisp": {}}
     return {"waves": waves, "fuzzy": fuzzy, "plan": plan, "executor": nullcontext, **asked}
 

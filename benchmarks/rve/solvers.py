@@ -32,7 +32,7 @@ from alphacut.rve.solver.krylov import ConvergenceError, Solutions, SolverOption
 from alphacut.stochastic import HermiteMap, RadiusMap
 from benchmarks.rows import write
 
-PAPER = HermiteMap(0.1337, 0.1, 0.8663, 0.1692)  # modal values of the paper, section 4.1
+PAPER = HermiteMap(0.1337, 0.1, 0.8663, 0.1692)  # nominal values of the paper, section 4.1
 MATRIX, PARTICLE = Phase(20e9), Phase(80e9)
 SAME = 1e-8  # relative, of E by any options that converge
 SLOWER = 8.0  # at least, MUMPS on the system of all levels

@@ -26,7 +26,7 @@ from alphacut.rve.series.model import SeriesModel
 from alphacut.stochastic import HermiteMap, RadiusMap, TruncatedNormal
 
 MATRIX, PARTICLE = Phase(20e9), Phase(80e9)
-PAPER_MAP = HermiteMap(0.1337, 0.1, 0.8663, 0.1692)  # modal values of the paper, section 4.1
+PAPER_MAP = HermiteMap(0.1337, 0.1, 0.8663, 0.1692)  # nominal values of the paper, section 4.1
 ROUND_OFF = 1e-11
 
 Solve = Callable[[RadiusMap, Phase, Phase], HomogenisedStiffness]

@@ -22,7 +22,7 @@ from alphacut.frame.modes.superposition import (
 from alphacut.frame.response.oscillators import Grid, Oscillators
 from alphacut.frame.structures.linear import LinearSystem, histories
 from alphacut.frame.structures.loads import History
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Ints
 
 MAX_ENTRIES = 400_000
 """Entries of the matrices of all points whose exact motions are computed together."""
@@ -52,7 +52,7 @@ class Box:
     high: Array
 
     @property
-    def active(self) -> Rows:
+    def active(self) -> Ints:
         """Indices of the inputs that have a width, shape (d,)."""
         return np.flatnonzero(self.high > self.low)
 
@@ -79,9 +79,9 @@ class Box:
 
     def level(
         self,
-        nodes: Rows | slice = slice(None),
+        nodes: Ints | slice = slice(None),
         allowed: Array | None = None,
-        outputs: Rows | slice = slice(None),
+        outputs: Ints | slice = slice(None),
     ) -> LevelModels:
         """Models over the box of the motion of `outputs` at `nodes`, both all unless given.
 
@@ -101,7 +101,7 @@ class Box:
                 refusal.along = int(self.active[refusal.along])
             raise
 
-    def reached(self, unit: Array, node: Rows, output: Rows) -> tuple[Array, Array]:
+    def reached(self, unit: Array, node: Ints, output: Ints) -> tuple[Array, Array]:
         """Exact values of one output at one node for each of S points, and their rounding, (S,).
 
         Points are unit coordinates (S, d); modes are found once for each distinct one.

@@ -22,7 +22,7 @@ from alphacut.frame.bounds.model_error import Remainder
 from alphacut.frame.bounds.newton import Optima, refine
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.modes.modal_model import ModalModel
-from alphacut.fuzzy.arrays import Rows
+from alphacut.fuzzy.arrays import Ints
 from alphacut.fuzzy.progress_bar import Progress
 
 PIECE = 30_000
@@ -135,7 +135,7 @@ class Tree:
         )
         return outcome
 
-    def improve(self, frontier: Frontier, items: Rows, value: Array) -> None:
+    def improve(self, frontier: Frontier, items: Ints, value: Array) -> None:
         """Replace incumbents by the centres of higher `items`, rising, and refine them (Newton)."""
         problems, centre = frontier.problem[items], frontier.geometry(self.lower, self.upper)[0]
         self.optima.point[problems] = centre[frontier.box[items]]
@@ -221,7 +221,7 @@ class Frontier:
         items = np.unique(child[np.searchsorted(distinct_keys, keys)] * n_problems + problem)
         return Frontier(positions, *np.divmod(items, n_problems))
 
-    def _places(self, keys: Rows, count: int) -> Rows:
+    def _places(self, keys: Ints, count: int) -> Ints:
         """Positions (K, d) of child boxes by key: parent × `count` + number."""
         d = self.position.shape[1]
         positions: Array = self.position[keys // count].copy()

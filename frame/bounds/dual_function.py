@@ -19,7 +19,7 @@ import numpy as np
 
 from alphacut.frame.calculus.kernels import compiled, kernel
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Ints
 
 LARGEST = 1e100
 """Magnitude of models, tables and multipliers at most: no sum of their products overflows."""
@@ -165,7 +165,7 @@ def dot(a: Array, b: Array) -> float:
 
 @loops
 def dual_value(
-    mu: Array, cell: Rows, node: int, side: float, data: Data, gradient: Array, u: Array
+    mu: Array, cell: Ints, node: int, side: float, data: Data, gradient: Array, u: Array
 ) -> float:
     """Value D(μ) of the dual function at multipliers μ (Z,), without constants and cubic parts.
 
@@ -203,7 +203,7 @@ def dual_value(
 
 @loops
 def mode_maximum(
-    mu: Array, k: int, cell: Rows, node: int, side: float, data: Data, values: Array
+    mu: Array, k: int, cell: Ints, node: int, side: float, data: Data, values: Array
 ) -> tuple[float, int]:
     """Maximum of mode k's term in D(μ) over a cell of its table, and its point.
 
@@ -258,7 +258,7 @@ def remainder_bound(mu: Array, data: Data) -> float:
 @compiled
 def minimise(
     mu: Array,
-    cell: Rows,
+    cell: Ints,
     node: int,
     side: float,
     data: Data,

@@ -17,7 +17,7 @@ from math import inf, sqrt
 import numpy as np
 
 from alphacut.frame.calculus.kernels import compiled
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Ints
 
 FACES = 16
 """Codes from here on confine an item to faces: plus 3^axis, once for lower and twice for upper."""
@@ -199,14 +199,14 @@ def expand_output(w: Array, table: Array, J: Array, H: Array) -> None:
 
 @compiled
 def examine(
-    frame: tuple[Rows, ...],
+    frame: tuple[Ints, ...],
     boxes: tuple[Array, ...],
     waves: Array,
     time: Array,
     remainder: tuple[Array, ...],
     target: Array,
     linear_phases: bool,
-) -> tuple[Rows, Array, Array]:
+) -> tuple[Ints, Array, Array]:
     """Examine all items: what is done next with each, its value and its upper bound.
 
     An item is a box with a problem, an output and side at a time node; a row is a box with a node.

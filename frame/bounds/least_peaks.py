@@ -19,7 +19,7 @@ import numpy as np
 from alphacut.frame import numbers
 from alphacut.frame.bounds.dual_function import minimise
 from alphacut.frame.bounds.level import LevelModels, OutputBounds
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Ints
 
 
 @dataclass(order=True)
@@ -36,7 +36,7 @@ class PeakCell:
 
     bound: float
     number: int
-    ends: Rows = field(compare=False)
+    ends: Ints = field(compare=False)
     node: int = field(compare=False)
     at: Array = field(compare=False)
 
@@ -65,7 +65,7 @@ def least_peak(level: LevelModels, output: int) -> tuple[float, Array]:
 
 
 def _bounded_cell(
-    sides: list[OutputBounds], motion: Array, ends: Rows, number: int, known: float
+    sides: list[OutputBounds], motion: Array, ends: Ints, number: int, known: float
 ) -> PeakCell:
     """Cell with the largest dual bound of a few nodes where the motion in its middle peaks.
 
@@ -95,7 +95,7 @@ def _bounded_cell(
     return cell
 
 
-def _halves(cell: PeakCell, motion: Array) -> list[Rows]:
+def _halves(cell: PeakCell, motion: Array) -> list[Ints]:
     """Ends of both halves of a cell along the ω or q over which a mode varies most at its node.
 
     They share the middle point; none where no range has a point between its ends. `motion` holds

@@ -19,7 +19,7 @@ from alphacut.frame.modes.models import MotionModels
 from alphacut.frame.modes.structure import Classical
 from alphacut.frame.response.oscillators import Grid, ModalResponses, Oscillators, grid_over
 from alphacut.frame.structures.loads import History
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.fuzzy.progress_bar import Progress
 
 POINTS = (8, 80), (3, 12)
@@ -59,7 +59,7 @@ class ResponseTables:
 
 
 def response_tables(
-    oscillators: Sequence[Oscillator], excitation: Excitation, orders: Rows
+    oscillators: Sequence[Oscillator], excitation: Excitation, orders: Ints
 ) -> ResponseTables:
     """Return tables of the responses of all oscillators to all sources, with bounds of errors.
 
@@ -194,11 +194,11 @@ class OutputBounds:
         """−1 or 1."""
         return (-1.0, 1.0)[self.index[1]]
 
-    def nodes_above(self, nodes: Rows) -> Rows:
+    def nodes_above(self, nodes: Ints) -> Ints:
         """Those of some nodes whose bound exceeds the reached value by more than the wanted gap."""
         return nodes[self.out[0, nodes] > self.reached + self.wanted_gap]
 
-    def open_nodes(self, slack_below_peak: float) -> Rows:
+    def open_nodes(self, slack_below_peak: float) -> Ints:
         """Nodes (J,) whose bound exceeds the model's value by more than suffices; see `Effort`."""
         bound, value = self.out
         below_peak = np.maximum(max(value.max(), self.reached) - value, 0.0)
@@ -214,7 +214,7 @@ class OutputBounds:
         of_node = cells, steps, slack_below_peak, remainder_multiple
         return Effort(*of_node, self.wanted_gap, incumbent, *tuned)
 
-    def improve(self, nodes: Rows, effort: Effort) -> None:
+    def improve(self, nodes: Ints, effort: Effort) -> None:
         """Lower the bounds and raise the model's values at nodes (J,), reading no others."""
         new, at = np.empty((2, len(nodes))), np.empty((len(nodes), self.at.shape[1]))
         bound_nodes(nodes, self.side, effort, self.constant, self.data, new, at)
@@ -225,7 +225,7 @@ class OutputBounds:
 
 
 def improve_all(
-    jobs: Sequence[tuple[OutputBounds, Rows, Effort]], pool: ThreadPoolExecutor, tick: Progress
+    jobs: Sequence[tuple[OutputBounds, Ints, Effort]], pool: ThreadPoolExecutor, tick: Progress
 ) -> None:
     """Improve bounds at nodes by threads, in blocks; each node begins where the last one ended.
 

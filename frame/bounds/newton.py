@@ -12,7 +12,7 @@ import numpy as np
 from alphacut.frame import numbers
 from alphacut.frame.calculus.box_quadratic import gain, global_maximum, local_maximum
 from alphacut.frame.modes.modal_model import ModalModel
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.fuzzy.sets.boxes import chebyshev_points
 
 BOX_WIDTH = 2.0
@@ -51,7 +51,7 @@ def first_optima(model: ModalModel, lower: Array, upper: Array, least_gain: floa
 
 
 def refine(
-    model: ModalModel, optima: Optima, which: Rows, lower: Array, upper: Array, least_gain: float
+    model: ModalModel, optima: Optima, which: Ints, lower: Array, upper: Array, least_gain: float
 ) -> None:
     """Improve the optima in rows `which` by Newton's method in a box, in place.
 
@@ -63,7 +63,7 @@ def refine(
 
 
 def _newton(
-    model: ModalModel, optima: Optima, which: Rows, lower: Array, upper: Array, least_gain: float
+    model: ModalModel, optima: Optima, which: Ints, lower: Array, upper: Array, least_gain: float
 ) -> None:
     radius: Array = np.full(len(which), numbers.NEWTON_RADIUS)
     f, g, H = _signed(model, optima.point[which], which)
@@ -98,7 +98,7 @@ def _newton(
         radius = np.where(ratio > 0.75, wider, np.where(ratio < 0.25, narrower, radius))
 
 
-def _signed(model: ModalModel, points: Array, which: Rows) -> tuple[Array, Array, Array]:
+def _signed(model: ModalModel, points: Array, which: Ints) -> tuple[Array, Array, Array]:
     """Side × output (W,), its gradient and Hessian, of problems `which` at their points (W, d)."""
     node, column = np.divmod(which, 2 * len(model.outputs))
     f, g, H = model.at(points, node, column // 2)

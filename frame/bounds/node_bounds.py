@@ -12,7 +12,7 @@ import numpy as np
 
 from alphacut.frame.bounds.dual_function import Data, add, dot, loops, minimise, products
 from alphacut.frame.calculus.kernels import compiled
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Ints
 
 GRID = 2.0**24
 """Steps of the model's ascent in unit coordinates, so that rounding does not lead it elsewhere."""
@@ -59,7 +59,7 @@ class Cells(NamedTuple):
         value: Upper bounds D(μ) over the cells, shape (…,).
     """
 
-    ends: Rows
+    ends: Ints
     mu: Array
     disagreement: Array
     value: Array
@@ -67,7 +67,7 @@ class Cells(NamedTuple):
 
 @compiled
 def bound_nodes(
-    nodes: Rows, side: float, effort: Effort, constant: Array, data: Data, out: Array, at: Array
+    nodes: Ints, side: float, effort: Effort, constant: Array, data: Data, out: Array, at: Array
 ) -> None:
     """Write upper bounds of side × output at rising time nodes (J,), each begun from the last.
 

@@ -13,14 +13,14 @@ import numpy as np
 from alphacut.frame import numbers
 from alphacut.frame.bounds.level import LevelModels, OutputBounds
 from alphacut.frame.bounds.node_bounds import response_and_gradient
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Ints
 
 FRACTIONS = (0.25, 0.5)
 """Fractions of an input's range that are tried, the second where the first can be pruned."""
 
 
 def prune_ends(
-    level: LevelModels, bounds: OutputBounds, above: Rows
+    level: LevelModels, bounds: OutputBounds, above: Ints
 ) -> tuple[Array, Array, Array, Array]:
     """Prune ends of the box [−1, 1]^d over which no bound exceeds the peak by more than the gap.
 

@@ -32,7 +32,7 @@ from alphacut.frame.boxes import Boxes, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import exact_flow
 from alphacut.frame.envelope import Envelope
-from alphacut.fuzzy.arrays import Array, Mask, Rows
+from alphacut.fuzzy.arrays import Array, Ints, Mask
 from alphacut.fuzzy.progress_bar import Progress
 
 LOG = logging.getLogger(__name__)
@@ -69,7 +69,7 @@ class SubBox:
     work: float = 1.0
     done: float = 0.0
 
-    def on_levels(self, rows: Rows, boxes: Boxes | None = None) -> SubBox:
+    def on_levels(self, rows: Ints, boxes: Boxes | None = None) -> SubBox:
         """Copy on some levels, given by their rows, with the ends of `boxes` if given."""
         boxes = self.boxes.on_levels(rows) if boxes is None else boxes
         levels, peaks, outer = [self.levels[k] for k in rows], self.peaks[rows], self.outer[rows]

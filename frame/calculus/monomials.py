@@ -15,7 +15,7 @@ from math import comb
 import numpy as np
 
 from alphacut.frame.calculus.kernels import compiled
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Ints
 
 SMALL = 300_000
 """Multiplications by one coefficient up to which a loop over all pairs is faster than products of
@@ -28,7 +28,7 @@ def count(d: int, degree: int) -> int:
 
 
 @cache
-def monomials(d: int, degree: int) -> Rows:
+def monomials(d: int, degree: int) -> Ints:
     """All rising lists of `degree` out of d variables by place, shape (monomials, degree)."""
     lists = list(combinations_with_replacement(range(d), degree))
     rows = np.array(lists, np.int64).reshape(len(lists), degree)
@@ -36,12 +36,12 @@ def monomials(d: int, degree: int) -> Rows:
 
 
 @cache
-def _binomials(d: int, degree: int) -> Rows:
+def _binomials(d: int, degree: int) -> Ints:
     """C(i + k, k + 1) for variables i and k, shape (d, degree)."""
     return np.array([[comb(i + k, k + 1) for k in range(degree)] for i in range(d)], np.int64)
 
 
-def places(lists: Rows, d: int) -> Rows:
+def places(lists: Ints, d: int) -> Ints:
     """Places of rising lists (N, m), shape (N,)."""
     degree = lists.shape[1]
     if degree == 0:
@@ -50,7 +50,7 @@ def places(lists: Rows, d: int) -> Rows:
 
 
 @cache
-def product_places(d: int, m: int, q: int) -> Rows:
+def product_places(d: int, m: int, q: int) -> Ints:
     """Places of the products of all monomials of degree m with all of degree q, shape (M, Q)."""
     a, b = monomials(d, m), monomials(d, q)
     pairs = np.concatenate([np.repeat(a, len(b), axis=0), np.tile(b, (len(a), 1))], axis=1)
@@ -58,14 +58,14 @@ def product_places(d: int, m: int, q: int) -> Rows:
 
 
 @cache
-def exponents(d: int, degree: int) -> Rows:
+def exponents(d: int, degree: int) -> Ints:
     """How often each variable stands in each monomial, shape (monomials, d)."""
     lists = monomials(d, degree)
     return np.asarray((lists[:, :, None] == np.arange(d)).sum(1))
 
 
 @cache
-def _last_factors(d: int, degree: int) -> tuple[Rows, Rows]:
+def _last_factors(d: int, degree: int) -> tuple[Ints, Ints]:
     """The last variable of each monomial, and the place of the product of the others."""
     lists = monomials(d, degree)
     return lists[:, -1], places(lists[:, :-1], d)
@@ -144,7 +144,7 @@ def product_part(
 
 
 @compiled
-def _add_products(a: Array, b: Array, at: Rows, out: Array) -> None:
+def _add_products(a: Array, b: Array, at: Ints, out: Array) -> None:
     """Add a[x] b[y], entry by entry, (v,), to out[at[x, y]] for all pairs of monomials x, y."""
     for x in range(len(a)):
         if not a[x].any():
@@ -156,7 +156,7 @@ def _add_products(a: Array, b: Array, at: Rows, out: Array) -> None:
 
 
 @compiled
-def _add_matrix_products(a: Array, b: Array, at: Rows, out: Array) -> None:
+def _add_matrix_products(a: Array, b: Array, at: Ints, out: Array) -> None:
     """Add a[x] @ b[y], (p, q) by (q, r), to out[at[x, y]] for all pairs of monomials x, y."""
     for x in range(len(a)):
         if not a[x].any():

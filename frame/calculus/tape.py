@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.fuzzy.refused import require_choice
 
 if TYPE_CHECKING:
     from sympy import Expr, Symbol
 
-Tape = tuple[Rows, Rows, Array]
+Tape = tuple[Ints, Ints, Array]
 """Operations (L, 3), places of the results (m,), and the places themselves.
 
 An operation has a number and the places of two operands. Places hold arguments, the result of each

@@ -33,7 +33,7 @@ from alphacut.frame.calculus.monomials import (
 )
 from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF, gamma
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Ints
 
 ORDER = 3
 """Order of a Taylor model unless another is given."""
@@ -131,7 +131,7 @@ class TaylorModel:
         return np.concatenate(self.parts)
 
     @property
-    def exponents(self) -> Rows:
+    def exponents(self) -> Ints:
         """Exponents of these monomials, shape (terms, d)."""
         return np.concatenate([exponents(self.inputs, k) for k in range(len(self.parts))])
 
@@ -166,7 +166,7 @@ class TaylorModel:
             tables.append(np.hstack(derivatives))
         return tables
 
-    def present(self) -> Rows:
+    def present(self) -> Ints:
         """Inputs that the functions depend on."""
         found = np.zeros(self.inputs, bool)
         for degree, part in enumerate(self.parts[1:], 1):
@@ -174,7 +174,7 @@ class TaylorModel:
             found[monomials(self.inputs, degree)[some]] = True
         return np.flatnonzero(found)
 
-    def on(self, inputs: Rows) -> TaylorModel:
+    def on(self, inputs: Ints) -> TaylorModel:
         """The model as functions of the inputs at `inputs` (d,) alone; it depends on no others."""
         d = len(inputs)
         lists = (inputs[monomials(d, degree)] for degree in range(len(self.parts)))
@@ -182,7 +182,7 @@ class TaylorModel:
         parts = tuple(part[at] for part, at in zip(self.parts, rows, strict=True))
         return TaylorModel(parts, self.remainder, d, self.order)
 
-    def among(self, inputs: Rows, d: int) -> TaylorModel:
+    def among(self, inputs: Ints, d: int) -> TaylorModel:
         """The same functions as functions of d inputs, of which theirs are at `inputs`, rising.
 
         Functions of d inputs stay as they are.

@@ -141,7 +141,7 @@ class MeasuredMode:
         require(self.mode >= 1, f"{mode}: number", value=self.mode, allowed="numbers from 1 on")
         are_positive = min(floors, default=1) >= 1
         require(are_positive, f"{mode}: floors", value=floors, allowed="numbers from 1 on")
-        hertz, allowed = self.frequency.modal, "positive values in Hz"
+        hertz, allowed = self.frequency.nominal, "positive values in Hz"
         require(hertz > 0, f"{mode}: frequency", value=hertz, allowed=allowed)
         fits = not floors or (self.reference >= 1 and self.reference not in floors)
         allowed = "a floor beside those of the shape"

@@ -27,7 +27,7 @@ from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.envelope import Ends, Envelope
 from alphacut.frame.structures.linear import frequencies
-from alphacut.fuzzy.arrays import Array, Mask, Rows
+from alphacut.fuzzy.arrays import Array, Ints, Mask
 from alphacut.fuzzy.progress_bar import Progress, subprogress
 from alphacut.fuzzy.refused import checked_number
 
@@ -108,7 +108,7 @@ class DualProof:
             what = "a mode does not oscillate: the stiffness lets the structure drift"
             raise UnprovedError(what, "take improved-graph-follower")
         ends = np.stack([boxes.lower[0], boxes.upper[0]])
-        near = boxes.modal + NEAR * (ends - boxes.modal)
+        near = boxes.nominal + NEAR * (ends - boxes.nominal)
         if (near[1] > near[0]).any():
             Box(flow.system, boxes.names, flow.time, *near).level(
                 np.arange(2), np.full(len(flow.outputs), np.inf)
@@ -151,7 +151,7 @@ class DualProof:
             inner, attained_error = np.full(needed.shape, -np.inf), np.zeros(needed.shape[:2])
             inner[needed] = np.where(side, value, -value) - error
             np.maximum.at(attained_error, (node, output), 2 * error)
-            above = dict[tuple[int, int], Rows]()
+            above = dict[tuple[int, int], Ints]()
             for (o, s), problem in problems.items():
                 problem.wanted_gap = self.peaks * goal.peak[o]
                 problem.reached = max(problem.reached, inner[:, o, s].max())

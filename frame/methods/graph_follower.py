@@ -19,7 +19,7 @@ from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.calculus.box_quadratic import gain, local_maximum
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.sampled import SAFETY, independent_excess
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.fuzzy.progress_bar import Progress, subprogress
 from alphacut.fuzzy.refused import checked_number, require
 from alphacut.fuzzy.result import Nature
@@ -28,7 +28,7 @@ MAX_RATIO = 8.0
 """Slope along a half width of the box, as a fraction of the output's range, from which on
 neighbouring trajectories part."""
 
-Places = tuple[Rows, ...]
+Places = tuple[Ints, ...]
 """Indices of nodes, outputs and sides, one of each for a place."""
 
 
@@ -119,10 +119,10 @@ class Followed:
     """
 
     bounds: Array
-    best: Rows
+    best: Ints
     predicted_gain: Array
-    guess: Rows
-    new: Rows
+    guess: Ints
+    new: Ints
     storage: Storage
 
 
@@ -178,7 +178,7 @@ class GraphFollower:
     def follow(self, flow: UnitFlow, progress: Progress | None = None) -> Followed:
         """Return bounds on all levels by Taylor models, from the narrowest box to the widest."""
         storage = Storage(flow)
-        storage.add(flow.boxes.to_unit(flow.boxes.modal)[None])
+        storage.add(flow.boxes.to_unit(flow.boxes.nominal)[None])
         levels, (n_nodes, m, _) = len(flow.boxes.alpha), storage.top.shape
         shape = (levels, n_nodes, m, 2)
         zeros, none = np.zeros(shape), np.full(shape, -1)

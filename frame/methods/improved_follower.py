@@ -173,7 +173,7 @@ class ImprovedFollower:
     def _start(self, storage: Storage, lower: Array, upper: Array) -> Array:
         """Return the first unit coordinates of a level, nominal and spread ones, shape (S, d)."""
         boxes = storage.flow.boxes
-        nominal = boxes.to_unit(boxes.modal)[None]
+        nominal = boxes.to_unit(boxes.nominal)[None]
         if not (upper > lower).any():  # no other points, and none once it is stored
             return nominal[:0] if len(storage) else nominal
         middle, half = (lower + upper) / 2, (upper - lower) / 2

@@ -10,7 +10,7 @@ import numpy as np
 
 from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.envelope import Envelope
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.fuzzy.progress_bar import Progress
 from alphacut.fuzzy.refused import checked_number
 from alphacut.fuzzy.result import Nature
@@ -101,10 +101,10 @@ def spread_points(lower: Array, upper: Array, count: int, skip: int) -> Array:
     return np.asarray((lower + upper) / 2 + (upper - lower) / 2 * points)
 
 
-def largest_values(flow: UnitFlow, points: Array) -> tuple[Array, Rows]:
+def largest_values(flow: UnitFlow, points: Array) -> tuple[Array, Ints]:
     """Return the largest (−output, output) of motions, shape (T, m, 2), and which has it."""
     largest: Array = np.full((len(flow.time), len(flow.outputs), 2), -np.inf)
-    index: Rows = np.zeros(largest.shape, np.int64)
+    index: Ints = np.zeros(largest.shape, np.int64)
     size = int(np.clip(MAX_NUMBERS / largest.size, 1, BATCH))
     for first in range(0, len(points), size):
         values = flow.values(points[first : first + size])

@@ -17,7 +17,7 @@ import numpy as np
 from alphacut.frame.calculus.monomials import matmul, monomials, product_part
 from alphacut.frame.calculus.rounding import gamma
 from alphacut.frame.calculus.taylor_model import TaylorModel, inverse_bound
-from alphacut.fuzzy.arrays import Array, Mask, Rows
+from alphacut.fuzzy.arrays import Array, Ints, Mask
 
 MAX_MONOMIALS = 33_000
 """Monomials of the series' highest degree, at most."""
@@ -54,7 +54,7 @@ class Block:
         norm: N, x_iᵀ M x_j, shape (p, p).
     """
 
-    modes: Rows
+    modes: Ints
     rate: TaylorModel
     shape: TaylorModel
     mass_shape: TaylorModel
@@ -71,7 +71,7 @@ class Block:
         parts = (x.cut(order) for x in (self.rate, self.shape, self.mass_shape, self.norm))
         return Block(self.modes, *parts)
 
-    def among(self, used: Rows, inputs: int) -> Block:
+    def among(self, used: Ints, inputs: int) -> Block:
         """The same as functions of all inputs, of which those at `used` are its own."""
         parts = (x.among(used, inputs) for x in (self.rate, self.shape, self.mass_shape, self.norm))
         return Block(self.modes, *parts)
@@ -108,7 +108,7 @@ Series = tuple[list[Array], list[Array], list[Array]]
 
 
 def narrowest_block(
-    block: Rows, rotation: Array, centre: CentredMatrices, tolerance: float
+    block: Ints, rotation: Array, centre: CentredMatrices, tolerance: float
 ) -> Block | None:
     """Enclosure of a block of modes by series of the least degree that meets the tolerance.
 
@@ -137,7 +137,7 @@ def narrowest_block(
 
 
 def subspace_series(
-    block: Rows, degree: int, centre: CentredMatrices, lower: Series | None = None
+    block: Ints, degree: int, centre: CentredMatrices, lower: Series | None = None
 ) -> Series:
     """Perturbation series of an invariant subspace K X = M X L, X the identity on the block.
 
@@ -174,7 +174,7 @@ def subspace_series(
 
 
 def enclosed_block(
-    block: Rows, rotation: Array, series: Series, centre: CentredMatrices
+    block: Ints, rotation: Array, series: Series, centre: CentredMatrices
 ) -> Block | None:
     """Enclose a block's invariant subspace K X = M X L over the box by Brouwer's theorem.
 

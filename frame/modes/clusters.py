@@ -11,7 +11,7 @@ from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.blocks import Block, CentredMatrices, eigenvalue_drop, narrowest_block
 from alphacut.frame.structures.linear import undamped_modes
-from alphacut.fuzzy.arrays import Array, Mask, Rows
+from alphacut.fuzzy.arrays import Array, Ints, Mask
 
 NEAR = 2.0
 """First-order change of the distance of two λ over the box, as a share of that distance, from which
@@ -42,7 +42,7 @@ class Subspaces:
     """
 
     blocks: list[Block]
-    used: Rows
+    used: Ints
     centre: CentredMatrices
     low: Array
     high: Array
@@ -50,14 +50,14 @@ class Subspaces:
     along: int | None
 
     @property
-    def others(self) -> Rows:
+    def others(self) -> Ints:
         """Numbers of the modes that are not enclosed, rising."""
         taken = [block.modes for block in self.blocks]
         return np.setdiff1d(np.arange(self.centre.modes), np.concatenate([[], *taken]))
 
 
 def enclose_subspaces(
-    centre: CentredMatrices, used: Rows, wanted: int, tolerances: Array | None = None
+    centre: CentredMatrices, used: Ints, wanted: int, tolerances: Array | None = None
 ) -> Subspaces:
     """Enclose the lowest modes over the box, in blocks, from below until one is not enclosed.
 
@@ -76,7 +76,7 @@ def enclose_subspaces(
     slopes = _slopes(centre)
     low, high, variation = _ranges(centre, int(used[_steepest(centre, slopes)]))
     near, blocks, along = _nearness(centre, slopes), list[Block](), None
-    free: Rows = np.arange(centre.modes)
+    free: Ints = np.arange(centre.modes)
     while len(free) and free[0] < wanted and along is None:
         modes, block = _linked(near > NEAR, free[:1], free), None
         while block is None:
@@ -112,7 +112,7 @@ def _ranges(centre: CentredMatrices, along: int) -> tuple[Array, Array, tuple[fl
     return low, high, (mass, stiffness)
 
 
-def centred_matrices(mass: TaylorModel, stiffness: TaylorModel) -> tuple[CentredMatrices, Rows]:
+def centred_matrices(mass: TaylorModel, stiffness: TaylorModel) -> tuple[CentredMatrices, Ints]:
     """M and K in coordinates that make both diagonal in the middle of the box.
 
     Unknowns b without mass follow the others a there, x_b = −K_bb⁻¹ K_ba x_a, and have coordinates
@@ -173,7 +173,7 @@ def _steepest(centre: CentredMatrices, slopes: Array) -> int:
     return int((np.abs(slopes) / centre.squared[:, None]).max(0).argmax())
 
 
-def _couplings(centre: CentredMatrices, some: Rows) -> Array:
+def _couplings(centre: CentredMatrices, some: Ints) -> Array:
     """First-order change of K − λ M between modes, λ the mean of both, shape (d, p, p)."""
     stiff, heavy = (x.part(1)[:, some[:, None], some] for x in (centre.stiffness, centre.mass))
     mean = (centre.squared[some, None] + centre.squared[some]) / 2
@@ -195,7 +195,7 @@ def _nearness(centre: CentredMatrices, slopes: Array) -> Array:
     return near
 
 
-def _linked(pairs: Mask, modes: Rows, free: Rows) -> Rows:
+def _linked(pairs: Mask, modes: Ints, free: Ints) -> Ints:
     """Numbers of the free modes that `pairs` link to `modes`, directly or through others."""
     while True:
         neighbours = np.intersect1d(free, np.flatnonzero(pairs[modes].any(0)))
@@ -205,7 +205,7 @@ def _linked(pairs: Mask, modes: Rows, free: Rows) -> Rows:
         modes = extended
 
 
-def rotation(centre: CentredMatrices, modes: Rows) -> Array:
+def rotation(centre: CentredMatrices, modes: Ints) -> Array:
     """Rotation R of p modes after which K − λ M is nearly diagonal over the box, shape (p, p).
 
     Joint diagonalisation of K − λ M in the middle and of its derivatives by all inputs, by Jacobi

@@ -22,7 +22,7 @@ from alphacut.frame.structures.linear import LinearSystem
 from alphacut.frame.structures.loads import History
 from alphacut.frame.structures.matrix import MatrixStructure
 from alphacut.frame.structures.storey import StoreyFrame
-from alphacut.fuzzy.arrays import Array, Mask, Rows
+from alphacut.fuzzy.arrays import Array, Ints, Mask
 
 EQUAL = 1e-6
 """Relative distance of two eigenvalues below which they count as equal."""
@@ -141,7 +141,7 @@ class DampedModes:
     share: TaylorModel
 
     @classmethod
-    def of_structure(cls, structure: DampedStructure, chosen: Rows) -> DampedModes:
+    def of_structure(cls, structure: DampedStructure, chosen: Ints) -> DampedModes:
         """Series of the modes in places `chosen` (n,) by rising |λ|, about the middle of the box.
 
         Raises:
@@ -188,7 +188,7 @@ def _halves(structure: DampedStructure) -> tuple[slice, slice]:
 
 def needed_modes(
     structure: DampedStructure, loads: Sequence[History], time: Array, allowed: Array | float
-) -> Rows:
+) -> Ints:
     """Places (n,) by rising |λ| of the modes without which outputs miss at most `allowed` (m,).
 
     An output r q + s q̇ is at most √(r K⁻¹ rᵀ + s M⁻¹ sᵀ) times √(qᵀ K q + q̇ᵀ M q̇). All is that of
@@ -243,7 +243,7 @@ def norm_of(vectors: Array) -> Array:
 
 
 def _eigen_series(
-    structure: DampedStructure, D: TaylorModel, chosen: Rows
+    structure: DampedStructure, D: TaylorModel, chosen: Ints
 ) -> tuple[TaylorModel, TaylorModel]:
     """λ (n,) and φ (n, N) with (λ² M + λ D + K) φ = 0 to the order of M, about the middle."""
     # in degree m, (λ₀² M₀ + λ₀ D₀ + K₀) φ_m + λ_m (2 λ₀ M₀ + D₀) φ₀ is known, and φ₀* φ_m = 0
@@ -290,7 +290,7 @@ def _oscillates(rate: Array) -> Mask:
     return np.asarray(rate.imag > 1e-9 * np.abs(rate))
 
 
-def _equal_modes(rates: Array, k: int) -> Rows:
+def _equal_modes(rates: Array, k: int) -> Ints:
     """Places of all eigenvalues that equal number k, itself among them."""
     return np.flatnonzero(np.abs(rates - rates[k]) <= EQUAL * np.abs(rates[k]))
 

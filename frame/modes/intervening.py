@@ -26,7 +26,7 @@ from alphacut.frame.modes.clusters import Subspaces
 from alphacut.frame.modes.structure import Classical
 from alphacut.frame.response.oscillators import Grid
 from alphacut.frame.structures.loads import History
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Ints
 
 MAX_PAIRS = 100_000
 """Pairs of coefficients in a product of two polynomials at most; a pair takes 3 ns."""
@@ -92,7 +92,7 @@ class BlockShares:
 
     @classmethod
     def from_block(
-        cls, block: Block, rows: TaylorModel, excited: TaylorModel, used: Rows
+        cls, block: Block, rows: TaylorModel, excited: TaylorModel, used: Ints
     ) -> BlockShares:
         """Shares of a block: r X, Xᵀ M v and N⁻¹ Xᵀ M v, of outputs r and sources v, N = Xᵀ M X.
 
@@ -166,7 +166,7 @@ def oscillators(structure: Classical, of_block: BlockShares, found: Subspaces) -
     return made
 
 
-def damped_range(structure: Classical, low: float, high: float, modes: Rows) -> tuple[Ends, Ends]:
+def damped_range(structure: Classical, low: float, high: float, modes: Ints) -> tuple[Ends, Ends]:
     """Ranges of ω = √(λ − g²) and of g/ω for modes whose λ lie in [low, high], g their decay.
 
     Raises:

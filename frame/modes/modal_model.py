@@ -24,7 +24,7 @@ from alphacut.frame.modes.damped import (
 )
 from alphacut.frame.response.load_tables import Direct, LoadTables
 from alphacut.frame.structures.linear import courses_of_forces, histories
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Ints
 
 PIECE = 20_000
 """Points whose values are computed together."""
@@ -158,7 +158,7 @@ class ModalModel:
         w = np.concatenate(waves, -1)
         return np.asarray(2 * (w.real @ C.real - w.imag @ C.imag))
 
-    def at(self, unit: Array, node: Rows, output: Rows) -> tuple[Array, Array, Array]:
+    def at(self, unit: Array, node: Ints, output: Ints) -> tuple[Array, Array, Array]:
         """One output at one node for each of N points, with derivatives by unit coordinates.
 
         Args:
@@ -182,7 +182,7 @@ class ModalModel:
         H[:, row, column] = H[:, column, row] = derivatives[:, 1 + d :]
         return derivatives[:, 0], derivatives[:, 1 : 1 + d], H
 
-    def value_at(self, unit: Array, node: Rows, output: Rows) -> Array:
+    def value_at(self, unit: Array, node: Ints, output: Ints) -> Array:
         """Values (N,) of one output at one node for each of N points, as in `at`.
 
         They are 2 Re Σ_k C_k w(t; λ_k) over the free motion and each load.
@@ -197,7 +197,7 @@ class ModalModel:
                     values[rows] += 2 * (amplitude * wave[0]).real.sum(1)
         return values
 
-    def waves(self, rate: Array, node: Rows) -> Sequence[Waves]:
+    def waves(self, rate: Array, node: Ints) -> Sequence[Waves]:
         """Time functions w(t; λ_k) of the free motion and of each load, with derivatives by λ.
 
         Args:

@@ -14,7 +14,7 @@ import numpy as np
 from alphacut.frame.calculus.taylor_model import TaylorModel, solve
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.structures.linear import Assembly, LinearSystem, histories, stack
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Ints
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +39,7 @@ class Classical:
     stiffness: TaylorModel
     rows: Array
     factor: TaylorModel
-    order: Rows
+    order: Ints
     start: TaylorModel
     pattern: Array
     rayleigh: TaylorModel

@@ -31,7 +31,7 @@ from alphacut.frame.response.duhamel import (
 from alphacut.frame.response.oscillators import read_response
 from alphacut.frame.structures.linear import LinearSystem, evaluate, histories, undamped_modes
 from alphacut.frame.structures.loads import History
-from alphacut.fuzzy.arrays import Array, Mask, Rows
+from alphacut.fuzzy.arrays import Array, Ints, Mask
 
 ENTRY_ROUNDINGS = 8
 """Roundings of an entry of M, K and of output rows, as a stiffness 12 c E I / l³ takes."""
@@ -64,7 +64,7 @@ class Modal:
     stiffness_error: Array
     mass_error: Array
     rows: Array
-    order: Rows
+    order: Ints
     accelerated: Array
 
     @property
@@ -72,7 +72,7 @@ class Modal:
         """Bound of |dσ/dλ|, shape (S, n), in s; see `rest.response_slopes`."""
         return np.asarray(1 / (2 * self.sigma.imag))
 
-    def output_coefficients(self, point: Rows, output: Rows) -> tuple[Array, Array]:
+    def output_coefficients(self, point: Ints, output: Ints) -> tuple[Array, Array]:
         """Coefficients r of modes in outputs (N,) at points (N,), and their rounding, (N, n)."""
         n, order = self.shape.shape[-1], self.order[output][:, None]
         rows, shape = self.rows[point, output], self.shape[point]
@@ -160,7 +160,7 @@ class LoadAtNodes:
     value: Array
 
 
-def load_at_given_nodes(sigma: Array, load: History, time: Array, node: Rows) -> LoadAtNodes:
+def load_at_given_nodes(sigma: Array, load: History, time: Array, node: Ints) -> LoadAtNodes:
     """Responses of oscillators σ (N, n) to a load, each row at its node (N,) of `time`."""
     responses = responses_at_given_nodes(sigma, load, time, node, 1)
     impulse = absolute_moments(0.0, load, time)[0]
@@ -175,8 +175,8 @@ def load_at_nodes(sigma: Array, load: History, time: Array) -> LoadAtNodes:
 
 def outputs_at(
     modal: Modal,
-    point: Rows,
-    output: Rows,
+    point: Ints,
+    output: Ints,
     time: Array,
     loads: Mapping[str, LoadAtNodes],
 ) -> tuple[Array, Array]:
@@ -225,7 +225,7 @@ class _Responses:
 
     @classmethod
     def of_modes(
-        cls, modal: Modal, point: Rows, orders: Rows, source: str, load: LoadAtNodes, time: Array
+        cls, modal: Modal, point: Ints, orders: Ints, source: str, load: LoadAtNodes, time: Array
     ) -> _Responses:
         """Responses to a source of the modes at points (N,), read by derivatives `orders` (N,)."""
         sigma, sigma_slope, order = modal.sigma[point], modal.sigma_slope[point], orders[:, None]
@@ -253,7 +253,7 @@ class _Responses:
 
 def _superposition_error(
     modal: Modal,
-    point: Rows,
+    point: Ints,
     read: tuple[Array, Array],
     share: tuple[Array, Array],
     response: _Responses,

@@ -148,7 +148,7 @@ def _points_of_cut(cuts: Boxes, level: int) -> Array:
     """Return corners of an α-cut and points inside it, shape (S, d), in SI units."""
     lower, upper = cuts.unit(level)
     if not (upper > lower).any():
-        return cuts.modal[None]
+        return cuts.nominal[None]
     inner = (lower + upper) / 2 + (upper - lower) / 2 * chebyshev_points(len(lower), SPREAD)
     ends = corners(lower, upper) if len(lower) <= MAX_CORNER_INPUTS else inner[:0]
     return np.asarray(cuts.to_physical(np.vstack([ends, inner])))

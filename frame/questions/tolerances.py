@@ -49,12 +49,12 @@ class Tolerances:
 
 def scale_supports(inputs: Mapping[str, FuzzyNumber], scale: float) -> dict[str, FuzzyNumber]:
     """Return inputs as their supports, scaled about nominal values; crisp numbers at scale 0."""
-    middles = {name: (number.modal, number.support) for name, number in inputs.items()}
+    middles = {name: (number.nominal, number.support) for name, number in inputs.items()}
     return {
-        name: Interval(modal - scale * (modal - low), modal + scale * (high - modal))
+        name: Interval(nominal - scale * (nominal - low), nominal + scale * (high - nominal))
         if scale > 0 and high > low
-        else Crisp(modal)
-        for name, (modal, (low, high)) in middles.items()
+        else Crisp(nominal)
+        for name, (nominal, (low, high)) in middles.items()
     }
 
 

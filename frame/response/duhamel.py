@@ -32,7 +32,7 @@ from alphacut.frame.calculus.kernels import compiled, kernel
 from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.structures.loads import History
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Ints
 
 parallel = kernel(parallel=True)
 PARALLEL_LOOP = Lock()
@@ -72,9 +72,9 @@ class LinearPieces(NamedTuple):
     first: Array
     last: Array
     step: float
-    interval: Rows
+    interval: Ints
     offsets: Array
-    offset: Rows
+    offset: Ints
     time_rounding: Array
 
 
@@ -176,7 +176,7 @@ def responses_at_nodes(
 
 
 def responses_at_given_nodes(
-    sigma: Array, history: History, time: Array, node: Rows, derivatives: int
+    sigma: Array, history: History, time: Array, node: Ints, derivatives: int
 ) -> tuple[Array, Array]:
     """Return ρ and derivatives as `responses_at_nodes` at one node, of index (S,), per row of σ.
 
@@ -255,7 +255,7 @@ def _respond_at_nodes(
 
 @parallel
 def _respond_at_given(
-    sigma: Array, load: LinearPieces, orders: Orders, node: Rows, out: Array, error: Array
+    sigma: Array, load: LinearPieces, orders: Orders, node: Ints, out: Array, error: Array
 ) -> None:
     """Write ρ of each row of σ (S, n) at the row's node to `out` (1 + len(orders), S, n)."""
     for s in prange(len(sigma)):
@@ -273,7 +273,7 @@ def _respond(
     sigma: complex,
     load: LinearPieces,
     orders: Orders,
-    nodes: tuple[Rows, Rows, Array],
+    nodes: tuple[Ints, Ints, Array],
     offsets: Array,
     factors: tuple[Array, Array, Array],
     start: tuple[int, int],

@@ -18,7 +18,7 @@ from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.response.duhamel import responses_at_nodes
 from alphacut.frame.structures.loads import History
-from alphacut.fuzzy.arrays import Rows
+from alphacut.fuzzy.arrays import Ints
 
 Complex = NDArray[np.complex128]
 REACH = 6.0
@@ -63,7 +63,7 @@ class LoadTable:
         (values,), _ = responses_at_nodes(rate, history, time, window=length)
         self.moment = np.fft.fft(values, axis=1) / order / phase ** np.arange(order)
 
-    def response(self, rate: Array, node: Rows) -> Array:
+    def response(self, rate: Array, node: Ints) -> Array:
         """Return R, dR/dλ and d²R/dλ² at one node per point, (3, N), for eigenvalues (N,)."""
         table = (self.middle, self.scale, self.moment, self.ends, self.time)
         out: Array = np.empty((3, len(rate)), complex)
@@ -103,7 +103,7 @@ class LoadTables:
         (driven,), _ = responses_at_nodes(rate.ravel(), self.history, self.time, 0)
         return np.moveaxis(driven.reshape(len(self.time), *rate.shape), 0, 1)
 
-    def response(self, rate: Array, node: Rows) -> tuple[Array, Array, Array]:
+    def response(self, rate: Array, node: Ints) -> tuple[Array, Array, Array]:
         """R, dR/dλ and d²R/dλ² at one node per point, each shape (N, n), for eigenvalues (N, n)."""
         pairs = zip(self.tables, rate.T, strict=True)
         R, slope, curve = np.stack([table.response(x, node) for table, x in pairs], -1)
@@ -124,7 +124,7 @@ class Direct(LoadTables):
         R[:, :, 0] = self.history.values(self.time)
         return R
 
-    def response(self, rate: Array, node: Rows) -> tuple[Array, Array, Array]:
+    def response(self, rate: Array, node: Ints) -> tuple[Array, Array, Array]:
         """A and its derivatives by λ, which are zero, each shape (N, n)."""
         R: Array = np.zeros(rate.shape, complex)
         R[:, 0] = self.history.values(self.time[node])
@@ -139,11 +139,11 @@ def left_out(phase: float, order: int) -> float:
 @compiled
 def _responses(
     rate: Complex,
-    node: Rows,
+    node: Ints,
     middle: complex,
     scale: float,
     moment: Complex,
-    ends: Rows,
+    ends: Ints,
     time: Array,
     out: Complex,
 ) -> None:

@@ -21,7 +21,7 @@ from alphacut.frame.calculus.kernels import kernel
 from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF
 from alphacut.frame.response.duhamel import absolute_moments, responses_at_nodes
 from alphacut.frame.structures.loads import History
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Ints
 
 compiled_fast = kernel(fastmath={"reassoc", "contract"})
 PHASE = 0.5
@@ -186,7 +186,7 @@ def _raise_amplitudes(
 def _raise_ends(
     sigma: Array,
     rho: Array,
-    around: tuple[Rows, Rows, Array],
+    around: tuple[Ints, Ints, Array],
     added: Array,
     order: int,
     off: Array,

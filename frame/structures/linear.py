@@ -18,7 +18,7 @@ from alphacut.frame.calculus.jet import Jet, concatenate, inverse, variables
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.structures.loads import Accelerogram, Force, History, different
 from alphacut.frame.structures.quantities import Parameter
-from alphacut.fuzzy.arrays import Array, Mask, Rows
+from alphacut.fuzzy.arrays import Array, Ints, Mask
 from alphacut.fuzzy.refused import require
 
 Number = TypeVar("Number", Jet, TaylorModel)
@@ -61,7 +61,7 @@ class Assembly(Generic[Number]):
     rows: Array
     accelerated: Array
     pattern: Array
-    massive: Rows
+    massive: Ints
     loads: Sequence[Force]
     columns: Number | None
 

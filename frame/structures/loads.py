@@ -125,7 +125,8 @@ class History:
         """Upper bounds of the distance of f from straight lines between nodes, shape (T,).
 
         Row j is that of the step that ends at node j. g deviates most at a sample, just before or
-        after it; its chord g_c times the sine by h² max |(g_c sin)″| / 8 at most, h the step.
+        after it. The product of its chord and the sine deviates by h²/8 times its second
+        derivative at most, h the step.
         """
         h, g = np.diff(time, prepend=time[0]), self.envelope(time)
         breaks = self.start + np.arange(len(self.samples)) * self.step

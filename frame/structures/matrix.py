@@ -20,7 +20,7 @@ from alphacut.frame.structures.linear import (
 )
 from alphacut.frame.structures.loads import Accelerogram, Factor, Force, require_forces
 from alphacut.frame.structures.quantities import RATIO, Output, Parameter
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.fuzzy.refused import (
     RefusedError,
     checked_number,
@@ -124,12 +124,12 @@ class MatrixStructure:
         return len(self.mass[0][1])
 
     @cached_property
-    def massive(self) -> Rows:
+    def massive(self) -> Ints:
         """Unknowns that have mass, rising."""
         return np.flatnonzero(np.any([array.any(1) for _, array in self.mass], axis=0))
 
     @cached_property
-    def massless(self) -> Rows:
+    def massless(self) -> Ints:
         """Unknowns that have none."""
         return np.setdiff1d(np.arange(self.size), self.massive)
 
@@ -270,7 +270,7 @@ def value_of(factor: Factor | str | float, p: Mapping[str, Any]) -> Any:
     return factor(p) if callable(factor) else factor
 
 
-def modal_energy_shares(system: MatrixStructure, terms: Sequence[int] | Rows) -> Array:
+def modal_energy_shares(system: MatrixStructure, terms: Sequence[int] | Ints) -> Array:
     """Fraction of each mode's strain energy in some terms of K = Σ K_i, shape (modes,).
 
     It is Σ φᵀK_i φ / φᵀK φ over these terms, for the modes φ by rising frequency. The loss factor

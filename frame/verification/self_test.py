@@ -123,7 +123,7 @@ def cuts_of(envelope: Envelope) -> Boxes:
     """Return the α-cuts of an envelope's inputs as boxes."""
     numbers = envelope.inputs.values()
     ends = np.array([[x.cut(float(a)) for x in numbers] for a in envelope.alpha], float)
-    nominal = np.array([x.modal for x in numbers], float)
+    nominal = np.array([x.nominal for x in numbers], float)
     names = tuple(envelope.inputs)
     return Boxes(names, envelope.alpha, ends[..., 0], ends[..., 1], nominal)
 

@@ -130,7 +130,7 @@ def with_node_deviation(bounds: Envelope, flow: UnitFlow) -> Envelope:
     if bounds.between is not None:
         return bounds
     corners = flow.boxes.probes
-    between = node_deviation(flow.flow, np.vstack([corners, (corners + flow.boxes.modal) / 2]))
+    between = node_deviation(flow.flow, np.vstack([corners, (corners + flow.boxes.nominal) / 2]))
     facts = {**bounds.facts, "between_nodes": float((between / flow.scale).max())}
     return replace(bounds, between=between, facts=facts)
 

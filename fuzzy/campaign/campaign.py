@@ -125,7 +125,7 @@ class Campaign:
         lower, upper = (ends[0] for ends in domain.boxes)
         failures: list[tuple[dict[str, float], str]] = []
         failed_points = []
-        for point in (domain.modal, *(lower + unit * (upper - lower))):
+        for point in (domain.nominal, *(lower + unit * (upper - lower))):
             try:
                 columns = self(point[None]).columns
             except CampaignError as error:

@@ -21,7 +21,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.fuzzy.refused import RefusedError, checked_number, require
 from alphacut.fuzzy.sets.numbers import Stepwise
 
@@ -120,8 +120,8 @@ class Windows:
     """
 
     level: Array
-    low: Rows
-    high: Rows
+    low: Ints
+    high: Ints
 
 
 @lru_cache(maxsize=64)

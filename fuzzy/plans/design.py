@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Mask, Rows
+from alphacut.fuzzy.arrays import Array, Ints, Mask
 from alphacut.fuzzy.campaign.call import Samples, Values
 from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.knowledge.known import contradiction, negligible
@@ -34,7 +34,7 @@ class Design:
 
     domain: Domain
     points: Array
-    levels: tuple[Rows, ...]
+    levels: tuple[Ints, ...]
 
     @classmethod
     def from_levels(cls, domain: Domain, points: Sequence[Array]) -> Design:
@@ -64,11 +64,11 @@ class Design:
             method=method,
         )
 
-    def _extremes(self, values: Array) -> Rows:
+    def _extremes(self, values: Array) -> Ints:
         """Row of the sample with the least of the values (n, outputs), shape (levels, outputs)."""
         columns = np.arange(values.shape[1])
         usable = np.where(np.isnan(values), np.inf, values)
-        least_rows: list[Rows] = []  # from the highest level down
+        least_rows: list[Ints] = []  # from the highest level down
         for alpha, rows in zip(reversed(self.domain.alpha), reversed(self.levels), strict=True):
             candidates = [*least_rows[-1:]]  # higher levels are contained in lower ones
             if len(rows):

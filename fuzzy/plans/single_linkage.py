@@ -32,7 +32,7 @@ from math import ceil, gamma, inf, log, pi, sqrt
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Mask, Rows
+from alphacut.fuzzy.arrays import Array, Ints, Mask
 from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.plans.cut import Bound, CutSearch, Optimum, cuts_with_width
 from alphacut.fuzzy.sets.boxes import Domain
@@ -77,7 +77,7 @@ def uncovered_fraction(samples: int, optima: int) -> float:
     return optima * (optima + 1) / (samples * (samples - 1))
 
 
-def rows_without_better_neighbour(unit: Array, values: Array, distance: float) -> Rows:
+def rows_without_better_neighbour(unit: Array, values: Array, distance: float) -> Ints:
     """Rows of the samples (n, d), in unit coordinates, without a better one within a distance.
 
     Descents start there; infinite values (n,) start none.
@@ -186,7 +186,7 @@ class SingleLinkage:
         # uniform samples of all cuts, and the level of the cut in which each was drawn
         self._points: Array = np.empty((0, len(domain.names)))
         self._values: dict[Bound, Array] = {bound: np.empty(0) for bound in self.bounds}
-        self._levels: Rows = np.empty(0, int)
+        self._levels: Ints = np.empty(0, int)
 
     def run(self, first: Array) -> None:
         """Sample and descend, cut by cut in rounds, until every bound meets the stopping rule.
@@ -320,7 +320,7 @@ class SingleLinkage:
         values = self._values[bound][np.isfinite(self._values[bound])]
         return float(VALUE_TOLERANCE * np.ptp(values) + ROUNDING * np.abs(values).max())
 
-    def _rows(self, cut: CutSearch) -> Rows:
+    def _rows(self, cut: CutSearch) -> Ints:
         """Return the rows of the samples that are uniform in a cut: its own and of wider cuts."""
         return np.flatnonzero((self._levels <= cut.level) & cut.contains(self._points))
 

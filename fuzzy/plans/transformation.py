@@ -21,7 +21,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Mask, Rows
+from alphacut.fuzzy.arrays import Array, Ints, Mask
 from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.knowledge.known import Signs
 from alphacut.fuzzy.plans.design import Design, bounds_of_samples, guaranteed_bounds
@@ -219,7 +219,7 @@ def find_effects(campaign: Campaign, domain: Domain, outputs: tuple[str, ...] = 
     signs = campaign.knowledge.stated_signs(domain.names, outputs)
     lowers, uppers = domain.boxes
     for column in np.flatnonzero(signs.any(axis=0)):
-        campaign(_sign_test_points(domain.modal, signs, lowers[0], uppers[0], int(column)))
+        campaign(_sign_test_points(domain.nominal, signs, lowers[0], uppers[0], int(column)))
 
     def model(points: Array) -> Array:
         """The outputs at points (n, inputs), shape (n, outputs)."""
@@ -231,15 +231,17 @@ def find_effects(campaign: Campaign, domain: Domain, outputs: tuple[str, ...] = 
         box = lowers[row], uppers[row]
         signs = np.where(box[1] == box[0], np.int8(1), signs)
         if (signs == 0).any():
-            signs = np.where(signs == 0, _observed_signs(model, box, domain.modal, signs), signs)
+            signs = np.where(signs == 0, _observed_signs(model, box, domain.nominal, signs), signs)
         levels.append(signs)
     return Effects(outputs, np.array(levels))
 
 
-def _sign_test_points(modal: Array, signs: Signs, lower: Array, upper: Array, column: int) -> Array:
+def _sign_test_points(
+    nominal: Array, signs: Signs, lower: Array, upper: Array, column: int
+) -> Array:
     """Return points (n, inputs) that test the stated sign of the input in a column."""
     # pairs with the input at either end, the others at nominal values or at an extreme corner
-    others = np.concatenate([modal[None], _extreme_corners(signs, lower, upper)])
+    others = np.concatenate([nominal[None], _extreme_corners(signs, lower, upper)])
     points = np.repeat(others, 2, axis=0)
     points[::2, column], points[1::2, column] = lower[column], upper[column]
     return np.asarray(np.unique(points, axis=0))
@@ -251,7 +253,7 @@ def _extreme_corners(signs: Signs, lower: Array, upper: Array) -> Array:
     return np.concatenate([np.where(rises, lower, upper), np.where(rises, upper, lower)])
 
 
-def _observed_signs(model: Model, box: tuple[Array, Array], modal: Array, stated: Signs) -> Signs:
+def _observed_signs(model: Model, box: tuple[Array, Array], nominal: Array, stated: Signs) -> Signs:
     """Return the sign of the slopes at all probes of a box, shape (outputs, inputs).
 
     It is 0 where slopes differ in sign, or the smallest is below 5 % of their range, and 1 for an
@@ -259,10 +261,10 @@ def _observed_signs(model: Model, box: tuple[Array, Array], modal: Array, stated
     """
     lower, upper = box
     free = np.flatnonzero((stated == 0).any(axis=0))
-    first = np.nan_to_num(np.sign(_slopes(model, box, modal[None], free)[0])).astype(np.int8)
+    first = np.nan_to_num(np.sign(_slopes(model, box, nominal[None], free)[0])).astype(np.int8)
     corners = _extreme_corners(np.where(stated != 0, stated, first), lower, upper)
     inside = lower + quasi_random_points(len(lower), _PROBES) * (upper - lower)
-    slopes = _slopes(model, box, np.concatenate([modal[None], corners, inside]), free)
+    slopes = _slopes(model, box, np.concatenate([nominal[None], corners, inside]), free)
     smallest, largest = slopes.min(axis=0), slopes.max(axis=0)
     margin = _MARGIN * (largest - smallest)
     rises = (smallest > 0) & (smallest >= margin)
@@ -271,7 +273,7 @@ def _observed_signs(model: Model, box: tuple[Array, Array], modal: Array, stated
     return np.asarray((rises | has_no_effect).astype(np.int8) - falls.astype(np.int8))
 
 
-def _slopes(model: Model, box: tuple[Array, Array], points: Array, inputs: Rows) -> Array:
+def _slopes(model: Model, box: tuple[Array, Array], points: Array, inputs: Ints) -> Array:
     """Return one-sided differences by some inputs inside a box, (n, outputs, inputs)."""
     (lower, upper), values = box, model(points)
     slopes = np.zeros((*values.shape, points.shape[1]))

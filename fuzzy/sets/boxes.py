@@ -110,9 +110,9 @@ class Domain:
         return cuts[..., 0], cuts[..., 1]
 
     @property
-    def modal(self) -> Array:
+    def nominal(self) -> Array:
         """Nominal point of the inputs, shape (inputs,)."""
-        return np.array([number.modal for number in self.inputs.values()], float)
+        return np.array([number.nominal for number in self.inputs.values()], float)
 
     def inside(self, points: Array) -> Mask:
         """Return which points (n, inputs) lie in the box of each level, a mask (levels, n)."""

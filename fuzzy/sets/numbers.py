@@ -53,7 +53,7 @@ class FuzzyNumber(ABC):
         """The α-cuts at the corners of the membership function."""
 
     @cached_property
-    def modal(self) -> float:
+    def nominal(self) -> float:
         """The nominal value: of membership 1, or the middle of the interval of such values."""
         lower, upper = self.cut(1.0)
         return lower if lower == upper else (lower + upper) / 2
@@ -168,7 +168,7 @@ class Triangular(_Corners):
     """
 
     lower: float
-    modal: float = field()  # declared anew: the base class derives it from the cuts
+    nominal: float = field()  # declared anew: the base class derives it from the cuts
     upper: float
 
 

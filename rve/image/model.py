@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.rve.image.bounds import Interval, StiffnessBounds, inverse_below
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
@@ -190,7 +190,7 @@ def solve_image(bulk: Array, shear: Array, **settings: Any) -> ImageSolution:
 
 
 def phase_energies(
-    solution: ImageSolution, images: ModuliImages, phase: Rows, *, count: int, aspect: float = 1.0
+    solution: ImageSolution, images: ModuliImages, phase: Ints, *, count: int, aspect: float = 1.0
 ) -> PhaseEnergies:
     """Estimated parts of K and G of each phase in C11 + C12, C11 − C12 and C33; nothing is proved.
 
@@ -215,7 +215,7 @@ def phase_energies(
 
 
 def energy_parts(
-    element: Element, side: SideSolution, images: ModuliImages, phase: Rows, count: int
+    element: Element, side: SideSolution, images: ModuliImages, phase: Ints, count: int
 ) -> Array:
     """Energies of unit strains or stresses in K and in G of each phase, shape (count, 2, 3, 3)."""
     bulk, shear = images.bulk[0], images.shear[0]  # bulk is K + G/3, the modulus of the trace

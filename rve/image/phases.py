@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.fuzzy.refused import RefusedError
 
 MIN_MODULUS, MAX_MODULUS = 1e-60, 1e60  # Pa; products of four moduli must be numbers
@@ -104,7 +104,7 @@ class ModuliImages:
         return all(np.array_equal(a, b) for a, b in pairs)
 
 
-def threshold_ranges(grey: Array, thresholds: Sequence[tuple[float, float]]) -> tuple[Rows, Rows]:
+def threshold_ranges(grey: Array, thresholds: Sequence[tuple[float, float]]) -> tuple[Ints, Ints]:
     """Least and greatest number of the phase that each pixel may be of, (rows, columns) each.
 
     A pixel is of phase k if k of the thresholds (lower, upper), rising, are ≤ its grey value.
@@ -115,7 +115,7 @@ def threshold_ranges(grey: Array, thresholds: Sequence[tuple[float, float]]) -> 
     return first, last
 
 
-def moduli_images(first: Rows, last: Rows, phases: Sequence[ModuliInterval]) -> ModuliImages:
+def moduli_images(first: Ints, last: Ints, phases: Sequence[ModuliInterval]) -> ModuliImages:
     """Least and greatest moduli of each pixel over the phases `first` … `last` it may be of."""
     tables = np.zeros((4, len(phases), len(phases)))  # by first and last
     for code in np.unique(first * len(phases) + last):

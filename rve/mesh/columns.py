@@ -11,7 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from alphacut.fuzzy.arrays import Array, Mask, Rows
+from alphacut.fuzzy.arrays import Array, Ints, Mask
 from alphacut.rve.cell.outline import Outline, circle, is_round
 from alphacut.rve.mesh import square
 from alphacut.rve.mesh.gmsh_prisms import INCLUSION, INTERPHASE, Prisms, extruded
@@ -106,7 +106,7 @@ def grid_of(
     # planar nodes are the columns, vertices before edge midpoints
     vertices = np.unique(column[lowest[:, :3]])
     midpoints = np.setdiff1d(column[lowest[:, BELOW]], vertices)
-    planar_of_column: Rows = np.full(num_columns, -1)
+    planar_of_column: Ints = np.full(num_columns, -1)
     planar_of_column[vertices] = np.arange(len(vertices))
     planar_of_column[midpoints] = len(vertices) + np.arange(len(midpoints))
     planar = planar_of_column[column]
@@ -128,13 +128,13 @@ def grid_of(
     return PrismGrid(plane, cells, heights, phase, prisms.names, radius > 0 or is_fixed, fixed)
 
 
-def _levels(prisms: Prisms) -> tuple[Array, Rows]:
+def _levels(prisms: Prisms) -> tuple[Array, Ints]:
     """θ of the levels, rising, and the level of each node, −1 half-way; shapes (k,) and (n,)."""
     on_levels = np.unique(prisms.cells[:, BELOW + ABOVE])
     theta = prisms.points[:, 2]
     rising = np.sort(theta[on_levels])
     thetas = rising[np.append(True, np.diff(rising) > SAME_PLACE)]
-    level: Rows = np.full(len(theta), -1)
+    level: Ints = np.full(len(theta), -1)
     level[on_levels] = np.searchsorted(thetas, theta[on_levels] + SAME_PLACE, side="right") - 1
     below, above = level[prisms.cells[:, BELOW]], level[prisms.cells[:, ABOVE]]
     is_tilted = (below != below[:, :1]).any(axis=1) | (above != below[:, :1] + 1).any(axis=1)
@@ -148,7 +148,7 @@ def _levels(prisms: Prisms) -> tuple[Array, Rows]:
     return np.asarray(thetas), level
 
 
-def _columns(prisms: Prisms) -> tuple[Rows, int]:
+def _columns(prisms: Prisms) -> tuple[Ints, int]:
     """Column of each node by the vertical edges of the prisms, (n,), and the number of columns."""
     below = prisms.cells[:, BELOW + BELOW[:3]].ravel()
     above = prisms.cells[:, ABOVE + HALF_WAY].ravel()
@@ -158,7 +158,7 @@ def _columns(prisms: Prisms) -> tuple[Rows, int]:
     return np.asarray(column), int(count)
 
 
-def _number_nodes(prisms: Prisms, level: Rows, planar: Rows, layers: int, vertices: int) -> Rows:
+def _number_nodes(prisms: Prisms, level: Ints, planar: Ints, layers: int, vertices: int) -> Ints:
     """New number of each node, (n,): all levels, then the planes half-way, vertices first."""
     per_level = int(planar.max()) + 1
     number = level * per_level + planar
@@ -171,7 +171,7 @@ def _number_nodes(prisms: Prisms, level: Rows, planar: Rows, layers: int, vertic
     return np.asarray(number)
 
 
-def _triangles(vertices: Rows, layer: Rows) -> Rows:
+def _triangles(vertices: Ints, layer: Ints) -> Ints:
     """Number of the planar triangle below each prism, by its planar vertices, (prisms, 3)."""
     triangle = np.unique(np.sort(vertices, axis=1), axis=0, return_inverse=True)[1].ravel()
     counts = np.bincount(triangle)
@@ -181,12 +181,12 @@ def _triangles(vertices: Rows, layer: Rows) -> Rows:
 
 
 def _plane(
-    points: Array, cells: Rows, inside: Mask, radius: float, outline: Outline
+    points: Array, cells: Ints, inside: Mask, radius: float, outline: Outline
 ) -> Triangulation:
     """Triangulation of the lowest level, with its edges and its nodes on the interface."""
     triangles = cells[:, BELOW]
     vertices = int(triangles[:, :3].max()) + 1
-    ends: Rows = np.empty((len(points) - vertices, 2), np.intp)
+    ends: Ints = np.empty((len(points) - vertices, 2), np.intp)
     for middle, (first, second) in zip((3, 4, 5), ((0, 1), (0, 2), (1, 2)), strict=True):
         ends[triangles[:, middle] - vertices] = triangles[:, [first, second]]
     edge_ends, _, on_interface = square.edges(triangles[:, :3], inside)
@@ -199,7 +199,7 @@ def _plane(
     )
 
 
-def _rows_in(rows: Rows, candidates: Rows) -> Mask:
+def _rows_in(rows: Ints, candidates: Ints) -> Mask:
     """Mask of the pairs (n, 2) that are among candidates (k, 2), shape (n,)."""
     size = int(rows.max(initial=0)) + 1
     return np.isin(rows @ [size, 1], candidates @ [size, 1])

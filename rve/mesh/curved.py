@@ -10,7 +10,7 @@ from functools import partial
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Mask, Rows
+from alphacut.fuzzy.arrays import Array, Ints, Mask
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.cell.cell import require_mesh_size
 from alphacut.rve.cell.outline import CLOSEST, Outline, circle, is_round, require_fit
@@ -40,8 +40,8 @@ class PlaneMesh:
     """
 
     points: Array
-    triangles: Rows
-    phase: Rows
+    triangles: Ints
+    phase: Ints
     radius: float
     outline: Outline = circle
     thickness: float = 0.0
@@ -111,7 +111,7 @@ def _graded_mesh(
     return PlaneMesh(points, np.sort(triangles, axis=1), phase, radius, outline, thickness)
 
 
-def curved_nodes(mesh: PlaneMesh, order: int) -> tuple[Array, Rows]:
+def curved_nodes(mesh: PlaneMesh, order: int) -> tuple[Array, Ints]:
     """Nodes (n, 2) and cells of Lagrange triangles of `order`, bent onto the outline."""
     element = basix.create_element(
         basix.ElementFamily.P, basix.CellType.triangle, order, basix.LagrangeVariant.gll_warped
@@ -134,7 +134,7 @@ def curved_nodes(mesh: PlaneMesh, order: int) -> tuple[Array, Rows]:
     return points, cells
 
 
-def _lagrange_nodes(triangles: Rows, edges: Rows, counts: tuple[int, int], order: int) -> Rows:
+def _lagrange_nodes(triangles: Ints, edges: Ints, counts: tuple[int, int], order: int) -> Ints:
     """Nodes of each Lagrange triangle of an order, (m, (order + 1)(order + 2)/2), in Basix's order.
 
     From its vertices and edges, (m, 3) each, and the numbers of both. Vertices are numbered first,
@@ -168,7 +168,7 @@ def _polar_positions(corners: Array, barycentric: Array) -> Array:
     return np.asarray(distance[..., None] * unit)
 
 
-def _bend_onto_outline(mesh: PlaneMesh, radius: float, ends: Rows, weights: Array) -> Array:
+def _bend_onto_outline(mesh: PlaneMesh, radius: float, ends: Ints, weights: Array) -> Array:
     """Displacements that bend an edge of triangles, (k, 2), onto the outline, (k, nodes, 2).
 
     Inside a triangle they fade with the bubble of the edge, so the map stays smooth and the
@@ -197,7 +197,7 @@ def quadrature_degree(order: int) -> int:
     return 2 * order + 1
 
 
-def jacobian_ratios(nodes: Array, cells: Rows, order: int) -> Array:
+def jacobian_ratios(nodes: Array, cells: Ints, order: int) -> Array:
     """Least det J over its mean in each isoparametric triangle of `order`, shape (m,)."""
     element = basix.create_element(
         basix.ElementFamily.P, basix.CellType.triangle, order, basix.LagrangeVariant.gll_warped

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.mesh import gmsh_prisms, square
 from alphacut.rve.mesh.columns import grid_of
@@ -127,8 +127,8 @@ def _require_periodic_square(grid: PrismGrid) -> None:
 def write(
     path: Path | str,
     points: Array,
-    cells: Rows,
-    phase: Rows,
+    cells: Ints,
+    phase: Ints,
     names: Sequence[str],
     fields: Mapping[str, Array] | None = None,
 ) -> None:

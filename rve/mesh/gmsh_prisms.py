@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.rve.cell.outline import Outline
 from alphacut.rve.mesh import square
 from alphacut.rve.mesh.periodicity import MeshError
@@ -34,8 +34,8 @@ class Prisms:
     """
 
     points: Array
-    cells: Rows
-    phase: Rows
+    cells: Ints
+    phase: Ints
     names: tuple[str, ...]
 
 
@@ -82,8 +82,8 @@ def read(gmsh: Any) -> Prisms:
     number_of_tag = np.zeros(int(tags.max(initial=0)) + 1, np.int64)
     number_of_tag[tags] = np.arange(len(tags))
     names: list[str] = []
-    cells: list[Rows] = []
-    phases: list[Rows] = []
+    cells: list[Ints] = []
+    phases: list[Ints] = []
     grouped: set[int] = set()
     for _, group in gmsh.model.getPhysicalGroups(3):
         name = gmsh.model.getPhysicalName(3, group) or f"group {group}"
@@ -105,7 +105,7 @@ def read(gmsh: Any) -> Prisms:
     return Prisms(points, compact.reshape(-1, 15), np.concatenate(phases), tuple(names))
 
 
-def _cells_of(gmsh: Any, volume: int, name: str) -> Rows:
+def _cells_of(gmsh: Any, volume: int, name: str) -> Ints:
     """Node tags of the prisms of a volume, shape (m, 15), in Basix's order."""
     kinds, _, nodes = gmsh.model.mesh.getElements(3, volume)
     if list(kinds) != [PRISM_15]:

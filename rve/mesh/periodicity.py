@@ -11,7 +11,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Mask, Rows
+from alphacut.fuzzy.arrays import Array, Ints, Mask
 from alphacut.fuzzy.refused import FailedError
 from alphacut.rve.mesh.prism_grid import Triangulation
 
@@ -31,11 +31,11 @@ class Periodicity:
     `unknown` of each planar node, −1 at the corners, (n,); `vertices` and `count` in all.
     """
 
-    unknown: Rows
+    unknown: Ints
     vertices: int
     count: int
 
-    def ends(self, plane: Triangulation) -> Rows:
+    def ends(self, plane: Triangulation) -> Ints:
         """Unknowns of the vertices beside each midpoint's, −1 where fixed, shape (midpoints, 2)."""
         first = np.unique(self.unknown[plane.vertices :], return_index=True)[1]
         return np.asarray(self.unknown[plane.ends[first]])
@@ -48,20 +48,20 @@ def identify(plane: Triangulation) -> Periodicity:
     return Periodicity(unknown, int(unknown[: plane.vertices].max()) + 1, int(unknown.max()) + 1)
 
 
-def unknowns(points: Array) -> Rows:
+def unknowns(points: Array) -> Ints:
     """Number of each node's unknown, the same for periodic partners, −1 at corners, shape (n,)."""
     on_side = abs(abs(points) - 1) <= SAME_PLACE
-    representative: Rows = np.arange(len(points))
+    representative: Ints = np.arange(len(points))
     for axis in (0, 1):
         first, second = partners(points, on_side[:, axis], axis)
         representative[first] = representative[second] = np.minimum(first, second)
     free = ~on_side.all(axis=1)
-    unknown: Rows = np.full(len(points), -1)
+    unknown: Ints = np.full(len(points), -1)
     unknown[free] = np.unique(representative[free], return_inverse=True)[1]
     return unknown
 
 
-def partners(points: Array, on_side: Mask, axis: int) -> tuple[Rows, Rows]:
+def partners(points: Array, on_side: Mask, axis: int) -> tuple[Ints, Ints]:
     """Nodes of the side x = −1 and their partners on x = 1, (k,) each, sorted along the side.
 
     Args:

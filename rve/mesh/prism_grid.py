@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from alphacut.fuzzy.arrays import Array, Mask, Rows
+from alphacut.fuzzy.arrays import Array, Ints, Mask
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.cell.outline import Outline, circle, reach, require_fit
 from alphacut.stochastic import RadiusMap, ThetaLaw, require_map
@@ -49,8 +49,8 @@ class Triangulation:
 
     points: Array
     vertices: int
-    ends: Rows
-    triangles: Rows
+    ends: Ints
+    triangles: Ints
     inside: Mask
     arc: Mask
     radius: float
@@ -169,9 +169,9 @@ class PrismGrid:
     """
 
     plane: Triangulation
-    cells: Rows
+    cells: Ints
     heights: Array
-    phase: Rows
+    phase: Ints
     names: tuple[str, ...]
     conforming: bool = True
     fixed: Array | None = None

@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Mask, Rows
+from alphacut.fuzzy.arrays import Array, Ints, Mask
 from alphacut.rve.cell.outline import Outline, bend_radii, extents, is_round
 
-Triangles = tuple[Array, Rows, Rows]
+Triangles = tuple[Array, Ints, Ints]
 RING_LAYERS = 2
 """Layers of elements across an interphase; with quadratic ones E is off by some (thickness/2)⁴."""
 Sizes = Callable[[float, float], float]
@@ -82,7 +82,7 @@ def surfaces(
     return _particle_in_ring(geo, size, (radius, radius + thickness), steps)
 
 
-def edges(triangles: Rows, inside: Mask) -> tuple[Rows, Rows, Mask]:
+def edges(triangles: Ints, inside: Mask) -> tuple[Ints, Ints, Mask]:
     """Vertices of edges, (k, 2), edges of triangles, (m, 3), and mask of the interface, (k,)."""
     vertex_pairs = np.sort(triangles[:, EDGES].reshape(-1, 2), axis=1)
     ends, number = np.unique(vertex_pairs, axis=0, return_inverse=True)

@@ -8,7 +8,7 @@ from itertools import permutations
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.rve.cell.cell import THREE_LOADS, AnyPhase, Cell, Interphase, thickness_of
 from alphacut.rve.fenicsx import at_points, fem
 from alphacut.rve.mesh.wedge import vertices_and_midpoints
@@ -44,12 +44,12 @@ class CellFields:
     """
 
     points: Array
-    cells: Rows
-    phase: Rows
+    cells: Ints
+    phase: Ints
     displacement: Array
     stress: Array
     names: tuple[str, ...]
-    node: Rows
+    node: Ints
 
     def in_tetrahedra(self) -> CellFields:
         """The same with each prism as three quadratic tetrahedra in VTK's order, (3 m, 10).
@@ -76,7 +76,7 @@ class CellFields:
         return CellFields(points, cells.reshape(-1, 10), phase, displacement, stress, names, node)
 
 
-def _tetrahedra_nodes(columns: tuple[int, ...]) -> Rows:
+def _tetrahedra_nodes(columns: tuple[int, ...]) -> Ints:
     """Nodes, shape (3, 10), of a prism's tetrahedra; its diagonals rise along `columns`."""
     lower, upper = list(columns), [3 + column for column in columns]
     middles = {frozenset(edge): 6 + k for k, edge in enumerate(EDGES)}

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.rve.cell.cell import AREA
 from alphacut.rve.cell.outline import is_round
@@ -96,7 +96,7 @@ class PrismProblem:
         self.grid, self.comm = grid, comm
         self.mesh = mesh_of(comm, grid.cells, grid.nodes, wedge(3))
         self.space = fem.functionspace(self.mesh, wedge(2))
-        self.wedge: Rows = np.asarray(self.mesh.topology.original_cell_index)
+        self.wedge: Ints = np.asarray(self.mesh.topology.original_cell_index)
         self.layer = self.wedge // len(grid.plane.triangles)
         self.node = self._node_of_dof()
         self._compile_forms()
@@ -108,7 +108,7 @@ class PrismProblem:
         self.matrix = zero_matrix(pairs[cells], self.local_map, rows, self.numbering.size)
         self._to_nodes = NodeScatter(pairs[self.node], self.matrix.createVecRight())
 
-    def _node_of_dof(self) -> Rows:
+    def _node_of_dof(self) -> Ints:
         sizes, geometry = self.space.dofmap.index_map, self.mesh.geometry
         nodes = np.empty(sizes.size_local + sizes.num_ghosts, np.int64)
         nodes[self.space.dofmap.list] = geometry.input_global_indices[geometry.dofmap]

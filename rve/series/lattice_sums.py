@@ -14,7 +14,7 @@ from functools import cache, cached_property
 import numpy as np
 from scipy.special import gammaln, zeta
 
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.rve.cell.cell import AREA
 
 # ζ(z + P) − ζ(z) = π conj(P) / area: Legendre's relation on the square lattice
@@ -55,7 +55,7 @@ def lattice_sums(highest: int) -> LatticeSums:
     return LatticeSums(plain, conjugate)
 
 
-def lattice_images(sums: LatticeSums, k: Rows, n: Rows) -> Array:
+def lattice_images(sums: LatticeSums, k: Ints, n: Ints) -> Array:
     """Taylor coefficients k of Σ (z − P)^-n over all images P ≠ 0, odd n, (len(k), len(n))."""
     k, n = k[:, None], n[None, :]
     log_binomial = gammaln(n + k) - gammaln(n) - gammaln(k + 1)

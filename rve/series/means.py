@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.rve.cell.cell import Cell, Phase, require_continuous
 from alphacut.rve.result.result import STEP, PhaseEnergies, StressCurve
@@ -65,7 +65,7 @@ class CellModuli:
 
     moduli: Array
     errors: Array
-    terms: Rows
+    terms: Ints
     voigt: Callable[[Array, Array, Array], Array]
 
     @property
@@ -197,7 +197,7 @@ class Mean:
 
     curve: StressCurve
     errors: dict[str, Array]
-    terms: Rows
+    terms: Ints
 
 
 @dataclass(frozen=True, eq=False)
@@ -296,7 +296,7 @@ def mean_energies(series: Series, cell: Cell, mean: Mean) -> PhaseEnergies:
     return PhaseEnergies(values, errors, moduli_at)
 
 
-def _rule_energies(series: Series, cell: Cell, rule: ThetaRule, terms: Rows) -> Array:
+def _rule_energies(series: Series, cell: Cell, rule: ThetaRule, terms: Ints) -> Array:
     """Mean energies X ∂c/∂X, shape (2 phases, K and G, 3 moduli), in Pa."""
     moduli = np.array([phase.bulk_and_shear for phase in cell.phases if isinstance(phase, Phase)])
     energies = np.zeros((2, 2, 3))
@@ -309,7 +309,7 @@ def _rule_energies(series: Series, cell: Cell, rule: ThetaRule, terms: Rows) -> 
 
 
 def _mean_moduli(
-    series: Series, cell: Cell, rule: ThetaRule, terms: Rows, bulk: Array, shear: Array
+    series: Series, cell: Cell, rule: ThetaRule, terms: Ints, bulk: Array, shear: Array
 ) -> Array:
     """Mean moduli over θ, (3,), with complex K and G of matrix and particle, (2,) each."""
     radii, total = cell.radius(rule.nodes), np.zeros(3, complex)

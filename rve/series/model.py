@@ -30,7 +30,7 @@ from typing import Any, ClassVar
 import numpy as np
 from scipy.special import gammaln
 
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.cell.cell import Cell, Phase, require_parts, require_points
 from alphacut.rve.result.checks import with_checks
@@ -98,15 +98,15 @@ class Family:
         b_to_q: q at the orders `a` per b_n.
     """
 
-    a: Rows
-    b: Rows
+    a: Ints
+    b: Ints
     to_p: Array
     to_next: Array
     a_to_q: Array
     b_to_q: Array
 
 
-def _conjugate_images(sums: LatticeSums, k: Rows, n: Rows) -> Array:
+def _conjugate_images(sums: LatticeSums, k: Ints, n: Ints) -> Array:
     """Taylor coefficient k of n Σ' conj(P) (z − P)^(-n-1) for odd n."""
     k, n = k[:, None], n[None, :]
     halved = np.exp(gammaln(n + k + 1) - gammaln(n + 1) - gammaln(k + 1) - (n + k) * np.log(2))

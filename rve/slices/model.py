@@ -14,7 +14,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.polynomial.chebyshev import chebvander
 
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.cell.cell import (
     AREA,
@@ -335,7 +335,7 @@ def _space_errors(curve: StressCurve, error: Array, *, square: bool) -> Array:
 
 
 def _mean_energies(
-    cell: Cell, rule: ThetaRule, radii: Array, nodes: Rows, values: Array, errors: Array
+    cell: Cell, rule: ThetaRule, radii: Array, nodes: Ints, values: Array, errors: Array
 ) -> PhaseEnergies:
     """Mean energies of the phases over θ from those at the radii, (n, phases, 2, 3), in Pa."""
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.rve.cell.cell import AnyPhase
 from alphacut.rve.fenicsx import PETSc, at_points, compiled, fem, petsc, ufl
 from alphacut.rve.result.moduli import moduli_of_energies
@@ -20,7 +20,7 @@ ALL_PARTS = slice(None)
 """All parts of a form."""
 
 
-def measure_of(mesh: Any, cells: Rows, metadata: dict[str, Any]) -> Any:
+def measure_of(mesh: Any, cells: Ints, metadata: dict[str, Any]) -> Any:
     """Measure of some cells of this rank; forms over any of them are compiled once."""
     part = [(0, np.asarray(cells, np.int32))]
     return ufl.Measure("dx", mesh, metadata=metadata, subdomain_data=part)(0)

@@ -13,18 +13,18 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.rve.fenicsx import MPI, PETSc
 from alphacut.rve.mesh.periodicity import identify
 from alphacut.rve.mesh.prism_grid import PrismGrid
 
 
-def map_of(pairs: Rows, comm: MPI.Intracomm) -> PETSc.LGMap:
+def map_of(pairs: Ints, comm: MPI.Intracomm) -> PETSc.LGMap:
     """PETSc's local-to-global map of nodes to their pairs of unknowns, −1 where eliminated."""
     return PETSc.LGMap().create(pairs.astype(PETSc.IntType), bsize=2, comm=comm)
 
 
-def zero_matrix(pairs: Rows, local_map: PETSc.LGMap, rows: range, size: int) -> PETSc.Mat:
+def zero_matrix(pairs: Ints, local_map: PETSc.LGMap, rows: range, size: int) -> PETSc.Mat:
     """PETSc matrix of zeros with the sparsity pattern of all unknowns that share a cell.
 
     Args:
@@ -66,7 +66,7 @@ def reduced_vector(values: Array, local_map: PETSc.LGMap, num_rows: int, size: i
 class NodeScatter:
     """Scatter of vectors of unknowns, as `vector` is one, to this rank's nodes by `pairs`."""
 
-    def __init__(self, pairs: Rows, vector: PETSc.Vec) -> None:
+    def __init__(self, pairs: Ints, vector: PETSc.Vec) -> None:
         self._free_nodes = np.flatnonzero(pairs >= 0)
         self._shape = len(pairs), 2
         blocks = pairs[self._free_nodes].astype(PETSc.IntType)
@@ -116,7 +116,7 @@ class LevelNumbering:
         self.layers = range(max(0, first - 1), self.half_levels.stop) if self.levels else range(0)
 
     @cached_property
-    def pairs(self) -> Rows:
+    def pairs(self) -> Ints:
         """Number p of each node's pair of displacements, unknowns 2p and 2p + 1, −1 where held."""
         planar, layers = self.periodicity.unknown, self.grid.layers
         vertices = planar[: self.grid.plane.vertices]

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.fuzzy.refused import require
 
 
@@ -26,7 +26,7 @@ class AreaWeighted:
 
     values: Array
     weights: Array
-    groups: Rows
+    groups: Ints
 
     @classmethod
     def from_values(

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.fuzzy.refused import RefusedError
 
 METRES = {"m": 1.0, "dm": 0.1, "cm": 1e-2, "mm": 1e-3, "µm": 1e-6, "μm": 1e-6, "um": 1e-6}
@@ -22,7 +22,7 @@ MAX_LENGTH = 100  # characters of a number; a longer field is none
 NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 
 
-def length_columns(path: Path, columns: Sequence[str]) -> tuple[Rows, Array]:
+def length_columns(path: Path, columns: Sequence[str]) -> tuple[Ints, Array]:
     """Read columns of lengths from a CSV file, separated by commas, semicolons or tabs.
 
     Empty lines and comments behind # are skipped. A column d of diameters may stand in for "r".

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import KDTree
 
-from alphacut.fuzzy.arrays import Array, Mask, Rows
+from alphacut.fuzzy.arrays import Array, Ints, Mask
 from alphacut.fuzzy.refused import FailedError, checked_number, require
 from alphacut.stochastic.particles.particles import (
     DISCS,
@@ -211,7 +211,7 @@ def _push(particles: Particles, growth: float) -> Particles:
 
 
 def _repulsion(
-    centres: Array, radii: Array, pairs: tuple[Rows, Rows], box: Array
+    centres: Array, radii: Array, pairs: tuple[Ints, Ints], box: Array
 ) -> tuple[Array, float]:
     """Force on each particle, (n, d), equal to its overlaps, and the greatest overlap, in m."""
     first, second = pairs

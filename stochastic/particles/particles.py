@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import KDTree
 
-from alphacut.fuzzy.arrays import Array, Mask, Rows
+from alphacut.fuzzy.arrays import Array, Ints, Mask
 from alphacut.fuzzy.refused import require
 
 
@@ -121,7 +121,7 @@ class Particles:
         """Side of the square or cube of one particle's share, in m."""
         return float((self.measure / len(self)) ** (1 / len(self.size)))
 
-    def separation(self, first: Rows, second: Rows) -> Array:
+    def separation(self, first: Ints, second: Ints) -> Array:
         """Return vectors from centres `first` to the nearest images of `second`, (…, d), in m."""
         offset: Array = self.centres[second] - self.centres[first]
         return nearest_image(offset, self.size) if self.periodic else offset
@@ -141,7 +141,7 @@ def _require_all(is_allowed: Mask | np.bool_, name: str, values: Array, allowed:
 MAX_PAIRS = 3_000_000  # in a portion, so that it fits into memory
 
 
-def size_classes(radii: Array) -> Iterator[Rows]:
+def size_classes(radii: Array) -> Iterator[Ints]:
     """Yield the indices of particles by class: radii of a class lie within a factor of two."""
     number = np.zeros(len(radii))
     largest = radii.max(initial=0.0)
@@ -151,7 +151,7 @@ def size_classes(radii: Array) -> Iterator[Rows]:
         yield np.flatnonzero(number == value)
 
 
-def close_pairs(particles: Particles, gap: float) -> tuple[Rows, Rows]:
+def close_pairs(particles: Particles, gap: float) -> tuple[Ints, Ints]:
     """Return first and second index of unordered pairs with surfaces closer than `gap`, (m,) each.
 
     The gap is in m, 0 finds overlaps; particles are in a periodic box or a window.
@@ -173,13 +173,13 @@ def close_pairs(particles: Particles, gap: float) -> tuple[Rows, Rows]:
     return first[is_close], second[is_close]
 
 
-def surface_distance(particles: Particles, first: Rows, second: Rows) -> Array:
+def surface_distance(particles: Particles, first: Ints, second: Ints) -> Array:
     """Distance between the surfaces of pairs (nearest image), negative where they overlap, in m."""
     distance = np.linalg.norm(particles.separation(first, second), axis=-1)
     return np.asarray(distance - particles.radii[first] - particles.radii[second])
 
 
-def points_in_balls(tree: KDTree, centres: Array, reach: Array) -> tuple[Rows, Rows]:
+def points_in_balls(tree: KDTree, centres: Array, reach: Array) -> tuple[Ints, Ints]:
     """Number of points in each ball, shape (n,), and indices of all points, ball after ball."""
     near = tree.query_ball_point(centres, reach, return_sorted=False)
     counts = np.fromiter(map(len, near), int, len(near))
@@ -196,11 +196,11 @@ class Pairs:
         offset: Vector from the centre of i to that image of j, shape (m, 2), in m.
     """
 
-    first: Rows
-    second: Rows
+    first: Ints
+    second: Ints
     offset: Array
 
-    def select(self, keep: Mask | Rows) -> Pairs:
+    def select(self, keep: Mask | Ints) -> Pairs:
         """The pairs of a mask, or of indices."""
         return Pairs(self.first[keep], self.second[keep], self.offset[keep])
 
@@ -214,7 +214,7 @@ class Pairs:
         return Pairs(first[order], second[order], offset[order])
 
 
-def pairs_within(discs: Particles, reach: Array) -> Iterator[tuple[Rows, Pairs]]:
+def pairs_within(discs: Particles, reach: Array) -> Iterator[tuple[Ints, Pairs]]:
     """Yield ordered pairs of disc i and periodic image of disc j with centres within reach_i.
 
     They come in portions of `MAX_PAIRS` pairs or so, with the indices i of each; `reach` is in m,
@@ -234,10 +234,10 @@ def pairs_within(discs: Particles, reach: Array) -> Iterator[tuple[Rows, Pairs]]
         yield portion, Pairs(first, second, offset).select(is_pair)
 
 
-def _periodic_images(discs: Particles, margin: float) -> tuple[Rows, Array]:
+def _periodic_images(discs: Particles, margin: float) -> tuple[Ints, Array]:
     """Disc and shift of all periodic images within `margin` of the box, originals first."""
     originals = np.arange(len(discs), dtype=np.intp)
-    indices: list[Rows] = [originals]
+    indices: list[Ints] = [originals]
     shifts: list[Array] = [np.zeros((len(discs), 2))]
     tiles = np.ceil(margin / discs.size).astype(int) if discs.periodic else (0, 0)
     for tile in itertools.product(*(range(-number, number + 1) for number in tiles)):

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.fuzzy.refused import require
 from alphacut.stochastic.particles.particles import Pairs, Particles, pairs_within
 from alphacut.stochastic.tessellation.circle_envelope import (
@@ -50,8 +50,8 @@ class Apollonius:
 
     discs: Particles
     areas: Array
-    cell: Rows
-    neighbour: Rows
+    cell: Ints
+    neighbour: Ints
     offset: Array
     start: Array
     end: Array
@@ -91,7 +91,7 @@ def apollonius(discs: Particles) -> Apollonius:
     return Apollonius(discs, areas, cell, neighbour, offset, start, end)
 
 
-def _near_far(radii: Array, first: Rows, second: Rows, offset: Array) -> tuple[Array, Array]:
+def _near_far(radii: Array, first: Ints, second: Ints, offset: Array) -> tuple[Array, Array]:
     """D + Δ and d − Δ of pairs: d distance of the centres, Δ = r_first − r_second, 0 at an edge."""
     distance = np.hypot(offset[:, 0], offset[:, 1])
     difference = np.where(second < 0, 0.0, radii[first] - radii[second])
@@ -150,7 +150,7 @@ def _walls(discs: Particles, reach: Array) -> Iterator[_Walls]:
         yield _Walls(discs, pairs, upper_envelopes(a, b, 1 / near - 1 / far, counts))
 
 
-def _bounding_pairs(discs: Particles, portion: Rows) -> Pairs:
+def _bounding_pairs(discs: Particles, portion: Ints) -> Pairs:
     """Pairs that bound every cell: own images, or in a window mirror images (`second` is −1)."""
     if discs.periodic:
         shifts = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j]) * discs.size
@@ -165,7 +165,7 @@ def _bounding_pairs(discs: Particles, portion: Rows) -> Pairs:
     return Pairs(np.repeat(portion, 4), np.full(4 * len(portion), -1), offset.reshape(-1, 2))
 
 
-def counted_cells(diagram: Apollonius) -> tuple[Rows, Array]:
+def counted_cells(diagram: Apollonius) -> tuple[Ints, Array]:
     """Cells that no disc outside the window can change, and the number that each stands for.
 
     Large cells are changed more often than small ones; each counted cell therefore stands for 1/p
@@ -223,8 +223,8 @@ class Neighbours:
         offset: Vector to the other end, shape (m, 2), in m.
     """
 
-    number: Rows
-    first: Rows
+    number: Ints
+    first: Ints
     offset: Array
 
     @property

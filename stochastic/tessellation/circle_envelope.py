@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.fuzzy.refused import FailedError
 
 
@@ -63,13 +63,13 @@ class Arcs:
     uppermost there, counted through all envelopes.
     """
 
-    owner: Rows
-    function: Rows
+    owner: Ints
+    function: Ints
     start: Array
     end: Array
 
 
-def upper_envelopes(a: Array, b: Array, c: Array, counts: Rows) -> Arcs:
+def upper_envelopes(a: Array, b: Array, c: Array, counts: Ints) -> Arcs:
     """Arcs of the upper envelopes of groups of functions a cos φ + b sin φ + c.
 
     Args:
@@ -82,7 +82,7 @@ def upper_envelopes(a: Array, b: Array, c: Array, counts: Rows) -> Arcs:
     pending = np.argsort(counts, kind="stable")
     pending = pending[counts[pending] > 0]
     no_rows, no_angles = np.zeros(0, np.intp), np.zeros(0)
-    parts: list[tuple[Rows, Rows, Array, Array]] = [(no_rows, no_rows, no_angles, no_angles)]
+    parts: list[tuple[Ints, Ints, Array, Array]] = [(no_rows, no_rows, no_angles, no_angles)]
     while len(pending):
         # groups of like size share one padded table, small enough for the cache
         width = int(counts[pending[: max(1, len(pending) // 64)]][-1])
@@ -99,8 +99,8 @@ def upper_envelopes(a: Array, b: Array, c: Array, counts: Rows) -> Arcs:
 
 
 def _sweep(
-    a: Array, b: Array, c: Array, table: Rows, group: Rows
-) -> tuple[Rows, Rows, Array, Array]:
+    a: Array, b: Array, c: Array, table: Ints, group: Ints
+) -> tuple[Ints, Ints, Array, Array]:
     """Arcs of n upper envelopes by one sweep of all around the circle, from crossing to crossing.
 
     The tables (n, w) have a row for each group, whose numbers are `group`, and the index of each
@@ -110,7 +110,7 @@ def _sweep(
     highest = np.argmax(np.hypot(a, b) + c, axis=1)  # its maximum is on the envelope
     phi = np.arctan2(b[row, highest], a[row, highest])
     open_rows, limit = row, phi + 2 * np.pi
-    crossings: list[tuple[Rows, Rows, Array]] = []  # row, function that becomes uppermost, angle
+    crossings: list[tuple[Ints, Ints, Array]] = []  # row, function that becomes uppermost, angle
     for step in range(4 * a.shape[1] + 16):
         after = phi + STRIDE if step else phi
         uppermost, angle_ahead = _next_crossing(a, b, c, after)
@@ -126,8 +126,8 @@ def _sweep(
 
 
 def _arcs_between(
-    crossings: list[tuple[Rows, Rows, Array]], table: Rows, group: Rows
-) -> tuple[Rows, Rows, Array, Array]:
+    crossings: list[tuple[Ints, Ints, Array]], table: Ints, group: Ints
+) -> tuple[Ints, Ints, Array, Array]:
     """Arcs between the crossings of a sweep: row, column that becomes uppermost, φ of each."""
     row, column, start = map(np.concatenate, zip(*crossings, strict=True))
     order = np.argsort(row, kind="stable")
@@ -144,7 +144,7 @@ def _arcs_between(
     return group[row[keep]], function[keep], start[keep], end[keep]
 
 
-def _next_crossing(a: Array, b: Array, c: Array, phi: Array) -> tuple[Rows, Array]:
+def _next_crossing(a: Array, b: Array, c: Array, phi: Array) -> tuple[Ints, Array]:
     """Uppermost function (n,) of each row at angles φ (n,), and the angle to its next crossing."""
     # The difference g ≤ 0 of another function to the uppermost one has at φ the value −h, the slope
     # q, the oscillating part p and the constant d. Ahead by δ, with t = tan(δ/2), it is zero where

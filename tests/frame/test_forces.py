@@ -60,7 +60,7 @@ FRAME = StoreyFrame(
 
 
 def course(force, t):
-    """f(t) at the modal amplitude, written from the definition."""
+    """f(t) at the nominal amplitude, written from the definition."""
     h = force.history
     if h is None or t < h.start:
         return 0.0

@@ -66,7 +66,7 @@ def along_fibres(bulk, shear, fraction, phases):
 
 
 def phases_of(case, changes):
-    """E in GPa and ν of matrix and inclusion at the modal values."""
+    """E in GPa and ν of matrix and inclusion at the nominal values."""
     cell = tomllib.loads((ROOT / f"cases/{case}.toml").read_text(encoding="utf-8"))["cell"]
     pairs = []
     for name in ("matrix", "inclusion"):

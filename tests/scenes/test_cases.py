@@ -63,8 +63,8 @@ def same_modulus(new, old):
     assert len(new["alpha"]) >= 2
     rows = [old["alpha"].index(level) for level in new["alpha"]]
     as_sure(new, old)
-    modal = relative_error(new) + relative_error(old)  # at α = 1
-    share = 2 * modal + 1e-9  # small particles, of which α = 0 has more, are coarser
+    nominal = relative_error(new) + relative_error(old)  # at α = 1
+    share = 2 * nominal + 1e-9  # small particles, of which α = 0 has more, are coarser
     for side in ("lower", "upper"):
         ends = [old["E_GPa"][side][row] for row in rows]
         assert new["E_GPa"][side] == pytest.approx(ends, rel=share)

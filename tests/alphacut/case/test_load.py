@@ -156,7 +156,7 @@ CHANGES = [
     ("envelope.fuzzy=E,m1", lambda c: c.envelope.fuzzy, ("E", "m1")),
     ("envelope.alpha=0,1", lambda c: c.envelope.alpha, (0.0, 1.0)),
     ("frame.modulus=[20, 30] GPa", lambda c: c.frame.modulus, Interval(20e9, 30e9)),
-    ('frame.damping_ratio="5 %"', lambda c: c.frame.damping_ratio[0].modal, 0.05),
+    ('frame.damping_ratio="5 %"', lambda c: c.frame.damping_ratio[0].nominal, 0.05),
 ]
 
 

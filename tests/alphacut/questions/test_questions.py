@@ -64,7 +64,7 @@ def test_tolerances_keep_what_the_decision_keeps(summary):
     assert set(answer["supports"]) == {"E", "m1"}
     for support in answer["supports"].values():
         low, high = support["kept"]
-        assert low < support["own"][0] < support["modal"] < support["own"][1] < high
+        assert low < support["own"][0] < support["nominal"] < support["own"][1] < high
 
 
 @pytest.mark.parametrize(

@@ -54,9 +54,9 @@ def summary(folder, text):
 def test_the_frame_is_damped_by_half_the_loss_factor_of_its_material(tmp_path):
     document = summary(tmp_path, CASE)
     loss = document["modulus"]["loss"]["E"]
-    low, modal, high = document["damping"]["zeta"]
+    low, nominal, high = document["damping"]["zeta"]
     expected = np.sin(np.arctan([loss["lower"][0], loss["lower"][-1], loss["upper"][0]]) / 2)
-    assert np.allclose([low, modal, high], expected, rtol=1e-12)
+    assert np.allclose([low, nominal, high], expected, rtol=1e-12)
     assert low > 0.35e-2 / 2
     assert high < 2.6e-2 / 2
     assert document["envelopes"]["all"]["nature"] == "guaranteed"
@@ -107,7 +107,7 @@ def test_joints_come_on_top_on_every_level():
         joints, loss = damping.joints.cut(level), Triangular(0.01, 0.02, 0.04).cut(level)
         expected = np.sin(np.arctan(np.array(loss) / 2) / 2) + joints
         assert np.allclose(ratio.cut(level), expected, rtol=1e-12)
-    assert MaterialDamping().damping_ratio(Crisp(0.02)).modal == pytest.approx(0.01, rel=1e-3)
+    assert MaterialDamping().damping_ratio(Crisp(0.02)).nominal == pytest.approx(0.01, rel=1e-3)
 
 
 def test_a_lossless_ground_storey_damps_modes_by_their_energy_elsewhere():

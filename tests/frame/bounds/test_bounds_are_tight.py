@@ -230,7 +230,7 @@ def test_an_error_of_time_stepping_does_not_fall_after_it_was_seen() -> None:
     frame = StoreyFrame((1.0,), (1.0,), 1 / 24, 1.0, q0=(1.0,))
     flow = LinearFlow(frame, ("E",), 40.0, 0.5, Midpoint())
     cuts = boxes({"E": Interval(0.999 / 24, 1.001 / 24)}, (0,))
-    raw = flow.deviations(cuts.modal[None])[1][0]
+    raw = flow.deviations(cuts.nominal[None])[1][0]
     error = step_error(UnitFlow(flow, cuts))
     assert (np.diff(raw, axis=0) < 0).any()
     assert (np.diff(error, axis=0) >= 0).all()

@@ -169,10 +169,10 @@ def test_wide_bounds_of_a_proof_get_peaks_that_are_followed_inside_them(monkeypa
     system, inputs = KINDS["record"]
     flow = UnitFlow(frame.LinearFlow(system, tuple(inputs), 4.0, 0.05, frame.Exact()),
                     boxes(inputs, MOTION["alpha"]))  # fmt: skip
-    nominal = np.repeat(flow.values(flow.boxes.to_unit(flow.boxes.modal)[None]), 3, axis=0)
+    nominal = np.repeat(flow.values(flow.boxes.to_unit(flow.boxes.nominal)[None]), 3, axis=0)
     close = envelope(system, inputs, frame.Proof(tolerance=1e-4), **MOTION)
     more = np.abs(close.upper).max((0, 1))
-    at = np.broadcast_to(flow.boxes.modal, close.upper_at.shape)
+    at = np.broadcast_to(flow.boxes.nominal, close.upper_at.shape)
     wide = replace(close, inner=Ends(nominal, nominal), upper=close.upper + more,
                    lower=close.lower - more, lower_at=at, upper_at=at)  # fmt: skip
     monkeypatch.setattr(frame.DualProof, "run", lambda *_: wide)

@@ -75,7 +75,7 @@ def test_bounds_fill_in_what_the_values_do_not_decide():
     assert number.support == (1, 3)
     assert number.cut(0.25) == (1.88, 2.10)
     assert number.cut(np.nextafter(0.25, 0)) == (1.88, 3)
-    assert number.modal == 2.01
+    assert number.nominal == 2.01
     assert number.membership([0.5, 1.5, 1.9, 2.01]) == pytest.approx([0, 1 / 8, 3 / 8, 1])
 
 

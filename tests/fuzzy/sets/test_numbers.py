@@ -25,7 +25,7 @@ def test_cuts_are_nested_and_reach_from_support_to_modal_value(number):
     cuts = [number.cut(level) for level in np.linspace(0, 1, 41)]
     assert cuts[0] == number.support
     assert all(a.lower <= b.lower <= b.upper <= a.upper for a, b in itertools.pairwise(cuts))
-    assert cuts[-1].lower <= number.modal <= cuts[-1].upper
+    assert cuts[-1].lower <= number.nominal <= cuts[-1].upper
 
 
 @pytest.mark.parametrize("number", NUMBERS, ids=lambda number: type(number).__name__)
@@ -42,7 +42,7 @@ def test_triangle_meets_its_three_values_exactly(values):
     triangle = Triangular(*values)
     assert triangle.cut(0) == (values[0], values[2])
     assert triangle.cut(1) == (values[1], values[1])
-    assert triangle.modal == values[1]
+    assert triangle.nominal == values[1]
 
 
 def test_what_is_no_number_has_no_grade():
