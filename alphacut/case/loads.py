@@ -203,8 +203,8 @@ def _read_recordings(value: object, info: ValidationInfo) -> tuple[Recording, ..
         except RefusedError as error:
             errors.append(error)
     if errors:  # all bad files of a folder at once, the first with its reason
-        first, *others = errors
-        names = [error.key.partition(",")[0] for error in others]
+        first, *further = errors
+        names = [error.key.partition(",")[0] for error in further]
         # in the cure, which is never cut off
         cures = [f"bad as well: {', '.join(names)}"] * bool(names) + [first.cure] * bool(first.cure)
         raise RefusedError(first.key, first.value, first.allowed, "; ".join(cures))

@@ -82,8 +82,8 @@ def read_cosmos(file: TextFile, channel: str = "") -> Recording:
             are not those of the format.
     """
     channels = list(_cosmos_channels(file) if is_cosmos(file) else _csmip_channels(file))
-    place = file.place(channels[0].line if channels else 0)
-    return channels[choose_channel(place, channel, [x.names for x in channels])].read()
+    location = file.location(channels[0].line if channels else 0)
+    return channels[choose_channel(location, channel, [x.names for x in channels])].read()
 
 
 def _samples(file: TextFile, line: int, count: int, per_line: int, width: int) -> Array:
@@ -116,7 +116,7 @@ def _read_cosmos(file: TextFile, line: int, reals: int, names: tuple[str, ...]) 
     step = _cosmos_step(file, line, reals, count, float(match[2]))
     below = file.lines[line + 1].rstrip() if line + 1 < len(file.lines) else ""
     samples = _samples(file, line, count, len(below) // max(width, 1), width)
-    return recording_in_si(file.place(line), "COSMOS V2", unit, step, samples, " ".join(names))
+    return recording_in_si(file.location(line), "COSMOS V2", unit, step, samples, " ".join(names))
 
 
 def _cosmos_step(file: TextFile, line: int, reals: int, count: int, duration: float) -> float:
@@ -156,7 +156,7 @@ def _read_csmip(file: TextFile, start: int, end: int, names: tuple[str, ...]) ->
             per_line, width = int(match[5] or 8), int(match[6] or 10)
             samples = _samples(file, line, int(match[1]), per_line, width)
             return recording_in_si(
-                file.place(line), "CSMIP", unit, float(match[2]), samples, " ".join(names)
+                file.location(line), "CSMIP", unit, float(match[2]), samples, " ".join(names)
             )
     return _read_unannounced(file, start, end, names)
 
@@ -185,4 +185,4 @@ def _read_unannounced(file: TextFile, start: int, end: int, names: tuple[str, ..
         step = float(steps.mean())
         if np.ptp(steps) > 0.1 * step or not step > 0:
             raise file.refusal(line, "uneven times", "even steps", "resample to even steps")
-    return recording_in_si(file.place(line), "CSMIP V1", unit, step, samples, " ".join(names))
+    return recording_in_si(file.location(line), "CSMIP V1", unit, step, samples, " ".join(names))

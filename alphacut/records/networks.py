@@ -68,7 +68,7 @@ def read_peer(file: TextFile) -> Recording:
         file.require_count(samples, count, row)
     component = PEER_COMPONENT.fullmatch(file.lines[1]) if row > 1 else None
     channel = component[1] if component else ""
-    return recording_in_si(file.place(line), "PEER AT2", unit, step, samples, channel)
+    return recording_in_si(file.location(line), "PEER AT2", unit, step, samples, channel)
 
 
 def _peer_unit(file: TextFile, last: int) -> tuple[int, str]:
@@ -113,8 +113,8 @@ def read_knet(file: TextFile) -> Recording:
     rate, duration, gal, full_scale = numbers
     counts = file.numbers(end + 1, len(file.lines))
     file.require_count(counts, round(duration * rate), head["Duration Time(s)"][0])
-    place, channel = file.place(end), head.get("Dir.", (0, ""))[1].strip()
-    return recording_in_si(place, "K-NET", "gal", 1 / rate, counts * (gal / full_scale), channel)
+    location, channel = file.location(end), head.get("Dir.", (0, ""))[1].strip()
+    return recording_in_si(location, "K-NET", "gal", 1 / rate, counts * (gal / full_scale), channel)
 
 
 def is_esm(file: TextFile) -> bool:
@@ -139,7 +139,7 @@ def read_esm(file: TextFile) -> Recording:
     samples = file.numbers(first, len(file.lines))
     file.require_count(samples, count, head[COUNT][1])
     return recording_in_si(
-        file.place(line), "ESM", unit, step, samples, head.get("STREAM", ("", 0))[0]
+        file.location(line), "ESM", unit, step, samples, head.get("STREAM", ("", 0))[0]
     )
 
 
@@ -192,7 +192,7 @@ def read_smc(file: TextFile) -> Recording:
     samples = file.numbers(first, first + ceil(count / 8), width=10)
     file.require_count(samples, count, SMC_TEXT)
     channel = "vertical" if integers[VERTICAL_ANGLE - 1] in (0, 180) else ""
-    return recording_in_si(file.place(reals_line), "SMC", "cm/s^2", 1 / rate, samples, channel)
+    return recording_in_si(file.location(reals_line), "SMC", "cm/s^2", 1 / rate, samples, channel)
 
 
 FORMATS: tuple[tuple[Callable[[TextFile], bool], Callable[[TextFile], Recording]], ...] = (

@@ -99,13 +99,13 @@ def read_table(file: TextFile, step: float | None = None, unit: str = "") -> Rec
         allowed = f"a unit of {ACCELERATION_UNITS}, and a step" if columns == 1 else ALLOWED
         cure = 'records.unit = "g"' + (', records.step = "0.005 s"' if columns == 1 else "")
         raise file.refusal(table.start, value, allowed, f"or say {cure}")
-    numbers, place = table.numbers(file, columns), file.place(table.start)
+    numbers, location = table.numbers(file, columns), file.location(table.start)
     if columns == 1:
-        return recording_in_si(place, "one column", unit, step or 0.0, numbers[:, 0])
+        return recording_in_si(location, "one column", unit, step or 0.0, numbers[:, 0])
     step, remarks = _even_step(file, to_s * numbers[:, 0], [*table.rows])
     remarks += ("its times have no unit, taken as s",) * bool(match and not time_unit)
     name = "CSV" if match else "two columns"
-    return recording_in_si(place, name, unit, step, numbers[:, 1], "", remarks)
+    return recording_in_si(location, name, unit, step, numbers[:, 1], "", remarks)
 
 
 def _factor_to_seconds(unit: str) -> float:

@@ -63,13 +63,13 @@ class TextFile:
             raise file.refusal(longest, f"{lengths[longest]:,} letters long", allowed)
         return file
 
-    def place(self, line: int) -> str:
+    def location(self, line: int) -> str:
         """Name of a line, counted from 0, for messages."""
         return f"{self.name}, line {line + 1}"
 
     def refusal(self, line: int, value: object, allowed: str, cure: str = "") -> RefusedError:
         """Error about a line, counted from 0."""
-        return RefusedError(self.place(line), str(value)[:80], allowed, cure)
+        return RefusedError(self.location(line), str(value)[:80], allowed, cure)
 
     def numbers(self, first: int, last: int, *, width: int = 0, count: int = 0) -> Array:
         """All numbers from line `first` up to, but not with, line `last`, counted from 0.
@@ -105,7 +105,7 @@ class TextFile:
 
 
 def recording_in_si(
-    place: str,
+    location: str,
     file_format: str,
     unit: str,
     step: float,
@@ -117,18 +117,18 @@ def recording_in_si(
     to_si = acceleration_factor(unit)
     if to_si is None:
         value = f"in units of {unit}" if unit else "without a unit"
-        raise RefusedError(place, value, f"accelerations in {ACCELERATION_UNITS}")
+        raise RefusedError(location, value, f"accelerations in {ACCELERATION_UNITS}")
     allowed = f"a step above 0 and below {LONGEST_STEP:g} s"
-    require(0 < step < LONGEST_STEP, place, value=f"a step of {step:g} s", allowed=allowed)
+    require(0 < step < LONGEST_STEP, location, value=f"a step of {step:g} s", allowed=allowed)
     return Recording(file_format, unit, step, to_si * samples, channel, remarks)
 
 
-def choose_channel(place: str, channel: str, names: Sequence[tuple[str, ...]]) -> int:
+def choose_channel(location: str, channel: str, names: Sequence[tuple[str, ...]]) -> int:
     """Index of the channel that has a name; of the only one where none is asked for."""
-    chosen = [k for k, own in enumerate(names) if not channel or channel.lower() in own]
-    allowed = "; ".join(dict.fromkeys(" or ".join(own) for own in names)) or "accelerations"
+    chosen = [k for k, aliases in enumerate(names) if not channel or channel.lower() in aliases]
+    allowed = "; ".join(dict.fromkeys(" or ".join(aliases) for aliases in names)) or "accelerations"
     value = f"channel {channel or 'not named'}"
-    require(len(chosen) == 1, place, value=value, allowed=f"one of: {allowed}")
+    require(len(chosen) == 1, location, value=value, allowed=f"one of: {allowed}")
     return chosen[0]
 
 

@@ -395,8 +395,8 @@ def solution_series(matrix: TaylorModel, right: TaylorModel) -> TaylorModel:
     middle_inverse = np.linalg.inv(matrix.value)
     parts = [middle_inverse @ right.part(0)]
     for degree in range(1, order + 1):
-        known = product_part(matrix.parts, parts, degree, d, matmul)
-        parts.append(middle_inverse @ (right.part(degree) - known))
+        lower_degrees = product_part(matrix.parts, parts, degree, d, matmul)
+        parts.append(middle_inverse @ (right.part(degree) - lower_degrees))
     return TaylorModel(tuple(parts), np.zeros(right.shape), d, order)
 
 

@@ -269,8 +269,8 @@ def _line_deviation(model: ModalModel) -> Array:
             sigma = np.multiply.outer(-np.linspace(*q, 3) + 1j, along_omega)
             modulus, of_imaginary = line_deviations(sigma, load, model.time, (0,))[0]
             of_imaginary = np.minimum(omega[1][k] * of_imaginary, modulus)  # which is over ω
-            apart = np.outer(modulus, real[k]) + np.outer(of_imaginary, imaginary[k])
-            deviation += 2 * np.minimum(np.outer(modulus, size[k]), apart)
+            by_parts = np.outer(modulus, real[k]) + np.outer(of_imaginary, imaginary[k])
+            deviation += 2 * np.minimum(np.outer(modulus, size[k]), by_parts)
     return deviation
 
 

@@ -192,8 +192,8 @@ def outputs_at(
     sigma, t = modal.sigma[point], time[:, None]
     exp = np.exp(sigma * t)
     rounding = (gamma(4) + UNIT_ROUNDOFF * np.abs(sigma) * t) * np.abs(exp)
-    one = np.ones_like(time)
-    free = LoadAtNodes(np.stack([exp, t * exp]), rounding, one, 0 * one)
+    unit_load = np.ones_like(time)
+    free = LoadAtNodes(np.stack([exp, t * exp]), rounding, unit_load, 0 * unit_load)
     read = modal.output_coefficients(point, output)
     total, error = np.zeros((2, len(point)))
     for source, load in {"velocity": free, "start": free, **loads}.items():
@@ -272,8 +272,8 @@ def _superposition_error(
     unlimited = np.full_like(gaps, np.inf)
     quotient = np.divide(e[:, :, None] + e[:, None], gaps, out=unlimited, where=gaps > 0)
     diagonal = np.eye(n, dtype=bool)
-    divided = np.where(diagonal, response.slope[:, None], np.minimum(quotient, cap))
-    couplings = modal.stiffness_error[point] * divided
+    divided_differences = np.where(diagonal, response.slope[:, None], np.minimum(quotient, cap))
+    couplings = modal.stiffness_error[point] * divided_differences
     error += np.einsum("sj,sjk,sk->s", r, couplings, c, optimize=True)
     error += np.einsum("sj,sjk,sk->s", r * e, modal.mass_error[point], c, optimize=True)
     return np.asarray(error)

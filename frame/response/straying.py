@@ -79,7 +79,7 @@ def line_deviations(
     # of each end of a piece: the nodes around it, and its place between them, 0 at a node
     left = np.repeat(node, np.diff(node, append=node[-1] + 1))
     right = np.append(np.repeat(node[1:], np.diff(node)), node[-1])
-    place = (times - times[left]) / np.maximum(times[right] - times[left], 1e-300)
+    fraction = (times - times[left]) / np.maximum(times[right] - times[left], 1e-300)
     # how far the load lies off the line between nodes, before and after each end
     off_line = np.stack([np.append(0.0, pieces.last), np.append(pieces.first, 0.0)])
     off_line -= np.interp(times, time, load.values(time) if load else np.zeros(len(time)))
@@ -99,7 +99,7 @@ def line_deviations(
         for order in orders
     }
     for order in orders:
-        largest[order][2][3:] = np.where(place > 0, 0.0, np.abs(added[order]))
+        largest[order][2][3:] = np.where(fraction > 0, 0.0, np.abs(added[order]))
     count = 1 if tables else -(-3 * len(times) * sigma.size // MAX_ENTRIES)
     for part in np.array_split(sigma.ravel(), count):
         if tables:
@@ -111,11 +111,11 @@ def line_deviations(
             rho, error = responses_at_nodes(part, load, times, 2)
         for order, (amplitude, rounding, off) in largest.items():
             _raise_amplitudes(part, rho, error, pieces.first, slope, order, amplitude, rounding)
-            _raise_ends(part, rho, (left, right, place), added[order], order, off)
+            _raise_ends(part, rho, (left, right, fraction), added[order], order, off)
     # between the points of the grid F strays from what is bilinear by `between` |F″|
     h, k_step = (float(np.diff(np.sort(x)).max(initial=0.0)) for x in (omega, quotient))
     between = ((1 + quotient.max() ** 2) * h**2 + (omega.max() * k_step) ** 2) / 8
-    growth, inside = np.exp(max(-decay, 0.0) * d), place > 0
+    growth, inside = np.exp(max(-decay, 0.0) * d), fraction > 0
     found = dict[int, Array]()
     for order, (amplitude, rounding, off) in largest.items():
         fourth = sum(
@@ -196,11 +196,11 @@ def _raise_ends(
     H is σ^order ρ less the line through it at the nodes around an end; `added` is the load, off
     its own line, before and after the end, shape (2, P + 1).
     """
-    left, right, place = around
+    left, right, fraction = around
     power = sigma**order
     power_first, power_second = order * sigma ** max(order - 1, 0), order * (order - 1.0)
-    for p in range(len(place)):
-        x, i, j = place[p], left[p], right[p]
+    for p in range(len(fraction)):
+        x, i, j = fraction[p], left[p], right[p]
         if x == 0:
             continue
         largest, largest_second, total = 0.0, 0.0, 0.0

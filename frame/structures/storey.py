@@ -240,7 +240,7 @@ class StoreyFrame:
         """Matrices, rows and loads at parameters `p`, jets or Taylor models (eq. 23)."""
         n, links, names = self.floors, self.springs(p), self.force_names
         floors, storeys = diagonal(np.eye(n)), chain_matrix(np.eye(n))
-        dashpots, one = self._of_floors("d{}", p), p["rayleigh_mass"] * 0.0 + 1.0
+        dashpots, unity = self._of_floors("d{}", p), p["rayleigh_mass"] * 0.0 + 1.0
         shears = [z if kind == "shear" else None for kind, z in map(self.quantity, self.outputs)]
         forces = np.array([np.eye(n)[int(force.at) - 1] for force in self.loads])
         return Assembly(
@@ -252,7 +252,7 @@ class StoreyFrame:
             ratios=[p[name] for name in self.ratios],
             q0=self._of_floors("q{}_0", p),
             v0=self._of_floors("v{}_0", p),
-            row_factors=stack([one if z is None else links[..., z] for z in shears]),
+            row_factors=stack([unity if z is None else links[..., z] for z in shears]),
             rows=self._rows[:, : 2 * n],
             accelerated=self._rows[:, 2 * n :],
             pattern=np.ones(n),

@@ -70,8 +70,8 @@ class Course(NamedTuple):
         g rises by r within a substep, of which there are `parts` between two samples; θ is the
         angle of the sine, 90° without one.
         """
-        held = self.is_held * max(0, -(-count // parts) + 1 - len(self.samples))
-        samples = np.append(self.samples, np.full(held, self.samples[-1:]))
+        n_held = self.is_held * max(0, -(-count // parts) + 1 - len(self.samples))
+        samples = np.append(self.samples, np.full(n_held, self.samples[-1:]))
         line = np.zeros((count, 2))
         if len(samples) > 1:
             rise = np.repeat(np.diff(samples), parts) / parts

@@ -50,8 +50,8 @@ class CampaignError(FailedError):
             values = ", ".join(f"{name} = {value:.6g}" for name, value in point.items())
             lines.append(f"at {values}: {brief}")
         more = f"; and {len(failures) - _MAX_QUOTED} more" if len(failures) > _MAX_QUOTED else ""
-        rest = "the others are done: " if len(failures) < total else ""
-        what = f"{len(failures)} of {total} samples failed, {rest}"
+        successes = "the others are done: " if len(failures) < total else ""
+        what = f"{len(failures)} of {total} samples failed, {successes}"
         super().__init__(what + "; ".join(lines) + more, cure)
 
 

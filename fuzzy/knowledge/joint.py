@@ -69,9 +69,9 @@ def _common_quantity(claimed: Mapping[str, ClaimedNumber]) -> str:
 
 def _require_different_values(claimed: Mapping[str, ClaimedNumber]) -> None:
     """Refuse inputs stated to be independent of which two have the same cuts, from one sample."""
-    for (first, number), (second, other) in combinations(claimed.items(), 2):
+    for (first, number), (second, second_number) in combinations(claimed.items(), 2):
         cure = f"{first} and {second} rest on the same values"
-        is_other = number.number != other.number
+        is_other = number.number != second_number.number
         require(is_other, "independent", value=True, allowed="False", cure=cure)
 
 
@@ -110,8 +110,8 @@ class JointClaim:
         a condition. Inputs with a width but no claim are opinions.
         """
         claimed = {name: x for name, x in inputs.items() if isinstance(x, ClaimedNumber)}
-        others = {name: x for name, x in inputs.items() if name not in claimed}
-        opinions = tuple(name for name, x in others.items() if x.support.width > 0)
+        unclaimed = {name: x for name, x in inputs.items() if name not in claimed}
+        opinions = tuple(name for name, x in unclaimed.items() if x.support.width > 0)
         names_by_condition: dict[str, list[str]] = {}
         for name, number in claimed.items():
             if number.claim.conditions:

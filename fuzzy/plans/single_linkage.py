@@ -265,7 +265,7 @@ class SingleLinkage:
             for start in rows_without_better_neighbour(unit, values, distance):
                 if is_tied[start]:
                     value = float(values[start])
-                    if any(abs(value - known) <= tolerance for known in state.plateaus):
+                    if any(abs(value - plateau) <= tolerance for plateau in state.plateaus):
                         continue
                     state.plateaus.append(value)
                 if keys[start] not in state.started:

@@ -241,8 +241,8 @@ def _sign_test_points(
 ) -> Array:
     """Return points (n, inputs) that test the stated sign of the input in a column."""
     # pairs with the input at either end, the others at nominal values or at an extreme corner
-    others = np.concatenate([nominal[None], _extreme_corners(signs, lower, upper)])
-    points = np.repeat(others, 2, axis=0)
+    other_points = np.concatenate([nominal[None], _extreme_corners(signs, lower, upper)])
+    points = np.repeat(other_points, 2, axis=0)
     points[::2, column], points[1::2, column] = lower[column], upper[column]
     return np.asarray(np.unique(points, axis=0))
 

@@ -159,8 +159,8 @@ def in_database(options: SolverOptions) -> Iterator[None]:
         RefusedError: PETSc refuses an option, or has not used an override in the block.
     """
     database, environment = PETSc.Options(PREFIX), options.environment
-    kept = environment.keys() - options.overrides.keys()
-    added = {name: value for name, value in options.all.items() if name not in kept}
+    from_environment = environment.keys() - options.overrides.keys()
+    added = {name: value for name, value in options.all.items() if name not in from_environment}
     for name, value in added.items():
         database[name] = value
     try:
