@@ -133,7 +133,7 @@ def _numbers(number: FuzzyNumber, unit: str) -> str:
 
 def add_folder(parser: argparse.ArgumentParser) -> None:
     """Adds the folder."""
-    parser.add_argument("folder", metavar="FOLDER", help="results of a run, as results/building")
+    parser.add_argument("folder", metavar="FOLDER", help="results of a run, as results/wind")
     add_quiet(parser)
 
 
