@@ -203,13 +203,17 @@ def width_shares(
         for name in group:
             require_choice("input of a group", name, numbers)
 
-    def width_with(crisp: Mapping[str, FuzzyNumber]) -> Array:
+    def ends_with(crisp: Mapping[str, FuzzyNumber]) -> Array:
         result = propagation({**numbers, **crisp})
-        lower, upper = (result.lower, result.upper) if isinstance(result, Bounds) else result
-        return np.asarray(upper - np.asarray(lower))
+        return np.array([result.lower, result.upper] if isinstance(result, Bounds) else result)
 
-    width = width_with({})
+    box_ends = ends_with({})
     fixed = [{x: Crisp(numbers[x].nominal) for x in group} for group in members.values()]
-    reduction = np.array([width - width_with(crisp) for crisp in fixed])
+    ends = np.array([ends_with(crisp) for crisp in fixed])
+    # what is reached with an input fixed is reached in the box_ends box: no share is negative
+    lower = np.minimum(box_ends[0], ends[:, 0].min(axis=0))
+    upper = np.maximum(box_ends[1], ends[:, 1].max(axis=0))
+    width = upper - lower
+    reduction = width - (ends[:, 1] - ends[:, 0])
     share = np.divide(reduction, width, out=np.zeros_like(reduction), where=width > 0)
     return Shares(tuple(members), share)

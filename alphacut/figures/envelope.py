@@ -152,7 +152,10 @@ def draw_decision(answer: DecisionAnswer) -> Figure:
     figure, axes = style.figure(7.2, 1.2 + 0.7 * len(limits))
     alpha, rows = answer.alpha, np.arange(len(limits))[::-1]  # the first limit on top
     for row, limit in zip(rows, limits, strict=True):
-        size = max(abs(limit.limit), 1e-300)
+        margins = np.concatenate([limit.margin.lower, limit.margin.upper])
+        # of a limit of zero the largest margin has length 1
+        largest = np.abs(margins[np.isfinite(margins)]).max(initial=1e-300)
+        size = abs(limit.limit) or float(largest)
         # margin = limit − peak, so that the largest margin belongs to the smallest peak
         lefts, rights = 1 - limit.margin.upper / size, 1 - limit.margin.lower / size
         look: style.Look = {"height": 0.66 - 0.4 * alpha, "color": style.colours(alpha), "lw": 0}

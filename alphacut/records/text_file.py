@@ -137,7 +137,7 @@ def read_bytes(path: Path) -> bytes:
     try:
         return path.read_bytes()
     except OSError as error:
-        reason = str(error.strerror or "unreadable").lower()
+        reason = str(error.strerror or "unreadable").lower().removeprefix("is ")
         raise RefusedError(str(path), reason, "a file with a record") from None
 
 

@@ -134,7 +134,7 @@ def moduli_images(first: Ints, last: Ints, phases: Sequence[ModuliInterval]) -> 
 PLANE_MODES = ("1", "L", "I;16", "I;16B", "I;16L", "I", "F")
 PHOTOMETRIC, WHITE_IS_ZERO = 262, 0  # tag of TIFF and its value
 SAMPLE_FORMAT, SIGNED = 339, 2
-BYTES, BYTES_PER_ELEMENT = 1e8, 1450
+BYTES, BYTES_PER_ELEMENT = 1.3e8, 1450
 """Of the program, and of each element of the cuts' solutions with their first guess; within 1.25 of
 peaks measured at 128² … 512² pixels of two elements a side, and 512² and 1024² of one."""
 

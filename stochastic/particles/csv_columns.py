@@ -65,7 +65,7 @@ def text_of(path: Path) -> str:
     try:
         return path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
-        reason = str(getattr(error, "strerror", None) or "no text").lower()
+        reason = str(getattr(error, "strerror", None) or "no text").lower().removeprefix("is ")
         raise RefusedError(str(path), reason, "text files in UTF-8") from None
 
 

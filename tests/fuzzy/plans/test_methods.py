@@ -273,3 +273,13 @@ def test_a_stated_sign_that_fails_between_the_corners_is_refused(method):
         propagate(
             lambda x, y: x * (1 - x) + 1e-3 * x + 1e-3 * y, inputs, method, knowledge=knowledge
         )
+
+
+def test_what_an_input_fixed_reaches_is_reached_in_the_whole_box():
+    def missing(numbers):  # misses the end that it finds with b fixed
+        is_fixed = numbers["b"].support[0] == numbers["b"].support[1]
+        return np.array([0.0]), np.array([1.2 if is_fixed else 1.0])
+
+    numbers = {"a": Interval(0, 1), "b": Interval(0, 1)}
+    shares = width_shares(missing, numbers).share.ravel()
+    assert shares == pytest.approx([1 - 1.0 / 1.2, 0.0])
