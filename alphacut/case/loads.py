@@ -205,9 +205,10 @@ def _read_recordings(value: object, info: ValidationInfo) -> tuple[Recording, ..
     if errors:  # all bad files of a folder at once, the first with its reason
         first, *further = errors
         names = [error.key.partition(",")[0] for error in further]
-        # in the cure, which is never cut off
-        cures = [f"bad as well: {', '.join(names)}"] * bool(names) + [first.cure] * bool(first.cure)
-        raise RefusedError(first.key, first.value, first.allowed, "; ".join(cures))
+        cure = first.cure
+        if names:  # in the cure, which is never cut off
+            cure = "; ".join(filter(None, [f"bad as well: {', '.join(names)}", cure]))
+        raise RefusedError(first.key, first.value, first.allowed, cure)
     return tuple(recordings)
 
 

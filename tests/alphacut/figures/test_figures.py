@@ -11,8 +11,10 @@ import xarray
 from alphacut.figures import envelope, overview, style
 from alphacut.frame import StoreyFrame, propagation
 from alphacut.fuzzy import Triangular
+from alphacut.questions.decision import DecisionAnswer, LimitDecision
 from alphacut.report.page import caption
 from alphacut.rve import Cell, Phase
+from alphacut.stages.store import CutsResult
 from alphacut.stochastic import HermiteMap
 from alphacut.stochastic.figures.style import figure_style
 from tests.alphacut.one_case import run
@@ -101,3 +103,17 @@ def test_a_mesh_and_six_cuts_are_those_of_the_case():
     assert plane.get_title(loc="left") == "physical domain, θ = -1"
     bars = [line.get_xdata() for line in cuts.axes[0].lines[1:]]
     assert np.array(bars) / 1e9 == pytest.approx(np.array([[75 + k, 85 - k] for k in range(6)]))
+
+
+def test_a_limit_of_zero_leaves_room_for_the_bars_of_others():
+    limits = {}
+    for size in (0.0, 0.02):
+        limit = LimitDecision(
+            side="", output="q1", unit="m", limit=size, possibility=(0, 0), necessity=(0, 0),
+            margin=CutsResult.of([[size - 0.02, size - 0.01]]), verdict="not exceeded",
+            from_level=0, nature="estimated", peak=None,
+        )  # fmt: skip
+        limits[f"{size}"] = limit.model_copy(update={"peak": object()})  # drawn are those with one
+    answer = DecisionAnswer(alpha=[0.0], step=0.1, limits={}).model_copy(update={"limits": limits})
+    (axes,) = envelope.draw_decision(answer).axes
+    assert max(abs(end) for end in axes.get_xlim()) < 3
