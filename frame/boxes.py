@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +17,6 @@ from alphacut.fuzzy import FuzzyNumber, Interval
 from alphacut.fuzzy.arrays import Ints, Mask
 from alphacut.fuzzy.knowledge.joint import joined_inputs
 from alphacut.fuzzy.refused import require, require_numbers
-from alphacut.fuzzy.result import Nature
 from alphacut.fuzzy.sets.boxes import corners
 from alphacut.fuzzy.sets.numbers import checked_levels
 
@@ -250,23 +250,13 @@ class UnitFlow:
         return self.boxes.in_unit(self.flow.taylor(self.boxes.to_physical(unit)))
 
     def envelope(
-        self,
-        bounds: Array,
-        at: Array,
-        error: Array | None = None,
-        *,
-        method: str,
-        nature: Nature,
-        evaluations: int,
-        seconds: float,
-        facts: Mapping[str, float] | None = None,
-        notes: tuple[str, ...] = (),
+        self, bounds: Array, at: Array, error: Array | None = None, **fields: Any
     ) -> Envelope:
         """Return the envelope of upper bounds of (−output, output), shape (A, T, m, 2).
 
-        Unit coordinates `at` (A, T, m, 2, d) reach them; their `error` (A, T, m) is 0 if None.
+        Inputs `at` (A, T, m, 2, n) in SI units reach them; their `error` (A, T, m) is 0 if None.
+        Further `fields` of `Envelope` are given by name.
         """
-        inputs_at = self.boxes.to_physical(at)
         return Envelope(
             alpha=self.boxes.alpha,
             time=self.time,
@@ -274,14 +264,9 @@ class UnitFlow:
             inputs=self.boxes.inputs,
             lower=-bounds[..., 0],
             upper=bounds[..., 1],
-            lower_at=inputs_at[..., 0, :],
-            upper_at=inputs_at[..., 1, :],
+            lower_at=at[..., 0, :],
+            upper_at=at[..., 1, :],
             error=np.zeros(bounds.shape[:-1]) if error is None else error,
-            nature=nature,
-            method=method,
             units=self.units,
-            evaluations=evaluations,
-            seconds=seconds,
-            facts=facts or {},
-            notes=notes,
+            **fields,
         )

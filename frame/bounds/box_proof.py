@@ -202,19 +202,12 @@ class Hull:
             "gap": float((error / self.problem.scale).max()),
             "gap_of_peaks": float(((outer.max(1) - inner.max(1)).max(-1) / largest).max()),
         }
-        return Envelope(
-            alpha=self.problem.boxes.alpha,
-            time=self.flow.time,
-            outputs=self.flow.outputs,
-            inputs=self.problem.boxes.inputs,
-            lower=-outer[..., 0],
-            upper=outer[..., 1],
-            lower_at=at[..., 0, :],
-            upper_at=at[..., 1, :],
-            error=error,
+        return self.problem.envelope(
+            outer,
+            at,
+            error,
             nature=Nature.GUARANTEED,
             method=method,
-            units=self.problem.units,
             basis=("the equations of motion hold",),
             inner=Ends(-inner[..., 0], inner[..., 1]),
             between=self.between,

@@ -108,7 +108,7 @@ class Tree:
 
     def examine(self, frontier: Frontier, boxes: slice, items: slice) -> tuple[Array, Array, Array]:
         """Codes, values at centres and upper bounds of items (I,) of boxes by `kernel.examine`."""
-        model, over_domain, d = self.model, self.remainder, len(self.lower)
+        model, d = self.model, len(self.lower)
         n, m = model.count, len(model.outputs)
         centre, radius, edges = frontier.geometry(self.lower, self.upper, boxes)
         box, problem = frontier.box[items] - boxes.start, frontier.problem[items]
@@ -120,20 +120,42 @@ class Tree:
         rate, share = jets[..., :n], jets[..., n:].reshape(*jets.shape[:2], -1, n, m)
         waves = np.stack([np.stack(w, 1) for w in model.waves(rate[0, row_box], row_node)], 1)
         starts = np.searchsorted(row_box, np.arange(len(centre) + 1)), np.append(begin, len(box))
-        flat = [x.reshape(d**order, -1) for order, x in enumerate(over_domain.share)]
-        bounds = over_domain.tensor, over_domain.margin, over_domain.rate[2].reshape(d * d, -1)
-        bounds += over_domain.rate[3].reshape(d**3, -1), flat[0][0], *flat[1:]
-        shares, slopes = _in_planes(share[0, :, 0]), _in_planes(rate[1 : 1 + d].swapaxes(0, 1))
         outcome: tuple[Array, Array, Array] = examine(
             (*starts, row_node, column),
-            (centre, radius, edges, _tables(rate, share, d), shares, slopes),
+            (radius, edges, _tables(rate, share, d)),
             _in_planes(waves).reshape(len(begin), -1),
             model.time,
-            tuple(np.ascontiguousarray(x, float) for x in bounds),
+            self._linear_phases(radius, rate[1 : 1 + d], share[0, :, 0]),
+            (self.remainder.tensor, self.remainder.margin),
             self.optima.value + self.gap,
             not model.loads,
         )
         return outcome
+
+    def _linear_phases(self, radius: Array, slopes: Array, share: Array) -> tuple[Array, ...]:
+        """`modes` of `kernel.linear_phase_bound` for B boxes; `slopes` (d, B, n) are those of λ."""
+        slopes, (count, n, m) = slopes.swapaxes(0, 1), share.shape
+        phase, decay = (
+            np.einsum("bd,bdn->bn", radius, np.abs(x)) for x in (slopes.imag, slopes.real)
+        )
+        products = [np.ones((count, 1))]  # of no radii to three: 1, r_i, r_i r_j, r_i r_j r_k
+        for _ in range(3):
+            products.append((products[-1][..., None] * radius[:, None]).reshape(count, -1))
+        of_rate, of_share = (
+            np.stack(
+                [p @ x.reshape(p.shape[1], -1) for p, x in zip(products, bounds, strict=True)], 1
+            )
+            for bounds in (self.remainder.rate, self.remainder.share)
+        )
+        slope = np.ascontiguousarray(slopes.imag.swapaxes(1, 2))
+        return (
+            _in_planes(share),
+            slope,
+            phase,
+            decay,
+            of_rate[:, 2:],
+            of_share.reshape(count, 4, n, m),
+        )
 
     def improve(self, frontier: Frontier, items: Ints, value: Array) -> None:
         """Replace incumbents by the centres of higher `items`, rising, and refine them (Newton)."""
@@ -216,7 +238,8 @@ class Frontier:
         keys = np.concatenate([halves, halves + 1, faces])  # of child boxes; see `_places`
         problem = self.problem[np.concatenate([to_halve, to_halve, to_confine])]
         distinct_keys = np.unique(keys)
-        positions, child = _distinct(self._places(distinct_keys, count))  # faces may coincide
+        places = self._places(distinct_keys, count)
+        positions, child = np.unique(places, axis=0, return_inverse=True)  # faces may coincide
         n_problems = int(problem.max(initial=0)) + 1
         items = np.unique(child[np.searchsorted(distinct_keys, keys)] * n_problems + problem)
         return Frontier(positions, *np.divmod(items, n_problems))
@@ -233,15 +256,6 @@ class Frontier:
         ternary = (number[rows, None] - 2 * d) // 3 ** np.arange(d) % 3
         positions[rows] = np.select([ternary == 1, ternary == 2], [LOWER, UPPER], positions[rows])
         return np.asarray(positions)
-
-
-def _distinct(rows: Array) -> tuple[Array, Array]:
-    """Distinct rows (B, d) of integers, rising, and which of them each row is, as `np.unique`."""
-    order = np.lexsort(rows.T[::-1])
-    fresh = np.any(np.diff(rows[order], axis=0, prepend=-3), axis=1)
-    number = np.empty(len(rows), np.int64)
-    number[order] = np.cumsum(fresh) - 1
-    return rows[order][fresh], number
 
 
 def _tables(rate: Array, C: Array, d: int) -> Array:

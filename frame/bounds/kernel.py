@@ -113,20 +113,6 @@ def stays_below(
 
 
 @compiled
-def contract_bounds(bound: Array, r: Array, out: Array) -> None:
-    """Write Σ_ij… bound[ij…] r_i r_j … to `out` (K,), for K tensors `bound` (d^order, K)."""
-    d = len(r)
-    out[:] = 0.0
-    for a in range(len(bound)):
-        weight, digits, count = 1.0, a, len(bound)
-        while count > 1:  # the digits of a to base d are the tensor's indices i, j, …
-            weight *= r[digits % d]
-            digits, count = digits // d, count // d
-        for k in range(len(out)):
-            out[k] += weight * bound[a, k]
-
-
-@compiled
 def linear_phase_remainder(reach: float, e: Array, c: Array) -> float:
     """Bound of what a mode C exp(λ t) differs from one of linear phase beyond second order in x.
 
@@ -203,9 +189,10 @@ def examine(
     boxes: tuple[Array, ...],
     waves: Array,
     time: Array,
+    linear_phases: tuple[Array, ...],
     remainder: tuple[Array, ...],
     target: Array,
-    linear_phases: bool,
+    has_linear_phases: bool,
 ) -> tuple[Ints, Array, Array]:
     """Examine all items: what is done next with each, its value and its upper bound.
 
@@ -219,44 +206,28 @@ def examine(
     Args:
         frame: First row of each box, first item of each row, node of each row, column of each item
             (2 output + 1 for upper bounds).
-        boxes: Centre, radius, which faces lie on the domain's, tables from waves to jets (B, m, K,
-            q), of the free modes' shares (B, n, m, 2) and slopes of their rates (B, d, n, 2).
+        boxes: Radius, which faces lie on the domain's, and tables from waves to jets (B, m, K, q).
         waves: Waves of all modes at the rows, real and imaginary parts, shape (R, K).
         time: Nodes, shape (T,), in s.
-        remainder: Bounds of third derivatives (T, m, d, d, d), of rounding (T, m, 1 + d), and along
-            the axes of rates, orders 2 and 3, (d², n) and (d³, n), and shares, orders 0 to 3.
+        linear_phases: The `modes` of `linear_phase_bound`, along the boxes.
+        remainder: Bounds of third derivatives (T, m, d, d, d) and of rounding (T, m, 1 + d).
         target: Best value of each problem with the gap asked for.
-        linear_phases: Whether modes with linear phases are tried as bounds.
+        has_linear_phases: Whether modes with linear phases are tried as bounds.
     """
     row_start, item_start, nodes, column = frame
-    centre, radius, edges, tables, shares, rates = boxes
-    third, margin, rate2, rate3, share0, share1, share2, share3 = remainder
-    (d, m), n, q = (centre.shape[1], tables.shape[1]), shares.shape[1], tables.shape[3]
+    radius, edges, tables = boxes
+    share, slope, phase, decay, of_rates, of_shares = linear_phases
+    third, margin = remainder
+    d, m, q = radius.shape[1], tables.shape[1], tables.shape[3]
     code, value = np.zeros(len(column), np.int64), np.zeros(len(column))
     bound = np.zeros(len(column))
     J, H, g, S, third_change, second_change = (
         np.empty(q), np.empty((d, d)), np.empty(d), np.empty((d, d)), np.empty(d), np.empty(d),
     )  # fmt: skip
     low, high, work, L = np.empty(d), np.empty(d), np.empty((3, d)), np.empty((d, d))
-    e, c, phase, decay = np.empty((2, n)), np.empty((4, n, m)), np.empty(n), np.empty(n)
-    slope = np.empty((n, d))
-    for b in range(len(centre)):
+    for b in range(len(radius)):
         r = radius[b]
-        if linear_phases and (b == 0 or (r != radius[b - 1]).any()):
-            contract_bounds(rate2, r, e[0])
-            contract_bounds(rate3, r, e[1])
-            flat = c.reshape(4, n * m)
-            flat[0] = share0
-            contract_bounds(share1, r, flat[1])
-            contract_bounds(share2, r, flat[2])
-            contract_bounds(share3, r, flat[3])
-        for k in range(n):
-            phase[k] = decay[k] = 0.0
-            for i in range(d):
-                slope[k, i] = rates[b, i, k, 1]
-                phase[k] += abs(slope[k, i]) * r[i]
-                decay[k] += abs(rates[b, i, k, 0]) * r[i]
-        modes = (shares[b], slope, phase, decay, e, c)
+        modes = (share[b], slope[b], phase[b], decay[b], of_rates[b], of_shares[b])
         for row in range(row_start[b], row_start[b + 1]):
             node, before = nodes[row], -1
             for item in range(item_start[row], item_start[row + 1]):
@@ -290,7 +261,7 @@ def examine(
                 bound[item] = f + separable_bound(g, S, r) + missing
                 if is_monotone_inside or bound[item] <= aim:
                     continue
-                if linear_phases:  # bound by modes of linear phase
+                if has_linear_phases:  # bound by modes of linear phase
                     room = aim - f - noise
                     room -= linear_phase_bound(g, S, waves[row], time[node], side, modes, o)
                     for i in range(d):

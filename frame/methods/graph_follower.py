@@ -166,7 +166,7 @@ class GraphFollower:
         error = followed.predicted_gain.max(-1) + SAFETY * missed[:, None]
         return flow.envelope(
             followed.bounds,
-            followed.storage.points[followed.best],
+            flow.boxes.to_physical(followed.storage.points[followed.best]),
             None if diverges else error,
             method=self.name,
             nature=Nature.ATTAINED if diverges else Nature.ESTIMATED,

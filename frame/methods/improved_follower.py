@@ -126,7 +126,7 @@ class ImprovedFollower:
         note = f"stopped at the budget of {self.budget} trajectories"
         return flow.envelope(
             bounds,
-            points,
+            flow.boxes.to_physical(points),
             None if diverges else errors + SAFETY * missed[:, None],
             method=self.name,
             nature=Nature.ATTAINED if diverges else Nature.ESTIMATED,

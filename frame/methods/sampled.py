@@ -65,7 +65,7 @@ class Sampled:
                     progress((done + number * BATCH / len(points)) / levels)
         return flow.envelope(
             bounds,
-            at,
+            flow.boxes.to_physical(at),
             method=self.name,
             nature=Nature.ATTAINED,
             evaluations=levels * self.samples,
