@@ -37,12 +37,12 @@ from alphacut.stages.campaign import CellCampaign
 from alphacut.stages.envelope import EnvelopeTask, PeakResults, peaks_of
 from alphacut.stages.modulus import fuzzy_loss, fuzzy_modulus, require_levels
 from alphacut.stages.store import (
-    Computed,
     RunProgress,
     Stage,
     StageContext,
     StageResult,
     StageStore,
+    no_progress,
 )
 from alphacut.stochastic.sections import Simulated
 
@@ -74,7 +74,8 @@ def open_results(
             say(f"warning: {results.path / MANIFEST} is damaged; everything is computed anew")
         if results is not None and fresh and rank() == 0:
             results.clear()
-        yield case, StageStore(results, case.text, fresh, options.workers, RunProgress(tick))
+        progress = RunProgress(tick or no_progress)
+        yield case, StageStore(results, case.text, fresh, options.workers, progress)
 
 
 QUESTIONS: dict[str, Callable[[Any, FuzzyResponse], Answer]] = {
@@ -198,9 +199,11 @@ class Pipeline:
         for warning in (warning for record in records for warning in record.warnings):
             say(f"warning: {warning}")
         limited = tuple(dict.fromkeys((*structure.outputs, *limited)))
-        stages = suite.stages(structure, replace(task, limited=limited), records)
+        task = replace(task, limited=limited)
+        longest_first = sorted(records, key=lambda record: -record.duration)
+        stages = [suite.stage(structure, task, record) for record in longest_first]
         outcomes = self.store.take_all(stages, self.executor)
-        by_record = {record.name: outcomes[suite.stage_name(record)].numbers for record in records}
+        by_record = {record.name: outcomes[f"record_{record.name}"].numbers for record in records}
         units = {name: structure.unit(name) for name in envelope.outputs_of(limited)}
         self.results.suite = suite.suite_result(by_record, records, mode, alpha, units)
         peaks = {name: peaks_of(result, alpha) for name, result in by_record.items()}
@@ -227,9 +230,9 @@ class Pipeline:
 
 def answer_of(
     section: QuestionSection, response: FuzzyResponse, context: StageContext
-) -> Computed[Answer]:
+) -> StageResult[Answer]:
     """The answer to the question of a section about a response."""
-    return Computed(QUESTIONS[section.key](section, replace(response, progress=context.tick)))
+    return StageResult(QUESTIONS[section.key](section, replace(response, progress=context.tick)))
 
 
 def response_of(

@@ -17,7 +17,7 @@ from alphacut.io.provenance import NESTED, version_of
 from alphacut.questions.summary import Results
 from alphacut.stages.cell import GPA, CellProblem
 from alphacut.stages.identify import IdentifiedResult
-from alphacut.stages.store import Computed, Stage, StageContext, StageStore
+from alphacut.stages.store import Stage, StageContext, StageResult, StageStore
 from alphacut.stochastic.figures.style import figure_style, save
 
 if TYPE_CHECKING:
@@ -103,7 +103,7 @@ def draw_figures(results: Results, store: StageStore, executor: Executor | None)
 
 def draw_all(
     results: Results, executor: Executor | None, context: StageContext
-) -> Computed[list[str]]:
+) -> StageResult[list[str]]:
     """Draws all figures by `PARTS` tasks; returns the names of the files."""
     assert context.folder is not None
     folder = context.folder
@@ -112,10 +112,9 @@ def draw_all(
     names = []
     for count, part in enumerate(parts, start=1):
         names += part.result()
-        if context.tick:
-            context.tick(count / PARTS)
+        context.tick(count / PARTS)
     drawn_meshes = [name for name, future in mesh_futures.items() if future.result()]
-    return Computed([*sorted(names), *drawn_meshes])
+    return StageResult([*sorted(names), *drawn_meshes])
 
 
 def draw_part(results: Results, folder: Path, part: int) -> list[str]:

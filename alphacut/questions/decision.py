@@ -17,7 +17,6 @@ from alphacut.questions.question import (
     Record,
     Texts,
     input_text,
-    limit_fields,
 )
 from alphacut.stages.envelope import PeakResult, peak_results
 from alphacut.stages.store import CutsResult
@@ -55,23 +54,11 @@ class LimitDecision(LimitAnswer):
         texts += [f"record {self.record}"] if self.record else []
         return f"{self.verdict}, as at {', '.join(texts)}"
 
-    @property
-    def margin_text(self) -> str:
-        """The margin on the lowest level."""
-        margin = float(self.margin.lower[0])
-        if not np.isfinite(margin):
+    def text_of(self, value: float) -> str:
+        """Text of a peak or a margin, which may be infinite; of several limits a share of them."""
+        if not np.isfinite(value):
             return "not known"
-        return engineering(margin, self.unit) if self.unit else f"{margin:.1%}"
-
-    def peak_texts(self) -> Texts:
-        """The peak on the lowest level: proved bound, reached, relative gap."""
-        proved, reached, gap = "", "", ""
-        if self.peak is not None:
-            bound, inner = float(self.peak.proved[0]), float(self.peak.reached[0])
-            reached = engineering(inner, self.unit)
-            proved = engineering(bound, self.unit) if np.isfinite(bound) else "not known"
-            gap = f"{abs((bound - inner) / bound):.1%}" if bound and np.isfinite(bound) else ""
-        return {"peak at most": proved, "peak reached": reached, "gap": gap}
+        return engineering(value, self.unit) if self.unit else f"{value:.1%}"
 
 
 def degree_text(ends: tuple[float, float]) -> str:
@@ -88,15 +75,22 @@ class DecisionAnswer(LimitsAnswer[LimitDecision]):
     step: float
 
     def texts_of(self, limit: LimitDecision) -> Texts:
-        """Verdict, degrees, and margin and peak on the lowest level."""
+        """Verdict, degrees, and on the lowest level margin, proved and reached peak, and gap."""
+        proved, reached, gap = "", "", ""
+        if (peak := limit.peak) is not None:
+            bound, inner = float(peak.proved[0]), float(peak.reached[0])
+            proved, reached = limit.text_of(bound), limit.text_of(inner)
+            gap = f"{abs((bound - inner) / bound):.1%}" if bound and np.isfinite(bound) else ""
         return {
             "limit": limit.words,
             "verdict": limit.verdict_and_motion,
             "nature": limit.nature,
             "possibility": degree_text(limit.possibility),
             "necessity": degree_text(limit.necessity),
-            "least margin": limit.margin_text,
-            **limit.peak_texts(),
+            "least margin": limit.text_of(float(limit.margin.lower[0])),
+            "peak at most": proved,
+            "peak reached": reached,
+            "gap": gap,
         }
 
     def numbers_of(self, limit: LimitDecision) -> Iterator[Record]:
@@ -137,26 +131,24 @@ def decide(section: DecisionSection, response: FuzzyResponse) -> DecisionAnswer:
     by_peak = peak_results(response.peaks)
 
     def record_at(peak: str) -> str:
-        """Record under which a peak is reached, of a suite."""
+        """Record of a suite under which a peak is reached; "" of a mean or without a suite."""
         by_record = {} if response.suite is None else response.suite.peaks
-        reached = {
-            x: float(peaks[peak].reached[0]) for x, peaks in by_record.items() if peak in peaks
-        }
+        reached = {x: float(ends[peak].reached[0]) for x, ends in by_record.items() if peak in ends}
         return max(reached, key=lambda x: reached[x], default="")
 
     decisions = {
-        name: LimitDecision.model_validate(
-            {
-                **limit_fields(section, name, response.structure),
-                "possibility": answer.possibility,
-                "necessity": answer.necessity,
-                "margin": CutsResult.of(answer.margin),
-                "verdict": answer.outcome,
-                "from_level": answer.lowest,
-                "nature": answer.nature,
-                "peak": None if name == ANY else by_peak[limits[name].peak],
-                "record": "" if name == ANY else record_at(limits[name].peak),
-            }
+        name: LimitDecision.of(
+            section,
+            name,
+            response.structure,
+            possibility=answer.possibility,
+            necessity=answer.necessity,
+            margin=CutsResult.of(answer.margin),
+            verdict=answer.outcome,
+            from_level=answer.lowest,
+            nature=answer.nature,
+            peak=None if name == ANY else by_peak[limits[name].peak],
+            record="" if name == ANY else record_at(limits[name].peak),
         )
         for name, answer in passing(peaks, section.limits_in_si(response.structure)).items()
     }

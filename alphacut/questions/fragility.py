@@ -20,7 +20,6 @@ from alphacut.questions.question import (
     LimitsAnswer,
     Record,
     Texts,
-    limit_fields,
 )
 from alphacut.stages.store import CutsResult, Values
 
@@ -135,17 +134,17 @@ def fragility(section: FragilitySection, response: FuzzyResponse) -> FragilityAn
         grid = measure_grid(critical)
         has_spread = len(critical.low) > 1  # one record has no dispersion
         confidence = critical.confidence_band(grid) if section.independent else None
-        return LimitFragility.model_validate(
-            {
-                **limit_fields(section, name, response.structure),
-                "nature": natures[name],
-                "critical": {x.name: getattr(critical, x.name).T for x in fields(critical)},
-                "measure": grid,
-                "band": critical.band(grid)._asdict(),
-                "median": critical.median._asdict(),
-                "dispersion": critical.dispersion._asdict() if has_spread else None,
-                "confidence": None if confidence is None else confidence._asdict(),
-            }
+        return LimitFragility.of(
+            section,
+            name,
+            response.structure,
+            nature=natures[name],
+            critical={x.name: getattr(critical, x.name).T for x in fields(critical)},
+            measure=grid,
+            band=critical.band(grid)._asdict(),
+            median=critical.median._asdict(),
+            dispersion=critical.dispersion._asdict() if has_spread else None,
+            confidence=None if confidence is None else confidence._asdict(),
         )
 
     return FragilityAnswer(

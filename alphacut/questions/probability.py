@@ -11,7 +11,7 @@ from alphacut.case.limits import ProbabilitySection
 from alphacut.frame.questions.probability import CONFIDENCE, probabilities
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.result import Nature
+from alphacut.fuzzy.result import Ends, Nature
 from alphacut.io.quantity import range_text
 from alphacut.questions.question import (
     FuzzyResponse,
@@ -19,7 +19,6 @@ from alphacut.questions.question import (
     LimitsAnswer,
     Record,
     Texts,
-    limit_fields,
 )
 from alphacut.stages.store import CutsResult, Values
 
@@ -122,19 +121,15 @@ def probability(section: ProbabilitySection, response: FuzzyResponse) -> Probabi
         step=response.step,
         alpha=np.array(response.alpha),
         events={
-            name: LimitProbability.model_validate(
-                {
-                    **limit_fields(section, name, structure),
-                    "lower": answer.lower,
-                    "upper": answer.upper,
-                    "error": answer.error,
-                    "interval": CutsResult.of(answer.interval.T),
-                    "curve": {
-                        "limit": answer.limits,
-                        "lower": answer.curve[0],
-                        "upper": answer.curve[1],
-                    },
-                }
+            name: LimitProbability.of(
+                section,
+                name,
+                structure,
+                lower=answer.lower,
+                upper=answer.upper,
+                error=answer.error,
+                interval=CutsResult.of(answer.interval.T),
+                curve={"limit": answer.limits, **Ends(*answer.curve)._asdict()},
             )
             for name, answer in answers.items()
         },

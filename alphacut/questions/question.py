@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Generic, TypeVar
+from typing import ClassVar, Generic, Self, TypeVar
 
 from alphacut.case.limits import QuestionSection, Side
 from alphacut.case.structure import Structure
@@ -102,6 +102,18 @@ class LimitAnswer(Numbers):
     unit: str
     limit: float
 
+    @classmethod
+    def of(
+        cls, section: QuestionSection, name: str, structure: Structure, **numbers: object
+    ) -> Self:
+        """The part about a limit by its name in a section, or about several, with its numbers."""
+        fields: dict[str, object] = {"side": "", "output": name, "unit": "", "limit": 1.0}
+        if (limit := section.limits_by_name.get(name)) is not None:
+            value = limit.value_in_si(structure, f"{section.key}.limits")
+            unit = structure.unit(limit.output)
+            fields = {"side": limit.side, "output": limit.output, "unit": unit, "limit": value}
+        return cls.model_validate(fields | numbers)
+
     @property
     def peak_name(self) -> str:
         """Name of the limited peak, such as "max q3"."""
@@ -153,13 +165,3 @@ class LimitsAnswer(Answer, Generic[L]):
             for name, limit in self.limits.items()
             for record in self.numbers_of(limit)
         ]
-
-
-def limit_fields(section: QuestionSection, name: str, structure: Structure) -> dict[str, object]:
-    """Fields of `LimitAnswer` for a limit by its name in a section, or for several together."""
-    limit = section.limits_by_name.get(name)
-    if limit is None:
-        return {"side": "", "output": name, "unit": "", "limit": 1.0}
-    value = limit.value_in_si(structure, f"{section.key}.limits")
-    unit = structure.unit(limit.output)
-    return {"side": limit.side, "output": limit.output, "unit": unit, "limit": value}

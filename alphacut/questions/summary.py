@@ -40,10 +40,6 @@ ANSWERS: tuple[type[Answer], ...] = (
 """Kinds of answers in the order of the report."""
 
 
-AnyResult = StageResult[Any]
-"""Result of one of several stages; its reader knows the type of its numbers."""
-
-
 class FrameResult(Numbers):
     """A frame at its nominal inputs, with the height of the storey of each drift."""
 
@@ -79,15 +75,10 @@ class Results:
         return any(task.figures for task in self.tasks)
 
     @property
-    def single(self) -> dict[str, AnyResult]:
+    def single(self) -> dict[str, StageResult[Any]]:
         """Results of the stages that have one, by name."""
-        results = {
-            "microstructure": self.microstructure,
-            "modulus": self.modulus,
-            "image": self.image,
-            "shares": self.shares,
-        }
-        return {name: result for name, result in results.items() if result is not None}
+        names = ("microstructure", "modulus", "image", "shares")
+        return {x: getattr(self, x) for x in names if getattr(self, x) is not None}
 
     @property
     def fingerprints(self) -> dict[str, str]:
@@ -163,7 +154,7 @@ class Parts(Numbers):
     @property
     def answers(self) -> list[Answer]:
         """The answers to all questions of the case, in the order of the report."""
-        answers = (self.probability, self.decision, self.tolerances, self.fragility)
+        answers = (getattr(self, kind.key) for kind in ANSWERS)
         return [answer for answer in answers if answer is not None]
 
 
@@ -189,15 +180,12 @@ class Summary(Parts):
     @classmethod
     def read(cls, folder: ResultsFolder) -> Self:
         """The summary in a folder of results; RefusedError where it is missing or damaged."""
-        if not (folder.path / SUMMARY).exists():
-            raise damaged(folder, f"without {SUMMARY}")
         try:
             return cls.model_validate_json(folder.content(SUMMARY))
-        except RefusedError as error:
-            raise damaged(folder, f"damaged ({SUMMARY} {error.value})") from None
         except ValidationError as error:
             keys = ".".join(map(str, error.errors()[0]["loc"])) or "no JSON object"
-            raise damaged(folder, f"damaged ({SUMMARY}: {keys})") from None
+            what = f"damaged ({SUMMARY}: {keys})"
+            raise RefusedError(str(folder.path), what, COMPLETE, RUN_AGAIN) from None
 
     def require_run_of(self, folder: ResultsFolder) -> None:
         """Refuses a folder with files of another run than that of this summary."""
@@ -208,8 +196,3 @@ class Summary(Parts):
         ]
         value = f"with {', '.join(changed)} of another run"
         require(not changed, str(folder.path), value=value, allowed="one run's files")
-
-
-def damaged(folder: ResultsFolder, what: str) -> RefusedError:
-    """The error of results that cannot be used."""
-    return RefusedError(str(folder.path), what, COMPLETE, RUN_AGAIN)

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from textwrap import wrap
-from typing import TypeVar
 
 import numpy as np
 
@@ -22,7 +21,6 @@ from alphacut.stages.image import ImageResult
 from alphacut.stages.modulus import ModulusResult
 from alphacut.stages.store import CutsResult
 
-T = TypeVar("T")
 MATERIAL = ("material", "most plausible", "range at α = 0", "nature", "± error")
 MEANING = "Least … largest value if every input stays in its range; α = 1: most plausible"
 """First line of all results, for readers who do not know α-cuts; "nominal" is α = 1."""
@@ -81,11 +79,10 @@ def material(parts: Parts) -> Table:
 
 def _constants(part: ModulusResult | ImageResult) -> Iterator[Row]:
     """Yields the row of E of a cell or an image, and those of ν, E_T and the loss factor."""
-    nature, further = part.nature, dict[str, CutsResult]()
-    if isinstance(part, ImageResult):
-        young, error, declares_error = part.cuts.E_GPa, 0.0, True
-    else:
-        young, declares_error = part.E_GPa, part.particles != "mesh"  # which is not refined
+    nature, further, error = part.nature, dict[str, CutsResult](), 0.0
+    young, declares_error = young_cuts(part), True
+    if isinstance(part, ModulusResult):
+        declares_error = part.particles != "mesh"  # which is not refined
         error = sum(part.error.values()) * float(young.upper.max())
         further = {"ν": part.nu_cuts}
         if "E_T_GPa" in part.fibres:
@@ -99,6 +96,11 @@ def _constants(part: ModulusResult | ImageResult) -> Iterator[Row]:
         cuts = cut_text(loss.E, -1, loss.nature), cut_text(loss.E, 0, loss.nature)
         error_cell = error_text(loss.error["E"], loss.nature) if loss.error else ""
         yield ("loss factor of E", *cuts, loss.nature, error_cell)
+
+
+def young_cuts(part: ModulusResult | ImageResult) -> CutsResult:
+    """The α-cuts of E, in GPa."""
+    return part.E_GPa if isinstance(part, ModulusResult) else part.cuts.E_GPa
 
 
 def without_empty_columns(head: Row, rows: list[Row]) -> Table:
@@ -257,58 +259,39 @@ def drivers(parts: Parts) -> Iterator[str]:
 
 def comparison(first: Parts, second: Parts) -> Table:
     """Table of what both runs have: E, greatest peaks and their widths, verdicts on limits."""
-    rows = [*_compared_moduli(first, second), *_compared_peaks(first, second)]
-    return Table(COMPARED, [*rows, *_compared_limits(first, second)])
+    rows: list[Row] = []
+    others = {what: entry for what, _, entry in _compared_entries(second)}
+    for what, unit, entry in _compared_entries(first):
+        other = others.get(what)
+        if other is None:
+            continue
+        if isinstance(entry, str) or isinstance(other, str):
+            rows.append((what, str(entry), str(other), ""))
+        else:
+            ratio = f"{other / entry:.3f}" if entry else ""
+            rows.append((what, engineering(entry, unit), engineering(other, unit), ratio))
+    return Table(COMPARED, rows)
 
 
-def _compared_moduli(first: Parts, second: Parts) -> Iterator[Row]:
-    """Rows on the greatest E and the width of E, of a round cell and of an image."""
-    pairs = [
-        [x.modulus.E_GPa for x in (first, second) if x.modulus is not None],
-        [x.image.cuts.E_GPa for x in (first, second) if x.image is not None],
-    ]
-    for cuts in pairs:
-        if len(cuts) == 2:
-            ends = [1e9 * np.array(x[0]) for x in cuts]
-            yield _compared("greatest E", "Pa", *(high for _, high in ends))
-            yield _compared("width of E", "Pa", *(high - low for low, high in ends))
-
-
-def _compared_peaks(first: Parts, second: Parts) -> Iterator[Row]:
-    """Rows on the greatest peak and its width of each output, then on statistics of records."""
-    for study, *results in _in_both(first.envelopes, second.envelopes):
-        for output, *peaks in _in_both(*(x.peak for x in results)):
-            name = output if study == "all" else f"{output} ({study})"
-            unit = unit_of(results[0].units, output)
-            widths = (float(x.upper[0] - x.lower[0]) for x in peaks)
-            yield _compared(f"greatest peak of {name}", unit, *(float(x.far_end[0]) for x in peaks))
-            yield _compared(f"width of the peak of {name}", unit, *widths)
-    if first.records is not None and second.records is not None:
-        for output, *both in _in_both(first.records.statistics, second.records.statistics):
-            unit = unit_of(first.records.units, output)
-            for name, *values in _in_both(*(x.proved for x in both)):  # mean, median …
-                ends = (float(x[0]) for x in values)
-                yield _compared(f"{name} of the records' peaks of {output}", unit, *ends)
-
-
-def _in_both(first: Mapping[str, T], second: Mapping[str, T]) -> Iterator[tuple[str, T, T]]:
-    """Yields name and values of what two results have, in the order of the first's file."""
-    return ((name, value, second[name]) for name, value in first.items() if name in second)
-
-
-def _compared_limits(first: Parts, second: Parts) -> Iterator[Row]:
-    """Rows on the verdicts on limits that both runs have, and on their scales of tolerances."""
-    if first.decision is not None and second.decision is not None:
-        for _, limit, other in _in_both(first.decision.limits, second.decision.limits):
-            yield (limit.words, limit.verdict_words, other.verdict_words, "")
-            if limit.limit != other.limit:
-                yield (other.words, "another limit", "this limit", "")
-    kept = [x.tolerances.kept for x in (first, second) if x.tolerances is not None]
-    scales = [scale for scale in kept if scale is not None]
-    if len(scales) == 2:
-        yield _compared("scale of tolerances", "", *scales)
-
-
-def _compared(what: str, unit: str, first: float, second: float) -> Row:
-    ratio = f"{second / first:.3f}" if first else ""
-    return (what, engineering(first, unit), engineering(second, unit), ratio)
+def _compared_entries(parts: Parts) -> Iterator[tuple[str, str, float | str]]:
+    """Yields what is compared of a run on the lowest level: its name, its unit, number or text."""
+    for result in (parts.modulus, parts.image):
+        if result is not None:
+            low, high = np.array(young_cuts(result)[0]) * 1e9
+            yield "greatest E", "Pa", float(high)
+            yield "width of E", "Pa", float(high - low)
+    for study_name, study in parts.envelopes.items():
+        for output, peak in study.peak.items():
+            name = output if study_name == "all" else f"{output} ({study_name})"
+            unit = unit_of(study.units, output)
+            yield f"greatest peak of {name}", unit, float(peak.far_end[0])
+            yield f"width of the peak of {name}", unit, float(peak.upper[0] - peak.lower[0])
+    if (suite := parts.records) is not None:
+        for output, statistics in suite.statistics.items():
+            for name, ends in statistics.proved.items():  # mean, median …
+                unit = unit_of(suite.units, output)
+                yield f"{name} of the records' peaks of {output}", unit, float(ends[0])
+    for limit in () if parts.decision is None else parts.decision.limits.values():
+        yield limit.words, "", limit.verdict_words
+    if parts.tolerances is not None and parts.tolerances.kept is not None:
+        yield "scale of tolerances", "", parts.tolerances.kept

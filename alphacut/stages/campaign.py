@@ -16,7 +16,6 @@ from alphacut.fuzzy.refused import FailedError
 from alphacut.fuzzy.result import Bounds, Nature
 from alphacut.io.files import Document
 from alphacut.io.provenance import file_digest, source_digest, versions
-from alphacut.rve.result.loss_factors import CONSTANTS
 from alphacut.rve.result.result import HomogenisedStiffness
 from alphacut.rve.series.fibre_constants import fibre_constants
 from alphacut.rve.series.model import SeriesModel
@@ -34,7 +33,7 @@ from alphacut.stages.modulus import (
     plane_cuts,
     plane_outputs,
 )
-from alphacut.stages.store import Computed, Stage, StageContext
+from alphacut.stages.store import Stage, StageContext, StageResult
 from alphacut.stochastic.theta.quadrature import between_nodes
 
 TEST_TOLERANCE_FACTOR = 100.0
@@ -51,42 +50,40 @@ PLANS: dict[str, Plan] = {
 }
 
 
-@dataclass(frozen=True)
-class CellTask:
-    """Samples of the cell that share all but the inclusion's modulus, for any process.
+@on_one_blas_thread
+def sample_outputs(
+    model: Solve,
+    problem: CellProblem,
+    crisp: Mapping[str, float],
+    losses: LossCuts | None,
+    points: Sequence[Mapping[str, float]],
+) -> list[dict[str, float | Array]]:
+    """Outputs of the cell by name, in SI, at points of the fuzzy inputs; `crisp` has the others.
 
-    `crisp` has the inputs that are not fuzzy, by name, in SI.
+    The stress curve has shape (CURVE_POINTS,), bounds of the loss factors (levels, 3).
     """
-
-    model: Solve
-    problem: CellProblem
-    crisp: Mapping[str, float]
-    losses: LossCuts | None = None
-
-    @on_one_blas_thread
-    def __call__(self, points: Sequence[Mapping[str, float]]) -> list[dict[str, float | Array]]:
-        """Outputs of the cell at each point of the fuzzy inputs, by name, in SI."""
-        cells = [self.problem.at({**self.crisp, **point}) for point in points]
-        return [self._outputs(result) for result in self.model(cells)]
-
-    def _outputs(self, result: HomogenisedStiffness) -> dict[str, float | Array]:
-        """Outputs of a cell by name, in SI; the stress curve has shape (CURVE_POINTS,)."""
+    outputs = []
+    for result in model([problem.at({**crisp, **point}) for point in points]):
         require_isotropic(result)
         curve = result.curve
-        fibres = fibre_constants(result).values if self.problem.cell.is_fibre else {}
-        losses = {} if self.losses is None else loss_bound_outputs(result, self.losses)
-        return {
+        fibres = fibre_constants(result).values if problem.cell.is_fibre else {}
+        sample: dict[str, float | Array] = {
             "E": result.modulus,
             "nu": result.poisson,
             **dict(zip(("s11", "s12"), curve.mean, strict=True)),
             **{name: fibres[name] for name in FIBRES if name in fibres},
             **plane_outputs(result),
             "systems": len(result.iterations),
-            "curve11": between_nodes(curve.theta, curve.s11, curve_theta(self.problem)),
+            "curve11": between_nodes(curve.theta, curve.s11, curve_theta(problem)),
             **{f"error:{name}": result.error.get(name, 0.0) for name in ("space", "theta")},
             **{f"check:{name}": value for name, value in result.checks.items()},
-            **losses,
         }
+        if losses is not None:
+            bounds, errors = loss_bounds(result, losses)
+            sample |= {"loss_lower": bounds[:, 0], "loss_upper": bounds[:, 1]}
+            sample["loss_error"] = np.nan_to_num(errors)
+        outputs.append(sample)
+    return outputs
 
 
 def curve_theta(problem: CellProblem) -> Array:
@@ -104,16 +101,14 @@ class CellCampaign(CellProblem):
     def inputs(self) -> dict[str, FuzzyNumber]:
         """Fuzzy inputs by name, in SI; one crisp modulus where none is fuzzy."""
         numbers = self.numbers
-        names = ("inclusion_modulus", "matrix_modulus", *numbers)
-        stand_in = next(name for name in names if name in numbers)
         fuzzy = {name: number for name, number in numbers.items() if number.support.width > 0}
-        return fuzzy or {stand_in: numbers[stand_in]}
+        names = ("inclusion_modulus", "matrix_modulus", *numbers)
+        return fuzzy or next({name: numbers[name]} for name in names if name in numbers)
 
     def campaign_model(self, *, estimate: bool = False) -> Solve:
         """The function that solves cells; with `estimate`, prisms declare errors at extra cost."""
-        support, modulus = None, self.cell.constants.get("inclusion_modulus")
-        if modulus is not None:
-            support = (modulus.support.lower, modulus.support.upper)
+        modulus = self.cell.constants.get("inclusion_modulus")
+        support = None if modulus is None else tuple(modulus.support)
         return self.model(estimate=estimate, moduli=support, petsc=self.petsc)
 
     @cached_property
@@ -124,19 +119,19 @@ class CellCampaign(CellProblem):
     @property
     def identity(self) -> Document:
         """All but the fuzzy inputs that the outputs of a sample depend on: the key of its store."""
-        crisp = {name: repr(x) for name, x in self.numbers.items()}
-        sections = {
+        return {
             "modulus": self.modulus.model_dump(exclude={"plan", "alpha"}),
             "mesh": self.mesh.model_dump(exclude={"file"}),
             "mesh_file": self.mesh.file and file_digest(self.mesh.file),
             "petsc": dict(self.petsc),
             "particles": self.cell.particles,
-            "inputs": crisp,
+            "inputs": {name: repr(x) for name, x in self.numbers.items()},
             "theta": self.radius.theta,
             "stiffness": repr(self.cell.model_dump(include={"inclusion_modulus", "phases"})),
             "losses": repr((self.cell.losses, self.modulus.alpha)) if self.cell.losses else "",
+            "source": source_digest(("stochastic", "rve")),
+            "versions": versions(),
         }
-        return {**sections, "source": source_digest(("stochastic", "rve")), "versions": versions()}
 
     @property
     def propagation(self) -> Callable[..., Bounds]:
@@ -145,19 +140,19 @@ class CellCampaign(CellProblem):
         return partial(propagate, self.task, alpha=self.modulus.alpha, shared=shared)
 
     @property
-    def task(self) -> CellTask:
+    def task(self) -> Callable[[Sequence[Mapping[str, float]]], list[dict[str, float | Array]]]:
         """The function from points of the fuzzy inputs to all outputs."""
         crisp = {name: x.nominal for name, x in self.numbers.items() if name not in self.inputs}
         problem = CellProblem(self.radius, self.cell, self.mesh, self.modulus)
-        return CellTask(self.campaign_model(), problem, crisp, self.losses)
+        return partial(sample_outputs, self.campaign_model(), problem, crisp, self.losses)
 
-    def run(self, context: StageContext) -> Computed[ModulusResult]:
+    def run(self, context: StageContext) -> StageResult[ModulusResult]:
         """Computes all samples and the α-cuts; stored samples of an interrupted run are taken."""
         result = self.propagation(
             self.inputs,
             PLANS[self.modulus.plan],
             workers=context.workers,
-            progress=context.tick or False,
+            progress=context.tick,
             knowledge=self.knowledge,
             store=context.samples,
             identity=self.identity if context.samples else None,
@@ -165,12 +160,12 @@ class CellCampaign(CellProblem):
         self.require_consistent(result)
         losses = loss_cuts(result) if self.losses else {}
         data = modulus_dataset(result, curve_theta(self), losses)
-        return Computed(self._numbers(result, losses), data)
+        return StageResult(self._numbers(result, losses), data)
 
     def _numbers(self, result: Bounds, losses: Mapping[str, Array]) -> ModulusResult:
         """The result of the campaign, from the cuts of all outputs and of the loss factors."""
         assert result.samples is not None
-        errors = self.loss_errors(result) if losses else {}
+        loss_errors = self.loss_errors(result) if losses else None
         is_own_mesh = isinstance(self.cell, MeshedCell)  # without a declared error
         return ModulusResult(
             alpha=result.alpha,
@@ -189,7 +184,7 @@ class CellCampaign(CellProblem):
             error=self.errors(result),
             checks=largest_over_samples(result, "check"),
             references=self.references(),
-            loss=LossResult.of(losses, errors, Nature.ATTAINED) if losses else None,
+            loss=LossResult.of(losses, loss_errors, Nature.ATTAINED) if losses else None,
         )
 
     def require_consistent(self, result: Bounds) -> None:
@@ -253,36 +248,22 @@ class CellCampaign(CellProblem):
         of_inputs = {name: {"E": sign} for name, sign in signs.items() if name in self.inputs}
         return Knowledge(signs=of_inputs, source="as mechanics proves of exact cells", tests=2)
 
-    def loss_errors(self, result: Bounds) -> dict[str, float]:
+    def loss_errors(self, result: Bounds) -> Array | None:
         """Largest errors of the loss factors of E, G and K; of prisms those of the nominal cell."""
         assert self.losses is not None
         assert result.samples is not None
         if isinstance(self.cell, MeshedCell):
-            return {}
+            return None
         if self.modulus.method == "prism":
-            errors = loss_bounds(self.nominal_estimate, self.losses)[1]
-            return dict(zip(CONSTANTS, errors, strict=True))
-        largest_errors = result.samples.values.output("loss_error").max(axis=0)
-        return dict(zip(CONSTANTS, map(float, largest_errors), strict=True))
+            return loss_bounds(self.nominal_estimate, self.losses)[1]
+        return np.asarray(result.samples.values.output("loss_error").max(axis=0))
 
     def errors(self, result: Bounds) -> dict[str, float]:
         """Relative error of E by source: the largest of all samples, or that of the nominal one."""
-        errors = {
-            name: error for name, error in largest_over_samples(result, "error").items() if error
-        }
+        errors = {x: e for x, e in largest_over_samples(result, "error").items() if e}
         if errors or self.modulus.method != "prism" or isinstance(self.cell, MeshedCell):
             return errors
         return dict(self.nominal_estimate.error)
-
-
-def loss_bound_outputs(result: HomogenisedStiffness, cuts: LossCuts) -> dict[str, Array]:
-    """Outputs of a sample: bounds of the loss factors on each level, and their errors."""
-    bounds, errors = loss_bounds(result, cuts)
-    return {
-        "loss_lower": bounds[:, 0],
-        "loss_upper": bounds[:, 1],
-        "loss_error": np.nan_to_num(errors),
-    }
 
 
 def stage(campaign: CellCampaign) -> Stage[ModulusResult]:

@@ -17,11 +17,11 @@ from alphacut.frame.bounds.model_error import MAX_PARAMETERS
 from alphacut.frame.questions.peaks import PEAK_BOUNDS, Peak, Peaks, output_of, peaks, tightest
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.progress_bar import subprogress
+from alphacut.fuzzy.progress_bar import Progress, subprogress
 from alphacut.fuzzy.refused import FailedError, require
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document, say
-from alphacut.stages.store import Computed, Numbers, Stage, StageContext, StageResult, Values
+from alphacut.stages.store import Numbers, Stage, StageContext, StageResult, Values
 
 if TYPE_CHECKING:
     import xarray
@@ -34,15 +34,11 @@ PEAK_ERROR = 5e-3
 
 
 class PeakResult(Numbers):
-    """Bounds of the peak of an output on each level, in SI, as `Peak` has them.
+    """Bounds of the peak of an output on each level, in SI, as `Peak` has them; nan if unknown.
 
-    The peak is the largest magnitude, or the greatest ("max q3") or least ("min q3") value. A least
-    value has its own sign here, and `lower` and `upper` change places. Unknown bounds are nan.
-
-    Args:
-        proved: Bound that no motion passes.
-        is_least: Whether it is a least value.
-        reached_at: Inputs in SI of the motion that reaches it on the lowest level, if known.
+    The peak is the largest magnitude, or the greatest ("max q3") or least ("min q3") value, which
+    has its own sign here, so that `lower` and `upper` change places. No motion passes `proved`;
+    `reached_at` has the inputs of one that reaches the peak on the lowest level, if known.
     """
 
     lower: Values
@@ -125,20 +121,10 @@ class EnvelopeTask:
         same_inputs = set(self.fuzzy) == set(section.fuzzy)
         return same_inputs and self.duration == section.duration
 
-    def options(self, structure: Structure) -> Document:
-        """Options of the method of [envelope]: its tolerance, if it has one."""
-        method, tolerance = self.section.method, self.tolerance(structure).value
-        # without a tolerance in the case, method auto takes any gap that is proved
-        takes_any_gap = method == "auto" and self.section.tolerance is None
-        if takes_any_gap or not hasattr(frame.METHODS[method], "tolerance"):
-            return {}
-        return {"tolerance": tolerance * (self.section.gain if method in FOLLOWERS else 1.0)}
-
-    def compute(self, structure: Structure, context: StageContext) -> Computed[EnvelopeResult]:
+    def compute(self, structure: Structure, context: StageContext) -> StageResult[EnvelopeResult]:
         """Computes the envelope as a dataset, and the fuzzy peak of each output as a document."""
-        tick = context.tick
-        first, second = (subprogress(tick, *ends) for ends in ((0.0, 0.5), (0.5, 1.0)))
-        arguments = self.arguments(structure) | {"progress": first if tick else False}
+        first, second = (subprogress(context.tick, x, x + 0.5) for x in (0.0, 0.5))
+        arguments = self.arguments(structure) | {"progress": first}
         result = frame.envelope(**arguments, relative=not self.tolerance(structure).unit)
         data = result.to_dataset()
         signed = [name for name in self.limited if name != output_of(name)]
@@ -147,10 +133,9 @@ class EnvelopeTask:
         has_many_inputs = len(structure.inputs(self.fuzzy)) > MAX_PARAMETERS
         gap = np.inf if has_many_inputs else PEAK_ERROR
         if loose := loose_peaks(peak_bounds, self.limited, gap):
-            further = replace(context, tick=second if tick else None)
-            tighter = replace(self, limited=loose).close_peaks(structure, further)
+            tighter = replace(self, limited=loose).close_peaks(structure, second)
             peak_bounds = tightest(peak_bounds, tighter)
-        return Computed(self._result(data, peak_bounds, structure), data)
+        return StageResult(self._result(data, peak_bounds, structure), data)
 
     def _result(self, data: xarray.Dataset, peaks: Peaks, structure: Structure) -> EnvelopeResult:
         """Extremes and errors on the lowest level, read off the dataset, and the peaks."""
@@ -178,21 +163,23 @@ class EnvelopeTask:
 
     def compute_peaks(
         self, structure: Structure, context: StageContext, nodes: int = 1
-    ) -> Computed[PeakResults]:
+    ) -> StageResult[PeakResults]:
         """Computes the peaks of the limited outputs alone, with some nodes in each step."""
-        return Computed(peak_results(self.close_peaks(structure, context, nodes)))
+        return StageResult(peak_results(self.close_peaks(structure, context.tick, nodes)))
 
     def arguments(self, structure: Structure) -> Document:
         """Arguments of `frame.envelope` and `frame.require_envelope`, by name, from the case."""
-        return {
-            **self._motion(structure),
-            "model": structure.model,
-            "method": self.section.method,
-            "integrator": self.section.integrator,
-            **self.options(structure),
-        }
+        section, method = self.section, self.section.method
+        arguments = {**self._motion(structure), "model": structure.model, "method": method}
+        arguments["integrator"] = section.integrator
+        tolerance = self.tolerance(structure).value
+        # without a tolerance in the case, method auto takes any gap that is proved
+        takes_any_gap = method == "auto" and section.tolerance is None
+        if not takes_any_gap and hasattr(frame.METHODS[method], "tolerance"):
+            arguments["tolerance"] = tolerance * (section.gain if method in FOLLOWERS else 1.0)
+        return arguments
 
-    def close_peaks(self, structure: Structure, context: StageContext, nodes: int = 1) -> Peaks:
+    def close_peaks(self, structure: Structure, progress: Progress, nodes: int = 1) -> Peaks:
         """Peaks of the limited outputs by the method that bounds peaks most closely.
 
         There are `nodes` nodes in each step of [envelope].
@@ -200,9 +187,8 @@ class EnvelopeTask:
         model = structure.model_with_outputs("limits", outputs_of(self.limited))
         magnitudes = all(name == output_of(name) for name in self.limited)
         method = frame.Auto(PEAK_ERROR, peaks=True, magnitudes=magnitudes)
-        arguments = self._motion(structure) | {"progress": context.tick or False}
-        arguments["step"] = self.section.step / nodes
-        result = frame.envelope(model, method=method, relative=True, **arguments)
+        motion = self._motion(structure) | {"step": self.section.step / nodes}
+        result = frame.envelope(model, method=method, relative=True, progress=progress, **motion)
         return peaks(result, self.limited)
 
     def _motion(self, structure: Structure) -> dict[str, Any]:

@@ -87,7 +87,18 @@ def require_learnable(
     allowed, held_out = f"some of modes {[*rows]}, not all", section.held_out
     fits, value = set(held_out) < set(rows), ", ".join(map(str, held_out))
     require(fits, "identify.held_out", value=value, allowed=allowed)
-    learned = [_measured_mode(section, row) for mode, row in rows.items() if mode not in held_out]
+    learned = [
+        measured_mode(
+            mode,
+            row.frequencies,
+            {floor: [*map(float, values)] for floor, values in row.amplitudes.items()},
+            # the section's standard deviations stand in where the file has none
+            frequency_deviation=row.frequency_deviation or section.frequency_deviation,
+            shape_deviation=row.shape_deviation or section.shape_deviation,
+        )
+        for mode, row in rows.items()
+        if mode not in held_out
+    ]
     return rows, learned, structure.inputs(section.learn, "identify.learn")
 
 
@@ -100,18 +111,6 @@ def _measured_rows(section: Identify) -> tuple[ModeRows, ...]:
     if is_universal:
         return uff_mode_rows(section.measured, section.floors)
     return mode_rows(section.measured)
-
-
-def _measured_mode(section: Identify, row: ModeRows) -> MeasuredMode:
-    """A measured mode; the section's standard deviations stand in where its file has none."""
-    shapes = {floor: [*map(float, values)] for floor, values in row.amplitudes.items()}
-    return measured_mode(
-        row.mode,
-        row.frequencies,
-        shapes,
-        frequency_deviation=row.frequency_deviation or section.frequency_deviation,
-        shape_deviation=row.shape_deviation or section.shape_deviation,
-    )
 
 
 def _prediction(row: ModeRows, frequencies: Ends) -> Prediction:

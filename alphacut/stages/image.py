@@ -36,7 +36,7 @@ from alphacut.rve.result.moduli import plane_constants
 from alphacut.rve.result.result import PhaseEnergies
 from alphacut.stages.cell import AVERAGES, GPA, References, isotropic_bounds
 from alphacut.stages.modulus import LossCuts, LossResult, constant_cuts
-from alphacut.stages.store import Computed, CutsResult, Numbers, Stage, StageContext, Values
+from alphacut.stages.store import CutsResult, Numbers, Stage, StageContext, StageResult, Values
 from alphacut.stochastic.segmentation import segment
 
 if TYPE_CHECKING:
@@ -93,9 +93,9 @@ def stage(cell: ImageCell, alpha: tuple[float, ...], average: str) -> Stage[Imag
 
 def compute_cuts(
     cell: ImageCell, alpha: tuple[float, ...], average: str, context: StageContext
-) -> Computed[ImageResult]:
+) -> StageResult[ImageResult]:
     """Computes α-cuts of E and of the stiffness of an image, and how its sources widen E."""
-    start, tick = perf_counter(), context.tick or (lambda fraction: None)
+    start = perf_counter()
     study, aspect = image_study(cell), cell.pixel[-1] / cell.pixel[0]
     nominal = study.images(None, None)  # at nominal thresholds and moduli
     division, solver = usual_division(nominal), ConjugateGradient(ACCURACY)
@@ -103,19 +103,24 @@ def compute_cuts(
     require_memory(rows, columns, division)
     model = ImageModel(aspect, division=division, solver=solver, average=average)
     crisp = model.solve(nominal)
-    tick(0.2)
+    context.tick(0.2)
     images = [study.images(level, level) for level in alpha]
     cuts = model.cuts(images, (nominal, crisp))
     model.require_consistent(images, cuts)
     _require_isotropic(cuts[0])
-    tick(0.8)
+    context.tick(0.8)
 
     def width(threshold: AlphaLevel, phases: AlphaLevel) -> float:
         """Width of E in Pa at levels of the threshold and of the phases."""
         (cut,) = model.cuts([study.images(threshold, phases)], (nominal, crisp))
         return float(cut.modulus[1] - cut.modulus[0])
 
-    widths = _widths(study, alpha[0], width)
+    base, lowest = width(None, None), alpha[0]
+    widths = {"discretisation": base}
+    if study.fuzzy_threshold:
+        widths["threshold"] = max(0.0, width(lowest, None) - base)
+    if any(number.support.width > 0 for pair in cell.pairs for number in pair):
+        widths["phases"] = max(0.0, width(None, lowest) - base)
     phase = study.phase_ranges(None)[0]
     losses, loss = dict[str, Array](), None
     if cell.losses:
@@ -123,9 +128,11 @@ def compute_cuts(
         phase_cuts = LossCuts.from_phases(cell.losses, alpha)
         bounds, errors = image_loss_bounds(energies, phase_cuts, average)
         losses = dict(zip(CONSTANTS, np.moveaxis(bounds, -1, 0), strict=True))
-        errors_by_name = dict(zip(CONSTANTS, map(float, errors), strict=True))
-        loss = LossResult.of(losses, errors_by_name, Nature.ESTIMATED)
+        loss = LossResult.of(losses, errors, Nature.ESTIMATED)
     top, constants = cuts[-1], np.array([cut.constants for cut in cuts])  # (levels, constants, 2)
+    fractions = study.fractions
+    shares = np.array([*fractions.values()])
+    phases = [Phase(young.nominal, nu.nominal) for young, nu in cell.pairs]
     result = ImageResult(
         lower_GPa=np.asarray(top.bounds.lower / GPA, float),
         upper_GPa=np.asarray(top.bounds.upper / GPA, float),
@@ -139,13 +146,13 @@ def compute_cuts(
             E_GPa=CutsResult.of(np.array([cut.modulus for cut in cuts]) / GPA),
         ),
         seconds=perf_counter() - start,
-        widths_GPa={name: value / GPA for name, value in widths.items()},
-        fractions=study.fractions,
+        widths_GPa={x: widths[x] / GPA for x in sorted(widths, key=lambda x: -widths[x])},
+        fractions=fractions,
         division=model.division,
-        references={"hashin_shtrikman_E_GPa": study.isotropic_bounds},
+        references={"hashin_shtrikman_E_GPa": isotropic_bounds(shares, phases)},
         loss=loss,
     )
-    return Computed(result, _dataset(alpha, cuts, phase, losses))
+    return StageResult(result, _dataset(alpha, cuts, phase, losses))
 
 
 def _bounds_by_side(bounds: Interval, unit: float = 1.0) -> dict[str, float]:
@@ -169,9 +176,7 @@ def _dataset(
     """Dataset of the bounds on each level, in SI, and of the phase of each pixel."""
     import xarray
 
-    young, constants = (
-        np.array([getattr(cut, x) for cut in cuts]) for x in ("modulus", "constants")
-    )
+    young, constants = np.array([x.modulus for x in cuts]), np.array([x.constants for x in cuts])
     stiffness = np.array([[cut.bounds.lower, cut.bounds.upper] for cut in cuts])
     variables: dict[str, Any] = {
         "E": (("alpha", "bound"), young, {"units": "Pa"}),
@@ -186,10 +191,7 @@ def _dataset(
 
 def image_loss_bounds(energies: PhaseEnergies, cuts: LossCuts, average: str) -> tuple[Array, Array]:
     """Bounds of the loss factors of E, G, K at nominal moduli, (levels, 2, 3), and errors, (3,)."""
-
-    def constants_of(moduli: Array) -> Array:
-        return plane_constants(moduli, average)
-
+    constants_of = partial(plane_constants, average=average)
     fractions, _ = energies.energy_fractions(constants_of)
     same_losses = np.array([bulk_and_shear_losses(None, False)] * len(fractions))  # of K and G
     corners = cuts.corners(fractions, same_losses)
@@ -198,19 +200,6 @@ def image_loss_bounds(energies: PhaseEnergies, cuts: LossCuts, average: str) -> 
     _, errors = first_order(energies, largest, constants_of)
     # what the first order leaves out is of the order of the squared difference of losses
     return bounds, errors + np.ptp(largest) ** 2 * bounds[0, 1]
-
-
-def _widths(
-    study: ImageStudy, lowest: float, width: Callable[[AlphaLevel, AlphaLevel], float]
-) -> dict[str, float]:
-    """Widths of E in Pa on the lowest level by what causes them, the largest first."""
-    base = width(None, None)
-    widths = {"discretisation": base}
-    if study.fuzzy_threshold:
-        widths["threshold"] = max(0.0, width(lowest, None) - base)
-    if study.fuzzy_phases:
-        widths["phases"] = max(0.0, width(None, lowest) - base)
-    return dict(sorted(widths.items(), key=lambda pair: -pair[1]))
 
 
 def cut_or_nominal(number: FuzzyNumber, level: AlphaLevel) -> tuple[float, float]:
@@ -229,11 +218,6 @@ class ImageStudy:
     phase_ranges: PhaseRanges
     fuzzy_threshold: bool
 
-    @property
-    def fuzzy_phases(self) -> bool:
-        """True if the moduli depend on the level."""
-        return any(number.support.width > 0 for pair in self.cell.pairs for number in pair)
-
     def images(self, threshold: AlphaLevel, phases: AlphaLevel) -> ModuliImages:
         """Least and greatest moduli of each pixel, at levels of threshold and phases."""
         moduli = [
@@ -241,12 +225,6 @@ class ImageStudy:
             for young, poisson in self.cell.pairs
         ]
         return moduli_images(*self.phase_ranges(threshold), moduli)
-
-    @property
-    def isotropic_bounds(self) -> tuple[float, float]:
-        """Hashin and Shtrikman's bounds of an isotropic E in GPa at the nominal values."""
-        phases = [Phase(young.nominal, nu.nominal) for young, nu in self.cell.pairs]
-        return isotropic_bounds(np.array([*self.fractions.values()]), phases)
 
     @property
     def fractions(self) -> dict[str, float]:

@@ -12,7 +12,7 @@ from alphacut.fuzzy.campaign.workers import pool
 from alphacut.io.arrays import columns_text
 from alphacut.io.files import Document, write_text
 from alphacut.io.provenance import file_digest
-from alphacut.stages.store import Computed, Stage, StageContext
+from alphacut.stages.store import Stage, StageContext, StageResult
 from alphacut.stochastic.microstructure import Microstructure, fragment, study, summary, to_dataset
 
 
@@ -26,7 +26,7 @@ def stage(section: MicrostructureSection, spheres: bool, figures: bool = True) -
 
 def compute_map(
     section: MicrostructureSection, spheres: bool, figures: bool, context: StageContext
-) -> Computed[Document]:
+) -> StageResult[Document]:
     """Computes the fuzzy radius map of particles, and writes its files if there is a folder.
 
     The result does not depend on the number of workers.
@@ -36,7 +36,7 @@ def compute_map(
     numbers = summary(result)
     if context.folder is not None:
         write_files(result, numbers, context.folder, figures=figures)
-    return Computed(numbers, to_dataset(result))
+    return StageResult(numbers, to_dataset(result))
 
 
 def write_files(result: Microstructure, numbers: Document, folder: Path, *, figures: bool) -> None:

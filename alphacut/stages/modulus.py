@@ -54,12 +54,11 @@ class LossResult(Numbers):
     nature: Nature
 
     @classmethod
-    def of(
-        cls, cuts: Mapping[str, Array], errors: Mapping[str, float], nature: Nature
-    ) -> LossResult:
-        """The result of cuts (levels, 2) by the names of `CONSTANTS`."""
+    def of(cls, cuts: Mapping[str, Array], errors: Array | None, nature: Nature) -> LossResult:
+        """The result of cuts (levels, 2) by the names of `CONSTANTS`, and of their errors (3,)."""
         named = {name: CutsResult.of(cuts[name]) for name in CONSTANTS}
-        return cls(**named, error=dict(errors), nature=nature)
+        by_name = {} if errors is None else dict(zip(CONSTANTS, map(float, errors), strict=True))
+        return cls(**named, error=by_name, nature=nature)
 
 
 class ModulusResult(Numbers):

@@ -26,7 +26,7 @@ from alphacut.fuzzy.result import Nature
 from alphacut.io.provenance import NESTED
 from alphacut.stages.campaign import OUTPUTS, CellCampaign
 from alphacut.stages.envelope import EnvelopeTask
-from alphacut.stages.store import Computed, Stage, StageContext
+from alphacut.stages.store import Stage, StageContext, StageResult
 
 ShareTable = dict[str, dict[str, float]]
 """Share of each input by result, such as E, then by input."""
@@ -38,11 +38,8 @@ def stage(
     campaign: CellCampaign | None, structure: Structure | None, task: EnvelopeTask | None
 ) -> Stage[ShareTable]:
     """The stage of the shares of a cell's inputs in its modulus, and of a study's in its peaks."""
-    inputs: list[object] = [None, None]
-    if campaign is not None:
-        inputs[0] = [campaign.identity, campaign.inputs, campaign.modulus.alpha]
-    if structure is not None:
-        inputs[1] = [structure.model, structure.numbers, task]
+    of_cell = campaign and [campaign.identity, campaign.inputs, campaign.modulus.alpha]
+    inputs = [of_cell, structure and [structure.model, structure.numbers, task]]
     compute = partial(compute_shares, campaign, structure, task)
     return Stage("shares", inputs, (*NESTED, "alphacut"), ShareTable, compute)
 
@@ -52,7 +49,7 @@ def compute_shares(
     structure: Structure | None,
     task: EnvelopeTask | None,
     context: StageContext,
-) -> Computed[ShareTable]:
+) -> StageResult[ShareTable]:
     """Computes each input's share in the widths of E, ν and peaks on the lowest level.
 
     A result of one input has none.
@@ -65,7 +62,7 @@ def compute_shares(
         peak = peak_shares(structure.frame, structure, task)
         for column, name in enumerate(structure.outputs):
             shares[f"the peak of {name}"] = _by_input(peak, peak.share[:, column])
-    return Computed(shares)
+    return StageResult(shares)
 
 
 def _by_input(shares: Shares, values: Array) -> dict[str, float]:

@@ -8,11 +8,11 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, as_completed
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Annotated, Generic, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Annotated, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -75,32 +75,29 @@ class CutsResult(Numbers):
 T = TypeVar("T")
 
 
+def no_progress(share: float) -> None:
+    """Shows nothing."""
+
+
 @dataclass(frozen=True)
 class StageContext:
-    """Surroundings of a computation.
+    """Surroundings of a computation: an empty folder for further files, or None to write none.
 
-    Args:
-        folder: Empty folder for further files of the stage; None to write none.
-        samples: Store of samples; None for none.
-        tick: Takes the share done; None to show nothing.
+    `samples` is a store of samples, `tick` takes the share done.
     """
 
     folder: Path | None = None
     samples: Path | None = None
     workers: int = 1
-    tick: Progress | None = None
-
-
-class Computed(NamedTuple, Generic[T]):
-    """What a stage computes: numbers, and arrays with their axes if it has some."""
-
-    numbers: T
-    data: xarray.Dataset | None = None
+    tick: Progress = no_progress
 
 
 @dataclass(frozen=True)
 class StageResult(Generic[T]):
-    """Result of a stage, with the names of its files and the digest of what it was made from."""
+    """Numbers of a stage, and arrays with their axes if it has some.
+
+    The store adds the names of the files and the digest of what the result was made from.
+    """
 
     numbers: T
     data: xarray.Dataset | None = None
@@ -128,7 +125,7 @@ class Stage(Generic[T]):
     inputs: object
     packages: tuple[str, ...]
     kind: type[T]
-    compute: Callable[[StageContext], Computed[T]]
+    compute: Callable[[StageContext], StageResult[T]]
     has_samples: bool = False
 
     @cached_property
@@ -137,39 +134,32 @@ class Stage(Generic[T]):
         return fingerprint([self.name, self.inputs], self.packages)
 
     @on_one_blas_thread
-    def run(self, context: StageContext) -> Computed[T]:
+    def run(self, context: StageContext) -> StageResult[T]:
         """The result, computed."""
         return self.compute(context)
 
 
 @dataclass
 class RunProgress:
-    """Progress of a run in one bar; each stage takes an equal part of what is left.
+    """Progress of a run in one bar; each of the `stages_left` takes an equal part of what is left.
 
-    Args:
-        tick: Takes the share done; None to show nothing.
-        stages_left: Stages that are still to be taken.
-        done: Share done.
+    `show` takes the share done.
     """
 
-    tick: Progress | None = None
+    show: Progress = no_progress
     stages_left: int = 1
     done: float = 0.0
+    shown: float = 0.0
 
-    def next_part(self, count: int = 1) -> Progress | None:
-        """Progress of the next stages, `count` of them; None where nothing is shown."""
+    def next_part(self, count: int = 1) -> Progress:
+        """Progress of the next stages, `count` of them."""
         first, part = self.done, count / max(count, self.stages_left)
         self.done, self.stages_left = first + part * (1 - first), self.stages_left - count
-        if (show := self.tick) is None:
-            return None
-        shown, last = first, self.done
+        return subprogress(self._advance, first, self.done)
 
-        def tick(share: float) -> None:
-            nonlocal shown
-            shown = max(shown, first + (last - first) * share)  # a second analysis begins at 0
-            show(shown)
-
-        return tick
+    def _advance(self, share: float) -> None:
+        self.shown = max(self.shown, share)  # a second analysis of a stage begins at 0
+        self.show(self.shown)
 
 
 @dataclass(frozen=True)
@@ -208,15 +198,14 @@ class StageStore:
         if executor is None or self.folder is None or len(stale) == 1:
             for k, stage in enumerate(stale):
                 stage_tick = subprogress(tick, k / len(stale), (k + 1) / len(stale))
-                results[stage.name] = self._compute(stage, stage_tick if tick else None)
+                results[stage.name] = self._compute(stage, stage_tick)
             return results
         stage_of_future = {executor.submit(stage.run, StageContext()): stage for stage in stale}
         for count, future in enumerate(as_completed(stage_of_future), start=1):
             stage = stage_of_future[future]
             with _naming_dead_workers(stage.name), TemporaryDirectory() as scratch:
                 results[stage.name] = self._write(stage, future.result(), Path(scratch))
-            if tick:
-                tick(count / len(stale))
+            tick(count / len(stale))
         return results
 
     def _read(self, stage: Stage[T]) -> StageResult[T] | None:
@@ -240,17 +229,17 @@ class StageStore:
         arrays = f"{stage.name}.nc"
         return StageResult(numbers, folder.dataset(arrays) if arrays in files else None, files, key)
 
-    def _compute(self, stage: Stage[T], tick: Progress | None) -> StageResult[T]:
+    def _compute(self, stage: Stage[T], tick: Progress) -> StageResult[T]:
         """The result of a stage, computed and written."""
         LOG.info("stage %s is computed", stage.name)
-        folder, workers = self.folder, self.workers
+        folder = self.folder
         with _naming_dead_workers(stage.name), TemporaryDirectory() as temporary:
             if folder is None:
-                return StageResult(*stage.run(StageContext(workers=workers, tick=tick)))
+                return stage.run(StageContext(workers=self.workers, tick=tick))
             for ending in (".json", ".nc"):
                 folder.require_free(f"{stage.name}{ending}")
             samples = self._sample_store(folder) if stage.has_samples else None
-            context = StageContext(Path(temporary), samples, workers, tick)
+            context = StageContext(Path(temporary), samples, self.workers, tick)
             return self._write(stage, stage.run(context), Path(temporary))
 
     def _sample_store(self, folder: ResultsFolder) -> Path:
@@ -265,19 +254,19 @@ class StageStore:
             folder.add_to_list(dict.fromkeys((SAMPLES, f"{SAMPLES}-journal"), Listed("", "")))
         return path
 
-    def _write(self, stage: Stage[T], computed: Computed[T], files: Path) -> StageResult[T]:
+    def _write(self, stage: Stage[T], computed: StageResult[T], files: Path) -> StageResult[T]:
         """Writes a result beside the other files of its stage in `files`, into the folder."""
         assert self.folder is not None
         name, key = f"{stage.name}.json", stage.key
         if rank() != 0:
-            return StageResult(*computed, fingerprint=key)
+            return replace(computed, fingerprint=key)
         document = {**build_provenance(self.case_text, key), "result": computed.numbers}
         write_text(files / name, as_json(document, indent=1))
         if computed.data is not None:
             computed.data.to_netcdf(files / f"{stage.name}.nc")
         before = self.folder.files[name].source if name in self.folder.files else ""
         self.folder.put_files(key, files, before)
-        return StageResult(*computed, self.folder.made_from(key), key)
+        return replace(computed, files=self.folder.made_from(key), fingerprint=key)
 
     def put_text(self, name: str, text: str) -> None:
         """Writes a text file of the run itself, such as summary.json."""

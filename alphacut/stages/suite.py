@@ -36,8 +36,8 @@ NODES = 2
 """Nodes in a step at which peaks are bounded; the error between nodes falls with its square."""
 MAX_OFFSET = 0.01
 """Mean of a record as a share of its peak that is said."""
-QUANTILES = {"mean": None, "median": 0.5, "84 %": 0.84}
-"""Statistics of a suite's peaks; 84 % is one standard deviation of a normal law above the mean."""
+QUANTILES = {"median": 0.5, "84 %": 0.84}
+"""Of a suite's peaks; 84 % is one standard deviation of a normal law above the mean."""
 
 
 class NominalMode(NamedTuple):
@@ -128,24 +128,13 @@ def with_record(structure: Structure, record: SuiteRecord) -> Structure:
     return replace(structure, model=replace(structure.linear, ground=record.ground))
 
 
-def stages(
-    structure: Structure, task: EnvelopeTask, records: Sequence[SuiteRecord]
-) -> list[Stage[PeakResults]]:
-    """The stages that compute the peaks of a structure under each record, the longest first."""
-    found = []
-    for record in sorted(records, key=lambda record: -record.duration):
-        loaded = with_record(structure, record)
-        record_task = replace(task, name=record.name, duration=record.duration)
-        inputs = [loaded.model, loaded.numbers, record_task]
-        compute = partial(record_task.compute_peaks, loaded, nodes=NODES)
-        packages = ("fuzzy", "frame")
-        found.append(Stage(stage_name(record), inputs, packages, PeakResults, compute))
-    return found
-
-
-def stage_name(record: SuiteRecord) -> str:
-    """Name of the files of a record's result."""
-    return f"record_{record.name}"
+def stage(structure: Structure, task: EnvelopeTask, record: SuiteRecord) -> Stage[PeakResults]:
+    """The stage that computes the peaks of a structure under a record."""
+    loaded = with_record(structure, record)
+    record_task = replace(task, name=record.name, duration=record.duration)
+    inputs = [loaded.model, loaded.numbers, record_task]
+    compute = partial(record_task.compute_peaks, loaded, nodes=NODES)
+    return Stage(f"record_{record.name}", inputs, ("fuzzy", "frame"), PeakResults, compute)
 
 
 def worst_peaks(peaks: Mapping[str, Peaks]) -> dict[str, Peak]:
@@ -196,12 +185,10 @@ def with_means(
         in_cuts = np.where(inside, tried, -np.inf)  # (levels, points)
         mean_minima = np.maximum(means["lower"] - means["error"], means["least_proved"])
         # a structure of any higher cut has at least the mean of that cut's least peaks
-        means["reached"] = np.maximum(
-            np.maximum.accumulate(mean_minima[::-1])[::-1], in_cuts.max(axis=1)
-        )
+        minima_of_higher_cuts = np.maximum.accumulate(mean_minima[::-1])[::-1]
+        means["reached"] = np.maximum(minima_of_higher_cuts, in_cuts.max(axis=1))
         means["least_reached"] = np.full_like(mean_minima, np.inf)  # nothing bounds one structure's
-        farthest = map(float, points[in_cuts[0].argmax()])
-        reached_at = dict(zip(inputs, farthest, strict=True))
+        reached_at = dict(zip(inputs, points[in_cuts[0].argmax()].tolist(), strict=True))
         found[f"mean {name}"] = replace(worst[name], reached_at=reached_at, **means)
     return found
 
@@ -272,25 +259,19 @@ def suite_result(
             name: Statistics(proved=record_statistics(bounds[name], peak.is_least))
             for name, peak in first.items()
         },
-        spectra={
-            "period_s": PERIODS,
-            **{x.name: response_spectrum(x.ground, mode) for x in records},
+        spectra={"period_s": PERIODS}
+        | {
+            x.name: np.array([mode.spectral_acceleration(x.ground, float(t)) for t in PERIODS])
+            for x in records
         },
         units=dict(units),
     )
 
 
-def response_spectrum(ground: Accelerogram, mode: NominalMode) -> Array:
-    """Pseudo-accelerations at `PERIODS` with the nominal damping, in m/s²."""
-    return np.array([mode.spectral_acceleration(ground, float(x)) for x in PERIODS])
-
-
 def record_statistics(values: Array, is_least: bool) -> dict[str, Array]:
     """Mean and quantiles by name over records of values (records, levels); of least from above."""
     sign = -1.0 if is_least else 1.0
-    return {
-        name: np.asarray(
-            values.mean(0) if x is None else sign * np.quantile(sign * values, x, axis=0), float
-        )
-        for name, x in QUANTILES.items()
-    }
+    found = {"mean": np.asarray(values.mean(axis=0))}
+    for name, share in QUANTILES.items():
+        found[name] = sign * np.quantile(sign * values, share, axis=0)
+    return found

@@ -22,7 +22,7 @@ from alphacut.io.files import as_json
 from alphacut.io.results import ResultsFolder
 from alphacut.questions.summary import Results, Summary
 from alphacut.stages import envelope, modulus
-from alphacut.stages.store import Computed, RunProgress, Stage, StageStore
+from alphacut.stages.store import RunProgress, Stage, StageResult, StageStore
 from tests.alphacut.small import CELL, FRAME, written
 
 ROOT = Path(alphacut.__file__).resolve().parents[1]
@@ -34,7 +34,7 @@ def counted():
 
     def compute(work):
         calls.append(work)
-        return Computed({"count": len(calls)}, xarray.Dataset({"x": ((), len(calls))}))
+        return StageResult({"count": len(calls)}, xarray.Dataset({"x": ((), len(calls))}))
 
     return calls, lambda inputs: Stage("thing", inputs, ("fuzzy",), dict[str, int], compute)
 
@@ -82,7 +82,7 @@ def test_a_run_has_one_progress_that_ends_once(tmp_path):
     def compute(work):
         for share in (0.0, 0.5, 0.2, 1.0):
             work.tick(share)
-        return Computed({})
+        return StageResult({})
 
     stages = [Stage(f"stage{k}", k, ("fuzzy",), dict, compute) for k in range(6)]
     store = store_in(tmp_path, progress=RunProgress(told.append, stages_left=5))
@@ -138,7 +138,7 @@ def test_a_borrowed_folder_is_not_believed(tmp_path):
         summary.model_copy(update={"fingerprints": {"modulus": "other"}}).require_run_of(results)
     for text in ("", "[" * 100_000, '{"case": 1}'):
         (folder / "summary.json").write_text(text)
-        with pytest.raises(RefusedError, match="damaged"):
+        with pytest.raises(RefusedError, match="is changed"):
             Summary.read(ResultsFolder.read(folder))
 
 
