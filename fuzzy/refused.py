@@ -132,9 +132,7 @@ def require_choice(key: str, value: object, names: Iterable[str]) -> None:
     require(value in allowed, key, value=value, allowed=", ".join(allowed))
 
 
-def require(
-    holds: bool | np.bool_, key: str, *, value: object, allowed: str, cure: str = ""
-) -> None:
+def require(holds: bool | np.bool_, key: str, value: object, allowed: str, cure: str = "") -> None:
     """Raise `RefusedError`(key, value, allowed, cure) unless the condition `holds`."""
     if not holds:
         raise RefusedError(key, value, allowed, cure)

@@ -97,22 +97,20 @@ class CellContent(Section):
         """Refuses a mesh file without [cell.phases] or the reverse; keys that repeat the file."""
         if self.mesh.file is None:
             allowed = "a mesh of Gmsh beside [cell.phases]"
-            require(self.mesh_cell is None, "mesh.file", value=None, allowed=allowed)
+            require(self.mesh_cell is None, "mesh.file", None, allowed)
             is_complete = self.radius is None or self.radius_map is not None
             about = RadiusMapSection.model_fields["a1"].description
-            allowed = f"{about}; theta alone beside mesh.file"
-            require(is_complete, "radius.a1", value=None, allowed=allowed)
+            require(is_complete, "radius.a1", None, f"{about}; theta alone beside mesh.file")
             return self
         allowed = "[cell.phases], a phase for each physical group of mesh.file"
-        require(self.mesh_cell is not None, "cell.phases", value=None, allowed=allowed)
+        require(self.mesh_cell is not None, "cell.phases", None, allowed)
         for key in ("size", "layers"):
             require_alone(f"mesh.{key}", self.mesh.has_key(key), "mesh.file")
         has_map = self.radius_map is not None or "microstructure" in self.stages
-        allowed = "theta alone beside mesh.file"
-        require(not has_map, "radius", value="a map of radii", allowed=allowed)
+        require(not has_map, "radius", "a map of radii", "theta alone beside mesh.file")
         tolerance, cure = self.modulus.tolerance, "compare a coarser mesh"
         allowed = "none beside mesh.file, whose error nobody knows"
-        require(tolerance is None, "modulus.tolerance", value=tolerance, allowed=allowed, cure=cure)
+        require(tolerance is None, "modulus.tolerance", tolerance, allowed, cure=cure)
         return self
 
     @model_validator(mode="after")
@@ -127,7 +125,7 @@ class CellContent(Section):
         radius, thickest = law.largest_radius, cell.interphase_thickness.support.upper
         fits = radius + thickest < CLOSEST  # the largest outer radius that can be meshed
         allowed = f"values below {CLOSEST - radius:.4g}, beside radii up to {radius:.4g}"
-        require(fits, "cell.interphase_thickness", value=f"{thickest:g}", allowed=allowed)
+        require(fits, "cell.interphase_thickness", f"{thickest:g}", allowed)
         return self
 
     @model_validator(mode="after")
@@ -144,7 +142,7 @@ class CellContent(Section):
         for stage in self.stages:
             for key in sections[stage]:
                 allowed = f"[{key}], which stage {stage} needs"
-                require(getattr(self, key) is not None, key, value=None, allowed=allowed)
+                require(getattr(self, key) is not None, key, None, allowed)
         is_source = {
             "radius": self.radius is not None,
             "cell.fraction": has_fraction,
@@ -154,6 +152,5 @@ class CellContent(Section):
         require_alone(first, bool(further), ", ".join(further))
         method = self.modulus.method
         methods = (method,) if self.cell is None else self.cell.methods
-        allowed = f"{', '.join(methods)} for this cell"
-        require(method in methods, "modulus.method", value=method, allowed=allowed)
+        require(method in methods, "modulus.method", method, f"{', '.join(methods)} for this cell")
         return self

@@ -114,7 +114,7 @@ class Content(CellContent):
         if self.has_material_damping:
             section = "frame" if self.frame else "matrices"
             allowed = "stage modulus and loss factors in [cell], or a number"
-            require(has_losses, f"{section}.damping_ratio", value="material", allowed=allowed)
+            require(has_losses, f"{section}.damping_ratio", "material", allowed)
         return self
 
     @model_validator(mode="after")
@@ -126,17 +126,17 @@ class Content(CellContent):
         allowed = "a start, an accelerogram, a section [records] or [[force]]"
         cure = "nothing moves the frame"
         is_moved = is_loaded or not starts_at_rest
-        require(is_moved, "frame.displacements", value=None, allowed=allowed, cure=cure)
+        require(is_moved, "frame.displacements", None, allowed, cure=cure)
         if self.records is None:
             is_absent, allowed = self.fragility is None, "beside [records]"
-            require(is_absent, "fragility", value="without records", allowed=allowed)
+            require(is_absent, "fragility", "without records", allowed)
             return self
         require_alone("records", ground is not None, "an accelerogram")
         if self.matrices is not None:
             self.matrices.require_pattern()
         for key in ("probability", "tolerances", "identify", "study"):
             allowed = "[decision] and [fragility], of one motion for each record"
-            require(not getattr(self, key), key, value="beside [records]", allowed=allowed)
+            require(not getattr(self, key), key, "beside [records]", allowed)
         return self
 
     @model_validator(mode="after")
@@ -154,13 +154,13 @@ class Content(CellContent):
         for number, study in enumerate(self.study):
             self._require_study(f"study[{number}]", study, envelope, structure)
         has_modulus = self.has_stated_modulus or "modulus" in self.stages
-        require(has_modulus, "frame.modulus", value=None, allowed="a modulus, or stage modulus")
+        require(has_modulus, "frame.modulus", None, "a modulus, or stage modulus")
         is_framed = self.identify is None or self.frame is not None
-        require(is_framed, "identify", value="without a frame", allowed="beside [frame]")
+        require(is_framed, "identify", "without a frame", "beside [frame]")
         names = [study.name for study in self.study]
         for number, name in enumerate(names):
             is_new = name not in names[:number]
-            require(is_new, f"study[{number}].name", value=name, allowed="a name of its own")
+            require(is_new, f"study[{number}].name", name, "a name of its own")
         for section in self.questions.values():
             section.require_answerable(structure)
         if self.identify is not None:

@@ -68,7 +68,7 @@ def parse_limit(value: object) -> Limit:
         number = _number(text, "" if is_relative else Output(name).unit)
     except ValueError as error:
         raise RefusedError("", value, allowed, str(error)) from None
-    require(number > 0 or side in ("max", "min"), "", value=value, allowed=allowed)
+    require(number > 0 or side in ("max", "min"), "", value, allowed)
     return Limit(cast("Side", side or ""), name, number, is_relative, str(value))
 
 
@@ -113,7 +113,7 @@ class QuestionSection(Section):
         outputs = tuple(dict.fromkeys(limit.output for limit in self.limits))
         structure.require_quantities(key, outputs)
         texts = ", ".join(limit.text for limit in self.limits)
-        require(len(values) == len(self.limits), key, value=texts, allowed="each limit once")
+        require(len(values) == len(self.limits), key, texts, "each limit once")
         return values
 
     def require_answerable(self, structure: Structure) -> None:
@@ -123,7 +123,7 @@ class QuestionSection(Section):
             is_one_each = all(name == x.output for name, x in self.limits_by_name.items())
             texts = ", ".join(limit.text for limit in self.limits)
             allowed = "one limit of the magnitude for each output"
-            require(is_one_each, f"{self.key}.limits", value=texts, allowed=allowed)
+            require(is_one_each, f"{self.key}.limits", texts, allowed)
 
 
 class DecisionSection(QuestionSection):
@@ -179,8 +179,8 @@ class FragilitySection(QuestionSection):
         is_free = linear is not None and not linear.loads
         is_at_rest = not any(np.any(getattr(linear, start, 0)) for start in ("q0", "v0"))
         allowed = "linear structures that start at rest, without forces: they scale with records"
-        require(is_free and is_at_rest, "fragility", value="of another motion", allowed=allowed)
+        require(is_free and is_at_rest, "fragility", "of another motion", allowed)
         for limit in self.limits:
             fits = limit.sign * limit.value > 0 and limit.side != "mean"
             allowed = "limits of each record that the structure at rest keeps"
-            require(fits, "fragility.limits", value=limit.text, allowed=allowed)
+            require(fits, "fragility.limits", limit.text, allowed)

@@ -51,7 +51,7 @@ def _parse_history(value: object, info: ValidationInfo) -> ForceHistory:
     counts = (1, 2) if kind == "harmonic" else (0,)  # a frequency and perhaps a phase
     max_options = 0 if kind == "impulse" else 1
     fits = len(numbers) in counts and len(static) + len(starts) <= max_options
-    require(fits and not (static and kind == "harmonic"), "", value=value, allowed=HISTORY)
+    require(fits and not (static and kind == "harmonic"), "", value, HISTORY)
     try:
         start = quantity.parse_number(starts[0], "s") if starts else 0.0
         if kind == "harmonic":
@@ -116,12 +116,12 @@ class ForceSection(Section):
     @model_validator(mode="after")
     def _check_units(self) -> Self:
         """Refuses amplitudes whose unit is not that of the time history."""
-        require(bool(self.amplitude), "force.amplitude", value=None, allowed="one floor or more")
+        require(bool(self.amplitude), "force.amplitude", None, "one floor or more")
         quantity_name, example = quantity.QUANTITIES[self.history.unit]
         for unknown, (_, unit) in self.amplitude.items():
             is_same, shown = unit == self.history.unit, unit or "a number"
             key = f"force.amplitude.{unknown}"
-            require(is_same, key, value=shown, allowed=f'{quantity_name}, as "{example}"')
+            require(is_same, key, shown, f'{quantity_name}, as "{example}"')
         return self
 
 
@@ -188,10 +188,10 @@ def _read_recordings(value: object, info: ValidationInfo) -> tuple[Recording, ..
     pattern, _, channel = str(value).partition("#")
     allowed = f"files or patterns such as records/*.AT2, from the folder {folder.absolute()}"
     is_relative = isinstance(value, str) and not pattern.startswith("/") and pattern.strip() != ""
-    require(is_relative, "", value=value, allowed=allowed)
+    require(is_relative, "", value, allowed)
     paths = sorted(path for path in folder.glob(pattern) if path.is_file())
     allowed += f"; 1 to {MAX_RECORDS} files"
-    require(0 < len(paths) <= MAX_RECORDS, "", value=value, allowed=allowed)
+    require(0 < len(paths) <= MAX_RECORDS, "", value, allowed)
     end = f"_{channel}" if channel else ""
     step, unit = info.data.get("step"), info.data.get("unit") or ""
     recordings: list[Recording] = []
@@ -215,7 +215,7 @@ def _read_recordings(value: object, info: ValidationInfo) -> tuple[Recording, ..
 def _parse_unit(value: object, _: ValidationInfo) -> str:
     """Parse a unit of acceleration, such as g."""
     is_unit = acceleration_factor(str(value)) is not None
-    require(is_unit, "", value=value, allowed=f"a unit of {ACCELERATION_UNITS}")
+    require(is_unit, "", value, f"a unit of {ACCELERATION_UNITS}")
     return str(value)
 
 
@@ -228,7 +228,7 @@ def _parse_scale(value: object, _: ValidationInfo) -> Scale:
     except ValueError as error:
         raise RefusedError("", value, allowed, str(error)) from None
     fits = number > 0 and (measure in ("PGA", "Sa(T1)") or not equals)
-    require(fits, "", value=value, allowed=allowed)
+    require(fits, "", value, allowed)
     return Scale(number, measure if equals else "")
 
 
@@ -263,6 +263,5 @@ class RecordsSection(Section):
         """Refuses two files of the same name, which is that of their results."""
         names = [recording.name for recording in self.recordings]
         repeated = ", ".join(sorted({name for name in names if names.count(name) > 1}))
-        allowed = "each file once, by its name"
-        require(not repeated, "records.files", value=repeated, allowed=allowed)
+        require(not repeated, "records.files", repeated, "each file once, by its name")
         return self

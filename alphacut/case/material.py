@@ -44,7 +44,7 @@ class PhaseSection(Section):
         isotropic = isinstance(self.modulus, FuzzyNumber)
         value = "without poisson" if self.poisson is None else "with poisson"
         allowed = "poisson beside Young's modulus, none beside a stiffness"
-        require(isotropic == (self.poisson is not None), "", value=value, allowed=allowed)
+        require(isotropic == (self.poisson is not None), "", value, allowed)
         return self
 
     def phase(self, modulus: float | None) -> Phase | VoigtPhase:
@@ -88,7 +88,7 @@ class MeshedCell(Section):
         missing = [name for name, phase in self.phases.items() if phase.loss is None]
         complete = len(missing) in (0, len(self.phases))
         key = f"cell.phases.{missing[0]}.loss" if missing else ""
-        require(complete, key, value=None, allowed="a loss factor of each phase, 0 for none")
+        require(complete, key, None, "a loss factor of each phase, 0 for none")
         return self
 
 
@@ -205,14 +205,14 @@ class RoundCell(Section):
         has_ratio, is_isotropic = self.inclusion_poisson is not None, self.stiffness is None
         value = "there" if has_ratio else "missing"
         allowed = "a number beside Young's modulus, none beside a stiffness"
-        require(is_isotropic == has_ratio, "cell.inclusion_poisson", value=value, allowed=allowed)
+        require(is_isotropic == has_ratio, "cell.inclusion_poisson", value, allowed)
         fits, allowed = is_isotropic or self.particles != "spheres", "Young's modulus of spheres"
-        require(fits, "cell.inclusion_modulus", value="a plane stiffness", allowed=allowed)
+        require(fits, "cell.inclusion_modulus", "a plane stiffness", allowed)
         if self.fraction is not None:
             touching = float(self.shape.fractions(1 / reach(outline)))
             fits, value = self.fraction.support.upper < touching, f"{self.fraction.support.upper:g}"
             allowed = f"values below {touching:.6g}, where particles touch"
-            require(fits, "cell.fraction", value=value, allowed=allowed)
+            require(fits, "cell.fraction", value, allowed)
         return self
 
     @model_validator(mode="after")
@@ -222,11 +222,10 @@ class RoundCell(Section):
         missing = [name for name in names if getattr(self, name) is None]
         if len(missing) == len(names):  # there is no interphase
             return self
-        allowed = f"all of {', '.join(names)}"
-        require(not missing, f"cell.{(missing or names)[0]}", value=None, allowed=allowed)
+        require(not missing, f"cell.{(missing or names)[0]}", None, f"all of {', '.join(names)}")
         key, fits = "cell.interphase_thickness", self.particles == "cylinders"
-        require(fits, key, value=f"beside {self.particles}", allowed="a ring around cylinders")
-        require(not self.losses, "cell.matrix_loss", value="beside a ring", allowed="no losses")
+        require(fits, key, f"beside {self.particles}", "a ring around cylinders")
+        require(not self.losses, "cell.matrix_loss", "beside a ring", "no losses")
         return self
 
     @model_validator(mode="after")
@@ -249,7 +248,7 @@ class RoundCell(Section):
             bound = 3 * loss.support.lower / (1 - 2 * ratio.support.lower)
             allowed = f"up to {bound:.4g}, where the shear modulus loses nothing"
             fits, value = bulk.support.upper <= bound, f"{bulk.support.upper:g}"
-            require(fits, key, value=value, allowed=allowed)
+            require(fits, key, value, allowed)
         return self
 
 
@@ -287,18 +286,17 @@ class ImageCell(Section):
         """Refuses thresholds beside labels or neither, and numbers of values that do not fit."""
         has_one = bool(self.threshold) != bool(self.labels)
         value = "beside cell.labels" if self.threshold else None
-        allowed = "one of cell.threshold and cell.labels"
-        require(has_one, "cell.threshold", value=value, allowed=allowed)
+        require(has_one, "cell.threshold", value, "one of cell.threshold and cell.labels")
         n_phases = len(self.threshold) + 1 if self.threshold else len(self.labels or ())
         allowed = f"one for each of {n_phases} phases"
         fits = len(self.modulus) == n_phases and len(self.poisson) in (1, n_phases)
         values = f"{len(self.modulus)} moduli and {len(self.poisson)} Poisson's ratios"
-        require(fits, "cell.modulus", value=values, allowed=allowed)
+        require(fits, "cell.modulus", values, allowed)
         n_losses = len(self.losses)
         fits = n_losses in (0, n_phases)
-        require(fits, "cell.loss", value=f"{n_losses} loss factors", allowed=allowed)
+        require(fits, "cell.loss", f"{n_losses} loss factors", allowed)
         n_sides, allowed = len(self.pixel), "a side, or a width and a height"
-        require(n_sides <= 2, "cell.pixel", value=n_sides, allowed=allowed)
+        require(n_sides <= 2, "cell.pixel", n_sides, allowed)
         return self
 
 

@@ -140,8 +140,7 @@ class MatricesSection(StructureSection):
     ) -> dict[str, FuzzyNumber]:
         """Ratio "zeta" of all modes if E is in every term of K; else "zeta1" … by energy shares."""
         has_modulus = [any(name == "E" for name, _ in f.powers) for f, _ in self.stiffness]
-        allowed = "a term of the stiffness with E"
-        require(any(has_modulus), "damping_ratio", value="material", allowed=allowed)
+        require(any(has_modulus), "damping_ratio", "material", "a term of the stiffness with E")
         if all(has_modulus):
             return damping_ratios_by_name(damping, loss)
         shares = modal_energy_shares(model, np.flatnonzero(has_modulus))
@@ -159,7 +158,7 @@ class MatricesSection(StructureSection):
         vector = np.zeros(len(indices))
         for name, value in entries.items():
             allowed = f"unknowns, as {', '.join(self.unknowns[:6])}"
-            require(name in indices, f"matrices.{key}", value=name, allowed=allowed)
+            require(name in indices, f"matrices.{key}", name, allowed)
             vector[indices[name]] = value
         return vector
 
@@ -172,7 +171,7 @@ class MatricesSection(StructureSection):
     @model_validator(mode="after")
     def _check_rows(self) -> Self:
         """Refuses a structure without outputs, and a record without a direction."""
-        require(bool(self.outputs), "matrices.outputs", value=None, allowed="one output or more")
+        require(bool(self.outputs), "matrices.outputs", None, "one output or more")
         if self.accelerogram is not None or self.direction:
             self.require_pattern()
         _ = self.nominal  # refuses matrices that do not fit together
@@ -183,4 +182,4 @@ class MatricesSection(StructureSection):
         directions = sorted({name.rpartition(".")[2] for name in self.unknowns})
         allowed = f"one of {', '.join(directions[:8])}, or a table by unknown"
         is_moved = bool(self._ground_pattern().any())
-        require(is_moved, "matrices.direction", value=self.direction or None, allowed=allowed)
+        require(is_moved, "matrices.direction", self.direction or None, allowed)

@@ -44,7 +44,7 @@ class PackingSection(Section):
         fits, key = self.fraction <= shape.densest, "microstructure.packing.fraction"
         allowed = f"shares up to {shape.densest:g} of {shape.particles} packed at random"
         cure = f"set cell.fraction = {self.fraction:g} in place of [microstructure]"
-        require(fits, key, value=self.fraction, allowed=allowed, cure=cure)
+        require(fits, key, self.fraction, allowed, cure=cure)
         packing = Packing(self.particles, self.fraction, radii, shape=shape)
         return Simulated(packing, self.packings)
 
@@ -54,7 +54,7 @@ class PackingSection(Section):
         ends = (self.smallest_radius, self.largest_radius)
         fits = None not in ends if self.file is None else ends == (None, None)
         key, allowed = "microstructure.packing.file", "a file, or both ends of the radii"
-        require(fits, key, value="beside or without ends", allowed=allowed)
+        require(fits, key, "beside or without ends", allowed)
         return self
 
 
@@ -101,7 +101,7 @@ class MicrostructureSection(Section):
         """Refuses several sources of the particles, or none."""
         allowed, count = "one of packing, circles and image", len(self.sources)
         value = f"with {count} of them" if count else None
-        require(count == 1, "microstructure", value=value, allowed=allowed)
+        require(count == 1, "microstructure", value, allowed)
         return self
 
     def study(self, *, spheres: bool) -> MicrostructureStudy:

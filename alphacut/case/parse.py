@@ -164,7 +164,7 @@ def apply_changes(
         cure = next(endings, suggestion(key, full_keys))
         allowed = "KEY=VALUE, each full key once, as cell.matrix_modulus='20 GPa'"
         is_new = key in full_keys and key not in keys
-        require(is_new, "--set", value=change, allowed=allowed, cure=cure)
+        require(is_new, "--set", change, allowed, cure=cure)
         _set_key(table, key, _parse_value(value))
         keys.append(key)
     return tuple(keys)

@@ -128,7 +128,7 @@ class Structure:
         except (ValueError, KeyError):
             fuzzy, allowed = (), ", ".join(self.numbers)
             cure = suggestion(name, self.numbers)
-        require(bool(fuzzy), key, value=name, allowed=allowed, cure=cure)
+        require(bool(fuzzy), key, name, allowed, cure=cure)
         return fuzzy
 
     def inputs(self, names: Sequence[str], key: str = "envelope.fuzzy") -> dict[str, FuzzyNumber]:
@@ -322,13 +322,11 @@ class Frame(StructureSection):
         has_columns = self.stiffness is None or not isinstance(self.damping_ratio, MaterialDamping)
         value = "material, beside stiffness"
         allowed = "columns of the material, or [matrices] if some storeys are of another one"
-        require(has_columns, "frame.damping_ratio", value=value, allowed=allowed)
+        require(has_columns, "frame.damping_ratio", value, allowed)
         is_placed = self.has_key("dampers") == (self.damper_placement is not None)
-        allowed = "both dampers and damper_placement"
-        require(is_placed, "frame.damper_placement", value=None, allowed=allowed)
+        require(is_placed, "frame.damper_placement", None, "both dampers and damper_placement")
         is_damped = any(map(self.has_key, DAMPING))
-        allowed = " or ".join(DAMPING)
-        require(is_damped, "frame.dampers", value=None, allowed=allowed, cure='"0 %" for none')
+        require(is_damped, "frame.dampers", None, " or ".join(DAMPING), cure='"0 %" for none')
         _ = self.nominal  # refuses values that make no frame
         return self
 

@@ -84,7 +84,7 @@ class Quantity:
             fits = all(self.holds(end) for end in ends)
         except ValueError as error:
             fits, cure = False, str(error)
-        require(fits, "", value=value, allowed=self.allowed, cure=cure)
+        require(fits, "", value, self.allowed, cure=cure)
         return number
 
     def holds(self, value: float) -> bool:
@@ -183,7 +183,7 @@ def distinct(values: tuple[str, ...]) -> tuple[str, ...]:
 
 def require_alone(key: str, is_there: bool, other: str) -> None:
     """Refuses a key or section that stands beside another one for the same thing."""
-    require(not is_there, key, value=f"beside {other}", allowed="one of them")
+    require(not is_there, key, f"beside {other}", "one of them")
 
 
 after = AfterValidator

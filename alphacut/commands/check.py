@@ -145,7 +145,7 @@ def verify(options: argparse.Namespace, out: TextIO) -> int:
     path = Path(options.folder)
     folder, document, text = ResultsFolder.read(path), dict[str, object](), ""
     names = [x.removesuffix(".nc") for x in folder.files if re.fullmatch(r"envelope_.*\.nc", x)]
-    require(bool(names), "FOLDER", value=str(path), allowed="results of a run with an envelope")
+    require(bool(names), "FOLDER", str(path), "results of a run with an envelope")
     for name in names:
         data, n_motions, verdict = folder.dataset(f"{name}.nc"), 0, "nothing in it is proved"
         if "motion_inputs" in data:  # which proved envelopes alone store

@@ -66,8 +66,7 @@ def require_petsc(petsc: Mapping[str, str], has_prisms: bool) -> None:
     """Refuses PETSc options, named without their prefix, where no prisms are solved."""
     name = next(iter(petsc), "")
     option = name if name == PETSC_LOG else PETSC_PREFIX + name
-    allowed = "options of a cell with method prism"
-    require(has_prisms or not petsc, option, value="PETSc's", allowed=allowed)
+    require(has_prisms or not petsc, option, "PETSc's", "options of a cell with method prism")
 
 
 def add_common(parser: argparse.ArgumentParser) -> None:

@@ -62,8 +62,7 @@ def open_results(
 
     `folder` is that of the results where ``--out`` is left out; empty to write nothing.
     """
-    allowed = "a whole number 1 or more"
-    require(options.workers >= 1, "--workers", value=options.workers, allowed=allowed)
+    require(options.workers >= 1, "--workers", options.workers, "a whole number 1 or more")
     case, path, fresh = read_case(options), options.out or folder, getattr(options, "fresh", False)
     if path:
         require_writable("--out", path, folder=True)

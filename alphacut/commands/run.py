@@ -116,11 +116,10 @@ def report(options: argparse.Namespace, out: TextIO) -> int:
 def compare(options: argparse.Namespace, out: TextIO) -> int:
     """Shows two runs side by side, and writes the files requested; returns exit status 0."""
     folders = options.folder
-    require(len(folders) == 2, "FOLDER", value=f"{len(folders)} folders", allowed="one or two")
+    require(len(folders) == 2, "FOLDER", f"{len(folders)} folders", "one or two")
     first, second = (Summary.read(ResultsFolder.read(Path(name))) for name in folders)
     table = comparison(first, second)
-    allowed = "two runs with a quantity in common"
-    require(bool(table.rows), "FOLDER", value=" and ".join(folders), allowed=allowed)
+    require(bool(table.rows), "FOLDER", " and ".join(folders), "two runs with a quantity in common")
     rows = [dict(zip(table.head, row, strict=True)) for row in table.rows]
     files = list[Path]()
     if options.out:

@@ -34,7 +34,7 @@ def read_array(path: Path, name: str = "") -> Array:
         raise RefusedError(path.name, reason or type(error).__name__, ALLOWED) from None
     is_finite = array.dtype.kind in "iuf" and bool(np.isfinite(array).all())
     fits = is_finite and array.ndim in (1, 2) and array.size > 0
-    require(fits, path.name, value="no such array", allowed=ALLOWED)
+    require(fits, path.name, "no such array", ALLOWED)
     return array.astype(float)
 
 

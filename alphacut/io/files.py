@@ -140,7 +140,7 @@ def require_writable(option: str, value: str, *, folder: bool) -> None:
     except OSError as error:
         fits, reason = False, f"nothing can be written in {existing}: {error.strerror or error}"
     allowed, fits = f"the name of {kind} where you may write", fits or is_special(path)
-    require(fits, option, value=value or "empty", allowed=allowed, cure=reason.lower())
+    require(fits, option, value or "empty", allowed, cure=reason.lower())
 
 
 @contextmanager

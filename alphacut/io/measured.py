@@ -58,7 +58,7 @@ def mode_rows(path: Path) -> tuple[ModeRows, ...]:
         ]
         mode, allowed = values[columns["mode"]], "a mode from 1, frequency and deviations above 0"
         fits = mode >= 1 and mode % 1 == 0 and all(values[column] > 0 for column in positive)
-        require(fits, f"{path.name}, row {row}", value=",".join(cells)[:80], allowed=allowed)
+        require(fits, f"{path.name}, row {row}", ",".join(cells)[:80], allowed)
         modes[int(mode)].append(values)
     return tuple(
         _measurements_of_mode(path, mode, np.array(modes[mode]), columns) for mode in sorted(modes)
@@ -72,7 +72,7 @@ def _column_indices(path: Path, head: list[str]) -> dict[str, int]:
     columns = {name: column for column, name in enumerate(names)}
     is_known = "" not in columns and {"mode", "frequency"} <= columns.keys()
     is_complete = is_known and len(columns) == len(head)
-    require(is_complete, f"{path.name}, header", value=",".join(head)[:80], allowed=ALLOWED)
+    require(is_complete, f"{path.name}, header", ",".join(head)[:80], ALLOWED)
     return columns
 
 

@@ -93,7 +93,7 @@ class ResultsFolder:
         version = document.get("format_version")
         value, allowed = f"of format {version}", f"files of format {FORMAT}"
         cure = "name another folder" if version is None else RUN_AGAIN
-        require(version == FORMAT, str(file), value=value, allowed=allowed, cure=cure)
+        require(version == FORMAT, str(file), value, allowed, cure=cure)
         try:
             files = FILES.validate_python(document.get("files"))
         except ValidationError:
@@ -131,7 +131,7 @@ class ResultsFolder:
             state = None if isinstance(error, FileNotFoundError) else "no regular file"
             raise RefusedError(str(file), state, COMPLETE, RUN_AGAIN) from None
         is_same = digest in ("", digest_of(content))
-        require(is_same, str(file), value="changed", allowed=COMPLETE, cure=RUN_AGAIN)
+        require(is_same, str(file), "changed", COMPLETE, cure=RUN_AGAIN)
         return content
 
     def dataset(self, name: str) -> xarray.Dataset:
@@ -160,7 +160,7 @@ class ResultsFolder:
         is_listed, is_regular = self.is_damaged or name in self.files, stat.S_ISREG(mode)
         kind = "a file that no manifest lists" if is_regular else "no regular file"
         is_free = is_listed and (is_regular or stat.S_ISLNK(mode))
-        require(is_free, str(file), value=kind, allowed=allowed, cure=cure)
+        require(is_free, str(file), kind, allowed, cure=cure)
 
     def put_files(self, source: str, folder: Path, before: str = "") -> None:
         """Copies all files below a folder here and lists them as made from `source`.

@@ -45,7 +45,7 @@ def read_recording(
         raise RefusedError(path.name, str(error), "numbers of a recording") from None
     samples, allowed = recording.samples, "two finite samples or more"
     fits = len(samples) > 1 and bool(np.isfinite(samples).all())
-    require(fits, path.name, value=f"a record of {len(samples)} samples", allowed=allowed)
+    require(fits, path.name, f"a record of {len(samples)} samples", allowed)
     return recording
 
 
@@ -95,7 +95,7 @@ def _read_waveform(path: Path, channel: str, unit: str) -> Recording:
         raise RefusedError(path.name, reason, "miniSEED or SAC that obspy reads") from None
     names = [(str(trace.stats.channel).lower(),) for trace in traces]
     trace = traces[choose_channel(f"{path.name} without gaps", channel, names)]
-    require(bool(unit), path.name, value="without a unit", allowed='records.unit = "m/s^2"')
+    require(bool(unit), path.name, "without a unit", 'records.unit = "m/s^2"')
     samples, step = np.asarray(trace.data, float), float(trace.stats.delta)
     file_format = str(trace.stats.get("_format", "waveform"))
     channel = str(trace.stats.channel)

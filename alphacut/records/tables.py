@@ -88,7 +88,7 @@ def read_table(file: TextFile, step: float | None = None, unit: str = "") -> Rec
     """
     table = _Table.of(file)
     allowed = "a header with units, and rows of numbers below it"
-    require(len(table.rows) > 1, file.name, value=f"{len(table.rows)} rows", allowed=allowed)
+    require(len(table.rows) > 1, file.name, f"{len(table.rows)} rows", allowed)
     columns = len(next(iter(table.rows.values())))
     match = HEAD.fullmatch(table.head) if columns == 2 else None
     time_unit, head_unit = match.groups() if match else ("", "")

@@ -119,7 +119,7 @@ def recording_in_si(
         value = f"in units of {unit}" if unit else "without a unit"
         raise RefusedError(location, value, f"accelerations in {ACCELERATION_UNITS}")
     allowed = f"a step above 0 and below {LONGEST_STEP:g} s"
-    require(0 < step < LONGEST_STEP, location, value=f"a step of {step:g} s", allowed=allowed)
+    require(0 < step < LONGEST_STEP, location, f"a step of {step:g} s", allowed)
     return Recording(file_format, unit, step, to_si * samples, channel, remarks)
 
 
@@ -128,7 +128,7 @@ def choose_channel(location: str, channel: str, names: Sequence[tuple[str, ...]]
     chosen = [k for k, aliases in enumerate(names) if not channel or channel.lower() in aliases]
     allowed = "; ".join(dict.fromkeys(" or ".join(aliases) for aliases in names)) or "accelerations"
     value = f"channel {channel or 'not named'}"
-    require(len(chosen) == 1, location, value=value, allowed=f"one of: {allowed}")
+    require(len(chosen) == 1, location, value, f"one of: {allowed}")
     return chosen[0]
 
 

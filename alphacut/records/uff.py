@@ -52,10 +52,9 @@ def uff_mode_rows(path: Path, floors: Mapping[str, int]) -> tuple[ModeRows, ...]
     modes: dict[int, ModeRows] = {}  # by number
     for shape in filter(None, sets):
         value, key = f"mode {shape.mode} again", f"{path.name}, data set 55"
-        require(shape.mode not in modes, key, value=value, allowed="each mode once")
+        require(shape.mode not in modes, key, value, "each mode once")
         modes[shape.mode] = _mode_rows(f"{path.name}, mode {shape.mode}", shape, floors)
-    allowed = "a data set 55 of a normal or complex mode"
-    require(bool(modes), path.name, value="without a mode", allowed=allowed)
+    require(bool(modes), path.name, "without a mode", "a data set 55 of a normal or complex mode")
     return tuple(modes[number] for number in sorted(modes))
 
 
@@ -97,16 +96,15 @@ def _mode_rows(key: str, shape: _Shape, floors: Mapping[str, int]) -> ModeRows:
     """Frequency of a mode, and its real amplitudes on the floors of the unknowns in `floors`."""
     missing = [name for name in floors if name.lower() not in shape.amplitudes]
     value, allowed = f"without {', '.join(missing)}", f"unknowns of {[*shape.amplitudes][:8]} …"
-    require(not missing, key, value=value, allowed=allowed)
+    require(not missing, key, value, allowed)
     is_positive, value = 0 < shape.frequency < np.inf, f"{shape.frequency:g} Hz"
-    require(is_positive, f"{key}: frequency", value=value, allowed="above 0 Hz")
+    require(is_positive, f"{key}: frequency", value, "above 0 Hz")
     values = np.array([shape.amplitudes[name.lower()] for name in floors])
     are_finite = bool(np.isfinite(values).all())
-    require(are_finite, key, value="not finite", allowed="finite amplitudes")
+    require(are_finite, key, "not finite", "finite amplitudes")
     collinearity = phase_collinearity(values)
     is_real, value = collinearity >= MIN_COLLINEARITY, f"complex: {collinearity:.3f}"
-    allowed = f"a modal phase collinearity from {MIN_COLLINEARITY:g} on"
-    require(is_real, key, value=value, allowed=allowed)
+    require(is_real, key, value, f"a modal phase collinearity from {MIN_COLLINEARITY:g} on")
     # the real part, after a turn of all phases that makes it largest
     turn = np.exp(-0.5j * np.angle((values**2).sum()))
     pairs = zip(floors.values(), (values * turn).real, strict=True)
@@ -155,10 +153,10 @@ def read_uff_record(name: str, content: bytes, channel: str = "") -> Recording:
     key = f"{name}, response {series.name}"
     is_history = series.function == TIME_HISTORY or (series.function == 0 and series.axis == TIME)
     allowed = "a time history (1) of an acceleration"
-    require(is_history, key, value=f"of function type {series.function}", allowed=allowed)
+    require(is_history, key, f"of function type {series.function}", allowed)
     is_full = len(series.samples) == series.count > 1 and bool(np.isfinite(series.samples).all())
     value = f"{series.count} points, and {len(series.samples)} are there"
-    require(is_full, key, value=value, allowed="two or more finite samples, as many as stated")
+    require(is_full, key, value, "two or more finite samples, as many as stated")
     step = _even_step(key, series) if series.times is not None else series.step
     return recording_in_si(key, "UFF 58", series.unit, step, series.samples, series.name)
 
@@ -255,7 +253,7 @@ def _even_step(key: str, series: _Series) -> float:
     size = np.maximum(np.abs(times), np.finfo(float).tiny)
     rounding = 10 ** (np.floor(np.log10(size)) - 5)
     is_even = step > 0 and bool((np.abs(times - even) <= rounding + EVEN * step).all())
-    require(is_even, key, value="uneven", allowed="even times")
+    require(is_even, key, "uneven", "even times")
     rate = round(1 / step)  # of which the digits are often but a rounding
     is_whole = rate > 0 and abs(1 / rate - step) * (len(times) - 1) <= rounding[-1]
     return 1 / rate if is_whole else step
