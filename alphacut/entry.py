@@ -26,7 +26,7 @@ from alphacut.commands.options import (
 from alphacut.fuzzy.campaign.campaign import CampaignError
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.files import check_destinations, rank, ranks, say, standard_output
-from alphacut.io.problem import BadInput, InputProblem, missing
+from alphacut.io.problem import BadInput, missing
 from alphacut.io.provenance import own_version
 from alphacut.rve.interruption import STOP_SIGNALS, uninterrupted
 
@@ -106,12 +106,9 @@ def main(
         try:
             with show_log(DEBUG in words):
                 return _run_command(words, program, names)
-        except BadInput as error:
-            for problem in error.problems:
-                say(str(problem))
-            return 2
-        except RefusedError as error:
-            say(str(InputProblem.from_error(error)))
+        except (BadInput, RefusedError) as error:
+            for line in str(error).splitlines():  # one for each problem
+                say(line)
             return 2
         except KeyboardInterrupt:
             number = signals[0] if signals else signal.SIGINT

@@ -47,25 +47,29 @@ class RefusedError(ValueError):
         value: The value as the caller wrote it; None where it is missing.
         allowed: The allowed values, such as "values in (0, 1]".
         cure: What to do, where `allowed` does not say it.
+        place: File, and line, that the value stands in; empty where the key says it.
 
     Example:
         >>> RefusedError("mesh.size", -1, "values in (0, 1]")
         RefusedError('mesh.size is -1; allowed: values in (0, 1]')
     """
 
-    def __init__(self, key: str, value: object, allowed: str, cure: str = "") -> None:
-        self.key, self.value, self.allowed, self.cure = key, value, allowed, cure
+    def __init__(
+        self, key: str, value: object, allowed: str, cure: str = "", place: str = ""
+    ) -> None:
+        self.key, self.value, self.allowed, self.cure, self.place = key, value, allowed, cure, place
 
         def line(value_text: str, allowed_text: str) -> str:
             has = "is missing" if value is None else f"is {value_text}"
-            return f"{key} {has}; allowed: {allowed_text}"
+            text = f"{place}: {key} {has}" if place else f"{key} {has}"
+            return f"{text}; allowed: {allowed_text}" if allowed_text else text
 
         super().__init__(fit_message(printable(value), allowed, line, cure))
 
-    def __reduce__(self) -> tuple[type[RefusedError], tuple[str, str | None, str, str]]:
+    def __reduce__(self) -> tuple[type[RefusedError], tuple[str, str | None, str, str, str]]:
         """For pickle, which sends it to other processes: the value as text."""
         value = None if self.value is None else printable(self.value)
-        return type(self), (self.key, value, self.allowed, self.cure)
+        return type(self), (self.key, value, self.allowed, self.cure, self.place)
 
 
 class FailedError(RuntimeError):

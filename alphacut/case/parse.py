@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any, Generic, TypeVar, get_args
@@ -16,11 +16,10 @@ from pydantic_core import ErrorDetails
 
 from alphacut.case.types import Quantity, Section
 from alphacut.fuzzy.refused import RefusedError, printable, require
-from alphacut.io.problem import BadInput, InputProblem, nearest, suggestion
+from alphacut.io.problem import BadInput, nearest, suggestion
 from alphacut.stochastic.particles.csv_columns import text_of
 
 KINDS = {
-    "tuple_type": "an array",
     "bool_type": "true or false",
     "string_type": "text in quotes",
     "dict_type": "a table",
@@ -28,9 +27,9 @@ KINDS = {
     "model_attributes_type": "a section",
 }
 """What a key takes, by Pydantic's name of the error."""
-
-
 C = TypeVar("C", bound=Section)
+Refusal = tuple[str, object, str, str]
+"""Key, value, allowed values and cure of a `RefusedError`."""
 
 
 @dataclass(frozen=True)
@@ -61,11 +60,11 @@ def parse(model: type[C], path: Path | str, changes: Sequence[str] = ()) -> Pars
     try:
         content = model.model_validate(table, context={"folder": path.parent})
     except ValidationError as error:
-        problems = [
-            replace(x, file="command line" if _is_below(x.key, changed) else str(path))
-            for x in _list_problems(model, error)
-        ]
-        raise BadInput([*dict.fromkeys(problems)]) from None
+        problems = (
+            RefusedError(*refusal, "command line" if _is_below(refusal[0], changed) else str(path))
+            for refusal in _refusals(model, error)
+        )
+        raise BadInput({str(problem): problem for problem in problems}.values()) from None
     return ParsedCase(path, text, content, tuple(changes))
 
 
@@ -74,16 +73,18 @@ def _parse_toml(path: Path, text: str) -> dict[str, object]:
     try:
         return tomllib.loads(text.replace("\r\n", "\n"))
     except (RecursionError, ValueError) as error:
-        match = re.search(r"\(at line (\d+), column \d+\)", str(error))
-        line = int(match[1]) if match else 0  # an integer of too many digits has no line
-        lines = text.splitlines()
-        shown = lines[line - 1].strip() if 0 < line <= len(lines) else ""
-        what = f"is not TOML: {str(error).partition(' (at')[0].lower()}"
-        raise BadInput(InputProblem(shown or "the file", what, file=str(path), line=line)) from None
+        what, place = str(error).partition(" (at")[0].lower(), str(path)
+        shown = ""  # an integer of too many digits has no line
+        if match := re.search(r"\(at line (\d+), column \d+\)", str(error)):
+            place += f":{match[1]}"
+            shown = text.splitlines()[int(match[1]) - 1].strip()
+        raise BadInput(
+            [RefusedError(shown or "the file", f"not TOML: {what}", "", "", place)]
+        ) from None
 
 
-def _list_problems(model: type[Section], error: ValidationError) -> Iterator[InputProblem]:
-    """The problem of each error that Pydantic reports; a misspelt key is not missing as well."""
+def _refusals(model: type[Section], error: ValidationError) -> Iterator[Refusal]:
+    """What is wrong by each error of Pydantic; a misspelt key is not missing as well."""
     details = [(_full_key(detail["loc"]), detail) for detail in error.errors(include_url=False)]
     unknown = [key for key, detail in details if detail["type"] == "extra_forbidden"]
     suggested = {key: _suggested_key(model, key) for key in unknown}
@@ -91,24 +92,25 @@ def _list_problems(model: type[Section], error: ValidationError) -> Iterator[Inp
         if key in suggested:
             kind = "section" if isinstance(detail["input"], dict) else "key"
             close = suggested[key].removeprefix(f"{_section_name(key)}.")
-            names = ", ".join(_sibling_names(model, key))
-            cure = f"did you mean {close}?" if close else ""
-            yield InputProblem(key, f"is an unknown {kind}", "", "" if close else names, cure)
+            names = "" if close else ", ".join(_sibling_names(model, key))
+            yield key, f"an unknown {kind}", names, f"did you mean {close}?" if close else ""
         elif key not in suggested.values():
-            yield _describe_problem(model, key, detail)
+            yield _refusal(model, key, detail)
 
 
 def _section_name(key: str) -> str:
     return key.rpartition(".")[0]
 
 
+def _without_indices(key: str) -> str:
+    return re.sub(r"\[\d+\]", "", key)
+
+
 def _sibling_names(model: type[Section], key: str) -> list[str]:
     """Keys and sections beside a key."""
-    inside = re.sub(r"\[\d+\]", "", _section_name(key))
-    names = dict.fromkeys(
-        name for name, _, _ in _walk_keys("", model) if _section_name(name) == inside
-    )
-    return [name.rpartition(".")[2] for name in names]
+    inside = _without_indices(_section_name(key))
+    names = (name for name, _, _ in _walk_keys("", model) if _section_name(name) == inside)
+    return [name.rpartition(".")[2] for name in dict.fromkeys(names)]
 
 
 def _suggested_key(model: type[Section], key: str) -> str:
@@ -120,25 +122,29 @@ def _suggested_key(model: type[Section], key: str) -> str:
     return elsewhere.get(nearest(name, elsewhere), "")
 
 
-def _describe_problem(model: type[Section], key: str, detail: ErrorDetails) -> InputProblem:
-    """The problem of a key whose value is wrong or missing, from the error of Pydantic."""
-    cause = detail.get("ctx", {}).get("error")
+def _refusal(model: type[Section], key: str, detail: ErrorDetails) -> Refusal:
+    """What is wrong with a key whose value is wrong or missing, by the error of Pydantic."""
+    context = detail.get("ctx", {})
+    cause, kind = context.get("error"), detail["type"]
     if isinstance(cause, RefusedError):
-        return replace(InputProblem.from_error(cause), key=cause.key or key)
-    what, value, cure = "", _as_text(detail["input"]), ""
-    allowed = str(cause or KINDS.get(detail["type"], detail["msg"]))
-    if detail["type"] == "missing":
-        about = keys_of(model).get(re.sub(r"\[\d+\]", "", key))
-        what, value, allowed = "is missing", "", (about and about.description) or "a section"
-    if detail["type"] == "literal_error":
-        allowed = str(detail["ctx"]["expected"]).replace("'", '"')
-        cure = suggestion(str(detail["input"]), re.findall(r'"([^"]+)"', allowed))
-    return InputProblem(key, what, value, allowed, cure)
+        return cause.key or key, cause.value, cause.allowed, cause.cure
+    about = keys_of(model).get(_without_indices(key))
+    words = (about and about.description) or "a section"
+    if kind == "missing":
+        return key, None, words, ""
+    value = _as_text(detail["input"])
+    if kind == "literal_error":
+        allowed = str(context["expected"]).replace("'", '"')
+        names = re.findall(r'"([^"]+)"', allowed)
+        return key, value, allowed, suggestion(str(detail["input"]), names)
+    if kind == "tuple_type":
+        return key, value, "an array", f"write {key.rpartition('.')[2]} = [{value}]"
+    return key, value, str(cause or KINDS.get(kind, detail["msg"])), ""
 
 
 def _full_key(location: tuple[int | str, ...]) -> str:
-    """Full name of a key, without the tags of unions, which stand in angle brackets."""
-    parts = (f"[{part}]" if isinstance(part, int) else f".{part}" for part in location)
+    """Full name of a key, entries counted from 1, without the tags of unions, as <image>."""
+    parts = (f"[{part + 1}]" if isinstance(part, int) else f".{part}" for part in location)
     return "".join(part for part in parts if not part.startswith(".<")).lstrip(".")
 
 
@@ -161,10 +167,10 @@ def apply_changes(
     for change in changes:
         key, _, value = (part.strip() for part in change.partition("="))
         endings = (f"did you mean {full}?" for full in full_keys if full.endswith(f".{key}"))
-        cure = next(endings, suggestion(key, full_keys))
-        allowed = "KEY=VALUE, each full key once, as cell.matrix_modulus='20 GPa'"
-        is_new = key in full_keys and key not in keys
-        require(is_new, "--set", change, allowed, cure=cure)
+        cure = next(endings, suggestion(key, full_keys)) or "docs/case-format.md has all keys"
+        allowed = "KEY=VALUE with a full key, as cell.matrix_modulus='20 GPa'"
+        require(key in full_keys, "--set", f"{change}, of an unknown key", allowed, cure)
+        require(key not in keys, "--set", f"{change}, of a key given before", "each key once")
         _set_key(table, key, _parse_value(value))
         keys.append(key)
     return tuple(keys)

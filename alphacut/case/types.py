@@ -96,7 +96,7 @@ class Quantity:
             return value
         bare = not self.si and isinstance(value, str) and "%" not in value and "[" not in value
         if bare or self.is_integer:
-            raise ValueError("a number stands without quotes")
+            raise ValueError("write a number without quotes and without a unit")
         parse = quantity.parse_fuzzy if self.fuzzy else quantity.parse_number
         return parse(value, self.si)
 

@@ -12,7 +12,7 @@ from alphacut.case.cell import CellContent
 from alphacut.case.parse import parse
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io.files import as_json, write_text
-from alphacut.io.problem import BadInput, InputProblem, suggestion
+from alphacut.io.problem import suggestion
 
 PETSC_PREFIX = "-rve_"
 PETSC_LOG = "-log_view"
@@ -32,9 +32,16 @@ class Parser(argparse.ArgumentParser):
     """An argument parser that raises in place of printing its usage and leaving."""
 
     def error(self, message: str) -> NoReturn:
-        """Raises the complaint of argparse as a problem."""
-        command = self.prog.removeprefix("alphacut").strip()
-        raise BadInput(InputProblem(command, f"{message}; see --help"))
+        """Raises the complaint of argparse as the refusal of an argument."""
+        argument, _, reason = message.removeprefix("argument ").partition(": ")
+        cure = f"see {self.prog} --help"
+        choices = re.fullmatch(r"invalid choice: '(.*?)' \(choose from (.*)\)", reason)
+        if choices is not None:
+            raise RefusedError(argument, choices[1], choices[2].replace("'", ""), cure)
+        if number := re.fullmatch(r"invalid int value: '(.*)'", reason):
+            raise RefusedError(argument, number[1], "whole numbers", cure)
+        is_argument = reason.startswith("expected")  # else the names of all that are missing
+        raise RefusedError(f"value of {argument}" if is_argument else reason, None, "", cure)
 
     def refuse(self, word: str) -> NoReturn:
         """Raises the problem of a word that is no option of this command."""

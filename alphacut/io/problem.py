@@ -1,65 +1,19 @@
-"""Problems of an input, one line each, and the exception that carries them."""
+"""The exception that carries all problems of an input, and words on how to mend one."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable
 from difflib import get_close_matches
-from typing import Self
 
-from alphacut.fuzzy.refused import RefusedError, fit_message, printable
-
-
-@dataclass(frozen=True)
-class InputProblem:
-    """One thing wrong with a case file or a command line.
-
-    Args:
-        key: Name of the key or option, such as ``cell.matrix_modulus``.
-        what: Statement of what is wrong; empty where `value` and `allowed` say it.
-        cure: Advice where `allowed` does not give it.
-        file: Case file; empty for a command line.
-        line: Line in the file, from 1; 0 where it is not known.
-    """
-
-    key: str
-    what: str = ""
-    value: str = ""
-    allowed: str = ""
-    cure: str = ""
-    file: str = ""
-    line: int = 0
-
-    @classmethod
-    def from_error(cls, error: RefusedError) -> Self:
-        """The problem of a value that a constructor refused."""
-        value = "" if error.value is None else printable(error.value)
-        what = "is missing" if error.value is None else ""
-        return cls(error.key, what, value, error.allowed, error.cure)
-
-    def __str__(self) -> str:
-        """The problem as one line: ``FILE:LINE: KEY is VALUE; allowed: ALLOWED; CURE``."""
-        location = f"{self.file}:{self.line}" if self.line else self.file
-
-        def line(value: str, allowed: str) -> str:
-            """The line without the cure; `fit_message` shortens both texts."""
-            text = f"{location}: {self.key}" if location else self.key
-            text += f" is {value}" if value else ""
-            if self.what:
-                text += f": {self.what}" if value else f" {self.what}"
-            return f"{text}; allowed: {allowed}" if allowed else text
-
-        return fit_message(
-            printable(self.value), printable(self.allowed), line, printable(self.cure)
-        )
+from alphacut.fuzzy.refused import RefusedError
 
 
 class BadInput(Exception):  # noqa: N818 - it names the input, not the program, as the culprit
-    """An input that cannot be used; carries every problem of it."""
+    """An input that cannot be used; `problems` are all that is wrong with it."""
 
-    def __init__(self, problems: InputProblem | Sequence[InputProblem]) -> None:
-        self.problems = (problems,) if isinstance(problems, InputProblem) else tuple(problems)
+    def __init__(self, problems: Iterable[RefusedError]) -> None:
+        self.problems = tuple(problems)
         super().__init__("\n".join(map(str, self.problems)))
 
 

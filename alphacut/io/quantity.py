@@ -101,7 +101,10 @@ def factor(unit: str, si: str) -> Decimal:
         one_unit = registry().Quantity(Decimal(1), registry().parse_units(spelt))
         return Decimal(one_unit.to(si).magnitude)
     except Exception:  # Pint's parser raises whatever Python's does
-        raise ValueError(f'the unit "{unit}" is no unit of {QUANTITIES[si][0]}') from None
+        kinds = (QUANTITIES[x][0] for x, units in POWERS_OF_TEN.items() if unit in units)
+        kind = next(kinds, "")
+        measured = f"is a unit of {kind}, and" if kind else "is"
+        raise ValueError(f'the unit "{unit}" {measured} no unit of {QUANTITIES[si][0]}') from None
 
 
 def _parse_decimal(text: str, si: str) -> Decimal:

@@ -12,7 +12,6 @@ from pathlib import Path, PurePosixPath
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document, say
-from alphacut.io.problem import InputProblem
 from alphacut.io.results import ResultsFolder
 from alphacut.questions.question import Answer, Row
 from alphacut.questions.summary import ANSWERS, Summary
@@ -220,7 +219,7 @@ class Page:
             try:
                 content = self.folder.content(self.unshown.pop(stem))
             except RefusedError as error:
-                say(f"warning: a figure is left out: {InputProblem.from_error(error)}")
+                say(f"warning: a figure is left out: {error}")
                 continue
             yield "figure", caption(stem, paper=self.paper), base64.b64encode(content).decode()
 

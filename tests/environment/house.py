@@ -41,10 +41,7 @@ def raising(tree: ast.AST) -> int:
     """Places of a syntax tree that raise something new, list a problem or call `require`."""
     return sum(
         (isinstance(node, ast.Raise) and node.exc is not None)
-        or (
-            isinstance(node, ast.Call)
-            and getattr(node.func, "id", "") in ("InputProblem", "require")
-        )
+        or (isinstance(node, ast.Call) and getattr(node.func, "id", "") == "require")
         for node in ast.walk(tree)
     )
 
