@@ -151,7 +151,7 @@ class Content(CellContent):
             raise RefusedError("frame", value, "one of [frame], [matrices] and [pendulum]")
         main_study = Study.model_construct(fuzzy=envelope.fuzzy, duration=envelope.duration)
         self._require_study("envelope", main_study, envelope, structure)
-        for number, study in enumerate(self.study):
+        for number, study in enumerate(self.study, start=1):
             self._require_study(f"study[{number}]", study, envelope, structure)
         has_modulus = self.has_stated_modulus or "modulus" in self.stages
         require(has_modulus, "frame.modulus", None, "a modulus, or stage modulus")
@@ -159,8 +159,8 @@ class Content(CellContent):
         require(is_framed, "identify", "without a frame", "beside [frame]")
         names = [study.name for study in self.study]
         for number, name in enumerate(names):
-            is_new = name not in names[:number]
-            require(is_new, f"study[{number}].name", name, "a name of its own")
+            is_new, key = name not in names[:number], f"study[{number + 1}].name"
+            require(is_new, key, name, "a name of its own")
         for section in self.questions.values():
             section.require_answerable(structure)
         if self.identify is not None:

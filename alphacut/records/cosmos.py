@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import partial
 from math import ceil
 
@@ -50,40 +49,29 @@ V1_COUNTS, V1_DURATION = (33, 28), 3  # entries of the integer header and of the
 V1_UNIT = re.compile(r"\b(g/10|g\*10|10\*?g|cm/s(?:ec)?/s(?:ec)?|g)\b", re.IGNORECASE)
 
 
-@dataclass(frozen=True)
-class _Channel:
-    """A channel of a file: the names that it has, the line that announces it, and its reader."""
-
-    names: tuple[str, ...]
-    line: int
-    read: Callable[[], Recording]
+Channel = tuple[tuple[str, ...], int, Callable[[], Recording]]
+"""A channel of a file: the names that it has, the line that announces it, and its reader."""
 
 
 def is_cosmos(file: TextFile) -> bool:
-    """True if a line announces samples of acceleration as the format has it."""
-    return any(DATA.fullmatch(line) for line in file.lines)
-
-
-def is_csmip(file: TextFile) -> bool:
-    """True if the first line is that of CSMIP's volume 1 or 2."""
-    return CSMIP.fullmatch(file.lines[0]) is not None
+    """True if the first line is CSMIP's, or a line announces samples as COSMOS has it."""
+    return bool(CSMIP.match(file.lines[0])) or any(map(DATA.match, file.lines))
 
 
 def read_cosmos(file: TextFile, channel: str = "") -> Recording:
     """Recording of one channel of a file of COSMOS or CSMIP.
 
-    Args:
-        file: The file.
-        channel: Number, orientation or code of the channel, as "1", "90 deg" or "HNE"; may be left
-            out where the file has one channel.
+    A channel is named by its number, orientation or code, as "1", "90 deg" or "HNE"; of several
+    one must be named.
 
     Raises:
         RefusedError: There is no such channel or there are several, or its step, unit or samples
             are not those of the format.
     """
-    channels = list(_cosmos_channels(file) if is_cosmos(file) else _csmip_channels(file))
-    location = file.location(channels[0].line if channels else 0)
-    return channels[choose_channel(location, channel, [x.names for x in channels])].read()
+    channels = [*_cosmos_channels(file)] or [*_csmip_channels(file)]
+    names = [aliases for aliases, _, _ in channels]
+    _, _, read = channels[choose_channel(file.location(channels[0][1]), channel, names)]
+    return read()
 
 
 def _samples(file: TextFile, line: int, count: int, per_line: int, width: int) -> Array:
@@ -93,19 +81,19 @@ def _samples(file: TextFile, line: int, count: int, per_line: int, width: int) -
     return samples
 
 
-def _cosmos_channels(file: TextFile) -> Iterator[_Channel]:
+def _cosmos_channels(file: TextFile) -> Iterator[Channel]:
     """Channels of acceleration, without those of velocity and displacement, in the file's order."""
     reals, names = -1, list[str]()  # line of the real header and names read last
     for row, line in enumerate(file.lines):
-        if REALS.fullmatch(line):
+        if REALS.match(line):
             reals = row
-        elif match := CHANNEL.fullmatch(line):
+        elif match := CHANNEL.match(line):
             names = [match[1].lower(), match[2].strip().lower()]
-        elif DATA.fullmatch(line):
-            ends = (CODE.fullmatch(x) for x in file.lines[row:] if "acc" in x.lower())
+        elif DATA.match(line):
+            ends = (CODE.match(x) for x in file.lines[row:] if "acc" in x.lower())
             code = next((match[1].lower() for match in ends if match), "")
             unique = tuple(dict.fromkeys(name for name in (*names, code) if name))
-            yield _Channel(unique, row, partial(_read_cosmos, file, row, reals, unique))
+            yield unique, row, partial(_read_cosmos, file, row, reals, unique)
 
 
 def _read_cosmos(file: TextFile, line: int, reals: int, names: tuple[str, ...]) -> Recording:
@@ -135,9 +123,9 @@ def _cosmos_step(file: TextFile, line: int, reals: int, count: int, duration: fl
     raise file.refusal(reals, value, allowed)
 
 
-def _csmip_channels(file: TextFile) -> Iterator[_Channel]:
+def _csmip_channels(file: TextFile) -> Iterator[Channel]:
     """Channels of a file of CSMIP, each of which begins with the line that tells the format."""
-    titles = {k: match for k, line in enumerate(file.lines) if (match := CSMIP.fullmatch(line))}
+    titles = {k: match for k, line in enumerate(file.lines) if (match := CSMIP.match(line))}
     # volume 2 repeats the title of volume 1 in its second line
     starts = [k for k, match in titles.items() if match[1] == titles[0][1] or match[1] is None]
     for start, end in zip(starts, [*starts[1:], len(file.lines)], strict=True):
@@ -145,20 +133,18 @@ def _csmip_channels(file: TextFile) -> Iterator[_Channel]:
         named = (CSMIP_CHANNEL.fullmatch(line) for line in block[:V1_TEXT])
         match = next(filter(None, named), None)
         names = tuple(x.lower() for x in match.groups() if x) if match else ()
-        yield _Channel(names, start, partial(_read_csmip, file, start, end, names))
+        yield names, start, partial(_read_csmip, file, start, end, names)
 
 
 def _read_csmip(file: TextFile, start: int, end: int, names: tuple[str, ...]) -> Recording:
     """Recording of the series that a line of a channel announces, else by its headers."""
-    for line in range(start, end):
-        if match := SERIES.fullmatch(file.lines[line]):
-            unit = (match[3] or match[4] or "").rstrip(".,")
-            per_line, width = int(match[5] or 8), int(match[6] or 10)
-            samples = _samples(file, line, int(match[1]), per_line, width)
-            return recording_in_si(
-                file.location(line), "CSMIP", unit, float(match[2]), samples, " ".join(names)
-            )
-    return _read_unannounced(file, start, end, names)
+    matches = ((line, SERIES.match(file.lines[line])) for line in range(start, end))
+    line, match = next((x for x in matches if x[1]), (start, None))
+    if match is None:
+        return _read_unannounced(file, start, end, names)
+    unit, step = (match[3] or match[4] or "").rstrip(".,"), float(match[2])
+    samples = _samples(file, line, int(match[1]), int(match[5] or 8), int(match[6] or 10))
+    return recording_in_si(file.location(line), "CSMIP", unit, step, samples, " ".join(names))
 
 
 def _read_unannounced(file: TextFile, start: int, end: int, names: tuple[str, ...]) -> Recording:

@@ -9,7 +9,6 @@ Behind the samples there may be text, such as ``*** End Data ***``.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from math import ceil
 
 from alphacut.records.recording import Recording
@@ -23,7 +22,9 @@ PEER_STEP = re.compile(
     re.I,
 )
 PEER_STEP_FIRST = re.compile(rf"([0-9]+)[\s,]+{REAL}[\s,]+NPTS\s*,?\s*DT\s*[,;.]?\s*", re.I)
-PEER_MARK = re.compile(r"\bNPTS\b|\bPEER\b.*\b(?:DATABASE|RECORD)\b", re.I)
+PEER_MARK = re.compile(
+    rf".*(?:\bNPTS\b|\bDT\s*=?\s*{REAL}|\bPEER\b.*\b(?:DATABASE|RECORD)\b)", re.I
+)
 PEER_UNIT = re.compile(r"\bunits\s*(?:of|are|is|=|:)?\s*\(?\s*([^\s,;()]+)", re.I)
 PEER_IN_GRAVITY = re.compile(r"\bacceleration\b.*\bin\s+\(?(g(?:'s|s)?)\b", re.I)
 PEER_COMPONENT = re.compile(r".*,\s*([\w-]+)\s*(?:\(.*\))?\s*")
@@ -36,16 +37,11 @@ KNET_LABEL = 18
 """Columns of a label in the head."""
 ESM_LINE = re.compile(r"([A-Z][A-Z0-9_/.]*(?: [A-Z0-9_/.]+)*)\s*:\s*(.*)")
 INTERVAL, COUNT, KIND = "SAMPLING_INTERVAL_S", "NDATA", "DATA_TYPE"
-SMC = re.compile(r"\s*([1-4])\s+(?:(?:UN)?CORRECTED ACCELEROGRAM|VELOCITY|DISPLACEMENT)\s*")
+SMC = re.compile(r"\s*([1-4])\s+(?:(?:UN)?CORRECTED ACCELEROGRAM|VELOCITY|DISPLACEMENT)\s*$")
 SMC_TEXT, SMC_INTEGERS, SMC_REALS = 11, 6, 10
 """Lines of the three heads of an SMC file."""
 VERTICAL_ANGLE, COMMENTS, POINTS, RATE = 13, 16, 17, 2
 """Entries of the integer head, from 1, and the one of the real head with samples in a second."""
-
-
-def is_peer(file: TextFile) -> bool:
-    """True if one of the first lines has NPTS, the step or PEER's name as files of type AT2 do."""
-    return any(_step_line(line) or PEER_MARK.search(line) for line in file.lines[:PEER_HEAD_LINES])
 
 
 def read_peer(file: TextFile) -> Recording:
@@ -54,16 +50,16 @@ def read_peer(file: TextFile) -> Recording:
     Raises:
         RefusedError: The head or the unit is missing, or the numbers are not those it states.
     """
-    row = next((k for k, line in enumerate(file.lines[:PEER_HEAD_LINES]) if _step_line(line)), None)
-    if row is None:
+    head = enumerate(file.lines[:PEER_HEAD_LINES])
+    found = ((k, PEER_STEP_FIRST.search(x) or PEER_STEP.search(x)) for k, x in head)
+    row, match = next(((k, match) for k, match in found if match), (0, None))
+    if match is None:
         raise file.refusal(min(3, len(file.lines) - 1), "without NPTS and DT", PEER_HEAD)
-    match = _step_line(file.lines[row])
-    assert match is not None
-    count, step = match[1] and int(match[1]), float(re.sub("[dD]", "e", match[2]))
+    count, step = int(match[1] or 0), float(re.sub("[dD]", "e", match[2]))
     line, unit = _peer_unit(file, row)
     if re.search(r"\b(velocity|displacement)\b", file.lines[line], re.I):
         raise file.refusal(line, f"in units of {unit}", f"accelerations in {ACCELERATION_UNITS}")
-    samples = file.numbers(row + 1, len(file.lines), count=count or 0)
+    samples = file.numbers(row + 1, len(file.lines), count=count)
     if count:
         file.require_count(samples, count, row)
     component = PEER_COMPONENT.fullmatch(file.lines[1]) if row > 1 else None
@@ -78,15 +74,6 @@ def _peer_unit(file: TextFile, last: int) -> tuple[int, str]:
             if match := pattern.search(line):
                 return row, match[1].rstrip(".")
     return last, ""
-
-
-def _step_line(line: str) -> re.Match[str] | None:
-    return PEER_STEP_FIRST.search(line) or PEER_STEP.search(line)
-
-
-def is_knet(file: TextFile) -> bool:
-    """True if the first line is that of a K-NET file."""
-    return file.lines[0].startswith("Origin Time")
 
 
 def read_knet(file: TextFile) -> Recording:
@@ -117,11 +104,6 @@ def read_knet(file: TextFile) -> Recording:
     return recording_in_si(location, "K-NET", "gal", 1 / rate, counts * (gal / full_scale), channel)
 
 
-def is_esm(file: TextFile) -> bool:
-    """True if a line of the head states the sampling interval as files of ESM do."""
-    return any(line.startswith(INTERVAL) for line in file.lines[:80])
-
-
 def read_esm(file: TextFile) -> Recording:
     """Recording of a file of ESM or ITACA: a head of lines ``KEY: value``, then one sample a line.
 
@@ -129,42 +111,25 @@ def read_esm(file: TextFile) -> Recording:
         RefusedError: A line of the head is missing, the samples are no accelerations, or there are
             not as many as the head states.
     """
-    head = _esm_head(file)
-    step, count = _positive_number(file, head, INTERVAL), int(_positive_number(file, head, COUNT))
-    unit, line = head.get("UNITS", ("", head[INTERVAL][1]))
-    kind, kind_line = head.get(KIND, ("ACCELERATION", 0))
-    if "ACCELERATION" not in kind.upper():
-        raise file.refusal(kind_line, kind, f"accelerations in {ACCELERATION_UNITS}")
-    first = 1 + max(row for _, row in head.values())
-    samples = file.numbers(first, len(file.lines))
-    file.require_count(samples, count, head[COUNT][1])
-    return recording_in_si(
-        file.location(line), "ESM", unit, step, samples, head.get("STREAM", ("", 0))[0]
-    )
-
-
-def _esm_head(file: TextFile) -> dict[str, tuple[str, int]]:
-    """Value and line number, from 0, of each key of the head, which ends at the first number."""
-    head: dict[str, tuple[str, int]] = {}
+    head = dict[str, tuple[str, int]]()  # value and line, from 0, of each key
     for row, line in enumerate(file.lines):
-        match = ESM_LINE.fullmatch(line.strip())
-        if match is not None:
+        if match := ESM_LINE.fullmatch(line.strip()):
             head[match[1]] = match[2].strip(), row
         elif NUMBER.fullmatch(line.strip()):
             break
-    return head
-
-
-def _positive_number(file: TextFile, head: dict[str, tuple[str, int]], key: str) -> float:
-    text, line = head.get(key, ("", 0))
-    if not NUMBER.fullmatch(text) or float(text) <= 0:
-        raise file.refusal(line, f"{key}: {text}", "a number above 0", "load the file anew")
-    return float(text)
-
-
-def is_smc(file: TextFile) -> bool:
-    """True if the first line is that of an SMC file."""
-    return SMC.fullmatch(file.lines[0]) is not None
+    for key in (INTERVAL, COUNT):
+        text, row = head.get(key, ("", 0))
+        if not NUMBER.fullmatch(text) or float(text) <= 0:
+            raise file.refusal(row, f"{key}: {text}", "a number above 0", "load the file anew")
+    kind, kind_row = head.get(KIND, ("ACCELERATION", 0))
+    if "ACCELERATION" not in kind.upper():
+        raise file.refusal(kind_row, kind, f"accelerations in {ACCELERATION_UNITS}")
+    step, count = float(head[INTERVAL][0]), int(float(head[COUNT][0]))
+    samples = file.numbers(1 + max(row for _, row in head.values()), len(file.lines))
+    file.require_count(samples, count, head[COUNT][1])
+    unit, unit_row = head.get("UNITS", ("", head[INTERVAL][1]))
+    channel, _ = head.get("STREAM", ("", 0))
+    return recording_in_si(file.location(unit_row), "ESM", unit, step, samples, channel)
 
 
 def read_smc(file: TextFile) -> Recording:
@@ -173,7 +138,7 @@ def read_smc(file: TextFile) -> Recording:
     Raises:
         RefusedError: The series is no acceleration, or the samples are not those of the heads.
     """
-    match = SMC.fullmatch(file.lines[0])
+    match = SMC.match(file.lines[0])
     assert match is not None
     if match[1] not in "12":
         raise file.refusal(0, file.lines[0].strip(), "1 UNCORRECTED or 2 CORRECTED ACCELEROGRAM")
@@ -195,10 +160,10 @@ def read_smc(file: TextFile) -> Recording:
     return recording_in_si(file.location(reals_line), "SMC", "cm/s^2", 1 / rate, samples, channel)
 
 
-FORMATS: tuple[tuple[Callable[[TextFile], bool], Callable[[TextFile], Recording]], ...] = (
-    (is_knet, read_knet),
-    (is_smc, read_smc),
-    (is_esm, read_esm),
-    (is_peer, read_peer),
+FORMATS = (
+    (re.compile("Origin Time"), 1, read_knet),
+    (SMC, 1, read_smc),
+    (re.compile(INTERVAL), 80, read_esm),
+    (PEER_MARK, PEER_HEAD_LINES, read_peer),
 )
-"""What tells a file of each format, and its reader."""
+"""How a line of a file of each format begins, in how many first lines, and its reader."""

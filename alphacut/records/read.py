@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from alphacut.fuzzy.refused import RefusedError, require
-from alphacut.records.cosmos import is_cosmos, is_csmip, read_cosmos
+from alphacut.records.cosmos import is_cosmos, read_cosmos
 from alphacut.records.networks import FORMATS
 from alphacut.records.recording import Recording
 from alphacut.records.tables import is_table, read_table
@@ -17,20 +17,16 @@ from alphacut.records.uff import is_universal, read_uff_record
 
 READ = "PEER AT2, COSMOS, CSMIP, SMC, K-NET, ESM, miniSEED, SAC, UFF 58, CSV"
 MINISEED = re.compile(rb"[0-9 ]{6}[DRQM][ \0]|MS\x03")
-SAC_HEAD, SAC_VERSION, SAC_COUNT = 632, 304, 316
-"""Bytes of the head of a SAC file, and where its version (6 or 7) and number of samples stand."""
+SAC_HEAD, SAC_VERSION, SAC_COUNT = 632, 76, 79
+"""Bytes of the head of a SAC file; words in it with its version (6 or 7) and number of samples."""
 
 
 def read_recording(
     path: Path, channel: str = "", step: float | None = None, unit: str = ""
 ) -> Recording:
-    """Reads a recording from a file of one of the formats in `READ`.
+    """Reads a recording, or one channel of several, from a file of one of the formats in `READ`.
 
-    Args:
-        path: The file.
-        channel: Channel of a file with several.
-        step: Step in s of files that do not say it.
-        unit: Unit of files that do not say it.
+    Step in s and unit are for files that do not say them.
 
     Raises:
         RefusedError: The file cannot be read, is of another format, or its head and its samples
@@ -57,10 +53,10 @@ def _read_by_marks(path: Path, channel: str, step: float | None, unit: str) -> R
     if _is_waveform(content):
         return _read_waveform(path, channel, unit)
     file = TextFile.from_bytes(path.name, content)
-    if is_cosmos(file) or is_csmip(file):
+    if is_cosmos(file):
         return read_cosmos(file, channel)
-    for is_format, read in FORMATS:
-        if is_format(file):
+    for mark, n_lines, read in FORMATS:
+        if any(map(mark.match, file.lines[:n_lines])):
             return read(file)
     if is_table(file):
         return read_table(file, step, unit)
@@ -70,15 +66,12 @@ def _read_by_marks(path: Path, channel: str, step: float | None, unit: str) -> R
 
 def _is_waveform(content: bytes) -> bool:
     """True for a file of miniSEED or SAC."""
-    if MINISEED.match(content):
-        return True
     for order in ("<i4", ">i4") if len(content) > SAC_HEAD else ():
-        version, count = (
-            int(np.frombuffer(content, order, 1, offset=at)[0]) for at in (SAC_VERSION, SAC_COUNT)
-        )
+        head = np.frombuffer(content[:SAC_HEAD], order)
+        version, count = int(head[SAC_VERSION]), int(head[SAC_COUNT])
         if version in (6, 7) and 0 < 4 * count <= len(content) - SAC_HEAD:
             return True
-    return False
+    return MINISEED.match(content) is not None
 
 
 def _read_waveform(path: Path, channel: str, unit: str) -> Recording:

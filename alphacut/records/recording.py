@@ -17,7 +17,6 @@ import numpy as np
 
 from alphacut.frame import Accelerogram
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import checked_number, require
 from alphacut.io.quantity import factor
 
 Baseline = Literal["none", "mean", "linear"]
@@ -33,16 +32,11 @@ VERTICAL = re.compile(
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """Samples of one channel, in SI, before any processing.
+    """Samples of one channel, shape (n,), in m/s², before any processing; their step is in s.
 
-    Args:
-        file_format: Name of the format, such as "PEER AT2".
-        unit: Unit as the file states it.
-        step: Time between samples, in s.
-        samples: Accelerations from the first sample on, shape (n,), in m/s².
-        channel: The file's own name of the channel; empty if it has none.
-        remarks: What reading left out or took for granted, one clause each.
-        name: Name of its results: that of the file without ending, and of a channel asked for.
+    `unit` is the file's, `channel` its own name of the channel or empty. `remarks` are clauses on
+    what reading left out or took for granted. `name` is that of its results: of the file without
+    ending, and of a channel asked for.
     """
 
     file_format: str
@@ -101,27 +95,20 @@ POINTS_PER_PERIOD = 40
 def spectral_acceleration(ground: Accelerogram, period: float, ratio: float) -> float:
     """Pseudo-acceleration ω² max |u| of an oscillator at rest at the start, in m/s².
 
-    The free motion after the record's end is included for one period.
-
-    Args:
-        ground: The record.
-        period: Undamped natural period T, in s, above 0.
-        ratio: Damping ratio ζ, from 0 and below 1.
-
-    Raises:
-        RefusedError: The period or the ratio is out of range.
+    `period` T is undamped, in s; the damping `ratio` ζ is below 1. The free motion after the
+    record's end is included for one period.
     """
-    checked_number("period", period, positive=True)
-    require(
-        0 <= checked_number("ratio", ratio) < 1, "ratio", value=ratio, allowed="from 0 and below 1"
-    )
     from scipy.linalg import expm  # which takes time to import
     from scipy.signal import lfilter
 
     omega = 2 * pi / period
     substeps = max(1, ceil(ground.step * POINTS_PER_PERIOD / period))
     substep = ground.step / substeps
-    start, end = _substep_accelerations(ground, substeps, ceil(period / substep))
+    # accelerations at the ends of all substeps, and then of zeros for one period
+    samples, zeros = ground.acceleration, np.zeros(ceil(period / substep))
+    positions = np.arange((len(samples) - 1) * substeps + 1) / substeps
+    values = np.interp(positions, np.arange(len(samples)), samples)
+    start, end = np.append(values[:-1], zeros), np.append(values[1:], zeros)
     # x' = F x of x = (u, u', a, a'), with a the ground's acceleration and a' its constant slope
     F = np.zeros((4, 4))
     F[0, 1] = 1.0
@@ -135,12 +122,3 @@ def spectral_acceleration(ground: Accelerogram, period: float, ratio: float) -> 
     added[1:] += A[0, 1] * load[1, :-1] - A[1, 1] * load[0, :-1]
     displacement = lfilter([1.0], [1.0, -np.trace(A), np.linalg.det(A)], added)
     return float(omega**2 * np.abs(displacement).max())
-
-
-def _substep_accelerations(ground: Accelerogram, substeps: int, n_free: int) -> tuple[Array, Array]:
-    """Ground's acceleration at the start and at the end of each substep, then of `n_free` zeros."""
-    samples = ground.acceleration
-    positions = np.arange((len(samples) - 1) * substeps + 1) / substeps
-    values = np.interp(positions, np.arange(len(samples)), samples)
-    zeros = np.zeros(n_free)
-    return np.append(values[:-1], zeros), np.append(values[1:], zeros)

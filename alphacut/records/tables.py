@@ -125,13 +125,17 @@ def _even_step(
     """
     first = 0.0 if from_zero else time[0]
     even = np.linspace(first, time[-1], len(time))
-    deviation = np.abs(time - even)
-    worst = int(deviation.argmax())
     step = float(even[1] - even[0]) if len(time) > 1 else 0.0
-    if not (step > 0 and deviation[worst] <= UNEVEN * step):
-        value = f"time {time[worst]:g} s"
+    deviation = np.abs(time - even)
+    if not (step > 0 and deviation.max() <= UNEVEN * step):
+        steps = np.diff(time, prepend=first)  # the first is 0
+        usual = np.median(steps[steps > 0]) if (steps > 0).any() else 0.0
+        is_odd = np.abs(steps - usual) > 2 * UNEVEN * usual
+        is_odd[0] = abs(steps[0]) > UNEVEN * usual
+        wrong = int(is_odd.argmax() if is_odd.any() else deviation.argmax())
+        value = f"time {time[wrong]:g} s" + (f" after {time[wrong - 1]:g} s" if wrong else "")
         allowed = "even steps from 0 s" if from_zero else "even steps"
-        raise file.refusal(lines[worst], value, allowed, "resample to even steps")
+        raise file.refusal(lines[wrong], value, allowed, "resample to even steps")
     is_shifted = abs(first) > UNEVEN * step
     return step, (f"its times begin at {first:g} s, taken as 0",) if is_shifted else ()
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError, require
-from alphacut.io.quantity import factor
+from alphacut.io.quantity import STANDARD_GRAVITY, factor
 from alphacut.records.recording import Recording
 
 NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eEdD][-+]?[0-9]+)?")
@@ -31,36 +31,24 @@ LONGEST_STEP = 10.0
 
 @dataclass(frozen=True)
 class TextFile:
-    """The lines of a text file.
-
-    Args:
-        name: Name of the file, for messages.
-        lines: Its lines without their ends.
-    """
+    """The lines of a text file, without their ends; its name is for messages."""
 
     name: str
     lines: tuple[str, ...]
 
     @classmethod
     def from_bytes(cls, name: str, content: bytes) -> Self:
-        """The lines of a content in UTF-8 or Latin-1; `name` is for messages.
-
-        Raises:
-            RefusedError: It holds bytes that no text has, or a line of more than `LONGEST_LINE`
-                letters.
-        """
-        if b"\0" in content:
-            raise RefusedError(name, "no text", "a text file with a record")
+        """The lines of a content in UTF-8 or Latin-1; RefusedError of what no text has."""
+        require(b"\0" not in content, name, "no text", "a text file with a record")
         try:
             text = content.decode("utf-8-sig")
         except UnicodeDecodeError:
             text = content.decode("latin-1")
         file = cls(name, tuple(re.split(r"\r\n|\r|\n", text)))
-        lengths = [len(line) for line in file.lines]
-        longest = lengths.index(max(lengths))
-        if lengths[longest] > LONGEST_LINE:
+        length, longest = max((len(line), number) for number, line in enumerate(file.lines))
+        if length > LONGEST_LINE:
             allowed = f"lines of up to {LONGEST_LINE:,} letters"
-            raise file.refusal(longest, f"{lengths[longest]:,} letters long", allowed)
+            raise file.refusal(longest, f"{length:,} letters long", allowed)
         return file
 
     def location(self, line: int) -> str:
@@ -74,28 +62,22 @@ class TextFile:
     def numbers(self, first: int, last: int, *, width: int = 0, count: int = 0) -> Array:
         """All numbers from line `first` up to, but not with, line `last`, counted from 0.
 
-        Args:
-            first: First line.
-            last: Line behind the last one.
-            width: Characters of one number in files of fixed columns; 0 where spaces part them.
-            count: Numbers after which lines of text end the reading; 0 where none may.
-
-        Raises:
-            RefusedError: Something there is no finite number.
+        In files of fixed columns a number has `width` characters, else spaces part numbers. Behind
+        `count` numbers a line of text ends the reading. What else is no finite number is refused.
         """
         values: list[float] = []
         for row in range(first, min(last, len(self.lines))):
-            words = _words(self.lines[row], width)
+            line = self.lines[row].rstrip()
+            columns = range(0, len(line), width) if width else ()
+            words = [line[start : start + width].strip() for start in columns] or line.split()
             if 0 < count <= len(values) and not all(map(NUMBER.fullmatch, words)):
                 break
-            values += [self._number(row, word) for word in words]
+            for word in filter(None, words):
+                value = float(re.sub("[dD]", "e", word)) if NUMBER.fullmatch(word) else np.nan
+                if not isfinite(value):
+                    raise self.refusal(row, repr(word), "finite numbers such as -.1394908E-02")
+                values.append(value)
         return np.array(values)
-
-    def _number(self, line: int, word: str) -> float:
-        value = float(re.sub("[dD]", "e", word)) if NUMBER.fullmatch(word) else np.nan
-        if not isfinite(value):
-            raise self.refusal(line, repr(word), "finite numbers such as -.1394908E-02")
-        return value
 
     def require_count(self, samples: Array, count: int, line: int) -> None:
         """Refuses another number of samples than the head states."""
@@ -145,19 +127,10 @@ def acceleration_factor(unit: str) -> float | None:
     """Factor to m/s² of a unit of acceleration as files of records write it; None if unknown."""
     text = unit.strip().strip("()[]").strip().rstrip(".")
     if match := GRAVITY_UNIT.fullmatch(text):
-        return float(factor("g", "m/s^2")) * {"": 1.0, "/10": 0.1}.get(match[1] or "", 10.0)
-    if text.lower() in ("gal", "gals"):
-        return float(factor("gal", "m/s^2"))
+        return float(STANDARD_GRAVITY) * {"": 1.0, "/10": 0.1}.get(match[1] or "", 10.0)
     if match := PER_SECOND_SQUARED.fullmatch(text):
         return {"cm": 0.01, "m": 1.0}[match[1].lower()]
     try:
-        return float(factor(text, "m/s^2"))
+        return float(factor("gal" if text.lower() in ("gal", "gals") else text, "m/s^2"))
     except ValueError:
         return None
-
-
-def _words(line: str, width: int) -> Sequence[str]:
-    if not width:
-        return line.split()
-    cells = (line[start : start + width].strip() for start in range(0, len(line.rstrip()), width))
-    return [cell for cell in cells if cell]

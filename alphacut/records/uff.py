@@ -35,9 +35,7 @@ EVEN = 1e-3
 def uff_mode_rows(path: Path, floors: Mapping[str, int]) -> tuple[ModeRows, ...]:
     """Reads the modes of a universal file (data sets 55), one measurement each, by rising number.
 
-    Args:
-        path: The file.
-        floors: Floor of each measured unknown, named NODE.DIRECTION, as {"12.x": 1}.
+    `floors` has the floor of each measured unknown, named NODE.DIRECTION, as {"12.x": 1}.
 
     Raises:
         RefusedError: The file cannot be read, has no mode or one mode twice, a named unknown is not
@@ -50,24 +48,23 @@ def uff_mode_rows(path: Path, floors: Mapping[str, int]) -> tuple[ModeRows, ...]
         allowed = "data sets 55 of a universal file"
         raise RefusedError(path.name, str(error)[:80], allowed) from None
     modes: dict[int, ModeRows] = {}  # by number
-    for shape in filter(None, sets):
-        value, key = f"mode {shape.mode} again", f"{path.name}, data set 55"
-        require(shape.mode not in modes, key, value, "each mode once")
-        modes[shape.mode] = _mode_rows(f"{path.name}, mode {shape.mode}", shape, floors)
+    for mode, frequency, amplitudes in filter(None, sets):
+        is_new, key = mode not in modes, f"{path.name}, data set 55"
+        require(is_new, key, f"mode {mode} again", "each mode once")
+        key = f"{path.name}, mode {mode}"
+        is_positive, value = 0 < frequency < np.inf, f"{frequency:g} Hz"
+        require(is_positive, f"{key}: frequency", value, "above 0 Hz")
+        shape = _real_amplitudes(key, amplitudes, floors)
+        modes[mode] = ModeRows(mode, np.array([frequency]), shape if len(shape) > 1 else {})
     require(bool(modes), path.name, "without a mode", "a data set 55 of a normal or complex mode")
     return tuple(modes[number] for number in sorted(modes))
 
 
-@dataclass(frozen=True)
-class _Shape:
-    """A data set 55: number of the mode, frequency in Hz, amplitudes by NODE.DIRECTION."""
-
-    mode: int
-    frequency: float
-    amplitudes: dict[str, complex]
+Shape = tuple[int, float, dict[str, complex]]
+"""A data set 55: number of the mode, frequency in Hz, amplitudes by NODE.DIRECTION."""
 
 
-def _parse_shape(head: list[str], values: bytes | list[str]) -> _Shape | None:
+def _parse_shape(head: list[str], values: bytes | list[str]) -> Shape | None:
     """The mode shape of a data set 55; None of another analysis."""
     _, analysis, _, _, kind, size = (int(word) for word in head[5].split()[:6])
     if analysis not in (NORMAL_MODE, *COMPLEX_MODES):
@@ -85,32 +82,29 @@ def _parse_shape(head: list[str], values: bytes | list[str]) -> _Shape | None:
         shape = [complex(*numbers[k : k + parts]) for k in range(0, parts * size, parts)]
         node = int(lines[start])
         amplitudes |= {f"{node}.{axis}": x for axis, x in zip(DIRECTIONS, shape, strict=False)}
-    return _Shape(int(head[6].split()[3]), hertz, amplitudes)
+    return int(head[6].split()[3]), hertz, amplitudes
 
 
 def _floats(line: str) -> list[float]:
     return [float(number.upper().replace("D", "E")) for number in NUMBER.findall(line)]
 
 
-def _mode_rows(key: str, shape: _Shape, floors: Mapping[str, int]) -> ModeRows:
-    """Frequency of a mode, and its real amplitudes on the floors of the unknowns in `floors`."""
-    missing = [name for name in floors if name.lower() not in shape.amplitudes]
-    value, allowed = f"without {', '.join(missing)}", f"unknowns of {[*shape.amplitudes][:8]} …"
+def _real_amplitudes(
+    key: str, amplitudes: Mapping[str, complex], floors: Mapping[str, int]
+) -> dict[int, Array]:
+    """Real amplitude of a mode, of shape (1,), on each floor of the unknowns in `floors`."""
+    missing = [name for name in floors if name.lower() not in amplitudes]
+    value, allowed = f"without {', '.join(missing)}", f"unknowns of {[*amplitudes][:8]} …"
     require(not missing, key, value, allowed)
-    is_positive, value = 0 < shape.frequency < np.inf, f"{shape.frequency:g} Hz"
-    require(is_positive, f"{key}: frequency", value, "above 0 Hz")
-    values = np.array([shape.amplitudes[name.lower()] for name in floors])
-    are_finite = bool(np.isfinite(values).all())
-    require(are_finite, key, "not finite", "finite amplitudes")
+    values = np.array([amplitudes[name.lower()] for name in floors])
+    require(np.isfinite(values).all(), key, "not finite", "finite amplitudes")
     collinearity = phase_collinearity(values)
-    is_real, value = collinearity >= MIN_COLLINEARITY, f"complex: {collinearity:.3f}"
-    require(is_real, key, value, f"a modal phase collinearity from {MIN_COLLINEARITY:g} on")
+    allowed = f"a modal phase collinearity from {MIN_COLLINEARITY:g} on"
+    require(collinearity >= MIN_COLLINEARITY, key, f"complex: {collinearity:.3f}", allowed)
     # the real part, after a turn of all phases that makes it largest
     turn = np.exp(-0.5j * np.angle((values**2).sum()))
-    pairs = zip(floors.values(), (values * turn).real, strict=True)
-    amplitudes = {floor: np.array([amplitude]) for floor, amplitude in pairs}
-    frequencies = np.array([shape.frequency])
-    return ModeRows(shape.mode, frequencies, amplitudes if len(amplitudes) > 1 else {})
+    real_parts = (values * turn).real
+    return {floor: real_parts[k : k + 1] for k, floor in enumerate(floors.values())}
 
 
 def phase_collinearity(shape: Array) -> float:
@@ -135,11 +129,7 @@ def read_uff_record(name: str, content: bytes, channel: str = "") -> Recording:
     """Reads a recording of acceleration from a data set 58 of a universal file, text or binary.
 
     The stated unit says whether it is an acceleration, whatever numeric type the file gives it.
-
-    Args:
-        name: Name of the file, for messages.
-        content: The file.
-        channel: NODE.DIRECTION of the response, as "7.x"; may be left out where there is one.
+    `channel` is NODE.DIRECTION of the response, as "7.x"; it may be left out where there is one.
 
     Raises:
         RefusedError: The file holds no such acceleration over even times in a known unit.
@@ -157,7 +147,7 @@ def read_uff_record(name: str, content: bytes, channel: str = "") -> Recording:
     is_full = len(series.samples) == series.count > 1 and bool(np.isfinite(series.samples).all())
     value = f"{series.count} points, and {len(series.samples)} are there"
     require(is_full, key, value, "two or more finite samples, as many as stated")
-    step = _even_step(key, series) if series.times is not None else series.step
+    step = series.step if series.times is None else _even_step(key, series.times)
     return recording_in_si(key, "UFF 58", series.unit, step, series.samples, series.name)
 
 
@@ -231,23 +221,14 @@ def _parse_series(head: list[str], values: bytes | list[str]) -> _Series:
         rows = rows[: len(rows) // columns * columns].reshape(-1, columns)
         times = None if is_even else rows[:, 0]
         samples = rows[:, columns - parts]
-    unit = head[8][47:67].strip()
-    return _Series(
-        f"{response}.{axis_name}",
-        int(head[5][:5]),
-        int(head[7][:10]),
-        "" if unit.upper() == "NONE" else unit,
-        count,
-        step,
-        times,
-        samples,
-    )
+    function, axis, unit = int(head[5][:5]), int(head[7][:10]), head[8][47:67].strip()
+    unit = "" if unit.upper() == "NONE" else unit
+    name = f"{response}.{axis_name}"
+    return _Series(name, function, axis, unit, count, step, times, samples)
 
 
-def _even_step(key: str, series: _Series) -> float:
+def _even_step(key: str, times: Array) -> float:
     """Step in s of times that are even but for the six digits with which the format has them."""
-    times = series.times
-    assert times is not None
     even = np.linspace(times[0], times[-1], len(times))
     step = float(even[1] - even[0])
     size = np.maximum(np.abs(times), np.finfo(float).tiny)

@@ -83,11 +83,13 @@ def test_e_is_the_isotropic_average_unless_the_axes_are_named(tmp_path, capfd):
 
 
 REFUSED = [
-    ("rnu case.toml", "invalid choice: 'rnu' (choose from"),
+    ("rnu case.toml", "COMMAND is rnu; allowed: run, check"),
+    ("run", "CASE is missing; see alphacut run --help"),
+    ("run case.toml --out", "value of --out is missing"),
     ("run case.toml --quik", "option is --quik"),
     ("run case.toml more.toml", "option is more.toml"),
     ("run case.toml --workers 0", "a whole number 1 or more"),
-    ("run case.toml --workers two", "--workers"),
+    ("run case.toml --workers two", "--workers is two; allowed: whole numbers"),
     ("run none.toml", "no such file"),
     ("run .", "is a directory"),
     ("run case.toml --out case.toml", "the name of a folder"),
