@@ -39,10 +39,8 @@ def proof_of(coupling: float, width: float) -> Envelope:
 
 
 @pytest.mark.parametrize(("coupling", "widest"), [(0.01, 2.0), (0.1, 4.0)])
-def test_a_proof_holds_where_frequencies_come_near(coupling: float, widest: float) -> None:
-    seed = int(np.random.default_rng().integers(10**9))
-    print(f"seed {seed}")
-    width = np.random.default_rng(seed).uniform(0.25, 1.0) * widest
+def test_a_proof_holds_where_frequencies_come_near(coupling, widest, rng):
+    width = rng.uniform(0.25, 1.0) * widest
     points = np.linspace(100 - width, 100 + width, 801)[:, None]
     values = LinearFlow(twins(coupling), ("k",), DURATION, STEP, Exact()).values(points)
     proof = proof_of(coupling, width)
