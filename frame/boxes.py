@@ -134,14 +134,6 @@ class Boxes:
         """Physical points of unit coordinates (…, d), never outside the widest box."""
         return np.asarray(np.clip(self.centre + self.radius * unit, self.lower[0], self.upper[0]))
 
-    def in_unit(self, jet: Jet) -> Jet:
-        """Scale a jet's derivatives, in place, to those by unit coordinates; return the jet."""
-        shape, r = (1,) * jet.value.ndim, self.radius
-        jet.first[:] *= r.reshape(-1, *shape)
-        if len(jet.second):
-            jet.second[:] *= (r[:, None] * r).reshape(len(r), len(r), *shape)
-        return jet
-
     def unit(self, level: int) -> tuple[Array, Array]:
         """Return lower and upper ends (d,) of a level's box in unit coordinates."""
         return self.to_unit(self.lower[level]), self.to_unit(self.upper[level])
@@ -247,7 +239,11 @@ class UnitFlow:
 
     def taylor(self, unit: Array) -> Jet:
         """Return outputs with first and second derivatives by unit coordinates, shape (S, T, m)."""
-        return self.boxes.in_unit(self.flow.taylor(self.boxes.to_physical(unit)))
+        jet, radius = self.flow.taylor(self.boxes.to_physical(unit)), self.boxes.radius
+        jet.first[:] *= radius.reshape(-1, 1, 1, 1)
+        if len(jet.second):
+            jet.second[:] *= np.multiply.outer(radius, radius)[..., None, None, None]
+        return jet
 
     def envelope(
         self, bounds: Array, at: Array, error: Array | None = None, **fields: Any

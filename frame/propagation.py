@@ -72,7 +72,7 @@ def envelope(
     integrator: str | Integrator | None = None,
     relative: bool = True,
     progress: Progress | bool | None = None,
-    **options: object,
+    **options: Any,
 ) -> Envelope:
     """Return lower and upper envelopes of a structure's outputs over time, on every level.
 
@@ -110,9 +110,13 @@ def envelope(
         >>> str(bounds.nature)
         'guaranteed'
     """
-    chosen, flow, levels, rows = _build_problem(
-        model, inputs, method, duration, step, alpha, integrator, options
-    )
+    motion: dict[str, Any] = {
+        "duration": duration,
+        "step": step,
+        "alpha": alpha,
+        "integrator": integrator,
+    }
+    chosen, flow, levels, rows = _build_problem(model, inputs, method, **motion, **options)
     flow = replace(flow, relative=relative)
     steps = step_error(flow)
     proof = _proof_beside(chosen, flow)
@@ -133,11 +137,12 @@ def _build_problem(
     model: LinearSystem | LagrangianSystem,
     inputs: Mapping[str, FuzzyNumber | float],
     method: Method | str | None,
+    *,
     duration: float,
     step: float,
-    alpha: Sequence[float],
-    integrator: str | Integrator | None,
-    options: Mapping[str, object],
+    alpha: Sequence[float] = ALPHA,
+    integrator: str | Integrator | None = None,
+    **options: object,
 ) -> tuple[Method, UnitFlow, Array, Ints]:
     """Return the method, the motion over distinct cuts, the levels, and the cut of each level."""
     is_system = isinstance(model, LagrangianSystem) or hasattr(model, "assembly")
@@ -182,12 +187,7 @@ def require_envelope(
     model: LinearSystem | LagrangianSystem,
     inputs: Mapping[str, FuzzyNumber | float],
     method: Method | str | None = None,
-    *,
-    duration: float,
-    step: float,
-    alpha: Sequence[float] = ALPHA,
-    integrator: str | Integrator | None = None,
-    **options: object,
+    **arguments: Any,
 ) -> None:
     """Refuse arguments that `envelope` refuses, from the first steps of a few trajectories.
 
@@ -201,11 +201,9 @@ def require_envelope(
         >>> frame = StoreyFrame(masses=[1e3], stiffness=[4e4], q0=[0.1])
         >>> require_envelope(frame, {"m1": Triangular(900, 1000, 1100)}, duration=0.5, step=0.1)
     """
-    chosen, flow, _, _ = _build_problem(
-        model, inputs, method, duration, step, alpha, integrator, options
-    )
-    short_flow = replace(flow.flow, duration=min(FIRST_STEPS * step, duration))
-    short_flow.values(flow.boxes.probes)
+    chosen, flow, _, _ = _build_problem(model, inputs, method, **arguments)
+    duration = min(FIRST_STEPS * flow.flow.step, flow.flow.duration)
+    replace(flow.flow, duration=duration).values(flow.boxes.probes)
     if isinstance(chosen, Proof | DualProof):
         with refusing():
             chosen.forecast(exact_flow(flow.flow), flow.boxes)
@@ -231,9 +229,8 @@ def _with_proof(followed: Envelope, over: UnitFlow, proof: Proof, tick: Progress
         proved = proof.run(exact, tick)
     except UnprovedError:
         return followed
-    gaps = [np.abs(followed.upper - ends.upper) for ends in (proved.proved, proved.attained)]
-    gaps += [np.abs(followed.lower - ends.lower) for ends in (proved.proved, proved.attained)]
-    error = np.max(gaps, axis=0)
+    both = np.array([proved.proved, proved.attained])  # (2, lower or upper, A, T, m)
+    error = np.abs(np.stack([followed.lower, followed.upper]) - both).max((0, 1))
     largest = float((error / over.scale).max())
     facts = {**followed.facts, "gap": proved.facts["gap"], "estimated_error": largest}
     return replace(followed, outer=proved.proved, between=proved.between, error=error, facts=facts)

@@ -160,10 +160,6 @@ class Hull:
         """Raise the bounds of some peaks (m, 2) at all nodes to those of a box, (T, m, 2)."""
         self.closed[level][:, peaks] = np.maximum(self.closed[level][:, peaks], outer[:, peaks])
 
-    def close_least(self, level: int, least: Array) -> None:
-        """Lower the bounds of the least peaks to those of a box, shape (m,)."""
-        self.least[level] = np.minimum(self.least[level], least)
-
     def take(self, level: int, bounds: BoxBounds) -> None:
         """Take over what motions of a box reach, errors and facts."""
         better = bounds.inner > self.inner[level]
@@ -171,8 +167,8 @@ class Hull:
         self.between = np.maximum(self.between, bounds.between)
         self.attained_error = np.maximum(self.attained_error, bounds.attained_error)
         if bounds.least_peaks is not None:
-            np.minimum(
-                self.least_reached[level], bounds.least_peaks.upper, self.least_reached[level]
+            self.least_reached[level] = np.minimum(
+                self.least_reached[level], bounds.least_peaks.upper
             )
         for name, value in bounds.facts.items():
             earlier = self.facts.get(name, 0)

@@ -67,66 +67,52 @@ class Cells(NamedTuple):
 
 @compiled
 def bound_nodes(
-    nodes: Ints, side: float, effort: Effort, constant: Array, data: Data, out: Array, at: Array
+    nodes: Ints, side: float, effort: Effort, constants: Array, data: Data, out: Array, at: Array
 ) -> None:
     """Write upper bounds of side × output at rising time nodes (J,), each begun from the last.
 
-    `constant` (2, T) is added to the model's value for the motion's, and to both for the bound.
+    At each node the output's dual function D(μ), see `dual_function`, is minimised over cells of
+    the modes' tables, and the cell of the largest bound is halved until that is near a value of the
+    model: best-first bisection of the ranges of the modes' ω and q = g/ω.
+
+    `constants` (2, T) are added to the model's value for the motion's, and to both for the bound.
     Written are `out` (2, J), bounds of side × output and the model's values of it, and `at` (J, L),
     the inputs of the latter.
     """
-    count, Z = effort.cells, len(data.linear)
+    max_cells, Z = effort.cells, len(data.linear)
     cells = Cells(
-        np.zeros((count, len(data.share), 4), np.int64),
-        np.zeros((count, Z)),
-        np.zeros((count, Z)),
-        np.zeros(count),
+        np.zeros((max_cells, len(data.share), 4), np.int64),
+        np.zeros((max_cells, Z)),
+        np.zeros((max_cells, Z)),
+        np.zeros(max_cells),
     )
-    mu, u = np.zeros(Z), np.zeros(data.linear.shape[1])
+    mu, u = np.zeros(Z), np.zeros(data.linear.shape[1])  # of undivided tables; of the model's value
     for j in range(len(nodes)):
-        bound_node(nodes[j], side, effort, constant[:, nodes[j]], data, cells, mu, u, out[:, j])
+        node, constant = nodes[j], constants[:, nodes[j]]
+        cells.ends[0], cells.mu[0], cells.value[0] = data.ends.astype(np.int64), mu, np.inf
+        model_value = ascend(u, node, side, data, effort.ascents)
+        target = target_value(model_value, 0.0, effort, constant)
+        model_value = bound_cell(0, node, side, data, effort, target, cells, model_value, u)
+        mu[:] = cells.mu[0]
+        least_gap = effort.remainder_multiple * (constant[1] + dot(np.abs(mu), data.remainder))
+        count, first_bound = 1, cells.value[0]
+        while count < max_cells:
+            worst = int(np.argmax(cells.value[:count]))
+            target = target_value(model_value, least_gap, effort, constant)
+            fall = (first_bound - target) * effort.min_progress * count / max_cells
+            falls_slowly = count >= effort.grace and cells.value[worst] > first_bound - fall
+            if cells.value[worst] <= target or falls_slowly:
+                break
+            if not halve_cell(cells, worst, count):
+                break
+            for half in (worst, count):
+                model_value = bound_cell(
+                    half, node, side, data, effort, target, cells, model_value, u
+                )
+            count += 1
+        out[0, j] = cells.value[:count].max() + constant[0] + constant[1]
+        out[1, j] = model_value + constant[0]
         at[j] = u
-
-
-@compiled
-def bound_node(
-    node: int,
-    side: float,
-    effort: Effort,
-    constant: Array,
-    data: Data,
-    cells: Cells,
-    mu: Array,
-    u: Array,
-    out: Array,
-) -> None:
-    """Write the upper bound of side × output at one time node, by best-first bisection of cells.
-
-    `out` takes the bound and the largest model value, `u` (L,) the inputs of the latter and `mu`
-    (Z,) the multipliers of the undivided tables; the last two are where the search begins.
-    `constant` (2,) is that of the node, and `cells` is scratch.
-    """
-    cells.ends[0], cells.mu[0], cells.value[0] = data.ends.astype(np.int64), mu, np.inf
-    model_value = ascend(u, node, side, data, effort.ascents)
-    target = target_value(model_value, 0.0, effort, constant)
-    model_value = bound_cell(0, node, side, data, effort, target, cells, model_value, u)
-    mu[:] = cells.mu[0]
-    least_gap = effort.remainder_multiple * (constant[1] + dot(np.abs(mu), data.remainder))
-    count, start_value = 1, cells.value[0]
-    while count < effort.cells:
-        worst = int(np.argmax(cells.value[:count]))
-        target = target_value(model_value, least_gap, effort, constant)
-        fall = (start_value - target) * effort.min_progress * count / effort.cells
-        falls_slowly = count >= effort.grace and cells.value[worst] > start_value - fall
-        if cells.value[worst] <= target or falls_slowly:
-            break
-        if not halve_cell(cells, worst, count):
-            break
-        for half in (worst, count):
-            model_value = bound_cell(half, node, side, data, effort, target, cells, model_value, u)
-        count += 1
-    out[0] = cells.value[:count].max() + constant[0] + constant[1]
-    out[1] = model_value + constant[0]
 
 
 @compiled
@@ -225,42 +211,30 @@ def response_and_gradient(u: Array, node: int, side: float, data: Data, weight: 
     """
     bilinear, z = np.empty(data.quadratic.shape[1]), np.empty(len(data.linear))
     products(u, bilinear)
-    for a in range(len(z)):
-        z[a] = dot(data.linear[a], u) + dot(data.quadratic[a], bilinear)
+    for v in range(len(z)):
+        z[v] = dot(data.linear[v], u) + dot(data.quadratic[v], bilinear)
     weight[:] = 0.0
-    total = 0.0
-    for k in range(len(data.share)):
-        total += mode_response(z, k, node, side, data, weight)
-    return total
-
-
-@loops
-def mode_response(z: Array, k: int, node: int, side: float, data: Data, weight: Array) -> float:
-    """Response of mode k at a node, side × output, by bilinear interpolation in its table.
-
-    `z` (Z,) are the scaled ω, g and amplitudes of all modes. Written are the mode's entries of
-    `weight` (Z,): derivatives by z.
-    """
-    width, sources = int(data.points[0]), data.share.shape[1]
-    first = k * (2 + sources)
-    w = data.centre[k, 0] + data.radius[k, 0] * z[first]
-    g = data.centre[k, 1] + data.radius[k, 1] * z[first + 1]
-    x = min(max((w - data.start[k, 0]) / data.step[k, 0], 0.0), width - 1.000001)
-    y = min(max((g / w - data.start[k, 1]) / data.step[k, 1], 0.0), data.points[1] - 1.000001)
-    i, j = int(x), int(y)
-    x, y = x - i, y - j
-    at, total = j * width + i, 0.0
-    for s in range(sources):
-        e = data.table[k, s, node]
-        a, b, c, f = e[at], e[at + 1], e[at + width], e[at + width + 1]  # corners
-        value = side * ((1 - y) * ((1 - x) * a + x * b) + y * ((1 - x) * c + x * f))
-        along = side * ((1 - y) * (b - a) + y * (f - c)) / data.step[k, 0]
-        across = side * ((1 - x) * (c - a) + x * (f - b)) / data.step[k, 1]
-        amplitude = data.share[k, s] + data.reach[k, s] * z[first + 2 + s]
-        total += amplitude * value
-        weight[first] += amplitude * (along - across * g / w**2) * data.radius[k, 0]
-        weight[first + 1] += amplitude * across / w * data.radius[k, 1]
-        weight[first + 2 + s] = value * data.reach[k, s]
+    total, width, sources = 0.0, int(data.points[0]), data.share.shape[1]
+    for k in range(len(data.share)):  # by bilinear interpolation in the table of mode k
+        first = k * (2 + sources)  # of its variables: ω, g and amplitudes
+        w = data.centre[k, 0] + data.radius[k, 0] * z[first]
+        g = data.centre[k, 1] + data.radius[k, 1] * z[first + 1]
+        x = min(max((w - data.start[k, 0]) / data.step[k, 0], 0.0), width - 1.000001)
+        y = min(max((g / w - data.start[k, 1]) / data.step[k, 1], 0.0), data.points[1] - 1.000001)
+        i, j = int(x), int(y)
+        x, y = x - i, y - j
+        at = j * width + i
+        for s in range(sources):
+            e = data.table[k, s, node]
+            a, b, c, f = e[at], e[at + 1], e[at + width], e[at + width + 1]  # corners
+            value = side * ((1 - y) * ((1 - x) * a + x * b) + y * ((1 - x) * c + x * f))
+            along = side * ((1 - y) * (b - a) + y * (f - c)) / data.step[k, 0]
+            across = side * ((1 - x) * (c - a) + x * (f - b)) / data.step[k, 1]
+            amplitude = data.share[k, s] + data.reach[k, s] * z[first + 2 + s]
+            total += amplitude * value
+            weight[first] += amplitude * (along - across * g / w**2) * data.radius[k, 0]
+            weight[first + 1] += amplitude * across / w * data.radius[k, 1]
+            weight[first + 2 + s] = value * data.reach[k, s]
     return total
 
 

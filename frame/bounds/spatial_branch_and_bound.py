@@ -20,14 +20,7 @@ from heapq import heappop, heappush
 import numpy as np
 
 from alphacut.frame import numbers
-from alphacut.frame.bounds.box_proof import (
-    Answer,
-    BisectionError,
-    BoxProof,
-    Goal,
-    Hull,
-    refusing,
-)
+from alphacut.frame.bounds.box_proof import Answer, BisectionError, BoxProof, Goal, Hull, refusing
 from alphacut.frame.boxes import Boxes, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import exact_flow
@@ -39,8 +32,6 @@ LOG = logging.getLogger(__name__)
 
 BATCH = 2
 """Boxes that are bounded with the same incumbents, whatever the number of threads."""
-NAMED = 3
-"""Inputs that are named with their shares in a gap."""
 OWN_WORK = 0.5
 """Fraction of a box's expected work that its own bounds take, and not its halves."""
 
@@ -145,21 +136,16 @@ class Queue:
             pool.shutdown(wait=False, cancel_futures=True)
 
     def notes(self) -> Iterator[str]:
-        """Yield a sentence on the inputs to narrow where a gap remains."""
+        """Yield a sentence on the input to narrow where a gap remains."""
         gaps = np.minimum.accumulate(self.hull.closed.max(1), axis=0)
         gaps -= np.stack([self.hull.incumbent(level) for level in range(len(gaps))])
         gaps = np.where(self.number > 0, gaps, -np.inf) / self.problem.peak[:, None]
         level, output, side = np.unravel_index(gaps.argmax(), gaps.shape)
         gap, shares = gaps[level, output, side], self.gap_shares[level, output, side]
-        if gap * self.problem.peak[output] <= self.gap[output, 0] or not shares.any():
-            return
-        largest = [axis for axis in np.argsort(-shares)[:NAMED] if shares[axis] > 0]
-        names = [self.problem.boxes.names[axis] for axis in largest]
-        words = [f"{name} {shares[axis]:.0%}" for name, axis in zip(names, largest, strict=True)]
-        yield (
-            f"gap of {self.flow.outputs[output]}, {gap:.2g} of its peak, by input:"
-            f" {', '.join(words)}; narrow {names[0]} first"
-        )
+        if gap * self.problem.peak[output] > self.gap[output, 0] and shares.any():
+            name, share = self.problem.boxes.names[shares.argmax()], shares.max()
+            of_peak = f"gap of {self.flow.outputs[output]}, {gap:.2g} of its peak"
+            yield f"{of_peak}: {share:.0%} of it by {name}, which is to be narrowed first"
 
     def _push(self, box: SubBox) -> None:
         """Queue a box by the largest excess of its bounds, in units of the gap; ties by age."""
@@ -287,7 +273,7 @@ class Queue:
                 continue
             if box.is_wide[k]:  # from here on the level's open peaks alone are bounded
                 box.is_wide[k] = False
-                self.hull.close_least(level, box.least[k])
+                self.hull.least[level] = np.minimum(self.hull.least[level], box.least[k])
             self.hull.close(level, box.peaks[k] & ~is_open, box.outer[k])
             box.peaks[k] = is_open
 
