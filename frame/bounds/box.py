@@ -12,13 +12,7 @@ from alphacut.frame.bounds.level import LevelModels
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.structure import Classical, classical_structure
-from alphacut.frame.modes.superposition import (
-    Modal,
-    load_at_given_nodes,
-    load_at_nodes,
-    modes_at,
-    outputs_at,
-)
+from alphacut.frame.modes.superposition import Modal, load_at_nodes, modes_at, outputs_at
 from alphacut.frame.response.oscillators import Grid, Oscillators
 from alphacut.frame.structures.linear import LinearSystem, histories
 from alphacut.frame.structures.loads import History
@@ -115,7 +109,7 @@ class Box:
             for rows in np.array_split(inside, -(-len(inside) // count)):
                 point, nodes = index[rows] - first, node[rows]
                 loads = {
-                    name: load_at_given_nodes(modal.sigma[point], load, self.time, nodes)
+                    name: load_at_nodes(modal.sigma[point], load, self.time, nodes)
                     for name, load in self.loads.items()
                 }
                 values_and_errors[:, rows] = outputs_at(

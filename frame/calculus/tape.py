@@ -34,7 +34,12 @@ def tape(components: Sequence[Expr], active: Sequence[Symbol], constants: Sequen
     Raises:
         RefusedError: An expression has a function that is not among `OPERATIONS`.
     """
-    return _Writer([*active, *constants]).tape(components)
+    writer = _Writer([*active, *constants])
+    results = np.array([writer.place(e) for e in components], np.int64)
+    code = np.array(writer.code, np.int64).reshape(-1, 3)
+    places = np.zeros(writer.arguments + len(code) + len(writer.numbers))
+    places[writer.arguments + len(code) :] = [*writer.numbers][::-1]
+    return code, results, places
 
 
 def with_derivatives(
@@ -55,14 +60,6 @@ class _Writer:
         self.code: list[tuple[int, int, int]] = []
         self.operation_places: dict[tuple[int, int, int], int] = {}
         self.arguments = len(arguments)
-
-    def tape(self, expressions: Sequence[Expr]) -> Tape:
-        """The tape."""
-        results = np.array([self.place(e) for e in expressions], np.int64)
-        code = np.array(self.code, np.int64).reshape(-1, 3)
-        places = np.zeros(self.arguments + len(code) + len(self.numbers))
-        places[self.arguments + len(code) :] = [*self.numbers][::-1]
-        return code, results, places
 
     def place(self, e: Expr) -> int:
         """Place of an expression."""

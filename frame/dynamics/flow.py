@@ -145,10 +145,9 @@ class Flow(ABC):
             with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
                 motion = self._march(points, derivatives=derivatives)
         except StepError as failure:
-            where = self._point_words(self._failing_point(points))
-            raise StepError(f"{failure}; it failed at {where}") from None
+            raise StepError(f"{failure}; it failed at {self._failing_point(points)}") from None
         except np.linalg.LinAlgError:
-            what = f"a singular matrix at {self._point_words(self._failing_point(points))}"
+            what = f"a singular matrix at {self._failing_point(points)}"
             raise RefusedError("trajectory", what, "motions that exist", CURE) from None
         finite = np.isfinite(motion.value).all(-1)
         if not finite.all():
@@ -159,8 +158,8 @@ class Flow(ABC):
             raise RefusedError("trajectory", what, "motions that exist", cure)
         return motion
 
-    def _failing_point(self, points: Array) -> Array:
-        """One (d,) of the points (S, d) at which the motion fails, by bisection."""
+    def _failing_point(self, points: Array) -> str:
+        """One of the points (S, d) at which the motion fails, by bisection, as a text."""
         while len(points) > 1:
             half = points[: len(points) // 2]
             try:
@@ -168,10 +167,9 @@ class Flow(ABC):
                 points = points[len(half) :]
             except (np.linalg.LinAlgError, StepError):
                 points = half
-        return np.asarray(points[0])
+        return self._point_words(points[0])
 
     def _point_words(self, point: Array) -> str:
-        """Return the parameters of a point (d,) as a text."""
         pairs = zip(self.names, point, strict=True)
         return ", ".join(f"{name} = {x:g}" for name, x in pairs) or "the nominal parameters"
 
@@ -234,18 +232,14 @@ class LinearFlow(Flow):
             size += np.einsum("oi,ij,oj->o", row, inverse, row, optimize=True)
         return np.asarray(np.sqrt(np.maximum(size, 0.0) * max(float(energy.max()), 0.0)))
 
-    @property
-    def _loads(self) -> list[History]:
-        """Histories of the ground, if any, and of forces."""
-        return list(histories(self.system).values())
-
-    def _pushes(self, matrices: Matrices) -> Jet:
-        """Accelerations by a unit of each load, shape (S, n, L)."""
-        return matrices.pushes(ground=self.system.ground is not None)
+    def _loads(self, matrices: Matrices) -> tuple[Jet, list[History]]:
+        """Accelerations by a unit of each of L loads, (S, n, L), and their histories."""
+        pushes = matrices.pushes(ground=self.system.ground is not None)
+        return pushes, list(histories(self.system).values())
 
     def _step_map(self, matrices: Matrices) -> StepMap:
-        pushes, steps = self._pushes(matrices), len(self.time) - 1
-        return self.integrator.step_map(matrices, pushes, self._loads, self.step, steps)
+        steps = len(self.time) - 1
+        return self.integrator.step_map(matrices, *self._loads(matrices), self.step, steps)
 
     def _march(self, points: Array, *, derivatives: bool) -> Jet:
         """Outputs of x[k+1] = T x[k] + G load[k] at points (S, d), shape (S, T, outputs)."""
@@ -261,9 +255,9 @@ class LinearFlow(Flow):
 
     def _from_modes(self, matrices: Matrices, rows: Jet) -> Jet | None:
         """The same with two derivatives by complex modes; None where they are too near."""
-        pushes = self._pushes(matrices)
+        pushes, loads = self._loads(matrices)
         columns = concatenate([matrices.start, concatenate([pushes * 0.0, pushes], -2)], -1)
-        return modal_trajectory(state_matrix(matrices), columns, rows, self._loads, self.time)
+        return modal_trajectory(state_matrix(matrices), columns, rows, loads, self.time)
 
 
 def trajectory(step_map: StepMap, start: Jet, rows: Jet) -> Jet:

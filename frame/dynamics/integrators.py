@@ -135,7 +135,7 @@ class Exact:
         A, substeps = state_matrix(matrices), 1
         if loads:
             fastest = float(np.abs(np.linalg.eigvals(A.value)).max())
-            substeps = substeps_of(max(fastest, *(load.frequency for load in loads)), step)
+            substeps = _substeps(max(fastest, *(load.frequency for load in loads)), step)
         h = step / substeps
         term = concatenate([pushes * 0.0, pushes], -2)
         series = [term]
@@ -182,16 +182,8 @@ def exponential(z: Jet) -> Jet:
     return series
 
 
-def substeps_of(fastest: float, step: float) -> int:
-    """Return the number of substeps of an exact step, a power of 2.
-
-    Args:
-        fastest: Largest |λ| of the motions and angular frequency of the loads, in rad/s.
-        step: Length of a step, in s.
-
-    Raises:
-        ValueError: There would be more than `MAX_SUBSTEPS`.
-    """
+def _substeps(fastest: float, step: float) -> int:
+    """Number of substeps of an exact step, a power of 2, by the largest |λ| or Ω in rad/s."""
     substeps = 1 << max(0, ceil(log2(max(1.0, fastest * step / MAX_PHASE)) - 1e-9))
     if substeps > MAX_SUBSTEPS:
         raise ValueError(

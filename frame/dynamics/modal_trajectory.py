@@ -59,17 +59,12 @@ def modal_trajectory(
     ]
     table = np.concatenate(waves, 1).reshape(len(weight), -1, len(time))
     table = np.concatenate([table.real, -table.imag], -2)
-    factors = zip(*(_chain(amplitude, rate[:, None]) for amplitude in amplitudes), strict=True)
-    return Jet(*(_superposed(parts, table) for parts in factors))
-
-
-def _superposed(factors: Sequence[Array], table: Array) -> Array:
-    """Real part of the sum of factors (…, S, m, n) times ρ and its derivatives, (…, S, T, m).
-
-    `table` holds their real parts, then the negative imaginary ones, shape (S, 2 Σ n, T).
-    """
-    factor = np.concatenate(factors, -1)
-    return np.asarray((np.concatenate([factor.real, factor.imag], -1) @ table).swapaxes(-1, -2))
+    derivatives = list[Array]()
+    for factors in zip(*(_chain(x, rate[:, None]) for x in amplitudes), strict=True):
+        factor = np.concatenate(factors, -1)
+        motion = np.concatenate([factor.real, factor.imag], -1) @ table  # its real part
+        derivatives.append(np.asarray(motion.swapaxes(-1, -2)))
+    return Jet(*derivatives)
 
 
 def _chain(a: Jet, rate: Jet) -> list[Array]:

@@ -122,12 +122,10 @@ class LagrangianFlow(Flow):
 
     @cached_property
     def _plain(self) -> list[Tape]:
-        """Tapes of a step, the outputs and the start."""
         return [tape(*expression) for expression in self._expressions]
 
     @cached_property
     def _deep(self) -> list[Tape]:
-        """The same with first and second derivatives by the inputs."""
         return [with_derivatives(*expression) for expression in self._expressions]
 
     def _march(self, points: Array, *, derivatives: bool) -> Jet:
@@ -159,19 +157,10 @@ def _march(
     out1: Array,
     out2: Array,
 ) -> bool:
-    """Write outputs of S motions at T nodes, with derivatives; return False if a step fails.
+    """Write outputs (S, T, m) and derivatives (S, T, m, d), (S, T, m, d, d); False if a step fails.
 
-    Args:
-        newton: Tape of the momenta before a step and their derivatives by the new coordinates.
-        step: Tape of the momenta before and after a step, with derivatives where d > 0.
-        observe: Tape of the outputs of a state, likewise.
-        initial: Tape of the initial state, likewise.
-        n: Number of coordinates.
-        inputs: d inputs and then other parameters, shape (S, K).
-        h: Length of a step, in s.
-        out: Written: outputs, shape (S, T, m).
-        out1: Written: their first derivatives, shape (S, T, m, d).
-        out2: Written: their second ones, shape (S, T, m, d, d).
+    The tapes are those of `LagrangianFlow`, with derivatives where d > 0; `inputs` (S, K) are d
+    inputs and then other parameters.
     """
     size, d, m = 2 * n, out1.shape[3], out.shape[2]
     a = size + d
@@ -203,13 +192,10 @@ def _march(
 def _midpoint_step(
     newton: Tape, step: Tape, n: int, p: Array, h: float, x: Array, x1: Array, x2: Array
 ) -> bool:
-    """Advance a state x (2n,) with derivatives x1 and x2 in place; return False if it fails.
-
-    Tape `newton` gives the momenta before the step, to equal those of the state, and their
-    derivatives by the new coordinates, which Newton's method finds.
-    """
+    """Advance a state x (2n,) with derivatives x1 and x2 in place; return False if it fails."""
     d, m, n_parameters = x1.shape[1], 2 * n, len(p)
     arguments, flat = np.empty(m + n_parameters + 1), np.empty(n + n * n)
+    # Newton's method finds new coordinates whose momenta before the step are those of the state
     residual, jacobian = np.empty((n, 1)), np.empty((n, n))
     arguments[:n] = arguments[n:m] = x[:n]  # new coordinates, guessed, and old ones
     arguments[m : m + n_parameters] = p
@@ -245,13 +231,11 @@ def _step_derivatives(flat: Array, n: int, x1: Array, x2: Array) -> None:
     """Advance derivatives x1 (2n, d) and x2 (2n, d, d) of a state by one midpoint step, in place.
 
     `flat` holds the momenta before and after the step, with first and second derivatives by new and
-    old coordinates and the inputs. The momenta before the step, whose Jacobian by the new
-    coordinates is J, determine these: one linear system with J gives their first derivatives,
-    another one the second ones.
+    old coordinates and the inputs.
     """
     m, d = x1.shape
     a = m + d
-    J = np.empty((n, n))
+    J = np.empty((n, n))  # of the momenta before the step by the new coordinates
     # derivatives of the variables (new coordinates, old coordinates, inputs) by the inputs
     inner1, inner2 = np.zeros((a, d)), np.zeros((a, d, d))
     out1, out2 = np.empty((m, d)), np.empty((m, d, d))

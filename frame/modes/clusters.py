@@ -74,7 +74,8 @@ def enclose_subspaces(
     """
     tolerances = np.zeros(centre.modes) if tolerances is None else tolerances
     slopes = _slopes(centre)
-    low, high, variation = _ranges(centre, int(used[_steepest(centre, slopes)]))
+    steepest = int((np.abs(slopes) / centre.squared[:, None]).max(0).argmax())  # input, of λ
+    low, high, variation = _ranges(centre, int(used[steepest]))
     near, blocks, along = _nearness(centre, slopes), list[Block](), None
     free: Ints = np.arange(centre.modes)
     while len(free) and free[0] < wanted and along is None:
@@ -166,11 +167,6 @@ def _slopes(centre: CentredMatrices) -> Array:
     at = np.arange(centre.modes)
     stiff, heavy = (x.part(1)[:, at, at] for x in (centre.stiffness, centre.mass))
     return np.asarray((stiff - centre.squared * heavy).T)
-
-
-def _steepest(centre: CentredMatrices, slopes: Array) -> int:
-    """The input with the largest relative effect on a mode's λ."""
-    return int((np.abs(slopes) / centre.squared[:, None]).max(0).argmax())
 
 
 def _couplings(centre: CentredMatrices, some: Ints) -> Array:

@@ -174,16 +174,11 @@ class DampedModes:
 
     def outputs(self, structure: DampedStructure) -> TaylorModel:
         """Outputs of the states [φ_k, w_k], shape (S, n, m)."""
-        of_shape, of_velocity = (structure.rows[:, part].T for part in _halves(structure))
-        found = self.shape @ of_shape + self.velocity @ of_velocity
+        n = len(structure.omega)
+        found = self.shape @ structure.rows[:, :n].T + self.velocity @ structure.rows[:, n:].T
         if structure.ratio is None or not structure.reading.size().any():
             return found
         return found - self.ratio_force(structure) @ structure.reading.T
-
-
-def _halves(structure: DampedStructure) -> tuple[slice, slice]:
-    n = len(structure.omega)
-    return slice(None, n), slice(n, None)
 
 
 def needed_modes(
@@ -201,7 +196,7 @@ def needed_modes(
         allowed: Largest error of each output, shape (m,).
     """
     rate, shape, norm = _middle_modes(structure)
-    omega, (r, s) = structure.omega, (structure.rows.value[:, x] for x in _halves(structure))
+    omega, (r, s) = structure.omega, np.split(structure.rows.value, 2, axis=1)
     force = shape @ structure.impulse.value - shape @ structure.static.value / rate[:, None]
     amplitude = np.abs(force / norm[:, None])  # (2N, S)
     for k, history in enumerate(loads, start=1):  # |∫ exp(λ τ) a| ≤ min(∫ |a|, max |a| / −Re λ)
@@ -218,7 +213,8 @@ def needed_modes(
 def _middle_modes(structure: DampedStructure) -> tuple[Array, Array, Array]:
     """λ (2N,), unit shapes φ as rows and φᵀ (2 λ M + D) φ in the middle; Im λ > 0 first, by |λ|."""
     omega, n = structure.omega, len(structure.omega)
-    D = _middle_damping(structure)
+    ratio = 0.0 if structure.ratio is None else float(structure.ratio.value)
+    D = structure.damping.value + 2 * ratio * np.diag(omega)
     lower = np.hstack([-np.diag(omega**2), -D])
     rate, X = np.linalg.eig(np.vstack([np.eye(n, 2 * n, n), lower]))
     group = np.where(_oscillates(rate), 0, np.where(_oscillates(rate.conj()), 2, 1))
@@ -230,11 +226,6 @@ def _middle_modes(structure: DampedStructure) -> tuple[Array, Array, Array]:
         if len(alike) > 1 and k == alike[0]:
             shape[alike] = _orthogonal_shapes(shape[alike], rate[k], D)
     return rate, shape, ((2 * rate[:, None] * shape + shape @ D) * shape).sum(1)
-
-
-def _middle_damping(structure: DampedStructure) -> Array:
-    ratio = 0.0 if structure.ratio is None else float(structure.ratio.value)
-    return structure.damping.value + 2 * ratio * np.diag(structure.omega)
 
 
 def norm_of(vectors: Array) -> Array:

@@ -26,8 +26,6 @@ from alphacut.frame.response.load_tables import Direct, LoadTables
 from alphacut.frame.structures.linear import courses_of_forces, histories
 from alphacut.fuzzy.arrays import Array, Ints
 
-PIECE = 20_000
-"""Points whose values are computed together."""
 Waves = tuple[Array, Array, Array]
 
 
@@ -181,21 +179,6 @@ class ModalModel:
         H = np.empty((len(unit), d, d))
         H[:, row, column] = H[:, column, row] = derivatives[:, 1 + d :]
         return derivatives[:, 0], derivatives[:, 1 : 1 + d], H
-
-    def value_at(self, unit: Array, node: Ints, output: Ints) -> Array:
-        """Values (N,) of one output at one node for each of N points, as in `at`.
-
-        They are 2 Re Σ_k C_k w(t; λ_k) over the free motion and each load.
-        """
-        values, n = np.zeros(len(unit)), self.count
-        for o in np.unique(output):
-            of_output = np.flatnonzero(output == o)
-            for rows in np.array_split(of_output, -(-len(of_output) // PIECE)):
-                variables = self.of_output[o].at(unit[rows])
-                for number, wave in enumerate(self.waves(variables[:, :n], node[rows]), 1):
-                    amplitude = variables[:, number * n : (number + 1) * n]
-                    values[rows] += 2 * (amplitude * wave[0]).real.sum(1)
-        return values
 
     def waves(self, rate: Array, node: Ints) -> Sequence[Waves]:
         """Time functions w(t; λ_k) of the free motion and of each load, with derivatives by λ.

@@ -18,7 +18,13 @@ from alphacut.frame.modes.intervening import (
     oscillators,
     source_patterns,
 )
-from alphacut.frame.modes.rest import TruncatedModes, coupling_bounds, rest_of_block, rest_of_modes
+from alphacut.frame.modes.rest import (
+    TruncatedModes,
+    coupling_bounds,
+    rest_of_modes,
+    sums_over_block,
+    truncated_modes,
+)
 from alphacut.frame.modes.structure import Classical
 from alphacut.frame.response.duhamel import responses_at_nodes
 from alphacut.frame.response.oscillators import POWERS, feedthrough, read_response
@@ -97,7 +103,8 @@ class MotionModels:
             of_modes = oscillators(structure, of_block, found)
             if len(of_modes) > 1:
                 more, straying, ends = coupling_bounds(structure, of_block, found, excitation)
-                by_sums = rest_of_block(structure, found, of_block, ends, excitation)
+                sums = sums_over_block(of_block)
+                by_sums = truncated_modes(sums, ends, structure, found, excitation)
                 scale = np.maximum(more.max(0) if allowed is None else allowed, 1e-300)
                 is_narrower = (by_sums.width / scale).max() < (more.max(0) / scale).max()
                 if is_narrower and (single or of_block is not shares[-1]):  # one oscillator is left

@@ -72,24 +72,9 @@ class TruncatedModes:
         return np.asarray((self.amplitude.size()[..., None] * self.half).max(-1).sum(0))
 
 
-@dataclass(frozen=True, eq=False)
-class _Sums:
-    """Sums over modes, without the outputs' factors; in each pair the second has terms over λ.
-
-    Args:
-        shares: Σ a β, shape (sources, m) each.
-        outputs: Σ a², shape (m,) each.
-        sources: Σ β², shape (sources,) each.
-    """
-
-    shares: tuple[TaylorModel, TaylorModel]
-    outputs: tuple[TaylorModel, TaylorModel]
-    sources: tuple[TaylorModel, TaylorModel]
-
-    def __sub__(self, other: _Sums) -> _Sums:
-        names = ("shares", "outputs", "sources")
-        pairs = (zip(getattr(self, x), getattr(other, x), strict=True) for x in names)
-        return _Sums(*((a0 - b0, a1 - b1) for (a0, b0), (a1, b1) in pairs))
+Sums = list[tuple[TaylorModel, TaylorModel]]
+"""Σ a β (sources, m), Σ a² (m,), Σ β² (sources,) over modes, and each with its terms over λ;
+without the outputs' factors."""
 
 
 def rest_of_modes(
@@ -113,39 +98,28 @@ def rest_of_modes(
         return None
     sums = _sums_over_modes(found, *coordinates, max(x.block.norm.order for x in shares))
     for of_block in shares:
-        sums = sums - _sums_over_block(of_block)
+        pairs = zip(sums, sums_over_block(of_block), strict=True)
+        sums = [(a - c, b - d) for (a, b), (c, d) in pairs]
     low, high = float(found.low[other_modes].min()), float(found.high[other_modes].max())
     ends = damped_range(structure, low, high, other_modes)
-    return _truncated_modes(sums, ends, structure, found, excitation)
+    return truncated_modes(sums, ends, structure, found, excitation)
 
 
-def rest_of_block(
-    structure: Classical,
-    found: Subspaces,
-    of_block: BlockShares,
-    ends: tuple[Ends, Ends],
-    excitation: Excitation,
-) -> TruncatedModes:
-    """Bounds of the motion of a block's modes by sums over them; `ends` bound ω and g/ω."""
-    return _truncated_modes(_sums_over_block(of_block), ends, structure, found, excitation)
-
-
-def _truncated_modes(
-    sums: _Sums,
+def truncated_modes(
+    sums: Sums,
     ends: tuple[Ends, Ends],
     structure: Classical,
     found: Subspaces,
     excitation: Excitation,
 ) -> TruncatedModes:
+    """Bounds of the motion of modes by sums over them; `ends` bound their ω and g/ω."""
     orders = sorted({int(order) for order in structure.order})
     (omega, quotient), (loads, time, sources) = ends, excitation
     ranges = response_ranges(omega, quotient, loads, time, sources, orders)
     return _with_best_powers(structure, _amplitude_bounds(sums, structure, found), ranges)
 
 
-def _sums_over_modes(
-    found: Subspaces, read: TaylorModel, excited: TaylorModel, order: int
-) -> _Sums:
+def _sums_over_modes(found: Subspaces, read: TaylorModel, excited: TaylorModel, order: int) -> Sums:
     """Sums over all modes, of outputs `read` (m, n) and sources `excited` (sources, n)."""
     centre, mass, stiffness = found.centre, found.centre.mass, found.centre.stiffness
     if len(excited.present()):
@@ -167,11 +141,11 @@ def _sums_over_modes(
         of_stiffness = of_stiffness - _diagonal(massless)
         of_mass = of_mass.loosened(np.where(light_rows.size().any(1), UNKNOWN, 0.0))
     by_stiffness = inverse_form(stiffness, forces, forces, least_stiffness)
-    return _Sums(
-        shares=(excited @ rows.T, inverse_form(stiffness, forces, rows, least_stiffness)),
-        outputs=(of_mass, of_stiffness),
-        sources=(_diagonal(forces @ excited.T), _diagonal(by_stiffness)),
-    )
+    return [
+        (excited @ rows.T, inverse_form(stiffness, forces, rows, least_stiffness)),
+        (of_mass, of_stiffness),
+        (_diagonal(forces @ excited.T), _diagonal(by_stiffness)),
+    ]
 
 
 def inverse_form(
@@ -195,16 +169,16 @@ def inverse_form(
     return (x @ right.T).loosened(e @ y.size().T + np.outer(*norms) / least)
 
 
-def _sums_over_block(of_block: BlockShares) -> _Sums:
+def sums_over_block(of_block: BlockShares) -> Sums:
     """Sums over a block's modes, by X, N = Xᵀ M X and Xᵀ K X = N L."""
     projected_stiffness = of_block.block.norm @ of_block.block.rate.T
     read, forces = of_block.read, of_block.source_forces
     read_over_stiffness = solve(projected_stiffness, read)
-    return _Sums(
-        shares=(of_block.participation.T @ read, forces.T @ read_over_stiffness),
-        outputs=(of_block.of_outputs, column_products(read, read_over_stiffness)),
-        sources=(of_block.of_sources, column_products(forces, solve(projected_stiffness, forces))),
-    )
+    return [
+        (of_block.participation.T @ read, forces.T @ read_over_stiffness),
+        (of_block.of_outputs, column_products(read, read_over_stiffness)),
+        (of_block.of_sources, column_products(forces, solve(projected_stiffness, forces))),
+    ]
 
 
 def _diagonal(matrix: TaylorModel) -> TaylorModel:
@@ -213,13 +187,12 @@ def _diagonal(matrix: TaylorModel) -> TaylorModel:
 
 
 def _amplitude_bounds(
-    sums: _Sums, structure: Classical, found: Subspaces
+    sums: Sums, structure: Classical, found: Subspaces
 ) -> list[tuple[TaylorModel, TaylorModel]]:
     """C and the bound of √(A B) for each power 0, ½, 1 of λ, with the outputs' factors."""
     d, order = structure.start.inputs, structure.start.order
     (C0, C1), (A0, A1), (B0, B1) = (
-        [x.cut(order).among(found.used, d) for x in pair]
-        for pair in (sums.shares, sums.outputs, sums.sources)
+        [x.cut(order).among(found.used, d) for x in pair] for pair in sums
     )
     pairs = ((C0, A0, B0), (C0 * 0.0, A1, B0), (C1, A1, B1))
     factor = structure.factor

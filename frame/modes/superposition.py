@@ -23,11 +23,7 @@ import numpy as np
 from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF, gamma
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.structure import Classical
-from alphacut.frame.response.duhamel import (
-    absolute_moments,
-    responses_at_given_nodes,
-    responses_at_nodes,
-)
+from alphacut.frame.response.duhamel import absolute_moments, responses_at_nodes
 from alphacut.frame.response.oscillators import read_response
 from alphacut.frame.structures.linear import LinearSystem, evaluate, histories, undamped_modes
 from alphacut.frame.structures.loads import History
@@ -160,17 +156,13 @@ class LoadAtNodes:
     value: Array
 
 
-def load_at_given_nodes(sigma: Array, load: History, time: Array, node: Ints) -> LoadAtNodes:
-    """Responses of oscillators σ (N, n) to a load, each row at its node (N,) of `time`."""
-    responses = responses_at_given_nodes(sigma, load, time, node, 1)
-    impulse = absolute_moments(0.0, load, time)[0]
-    return LoadAtNodes(*responses, impulse[node], load.values(time[node]))
-
-
-def load_at_nodes(sigma: Array, load: History, time: Array) -> LoadAtNodes:
-    """Responses of oscillators σ (n,) to a load at all nodes."""
-    responses = responses_at_nodes(sigma, load, time, 1)
-    return LoadAtNodes(*responses, absolute_moments(0.0, load, time)[0], load.values(time))
+def load_at_nodes(
+    sigma: Array, load: History, time: Array, node: Ints | None = None
+) -> LoadAtNodes:
+    """Responses of oscillators σ (N, n) to a load, each row at its node (N,); (n,) at all nodes."""
+    at, impulse = slice(None) if node is None else node, absolute_moments(0.0, load, time)[0]
+    responses = responses_at_nodes(sigma, load, time, 1, node=node)
+    return LoadAtNodes(*responses, impulse[at], load.values(time[at]))
 
 
 def outputs_at(
@@ -189,7 +181,7 @@ def outputs_at(
         time: Node of each value, shape (N,), in s.
         loads: The loads by name.
     """
-    sigma, t = modal.sigma[point], time[:, None]
+    sigma, slope, t = modal.sigma[point], modal.sigma_slope[point], time[:, None]
     exp = np.exp(sigma * t)
     rounding = (gamma(4) + UNIT_ROUNDOFF * np.abs(sigma) * t) * np.abs(exp)
     unit_load = np.ones_like(time)
@@ -197,58 +189,39 @@ def outputs_at(
     read = modal.output_coefficients(point, output)
     total, error = np.zeros((2, len(point)))
     for source, load in {"velocity": free, "start": free, **loads}.items():
-        response = _Responses.of_modes(modal, point, modal.order[output], source, load, time)
+        response = _mode_responses(sigma, slope, modal.order[output], source, load, t)
         share = modal.share[source][point], modal.share_error[source][point]
-        total += (read[0] * share[0] * response.value).sum(-1)
+        total += (read[0] * share[0] * response[0]).sum(-1)
         error += _superposition_error(modal, point, read, share, response)
     # terms of second order in the residuals are at most this fraction of those of first order
     diagonal = np.einsum("skk->sk", modal.stiffness_error[point])
-    second_order = (diagonal * modal.sigma_slope[point] * t).max(-1)
-    return total, error / np.maximum(1 - second_order, 1e-300)
+    return total, error / np.maximum(1 - (diagonal * slope * t).max(-1), 1e-300)
 
 
-@dataclass(frozen=True, eq=False)
-class _Responses:
-    """Responses e of all modes to one source, at a node for each of N points, each (N, n).
-
-    Args:
-        value: e.
-        error: Bound of its rounding.
-        slope: Bound of |de/dλ| at the modes, λ the squared undamped angular frequency.
-        slope_anywhere: The same at any λ, from bounds of ρ at any σ that does not grow.
-    """
-
-    value: Array
-    error: Array
-    slope: Array
-    slope_anywhere: Array
-
-    @classmethod
-    def of_modes(
-        cls, modal: Modal, point: Ints, orders: Ints, source: str, load: LoadAtNodes, time: Array
-    ) -> _Responses:
-        """Responses to a source of the modes at points (N,), read by derivatives `orders` (N,)."""
-        sigma, sigma_slope, order = modal.sigma[point], modal.sigma_slope[point], orders[:, None]
-        omega, size = sigma.imag, np.abs(sigma)
-        power, power_slope = size**order, order * size ** np.maximum(order - 1, 0)
-        G = sigma**order * load.rho[0]
-        error = power * load.error + gamma(2 * order.max() + 6) * np.abs(G)
-        direct = np.zeros_like(time)
-        if source.startswith("force"):  # of the relative acceleration
-            direct = np.where(orders == 2, load.value, 0.0)
-        # |G| and |dG/dσ| at the modes, and anywhere, where |ρ| ≤ ∫ |f| and |ρ′| ≤ t ∫ |f|
-        impulse, quotient = load.impulse[:, None], -sigma.real / omega
-        slopes = []
-        for rho, rho_slope in (np.abs(load.rho), (impulse, time[:, None] * impulse)):
-            G_size, G_slope = power * rho, power_slope * rho + power * rho_slope
-            if source == "start":
-                by_quotient = sigma_slope * (1 + quotient) / omega * G_size
-                slopes.append(sigma_slope * (1 + quotient) * G_slope + by_quotient)
-            else:
-                slopes.append(sigma_slope * (G_slope / omega + G_size / omega**2))
-        error = error * (1 + quotient) if source == "start" else error / omega
-        error = error + gamma(8) * np.abs(direct)[:, None]
-        return cls(read_response(source, sigma, G) + direct[:, None], error, *slopes)
+def _mode_responses(
+    sigma: Array, sigma_slope: Array, orders: Ints, source: str, load: LoadAtNodes, time: Array
+) -> tuple[Array, Array, Array, Array]:
+    """Responses e, their rounding, and bounds of |de/dλ| at the modes and at any λ, (N, n) each."""
+    omega, size, order = sigma.imag, np.abs(sigma), orders[:, None]
+    power, power_slope = size**order, order * size ** np.maximum(order - 1, 0)
+    G = sigma**order * load.rho[0]
+    error = power * load.error + gamma(2 * order.max() + 6) * np.abs(G)
+    direct = np.zeros_like(time)
+    if source.startswith("force"):  # of the relative acceleration
+        direct = np.where(order == 2, load.value[:, None], 0.0)
+    # |G| and |dG/dσ| at the modes, and anywhere, where |ρ| ≤ ∫ |f| and |ρ′| ≤ t ∫ |f|
+    impulse, quotient = load.impulse[:, None], -sigma.real / omega
+    slopes = []
+    for rho, rho_slope in (np.abs(load.rho), (impulse, time * impulse)):
+        G_size, G_slope = power * rho, power_slope * rho + power * rho_slope
+        if source == "start":
+            by_quotient = sigma_slope * (1 + quotient) / omega * G_size
+            slopes.append(sigma_slope * (1 + quotient) * G_slope + by_quotient)
+        else:
+            slopes.append(sigma_slope * (G_slope / omega + G_size / omega**2))
+    error = error * (1 + quotient) if source == "start" else error / omega
+    error = error + gamma(8) * np.abs(direct)
+    return read_response(source, sigma, G) + direct, error, slopes[0], slopes[1]
 
 
 def _superposition_error(
@@ -256,23 +229,24 @@ def _superposition_error(
     point: Ints,
     read: tuple[Array, Array],
     share: tuple[Array, Array],
-    response: _Responses,
+    response: tuple[Array, Array, Array, Array],
 ) -> Array:
-    """Bound of the rounding of Σ_k r_k c_k e_k, shape (N,); r and c with theirs, (N, n) each."""
+    """Bound of the rounding of Σ_k r_k c_k e_k, (N,), by r, c and e with their errors, (N, n)."""
     (r, r_error), (c, c_error) = (tuple(np.abs(x) for x in pair) for pair in (read, share))
-    e, n = np.abs(response.value), response.value.shape[-1]
-    error = (r * c * response.error + (r_error * c + r * c_error) * e).sum(-1)
+    value, e_error, slope, anywhere = response
+    e, n = np.abs(value), value.shape[-1]
+    error = (r * c * e_error + (r_error * c + r * c_error) * e).sum(-1)
     error += gamma(n + 6) * (r * c * e).sum(-1)
     # e[λ_j, λ_k] is no more than (|e_j| + |e_k|) / |λ_j − λ_k|, nor than sup |de/dλ| between modes
     # of one damping ratio
-    squared, anywhere = modal.squared[point], response.slope_anywhere
+    squared = modal.squared[point]
     gaps = np.abs(squared[:, :, None] - squared[:, None])
     of_ratios = np.where(modal.is_alike[point][:, None, None], 0.0, np.inf)
     cap = of_ratios + np.maximum(anywhere[:, :, None], anywhere[:, None])
     unlimited = np.full_like(gaps, np.inf)
     quotient = np.divide(e[:, :, None] + e[:, None], gaps, out=unlimited, where=gaps > 0)
     diagonal = np.eye(n, dtype=bool)
-    divided_differences = np.where(diagonal, response.slope[:, None], np.minimum(quotient, cap))
+    divided_differences = np.where(diagonal, slope[:, None], np.minimum(quotient, cap))
     couplings = modal.stiffness_error[point] * divided_differences
     error += np.einsum("sj,sjk,sk->s", r, couplings, c, optimize=True)
     error += np.einsum("sj,sjk,sk->s", r * e, modal.mass_error[point], c, optimize=True)

@@ -141,58 +141,49 @@ def _absolute_moments(load: LinearPieces, offset: Array, decay: float, out: Arra
 
 
 def responses_at_nodes(
-    sigma: Array, history: History, time: Array, derivatives: int = 0, *, window: int | None = None
+    sigma: Array,
+    history: History,
+    time: Array,
+    derivatives: int = 0,
+    *,
+    node: Ints | None = None,
+    window: int | None = None,
 ) -> tuple[Array, Array]:
-    """Return ρ(σ; t) = ∫ exp(σ τ) f(t − τ) dτ at all nodes t, with derivatives by σ.
+    """Return ρ(σ; t) = ∫ exp(σ τ) f(t − τ) dτ at nodes t, with derivatives by σ.
 
     Args:
-        sigma: Exponents σ, shape (S,), in 1/s.
+        sigma: Exponents σ in 1/s, shape (S,), for all T nodes; with `node`, shape (N, S), a row
+            for each of N points.
         history: The load f.
         time: Nodes, shape (T,), in s.
         derivatives: 0 to 2.
+        node: Index of each point's node, shape (N,).
         window: Integrals begin at each `window`-th node, which itself ends the window before, and
             real parts of σ may be positive; None: all begin at t = 0.
 
     Returns:
-        ρ and its derivatives, shape (1 + derivatives, T, S), and bounds of the rounding of ρ,
-        shape (T, S).
+        ρ and its derivatives, shape (1 + derivatives, T or N, S), and bounds of the rounding of
+        ρ, shape (T or N, S).
 
     Raises:
         UnprovedError: A σ is out of the kernel's range.
     """
     length = window or len(time)
     longest = float(time[min(length, len(time) - 1)] - time[0]) if window else float(time[-1])
+    times = time if node is None else time[node]
 
     def response_to_g(shifted: Array) -> tuple[Array, Array]:
         require_in_range(shifted, history.step, max(history.step, longest))
-        out = np.empty((1 + derivatives, len(time), len(sigma)), complex)
-        error = np.empty(out.shape[1:])
-        pieces = linear_pieces(history, time)
+        out = np.empty((1 + derivatives, len(times), sigma.shape[-1]), complex)
+        error, pieces = np.empty(out.shape[1:]), linear_pieces(history, time)
         with PARALLEL_LOOP:
-            _respond_at_nodes(shifted, pieces, (0,) * derivatives, length, out, error)
+            if node is None:
+                _respond_at_nodes(shifted, pieces, (0,) * derivatives, length, out, error)
+            else:
+                _respond_at_given(shifted, pieces, (0,) * derivatives, node, out, error)
         return out, error
 
-    return _with_sine(response_to_g, sigma, history, time[:, None])
-
-
-def responses_at_given_nodes(
-    sigma: Array, history: History, time: Array, node: Ints, derivatives: int
-) -> tuple[Array, Array]:
-    """Return ρ and derivatives as `responses_at_nodes` at one node, of index (S,), per row of σ.
-
-    σ has shape (S, n), ρ with its derivatives (1 + derivatives, S, n), its rounding (S, n).
-    """
-
-    def response_to_g(shifted: Array) -> tuple[Array, Array]:
-        require_in_range(shifted, history.step, max(history.step, float(time[-1])))
-        out = np.empty((1 + derivatives, *sigma.shape), complex)
-        error = np.empty(sigma.shape)
-        pieces = linear_pieces(history, time)
-        with PARALLEL_LOOP:
-            _respond_at_given(shifted, pieces, (0,) * derivatives, node, out, error)
-        return out, error
-
-    return _with_sine(response_to_g, sigma, history, time[node][:, None])
+    return _with_sine(response_to_g, sigma, history, times[:, None])
 
 
 def require_in_range(sigma: Array, step: float, duration: float) -> None:
@@ -280,21 +271,9 @@ def _respond(
     out: Array,
     error: Array,
 ) -> None:
-    """Write ρ(σ; t) and derivatives by σ at N nodes to `out`, and bounds of the rounding of ρ.
-
-    Args:
-        sigma: σ, in 1/s.
-        load: The load f by intervals.
-        orders: As many zeros as derivatives.
-        nodes: Interval, index of the offset in it, and rounding of that time, shape (N,) each.
-        offsets: Offsets of nodes in intervals, shape (P,), in s.
-        factors: Those of `_propagators` for the offsets.
-        start: Interval in which the integral begins, and index of its offset in it; −1: at once.
-        out: Written: ρ and its derivatives, shape (1 + len(orders), N).
-        error: Written: bounds of the rounding of ρ, shape (N,).
-    """
-    interval, offset, time_rounding = nodes
-    turns, integrals, roundings = factors
+    """Write ρ and derivatives at N nodes to `out` (1 + len(orders), N), ρ's rounding to `error`."""
+    interval, offset, time_rounding = nodes  # `offset`: index among `offsets` (P,), in s
+    turns, integrals, roundings = factors  # `_propagators` of the offsets
     h, rate = load.step, abs(sigma.real) + abs(sigma.imag)
     E, J, U = _propagators(sigma, np.array([h]))
     e, J0, J1, J2, J3 = E[0], J[0, 0], J[0, 1], J[0, 2], J[0, 3]
@@ -302,7 +281,7 @@ def _respond(
     # ρ and its derivatives at `since` in the interval, apart from what f adds from its beginning on
     r0 = r1 = r2 = 0.0 + 0.0j
     rounding, node, since = 0.0, 0, 0.0
-    begin, j = start
+    begin, j = start  # where the integral begins: interval, and index of its offset or −1
     if j >= 0 and offsets[j] > 0:  # ρ is zero at `since`: r takes away what f adds up to there
         since, P = offsets[j], integrals[j]
         slope = (load.last[begin] - load.first[begin]) / h

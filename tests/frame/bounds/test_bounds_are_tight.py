@@ -128,7 +128,7 @@ def test_what_a_series_of_a_load_leaves_out_is_in_the_proved_error() -> None:
     largest = motion_parts(model, largest_growth(model.eigenvalue, np.ones(1)))[1].waves[0][:, 0]
     table.truncation = (np.abs(missed[:, 1:]) / largest[1:]).max()
     truth = UnitFlow(model.flow, model.boxes).values(unit)[..., 0]
-    off = np.abs(model.value_at(*at, 0 * at[1]).reshape(21, 61) - truth).max(0)
+    off = np.abs(model.at(*at, 0 * at[1])[0].reshape(21, 61) - truth).max(0)
     assert 0.5 < (off[1:] / proved_error(model)[1:, 0]).max() <= 1
 
 
@@ -211,7 +211,7 @@ def test_rounding_of_late_phases_is_in_the_margin() -> None:
         exact = (
             2 * np.exp(growth * t) * (share[0] * np.cos(phase * t) - share[1] * np.sin(phase * t))
         )
-        off = np.abs(model.value_at(unit, np.full(200, node), np.zeros(200, int)) - exact)
+        off = np.abs(model.at(unit, np.full(200, node), np.zeros(200, int))[0] - exact)
         assert 0 < off.max() <= margin[node]
         assert off.max() > 1e-3 * margin[node]
 

@@ -130,7 +130,7 @@ def test_tables_of_the_modes_are_exact_under_any_record() -> None:
         model = ModalModel.of_degree(flow, cuts, 4)
         truth = motion(replace(frame, modulus=1.0001 * frame.modulus), flow.time)
         everywhere = (np.ones((truth.size, 1)), *map(np.ravel, np.indices(truth.shape)))
-        for values in (model.values(np.ones((1, 1)))[0], model.value_at(*everywhere)):
+        for values in (model.values(np.ones((1, 1)))[0], model.at(*everywhere)[0]):
             wrong = np.abs(values.reshape(truth.shape) - truth).max(0)
             assert (wrong < 1e-10 * np.abs(truth).max(0)).all()
 

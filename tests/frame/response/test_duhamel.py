@@ -14,7 +14,6 @@ from alphacut.frame.response.duhamel import (
     absolute_moments,
     error_of_integrals,
     linear_pieces,
-    responses_at_given_nodes,
     responses_at_nodes,
     step_integrals,
 )
@@ -132,7 +131,7 @@ def test_responses_are_off_by_their_rounding_at_most(case):
         for s in range(3)
     ]
     assert IDLE <= np.max(shares) <= 1
-    named = responses_at_given_nodes(np.tile(sigma, (8, 1)), ground, time, nodes, 2)
+    named = responses_at_nodes(np.tile(sigma, (8, 1)), ground, time, 2, node=nodes)
     assert np.allclose(named[0], value[:, nodes], rtol=1e-13, atol=0)
     assert np.allclose(named[1], error[nodes], rtol=1e-9, atol=0)
 
@@ -193,4 +192,4 @@ def test_exponents_out_of_range_are_refused(sigma):
     with pytest.raises(UnprovedError, match="take a shorter step of the record"):
         responses_at_nodes(np.array([-1 + 2j, sigma]), ground, time, 0)
     with pytest.raises(UnprovedError, match="allowed: 1e"):
-        responses_at_given_nodes(np.array([[sigma]]), ground, time, np.array([2]), 1)
+        responses_at_nodes(np.array([[sigma]]), ground, time, 1, node=np.array([2]))
