@@ -3,11 +3,14 @@
 import ast
 import importlib
 import inspect
+import json
 import os
 import shutil
 import subprocess
 import sys
 from pathlib import Path
+
+import pytest
 
 from alphacut.frame.calculus import kernels
 
@@ -31,34 +34,66 @@ def shifted(x):
     return scaled(x) + 1.0
 """,
 }
-CALL = """
-from alphacut.frame.caller import shifted
-print(shifted(3.0), sum(shifted.stats.cache_hits.values()))
+CALLS = """
+import json, os, sys
+from pathlib import Path
+for folder, files in json.load(sys.stdin):
+    for name, text in files.items():
+        file = Path(folder, "alphacut", name)
+        file.write_text(text)
+        os.utime(file, (1e9, 1e9))  # times and sizes of changed files are as before
+    for name in [name for name in sys.modules if name.startswith("alphacut")]:
+        del sys.modules[name]
+    sys.path[0] = folder
+    from alphacut.frame.caller import shifted
+    print(shifted(3.0), sum(shifted.stats.cache_hits.values()))
 """
+NEW_HELPER = {"frame/helper.py": FILES["frame/helper.py"].replace("*", "-")}
+NEW_CONSTANT = {"frame/units.py": "FACTOR = 5.0\n"}
 
 
-def test_a_changed_helper_or_constant_changes_the_result(tmp_path: Path) -> None:
-    """Times and sizes of the changed files are as before."""
-    package = tmp_path / "alphacut"
-    (package / "frame/calculus").mkdir(parents=True)
-    shutil.copy(inspect.getfile(kernels), package / "frame/calculus/kernels.py")
+def results(cache: Path, *calls: tuple[Path, dict[str, str]]) -> list[tuple[float, float]]:
+    """Results and cache hits of the caller in checkouts, some of whose files are changed before."""
+    for folder, _ in calls:
+        (folder / "alphacut/frame/calculus").mkdir(parents=True, exist_ok=True)
+        shutil.copy(inspect.getfile(kernels), folder / "alphacut/frame/calculus/kernels.py")
+    told = subprocess.run(
+        [sys.executable, "-Bc", CALLS],
+        env=os.environ | {"ALPHACUT_CACHE": str(cache)},
+        input=json.dumps([(str(folder), FILES | changed) for folder, changed in calls]),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert not told.stderr
+    rows = (line.split() for line in told.stdout.splitlines())
+    return [(float(value), float(hits)) for value, hits in rows]
 
-    def result(**changed: str) -> list[float]:
-        for name, text in FILES.items():
-            file = package / name
-            file.write_text(changed.get(file.stem, text))
-            os.utime(file, (1e9, 1e9))
-        told = subprocess.run(
-            [sys.executable, "-Bc", CALL], cwd=tmp_path, capture_output=True, text=True, check=False
-        )
-        assert not told.stderr
-        return [float(x) for x in told.stdout.split()]
 
-    assert result() == [7.0, 0]
-    assert result() == [7.0, 1]  # from the cache
-    assert result(helper=FILES["frame/helper.py"].replace("*", "-")) == [0.0, 0]
-    assert result(units="FACTOR = 5.0\n") == [16.0, 0]
-    assert result() == [7.0, 0]
+@pytest.mark.parametrize("is_shared", [True, False])
+def test_a_changed_helper_or_constant_changes_the_result(tmp_path: Path, is_shared: bool) -> None:
+    """In the folder that checkouts share, and in a checkout's own."""
+    cache = tmp_path / "cache"
+    if not is_shared:
+        cache.touch()  # a file, where no folder can be made
+    one, two = tmp_path / "checkout1", tmp_path / "checkout2"
+    calls = (one, {}), (one, {}), (one, NEW_HELPER), (one, NEW_CONSTANT), (one, {}), (two, {})
+    expected = [(7, 0), (7, 1), (0, 0), (16, 0), (7, is_shared), (7, is_shared)]
+    assert results(cache, *calls) == expected
+
+
+def test_code_is_neither_taken_from_other_users_nor_kept_for_ever(tmp_path: Path) -> None:
+    cache = tmp_path / "kernels"
+    old = cache / "old"
+    old.mkdir(parents=True)
+    os.utime(old, (1e9, 1e9))
+    cache.chmod(0o777)
+    assert results(tmp_path, (tmp_path / "checkout1", {})) == [(7, 0)]
+    assert [*cache.iterdir()] == [old]
+    cache.chmod(0o700)
+    assert results(tmp_path, (tmp_path / "checkout2", {})) == [(7, 0)]
+    names = {folder.name.partition("-")[0] for folder in cache.iterdir()}
+    assert names == {"alphacut.frame.helper", "alphacut.frame.caller"}
 
 
 def test_what_kernels_read_from_other_files_is_in_their_digests() -> None:
