@@ -4,11 +4,13 @@ import ast
 import re
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parent.parent
+from tests.environment.house import ROOT, trees
+
 MAY_IMPORT = {
     "fuzzy": set(),
     "stochastic": {"fuzzy"},
@@ -34,68 +36,16 @@ HEAVY = {
 
 
 def package_of(module: str) -> str:
-    """Package of this project that a module belongs to; empty where it is none of them."""
-    first, _, rest = module.partition(".")
-    if first != "alphacut":
-        return ""
-    second = rest.partition(".")[0]
+    """Package of this project that a module belongs to."""
+    second = module.removeprefix("alphacut").strip(".").partition(".")[0]
     return second if second in MAY_IMPORT else "alphacut"
 
 
-def imported(tree: ast.AST) -> set[str]:
-    """Packages of this project that a syntax tree imports."""
-    found: set[str] = set()
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Import):
-            found |= {package_of(alias.name) for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            names = [f"{node.module}.{alias.name}" for alias in node.names]
-            found |= {package_of(name) for name in names}
-    return found - {""}
-
-
-def wrong_directions(package: str, file_name: str, tree: ast.AST) -> set[str]:
-    """Packages of this project that a file imports and may not."""
-    entry = {"alphacut"} if file_name == "__main__.py" else set()
-    return imported(tree) - MAY_IMPORT[package] - {package} - entry
-
-
-@pytest.mark.parametrize("package", MAY_IMPORT)
-def test_imports_point_one_way(package):
-    files = sorted((ROOT / package).rglob("*.py"))
-    assert files
-    wrong = {
-        file.name: wrong_directions(package, file.name, ast.parse(file.read_text(encoding="utf-8")))
-        for file in files
-    }
-    assert not {name: found for name, found in wrong.items() if found}
-
-
-TABLE = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
-
-
-def rooms_of(package: str) -> tuple[str, ...]:
-    """Folders of a package in the order of CONTRIBUTING's table: each may import those before."""
-    rows = re.findall(rf"^\| in `{package}/` \| (.*) \|$", TABLE, re.MULTILINE)
-    assert len(rows) == 1, f"CONTRIBUTING.md has {len(rows)} rows of the rooms in {package}"
-    return tuple(re.findall(r"`(\w+)`", rows[0]))
-
-
-def module_of(path: Path) -> str:
+def module_of(file: Path) -> str:
     """Full name of a file's module."""
-    parts = path.relative_to(ROOT).with_suffix("").parts
+    parts = file.relative_to(ROOT).with_suffix("").parts
     parts = parts if parts[0] == "alphacut" else ("alphacut", *parts)
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
-
-
-def project_files() -> dict[str, Path]:
-    """Every file of the five packages by its module; links are not followed."""
-    return {
-        module_of(path): path
-        for package in MAY_IMPORT
-        for path in (ROOT / package).rglob("*.py")
-        if package != "alphacut" or path.relative_to(ROOT).parts[1] not in MAY_IMPORT
-    }
 
 
 def uses(tree: ast.AST, known: set[str]) -> set[str]:
@@ -111,12 +61,25 @@ def uses(tree: ast.AST, known: set[str]) -> set[str]:
     return found & known
 
 
+@cache
 def graph() -> dict[str, set[str]]:
-    """The modules that each module imports."""
-    files = project_files()
+    """The modules of the five packages that each of them imports."""
+    packages = {
+        module_of(file): tree
+        for file, tree in trees().items()
+        if file.relative_to(ROOT).parts[0] in MAY_IMPORT
+    }
+    return {name: uses(tree, set(packages)) - {name} for name, tree in packages.items()}
+
+
+def wrong_directions(imports: dict[str, set[str]]) -> set[tuple[str, str]]:
+    """Imports of a package that may not be imported; each __main__ may import the program."""
     return {
-        name: uses(ast.parse(path.read_text(encoding="utf-8")), set(files)) - {name}
-        for name, path in files.items()
+        (here, there)
+        for here, used in imports.items()
+        for there in used
+        if package_of(there) not in MAY_IMPORT[package_of(here)] | {package_of(here)}
+        and not (here.endswith(".__main__") and package_of(there) == "alphacut")
     }
 
 
@@ -125,13 +88,13 @@ def circles(imports: dict[str, set[str]]) -> set[str]:
     rest = dict(imports)
     while free := {name for name, found in rest.items() if not found & rest.keys()}:
         rest = {name: found for name, found in rest.items() if name not in free}
-    while last := {name for name in rest if not any(name in found for found in rest.values())}:
+    while last := rest.keys() - set().union(*rest.values()):
         rest = {name: found for name, found in rest.items() if name not in last}
     return set(rest)
 
 
 def folder_of(module: str) -> str:
-    """Folder of a module within its package, as "frame.bounds"; a file beside the folders is itself."""
+    """Folder of a module, as "frame.bounds"; a file beside the folders is itself."""
     package = package_of(module)
     parts = module.removeprefix("alphacut.").removeprefix(f"{package}.").split(".")
     return f"{package}.{parts[0]}" if module != f"alphacut.{package}" else package
@@ -146,6 +109,13 @@ def folder_imports(imports: dict[str, set[str]]) -> dict[str, set[str]]:
     return folders
 
 
+def rooms_of(package: str) -> tuple[str, ...]:
+    """Folders of a package in the order of CONTRIBUTING's table: each may import those before."""
+    table = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    (row,) = re.findall(rf"^\| in `{package}/` \| (.*) \|$", table, re.MULTILINE)
+    return tuple(re.findall(r"`(\w+)`", row))
+
+
 def backward(imports: dict[str, set[str]], package: str) -> list[str]:
     """Imports of a folder from one that comes after it in CONTRIBUTING's table."""
     order = {f"{package}.{room}": number for number, room in enumerate(rooms_of(package))}
@@ -157,11 +127,13 @@ def backward(imports: dict[str, set[str]], package: str) -> list[str]:
     ]
 
 
-def test_no_files_import_one_another_in_a_circle():
+def test_imports_point_one_way():
+    assert {package_of(name) for name in graph()} == set(MAY_IMPORT)
+    assert wrong_directions(graph()) == set()
+
+
+def test_no_files_and_no_folders_import_one_another_in_a_circle():
     assert circles(graph()) == set()
-
-
-def test_no_folders_import_one_another_in_a_circle():
     assert circles(folder_imports(graph())) == set()
 
 
@@ -176,7 +148,7 @@ def test_rooms_import_in_the_order_of_the_table(package):
     assert backward(graph(), package) == []
 
 
-def test_a_circle_and_a_backward_import_would_be_seen():
+def test_a_circle_and_an_import_the_wrong_way_would_be_seen():
     lazy = ast.parse("def f():\n    from alphacut.case import content\n")
     assert uses(lazy, {"alphacut.case.content"}) == {"alphacut.case.content"}
     assert circles({"a": {"b"}, "b": {"c"}, "c": {"b"}, "d": {"a"}}) == {"b", "c"}
@@ -187,37 +159,26 @@ def test_a_circle_and_a_backward_import_would_be_seen():
     pair["alphacut.frame.bounds.box"] = set()
     assert circles(pair) == set()
     assert circles(folder_imports(pair)) == {"frame.bounds", "frame.boxes"}
-
-
-def test_a_wrong_direction_would_be_seen():
-    assert wrong_directions(
-        "fuzzy", "plan.py", ast.parse("def f():\n    from alphacut.rve.cell.cell import Phase\n")
-    ) == {"rve"}
-    assert wrong_directions("rve", "cell.py", ast.parse("import alphacut.entry")) == {"alphacut"}
-    assert not wrong_directions("rve", "__main__.py", ast.parse("import alphacut.entry"))
-
-
-@pytest.mark.parametrize(
-    "package", [f"alphacut.{name}" for name in (*MAY_IMPORT, "entry") if name != "alphacut"]
-)
-def test_a_package_imports_nothing_heavy(package):
-    program = f"import sys, {package}; print(*sys.modules)"
-    assert not HEAVY & modules_after(program)
+    up = ("alphacut.fuzzy.plan", "alphacut.rve.cell"), ("alphacut.rve.cell", "alphacut.entry")
+    assert wrong_directions({here: {there} for here, there in up}) == set(up)
+    assert not wrong_directions({"alphacut.rve.__main__": {"alphacut.entry"}})
 
 
 def modules_after(program: str) -> set[str]:
-    """What a program prints, word by word."""
-    run = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, check=True
-    )
+    """Modules that a new process has after a program."""
+    command = [sys.executable, "-c", f"import sys\n{program}\nprint(*sys.modules)"]
+    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
     return set(run.stdout.split())
 
 
-def test_a_case_is_read_without_matplotlib():
-    program = "import sys; from alphacut.case.content import load; load('cases/building.toml')"
-    modules = modules_after(f"{program}; print(*sys.modules)")
+def test_packages_and_the_program_import_nothing_heavy():
+    packages = (f"alphacut.{name}" for name in MAY_IMPORT if name != "alphacut")
+    assert not HEAVY & modules_after(f"import {', '.join(packages)}, alphacut.entry")
+
+
+def test_a_case_is_read_without_figures_and_questions():
+    program = "from alphacut.case.content import load; load('cases/building.toml')"
+    modules = modules_after(program)
     assert "alphacut.case.content" in modules
-    assert not {name for name in modules if name.partition(".")[0] == "matplotlib"}
-    assert not {
-        name for name in modules if name.startswith(("alphacut.figures", "alphacut.questi"))
-    }
+    wrong = ("matplotlib", "alphacut.figures", "alphacut.questions")
+    assert not {name for name in modules if name.startswith(wrong)}
