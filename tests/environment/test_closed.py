@@ -3,7 +3,6 @@
 import os
 import subprocess
 import sys
-from functools import cache
 from pathlib import Path
 
 import pytest
@@ -12,10 +11,15 @@ ROOT = Path(__file__).parents[2]
 PYTHON = f"python{sys.version_info.major}.{sys.version_info.minor}"
 SITE = f".local/lib/{PYTHON}/site-packages"
 FALSE = "raise SystemExit('a planted file was run')\n"
-IMPORTS = "import sys, numpy, pint; print(numpy.__file__, pint.__file__, *sys.path)"
-MATPLOTLIB = (
-    "import matplotlib; print(matplotlib.matplotlib_fname(), matplotlib.rcParams['savefig.dpi'])"
-)
+IMPORTS = """
+import sys
+from importlib.util import find_spec
+print(*(find_spec(name).origin for name in ("numpy", "pint")), *sys.path)
+"""
+MATPLOTLIB = """
+import matplotlib
+print(matplotlib.matplotlib_fname(), matplotlib.rcParams["savefig.dpi"])
+"""
 KERNEL = """
 import os
 from IPython.paths import get_ipython_dir
@@ -43,16 +47,19 @@ PLANTS = {
 }
 
 
+ENTER = str(ROOT / "enter")
+
+
 def environment(home: Path, variables: dict[str, str]) -> dict[str, str]:
     """Variables of a caller with the given home folder, in which some variables point."""
     own = {**os.environ, "HOME": str(home), "ALPHACUT_CACHE": str(home.parent / "cache")}
     return {**own, **{name: str(home / folder) for name, folder in variables.items()}}
 
 
-def answer(command: tuple[str, ...], variables: dict[str, str]) -> tuple[int, str]:
+def answer(command: tuple[str, ...], variables: dict[str, str]) -> str:
     """Exit status and standard output of a command."""
     run = subprocess.run(command, env=variables, capture_output=True, text=True, check=False)
-    return run.returncode, run.stdout
+    return f"{run.returncode} {run.stdout}"
 
 
 def plant(home: Path, name: str) -> dict[str, str]:
@@ -64,35 +71,26 @@ def plant(home: Path, name: str) -> dict[str, str]:
     return environment(home, variables)
 
 
-@pytest.fixture(scope="module")
-def unplanted(tmp_path_factory):
-    """Answer of a command to a caller with an empty home folder."""
-    empty = tmp_path_factory.mktemp("empty")
-    return cache(lambda *command: answer(command, environment(empty, {})))
+def test_what_is_planted_changes_nothing(tmp_path):
+    """All plants at once, which as many programs ask for, beside an empty home folder."""
+    for name in PLANTS:
+        plant(tmp_path / "home", name)
+    variables = {key: v for _, own, _ in PLANTS.values() for key, v in own.items()}
+    planted = environment(tmp_path / "home", variables)
+    (tmp_path / "empty").mkdir()
+    command = (ENTER, "python", "-c", "".join({program: "" for _, _, program in PLANTS.values()}))
+    expected = answer(command, environment(tmp_path / "empty", {}))
+    assert expected.startswith("0 ")
+    assert expected.endswith("False False False\n")  # no folder of notebooks is in the home folder
+    assert answer(command, planted) == expected
 
 
 @pytest.mark.parametrize("name", PLANTS)
-def test_what_is_planted_changes_nothing(name, unplanted, tmp_path):
-    command = (str(ROOT / "enter"), "python", "-c", PLANTS[name][2])
-    assert unplanted(*command)[0] == 0
-    assert answer(command, plant(tmp_path, name)) == unplanted(*command)
-
-
-@pytest.mark.parametrize("name", PLANTS)
-def test_the_plant_would_change_an_open_environment(name, unplanted, tmp_path):
+def test_the_plant_would_change_an_open_environment(name, tmp_path):
     command = (sys.executable, "-c", PLANTS[name][2])
     planted, own = plant(tmp_path, name), PLANTS[name][1]
     opened = {key: v for key, v in planted.items() if key in own or key not in CLOSING}
-    assert answer(command, opened) != unplanted(str(ROOT / "enter"), *command)
-
-
-def test_a_command_answers_the_same(unplanted, tmp_path):
-    case = str(ROOT / "cases" / "porous.toml")
-    command = (str(ROOT / "enter"), "python", "-m", "alphacut", "check", case)
-    for name in PLANTS:
-        plant(tmp_path, name)
-    assert unplanted(*command)[0] == 0
-    assert answer(command, environment(tmp_path, {"PYTHONPATH": "lib"})) == unplanted(*command)
+    assert answer(command, opened) != answer((ENTER, "python", *command[1:]), planted)
 
 
 def test_options_of_petsc_stay_outside(tmp_path):
@@ -102,6 +100,5 @@ def test_options_of_petsc_stay_outside(tmp_path):
         f"{start}; from petsc4py import PETSc; print(PETSc.Options().hasName('planted'))"
         for start in ("import alphacut.rve.slices.model, alphacut.rve.solver.krylov", "pass")
     )
-    enter = str(ROOT / "enter")
-    assert answer((enter, "python", "-c", program), planted) == (0, "False\n")
-    assert answer((enter, "python", "-c", bare), planted) == (0, "True\n")  # read without it
+    assert answer((ENTER, "python", "-c", program), planted) == "0 False\n"
+    assert answer((ENTER, "python", "-c", bare), planted) == "0 True\n"  # read without it
