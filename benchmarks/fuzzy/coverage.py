@@ -70,24 +70,18 @@ def held(
     *,
     named: str | None = None,
     make: Callable[..., FuzzyNumber] = from_data,
-    censored: float | None = None,
 ) -> tuple[Array, Array]:
     """Share of samples of n values whose cut holds the truth, less 1 − α.
 
-    Of values above `censored` no more than that is known, and no bounds. A cut that the values do
-    not decide holds everything, and counts; without those the share would be that of some samples.
+    A cut that the values do not decide holds everything, and counts; without those the share would
+    be that of some samples.
 
     Returns:
         Two arrays over `ALPHA`: over its standard error, and as it is.
     """
     law, bounds = LAWS[name]
     values = law.rvs(size=(count, n), random_state=rng).astype(float)
-    if censored is None:
-        numbers = [make(row, claim, bounds=bounds, law=named) for row in values]
-    else:
-        pairs = np.stack([np.minimum(values, censored), values], -1)
-        pairs[values > censored, 1] = np.inf
-        numbers = [make(row, claim, law=named) for row in pairs]
+    numbers = [make(row, claim, bounds=bounds, law=named) for row in values]
     cuts = np.array([[decided_cut(number, alpha) for alpha in ALPHA] for number in numbers])
     truth = truth_of(law, claim, rng, count)[:, None]
     excess = ((cuts[..., 0] <= truth) & (truth <= cuts[..., 1])).mean(0) - (1 - ALPHA)

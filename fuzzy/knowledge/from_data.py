@@ -27,7 +27,6 @@ LEVELS = np.unique(
 them the wider cut holds.
 """
 CLAIMS = "'next value', 'mean', 'median' or 'quantile Q' with Q in (0, 1)"
-UNDECIDED = "samples whose censored values decide no cut count as containing it"
 
 
 def from_data(
@@ -35,8 +34,7 @@ def from_data(
 ) -> ClaimedNumber:
     """Return the fuzzy number of measured values: P(claimed quantity in its α-cut) >= 1 − α.
 
-    The probability is over repeated samples. Where censored values decide no cut at α and no bound
-    stands for it, the sample counts as one whose cut contains the quantity; the claim says so.
+    The probability is over repeated samples.
 
     For the next value, the median and a quantile this holds for any law and any number of values,
     drawn independently, or at least exchangeably, from one law. Without bounds n values decide the
@@ -44,8 +42,7 @@ def from_data(
     from qⁿ + (1 − q)ⁿ.
 
     Args:
-        values: Numbers, or pairs (lower, upper) between which each value is known to lie; an
-            infinite end means censored on that side.
+        values: The measured numbers, one or more.
         claim: "next value", "mean", "median" or "quantile 0.95". A mean needs a law or both bounds.
         bounds: Physically possible values (lower, upper), None where there is no bound. They are
             the ends of cuts that the values do not decide: without them the number has no cut at
@@ -86,12 +83,12 @@ def _quantile(claim: str) -> float | None:
 def _conditions(data: Observations, law: Law | None, bounds: Limits | None) -> tuple[str, ...]:
     """Conditions of the claim, in words."""
     low, high = data.bounds
-    conditions = [f"{data.count} values drawn alike and independently"]
+    conditions = [f"{len(data.values)} values drawn alike and independently"]
     if law:
         conditions[0] += f" from a {law} law"
     if bounds is not None:
         conditions.append(f"bounds [{low:g}, {high:g}]")
-    return (*conditions, *((UNDECIDED,) if data.is_censored else ()))
+    return tuple(conditions)
 
 
 def mean_cuts(data: Observations) -> Stepwise:
@@ -110,13 +107,12 @@ def mean_cuts(data: Observations) -> Stepwise:
     are_finite, allowed = np.isfinite(data.bounds).all(), "finite ends for a mean of any law"
     cure = "give both, or law='normal'"
     require(are_finite, "bounds", value=data.bounds, allowed=allowed, cure=cure)
-    band, fraction = _band_half_width(data.count), np.arange(data.count + 1) / data.count
-    lower_sums, upper_sums = (
-        np.append(0.0, np.cumsum(row)) / data.count for row in (data.lower, data.upper)
-    )
+    n = len(data.values)
+    band, fraction = _band_half_width(n), np.arange(n + 1) / n
+    sums = np.append(0.0, np.cumsum(data.values)) / n
     # the largest fraction `band` of the values moved to the lower bound, or the least to the upper
-    lower = low * band + np.interp(1 - band, fraction, lower_sums)
-    upper = high * band + upper_sums[-1] - np.interp(band, fraction, upper_sums)
+    lower = low * band + np.interp(1 - band, fraction, sums)
+    upper = high * band + sums[-1] - np.interp(band, fraction, sums)
     # within the bounds and nested, despite round-off
     lower = np.maximum.accumulate(np.maximum(lower, low))
     upper = np.minimum.accumulate(np.minimum(upper, high))
@@ -147,44 +143,23 @@ def law_cuts(
         mean: Whether the mean is to be bounded, which `from_data` allows with a normal law alone.
 
     Raises:
-        RefusedError: The values do not fit the law: fewer than two, all equal, not positive, or
-            censored without an end.
+        RefusedError: The values do not fit the law: fewer than two, all equal, or not positive.
     """
     is_logarithmic = law == "log-normal"
     cure = "give bounds=(lower, upper) in place of a law, or measure more"
-    least, allowed = data.lower[0], "positive ones with a log-normal law"
+    least, greatest = data.values[[0, -1]]
+    allowed = "positive ones with a log-normal law"
     has_logarithm = least > 0 or not is_logarithmic
     require(has_logarithm, "least value", value=least, allowed=allowed, cure=cure)
-    are_finite = np.isfinite([data.lower, data.upper]).all()
-    are_distinct = not data.exact or data.lower[0] < data.lower[-1]
-    is_enough = data.count > 1 and are_finite and are_distinct
-    values = f"{data.count} from {data.lower[0]:g} to {data.upper[-1]:g}"
-    allowed = "two or more, finite, unlike"
-    require(is_enough, f"values of a {law} law", value=values, allowed=allowed, cure=cure)
-    normal_data = data.mapped(np.log) if is_logarithmic else data
-    lower, upper = _normal_cuts(normal_data, 0.5 if mean else quantile)
+    shown, key = f"{len(data.values)} from {least:g} to {greatest:g}", f"values of a {law} law"
+    require(least < greatest, key, value=shown, allowed="two or more, unlike", cure=cure)
+    values = np.log(data.values) if is_logarithmic else data.values
+    factors = _factors(len(values), 0.5 if mean else quantile)
+    lower, upper = (values.mean() + factor * values.std(ddof=1) for factor in factors)
     if is_logarithmic:
         with np.errstate(over="ignore"):
             lower, upper = np.exp(lower), np.exp(upper)
     return _clip_cuts(lower, upper, data.bounds)
-
-
-def _normal_cuts(data: Observations, quantile: float | None) -> tuple[Array, Array]:
-    """Ends at the `LEVELS`: mean + factor · deviation, widest over values in their intervals."""
-    lower_factor, upper_factor = _factors(data.count, quantile)
-    least, greatest = _deviation_range(data)
-    lower = data.lower.mean() + lower_factor * np.where(lower_factor < 0, greatest, least)
-    upper = data.upper.mean() + upper_factor * np.where(upper_factor > 0, greatest, least)
-    return lower, upper
-
-
-def _deviation_range(data: Observations) -> tuple[float, float]:
-    """Lower and upper bound of the standard deviation of values anywhere within their intervals."""
-    middle, half_width = (data.lower + data.upper) / 2, (data.upper - data.lower) / 2
-    deviation = float(middle.std(ddof=1))
-    # triangle inequality: it differs from that of the middles by |half widths| / √(n − 1) at most
-    change = float(np.sqrt((half_width**2).sum() / (data.count - 1)))
-    return max(deviation - change, 0.0), deviation + change
 
 
 @lru_cache(maxsize=64)

@@ -1,4 +1,4 @@
-"""Measured values as intervals, and exact cuts of any law from their ranks.
+"""Measured values, and exact cuts of any law from their ranks.
 
 Between n values in rising order, with the physical bounds at both ends, there are n + 1 gaps. The
 probability that the quantity lies in gap k does not depend on the law: 1/(n + 1) for the next value
@@ -13,7 +13,6 @@ Statistics, section 7.1; Vovk, Gammerman and Shafer, Algorithmic Learning in a R
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -22,94 +21,38 @@ import numpy as np
 from numpy.typing import NDArray
 
 from alphacut.fuzzy.arrays import Array, Ints
-from alphacut.fuzzy.refused import RefusedError, checked_number, require
+from alphacut.fuzzy.refused import checked_number, require
 from alphacut.fuzzy.sets.numbers import Stepwise
 
-Values = Sequence[float] | Sequence[tuple[float, float]] | NDArray[np.float64]
+Values = Sequence[float] | NDArray[np.float64]
 Limits = tuple[float | None, float | None]
 
 
 @dataclass(frozen=True, eq=False)
 class Observations:
-    """Values that are known to lie between two ends each, both rows in rising order.
+    """Measured values, rising, shape (n,), and the physically possible ones, infinite for none."""
 
-    Args:
-        lower: Lower ends, shape (n,), rising; −∞ where a value is only known from above.
-        upper: Upper ends, shape (n,), rising; ∞ where a value is only known from below.
-        bounds: Physically possible values; infinite where there is none.
-    """
-
-    lower: Array
-    upper: Array
+    values: Array
     bounds: tuple[float, float]
 
     @classmethod
     def from_values(cls, values: Values, bounds: Limits | None = None) -> Observations:
-        """Return the observations of values as measured, numbers or pairs, within physical bounds.
+        """Return the observations of values as measured, within physical bounds.
 
         Raises:
-            RefusedError: There is no value, a value is not a number, a pair is not in order, or a
-                value lies outside the bounds.
+            RefusedError: There is no value, one is not a number, or one lies outside the bounds.
         """
-        low, high = _limits(bounds)
-        ends = np.array([_ends(number, value) for number, value in enumerate(values, 1)])
-        require(len(ends) > 0, "values", value=list(values), allowed="one or more")
-        lower, upper = ends.T
-        is_possible = (upper >= low) & (lower <= high)
-        row = int(np.argmin(is_possible))
-        allowed = f"values within the bounds [{low:g}, {high:g}]"
-        require(is_possible.all(), f"value {row + 1}", value=ends[row].tolist(), allowed=allowed)
-        return cls(np.sort(np.maximum(lower, low)), np.sort(np.minimum(upper, high)), (low, high))
-
-    @property
-    def count(self) -> int:
-        """Number of values n."""
-        return len(self.lower)
-
-    @property
-    def exact(self) -> bool:
-        """True if every value is known exactly."""
-        return bool((self.lower == self.upper).all())
-
-    @property
-    def is_censored(self) -> bool:
-        """True if a value has an infinite end, which no bound replaces."""
-        return bool(np.isinf([self.lower, self.upper]).any())
-
-    def mapped(self, function: np.ufunc) -> Observations:
-        """Observations of a rising function of the values, such as the logarithm."""
-        with np.errstate(divide="ignore"):
-            low, high = (float(function(end)) for end in self.bounds)
-            return Observations(function(self.lower), function(self.upper), (low, high))
-
-
-def _limits(bounds: Limits | None) -> tuple[float, float]:
-    """Return the physical bounds as two floats, infinite where there is none."""
-    lower, upper = (None, None) if bounds is None else bounds
-    low = -np.inf if lower is None else checked_number("lower bound", lower)
-    high = np.inf if upper is None else checked_number("upper bound", upper)
-    allowed = "(lower, upper) with lower < upper, None for none"
-    require(low < high, "bounds", value=bounds, allowed=allowed)
-    return low, high
-
-
-def _is_number(value: object) -> bool:
-    """True for a number that a float can hold; truth values are none."""
-    if isinstance(value, bool) or not isinstance(value, int | float | np.number):
-        return False
-    return not isinstance(value, int) or abs(value) < sys.float_info.max
-
-
-def _ends(position: int, value: object) -> tuple[float, float]:
-    """Lower and upper end of the measured value at a position from 1: a number or a pair."""
-    ends = np.atleast_1d(np.asarray(value, object))
-    has_ends = ends.ndim == 1 and len(ends) in (1, 2) and not np.ma.is_masked(value)  # type: ignore[no-untyped-call]
-    if has_ends and all(_is_number(end) for end in ends):
-        low, high = float(ends[0]), float(ends[-1])
-        if low <= high and np.isfinite((low, high)).any():  # at most one end is infinite
-            return low, high
-    allowed = "finite numbers, or pairs (lower, upper) in order, one end of which may be infinite"
-    raise RefusedError(f"value {position}", value, allowed)
+        low, high = (None, None) if bounds is None else bounds
+        low = -np.inf if low is None else checked_number("lower bound", low)
+        high = np.inf if high is None else checked_number("upper bound", high)
+        allowed = "(lower, upper) with lower < upper, None for none"
+        require(low < high, "bounds", value=bounds, allowed=allowed)
+        require(len(values) > 0, "values", value=list(values), allowed="one or more")
+        within = f"values within the bounds [{low:g}, {high:g}]"
+        for number, value in enumerate(values, 1):
+            checked_number(f"value {number}", value)
+            require(low <= value <= high, f"value {number}", value=value, allowed=within)
+        return cls(np.sort(np.asarray(values, float)), (low, high))
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,35 +120,23 @@ def _removes_lowest(
 def rank_cuts(data: Observations, quantile: float | None) -> tuple[Stepwise, float]:
     """Return the α-cuts from ranks, and the least level at which the values decide both ends.
 
-    Below that level the cuts repeat the first that is finite. Physical bounds count as ends.
+    Below that level the cuts repeat the first that is finite; a finite physical bound is an end.
 
     Args:
         data: The values.
         quantile: Probability of the quantile; None for the next value.
-
-    Raises:
-        RefusedError: The values decide no cut at all.
     """
     low, high = data.bounds
-    nested = windows(data.count, quantile, (bool(np.isinf(low)), bool(np.isinf(high))))
+    nested = windows(len(data.values), quantile, (bool(np.isinf(low)), bool(np.isinf(high))))
     levels = np.append(nested.level, 1.0)
-    lower = np.append(low, data.lower)[nested.low]
-    upper = np.append(data.upper, high)[nested.high]
-    centre = _centre(data, 0.5 if quantile is None else quantile)
+    lower = np.append(low, data.values)[nested.low]
+    upper = np.append(data.values, high)[nested.high]
+    centre = float(np.quantile(data.values, 0.5 if quantile is None else quantile))  # cut at α = 1
     finite = np.flatnonzero(np.isfinite(lower) & np.isfinite(upper))
     if not len(finite):
-        has_centre, allowed = np.isfinite(centre), "finite ends: the values decide no cut"
-        require(has_centre, "bounds", value=data.bounds, allowed=allowed)
         return Stepwise((0.0,), (centre,), (centre,)), 1.0
     first = finite[0]
     lower[:first], upper[:first] = lower[first], upper[first]
     centre = float(np.clip(centre, lower[-1], upper[-1]))
     cuts = Stepwise(tuple(levels), (*lower, centre), (*upper, centre))
     return cuts, float(levels[first])
-
-
-def _centre(data: Observations, quantile: float) -> float:
-    """Return the sample quantile, the cut at α = 1: mean of those of lower and of upper ends."""
-    rows = (row[np.isfinite(row)] for row in (data.lower, data.upper))
-    ends = [np.quantile(row, quantile) for row in rows if len(row)]
-    return float(np.mean(ends)) if ends else np.nan
