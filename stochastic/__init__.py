@@ -2,7 +2,7 @@
 
 from alphacut.stochastic.radius_map import HermiteMap, RadiusMap, require_map
 from alphacut.stochastic.theta.law import ThetaLaw, TruncatedNormal
-from alphacut.stochastic.theta.quadrature import ThetaRule, gauss_rule, layered_rule
+from alphacut.stochastic.theta.quadrature import ThetaRule, gauss_rule
 
 __all__ = [
     "HermiteMap",
@@ -11,6 +11,5 @@ __all__ = [
     "ThetaRule",
     "TruncatedNormal",
     "gauss_rule",
-    "layered_rule",
     "require_map",
 ]

@@ -69,11 +69,6 @@ class Segmentation:
         return float(np.ptp(self.light))
 
     @property
-    def level_midpoints(self) -> tuple[float, ...]:
-        """Grey values half-way between the levels of neighbouring classes."""
-        return tuple(float(value) for value in (self.levels[1:] + self.levels[:-1]) / 2)
-
-    @property
     def fractions(self) -> Array:
         """Area fraction of each class, shape (classes,)."""
         labels = np.searchsorted(self.thresholds, self.grey, side="right")

@@ -103,7 +103,7 @@ def draw_prism(rng: np.random.Generator, cell: Cell) -> PrismModel:
 def draw_slices(rng: np.random.Generator, cell: Cell) -> SlicesModel:
     """Slices at a random resolution."""
     size, points = float(rng.uniform(0.2, 1.0)), int(rng.integers(3, 10))
-    return SlicesModel(int(rng.integers(2, 5)), size, points, cell.outline)
+    return SlicesModel(size, points, cell.outline)
 
 
 def judged(own: HomogenisedStiffness, truth: HomogenisedStiffness) -> Iterator[Judgement]:

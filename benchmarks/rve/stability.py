@@ -87,8 +87,7 @@ def models(*, small: bool) -> dict[str, Solve]:
     size = 0.5 if small else 0.25
     return {
         "series": solved_by(SeriesModel()),
-        "slices, order 2": solved_by(SlicesModel(2, size, 8)),
-        "slices, order 4": solved_by(SlicesModel(4, size, 8)),
+        "slices": solved_by(SlicesModel(size, 8)),
         "prism": solved_by(PrismModel(size, 6 if small else 12)),
     }
 

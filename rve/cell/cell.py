@@ -6,7 +6,6 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from numbers import Real
-from typing import Self
 
 import numpy as np
 
@@ -60,13 +59,6 @@ class Phase:
         e, nu = self.modulus, self.poisson
         unit = np.array([[1 - nu, nu, 0], [nu, 1 - nu, 0], [0, 0, (1 - 2 * nu) / 2]])
         return e / ((1 + nu) * (1 - 2 * nu)) * unit
-
-    @classmethod
-    def of_bulk_and_shear(cls, bulk: float, shear: float) -> Self:
-        """The material with K of three dimensions and G, in Pa."""
-        return cls(
-            9 * bulk * shear / (3 * bulk + shear), (3 * bulk - 2 * shear) / (6 * bulk + 2 * shear)
-        )
 
     @property
     def bulk_and_shear(self) -> Array:

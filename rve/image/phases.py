@@ -53,12 +53,6 @@ class PlaneModuli:
         shear = modulus / (2 * (1 + poisson))
         return cls(modulus / (3 * (1 - 2 * poisson)) + shear / 3, shear)
 
-    @property
-    def stiffness(self) -> Array:
-        """Plane-strain stiffness in Voigt order (11, 22, 12 with 2 ε12), shape (3, 3), in Pa."""
-        k, g = self.bulk, self.shear
-        return np.array([[k + g, k - g, 0], [k - g, k + g, 0], [0, 0, g]])
-
 
 @dataclass(frozen=True)
 class ModuliInterval:

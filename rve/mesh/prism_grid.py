@@ -217,11 +217,3 @@ class PrismGrid:
         if not self.conforming:
             return np.broadcast_to(self.plane.points, (len(theta), *self.plane.points.shape))
         return nodes_at_radii(self.plane, radius(theta), thickness)
-
-    def particle_indicator(self, points: Array, radius: RadiusMap) -> Array:
-        """1 at points (x1, x2, θ), (…, 3), in the particle (z < 0 in eq. 14), else 0; shape (…)."""
-        if isinstance(radius, LevelSet):
-            return radius.is_inside(points).astype(float)
-        x, y, theta = np.moveaxis(points, -1, 0)
-        outline = radius(theta) * self.plane.outline(np.arctan2(y, x))
-        return np.asarray(np.hypot(x, y) < outline, float)

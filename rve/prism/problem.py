@@ -13,7 +13,7 @@ from alphacut.rve.cell.cell import AREA
 from alphacut.rve.cell.outline import is_round
 from alphacut.rve.fenicsx import MPI, PETSc, basix, fem, mesh_of, petsc, ufl
 from alphacut.rve.mesh.curved import MIN_JACOBIAN_RATIO
-from alphacut.rve.mesh.prism_grid import PrismGrid
+from alphacut.rve.mesh.prism_grid import LevelSet, PrismGrid
 from alphacut.rve.mesh.wedge import (
     POINTS_PER_SLICE,
     SLICES_PER_LAYER,
@@ -157,7 +157,7 @@ class PrismProblem:
         self._require_valid_elements()
         prism_density = self.at_prisms(density)
         self.elastic.density.x.array[:] = np.repeat(prism_density, POINTS_PER_SLICE)
-        if not self.grid.conforming:
+        if isinstance(radius, LevelSet):
             self.elastic.in_particle.x.array[:] = self._inside(positions, radius).ravel()
 
     def _require_valid_elements(self) -> None:
@@ -171,10 +171,11 @@ class PrismProblem:
             cure = "take more layers or a smaller mesh size"
             raise FoldedMeshError(f"the mesh folds over {where}", cure)
 
-    def _inside(self, positions: Array, radius: RadiusMap) -> Array:
+    def _inside(self, positions: Array, radius: LevelSet) -> Array:
+        """1 at the quadrature points in the particles (z < 0 in eq. 14), else 0."""
         shapes: Array = wedge(1).tabulate(0, prism_rule()[0])[0].reshape(-1, 15)
         points = np.einsum("qn,cnd->cqd", shapes, positions[self.grid.cells[self.wedge]])
-        return np.asarray(self.grid.particle_indicator(points, radius))
+        return radius.is_inside(points).astype(float)
 
     def strains(self, displacement: Array) -> Array:
         """(ε11, ε22, 2 ε12) at points, (cells, 3, points, 3), of displacements (nodes, 2)."""

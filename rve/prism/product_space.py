@@ -40,7 +40,6 @@ class ProductSpace:
         density: f_Θ at the quadrature points.
 
     Raises:
-        RefusedError: The mesh ignores the interface, so that no measure has phases.
         FoldedMeshError: The map bends more than the layers can follow.
 
     Example:
@@ -51,8 +50,6 @@ class ProductSpace:
     """
 
     def __init__(self, model: PrismModel | MeshModel, law: RadiusMap | ThetaLaw) -> None:
-        if isinstance(model, PrismModel) and model.interface != "conforming":
-            raise RefusedError("the interface", repr(model.interface), "'conforming'")
         self._petsc = model.petsc
         self._problem = _separate_problem(model, law)
         self.space: fem.FunctionSpace = self._problem.space

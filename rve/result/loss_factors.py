@@ -10,28 +10,24 @@ Am. 34, 954, 1962).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.cell.cell import AnyPhase, Phase
-from alphacut.rve.result.result import HomogenisedStiffness, PhaseEnergies, young_shear_bulk
+from alphacut.rve.result.result import (
+    DeclaredConstants,
+    HomogenisedStiffness,
+    PhaseEnergies,
+    young_shear_bulk,
+)
 
 CONSTANTS = ("E", "G", "K")
 """Effective moduli that loss factors are of; K is the plane-strain bulk modulus."""
 MAX_FIRST_ORDER = 0.1
 """Loss factor of a phase above which series take complex moduli."""
 ROUND_OFF = 1e-12
-
-
-@dataclass(frozen=True)
-class LossFactors:
-    """Effective loss factors by the names of `CONSTANTS`, and their declared absolute errors."""
-
-    values: dict[str, float]
-    errors: dict[str, float]
 
 
 def bulk_and_shear_losses(phase: AnyPhase | None, has_bulk: bool) -> Array:
@@ -50,7 +46,7 @@ def bulk_and_shear_losses(phase: AnyPhase | None, has_bulk: bool) -> Array:
     return np.array([[0.0, 1.0], [1.5 / (1 + nu), (nu - 0.5) / (1 + nu)]])
 
 
-def loss_factors(result: HomogenisedStiffness, losses: Array) -> LossFactors:
+def loss_factors(result: HomogenisedStiffness, losses: Array) -> DeclaredConstants:
     """Effective loss factors of E, G and K, to first order or by complex moduli, with errors.
 
     Complex moduli where a phase has more than `MAX_FIRST_ORDER` and the model takes them (series).
@@ -68,10 +64,7 @@ def loss_factors(result: HomogenisedStiffness, losses: Array) -> LossFactors:
     else:
         errors = errors + np.ptp(losses) ** 2 * values  # second order; 0 where losses are equal
     errors = errors + ROUND_OFF * abs(values)
-    return LossFactors(
-        dict(zip(CONSTANTS, map(float, values), strict=True)),
-        dict(zip(CONSTANTS, map(float, errors), strict=True)),
-    )
+    return DeclaredConstants.from_arrays(CONSTANTS, values, errors)
 
 
 def _by_complex_moduli(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 
@@ -63,6 +63,20 @@ class StressCurve:
     def mean(self) -> tuple[float, float]:
         """Means of s11 and s12 under f_Θ, in Pa."""
         return float(self.weights @ self.s11), float(self.weights @ self.s12)
+
+
+@dataclass(frozen=True)
+class DeclaredConstants:
+    """Constants by name, moduli in Pa, and their declared absolute errors, nan if unknown."""
+
+    values: dict[str, float]
+    errors: dict[str, float]
+
+    @classmethod
+    def from_arrays(cls, names: Sequence[str], values: Array, errors: Array) -> DeclaredConstants:
+        """The constants from arrays in the order of their names."""
+        pairs = (zip(names, array.tolist(), strict=True) for array in (values, errors))
+        return cls(*map(dict, pairs))
 
 
 STEP = 1e-30  # of complex-step derivatives, which have no cancellation
@@ -170,10 +184,10 @@ class HomogenisedStiffness:
 
     def __repr__(self) -> str:
         """One line with E, ν, the declared error of E, the model and its wall time."""
-        cost = self.seconds.get("total", 0.0)
+        cost, error = self.seconds.get("total", 0.0), f"{self.estimated_error:.2g}"
         return (
             f"HomogenisedStiffness(E = {self.modulus:.7g} Pa, ν = {self.poisson:.5g}"
-            f" ({self.convention}), relative error of E {self.estimated_error:.2g},"
+            f" ({self.convention}), relative error of E {error if self.errors else 'not declared'},"
             f" by {self.method}, {cost:.2g} s)"
         )
 

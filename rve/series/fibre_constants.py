@@ -10,36 +10,23 @@ square array by Rayleigh's harmonic multipoles (1892).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.cell.cell import Cell, Phase
 from alphacut.rve.result.engineering_constants import Mixture
-from alphacut.stochastic import ThetaRule, gauss_rule
-
-if TYPE_CHECKING:
-    from alphacut.rve.result.result import HomogenisedStiffness
+from alphacut.rve.result.result import DeclaredConstants, HomogenisedStiffness
 from alphacut.rve.series.lattice_sums import ZETA_PERIOD, lattice_images, lattice_sums
 from alphacut.rve.series.means import SAFETY, finer_count
+from alphacut.stochastic import ThetaRule, gauss_rule
 
 CONSTANTS = ("E_T", "E_L", "nu_LT", "G_T", "G_L", "K_T")
 NODES = 32  # in θ
 _ROUND_OFF = 1e-12
 
 
-@dataclass(frozen=True)
-class FibreConstants:
-    """Values and declared absolute errors (nan if unknown) by the names of `CONSTANTS`, in Pa."""
-
-    values: dict[str, float]
-    errors: dict[str, float]
-
-
-def fibre_constants(result: HomogenisedStiffness) -> FibreConstants:
+def fibre_constants(result: HomogenisedStiffness) -> DeclaredConstants:
     """E_T, E_L, ν_LT, G_T, G_L and K_T of a result of round fibres, with declared errors.
 
     Errors are the largest changes over the corners of the intervals of z̄, G_T and G_L.
@@ -62,10 +49,7 @@ def fibre_constants(result: HomogenisedStiffness) -> FibreConstants:
         for longitudinal in (G_L / (1 + G_L_error), G_L * (1 + G_L_error))
     ]
     errors = np.abs(np.array(corners) - values).max(axis=0) + _ROUND_OFF * np.abs(values)
-    return FibreConstants(
-        dict(zip(CONSTANTS, map(float, values), strict=True)),
-        dict(zip(CONSTANTS, map(float, errors), strict=True)),
-    )
+    return DeclaredConstants.from_arrays(CONSTANTS, values, errors)
 
 
 def _constants(mixture: Mixture, z: float, K_T: float, G_T: float, G_L: float) -> Array:

@@ -200,24 +200,6 @@ class Mean:
     terms: Ints
 
 
-@dataclass(frozen=True, eq=False)
-class _Averages:
-    """All inclusions' cells at the nodes of one rule."""
-
-    rule: ThetaRule
-    cells: CellModuli
-
-    @property
-    def moduli(self) -> Array:
-        """Means, shape (m, 3), in Pa."""
-        return self.rule.mean(self.cells.moduli)
-
-    @property
-    def errors(self) -> Array:
-        """Their relative errors by the series, shape (m, 3)."""
-        return self.rule.mean(self.cells.moduli * self.cells.errors) / self.moduli
-
-
 def converged_means(
     radius_map: RadiusMap,
     cells: Callable[[Array], CellModuli],
@@ -242,23 +224,25 @@ def converged_means(
     count = points or max(6, int(np.ceil(1 - 0.75 * np.log10(accuracy))))
     law = radius_map.distribution
     make_rule: Callable[..., ThetaRule] = _cached_rule if isinstance(law, Hashable) else gauss_rule
-    averages: dict[int, _Averages] = {}
+    solved: dict[int, tuple[ThetaRule, CellModuli]] = {}
     means: dict[int, Mean] = {}
     while True:
         counts = [count, finer_count(count), finer_count(finer_count(count))]
         for n in counts:
-            if n not in averages:
+            if n not in solved:
                 rule = make_rule(law, points=n)
-                averages[n] = _Averages(rule, cells(radius_map(rule.nodes)))
-        coarse, finer, finest = (averages[n] for n in counts)
-        errors = SAFETY * _largest_distance(coarse.moduli, finer.moduli, finest.moduli) + _NOISE
+                solved[n] = rule, cells(radius_map(rule.nodes))
+        three = [solved[n] for n in counts]
+        moduli = [rule.mean(x.moduli) for rule, x in three]  # (inclusions, 3) each
+        truncation = [rule.mean(x.moduli * x.errors) / rule.mean(x.moduli) for rule, x in three]
+        errors = SAFETY * _largest_distance(*moduli) + _NOISE
+        rule, coarse = three[0]
         for k in range(len(errors)):
             if k not in means and (points or errors[k].max() <= accuracy):
                 # each inclusion by itself, whatever the others need
-                in_space = np.maximum(coarse.errors[k], finest.errors[k])
-                curve = StressCurve.from_stiffness(coarse.rule, coarse.cells.matrix[:, k])
-                by_source = {"space": in_space, "theta": errors[k]}
-                means[k] = Mean(curve, by_source, coarse.cells.terms[:, k])
+                in_space = np.maximum(truncation[0][k], truncation[-1][k])
+                curve = StressCurve.from_stiffness(rule, coarse.matrix[:, k])
+                means[k] = Mean(curve, {"space": in_space, "theta": errors[k]}, coarse.terms[:, k])
         if len(means) == len(errors):
             return [means[k] for k in range(len(errors))]
         if counts[-1] >= _MAX_POINTS:

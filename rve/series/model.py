@@ -23,7 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache, cached_property, partial
+from functools import cache, partial
 from time import perf_counter
 from typing import Any, ClassVar
 
@@ -46,42 +46,35 @@ LOADS = ("hydrostatic", "deviator", "shear")
 
 @dataclass(frozen=True)
 class Contrast:
-    """Factors of the interface conditions of a matrix and m inclusions; complex with losses."""
+    """Factors of the interface conditions of a matrix and m inclusions; complex with losses.
+
+    Args:
+        kappa: κ = 3 − 4ν of the matrix, in plane strain.
+        mu: Its shear modulus μ, in Pa.
+        outer: Factor of a_n, shape (m,).
+        inner: Factor of b_n, n ≥ 2.
+        swelling: Factor of b_1.
+    """
 
     kappa: complex
     mu: complex
-    kappa_i: Array
-    mu_i: Array
+    outer: Array
+    inner: Array
+    swelling: Array
 
     @classmethod
     def of_materials(cls, materials: Sequence[Material]) -> Contrast:
-        """From the matrix and m inclusions in plane strain: κ = 3 − 4ν, μ = G."""
-        kappa = np.array([3 - 4 * material.poisson for material in materials])
-        mu = np.array([material.bulk_and_shear[1] for material in materials])
-        return cls(kappa[0], mu[0], kappa[1:], mu[1:])
-
-    @cached_property
-    def ratio(self) -> Array:
-        """λ = μ_m / μ_i."""
-        return np.asarray(self.mu / self.mu_i)
-
-    @cached_property
-    def outer(self) -> Array:
-        """The factor of a_n."""
-        return np.asarray((1 - self.ratio) / (self.kappa + self.ratio))
-
-    @cached_property
-    def inner(self) -> Array:
-        """The factor of b_n, n ≥ 2."""
-        return np.asarray(
-            (self.kappa - self.ratio * self.kappa_i) / (1 + self.ratio * self.kappa_i)
+        """From the materials of the matrix and of m inclusions."""
+        kappa, *inclusion_kappas = (3 - 4 * material.poisson for material in materials)
+        mu, *inclusion_mus = (material.bulk_and_shear[1] for material in materials)
+        kappa_i, ratio = np.array(inclusion_kappas), mu / np.array(inclusion_mus)
+        return cls(
+            kappa,
+            mu,
+            outer=(1 - ratio) / (kappa + ratio),
+            inner=(kappa - ratio * kappa_i) / (1 + ratio * kappa_i),
+            swelling=2 * ((kappa - 1) - ratio * (kappa_i - 1)) / (2 + ratio * (kappa_i - 1)),
         )
-
-    @cached_property
-    def swelling(self) -> Array:
-        """The factor of b_1."""
-        lam, k = self.ratio, self.kappa_i - 1
-        return np.asarray(2 * ((self.kappa - 1) - lam * k) / (2 + lam * k))
 
 
 @dataclass(frozen=True)
@@ -160,7 +153,7 @@ def _system(
         by_shift[..., :-1] = b_to_q[..., 1:] * (orders.b[1:] - 2)
     outer, inner = (mirror * f[:, None, None] for f in (contrast.outer, contrast.inner))
     coupling = (to_next + a_to_q + by_shift)[:, None] + inner * (b_to_q @ to_p)[:, None]
-    shape = len(radius), contrast.kappa_i.size, orders.a.size
+    shape = len(radius), contrast.outer.size, orders.a.size
     source = np.zeros(shape, np.result_type(outer))
     if is_deviatoric:
         source[..., 0] = mirror * contrast.outer * radius[:, None]

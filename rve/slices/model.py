@@ -6,8 +6,8 @@ with radius r(θ). The error of a slice is told by orders and meshes.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from time import perf_counter
 from typing import ClassVar
 
@@ -15,7 +15,6 @@ import numpy as np
 from numpy.polynomial.chebyshev import chebvander
 
 from alphacut.fuzzy.arrays import Array, Ints
-from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.cell.cell import (
     AREA,
     STRAIN,
@@ -23,6 +22,7 @@ from alphacut.rve.cell.cell import (
     AnyPhase,
     Cell,
     Interphase,
+    Phase,
     require_compressible,
     require_continuous,
     require_interphase,
@@ -31,7 +31,7 @@ from alphacut.rve.cell.cell import (
     require_points,
     thickness_of,
 )
-from alphacut.rve.cell.outline import Outline, circle
+from alphacut.rve.cell.outline import Outline, circle, is_round
 from alphacut.rve.fenicsx import MPI, basix, cholesky, fem, mesh_of
 from alphacut.rve.mesh.curved import PlaneMesh, curved_nodes, plane_mesh, quadrature_degree
 from alphacut.rve.mesh.periodicity import unknowns
@@ -52,8 +52,8 @@ from alphacut.stochastic import RadiusMap, ThetaRule, gauss_rule
 
 PREFIX = "rve_slice_"
 RESIDUAL = 1e-8  # relative, of a factorisation
-ACCURATE_ORDER, REFERENCE_ORDER = 4, 5
-"""Order of the elements whose error is estimated, and the next, which estimates it."""
+ORDER, REFERENCE_ORDER = 4, 5
+"""Polynomial degree of the elements, and the next, which estimates their error."""
 LIMIT = 0.7
 """Mesh size up to which the second mesh is twice as coarse, in halves of the cell's side: there
 size ends to matter. Where it would lie above, the second mesh is twice as fine."""
@@ -133,48 +133,21 @@ class PlaneCell:
 
 @dataclass(frozen=True)
 class Slice:
-    """A two-dimensional cell solved for m inclusions by several orders, the highest on two meshes.
+    """A plane cell solved by elements of order 4.
 
     Args:
-        by_order: Stiffness in Pa, (m, 3, 3), by order; orders 4 and 5 are among them.
-        on_second_mesh: Stiffness by order 5 on the second mesh, shape (m, 3, 3), in Pa.
-        unknowns: Number of unknowns of the linear system, by order.
-        round_off: Relative error by rounding of each inclusion, shape (m, 1).
-        energies: Parts of the phases in the three moduli by order, shape (m, phases, 2, 3), in Pa.
+        stiffness: In Pa, Voigt order, shape (3, 3).
+        errors: Declared relative errors of C11 + C12, C11 − C12 and C33, shape (3,).
+        energies: Parts of the phases in these three moduli, shape (phases, 2, 3), in Pa.
+        energy_errors: Their declared errors, same shape.
+        unknowns: Number of unknowns of the linear system.
     """
 
-    by_order: Mapping[int, Array]
-    on_second_mesh: Array
-    unknowns: Mapping[int, int]
-    round_off: Array
-    energies: Mapping[int, Array] = field(default_factory=dict)
-
-    def error(self, order: int, *, square: bool) -> Array:
-        """Declared relative errors of C11 + C12, C11 − C12 and C33, shape (m, 3).
-
-        The error of order 4 is the larger of its distances from order 5 on the same mesh and on the
-        second one, each with a safety factor; other orders add their distance from order 4. Without
-        the symmetry of the square, the larger of the errors with C11 and with C22 counts.
-        """
-        accurate, higher = self.by_order[ACCURATE_ORDER], self.by_order[REFERENCE_ORDER]
-        by_order = ORDER_SAFETY * _distance(accurate, higher, square=square)
-        by_mesh = MESH_SAFETY * _distance(accurate, self.on_second_mesh, square=square)
-        error = np.maximum(by_order, by_mesh)
-        distance = _distance(self.by_order[order], accurate, square=square)
-        return np.asarray((1 + distance) * (1 + error + self.round_off) - 1)
-
-    def energies_with_errors(self, order: int) -> tuple[Array, Array]:
-        """Energies by elements of `order`, and errors: distances from the highest other order."""
-        values = self.energies[order]
-        reference = self.energies[max(set(self.energies) - {order})]
-        error = ORDER_SAFETY * abs(values - reference)
-        return values, error + NOISE * values.sum(axis=(1, 2), keepdims=True)
-
-
-def _distance(first: Array, second: Array, *, square: bool) -> Array:
-    """Largest relative distance of each modulus along either axis, shape (m, 3)."""
-    ratio = axial_moduli(first, square=square) / axial_moduli(second, square=square)
-    return np.asarray((np.maximum(ratio, 1 / ratio) - 1).max(axis=1))
+    stiffness: Array
+    errors: Array
+    energies: Array
+    energy_errors: Array
+    unknowns: int
 
 
 def solve_slice(
@@ -184,40 +157,58 @@ def solve_slice(
     *,
     mesh_size: float,
     outline: Outline = circle,
-    order: int = ACCURATE_ORDER,
     interphase: Interphase | None = None,
-) -> Slice:
-    """Solve a plane cell with one particle by three orders on one mesh and one on a second mesh.
+) -> list[Slice]:
+    """Solve the plane cell with each of `inclusions`, and declare its error.
+
+    The error is the larger of two distances of order 4 from order 5, on the same mesh and on a
+    second one, each with a safety factor. Without the symmetry of the square, the larger of the
+    errors with C11 and with C22 counts.
 
     Args:
         radius: Radius of the particle over half the cell's side.
         matrix: Phase outside it.
-        inclusions: Phases of the particle, m of them, each of which is solved.
+        inclusions: Phases of the particle.
         mesh_size: Edge length of the mesh of the result, in halves of the cell's side.
         outline: Outline of the particle.
-        order: Order of the elements of the result.
         interphase: Ring around a round particle.
     """
     thickness = thickness_of(interphase)
     ring = () if interphase is None else (interphase.phase,)
-    samples = [(matrix, inclusion, *ring) for inclusion in inclusions]
     second_size = 2 * mesh_size if 2 * mesh_size <= LIMIT else mesh_size / 2
     first, second = (
         plane_mesh(radius, size=size, outline=outline, thickness=thickness)
         for size in (mesh_size, second_size)
     )
-    orders = sorted({order, ACCURATE_ORDER, REFERENCE_ORDER})
-    cells = {degree: PlaneCell(first, degree) for degree in orders}
-    solved = {degree: [_solve_sample(cell, x) for x in samples] for degree, cell in cells.items()}
-    reference = PlaneCell(second, REFERENCE_ORDER)
-    contrast = np.array([[x.stiffness[2, 2] / matrix.stiffness[2, 2]] for x in inclusions])
-    return Slice(
-        by_order={degree: np.array([x for x, _ in pairs]) for degree, pairs in solved.items()},
-        on_second_mesh=np.array([_solve_sample(reference, x)[0] for x in samples]),
-        unknowns={degree: cell.unknowns for degree, cell in cells.items()},
-        round_off=ROUND_OFF + CANCELLATION * radius * contrast,
-        energies={degree: np.array([x for _, x in pairs]) for degree, pairs in solved.items()},
-    )
+    cell, higher_cell = PlaneCell(first, ORDER), PlaneCell(first, REFERENCE_ORDER)
+    second_cell, slices = PlaneCell(second, REFERENCE_ORDER), []
+    for inclusion in inclusions:
+        phases = (matrix, inclusion, *ring)
+        square = is_round(outline) and all(isinstance(phase, Phase) for phase in phases)
+        stiffness, energies = _solve_sample(cell, phases)
+        higher, reference_energies = _solve_sample(higher_cell, phases)
+        by_order = ORDER_SAFETY * _distance(stiffness, higher, square=square)
+        on_second_mesh, _ = _solve_sample(second_cell, phases)
+        by_mesh = MESH_SAFETY * _distance(stiffness, on_second_mesh, square=square)
+        contrast = inclusion.stiffness[2, 2] / matrix.stiffness[2, 2]
+        round_off = ROUND_OFF + CANCELLATION * radius * contrast
+        noise = NOISE * energies.sum(axis=(0, 1))
+        slices.append(
+            Slice(
+                stiffness=stiffness,
+                errors=np.maximum(by_order, by_mesh) + round_off,
+                energies=energies,
+                energy_errors=ORDER_SAFETY * abs(energies - reference_energies) + noise,
+                unknowns=cell.unknowns,
+            )
+        )
+    return slices
+
+
+def _distance(first: Array, second: Array, *, square: bool) -> Array:
+    """Largest relative distance of each modulus along either axis, shape (3,)."""
+    ratio = axial_moduli(first, square=square) / axial_moduli(second, square=square)
+    return np.asarray((np.maximum(ratio, 1 / ratio) - 1).max(axis=0))
 
 
 def _solve_sample(cell: PlaneCell, phases: Sequence[AnyPhase]) -> tuple[Array, Array]:
@@ -230,7 +221,6 @@ def _solve_sample(cell: PlaneCell, phases: Sequence[AnyPhase]) -> tuple[Array, A
     return total_energy(products, stiffness), energies
 
 
-_ORDERS = 2, 3, 4
 _DIGITS = 12  # radii equal to so many decimals are one slice
 _FINE = 128  # points of a rule in θ whose error is below rounding
 _SAFETY = 1.6  # of the error in θ
@@ -239,24 +229,20 @@ _NOISE = 1e-13  # of a declared error: what rounding leaves
 
 @dataclass(frozen=True)
 class SlicesModel:
-    """Plane finite elements with curved sides at the nodes of a Gauss rule in θ.
+    """Plane finite elements of order 4 with curved sides at the nodes of a Gauss rule in θ.
 
     Args:
-        order: Polynomial degree of the elements, 2 to 4.
         mesh_size: Edge length far from the interface, in halves of the cell's side, in (0, 1].
         points: Nodes in θ, at least 2.
         outline: Distance of the particle's edge from its centre over r(θ), a function of the angle.
     """
 
-    order: int = 4
     mesh_size: float = 0.2
     points: int = 10
     outline: Outline = circle
     name: ClassVar[str] = "slices"
 
     def __post_init__(self) -> None:
-        if self.order not in _ORDERS:
-            raise RefusedError("order of the elements", self.order, "2, 3, 4")
         require_mesh_size(self.mesh_size)
         require_points(self.points)
 
@@ -283,42 +269,38 @@ class SlicesModel:
         all_radii = np.concatenate([radius_map(rule.nodes), extremes])
         radii, indices = np.unique(np.round(all_radii, _DIGITS), return_inverse=True)
         nodes = indices[: rule.nodes.size]  # index among the radii of each node in θ
-        slices = [
+        by_radius = [
             solve_slice(
                 radius,
                 matrix,
                 inclusions,
                 mesh_size=self.mesh_size,
                 outline=self.outline,
-                order=self.order,
                 interphase=interphase,
             )
             for radius in radii
         ]
-        pairs = [plane.energies_with_errors(self.order) for plane in slices]
-        energies, energy_errors = (np.array(x) for x in zip(*pairs, strict=True))
         seconds = {"total": perf_counter() - start}
         results = []
-        for m, inclusion in enumerate(inclusions):
+        for inclusion, *slices in zip(inclusions, *by_radius, strict=True):
             cell = Cell(matrix, inclusion, radius_map, self.outline, interphase)
-            stiffness = np.array([plane.by_order[self.order][m] for plane in slices])
-            errors = np.array([plane.error(self.order, square=cell.square)[m] for plane in slices])
+            stiffness = np.array([plane.stiffness for plane in slices])
+            errors = np.array([plane.errors for plane in slices])
+            energies = np.array([[x.energies, x.energy_errors] for x in slices])
             curve = StressCurve.from_stiffness(rule, stiffness[nodes])
             moduli = square_moduli(stiffness)
             result = HomogenisedStiffness(
                 curve=curve,
                 method=self.name,
                 solver="cholesky",
-                unknowns=max(plane.unknowns[self.order] for plane in slices),
+                unknowns=max(plane.unknowns for plane in slices),
                 seconds=seconds,
                 errors={
                     "space": _space_errors(curve, errors[nodes], square=cell.square),
                     "theta": theta_error(cell, rule, radii=radii, moduli=moduli),
                 },
                 cell=cell,
-                energies=_mean_energies(
-                    cell, rule, radii, nodes, energies[:, m], energy_errors[:, m]
-                ),
+                energies=_mean_energies(cell, rule, radii, nodes, energies),
             )
             results.append(with_checks(result))
         return results
@@ -335,13 +317,14 @@ def _space_errors(curve: StressCurve, error: Array, *, square: bool) -> Array:
 
 
 def _mean_energies(
-    cell: Cell, rule: ThetaRule, radii: Array, nodes: Ints, values: Array, errors: Array
+    cell: Cell, rule: ThetaRule, radii: Array, nodes: Ints, energies: Array
 ) -> PhaseEnergies:
-    """Mean energies of the phases over θ from those at the radii, (n, phases, 2, 3), in Pa."""
+    """Mean energies over θ from values and errors at n radii, shape (n, 2, phases, 2, 3), in Pa."""
 
     def absolute_theta_error(moduli: Array) -> Array:
         return theta_error(cell, rule, radii=radii, moduli=moduli) * rule.mean(moduli[nodes])
 
+    values, errors = energies[:, 0], energies[:, 1]
     # energies X ∂c/∂X may change sign, but c + X ∂c/∂X are moduli with stiffer phases
     moduli = values.sum(axis=(1, 2))
     stiffer_errors = [

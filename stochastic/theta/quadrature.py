@@ -34,18 +34,12 @@ class ThetaRule:
         return np.asarray(np.tensordot(self.weights, values, axes=1), float)
 
 
-def layered_rule(distribution: ThetaLaw, *, layers: int, points: int) -> ThetaRule:
-    """Return a Gauss–Legendre rule with `points` nodes in each of `layers` equal intervals of θ.
+def level_rule(distribution: ThetaLaw, levels: Array, *, points: int) -> ThetaRule:
+    """Return the rule with `points` Gauss–Legendre nodes in each interval of rising levels of θ.
 
     The weights contain the density f_Θ and are scaled to the sum 1. Where the density is smooth,
     the error of the mean of a smooth function falls with the power 2·points of the interval.
     """
-    levels = np.asarray(np.linspace(distribution.lower, distribution.upper, layers + 1), float)
-    return level_rule(distribution, levels, points=points)
-
-
-def level_rule(distribution: ThetaLaw, levels: Array, *, points: int) -> ThetaRule:
-    """As `layered_rule`, between given levels of θ, shape (layers + 1,), rising."""
     return _weighted(distribution, levels, np.polynomial.legendre.leggauss(points))
 
 

@@ -75,13 +75,6 @@ def test_a_wrong_stiffness_is_refused_by_name(wrong, message):
         checks_within_limits(checks_of(wrong(c), np.eye(3)))
 
 
-def test_a_flipped_shear_stress_is_below_the_reuss_bound():
-    stress = layered(0.4) @ LOADS.T
-    stress[2] *= -1
-    with pytest.raises(CertificateError, match="Reuss"):
-        checks_within_limits(checks_of(stress, LOADS))
-
-
 def test_two_loads_see_the_bulk_modulus_of_the_whole_stiffness():
     c = voigt(SHARES, PAIR) * 0.9999
     whole, seen = checks_of(c, np.eye(3)), checks_of(c @ LOADS.T, LOADS)
@@ -105,14 +98,6 @@ class TestProductSpace:
         assert set(checks) == algebraic | {"reuss", "voigt", "hashin_shtrikman"}
         assert max(checks[k] for k in algebraic) < 2e-8
         assert max(checks[k] for k in ("reuss", "voigt")) == 0
-
-    def test_a_flipped_sign_of_the_load_is_found(self, monkeypatch):
-        from alphacut.rve.solver.form import CellForm
-
-        right = CellForm.load
-        monkeypatch.setattr(CellForm, "load", lambda self, *parts: -right(self, *parts))
-        with pytest.raises(CertificateError, match=r"Hill.Mandel"):
-            self.solve()
 
     def test_a_solver_stopped_early_is_found_though_it_claims_success(self):
         with pytest.raises(CertificateError, match=r"linear system is not solved|Hill.Mandel"):

@@ -60,18 +60,16 @@ def test_the_series_estimate_is_tight():
 
 
 @pytest.mark.parametrize(
-    ("radius", "modulus", "size", "order"),
-    [(0.68, 4e8, 0.69, 4), (0.88, 7e8, 0.56, 4), (0.67, 1e9, 0.99, 4), (0.6, 5e9, 1.0, 2)],
+    ("radius", "modulus", "size"), [(0.68, 4e8, 0.69), (0.88, 7e8, 0.56), (0.67, 1e9, 0.99)]
 )
-def test_the_estimate_of_a_slice_is_tight(radius, modulus, size, order):
+def test_the_estimate_of_a_slice_is_tight(radius, modulus, size):
     pytest.importorskip("alphacut.rve.fenicsx")
     from alphacut.rve.slices.model import solve_slice
 
     phases = [Phase(modulus)]
-    solved = solve_slice(radius, MATRIX, phases, mesh_size=size, order=order)
+    [solved] = solve_slice(radius, MATRIX, phases, mesh_size=size)
     exact = square_stiffness(np.array([radius]), MATRIX, phases)
-    true = apart(solved.by_order[order], square_moduli(exact.matrix[0]))
-    ratio = solved.error(order, square=True) / true
+    ratio = solved.errors / apart(solved.stiffness, square_moduli(exact.matrix[0, 0]))
     assert TIGHT[0] < ratio.min() < TIGHT[1]
 
 

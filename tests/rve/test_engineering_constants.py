@@ -24,7 +24,7 @@ CONSTANTS = {"E_L": 215.33, "E_x": 143.96, "G_T": 45.824, "G_L": 54.378, "nu_LT"
 """Boron in aluminium, a square array, in GPa: the table of docs/howto/material.md."""
 
 
-@pytest.mark.parametrize("model", [SeriesModel(), SlicesModel(4, 0.3, 2)], ids=lambda x: x.name)
+@pytest.mark.parametrize("model", [SeriesModel(), SlicesModel(0.3, 2)], ids=lambda x: x.name)
 def test_boron_aluminium_has_its_constants_by_series_and_by_elements(model):
     result = model.solve(HermiteMap(R, 0, R, 0), MATRIX, [PARTICLE])[0]
     plane, free = (engineering_constants(result)[x].values / 1e9 for x in (PLANE_STRAIN, FREE))
@@ -36,7 +36,7 @@ def test_boron_aluminium_has_its_constants_by_series_and_by_elements(model):
 
 
 def test_one_material_has_its_own_constants_without_stress_along_the_fibres():
-    result = SlicesModel(2, 0.5, 2).solve(HermiteMap(0.5, 0, 0.5, 0), MATRIX, [MATRIX])[0]
+    result = SlicesModel(0.5, 2).solve(HermiteMap(0.5, 0, 0.5, 0), MATRIX, [MATRIX])[0]
     young, nu = MATRIX.modulus, MATRIX.poisson
     constants = engineering_constants(result)
     shear = young / (2 * (1 + nu))
@@ -49,7 +49,7 @@ def test_one_material_has_its_own_constants_without_stress_along_the_fibres():
 def test_hill_s_relations_are_what_a_strain_along_the_fibres_gives(particle):
     """Against a load ε33 by the operator of the plane cell, of a turned ellipse."""
     outline, radius = Ellipse(2.0, 30.0), 0.5
-    model = SlicesModel(4, 0.3, 2, outline)
+    model = SlicesModel(0.3, 2, outline)
     result = model.solve(HermiteMap(radius, 0, radius, 0), MATRIX, [particle])[0]
     axial = AxialStiffness.of_result(result)
     cell = PlaneCell(plane_mesh(radius, size=0.3, outline=outline), 4)

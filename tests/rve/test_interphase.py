@@ -7,9 +7,6 @@ pytest.importorskip("alphacut.rve.fenicsx")
 
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve import Ellipse, Interphase, MeshModel, Phase, PrismModel, SeriesModel, SlicesModel
-from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
-from alphacut.rve.image.model import ImageModel
-from alphacut.rve.image.phases import ModuliInterval, moduli_images
 from alphacut.rve.mesh.file import write
 from alphacut.stochastic import HermiteMap
 
@@ -56,24 +53,6 @@ def test_wedges_agree_with_slices_over_the_cone():
     assert abs(result.modulus / exact.modulus - 1) <= result.estimated_error < 2e-3
     assert exact.estimated_error < 1e-5
     assert result.energies.values.shape == (3, 2, 3)
-
-
-def test_the_modulus_is_inside_proved_bounds_of_an_image_with_mixed_pixels():
-    half, size = 1 / 128, 128
-    middles = (np.arange(size) + 0.5) * 2 * half - 1
-    x, y = np.meshgrid(abs(middles), abs(middles))
-    nearest = np.hypot(np.maximum(x - half, 0), np.maximum(y - half, 0))
-    farthest = np.hypot(x + half, y + half)
-    radii = [0.6, 0.5]  # of the phases matrix, ring, particle, each stiffer than the one before
-    first, last = (sum((d < r).astype(int) for r in radii) for d in (farthest, nearest))
-    phases = [
-        ModuliInterval.of_young((one.modulus,) * 2, (one.poisson,) * 2)
-        for one in (SOFT, RING, HARD)
-    ]
-    model = ImageModel(solver=ConjugateGradient(accuracy=1e-4))
-    low, high = model.solve(moduli_images(first, last, phases)).bounds.young("axes")
-    assert low < by_slices(0.1, points=2).modulus < high
-    assert high / low < 1.08
 
 
 @pytest.mark.parametrize(

@@ -1,11 +1,9 @@
 """Ctrl-C and SIGTERM wait for the end of imports of DOLFINx and of PETSc's work; then, one line."""
 
-import ast
 import os
 import signal
 import subprocess
 import sys
-import threading
 import time
 from pathlib import Path
 
@@ -114,26 +112,6 @@ def test_handlers_that_the_block_takes_for_itself_are_given_back(name):
         signal.signal(number, before)
 
 
-def imported_at_once(tree):
-    """Names that a module imports outside a block of `uninterrupted`."""
-    for node in tree.body:
-        if isinstance(node, ast.Import):
-            yield from (name.name for name in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            yield node.module
-
-
-def test_no_module_imports_them_without_holding_it_back():
-    files = [file for room in ("rve", "alphacut") for file in (ROOT / room).rglob("*.py")]
-    bare = [
-        f"{file.relative_to(ROOT)}: {name}"
-        for file in files
-        for name in imported_at_once(ast.parse(file.read_text(encoding="utf-8")))
-        if name.split(".")[0] in ("basix", "dolfinx")
-    ]
-    assert bare == []
-
-
 def interrupt():
     os.kill(os.getpid(), signal.SIGINT)
 
@@ -161,16 +139,3 @@ def test_an_interruption_waits_for_the_end_of_the_block_and_goes_before_its_erro
     with pytest.raises(KeyboardInterrupt):
         block()
     assert done == ["block"]
-
-
-def test_other_threads_leave_the_handler_alone(handler):
-    seen = []
-
-    def work():
-        with uninterrupted():
-            seen.append(signal.getsignal(signal.SIGINT))
-
-    thread = threading.Thread(target=work)
-    thread.start()
-    thread.join()
-    assert seen == [signal.default_int_handler]

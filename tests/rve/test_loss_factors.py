@@ -14,7 +14,7 @@ MATRIX, PARTICLE = Phase(20e9, 0.3), Phase(80e9, 0.2)
 LOSSES = np.array([[0.01, 0.02], [0.005, 0.003]])
 MODELS = [
     SeriesModel(energies=True),
-    SlicesModel(3, 0.5, 6),
+    SlicesModel(0.5, 6),
     PrismModel(0.5, 4, stiffness=True),
 ]
 

@@ -2,14 +2,13 @@
 properties that hold for any discs.
 """
 
-from itertools import pairwise, product
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import integrate
-from scipy.spatial import ConvexHull, Voronoi
 
 from alphacut.stochastic.particles.particles import Particles
 from alphacut.stochastic.tessellation.apollonius import apollonius
@@ -108,18 +107,6 @@ def test_configurations_tile_their_rectangle_and_match_a_raster(seeds):
         assert (diagram.areas >= 0).all()
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_equal_radii_give_scipys_voronoi_cells(seed):
-    centres = np.random.default_rng(seed).random((200, 2))
-    shifts = sorted(product((0, 1, -1), repeat=2), key=any)  # the centres themselves first
-    voronoi = Voronoi(np.concatenate([centres + shift for shift in shifts]))
-    regions = [voronoi.regions[region] for region in voronoi.point_region[:200]]
-    exact = [ConvexHull(voronoi.vertices[region]).volume for region in regions]
-    for radius in (0.0, 0.01):
-        areas = apollonius(Particles(centres, np.full(200, radius), (1, 1))).areas
-        assert areas == pytest.approx(exact, rel=1e-10)
-
-
 @settings(max_examples=30, deadline=None)
 @given(st.integers(0, 10**6), st.floats(-0.01, 0.2), st.floats(0.01, 1e6))
 def test_areas_do_not_change_with_a_common_growth_and_scale_with_the_length(seed, growth, scale):
@@ -146,13 +133,3 @@ def test_disc_in_front_of_a_giant():
     assert diagram.areas[:4] == pytest.approx(
         [quadrature_area(diagram.discs, i) for i in range(4)], rel=1e-8
     )
-
-
-def test_arcs_close_and_meet():
-    diagram = apollonius(configuration(33))
-    for cell in np.unique(diagram.cell):
-        arc = np.flatnonzero(diagram.cell == cell)
-        assert diagram.end[arc[:-1]] == pytest.approx(diagram.start[arc[1:]], abs=1e-12)
-        assert diagram.end[arc[-1]] == pytest.approx(diagram.start[arc[0]] + 2 * np.pi, abs=1e-12)
-        incoming, outgoing = diagram.walls(2)[1][:, arc]
-        assert outgoing == pytest.approx(np.roll(incoming, -1), rel=1e-6)

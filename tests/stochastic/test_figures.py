@@ -4,9 +4,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
-from alphacut.stochastic.figures.all import draw_cells, plot_cells
+from alphacut.stochastic.figures.all import draw_cells
 from alphacut.stochastic.particles.packing import Packing
-from alphacut.stochastic.particles.particles import Particles
 from alphacut.stochastic.particles.radius_laws import LogNormalRadii
 from alphacut.stochastic.tessellation.apollonius import apollonius
 
@@ -19,25 +18,6 @@ def closed():
     """No figure stays open."""
     yield
     plt.close("all")
-
-
-def walls(discs: Particles) -> list[np.ndarray]:
-    """What is drawn of a section's cells, in mm."""
-    axes = plt.figure().add_subplot()
-    plot_cells(axes, apollonius(discs))
-    return [np.asarray(segment) for segment in axes.collections[0].get_segments()]
-
-
-@pytest.mark.parametrize("side", [0, 1])
-def test_walls_that_leave_a_periodic_box_come_in_on_the_other_side(side):
-    drawn, size = walls(EQUAL), 1e3 * EQUAL.size
-    middles = np.array([wall[12] for wall in drawn])
-    crossing = [x for x in drawn if x[:, side].max() > size[side] > x[:, side].min()]
-    leaving = [wall for wall in crossing if 0 < wall[12, 1 - side] < size[1 - side]]
-    assert len(leaving) > 5
-    for wall in leaving:
-        there = wall[12] - np.eye(2)[side] * size[side]
-        assert np.hypot(*(middles - there).T).min() < 1e-6 * size[0]
 
 
 def test_a_corner_of_a_section_has_the_cells_of_the_whole_and_says_so():

@@ -13,7 +13,6 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Protocol
 
 import numpy as np
 from scipy.linalg.blas import daxpy
@@ -26,11 +25,8 @@ LOG = logging.getLogger(__name__)
 LIMIT = 2000  # iterations; with the preconditioner, contrasts of 1e6 need fewer
 
 
-class LinearOperator(Protocol):
-    """A symmetric linear map of fields, shape (loads, unknowns, rows, columns)."""
-
-    def apply(self, fields: Array, /) -> Array:
-        """The image of the fields."""
+LinearMap = Callable[[Array], Array]
+"""A symmetric linear map of fields, shape (loads, unknowns, rows, columns)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,18 +42,12 @@ class System:
         start: First guess, of the load's shape; None: zero.
     """
 
-    operator: LinearOperator
-    preconditioner: LinearOperator
+    operator: LinearMap
+    preconditioner: LinearMap
     load: Array
     scale: Array
     least: float
     start: Array | None = None
-
-    def begin(self) -> tuple[Array, Array]:
-        """First fields and their residuals, arrays to work in."""
-        if self.start is None:
-            return np.zeros_like(self.load), self.load.copy()
-        return self.start.copy(), self.load - self.operator.apply(self.start)
 
 
 @dataclass(frozen=True)
@@ -79,8 +69,11 @@ class ConjugateGradient:
         Raises:
             FailedError: `LIMIT` iterations are not enough.
         """
-        x, r = system.begin()
-        p = system.preconditioner.apply(r)
+        if system.start is None:
+            x, r = np.zeros_like(system.load), system.load.copy()
+        else:
+            x, r = system.start.copy(), system.load - system.operator(system.start)
+        p = system.preconditioner(r)
         gamma = inner(r, p)  # residual · preconditioned residual
         # energy error ≤ error_factor · gamma, by the lower bound of the spectrum
         error_factor = np.full(gamma.shape, 1 / system.least)
@@ -90,16 +83,16 @@ class ConjugateGradient:
             if np.all(error_factor * gamma <= allowed):
                 LOG.debug("fields on %s points: %d iterations", x.shape[2:], number)
                 return x, number
-            Ap = system.operator.apply(p)
+            Ap = system.operator(p)
             alpha = _ratio(gamma, inner(p, Ap))
             _add_multiple(x, alpha, p)
             _add_multiple(r, -alpha, Ap)
             del Ap  # memory for the preconditioner
-            z = system.preconditioner.apply(r)
+            z = system.preconditioner(r)
             last_gamma, gamma = gamma, inner(r, z)
             beta = _ratio(gamma, last_gamma)
             error_factor = _radau(error_factor - alpha, beta, system.least)
-            p *= _per_load(beta)
+            p *= beta[:, None, None, None]
             p += z
         energy_error = float((error_factor * gamma / system.scale).max())
         raise FailedError(
@@ -126,11 +119,6 @@ def _add_multiple(fields: Array, factors: Array, other: Array) -> None:
     """Add the other fields, times a factor a load, in place and without a copy."""
     for own, factor, added in zip(fields, factors, other, strict=True):
         daxpy(added.reshape(-1), own.reshape(-1), a=factor)
-
-
-def _per_load(factors: Array) -> Array:
-    """Factors of the loads, to multiply fields with."""
-    return factors[:, None, None, None]
 
 
 def _ratio(above: Array, below: Array) -> Array:

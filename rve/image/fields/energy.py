@@ -209,7 +209,7 @@ def _solve_loads(
         part = slice(first, first + n_together)
         guess = None if start is None else np.tensordot(SOLVED_LOADS[part], start, axes=1)
         load = operator.load(modes[:, part])
-        system = System(operator, preconditioner, load, scale[part], least, guess)
+        system = System(operator.apply, preconditioner.apply, load, scale[part], least, guess)
         fields[part], number = solver.solve(system)
         iterations.append(number)
     return fields, max(iterations)

@@ -21,7 +21,7 @@ def judged(grey):
     """The segmentation half-way between the levels that the image itself shows."""
     threshold = (grey.min() + grey.max()) / 2
     for _ in range(4):
-        (threshold,) = segment(grey, [threshold]).level_midpoints
+        threshold = float(segment(grey, [threshold]).levels.mean())
     result = segment(grey, [threshold])
     result.require_certain()
     return result

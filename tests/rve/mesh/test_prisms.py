@@ -9,7 +9,7 @@ pytest.importorskip("alphacut.rve.fenicsx")
 
 from alphacut.rve.cell.outline import Ellipse, circle
 from alphacut.rve.mesh import gmsh_prisms, square
-from alphacut.rve.mesh.columns import extrude, grid_of
+from alphacut.rve.mesh.columns import grid_of
 from alphacut.rve.mesh.periodicity import MeshError
 from alphacut.rve.mesh.wedge import prism_rule, wedge
 from alphacut.stochastic import HermiteMap
@@ -37,17 +37,6 @@ def test_a_prism_that_gmsh_does_not_return_is_missed_by_its_volume(outline):
     assert lost == pytest.approx(each[17], rel=1e-10)
     with pytest.raises(MeshError, match=r"layers of prisms differ|do not pass all levels"):
         grid_of(rest, 0.4, outline)
-
-
-def test_nodes_are_numbered_level_by_level():
-    grid = extrude(size=0.4, radius=0.5, layers=4)
-    points = grid.positions(MAP)
-    theta = np.repeat(np.linspace(-3, 3, 5), len(grid.plane.points))
-    half = np.repeat(np.linspace(-2.25, 2.25, 4), grid.plane.vertices)
-    assert points[:, 2] == pytest.approx(np.concatenate([theta, half]), abs=1e-12)
-    assert sorted(set(grid.cells.ravel())) == list(range(grid.nodes))
-    mids = points[grid.cells[:, [0, 1, 2]]] + points[grid.cells[:, [3, 4, 5]]]
-    assert mids[..., 2] / 2 == pytest.approx(points[grid.cells[:, [8, 10, 11]], 2], abs=1e-12)
 
 
 def test_the_order_of_prisms_does_not_matter():

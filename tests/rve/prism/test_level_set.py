@@ -6,7 +6,7 @@ import pytest
 pytest.importorskip("alphacut.rve.fenicsx")
 
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.rve import LevelSetModel, Phase, PrismModel
+from alphacut.rve import LevelSetModel, Phase, SeriesModel
 from alphacut.stochastic import HermiteMap, TruncatedNormal
 
 CONE, LAW = HermiteMap(0.2, 0.1, 0.7, 0.1), TruncatedNormal(-3, 3)
@@ -27,13 +27,16 @@ def solve(level_set, size, layers=1, law=LAW, phases=PHASES):
     return model.solve(law, phases)[0]
 
 
-def test_the_cone_of_a_map_is_one_level_set():
-    model = PrismModel(0.5, 3, interface="sign", stiffness=True, estimate=False)
-    right = model.solve(CONE, PHASES["matrix"], [PHASES["inclusion"]])[0]
-    result = solve(cone, 0.5, 3)
-    assert result.stiffness == pytest.approx(right.stiffness, rel=1e-12, abs=1e-3)
-    assert result.energies.values == pytest.approx(right.energies.values[::-1], rel=1e-9, abs=1.0)
-    assert not result.errors
+def test_the_cone_of_a_map_is_too_stiff_by_first_order_and_declares_no_error():
+    exact = SeriesModel(energies=True).solve(CONE, PHASES["matrix"], [PHASES["inclusion"]])[0]
+    results = [solve(cone, size, 6) for size in (0.2, 0.1)]
+    errors = [result.modulus / exact.modulus - 1 for result in results]
+    assert 0 < errors[1] < errors[0]
+    assert 0.5 < np.log2(errors[0] / errors[1]) < 1.6
+    right = exact.energies.values[::-1]  # in the order of `PHASES`
+    assert abs(results[1].energies.values - right).max() < 0.02 * right.sum(axis=(0, 1)).max()
+    assert not results[1].errors
+    assert "error of E not declared" in repr(results[1])
 
 
 def test_two_particles_are_too_stiff_by_first_order():

@@ -120,13 +120,6 @@ def test_iterations_depend_on_neither_map_nor_contrast_and_fall_with_layers(
     assert max(result.iterations) <= most
 
 
-def test_ignoring_the_interface_is_first_order_and_too_stiff():
-    exact = SeriesModel().solve(PAPER, MATRIX, [PARTICLE])[0].modulus
-    errors = [solve(mesh_size=h, interface="sign").modulus / exact - 1 for h in (0.2, 0.1)]
-    assert 0 < errors[1] < errors[0]
-    assert 0.5 < np.log2(errors[0] / errors[1]) < 1.6
-
-
 ORTHOTROPIC = VoigtPhase(((90e9, 20e9, 5e9), (20e9, 50e9, 0.0), (5e9, 0.0, 30e9)))
 SMALL = HermiteMap(0.2, 0.1, 0.55, 0.1)
 
@@ -135,7 +128,7 @@ SMALL = HermiteMap(0.2, 0.1, 0.55, 0.1)
 def turned_ellipse():
     """An ellipse of an orthotropic material, both turned, by prisms and by slices."""
     outline = Ellipse(2.0, 30.0)
-    slices = SlicesModel(4, 0.4, 5, outline)
+    slices = SlicesModel(0.4, 5, outline)
     models = PrismModel(0.4, 3, outline=outline), slices
     return [model.solve(SMALL, MATRIX, [ORTHOTROPIC])[0] for model in models]
 
@@ -165,7 +158,6 @@ def test_losses_of_any_stiffness_and_outline_agree_within_declared_errors(turned
         ({"layers": 1}, PAPER, Phase(2e6)),
         ({"layers": 2}, HermiteMap(0.5, 2.0, 0.5, 2.0), PARTICLE),
         ({"mesh_size": 0.2, "layers": 5}, HermiteMap(0.02, 0, 0.02, 0), PARTICLE),
-        ({"interface": "sign", "mesh_size": 0.4}, PAPER, PARTICLE),
         (
             {"mesh_size": 0.4, "layers": 4},
             HermiteMap(0.2, 0.1, 0.8, 0.2, Own("beta", (2, 4))),
@@ -219,7 +211,6 @@ def test_what_petsc_does_not_take_or_reach_is_an_error(petsc, error, message):
     [
         ({"mesh_size": 0.0}, r"the mesh size is 0; allowed: values in \(0, 1\]"),
         ({"layers": 0}, "the number of layers is 0; allowed: 1 or more"),
-        ({"interface": "soft"}, "the interface is 'soft'; allowed: conforming, sign"),
     ],
 )
 def test_an_option_out_of_range_is_refused(options, message):

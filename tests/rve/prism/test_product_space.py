@@ -102,11 +102,6 @@ def test_a_later_map_of_the_model_does_not_move_the_mesh(cell):
     assert (cell.space.mesh.geometry.x == before).all()
 
 
-def test_a_mesh_that_ignores_the_interface_has_no_measure_of_phases():
-    with pytest.raises(RefusedError, match="conforming"):
-        ProductSpace(PrismModel(0.6, 2, interface="sign"), CONE)
-
-
 def test_a_mesh_from_a_file_has_its_measures_by_the_names_of_its_groups():
     model = MeshModel(MESHES / "two-particles.msh")
     cell = ProductSpace(model, TruncatedNormal())

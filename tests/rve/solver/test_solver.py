@@ -1,19 +1,16 @@
 """The solver of the product space: exact where it should be, honest where it stops, orderly."""
 
-import os
-import signal
-
 import numpy as np
 import pytest
 import scipy.sparse as sp
 
 pytest.importorskip("alphacut.rve.fenicsx")
 
-from alphacut.rve.cell.cell import LOADS, Phase
+from alphacut.rve.cell.cell import Phase
 from alphacut.rve.fenicsx import MPI, PETSc, option_is_used
 from alphacut.rve.mesh.columns import extrude
 from alphacut.rve.prism.problem import PrismProblem
-from alphacut.rve.solver.krylov import SolverOptions, krylov_solver, solve
+from alphacut.rve.solver.krylov import SolverOptions
 from alphacut.rve.solver.theta_preconditioner import ThetaPreconditioner
 from alphacut.stochastic import HermiteMap
 
@@ -60,32 +57,6 @@ def test_the_preconditioner_is_symmetric_and_definite_where_the_radius_changes()
     assert abs(inverse - inverse.T).max() < 1e-12 * abs(inverse).max()
     values = np.linalg.eigvals(inverse @ dense(one.matrix)).real
     assert 0.3 < values.min() < 1 < values.max() < 3
-
-
-class Interrupted:
-    """A preconditioner during which the user presses Ctrl-C, once."""
-
-    def __init__(self, *_):
-        self.calls = 0
-
-    def apply(self, _pc, residual, result):
-        self.calls += 1
-        if self.calls == 1:
-            os.kill(os.getpid(), signal.SIGINT)
-        result.array[:] = residual.array_r
-
-
-def test_an_interruption_below_petsc_arrives_after_the_solve(problem, monkeypatch):
-    monkeypatch.setattr("alphacut.rve.solver.krylov.ThetaPreconditioner", Interrupted)
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        options = SolverOptions({"ksp_rtol": "1e-3", "ksp_max_it": "5000"})
-        ksp = krylov_solver(problem.matrix, problem.numbering, CRISP.distribution, options)
-        with pytest.raises(KeyboardInterrupt):
-            solve(ksp, problem.loads(LOADS))
-        assert solve(ksp, problem.loads(LOADS)).residual < 2e-3
-    finally:
-        assert signal.signal(signal.SIGINT, before) is signal.default_int_handler
 
 
 def test_options_leave_no_trace_in_the_database(problem):

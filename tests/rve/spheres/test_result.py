@@ -12,7 +12,6 @@ from alphacut.rve.spheres.result import (
     cubic_moduli,
     cubic_voigt,
     hill_average,
-    space_stiffness,
     spheres_with_checks,
 )
 from alphacut.stochastic import HermiteMap
@@ -29,13 +28,6 @@ def test_mean_over_theta_is_that_of_a_fine_rule():
     assert abs(result.modulus / fine.modulus - 1) <= result.estimated_error
 
 
-def test_homogeneous_cell_is_the_matrix():
-    result = SphereSeriesModel().solve(MAP, MATRIX, [MATRIX])[0]
-    assert result.modulus == pytest.approx(20e9, rel=1e-11)
-    assert result.poisson == pytest.approx(0.3, rel=1e-11)
-    np.testing.assert_allclose(result.stiffness, space_stiffness(MATRIX), rtol=1e-11, atol=1e-2)
-
-
 def test_bounds_meet_the_phases_and_mori_and_tanaka():
     for share, phase in ((0.0, MATRIX), (1.0, STIFF)):
         ends = hashin_shtrikman(np.array([1 - share, share]), [MATRIX, STIFF], space=True)
@@ -46,22 +38,6 @@ def test_bounds_meet_the_phases_and_mori_and_tanaka():
         np.testing.assert_allclose(estimate, ends[:, k])
     bulk, shear = ends[:, 0]
     assert hill_average(np.array([bulk, shear, shear]))[0] == pytest.approx(25.78e9, abs=5e6)
-
-
-def test_hill_average_of_copper_lies_between_the_means_of_stiffness_and_compliance():
-    stiffness = cubic_voigt(137.07e9, 23.5e9, 75.4e9)
-    soft = np.linalg.inv(stiffness)
-
-    def invariants(matrix):
-        along, cross = matrix[:3, :3].trace(), matrix[0, 1] + matrix[0, 2] + matrix[1, 2]
-        return along - cross, matrix[3:, 3:].trace()
-
-    (first, second), (soft_first, soft_second) = map(invariants, (stiffness, soft))
-    voigt, reuss = (first + 3 * second) / 15, 15 / (4 * soft_first + 3 * soft_second)
-    bulk, shear = 137.07e9, (voigt + reuss) / 2
-    assert reuss < 0.8 * voigt
-    young = hill_average(np.array([137.07e9, 23.5e9, 75.4e9]))[0]
-    assert young == pytest.approx(9 * bulk * shear / (3 * bulk + shear), rel=1e-12)
 
 
 @pytest.mark.parametrize(
