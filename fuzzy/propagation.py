@@ -100,6 +100,7 @@ def propagate(
     is_allowed = executor is None or (isinstance(executor, Executor) and workers == 1)
     allowed = "one of concurrent.futures (of dask client.get_executor()), without workers"
     require(is_allowed, "executor", value=executor, allowed=allowed)
+    model = b"" if store is None else model_key(identity or {})
     with (
         progress_reporter(progress) as report,
         nullcontext(executor) if executor else pool(workers) as sample_executor,
@@ -112,7 +113,7 @@ def propagate(
             executor=sample_executor,
             progress=report,
             store=sample_store,
-            model=b"" if store is None else model_key(identity or {}),
+            model=model,
             skip=on_failure == "skip",
         )
         bounds = _note_failures(method.run(campaign, domain), campaign.failed)

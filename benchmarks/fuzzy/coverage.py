@@ -37,7 +37,7 @@ LAWS: dict[str, tuple[Any, tuple[float, float]]] = {
     "coin 0.1": (stats.bernoulli(0.1), (0.0, 1.0)),
 }
 FREE = ("next value", "median", "quantile 0.9")
-NAMED = {"normal": (*FREE, "mean"), "log-normal": FREE}
+NAMED = {"normal": ("mean",)}
 
 
 @dataclass(frozen=True)

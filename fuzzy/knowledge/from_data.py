@@ -1,25 +1,24 @@
 """Fuzzy numbers from measured values, with a claim how often their cuts contain a quantity.
 
-Without a law: by ranks (`order_statistics`), the mean by a band. Under a named law, normal, or
-log-normal through the logarithms of the values: next value and mean by Student's t, quantiles by
-the non-central t (Hahn and Meeker, Statistical Intervals, 1991, chapters 4 and 14).
+The next value, the median and quantiles by ranks (`order_statistics`), the mean by a band, or where
+the law is known to be normal by Student's t (Hahn and Meeker, Statistical Intervals, 1991, ch. 4).
 """
 
 from __future__ import annotations
 
 import re
 from functools import lru_cache
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.knowledge.order_statistics import Limits, Observations, Values, rank_cuts
-from alphacut.fuzzy.refused import checked_number, require, require_choice
+from alphacut.fuzzy.refused import checked_number, require
 from alphacut.fuzzy.sets.claimed import ClaimedNumber, CoverageClaim
 from alphacut.fuzzy.sets.numbers import Stepwise
 
-Law = Literal["normal", "log-normal"]
+Law = Literal["normal"]
 LEVELS = np.unique(
     np.round(np.concatenate([np.geomspace(1e-9, 1, 600), np.linspace(0.0025, 1, 400)]), 12)
 )
@@ -47,8 +46,7 @@ def from_data(
         bounds: Physically possible values (lower, upper), None where there is no bound. They are
             the ends of cuts that the values do not decide: without them the number has no cut at
             low α.
-        law: "normal" or, except for the mean, "log-normal", where the law is known: narrower cuts,
-            which rest on it.
+        law: "normal" where the law is known, for narrower cuts of the mean, which rest on it.
 
     Raises:
         RefusedError: An argument is wrong, or the values decide nothing.
@@ -59,15 +57,15 @@ def from_data(
         Cut(lower=1.88, upper=2.1)
     """
     quantile = _quantile(claim)
-    if law is not None:
-        require_choice("law", law, ("normal",) if claim == "mean" else get_args(Law))
+    is_allowed = law is None or (law == "normal" and claim == "mean")
+    require(is_allowed, "law", value=law, allowed="'normal' for a mean; ranks bound the others")
     data = Observations.from_values(values, bounds)
-    if law is not None:
-        number, decided = law_cuts(data, law, quantile, mean=claim == "mean")
-    elif claim == "mean":
+    if claim != "mean":
+        number, decided = rank_cuts(data, quantile)
+    elif law is None:
         number, decided = mean_cuts(data), 0.0
     else:
-        number, decided = rank_cuts(data, quantile)
+        number, decided = student_cuts(data)
     return ClaimedNumber(number, CoverageClaim(claim, _conditions(data, law, bounds)), decided)
 
 
@@ -80,7 +78,7 @@ def _quantile(claim: str) -> float | None:
     return 0.5 if claim == "median" else None
 
 
-def _conditions(data: Observations, law: Law | None, bounds: Limits | None) -> tuple[str, ...]:
+def _conditions(data: Observations, law: str | None, bounds: Limits | None) -> tuple[str, ...]:
     """Conditions of the claim, in words."""
     low, high = data.bounds
     conditions = [f"{len(data.values)} values drawn alike and independently"]
@@ -129,55 +127,28 @@ def _band_half_width(n: int) -> Array:
     return np.clip(band, 0.0, 1.0)
 
 
-def law_cuts(
-    data: Observations, law: Law, quantile: float | None, *, mean: bool
-) -> tuple[Stepwise, float]:
-    """Return the α-cuts of a quantity under a named law, and the least level with finite ends.
+def student_cuts(data: Observations) -> tuple[Stepwise, float]:
+    """Return the α-cuts of a normal law's mean, and the least level with finite ends.
 
     The cuts, at the `LEVELS`, are clipped to the physical bounds; with two of them the level is 0.
 
-    Args:
-        data: The values.
-        law: Name of the law.
-        quantile: Probability of the quantile to bound; None for the next value, or for the mean.
-        mean: Whether the mean is to be bounded, which `from_data` allows with a normal law alone.
-
     Raises:
-        RefusedError: The values do not fit the law: fewer than two, all equal, or not positive.
+        RefusedError: There are fewer than two values, or all are equal.
     """
-    is_logarithmic = law == "log-normal"
+    values, (least, greatest) = data.values, data.values[[0, -1]]
+    shown, allowed = f"{len(values)} from {least:g} to {greatest:g}", "two or more, unlike"
     cure = "give bounds=(lower, upper) in place of a law, or measure more"
-    least, greatest = data.values[[0, -1]]
-    allowed = "positive ones with a log-normal law"
-    has_logarithm = least > 0 or not is_logarithmic
-    require(has_logarithm, "least value", value=least, allowed=allowed, cure=cure)
-    shown, key = f"{len(data.values)} from {least:g} to {greatest:g}", f"values of a {law} law"
-    require(least < greatest, key, value=shown, allowed="two or more, unlike", cure=cure)
-    values = np.log(data.values) if is_logarithmic else data.values
-    factors = _factors(len(values), 0.5 if mean else quantile)
-    lower, upper = (values.mean() + factor * values.std(ddof=1) for factor in factors)
-    if is_logarithmic:
-        with np.errstate(over="ignore"):
-            lower, upper = np.exp(lower), np.exp(upper)
-    return _clip_cuts(lower, upper, data.bounds)
+    require(least < greatest, "values of a normal law", value=shown, allowed=allowed, cure=cure)
+    half_width = _student_factors(len(values)) * values.std(ddof=1)
+    return _clip_cuts(values.mean() - half_width, values.mean() + half_width, data.bounds)
 
 
 @lru_cache(maxsize=64)
-def _factors(n: int, quantile: float | None) -> tuple[Array, Array]:
-    """Factors k of the ends, mean + k · deviation, at confidence 1 − α, (levels,) each."""
-    tail = LEVELS / 2
-    # Student's t for the next value, the mean and the median, the non-central t for quantiles
-    if quantile is None or quantile == 0.5:
-        from scipy.stats import t
+def _student_factors(n: int) -> Array:
+    """Factors k of mean ± k · deviation that hold the mean of n values, at each of the `LEVELS`."""
+    from scipy.stats import t
 
-        variance = 1 + 1 / n if quantile is None else 1 / n
-        factor = np.maximum(t.isf(tail, n - 1), 0.0) * np.sqrt(variance)
-        return -factor, factor
-    from scipy.stats import nct, norm
-
-    noncentrality = norm.ppf(quantile) * np.sqrt(n)
-    lower, upper = nct.ppf(tail, n - 1, noncentrality), nct.isf(tail, n - 1, noncentrality)
-    return lower / np.sqrt(n), upper / np.sqrt(n)
+    return np.asarray(np.maximum(t.isf(LEVELS / 2, n - 1), 0.0) / np.sqrt(n))
 
 
 def _clip_cuts(lower: Array, upper: Array, bounds: tuple[float, float]) -> tuple[Stepwise, float]:

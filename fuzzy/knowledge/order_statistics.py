@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,8 +56,7 @@ class Observations:
         return cls(np.sort(np.asarray(values, float)), (low, high))
 
 
-@dataclass(frozen=True, eq=False)
-class Windows:
+class Windows(NamedTuple):
     """Nested ranges of gaps from `low` to `high`, and the level of each, the probability outside.
 
     Three arrays of shape (k,), levels rising from 0.

@@ -1,15 +1,14 @@
-"""Methods, and designs: the samples of every α-level and how their values become α-cuts."""
+"""Methods, and how the values of their samples become α-cuts."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Ints, Mask
-from alphacut.fuzzy.campaign.call import Samples, Values
+from alphacut.fuzzy.arrays import Array, Mask
+from alphacut.fuzzy.campaign.call import Samples
 from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.knowledge.known import contradiction, negligible
 from alphacut.fuzzy.refused import FailedError, require
@@ -28,62 +27,36 @@ class Plan(Protocol):
         """Bounds of every output on every level."""
 
 
-@dataclass(frozen=True)
-class Design:
-    """Distinct samples (n, inputs) over a domain, and for each level the rows of its samples."""
-
-    domain: Domain
-    points: Array
-    levels: tuple[Ints, ...]
-
-    @classmethod
-    def from_levels(cls, domain: Domain, points: Sequence[Array]) -> Design:
-        """Design from the points of each level, shape (n_level, inputs)."""
-        distinct, inverse = np.unique(np.concatenate(points), axis=0, return_inverse=True)
-        ends = np.cumsum([len(rows) for rows in points])[:-1]
-        return cls(domain, distinct, tuple(np.split(inverse.ravel(), ends)))
-
-    def bounds(self, values: Values, method: str) -> Bounds:
-        """Attained bounds: extremes over the samples of each level and of all higher levels.
-
-        This is the retransformation of Hanss (2005). `values` are outputs at `points`, NaN where a
-        sample failed and was skipped.
-        """
-        lowest, highest = self._extremes(values.array), self._extremes(-values.array)
-        columns = np.arange(values.array.shape[1])
-        return Bounds(
-            alpha=np.array(self.domain.alpha),
-            lower=values.array[lowest, columns],
-            upper=values.array[highest, columns],
-            lower_at=self.points[lowest],
-            upper_at=self.points[highest],
-            error=np.zeros(lowest.shape),
-            nature=Nature.ATTAINED,
-            outputs=values.columns,
-            inputs=self.domain.inputs,
-            method=method,
-        )
-
-    def _extremes(self, values: Array) -> Ints:
-        """Row of the sample with the least of the values (n, outputs), shape (levels, outputs)."""
-        columns = np.arange(values.shape[1])
-        usable = np.where(np.isnan(values), np.inf, values)
-        least_rows: list[Ints] = []  # from the highest level down
-        for alpha, rows in zip(reversed(self.domain.alpha), reversed(self.levels), strict=True):
-            candidates = [*least_rows[-1:]]  # higher levels are contained in lower ones
-            if len(rows):
-                candidates.insert(0, rows[usable[rows].argmin(axis=0)])
-            if not candidates or np.isinf(usable[candidates[0], columns]).any():
-                raise FailedError(f"no sample of the cut at α = {alpha:g} has a value")
-            stacked = np.array(candidates)
-            least_rows.append(stacked[usable[stacked, columns].argmin(axis=0), columns])
-        return np.array(least_rows[::-1])
-
-
 def bounds_of_samples(domain: Domain, samples: Samples, method: str) -> Bounds:
-    """Return the bounds that samples attain; each level uses all samples that lie in its cut."""
-    levels = tuple(np.flatnonzero(inside) for inside in domain.inside(samples.points))
-    return Design(domain, samples.points, levels).bounds(samples.values, method)
+    """Return the bounds that samples attain: on each level the extremes of those in its cut.
+
+    For the points of the transformation method this is the retransformation of Hanss (2005). Values
+    are NaN where a sample failed and was skipped.
+    """
+    values, inside = samples.values.array, domain.inside(samples.points)
+    columns = np.arange(values.shape[1])
+    rows_of_ends = []
+    for signed in (values, -values):
+        usable, rows_by_level = np.where(np.isnan(signed), np.inf, signed), []
+        for alpha, is_inside in zip(domain.alpha, inside, strict=True):
+            rows = np.flatnonzero(is_inside)
+            if not len(rows) or np.isinf(usable[rows].min(axis=0)).any():
+                raise FailedError(f"no sample of the cut at α = {alpha:g} has a value")
+            rows_by_level.append(rows[usable[rows].argmin(axis=0)])
+        rows_of_ends.append(np.array(rows_by_level))
+    lowest, highest = rows_of_ends
+    return Bounds(
+        alpha=np.array(domain.alpha),
+        lower=values[lowest, columns],
+        upper=values[highest, columns],
+        lower_at=samples.points[lowest],
+        upper_at=samples.points[highest],
+        error=np.zeros(lowest.shape),
+        nature=Nature.ATTAINED,
+        outputs=samples.values.columns,
+        inputs=domain.inputs,
+        method=method,
+    )
 
 
 def guaranteed_bounds(bounds: Bounds, campaign: Campaign, proved: Mask) -> Bounds:

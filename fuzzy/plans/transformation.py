@@ -22,9 +22,10 @@ from typing import ClassVar
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Ints, Mask
+from alphacut.fuzzy.campaign.call import Samples
 from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.knowledge.known import Signs
-from alphacut.fuzzy.plans.design import Design, bounds_of_samples, guaranteed_bounds
+from alphacut.fuzzy.plans.design import bounds_of_samples, guaranteed_bounds
 from alphacut.fuzzy.refused import require, require_choice
 from alphacut.fuzzy.result import Bounds, Ends
 from alphacut.fuzzy.sets.boxes import Domain, quasi_random_points
@@ -80,6 +81,12 @@ def level_grids(domain: Domain, *, inner: bool) -> list[list[list[float]]]:
     return [list(level) for level in zip(*columns, strict=True)]
 
 
+def bounds_at(campaign: Campaign, domain: Domain, points: Array, method: str) -> Bounds:
+    """Evaluate points (n, inputs), equal ones once, and return the bounds that they attain."""
+    distinct = np.unique(points, axis=0)
+    return bounds_of_samples(domain, Samples(distinct, campaign(distinct)), method)
+
+
 def corners_suffice(domain: Domain, signs: Signs) -> Mask:
     """Return the outputs with a sign of every input that has a width, a mask (outputs,)."""
     lower, upper = domain.boxes
@@ -105,8 +112,8 @@ class General:
         """Bounds by all combinations of points, guaranteed where corners are known to suffice."""
         grids = level_grids(domain, inner=self.takes_inner_points)
         require_budget(sum(prod(map(len, grid)) for grid in grids), campaign, self.name)
-        design = Design.from_levels(domain, [np.array(list(product(*grid))) for grid in grids])
-        bounds = design.bounds(campaign(design.points), self.name)
+        points = np.array([point for grid in grids for point in product(*grid)])
+        bounds = bounds_at(campaign, domain, points, self.name)
         signs = campaign.knowledge.stated_signs(domain.names, bounds.outputs)
         return guaranteed_bounds(bounds, campaign, corners_suffice(domain, signs))
 
@@ -144,15 +151,18 @@ class Signed:
 
     def run(self, campaign: Campaign, domain: Domain) -> Bounds:
         """Bounds by the corners that the signs name, guaranteed where all signs are stated."""
-        effects = find_effects(campaign, domain, self.outputs)
+        columns = campaign.output_names(domain)
+        for name in self.outputs:
+            require_choice("output", name, columns)
+        outputs = self.outputs or columns
+        signs = find_effects(campaign, domain, outputs)
         grids = level_grids(domain, inner=True)
-        require_budget(_sample_count(effects, grids), campaign, self.name)
-        levels = zip(effects.signs, grids, strict=True)
-        points = [_level_points(np.unique(signs, axis=0), grid) for signs, grid in levels]
-        design = Design.from_levels(domain, points)
-        at_corners = design.bounds(campaign(design.points), self.name)
+        require_budget(_sample_count(signs, grids), campaign, self.name)
+        levels = zip(signs, grids, strict=True)
+        points = [_level_points(np.unique(x, axis=0), grid) for x, grid in levels]
+        at_corners = bounds_at(campaign, domain, np.concatenate(points), self.name)
         stated = campaign.knowledge.stated_signs(domain.names, at_corners.outputs)
-        proved = corners_suffice(domain, stated) & np.isin(at_corners.outputs, effects.outputs)
+        proved = corners_suffice(domain, stated) & np.isin(at_corners.outputs, outputs)
         guaranteed = guaranteed_bounds(at_corners, campaign, proved)
         bounds = bounds_of_samples(domain, campaign.samples, self.name)
         return replace(
@@ -161,16 +171,16 @@ class Signed:
             natures=guaranteed.natures,
             basis=guaranteed.basis,
             inner=Ends(bounds.lower, bounds.upper),
-            notes=effects.notes(domain),
+            notes=effect_notes(domain, outputs, signs),
         )
 
 
-def _sample_count(effects: Effects, grids: list[list[list[float]]]) -> float:
+def _sample_count(signs: Signs, grids: list[list[list[float]]]) -> float:
     """Number of samples of the signed plan, a float: there may be too many to list."""
     total = 0.0
-    for signs, grid in zip(effects.signs, grids, strict=True):
+    for level_signs, grid in zip(signs, grids, strict=True):
         counts = np.array([len(points) for points in grid], float)
-        patterns = np.unique(signs == 0, axis=0)
+        patterns = np.unique(level_signs == 0, axis=0)
         total += 2 * np.where(patterns, counts, 1.0).prod(axis=1).sum()
     return total
 
@@ -185,37 +195,28 @@ def _level_points(signs: Signs, grid: list[list[float]]) -> Array:
     return np.array(rows)
 
 
-@dataclass(frozen=True)
-class Effects:
-    """Signs of the effects of the inputs on the outputs, shape (levels, outputs, inputs).
+def effect_notes(domain: Domain, outputs: Sequence[str], signs: Signs) -> tuple[str, ...]:
+    """Return a sentence for each effect of unknown sign, with the highest such level.
 
-    They are +1, −1, or 0 where neither holds; an input without width has +1.
+    `signs` are of shape (levels, outputs, inputs), as of `find_effects`.
     """
-
-    outputs: tuple[str, ...]
-    signs: Signs
-
-    def notes(self, domain: Domain) -> tuple[str, ...]:
-        """Return a sentence for each effect of unknown sign, with the highest such level."""
-        return tuple(
-            f"output {output} is not monotone in input {name}, or not surely, up to α ="
-            f" {domain.alpha[np.flatnonzero(signs == 0)[-1]]:g}"
-            for row, output in enumerate(self.outputs)
-            for name, signs in zip(domain.names, self.signs[:, row].T, strict=True)
-            if (signs == 0).any()
-        )
+    return tuple(
+        f"output {output} is not monotone in input {name}, or not surely, up to α ="
+        f" {domain.alpha[np.flatnonzero(by_level == 0)[-1]]:g}"
+        for output, by_input in zip(outputs, np.moveaxis(signs, 0, -1), strict=True)
+        for name, by_level in zip(domain.names, by_input, strict=True)
+        if (by_level == 0).any()
+    )
 
 
-def find_effects(campaign: Campaign, domain: Domain, outputs: tuple[str, ...] = ()) -> Effects:
-    """Return the sign of every input's effect on every output, all or those named, level by level.
+def find_effects(campaign: Campaign, domain: Domain, outputs: tuple[str, ...]) -> Signs:
+    """Return the sign of each input's effect on each output, shape (levels, outputs, inputs).
+
+    It is +1, −1, or 0 where neither holds; an input without width has +1.
 
     Stated signs are tested at pairs of points; the others are observed at probes, from the widest
     box to the narrowest. A sign holds on all narrower boxes.
     """
-    columns = campaign.output_names(domain)
-    for name in outputs:
-        require_choice("output", name, columns)
-    outputs = outputs or columns
     signs = campaign.knowledge.stated_signs(domain.names, outputs)
     lowers, uppers = domain.boxes
     for column in np.flatnonzero(signs.any(axis=0)):
@@ -233,7 +234,7 @@ def find_effects(campaign: Campaign, domain: Domain, outputs: tuple[str, ...] = 
         if (signs == 0).any():
             signs = np.where(signs == 0, _observed_signs(model, box, domain.nominal, signs), signs)
         levels.append(signs)
-    return Effects(outputs, np.array(levels))
+    return np.array(levels)
 
 
 def _sign_test_points(

@@ -13,7 +13,6 @@ from alphacut.fuzzy import (
     Reduced,
     RefusedError,
     Signed,
-    Trapezoidal,
     Triangular,
     levels,
     propagate,
@@ -45,7 +44,6 @@ PROBLEMS = {
     "branin": (branin, {"x": Triangular(-5, 2, 10), "y": Triangular(0, 5, 15)}),
     "inside": (inside, {"x": Triangular(-2, 0.1, 2), "y": Triangular(-2, 0.0, 2)}),
 }
-COARSE = {method.name: method for method in (General(), Reduced(), Signed())}
 
 
 @pytest.fixture(scope="module")
@@ -69,18 +67,6 @@ def test_the_search_finds_the_brute_force_bounds(problem, truth):
     assert (np.abs(result.bounds()[0] - lower) <= 3e-4 * span).all()
     assert (np.abs(result.bounds()[1] - upper) <= 3e-4 * span).all()
     assert result.evaluations == len(result.samples.points)
-
-
-@pytest.mark.parametrize("problem", PROBLEMS)
-@pytest.mark.parametrize("method", COARSE)
-def test_coarse_methods_stay_inside(problem, method, truth):
-    function, inputs = PROBLEMS[problem]
-    result = propagate(function, inputs, COARSE[method], vectorised=True)
-    lower, upper = truth[problem]
-    grid = 3e-3 * (upper[0] - lower[0])
-    assert (result.bounds()[0] >= lower - grid).all()
-    assert (result.bounds()[1] <= upper + grid).all()
-    assert result.nature is Nature.ATTAINED
 
 
 @pytest.mark.parametrize("scale", [1e-13, 1e13])
@@ -254,14 +240,6 @@ def test_shares_of_width():
     assert (shares.share[:, -1] == 0).all()
     grouped = width_shares(run, inputs, groups={"both": ("a", "b")})
     np.testing.assert_allclose(grouped.share[0, :-1], 1)
-
-
-@pytest.mark.parametrize("number", [Trapezoidal(0, 1, 2, 4), Interval(-1, 1)])
-def test_modal_intervals_are_searched_too(number):
-    result = propagate(lambda x: (x - 0.5) ** 2, {"x": number}, Automatic(), alpha=[1.0])
-    low, high = number.cut(1.0)
-    grid = (np.linspace(low, high, 1001) - 0.5) ** 2
-    assert result.bounds() == pytest.approx((grid.min(), grid.max()), abs=1e-6)
 
 
 @pytest.mark.parametrize("method", [Signed(), Reduced(), None])

@@ -4,20 +4,8 @@ from functools import cache
 
 import numpy as np
 import pytest
-from scipy.optimize import minimize_scalar
-from scipy.special import gamma
 
 from alphacut.fuzzy import Interval, Nature, Triangular, propagate
-from alphacut.fuzzy.campaign.call import Call
-from alphacut.fuzzy.campaign.campaign import Campaign
-from alphacut.fuzzy.plans.cut import Bound, CutSearch
-from alphacut.fuzzy.plans.single_linkage import (
-    FIRST_STEP,
-    critical_distance,
-    rows_without_better_neighbour,
-    uncovered_fraction,
-)
-from alphacut.fuzzy.sets.boxes import Domain
 from tests.calibration.functions import named, rastrigin, schwefel, sines
 from tests.calibration.test_functions import shortfall, wide
 
@@ -87,23 +75,6 @@ def test_basins_that_a_long_first_step_leaves_are_found(family, seed):
     assert shortfall(function, inputs, result) <= 1
 
 
-@pytest.mark.parametrize("width", [0.05, 0.15])
-def test_a_descent_ends_in_the_basin_of_its_start(width):
-    """A slope that is steep beside a valley, from which a long first step would not come back."""
-
-    def function(x):
-        return x - 0.5 * np.exp(-(((x - 0.6) / width) ** 2))
-
-    campaign = Campaign(Call(function, ("x",)))
-    cut = CutSearch(campaign, Domain({"x": Interval(0, 1)}, (0.0,)), 0)
-    campaign(np.array([[0.0], [1.0]]))
-    bottom = minimize_scalar(function, bounds=(0.6 - width, 0.6), method="bounded").x
-    start = np.array([0.6 + width / 2])
-    near = cut.descend(start, Bound("y", 1.0), FIRST_STEP)
-    assert near.point[0] == pytest.approx(bottom, abs=1e-4)
-    assert cut.descend(start, Bound("y", 1.0)).point[0] == 0
-
-
 @pytest.mark.parametrize("function", [
     lambda x, y: np.clip(3 * x - 1.5, -0.4, 0.5) + np.maximum(0, 1 - 20 * np.hypot(x, y - 0.5)),
     lambda x, y: np.maximum((x - 0.5) ** 2 + (y - 0.5) ** 2, 0.1),
@@ -156,19 +127,6 @@ def test_what_never_changes_is_attained_without_a_search():
     assert result.natures == (Nature.ESTIMATED, Nature.ATTAINED)
     assert result.evaluations < 100
     assert any(note.startswith("v does not change") for note in result.notes)
-
-
-def test_critical_distance_and_share_are_those_of_the_papers():
-    for d, n in ((1, 100), (3, 200)):
-        ball = np.pi ** (d / 2) / gamma(1 + d / 2) * critical_distance(n, d) ** d
-        assert ball == pytest.approx(4 * np.log(n) / n)
-    assert uncovered_fraction(100, 3) == pytest.approx(12 / 9900)
-
-
-def test_descents_start_where_no_better_sample_is_near():
-    line = np.array([[0.0], [0.1], [0.2], [0.8], [0.9]])
-    starts = rows_without_better_neighbour(line, np.array([1.0, 3.0, 2.0, np.inf, 5.0]), 0.15)
-    assert list(starts) == [0, 2, 4]
 
 
 @pytest.mark.parametrize(

@@ -36,12 +36,6 @@ def test_points_are_ends_and_midpoints_of_the_level_above():
         np.testing.assert_allclose(row, points, rtol=1e-13, atol=1e-13)
 
 
-@pytest.mark.timeout(60)  # 45,000 points; comparing each with all others takes minutes
-def test_points_of_many_levels_take_no_time():
-    points = hanss_points(Triangular(0.0, 0.3, 1.0), levels(300))
-    assert [len(row) for row in points] == list(range(301, 0, -1))
-
-
 def test_fuzzy_intervals_start_from_two_points_and_crisp_inputs_from_one():
     for number, counts in (
         (Trapezoidal(0, 1, 2, 4), [5, 4, 3, 2]),
@@ -74,10 +68,3 @@ def test_bounds_are_attained_where_the_result_says():
             for column, output in enumerate(result.outputs):
                 point = dict(zip(result.inputs, places[level, column], strict=True))
                 assert monotone(**point)[output] == ends[level, column]
-
-
-def test_corners_alone_are_no_recursion():
-    number, alpha = Triangular(0, 1, 3), levels(3000)
-    rows = hanss_points(number, alpha, inner=False)
-    assert [tuple(row) for row in rows[:-1]] == [tuple(number.cut(level)) for level in alpha[:-1]]
-    assert rows[-1] == [1.0]
