@@ -203,8 +203,8 @@ def effect_notes(domain: Domain, outputs: Sequence[str], signs: Signs) -> tuple[
     return tuple(
         f"output {output} is not monotone in input {name}, or not surely, up to α ="
         f" {domain.alpha[np.flatnonzero(by_level == 0)[-1]]:g}"
-        for output, by_input in zip(outputs, np.moveaxis(signs, 0, -1), strict=True)
-        for name, by_level in zip(domain.names, by_input, strict=True)
+        for row, output in enumerate(outputs)
+        for name, by_level in zip(domain.names, signs[:, row].T, strict=True)
         if (by_level == 0).any()
     )
 

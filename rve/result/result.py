@@ -75,8 +75,8 @@ class DeclaredConstants:
     @classmethod
     def from_arrays(cls, names: Sequence[str], values: Array, errors: Array) -> DeclaredConstants:
         """The constants from arrays in the order of their names."""
-        pairs = (zip(names, array.tolist(), strict=True) for array in (values, errors))
-        return cls(*map(dict, pairs))
+        by_name = [dict(zip(names, map(float, x), strict=True)) for x in (values, errors)]
+        return cls(*by_name)
 
 
 STEP = 1e-30  # of complex-step derivatives, which have no cancellation
