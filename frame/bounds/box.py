@@ -98,23 +98,21 @@ class Box:
     def reached(self, unit: Array, node: Ints, output: Ints) -> tuple[Array, Array]:
         """Exact values of one output at one node for each of S points, and their rounding, (S,).
 
-        Points are unit coordinates (S, d); modes are found once for each distinct one.
+        Points are unit coordinates (S, d); modes are found once for all nodes of a point, about.
         """
-        points, index = np.unique(unit, axis=0, return_inverse=True)
         values_and_errors = np.empty((2, len(unit)))
+        by_point = np.unique(unit, axis=0, return_inverse=True)[1].argsort()
         count = max(MAX_ENTRIES // len(self.structure.pattern) ** 2, 1)
-        for first in range(0, len(points), count):
-            modal = self._modal(points[first : first + count])
-            inside = np.flatnonzero((index >= first) & (index < first + count))
-            for rows in np.array_split(inside, -(-len(inside) // count)):
-                point, nodes = index[rows] - first, node[rows]
-                loads = {
-                    name: load_at_nodes(modal.sigma[point], load, self.time, nodes)
-                    for name, load in self.loads.items()
-                }
-                values_and_errors[:, rows] = outputs_at(
-                    modal, point, output[rows], self.time[nodes], loads
-                )
+        for rows in np.array_split(by_point, -(-len(unit) // count)):
+            points, point = np.unique(unit[rows], axis=0, return_inverse=True)
+            modal, nodes = self._modal(points), node[rows]
+            loads = {
+                name: load_at_nodes(modal.sigma[point], load, self.time, nodes)
+                for name, load in self.loads.items()
+            }
+            values_and_errors[:, rows] = outputs_at(
+                modal, point, output[rows], self.time[nodes], loads
+            )
         return values_and_errors[0], values_and_errors[1]
 
     def centre_motion(self) -> tuple[Array, Array, Array]:

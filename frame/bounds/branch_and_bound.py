@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
@@ -46,8 +45,8 @@ def enclosed(
 ) -> tuple[Array, int]:
     """Upper bounds of side × output for all N problems of `optima`, by spatial branch and bound.
 
-    A problem is an output at a node on a side. Better points that are met replace those of
-    `optima`, in place.
+    A problem is an output at a node on a side: number node · 2 m + 2 output + (1 for upper bounds).
+    Better points that are met replace those of `optima`, in place.
 
     Args:
         model: The modal model.
@@ -62,108 +61,87 @@ def enclosed(
     Returns:
         Proved upper bounds (N,), and the number of examined pairs of a box and a problem.
     """
-    tree = Tree(model, lower, upper, optima, gap)
-    examined, n_problems = 0, len(optima.value)
+    examined, n_problems, remainder = 0, len(optima.value), Remainder(model, lower, upper)
     frontier = Frontier.of_box(len(lower), n_problems)
+
+    def examined_piece(boxes: slice, items: slice) -> tuple[Array, Array, Array]:
+        target = optima.value + gap
+        return examine_items(model, (lower, upper), remainder, target, frontier, boxes, items)
+
     with ThreadPoolExecutor(workers) as pool:
         while len(frontier) and examined + len(frontier) <= budget * n_problems:
             examined += len(frontier)
-            pieces = zip(*frontier.pieces(PIECE), strict=True)
-            results = pool.map(partial(tree.examine, frontier), *pieces)
+            results = pool.map(examined_piece, *zip(*frontier.pieces(PIECE), strict=True))
             code, value, _ = (np.concatenate(x) for x in zip(*results, strict=True))
             higher = np.flatnonzero(value > optima.value[frontier.problem] + HIGHER)
             if len(higher):  # the incumbent is the best of centres, refined
-                tree.improve(frontier, higher[np.argsort(value[higher])], value)
+                higher = higher[np.argsort(value[higher])]
+                problems, centre = frontier.problem[higher], frontier.geometry(lower, upper)[0]
+                optima.point[problems] = centre[frontier.box[higher]]
+                optima.value[problems] = value[higher]
+                refine(model, optima, np.unique(problems), lower, upper, gap / 100)
             frontier = frontier.children(code)
             if progress:
                 progress(1 - len(np.unique(frontier.problem)) / n_problems)
-    return tree.proved(frontier), examined  # boxes that are still open keep their own bounds
+    proved = optima.value + gap
+    for boxes, items in frontier.pieces(PIECE):  # boxes that are still open keep their own bounds
+        np.maximum.at(proved, frontier.problem[items], examined_piece(boxes, items)[2])
+    return proved, examined
 
 
-class Tree:
-    """Boxes of one domain and the problems that share them.
+def examine_items(
+    model: ModalModel,
+    domain: tuple[Array, Array],
+    remainder: Remainder,
+    target: Array,
+    frontier: Frontier,
+    boxes: slice,
+    items: slice,
+) -> tuple[Array, Array, Array]:
+    """Codes, values at centres and upper bounds of some items of some boxes by `kernel.examine`.
 
-    A problem is an output at a node on a side: number node · 2 m + 2 output + (1 for upper bounds).
-
-    Attributes:
-        optima: Best points and values of all N problems so far, which improve.
-        remainder: Of quadratic Taylor models over the domain.
-        gap: What the bounds may lie above the best values by.
+    `domain` are the ends of all boxes together, (d,) each, `remainder` that of quadratic Taylor
+    models over it, and `target` (N,) the values below which problems are fathomed.
     """
+    centre, radius, edges = frontier.geometry(*domain, boxes)
+    n, m, d = model.count, len(model.outputs), centre.shape[1]
+    box, problem = frontier.box[items] - boxes.start, frontier.problem[items]
+    node, column = np.divmod(problem, 2 * m)
+    is_new_row = np.append(True, (np.diff(box) != 0) | (np.diff(node) != 0))
+    begin = np.flatnonzero(is_new_row)  # of rows, each a box at a node
+    row_box, row_node = box[begin], node[begin]
+    jets = model.together.jets(centre).swapaxes(0, 1)  # (q, B, n + P n m)
+    rate, share = jets[..., :n], jets[..., n:].reshape(*jets.shape[:2], -1, n, m)
+    waves = np.stack([np.stack(w, 1) for w in model.waves(rate[0, row_box], row_node)], 1)
+    starts = np.searchsorted(row_box, np.arange(len(centre) + 1)), np.append(begin, len(box))
+    outcome: tuple[Array, Array, Array] = examine(
+        (*starts, row_node, column),
+        (radius, edges, _tables(rate, share, d)),
+        _in_planes(waves).reshape(len(begin), -1),
+        model.time,
+        _linear_phases(remainder, radius, rate[1 : 1 + d], share[0, :, 0]),
+        (remainder.tensor, remainder.margin),
+        target,
+        not model.loads,
+    )
+    return outcome
 
-    def __init__(
-        self, model: ModalModel, lower: Array, upper: Array, optima: Optima, gap: float
-    ) -> None:
-        self.model, self.lower, self.upper = model, lower, upper
-        self.optima, self.gap = optima, gap
-        self.remainder = Remainder(model, lower, upper)
 
-    def proved(self, frontier: Frontier) -> Array:
-        """Upper bounds of all problems, where the boxes of a frontier are left open, (N,)."""
-        upper = self.optima.value + self.gap
-        for part in frontier.pieces(PIECE):
-            bound = self.examine(frontier, *part)[2]
-            np.maximum.at(upper, frontier.problem[part[1]], bound)
-        return np.asarray(upper)
-
-    def examine(self, frontier: Frontier, boxes: slice, items: slice) -> tuple[Array, Array, Array]:
-        """Codes, values at centres and upper bounds of items (I,) of boxes by `kernel.examine`."""
-        model, d = self.model, len(self.lower)
-        n, m = model.count, len(model.outputs)
-        centre, radius, edges = frontier.geometry(self.lower, self.upper, boxes)
-        box, problem = frontier.box[items] - boxes.start, frontier.problem[items]
-        node, column = np.divmod(problem, 2 * m)
-        is_new_row = np.append(True, (np.diff(box) != 0) | (np.diff(node) != 0))
-        begin = np.flatnonzero(is_new_row)  # of rows, each a box at a node
-        row_box, row_node = box[begin], node[begin]
-        jets = model.together.jets(centre).swapaxes(0, 1)  # (q, B, n + P n m)
-        rate, share = jets[..., :n], jets[..., n:].reshape(*jets.shape[:2], -1, n, m)
-        waves = np.stack([np.stack(w, 1) for w in model.waves(rate[0, row_box], row_node)], 1)
-        starts = np.searchsorted(row_box, np.arange(len(centre) + 1)), np.append(begin, len(box))
-        outcome: tuple[Array, Array, Array] = examine(
-            (*starts, row_node, column),
-            (radius, edges, _tables(rate, share, d)),
-            _in_planes(waves).reshape(len(begin), -1),
-            model.time,
-            self._linear_phases(radius, rate[1 : 1 + d], share[0, :, 0]),
-            (self.remainder.tensor, self.remainder.margin),
-            self.optima.value + self.gap,
-            not model.loads,
-        )
-        return outcome
-
-    def _linear_phases(self, radius: Array, slopes: Array, share: Array) -> tuple[Array, ...]:
-        """`modes` of `kernel.linear_phase_bound` for B boxes; `slopes` (d, B, n) are those of λ."""
-        slopes, (count, n, m) = slopes.swapaxes(0, 1), share.shape
-        phase, decay = (
-            np.einsum("bd,bdn->bn", radius, np.abs(x)) for x in (slopes.imag, slopes.real)
-        )
-        products = [np.ones((count, 1))]  # of no radii to three: 1, r_i, r_i r_j, r_i r_j r_k
-        for _ in range(3):
-            products.append((products[-1][..., None] * radius[:, None]).reshape(count, -1))
-        of_rate, of_share = (
-            np.stack(
-                [p @ x.reshape(p.shape[1], -1) for p, x in zip(products, bounds, strict=True)], 1
-            )
-            for bounds in (self.remainder.rate, self.remainder.share)
-        )
-        slope = np.ascontiguousarray(slopes.imag.swapaxes(1, 2))
-        return (
-            _in_planes(share),
-            slope,
-            phase,
-            decay,
-            of_rate[:, 2:],
-            of_share.reshape(count, 4, n, m),
-        )
-
-    def improve(self, frontier: Frontier, items: Ints, value: Array) -> None:
-        """Replace incumbents by the centres of higher `items`, rising, and refine them (Newton)."""
-        problems, centre = frontier.problem[items], frontier.geometry(self.lower, self.upper)[0]
-        self.optima.point[problems] = centre[frontier.box[items]]
-        self.optima.value[problems] = value[items]
-        which = np.unique(problems)
-        refine(self.model, self.optima, which, self.lower, self.upper, self.gap / 100)
+def _linear_phases(
+    remainder: Remainder, radius: Array, slopes: Array, share: Array
+) -> tuple[Array, ...]:
+    """`modes` of `kernel.linear_phase_bound` for B boxes; `slopes` (d, B, n) are those of λ."""
+    slopes, (count, n, m) = slopes.swapaxes(0, 1), share.shape
+    phase, decay = (np.einsum("bd,bdn->bn", radius, np.abs(x)) for x in (slopes.imag, slopes.real))
+    products = [np.ones((count, 1))]  # of no radii to three: 1, r_i, r_i r_j, r_i r_j r_k
+    for _ in range(3):
+        products.append((products[-1][..., None] * radius[:, None]).reshape(count, -1))
+    of_rate, of_share = (
+        np.stack([p @ x.reshape(p.shape[1], -1) for p, x in zip(products, bounds, strict=True)], 1)
+        for bounds in (remainder.rate, remainder.share)
+    )
+    slope = np.ascontiguousarray(slopes.imag.swapaxes(1, 2))
+    return _in_planes(share), slope, phase, decay, of_rate[:, 2:], of_share.reshape(count, 4, n, m)
 
 
 @dataclass(frozen=True, eq=False)

@@ -185,7 +185,7 @@ def expand_output(w: Array, table: Array, J: Array, H: Array) -> None:
 
 @compiled
 def examine(
-    frame: tuple[Ints, ...],
+    rows: tuple[Ints, ...],
     boxes: tuple[Array, ...],
     waves: Array,
     time: Array,
@@ -204,7 +204,7 @@ def examine(
         output at the centres, and upper bounds over the boxes, each with an entry for each item.
 
     Args:
-        frame: First row of each box, first item of each row, node of each row, column of each item
+        rows: First row of each box, first item of each row, node of each row, column of each item
             (2 output + 1 for upper bounds).
         boxes: Radius, which faces lie on the domain's, and tables from waves to jets (B, m, K, q).
         waves: Waves of all modes at the rows, real and imaginary parts, shape (R, K).
@@ -214,7 +214,7 @@ def examine(
         target: Best value of each problem with the gap asked for.
         has_linear_phases: Whether modes with linear phases are tried as bounds.
     """
-    row_start, item_start, nodes, column = frame
+    row_start, item_start, nodes, column = rows
     radius, edges, tables = boxes
     share, slope, phase, decay, of_rates, of_shares = linear_phases
     third, margin = remainder

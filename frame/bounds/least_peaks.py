@@ -11,8 +11,8 @@ and the shares keep their ranges.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from heapq import heappush, heapreplace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,13 +22,12 @@ from alphacut.frame.bounds.level import LevelModels, OutputBounds
 from alphacut.fuzzy.arrays import Array, Ints
 
 
-@dataclass(order=True)
-class PeakCell:
-    """A cell with its bound.
+class PeakCell(NamedTuple):
+    """A cell with its bound; cells are ordered by bounds, and equal ones by number.
 
     Args:
         bound: Lower bound of the peak over it.
-        number: Of the cell, which decides between equal bounds.
+        number: Of the cell.
         ends: First and last point of the modes' tables along ω and q, shape (K, 4).
         node: Node of the bound.
         at: Coordinates that the bound names, shape (d,).
@@ -36,9 +35,9 @@ class PeakCell:
 
     bound: float
     number: int
-    ends: Ints = field(compare=False)
-    node: int = field(compare=False)
-    at: Array = field(compare=False)
+    ends: Ints
+    node: int
+    at: Array
 
 
 def least_peak(level: LevelModels, output: int) -> tuple[float, Array]:
@@ -76,23 +75,21 @@ def _bounded_cell(
     size = np.abs(expected)
     is_peak = np.append(True, size[1:] >= size[:-1]) & np.append(size[:-1] >= size[1:], True)
     nodes = np.argsort(np.where(is_peak, size, -1.0))[-int(numbers.LEAST_PEAK_NODES) :][::-1]
-    cell = PeakCell(known, number, ends, int(nodes[0]), np.zeros(sides[0].at.shape[1]))
-    highest = -np.inf
+    highest, highest_node, at = -np.inf, int(nodes[0]), np.zeros(sides[0].at.shape[1])
     for node in map(int, nodes):
         if size[node] <= highest:
             break
         bounds = sides[int(expected[node] < 0)]  # where the output is positive, of −output
         mu, weight = np.zeros((2, len(bounds.data.linear)))
-        u, steps = np.zeros_like(cell.at), int(numbers.LEAST_PEAK_STEPS)
+        u, steps = np.zeros_like(at), int(numbers.LEAST_PEAK_STEPS)
         dual = minimise(
             *(mu, ends, node, bounds.side, bounds.data, steps, int(numbers.PATIENCE)),
             *(-1e300, -size[node], weight, u),
         )
         least = -(dual + float(bounds.constant[:, node].sum()))
         if least > highest:
-            highest, cell.node, cell.at = least, node, u
-    cell.bound = max(highest, known)
-    return cell
+            highest, highest_node, at = least, node, u
+    return PeakCell(max(highest, known), number, ends, highest_node, at)
 
 
 def _halves(cell: PeakCell, motion: Array) -> list[Ints]:

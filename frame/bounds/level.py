@@ -53,10 +53,6 @@ class ResponseTables:
     grids: list[Grid]
     time: Array
 
-    def __post_init__(self) -> None:
-        for value in self.value.values():
-            require_in_range({"table": value})
-
 
 def response_tables(
     oscillators: Sequence[Oscillator], excitation: Excitation, orders: Ints
@@ -84,6 +80,7 @@ def response_tables(
         error[order] = np.array([[x.error for x in mode] for mode in modes])
         error[order] += rounding * np.abs(value[order]).max(-1)
         deviation[order] = np.array([[x.line_deviation for x in mode] for mode in modes])
+        require_in_range({"table": value[order]})
     return ResponseTables(value, error, deviation, grids, time)
 
 
@@ -106,18 +103,11 @@ class LevelModels:
         structure: The structure over the level's box.
         models: Its motion.
         tables: Responses of its oscillators.
-        sources: Names of what moves the structure.
     """
 
     structure: Classical
     models: MotionModels
     tables: ResponseTables
-    sources: tuple[str, ...]
-
-    @property
-    def oscillators(self) -> list[Oscillator]:
-        """Oscillators, one for each mode that is enclosed."""
-        return self.models.oscillators
 
     def within(self, low: Array, high: Array) -> LevelModels:
         """Models over the part low ≤ u ≤ high of the box, with the same response tables."""
@@ -143,14 +133,14 @@ class LevelModels:
         excitation = (loads, time, sources)
         models = MotionModels.from_structure(structure, excitation, allowed)
         tables = response_tables(models.oscillators, excitation, structure.order)
-        return cls(structure, models, tables, sources)
+        return cls(structure, models, tables)
 
     def line_deviation(self) -> Array:
         """Bound of how far outputs stray from straight lines in the step to each node, (T, m)."""
         deviation: Array = self.models.line_deviation.copy()
         for o, order in enumerate(map(int, self.structure.order)):
             tables = self.tables.line_deviation[order]
-            for mode, table in zip(self.oscillators, tables, strict=True):
+            for mode, table in zip(self.models.oscillators, tables, strict=True):
                 deviation[:, o] += mode.share.size()[:, o] @ table
             for truncated in self.models.truncated:
                 deviation[:, o] += truncated.line_deviation[:, o]
@@ -248,7 +238,7 @@ def _data(level: LevelModels, o: int, side: float) -> tuple[Data, Array]:
     Raises:
         UnprovedError: A number is out of the range of the dual function.
     """
-    modes, order = level.oscillators, int(level.structure.order[o])
+    modes, order = level.models.oscillators, int(level.structure.order[o])
     models = [(mode.omega[None], mode.decay[None], mode.share[:, o]) for mode in modes]
     variables = concatenate([x for of_mode in models for x in of_mode], -1)
     spread = np.maximum(variables.spread(), 1e-9 * np.abs(variables.value))
@@ -256,7 +246,7 @@ def _data(level: LevelModels, o: int, side: float) -> tuple[Data, Array]:
     linear, quadratic, cubic, remainder = _scaled(variables, radius)
     expected = numbers.EXPECTED_CUBIC * np.asarray(np.abs(cubic).sum(1))
     # of the sums that multipliers enter; scaled variables are at most 1, those of tables 2 or so
-    of_sums = 8 * gamma(roundings(len(modes), len(level.sources), linear.shape[1]))
+    of_sums = 8 * gamma(roundings(len(modes), modes[0].share.shape[0], linear.shape[1]))
     grids, value = level.tables.grids, level.tables.value[order]
     centres, radii = (x.reshape(len(modes), -1) for x in (variables.value, radius))
     omega = np.stack([np.tile(grid.omega, len(grid.quotient)) for grid in grids])
@@ -299,12 +289,12 @@ def _truncation_terms(level: LevelModels, o: int, side: float) -> tuple[list[Arr
     Returns the three fields of `Data` on truncated modes, for what depends on the inputs, and
     constants to add to the model's value for the motion's, and to that for its bound, (2, T).
     """
-    tables, order = level.tables, int(level.structure.order[o])
+    modes, tables, order = level.models.oscillators, level.tables, int(level.structure.order[o])
     constant: Array = np.zeros((2, len(tables.time)))
     constant[1] = level.models.added[:, o]
-    for mode, error in zip(level.oscillators, tables.error[order], strict=True):
+    for mode, error in zip(modes, tables.error[order], strict=True):
         constant[1] += mode.share.size()[:, o] @ error
-    d, sources = level.structure.rayleigh.inputs, len(level.sources)
+    d, sources = level.structure.rayleigh.inputs, modes[0].share.shape[0]
     if not level.models.truncated:
         return [np.zeros((0, x)) for x in (1, d, d * (d + 1) // 2)], constant
     waves, models = list[Array](), list[TaylorModel]()
@@ -318,7 +308,7 @@ def _truncation_terms(level: LevelModels, o: int, side: float) -> tuple[list[Arr
     linear, quadratic, cubic, remainder = _scaled(model, np.ones(len(wave)))
     constant[1] += (remainder + np.abs(cubic).sum(1)) @ np.abs(wave)
     size = np.abs(linear).sum(1) + np.abs(quadratic).sum(1)
-    constant[1] += gamma(roundings(len(level.oscillators), sources, d)) * (size @ np.abs(wave))
+    constant[1] += gamma(roundings(len(modes), sources, d)) * (size @ np.abs(wave))
     constant[1] += gamma(len(wave) + 4) * np.abs(constant).sum(0)
     return [wave, linear, quadratic], constant
 

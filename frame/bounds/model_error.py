@@ -174,16 +174,11 @@ def _ratio_errors(structure: DampedStructure, modes: DampedModes, norms: EnergyN
 
 def _start_errors(structure: DampedStructure, modes: DampedModes, norms: EnergyNorms) -> Array:
     """Bounds of the sources' initial conditions' defects in the norm of energy, (S,)."""
-    q, v = (2.0 * _sum_of_modes(x.real) for x in (modes.shape, modes.velocity))
+    twice = np.full((1, modes.shape.shape[1]), 2.0)  # the sum over modes and their conjugates
+    q, v = ((twice @ x.real)[:, 0] for x in (modes.shape, modes.velocity))
     spring = q @ structure.stiffness - structure.static.T
     momentum = v @ structure.mass - structure.impulse.T
     return np.hypot(norms.of_spring_force(spring.size()), norms.of_force(momentum.size()))
-
-
-def _sum_of_modes(x: TaylorModel) -> TaylorModel:
-    """Sum over modes, (S, N) of (S, n, N)."""
-    n = x.shape[1]
-    return (np.ones((1, n)) @ x)[:, 0]
 
 
 def derivative_bounds(polynomials: TaylorModel, reach: Array) -> list[Array]:
@@ -292,10 +287,8 @@ class Remainder:
     def __init__(self, model: ModalModel, lower: Array, upper: Array) -> None:
         d, n, m = len(lower), model.count, len(model.outputs)
         reach, width = np.maximum(np.abs(lower), np.abs(upper)), upper - lower
-        rate, growth = (
-            derivative_bounds(model.eigenvalue, reach),
-            largest_growth(model.eigenvalue, reach),
-        )
+        rate = derivative_bounds(model.eigenvalue, reach)
+        growth = largest_growth(model.eigenvalue, reach)
         third = np.zeros((len(model.time), m, d, d, d))
         margin = np.zeros((len(model.time), m, 1 + d))
         for part in motion_parts(model, growth):
@@ -314,7 +307,8 @@ class Remainder:
                 values = sizes[0] + np.einsum("tim,i->tm", mean_slope, width)
                 margin[..., 0] += noise[:, k, None] * values
                 margin[..., 1:] += noise[:, k, None, None] * np.moveaxis(slopes, -1, 1)
-        third[model.time == 0] = _initial_third_derivatives(model, reach)
+        at_start = np.full(n, 2.0) @ model.coefficient.real  # where most modes cancel
+        third[model.time == 0] = np.moveaxis(derivative_bounds(at_start, reach)[3], -1, 0)
         self.tensor, self.margin, self.rate, self.share = (1 + 1e-9) * third, margin, rate, share
 
 
@@ -328,12 +322,6 @@ def _rounding_bound(model: ModalModel, rate: Array, load: LoadTables | None) -> 
     if load is not None:
         operations = operations + (8 * len(model.time) + SERIES_TERMS) * np.exp(REACH)
     return np.finfo(float).eps * operations
-
-
-def _initial_third_derivatives(model: ModalModel, reach: Array) -> Array:
-    """Bounds of the outputs' third derivatives at t = 0, (m, d, d, d), where most modes cancel."""
-    sum_of_modes = np.full(model.count, 2.0) @ model.coefficient.real
-    return np.moveaxis(derivative_bounds(sum_of_modes, reach)[3], -1, 0)
 
 
 def leibniz(c: list[Array], r: list[Array], order: int) -> list[Array]:

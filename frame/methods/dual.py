@@ -179,7 +179,7 @@ class DualProof:
             remaining=remaining,
             pruned=pruned,
             least_peaks=least,
-            facts={"single_modes": len(level.oscillators)},
+            facts={"single_modes": len(level.models.oscillators)},
         )
 
     def _minimise(

@@ -1,6 +1,5 @@
 """Ingredients of a proof on cases where they nearly are the truth: halved, none would cover it."""
 
-from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +7,7 @@ import pytest
 from scipy.integrate import cumulative_trapezoid
 
 from alphacut.frame import Accelerogram, Exact, LinearFlow, Midpoint, StoreyFrame
-from alphacut.frame.bounds.branch_and_bound import Frontier, Tree, enclosed
+from alphacut.frame.bounds.branch_and_bound import Frontier, enclosed, examine_items
 from alphacut.frame.bounds.kernel import stays_below
 from alphacut.frame.bounds.model_error import (
     Remainder,
@@ -16,7 +15,7 @@ from alphacut.frame.bounds.model_error import (
     motion_parts,
     proved_error,
 )
-from alphacut.frame.bounds.newton import Optima, first_optima
+from alphacut.frame.bounds.newton import Optima
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.methods.proof import bound_levels
@@ -161,15 +160,14 @@ def test_branch_and_bound_needs_all_of_the_remainder(start, gap, budget) -> None
     assert 1 <= proved[3] <= 1.02
 
 
-def least_closed(tree: Tree) -> np.ndarray:
-    """Of each problem the least target below which its whole box is closed, shape (N,)."""
-    frontier = Frontier.of_box(len(tree.lower), len(tree.optima.value))
-    low, high = (np.full(len(tree.optima.value), end) for end in (-2.5, 2.5))
+def least_closed(model: ModalModel) -> np.ndarray:
+    """Of each problem the least target below which its whole box [−1, 1] is closed, shape (N,)."""
+    ends, count = np.ones(1), 2 * len(model.time)
+    frontier, given = Frontier.of_box(1, count), (slice(0, 1), slice(0, count))
+    low, high, remainder = np.full(count, -2.5), np.full(count, 2.5), Remainder(model, -ends, ends)
     for _ in range(30):
         target = (low + high) / 2
-        aimed = copy(tree)
-        aimed.optima, aimed.gap = replace(tree.optima, value=target), 0.0
-        code = aimed.examine(frontier, slice(0, 1), slice(0, len(frontier)))[0]
+        code = examine_items(model, (-ends, ends), remainder, target, frontier, *given)[0]
         low, high = np.where(code, target, low), np.where(code, high, target)
     return high
 
@@ -184,9 +182,8 @@ def turning() -> ModalModel:
 @pytest.mark.parametrize("even", [True, False])
 def test_a_box_is_closed_where_its_mode_allows_no_more(even: bool) -> None:
     """At all phases of a mode, whose phase is linear over the box, or is not."""
-    model, ends = turning() if even else spring(1.0, None, 12.0, 0.1), np.ones(1)
-    optima = first_optima(model, 0 * ends, 0 * ends, 1.0)
-    closed = least_closed(Tree(model, -ends, ends, optima, 1e-6)).reshape(-1, 2)
+    model = turning() if even else spring(1.0, None, 12.0, 0.1)
+    closed = least_closed(model).reshape(-1, 2)
     values = model.values(np.linspace(-1, 1, 2001)[:, None])[..., 0]
     truth = np.stack([-values.min(0), values.max(0)], 1)
     assert (closed >= truth - 1e-7).all()

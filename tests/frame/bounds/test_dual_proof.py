@@ -180,7 +180,7 @@ def test_any_multipliers_bound_any_motion():
         for s, side in enumerate((-1.0, 1.0)):
             problem = OutputBounds.initial(level, o, s, 1.0)
             columns, rows = problem.data.points.astype(int)
-            whole = np.tile([0, columns - 1, 0, rows - 1], (len(level.oscillators), 1))
+            whole = np.tile([0, columns - 1, 0, rows - 1], (len(level.models.oscillators), 1))
             for node in range(1, len(time)):
                 size = np.abs(values[:, node, o]).max() * 10.0 ** rng.uniform(-2, 1)
                 mu = size * rng.normal(size=len(problem.data.linear))

@@ -266,7 +266,7 @@ def test_tables_of_the_dual_have_the_rounding_of_all_sums_they_enter():
     level = LevelModels.from_structure(structure, {"load": RECORD}, time, sources)
     unit, d = np.finfo(float).eps / 2, 4
     # a term enters sums over all variables, over pairs and single inputs, and over sources
-    count = 2 * len(level.oscillators) * (len(sources) + 2)
+    count = 2 * len(level.models.oscillators) * (len(sources) + 2)
     count += 2 * d**2 + 4 * d + 4 * len(sources) + 32
     for k, grid in enumerate(level.tables.grids):
         alone = Oscillators(grid, {"load": RECORD}, time, {0})

@@ -165,7 +165,7 @@ def test_modes_over_a_narrow_box_are_off_by_their_rounding_at_most(stiff):
     frame, box, rng = drawn(1, stiff, RECORD)
     radius = 1e-9 * box.centre
     narrow = Box(frame, box.names, box.time, box.centre - radius, box.centre + radius)
-    single = narrow.level().oscillators
+    single = narrow.level().models.oscillators
     assert len(single) == 3
     ends = [
         (mp.mpf(float(a)), mp.mpf(float(b))) for a, b in zip(narrow.low, narrow.high, strict=True)
