@@ -41,39 +41,35 @@ def modulus(options: argparse.Namespace, out: TextIO) -> int:
     with open_results(options) as (case, store):
         results = Results(case.content)
         Pipeline(results, store, options.petsc).compute_modulus()
-    if results.image is not None:
-        image = results.image.numbers
-        text = text_table(*shown(tables.image(image))) + image_text(image)
-        write_answer(options, dict(image), out, text)
-    elif results.modulus is not None:
-        cell = results.modulus.numbers
-        text = text_table(*shown(tables.modulus(cell))) + modulus_text(cell)
-        write_answer(options, dict(cell), out, text)
+    result = results.modulus or results.image
+    assert result is not None
+    part: ModulusResult | ImageResult = result.numbers
+    words = image_text(part) if isinstance(part, ImageResult) else modulus_text(part)
+    write_answer(options, dict(part), out, text_table(*shown(tables.modulus(part))) + words)
     return 0
 
 
 def image_text(result: ImageResult) -> str:
     """Lines on an image: its constants, area fractions, and what widens the bounds of E."""
     shares = (f"{name}: {share:.1%} of the area\n" for name, share in result.fractions.items())
-    constants = constants_text(result, result.cuts.alpha, Nature.GUARANTEED)
+    constants = constants_text(result, Nature.GUARANTEED)
     return f"{constants}{''.join(shares)}{width_text(result)}\n"
 
 
 def modulus_text(result: ModulusResult) -> str:
     """Lines on a modulus: constants on the lowest and highest level, references, and the cost."""
-    alpha = result.alpha
     return (
-        cuts_text("of fibres", result.fibres, alpha, result.nature)
-        + constants_text(result, alpha, Nature.ATTAINED)
+        cuts_text("of fibres", result.fibres, result.alpha, result.nature)
+        + constants_text(result, Nature.ATTAINED)
         + ("" if result.error else GALERKIN)
         + f"{result.samples} samples, {result.solves} linear systems,"
         f" {result.seconds:.1f} s, {result.method}\n"
     )
 
 
-def constants_text(part: ModulusResult | ImageResult, alpha: Array, nature: Nature) -> str:
+def constants_text(part: ModulusResult | ImageResult, nature: Nature) -> str:
     """Constants along x and y by definition, loss factors, and the bounds of an isotropic E."""
-    text = "".join(cuts_text(name, cuts, alpha, nature) for name, cuts in part.plane.items())
+    text = "".join(cuts_text(name, cuts, part.alpha, nature) for name, cuts in part.plane.items())
     if len(part.plane) == 1:
         text += f"{ONLY}\n"
     if (loss := part.loss) is not None:

@@ -130,23 +130,25 @@ def fragility(section: FragilitySection, response: FuzzyResponse) -> FragilityAn
         critical[ANY] = of_any_limit(list(critical.values()))
         natures[ANY] = Nature.weakest(natures.values())
 
-    def limit_fragility(name: str, critical: CriticalMeasures) -> LimitFragility:
-        grid = measure_grid(critical)
-        has_spread = len(critical.low) > 1  # one record has no dispersion
-        confidence = critical.confidence_band(grid) if section.independent else None
-        return LimitFragility.of(
+    answers = {}
+    for name, ends in critical.items():
+        finite = ends.high[np.isfinite(ends.high)]
+        largest = float(finite.max()) if finite.size else float(ends.low_reached.max())
+        # from below the least critical measure to above the greatest that is finite
+        grid: Array = np.linspace(0.8 * float(ends.low.min()), 1.1 * largest, POINTS, dtype=float)
+        has_spread = len(ends.low) > 1  # one record has no dispersion
+        answers[name] = LimitFragility.of(
             section,
             name,
             response.structure,
             nature=natures[name],
-            critical={x.name: getattr(critical, x.name).T for x in fields(critical)},
+            critical={x.name: getattr(ends, x.name).T for x in fields(ends)},
             measure=grid,
-            band=critical.band(grid)._asdict(),
-            median=critical.median._asdict(),
-            dispersion=critical.dispersion._asdict() if has_spread else None,
-            confidence=None if confidence is None else confidence._asdict(),
+            band=ends.band(grid)._asdict(),
+            median=ends.median._asdict(),
+            dispersion=ends.dispersion._asdict() if has_spread else None,
+            confidence=ends.confidence_band(grid)._asdict() if section.independent else None,
         )
-
     return FragilityAnswer(
         alpha=np.array(response.alpha),
         measure=section.measure,
@@ -154,12 +156,5 @@ def fragility(section: FragilitySection, response: FuzzyResponse) -> FragilityAn
         period_s=suite.period,
         damping_ratio=suite.ratio,
         record_names=tuple(suite.peaks),
-        limits={name: limit_fragility(name, x) for name, x in critical.items()},
+        limits=answers,
     )
-
-
-def measure_grid(critical: CriticalMeasures) -> Array:
-    """Measures from below the least critical one to above the greatest that is finite."""
-    finite = critical.high[np.isfinite(critical.high)]
-    largest = float(finite.max()) if finite.size else float(critical.low_reached.max())
-    return np.asarray(np.linspace(0.8 * float(critical.low.min()), 1.1 * largest, POINTS), float)

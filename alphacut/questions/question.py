@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Generic, Self, TypeVar
+from typing import ClassVar, Generic, NamedTuple, Self, TypeVar
 
 from alphacut.case.limits import QuestionSection, Side
 from alphacut.case.structure import Structure
@@ -17,6 +17,15 @@ from alphacut.io.quantity import engineering
 from alphacut.stages.store import Numbers, Values
 
 Row = tuple[str, ...]
+
+
+class Table(NamedTuple):
+    """Titles of the columns, and rows of texts."""
+
+    head: Row
+    rows: list[Row]
+
+
 Texts = dict[str, str]
 """Texts of a row by the titles of their columns."""
 Record = dict[str, str | float | None]
@@ -74,8 +83,8 @@ class Answer(Numbers):
     caption: ClassVar[str]
 
     @abstractmethod
-    def rows(self) -> list[Texts]:
-        """The answer as a table of texts: what, answer and nature are the first three columns."""
+    def table(self) -> Table:
+        """The answer as texts: what, answer and nature are the first three columns."""
 
     @abstractmethod
     def records(self) -> list[Record]:
@@ -84,11 +93,6 @@ class Answer(Numbers):
     @abstractmethod
     def words(self) -> str:
         """Sentences on how to read it."""
-
-    def table(self) -> tuple[Row, list[Row]]:
-        """Titles of the columns, and rows of texts."""
-        rows = self.rows()
-        return tuple(rows[0]), [tuple(row.values()) for row in rows]
 
 
 class LimitAnswer(Numbers):
@@ -155,8 +159,13 @@ class LimitsAnswer(Answer, Generic[L]):
         """Yields the numbers of a limit, a record a row; output, unit and limit stand before."""
 
     def rows(self) -> list[Texts]:
-        """A row for each limit."""
+        """A row of texts for each limit."""
         return [self.texts_of(limit) for limit in self.limits.values()]
+
+    def table(self) -> Table:
+        """The rows of texts under their titles."""
+        rows = self.rows()
+        return Table(tuple(rows[0]), [tuple(row.values()) for row in rows])
 
     def records(self) -> list[Record]:
         """The rows of each limit."""

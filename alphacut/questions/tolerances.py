@@ -12,7 +12,7 @@ from alphacut.frame.structures.quantities import of_storey_frame
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature, rounded
 from alphacut.io.quantity import MINUS
-from alphacut.questions.question import Answer, FuzzyResponse, Record, Texts, input_text
+from alphacut.questions.question import Answer, FuzzyResponse, Record, Row, Table, input_text
 from alphacut.stages.envelope import PEAK_ERROR, PeakResults, peak_results
 from alphacut.stages.store import Numbers
 
@@ -28,13 +28,9 @@ class Support(Numbers):
 class TolerancesAnswer(Answer):
     """Scales of all supports, and the supports at the largest one with no limit exceeded.
 
-    Args:
-        limits: Of magnitudes, in SI.
-        peaks: Peaks of the limited outputs at scale 1.
-        kept: Largest scale with no limit exceeded; None if one is exceeded at every scale.
-        clear: Largest scale at which no motion is known to exceed a limit.
-        passed: Least scale known to exceed a limit.
-        most: Largest scale tried.
+    That scale is `kept`, None if a limit is exceeded at every scale. Up to `clear` no motion is
+    known to exceed a limit, `passed` is the least scale known to exceed one and `most` the largest
+    tried. Limits are in SI, and `peaks` those at scale 1.
     """
 
     key = "tolerances"
@@ -49,50 +45,36 @@ class TolerancesAnswer(Answer):
     nature: Nature
     supports: dict[str, Support]
 
-    def rows(self) -> list[Texts]:
-        """The scale of all supports, then the tolerance of each input."""
+    def table(self) -> Table:
+        """The scale of all supports, then the largest one of each input; rounded inwards."""
         scale, exceeded = "none", "none is exceeded"
         if self.kept is not None:
             scale = f"up to {rounded(self.kept, 'upper', Nature.ATTAINED):.4g}"
         if self.passed is not None:
             clear = "" if self.clear is None else f"no exceedance found up to {self.clear:.4g}, "
             exceeded = f"{clear}exceeded at {self.passed:.4g}"
-        texts = [("scale of all ranges", scale, exceeded)]
-        texts += [(f"tolerance of {x}", *self._texts_of(x)) for x in self.supports]
-        return [
-            {
-                "quantity": quantity,
-                "no limit exceeded": kept,
-                "nature": self.nature,
-                "limit exceeded, or relative": relative,
-            }
-            for quantity, kept, relative in texts
-        ]
-
-    def _texts_of(self, name: str) -> tuple[str, str]:
-        """Largest support of an input with no limit exceeded, and relative to its nominal value."""
-        if self.kept is None:
-            return "–", ""
-        support = self.supports[name]
-        relative = f"about {support.nominal:g}"
-        if support.nominal:
-            relative = ", ".join(f"{end / support.nominal - 1:+.2%}" for end in support.kept)
-        sides = zip(support.kept, ("lower", "upper"), strict=True)
-        inside = (rounded(end, side, Nature.ATTAINED) for end, side in sides)  # rounded inwards
-        text = " … ".join(input_text(name, end) for end in inside)
-        return text, relative.replace("-", MINUS)
+        rows: list[Row] = [("scale of all ranges", scale, self.nature, exceeded)]
+        for name, support in self.supports.items():
+            text, relative = "–", ""
+            if self.kept is not None:
+                ends = zip(support.kept, ("lower", "upper"), strict=True)
+                inside = (rounded(end, side, Nature.ATTAINED) for end, side in ends)
+                text = " … ".join(input_text(name, end) for end in inside)
+                relative = f"about {support.nominal:g}"
+                if support.nominal:
+                    relative = ", ".join(f"{x / support.nominal - 1:+.2%}" for x in support.kept)
+            rows.append((f"tolerance of {name}", text, self.nature, relative.replace("-", MINUS)))
+        head = ("quantity", "no limit exceeded", "nature", "limit exceeded, or relative")
+        return Table(head, rows)
 
     def records(self) -> list[Record]:
         """A row of the scale, then one of the range of each input."""
         rows = [("scale of all ranges", "", None, self.kept, None, 1.0, None)]
         for name, support in self.supports.items():
             ends = (None, None) if self.kept is None else support.kept
-            unit = of_storey_frame(name).unit
-            rows.append((name, unit, *ends, *support.own, support.nominal))
-        titles = (
-            *("quantity", "unit", "from", "to", "from in the case", "to in the case"),
-            *("most plausible", "nature"),
-        )
+            rows.append((name, of_storey_frame(name).unit, *ends, *support.own, support.nominal))
+        titles = ["quantity", "unit", "from", "to", "from in the case", "to in the case"]
+        titles += ["most plausible", "nature"]
         return [dict(zip(titles, (*row, self.nature), strict=True)) for row in rows]
 
     def words(self) -> str:

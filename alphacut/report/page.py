@@ -9,11 +9,10 @@ import tomllib
 from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 
-from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature
-from alphacut.io.files import Document, say
+from alphacut.io.files import Document
 from alphacut.io.results import ResultsFolder
-from alphacut.questions.question import Answer, Row
+from alphacut.questions.question import Answer, Row, Table
 from alphacut.questions.summary import ANSWERS, Summary
 from alphacut.report.results import (
     ANSWER_HEAD,
@@ -25,7 +24,7 @@ from alphacut.report.results import (
     peak_table,
     width_text,
 )
-from alphacut.report.tables import Table, tables
+from alphacut.report.tables import tables
 from alphacut.stages.envelope import EnvelopeResult
 from alphacut.stages.identify import RefutedResult
 from alphacut.stages.modulus import ModulusResult
@@ -83,9 +82,9 @@ def plot(name: str, study: EnvelopeResult, folder: ResultsFolder) -> Document:
     dataset = folder.dataset(f"envelope_{name}.nc")
     time = dataset["time"].values
     outputs = [str(output) for output in dataset["output"].values]
-    bands = {side: dataset[side] for side in ("lower", "upper")}
-    contains_error = study.nature is Nature.GUARANTEED
-    bands["error"] = dataset["lower"] * 0.0 if contains_error else dataset["error"]
+    bands = {side: dataset[side] for side in ("lower", "upper", "error")}
+    if study.nature is Nature.GUARANTEED:  # which contains it
+        bands["error"] = 0.0 * bands["error"]
     axes = ("alpha", "output", "time")
     arrays = {x: band.transpose(*axes).values.astype("<f4") for x, band in bands.items()}
     return {
@@ -213,14 +212,10 @@ class Page:
         No SVG is taken from the folder: it could hold a script of somebody else.
         """
         for name in names:
-            matches = (stem for stem in self.unshown if stem == name or stem.endswith(f"-{name}"))
-            if (stem := next(matches, None)) is None:
+            stem = next((x for x in self.unshown if x == name or x.endswith(f"-{name}")), None)
+            if stem is None:
                 continue
-            try:
-                content = self.folder.content(self.unshown.pop(stem))
-            except RefusedError as error:
-                say(f"warning: a figure is left out: {error}")
-                continue
+            content = self.folder.content(self.unshown.pop(stem))
             yield "figure", caption(stem, paper=self.paper), base64.b64encode(content).decode()
 
     def _more(self) -> Iterator[Piece]:
@@ -246,8 +241,6 @@ def _errors(part: ModulusResult) -> Table:
     if bounds := part.references.get("hashin_shtrikman_E_GPa"):
         text = f"{bounds[0]:.5g} GPa … {bounds[1]:.5g} GPa"
         rows.append(("Hashin–Shtrikman bounds, isotropic composites", text))
-    if (estimate := part.references.get("mori_tanaka_E_GPa")) is not None:
-        rows.append(("Mori–Tanaka, isotropic composites", f"{estimate:.5g} GPa"))
     return Table(("source, property or reference at the nominal values", "value"), rows)
 
 

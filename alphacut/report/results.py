@@ -11,10 +11,10 @@ import numpy as np
 from alphacut.fuzzy.result import Nature, rounded
 from alphacut.io.arrays import text_table
 from alphacut.io.quantity import STANDARD_GRAVITY, axis_prefix, engineering, range_text
-from alphacut.questions.question import Row
+from alphacut.questions.question import Row, Table
 from alphacut.questions.summary import FrameResult, Parts
 from alphacut.questions.tolerances import TolerancesAnswer
-from alphacut.report.tables import Table, unit_of
+from alphacut.report.tables import unit_of
 from alphacut.stages.envelope import PeakResult
 from alphacut.stages.identify import IdentifiedResult
 from alphacut.stages.image import ImageResult
@@ -80,7 +80,7 @@ def material(parts: Parts) -> Table:
 def _constants(part: ModulusResult | ImageResult) -> Iterator[Row]:
     """Yields the row of E of a cell or an image, and those of ν, E_T and the loss factor."""
     nature, further, error = part.nature, dict[str, CutsResult](), 0.0
-    young, declares_error = young_cuts(part), True
+    young, declares_error = part.young, True
     if isinstance(part, ModulusResult):
         declares_error = part.particles != "mesh"  # which is not refined
         error = sum(part.error.values()) * float(young.upper.max())
@@ -96,11 +96,6 @@ def _constants(part: ModulusResult | ImageResult) -> Iterator[Row]:
         cuts = cut_text(loss.E, -1, loss.nature), cut_text(loss.E, 0, loss.nature)
         error_cell = error_text(loss.error["E"], loss.nature) if loss.error else ""
         yield ("loss factor of E", *cuts, loss.nature, error_cell)
-
-
-def young_cuts(part: ModulusResult | ImageResult) -> CutsResult:
-    """The α-cuts of E, in GPa."""
-    return part.E_GPa if isinstance(part, ModulusResult) else part.cuts.E_GPa
 
 
 def without_empty_columns(head: Row, rows: list[Row]) -> Table:
@@ -123,9 +118,8 @@ def learned(result: IdentifiedResult) -> Table:
         texts = (_outer_text(ends, result.units[name]) for ends in (result.prior[name], cuts[0]))
         rows.append((name, *texts, f"{result.narrowed[name]:.0%} of the width"))
     for mode in result.held_out:
-        verdict = "inside" if mode.inside else "outside"
         predicted = _outer_text(mode.predicted, "Hz")
-        rows.append((f"mode {mode.mode}", f"{mode.measured:.4g} Hz", predicted, verdict))
+        rows.append((f"mode {mode.mode}", f"{mode.measured:.4g} Hz", predicted, mode.verdict))
     return Table(("input or mode", "before, measured", "learned, predicted", ""), rows)
 
 
@@ -194,14 +188,10 @@ def nominal_text(low: float, high: float, nature: Nature) -> str:
 
 
 def limits_by_peak(parts: Parts) -> dict[str, list[tuple[float, str]]]:
-    """Limits of each peak in SI with the verdict or "", of [decision], else of another question."""
+    """Limits of each peak in SI with the verdicts on them, of [decision]."""
     limits: dict[str, list[tuple[float, str]]] = {}
     for decision in () if parts.decision is None else parts.decision.limits.values():
         limits.setdefault(decision.peak_name, []).append((decision.limit, decision.verdict))
-    for event in () if parts.probability is None else parts.probability.limits.values():
-        limits.setdefault(event.peak_name, [(event.limit, "")])
-    for name, limit in {} if parts.tolerances is None else parts.tolerances.limits.items():
-        limits.setdefault(name, [(limit, "")])
     return limits
 
 
@@ -240,7 +230,7 @@ def answers(parts: Parts) -> list[Row]:
     """Rows (what, answer, nature) of all answers to questions; inputs of tolerances share a row."""
     rows: list[Row] = []
     for answer in parts.answers:
-        _, answer_rows = answer.table()
+        answer_rows = answer.table().rows
         if isinstance(answer, TolerancesAnswer):
             scale, *inputs = answer_rows
             answer_rows = [scale, ("ranges", f"of {len(inputs)} inputs", TOLERANCE_TABLE)]
@@ -277,7 +267,7 @@ def _compared_entries(parts: Parts) -> Iterator[tuple[str, str, float | str]]:
     """Yields what is compared of a run on the lowest level: its name, its unit, number or text."""
     for result in (parts.modulus, parts.image):
         if result is not None:
-            low, high = np.array(young_cuts(result)[0]) * 1e9
+            low, high = np.array(result.young[0]) * 1e9
             yield "greatest E", "Pa", float(high)
             yield "width of E", "Pa", float(high - low)
     for study_name, study in parts.envelopes.items():

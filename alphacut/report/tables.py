@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -13,7 +13,7 @@ from alphacut.fuzzy.result import Nature, rounded
 from alphacut.io.files import Document, write_text
 from alphacut.io.quantity import MINUS
 from alphacut.io.results import ResultsFolder
-from alphacut.questions.question import Row
+from alphacut.questions.question import Row, Table
 from alphacut.questions.summary import Parts
 from alphacut.stages.envelope import EnvelopeResult
 from alphacut.stages.identify import IdentifiedResult
@@ -55,20 +55,13 @@ SPECIAL = str.maketrans(
 """What LaTeX reads otherwise, or fonts do not have."""
 
 
-class Table(NamedTuple):
-    """Titles of the columns, and rows of texts."""
-
-    head: Row
-    rows: list[Row]
-
-
 def frames(parts: Parts) -> dict[str, pd.DataFrame]:
     """Numbers of all results as data frames by name: of stages, then of questions."""
     identified = parts.update if isinstance(parts.update, IdentifiedResult) else None
     of_stages: tuple[tuple[str, Callable[[Any], pd.DataFrame], object], ...] = (
         ("radius_map", radius_map, parts.microstructure),
         ("modulus", modulus, parts.modulus),
-        ("image", image, parts.image),
+        ("image", modulus, parts.image),
         ("update", update, identified),
         ("peaks", peaks, parts.envelopes),
         ("records", records, parts.records),
@@ -81,7 +74,7 @@ def frames(parts: Parts) -> dict[str, pd.DataFrame]:
 def tables(parts: Parts) -> dict[str, Table]:
     """Tables of texts of all results: numbers rounded as their nature allows, answers in words."""
     texts = {name: shown(frame) for name, frame in frames(parts).items()}
-    return texts | {answer.key: Table(*answer.table()) for answer in parts.answers}
+    return texts | {answer.key: answer.table() for answer in parts.answers}
 
 
 def radius_map(numbers: Document) -> pd.DataFrame:
@@ -92,27 +85,15 @@ def radius_map(numbers: Document) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=head)
 
 
-def modulus(result: ModulusResult) -> pd.DataFrame:
-    """The α-cuts of E and of ν, with the error of E."""
-    error = sum(result.error.values())
-    return pd.DataFrame(
-        {
-            "α": result.alpha,
-            "E from [GPa]": result.E_GPa.lower,
-            "E to [GPa]": result.E_GPa.upper,
-            "ν from": result.nu_cuts.lower,
-            "ν to": result.nu_cuts.upper,
-            "± E [GPa]": error * result.E_GPa.upper if error else np.nan,
-            "nature": str(result.nature),
-        }
-    )
-
-
-def image(result: ImageResult) -> pd.DataFrame:
-    """The α-cuts of E of an image."""
-    cuts = result.cuts.E_GPa
-    columns = {"α": result.cuts.alpha, "E from [GPa]": cuts.lower, "E to [GPa]": cuts.upper}
-    return pd.DataFrame({**columns, "nature": str(result.nature)})
+def modulus(result: ModulusResult | ImageResult) -> pd.DataFrame:
+    """The α-cuts of E, and of a cell those of ν and the error of E."""
+    young = result.young
+    columns = {"α": result.alpha, "E from [GPa]": young.lower, "E to [GPa]": young.upper}
+    if isinstance(result, ModulusResult):
+        error = sum(result.error.values())
+        columns |= {"ν from": result.nu_cuts.lower, "ν to": result.nu_cuts.upper}
+        columns["± E [GPa]"] = error * young.upper if error else np.full(len(young.upper), np.nan)
+    return pd.DataFrame(columns).assign(nature=str(result.nature))
 
 
 def update(result: IdentifiedResult) -> pd.DataFrame:
@@ -122,14 +103,12 @@ def update(result: IdentifiedResult) -> pd.DataFrame:
         for name, cuts in result.inputs.items()
     ]
     modes = [
-        (f"mode {x.mode}", "Hz", x.measured, x.measured, *x.predicted, np.nan, x.inside)
+        (f"mode {x.mode}", "Hz", x.measured, x.measured, *x.predicted, np.nan, x.verdict)
         for x in result.held_out
     ]
     head = ["input or mode", "unit", "before or measured, from", "before or measured, to"]
     head += ["from", "to", "narrowed by", "inside"]
-    return pd.DataFrame([*inputs, *modes], columns=head).replace(
-        {"inside": {True: "inside", False: "outside"}}
-    )
+    return pd.DataFrame([*inputs, *modes], columns=head)
 
 
 def peaks(studies: Mapping[str, EnvelopeResult]) -> pd.DataFrame:
@@ -161,31 +140,19 @@ def unit_of(units: Mapping[str, str], peak: str) -> str:
 
 def records(result: SuiteResult) -> pd.DataFrame:
     """Measures of each record and its peaks farthest out on the lowest level, then statistics."""
-    rows = [
-        {
-            "record": name,
-            "PGA [m/s^2]": record.measures["PGA"],
-            "Sa(T1) [m/s^2]": record.measures["Sa(T1)"],
-            "output": output,
-            "unit": unit_of(result.units, output),
-            "farthest peak": peak.far_end[0],
-            "peak reached": peak.reached[0],
-            "nature": str(peak.nature),
-        }
-        for name, record in result.records.items()
-        for output, peak in record.peak.items()
-    ]
-    rows += [
-        {
-            "record": f"{statistic} of all",
-            "output": output,
-            "unit": unit_of(result.units, output),
-            "farthest peak": proved[0],
-        }
-        for output, statistics in result.statistics.items()
-        for statistic, proved in statistics.proved.items()  # mean, median …
-    ]
-    return pd.DataFrame(rows)
+    head = ["record", "PGA [m/s^2]", "Sa(T1) [m/s^2]", "output", "unit"]
+    head += ["farthest peak", "peak reached", "nature"]
+    rows: list[tuple[object, ...]] = []
+    for name, record in result.records.items():
+        sizes = record.measures["PGA"], record.measures["Sa(T1)"]
+        for output, peak in record.peak.items():
+            peak_cells = peak.far_end[0], peak.reached[0], str(peak.nature)
+            rows.append((name, *sizes, output, unit_of(result.units, output), *peak_cells))
+    for output, statistics in result.statistics.items():
+        unit = unit_of(result.units, output)
+        for name, proved in statistics.proved.items():  # mean, median …
+            rows.append((f"{name} of all", np.nan, np.nan, output, unit, proved[0], np.nan, np.nan))
+    return pd.DataFrame(rows, columns=head)
 
 
 def spectra(result: SuiteResult) -> pd.DataFrame:

@@ -158,16 +158,13 @@ class CellCampaign(CellProblem):
             identity=self.identity if context.samples else None,
         )
         self.require_consistent(result)
-        losses = loss_cuts(result) if self.losses else {}
-        data = modulus_dataset(result, curve_theta(self), losses)
-        return StageResult(self._numbers(result, losses), data)
-
-    def _numbers(self, result: Bounds, losses: Mapping[str, Array]) -> ModulusResult:
-        """The result of the campaign, from the cuts of all outputs and of the loss factors."""
         assert result.samples is not None
-        loss_errors = self.loss_errors(result) if losses else None
+        losses, loss = dict[str, Array](), None
+        if self.losses is not None:
+            losses = loss_cuts(result)
+            loss = LossResult.of(losses, self.loss_errors(result), Nature.ATTAINED)
         is_own_mesh = isinstance(self.cell, MeshedCell)  # without a declared error
-        return ModulusResult(
+        numbers = ModulusResult(
             alpha=result.alpha,
             E_GPa=cuts_of(result, {"E": "E"})["E_GPa"],
             nu_cuts=cuts_of(result, {"nu": "nu"})["nu"],
@@ -184,8 +181,9 @@ class CellCampaign(CellProblem):
             error=self.errors(result),
             checks=largest_over_samples(result, "check"),
             references=self.references(),
-            loss=LossResult.of(losses, loss_errors, Nature.ATTAINED) if losses else None,
+            loss=loss,
         )
+        return StageResult(numbers, modulus_dataset(result, curve_theta(self), losses))
 
     def require_consistent(self, result: Bounds) -> None:
         """Requires that a coarser model agrees with guaranteed cuts of E at points inside them.

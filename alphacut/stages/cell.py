@@ -17,10 +17,10 @@ from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.io.problem import missing
-from alphacut.rve.cell.cell import STRAIN, AnyPhase, Cell, Interphase, Phase
+from alphacut.rve.cell.cell import AnyPhase, Cell, Interphase, Phase
 from alphacut.rve.cell.outline import circle
-from alphacut.rve.result.moduli import hashin_shtrikman, mori_tanaka
-from alphacut.rve.result.result import HomogenisedStiffness, effective_modulus
+from alphacut.rve.result.moduli import AXES, hashin_shtrikman, plane_constants
+from alphacut.rve.result.result import HomogenisedStiffness
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.spheres.model import SphereSeriesModel
 from alphacut.rve.spheres.result import hill_average, volume_fraction
@@ -43,7 +43,7 @@ Solve = Callable[[Sequence[Any]], list[HomogenisedStiffness]]
 
 
 class References(TypedDict, total=False):
-    """References of a cell: mean particle fraction, as the case states it; bounds, estimate of E.
+    """References of a cell: mean particle fraction, as the case states it, and bounds of E.
 
     The classical bounds are those of isotropic composites, lower and upper, in GPa.
     """
@@ -51,7 +51,6 @@ class References(TypedDict, total=False):
     fraction: float
     fraction_of_case: float
     hashin_shtrikman_E_GPa: tuple[float, float]
-    mori_tanaka_E_GPa: float
 
 
 ISOTROPIC = "Hashin–Shtrikman bounds of an isotropic E"
@@ -168,7 +167,7 @@ class CellProblem:
         return self.model(**elements)([self.nominal])[0]
 
     def references(self) -> References:
-        """Particle fraction, Hashin–Shtrikman bounds and Mori–Tanaka estimate of E, nominal inputs.
+        """Particle fraction and Hashin–Shtrikman bounds of E at the nominal inputs.
 
         The bounds are at the stated fraction, else at the mean fraction of the radius map. Of
         anisotropic phases or with an interphase there is `fraction` alone; nothing of a mesh from a
@@ -190,9 +189,6 @@ class CellProblem:
             found["fraction_of_case"] = stated
         fractions, phases = np.array([1 - fraction, fraction]), [matrix, inclusion]
         found["hashin_shtrikman_E_GPa"] = isotropic_bounds(fractions, phases, space=spheres)
-        if nominal.square or spheres:
-            young = _young if spheres else _transverse_young
-            found["mori_tanaka_E_GPa"] = young(*mori_tanaka(fraction, phases, space=spheres)) / GPA
         return found
 
     def require_mesh(self) -> None:
@@ -222,19 +218,12 @@ def isotropic_bounds(
     They are its values at the lower and at the upper bounds of the moduli K and G. Fractions have
     the shape (phases,).
     """
-    young = _young if space else _transverse_young
-    low, high = (young(*pair) / GPA for pair in hashin_shtrikman(fractions, phases, space=space).T)
-    return low, high
-
-
-def _transverse_young(bulk: float, shear: float) -> float:
-    """Transverse Young's modulus in Pa of an isotropic plane with moduli K and G in Pa (eq. 16)."""
-    return effective_modulus(2 * STRAIN * float(bulk), 2 * STRAIN * float(shear))[0]
-
-
-def _young(bulk: float, shear: float) -> float:
-    """Young's modulus in Pa of an isotropic material with moduli K and G in Pa."""
-    return float(hill_average(np.array([bulk, shear, shear]))[0])
+    bulk, shear = hashin_shtrikman(fractions, phases, space=space)  # lower and upper each
+    if space:
+        low, high = hill_average(np.stack([bulk, shear, shear], axis=-1))[:, 0]
+    else:
+        low, high = plane_constants(np.stack([2 * bulk, 2 * shear, shear], axis=-1), AXES)[:, 0]
+    return float(low / GPA), float(high / GPA)
 
 
 def key_and_unit(name: str) -> tuple[str, float]:

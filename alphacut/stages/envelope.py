@@ -92,12 +92,10 @@ class EnvelopeResult(Numbers):
 
 @dataclass(frozen=True)
 class EnvelopeTask:
-    """One envelope to be computed.
+    """One envelope to be computed; `fuzzy` inputs are named as in the case, such as E, m or m1.
 
-    Args:
-        fuzzy: Fuzzy inputs as the user names them: E, m, m1 …
-        figures: Outputs that are drawn, each with its number in the paper; empty for all.
-        limited: Outputs whose peak a question compares with a limit.
+    `figures` are the outputs that are drawn, each with its number in the paper, or empty for all;
+    `limited` those peaks that a question compares with a limit.
     """
 
     name: str
@@ -122,11 +120,10 @@ class EnvelopeTask:
         return same_inputs and self.duration == section.duration
 
     def compute(self, structure: Structure, context: StageContext) -> StageResult[EnvelopeResult]:
-        """Computes the envelope as a dataset, and the fuzzy peak of each output as a document."""
+        """Computes the envelope as a dataset; its extremes and the peaks of its outputs."""
         first, second = (subprogress(context.tick, x, x + 0.5) for x in (0.0, 0.5))
         arguments = self.arguments(structure) | {"progress": first}
         result = frame.envelope(**arguments, relative=not self.tolerance(structure).unit)
-        data = result.to_dataset()
         signed = [name for name in self.limited if name != output_of(name)]
         peak_bounds = peaks(result, [*map(str, result.outputs), *signed])
         # a second proof of many inputs is hardly tighter: the number of its parts ends it
@@ -135,31 +132,29 @@ class EnvelopeTask:
         if loose := loose_peaks(peak_bounds, self.limited, gap):
             tighter = replace(self, limited=loose).close_peaks(structure, second)
             peak_bounds = tightest(peak_bounds, tighter)
-        return StageResult(self._result(data, peak_bounds, structure), data)
-
-    def _result(self, data: xarray.Dataset, peaks: Peaks, structure: Structure) -> EnvelopeResult:
-        """Extremes and errors on the lowest level, read off the dataset, and the peaks."""
+        data = result.to_dataset()
         lowest, names = data.isel(alpha=0), [*map(str, data["output"].values)]
 
         def by_output(values: xarray.DataArray) -> dict[str, float]:
             return dict(zip(names, map(float, values.values), strict=True))
 
-        return EnvelopeResult(
+        numbers = EnvelopeResult(
             fuzzy=self.fuzzy,
             min=by_output(lowest["lower"].min("time")),
             max=by_output(lowest["upper"].max("time")),
             mean_width=by_output((lowest["upper"] - lowest["lower"]).mean("time")),
             error=by_output(lowest["error"].max("time")),
             alpha=data["alpha"].values,
-            peak=peak_results(peaks),
+            peak=peak_results(peak_bounds),
             trajectories=int(data.attrs["trajectories"]),
             seconds=float(data.attrs["seconds"]),
             method=str(data.attrs["method"]),
             nature=Nature(data.attrs["nature"]),
             motions_tested=int(data.attrs.get("motions_tested", 0)),
             step=float(data["time"].values[1]),
-            units={x: structure.unit(x) for x in (*names, *outputs_of([*peaks]))},
+            units={x: structure.unit(x) for x in (*names, *outputs_of([*peak_bounds]))},
         )
+        return StageResult(numbers, data)
 
     def compute_peaks(
         self, structure: Structure, context: StageContext, nodes: int = 1
@@ -261,13 +256,9 @@ def tasks(
 
     Only tasks with the motion of [envelope] have the outputs `limited` by questions.
     """
-    studied = tuple(
-        EnvelopeTask(study.name, study.fuzzy, study.duration, section, study.figures)
-        for study in studies
-    ) or (EnvelopeTask("all", section.fuzzy, section.duration, section),)
-    return tuple(
-        replace(task, limited=limited) if task.has_motion_of(section) else task for task in studied
-    )
+    tasks = [EnvelopeTask(x.name, x.fuzzy, x.duration, section, x.figures) for x in studies]
+    tasks = tasks or [EnvelopeTask("all", section.fuzzy, section.duration, section)]
+    return tuple(replace(x, limited=limited if x.has_motion_of(section) else ()) for x in tasks)
 
 
 def stage(structure: Structure, task: EnvelopeTask) -> Stage[EnvelopeResult]:

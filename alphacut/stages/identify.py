@@ -27,6 +27,11 @@ class Prediction(Numbers):
     predicted: tuple[float, float]
     inside: bool
 
+    @property
+    def verdict(self) -> str:
+        """Whether the measured frequency lies inside, in a word."""
+        return "inside" if self.inside else "outside"
+
 
 class IdentifiedResult(Numbers):
     """Identified inputs: α-cuts in SI, and the share of its width by which each is narrowed."""

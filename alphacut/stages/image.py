@@ -83,6 +83,16 @@ class ImageResult(Numbers):
     references: References
     loss: LossResult | None
 
+    @property
+    def alpha(self) -> Array:
+        """The levels, rising."""
+        return self.cuts.alpha
+
+    @property
+    def young(self) -> CutsResult:
+        """The α-cuts of E, in GPa."""
+        return self.cuts.E_GPa
+
 
 def stage(cell: ImageCell, alpha: tuple[float, ...], average: str) -> Stage[ImageResult]:
     """The stage of an image, on some levels; E and ν are of an average of its stiffness."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from alphacut.io.arrays import columns_text
 from alphacut.io.files import Document, write_text
 from alphacut.io.provenance import file_digest
 from alphacut.stages.store import Stage, StageContext, StageResult
-from alphacut.stochastic.microstructure import Microstructure, fragment, study, summary, to_dataset
+from alphacut.stochastic.microstructure import fragment, study, summary, to_dataset
 
 
 def stage(section: MicrostructureSection, spheres: bool, figures: bool = True) -> Stage[Document]:
@@ -27,26 +26,22 @@ def stage(section: MicrostructureSection, spheres: bool, figures: bool = True) -
 def compute_map(
     section: MicrostructureSection, spheres: bool, figures: bool, context: StageContext
 ) -> StageResult[Document]:
-    """Computes the fuzzy radius map of particles, and writes its files if there is a folder.
+    """Computes the fuzzy radius map of particles, whatever the number of workers.
 
-    The result does not depend on the number of workers.
+    If there is a folder, it gets radius.toml, a section of a case, figures if wanted, and
+    circles.csv of an image.
     """
     with pool(context.workers) as executor:
         result = study(section.study(spheres=spheres), executor=executor, progress=context.tick)
-    numbers = summary(result)
-    if context.folder is not None:
-        write_files(result, numbers, context.folder, figures=figures)
+    numbers, folder = summary(result), context.folder
+    if folder is not None:
+        from alphacut.stochastic.figures.all import draw
+
+        drawn = draw(result, folder / "figures") if figures else {}
+        write_text(folder / "radius.toml", fragment(numbers))
+        if "image_circles" in drawn:
+            discs = result.sections[0].particles
+            x, y = np.transpose(discs.centres)
+            circles = columns_text({"x [m]": x, "y [m]": y, "r [m]": discs.radii})
+            write_text(folder / "circles.csv", circles)
     return StageResult(numbers, to_dataset(result))
-
-
-def write_files(result: Microstructure, numbers: Document, folder: Path, *, figures: bool) -> None:
-    """Writes radius.toml, a section of a case; figures if wanted, and circles.csv of an image."""
-    from alphacut.stochastic.figures.all import draw
-
-    drawn = draw(result, folder / "figures") if figures else {}
-    write_text(folder / "radius.toml", fragment(numbers))
-    if "image_circles" in drawn:
-        discs = result.sections[0].particles
-        x, y = np.transpose(discs.centres)
-        circles = columns_text({"x [m]": x, "y [m]": y, "r [m]": discs.radii})
-        write_text(folder / "circles.csv", circles)

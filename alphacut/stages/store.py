@@ -115,10 +115,8 @@ class StageResult(Generic[T]):
 class Stage(Generic[T]):
     """A function from objects to a result of type `kind`, in files NAME.json and NAME.nc.
 
-    Args:
-        inputs: Everything that the result depends on.
-        packages: Packages of this project whose source it depends on.
-        has_samples: Whether it stores samples on the way.
+    The result depends on the `inputs` and on the source of `packages` of this project, nothing
+    else; with `has_samples` it stores samples on the way.
     """
 
     name: str
@@ -166,11 +164,8 @@ class RunProgress:
 class StageStore:
     """The results of a run, in a folder or, without one, in memory alone.
 
-    Args:
-        case_text: The case, which every result states.
-        fresh: Whether everything is computed anew.
-        workers: Processes of a stage.
-        up_to_date: Names of the stages whose files were up to date.
+    Every result states `case_text`; with `fresh` all are computed anew, by `workers` processes
+    a stage. `up_to_date` names the stages whose files were.
     """
 
     folder: ResultsFolder | None
@@ -192,8 +187,7 @@ class StageStore:
         The stages that take longest come first; without executor this process computes all.
         """
         tick = self.progress.next_part(len(stages))
-        stored = {stage.name: self._read(stage) for stage in stages}
-        results = {name: result for name, result in stored.items() if result is not None}
+        results = {stage.name: x for stage in stages if (x := self._read(stage)) is not None}
         stale = [stage for stage in stages if stage.name not in results]
         if executor is None or self.folder is None or len(stale) == 1:
             for k, stage in enumerate(stale):
@@ -211,11 +205,8 @@ class StageStore:
     def _read(self, stage: Stage[T]) -> StageResult[T] | None:
         """The result in the files of a stage; None where these are missing, changed or outdated."""
         folder, key, name = self.folder, stage.key, f"{stage.name}.json"
-        if folder is None or self.fresh or name not in folder.files:
+        if folder is None or self.fresh or name not in (files := folder.made_from(key)):
             return None
-        if folder.files[name].source != key:
-            return None
-        files = folder.made_from(key)
         if problem := folder.describe_damage(key):
             say(f"warning: {problem}; {stage.name} is computed anew")
             return None
@@ -245,11 +236,11 @@ class StageStore:
     def _sample_store(self, folder: ResultsFolder) -> Path:
         """Path of the store of samples; a fresh run refuses one that no manifest lists."""
         path, is_listed = folder.path / SAMPLES, SAMPLES in folder.files
-        exists = os.path.lexists(path)
-        is_allowed = is_listed or not exists or not self.fresh
+        is_new = not is_listed and not os.path.lexists(path)
+        is_allowed = is_listed or is_new or not self.fresh
         cure = "move it away, or leave out --fresh"
         require(is_allowed, str(path), value="listed in no manifest", allowed="none", cure=cure)
-        if rank() == 0 and not is_listed and not exists:
+        if rank() == 0 and is_new:
             # listed now, so that an interrupted run owns it; without digests, since it changes
             folder.add_to_list(dict.fromkeys((SAMPLES, f"{SAMPLES}-journal"), Listed("", "")))
         return path

@@ -55,11 +55,8 @@ class NominalMode(NamedTuple):
 class SuiteRecord:
     """A record of the suite as it moves the structure, corrected and scaled.
 
-    Args:
-        duration: Length of the motion, in s.
-        measures: "PGA" and "Sa(T1)" of the scaled record, in m/s², and "scale", 1.
-        cut_share: Share of the Arias intensity after the end of the motion.
-        warnings: What is unusual in it.
+    `duration` is that of the motion in s, `cut_share` the share of the Arias intensity after its
+    end; `measures` are "PGA" and "Sa(T1)" in m/s², and "scale", 1.
     """
 
     name: str
@@ -240,8 +237,14 @@ def suite_result(
     units: Mapping[str, str],
 ) -> SuiteResult:
     """Numbers on a suite, from the peaks under each record by its name."""
-    first = next(iter(peaks.values()))
-    bounds = {name: np.stack([x[name].proved for x in peaks.values()]) for name in first}
+    statistics = {}
+    for name, peak in next(iter(peaks.values())).items():
+        sign = -1.0 if peak.is_least else 1.0  # quantiles of least values are counted from above
+        bounds = np.stack([x[name].proved for x in peaks.values()])  # (records, levels)
+        proved = {"mean": bounds.mean(axis=0)}
+        for quantile, share in QUANTILES.items():
+            proved[quantile] = sign * np.quantile(sign * bounds, share, axis=0)
+        statistics[name] = Statistics(proved=proved)
     return SuiteResult(
         period_s=mode.period,
         damping_ratio=mode.ratio,
@@ -255,10 +258,7 @@ def suite_result(
             )
             for record in records
         },
-        statistics={
-            name: Statistics(proved=record_statistics(bounds[name], peak.is_least))
-            for name, peak in first.items()
-        },
+        statistics=statistics,
         spectra={"period_s": PERIODS}
         | {
             x.name: np.array([mode.spectral_acceleration(x.ground, float(t)) for t in PERIODS])
@@ -266,12 +266,3 @@ def suite_result(
         },
         units=dict(units),
     )
-
-
-def record_statistics(values: Array, is_least: bool) -> dict[str, Array]:
-    """Mean and quantiles by name over records of values (records, levels); of least from above."""
-    sign = -1.0 if is_least else 1.0
-    found = {"mean": np.asarray(values.mean(axis=0))}
-    for name, share in QUANTILES.items():
-        found[name] = sign * np.quantile(sign * values, share, axis=0)
-    return found

@@ -1,5 +1,9 @@
 """Cases of a second for the tests of the front door."""
 
+import json
+
+from alphacut.entry import main
+
 FRAME = """
 title = "One floor"
 stages = ["envelope"]
@@ -49,3 +53,11 @@ def written(folder, text=FRAME, **changes):
     path = folder / "case.toml"
     path.write_text(text, encoding="utf-8")
     return path
+
+
+def summary_of_run(case, *options):
+    """The summary of a run of a case without figures, into the folder beside it."""
+    out = case.parent / "out"
+    words = ["--quiet", "--no-figures", "--out", str(out), *options]
+    assert main(["run", str(case), *words]) == 0
+    return json.loads((out / "summary.json").read_text(encoding="utf-8"))

@@ -1,7 +1,7 @@
 """Questions of a case: their answers, and what a further one touches."""
 
 import json
-from pathlib import Path
+import re
 
 import numpy as np
 import pytest
@@ -9,19 +9,18 @@ import pytest
 from alphacut.case.content import Content, load
 from alphacut.case.limits import Limit, parse_limit
 from alphacut.commands.pipeline import QUESTIONS as PUT
-from alphacut.entry import main
 from alphacut.figures.envelope import DRAWINGS
+from alphacut.frame import Accelerogram, StoreyFrame, envelope
 from alphacut.frame.dynamics.nonlinear import make_flow
-from alphacut.frame.questions.peaks import Peak
-from alphacut.fuzzy import Triangular
+from alphacut.frame.questions.peaks import Peak, peaks
+from alphacut.fuzzy import Interval, Triangular
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature
 from alphacut.questions.decision import DecisionAnswer
 from alphacut.questions.probability import shaped_like
 from alphacut.questions.summary import ANSWERS
 from alphacut.stages.envelope import loose_peaks
-
-ROOT = Path(__file__).parents[3]
+from tests.alphacut.small import summary_of_run, written
 
 
 @pytest.fixture(scope="module")
@@ -127,10 +126,8 @@ limits = ["drift1 <= 1 %", "drift1 <= 3 %", "max drift1 <= 60 mm", "min drift1 >
 
 
 def test_an_output_has_several_limits_of_each_side_and_of_its_magnitude(tmp_path):
-    case = tmp_path / "case.toml"
-    case.write_text('title = "Limits"\nstages = ["envelope"]\n' + LIMITS, encoding="utf-8")
-    assert main(["run", str(case), "--quiet", "--no-figures", "--out", str(tmp_path / "out")]) == 0
-    summary = json.loads((tmp_path / "out/summary.json").read_text(encoding="utf-8"))
+    case = written(tmp_path, 'title = "Limits"\nstages = ["envelope"]\n' + LIMITS)
+    summary = summary_of_run(case)
     limits = summary["decision"]["limits"]
     assert limits["drift1 <= 1 %"]["limit"] == pytest.approx(0.029)  # of the least height
     verdicts = {name: limit["verdict"] for name, limit in limits.items()}
@@ -160,3 +157,14 @@ def test_an_output_has_several_limits_of_each_side_and_of_its_magnitude(tmp_path
     flow = make_flow(load(case).content.structure.model, ("k1",), 2.0, 1e-3, "exact")
     drift = [*map(str, flow.outputs)].index("drift1")
     assert flow.values(np.array([[stiffness]])).min(axis=1)[0, drift] < -0.0406
+
+
+def test_python_says_the_bound_over_time_as_the_command_does():
+    ground = Accelerogram(0.02, np.sin(np.arange(60)))
+    frame = StoreyFrame(masses=[1.0], stiffness=[150.0], damping_ratio=0.02, ground=ground)
+    inputs = {"k1": Interval(149.0, 151.0)}
+    found = envelope(frame, inputs, duration=1.2, step=0.02, alpha=[0], progress=False)
+    proved = float(re.search(r"proved (\S+) m", found.peak_words)[1])
+    bound = peaks(found)["q1"].upper[0]
+    assert bound <= proved <= 1.001 * bound
+    assert bound > np.maximum(found.upper, -found.lower).max()  # that at the nodes

@@ -1,19 +1,16 @@
 """Loss factors of phases in a case: their α-cuts, and the damping of a frame of the material."""
 
-import json
-
 import numpy as np
 import pytest
 from scipy.linalg import eigvals
 
 from alphacut.case.content import load
 from alphacut.case.structure import MaterialDamping
-from alphacut.entry import main
 from alphacut.frame import MatrixStructure
 from alphacut.frame.structures.matrix import modal_energy_shares
 from alphacut.fuzzy import Crisp, Triangular
 from alphacut.io.problem import BadInput
-from tests.alphacut.small import CELL, written
+from tests.alphacut.small import CELL, summary_of_run, written
 
 LOSSES = 'matrix_loss = "[1.4, 2, 2.6] %"\ninclusion_loss = "[0.35, 0.5, 0.65] %"\n'
 CASE = CELL.replace('["modulus"]', '["modulus", "envelope"]').replace("tolerance = 1e-6\n", "")
@@ -34,25 +31,8 @@ step = "0.02 s"
 """
 
 
-def summary(folder, text):
-    assert (
-        main(
-            [
-                "run",
-                str(written(folder, text)),
-                "--quiet",
-                "--no-figures",
-                "--out",
-                str(folder / "out"),
-            ]
-        )
-        == 0
-    )
-    return json.loads((folder / "out" / "summary.json").read_text(encoding="utf-8"))
-
-
 def test_the_frame_is_damped_by_half_the_loss_factor_of_its_material(tmp_path):
-    document = summary(tmp_path, CASE)
+    document = summary_of_run(written(tmp_path, CASE))
     loss = document["modulus"]["loss"]["E"]
     low, nominal, high = document["damping"]["zeta"]
     expected = np.sin(np.arctan([loss["lower"][0], loss["lower"][-1], loss["upper"][0]]) / 2)
@@ -62,36 +42,35 @@ def test_the_frame_is_damped_by_half_the_loss_factor_of_its_material(tmp_path):
     assert document["envelopes"]["all"]["nature"] == "guaranteed"
     without = CASE.partition("[frame]")[0].replace(', "envelope"]', "]")
     lines = (x for x in without.splitlines() if "_loss" not in x)
-    (tmp_path / "other").mkdir()
-    other = summary(tmp_path / "other", "\n".join(lines))
+    other = summary_of_run(written(tmp_path, "\n".join(lines)))
     assert other["modulus"]["E_GPa"] == document["modulus"]["E_GPa"]
     assert other["modulus"]["loss"] is None
 
 
-WRONG = [
-    (LOSSES, "", "frame.damping_ratio", "loss factors in [cell]"),
-    ('"[1.4, 2, 2.6] %"', '"-1 %"', "cell.matrix_loss", "from 0 up to 0.5"),
-    ('"[1.4, 2, 2.6] %"', "0.51", "cell.matrix_loss", "from 0 up to 0.5"),
-    ('matrix_loss = "[1.4, 2, 2.6] %"\n', "", "cell.matrix_loss", "a loss of either phase"),
-    ("[cell]", "[cell]\nmatrix_loss_bulk = 0.2", "cell.matrix_loss_bulk", "up to 0.105"),
-    (
-        CASE[CASE.index("[radius]") : CASE.index("[modulus]")],
-        '[mesh]\nfile = "x.msh"\n[cell.phases]\na = { modulus = "1 GPa", poisson = 0, loss = 0.1 }\n'
-        'b = { modulus = "1 GPa", poisson = 0 }\n',
-        "cell.phases.b.loss",
-        "0 for none",
-    ),
-    ('"material"', '"material - 1 %"', "frame.damping_ratio", "below 1"),
-    (
-        'lengths = "3 m"\nsecond_moment = "1e-5 m^4"',
-        'stiffness = "1 MN/m"',
-        "frame.damping_ratio",
-        "columns of the material",
-    ),
-]
-
-
-@pytest.mark.parametrize(("old", "new", "key", "words"), WRONG)
+@pytest.mark.parametrize(
+    ("old", "new", "key", "words"),
+    [
+        (LOSSES, "", "frame.damping_ratio", "loss factors in [cell]"),
+        ('"[1.4, 2, 2.6] %"', '"-1 %"', "cell.matrix_loss", "from 0 up to 0.5"),
+        ('"[1.4, 2, 2.6] %"', "0.51", "cell.matrix_loss", "from 0 up to 0.5"),
+        ('matrix_loss = "[1.4, 2, 2.6] %"\n', "", "cell.matrix_loss", "a loss of either phase"),
+        ("[cell]", "[cell]\nmatrix_loss_bulk = 0.2", "cell.matrix_loss_bulk", "up to 0.105"),
+        (
+            CASE[CASE.index("[radius]") : CASE.index("[modulus]")],
+            '[mesh]\nfile = "x.msh"\n[cell.phases]\na = { modulus = "1 GPa", poisson = 0, loss = 0.1 }\n'
+            'b = { modulus = "1 GPa", poisson = 0 }\n',
+            "cell.phases.b.loss",
+            "0 for none",
+        ),
+        ('"material"', '"material - 1 %"', "frame.damping_ratio", "below 1"),
+        (
+            'lengths = "3 m"\nsecond_moment = "1e-5 m^4"',
+            'stiffness = "1 MN/m"',
+            "frame.damping_ratio",
+            "columns of the material",
+        ),
+    ],
+)
 def test_what_is_wrong_is_said_in_one_line(tmp_path, old, new, key, words):
     with pytest.raises(BadInput) as caught:
         load(written(tmp_path, CASE, **{old: new}))

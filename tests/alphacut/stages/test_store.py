@@ -149,6 +149,7 @@ def test_peaks_pass_through_json_with_their_infinite_bounds():
     peaks = {
         "q1": Peak(np.zeros(1), *first, Nature.GUARANTEED),
         "max q1": Peak(np.zeros(1), *second, Nature.ATTAINED, is_signed=True),
+        "min q1": Peak(np.zeros(1), *second, Nature.ATTAINED, is_signed=True),  # of −q1
     }
     kind, text = TypeAdapter(envelope.PeakResults), as_json(envelope.peak_results(peaks))
     again = envelope.peaks_of(kind.validate_json(text), [0.0])

@@ -12,6 +12,7 @@ from alphacut.io.problem import BadInput
 from alphacut.questions.fragility import FragilityAnswer
 from alphacut.records.recording import spectral_acceleration
 from alphacut.stages.suite import nominal_mode, suite_records
+from tests.alphacut.small import summary_of_run
 
 CASE = """
 title = "One storey under two records"
@@ -126,9 +127,7 @@ def test_a_bad_record_is_named_before_anything_is_computed(tmp_path, capsys):
 
 
 def test_fragility_of_one_storey_holds_its_closed_form(tmp_path):
-    path, out = written(tmp_path), tmp_path / "out"
-    assert main(["run", str(path), "--out", str(out), "--no-figures"]) == 0
-    summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    summary = summary_of_run(written(tmp_path))
     answer, records = summary["fragility"]["limits"]["drift1"], summary["records"]["records"]
     assert answer["nature"] == "guaranteed"
     words = FragilityAnswer.model_validate(summary["fragility"]).rows()[0]["median at the lowest α"]
