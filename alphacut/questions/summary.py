@@ -75,7 +75,7 @@ class Results:
         return any(task.figures for task in self.tasks)
 
     @property
-    def single(self) -> dict[str, StageResult[Any]]:
+    def single(self) -> dict[str, StageResult[object]]:
         """Results of the stages that have one, by name."""
         names = ("microstructure", "modulus", "image", "shares")
         return {x: getattr(self, x) for x in names if getattr(self, x) is not None}
@@ -83,8 +83,8 @@ class Results:
     @property
     def fingerprints(self) -> dict[str, str]:
         """Digest of what each result was made from, by the name of its stage."""
-        studies = {f"envelope_{name}": result for name, result in self.envelopes.items()}
-        return {name: x.fingerprint for name, x in {**self.single, **studies}.items()}
+        studies = {f"envelope_{name}": x.fingerprint for name, x in self.envelopes.items()}
+        return {name: x.fingerprint for name, x in self.single.items()} | studies
 
     @property
     def frame_result(self) -> FrameResult | None:
