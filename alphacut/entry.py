@@ -15,14 +15,7 @@ from contextlib import contextmanager
 from importlib import import_module
 from types import FrameType
 
-from alphacut.commands.options import (
-    PETSC_LOG,
-    Command,
-    Parser,
-    read_cell,
-    require_petsc,
-    split_petsc,
-)
+from alphacut.commands.options import Command, Parser, require_petsc, split_petsc
 from alphacut.fuzzy.campaign.campaign import CampaignError
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.files import check_destinations, rank, ranks, say, standard_output
@@ -193,15 +186,7 @@ def _run_command(arguments: Sequence[str], program: str, names: Mapping[str, str
     with standard_output(alone=options.json == "-") as out, warnings.catch_warnings():
         warnings.showwarning = _say_warning
         command = import_command(options.command, names[options.command])
-        if PETSC_LOG not in petsc:
-            return command.run(options, out)
-        if "case" in options:
-            read_cell(options)  # refuses the log of a case without prisms
-        del petsc[PETSC_LOG]
-        from alphacut.rve.fenicsx import log_on_standard_error
-
-        with log_on_standard_error():
-            return command.run(options, out)
+        return command.run(options, out)
 
 
 def _say_warning(message: Warning | str, *_: object, **__: object) -> None:

@@ -100,16 +100,6 @@ def mesh_of(comm: MPI.Intracomm, cells: Ints, nodes: int, element: Any) -> dolfi
     )
 
 
-@contextmanager
-def log_on_standard_error() -> Iterator[None]:
-    """Context in which PETSc logs its events; prints the log to standard error at its end."""
-    PETSc.Log.begin()
-    yield
-    viewer = PETSc.Viewer().createASCII("stderr", comm=PETSc.COMM_WORLD)
-    PETSc.Log.view(viewer)
-    viewer.destroy()
-
-
 def option_is_used(name: str) -> bool:
     """True if PETSc has asked for the option; by C, since petsc4py 3.22 has no call for it."""
     interface = cffi.FFI()

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Self
+from typing import Annotated, NamedTuple, Self
 
 import numpy as np
 from pydantic import Field, ValidationInfo, model_validator
@@ -30,16 +30,11 @@ HISTORY = (
 )
 
 
-@dataclass(frozen=True)
-class ForceHistory:
-    """Time history of a force (None: impulse), and the SI unit of its amplitudes, empty of factors.
-
-    `size` is the SI value of an amplitude of 1: the largest magnitude in a file with a unit.
-    """
+class ForceHistory(NamedTuple):
+    """Time history of a force (None: impulse), and SI unit of its amplitudes, empty of factors."""
 
     history: History | None
     unit: str = "N"
-    size: float = 1.0
 
 
 def _parse_history(value: object, info: ValidationInfo) -> ForceHistory:
@@ -52,33 +47,25 @@ def _parse_history(value: object, info: ValidationInfo) -> ForceHistory:
     max_options = 0 if kind == "impulse" else 1
     fits = len(numbers) in counts and len(static) + len(starts) <= max_options
     require(fits and not (static and kind == "harmonic"), "", value, HISTORY)
+    if kind == "impulse":
+        return ForceHistory(None, "N*s")
     try:
         start = quantity.parse_number(starts[0], "s") if starts else 0.0
         if kind == "harmonic":
             phase = quantity.parse_number(numbers[1], "rad") if numbers[1:] else 0.0
-            wave = History.harmonic(quantity.parse_number(numbers[0], "1/s"), phase, start)
-            return ForceHistory(wave)
+            frequency = quantity.parse_number(numbers[0], "1/s")
+            return ForceHistory(History.harmonic(frequency, phase, start))
     except ValueError as error:
         raise RefusedError("", value, HISTORY, str(error)) from None
-    if kind == "impulse":
-        return ForceHistory(None, "N*s")
     if kind == "step":
         return ForceHistory(History.constant(start, is_static=bool(static)))
-    return _read_history_file(kind, start, bool(static), info)
-
-
-def _read_history_file(
-    name: str, start: float, is_static: bool, info: ValidationInfo
-) -> ForceHistory:
-    """Time history in a file, from `start` in s on; samples with a unit are scaled to at most 1."""
     try:
-        path = case_file(name, info)
+        path = case_file(kind, info)
     except RefusedError as error:
-        raise RefusedError("", name, f"{HISTORY}; {error.allowed}") from None
+        raise RefusedError("", kind, f"{HISTORY}; {error.allowed}") from None
     step, samples, has_unit = read_force_history(path)
-    size = float(np.abs(samples).max()) if has_unit else 1.0
-    history = History(step, np.asarray(samples / size), start, is_static=is_static)
-    return ForceHistory(history, "" if has_unit else "N", size)
+    history = History(step, samples, start, is_static=bool(static))
+    return ForceHistory(history, "" if has_unit else "N")
 
 
 def _parse_amplitude(value: object, _: ValidationInfo) -> tuple[FuzzyNumber, str]:
@@ -107,12 +94,6 @@ class ForceSection(Section):
     amplitude: dict[str, Amplitude]
     """amplitude by floor or unknown, as {3 = "8 kN"}; factor of a file with a unit"""
 
-    @property
-    def amplitudes(self) -> dict[str, FuzzyNumber]:
-        """Amplitude on each floor, in SI."""
-        size = self.history.size
-        return {unknown: _scaled(number, size) for unknown, (number, _) in self.amplitude.items()}
-
     @model_validator(mode="after")
     def _check_units(self) -> Self:
         """Refuses amplitudes whose unit is not that of the time history."""
@@ -123,12 +104,6 @@ class ForceSection(Section):
             key = f"force.amplitude.{unknown}"
             require(is_same, key, shown, f'{quantity_name}, as "{example}"')
         return self
-
-
-def _scaled(number: FuzzyNumber, factor: float) -> FuzzyNumber:
-    """The number times a positive factor: its corners are scaled."""
-    corners = (getattr(number, field.name) for field in fields(number))  # type: ignore[arg-type]
-    return type(number)(*(factor * corner for corner in corners))
 
 
 def with_forces(
@@ -146,23 +121,25 @@ def with_forces(
     forces = [
         (unknown, amplitude, section.history.history)
         for section in sections
-        for unknown, amplitude in section.amplitudes.items()
+        for unknown, (amplitude, _) in section.amplitude.items()
     ]
-    floors = range(1, model.floors + 1) if isinstance(model, StoreyFrame) else ()
+    is_frame = isinstance(model, StoreyFrame)
+    allowed = tuple(map(str, range(1, model.floors + 1))) if is_frame else unknowns
     for unknown, _, _ in forces:
-        require_choice("force.amplitude", unknown, tuple(map(str, floors)) or unknowns)
-    if isinstance(model, StoreyFrame):
+        require_choice("force.amplitude", unknown, allowed)
+    if is_frame:
         loads = [
-            Force(int(floor), amplitude.nominal, history) for floor, amplitude, history in forces
+            Force(int(floor), amplitude.nominal, course) for floor, amplitude, course in forces
         ]
         model = replace(model, loads=loads)
         names = model.force_names
     else:
         names = tuple(f"F{number}" for number in range(1, len(forces) + 1))
-        directions = [np.array([float(x == unknown) for x in unknowns]) for unknown, _, _ in forces]
-        histories = [history for _, _, history in forces]
-        loads = [Force(*x) for x in zip(directions, names, histories, strict=True)]
         nominal = {name: x.nominal for name, (_, x, _) in zip(names, forces, strict=True)}
+        loads = [
+            Force(np.array([float(x == unknown) for x in unknowns]), name, course)
+            for name, (unknown, _, course) in zip(names, forces, strict=True)
+        ]
         model = replace(model, loads=loads, parameters={**model.parameters, **nominal})
     amplitudes = {name: amplitude for name, (_, amplitude, _) in zip(names, forces, strict=True)}
     return replace(structure, model=model, numbers={**structure.numbers, **amplitudes})

@@ -77,10 +77,10 @@ class MeshedCell(Section):
         return moduli or {"scale": Crisp(1.0)}  # a campaign needs an input
 
     @property
-    def losses(self) -> tuple[tuple[FuzzyNumber, FuzzyNumber | None], ...]:
-        """Loss factor of each phase, whose bulk modulus has the same; empty for none."""
+    def losses(self) -> tuple[FuzzyNumber, ...]:
+        """Loss factor of the stiffness of each phase; empty for none."""
         losses = (phase.loss for phase in self.phases.values())
-        return tuple((loss, None) for loss in losses if loss is not None)
+        return tuple(loss for loss in losses if loss is not None)
 
     @model_validator(mode="after")
     def _check_losses(self) -> Self:
@@ -117,13 +117,9 @@ class RoundCell(Section):
     inclusion_poisson: Ratio | None = None
     """Poisson's ratio of the particle, beside its modulus"""
     matrix_loss: Loss | None = None
-    """loss factor tan δ of the matrix's Young's modulus, as 2 %"""
-    matrix_loss_bulk: Loss | None = None
-    """that of its bulk modulus, where it is another"""
+    """loss factor tan δ of the matrix's stiffness, as 2 %"""
     inclusion_loss: Loss | None = None
-    """loss factor of the particle's Young's modulus or stiffness"""
-    inclusion_loss_bulk: Loss | None = None
-    """that of its bulk modulus, where it is another"""
+    """loss factor of the particle's stiffness"""
     interphase_thickness: Thickness | None = None
     """thickness of a ring around the particle over half the cell's side"""
     interphase_modulus: Modulus | None = None
@@ -186,12 +182,11 @@ class RoundCell(Section):
         return None if self.fraction is None else FractionMap(self.fraction, self.shape)
 
     @property
-    def losses(self) -> tuple[tuple[FuzzyNumber, FuzzyNumber | None], ...]:
-        """Loss factors of Young's and the bulk modulus of matrix and particle; empty for none."""
+    def losses(self) -> tuple[FuzzyNumber, ...]:
+        """Loss factors of the stiffness of matrix and particle; empty for none."""
         if self.matrix_loss is None or self.inclusion_loss is None:
             return ()
-        particle = self.inclusion_loss, self.inclusion_loss_bulk
-        return (self.matrix_loss, self.matrix_loss_bulk), particle
+        return self.matrix_loss, self.inclusion_loss
 
     @property
     def is_fibre(self) -> bool:
@@ -230,25 +225,10 @@ class RoundCell(Section):
 
     @model_validator(mode="after")
     def _check_losses(self) -> Self:
-        """Refuses loss factors of one phase alone, and too large ones of the bulk moduli."""
-        losses = {"matrix": self.matrix_loss, "inclusion": self.inclusion_loss}
-        bulk_losses = {"matrix": self.matrix_loss_bulk, "inclusion": self.inclusion_loss_bulk}
-        if all(x is None for x in (*losses.values(), *bulk_losses.values())):
-            return self
-        for phase, loss in losses.items():
-            if loss is None:
-                raise RefusedError(f"cell.{phase}_loss", None, "a loss of either phase, 0 for none")
-            key, bulk = f"cell.{phase}_loss_bulk", bulk_losses[phase]
-            ratio = self.matrix_poisson if phase == "matrix" else self.inclusion_poisson
-            if bulk is None:
-                continue
-            if ratio is None:
-                raise RefusedError(key, "there", "none beside a stiffness")
-            # η_E = (1 − 2ν)/3 η_K + 2(1 + ν)/3 η_G, by 1/E = 1/(9K) + 1/(3G); η_G ≥ 0
-            bound = 3 * loss.support.lower / (1 - 2 * ratio.support.lower)
-            allowed = f"up to {bound:.4g}, where the shear modulus loses nothing"
-            fits, value = bulk.support.upper <= bound, f"{bulk.support.upper:g}"
-            require(fits, key, value, allowed)
+        """Refuses loss factors of one phase alone."""
+        missing = [x for x in ("matrix_loss", "inclusion_loss") if getattr(self, x) is None]
+        allowed = "a loss of either phase, 0 for none"
+        require(len(missing) != 1, f"cell.{''.join(missing)}", None, allowed)
         return self
 
 
@@ -276,10 +256,10 @@ class ImageCell(Section):
         return tuple(zip(self.modulus, ratios, strict=True))
 
     @property
-    def losses(self) -> tuple[tuple[FuzzyNumber, FuzzyNumber | None], ...]:
-        """Loss factors of Young's modulus of each phase; its bulk modulus has the same."""
-        factors = (self.loss or ()) * (len(self.modulus) if len(self.loss or ()) == 1 else 1)
-        return tuple((loss, None) for loss in factors)
+    def losses(self) -> tuple[FuzzyNumber, ...]:
+        """Loss factors of the stiffness of each phase; empty for none."""
+        losses = self.loss or ()
+        return losses * len(self.modulus) if len(losses) == 1 else losses
 
     @model_validator(mode="after")
     def _check_phases(self) -> Self:

@@ -15,8 +15,6 @@ from alphacut.io.files import as_json, write_text
 from alphacut.io.problem import suggestion
 
 PETSC_PREFIX = "-rve_"
-PETSC_LOG = "-log_view"
-"""The one option of PETSc without the prefix: a log of the process."""
 
 
 @dataclass(frozen=True)
@@ -57,9 +55,6 @@ def split_petsc(arguments: Sequence[str]) -> tuple[list[str], dict[str, str]]:
     remaining = list(arguments)
     while remaining:
         word = remaining.pop(0)
-        if word == PETSC_LOG:
-            petsc[word] = ""
-            continue
         if not word.startswith(PETSC_PREFIX):
             words.append(word)
             continue
@@ -71,8 +66,7 @@ def split_petsc(arguments: Sequence[str]) -> tuple[list[str], dict[str, str]]:
 
 def require_petsc(petsc: Mapping[str, str], has_prisms: bool) -> None:
     """Refuses PETSc options, named without their prefix, where no prisms are solved."""
-    name = next(iter(petsc), "")
-    option = name if name == PETSC_LOG else PETSC_PREFIX + name
+    option = PETSC_PREFIX + next(iter(petsc), "")
     require(has_prisms or not petsc, option, "PETSc's", "options of a cell with method prism")
 
 

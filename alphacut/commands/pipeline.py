@@ -297,8 +297,8 @@ def _with_stand_ins(content: Content, structure: Structure) -> Structure:
         is_fuzzy = any(number.support.width > 0 for number in inputs)
     if "E" in numbers:
         numbers["E"] = _stand_in(numbers["E"], 0.01 if is_fuzzy and not is_crisp else 0.0)
-    losses = [x for pair in content.cell.losses for x in pair if x] if content.cell else []
-    is_fuzzy = is_fuzzy or any(x.support.width > 0 for x in losses)
+    losses = content.cell.losses if content.cell else ()
+    is_fuzzy = is_fuzzy or any(loss.support.width > 0 for loss in losses)
     if content.has_material_damping and is_fuzzy and not is_crisp:
         ratios = {name for name in numbers if re.fullmatch(r"zeta\d*", name)}
         numbers |= {name: _stand_in(numbers[name], 0.1) for name in ratios}

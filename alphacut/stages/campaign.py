@@ -22,7 +22,6 @@ from alphacut.rve.series.model import SeriesModel
 from alphacut.stages.cell import GPA, SPHERE_TOLERANCE, CellProblem, Solve, require_isotropic
 from alphacut.stages.modulus import (
     FIBRES,
-    LossCuts,
     LossResult,
     ModulusResult,
     cuts_of,
@@ -30,6 +29,7 @@ from alphacut.stages.modulus import (
     loss_bounds,
     loss_cuts,
     modulus_dataset,
+    phase_loss_cuts,
     plane_cuts,
     plane_outputs,
 )
@@ -55,7 +55,7 @@ def sample_outputs(
     model: Solve,
     problem: CellProblem,
     crisp: Mapping[str, float],
-    losses: LossCuts | None,
+    losses: Array | None,
     points: Sequence[Mapping[str, float]],
 ) -> list[dict[str, float | Array]]:
     """Outputs of the cell by name, in SI, at points of the fuzzy inputs; `crisp` has the others.
@@ -215,11 +215,11 @@ class CellCampaign(CellProblem):
                     raise FailedError(f"the proof is wrong: {what}", "keep the case and report it")
 
     @property
-    def losses(self) -> LossCuts | None:
+    def losses(self) -> Array | None:
         """Cuts of the phases' loss factors; None where the case has none."""
         if not self.cell.losses:
             return None
-        return LossCuts.from_phases(self.cell.losses, self.modulus.alpha)
+        return phase_loss_cuts(self.cell.losses, self.modulus.alpha)
 
     @property
     def knowledge(self) -> Knowledge:

@@ -31,11 +31,11 @@ from alphacut.rve.image.phases import (
     threshold_ranges,
 )
 from alphacut.rve.result.engineering_constants import NAMES, PLANE_STRAIN
-from alphacut.rve.result.loss_factors import CONSTANTS, bulk_and_shear_losses, first_order
+from alphacut.rve.result.loss_factors import CONSTANTS, first_order
 from alphacut.rve.result.moduli import plane_constants
 from alphacut.rve.result.result import PhaseEnergies
 from alphacut.stages.cell import AVERAGES, GPA, References, isotropic_bounds
-from alphacut.stages.modulus import LossCuts, LossResult, constant_cuts
+from alphacut.stages.modulus import LossResult, constant_cuts, loss_corners, phase_loss_cuts
 from alphacut.stages.store import CutsResult, Numbers, Stage, StageContext, StageResult, Values
 from alphacut.stochastic.segmentation import segment
 
@@ -135,7 +135,7 @@ def compute_cuts(
     losses, loss = dict[str, Array](), None
     if cell.losses:
         energies = phase_energies(crisp, nominal, phase, count=len(cell.pairs), aspect=aspect)
-        phase_cuts = LossCuts.from_phases(cell.losses, alpha)
+        phase_cuts = phase_loss_cuts(cell.losses, alpha)
         bounds, errors = image_loss_bounds(energies, phase_cuts, average)
         losses = dict(zip(CONSTANTS, np.moveaxis(bounds, -1, 0), strict=True))
         loss = LossResult.of(losses, errors, Nature.ESTIMATED)
@@ -199,13 +199,13 @@ def _dataset(
     return xarray.Dataset(variables, axes, {"nature": str(NATURE)})
 
 
-def image_loss_bounds(energies: PhaseEnergies, cuts: LossCuts, average: str) -> tuple[Array, Array]:
+def image_loss_bounds(energies: PhaseEnergies, cuts: Array, average: str) -> tuple[Array, Array]:
     """Bounds of the loss factors of E, G, K at nominal moduli, (levels, 2, 3), and errors, (3,)."""
     constants_of = partial(plane_constants, average=average)
     fractions, _ = energies.energy_fractions(constants_of)
-    same_losses = np.array([bulk_and_shear_losses(None, False)] * len(fractions))  # of K and G
-    corners = cuts.corners(fractions, same_losses)
-    bounds = np.einsum("lecpx,pxc->lec", corners, fractions)  # letters as in `LossCuts.corners`
+    corners = loss_corners(cuts, fractions)
+    # level l, end e, constant c, phase p, K or G x
+    bounds = np.einsum("lecpx,pxc->lec", corners, fractions)
     largest = corners[0, 1, 0]
     _, errors = first_order(energies, largest, constants_of)
     # what the first order leaves out is of the order of the squared difference of losses

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from itertools import product
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,7 +22,6 @@ from alphacut.rve.result.engineering_constants import (
 from alphacut.rve.result.loss_factors import (
     CONSTANTS,
     MAX_FIRST_ORDER,
-    bulk_and_shear_losses,
     loss_factors,
 )
 from alphacut.rve.result.result import HomogenisedStiffness
@@ -204,59 +202,38 @@ def _stepped(data: xarray.Dataset, name: str) -> FuzzyNumber:
     return outer_steps(alpha, bounds[:, 0], bounds[:, 1])
 
 
-Losses = tuple[FuzzyNumber, FuzzyNumber | None]
-"""Loss factor of a phase's Young's modulus, and of its bulk modulus where that is another."""
+def phase_loss_cuts(losses: Sequence[FuzzyNumber], alpha: Sequence[float]) -> Array:
+    """Cuts of the loss factor of each phase on some levels, shape (levels, 2, phases)."""
+    return np.array([np.transpose([loss.cut(level) for loss in losses]) for level in alpha])
 
 
-@dataclass(frozen=True, eq=False)
-class LossCuts:
-    """Cuts of the phases' loss factors.
+def loss_corners(cuts: Array, fractions: Array) -> Array:
+    """Phases' loss factors where those of E, G and K are least and greatest, to first order.
 
     Args:
-        bounds: Of Young's and of the bulk modulus, shape (levels, 2, phases, 2); 0 where the
-            bulk modulus has no loss factor of its own.
-        has_bulk: Whether it has, for each phase.
+        cuts: Of each phase, of whose K and G it is the loss factor, shape (levels, 2, phases).
+        fractions: ∂ln c/∂ln X by X = K and G of each phase, shape (phases, 2, 3).
+
+    Returns:
+        Of K and G of the phases, shape (levels, 2, 3, phases, 2).
     """
-
-    bounds: Array
-    has_bulk: tuple[bool, ...]
-
-    @classmethod
-    def from_phases(cls, losses: Sequence[Losses], alpha: Sequence[float]) -> Self:
-        """Cuts of the phases' fuzzy loss factors on some levels."""
-        pairs = [(young, bulk or Crisp(0.0)) for young, bulk in losses]
-        cuts = [[[young.cut(x), bulk.cut(x)] for young, bulk in pairs] for x in alpha]
-        has_bulk = tuple(bulk is not None for _, bulk in losses)
-        return cls(np.moveaxis(np.array(cuts), -1, 1), has_bulk)  # the ends after the levels
-
-    def corners(self, fractions: Array, to_moduli: Array) -> Array:
-        """Phases' loss factors where those of E, G and K are least and greatest, to first order.
-
-        Args:
-            fractions: ∂ln c/∂ln X by X = K and G of each phase, shape (phases, 2, 3).
-            to_moduli: Loss factors of K and G from those of Young's and the bulk modulus, shape
-                (phases, 2, 2).
-
-        Returns:
-            Of K and G of the phases, shape (levels, 2, 3, phases, 2).
-        """
-        # level l, end e, constant c (E, G, K), phase p, modulus x (K, G), loss factor j (η_E, η_K)
-        slopes = np.einsum("pxj,pxc->cpj", to_moduli, fractions)
-        lower, upper = np.moveaxis(self.bounds[:, :, None], 1, 0)
-        minima, maxima = np.where(slopes >= 0, lower, upper), np.where(slopes >= 0, upper, lower)
-        return np.asarray(np.einsum("pxj,elcpj->lecpx", to_moduli, np.array([minima, maxima])))
+    slopes = fractions.sum(axis=1).T  # (constants, phases)
+    lower, upper = np.moveaxis(cuts[:, :, None], 1, 0)
+    minima, maxima = np.where(slopes >= 0, lower, upper), np.where(slopes >= 0, upper, lower)
+    corners = np.stack([minima, maxima], axis=1)
+    return np.stack([corners, corners], axis=-1)
 
 
-def loss_bounds(result: HomogenisedStiffness, cuts: LossCuts) -> tuple[Array, Array]:
-    """Bounds of the loss factors of E, G and K, (levels, 2, 3), and their largest errors, (3,)."""
+def loss_bounds(result: HomogenisedStiffness, cuts: Array) -> tuple[Array, Array]:
+    """Bounds of the loss factors of E, G and K, (levels, 2, 3), and their largest errors, (3,).
+
+    `cuts` are those of `phase_loss_cuts`.
+    """
     assert result.energies is not None
     fractions, _ = result.energies.energy_fractions(result.constants_of)
-    # phases of a mesh, whose result knows no cell, have no bulk losses of their own
-    phases = (None,) * len(cuts.has_bulk) if result.cell is None else result.cell.phases
-    pairs = zip(phases, cuts.has_bulk, strict=True)
-    corners = cuts.corners(fractions, np.array([bulk_and_shear_losses(*pair) for pair in pairs]))
+    corners = loss_corners(cuts, fractions)
     errors = [loss_factors(result, corners[0, 1, k]).errors[x] for k, x in enumerate(CONSTANTS)]
-    if corners.max() <= MAX_FIRST_ORDER:  # letters as in `LossCuts.corners`
+    if corners.max() <= MAX_FIRST_ORDER:  # level l, end e, constant c, phase p, K or G x
         return np.einsum("lecpx,pxc->lec", corners, fractions), np.array(errors)
     bounds = np.empty(corners.shape[:3])
     for corner in product(*map(range, bounds.shape)):

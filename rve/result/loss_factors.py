@@ -15,7 +15,7 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.rve.cell.cell import AnyPhase, Phase
+from alphacut.rve.cell.cell import Phase
 from alphacut.rve.result.result import (
     DeclaredConstants,
     HomogenisedStiffness,
@@ -28,22 +28,6 @@ CONSTANTS = ("E", "G", "K")
 MAX_FIRST_ORDER = 0.1
 """Loss factor of a phase above which series take complex moduli."""
 ROUND_OFF = 1e-12
-
-
-def bulk_and_shear_losses(phase: AnyPhase | None, has_bulk: bool) -> Array:
-    """Matrix (2, 2) from loss factors (η_E, η_K) of a phase to (η_K, η_G).
-
-    1/E = 1/(9 K) + 1/(3 G) gives η_E/E = η_K/(9 K) + η_G/(3 G). Without η_K both factors are η_E.
-
-    Raises:
-        RefusedError: η_K is given for a phase that is not isotropic.
-    """
-    if not has_bulk:
-        return np.array([[1.0, 0.0], [1.0, 0.0]])
-    if not isinstance(phase, Phase):
-        raise RefusedError("loss of the bulk modulus", "there", "none beside a stiffness")
-    nu = phase.poisson
-    return np.array([[0.0, 1.0], [1.5 / (1 + nu), (nu - 0.5) / (1 + nu)]])
 
 
 def loss_factors(result: HomogenisedStiffness, losses: Array) -> DeclaredConstants:

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from alphacut.fuzzy.refused import RefusedError
-from alphacut.rve import Phase, PrismModel, SeriesModel, SlicesModel, VoigtPhase
-from alphacut.rve.result.loss_factors import bulk_and_shear_losses, first_order, loss_factors
+from alphacut.rve import Phase, PrismModel, SeriesModel, SlicesModel
+from alphacut.rve.result.loss_factors import first_order, loss_factors
 from alphacut.rve.spheres.model import SphereSeriesModel
 from alphacut.stochastic import HermiteMap
 
@@ -66,15 +65,6 @@ def test_pores_and_rigid_particles_lose_nothing_whatever_their_loss(contrast):
     result = solved(MODELS[0], particle=Phase(20e9 * contrast, 0.2))
     loss = loss_factors(result, np.array([[0.02, 0.02], [0.09, 0.09]]))
     assert np.allclose([*loss.values.values()], 0.02, rtol=1e-6)
-
-
-def test_the_loss_of_young_s_modulus_is_the_mean_of_bulk_and_shear_by_energy():
-    bulk, shear = bulk_and_shear_losses(MATRIX, has_bulk=True) @ [0.02, 0.005]
-    moduli = MATRIX.bulk_and_shear * np.array([1 + 1e-9j * bulk, 1 + 1e-9j * shear])
-    young = 1 / (1 / (9 * moduli[0]) + 1 / (3 * moduli[1]))
-    assert young.imag / young.real * 1e9 == pytest.approx(0.02, rel=1e-6)
-    with pytest.raises(RefusedError, match="none beside a stiffness"):
-        bulk_and_shear_losses(VoigtPhase(np.eye(3).tolist()), has_bulk=True)
 
 
 def test_errors_of_coarse_energies_cover_what_finer_ones_find():

@@ -41,9 +41,9 @@ def test_amplitudes_are_parameters_and_courses_have_their_files_samples(tmp_path
     structure = content(tmp_path).structure
     assert structure.inputs(("F",)).keys() == {"F2", "F2_2"}
     numbers = {name: structure.numbers[name].support for name in structure.model.force_names}
-    assert numbers == {"F1": (4e3, 4e3), "F2": (3.6e3, 4.4e3), "F2_2": (1e3, 3e3), "J1": (4e2, 4e2)}
+    assert numbers == {"F1": (1.0, 1.0), "F2": (0.9, 1.1), "F2_2": (1e3, 3e3), "J1": (4e2, 4e2)}
     wind, _, machine, hammer = structure.model.loads
-    np.testing.assert_allclose(wind.history.values([0.0, 0.25, 1.0, 9.0]), [0.5, -0.25, 0.0, 0.0])
+    np.testing.assert_allclose(wind.history.values([0.0, 0.25, 1.0, 9.0]), [2e3, -1e3, 0.0, 0.0])
     assert wind.history.is_static
     assert machine.history.values([0.29, 0.3]) == pytest.approx([0.0, 1.0])
     assert hammer.history is None

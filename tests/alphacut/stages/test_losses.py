@@ -54,7 +54,6 @@ def test_the_frame_is_damped_by_half_the_loss_factor_of_its_material(tmp_path):
         ('"[1.4, 2, 2.6] %"', '"-1 %"', "cell.matrix_loss", "from 0 up to 0.5"),
         ('"[1.4, 2, 2.6] %"', "0.51", "cell.matrix_loss", "from 0 up to 0.5"),
         ('matrix_loss = "[1.4, 2, 2.6] %"\n', "", "cell.matrix_loss", "a loss of either phase"),
-        ("[cell]", "[cell]\nmatrix_loss_bulk = 0.2", "cell.matrix_loss_bulk", "up to 0.105"),
         (
             CASE[CASE.index("[radius]") : CASE.index("[modulus]")],
             '[mesh]\nfile = "x.msh"\n[cell.phases]\na = { modulus = "1 GPa", poisson = 0, loss = 0.1 }\n'
