@@ -64,19 +64,16 @@ def parse_limit(value: object) -> Limit:
         raise RefusedError("", value, allowed)
     side, name, _, text = match.groups()
     is_relative = name.startswith("drift") and text.endswith("%")
+    unit = "" if is_relative else Output(name).unit
     try:
-        number = _number(text, "" if is_relative else Output(name).unit)
+        if unit == "SI":  # the output's is not known here
+            number = float(quantity.parse_fuzzy_in_any_unit(text).nominal)
+        else:
+            number = quantity.parse_number(text, unit)
     except ValueError as error:
         raise RefusedError("", value, allowed, str(error)) from None
     require(number > 0 or side in ("max", "min"), "", value, allowed)
     return Limit(cast("Side", side or ""), name, number, is_relative, str(value))
-
-
-def _number(text: str, unit: str) -> float:
-    """A quantity in an SI unit, or in its own where the output's is not known here."""
-    if unit != "SI":
-        return quantity.parse_number(text, unit)
-    return float(quantity.parse_fuzzy_in_any_unit(text).nominal)
 
 
 AnyLimit = Annotated[Limit, PlainValidator(parse_limit, json_schema_input_type=str)]

@@ -123,11 +123,11 @@ def with_forces(
         for section in sections
         for unknown, (amplitude, _) in section.amplitude.items()
     ]
-    is_frame = isinstance(model, StoreyFrame)
-    allowed = tuple(map(str, range(1, model.floors + 1))) if is_frame else unknowns
+    if isinstance(model, StoreyFrame):
+        unknowns = [str(floor) for floor in range(1, model.floors + 1)]
     for unknown, _, _ in forces:
-        require_choice("force.amplitude", unknown, allowed)
-    if is_frame:
+        require_choice("force.amplitude", unknown, unknowns)
+    if isinstance(model, StoreyFrame):
         loads = [
             Force(int(floor), amplitude.nominal, course) for floor, amplitude, course in forces
         ]
