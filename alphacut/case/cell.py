@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from alphacut.case.material import (
     AnyLaw,
@@ -92,8 +92,13 @@ class CellContent(Section):
             raise RefusedError("radius", None, "a section [radius], or cell.fraction")
         return radius, self.particle_cell
 
-    @model_validator(mode="after")
-    def _check_mesh(self) -> Self:
+    def require_consistent(self) -> None:
+        """Refuses sections that do not fit each other."""
+        self._require_mesh()
+        self._require_interphase()
+        self._require_stages()
+
+    def _require_mesh(self) -> None:
         """Refuses a mesh file without [cell.phases] or the reverse; keys that repeat the file."""
         if self.mesh.file is None:
             allowed = "a mesh of Gmsh beside [cell.phases]"
@@ -101,7 +106,7 @@ class CellContent(Section):
             is_complete = self.radius is None or self.radius_map is not None
             about = RadiusMapSection.model_fields["a1"].description
             require(is_complete, "radius.a1", None, f"{about}; theta alone beside mesh.file")
-            return self
+            return
         allowed = "[cell.phases], a phase for each physical group of mesh.file"
         require(self.mesh_cell is not None, "cell.phases", None, allowed)
         for key in ("size", "layers"):
@@ -111,25 +116,21 @@ class CellContent(Section):
         tolerance, cure = self.modulus.tolerance, "compare a coarser mesh"
         allowed = "none beside mesh.file, whose error nobody knows"
         require(tolerance is None, "modulus.tolerance", tolerance, allowed, cure=cure)
-        return self
 
-    @model_validator(mode="after")
-    def _check_interphase(self) -> Self:
+    def _require_interphase(self) -> None:
         """Refuses an interphase that reaches the sides of the cell; lengths over half a side."""
         cell = self.particle_cell
         law = None if cell is None else self.radius_map or cell.fraction_map
         if cell is None or law is None or cell.interphase_thickness is None:
-            return self
+            return
         if "microstructure" in self.stages:  # which is yet to give the radius
-            return self
+            return
         radius, thickest = law.largest_radius, cell.interphase_thickness.support.upper
         fits = radius + thickest < CLOSEST  # the largest outer radius that can be meshed
         allowed = f"values below {CLOSEST - radius:.4g}, beside radii up to {radius:.4g}"
         require(fits, "cell.interphase_thickness", f"{thickest:g}", allowed)
-        return self
 
-    @model_validator(mode="after")
-    def _check_stages(self) -> Self:
+    def _require_stages(self) -> None:
         """Refuses stages without their sections, two sources of the radius, and unfit methods."""
         has_fraction = self.particle_cell is not None and self.particle_cell.fraction is not None
         has_radius = "microstructure" in self.stages or has_fraction
@@ -153,4 +154,3 @@ class CellContent(Section):
         method = self.modulus.method
         methods = (method,) if self.cell is None else self.cell.methods
         require(method in methods, "modulus.method", method, f"{', '.join(methods)} for this cell")
-        return self

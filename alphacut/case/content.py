@@ -7,9 +7,6 @@ import re
 from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Self
-
-from pydantic import model_validator
 
 from alphacut.case.cell import CellContent
 from alphacut.case.limits import (
@@ -107,18 +104,18 @@ class Content(CellContent):
         ratios = getattr(self.structure_section, "damping_ratio", None)
         return isinstance(ratios, MaterialDamping)
 
-    @model_validator(mode="after")
-    def _check_material_damping(self) -> Self:
-        """Refuses damping by the material where no stage computes the material's loss factors."""
-        has_losses = "modulus" in self.stages and bool(self.cell and self.cell.losses)
+    def require_consistent(self) -> None:
+        """Refuses sections that do not fit each other."""
+        super().require_consistent()
         if self.has_material_damping:
-            section = "frame" if self.frame else "matrices"
+            has_losses = "modulus" in self.stages and bool(self.cell and self.cell.losses)
+            key = f"{'frame' if self.frame else 'matrices'}.damping_ratio"
             allowed = "stage modulus and loss factors in [cell], or a number"
-            require(has_losses, f"{section}.damping_ratio", "material", allowed)
-        return self
+            require(has_losses, key, "material", allowed)
+        self._require_excitation()
+        self._require_envelope()
 
-    @model_validator(mode="after")
-    def _check_excitation(self) -> Self:
+    def _require_excitation(self) -> None:
         """Refuses a structure at rest without loads, and what a suite of records cannot answer."""
         ground = getattr(self.structure_section, "accelerogram", None)
         is_loaded = self.records is not None or ground is not None or bool(self.force)
@@ -130,21 +127,19 @@ class Content(CellContent):
         if self.records is None:
             is_absent, allowed = self.fragility is None, "beside [records]"
             require(is_absent, "fragility", "without records", allowed)
-            return self
+            return
         require_alone("records", ground is not None, "an accelerogram")
         if self.matrices is not None:
             self.matrices.require_pattern()
         for key in ("probability", "tolerances", "identify", "study"):
             allowed = "[decision] and [fragility], of one motion for each record"
             require(not getattr(self, key), key, "beside [records]", allowed)
-        return self
 
-    @model_validator(mode="after")
-    def _check_envelope(self) -> Self:
+    def _require_envelope(self) -> None:
         """Refuses two structures or none, and studies and questions that do not fit it."""
         envelope, structure = self.envelope, self.structure
         if envelope is None or "envelope" not in self.stages:
-            return self
+            return
         sections = [x for x in (self.frame, self.pendulum, self.matrices) if x is not None]
         if structure is None or len(sections) > 1:
             value = None if structure is None else f"beside {len(sections) - 1} more"
@@ -165,7 +160,6 @@ class Content(CellContent):
             section.require_answerable(structure)
         if self.identify is not None:
             structure.inputs(self.identify.learn, "identify.learn")
-        return self
 
     def _require_study(
         self, key: str, study: Study, envelope: EnvelopeSection, structure: Structure

@@ -6,10 +6,10 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, NamedTuple, Self
+from typing import Annotated, NamedTuple
 
 import numpy as np
-from pydantic import Field, ValidationInfo, model_validator
+from pydantic import Field, ValidationInfo
 
 from alphacut.case.structure import Structure
 from alphacut.case.types import NotEmpty, OneOrMany, Section, Time, case_file, text
@@ -94,8 +94,7 @@ class ForceSection(Section):
     amplitude: dict[str, Amplitude]
     """amplitude by floor or unknown, as {3 = "8 kN"}; factor of a file with a unit"""
 
-    @model_validator(mode="after")
-    def _check_units(self) -> Self:
+    def require_consistent(self) -> None:
         """Refuses amplitudes whose unit is not that of the time history."""
         require(bool(self.amplitude), "force.amplitude", None, "one floor or more")
         quantity_name, example = quantity.QUANTITIES[self.history.unit]
@@ -103,7 +102,6 @@ class ForceSection(Section):
             is_same, shown = unit == self.history.unit, unit or "a number"
             key = f"force.amplitude.{unknown}"
             require(is_same, key, shown, f'{quantity_name}, as "{example}"')
-        return self
 
 
 def with_forces(
@@ -235,10 +233,8 @@ class RecordsSection(Section):
         """The recordings of all files."""
         return tuple(recording for group in self.files for recording in group)
 
-    @model_validator(mode="after")
-    def _check_names(self) -> Self:
+    def require_consistent(self) -> None:
         """Refuses two files of the same name, which is that of their results."""
         names = [recording.name for recording in self.recordings]
         repeated = ", ".join(sorted({name for name in names if names.count(name) > 1}))
         require(not repeated, "records.files", repeated, "each file once, by its name")
-        return self

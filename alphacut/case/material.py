@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, ClassVar, Literal
 
-from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
+from pydantic import BeforeValidator, Discriminator, Field, Tag
 
 from alphacut.case.radius import FractionMap, Number, Radius, RadiusMapSection, ThetaSection
 from alphacut.case.types import (
@@ -38,14 +38,12 @@ class PhaseSection(Section):
     """Poisson's ratio, beside Young's modulus"""
     loss: Loss | None = Field(default=None, description="loss factor tan δ of the stiffness")
 
-    @model_validator(mode="after")
-    def _check_ratio(self) -> Self:
+    def require_consistent(self) -> None:
         """Refuses a Poisson's ratio beside a stiffness, and Young's modulus without one."""
         isotropic = isinstance(self.modulus, FuzzyNumber)
         value = "without poisson" if self.poisson is None else "with poisson"
         allowed = "poisson beside Young's modulus, none beside a stiffness"
         require(isotropic == (self.poisson is not None), "", value, allowed)
-        return self
 
     def phase(self, modulus: float | None) -> Phase | VoigtPhase:
         """The material, with its Young's modulus in Pa where it is isotropic."""
@@ -82,14 +80,12 @@ class MeshedCell(Section):
         losses = (phase.loss for phase in self.phases.values())
         return tuple(loss for loss in losses if loss is not None)
 
-    @model_validator(mode="after")
-    def _check_losses(self) -> Self:
+    def require_consistent(self) -> None:
         """Refuses losses of some phases alone."""
         missing = [name for name, phase in self.phases.items() if phase.loss is None]
-        complete = len(missing) in (0, len(self.phases))
-        key = f"cell.phases.{missing[0]}.loss" if missing else ""
-        require(complete, key, None, "a loss factor of each phase, 0 for none")
-        return self
+        is_complete = len(missing) in (0, len(self.phases))
+        key = f"cell.phases.{[*missing, ''][0]}.loss"
+        require(is_complete, key, None, "a loss factor of each phase, 0 for none")
 
 
 Thickness = Annotated[FuzzyNumber, Quantity(minimum=THINNEST, below=1, fuzzy=True)]
@@ -99,6 +95,10 @@ ELLIPSES = re.compile(r"^ellipses\(([^,]*),([^,]*)\)$")
 SHAPES = (
     'cylinders, spheres or ellipses(ratio of axes from 1/4 to 4, degrees), as "ellipses(2, 30)"'
 )
+
+
+LOSSES = "matrix_loss", "inclusion_loss"
+INTERPHASE = "interphase_thickness", "interphase_modulus", "interphase_poisson"
 
 
 class RoundCell(Section):
@@ -193,9 +193,8 @@ class RoundCell(Section):
         """True for round fibres of an isotropic material in a matrix alone."""
         return self.has_series and self.particles == "cylinders"
 
-    @model_validator(mode="after")
-    def _check_phases(self) -> Self:
-        """Refuses unknown shapes, a Poisson's ratio too few or too many, and touching particles."""
+    def require_consistent(self) -> None:
+        """Refuses unknown shapes, keys too few or too many, touching particles, and odd rings."""
         outline = self.outline or circle  # refuses unknown shapes
         has_ratio, is_isotropic = self.inclusion_poisson is not None, self.stiffness is None
         value = "there" if has_ratio else "missing"
@@ -208,28 +207,12 @@ class RoundCell(Section):
             fits, value = self.fraction.support.upper < touching, f"{self.fraction.support.upper:g}"
             allowed = f"values below {touching:.6g}, where particles touch"
             require(fits, "cell.fraction", value, allowed)
-        return self
-
-    @model_validator(mode="after")
-    def _check_interphase(self) -> Self:
-        """Refuses an interphase with a key missing, around spheres or ellipses, or with losses."""
-        names = [f"interphase_{name}" for name in ("thickness", "modulus", "poisson")]
-        missing = [name for name in names if getattr(self, name) is None]
-        if len(missing) == len(names):  # there is no interphase
-            return self
-        require(not missing, f"cell.{(missing or names)[0]}", None, f"all of {', '.join(names)}")
-        key, fits = "cell.interphase_thickness", self.particles == "cylinders"
-        require(fits, key, f"beside {self.particles}", "a ring around cylinders")
-        require(not self.losses, "cell.matrix_loss", "beside a ring", "no losses")
-        return self
-
-    @model_validator(mode="after")
-    def _check_losses(self) -> Self:
-        """Refuses loss factors of one phase alone."""
-        missing = [x for x in ("matrix_loss", "inclusion_loss") if getattr(self, x) is None]
-        allowed = "a loss of either phase, 0 for none"
-        require(len(missing) != 1, f"cell.{''.join(missing)}", None, allowed)
-        return self
+        self.require_together("cell", LOSSES, "a loss of either phase, 0 for none")
+        self.require_together("cell", INTERPHASE, f"all of {', '.join(INTERPHASE)}")
+        if self.interphase_thickness is not None:
+            key, fits = "cell.interphase_thickness", self.particles == "cylinders"
+            require(fits, key, f"beside {self.particles}", "a ring around cylinders")
+            require(not self.losses, "cell.matrix_loss", "beside a ring", "no losses")
 
 
 class ImageCell(Section):
@@ -261,8 +244,7 @@ class ImageCell(Section):
         losses = self.loss or ()
         return losses * len(self.modulus) if len(losses) == 1 else losses
 
-    @model_validator(mode="after")
-    def _check_phases(self) -> Self:
+    def require_consistent(self) -> None:
         """Refuses thresholds beside labels or neither, and numbers of values that do not fit."""
         has_one = bool(self.threshold) != bool(self.labels)
         value = "beside cell.labels" if self.threshold else None
@@ -277,7 +259,6 @@ class ImageCell(Section):
         require(fits, "cell.loss", f"{n_losses} loss factors", allowed)
         n_sides, allowed = len(self.pixel), "a side, or a width and a height"
         require(n_sides <= 2, "cell.pixel", n_sides, allowed)
-        return self
 
 
 def _cell_kind(table: Mapping[str, object]) -> str:

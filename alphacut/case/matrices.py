@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Annotated, Self
+from typing import Annotated
 
 import numpy as np
-from pydantic import Field, PlainValidator, ValidationInfo, model_validator
+from pydantic import Field, PlainValidator, ValidationInfo
 
 from alphacut.case.structure import (
     LOSS_STAND_IN,
@@ -168,14 +168,12 @@ class MatricesSection(StructureSection):
         pattern = [float(name.rpartition(".")[2] == self.direction) for name in self.unknowns]
         return np.array(pattern)
 
-    @model_validator(mode="after")
-    def _check_rows(self) -> Self:
+    def require_consistent(self) -> None:
         """Refuses a structure without outputs, and a record without a direction."""
         require(bool(self.outputs), "matrices.outputs", None, "one output or more")
         if self.accelerogram is not None or self.direction:
             self.require_pattern()
         _ = self.nominal  # refuses matrices that do not fit together
-        return self
 
     def require_pattern(self) -> None:
         """Refuses a direction in which the ground moves no unknown."""

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Self
+from typing import Annotated
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from alphacut.case.types import CaseFile, Fraction, Length, Quantity, Section, after, rising
 from alphacut.fuzzy.refused import require
@@ -48,14 +48,12 @@ class PackingSection(Section):
         packing = Packing(self.particles, self.fraction, radii, shape=shape)
         return Simulated(packing, self.packings)
 
-    @model_validator(mode="after")
-    def _check_radii(self) -> Self:
+    def require_consistent(self) -> None:
         """Refuses a file of radii beside their ends, and one end alone or none without a file."""
         ends = (self.smallest_radius, self.largest_radius)
         fits = None not in ends if self.file is None else ends == (None, None)
         key, allowed = "microstructure.packing.file", "a file, or both ends of the radii"
         require(fits, key, "beside or without ends", allowed)
-        return self
 
 
 class Circles(Section):
@@ -96,13 +94,11 @@ class MicrostructureSection(Section):
         """The section on the particles; one, once this is built."""
         return [x for x in (self.packing, self.circles, self.image) if x is not None]
 
-    @model_validator(mode="after")
-    def _check_source(self) -> Self:
+    def require_consistent(self) -> None:
         """Refuses several sources of the particles, or none."""
         allowed, count = "one of packing, circles and image", len(self.sources)
         value = f"with {count} of them" if count else None
         require(count == 1, "microstructure", value, allowed)
-        return self
 
     def study(self, *, spheres: bool) -> MicrostructureStudy:
         """The study that computes the radius map from these particles, or from packed spheres."""

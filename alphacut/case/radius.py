@@ -5,9 +5,9 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Self
+from typing import Annotated
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from alphacut.case.types import (
     Quantity,
@@ -64,8 +64,7 @@ class RadiusMapSection(ThetaSection):
         maps = (self.at(dict(zip(self.numbers, corner, strict=True))) for corner in corners)
         return max(radius.extremes()[1] for radius in maps)
 
-    @model_validator(mode="after")
-    def _check_range(self) -> Self:
+    def require_consistent(self) -> None:
         """Refuses supports of a1 … a4 for which the radius leaves (0, 1) at some θ."""
         # corners of the supports suffice, as the map is linear in a1 … a4
         for corner in itertools.product(*({*x.support} for x in self.numbers.values())):
@@ -74,7 +73,6 @@ class RadiusMapSection(ThetaSection):
                 self.at(values)  # refuses such a map
             except RefusedError as error:
                 raise RefusedError("radius", values, error.allowed, error.cure) from None
-        return self
 
 
 @dataclass(frozen=True)

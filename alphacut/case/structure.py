@@ -7,9 +7,9 @@ import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Annotated, Any, Literal, Self, cast
+from typing import Annotated, Any, Literal, cast
 
-from pydantic import Field, PlainValidator, ValidationInfo, model_validator
+from pydantic import Field, PlainValidator, ValidationInfo
 
 from alphacut.case.types import Modulus, OneOrMany, Quantity, Section, case_file, text
 from alphacut.frame import Accelerogram, MatrixStructure, StoreyFrame
@@ -316,8 +316,7 @@ class Frame(StructureSection):
         heights = {f"drift{z}": height for z, height in enumerate(lists["lengths"], start=1)}
         return Structure(model, {name: numbers[name] for name in model.parameters}, heights)
 
-    @model_validator(mode="after")
-    def _check_damping(self) -> Self:
+    def require_consistent(self) -> None:
         """Refuses a frame without damping, with contradictory damping or impossible values."""
         has_columns = self.stiffness is None or not isinstance(self.damping_ratio, MaterialDamping)
         value = "material, beside stiffness"
@@ -328,7 +327,6 @@ class Frame(StructureSection):
         is_damped = any(map(self.has_key, DAMPING))
         require(is_damped, "frame.dampers", None, " or ".join(DAMPING), cure='"0 %" for none')
         _ = self.nominal  # refuses values that make no frame
-        return self
 
 
 class Pendulum(StructureSection):

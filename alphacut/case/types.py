@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, Self, TypeVar
 
 from pydantic import (
     AfterValidator,
@@ -18,6 +18,7 @@ from pydantic import (
     PlainValidator,
     Tag,
     ValidationInfo,
+    model_validator,
 )
 from pydantic.annotated_handlers import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic.json_schema import JsonSchemaValue
@@ -43,6 +44,19 @@ class Section(BaseModel):
     def has_key(self, key: str) -> bool:
         """True if the file gives the key, so that no default stands in."""
         return key in self.model_fields_set
+
+    def require_consistent(self) -> None:
+        """Refuses values that do not fit each other, once each key has its value."""
+
+    def require_together(self, section: str, keys: Sequence[str], allowed: str) -> None:
+        """Refuses some keys of a section without the others."""
+        missing = [key for key in keys if getattr(self, key) is None]
+        require(len(missing) in (0, len(keys)), f"{section}.{[*missing, ''][0]}", None, allowed)
+
+    @model_validator(mode="after")
+    def _validate(self) -> Self:
+        self.require_consistent()
+        return self
 
 
 @dataclass(frozen=True)
