@@ -125,7 +125,7 @@ class Box:
         loads = {name: load_at_nodes(sigma, x, self.time) for name, x in self.loads.items()}
         columns = [
             outputs_at(modal, point, np.full(count, output), self.time, loads)
-            for output in range(len(modal.order))
+            for output in range(len(self.structure.order))
         ]
         value, error = (np.stack(column, -1) for column in zip(*columns, strict=True))
         return value, error, self._line_deviation(modal)
@@ -144,15 +144,15 @@ class Box:
 
     def _line_deviation(self, modal: Modal) -> Array:
         """Bound of how far a motion strays from straight lines in the step to a node, (T, m)."""
-        outputs = np.arange(len(modal.order))
+        outputs, orders = np.arange(len(self.structure.order)), set(map(int, self.structure.order))
         deviation = np.zeros((len(self.time), len(outputs)))
         read = np.abs(modal.output_coefficients(np.zeros_like(outputs), outputs)[0])
         for k, sigma in enumerate(modal.sigma[0]):
             grid = Grid(np.array([sigma.imag]), np.array([-sigma.real / sigma.imag]))
-            oscillator = Oscillators(grid, self.loads, self.time, {int(x) for x in modal.order})
+            oscillator = Oscillators(grid, self.loads, self.time, orders)
             for source, share in modal.share.items():
                 for o in outputs:
-                    wave = oscillator.responses(source, int(modal.order[o]))
+                    wave = oscillator.responses(source, int(self.structure.order[o]))
                     deviation[:, o] += read[o, k] * abs(share[0, k]) * wave.line_deviation
         return deviation
 

@@ -161,12 +161,8 @@ def variables(
 ) -> dict[str, Jet]:
     """Jets of the independent variables by name, each of shape (S,), with slope 1 by itself.
 
-    Args:
-        points: Values, shape (S, len(names)).
-        names: Names of the columns.
-        selected: The names to differentiate by, in the order of the derivatives; empty for values
-            alone.
-        order: Highest derivatives, 1 or 2.
+    `points` (S, len(names)) are their values, `selected` the names to differentiate by, in the
+    order of the derivatives, and `order` that of the highest, 1 or 2.
     """
     d = len(selected)
     second_derivatives = d if order > 1 else 0

@@ -87,14 +87,9 @@ def monomial_values(u: Array, degree: int) -> Array:
 def convolve(
     a: Array, b: Array, degrees: tuple[int, int], d: int, bilinear: Callable[[Array, Array], Array]
 ) -> Array:
-    """Product of homogeneous polynomials a and b by a bilinear product of their coefficients.
+    """Product of homogeneous polynomials in d variables by a bilinear product of coefficients.
 
-    Args:
-        a: Coefficients, shape (monomials, …).
-        b: The same, of another degree.
-        degrees: Degrees of a and b.
-        d: Number of variables.
-        bilinear: Product that broadcasts over the leading axes.
+    a and b, of `degrees`, have shapes (monomials, …); `bilinear` broadcasts over their first axes.
     """
     at, total = product_places(d, *degrees), count(d, sum(degrees))
     shape = bilinear(a[0], b[0]).shape
@@ -125,15 +120,9 @@ def product_part(
     bilinear: Callable[[Array, Array], Array],
     lowest: tuple[int, int] = (0, 0),
 ) -> Array:
-    """Part of one degree of the product of two polynomials in d variables.
+    """Part of one degree of the product of two polynomials in d variables, as by `convolve`.
 
-    Args:
-        a: Parts of the first by degree; missing ones count as zero.
-        b: Parts of the second.
-        degree: Degree of the product's part.
-        d: Number of variables.
-        bilinear: Product of coefficients, as of `convolve`.
-        lowest: Least degrees of the parts of a and of b that are taken.
+    a and b are their parts by degree; missing ones count as zero, as those below `lowest` do.
     """
     total = np.zeros(
         (count(d, degree), *bilinear(a[0][0], b[0][0]).shape), np.result_type(a[0], b[0])

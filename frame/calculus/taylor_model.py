@@ -250,7 +250,8 @@ class TaylorModel:
         shape = np.broadcast_shapes(self.shape, b.shape)
         parts = []
         for degree in range(max(len(self.parts), len(b.parts))):
-            part = np.zeros((count(self.inputs, degree), *shape), _dtype(self, b))
+            kind = np.result_type(self.parts[0], b.parts[0])
+            part = np.zeros((count(self.inputs, degree), *shape), kind)
             for x in (self, b):
                 if degree < len(x.parts):
                     part += _padded(x.parts[degree], len(shape))
@@ -338,13 +339,7 @@ class TaylorModel:
     def _linear(
         self, bilinear: Callable[[Array, Array], Array], factor: Array, terms: int
     ) -> TaylorModel:
-        """Image under a linear map by numbers, with its rounding in the remainder.
-
-        Args:
-            bilinear: Product of coefficients and `factor`.
-            factor: Numbers.
-            terms: Number of terms of each sum in that product.
-        """
+        """Product with numbers, each entry a sum of `terms`, with its rounding in the remainder."""
         remainder = np.asarray(bilinear(self.remainder, np.abs(factor))) * (1 + gamma(terms + 2))
         rounding = gamma(terms + COMPLEX) * bilinear(np.sum(self.sizes(), 0), np.abs(factor))
         parts = tuple(np.asarray(bilinear(part, factor)) for part in self.parts)
@@ -425,10 +420,6 @@ def _real_times(real: Array, coefficients: Array) -> Array:
     return np.asarray((real @ of_both_parts).view(complex))
 
 
-def _dtype(a: TaylorModel, b: TaylorModel) -> np.dtype[Any]:
-    return np.result_type(a.parts[0], b.parts[0])
-
-
 def _padded(part: Array, ndim: int) -> Array:
     """A part with V extended on the left by axes of length 1 up to `ndim` axes."""
     missing = ndim - (part.ndim - 1)
@@ -438,24 +429,21 @@ def _padded(part: Array, ndim: int) -> Array:
 def _product(
     a: TaylorModel, b: TaylorModel, bilinear: Callable[[Array, Array], Array]
 ) -> TaylorModel:
-    """Product a b by `bilinear` (elementwise or matrix), kept to the higher order of both.
-
-    The remainder takes the products of parts above that order, and the rounding of the others: a
-    coefficient of degree i + j is a sum over all ways to split its monomial into factors of degree
-    i and j, and over the contracted axis, if any.
-    """
+    """Product a b by `bilinear` (elementwise or matrix), kept to the higher order of both."""
     d, order, ndim = a.inputs, max(a.order, b.order), max(a.remainder.ndim, b.remainder.ndim)
     a_sizes, b_sizes = a.sizes(), b.sizes()
     remainder = bilinear(a.remainder, np.asarray(sum(b_sizes)) + b.remainder)
     remainder = remainder + bilinear(np.asarray(sum(a_sizes)), b.remainder)
     degrees = range(min(order, len(a_sizes) + len(b_sizes) - 2) + 1)
-    parts = [np.zeros((count(d, k), *remainder.shape), _dtype(a, b)) for k in degrees]
+    kind = np.result_type(a.parts[0], b.parts[0])
+    parts = [np.zeros((count(d, k), *remainder.shape), kind) for k in degrees]
     inner = a.shape[-1] if bilinear == matmul else 1
     for i, x in enumerate(a.parts):
         for j, y in enumerate(b.parts):
             omitted = 1.0  # fraction of the parts' product that the polynomial leaves out
             if i + j <= order:
                 parts[i + j] += convolve(_padded(x, ndim), _padded(y, ndim), (i, j), d, bilinear)
+                # rounding of sums over all ways to split a monomial into factors of degree i and j
                 omitted = gamma(inner * comb(i + j, i) + i + j + 1 + COMPLEX)
             remainder = remainder + omitted * bilinear(a_sizes[i], b_sizes[j])
     remainder = remainder * (1 + gamma(inner + (order + 1) ** 2))

@@ -266,13 +266,7 @@ def trajectory(step_map: StepMap, start: Jet, rows: Jet) -> Jet:
     Nodes come in blocks of √steps: states at the first node of each block come from one another,
     those in a block from powers of T and, all blocks at once, from the motion that starts at rest.
 
-    Args:
-        step_map: T, G and the loads of all steps.
-        start: Initial state, shape (S, N, 1).
-        rows: Observation rows C, shape (S, m, N).
-
-    Returns:
-        Outputs, shape (S, steps + 1, m).
+    The start has shape (S, N, 1), the rows C (S, m, N), and the outputs (S, steps + 1, m).
     """
     loads, transfer = step_map.loads, step_map.transfer
     count = len(loads) + 1

@@ -29,12 +29,8 @@ def modal_trajectory(
 ) -> Jet | None:
     """Return outputs at nodes with two derivatives, shape (S, T, m); None where modes are too near.
 
-    Args:
-        state_matrix: A, shape (S, N, N).
-        columns: The initial state, then what a unit of each of L loads pushes, shape (S, N, 1 + L).
-        rows: Observation rows C, shape (S, m, N).
-        loads: The loads.
-        time: Nodes, shape (T,), in s.
+    A is the state matrix (S, N, N), C are the rows (S, m, N), and columns (S, N, 1 + L) the initial
+    state and what a unit of each of L loads pushes.
     """
     modes = _modes(state_matrix)
     if modes is None:

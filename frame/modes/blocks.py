@@ -110,16 +110,10 @@ Series = tuple[list[Array], list[Array], list[Array]]
 def narrowest_block(
     block: Ints, rotation: Array, centre: CentredMatrices, tolerance: float
 ) -> Block | None:
-    """Enclosure of a block of modes by series of the least degree that meets the tolerance.
+    """Enclosure of a block (p,) of modes by series of the least degree that meets the tolerance.
 
-    Args:
-        block: Numbers of its modes from below, shape (p,).
-        rotation: Rotation R of its modes, shape (p, p).
-        centre: The structure.
-        tolerance: Relative error bound of L and N that suffices, clipped to [FINE, ROUGH / 2].
-
-    Returns:
-        That of the last degree tried if none meets it; None if its error bound exceeds `ROUGH`.
+    `tolerance` is the relative error bound of L and N that suffices, clipped to [FINE, ROUGH / 2];
+    of the last degree tried if none meets it. None if its error bound exceeds `ROUGH`.
     """
     series: Series | None = None
     found, tolerance = None, min(max(tolerance, FINE), ROUGH / 2)
@@ -142,13 +136,8 @@ def subspace_series(
     """Perturbation series of an invariant subspace K X = M X L, X the identity on the block.
 
     In degree m, (Λ − λ_j M₀) x_j + M₀ Σ_i L_ij e_i is known from lower degrees, Λ and M₀ the
-    diagonals of K and M in the middle: the block's own rows give L, the others x_j.
-
-    Args:
-        block: Numbers of its modes.
-        degree: Degree N.
-        centre: The structure.
-        lower: The same to a lower degree, where it is known.
+    diagonals of K and M in the middle: the block's own rows give L, the others x_j. `lower` is the
+    same to a lower degree, where it is known.
 
     Returns:
         Coefficients of degree 0 to N of Lᵀ (monomials, p, p), of x_j and M x_j (monomials, p, n).
@@ -196,8 +185,8 @@ def enclosed_block(
     Args:
         block: Numbers of its modes, shape (p,).
         rotation: Rotation R of X̃ in the rows of the block, shape (p, p).
-        series: Coefficients of L̃ᵀ, of the rows x̃ of X̃ᵀ and of M x̃, by degree.
-        centre: M and K in the coordinates of the box's middle.
+        series: That of `subspace_series`.
+        centre: M and K.
 
     Returns:
         The block with proved remainders; None if K − L̃_jj M may be singular or no bounds hold.
@@ -248,12 +237,9 @@ def _polynomial(parts: list[Array], inputs: int) -> TaylorModel:
 
 
 def eigenvalue_drop(matrix: TaylorModel, scale: Array, sign: float) -> float:
-    """Bound over the box of how far eigenvalues of ± S (A(u) − A(0)) S fall below 0.
+    """Bound over the box of how far eigenvalues of sign × S (A(u) − A(0)) S fall below 0.
 
-    Args:
-        matrix: A, symmetric, shape (n, n).
-        scale: Diagonal of S, shape (n,).
-        sign: 1 or −1.
+    `matrix` is A (n, n), symmetric, and `scale` the diagonal of S (n,).
     """
     if not len(scale):
         return 0.0

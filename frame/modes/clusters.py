@@ -63,11 +63,8 @@ def enclose_subspaces(
 
     A block that cannot be enclosed is joined by the mode nearest to it, and tried again.
 
-    Args:
-        centre: M and K in the coordinates of the box's middle.
-        used: Inputs that they depend on, among all.
-        wanted: Number of modes to enclose.
-        tolerances: Relative error of each mode's λ that suffices; 0 unless given.
+    `wanted` is the number of modes to enclose, `used` are the inputs of M and K among all, and
+    `tolerances` relative errors of each mode's λ that suffice; 0 unless given.
 
     Raises:
         UnprovedError: The box is so wide that the structure may lose its mass or stiffness.
@@ -119,9 +116,7 @@ def centred_matrices(mass: TaylorModel, stiffness: TaylorModel) -> tuple[Centred
     Unknowns b without mass follow the others a there, x_b = −K_bb⁻¹ K_ba x_a, and have coordinates
     of their own, in which K is as large as the greatest λ.
 
-    Args:
-        mass: M, shape (n, n); rows of zeros where unknowns have no mass.
-        stiffness: K, shape (n, n).
+    Rows of M, shape (n, n), are zero where unknowns have no mass.
 
     Returns:
         The matrices as functions of the inputs that M or K depends on, and the numbers of these.

@@ -187,13 +187,8 @@ def needed_modes(
     """Places (n,) by rising |λ| of the modes without which outputs miss at most `allowed` (m,).
 
     An output r q + s q̇ is at most √(r K⁻¹ rᵀ + s M⁻¹ sᵀ) times √(qᵀ K q + q̇ᵀ M q̇). All is that of
-    the middle of the box: what is left out counts as an error of the start in the proof.
-
-    Args:
-        structure: The structure.
-        loads: Histories of its sources but the start.
-        time: Nodes, shape (T,), in s.
-        allowed: Largest error of each output, shape (m,).
+    the middle of the box: what is left out counts as an error of the start in the proof. `loads`
+    are the histories of all sources but the start.
     """
     rate, shape, norm = _middle_modes(structure)
     omega, (r, s) = structure.omega, np.split(structure.rows.value, 2, axis=1)

@@ -96,12 +96,8 @@ class BlockShares:
     ) -> BlockShares:
         """Shares of a block: r X, Xᵀ M v and N⁻¹ Xᵀ M v, of outputs r and sources v, N = Xᵀ M X.
 
-        Args:
-            block: The block X, as functions of the inputs at `used`.
-            rows: Rows of the outputs in the block's coordinates, shape (m, n), constant but for
-                rounding.
-            excited: Patterns v of the sources in them, shape (sources, n), of all inputs.
-            used: Inputs of the block.
+        In the block's coordinates, `rows` r (m, n) are constant but for rounding; `excited` v
+        (sources, n) are functions of all inputs, of which the block's are at `used`.
         """
         degree, d = DEGREES[0], block.norm.inputs
         while degree < DEGREES[1] and comb(2 * d + degree + 1, degree + 1) <= MAX_PAIRS:

@@ -76,12 +76,8 @@ class ModalModel:
     ) -> ModalModel:
         """The motion by polynomials of a degree.
 
-        Args:
-            flow: The motion.
-            boxes: The inputs' boxes, one a level; the polynomials are for the widest.
-            degree: Total degree.
-            allowed: What modes that are left out may be worth in each output, shape (m,); nothing
-                unless given.
+        They are for the widest of the boxes, one a level. Modes are left out that are worth no more
+        than `allowed` in each output, shape (m,).
 
         Raises:
             UnprovedError: The integrator is not the exact one, the structure is not known to have a
@@ -159,13 +155,8 @@ class ModalModel:
     def at(self, unit: Array, node: Ints, output: Ints) -> tuple[Array, Array, Array]:
         """One output at one node for each of N points, with derivatives by unit coordinates.
 
-        Args:
-            unit: Unit coordinates of the points, shape (N, d).
-            node: Time node of each, shape (N,).
-            output: Index of the output of each, shape (N,).
-
-        Returns:
-            Values (N,), gradients (N, d) and Hessians (N, d, d), in the output's unit.
+        Points have unit coordinates (N, d); the index of each one's node and output is given.
+        Returns values (N,), gradients (N, d) and Hessians (N, d, d), in the output's unit.
         """
         n, d = self.count, unit.shape[1]
         row, column = np.triu_indices(d)
@@ -181,14 +172,9 @@ class ModalModel:
         return derivatives[:, 0], derivatives[:, 1 : 1 + d], H
 
     def waves(self, rate: Array, node: Ints) -> Sequence[Waves]:
-        """Time functions w(t; λ_k) of the free motion and of each load, with derivatives by λ.
+        """Time functions w(t; λ_k) of the free motion (if any), then of each load, at N points.
 
-        Args:
-            rate: Eigenvalues λ_k, shape (N, n), in 1/s.
-            node: Time node of each point, shape (N,).
-
-        Returns:
-            For the free motion (if any), then each load: w, dw/dλ and d²w/dλ², each (N, n).
+        Each has w, dw/dλ and d²w/dλ², (N, n) each, at eigenvalues λ_k (N, n) and nodes (N,).
         """
         parts = []
         if self.started:

@@ -75,10 +75,7 @@ class MotionModels:
         is an oscillator for each mode and a bound of their coupling or, where that is narrower,
         modes known by their sums, as all modes are that are not enclosed.
 
-        Args:
-            structure: The structure.
-            excitation: The loads, the nodes and the names of the sources.
-            allowed: Truncation error of each output that is allowed, shape (m,); none unless given.
+        `allowed` is the truncation error of each output that is allowed, (m,); none unless given.
 
         Raises:
             UnprovedError: None of its modes can be enclosed.
@@ -135,14 +132,7 @@ def modes_wanted(
     """Least number of lowest modes to enclose, so that what truncating the others errs is allowed.
 
     It is an estimate by the bounds of `TruncatedModes`, with sums and responses in the middle of
-    the box.
-
-    Args:
-        structure: The structure.
-        centre: Its modes in the middle of the box.
-        excited: Sources in the coordinates of `centre`, shape (sources, n).
-        excitation: The loads, the nodes and the names of the sources.
-        allowed: Truncation error of each output that is allowed, shape (m,).
+    the box. Sources `excited` (sources, n) are in the coordinates of `centre`.
 
     Returns:
         The number, and the relative error of each mode's λ that changes an output by its allowed

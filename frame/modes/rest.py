@@ -86,12 +86,8 @@ def rest_of_modes(
 ) -> TruncatedModes | None:
     """Bounds of the motion of all modes that are not enclosed; None if there are none.
 
-    Args:
-        structure: The structure.
-        found: Its enclosed modes.
-        shares: Their products with the rows of the outputs and the patterns of the sources.
-        coordinates: Outputs (m, n) and sources (sources, n) in the coordinates of `found`.
-        excitation: The loads, the nodes and the names of the sources.
+    `shares` are those of the enclosed modes `found`; `coordinates` outputs (m, n) and sources
+    (sources, n) in the coordinates of these.
     """
     other_modes = found.others
     if not len(other_modes):
@@ -154,13 +150,8 @@ def inverse_form(
     """Taylor model of left A⁻¹ rightᵀ, shape (l, r), with a remainder quadratic in small residuals.
 
     With series x ≈ left A⁻¹ and y ≈ right A⁻¹ of residuals e = left − x A and f = right − y A it is
-    x rightᵀ + e yᵀ + e A⁻¹ fᵀ.
-
-    Args:
-        matrix: A, diagonal in the middle of the box, shape (n, n).
-        left: Rows, shape (l, n).
-        right: Rows, shape (r, n).
-        least: A(u) ≥ least · A(0) over the box, as quadratic forms.
+    x rightᵀ + e yᵀ + e A⁻¹ fᵀ. A (n, n) is diagonal in the middle of the box, left (l, n) and right
+    (r, n) are rows, and A(u) ≥ least · A(0) over the box, as quadratic forms.
     """
     x, y = (solution_series(matrix, rows.T).T for rows in (left, right))
     e, f = (left - x @ matrix).size(), (right - y @ matrix).size()
@@ -281,12 +272,8 @@ def coupling_bounds(
 def response_slopes(source: str, G: Array, G_slope: Array, omega: float, quotient: float) -> Array:
     """Bounds of |de/dλ| of responses e to a source, in the shape of G and G_slope.
 
-    Args:
-        source: Name of a load, "velocity" or "start".
-        G: Bounds of |σ^ν ρ|.
-        G_slope: Bounds of its derivative by σ.
-        omega: Least ω.
-        quotient: Greatest g/ω.
+    G are bounds of |σ^ν ρ|, G_slope of its derivative by σ; ω is the least, `quotient` the greatest
+    g/ω.
     """
     # of g = (a + b λ)/2 + ζ √λ, ω² = λ − g²: 4 ω² |dσ/dλ|² = 1 + 4 g′ (g′ λ − g) ≤ 1, since
     # g′ λ ≤ g, and 2 ω³ |d(g/ω)/dλ| = |2 g′ λ − g| ≤ g

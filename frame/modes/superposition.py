@@ -47,8 +47,7 @@ class Modal:
         stiffness_error: G, shape (S, n, n).
         mass_error: |F|, shape (S, n, n).
         rows: Rows of all outputs on the state, shape (S, m, 2 n).
-        order: Which derivative of the displacements each output reads, shape (m,).
-        accelerated: What those of order 2 read of the accelerations, shape (m, n).
+        structure: The structure over the box.
     """
 
     squared: Array
@@ -60,8 +59,7 @@ class Modal:
     stiffness_error: Array
     mass_error: Array
     rows: Array
-    order: Ints
-    accelerated: Array
+    structure: Classical
 
     @property
     def sigma_slope(self) -> Array:
@@ -70,10 +68,11 @@ class Modal:
 
     def output_coefficients(self, point: Ints, output: Ints) -> tuple[Array, Array]:
         """Coefficients r of modes in outputs (N,) at points (N,), and their rounding, (N, n)."""
-        n, order = self.shape.shape[-1], self.order[output][:, None]
+        n, order = self.shape.shape[-1], self.structure.order[output][:, None]
         rows, shape = self.rows[point, output], self.shape[point]
         row = np.where(order == 1, rows[:, n:], rows[:, :n])
-        row = np.where(order == 2, self.accelerated[output], row)
+        # accelerations are read of structures whose unknowns all have mass
+        row = np.where(order == 2, self.structure.rows[output, :n], row)
         size = np.einsum("si,sik->sk", np.abs(row), np.abs(shape))
         return np.einsum("si,sik->sk", row, shape), gamma(n + ENTRY_ROUNDINGS) * size
 
@@ -125,9 +124,7 @@ def modes_at(
         stiffness_error=of_stiffness,
         mass_error=of_mass,
         rows=rows.value,
-        order=structure.order,
-        # accelerations are read of structures whose unknowns all have mass
-        accelerated=structure.rows[:, :n],
+        structure=structure,
     )
 
 
@@ -174,12 +171,7 @@ def outputs_at(
 ) -> tuple[Array, Array]:
     """Exact values of outputs at points and nodes, and bounds of their rounding, (N,) each.
 
-    Args:
-        modal: Modes at all points.
-        point: Point of each value, shape (N,).
-        output: Output of each value, shape (N,).
-        time: Node of each value, shape (N,), in s.
-        loads: The loads by name.
+    Each value has a point of `modal`, an output and a node `time` in s, (N,) each.
     """
     sigma, slope, t = modal.sigma[point], modal.sigma_slope[point], time[:, None]
     exp = np.exp(sigma * t)
@@ -189,7 +181,8 @@ def outputs_at(
     read = modal.output_coefficients(point, output)
     total, error = np.zeros((2, len(point)))
     for source, load in {"velocity": free, "start": free, **loads}.items():
-        response = _mode_responses(sigma, slope, modal.order[output], source, load, t)
+        order = modal.structure.order[output]
+        response = _mode_responses(sigma, slope, order, source, load, t)
         share = modal.share[source][point], modal.share_error[source][point]
         total += (read[0] * share[0] * response[0]).sum(-1)
         error += _superposition_error(modal, point, read, share, response)

@@ -22,7 +22,7 @@ integral of |a|.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from math import comb, perm
 
@@ -122,11 +122,9 @@ class Oscillators:
         }
 
     def responses(self, source: str, order: int) -> ModalResponses:
-        """Return responses to a unit share of a source, with bounds of their errors.
+        """Return responses to a unit share of a source, read by the derivative ν = `order`.
 
-        Args:
-            source: Name of a load or force, "velocity" or "start".
-            order: Derivative ν of the motion that is read, one of `orders`.
+        `source` is the name of a load or force, "velocity" or "start".
         """
         grid, is_start = self.grid, source == "start"
         sigma = grid.sigma.ravel()
@@ -197,13 +195,9 @@ def read_response(source: str, sigma: Array, G: Array) -> Array:
 
 def feedthrough(source: str, loads: Mapping[str, History], order: int, time: Array) -> Array:
     """Direct feedthrough f(t) of a force to accelerations at nodes, shape of `time`, else 0."""
-    if not _has_feedthrough(source, order):
-        return np.zeros_like(time)
-    return loads[source].values(time)
-
-
-def _has_feedthrough(source: str, order: int) -> bool:
-    return order == 2 and source.startswith("force")
+    if order == 2 and source.startswith("force"):
+        return loads[source].values(time)
+    return np.zeros_like(time)
 
 
 @dataclass(frozen=True, eq=False)
@@ -242,27 +236,19 @@ def response_ranges(
     count = max(1, int(np.ceil(np.log(omega[1] / omega[0]) / np.log(RATIO))))
     ratio = (omega[1] / omega[0] * (1 + 1e-9)) ** (1 / count)
     for n in range(count):
-        piece = (omega[0] * ratio**n, omega[0] * ratio ** (n + 1)), quotient
-        for order, s, k, bounds in _piece_bounds(piece, loads, time, sources, orders):
-            ranges = found[order]
-            ranges.low[k, s] = np.minimum(ranges.low[k, s], bounds[0])
-            ranges.high[k, s] = np.maximum(ranges.high[k, s], bounds[1])
-            ranges.line_deviation[k, s] = np.maximum(ranges.line_deviation[k, s], bounds[2])
+        piece = omega[0] * ratio**n, omega[0] * ratio ** (n + 1)
+        _extend_ranges(found, (piece, quotient), loads, time, sources)
     return found
 
 
-def _piece_bounds(
+def _extend_ranges(
+    found: dict[int, Ranges],
     ends: tuple[Ends, Ends],
     loads: Mapping[str, History],
     time: Array,
     sources: Sequence[str],
-    orders: Collection[int],
-) -> Iterator[tuple[int, int, int, tuple[Array, Array, Array]]]:
-    """Yield bounds over one piece of the range of ω, `ends` those of ω and g/ω.
-
-    Each is an order, the places of a source and of a power κ, and least, greatest and line
-    deviation of λ^κ e at nodes, (T,) each.
-    """
+) -> None:
+    """Extend ranges, by order, to the oscillators of one piece of ω; `ends` bound ω and g/ω."""
     omega, quotient = ends
     decay, fastest = quotient[0] * omega[0], omega[1] * np.sqrt(1 + quotient[1] ** 2)
     distance = STEP * (decay + 2 / max(float(time[-1]), 1e-300))
@@ -271,7 +257,7 @@ def _piece_bounds(
     tables: Oscillators | None = None
     if loads and along <= MAX_POINTS[0]:
         points = max(along, 2), int(np.clip(across, 2, MAX_POINTS[1]))
-        tables = Oscillators(grid_over(omega, quotient, points), loads, time, orders)
+        tables = Oscillators(grid_over(omega, quotient, points), loads, time, found)
     # of |ρ| of any oscillator
     size = {name: absolute_moments(decay, x, time)[0] for name, x in loads.items()}
     for s, source in enumerate(sources):
@@ -280,7 +266,7 @@ def _piece_bounds(
         in_step = before
         if source in loads:
             in_step = np.maximum(before + step * loads[source].extremes[0], rho)
-        for order in orders:
+        for order, ranges in found.items():
             factor = fastest**order * (1 + quotient[1] if source == "start" else 1 / omega[0])
             direct = np.abs(feedthrough(source, loads, order, time))
             size_at_nodes, size_in_step = factor * rho + direct, factor * in_step
@@ -298,17 +284,14 @@ def _piece_bounds(
                     )
                     low, high = np.maximum(low, least), np.minimum(high, greatest)
                     deviation = np.minimum(deviation, scale * table.line_deviation)
-                yield order, s, k, (low, high, deviation)
+                ranges.low[k, s] = np.minimum(ranges.low[k, s], low)
+                ranges.high[k, s] = np.maximum(ranges.high[k, s], high)
+                ranges.line_deviation[k, s] = np.maximum(ranges.line_deviation[k, s], deviation)
 
 
 def _bounds_over_cells(value: Array, error: Array, factor: Array) -> tuple[Array, Array]:
-    """Lower and upper bound of factor × value over a table, shape (T,) each.
-
-    Args:
-        value: Values at the points, shape (T, Q, W).
-        error: What bilinear interpolation misses, shape (T,).
-        factor: Positive factors, monotone along Q and rising along W, at the points, shape (Q, W).
-    """
+    """Lower and upper bound of factor × value ± error over a table (T, Q, W), shape (T,) each."""
+    # positive factors (Q, W), monotone along Q and rising along W
     # over strips between neighbouring ω, each over all Q
     low, high = value.min(1) - error[:, None], value.max(1) + error[:, None]  # (T, W)
     low, high = np.minimum(low[:, 1:], low[:, :-1]), np.maximum(high[:, 1:], high[:, :-1])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from alphacut.frame.calculus.jet import Jet, variables
+from alphacut.frame.calculus.jet import variables
 
 FUNCTIONS = {
     "quotient": lambda x, y: 2.0 / x + y / x,
@@ -25,9 +25,3 @@ def test_derivatives_are_those_of_difference_quotients(name):
         for j, b in enumerate(np.eye(2) * h):
             corners = (of(*(point + s * a + t * b)) * s * t for s in (1, -1) for t in (1, -1))
             assert found.second[i, j, 0] == pytest.approx(sum(corners) / (4 * h * h), abs=1e-5)
-
-
-def test_a_jet_without_directions_is_a_plain_array():
-    jet = Jet.constant(np.array([1.0, 4.0]), 0) ** 0.5
-    assert np.array_equal(jet.value, [1.0, 2.0])
-    assert jet.first.shape == (0, 2)
