@@ -13,7 +13,6 @@ import pandas as pd
 from alphacut.case.content import Case
 from alphacut.commands.options import Command, add_quiet, add_run, write_answer
 from alphacut.commands.pipeline import Pipeline, open_results
-from alphacut.figures.all import draw_figures
 from alphacut.fuzzy.campaign.workers import pool
 from alphacut.fuzzy.refused import require
 from alphacut.io.arrays import text_table
@@ -57,7 +56,11 @@ def compute_run(
     start = time.perf_counter()
     with pool(store.workers) as executor:
         results = Pipeline(Results(case.content), store, petsc, figures, executor).run()
-        names = draw_figures(results, store, executor) if figures else []
+        names = list[str]()
+        if figures:
+            from alphacut.figures.all import draw_figures  # which takes time to import
+
+            names = draw_figures(results, store, executor)
     summary = Summary.of(
         results,
         format_version=FORMAT,

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, Future
+from concurrent.futures import Executor
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+from matplotlib.figure import Figure
 
 from alphacut.export.mesh import draw_mesh
 from alphacut.figures import envelope, material, overview, structure
@@ -20,11 +21,8 @@ from alphacut.stages.identify import IdentifiedResult
 from alphacut.stages.store import Stage, StageContext, StageResult, StageStore
 from alphacut.stochastic.figures.style import figure_style, save
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 PARTS = 6  # tasks that the figures are divided into, so that no process waits long for another
-Drawing = tuple[str, Callable[[], "Figure"]]
+Drawing = tuple[str, Callable[[], Figure]]
 
 
 def drawings(results: Results) -> Iterator[Drawing]:
@@ -43,28 +41,27 @@ def drawings(results: Results) -> Iterator[Drawing]:
 
 def _material_figures(results: Results) -> Iterator[Drawing]:
     """Figures of the radius map, the modulus, the stresses and the image, by name."""
-    content, radius_map = results.content, results.content.radius_map
+    content, mesh, modulus = results.content, results.content.mesh, results.modulus
     if results.is_paper and content.modulus.method == "prism":
-        cell, mesh = CellProblem.of(content).nominal, content.mesh
+        cell = CellProblem.of(content).nominal
         yield "fig01-domains", partial(overview.domains, cell, mesh.size, mesh.layers)
-    if radius_map is not None and results.microstructure is None:  # which draws its own p-box
-        yield "fig13-p-box", partial(material.p_box, radius_map)
-    if radius_map is not None:
+    if (radius_map := content.radius_map) is not None:
+        if results.microstructure is None:  # which draws its own p-box
+            yield "fig13-p-box", partial(material.p_box, radius_map)
         yield "fig14-cone", partial(material.cone, radius_map)
-    if (data := results.modulus) is not None and results.is_paper:
+    if modulus is not None:
+        yield "fig16-stress-curves", partial(material.stress_curves, modulus.arrays)
+        yield "fig17-mean-stress", partial(material.mean_stress, modulus.arrays)
+        yield "fig18-modulus", partial(material.fuzzy_modulus, modulus, content.frame)
+    if modulus is not None and results.is_paper:
+        yield "fig19-membership", partial(material.membership, modulus.arrays)
         inclusion = getattr(content.cell, "inclusion_modulus", None)
         if isinstance(inclusion, FuzzyNumber):
-            cuts = data.numbers.E_GPa
-            bounds = (GPA * cuts.lower, GPA * cuts.upper)
-            effective = PiecewiseLinear(tuple(data.numbers.alpha), *map(tuple, bounds))
-            yield ("fig36-fuzzy-numbers", partial(overview.kinds_of_numbers, inclusion, effective))
+            cuts = modulus.numbers.E_GPa
+            ends = (tuple(GPA * cuts.lower), tuple(GPA * cuts.upper))
+            effective = PiecewiseLinear(tuple(modulus.numbers.alpha), *ends)
+            yield "fig36-fuzzy-numbers", partial(overview.kinds_of_numbers, inclusion, effective)
             yield "fig37-alpha-cuts", partial(overview.alpha_cuts, inclusion)
-    if (data := results.modulus) is not None:
-        yield "fig16-stress-curves", partial(material.stress_curves, data.arrays)
-        yield "fig17-mean-stress", partial(material.mean_stress, data.arrays)
-        yield "fig18-modulus", partial(material.fuzzy_modulus, data, results.content.frame)
-        if results.is_paper:
-            yield "fig19-membership", partial(material.membership, data.arrays)
     if results.image is not None:
         yield "image", partial(material.image, results.image.arrays)
 
@@ -79,12 +76,10 @@ def _structure_figures(results: Results) -> Iterator[Drawing]:
     if (section := results.content.frame) is not None:
         yield "fig26-frame", partial(structure.draw_frame, section)
         yield "fig27-chain", partial(structure.draw_chain, section)
-    widest_task = max(results.tasks, key=lambda task: len(task.fuzzy))
-    if widest_task.section.method == "graph-follower":
-        yield (
-            "fig21-25-graph-follower",
-            partial(structure.graph_follower_steps, results, widest_task),
-        )
+    task = max(results.tasks, key=lambda task: len(task.fuzzy))
+    if task.section.method == "graph-follower":
+        steps = partial(structure.graph_follower_steps, results, task)
+        yield "fig21-25-graph-follower", steps
 
 
 def draw_figures(results: Results, store: StageStore, executor: Executor | None) -> list[str]:
@@ -92,9 +87,8 @@ def draw_figures(results: Results, store: StageStore, executor: Executor | None)
 
     Returns the paths of the files, relative to the folder of the results.
     """
-    inputs = [results.content, results.answers]
-    inputs += [sorted(results.fingerprints.values())]
-    inputs += [version_of(name) for name in ("matplotlib", "pyvista")]
+    versions = [version_of(name) for name in ("matplotlib", "pyvista")]
+    inputs = [results.content, results.answers, sorted(results.fingerprints.values()), *versions]
     compute = partial(draw_all, results, executor)
     figures = store.take(Stage("figures", inputs, (*NESTED, "alphacut"), list[str], compute))
     before = () if results.microstructure is None else results.microstructure.files
@@ -104,17 +98,15 @@ def draw_figures(results: Results, store: StageStore, executor: Executor | None)
 def draw_all(
     results: Results, executor: Executor | None, context: StageContext
 ) -> StageResult[list[str]]:
-    """Draws all figures by `PARTS` tasks; returns the names of the files."""
+    """Draws all figures by `PARTS` tasks and one for the mesh; returns the names of the files."""
     assert context.folder is not None
-    folder = context.folder
-    mesh_futures = _submit_mesh(results, folder, executor)
-    parts = [submit(executor, draw_part, results, folder, part) for part in range(PARTS)]
-    names = []
-    for count, part in enumerate(parts, start=1):
-        names += part.result()
-        context.tick(count / PARTS)
-    drawn_meshes = [name for name, future in mesh_futures.items() if future.result()]
-    return StageResult([*sorted(names), *drawn_meshes])
+    tasks = [submit(executor, draw_mesh_figure, results, context.folder)]
+    tasks += [submit(executor, draw_part, results, context.folder, k) for k in range(PARTS)]
+    names = list[str]()
+    for count, task in enumerate(tasks, start=1):
+        names += task.result()
+        context.tick(count / len(tasks))
+    return StageResult(sorted(names))
 
 
 def draw_part(results: Results, folder: Path, part: int) -> list[str]:
@@ -127,18 +119,20 @@ def draw_part(results: Results, folder: Path, part: int) -> list[str]:
         ]
 
 
+def draw_mesh_figure(results: Results, folder: Path) -> list[str]:
+    """Draws the mesh (Fig. 15) if there are prisms; returns the path in `folder` if it is drawn."""
+    content = results.content
+    if (
+        results.modulus is None
+        or content.particle_cell is None
+        or content.modulus.method != "prism"
+    ):
+        return []
+    name = f"figures/{file_stem('fig15-prism-mesh', results)}.png"
+    is_drawn = draw_mesh(CellProblem.of(content).nominal, content.mesh, folder / name)
+    return [name] if is_drawn else []
+
+
 def file_stem(name: str, results: Results) -> str:
     """Name of a figure's files: with the paper's number only in the case of the paper."""
     return name if results.is_paper else re.sub(r"^fig[\d-]+-", "", name)
-
-
-def _submit_mesh(
-    results: Results, folder: Path, executor: Executor | None
-) -> dict[str, Future[bool]]:
-    """Future of drawing the mesh (Fig. 15) by its file: true if drawn; empty without prisms."""
-    prisms = results.content.particle_cell is not None and results.content.modulus.method == "prism"
-    if results.modulus is None or not prisms:
-        return {}
-    name = f"figures/{file_stem('fig15-prism-mesh', results)}.png"
-    cell = CellProblem.of(results.content).nominal
-    return {name: submit(executor, draw_mesh, cell, results.content.mesh, folder / name)}

@@ -6,9 +6,13 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from textwrap import fill
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import matplotlib.pyplot as plt
 import numpy as np
+import xarray
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from alphacut.figures import style
 from alphacut.frame.dynamics.nonlinear import make_flow
@@ -23,12 +27,7 @@ from alphacut.questions.tolerances import TolerancesAnswer
 from alphacut.stages.envelope import EnvelopeTask
 from alphacut.stages.identify import IdentifiedResult
 from alphacut.stages.suite import SuiteResult
-from alphacut.stochastic.figures.style import BLUE, GREY, INK, ORANGE
-
-if TYPE_CHECKING:
-    import xarray
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from alphacut.stochastic.figures.style import BLUE, GREY, INK, ORANGE, WIDTH
 
 
 def drawings(task: EnvelopeTask, results: Results) -> Iterator[tuple[str, Callable[[], Figure]]]:
@@ -43,7 +42,7 @@ def drawings(task: EnvelopeTask, results: Results) -> Iterator[tuple[str, Callab
 
 def envelope(dataset: xarray.Dataset, output: Output, task: EnvelopeTask) -> Figure:
     """Draws the bands between lower and upper envelope of an output, by level, and their errors."""
-    figure, axes = style.figure()
+    figure, axes = plt.subplots()
     shown = dataset.sel(output=str(output))
     alpha, time = dataset["alpha"].values, dataset["time"].values
     for level, shade in enumerate(style.colours(alpha)[:-1]):
@@ -55,8 +54,8 @@ def envelope(dataset: xarray.Dataset, output: Output, task: EnvelopeTask) -> Fig
     nature = str(dataset.attrs["nature"])
     error = draw_error_band(axes, time, shown.isel(alpha=0), nature, output.unit)
     time_axes(axes, time, output)
-    title = f"{output.words}; fuzzy: {', '.join(task.fuzzy)}; {nature}{error}"
-    style.title(axes, fill(re.sub(r"(?<=\d) ", "\u00a0", title), 80))  # keeps units by numbers
+    title = f"{output.words}; fuzzy: {', '.join(task.fuzzy)}; {nature}{error}".replace("^2", "²")
+    axes.set_title(fill(re.sub(r"(?<=\d) ", "\u00a0", title), 80))  # keeps units by numbers
     style.alpha_legend(axes, alpha)
     return figure
 
@@ -92,14 +91,14 @@ def mapping(results: Results, *, count: int = 40, duration: float = 5.0) -> Figu
     lower, upper = np.array([x.cut(float(dataset["alpha"])) for x in inputs.values()]).T
     points = np.random.default_rng(0).uniform(lower, upper, (count, len(inputs)))
     curves = flow.values(points)[:, :, list(flow.outputs).index(output)]
-    figure, axes = style.figure()
+    figure, axes = plt.subplots()
     axes.plot(flow.time, curves.T, color=BLUE, lw=0.5, alpha=0.5)
     shown = dataset.sel(output=output).isel(time=slice(0, len(flow.time)))
     for side in ("lower", "upper"):
         axes.plot(flow.time, shown[side], color=INK, lw=1.3)
     time_axes(axes, flow.time, Output(output, structure.unit(output)))
     level = f"α = {float(dataset['alpha']):g}"
-    style.title(axes, f"{output} at {level}: {count} random motions (blue) and their envelope")
+    axes.set_title(f"{output} at {level}: {count} random motions (blue) and their envelope")
     return figure
 
 
@@ -108,12 +107,12 @@ def draw_bars(
 ) -> Figure:
     """Draws intervals of inputs as bars, a row an input; each series (inputs, 2) has its look."""
     rows = np.arange(len(intervals[0][0]), dtype=float)[::-1]
-    figure, axes = style.figure(height=0.9 + 0.36 * len(rows))
+    figure, axes = plt.subplots(figsize=(WIDTH, 0.9 + 0.36 * len(rows)))
     for ends, look in intervals:
         axes.barh(rows, np.ptp(ends, axis=1), left=ends[:, 0], lw=0, **look)
     axes.set_yticks(rows, list(names))
     axes.set_xlabel(label)
-    axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return figure
 
 
@@ -133,23 +132,22 @@ def identified_inputs(result: IdentifiedResult) -> Figure:
 
 def spectra(suite: SuiteResult) -> Figure:
     """Draws the response spectra of the records of a suite, their mean, and T1."""
-    figure, axes = style.figure(7.2, 3.6)
+    figure, axes = plt.subplots()
     periods = suite.spectra["period_s"]
     curves = np.array([suite.spectra[name] for name in suite.records])
     axes.plot(periods, curves.T, color=GREY, lw=0.6)
     axes.plot(periods, curves.mean(0), color=BLUE, lw=1.6, label="mean")
     axes.axvline(suite.period_s, color=ORANGE, lw=1.2, ls="--", label="T1")
-    axes.set(
-        xscale="log", xlabel="period [s]", ylabel=f"Sa [m/s²], damping {suite.damping_ratio:.3g}"
-    )
-    axes.legend(fontsize=8)
+    label = f"Sa [m/s²], damping {suite.damping_ratio:.3g}"
+    axes.set(xscale="log", xlabel="period [s]", ylabel=label)
+    axes.legend()
     return figure
 
 
 def draw_decision(answer: DecisionAnswer) -> Figure:
     """Draws bars from the smallest to the largest peak over its limit, of each limit and level."""
     limits = [limit for limit in answer.limits.values() if limit.peak is not None]
-    figure, axes = style.figure(7.2, 1.2 + 0.7 * len(limits))
+    figure, axes = plt.subplots(figsize=(WIDTH, 1.2 + 0.7 * len(limits)))
     alpha, rows = answer.alpha, np.arange(len(limits))[::-1]  # the first limit on top
     for row, limit in zip(rows, limits, strict=True):
         margins = np.concatenate([limit.margin.lower, limit.margin.upper])
@@ -161,8 +159,8 @@ def draw_decision(answer: DecisionAnswer) -> Figure:
         look: style.Look = {"height": 0.66 - 0.4 * alpha, "color": style.colours(alpha), "lw": 0}
         axes.barh(row, rights - lefts, left=lefts, **look)
         possible, necessary = degree_text(limit.possibility), degree_text(limit.necessity)
-        text = f"{limit.verdict_words} ({limit.nature}): possible to {possible}"
-        text += f", necessary to {necessary}"
+        degrees = f"possible to {possible}, necessary to {necessary}"
+        text = f"{limit.verdict_words} ({limit.nature}): {degrees}"
         axes.text(0.01, row + 0.4, text, fontsize=8, transform=axes.get_yaxis_transform())
     axes.axvline(1.0, color=ORANGE, lw=1.4, ls="--")
     axes.axvline(0.0, color=GREY, lw=0.4)
@@ -173,17 +171,17 @@ def draw_decision(answer: DecisionAnswer) -> Figure:
 
 
 def draw_probability_bands(
-    x: Array, bands: Sequence[Array], alpha: Array, label: str, *, in_steps: bool = False
+    x: Array, bands: Sequence[Array], alpha: Array, title: str, *, in_steps: bool = False
 ) -> tuple[Figure, Axes]:
     """Draws lower and upper bounds of a probability over x, two arrays (levels, x)."""
-    figure, axes = style.figure(7.2, 3.6)
+    figure, axes = plt.subplots()
     band: style.Look = {"step": "post"} if in_steps else {}
     line: style.Look = {"drawstyle": "steps-post"} if in_steps else {}
     for low, high, shade in zip(*bands, style.colours(alpha), strict=True):
         axes.fill_between(x, low, high, color=shade, lw=0, **band)
     for end in (bands[0][-1], bands[1][-1]):  # the highest band may have no width
         axes.plot(x, end, color=INK, lw=1, **line)
-    axes.set(ylabel=label, ylim=(0, 1.02))
+    axes.set(ylim=(0, 1.02), title=title.replace("^2", "²"))
     style.alpha_legend(axes, alpha)
     return figure, axes
 
@@ -192,15 +190,15 @@ def draw_probability(answer: ProbabilityAnswer) -> Figure:
     """Draws the bounds of the exceedance probability of the last event over its limit, by level."""
     event = [*answer.limits.values()][-1]
     limits, *bands = (event.curve[x] for x in ("limit", "lower", "upper"))
-    label = "probability of exceeding it"
-    figure, axes = draw_probability_bands(limits, bands, answer.alpha, label)
     limit_text = engineering(event.limit, event.unit) if event.unit else "1"
     is_near = event.limit <= 2 * limits[-1]
+    title = f"limit {limit_text} ({'dashed' if is_near else 'far off'})"
+    figure, axes = draw_probability_bands(limits, bands, answer.alpha, title)
     if is_near:
         axes.axvline(event.limit, color=ORANGE, lw=1.2, ls="--")
-    style.title(axes, f"limit {limit_text} ({'dashed' if is_near else 'far off'})")
-    title = f"limit of |{event.output}|" if event.unit else "all limits, over those of the case"
-    style.prefix_axis(axes, title, event.unit, across=True)
+    axes.set_ylabel("probability of exceeding it")
+    label = f"limit of |{event.output}|" if event.unit else "all limits, over those of the case"
+    style.prefix_axis(axes, label, event.unit, across=True)
     return figure
 
 
@@ -210,11 +208,10 @@ def draw_tolerances(answer: TolerancesAnswer) -> Figure:
     nominal = np.array([[x.nominal or 1.0] for x in supports])
     own = np.array([x.own for x in supports]) / nominal
     kept = np.array([x.kept for x in supports]) / nominal
-    looks: list[style.Look] = [
-        {"color": GREY, "height": 0.7, "label": "in the case"},
-        {"color": BLUE, "height": 0.35, "label": "no limit exceeded"},
+    intervals: list[tuple[Array, style.Look]] = [
+        (own, {"color": GREY, "height": 0.7, "label": "in the case"}),
+        (kept, {"color": BLUE, "height": 0.35, "label": "no limit exceeded"}),
     ]
-    intervals = list(zip((own, kept), looks, strict=True))
     figure = draw_bars(intervals, answer.supports, "value over the nominal one")
     figure.axes[0].axvline(1.0, color=INK, lw=0.8)
     return figure
@@ -222,13 +219,13 @@ def draw_tolerances(answer: TolerancesAnswer) -> Figure:
 
 def draw_fragility(answer: FragilityAnswer) -> Figure:
     """Draws the bounds of the share of records that exceed the last limit over their measure."""
-    limit, label = [*answer.limits.values()][-1], "share of records that exceed it"
-    bands = (limit.band.lower, limit.band.upper)
-    figure, axes = draw_probability_bands(limit.measure, bands, answer.alpha, label, in_steps=True)
+    limit = [*answer.limits.values()][-1]
+    measures, bands = limit.measure, (limit.band.lower, limit.band.upper)
+    figure, axes = draw_probability_bands(measures, bands, answer.alpha, limit.words, in_steps=True)
     if limit.confidence is not None:
         for end in (limit.confidence.lower, limit.confidence.upper):
-            axes.plot(limit.measure, end[0], color=BLUE, lw=0.9, ls="--")
-    style.title(axes, limit.words)
+            axes.plot(measures, end[0], color=BLUE, lw=0.9, ls="--")
+    axes.set_ylabel("share of records that exceed it")
     style.prefix_axis(axes, answer.measure, answer.unit, across=True)
     return figure
 

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import itertools
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import matplotlib.pyplot as plt
 import numpy as np
+import xarray
+from matplotlib.figure import Figure
 
 from alphacut.case.radius import RadiusMapSection
 from alphacut.case.structure import Frame
@@ -15,20 +18,9 @@ from alphacut.stages.cell import GPA
 from alphacut.stages.modulus import ModulusResult
 from alphacut.stages.store import StageResult
 from alphacut.stochastic import HermiteMap
-from alphacut.stochastic.figures.style import BLUE, GREY, INK, ORANGE, PURPLE
-
-if TYPE_CHECKING:
-    import xarray
-    from matplotlib.figure import Figure
+from alphacut.stochastic.figures.style import BLUE, GREY, HEIGHT, INK, ORANGE, PURPLE, WIDTH
 
 SHOWN_LEVEL = 0.5
-
-
-def maps(section: RadiusMapSection, alpha: float) -> list[HermiteMap]:
-    """The radius maps at the corners of an α-cut."""
-    numbers = section.numbers
-    corners = itertools.product(*(sorted(set(number.cut(alpha))) for number in numbers.values()))
-    return [section.at(dict(zip(numbers, corner, strict=True))) for corner in corners]
 
 
 def nominal_map(section: RadiusMapSection) -> HermiteMap:
@@ -48,17 +40,15 @@ def distribution(radius: HermiteMap, at: Array) -> Array:
 
 def p_box(section: RadiusMapSection) -> Figure:
     """Fig. 13: p-box of the reduced radius, between the maps at the corners of the supports."""
-    figure, axes = style.figure()
-    corners = maps(section, 0.0)
-    low = min(radius.extremes()[0] for radius in corners)
-    high = max(radius.extremes()[1] for radius in corners)
-    at = np.asarray(np.linspace(low, high, 600), float)
-    family = np.array([distribution(radius, at) for radius in corners])
-    axes.fill_between(
-        at, family.min(0), family.max(0), color=PURPLE, alpha=0.15, lw=0, label="p-box, α = 0"
-    )
-    axes.plot(at, family.min(0), color=INK, lw=1)
-    axes.plot(at, family.max(0), color=INK, lw=1)
+    figure, axes = plt.subplots()
+    corners = itertools.product(*(set(number.support) for number in section.numbers.values()))
+    maps = [section.at(dict(zip(section.numbers, corner, strict=True))) for corner in corners]
+    lowest, highest = np.array([radius.extremes() for radius in maps]).T
+    at = np.asarray(np.linspace(lowest.min(), highest.max(), 600), float)
+    family = np.array([distribution(radius, at) for radius in maps])
+    ends, shade = (family.min(0), family.max(0)), "p-box, α = 0"
+    axes.fill_between(at, *ends, color=PURPLE, alpha=0.15, lw=0, label=shade)
+    axes.plot(at, np.transpose(ends), color=INK, lw=1)
     nominal = distribution(nominal_map(section), at)
     axes.plot(at, nominal, color=PURPLE, lw=1.8, label="nominal map")
     axes.set(xlabel="reduced radius r$_n$ = r/a", ylabel="cumulative distribution", ylim=(0, 1.02))
@@ -68,27 +58,19 @@ def p_box(section: RadiusMapSection) -> Figure:
 
 def cone(section: RadiusMapSection) -> Figure:
     """Fig. 14: the particle in the product domain, of radius r(θ) at every θ."""
-    import matplotlib.pyplot as plt
-
     figure = plt.figure(figsize=(5.0, 5.4))
     axes: Any = figure.add_subplot(projection="3d")
     radius = nominal_map(section)
-    theta, angle = np.linspace(*section.theta, 80), np.linspace(0, 2 * np.pi, 80)
-    r = radius(theta)[:, None]
-    axes.plot_surface(
-        r * np.cos(angle),
-        r * np.sin(angle),
-        np.broadcast_to(theta[:, None], (80, 80)),
-        color=PURPLE,
-        alpha=0.65,
-        lw=0,
-    )
-    for level in np.linspace(theta[0], theta[-1], 5):
+    theta, angle = np.linspace(*section.theta, 80)[:, None], np.linspace(0, 2 * np.pi, 80)
+    x, y = radius(theta) * np.cos(angle), radius(theta) * np.sin(angle)
+    axes.plot_surface(x, y, np.broadcast_to(theta, (80, 80)), color=PURPLE, alpha=0.65, lw=0)
+    low, high = section.theta
+    for level in np.linspace(low, high, 5):
         axes.plot([-1, 1, 1, -1, -1], [-1, -1, 1, 1, -1], level, color=GREY, lw=0.8)
         x, y = radius(level) * np.cos(angle), radius(level) * np.sin(angle)
         axes.plot(x, y, level, color=INK, lw=0.8)
     for x, y in itertools.product((-1, 1), (-1, 1)):
-        axes.plot([x, x], [y, y], [theta[0], theta[-1]], color=GREY, lw=0.8)
+        axes.plot([x, x], [y, y], [low, high], color=GREY, lw=0.8)
     axes.set(xlabel="x$_1$/a", ylabel="x$_2$/a", zlabel="θ", xticks=[-1, 0, 1], yticks=[-1, 0, 1])
     axes.set_box_aspect((1, 1, 1.3), zoom=0.88)
     axes.view_init(elev=18, azim=-55)
@@ -103,29 +85,28 @@ def levels_of_samples(dataset: xarray.Dataset) -> Array:
     slack = 1e-9 * np.maximum(high[0] - low[0], 1e-300)
     levels = np.full(len(points), alpha[0])
     for level, lower, upper in zip(alpha, low, high, strict=True):
-        inside = ((points >= lower - slack) & (points <= upper + slack)).all(axis=1)
-        levels[inside] = level
+        levels[((points >= lower - slack) & (points <= upper + slack)).all(axis=1)] = level
     return levels
 
 
 def stress_curves(dataset: xarray.Dataset) -> Figure:
     """Fig. 16: homogenised stress σ₁₁ over θ, one curve a sample, coloured by its membership."""
-    figure, axes = style.figure()
+    figure, axes = plt.subplots()
     alpha = dataset["alpha"].values
     shades = dict(zip(alpha, [*style.colours(alpha)[:-1], INK], strict=True))
     membership = levels_of_samples(dataset)
     theta, stress_GPa = dataset["theta"].values, dataset["curve11"].values / GPA
     for sample in np.argsort(membership, kind="stable"):  # high memberships on top
         axes.plot(theta, stress_GPa[sample], color=shades[membership[sample]], lw=0.8)
-    axes.set(xlabel="θ", ylabel="homogenised σ$_{11}$(ε$^{(1)}$) (GPa)")
-    style.title(axes, f"{len(stress_GPa)} samples")
+    label = "homogenised σ$_{11}$(ε$^{(1)}$) (GPa)"
+    axes.set(xlabel="θ", ylabel=label, title=f"{len(stress_GPa)} samples")
     style.alpha_legend(axes, alpha)
     return figure
 
 
 def mean_stress(dataset: xarray.Dataset) -> Figure:
     """Fig. 17: mean homogenised stress σ₁₁ of each sample at its membership, and its α-cuts."""
-    figure, axes = style.figure()
+    figure, axes = plt.subplots()
     means, levels = dataset["s11_sample"].values / GPA, levels_of_samples(dataset)
     axes.plot(means, levels, ".", color=ORANGE, ms=4, zorder=4, label="samples")
     style.shaded_cuts(axes, dataset["alpha"].values, *(dataset["s11"].values / GPA).T)
@@ -136,9 +117,7 @@ def mean_stress(dataset: xarray.Dataset) -> Figure:
 
 def fuzzy_modulus(result: StageResult[ModulusResult], frame: Frame | None) -> Figure:
     """Fig. 18: fuzzy Young's modulus, with the one that the case states, and Poisson's ratio ν."""
-    import matplotlib.pyplot as plt
-
-    size = (style.WIDTH, 1.75 * style.HEIGHT)
+    size = (WIDTH, 1.75 * HEIGHT)
     figure, (axes, below) = plt.subplots(2, 1, figsize=size, height_ratios=(3, 2))
     dataset, average = result.arrays, result.numbers.average
     alpha, modulus_GPa = dataset["alpha"].values, dataset["E"].values / GPA
@@ -157,7 +136,7 @@ def fuzzy_modulus(result: StageResult[ModulusResult], frame: Frame | None) -> Fi
 
 def membership(dataset: xarray.Dataset) -> Figure:
     """Fig. 19: membership function of a convex fuzzy parameter and one of its α-cuts."""
-    figure, axes = style.figure()
+    figure, axes = plt.subplots()
     alpha, (left, right) = dataset["alpha"].values, dataset["E"].values.T / GPA
     lower, upper = (float(np.interp(SHOWN_LEVEL, alpha, side)) for side in (left, right))
     axes.plot(style.outline(left, right), style.outline(alpha, alpha), color=INK, lw=1.5)
@@ -173,12 +152,9 @@ def membership(dataset: xarray.Dataset) -> Figure:
 
 def image(dataset: xarray.Dataset) -> Figure:
     """Segmented phases of the image as greys, and the α-cuts of E."""
-    import matplotlib.pyplot as plt
-
-    figure, (picture, cuts) = plt.subplots(1, 2, figsize=(style.WIDTH, 3.4), width_ratios=(1, 1.4))
+    figure, (picture, cuts) = plt.subplots(1, 2, figsize=(WIDTH, 3.4), width_ratios=(1, 1.4))
     picture.imshow(dataset["phase"].values, origin="lower", cmap="Greys_r")
-    picture.set(xticks=[], yticks=[])
-    style.title(picture, "phases as segmented")
+    picture.set(xticks=[], yticks=[], title="phases as segmented")
     lower, upper = dataset["E"].transpose("bound", "alpha").values / GPA
     style.shaded_cuts(cuts, dataset["alpha"].values, lower, upper)
     style.membership_axes(cuts, "Young's modulus E, plane strain (GPa)")

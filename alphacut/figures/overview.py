@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.patches import FancyBboxPatch
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
 from alphacut.figures import style
 from alphacut.figures.style import Look
@@ -13,16 +20,11 @@ from alphacut.fuzzy.arrays import Array, Ints, Mask
 from alphacut.io.quantity import axis_prefix
 from alphacut.questions.summary import Results
 from alphacut.rve.cell.cell import Cell
+from alphacut.rve.mesh.columns import extrude
+from alphacut.rve.mesh.prism_grid import PrismGrid, reference_radius
 from alphacut.stochastic.figures.style import BLUE, INK, ORANGE, PURPLE
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from alphacut.rve.mesh.prism_grid import PrismGrid
-
 MATRIX, PARTICLE = "#f6d9b8", "#b79ad9"
-
 BOX_WIDTH, PITCH = 2.4, 3.3  # width of a stage's box in Fig. 2, and distance of the boxes
 
 
@@ -31,11 +33,6 @@ def domains(cell: Cell, size: float, layers: int) -> Figure:
 
     `size` is the edge length of the triangles in halves of the cell's side.
     """
-    import matplotlib.pyplot as plt
-
-    from alphacut.rve.mesh.columns import extrude
-    from alphacut.rve.mesh.prism_grid import reference_radius
-
     radius = reference_radius(cell.radius, cell.outline)
     grid = extrude(size=size, radius=radius, layers=layers, outline=cell.outline)
     points = grid.positions(cell.radius)
@@ -51,16 +48,12 @@ def domains(cell: Cell, size: float, layers: int) -> Figure:
 
 def draw_plane_mesh(axes: Axes, grid: PrismGrid, level: Array) -> None:
     """Physical domain: triangles at one level of θ, with nodes (x1, x2, θ), coloured by phase."""
-    from matplotlib.collections import PolyCollection
-
     corners = level[grid.plane.triangles[:, :3], :2]
     for mask, colour in ((~grid.plane.inside, MATRIX), (grid.plane.inside, PARTICLE)):
         axes.add_collection(PolyCollection(list(corners[mask]), facecolor=colour, ec=INK, lw=0.25))
-    axes.set(xlim=(-1, 1), ylim=(-1, 1))
-    axes.set_aspect("equal")
-    axes.set(xlabel="x$_1$/a", ylabel="x$_2$/a")
+    axes.set(xlim=(-1, 1), ylim=(-1, 1), aspect="equal", xlabel="x$_1$/a", ylabel="x$_2$/a")
+    axes.set_title(f"physical domain, θ = {level[0, 2]:g}")
     axes.grid(visible=False)
-    style.title(axes, f"physical domain, θ = {level[0, 2]:g}")
 
 
 def draw_density(axes: Axes, cell: Cell, levels: Array) -> None:
@@ -70,8 +63,8 @@ def draw_density(axes: Axes, cell: Cell, levels: Array) -> None:
     axes.plot(law.pdf(theta), theta, color=BLUE, lw=1.6)
     axes.fill_betweenx(theta, 0, law.pdf(theta), color=BLUE, alpha=0.15, lw=0)
     axes.hlines(levels, 0, law.pdf(levels), color=ORANGE, lw=0.9)
-    axes.set(xlabel="density $f_Θ$", ylabel="θ", xlim=0)
-    style.title(axes, f"stochastic domain, {len(levels) - 1} layers")
+    title = f"stochastic domain, {len(levels) - 1} layers"
+    axes.set(xlabel="density $f_Θ$", ylabel="θ", xlim=0, title=title)
 
 
 def _draw_prisms(axes: Any, grid: PrismGrid, positions: Array) -> None:
@@ -79,9 +72,6 @@ def _draw_prisms(axes: Any, grid: PrismGrid, positions: Array) -> None:
 
     `positions` are (x1, x2, θ) of the nodes, shape (values of θ, nodes, 3).
     """
-    from matplotlib.colors import to_rgb
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
-
     plane, triangles = grid.plane.points, grid.plane.triangles[:, :3]
     pairs = np.concatenate([triangles[:, [0, 1]], triangles[:, [0, 2]], triangles[:, [1, 2]]])
     edges = np.unique(np.sort(pairs, axis=1), axis=0)  # corners of each, shape (edges, 2)
@@ -96,7 +86,7 @@ def _draw_prisms(axes: Any, grid: PrismGrid, positions: Array) -> None:
     axes.set(xlim=(-1, 1), ylim=(-1, 1), zlim=(positions[0, 0, 2], positions[-1, 0, 2]))
     axes.set_box_aspect((1, 1, 1.2), zoom=0.85)
     axes.view_init(elev=25, azim=-55)
-    axes.set_title(f"product domain, {len(grid.cells):,} prisms", loc="left", fontsize=10)
+    axes.set_title(f"product domain, {len(grid.cells):,} prisms")
 
 
 def layer_faces(levels: Array, edges: Ints, nodes: Mask) -> Array:
@@ -112,10 +102,8 @@ def layer_faces(levels: Array, edges: Ints, nodes: Mask) -> Array:
 
 def stages(results: Results) -> Figure:
     """Fig. 2: the stages of the run, with the data that each hands to the next."""
-    from matplotlib.patches import FancyBboxPatch
-
     boxes, arrows = boxes_and_arrows(results)
-    figure, axes = style.figure(2.9 * len(boxes), 1.9)
+    figure, axes = plt.subplots(figsize=(2.9 * len(boxes), 1.9))
     box: Look = {"boxstyle": "round,pad=0.02", "facecolor": "#dbe9f4", "edgecolor": INK, "lw": 1}
     centred: Look = {"ha": "center", "va": "top"}
     for number, (title, lines) in enumerate(boxes):
@@ -140,10 +128,8 @@ def boxes_and_arrows(results: Results) -> tuple[list[tuple[str, list[str]]], lis
     arrows: list[str] = []
     if content.radius is not None and results.modulus is not None:
         numbers = getattr(content.radius, "numbers", {})
-        lines = []
-        for name, number in numbers.items():
-            values = sorted({number.support.lower, number.nominal, number.support.upper})
-            lines.append(f"{name} = [{', '.join(f'{x:.4g}' for x in values)}]")
+        values = {name: sorted({x.nominal, *x.support}) for name, x in numbers.items()}
+        lines = [f"{k} = [{', '.join(f'{x:.4g}' for x in ends)}]" for k, ends in values.items()]
         boxes.append(("radius of the particle", lines))
         arrows.append("r(θ)")
     if (data := results.modulus) is not None:
@@ -157,11 +143,8 @@ def boxes_and_arrows(results: Results) -> tuple[list[tuple[str, list[str]]], lis
         outputs = ", ".join(results.structure.outputs[:4])
         boxes.append(("structure", [f"fuzzy: {', '.join(fuzzy)}", f"outputs: {outputs}"]))
         arrows.append("flow q(t; p)")
-        lines = [
-            f"{task.name}: {', '.join(task.fuzzy)} for {task.duration:g} s"
-            for task in results.tasks[:5]
-        ]
-        boxes.append(("envelopes", [f"by {results.tasks[0].section.method}", *lines]))
+        studies = [f"{x.name}: {', '.join(x.fuzzy)} for {x.duration:g} s" for x in results.tasks]
+        boxes.append(("envelopes", [f"by {results.tasks[0].section.method}", *studies[:5]]))
         arrows.append("bounds")
     return boxes, arrows[:-1]
 
@@ -174,8 +157,6 @@ def kinds_of_numbers(given: FuzzyNumber, result: FuzzyNumber) -> Figure:
 
     Four are made of the particle's Young's modulus in Pa, `given`; the last is the cell's.
     """
-    import matplotlib.pyplot as plt
-
     numbers: dict[str, FuzzyNumber] = {
         "crisp": Crisp(given.nominal),
         "interval": Interval(*given.cut(0.5)),
@@ -187,10 +168,8 @@ def kinds_of_numbers(given: FuzzyNumber, result: FuzzyNumber) -> Figure:
     for axes, (name, number) in zip(panels, numbers.items(), strict=True):
         number.plot(axes, color=BLUE, lw=1.6)
         margin = 0.15 * (number.support.width or given.support.width)
-        axes.set(
-            xlim=(number.support.lower - margin, number.support.upper + margin), ylim=(0, 1.08)
-        )
-        style.title(axes, name)
+        lower, upper = number.support
+        axes.set(xlim=(lower - margin, upper + margin), ylim=(0, 1.08), title=name)
         source = "E" if number.nominal == result.nominal else "E$_i$"
         style.prefix_axis(axes, source, "Pa", across=True)
     panels[0].set_ylabel("membership μ")
@@ -199,22 +178,15 @@ def kinds_of_numbers(given: FuzzyNumber, result: FuzzyNumber) -> Figure:
 
 def alpha_cuts(number: FuzzyNumber) -> Figure:
     """Fig. 37: the particle's Young's modulus in Pa, a triangular number, in six α-cuts."""
-    figure, axes = style.figure()
-    alpha = np.linspace(0, 1, CUTS)
+    figure, axes = plt.subplots()
     number.plot(axes, color=INK, lw=1.4)
     factor, unit = axis_prefix(number.support.upper, "Pa")
-    for level in alpha:
+    beside: Look = {"xytext": (8, 0), "textcoords": "offset points", "va": "center", "fontsize": 8}
+    for level in np.linspace(0, 1, CUTS):
         cut = number.cut(float(level))
         axes.plot(cut, [level, level], color=ORANGE, lw=2.5, marker="o", ms=4)
-        words = f"{factor * cut.lower:.4g} … {factor * cut.upper:.4g} {unit}"
-        axes.annotate(
-            f"α = {level:.1f}: {words}" if cut.width else f"α = {level:.1f}",
-            (cut.upper, level),
-            xytext=(8, 0),
-            textcoords="offset points",
-            va="center",
-            fontsize=8,
-        )
+        ends = f": {factor * cut.lower:.4g} … {factor * cut.upper:.4g} {unit}" if cut.width else ""
+        axes.annotate(f"α = {level:.1f}{ends}", (cut.upper, level), **beside)
     axes.set_xlim(right=number.support.upper + 0.35 * number.support.width)
     style.membership_axes(axes, "")
     axes.set_ylim(-0.06, 1.06)

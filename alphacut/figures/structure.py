@@ -2,26 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import TYPE_CHECKING
-
+import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from alphacut.case.structure import Frame
-from alphacut.figures import style
 from alphacut.figures.style import Look, prefix_axis
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.methods.graph_follower import Followed, GraphFollower
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy import Crisp
+from alphacut.fuzzy.arrays import Array
 from alphacut.questions.summary import Results
 from alphacut.stages.envelope import EnvelopeTask
 from alphacut.stochastic.figures.style import BLUE, GREY, INK, ORANGE
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 Point = tuple[float, float]
 ARROW = {"arrowstyle": "-|>", "color": ORANGE}
@@ -36,7 +33,7 @@ def draw_frame(section: Frame) -> Figure:
     height, level = sum(lengths), 0.0  # of the frame, and of the floor below, in m
     span = 0.45 * max(height, 6.0) if len(lengths) < 5 else 0.3 * height
     inches = min(9.0, 1.4 + 0.5 * height, 2.31 * height / span)
-    figure, axes = style.figure(1.9 * inches * span / height, inches)
+    figure, axes = plt.subplots(figsize=(1.9 * inches * span / height, inches))
     draw_ground(axes, (-0.1 * span, 1.1 * span), (-0.03 * span, 0))
     masses, stiffness = section.per_floor(section.masses), section.per_floor(section.stiffness)
     for floor, (length, mass) in enumerate(zip(lengths, masses, strict=True), start=1):
@@ -62,7 +59,8 @@ def draw_chain(section: Frame) -> Figure:
     floors, placement = section.floors, section.damper_placement if section.has_dampers else None
     foot = -0.9 if placement == "ground" else -0.5
     right, width = PITCH * floors + 0.2, min(12.0, 2.2 + 1.5 * floors)  # of the axes, in inches
-    figure, axes = style.figure(width, 2.15 * width / (PITCH * floors + 0.5) + 0.1)
+    height = 2.15 * width / (PITCH * floors + 0.5) + 0.1
+    figure, axes = plt.subplots(figsize=(width, height))
     draw_ground(axes, (-0.12, 0), (foot, 0.75))
     if placement == "ground":
         draw_ground(axes, (-0.12, right), (foot - 0.12, foot))
@@ -94,14 +92,12 @@ def draw_storey(axes: Axes, floor: int, placement: str | None) -> None:
 
 def set_to_scale(axes: Axes, across: Point, up: Point) -> None:
     """Sets the limits of axes to scale, and hides their lines and ticks."""
-    axes.set_xlim(*across)
-    axes.set_ylim(*up)
-    axes.set_aspect("equal")
+    axes.set(xlim=across, ylim=up, aspect="equal")
     axes.axis("off")
 
 
 def draw_ground(axes: Axes, across: Point, up: Point) -> None:
-    """Draws a draw_ground rectangle that stands for the ground."""
+    """Draws a rectangle that stands for the ground."""
     axes.fill_between(across, *up, hatch="////", facecolor="white", edgecolor=GREY, lw=0)
 
 
@@ -132,12 +128,15 @@ TITLES = (
     "bounds left by the sweep, and the best of all",
     "the discrete fuzzy mapping",
 )
+STORED: Look = {"color": GREY, "lw": 0.5}
+GUESS, NEW, ENVELOPE = ({"color": colour, "lw": 1.3} for colour in (BLUE, ORANGE, INK))
+NODE: Look = {"color": INK, "lw": 0.8, "ls": ":"}
 LINES: dict[str, Look] = {
-    "stored trajectory": {"color": GREY, "lw": 0.8},
-    "new trajectory": {"color": ORANGE, "lw": 1.3},
-    "guess, or bound left by the sweep": {"color": BLUE, "lw": 1.3},
-    "envelope": {"color": INK, "lw": 1.3},
-    "node that is treated": {"color": INK, "lw": 0.8, "ls": ":"},
+    "stored trajectory": STORED,
+    "new trajectory": NEW,
+    "guess, or bound left by the sweep": GUESS,
+    "envelope": ENVELOPE,
+    "node that is treated": NODE,
 }
 
 
@@ -147,56 +146,48 @@ def graph_follower_steps(results: Results, task: EnvelopeTask) -> Figure:
     A graph is the trajectory of one point of the inputs. At each node (of time) and side (lower,
     upper) the follower guesses the best stored graph, and may compute a new one.
     """
-    import matplotlib.pyplot as plt
-    from matplotlib.lines import Line2D
-
     run, column = followed_run(results, task)
     flow, points = run.storage.flow, run.storage.points
     time, graphs = flow.time, flow.values(points)[..., column]  # (T,), (graphs, T)
     guess, new = run.guess[0, :, column], run.new[0, :, column]  # graphs by (node, side); −1: none
-    lower, upper = graphs.min(0), graphs.max(0)
-    figure, mosaic = plt.subplot_mosaic("12;34;55", figsize=(8.4, 8.4), sharex=True, sharey=True)
-    panels = [mosaic[letter] for letter in "12345"]
     computed = np.argwhere(new >= 0)  # (node, side) of each new graph
     first_node = computed[0, 0]
     first_graphs = new[first_node][new[first_node] >= 0]
     late = computed[(computed[:, 0] > 0.5 * len(time)) & (guess[*computed.T] > 0)]
     node, side = late[0] if len(late) else computed[-1]
-
-    def draw_graphs(panel: Axes, indices: Iterable[int], node: int | None, n_new: int) -> None:
-        """Draws graphs in grey, the last `n_new` of them in orange, and marks a node."""
-        shown = list(indices)
-        for position, graph in enumerate(shown):
-            is_new = position >= len(shown) - n_new
-            colour, width = (ORANGE, 1.3) if is_new else (GREY, 0.4)
-            panel.plot(time, graphs[graph], color=colour, lw=width)
-        if node is not None:
-            panel.axvline(time[node], color=INK, lw=0.8, ls=":")
-
-    draw_graphs(panels[0], [0], first_node, 0)
-    panels[0].plot(time, graphs[0], color=BLUE, lw=1.3)
-    draw_graphs(panels[1], [0, *first_graphs], first_node, len(first_graphs))
-    draw_graphs(panels[2], range(new[node, side] + 1), node, 1)
-    panels[2].plot(time, graphs[guess[node, side]], color=BLUE, lw=1.3)
-    draw_graphs(panels[3], range(len(graphs)), None, 0)
-    nodes = np.arange(len(time))[:, None]
     # what the sweep knew at each node: the guess, and the new graph if there is one
+    nodes = np.arange(len(time))[:, None]
     swept = np.stack([graphs[guess, nodes], graphs[np.where(new < 0, guess, new), nodes]])
-    for bound, final in ((swept[..., 0].min(0), lower), (swept[..., 1].max(0), upper)):
-        panels[3].plot(time, bound, color=BLUE, lw=1.0)
-        panels[3].plot(time, final, color=INK, lw=1.3)
-    panels[4].fill_between(time, lower, upper, color=BLUE, alpha=0.2, lw=0)
-    for final in (lower, upper):
-        panels[4].plot(time, final, color=INK, lw=1.3)
-    for number, (panel, title) in enumerate(zip(panels, TITLES, strict=False), start=1):
+    bounds = np.stack([swept[..., 0].min(0), swept[..., 1].max(0)])
+    envelope = np.stack([graphs.min(0), graphs.max(0)])
+    figure, mosaic = plt.subplot_mosaic("12;34;55", figsize=(8.4, 8.4), sharex=True, sharey=True)
+    panels = [mosaic[letter] for letter in "12345"]
+    drawn: list[tuple[int, Array, Look]] = [
+        (0, graphs[:1], GUESS),
+        (1, graphs[:1], STORED),
+        (1, graphs[first_graphs], NEW),
+        (2, graphs[: new[node, side]], STORED),
+        (2, graphs[new[node, side]][None], NEW),
+        (2, graphs[guess[node, side]][None], GUESS),
+        (3, graphs, STORED),
+        (3, bounds, GUESS),
+        (3, envelope, ENVELOPE),
+        (4, envelope, ENVELOPE),
+    ]
+    for panel, curves, look in drawn:
+        panels[panel].plot(time, curves.T, **look)
+    for panel, marked in enumerate((first_node, first_node, node)):
+        panels[panel].axvline(time[marked], **NODE)
+    panels[4].fill_between(time, *envelope, color=BLUE, alpha=0.2, lw=0)
+    for number, (axes, title) in enumerate(zip(panels, TITLES, strict=True), start=1):
         label = f"Fig. {20 + number}" if results.is_paper else number
-        panel.set_title(f"{label}: {title}", loc="left", fontsize=9)
+        axes.set_title(f"{label}: {title}", fontsize=9)
     panels[4].set_xlabel("time t (s)")
     output = flow.outputs[column]
-    for panel in panels[::2]:
-        prefix_axis(panel, output, Output(output).unit)
+    for axes in panels[::2]:
+        prefix_axis(axes, output, Output(output).unit)
     lines = [Line2D([], [], label=words, **look) for words, look in LINES.items()]
-    figure.legend(handles=lines, fontsize=8, loc="outside lower center", ncols=3)
+    figure.legend(handles=lines, loc="outside lower center", ncols=3)
     return figure
 
 

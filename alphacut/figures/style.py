@@ -1,55 +1,36 @@
-"""What the figures of a run share: sizes, the α scale, axes with units and memberships."""
+"""What the figures of a run share: the α scale, axes with units, and memberships."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.io.quantity import MINUS, axis_prefix
 from alphacut.stochastic.figures.style import INK
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-WIDTH, HEIGHT = 7.2, 3.8  # inches
 Colour = tuple[float, float, float, float]
 Look = dict[str, Any]
 """Keywords of a drawing function of Matplotlib."""
 
 
-def figure(width: float = WIDTH, height: float = HEIGHT) -> tuple[Figure, Axes]:
-    """A figure with one pair of axes."""
-    import matplotlib.pyplot as plt
-
-    figure, axes = plt.subplots(figsize=(width, height))
-    return figure, axes
-
-
 def colours(alpha: Array) -> list[Colour]:
     """Colour for each level, the darker the higher, fit for grey print."""
-    from matplotlib import colormaps
-
     return [colormaps["YlGnBu"](0.25 + 0.65 * float(level)) for level in alpha]
 
 
 def alpha_legend(axes: Axes, alpha: Array) -> None:
     """Adds a legend of the colours of α-levels, beside the axes where no data are."""
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
-
     shades = zip(alpha[:-1], colours(alpha), strict=False)
     patches = [Patch(facecolor=shade, label=f"α = {level:g}") for level, shade in shades]
     top = Line2D([], [], color=INK, lw=1, label=f"α = {alpha[-1]:g}")
-    small: Look = {"title": "α-cut", "fontsize": 8, "title_fontsize": 8}
-    axes.legend(handles=[*patches, top], loc="upper left", bbox_to_anchor=(1.0, 1.0), **small)
-
-
-def title(axes: Axes, text: str) -> None:
-    """A small title at the left."""
-    axes.set_title(text.replace("^2", "²"), loc="left", fontsize=10)
+    beside: Look = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0)}
+    axes.legend(handles=[*patches, top], title="α-cut", title_fontsize=8, **beside)
 
 
 def prefix_axis(axes: Axes, label: str, si: str, *, across: bool = False) -> None:
@@ -57,12 +38,10 @@ def prefix_axis(axes: Axes, label: str, si: str, *, across: bool = False) -> Non
 
     The data stay in SI: the labels of ticks are scaled.
     """
-    limits = axes.get_xlim() if across else axes.get_ylim()
-    factor, unit = axis_prefix(max(map(abs, limits)), si)
-    words = f"{label} ({unit})".replace("^2", "²") if unit else label
-    (axes.set_xlabel if across else axes.set_ylabel)(words)
+    axis = axes.xaxis if across else axes.yaxis
+    factor, unit = axis_prefix(max(map(abs, axis.get_view_interval())), si)
+    axis.set_label_text(f"{label} ({unit})".replace("^2", "²") if unit else label)
     if factor != 1.0:
-        axis = axes.xaxis if across else axes.yaxis
         axis.set_major_formatter(lambda value, _: f"{value * factor:.10g}".replace("-", MINUS))
 
 

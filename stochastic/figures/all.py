@@ -1,35 +1,28 @@
-"""All figures of a microstructure.
-
-Here are distributions of radii (Fig. 11), neighbours (Figs. 6, 7) and r_n (Figs. 12, 13); pictures
-of discs are in `cells`.
-"""
+"""All figures of a microstructure: discs and cells, distributions of radii, neighbours and r_n."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import EllipseCollection, LineCollection
+from matplotlib.figure import Figure
+from scipy.spatial import KDTree
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.stochastic.figures.style import (
-    BLUE,
-    GREEN,
-    GREY,
-    INK,
-    LIGHT,
-    ORANGE,
-    PALE,
-    figure_style,
-    save,
-    two_panels,
-)
+from alphacut.stochastic.figures import style
+from alphacut.stochastic.figures.style import BLUE, GREEN, GREY, INK, LIGHT, ORANGE, PALE
 from alphacut.stochastic.microstructure import Microstructure, to_dataset
 from alphacut.stochastic.particles.measured import SectionImage
 from alphacut.stochastic.particles.packing import Packing
 from alphacut.stochastic.particles.particles import DISCS, Particles
-from alphacut.stochastic.particles.radius_laws import LogNormalRadii, RadiusLaw
+from alphacut.stochastic.particles.radius_laws import LogNormalRadii
 from alphacut.stochastic.sections import Simulated
 from alphacut.stochastic.tessellation.apollonius import (
     Apollonius,
@@ -38,60 +31,55 @@ from alphacut.stochastic.tessellation.apollonius import (
     neighbours,
 )
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
 REDUCED = "reduced radius $r_n$ = r/a"
 """Name of the axis."""
+CORNER_DISCS = 120  # of a larger section a corner with so many discs is drawn
+N_EQUAL = 4000  # equal discs whose direct neighbours are counted
+EQUAL = "{} equal discs of the same area fraction, not those of the section"
 
 
 def draw(result: Microstructure, folder: Path) -> dict[str, list[Path]]:
     """Write every figure of a microstructure as SVG and PNG; return the files of each name.
 
-    Figures of direct neighbours show discs of one size at the same area fraction, as in the paper.
+    Statistics of direct neighbours are of discs of one size at the same area fraction, as in the
+    paper.
     """
     first, source = result.sections[0], result.study.source
-    law = source.packing.radii if isinstance(source, Simulated) else None
     figures: dict[str, Callable[[], Figure]] = {
-        "11_radii": lambda: draw_radii(result, law),
-        "12_areas": lambda: draw_areas(result),
-        "13_pbox": lambda: draw_pbox(result),
-        "radius_map": lambda: draw_map(result),
+        "11_radii": partial(draw_radii, result),
+        "12_areas": partial(draw_areas, result),
+        "13_pbox": partial(draw_pbox, result),
+        "radius_map": partial(draw_map, result),
     }
-    if result.study.shape == DISCS:
-        generator = np.random.default_rng(result.study.seed)
-        few_equal, many_equal = _equal_discs(result, 120), _equal_discs(result, 4000)
-        figures |= {
-            "03-04_two_point": lambda: draw_two_point(many_equal, generator),
-            "05-08_neighbours": lambda: draw_neighbours(few_equal),
-            "06-07_neighbour_statistics": lambda: draw_neighbour_statistics(many_equal),
-            "09_correlation": lambda: draw_correlation(result, apollonius(many_equal)),
-        }
     if (diagram := first.diagram) is not None:
-        figures["10_cells"] = lambda: draw_cells(diagram)
+        generator, equal = np.random.default_rng(result.study.seed), _equal_discs(result)
+        figures |= {
+            "03-04_two_point": partial(draw_two_point, equal, generator),
+            "05-08_neighbours": partial(draw_neighbours, diagram.discs),
+            "06-07_neighbour_statistics": partial(draw_neighbour_statistics, equal),
+            "09_correlation": partial(draw_correlation, result, apollonius(equal)),
+            "10_cells": partial(draw_cells, diagram),
+        }
     if isinstance(source, SectionImage):
-        picture = source.picture()
-        figures["image_circles"] = lambda: draw_overlay(picture, first.particles)
-    with figure_style():
-        return {name: save(draw(), folder / name) for name, draw in sorted(figures.items())}
+        figures["image_circles"] = partial(draw_overlay, source.picture(), first.particles)
+    with style.figure_style():
+        return {name: style.save(draw(), folder / name) for name, draw in sorted(figures.items())}
 
 
-def _equal_discs(result: Microstructure, number: int) -> Particles:
+def _equal_discs(result: Microstructure) -> Particles:
     """Return a packing of equal discs with the sections' area fraction and mean disc area."""
     discs = [section.particles for section in result.sections]
     radius = float(np.sqrt(np.mean(np.concatenate([packing.radii for packing in discs]) ** 2)))
     fraction = float(np.mean([packing.fraction for packing in discs]))
-    packing = Packing(number, min(fraction, DISCS.densest), LogNormalRadii(radius, radius))
-    return packing.make(np.random.default_rng([result.study.seed, number]))
+    packing = Packing(N_EQUAL, min(fraction, DISCS.densest), LogNormalRadii(radius, radius))
+    return packing.make(np.random.default_rng([result.study.seed, N_EQUAL]))
 
 
-def draw_radii(result: Microstructure, law: RadiusLaw | None) -> Figure:
+def draw_radii(result: Microstructure) -> Figure:
     """Draw the distribution function of the radii, and their law if there is one (Fig. 11)."""
-    import matplotlib.pyplot as plt
-
-    figure, axes = plt.subplots(figsize=(6.4, 3.8))
-    particles = result.study.shape.particles
+    figure, axes = plt.subplots()
+    particles, source = result.study.shape.particles, result.study.source
+    law = source.packing.radii if isinstance(source, Simulated) else None
     values = 1e3 * np.concatenate([section.particles.radii for section in result.sections])
     axes.ecdf(values, color=BLUE, label=f"{len(values)} {particles}")
     if law is not None and law.smallest < law.largest:
@@ -104,27 +92,26 @@ def draw_radii(result: Microstructure, law: RadiusLaw | None) -> Figure:
 
 def draw_neighbour_statistics(discs: Particles) -> Figure:
     """Draw distances (Fig. 6) and number (Fig. 7) of direct neighbours of equal discs."""
-    figure, (left, right) = two_panels(EQUAL.format(len(discs)))
+    figure, (left, right) = plt.subplots(1, 2, figsize=(9.6, 4.0))
+    figure.suptitle(EQUAL.format(len(discs)))
     direct = neighbours(discs)
     distance, number = direct.distances / (2 * float(discs.radii[0])), direct.number
     left.hist(distance, bins=80, density=True, color=BLUE)
     left.axvline(1, color=ORANGE, label="one diameter")
-    left.set(xlabel="distance of direct neighbours / diameter", ylabel="density")
-    left.set(xlim=(0.8, np.quantile(distance, 0.999)))
-    left.legend()
+    label, farthest = "distance of direct neighbours / diameter", np.quantile(distance, 0.999)
+    left.set(xlabel=label, ylabel="density", xlim=(0.8, farthest))
     counts = np.bincount(number)
     right.bar(np.arange(len(counts)), counts / counts.sum(), color=BLUE)
     right.axvline(number.mean(), color=ORANGE, label=f"mean {number.mean():.4g}")
-    right.set(xlabel="number of direct neighbours", ylabel="share of discs")
-    right.set(xlim=(2.3, number.max() + 0.7))
-    right.legend()
+    label, end = "number of direct neighbours", number.max() + 0.7
+    right.set(xlabel=label, ylabel="share of discs", xlim=(2.3, end))
+    for axes in (left, right):
+        axes.legend()
     return figure
 
 
 def draw_correlation(result: Microstructure, equal: Apollonius) -> Figure:
     """Draw r_n of pairs of cells that share a wall, beside those of equal discs (Fig. 9)."""
-    import matplotlib.pyplot as plt
-
     figure, panels = plt.subplots(1, 2, figsize=(9.6, 4.4))
     diagrams = [section.diagram for section in result.sections if section.diagram]
     titles = "the sections", "equal discs"
@@ -144,16 +131,14 @@ def draw_areas(result: Microstructure) -> Figure:
 
     Lines show the limits of r_n, a hatched band where a particle would leave its cell.
     """
-    import matplotlib.pyplot as plt
-
-    figure, axes = plt.subplots(figsize=(6.4, 3.8))
+    figure, axes = plt.subplots()
     shape, (low, high) = result.study.shape, result.limits
     for section in result.sections:
         radius, measure = section.reduced_radii, 1e3**shape.dimensions * section.cells
         inside = (radius >= low) & (radius <= high)
         for part, size, colour in ((inside, 1.5, GREY), (~inside, 4, BLUE)):
             axes.plot(radius[part], measure[part], ".", ms=size, color=colour, rasterized=True)
-    for limit in result.limits:
+    for limit in (low, high):
         axes.axvline(limit, color=BLUE, lw=1)
     bound, unit = shape.largest, {2: "mm²", 3: "mm³"}[shape.dimensions]
     axes.axvspan(bound, bound + 0.07, facecolor="none", edgecolor=GREY, hatch="///", lw=0)
@@ -170,11 +155,9 @@ def draw_pbox(result: Microstructure) -> Figure:
 
     The lower panel shows the differences from the fitted map.
     """
-    import matplotlib.pyplot as plt
-
-    figure, (axes, residual_axes) = plt.subplots(
-        2, 1, figsize=(6.4, 5.6), height_ratios=(3, 1.4), sharex=True
-    )
+    size, ratios = (6.4, 5.6), (3, 1.4)
+    figure, panels = plt.subplots(2, 1, figsize=size, height_ratios=ratios, sharex=True)
+    axes, residual_axes = panels
     table = to_dataset(result)
     radius, cdf = table["r_n"].values, table["cdf"].values
     low, high = np.maximum(cdf - result.band, 0), np.minimum(cdf + result.band, 1)
@@ -185,8 +168,8 @@ def draw_pbox(result: Microstructure) -> Figure:
         edges = scale * (low - base), scale * (high - base)
         panel.fill_between(radius, *edges, fc=PALE, label=band_label)
         panel.plot(radius, scale * (cdf - base), color=BLUE, label=cells_label)
-        panel.plot(radius, scale * (table["pbox_upper"] - base), color=INK, lw=1, label="p-box")
-        panel.plot(radius, scale * (table["pbox_lower"] - base), color=INK, lw=1)
+        for name, label in (("pbox_upper", "p-box"), ("pbox_lower", None)):
+            panel.plot(radius, scale * (table[name] - base), color=INK, lw=1, label=label)
     axes.set(ylabel=f"{result.study.shape.cells}-weighted share", ylim=(0, 1.02))
     residual_axes.set(xlabel=REDUCED, ylabel="less the fit [%]")
     axes.legend(loc="upper left")
@@ -195,32 +178,21 @@ def draw_pbox(result: Microstructure) -> Figure:
 
 def draw_map(result: Microstructure) -> Figure:
     """Draw the radius map θ ↦ r_n: quantiles of the sample, fitted cubic, fuzzy bounds (eq. 12)."""
-    import matplotlib.pyplot as plt
-
-    figure, axes = plt.subplots(figsize=(6.4, 3.8))
-    fit, box = result.pbox.fit, result.pbox
-    law = fit.distribution
+    figure, axes = plt.subplots()
+    box, law = result.pbox, result.pbox.fit.distribution
     theta = np.asarray(np.linspace(law.lower, law.upper, 601), float)
-    quantiles = result.truncated.quantile(law.cdf(theta))
-    axes.step(theta, quantiles, color=BLUE, label="sample")
-    fitted = fit.map((box.a2[1], box.a4[1]))
-    label = f"$a_2$ = {fitted.a2:.4f}, $a_4$ = {fitted.a4:.4f}"
+    axes.step(theta, result.truncated.quantile(law.cdf(theta)), color=BLUE, label="sample")
+    fitted = box.fit.map((box.a2[1], box.a4[1]))
+    label, of_box = f"$a_2$ = {fitted.a2:.4f}, $a_4$ = {fitted.a4:.4f}", "fuzzy $a_2$, $a_4$"
     axes.plot(theta, fitted(theta), color=ORANGE, ls="--", label=label)
-    low, high = box.bounds(theta)
-    axes.fill_between(theta, low, high, color=GREY, alpha=0.4, lw=0, label="fuzzy $a_2$, $a_4$")
+    axes.fill_between(theta, *box.bounds(theta), color=GREY, alpha=0.4, lw=0, label=of_box)
     axes.set(xlabel="θ, standard deviations", ylabel=REDUCED, ylim=(0, 1))
     axes.legend()
     return figure
 
 
-CORNER_DISCS = 120  # of a larger section a corner with so many discs is drawn
-EQUAL = "{} equal discs of the same area fraction, not those of the section"
-
-
 def _circles(axes: Axes, centres: Array, radii: Array, **look: Any) -> None:
     """Draw circles by centres, shape (n, 2), and radii, shape (n,), in m, on axes in mm."""
-    from matplotlib.collections import EllipseCollection
-
     width = 2e3 * radii
     position = {"offsets": 1e3 * centres, "offset_transform": axes.transData}
     axes.add_collection(EllipseCollection(width, width, 0 * width, units="xy", **position, **look))
@@ -233,9 +205,9 @@ def _view(axes: Axes, low: Array, high: Array) -> None:
     axes.grid(visible=False)
 
 
-def plot_discs(axes: Axes, discs: Particles, colour: str, view: Array | None = None) -> None:
-    """Draw discs and their periodic images in the rectangle, or in its corner `view` (m), in mm."""
-    view, shifts = discs.size if view is None else view, _shifts(discs)
+def plot_discs(axes: Axes, discs: Particles, colour: str, view: Array) -> None:
+    """Draw discs and their periodic images in the corner `view` (m) of the rectangle, in mm."""
+    shifts = _shifts(discs)
     centres = np.concatenate([discs.centres + shift for shift in shifts])
     radii = np.tile(discs.radii, len(shifts))
     is_seen = ((centres > -radii[:, None]) & (centres < view + radii[:, None])).all(axis=1)
@@ -243,16 +215,12 @@ def plot_discs(axes: Axes, discs: Particles, colour: str, view: Array | None = N
     _view(axes, 0 * view, view)
 
 
-def plot_cells(axes: Axes, diagram: Apollonius, view: Array | None = None) -> None:
-    """Draw the curved walls of the cells, with images, in the rectangle or its corner `view`."""
-    from matplotlib.collections import LineCollection
-
-    discs = diagram.discs
-    view = discs.size if view is None else view
+def plot_cells(axes: Axes, diagram: Apollonius, view: Array) -> None:
+    """Draw the curved walls of the cells, with images, in the corner `view` (m), in mm."""
     angle, rho = diagram.walls(24)
     direction = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-    points = discs.centres[diagram.cell] + rho[..., None] * direction
-    walls = np.concatenate([points + shift for shift in _shifts(discs)], axis=1)
+    points = diagram.discs.centres[diagram.cell] + rho[..., None] * direction
+    walls = np.concatenate([points + shift for shift in _shifts(diagram.discs)], axis=1)
     is_seen = ((walls.max(axis=0) > 0) & (walls.min(axis=0) < view)).all(axis=1)
     lines = list(1e3 * walls[:, is_seen].swapaxes(0, 1))
     axes.add_collection(LineCollection(lines, colors=INK, linewidths=0.8))
@@ -264,34 +232,53 @@ def _shifts(discs: Particles) -> list[Array]:
     return [discs.size * (i, j) for i in tiles for j in tiles]
 
 
-def draw_cells(diagram: Apollonius) -> Figure:
-    """Draw Voronoi cells, whose walls cut discs, beside Apollonius cells (Fig. 10)."""
-    discs = diagram.discs
+def _corner_panels(discs: Particles, *titles: str) -> tuple[Figure, list[Axes], Array]:
+    """Return a figure with two panels, its axes, and the corner of the section to draw, in m."""
     view = discs.size * min(1.0, float(np.sqrt(CORNER_DISCS / len(discs))))
     width, height = 1e3 * discs.size
     title = f"one section of {width:.4g} × {height:.4g} mm with {len(discs)} discs"
     title = title if (view == discs.size).all() else f"a corner of {title}"
-    figure, (left, right) = two_panels(title, "Voronoi cells", "Apollonius cells")
-    points = Particles(discs.centres, np.zeros(len(discs)), discs.size, discs.periodic)
-    for axes, shown, colour in ((left, apollonius(points), PALE), (right, diagram, LIGHT)):
+    return *_titled_panels(title, *titles), view
+
+
+def _titled_panels(title: str, *titles: str) -> tuple[Figure, list[Axes]]:
+    """Return a figure with two panels and its axes, with titles."""
+    figure, panels = plt.subplots(1, 2, figsize=(9.6, 5.0))
+    figure.suptitle(title)
+    for axes, panel_title in zip(panels, titles, strict=True):
+        axes.set_title(panel_title)
+    return figure, list(panels)
+
+
+def draw_cells(diagram: Apollonius) -> Figure:
+    """Draw Voronoi cells, whose walls cut discs, beside Apollonius cells (Fig. 10)."""
+    discs = diagram.discs
+    figure, panels, view = _corner_panels(discs, "Voronoi cells", "Apollonius cells")
+    for axes, cells, colour in zip(panels, (_voronoi(discs), diagram), (PALE, LIGHT), strict=True):
         plot_discs(axes, discs, colour, view)
-        plot_cells(axes, shown, view)
+        plot_cells(axes, cells, view)
     return figure
 
 
-def draw_neighbours(discs: Particles) -> Figure:
-    """Draw the Delaunay triangulation of equal discs beside their Voronoi cells (Figs. 5, 8)."""
-    from matplotlib.collections import LineCollection
+def _voronoi(discs: Particles) -> Apollonius:
+    """Voronoi cells of the discs' centres."""
+    return apollonius(replace(discs, radii=np.zeros(len(discs))))
 
-    titles = "Delaunay triangulation: the direct neighbours", "Voronoi cells, its dual"
-    figure, (left, right) = two_panels(EQUAL.format(len(discs)), *titles)
+
+def draw_neighbours(discs: Particles) -> Figure:
+    """Draw the Delaunay triangulation of discs' centres beside their Voronoi cells (Figs. 5, 8)."""
+    titles = "Delaunay triangulation: direct neighbours", "Voronoi cells of the centres, its dual"
+    figure, panels, view = _corner_panels(discs, *titles)
     direct = neighbours(discs)
     start = discs.centres[direct.first]
-    edges = list(1e3 * np.stack([start, start + direct.offset], axis=1))
-    for axes in (left, right):
-        plot_discs(axes, discs, LIGHT)
-    left.add_collection(LineCollection(edges, colors=ORANGE, linewidths=0.8))
-    plot_cells(right, apollonius(discs))
+    edges = np.stack([start, start + direct.offset], axis=1)
+    edges = np.concatenate([edges + shift for shift in _shifts(discs)])
+    is_seen = ((edges.max(axis=1) > 0) & (edges.min(axis=1) < view)).all(axis=1)
+    for axes in panels:
+        plot_discs(axes, discs, LIGHT, view)
+    lines = list(1e3 * edges[is_seen])
+    panels[0].add_collection(LineCollection(lines, colors=ORANGE, linewidths=0.8))
+    plot_cells(panels[1], _voronoi(discs), view)
     return figure
 
 
@@ -310,7 +297,7 @@ def draw_two_point(discs: Particles, generator: np.random.Generator) -> Figure:
     direct_offsets = {tuple(np.round(v, 12)) for v in direct.offset[direct.first == centre]}
     colours = [GREEN if tuple(np.round(v, 12)) in direct_offsets else LIGHT for v in near]
     drawn = _from_pair_distances(discs, len(near), reach, generator)
-    figure, panels = two_panels(
+    figure, panels = _titled_panels(
         EQUAL.format(len(discs)),
         f"pair distances alone: {_overlaps(drawn, radius)} of {len(drawn)} overlap",
         f"the packing: {colours.count(GREEN)} of {len(near)} are direct neighbours",
@@ -328,8 +315,6 @@ def _from_pair_distances(
     discs: Particles, number: int, reach: float, generator: np.random.Generator
 ) -> Array:
     """Return points (number, 2), in m, at random angles and pair distances of the discs."""
-    from scipy.spatial import KDTree
-
     tree = KDTree(discs.centres, boxsize=discs.size)
     pairs = tree.query_pairs(reach, output_type="ndarray")
     offset = discs.separation(pairs[:, 0], pairs[:, 1])
@@ -347,13 +332,11 @@ def _overlaps(places: Array, radius: float) -> int:
 
 def draw_overlay(picture: Array, discs: Particles) -> Figure:
     """Draw the grey image (rows, columns) with the outline of every circle found in it."""
-    import matplotlib.pyplot as plt
-
     width, height = 1e3 * discs.size
     figure, axes = plt.subplots(figsize=(6.4, 6.4 * float(np.clip(height / width, 0.5, 1.6))))
     axes.imshow(picture, cmap="gray", extent=(0, width, 0, height), interpolation="none")
     outline = {"facecolors": "none", "edgecolors": ORANGE, "linewidths": 1.0}
     _circles(axes, discs.centres, discs.radii, **outline)
     _view(axes, 0 * discs.size, discs.size)
-    axes.set_title(f"{len(discs)} circles; what has no outline was left out", fontsize="medium")
+    axes.set_title(f"{len(discs)} circles; what has no outline was left out")
     return figure

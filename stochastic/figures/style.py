@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+import matplotlib as mpl
+import matplotlib.pyplot as plt
+from matplotlib.figure import Figure
 
 # Okabe & Ito
 INK, BLUE, ORANGE, GREEN = "#1a1a1a", "#0072b2", "#d55e00", "#009e73"
 PURPLE = "#7b3294"  # differs from blue and orange in lightness
 GREY, PALE, LIGHT = "#8c8c8c", "#dce9f2", "#9ecae1"
+WIDTH, HEIGHT = 7.2, 3.8  # inches
 SETTINGS: dict[str, Any] = {
+    "figure.figsize": (WIDTH, HEIGHT),
+    "figure.titlesize": 10,
     "font.size": 10,
+    "axes.titlelocation": "left",
+    "axes.titlesize": 10,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
@@ -25,6 +30,7 @@ SETTINGS: dict[str, Any] = {
     "axes.axisbelow": True,
     "axes.edgecolor": INK,
     "axes.labelcolor": INK,
+    "legend.fontsize": 8,
     "legend.frameon": False,
     "figure.constrained_layout.use": True,
     "svg.fonttype": "none",
@@ -36,28 +42,13 @@ SETTINGS: dict[str, Any] = {
 @contextmanager
 def figure_style() -> Iterator[None]:
     """Context manager that sets this style."""
-    import matplotlib as mpl
-
     mpl.use("Agg")
     with mpl.rc_context(SETTINGS):
         yield
 
 
-def two_panels(title: str, *titles: str) -> tuple[Figure, Sequence[Axes]]:
-    """Return a figure with two panels and their axes; titles of figure and panels are set."""
-    import matplotlib.pyplot as plt
-
-    figure, panels = plt.subplots(1, 2, figsize=(9.6, 5.0 if titles else 4.0))
-    figure.suptitle(title, fontsize=10)
-    for axes, panel_title in zip(panels, titles, strict=False):
-        axes.set_title(panel_title)
-    return figure, list(panels)
-
-
 def save(figure: Figure, stem: Path) -> list[Path]:
     """Write a figure to STEM.svg and STEM.png, close it, and return the two paths."""
-    import matplotlib.pyplot as plt
-
     stem.parent.mkdir(parents=True, exist_ok=True)
     files = []
     for kind in ("svg", "png"):

@@ -4,11 +4,12 @@ import json
 import os
 import shutil
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import xarray
 
-from alphacut.figures import envelope, overview, style
+from alphacut.figures import envelope, overview
 from alphacut.frame import StoreyFrame, propagation
 from alphacut.fuzzy import Triangular
 from alphacut.questions.decision import DecisionAnswer, LimitDecision
@@ -65,7 +66,7 @@ def study(nature, **more):
 def test_the_error_is_drawn_outside_bounds_that_it_may_pass(nature, lines):
     data = study(nature, error=0.25 * np.ones((2, 11, 1)))
     with figure_style():
-        _, axes = style.figure()
+        _, axes = plt.subplots()
         words = envelope.draw_error_band(
             axes, data["time"].values, data.sel(output="q1").isel(alpha=0), nature, "m"
         )
@@ -77,7 +78,7 @@ def test_the_error_is_drawn_outside_bounds_that_it_may_pass(nature, lines):
 def test_numbers_and_bounds_are_drawn_with_their_own_ends():
     number = Triangular(1.0, 2.0, 4.0)
     with figure_style():
-        _, axes = style.figure()
+        _, axes = plt.subplots()
         (line,) = number.plot(axes, color="red").lines
         assert line.get_xydata().tolist() == [[1, 0], [1, 0], [2, 1], [2, 1], [4, 0], [4, 0]]
         motion = propagation.envelope(
@@ -87,7 +88,7 @@ def test_numbers_and_bounds_are_drawn_with_their_own_ends():
             step=0.1,
             alpha=[0, 1],
         )
-        bands = motion.plot(style.figure()[1]).collections
+        bands = motion.plot(plt.subplots()[1]).collections
     ends = [band.get_paths()[0].get_extents() for band in bands]
     assert len(ends) == 2
     assert ends[0].ymax == pytest.approx(motion.upper[0].max())
