@@ -12,7 +12,7 @@ import numpy as np
 from alphacut.frame.calculus.jet import Array, Jet
 from alphacut.frame.dynamics.flow import Flow
 from alphacut.frame.envelope import Envelope
-from alphacut.frame.structures.quantities import units_of
+from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy import FuzzyNumber, Interval
 from alphacut.fuzzy.arrays import Ints, Mask
 from alphacut.fuzzy.knowledge.joint import joined_inputs
@@ -184,7 +184,7 @@ class UnitFlow:
     @property
     def units(self) -> tuple[str, ...]:
         """SI unit of each output; empty where it is not known."""
-        return units_of(self.outputs)
+        return tuple(Output(name).unit.removeprefix("SI") for name in self.outputs)
 
     def tolerance(self, value: float | None) -> float:
         """Return `value` if given, else the default tolerance, a fraction of the peak.

@@ -125,14 +125,14 @@ class MatricesSection(StructureSection):
         }
         return MatrixStructure(
             {name: number.nominal for name, number in numbers.items()},
-            mass=self._terms(self.mass),
-            stiffness=self._terms(self.stiffness),
-            damping=self._terms(self.damping),
+            mass=self.mass,
+            stiffness=self.stiffness,
+            damping=self.damping,
             observed=rows,
             ground=self.accelerogram,
             pattern=self._ground_pattern(),
             ratios=tuple(self._stated_ratios),
-            row_factors={name: self.outputs[name].factor.simplest for name in rows},
+            row_factors={name: self.outputs[name].factor for name in rows},
         )
 
     def _material_damping_ratios(
@@ -146,11 +146,6 @@ class MatricesSection(StructureSection):
         shares = modal_energy_shares(model, np.flatnonzero(has_modulus))
         ratios = tuple(damping.damping_ratio(loss, share) for share in shares)
         return damping_ratios_by_name(ratios, None)
-
-    def _terms(
-        self, terms: tuple[tuple[Monomial, Array], ...]
-    ) -> list[tuple[Monomial | str | float, Array]]:
-        return [(factor.simplest, array) for factor, array in terms]
 
     def _vector_over_unknowns(self, key: str, entries: Mapping[str, float]) -> Array:
         """A vector over the unknowns from its entries by unknown; `key` is for messages."""

@@ -317,7 +317,7 @@ def cut_record_warnings(content: Content, structure: Structure) -> Iterator[str]
     linear = structure.linear
     if linear is None or linear.ground is None or content.envelope is None:
         return
-    length = linear.ground.step * (len(linear.ground.acceleration) - 1)
+    length = linear.ground.step * (len(linear.ground.samples) - 1)
     longest = max(task.duration for task in envelope.tasks(content.envelope, content.study))
     if length > longest * (1 + 1e-9):
         yield f"the record lasts {length:g} s, and the motion is computed for {longest:g} s"

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from alphacut.case.limits import DecisionSection
-from alphacut.frame.questions.peaks import ANY, passing, verdict_words
+from alphacut.frame.questions.peaks import ANY, passing
 from alphacut.fuzzy.result import Nature
 from alphacut.io.quantity import engineering
 from alphacut.questions.question import (
@@ -42,7 +42,8 @@ class LimitDecision(LimitAnswer):
     @property
     def verdict_words(self) -> str:
         """The verdict, with the level from which on it holds if that is not 0."""
-        return verdict_words(self.verdict, self.from_level)
+        holds_from = bool(self.from_level) and self.verdict in ("exceeded", "not exceeded")
+        return f"{self.verdict} from α = {self.from_level:g} up" if holds_from else self.verdict
 
     @property
     def verdict_and_motion(self) -> str:

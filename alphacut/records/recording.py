@@ -105,7 +105,7 @@ def spectral_acceleration(ground: Accelerogram, period: float, ratio: float) -> 
     substeps = max(1, ceil(ground.step * POINTS_PER_PERIOD / period))
     substep = ground.step / substeps
     # accelerations at the ends of all substeps, and then of zeros for one period
-    samples, zeros = ground.acceleration, np.zeros(ceil(period / substep))
+    samples, zeros = ground.samples, np.zeros(ceil(period / substep))
     positions = np.arange((len(samples) - 1) * substeps + 1) / substeps
     values = np.interp(positions, np.arange(len(samples)), samples)
     start, end = np.append(values[:-1], zeros), np.append(values[1:], zeros)

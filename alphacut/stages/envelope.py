@@ -14,8 +14,8 @@ from alphacut import frame
 from alphacut.case.motion import EnvelopeSection, Study, Tolerance
 from alphacut.case.structure import Structure
 from alphacut.frame.bounds.model_error import MAX_PARAMETERS
-from alphacut.frame.questions.peaks import PEAK_BOUNDS, Peak, Peaks, output_of, peaks, tightest
-from alphacut.frame.structures.quantities import Output
+from alphacut.frame.questions.peaks import PEAK_BOUNDS, Peak, Peaks, peaks, tightest
+from alphacut.frame.structures.quantities import Output, output_of
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.progress_bar import Progress, subprogress
 from alphacut.fuzzy.refused import FailedError, require
@@ -45,8 +45,8 @@ class PeakResult(Numbers):
     upper: Values
     error: Values
     reached: Values
-    least_proved: Values
-    least_reached: Values
+    least_lower: Values
+    least_upper: Values
     proved: Values
     nature: Nature
     is_least: bool = False
@@ -234,7 +234,7 @@ def peaks_of(results: PeakResults, alpha: Sequence[float]) -> dict[str, Peak]:
         bounds = {bound: getattr(peak, bound) for bound in PEAK_BOUNDS}
         bounds = _negative(bounds) if peak.is_least else bounds
         for bound, values in bounds.items():
-            unknown = np.inf if bound in ("upper", "least_reached") else -np.inf
+            unknown = np.inf if bound in ("upper", "least_upper") else -np.inf
             bounds[bound] = np.where(np.isnan(values), unknown, values)
         is_signed = name.startswith(("max ", "min "))
         kind: dict[str, Any] = {"is_signed": is_signed, "reached_at": peak.reached_at}

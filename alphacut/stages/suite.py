@@ -16,8 +16,9 @@ from alphacut.case.motion import EnvelopeSection
 from alphacut.case.structure import Structure
 from alphacut.frame import Accelerogram
 from alphacut.frame.dynamics.nonlinear import make_flow
-from alphacut.frame.questions.peaks import PEAK_BOUNDS, Peak, Peaks, output_of
+from alphacut.frame.questions.peaks import PEAK_BOUNDS, Peak, Peaks
 from alphacut.frame.structures.linear import modal_damping_ratios
+from alphacut.frame.structures.quantities import output_of
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array, Mask
 from alphacut.fuzzy.refused import RefusedError, require
@@ -94,11 +95,11 @@ def _suite_record(
     allowed = "a record that moves something"
     require(measure > 0, f"record {name}", value="zero throughout", allowed=allowed)
     factor = section.scale.value / measure
-    length = (len(ground.acceleration) - 1) * ground.step
+    length = (len(ground.samples) - 1) * ground.step
     duration = min(envelope.duration, length + FREE_PERIODS * mode.period)
     steps = max(1, ceil(duration / envelope.step - 1e-9))
     envelope.require_steps(f"envelope.duration of {name}", steps * envelope.step)
-    shares = arias_fractions(ground.acceleration, ground.step)
+    shares = arias_fractions(ground.samples, ground.step)
     end = min(int(duration / ground.step + 1e-9), len(shares) - 1)
     cut_share = 0.0 if duration >= length else float(1 - shares[end])
     offset = float(ground.samples.mean()) / ground.extremes[0]
@@ -111,7 +112,7 @@ def _suite_record(
         warnings.append(f"{what} lies after the end of its motion, {steps * envelope.step:g} s")
     return SuiteRecord(
         name=name,
-        ground=Accelerogram(ground.step, factor * ground.acceleration),
+        ground=Accelerogram(ground.step, factor * ground.samples),
         duration=steps * envelope.step,
         measures={x: factor * size for x, size in sizes.items()} | {"scale": 1.0},
         cut_share=cut_share,
@@ -177,14 +178,14 @@ def with_means(
     for name, tried in zip(magnitudes, tried_means.T, strict=True):
         means = {
             bound: np.mean([getattr(x[name], bound) for x in peaks.values()], axis=0)
-            for bound in ("lower", "upper", "error", "least_proved")
+            for bound in ("lower", "upper", "error", "least_lower")
         }
         in_cuts = np.where(inside, tried, -np.inf)  # (levels, points)
-        mean_minima = np.maximum(means["lower"] - means["error"], means["least_proved"])
+        mean_minima = np.maximum(means["lower"] - means["error"], means["least_lower"])
         # a structure of any higher cut has at least the mean of that cut's least peaks
         minima_of_higher_cuts = np.maximum.accumulate(mean_minima[::-1])[::-1]
         means["reached"] = np.maximum(minima_of_higher_cuts, in_cuts.max(axis=1))
-        means["least_reached"] = np.full_like(mean_minima, np.inf)  # nothing bounds one structure's
+        means["least_upper"] = np.full_like(mean_minima, np.inf)  # nothing bounds one structure's
         reached_at = dict(zip(inputs, points[in_cuts[0].argmax()].tolist(), strict=True))
         found[f"mean {name}"] = replace(worst[name], reached_at=reached_at, **means)
     return found

@@ -189,7 +189,7 @@ def solve_with(ops: Any, integrator: Sequence[str | float], analysis: str) -> No
 
 def shake(ops: Any, ground: Accelerogram) -> None:
     """Move the ground of OpenSees' frame by the record."""
-    samples = [float(x) for x in ground.acceleration]
+    samples = [float(x) for x in ground.samples]
     ops.timeSeries("Path", 1, "-dt", ground.step, "-values", *samples)
     ops.pattern("UniformExcitation", 1, 1, "-accel", 1)
 

@@ -23,12 +23,11 @@ from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import (
     LinearSystem,
     Matrices,
-    courses_of_forces,
     evaluate,
     frequencies,
     histories,
 )
-from alphacut.frame.structures.loads import History
+from alphacut.frame.structures.loads import History, distinct_histories
 from alphacut.fuzzy.refused import (
     FailedError,
     RefusedError,
@@ -250,7 +249,7 @@ class LinearFlow(Flow):
         if matrices.feeds is None:
             return motion
         # accelerations among the outputs also hold the forces themselves, over the masses
-        at_nodes = np.stack([x.values(self.time) for x in courses_of_forces(self.system)])
+        at_nodes = np.stack([x.values(self.time) for x in distinct_histories(self.system.loads)])
         return motion + (matrices.feeds @ at_nodes).map(lambda x: x.swapaxes(-1, -2))
 
     def _from_modes(self, matrices: Matrices, rows: Jet) -> Jet | None:

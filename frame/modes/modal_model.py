@@ -23,7 +23,8 @@ from alphacut.frame.modes.damped import (
     require_dissipation,
 )
 from alphacut.frame.response.load_tables import Direct, LoadTables
-from alphacut.frame.structures.linear import courses_of_forces, histories
+from alphacut.frame.structures.linear import histories
+from alphacut.frame.structures.loads import distinct_histories
 from alphacut.fuzzy.arrays import Array, Ints
 
 Waves = tuple[Array, Array, Array]
@@ -65,7 +66,7 @@ class ModalModel:
         if structure.feeds is not None:  # 2 Re C_1 a(t) with half of it as C_1
             first = np.zeros((modes.share.shape[1], 1))
             first[0] = 0.5
-            for h, history in enumerate(courses_of_forces(flow.system)):
+            for h, history in enumerate(distinct_histories(flow.system.loads)):
                 share = (structure.feeds[:, h] * first).polynomial
                 loads.append(Direct(history, flow.time, modes.rate, share))
         return cls(flow, boxes, structure, modes, modes.rate, free, tuple(loads))

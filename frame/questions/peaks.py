@@ -14,23 +14,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from alphacut.frame.envelope import Envelope
+from alphacut.frame.structures.quantities import output_of
 from alphacut.fuzzy.arrays import Array, Mask
 from alphacut.fuzzy.refused import checked_number, require, require_choice
 from alphacut.fuzzy.result import Ends, Nature
 
 ANY = "any of them"
 """Name of the event that any of several limits is exceeded."""
-PEAK_BOUNDS = ("lower", "upper", "error", "reached", "least_proved", "least_reached")
+PEAK_BOUNDS = ("lower", "upper", "error", "reached", "least_lower", "least_upper")
 """Arrays of a `Peak` over the levels."""
-
-
-def output_of(peak: str) -> str:
-    """Return the output of a peak: "q3" of "max q3"."""
-    return peak.removeprefix("max ").removeprefix("min ").removeprefix("mean ")
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,9 +41,9 @@ class Peak:
         error: Distance by which peaks may lie outside `lower` and `upper`: that of the envelope and
             of the steps between nodes; 0 of guaranteed bounds, which contain it.
         reached: Peak that some motion in the cut is known to reach.
-        least_proved: Peak that each motion in the cut is proved to have at least.
-        least_reached: Peak that some motion in the cut is known not to exceed; infinite without
-            one.
+        least_lower: Proved lower bound of the least peak over each cut.
+        least_upper: Upper bound of it: a peak that some motion in the cut is known not to exceed;
+            infinite where none is known.
         nature: Nature of the bounds.
         is_signed: Whether it is a largest value, which may be negative, instead of a magnitude.
         reached_at: Inputs in SI, by name, of the motion that reaches the peak on the lowest level;
@@ -58,8 +55,8 @@ class Peak:
     upper: Array
     error: Array
     reached: Array
-    least_proved: Array
-    least_reached: Array
+    least_lower: Array
+    least_upper: Array
     nature: Nature
     is_signed: bool = False
     reached_at: Mapping[str, float] = field(default_factory=dict)
@@ -83,8 +80,8 @@ class Peak:
         lower_bound = np.maximum(self.lower - self.error, smallest)
         if self.nature is Nature.ATTAINED:
             lower_bound = np.full_like(lower_bound, smallest)
-        upper_bound = np.minimum(self.greatest_bounds.upper[-1:], self.least_reached)
-        return Ends(np.maximum(lower_bound, self.least_proved), upper_bound)
+        upper_bound = np.minimum(self.greatest_bounds.upper[-1:], self.least_upper)
+        return Ends(np.maximum(lower_bound, self.least_lower), upper_bound)
 
 
 Peaks = Mapping[str, Peak]
@@ -92,15 +89,10 @@ Peaks = Mapping[str, Peak]
 
 
 def peaks(envelope: Envelope, names: Sequence[str] = ()) -> dict[str, Peak]:
-    """Return the fuzzy peaks of an envelope's outputs by name: intervals of the peak by level.
+    """Return the fuzzy peaks of an envelope by name: intervals of the peak by level.
 
-    Args:
-        envelope: The envelope.
-        names: Outputs, for the peaks of their magnitudes, or "max q3", "min q3"; all outputs if
-            empty.
-
-    Returns:
-        Bounds of the greatest and least peak in each cut, their error, and peaks that are reached.
+    `names` are outputs, for the peaks of their magnitudes, or "max q3", "min q3"; all outputs if
+    empty.
     """
     return {name: _peak_of(envelope, name) for name in names or map(str, envelope.outputs)}
 
@@ -112,28 +104,27 @@ def _peak_of(envelope: Envelope, name: str) -> Peak:
     is_proved, is_signed = nature is Nature.GUARANTEED, name != output_of(name)
     smallest = -np.inf if is_signed else 0.0  # of any peak
     error = 0.0 if is_proved else envelope.error[..., k]  # which proved bounds contain
-    band, attained = (
+    ends_at_nodes, reached_at_nodes = (
         _oriented(ends.lower[..., k], ends.upper[..., k], name)  # (A, T) each
         for ends in (envelope, envelope.attained)
     )
-    upper, lower = band.upper.max(1), band.lower.max(1)
+    upper, lower = ends_at_nodes.upper.max(1), ends_at_nodes.lower.max(1)
     between = None if envelope.between is None else envelope.between[:, k]
-    above = within_steps(band.upper + error, between).max(1) - upper
-    below = lower - np.maximum(band.lower - error, smallest).max(1)
-    least_proved, least_reached = np.full_like(upper, smallest), np.full_like(upper, np.inf)
+    above = within_steps(ends_at_nodes.upper + error, between).max(1) - upper
+    below = lower - np.maximum(ends_at_nodes.lower - error, smallest).max(1)
+    least_lower, least_upper = np.full_like(upper, smallest), np.full_like(upper, np.inf)
     if envelope.least_peaks is not None and not is_signed:
-        least_proved, least_reached = (end[:, k] for end in envelope.least_peaks)
+        least_lower, least_upper = (end[:, k] for end in envelope.least_peaks)
     if is_proved:
-        lower, upper = np.maximum(lower, least_proved), upper + above
-    reached = np.where(np.isnan(attained.upper), smallest, attained.upper).max(1)
+        lower, upper = np.maximum(lower, least_lower), upper + above
     return Peak(
         alpha=np.asarray(envelope.alpha),
         lower=lower,
         upper=upper,
         error=0.0 * upper if is_proved else np.maximum(above, below),
-        reached=np.maximum(reached, smallest),
-        least_proved=least_proved,
-        least_reached=least_reached,
+        reached=np.fmax(reached_at_nodes.upper, smallest).max(1),  # NaN where none is known
+        least_lower=least_lower,
+        least_upper=least_upper,
         nature=nature,
         is_signed=is_signed,
         reached_at=_inputs_at_peak(envelope, k, name),
@@ -143,9 +134,8 @@ def _peak_of(envelope: Envelope, name: str) -> Peak:
 def _inputs_at_peak(envelope: Envelope, k: int, name: str) -> dict[str, float]:
     """Return inputs of the motion that reaches a peak of output k on the lowest level, if known."""
     low, high = envelope.attained
-    ends = [(high, envelope.upper_at), (-low, envelope.lower_at)]
-    if name != output_of(name):  # of one side
-        ends = ends[:1] if name.startswith("max ") else ends[1:]
+    by_side = {"max": (high, envelope.upper_at), "min": (-low, envelope.lower_at)}
+    ends = [by_side[name[:3]]] if name != output_of(name) else [*by_side.values()]
     values = np.array([end[0, :, k] for end, _ in ends])  # (ends, T)
     points = np.array([at[0, :, k] for _, at in ends])  # (ends, T, n)
     values = np.where(np.isfinite(points).all(-1) & np.isfinite(values), values, -np.inf)
@@ -177,33 +167,26 @@ def tightest(first: Peaks, second: Peaks) -> dict[str, Peak]:
 def _tighter(first: Peak, second: Peak) -> Peak:
     """Return the tighter bounds of one peak by two analyses, as `tightest` says."""
     natures = {first.nature, second.nature}
+    better = max(first, second, key=lambda x: (list(Nature).index(x.nature), -x.error.max()))
+    ends: dict[str, Any] = {"reached": np.maximum(first.reached, second.reached)}
     if natures == {Nature.GUARANTEED}:
-        lower, upper = np.maximum(first.lower, second.lower), np.minimum(first.upper, second.upper)
-        better = replace(first, lower=lower, upper=upper)
+        ends["lower"] = np.maximum(first.lower, second.lower)
+        ends["upper"] = np.minimum(first.upper, second.upper)
     elif natures == {Nature.ATTAINED}:
-        lower, upper = np.minimum(first.lower, second.lower), np.maximum(first.upper, second.upper)
-        error = np.maximum(first.error, second.error)
-        better = replace(first, lower=lower, upper=upper, error=error)
-    elif len(natures) == 1:
-        better = min(first, second, key=lambda peak: peak.error.max())
-    else:
-        better = max(first, second, key=lambda peak: list(Nature).index(peak.nature))
+        ends["lower"] = np.minimum(first.lower, second.lower)
+        ends["upper"] = np.maximum(first.upper, second.upper)
+        ends["error"] = np.maximum(first.error, second.error)
+    ends["least_lower"] = np.maximum(first.least_lower, second.least_lower)
+    ends["least_upper"] = np.minimum(first.least_upper, second.least_upper)
     farther = first if first.reached[0] >= second.reached[0] else second
-    return replace(
-        better,
-        reached_at=farther.reached_at,
-        reached=np.maximum(first.reached, second.reached),
-        least_proved=np.maximum(first.least_proved, second.least_proved),
-        least_reached=np.minimum(first.least_reached, second.least_reached),
-    )
+    return replace(better, reached_at=farther.reached_at, **ends)
 
 
 def within_steps(size: Array, between: Array | None) -> Array:
     """Return upper bounds of a magnitude over the step before each node, shape (…, T).
 
-    Args:
-        size: The magnitude at the time nodes, shape (…, T).
-        between: What it may exceed both ends of each step by, shape (…, T); None for nothing.
+    `size` is its magnitude at nodes, shape (…, T), and `between` what it may exceed both ends of
+    each step by, the same shape; None for nothing.
     """
     if between is None:
         return size
@@ -214,9 +197,7 @@ def within_steps(size: Array, between: Array | None) -> Array:
 def require_limits(limits: Mapping[str, float], outputs: Sequence[str]) -> None:
     """Refuse an empty set of limits, unknown outputs, and limits of magnitudes not above 0.
 
-    Raises:
-        RefusedError: There is no limit, one names no output, or one of a magnitude is not positive;
-            those of "max q3" and "min q3" may have any sign.
+    Those of "max q3" and "min q3" may have any sign.
     """
     require(bool(limits), "limits", value=None, allowed="one limit or more, as {'q3': 0.1}")
     for name, limit in limits.items():
@@ -255,30 +236,14 @@ class Passing:
             return "exceeded"
         return "can be exceeded" if self.is_reached else "undecided"
 
-    @property
-    def verdict(self) -> str:
-        """The outcome in words, with the level from which on it holds if that is not 0."""
-        return verdict_words(self.outcome, self.lowest)
-
-
-def verdict_words(outcome: str, lowest: float) -> str:
-    """Return the outcome as a text, with the level from which on it holds if that is not 0."""
-    holds_from = bool(lowest) and outcome in ("exceeded", "not exceeded")
-    return f"{outcome} from α = {lowest:g} up" if holds_from else outcome
-
 
 def passing(peaks: Peaks, limits: Mapping[str, float]) -> dict[str, Passing]:
-    """Return possibility and necessity that the magnitude of each output exceeds its limit.
+    """Return possibility and necessity that each fuzzy peak exceeds its limit, in SI, by name.
 
-    Args:
-        peaks: Fuzzy peaks of the outputs.
-        limits: Largest magnitude allowed by output, in SI units.
-
-    Returns:
-        One answer for each limit by output, and one named `ANY` if there are several.
+    If there are several limits one more answer, `ANY`, is on the event that any is exceeded.
 
     Raises:
-        RefusedError: There is no limit, one is not positive, or it names no output.
+        RefusedError: There is no limit, one is not positive, or it names no peak.
     """
     require_limits(limits, [*peaks])
     answers = {name: _passing_of(peaks[name], float(limit)) for name, limit in limits.items()}
@@ -308,21 +273,17 @@ def _passing_of(peak: Peak, limit: float) -> Passing:
 
 
 def _passing_of_any(answers: Mapping[str, Passing], limits: Mapping[str, float]) -> Passing:
-    """Return the degrees to which any of several limits is exceeded.
-
-    The possibility is that of the limit most possibly exceeded. The necessity is at least that of
-    each limit, and 0 if no motion of the highest cut exceeds a limit.
-    """
+    """Return the degrees to which any of several limits is exceeded, by those of each limit."""
     passings = list(answers.values())
-    possibility = [max(x.possibility[k] for x in passings) for k in (0, 1)]
-    are_kept = all(x.possibility[1] < 1 for x in passings)  # by all motions of the highest cut
+    least, greatest = (max(x.possibility[k] for x in passings) for k in (0, 1))
     relative_margins = [  # of a limit of 0 they are the sign
         x.margin / abs(limits[name]) if limits[name] else np.sign(x.margin)
         for name, x in answers.items()
     ]
     return Passing(
-        possibility=(possibility[0], possibility[1]),
-        necessity=(max(x.necessity[0] for x in passings), 0.0 if are_kept else 1.0),
+        possibility=(least, greatest),
+        # below 1 all motions of the highest cut keep all limits
+        necessity=(max(x.necessity[0] for x in passings), 0.0 if greatest < 1 else 1.0),
         margin=np.min(relative_margins, axis=0),
         lowest=passings[0].lowest,
         nature=Nature.weakest(x.nature for x in passings),
@@ -332,11 +293,10 @@ def _passing_of_any(answers: Mapping[str, Passing], limits: Mapping[str, float])
 
 def _highest(alpha: Array, holds: Mask) -> float:
     """Return the highest level at which the mask (A,) holds, 0 without one."""
-    return float(alpha[holds][-1]) if holds.any() else 0.0
+    return float(alpha[holds].max(initial=0.0))
 
 
 def _excluded(alpha: Array, excluded: Mask) -> float:
     """Return the lowest level from which on the mask (A,) holds on all levels, 1 without one."""
-    open_ = np.flatnonzero(~excluded)
-    first = open_[-1] + 1 if len(open_) else 0
+    first = np.flatnonzero(~excluded).max(initial=-1) + 1
     return float(alpha[first]) if first < len(alpha) else 1.0

@@ -16,10 +16,10 @@ import numpy as np
 
 from alphacut.frame.calculus.jet import Jet, concatenate, inverse, variables
 from alphacut.frame.calculus.taylor_model import TaylorModel
-from alphacut.frame.structures.loads import Accelerogram, Force, History, different
+from alphacut.frame.structures.loads import Accelerogram, Force, History, distinct_histories
 from alphacut.frame.structures.quantities import Parameter
 from alphacut.fuzzy.arrays import Array, Ints, Mask
-from alphacut.fuzzy.refused import require
+from alphacut.fuzzy.refused import RefusedError, require
 
 Number = TypeVar("Number", Jet, TaylorModel)
 
@@ -74,14 +74,14 @@ class Assembly(Generic[Number]):
     def forces(self) -> Number | None:
         """Columns b, one a history of forces, shape (…, n, H), in N; None without one."""
         keys = [force.history and force.history.identity for force in self.loads]
-        courses = [course.identity for course in different(tuple(self.loads))]
-        return self._summed(np.array([[key == x for x in courses] for key in keys], float))
+        columns = [history.identity for history in distinct_histories(self.loads)]
+        return self._summed(np.array([[key == x for x in columns] for key in keys], float))
 
     @property
     def static(self) -> Number | None:
         """Force under which the structure rests at the start besides q0, shape (…, n, 1)."""
-        courses = [force.history for force in self.loads]
-        first = [x.values(np.zeros(1))[0] if x and x.is_static else 0.0 for x in courses]
+        histories = [force.history for force in self.loads]
+        first = [x.values(np.zeros(1))[0] if x and x.is_static else 0.0 for x in histories]
         return self._summed(np.array(first, float)[:, None])
 
     @property
@@ -132,22 +132,8 @@ class LinearSystem(Protocol):
 def histories(system: LinearSystem) -> dict[str, History]:
     """Histories of all loads by name, in the order of `Matrices.pushes`: load, force1, …."""
     of_ground = {} if system.ground is None else {"load": system.ground}
-    return of_ground | {f"force{k}": x for k, x in enumerate(courses_of_forces(system), start=1)}
-
-
-def courses_of_forces(system: LinearSystem) -> list[History]:
-    """Histories of the forces alone, in the order of `Matrices.feeds`."""
-    return list(different(tuple(system.loads)))
-
-
-def require_ground(ground: object) -> None:
-    """Refuse a base excitation that is neither an `Accelerogram` nor None.
-
-    Raises:
-        RefusedError: It is neither.
-    """
-    is_record = ground is None or isinstance(ground, Accelerogram)
-    require(is_record, "ground", value=type(ground).__name__, allowed="an Accelerogram, or None")
+    of_forces = enumerate(distinct_histories(system.loads), start=1)
+    return of_ground | {f"force{k}": history for k, history in of_forces}
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,7 +203,6 @@ def evaluate(
     points: Array,
     *,
     derivatives: bool,
-    bent: bool = True,
     by_ratios: bool = True,
 ) -> tuple[Matrices, Jet]:
     """A structure's matrices and observation rows at S sets of some parameters.
@@ -226,8 +211,7 @@ def evaluate(
         system: The structure.
         names: These d parameters; others keep their nominal values.
         points: Values, shape (S, d), in SI units.
-        derivatives: Whether to differentiate by `names`.
-        bent: Whether to compute second derivatives, too.
+        derivatives: Whether to differentiate by `names`, twice.
         by_ratios: Whether the damping matrix includes the part that is given by ratios of the
             modes, which needs all modes.
 
@@ -236,7 +220,7 @@ def evaluate(
     """
     fixed = {name: x for name, x in system.parameters.items() if name not in names}
     values = np.hstack([points, np.tile(list(fixed.values()), (len(points), 1))])
-    p = variables(values, [*names, *fixed], names if derivatives else (), order=1 + bent)
+    p = variables(values, [*names, *fixed], names if derivatives else ())
     full = system.assembly(p)
     n, a = len(full.pattern), full.massive
     mass, stiffness, damping = full.mass, full.stiffness, full.dashpots
@@ -336,14 +320,9 @@ def require_modal_order(mass: Array, stiffness: Array, ratios: Array) -> None:
     nominal = similarity.argmax(1)  # the nominal mode that each mode is most like, (S, n)
     for _, k in np.argwhere(ratios[nominal] != ratios):
         pair = f"modes {min(k, nominal[:, k].min()) + 1} and {max(k, nominal[:, k].max()) + 1}"
+        what = f"unequal where {pair} may cross"
         cure = "give both the same ratio, or take narrower inputs"
-        require(
-            False,
-            "damping ratios",
-            value=f"unequal where {pair} may cross",
-            allowed="modes apart",
-            cure=cure,
-        )
+        raise RefusedError("damping ratios", what, "modes apart", cure)
 
 
 def _equal(x: Jet, y: Jet) -> bool:

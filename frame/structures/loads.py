@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Self
 
@@ -96,9 +96,8 @@ class History:
     @property
     def extremes(self) -> tuple[float, float]:
         """Bounds of ``|f|`` and of ``|f′|`` between jumps."""
-        size = float(np.abs(self.samples).max())
-        slope = float(np.abs(np.diff(self.samples)).max()) / self.step
-        return size, slope + self.frequency * size
+        size, rise = (float(np.abs(x).max()) for x in (self.samples, np.diff(self.samples)))
+        return size, rise / self.step + self.frequency * size
 
     def values(self, time: Array) -> Array:
         """Values of f at times, the same shape."""
@@ -148,21 +147,9 @@ class History:
 
 
 class Accelerogram(History):
-    """Acceleration of the ground in m/s², linear between its samples and zero outside them.
-
-    Example:
-        >>> import numpy as np
-        >>> ground = Accelerogram(0.01, np.array([0.0, 1.5, 0.0]))
-        >>> float(ground.acceleration.max())
-        1.5
-    """
+    """Acceleration of the ground, samples in m/s², linear between them and zero outside them."""
 
     key: ClassVar[str] = "accelerogram"
-
-    @property
-    def acceleration(self) -> Array:
-        """Samples from t = 0 on, shape (n,), in m/s²."""
-        return self.samples
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,19 +175,17 @@ class Force:
     history: History | None
 
 
-def different(forces: tuple[Force, ...]) -> tuple[History, ...]:
+def distinct_histories(forces: Sequence[Force]) -> list[History]:
     """Histories of forces, each once."""
-    found = {force.history.identity: force.history for force in forces if force.history}
-    return tuple(found.values())
+    return list(
+        {force.history.identity: force.history for force in forces if force.history}.values()
+    )
 
 
-def require_forces(forces: object) -> None:
-    """Refuse loads that are not a tuple of `Force`, each with a `History` or None.
-
-    Raises:
-        RefusedError: They are not.
-    """
-    are_forces = isinstance(forces, tuple) and all(isinstance(x, Force) for x in forces)
-    fits = are_forces and all(isinstance(x.history, History | None) for x in forces)  # type: ignore[attr-defined]
+def require_loads(ground: object, forces: Sequence[object]) -> None:
+    """Refuse a base excitation that is no `Accelerogram`, and forces that are no `Force`."""
+    is_record = isinstance(ground, Accelerogram | None)
+    require(is_record, "ground", value=type(ground).__name__, allowed="an Accelerogram, or None")
+    are_forces = all(isinstance(x, Force) and isinstance(x.history, History | None) for x in forces)
     allowed = "a sequence of Force, each with a History or None"
-    require(fits, "loads", value=type(forces).__name__, allowed=allowed)
+    require(are_forces, "loads", value=type(forces).__name__, allowed=allowed)

@@ -5,20 +5,14 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, reduce
 from typing import Any, Self
 
 import numpy as np
 
 from alphacut.frame.calculus.jet import Jet, variables
-from alphacut.frame.structures.linear import (
-    Assembly,
-    Number,
-    require_ground,
-    stack,
-    undamped_modes,
-)
-from alphacut.frame.structures.loads import Accelerogram, Factor, Force, require_forces
+from alphacut.frame.structures.linear import Assembly, Number, stack, undamped_modes
+from alphacut.frame.structures.loads import Accelerogram, Factor, Force, require_loads
 from alphacut.frame.structures.quantities import RATIO, Output, Parameter
 from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.fuzzy.refused import (
@@ -95,28 +89,27 @@ class MatrixStructure:
             checked_number(f"parameter {name}", value)
         for kind in ("mass", "stiffness", "observed"):
             require(bool(getattr(self, kind)), kind, value=None, allowed="one entry at least")
-        require_ground(self.ground)
+        require_loads(self.ground, self.loads)
         object.__setattr__(self, "loads", tuple(self.loads))
-        require_forces(self.loads)
         for kind in KINDS:
             terms = [self._term(kind, term) for term in getattr(self, kind)]
             object.__setattr__(self, kind, tuple(terms))
         self._require_vectors()
-        for name, factor in self.row_factors.items():
-            require_choice("row_factors", name, self.observed)
-            self._require_factor(f"observed: {name}", factor)
         self._require_definite()
+        factors = {f"observed: {name}": factor for name, factor in self.row_factors.items()}
+        for name in self.row_factors:
+            require_choice("row_factors", name, self.observed)
+        for name, factor in [*factors.items(), *(("a force", x.amplitude) for x in self.loads)]:
+            self._require_factor(name, factor)
         for force in self.loads:
-            self._require_factor("a force", force.amplitude)
-            missing = np.flatnonzero(np.asarray(force.at)[self.massless])
-            what, allowed = f"on unknowns {self.massless[missing]}", "on unknowns that have mass"
+            missing = self.massless[np.flatnonzero(np.asarray(force.at)[self.massless])]
+            what, allowed = f"on unknowns {missing}", "on unknowns that have mass"
             require(not len(missing), "force", value=what, allowed=allowed)
         ratios = [self.parameters.get(x, np.nan) if isinstance(x, str) else x for x in self.ratios]
-        fits = len(ratios) in (0, 1, len(self.massive)) and all(
-            Parameter("", range=RATIO).admits(x, x) for x in ratios
-        )
+        are_ratios = all(Parameter("", range=RATIO).admits(x, x) for x in ratios)
+        is_allowed = are_ratios and len(ratios) in (0, 1, len(self.massive))
         allowed = f"one number or parameter, or one a mode, {RATIO}"
-        require(fits, "ratios", value=self.ratios, allowed=allowed)
+        require(is_allowed, "ratios", value=self.ratios, allowed=allowed)
 
     @property
     def size(self) -> int:
@@ -133,11 +126,13 @@ class MatrixStructure:
         """Unknowns that have none."""
         return np.setdiff1d(np.arange(self.size), self.massive)
 
+    def nominal_terms(self, kind: str) -> Array:
+        """Terms of the matrix "mass" or "stiffness" at nominal parameters, shape (terms, n, n)."""
+        factors = [float(value_of(factor, self.parameters)) for factor, _ in getattr(self, kind)]
+        return np.array(factors)[:, None, None] * self._arrays[kind]
+
     def _require_definite(self) -> None:
-        mass, stiffness = (
-            np.sum([float(value_of(f, self.parameters)) * A for f, A in terms], axis=0)
-            for terms in (self.mass, self.stiffness)
-        )
+        mass, stiffness = (self.nominal_terms(x).sum(axis=0) for x in ("mass", "stiffness"))
         a, b = self.massive, self.massless
         is_definite = len(a) > 0 and np.linalg.eigvalsh(mass[np.ix_(a, a)]).min() > 0
         allowed = "a positive definite matrix of the unknowns that have mass"
@@ -164,11 +159,10 @@ class MatrixStructure:
     def _term(self, kind: str, term: Any) -> tuple[Factor | str | float, Array]:
         """A checked term of a matrix: its factor, and its array made exactly symmetric."""
         is_pair = isinstance(term, Sequence) and not isinstance(term, str) and len(term) == 2
-        what = type(term).__name__
-        require(is_pair, f"term of {kind}", value=what, allowed="pairs (factor, array)")
-        factor, array = term
-        self._require_factor(kind, factor)
-        return factor, self._symmetric(kind, array)
+        what, allowed = type(term).__name__, "pairs (factor, array)"
+        require(is_pair, f"term of {kind}", value=what, allowed=allowed)
+        self._require_factor(kind, term[0])
+        return term[0], self._symmetric(kind, term[1])
 
     def _require_factor(self, kind: str, factor: Factor | str | float) -> None:
         names, values = list(self.parameters), np.array([list(self.parameters.values())], float)
@@ -184,29 +178,29 @@ class MatrixStructure:
         """A dense or sparse array (n, n), symmetric up to rounding, as exactly symmetric."""
         array, key = np.asarray(value.toarray() if hasattr(value, "toarray") else value), "array of"
         size = np.shape(self.mass[0][1])[0]
-        fits, what = array.shape == (size, size), f"of shape {array.shape}"
-        require(fits, f"{key} {kind}", value=what, allowed=f"({size}, {size})")
+        what, allowed = f"of shape {array.shape}", f"({size}, {size})"
+        require(array.shape == (size, size), f"{key} {kind}", value=what, allowed=allowed)
         require_numbers(kind, array)
         asymmetry = np.abs(array - array.T)
         i, j = np.unravel_index(asymmetry.argmax(), asymmetry.shape)
-        fits = asymmetry[i, j] <= 1e-9 * np.abs(array).max()
+        is_symmetric = asymmetry[i, j] <= 1e-9 * np.abs(array).max()
         what = f"not symmetric: [{i}, {j}] is {array[i, j]:g}, [{j}, {i}] is {array[j, i]:g}"
         allowed, cure = "symmetric arrays", "mirror one triangle"
-        require(fits, f"{key} {kind}", value=what, allowed=allowed, cure=cure)
+        require(is_symmetric, f"{key} {kind}", value=what, allowed=allowed, cure=cure)
         return np.asarray((array + array.T) / 2, float)
 
     def _require_vectors(self) -> None:
         n = self.size
-        vectors: list[tuple[str, Any, tuple[int, ...]]]
-        vectors = [(name, getattr(self, name), (n,)) for name in ("q0", "v0", "pattern")]
-        vectors += [(f"observed: {k}", row, (n, 2 * n)) for k, row in self.observed.items()]
-        vectors += [("force", force.at, (n,)) for force in self.loads]
-        for name, value, lengths in vectors:
+        vectors: list[tuple[str, Any]]
+        vectors = [(name, getattr(self, name)) for name in ("q0", "v0", "pattern")]
+        vectors += [(f"observed: {name}", row) for name, row in self.observed.items()]
+        vectors += [("force", force.at) for force in self.loads]
+        for name, value in vectors:
             if value is not None:
                 require_numbers(name, value)
-                fits, what = np.ndim(value) == 1, f"of shape {np.shape(value)}"
-                fits = fits and len(value) in lengths
-                require(fits, name, value=what, allowed=f"{lengths} numbers")
+                shapes = [(n,), (2 * n,)] if name.startswith("observed") else [(n,)]
+                what, allowed = f"of shape {np.shape(value)}", f"{' or '.join(map(str, shapes))}"
+                require(np.shape(value) in shapes, name, value=what, allowed=allowed)
 
     def assembly(self, p: Mapping[str, Number]) -> Assembly[Number]:
         """Matrices, rows and loads at parameters `p`, jets or Taylor models."""
@@ -273,17 +267,12 @@ def value_of(factor: Factor | str | float, p: Mapping[str, Any]) -> Any:
 def modal_energy_shares(system: MatrixStructure, terms: Sequence[int] | Ints) -> Array:
     """Fraction of each mode's strain energy in some terms of K = Σ K_i, shape (modes,).
 
-    It is Σ φᵀK_i φ / φᵀK φ over these terms, for the modes φ by rising frequency. The loss factor
-    of a mode is to first order the mean of those of its parts by these shares (Johnson and
-    Kienholz, AIAA Journal 20, 1284, 1982), with modes at nominal values.
-
-    Args:
-        system: The structure.
-        terms: Indices of the terms in the structure's stiffness.
+    It is Σ φᵀK_i φ / φᵀK φ over the terms K_i of these indices, for the modes φ by rising
+    frequency. The loss factor of a mode is to first order the mean of those of its parts by these
+    shares (Johnson and Kienholz, AIAA Journal 20, 1284, 1982), with modes at nominal values.
     """
-    p, a, b = system.parameters, system.massive, system.massless
-    mass = np.sum([float(value_of(factor, p)) * array for factor, array in system.mass], axis=0)
-    parts = np.array([float(value_of(factor, p)) * array for factor, array in system.stiffness])
+    a, b = system.massive, system.massless
+    mass, parts = system.nominal_terms("mass").sum(axis=0), system.nominal_terms("stiffness")
     stiffness, shapes = parts.sum(axis=0), np.zeros((system.size, len(a)))
     # static condensation: q_b = follow q_a
     follow = -np.linalg.solve(stiffness[np.ix_(b, b)], stiffness[np.ix_(b, a)])
@@ -310,8 +299,7 @@ class Monomial:
         powers: Names with their whole exponents, none 0.
 
     Example:
-        >>> stiffness = Monomial.parse("12*E*I/l^3")
-        >>> stiffness({"E": 2.0, "I": 3.0, "l": 2.0})
+        >>> Monomial.parse("12*E*I/l^3")({"E": 2.0, "I": 3.0, "l": 2.0})
         9.0
     """
 
@@ -341,16 +329,7 @@ class Monomial:
 
     def __call__(self, p: Mapping[str, Any]) -> Any:
         """Value at parameters, which may be numbers, arrays or anything with × and powers."""
-        value: Any = self.coefficient
-        for name, power in self.powers:
-            value = p[name] ** power * value if power != 1 else p[name] * value
-        return value
-
-    @property
-    def simplest(self) -> Monomial | str | float:
-        """The number or the parameter's name if the monomial is one; else the monomial itself."""
-        if not self.powers:
-            return self.coefficient
-        if self.coefficient == 1 and len(self.powers) == 1 and self.powers[0][1] == 1:
-            return self.powers[0][0]
-        return self
+        factors = [p[name] if power == 1 else p[name] ** power for name, power in self.powers]
+        # nothing is multiplied by 1, which would add rounding to a Taylor model
+        numbers = [self.coefficient] if self.coefficient != 1 or not factors else []
+        return reduce(lambda product, factor: factor * product, [*numbers, *factors])

@@ -41,8 +41,8 @@ class Output(str):
     def __new__(cls, name: str, unit: str = "") -> Output:
         """The name with a unit; without one with that of its kind, such as "m" of "q3"."""
         output = super().__new__(cls, name)
-        own_unit = name.unit if isinstance(name, Output) else UNITS.get(output._parts[0], "SI")
-        output.unit = unit or own_unit
+        of_kind = UNITS.get(output._parts[0], "SI")
+        output.unit = unit or (name.unit if isinstance(name, Output) else of_kind)
         return output
 
     def __reduce__(self) -> tuple[type[Output], tuple[str, str]]:
@@ -51,7 +51,7 @@ class Output(str):
 
     @property
     def _parts(self) -> tuple[str, str]:
-        name = self.removeprefix("max ").removeprefix("min ").removeprefix("mean ")
+        name = output_of(self)
         kind = name.rstrip("0123456789")
         return kind, name[len(kind) :]
 
@@ -63,6 +63,11 @@ class Output(str):
         return f"{words} {floor} ({self})" if words and floor else self.replace("_", " ")
 
 
+def output_of(peak: str) -> str:
+    """The output of a peak: "q3" of "max q3"."""
+    return peak.removeprefix("max ").removeprefix("min ").removeprefix("mean ")
+
+
 @dataclass(frozen=True)
 class Parameter:
     """A parameter of a structure.
@@ -71,11 +76,6 @@ class Parameter:
         name: As ``m2``.
         unit: SI unit; empty where it has none, or none is known.
         range: `POSITIVE`, `NOT_NEGATIVE`, `RATIO`, or empty for any number.
-
-    Example:
-        >>> from alphacut.frame.structures.quantities import POSITIVE
-        >>> Parameter("m2", "kg", POSITIVE).admits(-1.0, 1.0)
-        False
     """
 
     name: str
@@ -110,8 +110,3 @@ OF_STOREY_FRAME = {
 def of_storey_frame(name: str) -> Parameter:
     """A parameter of a storey frame by its name; without unit and range where it is no such."""
     return Parameter(name, *OF_STOREY_FRAME.get(re.sub(r"\d+(_\d+)?$", "", name), ()))
-
-
-def units_of(outputs: tuple[str, ...]) -> tuple[str, ...]:
-    """SI unit of each output; empty where it is not known."""
-    return tuple(unit if (unit := Output(name).unit) != "SI" else "" for name in outputs)

@@ -15,8 +15,8 @@ from typing import Literal
 import numpy as np
 
 from alphacut.frame.calculus.jet import Jet
-from alphacut.frame.structures.linear import Assembly, Number, require_ground, stack
-from alphacut.frame.structures.loads import Accelerogram, Force, require_forces
+from alphacut.frame.structures.linear import Assembly, Number, stack
+from alphacut.frame.structures.loads import Accelerogram, Force, require_loads
 from alphacut.frame.structures.quantities import Output, Parameter, of_storey_frame
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import checked_number, require, require_choice, require_numbers
@@ -26,8 +26,8 @@ SYMBOLS = {
     **{"q0": "q{}_0", "v0": "v{}_0", "second_moment": "I{}"},
 }
 """Names of the parameters that each list holds, by floor or storey."""
-SINGLE = {"modulus": "E", "damping_ratio": "zeta"}
-"""The same of single values."""
+SINGLE = {"modulus": "E", "damping_ratio": "zeta", "rayleigh": "rayleigh_mass"}
+"""The same of values that may be single."""
 SPRING_KEYS = "lengths, modulus and second_moment, or stiffness (with lengths for gravity)"
 
 
@@ -103,13 +103,16 @@ class StoreyFrame:
         """Refuse values that are not allowed, and fill empty lists with their defaults."""
         self._require_values()
         self._require_springs()
-        require_ground(self.ground)
-        object.__setattr__(self, "loads", tuple(self.loads))
-        self._require_loads()
+        require_loads(self.ground, self.loads)
         n = len(self.masses)
+        for force in self.loads:
+            is_floor = force.at in range(1, n + 1)
+            require(is_floor, "floor", value=force.at, allowed=f"1 to {n}")
+            checked_number("amplitude", force.amplitude)
         filled: dict[str, Sequence[float]] = {
             name: tuple(getattr(self, name)) or (0.0,) * n for name in ("dampers", "q0", "v0")
         }
+        object.__setattr__(self, "loads", tuple(self.loads))
         filled["stiffness"] = tuple(self.stiffness)
         if not filled["stiffness"]:
             filled["columns"] = tuple(self.columns) or (2.0,) * n
@@ -127,7 +130,8 @@ class StoreyFrame:
         n = len(self.masses)
         require(n > 0, "masses", value=None, allowed="one value a floor, from below")
         checked_number("gravity", self.gravity, least=0)
-        for name, symbol in {**SYMBOLS, **SINGLE, "rayleigh": "rayleigh_mass"}.items():
+        sizes = dict.fromkeys(SYMBOLS, (0, n)) | {"second_moment": (1, n), "damping_ratio": (n,)}
+        for name, symbol in {**SYMBOLS, **SINGLE}.items():
             values, parameter = getattr(self, name), of_storey_frame(symbol.format(""))
             if values is None:
                 continue
@@ -136,11 +140,9 @@ class StoreyFrame:
             for value in np.atleast_1d(values):
                 allowed = parameter.range or "finite numbers"
                 require(parameter.admits(value, value), name, value=f"{value:g}", allowed=allowed)
-            sizes = {"second_moment": (1, n), "damping_ratio": (n,)}.get(name, (0, n))
-            has_any_size = name == "rayleigh" or (is_single and name not in SYMBOLS)
-            fits = has_any_size or np.size(values) in sizes
-            what, allowed = f"a list of {np.size(values)}", f"{n}, as masses has, from below"
-            require(fits, name, value=what, allowed=allowed)
+            if name in sizes and not (is_single and name in SINGLE):
+                what, allowed = f"a list of {np.size(values)}", f"{n}, as masses has, from below"
+                require(np.size(values) in sizes[name], name, value=what, allowed=allowed)
         require_choice("damper_placement", self.damper_placement, ("ground", "storey"))
 
     def _require_springs(self) -> None:
@@ -156,13 +158,6 @@ class StoreyFrame:
         for name, value in needed.items():
             require(value is not None, name, value=None, allowed=SPRING_KEYS)
 
-    def _require_loads(self) -> None:
-        require_forces(self.loads)
-        for force in self.loads:
-            is_floor = force.at in range(1, self.floors + 1)
-            require(is_floor, "floor", value=force.at, allowed=f"1 to {self.floors}")
-            checked_number("amplitude", force.amplitude)
-
     @property
     def floors(self) -> int:
         """Number of floors n."""
@@ -176,9 +171,7 @@ class StoreyFrame:
     @property
     def ratios(self) -> dict[str, float]:
         """Damping ratios by the names of their parameters; empty where there are none."""
-        if self.damping_ratio is None:
-            return {}
-        return _named("zeta{}", np.atleast_1d(self.damping_ratio))
+        return _named("zeta{}", () if self.damping_ratio is None else self.damping_ratio)
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -207,21 +200,16 @@ class StoreyFrame:
         return of_storey_frame(name)
 
     def group(self, name: str) -> tuple[str, ...]:
-        """The parameters that a short name stands for: "m" for m1 … mn; else itself.
-
-        Raises:
-            RefusedError: The name is neither a group nor a parameter.
-        """
-        patterns = {"m": "m{}", "d": "d{}", "q0": "q{}_0", "v0": "v{}_0"}
-        listed = [x for x in (*"klcI", "zeta") if f"{x}1" in self.parameters]
-        patterns |= {x: x + "{}" for x in listed}
-        if name == "F" and self.loads:
-            return self.force_names
-        if name in patterns:
-            return tuple(patterns[name].format(z + 1) for z in range(self.floors))
-        allowed = ", ".join([*patterns, *self.parameters])
-        require(name in self.parameters, "parameter", value=name, allowed=allowed)
-        return (name,)
+        """The parameters that a short name stands for: "m" for m1 … mn; else itself."""
+        patterns = [x for x in (*SYMBOLS.values(), "zeta{}") if x.format(1) in self.parameters]
+        groups = {
+            pattern.format("").replace("_", ""): [pattern.format(z + 1) for z in range(self.floors)]
+            for pattern in patterns
+        }
+        groups |= {"F": list(self.force_names)} if self.loads else {}
+        allowed = ", ".join([*groups, *self.parameters])
+        require({name} <= {*groups, *self.parameters}, "parameter", value=name, allowed=allowed)
+        return tuple(groups.get(name, [name]))
 
     def springs(self, p: Mapping[str, Number]) -> Number:
         """k_z of each storey (…, n), in N/m: as given, or 12 c E I / l³ of columns."""
@@ -273,11 +261,7 @@ class StoreyFrame:
         return rows
 
     def quantity(self, name: str) -> tuple[str, int]:
-        """An output's kind, such as "drift", and its floor or storey, counted from 0.
-
-        Raises:
-            RefusedError: There is no such output.
-        """
+        """An output's kind, such as "drift", and its floor or storey, from 0; refuses others."""
         pattern = r"(q|v|a|drift|shear)([1-9]\d*)"
         match = re.fullmatch(pattern, "shear1" if name == "base_shear" else name)
         kind, z = (match[1], int(match[2])) if match else ("", 0)
@@ -286,21 +270,11 @@ class StoreyFrame:
         return kind, z - 1
 
     def require_standing(self, ends: Mapping[str, tuple[float, float]]) -> None:
-        """Refuse weights that buckle a storey somewhere in a box.
-
-        A chain's stiffness is positive definite where k_z − P_z / l_z of each storey is positive.
-        k_z l_z / P_z is least where stiffness is low and mass high; with k_z of columns it falls
-        with heights.
-
-        Args:
-            ends: Lower and upper end of parameters, in SI units; others keep their nominal values.
-
-        Raises:
-            RefusedError: A storey buckles.
-        """
+        """Refuse weights that buckle a storey somewhere in a box of parameters, by SI ends."""
         if not self.gravity:
             return
-        # first letters of the parameters that are worst at their upper ends
+        # k − P / l of all storeys must be positive. k l / P is least where stiffness is low and
+        # mass high; with k of columns it falls with heights.
         worst_when_high = "m" if self.stiffness else "ml"
         worst = {name: ends.get(name, (x, x)) for name, x in self.parameters.items()}
         p = {
@@ -336,9 +310,9 @@ def diagonal(values: Array) -> Array:
 
 
 def _named(
-    pattern: str, values: Sequence[float] | Array, *, single: bool = True
+    pattern: str, given: float | Sequence[float], *, single: bool = True
 ) -> dict[str, float]:
     """Values by names with numbers from 1 on; without one where a single value is for all."""
-    if single and len(values) == 1:
-        return {pattern.format(""): float(values[0])}
-    return {pattern.format(z): float(x) for z, x in enumerate(values, start=1)}
+    values = np.ravel(given).tolist()
+    numbers = [""] if single and len(values) == 1 else range(1, len(values) + 1)
+    return {pattern.format(z): value for z, value in zip(numbers, values, strict=True)}

@@ -18,7 +18,8 @@ import numpy as np
 
 from alphacut.frame.boxes import Boxes
 from alphacut.frame.envelope import Envelope
-from alphacut.frame.structures.linear import LinearSystem, courses_of_forces, evaluate
+from alphacut.frame.structures.linear import LinearSystem, evaluate
+from alphacut.frame.structures.loads import distinct_histories
 from alphacut.frame.structures.quantities import Output
 from alphacut.frame.verification.exact_motion import Course, LinearMotion
 from alphacut.fuzzy.arrays import Array
@@ -88,7 +89,7 @@ def structures_at(system: LinearSystem, envelope: Envelope, points: Array) -> li
     record, step = (np.zeros(0), 0.0) if ground is None else (ground.samples, ground.step)
     courses = tuple(
         Course(x.samples, x.step, x.start, x.is_held, x.frequency, x.phase)
-        for x in courses_of_forces(system)
+        for x in distinct_histories(system.loads)
     )
     motions = []
     for s in range(len(points)):

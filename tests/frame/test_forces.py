@@ -300,7 +300,7 @@ def test_stored_motions_come_back():
     [
         ({"loads": [Force(4, 1.0, None)]}, "floor is 4"),
         ({"loads": [Force(1, np.nan, None)]}, "amplitude"),
-        ({"loads": [GUST]}, "loads is tuple"),
+        ({"loads": [GUST]}, "loads is list"),
     ],
 )
 def test_forces_that_are_none_are_refused(change, words):

@@ -111,8 +111,3 @@ def test_monomials_are_read(text, value):
 def test_other_expressions_are_refused(text):
     with pytest.raises(RefusedError):
         Monomial.parse(text)
-
-
-def test_simple_factors_stay_polynomials():
-    assert Monomial.parse("3").simplest == 3.0
-    assert Monomial.parse("E").simplest == "E"

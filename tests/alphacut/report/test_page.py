@@ -78,7 +78,7 @@ def peaks_of(**ends):
     peaks = {
         name: PeakResult(
             **{"lower": low, "upper": up, "error": [0.0002], "nature": "estimated"},
-            **dict.fromkeys(("reached", "least_proved", "least_reached", "proved"), [np.nan] * 3),
+            **dict.fromkeys(("reached", "least_lower", "least_upper", "proved"), [np.nan] * 3),
         )
         for name, (low, up) in ends.items()
     }

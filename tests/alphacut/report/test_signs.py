@@ -72,7 +72,7 @@ def parts_of(drawn, structure):
     peaks = {}
     for x in drawn:
         ends = {"lower": x.proved[0], "upper": x.proved[1], "error": 0.0, "reached": x.farthest}
-        ends |= {"least_proved": x.proved[0], "least_reached": x.nearest}
+        ends |= {"least_lower": x.proved[0], "least_upper": x.nearest}
         bounds = {end: np.array([x.outwards * value]) for end, value in ends.items()}
         is_signed = bool(x.side)
         peaks[x.name] = Peak(np.zeros(1), **bounds, nature=Nature.GUARANTEED, is_signed=is_signed)

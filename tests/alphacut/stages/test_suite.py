@@ -96,7 +96,7 @@ def test_columns_without_a_head_have_step_and_unit_from_the_case(tmp_path):
     new = '[records]\nstep = "0.02 s"\nunit = "m/s^2"\nfiles = ["plain.txt", "two.csv"]'
     (record, _), _ = records_of(tmp_path, '[records]\nfiles = ["one.csv", "two.csv"]', new)
     assert record.ground.step == 0.02
-    assert record.ground.acceleration == pytest.approx(samples)
+    assert record.ground.samples == pytest.approx(samples)
     for old, bad in (("0.02 s", "0.02"), ("m/s^2", "mm"), ('unit = "m/s^2"\n', "")):
         with pytest.raises(BadInput, match=r"unit|step"):
             records_of(tmp_path, '[records]\nfiles = ["one.csv", "two.csv"]', new.replace(old, bad))
@@ -173,7 +173,7 @@ def test_the_mean_over_records_lies_between_means_of_ends(tmp_path):
     assert max(means) * 0.996 <= peak["proved"][0]
     assert peak["reached_at"] == {"k1": pytest.approx([0.96, 1.04][means[-1] > means[0]] * 8e6)}
     # no number is of different structures
-    assert peak["least_reached"] == [None, None]
+    assert peak["least_upper"] == [None, None]
     assert set(records["statistics"]["drift1"]) == {"proved"}
     assert (out / "figures/spectra.svg").is_file()
     spectra = records["spectra"]

@@ -233,7 +233,7 @@ def test_what_is_not_covered_is_said(model, width, match):
 @pytest.mark.parametrize("unit", [1e-6, 3e5])
 def test_a_motion_in_other_units_has_the_same_bounds(unit):
     def bounds(factor):
-        shaken = Accelerogram(0.02, factor * record(2.0).acceleration)
+        shaken = Accelerogram(0.02, factor * record(2.0).samples)
         frame = storeys(3, damping_ratio=0.03, ground=shaken, outputs=("q3", "drift1", "a3"))
         return envelope(frame, each_storey(3), DualProof(), duration=1.0, step=0.02, alpha=(0,))
 

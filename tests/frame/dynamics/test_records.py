@@ -68,7 +68,7 @@ def motion(frame: StoreyFrame, time: np.ndarray) -> np.ndarray:
     arrays = [x.value[0] for x in (m.mass, m.damping, m.stiffness, rows)]
     start = np.concatenate([m.q0.value[0, :, 0], m.v0.value[0, :, 0]])
     ground, floors = frame.ground, np.ones(len(frame.masses))
-    exact = LinearMotion(*arrays, start, floors, ground.acceleration, ground.step, *UNFORCED)
+    exact = LinearMotion(*arrays, start, floors, ground.samples, ground.step, *UNFORCED)
     return exact.outputs(time)[0]
 
 

@@ -85,7 +85,7 @@ def test_growing_exponents_are_scaled_by_their_growth():
 def exact_response(sigma, ground, time):
     """ρ at one time by 40 digits, interval by interval."""
     sigma, time, h = mp.mpc(complex(sigma)), mp.mpf(float(time)), mp.mpf(ground.step)
-    samples, total = [mp.mpf(float(x)) for x in ground.acceleration], mp.mpc(0)
+    samples, total = [mp.mpf(float(x)) for x in ground.samples], mp.mpc(0)
     for i, (a, b) in enumerate(pairwise(samples)):
         low, high = i * h, min(time, (i + 1) * h)
         if low >= time:

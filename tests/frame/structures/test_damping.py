@@ -92,7 +92,7 @@ def test_equal_frequencies_are_no_obstacle():
 
 def test_group_and_messages():
     assert replace(FRAME, damping_ratio=0.05).group("zeta") == ("zeta",)
-    with pytest.raises(ValueError, match="parameter is zeta; allowed: m, d"):
+    with pytest.raises(ValueError, match="parameter is zeta; allowed: m, l, c, d"):
         FRAME.group("zeta")
     eye, row = np.eye(2), {"q": np.ones(2)}
     floating = MatrixStructure(

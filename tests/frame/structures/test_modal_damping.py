@@ -40,7 +40,7 @@ def exact(k1, m3, zeta1, zeta3, duration=3.0, step=0.05):
     rows = np.zeros((3, 6))
     rows[[0, 1, 1, 2], [2, 1, 0, 3]] = 1, 1, -1, 1
     arrays = M, D, K, rows, np.zeros(6), np.ones(3)
-    motion = LinearMotion(*arrays, RECORD.acceleration, RECORD.step, *UNFORCED)
+    motion = LinearMotion(*arrays, RECORD.samples, RECORD.step, *UNFORCED)
     return motion.outputs(step * np.arange(round(duration / step) + 1))[0]
 
 
