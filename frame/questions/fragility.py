@@ -39,8 +39,6 @@ class CriticalMeasures:
         high: Every structure of the cut exceeds it above; infinite where no peak is known to be
             larger than zero, shape (R, A).
 
-    Raises:
-        RefusedError: The ends do not rise, or a measure is not positive.
     """
 
     low: Array
@@ -61,10 +59,7 @@ class CriticalMeasures:
     ) -> CriticalMeasures:
         """Return the critical measures of R records at a limit of a magnitude, in its SI unit.
 
-        Args:
-            peaks: Peak of the limited output under each record as it is, R of them on A levels.
-            measures: Measure of each record as it is, R of them.
-            limit: The limit.
+        `peaks` of the limited output, on A levels, and `measures` are of each record as it is.
         """
         ends = [(*x.greatest_bounds[::-1], *x.least_bounds[::-1]) for x in peaks]
         falling = np.maximum(np.swapaxes([np.broadcast_arrays(*x) for x in ends], 0, 1), 0.0)
@@ -77,17 +72,14 @@ class CriticalMeasures:
     def band(self, measure: Array) -> Ends:
         """Return bounds of the fraction of the records under which a structure exceeds the limit.
 
-        Every structure within the α-cut has its fraction, for this suite of records, inside the
-        band. Lower and upper ends are of shape (A, X) each, for measures (X,).
+        They hold for every structure within the α-cut, shape (A, X) each, for measures (X,).
         """
         return Ends(*(_counts(end, measure) / len(self.low) for end in (self.high, self.low)))
 
     def confidence_band(self, measure: Array) -> Ends:
         """Return 95 % limits of the probability of exceedance if records are independent draws.
 
-        At each measure they are the lower Clopper–Pearson limit of the least count of records that
-        exceed, and the upper limit of the greatest count (Clopper, Pearson 1934), of shape (A, X)
-        each, for measures (X,).
+        They are of shape (A, X) each, for measures (X,) (Clopper, Pearson 1934).
         """
         # numbers of records that exceed for all structures of the cut, and for some
         counts = _counts(self.high, measure), _counts(self.low, measure)
@@ -118,15 +110,10 @@ class CriticalMeasures:
 
 
 def of_any_limit(limits: Sequence[CriticalMeasures]) -> CriticalMeasures:
-    """Return the critical measures of the event that any of several limits is exceeded.
-
-    A structure's critical measure is the least over its limits. High measures of single limits may
-    belong to different structures, so that only `low_reached` is known to be reached.
-    """
-    low, reached, high = (
-        np.min([getattr(x, name) for x in limits], axis=0)
-        for name in ("low", "low_reached", "high")
-    )
+    """Return the critical measures of the event that any of several limits is exceeded."""
+    # high measures of single limits may belong to different structures: none is known to be reached
+    ends = ("low", "low_reached", "high")
+    low, reached, high = (np.min([getattr(x, end) for x in limits], axis=0) for end in ends)
     return CriticalMeasures(low, reached, reached, np.maximum(high, reached))
 
 

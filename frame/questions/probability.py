@@ -93,7 +93,7 @@ def probabilities(
         duration: Length of the motion, in s.
         step: Distance of nodes, in s.
         alpha: Levels.
-        samples: Random draws.
+        samples: Number of random draws.
         rng: Source of the draws.
         progress: Called with the completed fraction.
 
@@ -102,16 +102,13 @@ def probabilities(
             output, or a random parameter does not give `samples` finite values.
     """
     require_limits(limits, model.outputs)
-    shared = sorted(set(fuzzy) & set(random))
-    require(
-        not shared, "random", value=", ".join(shared), allowed="inputs that are not fuzzy as well"
-    )
+    shared, allowed = ", ".join(sorted(set(fuzzy) & set(random))), "inputs that are not fuzzy too"
+    require(not shared, "random", value=shared, allowed=allowed)
     drawn = [np.asarray(draw(rng, samples), float) for draw in random.values()]
     for name, values in zip(random, drawn, strict=True):
-        finite = values.shape == (samples,) and bool(np.isfinite(values).all())
-        require(
-            finite, f"values of {name}", value=values.shape, allowed=f"{samples} finite numbers"
-        )
+        is_sample = values.shape == (samples,) and bool(np.isfinite(values).all())
+        what, allowed = values.shape, f"{samples} finite numbers"
+        require(is_sample, f"values of {name}", value=what, allowed=allowed)
     draws = np.column_stack(drawn) if drawn else np.zeros((1, 0))
     cuts = boxes(fuzzy, alpha)
     scheme = "midpoint" if isinstance(model, LagrangianSystem) else "exact"
@@ -155,15 +152,8 @@ def _points_of_cut(cuts: Boxes, level: int) -> Array:
 
 
 def _probability(event: Array, level: Array, limit: float, *, has_random: bool) -> Probability:
-    """Return bounds of the probability that a ratio of peak to limit exceeds 1.
-
-    Args:
-        event: Ratios, shape (3, points, draws): lower bound and upper bound at the nodes, and upper
-            bound within the steps.
-        level: Row of the level of each point, shape (points,).
-        limit: The limit.
-        has_random: Whether there are random inputs.
-    """
+    """Return bounds of the probability that a ratio of peak to limit exceeds 1."""
+    # bounds of the ratios, shape (points, draws): lower and upper ones at nodes, upper within steps
     low_ratio, ratio, ratio_within_steps = event
     # the last limit is the one in question, a ratio of 1
     limits = np.append(np.linspace(0.95 * low_ratio.min(), 1.05 * ratio.max(), LIMITS), 1.0)
@@ -175,10 +165,8 @@ def _probability(event: Array, level: Array, limit: float, *, has_random: bool) 
         tail = (1 - CONFIDENCE) / (2 * len(level))  # of either side at one point (Bonferroni)
         surely, possibly = ((x > 1).sum(axis=1) for x in (low_ratio, ratio_within_steps))
         ends = clopper_pearson(surely, possibly, ratio.shape[1], tail)
-        interval = Ends(
-            _bounds_over_points(ends.lower, level).lower,
-            _bounds_over_points(ends.upper, level).upper,
-        )
+        of_level = [_bounds_over_points(end, level) for end in ends]
+        interval = Ends(of_level[0].lower, of_level[1].upper)
     error = np.maximum(larger.lower[:, 0] - least[:, -1], larger.upper[:, 0] - high[:, -1])
     return Probability(
         lower=low[:, -1],
@@ -194,11 +182,8 @@ def _probability(event: Array, level: Array, limit: float, *, has_random: bool) 
 def clopper_pearson(least: Array, most: Array, total: int, tail: float) -> Ends:
     """Return exact limits of a probability from counts of events in independent draws.
 
-    Args:
-        least: Number of draws that are events for sure.
-        most: Number of draws that may be events, same shape.
-        total: Number of draws.
-        tail: Probability with which each limit may be passed (Clopper, Pearson 1934).
+    Of `total` draws `least` are events for sure and `most` may be, of one shape; each limit may be
+    passed with probability `tail` (Clopper, Pearson 1934).
     """
     from scipy.special import betaincinv  # which takes time to import
 
@@ -214,9 +199,6 @@ def _fractions_above(peaks: Array, limits: Array) -> Array:
 
 
 def _bounds_over_points(values: Array, level: Array) -> Ends:
-    """Return least and greatest values (A, …) over the points (points, …) of each level.
-
-    Points of higher levels count for the lower ones, so that the bounds are nested.
-    """
+    """Return least and greatest values (A, …) over the points (points, …) of a level and higher."""
     parts = [values[level >= k] for k in range(level.max() + 1)]
     return Ends(np.array([x.min(0) for x in parts]), np.array([x.max(0) for x in parts]))

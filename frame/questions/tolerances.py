@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -73,10 +74,6 @@ def tolerances(
 ) -> Tolerances:
     """Return scales of the supports up to which no magnitude exceeds its limit.
 
-    Two scales are bisected by envelopes on scaled supports: the largest one at which exceeding is
-    excluded (`admissible`), and the least one at which a computed motion exceeds a limit, between
-    `clear` and `passed`.
-
     Args:
         model: The structure, whose outputs have the limits.
         inputs: Fuzzy parameters, in SI units.
@@ -99,30 +96,21 @@ def tolerances(
     require_limits(limits, model.outputs)
     tried = {1.0: at_one} if at_one is not None and most >= 1 else {}  # peaks by scale
 
+    motion: dict[str, Any] = {"duration": duration, "step": step, "alpha": [0.0]}
+
     def peaks_at(scale: float) -> Peaks:
-        """Return the peaks on the supports at a scale, computed once."""
         if scale not in tried:
-            bounds = envelope(
-                model,
-                scale_supports(inputs, scale),
-                Auto(error, peaks=True),
-                duration=duration,
-                step=step,
-                alpha=[0.0],
-                progress=False,
-            )
-            tried[scale] = peaks(bounds)
+            scaled, method = scale_supports(inputs, scale), Auto(error, peaks=True)
+            tried[scale] = peaks(envelope(model, scaled, method, **motion, progress=False))
             if progress:
                 progress(min(1.0, len(tried) / (2 + np.log2(1 / precision))))
         return tried[scale]
 
     def is_excluded(scale: float) -> bool:
-        """Return True if no motion exceeds a limit at a scale."""
         found = peaks_at(scale)
         return all(found[x].greatest_bounds.upper[0] <= limit for x, limit in limits.items())
 
     def is_exceeded(scale: float) -> bool:
-        """Return True if a computed motion exceeds a limit at a scale."""
         found = peaks_at(scale)
         return any(found[x].greatest_bounds.lower[0] > limit for x, limit in limits.items())
 
@@ -148,10 +136,7 @@ def tolerances(
 
 
 def _bisected(holds: Callable[[float], bool], low: float, high: float, near: float) -> float:
-    """Return by bisection the largest scale at which a condition holds, to the distance `near`.
-
-    It holds at `low` and does not at `high`.
-    """
+    """Return to within `near` the largest scale at which a condition that `low` fulfils holds."""
     while high - low > near:
         middle = (low + high) / 2
         low, high = (middle, high) if holds(middle) else (low, middle)
