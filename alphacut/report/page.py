@@ -9,8 +9,9 @@ import tomllib
 from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 
+from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature
-from alphacut.io.files import Document
+from alphacut.io.files import Document, say
 from alphacut.io.results import ResultsFolder
 from alphacut.questions.question import Answer, Row, Table
 from alphacut.questions.summary import ANSWERS, Summary
@@ -215,7 +216,11 @@ class Page:
             stem = next((x for x in self.unshown if x == name or x.endswith(f"-{name}")), None)
             if stem is None:
                 continue
-            content = self.folder.content(self.unshown.pop(stem))
+            try:
+                content = self.folder.content(self.unshown.pop(stem))
+            except RefusedError as error:
+                say(f"warning: a figure is left out: {error}")
+                continue
             yield "figure", caption(stem, paper=self.paper), base64.b64encode(content).decode()
 
     def _more(self) -> Iterator[Piece]:
