@@ -211,14 +211,21 @@ def _exponent(largest: float) -> int:
     return min(9, max(-9, 3 * math.floor(math.log10(largest) / 3)))
 
 
+def rounded_ends(low: float, high: float, nature: Nature, digits: int = 4) -> tuple[float, float]:
+    """Both ends of a range, rounded in- or outwards as its nature demands, never past each other.
+
+    Ends that agree, or that would pass each other, are rounded to the nearest number.
+    """
+    lower, upper = rounded(low, "lower", nature, digits), rounded(high, "upper", nature, digits)
+    if high <= low + 1e-9 * abs(low) or lower > upper:
+        return float(f"{low:.{digits}g}"), float(f"{high:.{digits}g}")
+    return lower, upper
+
+
 def range_text(low: float, high: float, nature: Nature, digits: int = 4) -> str:
     """A range rounded in- or outwards as its nature demands; one number where its ends agree."""
-    is_crisp = high - low <= 1e-9 * abs(high)
-    lower = low if is_crisp else rounded(low, "lower", nature, digits)
-    upper = low if is_crisp else rounded(high, "upper", nature, digits)
-    if lower > upper:  # rounded inwards past each other
-        return range_text(low, high, nature, digits + 1)
-    texts = dict.fromkeys(f"{end:#.{digits}g}".rstrip(".") for end in (lower, upper))
+    ends = rounded_ends(low, high, nature, digits)
+    texts = dict.fromkeys(f"{end:#.{digits}g}".rstrip(".") for end in ends)
     return " … ".join(texts).replace("-", MINUS)
 
 

@@ -11,7 +11,7 @@ from alphacut.frame.questions.tolerances import scale_supports, tolerances
 from alphacut.frame.structures.quantities import of_storey_frame
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature, rounded
-from alphacut.io.quantity import MINUS
+from alphacut.io.quantity import MINUS, rounded_ends
 from alphacut.questions.question import Answer, FuzzyResponse, Record, Row, Table, input_text
 from alphacut.stages.envelope import PEAK_ERROR, PeakResults, peak_results
 from alphacut.stages.store import Numbers
@@ -57,9 +57,8 @@ class TolerancesAnswer(Answer):
         for name, support in self.supports.items():
             text, relative = "–", ""
             if self.kept is not None:
-                ends = zip(support.kept, ("lower", "upper"), strict=True)
-                inside = (rounded(end, side, Nature.ATTAINED) for end, side in ends)
-                text = " … ".join(input_text(name, end) for end in inside)
+                inside = rounded_ends(*support.kept, Nature.ATTAINED)
+                text = " … ".join(dict.fromkeys(input_text(name, end) for end in inside))
                 relative = f"about {support.nominal:g}"
                 if support.nominal:
                     relative = ", ".join(f"{x / support.nominal - 1:+.2%}" for x in support.kept)

@@ -10,7 +10,13 @@ import numpy as np
 
 from alphacut.fuzzy.result import Nature, rounded
 from alphacut.io.arrays import text_table
-from alphacut.io.quantity import STANDARD_GRAVITY, axis_prefix, engineering, range_text
+from alphacut.io.quantity import (
+    STANDARD_GRAVITY,
+    axis_prefix,
+    engineering,
+    range_text,
+    rounded_ends,
+)
 from alphacut.questions.question import Row, Table
 from alphacut.questions.summary import FrameResult, Parts
 from alphacut.questions.tolerances import TolerancesAnswer
@@ -123,9 +129,9 @@ def learned(result: IdentifiedResult) -> Table:
     return Table(("input or mode", "before, measured", "learned, predicted", ""), rows)
 
 
-def _outer_text(ends: Sequence[float], unit: str) -> str:
-    sides = zip(ends, ("lower", "upper"), strict=True)
-    return " … ".join(engineering(rounded(x, y, Nature.GUARANTEED), unit) for x, y in sides)
+def _outer_text(ends: tuple[float, float], unit: str) -> str:
+    texts = (engineering(x, unit) for x in rounded_ends(*ends, Nature.GUARANTEED))
+    return " … ".join(dict.fromkeys(texts))
 
 
 def peak_table(parts: Parts) -> Table:
@@ -143,48 +149,42 @@ def peak_table(parts: Parts) -> Table:
     if not any(peak.nature is Nature.GUARANTEED for peak in peaks):
         levels.insert(1, int(np.argmin(np.abs(alpha - 0.5))))
     levels = list(dict.fromkeys(levels))
-    limits, has_core, rows = limits_by_peak(parts), bool(alpha[-1] == 1), list[Row]()
+    limits, rows = limits_by_peak(parts), list[Row]()
     for name, study in studies.items():
         suffix = f" ({name})" if len(studies) > 1 else ""
         for peak_name in (name for name in study.peak if name in (study.drawn or study.peak)):
             peak = study.peak[peak_name]
             units = display_units(peak_name, unit_of(study.units, peak_name), peak, parts.structure)
             for label, factor in units:
-                cells = peak_cells(peak, factor, levels, has_core=has_core)
+                cells = peak_cells(peak, factor, levels)
                 for limit, verdict in limits.get(peak_name, [(math.nan, "")]):
                     limit_text = "" if math.isnan(limit) else engineering(limit * factor, "")
                     rows.append((label + suffix, *cells, limit_text, EXCEEDED.get(verdict, "")))
                     cells = ("",) * len(cells)  # of further limits of the same peak
     titles = [f"α = {alpha[k]:g}" for k in levels]
-    if has_core and not any("…" in row[1] for row in rows):
+    if alpha[-1] == 1 and not any("…" in row[1] for row in rows):
         titles[0] = "nominal"
     head = ("peak of", *titles, "± error", "reached", "gap", "limit", "exceeded")
     return without_empty_columns(head, rows)
 
 
-def peak_cells(peak: PeakResult, factor: float, levels: Sequence[int], *, has_core: bool) -> Row:
+def peak_cells(peak: PeakResult, factor: float, levels: Sequence[int]) -> Row:
     """Texts of a peak times a factor: its cut on some levels, its error, what is reached, the gap.
 
-    Levels are indices, the highest first; with `has_core` that is 1, shown by `nominal_text`.
+    Levels are indices, the highest first; a middle one has three digits.
     """
     nature, lower, upper = peak.nature, factor * peak.lower, factor * peak.upper
-    cuts = [range_text(float(lower[k]), float(upper[k]), nature, 3 if k else 4) for k in levels]
-    if has_core:
-        cuts[0] = nominal_text(float(lower[-1]), float(upper[-1]), nature)
+    digits = [3 if 0 < k < len(lower) - 1 else 4 for k in levels]
+    cuts = [
+        range_text(float(lower[k]), float(upper[k]), nature, count)
+        for k, count in zip(levels, digits, strict=True)
+    ]
     error = error_text(factor * float(peak.error.max()), nature)
     if nature is not Nature.GUARANTEED:
         return (*cuts, error, "", "")
     inner = "lower" if peak.is_least else "upper"
     reached = rounded(factor * float(peak.reached[0]), inner, Nature.ATTAINED)
     return (*cuts, error, engineering(reached, ""), f"{peak.gap(0):.1%}")
-
-
-def nominal_text(low: float, high: float, nature: Nature) -> str:
-    """Text of a cut at α = 1: a number, or a range if that is wider than a hundredth of it."""
-    if high - low > 0.01 * abs(high):
-        return range_text(low, high, nature, 3)
-    middle = (low + high) / 2
-    return range_text(middle, middle, nature)
 
 
 def limits_by_peak(parts: Parts) -> dict[str, list[tuple[float, str]]]:

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from alphacut.fuzzy.result import Nature, rounded
+from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document, write_text
-from alphacut.io.quantity import MINUS
+from alphacut.io.quantity import MINUS, rounded_ends
 from alphacut.io.results import ResultsFolder
 from alphacut.questions.question import Row, Table
 from alphacut.questions.summary import Parts
@@ -25,17 +25,8 @@ if TYPE_CHECKING:
     import xarray
 
 DIGITS = 6
-ENDS = {
-    "E from [GPa]": "lower",
-    "E to [GPa]": "upper",
-    "ν from": "lower",
-    "ν to": "upper",
-    "least peak": "lower",
-    "greatest peak": "upper",
-    "from": "lower",
-    "to": "upper",
-}
-"""Columns that are rounded as the nature of their row allows, each with its side."""
+RANGES = {"E from [GPa]": "E to [GPa]", "ν from": "ν to", "least peak": "greatest peak"}
+"""Columns of lower and upper ends that are rounded as the nature of their row demands."""
 SPECIAL = str.maketrans(
     {
         **{x: f"\\{x}" for x in "&%$#_{}"},
@@ -189,23 +180,19 @@ def over_time(data: xarray.Dataset, output: str, unit: str) -> pd.DataFrame:
 def shown(frame: pd.DataFrame) -> Table:
     """A data frame as texts, without columns that are empty."""
     filled = frame.dropna(axis=1, how="all")
-    natures = filled["nature"] if "nature" in filled else [""] * len(filled)
-    columns = {
-        name: [
-            _text(value, ENDS.get(name, ""), nature)
-            for value, nature in zip(filled[name], natures, strict=True)
-        ]
-        for name in filled
-    }
-    return Table(tuple(columns), [*zip(*columns.values(), strict=True)])
+    for titles in RANGES.items():
+        if titles[0] in filled:
+            columns = (filled[x] for x in (*titles, "nature"))
+            ends = [rounded_ends(x, y, Nature(z), DIGITS) for x, y, z in zip(*columns, strict=True)]
+            filled = filled.assign(**dict(zip(titles, zip(*ends, strict=True), strict=True)))
+    rows = [tuple(map(_text, row)) for row in filled.itertuples(index=False)]
+    return Table(tuple(map(str, filled)), rows)
 
 
-def _text(value: object, side: str, nature: str) -> str:
+def _text(value: object) -> str:
     if isinstance(value, str):
         return value
     number = float(value)  # type: ignore[arg-type]
-    if side and nature:
-        number = rounded(number, side, Nature(nature), DIGITS)
     return "" if np.isnan(number) else f"{number:.{DIGITS}g}".replace("-", MINUS)
 
 
