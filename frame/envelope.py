@@ -58,21 +58,16 @@ class Envelope(Bounds):
     @property
     def peak_words(self) -> str:
         """Text with each output's proved peak over time, and the reached one, in the widest cut."""
-        units = self.units or ("",) * len(self.outputs)
         bounds, reached = (
-            np.maximum(pair.upper, -pair.lower)[0] for pair in (self.proved, self.attained)
-        )  # at the nodes, (T, outputs)
-        if self.between is not None:  # what a motion may add between two nodes
-            bounds[1:] = np.maximum(bounds[1:], bounds[:-1]) + self.between[1:]
+            np.maximum(pair.upper, -pair.lower)[0].T for pair in (self.proved, self.attained)
+        )  # at the nodes, (outputs, T)
+        bounds = within_steps(bounds, None if self.between is None else self.between.T)
         words = []
-        for name, unit, *peaks in zip(
-            self.outputs, units, bounds.max(0), reached.max(0), strict=True
-        ):
-            natures = zip(peaks, (Nature.GUARANTEED, Nature.ATTAINED), strict=True)
-            proved, inner = (
-                f"{rounded(float(x), 'upper', nature):.4g} {unit}".rstrip() for x, nature in natures
-            )
-            words.append(f"{name}: proved {proved}, reached {inner}")
+        for k, name in enumerate(self.outputs):
+            unit = f" {self.units[k]}" if self.units else ""
+            proved = rounded(float(bounds[k].max()), "upper", Nature.GUARANTEED)
+            inner = rounded(float(reached[k].max()), "upper", Nature.ATTAINED)
+            words.append(f"{name}: proved {proved:.4g}{unit}, reached {inner:.4g}{unit}")
         return "; ".join(words)
 
     def to_dataset(self) -> xarray.Dataset:
@@ -106,3 +101,15 @@ class Envelope(Bounds):
         notes: dict[str, str | int] = {"nature": str(self.nature), "notes": "; ".join(self.notes)}
         notes["trajectories"] = self.evaluations
         return dataset.assign_attrs(notes | dict(self.facts))
+
+
+def within_steps(size: Array, between: Array | None) -> Array:
+    """Return upper bounds of a magnitude over the step before each node, shape (…, T).
+
+    `size` is its magnitude at nodes, shape (…, T), and `between` what it may exceed both ends of
+    each step by, the same shape; None for nothing.
+    """
+    if between is None:
+        return size
+    inside = np.maximum(size[..., 1:], size[..., :-1]) + between[..., 1:]
+    return np.concatenate([size[..., :1], inside], axis=-1)

@@ -110,13 +110,9 @@ def envelope(
         >>> str(bounds.nature)
         'guaranteed'
     """
-    motion: dict[str, Any] = {
-        "duration": duration,
-        "step": step,
-        "alpha": alpha,
-        "integrator": integrator,
-    }
-    chosen, flow, levels, rows = _build_problem(model, inputs, method, **motion, **options)
+    chosen, flow, levels, rows = _build_problem(
+        model, inputs, method, duration, step, alpha, integrator, **options
+    )
     flow = replace(flow, relative=relative)
     steps = step_error(flow)
     proof = _proof_beside(chosen, flow)
@@ -137,7 +133,6 @@ def _build_problem(
     model: LinearSystem | LagrangianSystem,
     inputs: Mapping[str, FuzzyNumber | float],
     method: Method | str | None,
-    *,
     duration: float,
     step: float,
     alpha: Sequence[float] = ALPHA,

@@ -11,6 +11,7 @@ import numpy as np
 from alphacut.frame.bounds.level import LevelModels
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.calculus.unproved import UnprovedError
+from alphacut.frame.envelope import within_steps
 from alphacut.frame.modes.structure import Classical, classical_structure
 from alphacut.frame.modes.superposition import Modal, load_at_nodes, modes_at, outputs_at
 from alphacut.frame.response.oscillators import Grid, Oscillators
@@ -136,8 +137,7 @@ class Box:
         time = np.linspace(self.time[0], self.time[-1], steps + 1)
         motion = replace(self, time=time, low=point, high=point)
         value, error, deviation = motion.centre_motion()
-        size = np.abs(value) + error
-        return np.asarray((np.maximum(size[1:], size[:-1]) + deviation[1:]).max(0))
+        return within_steps((np.abs(value) + error).T, deviation.T).max(1)
 
     def _modal(self, unit: Array) -> Modal:
         return modes_at(self.system, self.structure, self.names, self.inputs(unit), unit)

@@ -12,7 +12,7 @@ import numpy as np
 from alphacut.frame.boxes import Boxes, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import LinearFlow
-from alphacut.frame.envelope import Ends, Envelope
+from alphacut.frame.envelope import Ends, Envelope, within_steps
 from alphacut.fuzzy.arrays import Array, Mask
 from alphacut.fuzzy.refused import FailedError
 from alphacut.fuzzy.result import Nature
@@ -226,6 +226,5 @@ class Hull:
             node, side = divmod(int(outer[level, :, output].argmin()), 2)
             motion = self.flow.values(self.at[level, node, output, side][None])[0, :, output]
             size = np.abs(motion) + self.attained_error[:, output]
-            within_steps = np.maximum(size[1:], size[:-1]) + self.between[1:, output]
-            reached[level, output] = max(size[0], within_steps.max(initial=0.0))
+            reached[level, output] = within_steps(size, self.between[:, output]).max()
         return reached

@@ -18,7 +18,6 @@ dτ, with g a bound of Re λ. From these follow what quadratic Taylor models of 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 from itertools import combinations_with_replacement, permutations
 
 import numpy as np
@@ -70,80 +69,56 @@ def proved_error(model: ModalModel) -> Array:
     return (1 + ROUNDING) * (deviation[:, None] * norms.outputs + output_error)
 
 
-@dataclass(frozen=True, eq=False)
 class EnergyNorms:
     """Bounds of energy norms over the box, by M and K in its middle, the unit matrix and diag(ω²).
 
     (1 − μ) 1 ≤ M ≤ (1 + μ) 1 and (1 − κ) ω² ≤ K ≤ (1 + κ) ω² with spectral norms μ and κ of bounds
     of |M − 1| and |K − ω²| / (ω ωᵀ).
 
+    Attributes:
+        least_frequency: Lower bound of the frequencies over the box, in rad/s.
+        greatest_ratio: Largest damping ratio.
+        reading: What outputs read of a force, over its norm √(f* M⁻¹ f), shape (m,).
+        outputs: Error of outputs over a deviation √(qᵀ K q + vᵀ M v) of the motion, shape (m,).
+
     Raises:
         UnprovedError: M or K is not shown to stay positive definite.
     """
 
-    structure: DampedStructure
-
-    def __post_init__(self) -> None:
-        if not max(self.mass_spread, self.stiffness_spread) < 1:
+    def __init__(self, structure: DampedStructure) -> None:
+        mass, stiffness, self.omega = structure.mass, structure.stiffness, structure.omega
+        mass_off = (mass - np.eye(len(mass.value))).size()
+        stiffness_off = (stiffness - np.diag(self.omega**2)).size()
+        stiffness_off = stiffness_off / (self.omega[:, None] * self.omega)
+        self.mu, self.kappa = (float(np.linalg.norm(x, 2)) for x in (mass_off, stiffness_off))
+        if not max(self.mu, self.kappa) < 1:
             raise UnprovedError(
                 "the box is so wide that mass and stiffness are not shown to stay positive definite"
             )
-
-    @cached_property
-    def mass_spread(self) -> float:
-        """Number μ."""
-        mass = self.structure.mass
-        return float(np.linalg.norm((mass - np.eye(len(mass.value))).size(), 2))
-
-    @cached_property
-    def stiffness_spread(self) -> float:
-        """Number κ."""
-        omega, stiffness = self.structure.omega, self.structure.stiffness
-        spread = (stiffness - np.diag(omega**2)).size() / (omega[:, None] * omega)
-        return float(np.linalg.norm(spread, 2))
+        self.least_frequency = self.omega[0] * np.sqrt((1 - self.kappa) / (1 + self.mu))
+        ratio = structure.ratio
+        self.greatest_ratio = 0.0 if ratio is None else float(ratio.bounds()[1])
+        # √(r M rᵀ) of the rows r that are read
+        self.reading = np.sqrt(1 + self.mu) * norm_of(structure.reading.size())
+        of_displacement, of_velocity = np.split(structure.rows.size(), 2, axis=1)
+        # accelerations read the force of the damping by a ratio too, 2 ζ ω √(vᵀ M v) at most
+        highest_frequency = self.omega[-1] * np.sqrt((1 + self.kappa) / (1 - self.mu))
+        by_ratio = 2 * self.greatest_ratio * highest_frequency * self.reading
+        self.outputs = np.hypot(
+            self.of_spring_force(of_displacement), self.of_force(of_velocity) + by_ratio
+        )
 
     def of_displacement(self, x: Array) -> Array:
         """Bound of √(x* K x) for vectors of entries up to x (…, N), shape (…,)."""
-        return np.sqrt(1 + self.stiffness_spread) * norm_of(x * self.structure.omega)
+        return np.sqrt(1 + self.kappa) * norm_of(x * self.omega)
 
     def of_spring_force(self, f: Array) -> Array:
         """Bound of √(f* K⁻¹ f)."""
-        return norm_of(f / self.structure.omega) / np.sqrt(1 - self.stiffness_spread)
+        return norm_of(f / self.omega) / np.sqrt(1 - self.kappa)
 
     def of_force(self, f: Array) -> Array:
         """Bound of √(f* M⁻¹ f)."""
-        return norm_of(f) / np.sqrt(1 - self.mass_spread)
-
-    @property
-    def least_frequency(self) -> float:
-        """Lower bound of the frequencies over the box, in rad/s."""
-        ratio = (1 - self.stiffness_spread) / (1 + self.mass_spread)
-        return float(self.structure.omega[0] * np.sqrt(ratio))
-
-    @property
-    def greatest_ratio(self) -> float:
-        """Largest damping ratio."""
-        ratio = self.structure.ratio
-        return 0.0 if ratio is None else float(ratio.bounds()[1])
-
-    @cached_property
-    def reading(self) -> Array:
-        """What outputs read of a force, over its norm of M⁻¹: √(r M rᵀ) of their rows, (m,)."""
-        return np.sqrt(1 + self.mass_spread) * norm_of(self.structure.reading.size())
-
-    @cached_property
-    def outputs(self) -> Array:
-        """Error of outputs over a deviation √(qᵀ K q + vᵀ M v) of the motion, shape (m,).
-
-        Accelerations read the force of the damping by a ratio too, 2 ζ ω √(vᵀ M v) at most.
-        """
-        of_displacement, of_velocity = np.split(self.structure.rows.size(), 2, axis=1)
-        ratio = (1 + self.stiffness_spread) / (1 - self.mass_spread)
-        fastest = self.structure.omega[-1] * np.sqrt(ratio)
-        by_ratio = 2 * self.greatest_ratio * fastest * self.reading
-        return np.hypot(
-            self.of_spring_force(of_displacement), self.of_force(of_velocity) + by_ratio
-        )
+        return norm_of(f) / np.sqrt(1 - self.mu)
 
 
 def _energy_rates(

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from alphacut.frame.envelope import Envelope
+from alphacut.frame.envelope import Envelope, within_steps
 from alphacut.frame.structures.quantities import output_of
 from alphacut.fuzzy.arrays import Array, Mask
 from alphacut.fuzzy.refused import checked_number, require, require_choice
@@ -180,18 +180,6 @@ def _tighter(first: Peak, second: Peak) -> Peak:
     ends["least_upper"] = np.minimum(first.least_upper, second.least_upper)
     farther = first if first.reached[0] >= second.reached[0] else second
     return replace(better, reached_at=farther.reached_at, **ends)
-
-
-def within_steps(size: Array, between: Array | None) -> Array:
-    """Return upper bounds of a magnitude over the step before each node, shape (…, T).
-
-    `size` is its magnitude at nodes, shape (…, T), and `between` what it may exceed both ends of
-    each step by, the same shape; None for nothing.
-    """
-    if between is None:
-        return size
-    inside = np.maximum(size[..., 1:], size[..., :-1]) + between[..., 1:]
-    return np.concatenate([size[..., :1], inside], axis=-1)
 
 
 def require_limits(limits: Mapping[str, float], outputs: Sequence[str]) -> None:
