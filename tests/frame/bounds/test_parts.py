@@ -115,23 +115,16 @@ def test_a_gap_that_falls_too_slowly_is_left_and_its_bounds_stay():
     assert (values <= found.upper[0] + 1e-12).all()
 
 
-def spring(unit=1.0):
-    """A chain on a soil spring, with its modes a factor of two apart or more; lengths in `unit`."""
+def spring():
+    """A chain on a soil spring, with its modes a factor of two apart or more."""
     chain = 400.0 * (2 * np.eye(4) - np.eye(4, k=1) - np.eye(4, k=-1))
     chain[0, 0] = chain[3, 3] = 400.0
     time = np.arange(0, 3.001, 0.02)
-    ground = Accelerogram(0.02, 3 / unit * np.sin(9 * time) * np.exp(-((time - 1) ** 2)))
+    ground = Accelerogram(0.02, 3 * np.sin(9 * time) * np.exp(-((time - 1) ** 2)))
     soil = np.zeros((4, 4))
     soil[0, 0] = 300.0
-    top = {"top": np.eye(4)[3]}
-    return MatrixStructure(
-        {"s": 1.0},
-        [(1.0, np.eye(4))],
-        [(1.0, chain), ("s", soil)],
-        top,
-        ground=ground,
-        ratios=(0.04,),
-    )
+    arrays = [(1.0, np.eye(4))], [(1.0, chain), ("s", soil)], {"top": np.eye(4)[3]}
+    return MatrixStructure({"s": 1.0}, *arrays, ground=ground, ratios=(0.04,))
 
 
 @pytest.mark.parametrize("method", [DualProof(peaks=1e-3), Proof(tolerance=1e-3)], ids=repr)
@@ -178,11 +171,7 @@ def test_the_dual_bound_tells_how_many_nodes_are_done():
 def test_parts_left_after_a_refusal_have_bounds():
     """A gap that is left as it is leaves no half of a refused part without bounds."""
     frame = StoreyFrame(
-        masses=[1e3] * 4,
-        stiffness=[4e5] * 4,
-        damping_ratio=0.02,
-        v0=(0.0, 0.0, 0.0, 1.0),
-        outputs=("q4",),
+        [1e3] * 4, stiffness=[4e5] * 4, damping_ratio=0.02, v0=(0, 0, 0, 1.0), outputs=("q4",)
     )
     inputs = {f"k{z}": Triangular(3.2e5, 4e5, 4.8e5) for z in (1, 2, 3, 4)}
     inputs |= {f"m{z}": Triangular(800.0, 1e3, 1200.0) for z in (1, 2, 3)}

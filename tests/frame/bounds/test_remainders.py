@@ -137,15 +137,6 @@ def masses_on_springs(loose=0.0):
     return classical_structure(own, {name: p[i] for i, name in enumerate("abc")})
 
 
-def test_modes_that_cross_are_one_block_and_go_on_through_the_crossing():
-    found = modes(masses_on_springs())
-    assert [list(block.modes) for block in found.blocks] == [[0, 1], [2]]
-    rate, u = found.blocks[0].rate, points(3, 50)
-    expected = 1 + 1e-3 * u[:, :2]
-    assert np.sort(np.linalg.eigvals(rate.at(u))) == pytest.approx(np.sort(expected))
-    assert np.abs(rate.at(u)[:, 0, 1]).max() < 1e-12
-
-
 def test_half_of_what_springs_and_start_are_loosened_by_would_not_do():
     springs, time, parts = masses_on_springs(0.03), np.arange(0, 44.01, 0.25), 4
     both = springs.start.loosened(np.array([[0.0] * 3, [0.1, 0.1, 0.0]]))
