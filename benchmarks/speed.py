@@ -1,0 +1,110 @@
+"""What a person waits for, in two checkouts: medians of runs in turn, and their ratios.
+
+    python3 benchmarks/speed.py OLD NEW                   all works, three times each
+    python3 benchmarks/speed.py OLD NEW --only sample     one of them; may be repeated
+    python3 benchmarks/speed.py OLD NEW --runs 5
+
+OLD and NEW are folders of checkouts, of which each runs in its own `./enter`; this file needs
+Python alone. Before the runs that count each work runs once, so that kernels and forms are compiled.
+Processor time is that of all processes of a work, memory that of the largest one. On a machine
+that is not quiet only processor time and memory can be compared.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+RUN = ("python", "-m", "alphacut", "run")
+SOLVE = ("python", "-m", "rve", "solve", "cases/paper.toml", "--quiet", "--json=-")
+CAMPAIGN = (*RUN, "cases/paper.toml", "--set=stages=['modulus']", "--workers=2")
+WORKS = {  # name: command in a checkout; one that runs a case gets a new folder of results
+    "campaign": CAMPAIGN,  # of the paper, 225 samples
+    "paper": (*RUN, "cases/paper.toml", "--workers=2"),
+    "sample": SOLVE,
+    "building": (*RUN, "cases/building.toml", "--workers=2"),
+    **{
+        f"check-{case}": ("python", "-m", "alphacut", "check", f"cases/{case}.toml")
+        for case in ("building", "suite", "composite")
+    },
+    **{f"product-{size}": (*SOLVE, f"--set=mesh.size={size}") for size in (0.15, 0.08, 0.04)},
+}
+LARGEST = {"campaign": 0.5, "paper": 0.5, "sample": 0.65, "building": 0.4}
+LARGEST |= {name: 0.6 if name.startswith("check") else 0.85 for name in WORKS if "-" in name}
+"""Ratio of processor times that each work is to stay below."""
+
+
+def measured(checkout: Path, command: tuple[str, ...]) -> dict[str, float]:
+    """Seconds of processor and of the clock, MB of memory, and seconds that a solve itself states.
+
+    Raises:
+        SystemExit: If the command fails, with what it wrote.
+    """
+    with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryFile("w+") as told:
+        results = (f"--out={folder}/results", "--no-figures") if "run" in command else ()
+        begun = time.monotonic()
+        process = subprocess.Popen(
+            ["./enter", *command, *results],
+            cwd=checkout,
+            stdout=subprocess.PIPE,
+            stderr=told,
+            text=True,
+        )
+        assert process.stdout is not None
+        output = process.stdout.read()
+        _, status, used = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+        seconds = time.monotonic() - begun
+        if process.returncode != 0:
+            told.seek(0)
+            sys.exit(f"{' '.join(command)} in {checkout} ends with {status}:\n{told.read()}")
+    numbers = {
+        "processor s": used.ru_utime + used.ru_stime,
+        "clock s": seconds,
+        "memory MB": used.ru_maxrss / 1024,
+    }
+    if "--json=-" in command:  # what a cell costs once all is imported and meshed
+        parts = json.loads(output)["seconds"]
+        numbers["solve s"] = parts["assemble"] + parts["setup"] + parts["solve"]
+    return numbers
+
+
+def rows_of(name: str, old: list[dict[str, float]], new: list[dict[str, float]]) -> list[str]:
+    """Lines of the table of one work: medians of both checkouts and their ratio."""
+    rows = []
+    for quantity in new[0]:
+        before, after = (statistics.median(run[quantity] for run in runs) for runs in (old, new))
+        bound = f"{LARGEST[name]:.2f}" if quantity == "processor s" else ""
+        rows.append(
+            f"| {name} | {quantity} | {before:.2f} | {after:.2f} | {after / before:.2f} | {bound} |"
+        )
+    return rows
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Print the table, a work at a time."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("old", type=Path, help="folder of the earlier checkout")
+    parser.add_argument("new", type=Path, help="folder of the later one")
+    parser.add_argument("--only", action="append", choices=WORKS, metavar="NAME", help="a work")
+    parser.add_argument("--runs", type=int, default=3, help="of each work in each checkout")
+    asked = parser.parse_args(argv)
+    print("| work | quantity | old | new | ratio | at most |\n|---|---|---|---|---|---|")
+    for name in asked.only or WORKS:
+        old, new = [], []
+        for _ in range(1 + asked.runs):
+            old.append(measured(asked.old, WORKS[name]))
+            new.append(measured(asked.new, WORKS[name]))
+        print(*rows_of(name, old[1:], new[1:]), sep="\n", flush=True)  # the first run compiles
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
