@@ -5,7 +5,7 @@
     python3 benchmarks/speed.py OLD NEW --runs 5
 
 OLD and NEW are folders of checkouts, of which each runs in its own `./enter`; this file needs
-Python alone. Before the runs that count each work runs once, so that kernels and forms are compiled.
+Python alone. Each work runs once before those that count, which compiles kernels and forms.
 Processor time is that of all processes of a work, memory that of the largest one. On a machine
 that is not quiet only processor time and memory can be compared.
 """

@@ -12,7 +12,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
-from itertools import combinations, product, zip_longest
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -118,24 +118,9 @@ def differences(one: list[str], two: list[str]) -> list[str]:
     return [f"{x} against {y}" for x, y in zip_longest(one, two) if x != y]
 
 
-def pairwise(chance: Chance, ways: Mapping[str, tuple[str, ...]] = WAYS) -> list[dict[str, str]]:
-    """Ways to run that hold every pair of values of two factors, few of them.
-
-    Each is the best of 30 drawn at random by the number of new pairs in it.
-    """
-    missing = {
-        ((a, x), (b, y)) for a, b in combinations(ways, 2) for x, y in product(ways[a], ways[b])
-    }
-    rows = []
-    while missing:
-        drawn = [
-            {key: str(chance.choice(values)) for key, values in ways.items()} | dict(min(missing))
-            for _ in range(30)
-        ]
-        best = max(drawn, key=lambda row: len(missing & set(combinations(row.items(), 2))))
-        missing -= set(combinations(best.items(), 2))
-        rows.append(best)
-    return rows
+def random_ways(chance: Chance, count: int) -> list[dict[str, str]]:
+    """Ways to run a case, each factor drawn at random."""
+    return [{x: str(chance.choice(WAYS[x])) for x in WAYS} for _ in range(count)]
 
 
 def ways_checked(

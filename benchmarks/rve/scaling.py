@@ -1,7 +1,7 @@
 """Growth of the product-space solve with size, layers, contrast, ranks; `make bench-scaling`.
 
     ./enter python -m benchmarks.rve.scaling
-    ./enter python -m benchmarks.rve.scaling --only-ranks --finest 0.04
+    ./enter python -m benchmarks.rve.scaling --ranks 1 2 3 --finest 0.04
 
 Ranks run under mpirun, each line processes of its own, and must give the E of one. The fastest
 of several solves after the first counts; a machine should do nothing else meanwhile.
@@ -76,10 +76,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--finest", type=float, default=0.04, help="mesh size on ranks")
     parser.add_argument("--ranks", type=int, nargs="*", default=[1, 2, 3])
     parser.add_argument("--repeat", type=int, default=5, help="solves on ranks, the fastest counts")
-    parser.add_argument("--only-ranks", action="store_true", help="no tables of one rank")
     options = parser.parse_args(arguments)
-    if not options.only_ranks:
-        tabulate(options.finest)
+    tabulate(options.finest)
     return compare_ranks(options.ranks, options.finest, options.repeat)
 
 

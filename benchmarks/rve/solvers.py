@@ -168,11 +168,9 @@ def iterations(size: float) -> Iterator[tuple[str, float, int, int]]:
     """Map, contrast, layers, and most iterations of both loads."""
     settings = [(name, 4.0, layers) for name in MAPS for layers in (1, 2, 4, 6, 12, 24)]
     settings += [("paper", contrast, 12) for contrast in (1e-3, 1e-2, 1e2, 1e3)]
-    problem_of = {}
     for name, contrast, layers in settings:
-        key = layers, name
         model = PrismModel(size, layers)
-        problem = problem_of[key] = model.problem(MAPS[name])
+        problem = model.problem(MAPS[name])
         named = {
             gmsh_prisms.MATRIX: MATRIX,
             gmsh_prisms.INCLUSION: Phase(MATRIX.modulus * contrast),
@@ -200,14 +198,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 faults.append(f"{name} with {layers} layers takes {count} iterations")
         write(rows, RESULTS / "cell_iterations.csv")
     else:
-        timings: list[Timing] = []
-
-        def measured() -> Iterator[Timing]:
-            for solver in options.solvers:
-                timings.append(timing(solver, options.mesh_size, options.layers))
-                yield timings[-1]
-
-        faults = list(compare(measured()))
+        timings = [timing(x, options.mesh_size, options.layers) for x in options.solvers]
+        faults = list(compare(timings))
         rows = [asdict(one) for one in timings]
         write(rows, RESULTS / "cell_solvers.csv")
     print(f"made in {perf_counter() - started:.0f} s")

@@ -8,10 +8,9 @@ word and its true error is above the declared one.
 from __future__ import annotations
 
 import argparse
-import csv
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -20,16 +19,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from alphacut.fuzzy.arrays import Array
+from alphacut.rve import PrismModel, SlicesModel
 from alphacut.rve.cell.cell import Phase
-from alphacut.rve.result.result import HomogenisedStiffness
 from alphacut.rve.series.model import SeriesModel
 from alphacut.stochastic import HermiteMap, RadiusMap, TruncatedNormal
+from benchmarks.rows import write
 
 MATRIX, PARTICLE = Phase(20e9), Phase(80e9)
 PAPER_MAP = HermiteMap(0.1337, 0.1, 0.8663, 0.1692)  # nominal values of the paper, section 4.1
 ROUND_OFF = 1e-11
-
-Solve = Callable[[RadiusMap, Phase, Phase], HomogenisedStiffness]
 
 
 def crisp(radius: float) -> HermiteMap:
@@ -75,23 +73,6 @@ EDGES = (
 )
 
 
-def solved_by(model: Any) -> Solve:
-    """Function that solves one cell by a model of rve."""
-    return lambda radius_map, matrix, particle: model.solve(radius_map, matrix, [particle])[0]
-
-
-def models(*, small: bool) -> dict[str, Solve]:
-    """Name → model at a resolution that suits a test (`small`) or the table."""
-    from alphacut.rve import PrismModel, SlicesModel
-
-    size = 0.5 if small else 0.25
-    return {
-        "series": solved_by(SeriesModel()),
-        "slices": solved_by(SlicesModel(size, 8)),
-        "prism": solved_by(PrismModel(size, 6 if small else 12)),
-    }
-
-
 LAYERS = (2, 3, 6, 12, 25, 50, 100, 200)
 
 
@@ -108,17 +89,17 @@ class Row:
     sentence: str = ""
 
 
-def meet(edge: Edge, name: str, solve: Solve) -> Row:
+def meet(edge: Edge, name: str, model: Any) -> Row:
     """Try one model on one edge."""
-    cell, started = (edge.radius_map, edge.matrix, edge.particle), perf_counter()
+    cell, started = (edge.radius_map, edge.matrix, [edge.particle]), perf_counter()
     try:
-        found = solve(*cell)
+        found = model.solve(*cell)[0]
     except (RuntimeError, ValueError) as refusal:
         words, seconds = str(refusal).splitlines()[0], perf_counter() - started
         return Row(edge.name, name, "refuses", np.nan, np.nan, seconds, words)
     seconds, declared = perf_counter() - started, found.estimated_error
     try:
-        exact = solved_by(SeriesModel())(*cell)
+        exact = SeriesModel().solve(*cell)[0]
     except RuntimeError as refusal:
         return Row(edge.name, name, "unjudged", declared, np.nan, seconds, f"no truth: {refusal}")
     true = abs(found.modulus / exact.modulus - 1)
@@ -126,18 +107,14 @@ def meet(edge: Edge, name: str, solve: Solve) -> Row:
     return Row(edge.name, name, "works" if works else "WRONG", declared, true, seconds)
 
 
-def table(*, small: bool) -> Iterator[Row]:
+def table() -> Iterator[Row]:
     """All rows: every edge by every model, then the layers of the prism model."""
-    from alphacut.rve import PrismModel
-
-    chosen = models(small=small)
+    models = {"series": SeriesModel(), "slices": SlicesModel(0.25, 8), "prism": PrismModel(0.25)}
     for edge in EDGES:
-        for name, solve in chosen.items():
-            yield meet(edge, name, solve)
-    for layers in LAYERS[:4] if small else LAYERS:
-        yield meet(
-            Edge(f"{layers} layers", PAPER_MAP), "prism", solved_by(PrismModel(0.25, layers))
-        )
+        for name, model in models.items():
+            yield meet(edge, name, model)
+    for layers in LAYERS:
+        yield meet(Edge(f"{layers} layers", PAPER_MAP), "prism", PrismModel(0.25, layers))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -145,28 +122,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--small", action="store_true", help="coarse meshes, in seconds")
-    parser.add_argument(
-        "--out",
-        type=Path,
-        default=Path(__file__).parents[1] / "results" / "cell_stability.csv",
-        help="CSV file to write",
-    )
+    file = Path(__file__).parents[1] / "results" / "cell_stability.csv"
+    parser.add_argument("--out", type=Path, default=file, help="CSV file to write")
     options = parser.parse_args(arguments)
     rows = []
     print(f"{'edge':30} {'model':16} {'outcome':10} {'declared':>9} {'true':>9} {'seconds':>8}")
-    for row in table(small=options.small):
+    for row in table():
         rows.append(row)
         print(
             f"{row.edge:30} {row.model:16} {row.outcome:10} {row.declared:9.1e} {row.true:9.1e}"
             f" {row.seconds:8.2f}  {row.sentence}",
             flush=True,
         )
-    options.out.parent.mkdir(parents=True, exist_ok=True)
-    with options.out.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(Row.__dataclass_fields__)
-        writer.writerows([*row.__dict__.values()] for row in rows)
+    write([asdict(row) for row in rows], options.out)
     return int(any(row.outcome == "WRONG" for row in rows))
 
 

@@ -111,15 +111,6 @@ def test_runs_killed_at_random_times_are_taken_up_to_the_bit(tmp_path):
     pytest.fail(f"{kills} kills only")
 
 
-def test_ways_hold_every_pair_of_factors():
-    rows = cases.pairwise(np.random.default_rng(1))
-    assert len(rows) < 25
-    for one in cases.WAYS:
-        for two in cases.WAYS:
-            wanted = {(a, b) for a in cases.WAYS[one] for b in cases.WAYS[two] if one != two}
-            assert wanted <= {(row[one], row[two]) for row in rows}
-
-
 def test_summaries_differ_by_a_bit_or_an_order_but_not_by_times():
     one = {"E": [1.0, {"seconds": 2.0}], "command": "a", "x": 1}
     assert not cases.differences(*(cases.numbers(x) for x in (one, one | {"command": "b"})))

@@ -27,7 +27,7 @@ from alphacut.stochastic.particles.particles import SPHERES, Particles
 from alphacut.stochastic.particles.radius_laws import LogNormalRadii, MeasuredRadii
 from alphacut.stochastic.sections import Simulated, reduced_radii, with_cells
 from alphacut.stochastic.tessellation.apollonius import apollonius, counted_cells, neighbours
-from benchmarks.stochastic import paper_data, sphere_map
+from benchmarks.stochastic import paper_data
 
 EQUAL, TENFOLD = LogNormalRadii(1e-3, 1e-3), LogNormalRadii(1e-3, 1e-2)
 SOURCE = Simulated(Packing(300, 0.2, TENFOLD), 12)
@@ -286,9 +286,3 @@ def test_the_papers_data_as_described(tmp_path, capsys):
     table = capsys.readouterr().out.splitlines()
     assert len(table) == 6
     assert (tmp_path / "paper_data.svg").is_file()
-
-
-@needs_voro
-def test_the_map_of_spheres(capsys):
-    sphere_map.main(["--spheres", "100", "--packings", "5"])
-    assert "volume fraction of this map at its nominal values: 0.2" in capsys.readouterr().out
