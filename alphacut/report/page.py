@@ -30,23 +30,14 @@ from alphacut.stages.envelope import EnvelopeResult
 from alphacut.stages.identify import RefutedResult
 from alphacut.stages.modulus import ModulusResult
 
-TERMS = {
-    "α-cut": "All values whose membership is at least α.",
-    "Support": "The α-cut at 0: all values that are possible.",
-    "Most plausible": "The α-cut at 1, or that of the highest level computed.",
-    "Envelope": "Least and greatest value of an output at each time, over one α-cut of the inputs.",
-    "Peak": "Largest magnitude of an output over the motion; of max or min, its value.",
-    "Possibility": "Degree of the highest α-cut in which something happens. 0: it cannot.",
-    "Necessity": "One less the possibility of the contrary. 1: it must happen.",
-    **{str(nature).capitalize(): nature.sentence for nature in Nature},
-}
-"""Terms of the page with their meaning."""
 SHARES = "Share of the width that is lost when an input is fixed at its nominal value."
 Piece = tuple[object, ...]
 """Name of a macro of ``report.html``, and what it shows."""
 _TABLES = tomllib.loads(Path(__file__).with_name("captions.toml").read_text(encoding="utf-8"))
 FIGURES: dict[str, str] = _TABLES["figures"] | {kind.key: kind.caption for kind in ANSWERS}
 WORDS: dict[str, str] = _TABLES["words"]
+TERMS = _TABLES["terms"] | {str(nature).capitalize(): nature.sentence for nature in Nature}
+"""Terms of the page with their meaning."""
 
 
 def render_page(folder: ResultsFolder) -> str:

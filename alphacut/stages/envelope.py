@@ -70,22 +70,19 @@ PeakResults = dict[str, PeakResult]
 class EnvelopeResult(Numbers):
     """An envelope in SI: extremes and errors by output at the lowest level, peaks, and cost.
 
-    `drawn` are the outputs that are drawn, all if empty; `step` is the distance of nodes.
+    `drawn` are the outputs that are drawn, all if empty.
     """
 
     fuzzy: tuple[str, ...]
     min: dict[str, float]
     max: dict[str, float]
-    mean_width: dict[str, float]
     error: dict[str, float]
     alpha: Values
     peak: PeakResults
-    trajectories: int
     seconds: float
     method: str
     nature: Nature
     motions_tested: int
-    step: float
     units: dict[str, str]
     drawn: tuple[str, ...] = ()
 
@@ -142,16 +139,13 @@ class EnvelopeTask:
             fuzzy=self.fuzzy,
             min=by_output(lowest["lower"].min("time")),
             max=by_output(lowest["upper"].max("time")),
-            mean_width=by_output((lowest["upper"] - lowest["lower"]).mean("time")),
             error=by_output(lowest["error"].max("time")),
             alpha=data["alpha"].values,
             peak=peak_results(peak_bounds),
-            trajectories=int(data.attrs["trajectories"]),
             seconds=float(data.attrs["seconds"]),
             method=str(data.attrs["method"]),
             nature=Nature(data.attrs["nature"]),
             motions_tested=int(data.attrs.get("motions_tested", 0)),
-            step=float(data["time"].values[1]),
             units={x: structure.unit(x) for x in (*names, *outputs_of([*peak_bounds]))},
         )
         return StageResult(numbers, data)

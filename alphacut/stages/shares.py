@@ -54,47 +54,39 @@ def compute_shares(
 
     A result of one input has none.
     """
-    shares: ShareTable = {}
+    table: ShareTable = {}
     if campaign is not None and len(campaign.inputs) > 1:
-        cell = cell_shares(campaign)
-        shares = {x: _by_input(cell, cell.share[:, 0, k]) for k, x in enumerate(("E", "ν"))}
+        shares = cell_shares(campaign)
+        for k, name in enumerate(("E", "ν")):
+            table[name] = dict(zip(shares.names, map(float, shares.share[:, k]), strict=True))
     if structure is not None and task is not None and structure.frame and len(task.fuzzy) > 1:
-        peak = peak_shares(structure.frame, structure, task)
-        for column, name in enumerate(structure.outputs):
-            shares[f"the peak of {name}"] = _by_input(peak, peak.share[:, column])
-    return StageResult(shares)
-
-
-def _by_input(shares: Shares, values: Array) -> dict[str, float]:
-    """Values of one result by the name of the input."""
-    return dict(zip(shares.names, map(float, values), strict=True))
+        shares = peak_shares(structure.frame, structure, task)
+        for k, output in enumerate(structure.outputs):
+            column = map(float, shares.share[:, k])
+            table[f"the peak of {output}"] = dict(zip(shares.names, column, strict=True))
+    return StageResult(table)
 
 
 def cell_shares(campaign: CellCampaign) -> Shares:
-    """Fractions of the widths of E and ν that are lost if an input of the cell is nominal.
-
-    They have shape (inputs, levels, 2), and come from the series where it has a formula.
-    """
+    """Shares of the widths of E and ν, (inputs, 2), by the series where it has a formula."""
     modulus = campaign.modulus.model_copy(update={"method": "auto"})
-    propagation = replace(campaign, modulus=modulus).propagation
+    propagation, alpha = replace(campaign, modulus=modulus).propagation, modulus.alpha[:1]
 
     def bounds(inputs: Mapping[str, FuzzyNumber]) -> tuple[Array, Array]:
-        """Lower and upper bounds of E and ν on each level, shape (levels, 2) each."""
-        cell_bounds = propagation(inputs, Reduced(), progress=False)
+        """Lower and upper bounds of E and ν on the lowest level, shape (2,) each."""
+        cell_bounds = propagation(inputs, Reduced(), alpha=alpha, progress=False)
         columns = [cell_bounds.column(name) for name in OUTPUTS]
-        return cell_bounds.lower[:, columns], cell_bounds.upper[:, columns]
+        return cell_bounds.lower[0, columns], cell_bounds.upper[0, columns]
 
     return width_shares(bounds, campaign.inputs)
 
 
 def peak_shares(model: frame.StoreyFrame, structure: Structure, task: EnvelopeTask) -> Shares:
-    """Fractions of the width of each output's peak that are lost if an input is nominal.
-
-    They have shape (inputs, outputs), by the inputs of a study.
-    """
+    """Shares of the width of each output's peak, (inputs, outputs), by the inputs of a study."""
     groups, step = {name: structure.fuzzy_members(name) for name in task.fuzzy}, task.section.step
-    if model.ground is not None:
-        step = coarser_step(task.duration, step)
+    if model.ground is not None:  # at a multiple of the step that leaves some hundred nodes
+        steps = round(task.duration / step)
+        step *= max(k for k in range(1, max(1, steps // 100) + 1) if steps % k == 0)
 
     def bounds(numbers: Mapping[str, FuzzyNumber]) -> tuple[Array, Array]:
         """Least and greatest peak of each output on the lowest level, shape (outputs,) each.
@@ -112,9 +104,3 @@ def peak_shares(model: frame.StoreyFrame, structure: Structure, task: EnvelopeTa
         return np.array([x.lower[0] for x in found]), np.array(greatest)
 
     return width_shares(bounds, structure.inputs(task.fuzzy), groups=groups)
-
-
-def coarser_step(duration: float, step: float) -> float:
-    """Multiple of the step that leaves a hundred nodes or some more."""
-    steps = round(duration / step)
-    return step * max(k for k in range(1, max(1, steps // 100) + 1) if steps % k == 0)

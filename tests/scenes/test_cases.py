@@ -52,18 +52,13 @@ def same_decision(new, old):
             assert low - 1e-9 <= least <= most <= high + 1e-9, (name, degree)
 
 
-def relative_error(modulus):
-    """The declared relative error of E, all its sources together."""
-    error = modulus["error"]
-    return sum(error.values()) if isinstance(error, dict) else float(np.nan_to_num(error))
-
-
 def same_modulus(new, old):
     """Whether the cuts of E agree to within both errors on each level of the new ones."""
     assert len(new["alpha"]) >= 2
     rows = [old["alpha"].index(level) for level in new["alpha"]]
     as_sure(new, old)
-    nominal = relative_error(new) + relative_error(old)  # at α = 1
+    errors = [sum(x["error"].values()) for x in (new, old)]
+    nominal = sum(errors)  # at α = 1
     share = 2 * nominal + 1e-9  # small particles, of which α = 0 has more, are coarser
     for side in ("lower", "upper"):
         ends = [old["E_GPa"][side][row] for row in rows]
@@ -85,8 +80,9 @@ def same_envelope(new, old):
 
 def overlapping_cuts(new, old):
     """Whether two proofs of one quantity overlap, the new one at most half as wide again."""
-    new_low, new_high = (np.array(new["E_GPa"][side]) for side in ("lower", "upper"))
-    old_low, old_high = (np.array(old["E_GPa"][side]) for side in ("lower", "upper"))
+    (new_low, new_high), (old_low, old_high) = (
+        [np.array(x["E_GPa"][side]) for side in ("lower", "upper")] for x in (new, old)
+    )
     assert (new_low <= old_high).all()
     assert (old_low <= new_high).all()
     assert (new_high - new_low <= 1.5 * (old_high - old_low)).all()
@@ -192,11 +188,6 @@ def test_answers_have_their_golden_numbers(two_floors):
     golden = GOLDEN["two-floors"]
     assert golden.keys() == {"decision", "probability", "tolerances", "shares"}
     compare(summary, golden, golden)
-
-
-def test_a_missing_answer_would_be_seen():
-    with pytest.raises(KeyError):
-        compare({}, GOLDEN["two-floors"], {"shares"})
 
 
 @pytest.mark.parametrize("factor", [0.999, 1.001])

@@ -13,9 +13,8 @@ pytest.importorskip("alphacut.rve.fenicsx")
 
 from alphacut.export.cell_files import FORMATS, write_cell
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.rve import MeshModel, Phase, PrismModel
+from alphacut.rve import Phase, PrismModel
 from alphacut.rve.mesh import square
-from alphacut.rve.mesh.file import read_grid
 from alphacut.rve.mesh.gmsh_prisms import ABAQUS_ORDER
 from alphacut.rve.prism.fields import cell_fields
 from alphacut.stochastic import HermiteMap
@@ -126,16 +125,6 @@ def test_meshio_reads_abaqus(tmp_path):
         assert (each > 0).all()
         whole = VOLUME - particle_volume() if name == "matrix" else particle_volume()
         assert each.sum() == pytest.approx(whole, rel=1e-10)
-
-
-@pytest.mark.parametrize("written", [".msh"], indirect=True)
-def test_what_gmsh_was_given_is_a_mesh_of_ones_own(written):
-    grid = read_grid(written)
-    assert grid.names == fields().names
-    right = PrismModel(0.5, 3, stiffness=True, estimate=False).solve(MAP, SOFT, [HARD])[0]
-    phases = {"matrix": SOFT, "inclusion": HARD}
-    own = MeshModel(written).solve(MAP.distribution, phases)[0]
-    assert own.modulus == pytest.approx(right.modulus, rel=1e-12)
 
 
 def test_other_endings_are_refused(tmp_path):

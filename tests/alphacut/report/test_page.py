@@ -33,8 +33,12 @@ def changed(results, folder, **keys):
     return ResultsFolder.read(copy)
 
 
-def test_the_page_asks_nothing_of_the_network_and_shows_each_figure_once(results):
-    page = render_page(ResultsFolder.read(results))
+@pytest.fixture(scope="module")
+def page(results):
+    return render_page(ResultsFolder.read(results))
+
+
+def test_the_page_asks_nothing_of_the_network_and_shows_each_figure_once(results, page):
     assert not re.search(r'(src|href)="(?!data:)', page)
     drawn = [name for name in summary_of(results)["figures"] if name.endswith(".png")]
     assert page.count("data:image/png;base64,") == len(drawn) > 5
@@ -42,16 +46,14 @@ def test_the_page_asks_nothing_of_the_network_and_shows_each_figure_once(results
         assert page.count(words) == 1
 
 
-def test_wide_tables_scroll_by_themselves(results):
-    page = render_page(ResultsFolder.read(results))
+def test_wide_tables_scroll_by_themselves(page):
     tables = re.findall(r'(<div class="scroll"[^>]*>)?<table>', page)
     assert len(tables) > 5
     assert all(tables)
     assert re.search(r"^\.scroll \{[^}]*overflow-x: auto", page, re.MULTILINE)
 
 
-def test_texts_of_the_case_are_no_markup(results):
-    page = render_page(ResultsFolder.read(results))
+def test_texts_of_the_case_are_no_markup(page):
     assert "<script>alert" not in page
     assert "Two floors &lt;script&gt;" in page
 
@@ -82,10 +84,10 @@ def peaks_of(**ends):
         )
         for name, (low, up) in ends.items()
     }
-    numbers = {key: {} for key in ("min", "max", "mean_width", "error")}
+    numbers = {key: {} for key in ("min", "max", "error")}
     study = EnvelopeResult(
-        **numbers, fuzzy=("E",), alpha=[0, 0.5, 1], peak=peaks, trajectories=1, seconds=1.0,
-        method="proof", nature=Nature.ESTIMATED, motions_tested=0, step=0.1, units=units,
+        **numbers, fuzzy=("E",), alpha=[0, 0.5, 1], peak=peaks, seconds=1.0,
+        method="proof", nature=Nature.ESTIMATED, motions_tested=0, units=units,
     )  # fmt: skip
     frame = FrameResult(
         omega_rad_per_s=[1.0], period_s=6.28, weight_N=1e6, heights_m={"drift1": 4.0}
@@ -181,14 +183,3 @@ def test_one_peak_has_one_value_in_every_place(results, tables):
     # no motion passes the limit within the supports as they are, so more than these are kept
     assert at_one["upper"][0] + at_one["error"][0] <= 0.28
     assert summary["tolerances"]["kept"] >= 1
-
-
-def test_answers_are_numbers_with_their_units_in_the_head_or_beside(tables):
-    texts = {"limited output", "unit", "verdict", "nature", "quantity", "least margin"}
-    for name in ("decision", "probability", "tolerances"):
-        head, *rows = tables[name]
-        assert rows
-        for row in rows:
-            cells = dict(zip(head, row, strict=True))
-            assert cells["unit"] in ("m", "Pa", "kg", "")
-            assert all(float(cell or 0) >= 0 for x, cell in cells.items() if x not in texts)

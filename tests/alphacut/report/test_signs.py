@@ -78,10 +78,10 @@ def parts_of(drawn, structure):
         peaks[x.name] = Peak(np.zeros(1), **bounds, nature=Nature.GUARANTEED, is_signed=is_signed)
     section = DecisionSection(limits=tuple(x.text(y) for x in drawn for y in x.limits))
     answer = decide(section, FuzzyResponse(structure, ("k1",), (0.0,), 1.0, 0.1, peaks))
-    numbers = {key: {} for key in ("min", "max", "mean_width", "error")}
+    numbers = {key: {} for key in ("min", "max", "error")}
     study = EnvelopeResult(
-        **numbers, fuzzy=("k1",), alpha=[0.0], peak=peak_results(peaks), trajectories=1,
-        seconds=1.0, method="proof", nature=Nature.GUARANTEED, motions_tested=0, step=0.1,
+        **numbers, fuzzy=("k1",), alpha=[0.0], peak=peak_results(peaks),
+        seconds=1.0, method="proof", nature=Nature.GUARANTEED, motions_tested=0,
         units=OUTPUTS,
     )  # fmt: skip
     return Parts(envelopes={"all": study}, decision=answer)

@@ -40,7 +40,7 @@ def test_fuzzy_phases_of_a_mesh_run_to_a_report(tmp_path, capsys):
     case = written(tmp_path, TEXT)
     assert main(["check", str(case)]) == 0
     assert "cell.phases" in capsys.readouterr().out
-    assert main(["run", str(case), "--out", str(tmp_path / "out")]) == 0
+    assert main(["run", str(case), "--out", str(tmp_path / "out"), "--no-figures"]) == 0
     text = capsys.readouterr().out
     assert "not declared" in text
     assert "guaranteed" not in text

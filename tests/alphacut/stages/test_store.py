@@ -13,17 +13,16 @@ from pydantic import TypeAdapter
 
 import alphacut
 from alphacut.case.content import load
-from alphacut.commands.pipeline import Pipeline
 from alphacut.entry import main
 from alphacut.frame.questions.peaks import Peak
 from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import as_json
 from alphacut.io.results import ResultsFolder
-from alphacut.questions.summary import Results, Summary
-from alphacut.stages import envelope, modulus
+from alphacut.questions.summary import Summary
+from alphacut.stages import envelope
 from alphacut.stages.store import RunProgress, Stage, StageResult, StageStore
-from tests.alphacut.small import CELL, FRAME, written
+from tests.alphacut.small import CELL, written
 
 ROOT = Path(alphacut.__file__).resolve().parents[1]
 
@@ -114,18 +113,6 @@ def test_fingerprints_see_every_input(tmp_path):
     changes += ("envelope.alpha=0,1", "envelope.step=0.01 s", "envelope.gain=0.1")
     assert len({key(), *map(key, changes)}) == 1 + len(changes)
     assert key() == key("title=other")
-
-
-def test_a_modulus_is_handed_to_the_structure(tmp_path):
-    text = CELL.replace('["modulus"]', '["modulus", "envelope"]') + FRAME.partition("[frame]")[2]
-    text = text.replace('modulus = "[22, 24, 26] GPa"\n', "").replace(
-        'masses = ["[9, 10, 11] t"]', '[frame]\nmasses = ["[9, 10, 11] t"]'
-    )
-    content = load(written(tmp_path, text)).content
-    results = Pipeline(Results(content), store_in(tmp_path / "out")).run()
-    number = modulus.fuzzy_modulus(results.modulus.arrays)
-    assert results.structure.numbers["E"] == number
-    assert results.envelopes["all"].numbers.fuzzy == ("E", "m")
 
 
 def test_a_borrowed_folder_is_not_believed(tmp_path):

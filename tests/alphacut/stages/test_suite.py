@@ -118,14 +118,6 @@ def test_what_is_unusual_in_a_record_is_a_warning(tmp_path):
     assert "of record late its peak is 6.12 g" in warnings
 
 
-def test_a_bad_record_is_named_before_anything_is_computed(tmp_path, capsys):
-    path = written(tmp_path)
-    (tmp_path / "two.csv").write_text("time [s],acceleration [m/s^2]\n0,0\n0.02,x\n")
-    assert main(["run", str(path), "--out", str(tmp_path / "out")]) == 2
-    assert "two.csv, line 3" in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
-
-
 def test_fragility_of_one_storey_holds_its_closed_form(tmp_path):
     summary = summary_of_run(written(tmp_path))
     answer, records = summary["fragility"]["limits"]["drift1"], summary["records"]["records"]
