@@ -90,50 +90,36 @@ class MatricesSection(StructureSection):
 
         See `StructureSection`.
         """
-        try:
-            numbers = self._parameters_with_ratios(modulus)
-            model = self._nominal_model(numbers)
-            if isinstance(self.damping_ratio, MaterialDamping):
-                ratios = self._material_damping_ratios(
-                    self.damping_ratio, model, loss or LOSS_STAND_IN
-                )
-                numbers |= ratios
-                parameters = {name: number.nominal for name, number in numbers.items()}
-                model = replace(model, parameters=parameters, ratios=tuple(ratios))
-            return Structure(model, numbers)
-        except RefusedError as error:
-            key = f"matrices: {error.key}"
-            raise RefusedError(key, error.value, error.allowed, error.cure) from None
-
-    @property
-    def _stated_ratios(self) -> dict[str, FuzzyNumber]:
-        """Damping ratios that do not come from the material."""
-        is_stated = not isinstance(self.damping_ratio, MaterialDamping)
-        return damping_ratios_by_name(self.damping_ratio, None) if is_stated else {}
-
-    def _parameters_with_ratios(self, modulus: FuzzyNumber | None) -> dict[str, FuzzyNumber]:
-        numbers = self.parameters | self._stated_ratios
+        damping = self.damping_ratio if isinstance(self.damping_ratio, MaterialDamping) else None
+        ratios = {} if damping else damping_ratios_by_name(self.damping_ratio, None)
+        numbers = self.parameters | ratios or {"scale": Crisp(1.0)}
         if modulus is not None and "E" in numbers:
             numbers["E"] = modulus
-        return numbers or {"scale": Crisp(1.0)}
-
-    def _nominal_model(self, numbers: Mapping[str, FuzzyNumber]) -> MatrixStructure:
-        """The structure at the nominal values of its parameters."""
         rows: dict[str, Array] = {
             Output(name, output.unit): self._vector_over_unknowns(f"outputs.{name}.row", output.row)
             for name, output in self.outputs.items()
         }
-        return MatrixStructure(
-            {name: number.nominal for name, number in numbers.items()},
-            mass=self.mass,
-            stiffness=self.stiffness,
-            damping=self.damping,
-            observed=rows,
-            ground=self.accelerogram,
-            pattern=self._ground_pattern(),
-            ratios=tuple(self._stated_ratios),
-            row_factors={name: self.outputs[name].factor for name in rows},
-        )
+        try:
+            model = MatrixStructure(
+                {name: number.nominal for name, number in numbers.items()},
+                mass=self.mass,
+                stiffness=self.stiffness,
+                damping=self.damping,
+                observed=rows,
+                ground=self.accelerogram,
+                pattern=self._ground_pattern(),
+                ratios=tuple(ratios),
+                row_factors={name: self.outputs[name].factor for name in rows},
+            )
+            if damping is not None:
+                ratios = self._material_damping_ratios(damping, model, loss or LOSS_STAND_IN)
+                numbers |= ratios
+                nominal = {name: number.nominal for name, number in numbers.items()}
+                model = replace(model, parameters=nominal, ratios=tuple(ratios))
+        except RefusedError as error:
+            key = f"matrices: {error.key}"
+            raise RefusedError(key, error.value, error.allowed, error.cure) from None
+        return Structure(model, numbers)
 
     def _material_damping_ratios(
         self, damping: MaterialDamping, model: MatrixStructure, loss: FuzzyNumber
@@ -149,13 +135,10 @@ class MatricesSection(StructureSection):
 
     def _vector_over_unknowns(self, key: str, entries: Mapping[str, float]) -> Array:
         """A vector over the unknowns from its entries by unknown; `key` is for messages."""
-        indices = {name: index for index, name in enumerate(self.unknowns)}
-        vector = np.zeros(len(indices))
-        for name, value in entries.items():
+        for name in entries:
             allowed = f"unknowns, as {', '.join(self.unknowns[:6])}"
-            require(name in indices, f"matrices.{key}", name, allowed)
-            vector[indices[name]] = value
-        return vector
+            require(name in self.unknowns, f"matrices.{key}", name, allowed)
+        return np.array([entries.get(name, 0.0) for name in self.unknowns])
 
     def _ground_pattern(self) -> Array:
         if isinstance(self.direction, dict):

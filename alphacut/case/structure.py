@@ -110,6 +110,11 @@ class Structure:
         return self.model if isinstance(self.model, StoreyFrame) else None
 
     @property
+    def linear(self) -> StoreyFrame | MatrixStructure | None:
+        """The model if it is linear, else None."""
+        return None if isinstance(self.model, LagrangianSystem) else self.model
+
+    @property
     def outputs(self) -> tuple[str, ...]:
         """Names of the observed quantities."""
         return self.model.outputs
@@ -155,11 +160,6 @@ class Structure:
         except RefusedError as error:
             raise RefusedError(key, error.value, error.allowed) from None
 
-    @property
-    def linear(self) -> StoreyFrame | MatrixStructure | None:
-        """The model if it is linear, else None."""
-        return None if isinstance(self.model, LagrangianSystem) else self.model
-
     def model_with_outputs(
         self, key: str, outputs: tuple[str, ...]
     ) -> StoreyFrame | MatrixStructure | LagrangianSystem:
@@ -167,13 +167,13 @@ class Structure:
         self.require_quantities(key, outputs)
         if isinstance(self.model, StoreyFrame):
             return replace(self.model, outputs=outputs)
-        if isinstance(self.model, MatrixStructure):
-            observed: dict[str, Array] = {
-                x: self.model.observed[x] for x in self.model.outputs if x in outputs
-            }
-            factors = {x: f for x, f in self.model.row_factors.items() if x in outputs}
-            return replace(self.model, observed=observed, row_factors=factors)
-        return self.model
+        if isinstance(self.model, LagrangianSystem):
+            return self.model
+        observed: dict[str, Array] = {
+            x: self.model.observed[x] for x in self.outputs if x in outputs
+        }
+        factors = {x: f for x, f in self.model.row_factors.items() if x in outputs}
+        return replace(self.model, observed=observed, row_factors=factors)
 
 
 def read_accelerogram(value: object, info: ValidationInfo) -> Accelerogram:
@@ -270,8 +270,7 @@ class Frame(StructureSection):
 
     def per_floor(self, values: tuple[FuzzyNumber, ...] | None) -> tuple[FuzzyNumber, ...]:
         """One value for each floor; a single one holds for all of them."""
-        per_storey = values or ()
-        return per_storey * self.floors if len(per_storey) == 1 else per_storey
+        return values * self.floors if values and len(values) == 1 else values or ()
 
     def structure(
         self, modulus: FuzzyNumber | None = None, loss: FuzzyNumber | None = None
@@ -304,15 +303,12 @@ class Frame(StructureSection):
         except RefusedError as error:
             key = f"frame.{NAMES.get(error.key, error.key)}"
             raise RefusedError(key, error.value, error.allowed, error.cure) from None
-        numbers = {
-            SYMBOLS[x].format(z): number
-            for x, values in lists.items()
-            for z, number in enumerate(values, start=1)
-        }
+        factors = {x: getattr(self, x) for x in ("rayleigh_mass", "rayleigh_stiffness")}
+        numbers = {"E": young or STAND_IN, **factors, **ratios}
         if self.second_moment:
             numbers["I"] = self.second_moment[0]
-        numbers |= {"E": young or STAND_IN, "rayleigh_mass": self.rayleigh_mass, **ratios}
-        numbers |= {"rayleigh_stiffness": self.rayleigh_stiffness}
+        for x, values in lists.items():
+            numbers |= {SYMBOLS[x].format(z): number for z, number in enumerate(values, start=1)}
         heights = {f"drift{z}": height for z, height in enumerate(lists["lengths"], start=1)}
         return Structure(model, {name: numbers[name] for name in model.parameters}, heights)
 
@@ -343,11 +339,9 @@ class Pendulum(StructureSection):
         self, modulus: FuzzyNumber | None = None, loss: FuzzyNumber | None = None
     ) -> Structure:
         """The pendulum; see `StructureSection`."""
-        numbers = (
-            *(self.mass, self.length, self.damping),
-            *(self.gravity, self.angle, self.angular_velocity),
-        )
-        arguments = ("mass", "length", "damping", "gravity", "phi0", "omega0")
+        keys = ("mass", "length", "damping", "gravity", "angle", "angular_velocity")
+        arguments = (*keys[:4], "phi0", "omega0")
+        numbers = [getattr(self, key) for key in keys]
         values = {name: x.nominal for name, x in zip(arguments, numbers, strict=True)}
         model = pendulum(**values)
         model = replace(model, observed={"force": model.observed["force"]})

@@ -21,7 +21,7 @@ from alphacut.case.radius import RadiusMapSection, ThetaSection
 from alphacut.case.structure import Structure
 from alphacut.commands.options import require_case_petsc
 from alphacut.frame.questions.peaks import Peaks
-from alphacut.fuzzy import Crisp, FuzzyNumber, Triangular
+from alphacut.fuzzy import Crisp, Triangular
 from alphacut.fuzzy.progress_bar import progress_reporter
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io.files import Document, locked, rank, require_writable, say
@@ -69,6 +69,8 @@ def open_results(
     lock = locked("--out", Path(path)) if path and rank() == 0 else nullcontext()
     with progress_reporter(not options.quiet and rank() == 0) as tick, lock:
         results = ResultsFolder.read(Path(path)) if path else None
+        if results is not None:
+            results.require_own_files("--out")
         if results is not None and results.is_damaged:
             say(f"warning: {results.path / MANIFEST} is damaged; everything is computed anew")
         if results is not None and fresh and rank() == 0:
@@ -290,26 +292,19 @@ def _with_stand_ins(content: Content, structure: Structure) -> Structure:
     """The structure with numbers as fuzzy as those that stage modulus will compute."""
     if "modulus" not in content.stages:
         return structure
-    numbers, is_crisp = dict(structure.numbers), content.modulus.alpha == (1.0,)
+    numbers, has_cuts = dict(structure.numbers), content.modulus.alpha != (1.0,)
     is_fuzzy = content.image_cell is not None or "microstructure" in content.stages
-    if not is_fuzzy:
-        inputs = CellCampaign.of(content).inputs.values()
-        is_fuzzy = any(number.support.width > 0 for number in inputs)
+    inputs = () if is_fuzzy else CellCampaign.of(content).inputs.values()
+    is_fuzzy = has_cuts and (is_fuzzy or any(number.support.width > 0 for number in inputs))
     if "E" in numbers:
-        numbers["E"] = _stand_in(numbers["E"], 0.01 if is_fuzzy and not is_crisp else 0.0)
+        young = numbers["E"].nominal
+        numbers["E"] = Triangular(0.99 * young, young, 1.01 * young) if is_fuzzy else Crisp(young)
     losses = content.cell.losses if content.cell else ()
-    is_fuzzy = is_fuzzy or any(loss.support.width > 0 for loss in losses)
-    if content.has_material_damping and is_fuzzy and not is_crisp:
-        ratios = {name for name in numbers if re.fullmatch(r"zeta\d*", name)}
-        numbers |= {name: _stand_in(numbers[name], 0.1) for name in ratios}
+    has_fuzzy_losses = has_cuts and any(loss.support.width > 0 for loss in losses)
+    if content.has_material_damping and (is_fuzzy or has_fuzzy_losses):
+        ratios = {x: y.nominal for x, y in numbers.items() if re.fullmatch(r"zeta\d*", x)}
+        numbers |= {x: Triangular(0.9 * y, y, 1.1 * y) for x, y in ratios.items()}
     return replace(structure, numbers=numbers)
-
-
-def _stand_in(number: FuzzyNumber, share: float) -> FuzzyNumber:
-    """A number with the same nominal value, fuzzy by a share of it."""
-    nominal = number.nominal
-    ends = (1 - share) * nominal, (1 + share) * nominal
-    return Triangular(ends[0], nominal, ends[1]) if share else Crisp(nominal)
 
 
 def cut_record_warnings(content: Content, structure: Structure) -> Iterator[str]:

@@ -101,6 +101,14 @@ class ResultsFolder:
         is_whole = document.get("checksum") == digest_of(json.dumps(files).encode())
         return cls(path, files) if is_whole else cls(path, is_damaged=True)
 
+    def require_own_files(self, option: str) -> None:
+        """Refuses a folder of other files, in which no run has written its list."""
+        is_new = not os.path.lexists(self.path / MANIFEST)
+        others = [x.name for x in self.path.glob("[!.]*")] if is_new else []
+        allowed, cure = "an empty folder, or one of results", "name another folder"
+        value = f"{self.path}, with other files"
+        require(not others, option, value, allowed, cure)
+
     def made_from(self, source: str) -> tuple[str, ...]:
         """Names of the files that were made from what has this digest."""
         return tuple(name for name, entry in self.files.items() if entry.source == source)
