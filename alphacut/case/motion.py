@@ -24,12 +24,7 @@ from alphacut.fuzzy.refused import RefusedError
 from alphacut.io import quantity
 
 EnvelopeMethod = Literal[
-    "auto",
-    "proof",
-    "dual",
-    "graph-follower",
-    "improved-graph-follower",
-    "quasi-monte-carlo",
+    "auto", "proof", "dual", "graph-follower", "improved-graph-follower", "quasi-monte-carlo"
 ]
 MOST_STEPS = 1_000_000
 """Steps of a simulation; more do not fit into memory."""

@@ -9,12 +9,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from alphacut.case.types import (
-    Quantity,
-    Section,
-    after,
-    rising,
-)
+from alphacut.case.types import Quantity, Section, after, rising
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.stochastic import HermiteMap, TruncatedNormal
