@@ -135,22 +135,17 @@ class CellContent(Section):
         has_fraction = self.particle_cell is not None and self.particle_cell.fraction is not None
         has_radius = "microstructure" in self.stages or has_fraction
         has_geometry = self.image_cell is not None or self.mesh_cell is not None
-        sections = {
-            "microstructure": ("microstructure",),
-            "modulus": ("cell",) if has_radius or has_geometry else ("radius", "cell"),
-            "envelope": ("envelope",),
-        }
-        for stage in self.stages:
-            for key in sections[stage]:
+        sections: dict[str, list[str]] = {stage: [stage] for stage in self.stages}
+        if "modulus" in self.stages:
+            sections["modulus"] = ["cell"] if has_radius or has_geometry else ["radius", "cell"]
+        for stage, keys in sections.items():
+            for key in keys:
                 allowed = f"[{key}], which stage {stage} needs"
                 require(getattr(self, key) is not None, key, None, allowed)
-        is_source = {
-            "radius": self.radius is not None,
-            "cell.fraction": has_fraction,
-            "stage microstructure": "microstructure" in self.stages,
-        }
-        first, *further = [name for name, is_there in is_source.items() if is_there] or [""]
-        require_alone(first, bool(further), ", ".join(further))
+        other = "stage microstructure" if "microstructure" in self.stages else "cell.fraction"
+        require_alone("radius", self.radius is not None and has_radius, other)
+        is_computed = "microstructure" in self.stages
+        require_alone("cell.fraction", has_fraction and is_computed, "stage microstructure")
         method = self.modulus.method
         methods = (method,) if self.cell is None else self.cell.methods
         require(method in methods, "modulus.method", method, f"{', '.join(methods)} for this cell")

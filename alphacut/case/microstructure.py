@@ -12,7 +12,7 @@ from alphacut.stochastic.microstructure import MicrostructureStudy
 from alphacut.stochastic.particles.measured import CircleFile, SectionImage
 from alphacut.stochastic.particles.packing import Packing
 from alphacut.stochastic.particles.particles import DISCS, SPHERES
-from alphacut.stochastic.particles.radius_laws import LogNormalRadii, MeasuredRadii, RadiusLaw
+from alphacut.stochastic.particles.radius_laws import LogNormalRadii, MeasuredRadii
 from alphacut.stochastic.sections import Simulated
 
 
@@ -35,18 +35,14 @@ class PackingSection(Section):
 
     def source(self, spheres: bool) -> Simulated:
         """The random packings to be computed: of spheres, or else of discs."""
-        if self.file is None:
-            ends = self.smallest_radius or 0.0, self.largest_radius or 0.0  # both were required
-            radii: RadiusLaw = LogNormalRadii(*ends)
-        else:
-            radii = MeasuredRadii.read(self.file)
         shape = SPHERES if spheres else DISCS
         fits, key = self.fraction <= shape.densest, "microstructure.packing.fraction"
         allowed = f"shares up to {shape.densest:g} of {shape.particles} packed at random"
         cure = f"set cell.fraction = {self.fraction:g} in place of [microstructure]"
-        require(fits, key, self.fraction, allowed, cure=cure)
-        packing = Packing(self.particles, self.fraction, radii, shape=shape)
-        return Simulated(packing, self.packings)
+        require(fits, key, self.fraction, allowed, cure)
+        ends = self.smallest_radius or 0.0, self.largest_radius or 0.0  # both are there, or a file
+        radii = MeasuredRadii.read(self.file) if self.file else LogNormalRadii(*ends)
+        return Simulated(Packing(self.particles, self.fraction, radii, shape=shape), self.packings)
 
     def require_consistent(self) -> None:
         """Refuses a file of radii beside their ends, and one end alone or none without a file."""

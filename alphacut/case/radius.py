@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -55,19 +55,20 @@ class RadiusMapSection(ThetaSection):
     @property
     def largest_radius(self) -> float:
         """Largest radius at the corners of the supports."""
-        corners = itertools.product(*(x.support for x in self.numbers.values()))
-        maps = (self.at(dict(zip(self.numbers, corner, strict=True))) for corner in corners)
-        return max(radius.extremes()[1] for radius in maps)
+        return max(self.at(corner).extremes()[1] for corner in self._corners())
+
+    def _corners(self) -> Iterator[dict[str, float]]:
+        """Yields the corners of the supports, which suffice: the map is linear in a1 … a4."""
+        for corner in itertools.product(*({*x.support} for x in self.numbers.values())):
+            yield dict(zip(self.numbers, corner, strict=True))
 
     def require_consistent(self) -> None:
         """Refuses supports of a1 … a4 for which the radius leaves (0, 1) at some θ."""
-        # corners of the supports suffice, as the map is linear in a1 … a4
-        for corner in itertools.product(*({*x.support} for x in self.numbers.values())):
-            values = dict(zip(self.numbers, corner, strict=True))
+        for corner in self._corners():
             try:
-                self.at(values)  # refuses such a map
+                self.at(corner)  # refuses such a map
             except RefusedError as error:
-                raise RefusedError("radius", values, error.allowed, error.cure) from None
+                raise RefusedError("radius", corner, error.allowed, error.cure) from None
 
 
 @dataclass(frozen=True)
@@ -85,7 +86,7 @@ class FractionMap:
 
     @property
     def law(self) -> TruncatedNormal:
-        """Law of θ, a normal one cut off at both ends."""
+        """Law of θ, on which nothing depends."""
         return TruncatedNormal(*self.theta)
 
     @property

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from math import pi
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 import numpy as np
 
@@ -132,7 +132,7 @@ def _numbers(number: FuzzyNumber, unit: str) -> str:
 
 
 def add_folder(parser: argparse.ArgumentParser) -> None:
-    """Adds the folder."""
+    """Adds the arguments of ``verify``."""
     parser.add_argument("folder", metavar="FOLDER", help="results of a run, as results/wind")
     add_quiet(parser)
 
@@ -164,30 +164,21 @@ def verify(options: argparse.Namespace, out: TextIO) -> int:
 def envelope_of(data: xarray.Dataset) -> Envelope:
     """The envelope that a dataset holds, with the supports of its fuzzy inputs as intervals."""
     values = {name: variable.values for name, variable in data.data_vars.items()}
-    supports = values["cut"][0].tolist()
-
-    def stored_ends(name: str) -> Ends | None:
-        has_ends = f"{name}_lower" in values
-        return Ends(values[f"{name}_lower"], values[f"{name}_upper"]) if has_ends else None
-
-    labels = [str(label) for label in values["label"]]
+    names = ("lower", "upper", "lower_at", "upper_at", "error", "between", "attained_error")
+    arguments: dict[str, Any] = {name: values[name] for name in names if name in values}
+    for side, name in (("inner", "inner"), ("outer", "proved")):
+        if f"{name}_lower" in values:
+            arguments[side] = Ends(values[f"{name}_lower"], values[f"{name}_upper"])
+    supports = zip(data["parameter"].values, values["cut"][0], strict=True)
     return Envelope(
         alpha=data["alpha"].values,
         time=data["time"].values,
         outputs=tuple(map(str, data["output"].values)),
-        inputs={str(x): Interval(*supports[k]) for k, x in enumerate(data["parameter"].values)},
+        inputs={str(name): Interval(*map(float, support)) for name, support in supports},
         nature=Nature(data.attrs["nature"]),
         method=str(data.attrs["method"]),
-        units=tuple(x.partition("[")[2].rstrip("]") for x in labels),
-        between=values.get("between"),
-        attained_error=values.get("attained_error"),
-        lower=values["lower"],
-        upper=values["upper"],
-        lower_at=values["lower_at"],
-        upper_at=values["upper_at"],
-        error=values["error"],
-        inner=stored_ends("inner"),
-        outer=stored_ends("proved"),
+        units=tuple(str(x).partition("[")[2].rstrip("]") for x in values["label"]),
+        **arguments,
     )
 
 
