@@ -64,21 +64,16 @@ def build_parsers(program: str, commands: Mapping[str, str]) -> tuple[Parser, di
     )
     by_name: dict[str, Parser] = {}
     for name, file in commands.items():
-        command = import_command(name, file)
+        command: Command = import_module(f"alphacut.commands.{file}").COMMANDS[name]
         about = f"{command.about[:1].upper()}{command.about[1:]}."
         by_name[name] = subparsers.add_parser(
             name, help=command.about, description=about, allow_abbrev=False
         )
         command.arguments(by_name[name])
+        by_name[name].set_defaults(run=command.run)
         shown = "log what is done; a traceback with every error"
         by_name[name].add_argument(DEBUG, action="store_true", help=shown)
     return parser, by_name
-
-
-def import_command(name: str, file: str) -> Command:
-    """The command of a name, whose file is imported now."""
-    command: Command = import_module(f"alphacut.commands.{file}").COMMANDS[name]
-    return command
 
 
 def main(
@@ -152,7 +147,6 @@ def interrupt_on_stop_signals() -> Iterator[list[int]]:
 def show_log(is_on: bool) -> Iterator[None]:
     """Shows the log of the block, with the traceback of its error, on standard error if `is_on`."""
     logger, handler = logging.getLogger("alphacut"), logging.StreamHandler()
-    level = logger.level
     if is_on:
         logger.addHandler(handler)
         logger.setLevel(logging.DEBUG)
@@ -162,8 +156,8 @@ def show_log(is_on: bool) -> Iterator[None]:
         LOG.debug("the command ended by this error", exc_info=True)
         raise
     finally:
-        logger.setLevel(level)
         logger.removeHandler(handler)
+        logger.setLevel(logging.NOTSET)
 
 
 def _run_command(arguments: Sequence[str], program: str, names: Mapping[str, str]) -> int:
@@ -185,8 +179,8 @@ def _run_command(arguments: Sequence[str], program: str, names: Mapping[str, str
     check_destinations(by_name[options.command], options)
     with standard_output(alone=options.json == "-") as out, warnings.catch_warnings():
         warnings.showwarning = _say_warning
-        command = import_command(options.command, names[options.command])
-        return command.run(options, out)
+        status: int = options.run(options, out)
+        return status
 
 
 def _say_warning(message: Warning | str, *_: object, **__: object) -> None:

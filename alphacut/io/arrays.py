@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError, require
+from alphacut.fuzzy.refused import RefusedError, printable, require
 
 ENDINGS = (".mtx", ".npz", ".npy", ".csv")
 ALLOWED = "a file .mtx, .npz, .npy or .csv with one array of finite real numbers"
@@ -30,8 +29,8 @@ def read_array(path: Path, name: str = "") -> Array:
     except RefusedError:
         raise
     except Exception as error:  # whatever the readers of SciPy and NumPy raise
-        reason = " ".join(str(error).split())[:80]
-        raise RefusedError(path.name, reason or type(error).__name__, ALLOWED) from None
+        reason = printable(error, 80) or type(error).__name__
+        raise RefusedError(path.name, reason, ALLOWED) from None
     is_finite = array.dtype.kind in "iuf" and bool(np.isfinite(array).all())
     fits = is_finite and array.ndim in (1, 2) and array.size > 0
     require(fits, path.name, "no such array", ALLOWED)
@@ -48,9 +47,7 @@ def _read_by_ending(path: Path, name: str) -> Array:
         array = scipy.io.mmread(path)
         return np.asarray(array.toarray() if scipy.sparse.issparse(array) else array)
     if kind == ".csv":
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            rows = [row for row in csv.reader(file) if row and not row[0].startswith("#")]
-        return np.array([[float(cell) for cell in row] for row in rows])
+        return np.loadtxt(path, delimiter=",", ndmin=2, encoding="utf-8-sig")
     if kind == ".npy":
         return np.asarray(np.load(path, allow_pickle=False))
     with np.load(path, allow_pickle=False) as file:

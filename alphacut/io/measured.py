@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError, require
+from alphacut.fuzzy.refused import require
 from alphacut.stochastic.particles.csv_columns import fields, number
 
 HEAD = re.compile(r"\s*(mode|frequency(_std)?\s*(\[Hz\])?|shape_std|q[1-9]\d*)\s*")
@@ -22,13 +22,10 @@ ALLOWED = (
 
 @dataclass(frozen=True, eq=False)
 class ModeRows:
-    """All measurements of one mode.
+    """All measurements of one mode: frequencies in Hz and amplitudes by floor, of shape (rows,).
 
-    Args:
-        frequencies: In Hz, shape (rows,).
-        amplitudes: By floor, each of shape (rows,), to any scale.
-        frequency_deviation: Standard deviation over the mean; None where the file states none.
-        shape_deviation: Standard deviation over the mode's largest amplitude, or None.
+    Standard deviations are over the mean frequency and over the mode's largest amplitude; None
+    where the file states none.
     """
 
     mode: int
@@ -48,7 +45,12 @@ def mode_rows(path: Path) -> tuple[ModeRows, ...]:
             amplitudes in one row and not in another.
     """
     (_, head), *rows = fields(path)
-    columns = _column_indices(path, head)
+    matches = [HEAD.fullmatch(cell) for cell in head]
+    names = [match[1].partition("[")[0].strip() if match else "" for match in matches]
+    columns = {name: column for column, name in enumerate(names)}
+    is_known = "" not in columns and {"mode", "frequency"} <= columns.keys()
+    is_complete = is_known and len(columns) == len(head)
+    require(is_complete, f"{path.name}, header", ",".join(head)[:80], ALLOWED)
     positive = [columns[x] for x in ("frequency", "frequency_std", "shape_std") if x in columns]
     modes: dict[int, list[list[float]]] = defaultdict(list)
     for row, cells in rows:
@@ -65,17 +67,6 @@ def mode_rows(path: Path) -> tuple[ModeRows, ...]:
     )
 
 
-def _column_indices(path: Path, head: list[str]) -> dict[str, int]:
-    """Index of each column of a header by its name without the unit: "mode", "frequency", "q1"."""
-    matches = [HEAD.fullmatch(cell) for cell in head]
-    names = [match[1].partition("[")[0].strip() if match else "" for match in matches]
-    columns = {name: column for column, name in enumerate(names)}
-    is_known = "" not in columns and {"mode", "frequency"} <= columns.keys()
-    is_complete = is_known and len(columns) == len(head)
-    require(is_complete, f"{path.name}, header", ",".join(head)[:80], ALLOWED)
-    return columns
-
-
 def _measurements_of_mode(
     path: Path, mode: int, values: Array, columns: dict[str, int]
 ) -> ModeRows:
@@ -83,23 +74,19 @@ def _measurements_of_mode(
     floors = {int(name[1:]): k for name, k in columns.items() if name.startswith("q")}
     amplitudes = {floor: values[:, column] for floor, column in floors.items()}
     missing = {floor: np.isnan(x) for floor, x in amplitudes.items()}
-    if any(gaps.any() and not gaps.all() for gaps in missing.values()):
-        allowed = "an amplitude of a floor in every row of a mode, or in none"
-        raise RefusedError(f"{path.name}, mode {mode}", "an amplitude in some rows", allowed)
+    is_whole = all(gaps.all() or not gaps.any() for gaps in missing.values())
+    allowed = "an amplitude of a floor in every row of a mode, or in none"
+    require(is_whole, f"{path.name}, mode {mode}", "an amplitude in some rows", allowed)
     shape = {floor: x for floor, x in amplitudes.items() if not missing[floor].all()}
+    shape = shape if len(shape) > 1 else {}
     frequencies = values[:, columns["frequency"]]
-    largest = max((abs(x).mean() for x in shape.values()), default=0.0)
-    return ModeRows(
-        mode,
-        frequencies,
-        shape if len(shape) > 1 else {},
-        _relative_rms(values, columns.get("frequency_std"), float(frequencies.mean())),
-        _relative_rms(values, columns.get("shape_std"), float(largest)) if len(shape) > 1 else None,
-    )
-
-
-def _relative_rms(values: Array, column: int | None, size: float) -> float | None:
-    """Root mean square of a column of deviations over a size; None without the column."""
-    if column is None:
-        return None
-    return float(np.sqrt((values[:, column] ** 2).mean())) / size
+    sizes = {"frequency_std": float(frequencies.mean())}
+    if shape:
+        sizes["shape_std"] = float(max(abs(x).mean() for x in shape.values()))
+    deviations = {  # root mean squares
+        name: float(np.sqrt((values[:, columns[name]] ** 2).mean())) / size
+        for name, size in sizes.items()
+        if name in columns
+    }
+    ends = deviations.get("frequency_std"), deviations.get("shape_std")
+    return ModeRows(mode, frequencies, shape, *ends)

@@ -151,14 +151,10 @@ def parse_numbers(value: object, si: str) -> tuple[float, ...]:
         values = _parse_spread(match, si)
     else:
         values = (_parse_decimal(text, si),)
-    return tuple(_checked_float(x) for x in values)
-
-
-def _checked_float(value: Decimal) -> float:
-    size = abs(float(value))
-    if not (size == 0 or LEAST <= size <= GREATEST) or not math.isfinite(size):
+    floats = tuple(map(float, values))
+    if any(x != 0 and not LEAST <= abs(x) <= GREATEST for x in floats):
         raise ValueError(f"magnitudes go from {LEAST:g} to {GREATEST:g} in SI, or are 0")
-    return float(value)
+    return floats
 
 
 def parse_number(value: object, si: str) -> float:
