@@ -110,7 +110,7 @@ def document_of(result: HomogenisedStiffness) -> Document:
         },
         "unknowns": result.unknowns,
         "iterations": list(result.iterations),
-        "seconds": dict(result.seconds),
+        "seconds": result.seconds,
         "method": result.method,
         "solver": result.solver,
         "error": dict(result.error),

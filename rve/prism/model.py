@@ -12,8 +12,8 @@ Neither shares elements or mesh with the prisms.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from time import perf_counter
@@ -55,7 +55,6 @@ from alphacut.stochastic import RadiusMap
 
 SERIES_ACCURACY = 1e-9  # relative, of a reference by the series
 SLICES_POINTS = 14  # nodes in θ of a reference by slices
-Seconds = dict[str, float]
 
 
 @dataclass(frozen=True)
@@ -105,12 +104,10 @@ class PrismModel:
         require_parts(radius_map, matrix, inclusions, isotropic=False)
         require_compressible(matrix, *inclusions)
         require_interphase(interphase, self.outline)
-        seconds: Seconds = {}
-        with timed(seconds, "mesh"):
-            problem = self.problem(radius_map, thickness_of(interphase))
-        with timed(seconds, "solve"):
-            # reduced basis that serves all inclusions; beside a ring each one is solved
-            basis = None if interphase else self._basis(problem, matrix, inclusions)
+        started = perf_counter()
+        problem = self.problem(radius_map, thickness_of(interphase))
+        # reduced basis that serves all inclusions; beside a ring each one is solved
+        basis = None if interphase else self._basis(problem, matrix, inclusions)
         results = []
         for inclusion in inclusions:
             cell = Cell(matrix, inclusion, radius_map, self.outline, interphase)
@@ -119,7 +116,7 @@ class PrismModel:
                 iterations = basis.iterations
             else:
                 strains, solved = solve_loads(
-                    problem, cell.stiffness, self.loads(cell), self.options, seconds
+                    problem, cell.stiffness, self.loads(cell), self.options
                 )
                 iterations, residual = solved.iterations, solved.residual
             result = prism_result(strains, cell.phases, self.loads(cell), self.options)
@@ -128,7 +125,7 @@ class PrismModel:
                 cell=cell,
                 unknowns=problem.numbering.size,
                 iterations=iterations,
-                seconds={**seconds, "total": sum(seconds.values())},
+                seconds=perf_counter() - started,
             )
             if self.estimate:
                 result = _with_errors(result, _reference_result(cell))
@@ -137,7 +134,7 @@ class PrismModel:
             checks = {**result.checks, "residual": residual}
             checks = checks_within_limits(checks, discretisation=ROUND_OFF + allowed)
             results.append(replace(result, checks=checks))
-            seconds = {}
+            started = perf_counter()
         return results
 
     def problem(self, radius_map: RadiusMap, thickness: float = 0.0) -> PrismProblem:
@@ -204,32 +201,19 @@ def require_prisms(mesh_size: float, layers: int) -> None:
 
 
 def solve_loads(
-    problem: PrismProblem,
-    stiffness: Sequence[Array],
-    strains: Array,
-    options: SolverOptions,
-    seconds: Seconds,
+    problem: PrismProblem, stiffness: Sequence[Array], strains: Array, options: SolverOptions
 ) -> tuple[SliceStrains, Solutions]:
-    """Solve for macroscopic strains, shape (loads, 3): mean strains of slices, and solutions.
-
-    Wall times are added to those of the stages in `seconds`.
-    """
-    with timed(seconds, "assemble"):
-        problem.assemble(stiffness)
-        loads = problem.loads(strains)
+    """Solve for macroscopic strains, shape (loads, 3): mean strains of slices, and solutions."""
+    problem.assemble(stiffness)
+    loads = problem.loads(strains)
     is_homogeneous = all(np.array_equal(phase, stiffness[0]) for phase in stiffness)
     if is_homogeneous:  # without fluctuation
         zeros = [load.duplicate() for load in loads]
         solutions = Solutions(zeros, iterations=(0,) * len(loads), residual=0.0)
     else:
-        with timed(seconds, "setup"):
-            ksp = problem.solver(options)
-        with timed(seconds, "solve"):
-            solutions = solve(ksp, loads)
-    with timed(seconds, "solve"):
-        fluctuations = [problem.field(vector) for vector in solutions.vectors]
-        means = problem.slice_strains(list(zip(strains, fluctuations, strict=True)))
-    return means, solutions
+        solutions = solve(problem.solver(options), loads)
+    fluctuations = [problem.field(vector) for vector in solutions.vectors]
+    return problem.slice_strains(list(zip(strains, fluctuations, strict=True))), solutions
 
 
 def prism_result(
@@ -294,16 +278,6 @@ def _mean_moduli(curve: StressCurve) -> Array:
     if curve.stiffness is None:
         return np.array([[s11 / STRAIN, np.nan, s12 / (2 * STRAIN)]])
     return axial_moduli(mean(curve.weights, curve.stiffness), square=False)
-
-
-@contextmanager
-def timed(seconds: Seconds, stage: str) -> Iterator[None]:
-    """Context that adds its wall time to that of a stage in `seconds`."""
-    started = perf_counter()
-    try:
-        yield
-    finally:
-        seconds[stage] = seconds.get(stage, 0.0) + perf_counter() - started
 
 
 @lru_cache(maxsize=2)

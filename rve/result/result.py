@@ -135,7 +135,7 @@ class HomogenisedStiffness:
         solver: Name of the linear solver and its options, or "none".
         unknowns: Unknowns of one linear system after elimination of constraints.
         iterations: Iterations of the linear solver, one number per load.
-        seconds: Wall time by stage: mesh, assemble, setup, solve, total, jit.
+        seconds: Wall time, in s, without that of the errors' reference.
         errors: Declared relative errors of the mean moduli by source (space, theta): of C11 + C12,
             C11 − C12 and C33, shape (3,), nan for a modulus that was not computed; empty where none
             were estimated.
@@ -158,7 +158,7 @@ class HomogenisedStiffness:
     solver: str = "none"
     unknowns: int = 0
     iterations: tuple[int, ...] = ()
-    seconds: Mapping[str, float] = field(default_factory=dict)
+    seconds: float = 0.0
     errors: Mapping[str, Array] = field(default_factory=dict)
     checks: Mapping[str, float] = field(default_factory=dict)
     cell: Cell | None = None
@@ -184,11 +184,11 @@ class HomogenisedStiffness:
 
     def __repr__(self) -> str:
         """One line with E, ν, the declared error of E, the model and its wall time."""
-        cost, error = self.seconds.get("total", 0.0), f"{self.estimated_error:.2g}"
+        error = f"{self.estimated_error:.2g}" if self.errors else "not declared"
         return (
             f"HomogenisedStiffness(E = {self.modulus:.7g} Pa, ν = {self.poisson:.5g}"
-            f" ({self.convention}), relative error of E {error if self.errors else 'not declared'},"
-            f" by {self.method}, {cost:.2g} s)"
+            f" ({self.convention}), relative error of E {error},"
+            f" by {self.method}, {self.seconds:.2g} s)"
         )
 
     @property

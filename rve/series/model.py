@@ -281,7 +281,7 @@ class SeriesModel:
                 curve=mean.curve,
                 method=self.name,
                 unknowns=self.series.unknowns(int(mean.terms.max())),
-                seconds={"total": seconds},
+                seconds=seconds,
                 errors=mean.errors,
                 cell=cell,
             )

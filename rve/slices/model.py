@@ -280,7 +280,7 @@ class SlicesModel:
             )
             for radius in radii
         ]
-        seconds = {"total": perf_counter() - start}
+        seconds = perf_counter() - start
         results = []
         for inclusion, *slices in zip(inclusions, *by_radius, strict=True):
             cell = Cell(matrix, inclusion, radius_map, self.outline, interphase)

@@ -70,7 +70,7 @@ def _dipoles(
 ) -> Array:
     """Force dipoles of n times m spheres over r³ under unit strains, shape (n, m, loads)."""
     # singular amplitudes = T (regular amplitudes of the far field and of all images)
-    poles = multipoles(degree, shear=shear)
+    poles = Multipoles.up_to(degree, shear=shear)
     regular_scale, singular_scale = (radius[:, None] ** power for power in _powers(poles))
     images = couplings(degree, matrix.poisson, shear=shear)
     images = images * regular_scale[..., None] * singular_scale[:, None]
@@ -103,18 +103,12 @@ def _powers(poles: Multipoles) -> tuple[Array, Array]:
     return np.maximum(poles.n + kind, 0), poles.n + 1 - kind  # solution 1 of degree 0 is none
 
 
-@lru_cache(maxsize=256)
-def multipoles(degree: int, *, shear: bool) -> Multipoles:
-    """Multipoles up to a degree that axial or shear loads excite; cached."""
-    return Multipoles.up_to(degree, shear=shear)
-
-
 @lru_cache(maxsize=1024)
 def cached_t_matrices(
     degree: int, matrix: Material, inclusion: Material, *, shear: bool
 ) -> tuple[Array, Array]:
     """T-matrices of a sphere for the multipoles of one load: of solutions 1 and 3, and of 2."""
-    poles = multipoles(degree, shear=shear)
+    poles = Multipoles.up_to(degree, shear=shear)
     pair, torsion = t_matrices(poles.n, matrix, inclusion)
     return pair[poles.kind == 1], torsion[poles.kind == 2]
 

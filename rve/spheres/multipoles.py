@@ -49,6 +49,7 @@ class Multipoles:
     kind: Array
 
     @classmethod
+    @lru_cache(maxsize=256)
     def up_to(cls, highest: int, *, shear: bool) -> Multipoles:
         """All up to degree `highest`: m = 0, 4, … for axial loads, m = 2, 6, … for ε12."""
         first = 2 if shear else 0

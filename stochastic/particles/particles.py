@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 from scipy.spatial import KDTree
 
 from alphacut.fuzzy.arrays import Array, Ints, Mask
-from alphacut.fuzzy.refused import require
 
 
 @dataclass(frozen=True)
@@ -67,9 +66,6 @@ class Particles:
         radii: shape (n,), in m, not negative.
         size: Sides of the rectangle or box, shape (2,) or (3,), in m.
         periodic: Whether it repeats itself; otherwise it is a window on a larger section.
-
-    Raises:
-        RefusedError: A shape is wrong, a number is not finite, or a particle lies outside.
     """
 
     centres: Array
@@ -78,23 +74,12 @@ class Particles:
     periodic: bool = True
 
     def __post_init__(self) -> None:
-        size = np.array(self.size, float).ravel()
-        centres: Array = np.array(self.centres, float).reshape(-1, len(size))
-        radii = np.array(self.radii, float).ravel()
-        value = f"{len(radii)} numbers"
-        allowed = f"{len(centres)} positions, of one particle or more"
-        require(0 < len(radii) == len(centres), "radii", value=value, allowed=allowed)
-        _require_all((size > 0) & (size < np.inf), "size", size, "positive, finite lengths in m")
-        _require_all(np.isfinite(centres).all(axis=1), "centres", centres, "finite lengths in m")
-        is_length = (radii >= 0) & (radii < np.inf)
-        _require_all(is_length, "radii", radii, "finite lengths from 0 m on")
+        size = np.array(self.size, float)
+        centres: Array = np.array(self.centres, float)
         if self.periodic:
             wrapped = np.mod(centres, size)
             centres = np.where(wrapped < size, wrapped, 0.0)
-        else:
-            is_inside = ((centres >= 0) & (centres <= size)).all(axis=1)
-            allowed = f"places in the window of {size.tolist()} m"
-            _require_all(is_inside, "centres", centres, allowed)
+        radii = np.array(self.radii, float)
         for name, array in (("centres", centres), ("radii", radii), ("size", size)):
             object.__setattr__(self, name, array)
 
@@ -130,12 +115,6 @@ class Particles:
 def nearest_image(offset: Array, size: Array) -> Array:
     """Return vectors between centres (…, d) to the nearest image in a periodic box of `size`."""
     return np.asarray(offset - size * np.round(offset / size))
-
-
-def _require_all(is_allowed: Mask | np.bool_, name: str, values: Array, allowed: str) -> None:
-    """Refuse an array of which some values are not allowed; the message names the first of them."""
-    row = int(np.argmin(is_allowed))
-    require(is_allowed.all(), f"{name}[{row}]", value=values[row].tolist(), allowed=allowed)
 
 
 MAX_PAIRS = 3_000_000  # in a portion, so that it fits into memory

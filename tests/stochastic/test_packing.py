@@ -78,20 +78,6 @@ def test_what_finds_no_place_fails_with_the_numbers():
     assert random_sequential(np.ones(300), np.full(2, 36.0), np.random.default_rng(0)) is None
 
 
-def test_particles_without_meaning_are_refused():
-    good = dict(centres=[(0.1, 0.1), (0.5, 0.5)], radii=[0.1, 0.1], size=(1, 1))
-    for change, key in (
-        (dict(radii=[0.1]), "radii"),
-        (dict(radii=[0.1, -0.2]), "radii[1]"),
-        (dict(radii=[0.1, np.nan]), "radii[1]"),
-        (dict(size=(1, 0)), "size[1]"),
-        (dict(centres=[(0.1, 0.1), (2, 0.5)], periodic=False), "centres[1]"),
-    ):
-        with pytest.raises(RefusedError) as refused:
-            Particles(**(good | change))
-        assert refused.value.key == key
-
-
 def test_log_normal_law():
     assert TENFOLD.sigma == pytest.approx(np.log(10) / 6)
     theta = np.linspace(-3, 3, 13)
