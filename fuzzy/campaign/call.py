@@ -170,10 +170,7 @@ def named_point(names: Sequence[str], point: Array) -> dict[str, float]:
 
 
 def _outcome(output: Any) -> Outcome:
-    """Return the sample of a number (`y`), an array (`y[0]`, …) or a mapping of names to them.
-
-    Of an exception, and of what is no number, a failure is returned.
-    """
+    """Sample of a number (`y`), array (`y[0]`, …) or mapping of names to them; else a failure."""
     try:
         if isinstance(output, Exception):
             raise output

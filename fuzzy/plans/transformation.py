@@ -255,11 +255,9 @@ def _extreme_corners(signs: Signs, lower: Array, upper: Array) -> Array:
 
 
 def _observed_signs(model: Model, box: tuple[Array, Array], nominal: Array, stated: Signs) -> Signs:
-    """Return the sign of the slopes at all probes of a box, shape (outputs, inputs).
-
-    It is 0 where slopes differ in sign, or the smallest is below 5 % of their range, and 1 for an
-    input without any effect. Only inputs without a sign in `stated` are probed.
-    """
+    """Return the sign of the slopes at all probes of a box, (outputs, inputs), 0 where unsure."""
+    # unsure: slopes differ in sign, or the smallest is below 5 % of their range; 1 for an input
+    # without any effect; only inputs without a sign in `stated` are probed
     lower, upper = box
     free = np.flatnonzero((stated == 0).any(axis=0))
     first = np.nan_to_num(np.sign(_slopes(model, box, nominal[None], free)[0])).astype(np.int8)

@@ -57,11 +57,7 @@ def plane_mesh(
 ) -> PlaneMesh:
     """Mesh one cell, finer where the particle is small or nearly touches its images.
 
-    Args:
-        radius: Radius of the particle over half the cell's side.
-        size: Edge length far from the interface, in halves of the cell's side, in (0, 1].
-        outline: Of the particle.
-        thickness: Of an interphase around a round one, 0 for none.
+    `size` is the edge length far from the interface, in (0, 1]; lengths are in halves of the side.
 
     Raises:
         RefusedError: Particles nearly touch, so that the mesh between them would have no end; or an
@@ -135,11 +131,8 @@ def curved_nodes(mesh: PlaneMesh, order: int) -> tuple[Array, Ints]:
 
 
 def _lagrange_nodes(triangles: Ints, edges: Ints, counts: tuple[int, int], order: int) -> Ints:
-    """Nodes of each Lagrange triangle of an order, (m, (order + 1)(order + 2)/2), in Basix's order.
-
-    From its vertices and edges, (m, 3) each, and the numbers of both. Vertices are numbered first,
-    then the nodes inside edges, then inside triangles.
-    """
+    """Nodes of Lagrange triangles in Basix's order, from vertices and edges, (m, 3), and `counts`."""
+    # numbered first are vertices, then the nodes inside edges, then inside triangles
     vertices, edge_count = counts
     per_edge, per_triangle = order - 1, (order - 1) * (order - 2) // 2
     on_edges = [vertices + edges[:, [k]] * per_edge + np.arange(per_edge) for k in range(3)]
@@ -156,10 +149,8 @@ def _interfaces(mesh: PlaneMesh) -> list[tuple[Mask, float]]:
 
 
 def _polar_positions(corners: Array, barycentric: Array) -> Array:
-    """Nodes of triangles with corners (k, 3, 2), interpolated in polar coordinates, (k, nodes, 2).
-
-    Both circles of a ring are then one curve at two scales, which do not meet however thin it is.
-    """
+    """Nodes of triangles with corners (k, 3, 2), interpolated in polar coordinates, (k, nodes, 2)."""
+    # both circles of a ring are then one curve at two scales, which do not meet however thin it is
     angle = np.arctan2(corners[..., 1], corners[..., 0])
     difference = (angle - angle[:, :1] + np.pi) % (2 * np.pi) - np.pi  # across ±π too
     angles = (angle[:, :1] + difference) @ barycentric.T
@@ -169,11 +160,9 @@ def _polar_positions(corners: Array, barycentric: Array) -> Array:
 
 
 def _bend_onto_outline(mesh: PlaneMesh, radius: float, ends: Ints, weights: Array) -> Array:
-    """Displacements that bend an edge of triangles, (k, 2), onto the outline, (k, nodes, 2).
-
-    Inside a triangle they fade with the bubble of the edge, so the map stays smooth and the
-    elements keep their order. `weights`, (nodes, 2), are the nodes' barycentric coordinates at it.
-    """
+    """Displacements that bend an edge of k triangles, `ends` (k, 2), onto the outline."""
+    # inside a triangle they fade with the bubble of the edge, so that the map stays smooth and the
+    # elements keep their order; `weights` are the nodes' barycentric coordinates at its ends
     a, b = mesh.points[ends[:, 0]], mesh.points[ends[:, 1]]
     angle_a, angle_b = (np.arctan2(p[:, 1], p[:, 0]) for p in (a, b))
     difference = (angle_b - angle_a + np.pi) % (2 * np.pi) - np.pi  # across ±π too

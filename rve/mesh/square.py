@@ -60,20 +60,15 @@ def surfaces(
 ) -> dict[int, list[int]]:
     """Add the cell's geometry to the current Gmsh model; return its surfaces by phase number.
 
-    Matrix 0, particle 1, interphase 2; absent phases have no key.
-
-    Args:
-        size: Edge length of elements, in halves of the cell's side.
-        radius: Radius of the particle, 0 for none.
-        outline: Outline of the particle; with an interphase it is a circle.
-        thickness: Thickness of the interphase around it, 0 for none.
-        sizes: Edge length at (x1, x2) for the arcs of the interphase; `size` if left out.
+    Matrix 0, particle 1; absent phases have no key.
     """
     import gmsh
 
     geo = gmsh.model.geo
     if not radius:
-        return {0: _square(geo, size)}
+        surface = geo.addPlaneSurface([_square_loop(geo, size)])
+        geo.synchronize()
+        return {0: [surface]}
     if not thickness:
         particle, matrix = _particle(geo, size, radius, outline)
         return {1: [particle], 0: [matrix]}
@@ -127,13 +122,6 @@ def _square_loop(geo: Any, size: float) -> int:
         affine[:2, 3] = shift
         gmsh.model.mesh.setPeriodic(1, [second], [first], affine.ravel().tolist())
     return int(geo.addCurveLoop(sides))
-
-
-def _square(geo: Any, size: float) -> list[int]:
-    """Tag of the surface of a cell without a particle, in a list."""
-    surface = geo.addPlaneSurface([_square_loop(geo, size)])
-    geo.synchronize()
-    return [surface]
 
 
 def _quarter_steps(inner: float, outer: float, sizes: Sizes) -> int:

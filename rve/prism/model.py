@@ -269,11 +269,7 @@ def _with_errors(
 
 
 def _mean_moduli(curve: StressCurve) -> Array:
-    """Mean C11 + C12, C11 − C12 and C33 over θ in Pa, in three versions, shape (1 or 3, 3).
-
-    With the mean of C11 and C22, with C11, and with C22; without a third load with C11 alone, where
-    C11 − C12 is nan.
-    """
+    """Mean C11 + C12, C11 − C12 and C33 over θ by `axial_moduli`; of two loads with C11 alone."""
     s11, s12 = curve.mean
     if curve.stiffness is None:
         return np.array([[s11 / STRAIN, np.nan, s12 / (2 * STRAIN)]])

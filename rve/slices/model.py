@@ -163,15 +163,7 @@ def solve_slice(
 
     The error is the larger of two distances of order 4 from order 5, on the same mesh and on a
     second one, each with a safety factor. Without the symmetry of the square, the larger of the
-    errors with C11 and with C22 counts.
-
-    Args:
-        radius: Radius of the particle over half the cell's side.
-        matrix: Phase outside it.
-        inclusions: Phases of the particle.
-        mesh_size: Edge length of the mesh of the result, in halves of the cell's side.
-        outline: Outline of the particle.
-        interphase: Ring around a round particle.
+    errors with C11 and with C22 counts. `radius` and `mesh_size` are in halves of the cell's side.
     """
     thickness = thickness_of(interphase)
     ring = () if interphase is None else (interphase.phase,)

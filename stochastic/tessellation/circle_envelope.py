@@ -101,11 +101,7 @@ def upper_envelopes(a: Array, b: Array, c: Array, counts: Ints) -> Arcs:
 def _sweep(
     a: Array, b: Array, c: Array, table: Ints, group: Ints
 ) -> tuple[Ints, Ints, Array, Array]:
-    """Arcs of n upper envelopes by one sweep of all around the circle, from crossing to crossing.
-
-    The tables (n, w) have a row for each group, whose numbers are `group`, and the index of each
-    function among all groups. The arcs are as of `Arcs`.
-    """
+    """Arcs of n upper envelopes by one sweep around the circle, from functions in tables (n, w)."""
     row = np.arange(len(a), dtype=np.intp)
     highest = np.argmax(np.hypot(a, b) + c, axis=1)  # its maximum is on the envelope
     phi = np.arctan2(b[row, highest], a[row, highest])
