@@ -11,7 +11,7 @@ Example:
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from alphacut.rve.cell.cell import LOADS, STRAIN, Cell, Interphase, Phase, VoigtPhase
+from alphacut.rve.cell.cell import LOADS, STRAIN, Cell, Phase, VoigtPhase
 from alphacut.rve.cell.outline import Ellipse
 from alphacut.rve.result.result import HomogenisedStiffness, StressCurve, effective_modulus
 from alphacut.rve.series.model import SeriesModel
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from alphacut.rve.slices.model import SlicesModel
 
 __all__ = [
-    "LOADS", "STRAIN", "Cell", "Ellipse", "HomogenisedStiffness", "Interphase", "LevelSetModel",
+    "LOADS", "STRAIN", "Cell", "Ellipse", "HomogenisedStiffness", "LevelSetModel",
     "MeshModel", "Phase", "PrismModel", "ProductSpace", "SeriesModel", "SlicesModel",
     "StressCurve", "VoigtPhase", "cell_fields", "effective_modulus",
 ]  # fmt: skip

@@ -18,7 +18,6 @@ from alphacut.case.material import (
 from alphacut.case.radius import AnyRadius, RadiusMapSection, ThetaSection
 from alphacut.case.types import NotEmpty, Section, after, distinct, require_alone
 from alphacut.fuzzy.refused import RefusedError, require
-from alphacut.rve.cell.outline import CLOSEST
 
 Stage = Literal["microstructure", "modulus", "envelope"]
 
@@ -95,7 +94,6 @@ class CellContent(Section):
     def require_consistent(self) -> None:
         """Refuses sections that do not fit each other."""
         self._require_mesh()
-        self._require_interphase()
         self._require_stages()
 
     def _require_mesh(self) -> None:
@@ -116,19 +114,6 @@ class CellContent(Section):
         tolerance, cure = self.modulus.tolerance, "compare a coarser mesh"
         allowed = "none beside mesh.file, whose error nobody knows"
         require(tolerance is None, "modulus.tolerance", tolerance, allowed, cure=cure)
-
-    def _require_interphase(self) -> None:
-        """Refuses an interphase that reaches the sides of the cell; lengths over half a side."""
-        cell = self.particle_cell
-        law = None if cell is None else self.radius_map or cell.fraction_map
-        if cell is None or law is None or cell.interphase_thickness is None:
-            return
-        if "microstructure" in self.stages:  # which is yet to give the radius
-            return
-        radius, thickest = law.largest_radius, cell.interphase_thickness.support.upper
-        fits = radius + thickest < CLOSEST  # the largest outer radius that can be meshed
-        allowed = f"values below {CLOSEST - radius:.4g}, beside radii up to {radius:.4g}"
-        require(fits, "cell.interphase_thickness", f"{thickest:g}", allowed)
 
     def _require_stages(self) -> None:
         """Refuses stages without their sections, two sources of the radius, and unfit methods."""

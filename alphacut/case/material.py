@@ -24,7 +24,7 @@ from alphacut.case.types import (
 )
 from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.fuzzy.refused import RefusedError, require
-from alphacut.rve.cell.cell import THINNEST, Phase, VoigtPhase
+from alphacut.rve.cell.cell import Phase, VoigtPhase
 from alphacut.rve.cell.outline import Ellipse, circle, reach
 from alphacut.stochastic.particles.particles import DISCS, SPHERES, Shape
 
@@ -88,8 +88,6 @@ class MeshedCell(Section):
         require(is_complete, key, None, "a loss factor of each phase, 0 for none")
 
 
-Thickness = Annotated[FuzzyNumber, Quantity(minimum=THINNEST, below=1, fuzzy=True)]
-
 ELLIPSES = re.compile(r"^ellipses\(([^,]*),([^,]*)\)$")
 
 SHAPES = (
@@ -98,7 +96,6 @@ SHAPES = (
 
 
 LOSSES = "matrix_loss", "inclusion_loss"
-INTERPHASE = "interphase_thickness", "interphase_modulus", "interphase_poisson"
 
 
 class RoundCell(Section):
@@ -120,12 +117,6 @@ class RoundCell(Section):
     """loss factor tan δ of the matrix's stiffness, as 2 %"""
     inclusion_loss: Loss | None = None
     """loss factor of the particle's stiffness"""
-    interphase_thickness: Thickness | None = None
-    """thickness of a ring around the particle over half the cell's side"""
-    interphase_modulus: Modulus | None = None
-    """Young's modulus of the ring"""
-    interphase_poisson: Ratio | None = None
-    """Poisson's ratio of the ring"""
     fraction: Radius | None = Field(
         default=None,
         description="area fraction, below π/4, or volume fraction of spheres, below π/6, of"
@@ -134,10 +125,10 @@ class RoundCell(Section):
 
     @property
     def constants(self) -> dict[str, FuzzyNumber]:
-        """The elastic constants by name, and the thickness of an interphase."""
-        phases = ("matrix", "inclusion", "interphase")
-        names = [f"{phase}_{constant}" for phase in phases for constant in ("modulus", "poisson")]
-        pairs = [(name, getattr(self, name)) for name in (*names, "interphase_thickness")]
+        """The elastic constants by name."""
+        phases, constants = ("matrix", "inclusion"), ("modulus", "poisson")
+        names = [f"{phase}_{constant}" for phase in phases for constant in constants]
+        pairs = [(name, getattr(self, name)) for name in names]
         return {name: number for name, number in pairs if isinstance(number, FuzzyNumber)}
 
     @property
@@ -161,8 +152,7 @@ class RoundCell(Section):
     @property
     def has_series(self) -> bool:
         """True where the series has a formula: round particles of one isotropic material."""
-        others = (self.outline, self.stiffness, self.interphase_thickness)
-        return all(x is None for x in others)
+        return self.outline is None and self.stiffness is None
 
     @property
     def methods(self) -> tuple[str, ...]:
@@ -208,11 +198,6 @@ class RoundCell(Section):
             allowed = f"values below {touching:.6g}, where particles touch"
             require(fits, "cell.fraction", value, allowed)
         self.require_together("cell", LOSSES, "a loss of either phase, 0 for none")
-        self.require_together("cell", INTERPHASE, f"all of {', '.join(INTERPHASE)}")
-        if self.interphase_thickness is not None:
-            key, fits = "cell.interphase_thickness", self.particles == "cylinders"
-            require(fits, key, f"beside {self.particles}", "a ring around cylinders")
-            require(not self.losses, "cell.matrix_loss", "beside a ring", "no losses")
 
 
 class ImageCell(Section):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -52,19 +52,11 @@ class RadiusMapSection(ThetaSection):
         a1, a2, a3, a4 = (values[name] for name in self.numbers)
         return HermiteMap(a1, a2, a3, a4, self.law)
 
-    @property
-    def largest_radius(self) -> float:
-        """Largest radius at the corners of the supports."""
-        return max(self.at(corner).extremes()[1] for corner in self._corners())
-
-    def _corners(self) -> Iterator[dict[str, float]]:
-        """Yields the corners of the supports, which suffice: the map is linear in a1 … a4."""
-        for corner in itertools.product(*({*x.support} for x in self.numbers.values())):
-            yield dict(zip(self.numbers, corner, strict=True))
-
     def require_consistent(self) -> None:
         """Refuses supports of a1 … a4 for which the radius leaves (0, 1) at some θ."""
-        for corner in self._corners():
+        # corners of the supports suffice, as the map is linear in a1 … a4
+        for ends in itertools.product(*({*x.support} for x in self.numbers.values())):
+            corner = dict(zip(self.numbers, ends, strict=True))
             try:
                 self.at(corner)  # refuses such a map
             except RefusedError as error:
@@ -88,11 +80,6 @@ class FractionMap:
     def law(self) -> TruncatedNormal:
         """Law of θ, on which nothing depends."""
         return TruncatedNormal(*self.theta)
-
-    @property
-    def largest_radius(self) -> float:
-        """Largest radius of the support."""
-        return float(self.shape.reduced_radius(self.fraction.support.upper))
 
     def at(self, values: Mapping[str, float]) -> HermiteMap:
         """The map at a crisp fraction."""

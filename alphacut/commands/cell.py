@@ -82,8 +82,7 @@ def export(problem: CellProblem, path: Path) -> Document:
         fields = mesh_fields(MeshModel(mesh.file), problem.radius.law, nominal)
     else:
         model = PrismModel(mesh.size, mesh.layers, outline=nominal.outline)
-        phases = nominal.matrix, nominal.inclusion, nominal.interphase
-        fields = cell_fields(model, nominal.radius, *phases)
+        fields = cell_fields(model, nominal.radius, nominal.matrix, nominal.inclusion)
     return {"file": str(path), "nodes": write_cell(fields, path)}
 
 
@@ -123,7 +122,7 @@ def document_of(result: HomogenisedStiffness) -> Document:
 def fibres(result: HomogenisedStiffness) -> Document:
     """Constants of fibres with their declared errors, moduli in GPa; empty for other particles."""
     cell = result.cell
-    if isinstance(result, HomogenisedSpheres) or cell is None or not cell.square or cell.interphase:
+    if isinstance(result, HomogenisedSpheres) or cell is None or not cell.square:
         return {}
     constants = fibre_constants(result)
     return dict(_constant(x, value, constants.errors[x]) for x, value in constants.values.items())

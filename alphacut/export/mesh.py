@@ -19,14 +19,14 @@ from alphacut.case.material import Mesh
 from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.fuzzy.refused import FailedError
 from alphacut.io.files import say, whole_file
-from alphacut.rve.cell.cell import Cell, thickness_of
+from alphacut.rve.cell.cell import Cell
 from alphacut.rve.mesh.gmsh_prisms import ABAQUS_ORDER
 
 if TYPE_CHECKING:
     from pyvista import PolyData, UnstructuredGrid
 
-COLOURS = "#f0a860", "#b79ad9", "#7fb59a"
-"""Of matrix and particle, orange and lilac as in the paper, and of an interphase."""
+COLOURS = "#f0a860", "#b79ad9"
+"""Of matrix and particle, orange and lilac as in the paper."""
 PIXELS = (1000, 1100)
 FLATTENED = 0.6  # scale of the θ-axis in the picture
 EDGES = np.column_stack([[0, 1, 2, 3, 4, 5, 0, 1, 2], range(6, 15), [1, 2, 0, 4, 5, 3, 3, 4, 5]])
@@ -60,17 +60,15 @@ def draw_mesh(cell: Cell, mesh: Mesh, path: Path) -> bool:
 def prism_mesh(cell: Cell, mesh: Mesh) -> tuple[Array, Ints, Ints]:
     """Points (n, 3), cells (m, 15) in VTK's order and phases (m,) of the mesh of a case."""
     from alphacut.rve.mesh.columns import extrude
-    from alphacut.rve.mesh.prism_grid import RING_THICKNESS, reference_radius
+    from alphacut.rve.mesh.prism_grid import reference_radius
 
-    thickness = thickness_of(cell.interphase)
     grid = extrude(
         size=mesh.size,
-        radius=reference_radius(cell.radius, cell.outline, thickness),
+        radius=reference_radius(cell.radius, cell.outline),
         layers=mesh.layers,
         outline=cell.outline,
-        thickness=RING_THICKNESS if thickness else 0.0,
     )
-    return grid.positions(cell.radius, thickness), grid.cells[:, ABAQUS_ORDER], grid.phase
+    return grid.positions(cell.radius), grid.cells[:, ABAQUS_ORDER], grid.phase
 
 
 def draw_wedges(file: str, picture: str) -> None:

@@ -17,7 +17,7 @@ from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.io.problem import missing
-from alphacut.rve.cell.cell import AnyPhase, Cell, Interphase, Phase
+from alphacut.rve.cell.cell import AnyPhase, Cell, Phase
 from alphacut.rve.cell.outline import circle
 from alphacut.rve.result.moduli import AXES, hashin_shtrikman, plane_constants
 from alphacut.rve.result.result import HomogenisedStiffness
@@ -63,10 +63,8 @@ def _solve_cells(
 ) -> list[HomogenisedStiffness]:
     """Result of each sample by a model of rve; `is_averaged`: E and ν of the isotropic average."""
     if isinstance(samples[0], Cell):
-        first = samples[0]
-        interphase = () if first.interphase is None else (first.interphase,)
-        inclusions = [sample.inclusion for sample in samples]
-        results = model.solve(first.radius, first.matrix, inclusions, *interphase)
+        first, inclusions = samples[0], [sample.inclusion for sample in samples]
+        results = model.solve(first.radius, first.matrix, inclusions)
     else:
         results = [model.solve(law, phases)[0] for phases in samples]
     return [result.with_average("isotropic") for result in results] if is_averaged else results
@@ -147,15 +145,12 @@ class CellProblem:
         if isinstance(self.cell, MeshedCell):
             phases = self.cell.phases.items()
             return {name: phase.phase(values.get(f"{name}_modulus")) for name, phase in phases}
-        interphase, radius = None, cast("AnyRadius", self.radius).at(values)
+        radius = cast("AnyRadius", self.radius).at(values)
         matrix = Phase(values["matrix_modulus"], values["matrix_poisson"])
         inclusion: AnyPhase | None = self.cell.stiffness
         if inclusion is None:
             inclusion = Phase(values["inclusion_modulus"], values["inclusion_poisson"])
-        if self.cell.interphase_thickness is not None:
-            phase = Phase(values["interphase_modulus"], values["interphase_poisson"])
-            interphase = Interphase(values["interphase_thickness"], phase)
-        return Cell(matrix, inclusion, radius, self.cell.outline or circle, interphase)
+        return Cell(matrix, inclusion, radius, self.cell.outline or circle)
 
     @property
     def nominal(self) -> Any:
@@ -170,8 +165,7 @@ class CellProblem:
         """Particle fraction and Hashin–Shtrikman bounds of E at the nominal inputs.
 
         The bounds are at the stated fraction, else at the mean fraction of the radius map. Of
-        anisotropic phases or with an interphase there is `fraction` alone; nothing of a mesh from a
-        file.
+        anisotropic phases there is `fraction` alone; nothing of a mesh from a file.
         """
         if isinstance(self.cell, MeshedCell):
             return {}
@@ -182,7 +176,7 @@ class CellProblem:
         radii = nominal.radius(rule.nodes)
         fractions = volume_fraction(radii) if spheres else nominal.fraction(rule.nodes)
         found: References = {"fraction": float(np.asarray(rule.mean(fractions)))}
-        if not isinstance(matrix, Phase) or not isinstance(inclusion, Phase) or nominal.interphase:
+        if not isinstance(matrix, Phase) or not isinstance(inclusion, Phase):
             return found
         fraction = np.asarray(found["fraction"] if stated is None else stated)
         if stated is not None:

@@ -196,7 +196,7 @@ class Campaign:
 
 
 def _evaluate(campaign: Campaign, points: Array) -> dict[int, Outcome]:
-    """Sample or failure by row of new points (n, inputs), from the store or evaluated and stored."""
+    """Sample or failure by row of new points (n, inputs), from the store, or evaluated for it."""
     store, outcomes, unwritten = campaign.store, dict[int, Outcome](), dict[str, Sample]()
     keys = [point_key(campaign.call.names, point) for point in points] if store else []
     for row, key in enumerate(keys):

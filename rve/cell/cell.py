@@ -16,7 +16,6 @@ from alphacut.stochastic import RadiusMap, require_map
 
 AREA = 4.0  # of the cell, in halves of its side
 STRAIN = 0.01  # eq. 15
-THINNEST = 1e-4  # interphase, in halves of the cell's side
 NOT_IN_PA = (0.01, 1e4)  # range of E that solids have in GPa or MPa, but softer than gels in Pa
 # eq. 15 as (ε11, ε22, 2 ε12); ε12 is the tensor component
 LOADS = np.array([[STRAIN, STRAIN, 0.0], [0.0, 0.0, 2 * STRAIN]])
@@ -112,29 +111,6 @@ AnyPhase = Phase | VoigtPhase
 
 
 @dataclass(frozen=True)
-class Interphase:
-    """Ring of a third material around a round particle.
-
-    Args:
-        thickness: In halves of the cell's side, from `THINNEST` to below 1; the same at all θ.
-        phase: Its material.
-    """
-
-    thickness: float
-    phase: Phase
-
-    def __post_init__(self) -> None:
-        if not THINNEST <= self.thickness < 1:
-            allowed = f"values from {THINNEST:g} below 1, in halves of the cell's side"
-            raise RefusedError("thickness of the interphase", f"{self.thickness:g}", allowed)
-
-
-def thickness_of(interphase: Interphase | None) -> float:
-    """Thickness of an interphase, 0 where there is none."""
-    return 0.0 if interphase is None else interphase.thickness
-
-
-@dataclass(frozen=True)
 class Cell:
     """Periodic square cell of side 2 with one centred particle of random radius r(θ).
 
@@ -143,20 +119,17 @@ class Cell:
         inclusion: Material of the particle.
         radius: Map θ ↦ r(θ) in (0, 1), with the law of θ.
         outline: Distance of the particle's edge from its centre over r(θ), a function of the angle.
-        interphase: Ring around a round particle, if there is one.
     """
 
     matrix: AnyPhase
     inclusion: AnyPhase
     radius: RadiusMap
     outline: Outline = circle
-    interphase: Interphase | None = None
 
     @property
     def phases(self) -> tuple[AnyPhase, ...]:
-        """Matrix, particle and interphase."""
-        ring = () if self.interphase is None else (self.interphase.phase,)
-        return self.matrix, self.inclusion, *ring
+        """Matrix and particle."""
+        return self.matrix, self.inclusion
 
     def fraction(self, theta: Array) -> Array:
         """Area fraction of the particle at θ of any shape."""
@@ -164,11 +137,8 @@ class Cell:
 
     def fractions(self, theta: Array) -> Array:
         """Area fractions of the phases at θ, shape (phases, n)."""
-        inner, rings = self.fraction(theta), []
-        if self.interphase is not None:
-            outer = self.radius(theta) + self.interphase.thickness
-            rings = [np.pi * outer**2 / AREA - inner]
-        return np.stack([1 - inner - sum(rings), inner, *rings])
+        inner = self.fraction(theta)
+        return np.stack([1 - inner, inner])
 
     @property
     def stiffness(self) -> tuple[Array, ...]:
@@ -220,15 +190,6 @@ def require_compressible(*phases: AnyPhase) -> None:
     if ratio > MAX_POISSON:
         cure = "finite elements lock above: take the series"
         raise RefusedError("Poisson's ratio", f"{ratio:g}", f"values up to {MAX_POISSON:g}", cure)
-
-
-def require_interphase(interphase: Interphase | None, outline: Outline) -> None:
-    """Refuse an interphase in which elements lock, or around a particle that is not round."""
-    if interphase is None:
-        return
-    require_compressible(interphase.phase)
-    if not is_round(outline):
-        raise RefusedError("interphase", "around an outline", "one around round particles")
 
 
 def require_parts(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, TypeVar, cast
 
@@ -14,9 +13,9 @@ from scipy.sparse.csgraph import connected_components
 from alphacut.fuzzy.arrays import Array, Ints, Mask
 from alphacut.rve.cell.outline import Outline, circle, is_round
 from alphacut.rve.mesh import square
-from alphacut.rve.mesh.gmsh_prisms import INCLUSION, INTERPHASE, Prisms, extruded
+from alphacut.rve.mesh.gmsh_prisms import INCLUSION, Prisms, extruded
 from alphacut.rve.mesh.periodicity import SAME_PLACE, MeshError
-from alphacut.rve.mesh.prism_grid import PrismGrid, Ring, Triangulation
+from alphacut.rve.mesh.prism_grid import PrismGrid, Triangulation
 from alphacut.rve.mesh.square import REFINEMENTS, Sizes, bend_grading
 
 if TYPE_CHECKING:
@@ -36,7 +35,6 @@ def extrude(
     layers: int,
     outline: Outline = circle,
     refinement: float = REFINEMENTS[0],
-    thickness: float = 0.0,
     comm: MPI.Intracomm | None = None,
 ) -> PrismGrid:
     """Mesh the cell by Gmsh's triangles, opposite sides matching, and extrude them over θ.
@@ -48,16 +46,14 @@ def extrude(
         layers: Along θ, at least 1.
         outline: Of the particle.
         refinement: Of the edges along an outline that is not round; see `bend_grading`.
-        thickness: Of a ring around a round particle in the mesh, 0 for none.
         comm: Communicator, on whose first rank Gmsh runs; None: on this one.
     """
     sizes = None
     if radius and not is_round(outline):
         sizes = partial(_capped_size, size, bend_grading(outline, radius, refinement))
-    make_prisms = partial(extruded, size, radius, outline, layers, sizes, thickness)
+    make_prisms = partial(extruded, size, radius, outline, layers, sizes)
     prisms = make_prisms() if comm is None else from_first_rank(comm, make_prisms)
-    grid = grid_of(prisms, radius, outline)
-    return replace(grid, plane=replace(grid.plane, ring=_ring(grid, thickness)))
+    return grid_of(prisms, radius, outline)
 
 
 def from_first_rank(comm: MPI.Intracomm, make: Callable[[], T]) -> T:
@@ -72,17 +68,6 @@ def from_first_rank(comm: MPI.Intracomm, make: Callable[[], T]) -> T:
     if isinstance(result, Exception):
         raise result
     return cast("T", result)
-
-
-def _ring(grid: PrismGrid, thickness: float) -> Ring | None:
-    """Interphase of a mesh with the mask of its planar nodes; None if the thickness is 0."""
-    if not thickness:
-        return None
-    plane = grid.plane
-    in_ring = grid.phase[: len(plane.triangles)] == grid.names.index(INTERPHASE)
-    nodes: Mask = np.zeros(len(plane.points), bool)
-    nodes[plane.triangles[in_ring]] = True
-    return Ring(thickness, nodes)
 
 
 def grid_of(

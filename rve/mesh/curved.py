@@ -18,7 +18,7 @@ from alphacut.rve.fenicsx import basix
 from alphacut.rve.mesh import square
 from alphacut.rve.mesh.square import REFINEMENTS, Sizes, bend_grading, particle_grading
 
-MATRIX, PARTICLE, INTERPHASE = range(3)
+PARTICLE = 1  # number of its phase; the matrix is 0
 COARSEST = 0.7  # mesh size: on coarser ones small particles hide from every order
 
 ORDERS = 2, 3, 4, 5
@@ -33,10 +33,9 @@ class PlaneMesh:
         points: Vertices, shape (n, 2).
         triangles: Vertices of each triangle in rising order, shape (m, 3), so that two neighbours
             run along their edge the same way.
-        phase: Phase of a triangle: matrix 0, particle 1, interphase 2, shape (m,).
+        phase: Phase of a triangle: matrix 0, particle 1, shape (m,).
         radius: Radius of the particle.
         outline: Of the particle.
-        thickness: Of the interphase around a round one, 0 for none.
     """
 
     points: Array
@@ -44,7 +43,6 @@ class PlaneMesh:
     phase: Ints
     radius: float
     outline: Outline = circle
-    thickness: float = 0.0
 
     @property
     def inside(self) -> Mask:
@@ -52,9 +50,7 @@ class PlaneMesh:
         return np.asarray(self.phase == PARTICLE)
 
 
-def plane_mesh(
-    radius: float, *, size: float, outline: Outline = circle, thickness: float = 0.0
-) -> PlaneMesh:
+def plane_mesh(radius: float, *, size: float, outline: Outline = circle) -> PlaneMesh:
     """Mesh one cell, finer where the particle is small or nearly touches its images.
 
     `size` is the edge length far from the interface, in (0, 1]; lengths are in halves of the side.
@@ -64,10 +60,10 @@ def plane_mesh(
             outline is so sharp that elements fold however short they are.
     """
     require_mesh_size(size)
-    require_fit(outline, radius + thickness, CLOSEST)
-    size, near_particle = min(size, COARSEST), particle_grading(outline, radius, thickness)
+    require_fit(outline, radius, CLOSEST)
+    size, near_particle = min(size, COARSEST), particle_grading(outline, radius)
     if is_round(outline):
-        return _graded_mesh(radius, size, outline, near_particle, thickness)
+        return _graded_mesh(radius, size, outline, near_particle)
     for refinement in REFINEMENTS:
         bend = bend_grading(outline, radius, refinement)
         sizes = partial(_smaller_size, near_particle, bend)
@@ -92,19 +88,17 @@ def _smaller_size(first: Sizes, second: Sizes, x: float, y: float) -> float:
     return min(first(x, y), second(x, y))
 
 
-def _graded_mesh(
-    radius: float, size: float, outline: Outline, sizes: Sizes, thickness: float = 0.0
-) -> PlaneMesh:
+def _graded_mesh(radius: float, size: float, outline: Outline, sizes: Sizes) -> PlaneMesh:
     """Mesh with edges of length size · sizes(x1, x2), the interface's vertices on the outline."""
     points, triangles, phase = square.triangles(
-        size, radius, outline, lambda x, y: size * sizes(x, y), thickness
+        size, radius, outline, lambda x, y: size * sizes(x, y)
     )
     inside = phase == PARTICLE
     on_interface = np.intersect1d(triangles[inside], triangles[~inside])
     x, y = points[on_interface].T  # Gmsh's splines are near the outline only
     on_outline = radius * outline(np.arctan2(y, x))
     points[on_interface] *= (on_outline / np.hypot(x, y))[:, None]
-    return PlaneMesh(points, np.sort(triangles, axis=1), phase, radius, outline, thickness)
+    return PlaneMesh(points, np.sort(triangles, axis=1), phase, radius, outline)
 
 
 def curved_nodes(mesh: PlaneMesh, order: int) -> tuple[Array, Ints]:
@@ -114,16 +108,12 @@ def curved_nodes(mesh: PlaneMesh, order: int) -> tuple[Array, Ints]:
     )
     lattice: Array = np.asarray(element.points, float)
     barycentric = np.column_stack([1 - lattice.sum(axis=1), lattice])
-    ends, edges, _ = square.edges(mesh.triangles, mesh.inside)
+    ends, edges, on_interface = square.edges(mesh.triangles, mesh.inside)
     positions = np.einsum("nl,eld->end", barycentric, mesh.points[mesh.triangles])
-    for mask, radius in _interfaces(mesh):
-        on_interface = square.edges(mesh.triangles, mask)[2]
-        for k, (a, b) in enumerate(square.EDGES):
-            bent = np.flatnonzero(on_interface[edges[:, k]])
-            edge_ends = mesh.triangles[bent][:, [a, b]]
-            positions[bent] += _bend_onto_outline(mesh, radius, edge_ends, barycentric[:, [a, b]])
-    ring = mesh.phase == INTERPHASE
-    positions[ring] = _polar_positions(mesh.points[mesh.triangles[ring]], barycentric)
+    for k, (a, b) in enumerate(square.EDGES):
+        bent = np.flatnonzero(on_interface[edges[:, k]])
+        edge_ends = mesh.triangles[bent][:, [a, b]]
+        positions[bent] += _bend_onto_outline(mesh, edge_ends, barycentric[:, [a, b]])
     cells = _lagrange_nodes(mesh.triangles, edges, (len(mesh.points), len(ends)), order)
     points = np.empty((cells.max() + 1, 2))
     points[cells] = positions
@@ -131,7 +121,7 @@ def curved_nodes(mesh: PlaneMesh, order: int) -> tuple[Array, Ints]:
 
 
 def _lagrange_nodes(triangles: Ints, edges: Ints, counts: tuple[int, int], order: int) -> Ints:
-    """Nodes of Lagrange triangles in Basix's order, from vertices and edges, (m, 3), and `counts`."""
+    """Nodes of Lagrange triangles in Basix's order, from vertices and edges, (m, 3) each."""
     # numbered first are vertices, then the nodes inside edges, then inside triangles
     vertices, edge_count = counts
     per_edge, per_triangle = order - 1, (order - 1) * (order - 2) // 2
@@ -140,26 +130,7 @@ def _lagrange_nodes(triangles: Ints, edges: Ints, counts: tuple[int, int], order
     return np.hstack([triangles, *on_edges, first[:, None] + np.arange(per_triangle)])
 
 
-def _interfaces(mesh: PlaneMesh) -> list[tuple[Mask, float]]:
-    """Triangles inside each interface, and its radius."""
-    inner = [(mesh.inside, mesh.radius)]
-    if not mesh.thickness:
-        return inner
-    return [*inner, (mesh.phase != MATRIX, mesh.radius + mesh.thickness)]
-
-
-def _polar_positions(corners: Array, barycentric: Array) -> Array:
-    """Nodes of triangles with corners (k, 3, 2), interpolated in polar coordinates, (k, nodes, 2)."""
-    # both circles of a ring are then one curve at two scales, which do not meet however thin it is
-    angle = np.arctan2(corners[..., 1], corners[..., 0])
-    difference = (angle - angle[:, :1] + np.pi) % (2 * np.pi) - np.pi  # across ±π too
-    angles = (angle[:, :1] + difference) @ barycentric.T
-    distance = np.hypot(corners[..., 0], corners[..., 1]) @ barycentric.T
-    unit = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
-    return np.asarray(distance[..., None] * unit)
-
-
-def _bend_onto_outline(mesh: PlaneMesh, radius: float, ends: Ints, weights: Array) -> Array:
+def _bend_onto_outline(mesh: PlaneMesh, ends: Ints, weights: Array) -> Array:
     """Displacements that bend an edge of k triangles, `ends` (k, 2), onto the outline."""
     # inside a triangle they fade with the bubble of the edge, so that the map stays smooth and the
     # elements keep their order; `weights` are the nodes' barycentric coordinates at its ends
@@ -168,7 +139,7 @@ def _bend_onto_outline(mesh: PlaneMesh, radius: float, ends: Ints, weights: Arra
     difference = (angle_b - angle_a + np.pi) % (2 * np.pi) - np.pi  # across ±π too
     along = (1 + weights[:, 1] - weights[:, 0]) / 2  # from 0 at a to 1 at b
     angle = angle_a[:, None] + difference[:, None] * along
-    distance = radius * np.asarray(mesh.outline(angle))
+    distance = mesh.radius * np.asarray(mesh.outline(angle))
     arc = distance[..., None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     chord = a[:, None] + (b - a)[:, None] * along[:, None]
     bubble = weights.prod(axis=1)

@@ -18,7 +18,7 @@ from alphacut.rve.mesh.periodicity import MeshError
 
 PRISM_15 = 18
 """Gmsh's type of the element."""
-MATRIX, INCLUSION, INTERPHASE = NAMES = "matrix", "inclusion", "interphase"
+MATRIX, INCLUSION = NAMES = "matrix", "inclusion"
 """Names of the phases in their order."""
 
 
@@ -45,21 +45,19 @@ def extruded(
     outline: Outline,
     layers: int,
     sizes: square.Sizes | None = None,
-    thickness: float = 0.0,
 ) -> Prisms:
     """Mesh the cell by Gmsh and extrude the triangles to prisms, θ from 0 to 1 in equal layers.
 
     Arguments as of `columns.extrude`; `sizes` is the edge length at (x1, x2) in place of `size`.
     """
     with square.model() as gmsh:
-        surfaces = square.surfaces(size, radius, outline, thickness)
-        planes = [(2, tag) for phase_surfaces in surfaces.values() for tag in phase_surfaces]
+        surfaces = square.surfaces(size, radius, outline)
+        planes = [(2, tag) for tag in surfaces.values()]
         extrusion = gmsh.model.geo.extrude(planes, 0, 0, 1, numElements=[layers], recombine=True)
         gmsh.model.geo.synchronize()
-        volumes = iter([tag for dimension, tag in extrusion if dimension == 3])
-        phase_volumes = {phase: [next(volumes) for _ in tags] for phase, tags in surfaces.items()}
-        for phase in sorted(phase_volumes):
-            gmsh.model.addPhysicalGroup(3, phase_volumes[phase], name=NAMES[phase])
+        volumes = [tag for dimension, tag in extrusion if dimension == 3]
+        for phase, volume in sorted(zip(surfaces, volumes, strict=True)):
+            gmsh.model.addPhysicalGroup(3, [volume], name=NAMES[phase])
         if sizes:
             square.grade(gmsh, sizes)
         gmsh.option.setNumber("Mesh.ElementOrder", 2)

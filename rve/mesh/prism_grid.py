@@ -17,17 +17,6 @@ from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.cell.outline import Outline, circle, reach, require_fit
 from alphacut.stochastic import RadiusMap, ThetaLaw, require_map
 
-RING_THICKNESS = 0.05
-"""Of an interphase in the mesh that is moved to all others, in halves of the cell's side."""
-
-
-@dataclass(frozen=True, eq=False)
-class Ring:
-    """Interphase in a planar mesh: its thickness, and the mask of its nodes, (n,)."""
-
-    thickness: float
-    nodes: Mask
-
 
 @dataclass(frozen=True, eq=False)
 class Triangulation:
@@ -44,7 +33,6 @@ class Triangulation:
         arc: Whether a node lies on the interface, shape (n,).
         radius: Radius of the particle in this mesh, 0 if the mesh has none.
         outline: Of the particle.
-        ring: Interphase around it, if there is one.
     """
 
     points: Array
@@ -55,12 +43,9 @@ class Triangulation:
     arc: Mask
     radius: float
     outline: Outline = circle
-    ring: Ring | None = None
 
 
-def reference_radius(
-    radius_map: RadiusMap, outline: Outline = circle, thickness: float = 0.0
-) -> float:
+def reference_radius(radius_map: RadiusMap, outline: Outline = circle) -> float:
     """Radius of the planar mesh that is moved to all radii of a map: the middle of its range.
 
     Rounded to 1/20, in [0.1, 0.9 / reach of the outline].
@@ -68,7 +53,7 @@ def reference_radius(
     require_map(radius_map)
     law = radius_map.distribution
     radii = radius_map(np.linspace(law.lower, law.upper, 65))
-    require_fit(outline, float(radii.max()) + thickness)
+    require_fit(outline, float(radii.max()))
     middle = np.round((radii.min() + radii.max()) * 10) / 20
     return float(np.clip(middle, 0.1, 0.9 / reach(outline)))
 
@@ -107,21 +92,19 @@ class LevelSet(FixedCell):
         return np.asarray(values < 0)
 
 
-def nodes_at_radii(mesh: Triangulation, radii: Array, thickness: float = 0.0) -> Array:
+def nodes_at_radii(mesh: Triangulation, radii: Array) -> Array:
     """Positions of all nodes of a planar mesh at k radii of its particle, shape (k, n, 2).
 
     Nodes slide along rays from the centre: inside the particle in proportion, outside between the
     outline and the side of the square. Edge midpoints slide too, so that the layers between a large
     particle and the side bend with it; only an edge across a diagonal of the square, where sliding
-    has a kink, stays straight. Nodes of an interphase of some thickness slide inside it.
+    has a kink, stays straight.
     """
     radius, (x, y) = radii[:, None], mesh.points.T
     distance, outline = np.hypot(x, y), np.asarray(mesh.outline(np.arctan2(y, x)))
     in_particle = np.zeros(len(distance), bool)
     in_particle[mesh.triangles[mesh.inside]] = True
     old_edge, new_edge = mesh.radius * outline, radius * outline
-    if mesh.ring is not None:
-        old_edge, new_edge = old_edge + mesh.ring.thickness, new_edge + thickness
     with np.errstate(divide="ignore", invalid="ignore"):  # at the centre
         side = distance / abs(mesh.points).max(axis=1)  # distance of the square's side on the ray
         stretch = (side - new_edge) / (side - old_edge)
@@ -133,23 +116,7 @@ def nodes_at_radii(mesh: Triangulation, radii: Array, thickness: float = 0.0) ->
     crosses_diagonal = ((x - y).prod(axis=0) < -1e-12) | ((x + y).prod(axis=0) < -1e-12)
     straight = np.flatnonzero(crosses_diagonal & ~mesh.arc[mesh.vertices :])
     points[:, mesh.vertices + straight] = points[:, mesh.ends[straight]].mean(axis=2)
-    if mesh.ring is not None:
-        points[:, mesh.ring.nodes] = _ring_positions(mesh, mesh.ring, radii, thickness)
     return np.asarray(points)
-
-
-def _ring_positions(mesh: Triangulation, ring: Ring, radii: Array, thickness: float) -> Array:
-    """Positions of the nodes of an interphase at k radii of the particle, shape (k, nodes, 2)."""
-    x, y = mesh.points[: mesh.vertices].T
-    depth = (np.hypot(x, y) - mesh.radius) / ring.thickness  # 0 at the particle, 1 at the matrix
-    angle = np.arctan2(y, x)
-    first, second = mesh.ends.T
-    difference = (angle[second] - angle[first] + np.pi) % (2 * np.pi) - np.pi  # across ±π too
-    depths = np.concatenate([depth, (depth[first] + depth[second]) / 2])[ring.nodes]
-    angles = np.concatenate([angle, angle[first] + difference / 2])[ring.nodes]
-    distance = radii[:, None] + thickness * depths
-    unit = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
-    return np.asarray(distance[..., None] * unit)
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,14 +162,14 @@ class PrismGrid:
         """θ of all levels over the support of a law, shape (layers + 1,)."""
         return np.asarray(law.lower + self.heights * (law.upper - law.lower))
 
-    def positions(self, radius: RadiusMap, thickness: float = 0.0) -> Array:
-        """(x1, x2, θ) of all nodes at a map and a thickness of the interphase, shape (nodes, 3)."""
+    def positions(self, radius: RadiusMap) -> Array:
+        """(x1, x2, θ) of all nodes at a map, shape (nodes, 3)."""
         if self.fixed is not None:
             return self.fixed
         levels = self.level_thetas(radius.distribution)
         half_levels = (levels[1:] + levels[:-1]) / 2
-        on_levels = self._planar_positions(radius, levels, thickness)
-        on_half_levels = self._planar_positions(radius, half_levels, thickness)
+        on_levels = self._planar_positions(radius, levels)
+        on_half_levels = self._planar_positions(radius, half_levels)
         blocks = []
         for theta, xy in (
             (levels, on_levels),
@@ -212,8 +179,8 @@ class PrismGrid:
             blocks.append(np.dstack([xy, heights]).reshape(-1, 3))
         return np.concatenate(blocks)
 
-    def _planar_positions(self, radius: RadiusMap, theta: Array, thickness: float) -> Array:
+    def _planar_positions(self, radius: RadiusMap, theta: Array) -> Array:
         """Positions of the planar nodes at each θ, shape (k, planar nodes, 2)."""
         if not self.conforming:
             return np.broadcast_to(self.plane.points, (len(theta), *self.plane.points.shape))
-        return nodes_at_radii(self.plane, radius(theta), thickness)
+        return nodes_at_radii(self.plane, radius(theta))

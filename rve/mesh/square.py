@@ -16,8 +16,6 @@ from alphacut.fuzzy.arrays import Array, Ints, Mask
 from alphacut.rve.cell.outline import Outline, bend_radii, extents, is_round
 
 Triangles = tuple[Array, Ints, Ints]
-RING_LAYERS = 2
-"""Layers of elements across an interphase; with quadratic ones E is off by some (thickness/2)⁴."""
 Sizes = Callable[[float, float], float]
 EDGES = ((1, 2), (0, 2), (0, 1))
 """Edges of a triangle by their vertices, in Basix's order."""
@@ -26,41 +24,32 @@ SPLINE_STEPS = 16, 128
 so that the spline keeps lobes apart. Vertices are put on the outline itself afterwards."""
 
 
-def triangles(
-    size: float, radius: float, outline: Outline, sizes: Sizes, thickness: float = 0.0
-) -> Triangles:
+def triangles(size: float, radius: float, outline: Outline, sizes: Sizes) -> Triangles:
     """Mesh the cell by Gmsh: vertices (n, 2), triangles (m, 3) and their phases (m,).
 
     Arguments as of `surfaces`; `sizes` is the edge length at (x1, x2).
     """
     with model() as gmsh:
-        phase_surfaces = surfaces(size, radius, outline, thickness, sizes)
+        phase_surfaces = surfaces(size, radius, outline)
         grade(gmsh, sizes)
         gmsh.model.mesh.generate(2)
         node_tags, xyz, _ = gmsh.model.mesh.getNodes()
         number = np.zeros(int(node_tags.max()) + 1, np.int64)
         number[node_tags] = np.arange(len(node_tags))
         cells, phases = [], []
-        for phase, surface_tags in phase_surfaces.items():
-            for surface in surface_tags:
-                vertex_tags = gmsh.model.mesh.getElementsByType(2, surface)[1].astype(np.int64)
-                cells.append(number[vertex_tags].reshape(-1, 3))
-                phases.append(np.full(len(cells[-1]), phase))
+        for phase, surface in phase_surfaces.items():
+            vertex_tags = gmsh.model.mesh.getElementsByType(2, surface)[1].astype(np.int64)
+            cells.append(number[vertex_tags].reshape(-1, 3))
+            phases.append(np.full(len(cells[-1]), phase))
     # the centres of arcs are points without triangles
     used, compact = np.unique(np.concatenate(cells), return_inverse=True)
     return xyz.reshape(-1, 3)[used, :2], compact.reshape(-1, 3), np.concatenate(phases)
 
 
-def surfaces(
-    size: float,
-    radius: float,
-    outline: Outline,
-    thickness: float = 0.0,
-    sizes: Sizes | None = None,
-) -> dict[int, list[int]]:
-    """Add the cell's geometry to the current Gmsh model; return its surfaces by phase number.
+def surfaces(size: float, radius: float, outline: Outline) -> dict[int, int]:
+    """Add the cell's geometry to the current Gmsh model; tags of its surfaces by phase number.
 
-    Matrix 0, particle 1; absent phases have no key.
+    Matrix 0, particle 1 unless its `radius` is 0; `size` is the edge length of elements.
     """
     import gmsh
 
@@ -68,13 +57,9 @@ def surfaces(
     if not radius:
         surface = geo.addPlaneSurface([_square_loop(geo, size)])
         geo.synchronize()
-        return {0: [surface]}
-    if not thickness:
-        particle, matrix = _particle(geo, size, radius, outline)
-        return {1: [particle], 0: [matrix]}
-    # elements along a quarter of the circles
-    steps = _quarter_steps(radius, radius + thickness, sizes or (lambda x, y: size))
-    return _particle_in_ring(geo, size, (radius, radius + thickness), steps)
+        return {0: surface}
+    particle, matrix = _particle(geo, size, radius, outline)
+    return {1: particle, 0: matrix}
 
 
 def edges(triangles: Ints, inside: Mask) -> tuple[Ints, Ints, Mask]:
@@ -124,42 +109,6 @@ def _square_loop(geo: Any, size: float) -> int:
     return int(geo.addCurveLoop(sides))
 
 
-def _quarter_steps(inner: float, outer: float, sizes: Sizes) -> int:
-    """Number of elements along a quarter of a ring, of the shortest edge of its outer circle."""
-    angles = np.linspace(0, np.pi / 2, 181)
-    shortest = min(sizes(outer * np.cos(angle), outer * np.sin(angle)) for angle in angles)
-    return max(2, int(np.ceil(np.pi / 2 * inner / shortest)))
-
-
-def _particle_in_ring(
-    geo: Any, size: float, radii: tuple[float, float], steps: int
-) -> dict[int, list[int]]:
-    """Add a round particle in a ring with a structured mesh; surface tags by phase."""
-    import gmsh
-
-    centre, quarters = geo.addPoint(0, 0, 0, size), [(k, (k + 1) % 4) for k in range(4)]
-    inner, outer = (_poles(geo, size, radius) for radius in radii)
-    inner_arcs = [geo.addCircleArc(inner[a], centre, inner[b]) for a, b in quarters]
-    outer_arcs = [geo.addCircleArc(outer[a], centre, outer[b]) for a, b in quarters]
-    spokes = [geo.addLine(*ends) for ends in zip(inner, outer, strict=True)]
-    inner_loop, outer_loop = geo.addCurveLoop(inner_arcs), geo.addCurveLoop(outer_arcs)
-    particle = geo.addPlaneSurface([inner_loop])
-    matrix = geo.addPlaneSurface([_square_loop(geo, size), outer_loop])
-    ring = []
-    for a, b in quarters:
-        sector = geo.addCurveLoop([spokes[a], outer_arcs[a], -spokes[b], -inner_arcs[a]])
-        ring.append(geo.addPlaneSurface([sector]))
-    for curve in (*inner_arcs, *outer_arcs):
-        geo.mesh.setTransfiniteCurve(curve, steps + 1)
-    for curve in spokes:
-        geo.mesh.setTransfiniteCurve(curve, RING_LAYERS + 1)
-    for surface in ring:
-        geo.mesh.setTransfiniteSurface(surface)
-    geo.synchronize()
-    gmsh.model.mesh.embed(0, [centre], 2, particle)
-    return {1: [particle], 0: [matrix], 2: ring}
-
-
 def _poles(geo: Any, size: float, radius: float) -> list[int]:
     """Add the points of a circle on the axes, exact, so that meshes are the same everywhere."""
     axes = ((1, 0), (0, 1), (-1, 0), (0, -1))
@@ -207,11 +156,10 @@ REFINEMENTS = (0.5, 0.75, 1.1, 1.7, 2.5, 4.0)
 """Factors of `bend_grading` that are tried one after the other until all elements are valid."""
 
 
-def particle_grading(outline: Outline, radius: float, thickness: float = 0.0) -> Sizes:
+def particle_grading(outline: Outline, radius: float) -> Sizes:
     """Edge length at (x1, x2) near a particle and in gaps, over the nominal one."""
     half_width, half_height, min_distance = (radius * extent for extent in extents(outline))
-    outer = half_width + thickness, half_height + thickness
-    return lambda x, y: _size_near_particle(x, y, *outer, min_distance)
+    return lambda x, y: _size_near_particle(x, y, half_width, half_height, min_distance)
 
 
 def bend_grading(outline: Outline, radius: float, refinement: float) -> Sizes:

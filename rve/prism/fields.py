@@ -9,7 +9,7 @@ from itertools import permutations
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Ints
-from alphacut.rve.cell.cell import THREE_LOADS, AnyPhase, Cell, Interphase, thickness_of
+from alphacut.rve.cell.cell import THREE_LOADS, AnyPhase, Cell
 from alphacut.rve.fenicsx import at_points, fem
 from alphacut.rve.mesh.wedge import vertices_and_midpoints
 from alphacut.rve.prism.model import PrismModel
@@ -93,20 +93,17 @@ def _tetrahedra_nodes(columns: tuple[int, ...]) -> Ints:
 
 
 def cell_fields(
-    model: PrismModel,
-    radius_map: RadiusMap,
-    matrix: AnyPhase,
-    inclusion: AnyPhase,
-    interphase: Interphase | None = None,
+    model: PrismModel, radius_map: RadiusMap, matrix: AnyPhase, inclusion: AnyPhase
 ) -> CellFields:
     """Fields of one cell, on one rank, by a mesh that follows the interface.
 
     Raises:
         FoldedMeshError: The map bends more than the layers can follow.
     """
-    cell = Cell(matrix, inclusion, radius_map, model.outline, interphase)
-    problem = model.problem(radius_map, thickness_of(interphase))
-    return _solve_fields(problem, cell.stiffness, model.loads(cell), model.options)
+    cell = Cell(matrix, inclusion, radius_map, model.outline)
+    return _solve_fields(
+        model.problem(radius_map), cell.stiffness, model.loads(cell), model.options
+    )
 
 
 def mesh_fields(model: MeshModel, law: ThetaLaw, phases: Mapping[str, AnyPhase]) -> CellFields:
@@ -126,7 +123,7 @@ def _solve_fields(
     fluctuation = fem.Function(problem.space)
     rank_cells = np.arange(len(problem.wedge), dtype=np.int32)
     nodal_strain = at_points(strain(fluctuation), vertices_and_midpoints())
-    positions = grid.positions(problem.map, problem.thickness)
+    positions = grid.positions(problem.map)
     displacement = np.empty((grid.nodes, 2, len(vectors)))
     prism_strains = np.empty((len(grid.cells), NODES, 3, len(vectors)))
     for k, vector in enumerate(vectors):

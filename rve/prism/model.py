@@ -29,18 +29,15 @@ from alphacut.rve.cell.cell import (
     THREE_LOADS,
     AnyPhase,
     Cell,
-    Interphase,
     Phase,
     require_compressible,
-    require_interphase,
     require_mesh_size,
     require_parts,
-    thickness_of,
 )
 from alphacut.rve.cell.outline import Outline, circle, is_round
 from alphacut.rve.fenicsx import MPI
 from alphacut.rve.mesh.columns import extrude
-from alphacut.rve.mesh.prism_grid import RING_THICKNESS, reference_radius
+from alphacut.rve.mesh.prism_grid import reference_radius
 from alphacut.rve.mesh.square import REFINEMENTS
 from alphacut.rve.prism.modulus_basis import TOLERANCE, ModulusBasis, modulus_basis
 from alphacut.rve.prism.problem import FoldedMeshError, PrismProblem, SliceStrains
@@ -91,7 +88,6 @@ class PrismModel:
         radius_map: RadiusMap,
         matrix: AnyPhase,
         inclusions: Sequence[AnyPhase],
-        interphase: Interphase | None = None,
     ) -> list[HomogenisedStiffness]:
         """Homogenised stiffness for each of `inclusions`, in their order, on one mesh.
 
@@ -103,14 +99,12 @@ class PrismModel:
         """
         require_parts(radius_map, matrix, inclusions, isotropic=False)
         require_compressible(matrix, *inclusions)
-        require_interphase(interphase, self.outline)
         started = perf_counter()
-        problem = self.problem(radius_map, thickness_of(interphase))
-        # reduced basis that serves all inclusions; beside a ring each one is solved
-        basis = None if interphase else self._basis(problem, matrix, inclusions)
+        problem = self.problem(radius_map)
+        basis = self._basis(problem, matrix, inclusions)  # serves all inclusions
         results = []
         for inclusion in inclusions:
-            cell = Cell(matrix, inclusion, radius_map, self.outline, interphase)
+            cell = Cell(matrix, inclusion, radius_map, self.outline)
             if basis is not None and isinstance(inclusion, Phase):
                 strains, residual = basis.project(inclusion.modulus), basis.error
                 iterations = basis.iterations
@@ -137,28 +131,28 @@ class PrismModel:
             started = perf_counter()
         return results
 
-    def problem(self, radius_map: RadiusMap, thickness: float = 0.0) -> PrismProblem:
+    def problem(self, radius_map: RadiusMap) -> PrismProblem:
         """Mesh and form for a radius map; cached, so that the next map moves the same mesh.
 
         Raises:
             FoldedMeshError: The map bends more than the layers can follow.
             RefusedError: A radius does not fit into the cell.
         """
-        radius = reference_radius(radius_map, self.outline, thickness)
+        radius = reference_radius(radius_map, self.outline)
         if is_round(self.outline):
-            return self._moved_problem(radius_map, radius, REFINEMENTS[0], thickness)
+            return self._moved_problem(radius_map, radius, REFINEMENTS[0])
         for refinement in REFINEMENTS[:-1]:  # shorter edges where elements at bends fold
             with suppress(FoldedMeshError):
                 return self._moved_problem(radius_map, radius, refinement)
         return self._moved_problem(radius_map, radius, REFINEMENTS[-1])
 
     def _moved_problem(
-        self, radius_map: RadiusMap, radius: float, refinement: float, thickness: float = 0.0
+        self, radius_map: RadiusMap, radius: float, refinement: float
     ) -> PrismProblem:
         """Problem on the mesh of a reference radius, with its nodes moved to a map."""
         mesh = (self.mesh_size, radius, self.outline, refinement, self.layers, self.parallel)
-        problem = cached_problem(*mesh, RING_THICKNESS if thickness else 0.0)
-        problem.move(radius_map, thickness)
+        problem = cached_problem(*mesh)
+        problem.move(radius_map)
         return problem
 
     @property
@@ -243,12 +237,11 @@ def prism_result(
 def _reference_result(cell: Cell) -> HomogenisedStiffness:
     """Result of the series, or of slices where it has no formula; more accurate than prisms."""
     matrix, inclusion = cell.matrix, cell.inclusion
-    is_square = cell.square and cell.interphase is None
-    if is_square and isinstance(matrix, Phase) and isinstance(inclusion, Phase):
+    if cell.square and isinstance(matrix, Phase) and isinstance(inclusion, Phase):
         series = SeriesModel(accuracy=SERIES_ACCURACY, energies=True)
         return series.solve(cell.radius, matrix, [inclusion])[0]
     slices = SlicesModel(points=SLICES_POINTS, outline=cell.outline)
-    return slices.solve(cell.radius, matrix, [inclusion], cell.interphase)[0]
+    return slices.solve(cell.radius, matrix, [inclusion])[0]
 
 
 def _with_errors(
@@ -284,7 +277,6 @@ def cached_problem(
     refinement: float,
     layers: int,
     parallel: bool,
-    thickness: float,
 ) -> PrismProblem:
     """Mesh, form and numbering for any map with this reference radius; see `extrude`."""
     comm = MPI.COMM_WORLD if parallel else MPI.COMM_SELF
@@ -294,7 +286,6 @@ def cached_problem(
         layers=layers,
         outline=outline,
         refinement=refinement,
-        thickness=thickness,
         comm=comm,
     )
     return PrismProblem(grid, comm)

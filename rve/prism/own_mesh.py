@@ -144,9 +144,9 @@ class LevelSetModel(_NamedModel):
         """Problem on a cached mesh."""
         if not hasattr(law, "pdf"):
             raise RefusedError("law of θ", type(law).__name__, "a law, as TruncatedNormal(-3, 3)")
-        named = in_order_of(NAMES[:2], phases)
+        named = in_order_of(NAMES, phases)
         mesh = (self.mesh_size, 0.0, circle, REFINEMENTS[0], self.layers, self.parallel)
-        problem = cached_problem(*mesh, 0.0)
+        problem = cached_problem(*mesh)
         problem.move(LevelSet(cast("ThetaLaw", law), self.z))
         return problem, named
 

@@ -87,7 +87,7 @@ class PrismProblem:
         elastic: Stiffness and loads; `elastic.density` is f_Θ at the points.
         areas: Weights of the points in their slice, shape (cells, 3, points); a slice's sum is 4.
         numbering: Reduced unknowns.
-        map: The radius map, whose interphase has a `thickness`.
+        map: The radius map.
         matrix: The reduced stiffness.
         local_map: Nodes of this rank to pairs of reduced unknowns.
     """
@@ -134,17 +134,17 @@ class PrismProblem:
         self.elastic = CellForm(self.space, point_space, measures, mixed=ignores_interface)
         self._strains = PointStrains(self.space, points)
 
-    def move(self, radius: RadiusMap, thickness: float = 0.0) -> None:
+    def move(self, radius: RadiusMap) -> None:
         """Move the nodes to the interface r(θ) of a map and mark the particle (eq. 13, 14).
 
-        `thickness` is that of the interphase. After an error it is to be moved again before use.
+        After an error it is to be moved again before use.
 
         Raises:
             FoldedMeshError: An element is inverted.
             RefusedError: The density of θ is not positive at a quadrature point.
         """
-        self.map, self.thickness = radius, thickness
-        positions, geometry = self.grid.positions(radius, thickness), self.mesh.geometry
+        self.map = radius
+        positions, geometry = self.grid.positions(radius), self.mesh.geometry
         geometry.x[:] = positions[geometry.input_global_indices]
         self._levels = self.grid.level_thetas(radius.distribution)
         theta, _ = self.slice_rule()

@@ -35,7 +35,7 @@ def fibre_constants(result: HomogenisedStiffness) -> DeclaredConstants:
         RefusedError: The result has no cell, or not of round particles and two isotropic phases.
     """
     cell = result.cell
-    if cell is None or not cell.square or cell.interphase is not None:
+    if cell is None or not cell.square:
         raise RefusedError("cell", cell, "a result of round particles and two isotropic phases")
     mixture, bulk = Mixture.of_cell(cell), result.moduli[0] / 2
     G_T, (G_L, G_L_error) = result.shear, _mean_longitudinal_shear(cell)

@@ -21,15 +21,12 @@ from alphacut.rve.cell.cell import (
     THREE_LOADS,
     AnyPhase,
     Cell,
-    Interphase,
     Phase,
     require_compressible,
     require_continuous,
-    require_interphase,
     require_mesh_size,
     require_parts,
     require_points,
-    thickness_of,
 )
 from alphacut.rve.cell.outline import Outline, circle, is_round
 from alphacut.rve.fenicsx import MPI, basix, cholesky, fem, mesh_of
@@ -157,7 +154,6 @@ def solve_slice(
     *,
     mesh_size: float,
     outline: Outline = circle,
-    interphase: Interphase | None = None,
 ) -> list[Slice]:
     """Solve the plane cell with each of `inclusions`, and declare its error.
 
@@ -165,17 +161,14 @@ def solve_slice(
     second one, each with a safety factor. Without the symmetry of the square, the larger of the
     errors with C11 and with C22 counts. `radius` and `mesh_size` are in halves of the cell's side.
     """
-    thickness = thickness_of(interphase)
-    ring = () if interphase is None else (interphase.phase,)
     second_size = 2 * mesh_size if 2 * mesh_size <= LIMIT else mesh_size / 2
     first, second = (
-        plane_mesh(radius, size=size, outline=outline, thickness=thickness)
-        for size in (mesh_size, second_size)
+        plane_mesh(radius, size=size, outline=outline) for size in (mesh_size, second_size)
     )
     cell, higher_cell = PlaneCell(first, ORDER), PlaneCell(first, REFERENCE_ORDER)
     second_cell, slices = PlaneCell(second, REFERENCE_ORDER), []
     for inclusion in inclusions:
-        phases = (matrix, inclusion, *ring)
+        phases = matrix, inclusion
         square = is_round(outline) and all(isinstance(phase, Phase) for phase in phases)
         stiffness, energies = _solve_sample(cell, phases)
         higher, reference_energies = _solve_sample(higher_cell, phases)
@@ -243,7 +236,6 @@ class SlicesModel:
         radius_map: RadiusMap,
         matrix: AnyPhase,
         inclusions: Sequence[AnyPhase],
-        interphase: Interphase | None = None,
     ) -> list[HomogenisedStiffness]:
         """Homogenised stiffness for each of `inclusions`, in their order, with energies of phases.
 
@@ -253,7 +245,6 @@ class SlicesModel:
         """
         require_parts(radius_map, matrix, inclusions, isotropic=False)
         require_compressible(matrix, *inclusions)
-        require_interphase(interphase, self.outline)
         fine_radii = require_continuous(radius_map)
         start = perf_counter()
         rule = gauss_rule(radius_map.distribution, points=self.points)
@@ -268,14 +259,13 @@ class SlicesModel:
                 inclusions,
                 mesh_size=self.mesh_size,
                 outline=self.outline,
-                interphase=interphase,
             )
             for radius in radii
         ]
         seconds = perf_counter() - start
         results = []
         for inclusion, *slices in zip(inclusions, *by_radius, strict=True):
-            cell = Cell(matrix, inclusion, radius_map, self.outline, interphase)
+            cell = Cell(matrix, inclusion, radius_map, self.outline)
             stiffness = np.array([plane.stiffness for plane in slices])
             errors = np.array([plane.errors for plane in slices])
             energies = np.array([[x.energies, x.energy_errors] for x in slices])
@@ -336,7 +326,7 @@ def theta_error(cell: Cell, rule: ThetaRule, *, radii: Array, moduli: Array) -> 
     largest distance of these means from that by `rule`, with a safety factor.
 
     Args:
-        cell: The cell; with an interphase r is the outer radius.
+        cell: The cell.
         rule: Its n nodes.
         radii: Radii solved, shape (m,): those of the nodes and the two extreme ones.
         moduli: C11 + C12, C11 − C12 and C33 at `radii`, shape (m, 3).
@@ -354,8 +344,7 @@ def theta_error(cell: Cell, rule: ThetaRule, *, radii: Array, moduli: Array) -> 
     scale = mori_tanaka_moduli(fine_radii)
     logarithm = np.log(moduli / mori_tanaka_moduli(radii))
     low, high, span = logarithm.min(axis=0), logarithm.max(axis=0), np.ptp(logarithm, axis=0)
-    thickness = thickness_of(cell.interphase)
-    x, fine_x = (np.sqrt(1 - (r + thickness) ** 2) for r in (radii, fine_radii))
+    x, fine_x = (np.sqrt(1 - r**2) for r in (radii, fine_radii))
     middle, half_width = (x.min() + x.max()) / 2, max(np.ptp(x), 1e-12) / 2
     mean, distances = rule.weights @ moduli[nodes], []
     # up to the interpolating polynomial, from a degree with some freedom to spare on

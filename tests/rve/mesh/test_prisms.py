@@ -64,7 +64,7 @@ def particle_volume():
 
 def test_a_volume_without_a_name_of_other_elements_or_in_parts_is_refused():
     with square.model() as gmsh:
-        gmsh.model.geo.extrude([(2, square.surfaces(0.5, 0.0, circle)[0][0])], 0, 0, 1)
+        gmsh.model.geo.extrude([(2, square.surfaces(0.5, 0.0, circle)[0])], 0, 0, 1)
         gmsh.model.geo.synchronize()
         gmsh.model.mesh.generate(3)
         with pytest.raises(MeshError, match="volume 1 has no physical group"):
