@@ -59,12 +59,7 @@ class Row:
 
 @dataclass
 class Calibration:
-    """A table of quantities.
-
-    Args:
-        name: What is judged.
-        seed: That all of it was drawn from.
-    """
+    """A table of quantities under the name of what is judged, drawn from a seed."""
 
     name: str
     seed: int
@@ -74,16 +69,10 @@ class Calibration:
     def estimated(
         self, quantity: str, declared, true, *, size=1.0, least=0.0, case: object = ""
     ) -> None:
-        """Adds values with errors, all of shape (N,) or one number.
+        """Adds declared and true errors of values of a magnitude `size`, (N,) or one number each.
 
-        Args:
-            quantity: Name of the row.
-            declared: Errors as stated.
-            true: Distances from the truth, 0 or more.
-            size: Magnitude of the values, which are rounded.
-            least: True errors count as at least this in the ratio, as a share of the accuracy asked
-                for: who asks for 1e-4 and is right to 1e-12 has not been misled.
-            case: What tells this case from others, for the message.
+        In the ratio true errors count as at least `least`: who asks for 1e-4 and is right to 1e-12
+        has not been misled. `case` tells where in a message.
         """
         declared, true, size = np.broadcast_arrays(*np.atleast_1d(declared, true, size))
         covered = true <= declared + ROUNDING * size
@@ -93,16 +82,10 @@ class Calibration:
     def guaranteed(
         self, quantity: str, proved, attained, *, size=1.0, most=MOST, case: object = ""
     ) -> None:
-        """Adds pairs of ends, proved ones and ones attained by another method, shape (N,) each.
+        """Adds proved lower and upper ends and those that another method attains inside, (N,) each.
 
-        Args:
-            quantity: Name of the row.
-            proved: Lower and upper ends.
-            attained: The same, which must lie inside.
-            size: Magnitude of the values, which are rounded.
-            most: Most that the median of widths may be; infinite where the truth is one point of
-                many that the bounds are of.
-            case: What tells this case from others.
+        `most` is what the median of their widths' ratios may be: infinite where the truth is one
+        point of many that the bounds are of. `case` tells where in a message.
         """
         self.rows.setdefault(quantity, Row(True, most=most))
         (low, high), (least, most) = map(np.atleast_1d, proved), map(np.atleast_1d, attained)

@@ -45,12 +45,7 @@ def kink(rng, n):
 
 
 class Exact:
-    """A function whose least and greatest values over a box are known otherwise.
-
-    Args:
-        function: Of points, shape (n, d) or (d,).
-        ends: Least and greatest value over a box, from its lower and upper corners.
-    """
+    """A function of points, (n, d) or (d,), whose ends over a box of two corners are known."""
 
     def __init__(self, function, ends):
         self.function, self.ends = function, ends
@@ -124,7 +119,6 @@ def rising(rng, n):
     return monotone(rng, n)[0]
 
 
-FAMILIES = [smooth, hills, jump, kink]
 SINGLE = [rising, one_humped]
 SEVERAL = [smooth, hills, sines, rastrigin, schwefel, resonance, kink, spike, jump]
 

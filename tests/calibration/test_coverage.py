@@ -3,8 +3,6 @@
 import numpy as np
 import pytest
 
-import alphacut.fuzzy.knowledge.from_data as laws
-import alphacut.fuzzy.knowledge.order_statistics as ranks
 from benchmarks.fuzzy.coverage import ALPHA, FREE, LAWS, NAMED, held, jointly_held
 from tests.calibration.declared import free_seed
 
@@ -56,30 +54,3 @@ def test_joint_cuts_hold_all_of_them(links):
     print(scores)
     assert min(scores["unknown"], scores["independent"]) > -FAR
     assert scores["minimum"] < -FAR  # the usual rule, which claims too much
-
-
-def one_tail(monkeypatch):
-    """Level δ at each end in place of δ/2: log(1/δ) for log(2/δ)."""
-    true, level = laws._factors, np.minimum(2 * laws.LEVELS, 1.0)
-
-    def planted(n, quantile):
-        return tuple(np.interp(level, laws.LEVELS, row) for row in true(n, quantile))
-
-    monkeypatch.setattr(laws, "_factors", planted)
-
-
-def one_gap(monkeypatch):
-    """Levels of ranks that count one of the two ends only."""
-    true = ranks.windows
-
-    def planted(n, quantile, open_ends):
-        rows = true(n, quantile, open_ends)
-        return ranks.Windows(rows.level / 2, rows.low, rows.high)
-
-    monkeypatch.setattr(ranks, "windows", planted)
-
-
-@pytest.mark.parametrize("fault", [one_tail, one_gap])
-def test_half_a_level_is_seen(fault, monkeypatch):
-    fault(monkeypatch)
-    assert lacking("normal", (10,), 120, np.random.default_rng(3))

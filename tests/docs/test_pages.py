@@ -21,25 +21,21 @@ BIBLIOGRAPHY = (ROOT / "docs/theory/bibliography.md").read_text(encoding="utf-8"
 SOURCE = re.compile(r"^\| [^|]+ \| ([^,|]+),[^|]*\((\d{4})\) \| `([\w/]+\.py)` \|$", re.MULTILINE)
 
 
-@pytest.mark.parametrize(("author", "year", "file"), SOURCE.findall(BIBLIOGRAPHY))
-def test_a_source_is_cited_where_the_bibliography_says(author, year, file):
-    text = " ".join((ROOT / file).read_text(encoding="utf-8").split())
-    assert re.search(rf"{re.escape(author)}\b.{{0,120}}?{year}", text)
-
-
-def test_every_row_of_the_bibliography_is_a_source():
+def test_sources_are_cited_where_the_bibliography_says():
     rows = [row for row in BIBLIOGRAPHY.splitlines() if row.startswith("| ")][1:]
-    assert len(rows) == len(SOURCE.findall(BIBLIOGRAPHY)) > 20
+    sources = SOURCE.findall(BIBLIOGRAPHY)
+    assert len(rows) == len(sources) > 20
+    for author, year, file in sources:
+        text = " ".join((ROOT / file).read_text(encoding="utf-8").split())
+        assert re.search(rf"{re.escape(author)}\b.{{0,120}}?{year}", text), (author, file)
 
 
-def test_every_equation_of_the_paper_has_a_row():
-    assert [int(number) for number, _, _ in ROW.findall(EQUATIONS)] == list(range(1, 24))
-
-
-@pytest.mark.parametrize(("number", "file", "name"), ROW.findall(EQUATIONS))
-def test_the_table_of_equations_leads_to_the_code(number, file, name):
-    tree = ast.parse((ROOT / file).read_text(encoding="utf-8"))
-    assert not name or set(name.split(".")) <= defined(tree)
+def test_the_table_of_equations_has_all_of_the_paper_and_leads_to_the_code():
+    rows = ROW.findall(EQUATIONS)
+    assert [int(number) for number, _, _ in rows] == list(range(1, 24))
+    for number, file, name in rows:
+        tree = ast.parse((ROOT / file).read_text(encoding="utf-8"))
+        assert not name or set(name.split(".")) <= defined(tree), number
 
 
 def defined(tree):
@@ -53,14 +49,11 @@ def defined(tree):
     return names
 
 
-@pytest.mark.parametrize(
-    "page", [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))], ids=str
-)
-def test_links_to_files_lead_somewhere(page):
-    for link in re.findall(r"\]\(([^)#:]+)\)", page.read_text(encoding="utf-8")):
-        assert (page.parent / link).exists() or (page.parent / link).with_suffix(".py").exists(), (
-            link
-        )
+def test_links_to_files_lead_somewhere():
+    for page in (ROOT / "README.md", *(ROOT / "docs").rglob("*.md")):
+        for link in re.findall(r"\]\(([^)#:]+)\)", page.read_text(encoding="utf-8")):
+            target = page.parent / link
+            assert target.exists() or target.with_suffix(".py").exists(), (page, link)
 
 
 @pytest.mark.parametrize(
