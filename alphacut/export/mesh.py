@@ -11,12 +11,11 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from alphacut.case.material import Mesh
-from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.fuzzy.refused import FailedError
 from alphacut.io.files import say, whole_file
 from alphacut.rve.cell.cell import Cell
@@ -47,8 +46,7 @@ def draw_mesh(cell: Cell, mesh: Mesh, path: Path) -> bool:
         command = ["xvfb-run", "-a", *command]
     with tempfile.TemporaryDirectory() as folder, whole_file(path) as partial:
         file = Path(folder) / "mesh.npz"
-        points, cells, phase = prism_mesh(cell, mesh)
-        np.savez(file, points=points, cells=cells, phase=phase)
+        np.savez(file, **prism_mesh(cell, mesh))
         words = [*command, str(file), str(partial)]
         process = subprocess.run(words, capture_output=True, text=True, check=False)
         if process.returncode or not partial.is_file():
@@ -57,18 +55,15 @@ def draw_mesh(cell: Cell, mesh: Mesh, path: Path) -> bool:
     return True
 
 
-def prism_mesh(cell: Cell, mesh: Mesh) -> tuple[Array, Ints, Ints]:
-    """Points (n, 3), cells (m, 15) in VTK's order and phases (m,) of the mesh of a case."""
+def prism_mesh(cell: Cell, mesh: Mesh) -> dict[str, Any]:
+    """The mesh of a case: points (n, 3), cells (m, 15) in VTK's order and phase (m,)."""
     from alphacut.rve.mesh.columns import extrude
     from alphacut.rve.mesh.prism_grid import reference_radius
 
-    grid = extrude(
-        size=mesh.size,
-        radius=reference_radius(cell.radius, cell.outline),
-        layers=mesh.layers,
-        outline=cell.outline,
-    )
-    return grid.positions(cell.radius), grid.cells[:, ABAQUS_ORDER], grid.phase
+    radius = reference_radius(cell.radius, cell.outline)
+    grid = extrude(size=mesh.size, radius=radius, layers=mesh.layers, outline=cell.outline)
+    points, cells = grid.positions(cell.radius), grid.cells[:, ABAQUS_ORDER]
+    return {"points": points, "cells": cells, "phase": grid.phase}
 
 
 def draw_wedges(file: str, picture: str) -> None:

@@ -116,16 +116,11 @@ def fragility(section: FragilitySection, response: FuzzyResponse) -> FragilityAn
     suite, limits = response.suite, section.limits_in_si(response.structure)
     if suite is None:
         raise RefusedError("fragility", "without records", "a section [records]")
-    peaks = {
-        name: [x[limit.peak] for x in suite.peaks.values()]
-        for name, limit in section.limits_by_name.items()
-    }
-    measures = [sizes[section.measure] for sizes in suite.measures.values()]
-    critical = {
-        name: CriticalMeasures.from_peaks(peaks[name], measures, limit)
-        for name, limit in limits.items()
-    }
-    natures = {name: Nature.weakest(peak.nature for peak in peaks[name]) for name in limits}
+    measures, critical, natures = [x[section.measure] for x in suite.measures.values()], {}, {}
+    for name, limit in section.limits_by_name.items():
+        peaks = [x[limit.peak] for x in suite.peaks.values()]
+        critical[name] = CriticalMeasures.from_peaks(peaks, measures, limits[name])
+        natures[name] = Nature.weakest(peak.nature for peak in peaks)
     if len(limits) > 1:
         critical[ANY] = of_any_limit(list(critical.values()))
         natures[ANY] = Nature.weakest(natures.values())

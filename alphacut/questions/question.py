@@ -49,10 +49,8 @@ class SuiteResponse:
 class FuzzyResponse:
     """Fuzzy response of the structure, as section [envelope] names it: what questions are about.
 
-    Args:
-        fuzzy: Names of the fuzzy inputs.
-        peaks: Peaks of the outputs, under a suite of any record; None where no question reads them.
-        suite: Records that move the structure one by one; None where there are none.
+    `peaks` are those of the outputs, under a suite of any record; None where no question reads
+    them. `suite` has the records that move the structure one by one, if there are some.
     """
 
     structure: Structure
@@ -126,19 +124,17 @@ class LimitAnswer(Numbers):
     @property
     def words(self) -> str:
         """Text of the limit, as "|drift1| ≤ 40.00 mm", or as "any of them"."""
-        return self._words("≤", "≥")
+        if not self.unit:
+            return self.output
+        output = f"|{self.output}|" if self.side in ("", "mean") else self.output
+        relation = "≥" if self.side == "min" else "≤"
+        return f"{self.side} {output} {relation} {engineering(self.limit, self.unit)}".strip()
 
     @property
     def event(self) -> str:
         """The event that it is exceeded: "|drift1| > 40.00 mm", or "any of them exceeded"."""
-        return self._words(">", "<") if self.unit else f"{self.output} exceeded"
-
-    def _words(self, above: str, below: str) -> str:
-        if not self.unit:
-            return self.output
-        output = f"|{self.output}|" if self.side in ("", "mean") else self.output
-        relation = below if self.side == "min" else above
-        return f"{self.side} {output} {relation} {engineering(self.limit, self.unit)}".strip()
+        words = self.words if self.unit else f"{self.output} exceeded"
+        return words.translate({ord("≤"): ">", ord("≥"): "<"})
 
 
 L = TypeVar("L", bound=LimitAnswer)

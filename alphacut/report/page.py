@@ -6,14 +6,14 @@ import base64
 import math
 import re
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path, PurePosixPath
 
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document, say
 from alphacut.io.results import ResultsFolder
-from alphacut.questions.question import Answer, Row, Table
+from alphacut.questions.question import Table
 from alphacut.questions.summary import ANSWERS, Summary
 from alphacut.report.results import (
     ANSWER_HEAD,
@@ -28,7 +28,6 @@ from alphacut.report.results import (
 from alphacut.report.tables import tables
 from alphacut.stages.envelope import EnvelopeResult
 from alphacut.stages.identify import RefutedResult
-from alphacut.stages.modulus import ModulusResult
 
 SHARES = "Share of the width that is lost when an input is fixed at its nominal value."
 Piece = tuple[object, ...]
@@ -109,94 +108,81 @@ class Page:
 
         A piece is the name of a macro of the template, and what the macro shows.
         """
-        summary = self.summary
-        records = ["records"] if summary.records is not None else []
-        shares = [("text", SHARES), ("table", *self.tables["shares"])] if summary.shares else []
+        summary, of = self.summary, self._pieces
+        refuted = [summary.update.refuted] if isinstance(summary.update, RefutedResult) else []
+        shares = [SHARES] if summary.shares else []
+        plots: list[Piece] = [("plot",)] if summary.envelopes else []
         for title, pieces in (
             ("Key results", self._key_pieces()),
-            ("Microstructure", self._microstructure()),
-            ("How stiff is the material?", self._modulus()),
-            ("How stiff is the image?", self._image()),
-            ("What do the measured modes teach?", self._update()),
-            ("How does the structure move?", self._envelopes()),
-            ("How far does it move under each record?", map(self._folded_table, records)),
-            *((answer.title, self._answer(answer)) for answer in summary.answers),
-            ("What drives the width?", shares),
+            ("Microstructure", of(["pbox", "p-box"], self._particles(), folded="radius_map")),
+            ("How stiff is the material?", [*of(["modulus"], folded="modulus"), *self._errors()]),
+            ("How stiff is the image?", of(["image"], self._image(), folded="image")),
+            ("What do the measured modes teach?", of(["update-inputs"], refuted, "update")),
+            ("How does the structure move?", [*plots, *of([], self._motion(), folded="peaks")]),
+            ("How far does it move under each record?", of([], folded="records")),
+            *((x.title, of([x.key], [x.words()], x.key)) for x in summary.answers),
+            ("What drives the width?", of([], shares, "shares")),
             ("Terms", [("glossary", TERMS.items())]),
             ("More", self._more()),
         ):
             if shown := [*pieces]:
                 yield title, shown
 
+    def _pieces(
+        self, figures: Iterable[str], texts: Iterable[str] = (), table: str = "", folded: str = ""
+    ) -> Iterator[Piece]:
+        """Yields figures, texts, a table and a folded one, by their names; none that is missing."""
+        yield from self._figures(*figures)
+        yield from (("text", text) for text in texts)
+        if table in self.tables:
+            yield ("table", *self.tables[table])
+        if folded in self.tables:
+            yield "folded", "As a table", [("table", *self.tables[folded])]
+
     def _key_pieces(self) -> Iterator[Piece]:
         summary = self.summary
         yield "text", f"{MEANING}."
         for table in (material(summary), peak_table(summary), (ANSWER_HEAD, answers(summary))):
             yield ("table", *table)
-        yield from _texts(*natures(summary), *drivers(summary))
+        yield from self._pieces([], [*natures(summary), *drivers(summary)])
 
-    def _microstructure(self) -> Iterator[Piece]:
+    def _particles(self) -> Iterator[str]:
         if (part := self.summary.microstructure) is None:
             return
-        yield from self._figures("pbox", "p-box")
         count, kind = part.get("discs", part.get("spheres")), part["particles"]
         cells = "volume" if kind == "spheres" else "area"
         stated, mapped = part["fraction_of_case"], part[f"mean_{cells}_fraction_of_map"]
         beside = "" if stated is None else f"; the case says {stated:.4g}"
-        yield from _texts(
-            f"{count:,} {kind} in {part['packings']} sections or cubes.",
-            f"Of the {cells} of the cells the map's particles take {mapped:.4f}{beside}.",
-        )
-        yield self._folded_table("radius_map")
+        yield f"{count:,} {kind} in {part['packings']} sections or cubes."
+        yield f"Of the {cells} of the cells the map's particles take {mapped:.4f}{beside}."
 
-    def _modulus(self) -> Iterator[Piece]:
-        if (part := self.summary.modulus) is not None:
-            yield from self._figures("modulus")
-            yield self._folded_table("modulus")
-            yield "folded", "Errors, checks and references", [("table", *_errors(part))]
-
-    def _image(self) -> Iterator[Piece]:
+    def _image(self) -> Iterator[str]:
         if (part := self.summary.image) is not None:
-            yield from self._figures("image")
             shares = ", ".join(f"{x} {share:.1%}" for x, share in part.fractions.items())
-            yield from _texts(
-                "The bounds are those of the image as it was segmented, in plane strain.",
-                f"Of the area: {shares}. {width_text(part)}.",
-            )
-            yield self._folded_table("image")
+            yield "The bounds are those of the image as it was segmented, in plane strain."
+            yield f"Of the area: {shares}. {width_text(part)}."
 
-    def _update(self) -> Iterator[Piece]:
-        if (part := self.summary.update) is None:
+    def _errors(self) -> Iterator[Piece]:
+        """Yields errors of E by source, the largest violations of properties, and references."""
+        if (part := self.summary.modulus) is None:
             return
-        if isinstance(part, RefutedResult):
-            yield "text", part.refuted
-            return
-        yield from self._figures("update-inputs")
-        yield ("table", *self.tables["update"])
+        rows = [(f"error: {in_words(x)}", f"{error:.2g} of E") for x, error in part.error.items()]
+        rows += [(f"check: {in_words(x)}", f"{size:.2g}") for x, size in part.checks.items()]
+        if bounds := part.references.get("hashin_shtrikman_E_GPa"):
+            text = f"{bounds[0]:.5g} GPa … {bounds[1]:.5g} GPa"
+            rows.append(("Hashin–Shtrikman bounds, isotropic composites", text))
+        head = ("source, property or reference at the nominal values", "value")
+        yield "folded", "Errors, checks and references", [("table", head, rows)]
 
-    def _envelopes(self) -> Iterator[Piece]:
+    def _motion(self) -> Iterator[str]:
         studies, frame = self.summary.envelopes, self.summary.structure
-        if not studies:
-            return
-        yield ("plot",)
-        if frame is not None:
+        if studies and frame is not None:
             periods = ", ".join(f"{2 * math.pi / omega:.3g}" for omega in frame.omega_rad_per_s[:4])
-            yield "text", f"Linear elastic, with natural periods of {periods} s."
-        lines = [
-            f"{x}: {study.method}, fuzzy {', '.join(study.fuzzy)}" for x, study in studies.items()
-        ]
-        found = dict.fromkeys(study.nature for study in studies.values())
-        lines += [f"{str(nature).capitalize()}: {nature.sentence}" for nature in found]
-        yield from _texts(*lines)
-        yield self._folded_table("peaks")
-
-    def _answer(self, answer: Answer) -> Iterator[Piece]:
-        yield from self._figures(answer.key)
-        yield "text", answer.words()
-        yield ("table", *self.tables[answer.key])
-
-    def _folded_table(self, name: str) -> Piece:
-        return "folded", "As a table", [("table", *self.tables[name])]
+            yield f"Linear elastic, with natural periods of {periods} s."
+        for name, study in studies.items():
+            yield f"{name}: {study.method}, fuzzy {', '.join(study.fuzzy)}"
+        for nature in dict.fromkeys(study.nature for study in studies.values()):
+            yield f"{str(nature).capitalize()}: {nature.sentence}"
 
     def _figures(self, *names: str) -> Iterator[Piece]:
         """Yields the figures of these names, without the paper's number, that the run has drawn.
@@ -224,20 +210,6 @@ class Page:
         origin = f"Made by {summary.command} in {summary.seconds:.0f} s."
         versions = ("table", ("program", "version"), [*summary.versions.items()])
         yield "folded", "Versions", [("text", origin), versions]
-
-
-def _texts(*texts: str) -> Iterator[Piece]:
-    return (("text", text) for text in texts)
-
-
-def _errors(part: ModulusResult) -> Table:
-    """Table of the errors of E by source, the largest violations of properties, and references."""
-    rows: list[Row] = [(f"error: {in_words(x)}", f"{e:.2g} of E") for x, e in part.error.items()]
-    rows += [(f"check: {in_words(x)}", f"{size:.2g}") for x, size in part.checks.items()]
-    if bounds := part.references.get("hashin_shtrikman_E_GPa"):
-        text = f"{bounds[0]:.5g} GPa … {bounds[1]:.5g} GPa"
-        rows.append(("Hashin–Shtrikman bounds, isotropic composites", text))
-    return Table(("source, property or reference at the nominal values", "value"), rows)
 
 
 def in_words(name: str) -> str:

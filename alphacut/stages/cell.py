@@ -74,9 +74,8 @@ def _solve_cells(
 class CellProblem:
     """A cell that is no image, as the sections of a case state it.
 
-    Args:
-        radius: Radius map of a round particle, or the law of θ of a mesh from a file.
-        stated_fraction: Fraction of the cell that the particles take as the case says.
+    `radius` is the map of a round particle, or the law of θ of a mesh from a file;
+    `stated_fraction` is what the particles take of the cell as the case says.
     """
 
     radius: AnyRadius | ThetaSection

@@ -133,9 +133,8 @@ def loss_cuts(result: Bounds) -> dict[str, Array]:
     """
     cuts: dict[str, Array] = {name: np.empty((len(result.alpha), 2)) for name in CONSTANTS}
     for (constant, name), level in product(enumerate(CONSTANTS), range(len(result.alpha))):
-        lower_column = result.column(f"loss_lower[{level}][{constant}]")
-        upper_column = result.column(f"loss_upper[{level}][{constant}]")
-        cuts[name][level] = result.lower[level, lower_column], result.upper[level, upper_column]
+        lower = result.bounds(f"loss_lower[{level}][{constant}]").lower[level]
+        cuts[name][level] = lower, result.bounds(f"loss_upper[{level}][{constant}]").upper[level]
     return cuts
 
 
@@ -210,12 +209,8 @@ def phase_loss_cuts(losses: Sequence[FuzzyNumber], alpha: Sequence[float]) -> Ar
 def loss_corners(cuts: Array, fractions: Array) -> Array:
     """Phases' loss factors where those of E, G and K are least and greatest, to first order.
 
-    Args:
-        cuts: Of each phase, of whose K and G it is the loss factor, shape (levels, 2, phases).
-        fractions: ∂ln c/∂ln X by X = K and G of each phase, shape (phases, 2, 3).
-
-    Returns:
-        Of K and G of the phases, shape (levels, 2, 3, phases, 2).
+    `cuts` are those of each phase, (levels, 2, phases), the same of its K and G; `fractions` are
+    ∂ln c/∂ln X by X = K and G of each phase, (phases, 2, 3). Shape (levels, 2, 3, phases, 2).
     """
     slopes = fractions.sum(axis=1).T  # (constants, phases)
     lower, upper = np.moveaxis(cuts[:, :, None], 1, 0)
