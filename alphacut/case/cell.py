@@ -101,6 +101,7 @@ class CellContent(Section):
         if self.mesh.file is None:
             allowed = "a mesh of Gmsh beside [cell.phases]"
             require(self.mesh_cell is None, "mesh.file", None, allowed)
+            require(not self.mesh.refine, "mesh.refine", True, "true beside mesh.file")
             is_complete = self.radius is None or self.radius_map is not None
             about = RadiusMapSection.model_fields["a1"].description
             require(is_complete, "radius.a1", None, f"{about}; theta alone beside mesh.file")
@@ -111,9 +112,9 @@ class CellContent(Section):
             require_alone(f"mesh.{key}", self.mesh.has_key(key), "mesh.file")
         has_map = self.radius_map is not None or "microstructure" in self.stages
         require(not has_map, "radius", "a map of radii", "theta alone beside mesh.file")
-        tolerance, cure = self.modulus.tolerance, "compare a coarser mesh"
-        allowed = "none beside mesh.file, whose error nobody knows"
-        require(tolerance is None, "modulus.tolerance", tolerance, allowed, cure=cure)
+        tolerance, cure = self.modulus.tolerance, "set mesh.refine = true"
+        has_error, allowed = self.mesh.refine, "none beside mesh.file, whose error nobody knows"
+        require(tolerance is None or has_error, "modulus.tolerance", tolerance, allowed, cure=cure)
 
     def _require_stages(self) -> None:
         """Refuses stages without their sections, two sources of the radius, and unfit methods."""

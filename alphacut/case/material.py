@@ -274,6 +274,8 @@ class Mesh(Section):
         description="mesh of Gmsh, prisms of 15 nodes over [-1, 1]² and θ, in place of size and"
         " layers; its physical groups are the phases of [cell.phases]",
     )
+    refine: bool = False
+    """whether to refine the mesh of a file once, for a declared error"""
     layers: Annotated[int, Quantity(minimum=1, maximum=10_000, is_integer=True)] = 12
     """element layers in θ, of method prism"""
     size: Annotated[float, Quantity(minimum=0.005, below=1)] = 0.15

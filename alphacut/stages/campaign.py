@@ -163,7 +163,7 @@ class CellCampaign(CellProblem):
         if self.losses is not None:
             losses = loss_cuts(result)
             loss = LossResult.of(losses, self.loss_errors(result), Nature.ATTAINED)
-        is_own_mesh = isinstance(self.cell, MeshedCell)  # without a declared error
+        is_own_mesh = isinstance(self.cell, MeshedCell) and not self.mesh.refine  # no error
         numbers = ModulusResult(
             alpha=result.alpha,
             E_GPa=cuts_of(result, {"E": "E"})["E_GPa"],

@@ -114,7 +114,8 @@ class CellProblem:
 
                 assert self.mesh.file is not None
                 options = {name: x for name, x in elements.items() if name in MESH_OPTIONS}
-                model = MeshModel(self.mesh.file, **cast("dict[str, Any]", options))
+                mesh, refine = self.mesh.file, self.mesh.refine
+                model = MeshModel(mesh, refine=refine, **cast("dict[str, Any]", options))
         except ImportError as error:
             value, cure = self.modulus.method, missing(error)
             raise RefusedError("modulus.method", value, "series", cure) from None

@@ -19,12 +19,15 @@ from alphacut.rve.mesh.columns import grid_of
 from alphacut.rve.mesh.gmsh_prisms import Prisms
 from alphacut.rve.mesh.periodicity import SAME_PLACE, MeshError, partners
 from alphacut.rve.mesh.prism_grid import PrismGrid
-from alphacut.rve.mesh.wedge import prism_rule, wedge
+from alphacut.rve.mesh.wedge import prism_rule, vertices_and_midpoints, wedge
 
 FILLED = 1e-6  # of the cell that prisms may leave or take twice
 UPSIDE_DOWN = [3, 4, 5, 0, 1, 2, 12, 13, 8, 14, 10, 11, 6, 7, 9]
 MIRRORED = [0, 2, 1, 3, 5, 4, 7, 6, 8, 9, 11, 10, 13, 12, 14]
 """Orders of a prism's nodes that put its upper triangle first, and that exchange two vertices."""
+_A, _B, _C = (0.0, 0.0), (1.0, 0.0), (0.0, 1.0)  # vertices of the reference triangle
+_AB, _BC, _CA = (0.5, 0.0), (0.5, 0.5), (0.0, 0.5)  # middles of its edges
+_PLANE_PARTS = (_A, _AB, _CA), (_AB, _B, _BC), (_CA, _BC, _C), (_BC, _CA, _AB)
 
 
 def read_grid(path: Path | str) -> PrismGrid:
@@ -41,6 +44,37 @@ def read_grid(path: Path | str) -> PrismGrid:
     _require_periodic_square(grid)
     _require_joined_columns(grid)
     return grid
+
+
+def refined(grid: PrismGrid) -> PrismGrid:
+    """Split each prism of a mesh from a file into eight, in the place of its own curved shape.
+
+    The eight span all polynomials of the one, so that the displacements of the coarser mesh are
+    among those of the finer one, whose stiffness is therefore nowhere larger.
+
+    Raises:
+        MeshError: Middles of vertical edges lie at θ of their own, so that no level is half-way.
+    """
+    assert grid.fixed is not None
+    parts = np.array([part for part in _PLANE_PARTS for _ in range(2)])  # (8, 3, 2)
+    starts = np.tile([0.0, 0.5], len(_PLANE_PARTS))
+    x, y, z = vertices_and_midpoints().T
+    barycentric = np.stack([1 - x - y, x, y], axis=1)
+    planar = barycentric @ parts  # (8, 15, 2)
+    heights = starts[:, None] + z / 2
+    at = np.concatenate([planar, heights[..., None]], axis=-1).reshape(-1, 3)
+    shapes = np.asarray(wedge(1).tabulate(0, at)[0]).reshape(len(at), -1)
+    # a node that prisms share has the same weights of the vertices that they share, in sixteenths
+    across = np.stack([1 - at[:, 0] - at[:, 1], at[:, 0], at[:, 1]], axis=1)
+    weights = np.hstack([across * (1 - at[:, 2:]), across * at[:, 2:]])
+    sixteenths = np.rint(16 * weights).astype(int)
+    keys = np.where(sixteenths > 0, grid.cells[:, None, :6] * 17 + sixteenths, -1)
+    keys = np.sort(keys.reshape(-1, 6), axis=1)
+    _, first, nodes = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    points = (shapes @ grid.fixed[grid.cells]).reshape(-1, 3)[first]
+    phase = np.repeat(grid.phase, len(parts))
+    prisms = Prisms(points, nodes.reshape(-1, len(z)), phase, grid.names)
+    return grid_of(prisms, 0.0, is_fixed=True)
 
 
 def orient(prisms: Prisms) -> Prisms:

@@ -122,7 +122,7 @@ class PrismModel:
                 seconds=perf_counter() - started,
             )
             if self.estimate:
-                result = _with_errors(result, _reference_result(cell))
+                result = with_distance(result, _reference_result(cell))
             # of a mesh of triangles of order 2 where no error is declared
             allowed = 2 * result.largest_error if result.errors else 0.1 * self.mesh_size**3
             checks = {**result.checks, "residual": residual}
@@ -244,20 +244,26 @@ def _reference_result(cell: Cell) -> HomogenisedStiffness:
     return slices.solve(cell.radius, matrix, [inclusion])[0]
 
 
-def _with_errors(
-    result: HomogenisedStiffness, reference: HomogenisedStiffness
+def with_distance(
+    result: HomogenisedStiffness, reference: HomogenisedStiffness, safety: float = 1.0
 ) -> HomogenisedStiffness:
-    """Copy of a result with declared errors: its distance from a reference plus the latter's."""
+    """Copy of a result with declared errors: `safety` times its distance from a reference.
+
+    The declared error of the reference, if there is one, is added.
+    """
     moduli, reference_moduli = _mean_moduli(result.curve), _mean_moduli(reference.curve)
     if len(moduli) == 1:  # two loads: s11 is along x1
         reference_moduli = reference_moduli[1:2]
     ratios = moduli / reference_moduli
     distance = (np.maximum(ratios, 1 / ratios) - 1).max(axis=0)  # nan where not computed
-    error = np.asarray((1 + distance) * (1 + reference.modulus_errors) - 1)
+    reference_errors = reference.modulus_errors if reference.errors else 0.0
+    error = np.asarray((1 + safety * distance) * (1 + reference_errors) - 1)
     energies = result.energies
     if energies is not None and reference.energies is not None:
-        energy_distance = abs(energies.values - reference.energies.values)
-        energies = PhaseEnergies(energies.values, energy_distance + reference.energies.errors)
+        energy_errors = safety * abs(energies.values - reference.energies.values)
+        if reference.errors:
+            energy_errors = energy_errors + reference.energies.errors
+        energies = PhaseEnergies(energies.values, energy_errors)
     return replace(result, errors={"space": error}, energies=energies)
 
 

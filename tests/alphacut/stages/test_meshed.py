@@ -51,6 +51,16 @@ def test_fuzzy_phases_of_a_mesh_run_to_a_report(tmp_path, capsys):
     assert "Two particles" in (tmp_path / "out/report.html").read_text(encoding="utf-8")
 
 
+def test_a_mesh_that_is_refined_declares_its_error(tmp_path, capsys):
+    words = ["--set", "mesh.refine=true", "--json", str(tmp_path / "a.json")]
+    assert main(["cell", str(written(tmp_path, TEXT)), *words]) == 0
+    assert "not declared" not in capsys.readouterr().out
+    found = json.loads((tmp_path / "a.json").read_text(encoding="utf-8"))
+    assert 0 < modulus(80e9) / 1e9 / found["E_GPa"] - 1 < found["error"]["space"] < 1e-3
+    assert main(["check", str(written(tmp_path, CELL)), "--set", "mesh.refine=true"]) == 2
+    assert "mesh.refine is True; allowed: true beside mesh.file" in capsys.readouterr().err
+
+
 AUXETIC = [
     [f"{x} GPa" for x in row] for row in ((10, -8, 0), (-8, 10, 0), (0, 0, 10))
 ]  # 2 G_T = 20 GPa > 3 (C11 + C12) = 6 GPa

@@ -13,8 +13,9 @@ pytest.importorskip("alphacut.rve.fenicsx")
 
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve import MeshModel, Phase, PrismModel
+from alphacut.rve.cell.outline import Ellipse, circle
 from alphacut.rve.mesh.columns import extrude
-from alphacut.rve.mesh.file import MIRRORED, UPSIDE_DOWN, orient, read_grid, write
+from alphacut.rve.mesh.file import MIRRORED, UPSIDE_DOWN, orient, read_grid, refined, write
 from alphacut.rve.mesh.gmsh_prisms import Prisms
 from alphacut.rve.mesh.periodicity import MeshError
 from alphacut.stochastic import HermiteMap, TruncatedNormal
@@ -48,6 +49,46 @@ def test_two_particles_are_as_stiff_as_plane_triangles():
     """
     result = solve("two-particles.msh", matrix=SOFT, particles=HARD)
     assert 25.739483 < result.modulus / 1e9 < 25.739483 * 1.00015
+
+
+@pytest.mark.parametrize(
+    ("outline", "contrast", "are_mixed", "layers"),
+    [
+        (circle, 4, False, 2),
+        (Ellipse(2.0, 30.0), 1e-2, False, 1),
+        (circle, 1e-3, False, 1),
+        (circle, 5, True, 1),
+        (circle, 100, True, 1),  # columns of random phases: corners, and points where they cross
+    ],
+)
+def test_the_error_of_a_refined_mesh_covers_that_to_a_mesh_four_times_finer(
+    tmp_path, rng, outline, contrast, are_mixed, layers
+):
+    radius = HermiteMap(0.2, 0.1, 0.6, 0.1) if layers > 1 else HermiteMap(0.45, 0, 0.45, 0)
+    grid = extrude(size=rng.uniform(0.5, 0.8), radius=0.45, layers=layers, outline=outline)
+    phase = np.tile(rng.integers(0, 2, len(grid.phase)), layers) if are_mixed else grid.phase
+    write(tmp_path / "own.msh", grid.positions(radius), grid.cells, phase, grid.names)
+    fine = refined(refined(read_grid(tmp_path / "own.msh")))
+    write(tmp_path / "fine.msh", fine.fixed, fine.cells, fine.phase, fine.names)
+    phases = {"matrix": SOFT, "inclusion": Phase(20e9 * contrast)}
+    result = MeshModel(tmp_path / "own.msh", refine=True).solve(LAW, phases)[0]
+    [exact] = MeshModel(tmp_path / "fine.msh").solve(LAW, phases)
+    true = result.moduli / exact.moduli - 1
+    assert (true > 0).all()  # spaces are nested: the finer mesh is softer
+    assert (0.01 * result.modulus_errors < true).all()
+    assert (true < result.modulus_errors).all()
+    energy_error = abs(result.energies.values - exact.energies.values)
+    assert (energy_error <= result.energies.errors + 1e-9 * result.modulus).all()
+
+
+def test_a_mesh_without_levels_half_way_is_not_refined(tmp_path):
+    grid = extrude(size=0.6, radius=0.4, layers=1)
+    points = grid.positions(HermiteMap(0.4, 0, 0.4, 0)).copy()
+    points[grid.cells[0, 8], 2] += 0.2  # the middle of one vertical edge
+    write(tmp_path / "own.msh", points, grid.cells, grid.phase, grid.names)
+    phases = {"matrix": SOFT, "inclusion": HARD}
+    with pytest.raises(MeshError, match="does not stand on one level"):
+        MeshModel(tmp_path / "own.msh", refine=True).solve(LAW, phases)
 
 
 def test_three_phases_of_which_two_are_alike_are_two():
