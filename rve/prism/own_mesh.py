@@ -41,8 +41,8 @@ ROUGH_MESH = 0.1
 """Relative violation of a bound that a user's mesh may have, whose error nobody knows."""
 REFINEMENT_SAFETY = 2.5
 """Error of the finer mesh over its distance from the coarser one: 1/(2^q − 1) where energies
-converge with order q. That is 1/15 for smooth fields, 1 for those that are singular as at the tip of
-a crack, and 2.4 for q = 1/2; q is less at points where phases of high contrast meet crosswise."""
+converge with order q. That is 1/15 for smooth fields, 1 for those that are singular as at the tip
+of a crack, and 2.4 for q = 1/2; q is less where phases of high contrast meet crosswise."""
 SAME_LEVEL = 1e-6
 """Distance of an end of the law from the mesh's that is none, over the support."""
 
