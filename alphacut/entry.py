@@ -172,7 +172,7 @@ def _run_command(arguments: Sequence[str], program: str, names: Mapping[str, str
         first = next((word for word in unknown if word.startswith("-")), unknown[0])
         by_name[options.command].refuse(first)
     if "case" not in options:  # no prisms are solved
-        require_petsc(petsc, False)
+        require_petsc(petsc)
     options.petsc = petsc
     if options.json == "/dev/stdout":  # opened again, it would write over what a file holds
         options.json = "-"

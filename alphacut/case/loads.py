@@ -177,12 +177,10 @@ def _read_recordings(value: object, info: ValidationInfo) -> tuple[Recording, ..
             recordings.append(replace(recording, name=ENDING.sub("_", path.stem) + end))
         except RefusedError as error:
             errors.append(error)
-    if errors:  # all bad files of a folder at once, the first with its reason
-        first, *further = errors
-        names = [error.key.partition(",")[0] for error in further]
-        cure = first.cure
-        if names:  # in the cure, which is never cut off
-            cure = "; ".join(filter(None, [f"bad as well: {', '.join(names)}", cure]))
+    for first in errors[:1]:  # all bad files of a folder at once, the first with its reason
+        names = ", ".join(error.key.partition(",")[0] for error in errors[1:])
+        # in the cure, which is never cut off
+        cure = "; ".join(filter(None, [names and f"bad as well: {names}", first.cure]))
         raise RefusedError(first.key, first.value, first.allowed, cure)
     return tuple(recordings)
 

@@ -91,15 +91,11 @@ def _refusals(model: type[Section], error: ValidationError) -> Iterator[Refusal]
     for key, detail in details:
         if key in suggested:
             kind = "section" if isinstance(detail["input"], dict) else "key"
-            close = suggested[key].removeprefix(f"{_section_name(key)}.")
+            close = suggested[key].removeprefix(f"{key.rpartition('.')[0]}.")
             names = "" if close else ", ".join(_sibling_names(model, key))
             yield key, f"an unknown {kind}", names, f"did you mean {close}?" if close else ""
         elif key not in suggested.values():
             yield _refusal(model, key, detail)
-
-
-def _section_name(key: str) -> str:
-    return key.rpartition(".")[0]
 
 
 def _without_indices(key: str) -> str:
@@ -108,16 +104,16 @@ def _without_indices(key: str) -> str:
 
 def _sibling_names(model: type[Section], key: str) -> list[str]:
     """Keys and sections beside a key."""
-    inside = _without_indices(_section_name(key))
-    names = (name for name, _, _ in _walk_keys("", model) if _section_name(name) == inside)
-    return [name.rpartition(".")[2] for name in dict.fromkeys(names)]
+    section, _, _ = _without_indices(key).rpartition(".")
+    names = (name.rpartition(".") for name, _, _ in _walk_keys("", model))
+    return [*dict.fromkeys(name for inside, _, name in names if inside == section)]
 
 
 def _suggested_key(model: type[Section], key: str) -> str:
     """Full name of the known key nearest to an unknown one; empty where none is near."""
-    name = key.rpartition(".")[2]
+    section, dot, name = key.rpartition(".")
     if close := nearest(name, _sibling_names(model, key)):
-        return f"{_section_name(key)}.{close}".lstrip(".")
+        return f"{section}{dot}{close}"
     elsewhere = {x.rpartition(".")[2]: x for x in keys_of(model)}
     return elsewhere.get(nearest(name, elsewhere), "")
 

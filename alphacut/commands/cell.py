@@ -10,7 +10,9 @@ from typing import TextIO
 import numpy as np
 from numpy.typing import ArrayLike
 
-from alphacut.commands.options import Command, add_common, read_cell, write_answer
+from alphacut.case.cell import CellContent
+from alphacut.case.parse import parse
+from alphacut.commands.options import Command, add_common, require_petsc, write_answer
 from alphacut.io.arrays import text_table
 from alphacut.io.files import Document, ranks
 from alphacut.io.provenance import versions
@@ -55,7 +57,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, out: TextIO) -> int:
     """Solves the cell at the nominal values, checks and writes its result; exit status 0."""
-    content = read_cell(options)
+    content = parse(CellContent, options.case, options.set).content
+    require_petsc(options.petsc, content)
     problem = CellProblem.of(content)
     problem.require_mesh()
     result = problem.solve(petsc=options.petsc, parallel=ranks() > 1, estimate=True)

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import NoReturn, TextIO
 
 from alphacut.case.cell import CellContent
-from alphacut.case.parse import parse
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io.files import as_json, write_text
 from alphacut.io.problem import suggestion
@@ -50,22 +49,27 @@ class Parser(argparse.ArgumentParser):
 
 def split_petsc(arguments: Sequence[str]) -> tuple[list[str], dict[str, str]]:
     """Words of the program's own, and values of PETSc's options, named without ``-rve_``."""
-    words: list[str] = []
-    petsc: dict[str, str] = {}
-    remaining = list(arguments)
-    while remaining:
-        word = remaining.pop(0)
-        if not word.startswith(PETSC_PREFIX):
+    words, petsc = list[str](), dict[str, str]()
+    option = ""  # whose value may follow
+    for word in arguments:
+        is_value = not re.match(r"--?[A-Za-z_]", word) and not word.endswith(".toml")
+        if word.startswith(PETSC_PREFIX):
+            option = word.removeprefix(PETSC_PREFIX)
+            petsc[option] = ""
+        elif option and is_value:
+            petsc[option], option = word, ""
+        else:
             words.append(word)
-            continue
-        has_value = bool(remaining) and not re.match(r"--?[A-Za-z_]", remaining[0])
-        has_value = has_value and not remaining[0].endswith(".toml")
-        petsc[word.removeprefix(PETSC_PREFIX)] = remaining.pop(0) if has_value else ""
+            option = ""
     return words, petsc
 
 
-def require_petsc(petsc: Mapping[str, str], has_prisms: bool) -> None:
-    """Refuses PETSc options, named without their prefix, where no prisms are solved."""
+def require_petsc(petsc: Mapping[str, str], content: CellContent | None = None) -> None:
+    """Refuses PETSc options, named without their prefix, where a case solves no prisms."""
+    has_prisms = content is not None and (
+        content.mesh_cell is not None
+        or (content.particle_cell is not None and content.modulus.method == "prism")
+    )
     option = PETSC_PREFIX + next(iter(petsc), "")
     require(has_prisms or not petsc, option, "PETSc's", "options of a cell with method prism")
 
@@ -99,19 +103,6 @@ def add_run(parser: argparse.ArgumentParser, default_place: str = "nothing is ke
     about = f"folder for results ({default_place} if left out); what is up to date there is taken"
     parser.add_argument("--out", metavar="FOLDER", help=about)
     parser.add_argument("--workers", metavar="N", type=int, default=1, help="processes (default 1)")
-
-
-def require_case_petsc(petsc: Mapping[str, str], content: CellContent) -> None:
-    """Refuses options of PETSc where the case solves no prisms."""
-    prisms = content.particle_cell is not None and content.modulus.method == "prism"
-    require_petsc(petsc, prisms or content.mesh_cell is not None)
-
-
-def read_cell(options: argparse.Namespace) -> CellContent:
-    """The sections of the cell in the case file that the options name, changed by ``--set``."""
-    content = parse(CellContent, options.case, options.set).content
-    require_case_petsc(options.petsc, content)
-    return content
 
 
 def write_answer(

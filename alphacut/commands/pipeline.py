@@ -19,7 +19,7 @@ from alphacut.case.loads import RecordsSection
 from alphacut.case.motion import EnvelopeSection
 from alphacut.case.radius import RadiusMapSection, ThetaSection
 from alphacut.case.structure import Structure
-from alphacut.commands.options import require_case_petsc
+from alphacut.commands.options import require_petsc
 from alphacut.frame.questions.peaks import Peaks
 from alphacut.fuzzy import Crisp, Triangular
 from alphacut.fuzzy.progress_bar import progress_reporter
@@ -50,7 +50,7 @@ from alphacut.stochastic.sections import Simulated
 def read_case(options: argparse.Namespace) -> Case:
     """The case file that the options name, with the changes of ``--set``."""
     case = load(options.case, options.set)
-    require_case_petsc(options.petsc, case.content)
+    require_petsc(options.petsc, case.content)
     return case
 
 

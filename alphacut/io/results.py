@@ -47,15 +47,12 @@ def plain_name(name: str) -> str:
 
 
 class Listed(NamedTuple):
-    """What is known of a file.
-
-    Args:
-        digest: SHA-256 of its content; "" of a store of samples, whose rows have checksums.
-        source: Digest of everything that it was made from; "" of a text of the run itself.
-    """
+    """What is known of a file: digests of its content, and of everything that it was made from."""
 
     digest: str
+    """SHA-256; "" of a store of samples, whose rows have checksums"""
     source: str
+    """"" of a text of the run itself"""
 
 
 FILES = TypeAdapter(dict[Annotated[str, AfterValidator(plain_name)], Listed])
@@ -128,9 +125,8 @@ class ResultsFolder:
         Raises:
             RefusedError: The file is not listed, missing, changed, or a link.
         """
-        if name not in self.files:
-            what = f"without {name} in its manifest"
-            raise RefusedError(str(self.path), what, COMPLETE, RUN_AGAIN)
+        what = f"without {name} in its manifest"
+        require(name in self.files, str(self.path), what, COMPLETE, RUN_AGAIN)
         file, digest = self.path / name, self.files[name].digest
         try:
             self._require_real_parents(name)
