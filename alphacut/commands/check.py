@@ -76,12 +76,11 @@ def records_text(section: RecordsSection, records: Sequence[SuiteRecord]) -> str
     """Table of a suite's records, as their files hold them and as they are used; then warnings."""
     rows = []
     for raw, record in zip(section.recordings, records, strict=True):
-        measures = record.measures
-        file_cells = (raw.name, raw.file_format, raw.unit, f"{raw.step:g} s")
-        sample_cells = (f"{len(raw.samples)}", f"{raw.offset_share:.2%}")
-        peak = f"{raw.peak / GRAVITY:.3g} g"
-        used = tuple(f"{measures[name] / GRAVITY:.3g} g" for name in ("PGA", "Sa(T1)"))
-        rows.append((*file_cells, *sample_cells, peak, *used, f"{record.duration:.4g} s"))
+        counts = f"{raw.step:g} s", f"{len(raw.samples)}", f"{raw.offset_share:.2%}"
+        peaks = raw.peak, record.measures["PGA"], record.measures["Sa(T1)"]
+        sizes = (f"{peak / GRAVITY:.3g} g" for peak in peaks)
+        file_cells = raw.name, raw.file_format, raw.unit
+        rows.append((*file_cells, *counts, *sizes, f"{record.duration:.4g} s"))
     head = ("record", "format", "unit", "step", "samples", "mean/peak", "peak", "PGA used")
     text = text_table((*head, "Sa(T1) used", "motion"), rows)
     return text + "".join(f"warning: {x}\n" for record in records for x in record.warnings)
@@ -94,11 +93,10 @@ def nominal_structure(content: Content) -> StoreyFrame | MatrixStructure | None:
     """
     if "envelope" not in content.stages or content.structure is None:
         return None
-    if content.frame is None or content.frame.has_stated_modulus:
+    if content.has_stated_modulus:
         return content.structure.linear
-    if content.particle_cell is None or not content.particle_cell.has_series:
-        return None
-    if content.radius_map is None and content.particle_cell.fraction is None:
+    cell = content.particle_cell
+    if cell is None or not cell.has_series or not (content.radius_map or cell.fraction_map):
         return None
     section = content.modulus.model_copy(update={"method": "auto", "tolerance": 1e-4})
     result = replace(CellProblem.of(content), modulus=section).solve()

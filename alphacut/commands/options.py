@@ -98,7 +98,7 @@ def add_quiet(parser: argparse.ArgumentParser) -> None:
 
 
 def add_run(parser: argparse.ArgumentParser, default_place: str = "nothing is kept") -> None:
-    """Adds the options of a command that keeps results: ``--out``, ``--workers``."""
+    """Adds the arguments of a command that keeps results: ``--out`` and ``--workers`` as well."""
     add_common(parser)
     about = f"folder for results ({default_place} if left out); what is up to date there is taken"
     parser.add_argument("--out", metavar="FOLDER", help=about)

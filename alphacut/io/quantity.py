@@ -168,8 +168,7 @@ def parse_number(value: object, si: str) -> float:
 def parse_fuzzy(value: object, si: str) -> FuzzyNumber:
     """A quantity in the SI unit `si` as a fuzzy number: the count of its values says which kind.
 
-    Raises:
-        ValueError: As of `parse_numbers`, more than four values, or values that do not rise.
+    ValueError as of `parse_numbers`, of more than four values, or of values that do not rise.
     """
     values = parse_numbers(value, si)
     if len(values) > len(SHAPES) or list(values) != sorted(values):

@@ -63,10 +63,6 @@ def read_cosmos(file: TextFile, channel: str = "") -> Recording:
 
     A channel is named by its number, orientation or code, as "1", "90 deg" or "HNE"; of several
     one must be named.
-
-    Raises:
-        RefusedError: There is no such channel or there are several, or its step, unit or samples
-            are not those of the format.
     """
     channels = [*_cosmos_channels(file)] or [*_csmip_channels(file)]
     names = [aliases for aliases, _, _ in channels]

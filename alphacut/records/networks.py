@@ -1,5 +1,7 @@
 """Records of networks with one channel a file: PEER, K-NET and KiK-net, ESM and ITACA, SMC.
 
+Readers raise RefusedError with the line at which a file is not of its format.
+
 PEER's files of type AT2 are read with all the heads that were written since 1999. The head names
 the unit and, in one of its first lines, the number of samples and their step: ``NPTS= 4000, DT=
 .0050 SEC``, with a comma at its end or without SEC, ``4000 .0050 NPTS, DT``, or the step alone.
@@ -45,11 +47,7 @@ VERTICAL_ANGLE, COMMENTS, POINTS, RATE = 13, 16, 17, 2
 
 
 def read_peer(file: TextFile) -> Recording:
-    """Recording of a file of type AT2.
-
-    Raises:
-        RefusedError: The head or the unit is missing, or the numbers are not those it states.
-    """
+    """Recording of a file of type AT2."""
     head = enumerate(file.lines[:PEER_HEAD_LINES])
     found = ((k, PEER_STEP_FIRST.search(x) or PEER_STEP.search(x)) for k, x in head)
     row, match = next(((k, match) for k, match in found if match), (0, None))
@@ -81,9 +79,6 @@ def read_knet(file: TextFile) -> Recording:
 
     One count is the scale factor ``7845(gal)/8223790``. Counts keep the sensor's offset, so that
     such a record wants ``baseline = "mean"``.
-
-    Raises:
-        RefusedError: A line of the head is missing, or the counts are not those it states.
     """
     end = next((k for k, line in enumerate(file.lines) if line.startswith("Memo")), None)
     if end is None:
@@ -105,12 +100,7 @@ def read_knet(file: TextFile) -> Recording:
 
 
 def read_esm(file: TextFile) -> Recording:
-    """Recording of a file of ESM or ITACA: a head of lines ``KEY: value``, then one sample a line.
-
-    Raises:
-        RefusedError: A line of the head is missing, the samples are no accelerations, or there are
-            not as many as the head states.
-    """
+    """Recording of a file of ESM or ITACA: a head of lines ``KEY: value``, then a sample a line."""
     head = dict[str, tuple[str, int]]()  # value and line, from 0, of each key
     for row, line in enumerate(file.lines):
         if match := ESM_LINE.fullmatch(line.strip()):
@@ -133,11 +123,7 @@ def read_esm(file: TextFile) -> Recording:
 
 
 def read_smc(file: TextFile) -> Recording:
-    """Recording of an SMC file of the USGS, in cm/s²: three heads, comments, eight samples a line.
-
-    Raises:
-        RefusedError: The series is no acceleration, or the samples are not those of the heads.
-    """
+    """Recording of an SMC file of the USGS, in cm/s²: three heads, comments, 8 samples a line."""
     match = SMC.match(file.lines[0])
     assert match is not None
     if match[1] not in "12":

@@ -81,10 +81,6 @@ def read_table(file: TextFile, step: float | None = None, unit: str = "") -> Rec
 
     The case's unit, and of one column its step in s, stand in where no head states them; times
     without a unit are in s.
-
-    Raises:
-        RefusedError: A unit is wrong or missing, a row is no pair of numbers, or the steps are not
-            even.
     """
     table = _Table.of(file)
     allowed = "a header with units, and rows of numbers below it"
@@ -145,9 +141,6 @@ def read_force_history(path: Path) -> tuple[float, Array, bool]:
 
     Returns:
         Step in s; samples, shape (n,), in N or without a unit; whether the head gives a unit.
-
-    Raises:
-        RefusedError: A unit is wrong, a row is no pair of numbers, or the steps are not even.
     """
     file = TextFile.from_bytes(path.name, read_bytes(path))
     table = _Table.of(file)
