@@ -15,13 +15,14 @@ import numpy as np
 from alphacut.case.content import Content
 from alphacut.case.loads import RecordsSection
 from alphacut.case.parse import quantity_of
-from alphacut.case.structure import Structure
+from alphacut.case.structure import MaterialDamping, Structure
 from alphacut.case.types import Section
 from alphacut.commands.options import Command, add_common, add_quiet, write_answer
 from alphacut.commands.pipeline import cut_record_warnings, read_case, require_runnable
 from alphacut.frame import MatrixStructure, StoreyFrame
 from alphacut.frame.envelope import Ends, Envelope
 from alphacut.frame.structures.linear import frequencies
+from alphacut.frame.structures.matrix import Monomial
 from alphacut.frame.verification.self_test import Trial, stored_motions
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal, Triangular
 from alphacut.fuzzy.refused import require
@@ -107,21 +108,36 @@ def rows_of(prefix: str, section: Section) -> Iterator[Row]:
     """Rows (key, value, kind) of every quantity of a section, and of the sections below it."""
     for key, info in type(section).model_fields.items():
         value, unit = getattr(section, key), quantity_of(info)
+        entries = (
+            {f"[{n}]": x for n, x in enumerate(value, 1)} if type(value) is tuple else {"": value}
+        )
         if isinstance(value, dict):
-            for name, subsection in value.items():
-                if isinstance(subsection, Section):
-                    yield from rows_of(f"{prefix}{key}.{name}.", subsection)
-        entries = value if isinstance(value, tuple) else (value,)
-        for number, entry in enumerate(entries, start=1):
-            row_key = f"{prefix}{key}" + (f"[{number}]" if len(entries) > 1 else "")
-            if isinstance(entry, Section):
-                yield from rows_of(f"{row_key}.", entry)
-            elif isinstance(entry, FuzzyNumber) and unit and section.has_key(key):
-                yield row_key, _numbers(entry, unit.si), KINDS.get(type(entry), "fuzzy")
-            elif key == "columns" and getattr(section, "stiffness", None) is None:  # a default
-                yield row_key, _numbers(entry, ""), "default"
-            elif isinstance(entry, float) and unit and unit.si and section.has_key(key):
-                yield row_key, engineering(entry, unit.si), "number"
+            entries = {f".{name}": x for name, x in value.items()}
+        is_default = key == "columns" and getattr(section, "stiffness", None) is None
+        is_shown = section.has_key(key) or is_default
+        for index, entry in entries.items():
+            row_key = f"{prefix}{key}" + (index if index != "[1]" or len(entries) > 1 else "")
+            match entry:
+                case Section():
+                    yield from rows_of(f"{row_key}.", entry)
+                case FuzzyNumber() if is_shown:
+                    words = _numbers(entry, unit.si if unit else "")
+                    words += " in SI" * (key == "parameters")  # of matrices, in any unit
+                    kind = KINDS.get(type(entry), "fuzzy") if section.has_key(key) else "default"
+                    yield row_key, words, kind
+                case (FuzzyNumber() as force, str(si)):
+                    yield row_key, _numbers(force, si), KINDS.get(type(force), "fuzzy")
+                case (Monomial() as factor, np.ndarray() as array):
+                    size, largest = " × ".join(map(str, array.shape)), abs(array).max()
+                    yield row_key, f"{factor} × matrix {size}, largest {largest:.4g}", "in SI"
+                case MaterialDamping(joints):
+                    yield (
+                        row_key,
+                        f"of the material, and {_numbers(joints, '')} of joints",
+                        "computed",
+                    )
+                case float() if unit and unit.si and is_shown:
+                    yield row_key, engineering(entry, unit.si), "number"
 
 
 def _numbers(number: FuzzyNumber, unit: str) -> str:

@@ -327,6 +327,12 @@ class Monomial:
                 coefficient *= float(match["number"]) ** power
         return cls(coefficient, tuple((name, k) for name, k in powers.items() if k))
 
+    def __str__(self) -> str:
+        """The factors as they are parsed, such as 12*E*I*l^-3."""
+        powers = [name if k == 1 else f"{name}^{k}" for name, k in self.powers]
+        has_number = self.coefficient != 1 or not powers
+        return "*".join([f"{self.coefficient:g}"] * has_number + powers)
+
     def __call__(self, p: Mapping[str, Any]) -> Any:
         """Value at parameters, which may be numbers, arrays or anything with × and powers."""
         factors = [p[name] if power == 1 else p[name] ** power for name, power in self.powers]

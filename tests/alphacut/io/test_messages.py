@@ -67,15 +67,8 @@ MISUSES = {
     "a class as method": lambda: envelope(FLOOR, {"E": Crisp(2e10)}, method=Proof, **TIMES),
     "a number as method": lambda: envelope(FLOOR, {"E": Crisp(2e10)}, method=3, **TIMES),
     "a record of text": lambda: Accelerogram(0.01, ["a", "b"]),
-    "a step of text": lambda: Accelerogram("a", np.ones(3)),
-    "ground that is no record": lambda: StoreyFrame(
-        (1e4,), (3.0,), 2e10, (1e-5,), dampers=(50.0,), ground=np.ones(5)
-    ),
     "ground of matrices that is no record": lambda: MatrixStructure(
         {"k": 1.0}, [(1.0, np.eye(1))], [("k", np.eye(1))], {"x": np.ones(1)}, ground=[1.0, 2.0]
-    ),
-    "an output twice": lambda: StoreyFrame(
-        (1e4,), (3.0,), 2e10, (1e-5,), q0=(0.01,), outputs=("q1", "q1")
     ),
     "no output": lambda: MatrixStructure({"k": 1.0}, [(1.0, np.eye(1))], [("k", np.eye(1))], {}),
     "a class as method of propagate": lambda: propagate(abs, {"x": Crisp(1.0)}, General),
