@@ -6,7 +6,6 @@ from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
@@ -40,38 +39,27 @@ def domains(cell: Cell, size: float, layers: int) -> Figure:
     levels = points[: (layers + 1) * len(grid.plane.points)].reshape(layers + 1, -1, 3)
     figure = plt.figure(figsize=(11.0, 4.2))
     widths = figure.add_gridspec(1, 3, width_ratios=(1, 0.8, 1.2))
-    draw_plane_mesh(figure.add_subplot(widths[0]), grid, levels[layers // 2])
-    draw_density(figure.add_subplot(widths[1]), cell, levels[:, 0, 2])
+    plane, density = figure.add_subplot(widths[0]), figure.add_subplot(widths[1])
+    middle = levels[layers // 2]
+    corners = middle[grid.plane.triangles[:, :3], :2]
+    for mask, colour in ((~grid.plane.inside, MATRIX), (grid.plane.inside, PARTICLE)):
+        plane.add_collection(PolyCollection(list(corners[mask]), facecolor=colour, ec=INK, lw=0.25))
+    plane.set(xlim=(-1, 1), ylim=(-1, 1), aspect="equal", xlabel="x$_1$/a", ylabel="x$_2$/a")
+    plane.set_title(f"physical domain, θ = {middle[0, 2]:g}")
+    plane.grid(visible=False)
+    law, layer_ends = cell.radius.distribution, levels[:, 0, 2]
+    theta = np.linspace(law.lower, law.upper, 300)
+    density.plot(law.pdf(theta), theta, color=BLUE, lw=1.6)
+    density.fill_betweenx(theta, 0, law.pdf(theta), color=BLUE, alpha=0.15, lw=0)
+    density.hlines(layer_ends, 0, law.pdf(layer_ends), color=ORANGE, lw=0.9)
+    title = f"stochastic domain, {layers} layers"
+    density.set(xlabel="density $f_Θ$", ylabel="θ", xlim=0, title=title)
     _draw_prisms(figure.add_subplot(widths[2], projection="3d"), grid, levels)
     return figure
 
 
-def draw_plane_mesh(axes: Axes, grid: PrismGrid, level: Array) -> None:
-    """Physical domain: triangles at one level of θ, with nodes (x1, x2, θ), coloured by phase."""
-    corners = level[grid.plane.triangles[:, :3], :2]
-    for mask, colour in ((~grid.plane.inside, MATRIX), (grid.plane.inside, PARTICLE)):
-        axes.add_collection(PolyCollection(list(corners[mask]), facecolor=colour, ec=INK, lw=0.25))
-    axes.set(xlim=(-1, 1), ylim=(-1, 1), aspect="equal", xlabel="x$_1$/a", ylabel="x$_2$/a")
-    axes.set_title(f"physical domain, θ = {level[0, 2]:g}")
-    axes.grid(visible=False)
-
-
-def draw_density(axes: Axes, cell: Cell, levels: Array) -> None:
-    """Stochastic domain: the density of θ, and the levels of the mesh."""
-    law = cell.radius.distribution
-    theta = np.linspace(law.lower, law.upper, 300)
-    axes.plot(law.pdf(theta), theta, color=BLUE, lw=1.6)
-    axes.fill_betweenx(theta, 0, law.pdf(theta), color=BLUE, alpha=0.15, lw=0)
-    axes.hlines(levels, 0, law.pdf(levels), color=ORANGE, lw=0.9)
-    title = f"stochastic domain, {len(levels) - 1} layers"
-    axes.set(xlabel="density $f_Θ$", ylabel="θ", xlim=0, title=title)
-
-
 def _draw_prisms(axes: Any, grid: PrismGrid, positions: Array) -> None:
-    """Draws the product domain: prisms on the particle's cone, two front sides and the bottom.
-
-    `positions` are (x1, x2, θ) of the nodes, shape (values of θ, nodes, 3).
-    """
+    """Draws prisms on the particle's cone, two sides and the bottom, by nodes (θ, node, 3)."""
     plane, triangles = grid.plane.points, grid.plane.triangles[:, :3]
     pairs = np.concatenate([triangles[:, [0, 1]], triangles[:, [0, 2]], triangles[:, [1, 2]]])
     edges = np.unique(np.sort(pairs, axis=1), axis=0)  # corners of each, shape (edges, 2)
@@ -90,10 +78,7 @@ def _draw_prisms(axes: Any, grid: PrismGrid, positions: Array) -> None:
 
 
 def layer_faces(levels: Array, edges: Ints, nodes: Mask) -> Array:
-    """Side faces of the prisms over the edges between chosen nodes, shape (n, 4, 3).
-
-    `levels` are positions of the nodes at each θ, (levels, nodes, 3); edges have shape (edges, 2).
-    """
+    """Side faces (n, 4, 3) of prisms over edges (edges, 2) of chosen nodes (levels, nodes, 3)."""
     first, second = edges[nodes[edges].all(axis=1)].T
     below, above = levels[:-1], levels[1:]
     faces = np.stack([below[:, first], below[:, second], above[:, second], above[:, first]], axis=2)
@@ -102,17 +87,18 @@ def layer_faces(levels: Array, edges: Ints, nodes: Mask) -> Array:
 
 def stages(results: Results) -> Figure:
     """Fig. 2: the stages of the run, with the data that each hands to the next."""
-    boxes, arrows = boxes_and_arrows(results)
+    boxes = boxes_of(results)
     figure, axes = plt.subplots(figsize=(2.9 * len(boxes), 1.9))
     box: Look = {"boxstyle": "round,pad=0.02", "facecolor": "#dbe9f4", "edgecolor": INK, "lw": 1}
     centred: Look = {"ha": "center", "va": "top"}
-    for number, (title, lines) in enumerate(boxes):
+    for number, (title, lines, words) in enumerate(boxes):
         left, middle = PITCH * number, PITCH * number + BOX_WIDTH / 2
         axes.add_patch(FancyBboxPatch((left, 0), BOX_WIDTH, 1.5, **box))
         axes.text(middle, 1.4, title, weight="bold", size=10, **centred)
         axes.text(middle, 1.1, "\n".join(lines), size=8, **centred)
-    for number, words in enumerate(arrows):
-        start, end = PITCH * number + BOX_WIDTH, PITCH * (number + 1)
+        if number + 1 == len(boxes):
+            break
+        start, end = left + BOX_WIDTH, left + PITCH
         arrow = {"arrowstyle": "-|>", "color": ORANGE}
         axes.annotate("", (end, 0.75), (start, 0.75), arrowprops=arrow)
         axes.text((start + end) / 2, 0.85, words, ha="center", size=9, color=ORANGE)
@@ -121,32 +107,27 @@ def stages(results: Results) -> Figure:
     return figure
 
 
-def boxes_and_arrows(results: Results) -> tuple[list[tuple[str, list[str]]], list[str]]:
-    """Title and lines of each box, one a stage of the run; text of each arrow between boxes."""
-    content = results.content
-    boxes: list[tuple[str, list[str]]] = []
-    arrows: list[str] = []
-    if content.radius is not None and results.modulus is not None:
+def boxes_of(results: Results) -> list[tuple[str, list[str], str]]:
+    """Title and lines of each box, one a stage of the run, and what it hands to the next."""
+    content, modulus, boxes = results.content, results.modulus, list[tuple[str, list[str], str]]()
+    if content.radius is not None and modulus is not None:
         numbers = getattr(content.radius, "numbers", {})
         values = {name: sorted({x.nominal, *x.support}) for name, x in numbers.items()}
         lines = [f"{k} = [{', '.join(f'{x:.4g}' for x in ends)}]" for k, ends in values.items()]
-        boxes.append(("radius of the particle", lines))
-        arrows.append("r(θ)")
-    if (data := results.modulus) is not None:
-        low, high = data.numbers.E_GPa[0]
-        lines = [f"method {data.numbers.method}", f"{data.numbers.samples} samples"]
+        boxes.append(("radius of the particle", lines, "r(θ)"))
+    if modulus is not None:
+        low, high = modulus.numbers.E_GPa[0]
+        lines = [f"method {modulus.numbers.method}", f"{modulus.numbers.samples} samples"]
         lines += [f"E = {low:.5g} … {high:.5g} GPa"]
-        boxes.append(("cell on the product domain", lines))
-        arrows.append("fuzzy E")
+        boxes.append(("cell on the product domain", lines, "fuzzy E"))
     if results.structure is not None:
-        fuzzy = dict.fromkeys(name for task in results.tasks for name in task.fuzzy)
-        outputs = ", ".join(results.structure.outputs[:4])
-        boxes.append(("structure", [f"fuzzy: {', '.join(fuzzy)}", f"outputs: {outputs}"]))
-        arrows.append("flow q(t; p)")
+        fuzzy = ", ".join(dict.fromkeys(name for task in results.tasks for name in task.fuzzy))
+        lines = [f"fuzzy: {fuzzy}", f"outputs: {', '.join(results.structure.outputs[:4])}"]
+        boxes.append(("structure", lines, "flow q(t; p)"))
         studies = [f"{x.name}: {', '.join(x.fuzzy)} for {x.duration:g} s" for x in results.tasks]
-        boxes.append(("envelopes", [f"by {results.tasks[0].section.method}", *studies[:5]]))
-        arrows.append("bounds")
-    return boxes, arrows[:-1]
+        lines = [f"by {results.tasks[0].section.method}", *studies[:5]]
+        boxes.append(("envelopes", lines, "bounds"))
+    return boxes
 
 
 CUTS = 6  # levels in Fig. 37

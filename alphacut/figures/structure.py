@@ -75,7 +75,9 @@ def draw_storey(axes: Axes, floor: int, placement: str | None) -> None:
     right = PITCH * floor
     left, start = right - 1.0, max(0.0, right - PITCH)
     middle, half = (left + right) / 2, (start + left) / 2
-    draw_spring(axes, start, left, 0.2)
+    inner = np.linspace(start + 0.15 * (left - start), left - 0.15 * (left - start), 10)
+    zigzag = 0.2 + 0.1 * np.array([0, 1, -1, 1, -1, 1, -1, 1, -1, 0])
+    axes.plot([start, *inner, left], [0.2, *zigzag, 0.2], color=BLUE, lw=1.2)
     axes.annotate(f"$k_{{{floor}}}$", (half, 0.36), ha="center", fontsize=9)
     box: Look = {"facecolor": "#dbe9f4", "edgecolor": INK, "lw": 1}
     axes.fill_between([left, right], [-0.3] * 2, [0.6] * 2, **box)
@@ -99,13 +101,6 @@ def set_to_scale(axes: Axes, across: Point, up: Point) -> None:
 def draw_ground(axes: Axes, across: Point, up: Point) -> None:
     """Draws a rectangle that stands for the ground."""
     axes.fill_between(across, *up, hatch="////", facecolor="white", edgecolor=GREY, lw=0)
-
-
-def draw_spring(axes: Axes, left: float, right: float, height: float) -> None:
-    """Draws a spring as a zigzag between two points at the same height."""
-    inner = np.linspace(left + 0.15 * (right - left), right - 0.15 * (right - left), 10)
-    zigzag = height + 0.1 * np.array([0, 1, -1, 1, -1, 1, -1, 1, -1, 0])
-    axes.plot([left, *inner, right], [height, *zigzag, height], color=BLUE, lw=1.2)
 
 
 def draw_damper(axes: Axes, start: Point, end: Point) -> None:

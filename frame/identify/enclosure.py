@@ -23,12 +23,9 @@ from alphacut.frame.identify.modes import Chain, ModeCut, chain_modes, eigenvalu
 from alphacut.frame.structures.storey import chain_matrix
 from alphacut.fuzzy.arrays import Array
 
-MAX_PASSES = 6
-"""Most passes over all ends."""
-MIN_PROGRESS = 0.03
-"""Fraction of the widths that a further pass must take off to be worth another one."""
-ROUND_OFF = 1e-13
-"""Fraction of the sums' sizes by which bounds are widened for rounding."""
+MAX_PASSES = 6  # over all ends
+MIN_PROGRESS = 0.03  # fraction of the widths that a pass must take off to be worth another one
+ROUND_OFF = 1e-13  # fraction of the sums' sizes by which bounds are widened for rounding
 
 
 def enclosure(
@@ -38,21 +35,18 @@ def enclosure(
 
     Each side is bounded by linear programs, in at most `MAX_PASSES` passes over ever smaller boxes.
     `modes` are ranges of the measured modes at a level, `lower` and `upper` corners (d,) of the
-    first box: logarithms of parameters over nominal values.
-
-    Returns:
-        Lower and upper corner, shape (d,) each; None where no parameters agree.
+    first box: logarithms of parameters over nominal values. None where no parameters agree.
     """
     lower, upper = lower.copy(), upper.copy()
     amplitudes: dict[tuple[int, int], tuple[float, float]] = {}  # not measured, by mode and floor
     for _ in range(MAX_PASSES):
-        relaxation = ChainRelaxation.with_modes(chain, lower, upper, modes, amplitudes)
-        if relaxation is not None and relaxation.unmeasured:
+        relaxation = ChainRelaxation(chain, lower, upper, modes, amplitudes)
+        if relaxation.unmeasured and not relaxation.is_empty:
             amplitudes |= {key: relaxation.bounds(x) for key, x in relaxation.unmeasured.items()}
             if any(low > high for low, high in amplitudes.values()):
                 return None
-            relaxation = ChainRelaxation.with_modes(chain, lower, upper, modes, amplitudes)
-        if relaxation is None:
+            relaxation = ChainRelaxation(chain, lower, upper, modes, amplitudes)
+        if relaxation.is_empty:
             return None
         has_width, width = upper > lower, upper - lower
         for k in np.flatnonzero(has_width):
@@ -68,11 +62,8 @@ def enclosure(
 class LinearRelaxation:
     """Linear program A x ≤ 0, l ≤ x ≤ u, with products and exponentials between planes.
 
-    An expression is an array of the coefficients of all variables, shape (size,). The first
-    variable is 1, so that its coefficient is the constant.
-
-    Args:
-        size: Most variables.
+    An expression is an array of the coefficients of at most `size` variables, shape (size,). The
+    first variable is 1, so that its coefficient is the constant.
     """
 
     def __init__(self, size: int) -> None:
@@ -153,7 +144,10 @@ def is_proved_empty(rows: csr_array, lower: Array, upper: Array) -> bool:
 
 
 class ChainRelaxation(LinearRelaxation):
-    """Linear relaxation of all chains of a box, to which ranges of their modes are added.
+    """Linear relaxation of all chains of a box whose modes lie in measured ranges.
+
+    Args are those of `enclosure`; `known` are ends of amplitudes that were not measured, by mode
+    and floor.
 
     Attributes:
         logs: Logarithm of each parameter over its nominal value, as an expression.
@@ -162,12 +156,20 @@ class ChainRelaxation(LinearRelaxation):
         unmeasured: Amplitudes at floors without a sensor, as expressions, by mode and floor.
         lowest: Lower bounds of all eigenvalues, shape (n,), in 1/s².
         highest: Upper bounds of them.
+        is_empty: Whether no chain of the box has such eigenvalues.
     """
 
-    def __init__(self, chain: Chain, lower: Array, upper: Array, n_modes: int) -> None:
+    def __init__(
+        self,
+        chain: Chain,
+        lower: Array,
+        upper: Array,
+        modes: Sequence[ModeCut],
+        known: Mapping[tuple[int, int], tuple[float, float]],
+    ) -> None:
         n = len(chain.mass)
         # parameters, stiffnesses and masses; of each mode amplitudes, λ and three products a floor
-        super().__init__(1 + len(lower) + 2 * n + n_modes * (4 * n + 1))
+        super().__init__(1 + len(lower) + 2 * n + len(modes) * (4 * n + 1))
         self.chain = chain
         self.logs = [self.variable(*ends) for ends in zip(lower, upper, strict=True)]
         self.stiffness, self.mass = (
@@ -177,45 +179,24 @@ class ChainRelaxation(LinearRelaxation):
         low, high = chain.ranges(lower, upper)
         self.low, self.high = np.exp(low), np.exp(high)  # factors of stiffness and mass, (2, n)
         self.unmeasured: dict[tuple[int, int], Array] = {}
-
-    @classmethod
-    def with_modes(
-        cls,
-        chain: Chain,
-        lower: Array,
-        upper: Array,
-        modes: Sequence[ModeCut],
-        known: Mapping[tuple[int, int], tuple[float, float]],
-    ) -> ChainRelaxation | None:
-        """Return the relaxation of all chains with such modes; None if there are none.
-
-        Arguments are those of `enclosure`, with known ends of amplitudes that were not measured.
-        """
-        relaxation = cls(chain, lower, upper, len(modes))
-        for cut in modes:
-            k = cut.mode - 1
-            low, high = max(cut.low, relaxation.lowest[k]), min(cut.high, relaxation.highest[k])
-            if low > high:
-                return None
-            relaxation.require_frequency(cut)
-            ends = relaxation.amplitude_ranges(high, cut) if cut.shape else None
-            if ends is not None:
-                shape = {
-                    floor: relaxation.variable(*known.get((cut.mode, floor), ends[floor]))
-                    for floor in sorted(ends)
-                }
-                for floor in shape.keys() - cut.shape.keys():
-                    relaxation.unmeasured[cut.mode, floor] = shape[floor]
-                relaxation.require_balance(shape, relaxation.variable(low / high, 1.0), high)
-        return relaxation
+        least = {cut.mode: max(cut.low, self.lowest[cut.mode - 1]) for cut in modes}
+        greatest = {cut.mode: min(cut.high, float(self.highest[cut.mode - 1])) for cut in modes}
+        self.is_empty = any(least[mode] > greatest[mode] for mode in least)
+        for cut in () if self.is_empty else modes:
+            self.require_frequency(cut)
+            eigenvalue = greatest[cut.mode]
+            if cut.shape and (ends := self.amplitude_ranges(eigenvalue, cut)) is not None:
+                ends |= {z: known[cut.mode, z] for z in ends if (cut.mode, z) in known}
+                shape = {floor: self.variable(*ends[floor]) for floor in sorted(ends)}
+                unmeasured = shape.keys() - cut.shape.keys()
+                self.unmeasured |= {(cut.mode, floor): shape[floor] for floor in unmeasured}
+                relative = self.variable(least[cut.mode] / eigenvalue, 1.0)
+                self.require_balance(shape, relative, eigenvalue)
 
     def require_balance(
         self, shape: Mapping[int, Array], relative_eigenvalue: Array, eigenvalue: float
     ) -> None:
-        """Add the balance of shears and inertia forces at floors, T_z − T_(z+1) = λ m_z r_z.
-
-        `shape` are amplitudes r by floor, `relative_eigenvalue` is λ over its greatest value.
-        """
+        """Add the balance at floors, T_z − T_(z+1) = λ m_z r_z, with λ over its greatest value."""
         chain, n = self.chain, len(self.mass)
         unit = float(chain.stiffness.mean())  # of all forces
         shears, below = [], 0.0 * self.one  # the ground's amplitude
@@ -258,13 +239,10 @@ class ChainRelaxation(LinearRelaxation):
         return amplitudes
 
     def require_frequency(self, cut: ModeCut) -> None:
-        """Add two inequalities, necessary for an eigenvalue λ to lie within a measured cut.
-
-        They are low − e₁ ≤ xᵀK x / xᵀM x ≤ high + e₂ in the factors of stiffnesses and masses, x
-        the mode shape at the middle of the box. e₁ and e₂ bound the distance of quotient and
-        eigenvalue by the residual (Kato and Temple). Nothing is added if bounds of the neighbouring
-        eigenvalues overlap the quotient.
-        """
+        """Add two inequalities, necessary for an eigenvalue to lie within a measured cut."""
+        # low − e₁ ≤ xᵀK x / xᵀM x ≤ high + e₂ in the factors of stiffnesses and masses, x the mode
+        # shape at the middle of the box. e₁ and e₂ bound the distance of quotient and eigenvalue by
+        # the residual (Kato and Temple), where no neighbouring eigenvalue reaches the quotient.
         chain, low, high, k = self.chain, self.low, self.high, cut.mode - 1
         below = self.highest[k - 1] if k else -np.inf
         above = self.lowest[k + 1] if k + 1 < len(self.lowest) else np.inf
@@ -275,8 +253,8 @@ class ChainRelaxation(LinearRelaxation):
         strain, inertia = chain.stiffness * drift**2, chain.mass * shape**2
         least_quotient = float(strain @ low[0] / (inertia @ high[1]))
         greatest_quotient = float(strain @ high[0] / (inertia @ low[1]))
-        is_apart = below < min(self.lowest[k], least_quotient)
-        if not (is_apart and max(self.highest[k], greatest_quotient) < above):
+        is_above_last = below < min(self.lowest[k], least_quotient)
+        if not (is_above_last and max(self.highest[k], greatest_quotient) < above):
             return
         shears, force = half[0] * np.abs(chain.stiffness * drift), np.abs(chain.mass * shape)
         # of K x − λ M x over the box

@@ -44,8 +44,7 @@ def identify(
 
     Args:
         frame: The frame; damping, initial motion and outputs do not matter.
-        prior: Fuzzy numbers of the parameters, of "E", "I", "c1" … (columns of a storey), "l1" …,
-            "m1" …, in SI units.
+        prior: Fuzzy numbers of parameters of stiffness and mass, in SI units.
         measured: The measured modes, by rising number.
         alpha: Levels, rising within (0, 1].
 
@@ -64,9 +63,8 @@ def identify(
         low, high = np.log(np.array(cuts).T / nominal)
         if boxes:  # sets are nested
             low, high = np.maximum(low, boxes[-1][0]), np.minimum(high, boxes[-1][1])
-        box = None
-        if (low <= high).all():
-            box = enclosure(evidence.chain, low, high, evidence.modes(level))
+        is_empty = (low > high).any()
+        box = None if is_empty else enclosure(evidence.chain, low, high, evidence.modes(level))
         if box is None:
             empty = level
             break
@@ -91,9 +89,8 @@ def _require_input(
     prior: Mapping[str, FuzzyNumber],
     alpha: Sequence[float],
 ) -> None:
-    levels, n_floors = np.asarray(alpha, float), frame.floors
-    is_rising = levels.ndim == 1 and len(levels) > 0 and bool((np.diff(levels) > 0).all())
-    in_range = is_rising and levels[0] > 0 and levels[-1] <= 1
+    levels, n_floors = np.append(0.0, alpha), frame.floors
+    in_range = len(levels) > 1 and levels[-1] <= 1 and bool((np.diff(levels) > 0).all())
     require(in_range, "identify.alpha", value=list(alpha), allowed="rising in (0, 1]")
     mode_numbers = [mode.mode for mode in measured]
     are_rising = bool(mode_numbers) and sorted(set(mode_numbers)) == mode_numbers
@@ -128,15 +125,13 @@ class Evidence:
     def joint(self) -> JointRule | None:
         """Rule by which the claims hold together; None where there is none."""
         names = tuple(name for name, x in self.numbers.items() if isinstance(x, ClaimedNumber))
-        if not names:
-            return None
-        return JointRule(names, False, "parameter of the measured frame", named=True)
+        means = "parameter of the measured frame"
+        return JointRule(names, independent=False, means=means, named=True) if names else None
 
     def cut(self, number: FuzzyNumber, alpha: float) -> Cut:
         """Return the α-cut of a number, of a claim at the level where all claims hold jointly."""
-        if self.joint and isinstance(number, ClaimedNumber):
-            return number.cut(alpha / len(self.joint.names))
-        return number.cut(alpha)
+        n_claims = len(self.joint.names) if self.joint else 1
+        return number.cut(alpha / n_claims if isinstance(number, ClaimedNumber) else alpha)
 
     def modes(self, alpha: float) -> list[ModeCut]:
         """Return ranges of the measured modes at the joint level α."""

@@ -23,14 +23,10 @@ from alphacut.fuzzy.refused import RefusedError, checked_number, require
 from alphacut.fuzzy.sets.claimed import ClaimedNumber
 from alphacut.fuzzy.sets.numbers import Cut
 
-ROUND_OFF = 1e-13
-"""Share of the largest eigenvalue by which a computed one may be wrong, at most."""
-NEAR = 0.8
-"""Share of a mode's largest amplitude from which on a floor may be the reference."""
-MAX_SCATTER = 0.2
-"""Deviation of the reference over its amplitude above which ratios have no known distribution."""
-CHANCE = 1e-6
-"""Probability below which values contradict their deviation."""
+ROUND_OFF = 1e-13  # share of the largest eigenvalue by which a computed one may be wrong
+NEAR = 0.8  # share of a mode's largest amplitude from which on a floor may be the reference
+MAX_SCATTER = 0.2  # deviation of the reference's amplitude, as a share of it, that is refused above
+CHANCE = 1e-6  # probability below which values contradict their deviation
 
 
 class Chain:
@@ -56,27 +52,16 @@ class Chain:
         allowed = "none: a storey softened by weight has no stiffness of such a product"
         require(not frame.gravity, "frame.gravity", value=frame.gravity, allowed=allowed)
         self.powers = np.zeros((2, n, len(names)))
+        allowed = f"E, I, c1 … c{n} (columns), l1 …, m1 …, or k1 … k{n} (stiffnesses)"
         for column, name in enumerate(names):
-            part = re.fullmatch(r"([clmkI])(\d+)", name)
-            if name in ("E", "I") and name in values:
-                self.powers[0, :, column] = 1
-            elif part and name in values:
-                row = int(part[2]) - 1
-                self.powers[int(part[1] == "m"), row, column] = -3 if part[1] == "l" else 1
-            else:
-                allowed = f"E, I, c1 … c{n} (columns), l1 …, m1 …, or k1 … k{n} (stiffnesses)"
+            part = re.fullmatch(r"(E|[clmkI])(\d*)", name)
+            if part is None or name not in values:
                 raise RefusedError("identify.parameters", name, allowed)
+            floors = int(part[2]) - 1 if part[2] else slice(None)
+            self.powers[int(part[1] == "m"), floors, column] = -3 if part[1] == "l" else 1
         nominal = {name: Jet.constant([value], 0) for name, value in values.items()}
         self.names, self.nominal = tuple(names), np.array([values[name] for name in names])
         self.stiffness, self.mass = frame.springs(nominal).value[0], np.asarray(frame.masses, float)
-
-    def modes(self, points: Array) -> tuple[Array, Array]:
-        """Return eigenvalues λ = ω² (S, n), rising, and mode shapes (S, floor, mode).
-
-        `points` are parameters, shape (S, d), in SI units.
-        """
-        stiffness, mass = np.exp(np.log(points / self.nominal) @ self.powers.swapaxes(1, 2))
-        return chain_modes(self.stiffness * stiffness, self.mass * mass)
 
     def ranges(self, lower: Array, upper: Array) -> tuple[Array, Array]:
         """Return bounds of logarithms of stiffnesses and masses over nominal ones, (2, n) each.
@@ -84,10 +69,8 @@ class Chain:
         `lower` and `upper` are corners of a box of logarithms of parameters over nominal values,
         shape (d,); stiffnesses come first in the bounds.
         """
-        increases = self.powers > 0
-        lower_bound = np.where(increases, self.powers * lower, self.powers * upper).sum(-1)
-        upper_bound = np.where(increases, self.powers * upper, self.powers * lower).sum(-1)
-        return lower_bound, upper_bound
+        ends = np.sort([self.powers * lower, self.powers * upper], axis=0).sum(-1)
+        return ends[0], ends[1]
 
 
 def chain_modes(stiffness: Array, mass: Array) -> tuple[Array, Array]:
@@ -102,11 +85,8 @@ def chain_modes(stiffness: Array, mass: Array) -> tuple[Array, Array]:
 
 
 def eigenvalue_ranges(chain: Chain, lower: Array, upper: Array) -> tuple[Array, Array]:
-    """Return proved bounds of eigenvalues ω² over a box, (n,) each, in 1/s².
-
-    The box is that of `Chain.ranges`. They rise with every stiffness and fall with every mass, so
-    that two corners give them.
-    """
+    """Return proved bounds of eigenvalues ω² over a box of `Chain.ranges`, (n,) each, in 1/s²."""
+    # they rise with every stiffness and fall with every mass
     low, high = chain.ranges(lower, upper)
     stiffness = chain.stiffness * np.exp(np.stack([low[0], high[0]]))
     mass = chain.mass * np.exp(np.stack([high[1], low[1]]))
@@ -137,32 +117,26 @@ class MeasuredMode:
     reference: int = 0
 
     def __post_init__(self) -> None:
-        floors, mode = [*self.shape], f"mode {self.mode}"
-        require(self.mode >= 1, f"{mode}: number", value=self.mode, allowed="numbers from 1 on")
-        are_positive = min(floors, default=1) >= 1
-        require(are_positive, f"{mode}: floors", value=floors, allowed="numbers from 1 on")
-        hertz, allowed = self.frequency.nominal, "positive values in Hz"
-        require(hertz > 0, f"{mode}: frequency", value=hertz, allowed=allowed)
-        fits = not floors or (self.reference >= 1 and self.reference not in floors)
+        numbers, mode, hertz = [self.mode, *self.shape], f"mode {self.mode}", self.frequency.nominal
+        allowed = "numbers from 1 on"
+        require(min(numbers) >= 1, f"{mode}: mode and floors", value=numbers, allowed=allowed)
+        require(hertz > 0, f"{mode}: frequency", value=hertz, allowed="positive values in Hz")
+        is_beside = not self.shape or (self.reference >= 1 and self.reference not in self.shape)
         allowed = "a floor beside those of the shape"
-        require(fits, f"{mode}: reference", value=self.reference, allowed=allowed)
+        require(is_beside, f"{mode}: reference", value=self.reference, allowed=allowed)
 
     @property
     def quantities(self) -> dict[str, FuzzyNumber]:
         """Measured quantities by name: "f1", and "shape1_3" for the third floor."""
-        return {
-            f"f{self.mode}": self.frequency,
-            **{f"shape{self.mode}_{floor}": number for floor, number in self.shape.items()},
-        }
+        amplitudes = {f"shape{self.mode}_{floor}": number for floor, number in self.shape.items()}
+        return {f"f{self.mode}": self.frequency, **amplitudes}
 
     def ranges(self, cut: Callable[[FuzzyNumber], Cut]) -> ModeCut:
         """Return ranges of eigenvalue and amplitudes, given a function that cuts fuzzy numbers."""
-        low, high = cut(self.frequency)
+        low, high = (2 * np.pi * np.maximum(cut(self.frequency), 0.0)) ** 2
         shape = {floor: cut(number) for floor, number in self.shape.items()}
-        if self.reference:
-            shape[self.reference] = Cut(1.0, 1.0)
-        square = (2 * np.pi) ** 2
-        return ModeCut(self.mode, square * max(low, 0.0) ** 2, square * high**2, shape)
+        shape |= {self.reference: Cut(1.0, 1.0)} if self.reference else {}
+        return ModeCut(self.mode, float(low), float(high), shape)
 
 
 @dataclass(frozen=True)
@@ -205,9 +179,9 @@ def measured_mode(
     values = np.asarray(frequencies, float)
     rows = {floor: np.asarray(row, float) for floor, row in (shapes or {}).items()}
     counts = [row.size for row in rows.values()]
-    fits = values.ndim == 1 and not set(counts) - {values.size}
+    are_alike = values.ndim == 1 and not set(counts) - {values.size}
     allowed = f"{values.size} of each floor, as many as frequencies"
-    require(fits, f"mode {mode}: amplitudes", value=counts, allowed=allowed)
+    require(are_alike, f"mode {mode}: amplitudes", value=counts, allowed=allowed)
     spread = None if frequency_deviation is None else frequency_deviation * float(values.mean())
     number = _mean(values, spread, f"mode {mode}: frequencies", "frequency_deviation")
     if not rows:
@@ -232,22 +206,18 @@ def _mean_ratio(ratios: Array, deviation: float | None, what: str, reference: in
     """Mean of amplitude ratios (n,) as a fuzzy number, without the bias of the division."""
     # `deviation` is that of either amplitude over the reference's mean, if known; `variance` is the
     # reference's over its squared mean
-    variance = 0.0
-    if deviation is not None:
-        variance = deviation**2
-    elif len(ratios) > 1:
+    variance = (deviation or 0.0) ** 2
+    if deviation is None and len(ratios) > 1:
         variance = float(ratios.var(ddof=1) / (1 + ratios.mean() ** 2))
     value, cure = f"{np.sqrt(variance):.2g} of its amplitude", "take means of several rows"
     key = f"{what}: scatter of floor {reference}"
     is_small = bool(np.isfinite(ratios).all()) and variance <= MAX_SCATTER**2
     require(is_small, key, value=value, allowed=f"values up to {MAX_SCATTER:g}", cure=cure)
     # both amplitudes scatter; the last factor bounds the terms of second order from above
-    combined = deviation and deviation * float(
-        np.hypot(1, ratios.mean()) * np.sqrt(1 + 8 * variance)
-    )
+    widening = float(np.hypot(1, ratios.mean()) * np.sqrt(1 + 8 * variance))
     mean_of_inverse = 1 + variance + 3 * variance**2  # of 1/(1 + x), x normal
-    unbiased = np.asarray(ratios / mean_of_inverse, float)
-    return _mean(unbiased, combined, what, "shape_deviation")
+    combined = deviation and deviation * widening
+    return _mean(np.asarray(ratios / mean_of_inverse), combined, what, "shape_deviation")
 
 
 def _mean(values: Array, deviation: float | None, what: str, key: str) -> ClaimedNumber:

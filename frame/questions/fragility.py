@@ -3,11 +3,8 @@
 A linear structure that starts at rest and is moved by its record alone scales with it. So the
 measure of a record at which a limit L is reached is c(p) = m L / peak(p), m the record's measure as
 it is and p the inputs. Over an α-cut it ranges between m L over the greatest and m L over the least
-peak, both of which are bounded from outside (proved) and from inside (reached).
-
-α is a level of possibility. It is no probability and is never multiplied with one: for each α the
-fraction of the suite's records under which a structure exceeds the limit lies in a band, for all
-structures within the α-cut.
+peak, both of which are bounded from outside (proved) and from inside (reached). α is a level of
+possibility, no probability, and is never multiplied with one.
 """
 
 from __future__ import annotations
@@ -19,13 +16,10 @@ from itertools import pairwise
 import numpy as np
 
 from alphacut.frame.questions.peaks import Peak
-from alphacut.frame.questions.probability import clopper_pearson
+from alphacut.frame.questions.probability import CONFIDENCE, clopper_pearson
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import require
 from alphacut.fuzzy.result import Ends
-
-CONFIDENCE = 0.95
-"""Probability of the limits of a fraction if the records were independent draws."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,9 +42,8 @@ class CriticalMeasures:
 
     def __post_init__(self) -> None:
         """Refuse measures that are not positive or not in rising order."""
-        ends = (self.low, self.low_reached, self.high_reached, self.high)
-        rise = all((a <= b * (1 + 1e-9)).all() for a, b in pairwise(ends))
-        is_valid = rise and (self.low > 0).all()
+        ends = pairwise((self.low, self.low_reached, self.high_reached, self.high))
+        is_valid = (self.low > 0).all() and all((a <= b * (1 + 1e-9)).all() for a, b in ends)
         require(is_valid, "critical measures", value="not rising", allowed="rising ends")
 
     @classmethod
@@ -94,12 +87,11 @@ class CriticalMeasures:
     def dispersion(self) -> Ends:
         """Bounds of the standard deviation of the logarithms, shape (A,) each.
 
-        For values within their intervals it is within ‖h‖ / √(R − 1) of that of the middles, h the
-        half widths: subtracting the mean does not lengthen a vector.
-
         Raises:
             RefusedError: There is one record.
         """
+        # it is within ‖h‖ / √(R − 1) of that of the middles of the intervals, h their half widths:
+        # subtracting the mean does not lengthen a vector
         require(len(self.low) > 1, "records", value=len(self.low), allowed="two records or more")
         low, high = np.log(self.low), np.log(self.high)
         finite = np.isfinite(high).all(0)

@@ -1,13 +1,12 @@
 """Fuzzy peaks: the largest magnitude of each output over the motion, as intervals by level.
 
 At the nodes no motion peaks higher than its envelope, and each has at least the magnitude that its
-band is away from zero. Both are read off bounds that exclude values and bounds that are attained,
-so that a peak is as sure as its envelope; what the steps between nodes may add counts as error.
+band is away from zero; what the steps between nodes may add counts as error.
 
 Exceeding a limit is possible to the degree of the highest α-cut that holds such a motion. It is
 necessary to one less the degree to which not exceeding it is possible (Dubois and Prade,
-Possibility Theory, chapter 1). The α-cut of a peak is the answer: a peak that stays below the limit
-excludes the motion on its level and above. One that is attained above it proves the possibility.
+Possibility Theory, chapter 1). A greatest peak below the limit excludes the motion on its level and
+above, and one that is reached above it proves the possibility.
 """
 
 from __future__ import annotations
@@ -24,10 +23,8 @@ from alphacut.fuzzy.arrays import Array, Mask
 from alphacut.fuzzy.refused import checked_number, require, require_choice
 from alphacut.fuzzy.result import Ends, Nature
 
-ANY = "any of them"
-"""Name of the event that any of several limits is exceeded."""
-PEAK_BOUNDS = ("lower", "upper", "error", "reached", "least_lower", "least_upper")
-"""Arrays of a `Peak` over the levels."""
+ANY = "any of them"  # name of the event that any of several limits is exceeded
+PEAK_BOUNDS = ("lower", "upper", "error", "reached", "least_lower", "least_upper")  # of a `Peak`
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,25 +60,19 @@ class Peak:
 
     @property
     def greatest_bounds(self) -> Ends:
-        """A lower and an upper bound of the greatest peak in each cut, shape (A,) each.
-
-        If the envelope is only attained the upper one is infinite: other motions may peak higher.
-        """
-        is_attained = self.nature is Nature.ATTAINED
-        return Ends(self.reached, self.upper + (np.inf if is_attained else self.error))
+        """A lower and an upper bound of the greatest peak in each cut, shape (A,) each."""
+        # where bounds are only attained other motions may peak higher
+        beyond = np.inf if self.nature is Nature.ATTAINED else self.error
+        return Ends(self.reached, self.upper + beyond)
 
     @property
     def least_bounds(self) -> Ends:
-        """A lower and an upper bound of the least peak in each cut, shape (A,) each.
-
-        Each cut contains the narrowest one, whose greatest peak bounds the least peak from above.
-        """
+        """A lower and an upper bound of the least peak in each cut, shape (A,) each."""
         smallest = -np.inf if self.is_signed else 0.0  # of any peak
-        lower_bound = np.maximum(self.lower - self.error, smallest)
-        if self.nature is Nature.ATTAINED:
-            lower_bound = np.full_like(lower_bound, smallest)
-        upper_bound = np.minimum(self.greatest_bounds.upper[-1:], self.least_upper)
-        return Ends(np.maximum(lower_bound, self.least_lower), upper_bound)
+        beyond = np.inf if self.nature is Nature.ATTAINED else self.error
+        lower_bound = np.maximum(np.maximum(self.lower - beyond, smallest), self.least_lower)
+        # each cut contains the narrowest one, whose greatest peak bounds the least one
+        return Ends(lower_bound, np.minimum(self.greatest_bounds.upper[-1:], self.least_upper))
 
 
 Peaks = Mapping[str, Peak]
@@ -104,10 +95,8 @@ def _peak_of(envelope: Envelope, name: str) -> Peak:
     is_proved, is_signed = nature is Nature.GUARANTEED, name != output_of(name)
     smallest = -np.inf if is_signed else 0.0  # of any peak
     error = 0.0 if is_proved else envelope.error[..., k]  # which proved bounds contain
-    ends_at_nodes, reached_at_nodes = (
-        _oriented(ends.lower[..., k], ends.upper[..., k], name)  # (A, T) each
-        for ends in (envelope, envelope.attained)
-    )
+    ends = [(x.lower[..., k], x.upper[..., k]) for x in (envelope, envelope.attained)]
+    ends_at_nodes, reached_at_nodes = (_oriented(*end, name) for end in ends)  # (A, T) each
     upper, lower = ends_at_nodes.upper.max(1), ends_at_nodes.lower.max(1)
     between = None if envelope.between is None else envelope.between[:, k]
     above = within_steps(ends_at_nodes.upper + error, between).max(1) - upper
@@ -166,27 +155,20 @@ def tightest(first: Peaks, second: Peaks) -> dict[str, Peak]:
 
 def _tighter(first: Peak, second: Peak) -> Peak:
     """Return the tighter bounds of one peak by two analyses, as `tightest` says."""
-    natures = {first.nature, second.nature}
     better = max(first, second, key=lambda x: (list(Nature).index(x.nature), -x.error.max()))
-    ends: dict[str, Any] = {"reached": np.maximum(first.reached, second.reached)}
-    if natures == {Nature.GUARANTEED}:
-        ends["lower"] = np.maximum(first.lower, second.lower)
-        ends["upper"] = np.minimum(first.upper, second.upper)
-    elif natures == {Nature.ATTAINED}:
-        ends["lower"] = np.minimum(first.lower, second.lower)
-        ends["upper"] = np.maximum(first.upper, second.upper)
-        ends["error"] = np.maximum(first.error, second.error)
-    ends["least_lower"] = np.maximum(first.least_lower, second.least_lower)
-    ends["least_upper"] = np.minimum(first.least_upper, second.least_upper)
+    rules = {"reached": np.maximum, "least_lower": np.maximum, "least_upper": np.minimum}
+    if {first.nature, second.nature} == {Nature.GUARANTEED}:
+        rules |= {"lower": np.maximum, "upper": np.minimum}
+    elif {first.nature, second.nature} == {Nature.ATTAINED}:
+        rules |= {"lower": np.minimum, "upper": np.maximum, "error": np.maximum}
+    ends: dict[str, Any]
+    ends = {name: rule(getattr(first, name), getattr(second, name)) for name, rule in rules.items()}
     farther = first if first.reached[0] >= second.reached[0] else second
     return replace(better, reached_at=farther.reached_at, **ends)
 
 
 def require_limits(limits: Mapping[str, float], outputs: Sequence[str]) -> None:
-    """Refuse an empty set of limits, unknown outputs, and limits of magnitudes not above 0.
-
-    Those of "max q3" and "min q3" may have any sign.
-    """
+    """Refuse no limits, unknown outputs, and limits of magnitudes ("q3", no "max q3") up to 0."""
     require(bool(limits), "limits", value=None, allowed="one limit or more, as {'q3': 0.1}")
     for name, limit in limits.items():
         require_choice("limits", name, outputs)
@@ -241,18 +223,16 @@ def passing(peaks: Peaks, limits: Mapping[str, float]) -> dict[str, Passing]:
 
 
 def _passing_of(peak: Peak, limit: float) -> Passing:
-    """Return the degrees to which it is possible and necessary that a peak exceeds its limit.
-
-    The necessity of exceeding is 1 less the possibility of not exceeding (Dubois, Prade 1988).
-    """
+    """Return the degrees to which it is possible and necessary that a peak exceeds its limit."""
     greatest, least, alpha = peak.greatest_bounds, peak.least_bounds, peak.alpha
     reaches, is_excluded = greatest.lower > limit, greatest.upper <= limit
-    possibility = _highest(alpha, reaches), _excluded(alpha, is_excluded)
+    possibility = alpha[reaches].max(initial=0.0), _excluded(alpha, is_excluded)
     is_kept = np.broadcast_to(least.upper <= limit, alpha.shape)  # by some motion
-    possibility_of_keeping = _highest(alpha, is_kept), _excluded(alpha, least.lower > limit)
+    keeping = alpha[is_kept].max(initial=0.0), _excluded(alpha, least.lower > limit)
     return Passing(
-        possibility=possibility,
-        necessity=(1 - possibility_of_keeping[1], 1 - possibility_of_keeping[0]),
+        possibility=(float(possibility[0]), possibility[1]),
+        # one less the possibility of keeping the limit (Dubois, Prade 1988)
+        necessity=(1 - keeping[1], 1 - float(keeping[0])),
         margin=limit - np.stack([greatest.upper, least.lower], axis=1),
         lowest=float(alpha[0]),
         nature=peak.nature,
@@ -277,11 +257,6 @@ def _passing_of_any(answers: Mapping[str, Passing], limits: Mapping[str, float])
         nature=Nature.weakest(x.nature for x in passings),
         is_reached=any(x.is_reached for x in passings),
     )
-
-
-def _highest(alpha: Array, holds: Mask) -> float:
-    """Return the highest level at which the mask (A,) holds, 0 without one."""
-    return float(alpha[holds].max(initial=0.0))
 
 
 def _excluded(alpha: Array, excluded: Mask) -> float:

@@ -1,12 +1,10 @@
 """Fuzzy probability that limits are exceeded, with some inputs random and others fuzzy.
 
 The same independent draws serve every fuzzy point (common random numbers), so that differences
-between points are no noise. The points are the corners of each α-cut and a spread inside, so the
-bounds of the probability are attained: another point may have a smaller or a greater one.
-
-What the draws may miss is bounded by the interval of Clopper and Pearson (1934) at every fuzzy
-point, at the level of Bonferroni: with probability `CONFIDENCE` the intervals of all points hold
-their probabilities at once.
+between points are no noise. The points are the corners of each α-cut and a spread inside: another
+one may have a smaller or a greater probability. What the draws may miss is bounded by the interval
+of Clopper and Pearson (1934) at every fuzzy point, at the level of Bonferroni: with probability
+`CONFIDENCE` the intervals of all points hold their probabilities at once.
 """
 
 from __future__ import annotations
@@ -30,16 +28,11 @@ from alphacut.fuzzy.refused import require
 from alphacut.fuzzy.result import Ends
 from alphacut.fuzzy.sets.boxes import chebyshev_points, corners
 
-LIMITS = 201
-"""Limits for which the probability is computed besides."""
-SPREAD = 64
-"""Points inside each α-cut."""
-LOOKED_AT = 4
-"""Fuzzy points, and draws of each, whose motion between nodes is looked at."""
-MAX_CORNER_INPUTS = 8
-"""Most inputs of which all corners are tried."""
-CONFIDENCE = 0.95
-"""Probability with which the intervals of all fuzzy points hold at once, for each limit."""
+LIMITS = 201  # limits for which the probability is computed besides
+SPREAD = 64  # points inside each α-cut
+LOOKED_AT = 4  # fuzzy points, and draws of each, whose motion between nodes is looked at
+MAX_CORNER_INPUTS = 8  # most inputs of which all corners are tried
+CONFIDENCE = 0.95  # probability with which the intervals of all fuzzy points of a limit hold
 
 Sampler = Callable[[np.random.Generator, int], Array]
 

@@ -83,8 +83,7 @@ def tolerances(
         most: Largest scale that is tried.
         precision: Width of the interval of a scale at which its bisection ends, over `most`.
         error: Error of the peaks that is aimed at, as a fraction of each.
-        at_one: Peaks on the supports at scale 1, on their first level, where these are known; scale
-            1 is then tried at no cost.
+        at_one: Peaks on the supports at scale 1, on their first level, where these are known.
         progress: Called with the completed fraction.
 
     Raises:

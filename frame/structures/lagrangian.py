@@ -36,9 +36,9 @@ class LagrangianSystem:
         force: Generalised forces F(q, v, p), n of them; None for none.
 
     Raises:
-        RefusedError: L is not quadratic in v, so that momenta cannot be turned back into
-            velocities, some coordinate has no inertia, or a function asks for what is not there or
-            gives a list of another length. Functions that are not smooth are refused by a motion.
+        RefusedError: L is not quadratic in v, a coordinate has no inertia, or a function asks for
+            what is not there or gives a list of another length. Functions that are not smooth are
+            refused by a motion.
 
     Example:
         >>> oscillator = LagrangianSystem(
@@ -87,10 +87,8 @@ class LagrangianSystem:
 
     def output(self, name: str, velocity: Symbols) -> Expr:
         """An output as an expression in coordinates, given velocities and parameters."""
-        eq, expression = self.symbols, self.observed[name]
-        value = _expressions(
-            f"observed: {name}", lambda: [expression(list(eq.q), list(velocity), eq.p)], eq.p
-        )
+        q, p, expression = list(self.symbols.q), self.symbols.p, self.observed[name]
+        value = _expressions(f"observed: {name}", lambda: [expression(q, list(velocity), p)], p)
         return value[0]
 
     @property
@@ -111,13 +109,8 @@ class LagrangianSystem:
 class Equations:
     """Symbols and expressions of a system, from its Lagrangian.
 
-    Attributes:
-        q: Coordinates.
-        v: Velocities.
-        p: Parameters by name.
-        momentum: ∂L/∂v.
-        push: ∂L/∂q + F.
-        mass: ∂²L/∂v².
+    They are coordinates q, velocities v, parameters p by name, momentum ∂L/∂v, push ∂L/∂q + F and
+    mass ∂²L/∂v².
     """
 
     def __init__(self, system: LagrangianSystem) -> None:
@@ -168,14 +161,7 @@ def pendulum(
     """A damped pendulum as a system: L = m l² φ̇²/2 + m g l cos φ, moment −d φ̇.
 
     Parameters: "m", "l", "d", "g", "phi_0", "omega_0". Outputs: "force" in the bar, m l φ̇² + m g
-        cos φ, and the angle "phi".
-
-    Raises:
-        RefusedError: Mass, length or gravity is not positive, or the damping is negative.
-
-    Example:
-        >>> [str(name) for name in pendulum(length=2.0).observed]
-        ['force', 'phi']
+    cos φ, and the angle "phi". Mass, length and gravity must be positive, damping not negative.
     """
     for name, value in {"mass": mass, "length": length, "gravity": gravity}.items():
         checked_number(name, value, positive=True)
@@ -188,9 +174,6 @@ def pendulum(
         observed={"force": _bar_force, "phi": _angle},
         force=_moment,
     )
-
-
-# functions of a module, which processes can be sent
 
 
 def _lagrangian(q: Symbols, v: Symbols, p: Named) -> Expr:

@@ -271,10 +271,8 @@ def modal_damping(mass: Jet, stiffness: Jet, ratios: Sequence[Jet]) -> Jet:
     It follows the parameters through the modes Φ, and is not frozen at their nominal values. Modes
     of one ratio may have equal frequencies.
 
-    Args:
-        mass: M, symmetric and positive definite, shape (S, n, n), in kg.
-        stiffness: K, symmetric and positive definite, shape (S, n, n), in N/m.
-        ratios: ζ, shape (S,): one of all modes, or one of each mode by rising frequency.
+    M and K are symmetric and positive definite, shape (S, n, n). There is one ratio ζ, shape (S,),
+    of all modes, or one of each mode by rising frequency.
 
     Raises:
         RefusedError: A stiffness is not positive definite, but for rounding.
@@ -288,7 +286,8 @@ def modal_damping(mass: Jet, stiffness: Jet, ratios: Sequence[Jet]) -> Jet:
     G, omega = Y @ A.first @ X, np.sqrt(squared)
     total, number = mass * 0.0, np.full(squared.shape[-1], 0)
     if len(ratios) > 1:
-        same = [[_equal(x, y) for y in ratios] for x in ratios]
+        entries = [(x.value.tobytes(), x.first.tobytes(), x.second.tobytes()) for x in ratios]
+        same = [[x == y for y in entries] for x in entries]
         number = np.argmax(same, axis=1)  # that of the first mode with the same ratio
     for k in np.unique(number):
         # f(A) of f(λ) = 2 √λ for the modes of this ratio, 0 for others
@@ -305,15 +304,9 @@ def modal_damping(mass: Jet, stiffness: Jet, ratios: Sequence[Jet]) -> Jet:
 
 
 def require_modal_order(mass: Array, stiffness: Array, ratios: Array) -> None:
-    """Refuse modes of unequal damping ratio that change places between parameter sets.
+    """Refuse modes of unequal damping ratio (n,) that change places between parameter sets.
 
-    Args:
-        mass: M at S parameter sets, the nominal ones first, shape (S, n, n).
-        stiffness: K there.
-        ratios: ζ of the modes by rising frequency, shape (n,).
-
-    Raises:
-        RefusedError: Shapes of one set are those of the nominal set in another order.
+    M and K are given at S sets, the nominal ones first, shape (S, n, n).
     """
     shapes = undamped_modes(mass, stiffness)[1]
     similarity = np.abs(shapes[0].T @ mass[0] @ shapes)  # of nominal shapes (rows) and others
@@ -323,10 +316,6 @@ def require_modal_order(mass: Array, stiffness: Array, ratios: Array) -> None:
         what = f"unequal where {pair} may cross"
         cure = "give both the same ratio, or take narrower inputs"
         raise RefusedError("damping ratios", what, "modes apart", cure)
-
-
-def _equal(x: Jet, y: Jet) -> bool:
-    return all(np.array_equal(getattr(x, k), getattr(y, k)) for k in ("value", "first", "second"))
 
 
 def _divided_differences(omega: Array, inside: Mask) -> tuple[Array, Array]:

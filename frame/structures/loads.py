@@ -31,8 +31,7 @@ class History:
         phase: In rad.
 
     Raises:
-        RefusedError: The step is not positive, or there are not two samples, or one is not finite,
-            or the start lies before t = 0.
+        RefusedError: Step or samples are not as said, or the start lies before t = 0.
 
     Example:
         >>> wind = History(0.5, [1.0, 1.2, 0.7], is_held=True)
@@ -73,14 +72,10 @@ class History:
 
     @classmethod
     def harmonic(cls, hertz: float, phase: float = 0.0, start: float = 0.0) -> Self:
-        """A sine of unit amplitude from the time `start` on; phase in rad at that time.
-
-        Raises:
-            RefusedError: The frequency is not positive.
-        """
+        """A sine of unit amplitude from the time `start` on, where it has the phase, in rad."""
         checked_number("frequency", hertz, positive=True)
-        frequency = 2 * np.pi * float(hertz)
-        return cls(1.0, np.ones(2), start, is_held=True, frequency=frequency, phase=phase)
+        omega = 2 * np.pi * float(hertz)
+        return cls(1.0, np.ones(2), start, is_held=True, frequency=omega, phase=phase)
 
     @property
     def identity(self) -> tuple[object, ...]:
@@ -121,12 +116,9 @@ class History:
         return np.asarray(np.where(has_started & ~has_ended, inside, 0.0))
 
     def line_deviation(self, time: Array) -> Array:
-        """Upper bounds of the distance of f from straight lines between nodes, shape (T,).
-
-        Row j is that of the step that ends at node j. g deviates most at a sample, just before or
-        after it. The product of its chord and the sine deviates by h²/8 times its second
-        derivative at most, h the step.
-        """
+        """Upper bounds of the distance of f from a straight line in the step to each node, (T,)."""
+        # g deviates most at a sample, just before or after it. The product of its chord and the
+        # sine deviates by h²/8 times its second derivative at most, h the step.
         h, g = np.diff(time, prepend=time[0]), self.envelope(time)
         breaks = self.start + np.arange(len(self.samples)) * self.step
         breaks = breaks[(breaks > time[0]) & (breaks <= time[-1] * (1 + 1e-12))]

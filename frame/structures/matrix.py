@@ -55,19 +55,16 @@ class MatrixStructure:
         loads: Forces on unknowns that have mass.
 
     Raises:
-        RefusedError: A shape does not fit, a number is not finite, a factor names no parameter, an
-            array is not symmetric, the modal mass of the unknowns that have mass is not positive
-            definite, one without mass has a damper, a force or no stiffness, or the modal ratio is
-            outside [0, 1).
+        RefusedError: A shape is wrong, a number not finite, a factor names no parameter, an array
+            is not symmetric, the mass of unknowns that have mass is not positive definite, one
+            without mass has a damper, a force or no stiffness, or a ratio is outside [0, 1).
 
     Example:
         >>> import numpy as np
-        >>> springs = np.array([[2.0, -1.0], [-1.0, 1.0]])
-        >>> parts = {"mass": [("m", np.eye(2))], "stiffness": [("k", springs)]}
+        >>> mass, stiffness = [("m", np.eye(2))], [("k", np.array([[2.0, -1.0], [-1.0, 1.0]]))]
         >>> rows = {"q2": np.array([0.0, 1.0])}
-        >>> frame = MatrixStructure({"m": 1e3, "k": 4e4}, **parts, observed=rows)
-        >>> list(frame.parameters)
-        ['m', 'k']
+        >>> MatrixStructure({"m": 1e3, "k": 4e4}, mass, stiffness, rows).size
+        2
     """
 
     parameters: Mapping[str, float]
@@ -153,29 +150,15 @@ class MatrixStructure:
 
     def parameter(self, name: str) -> Parameter:
         """A parameter, whose range is known where it is a damping ratio."""
-        ratios = [ratio for ratio in self.ratios if isinstance(ratio, str)]
-        return Parameter(name, range=RATIO if name in ratios else "")
+        return Parameter(name, range=RATIO if name in self.ratios else "")
 
     def _term(self, kind: str, term: Any) -> tuple[Factor | str | float, Array]:
-        """A checked term of a matrix: its factor, and its array made exactly symmetric."""
+        """A term of a matrix: its factor, and its dense or sparse array made exactly symmetric."""
         is_pair = isinstance(term, Sequence) and not isinstance(term, str) and len(term) == 2
         what, allowed = type(term).__name__, "pairs (factor, array)"
         require(is_pair, f"term of {kind}", value=what, allowed=allowed)
-        self._require_factor(kind, term[0])
-        return term[0], self._symmetric(kind, term[1])
-
-    def _require_factor(self, kind: str, factor: Factor | str | float) -> None:
-        names, values = list(self.parameters), np.array([list(self.parameters.values())], float)
-        try:
-            value = value_of(factor, variables(values, names, names[:1]))
-        except (KeyError, TypeError, AttributeError, ValueError) as failure:
-            value = failure
-        allowed = f"arithmetic to one number, of {', '.join(names)}"
-        is_number = isinstance(value, Jet | float | int | np.number)
-        require(is_number, f"factor of {kind}", value=repr(value), allowed=allowed)
-
-    def _symmetric(self, kind: str, value: Any) -> Array:
-        """A dense or sparse array (n, n), symmetric up to rounding, as exactly symmetric."""
+        factor, value = term
+        self._require_factor(kind, factor)
         array, key = np.asarray(value.toarray() if hasattr(value, "toarray") else value), "array of"
         size = np.shape(self.mass[0][1])[0]
         what, allowed = f"of shape {array.shape}", f"({size}, {size})"
@@ -187,7 +170,17 @@ class MatrixStructure:
         what = f"not symmetric: [{i}, {j}] is {array[i, j]:g}, [{j}, {i}] is {array[j, i]:g}"
         allowed, cure = "symmetric arrays", "mirror one triangle"
         require(is_symmetric, f"{key} {kind}", value=what, allowed=allowed, cure=cure)
-        return np.asarray((array + array.T) / 2, float)
+        return factor, np.asarray((array + array.T) / 2, float)
+
+    def _require_factor(self, kind: str, factor: Factor | str | float) -> None:
+        names, values = list(self.parameters), np.array([list(self.parameters.values())], float)
+        try:
+            value = value_of(factor, variables(values, names, names[:1]))
+        except (KeyError, TypeError, AttributeError, ValueError) as failure:
+            value = failure
+        allowed = f"arithmetic to one number, of {', '.join(names)}"
+        is_number = isinstance(value, Jet | float | int | np.number)
+        require(is_number, f"factor of {kind}", value=repr(value), allowed=allowed)
 
     def _require_vectors(self) -> None:
         n = self.size
@@ -283,11 +276,9 @@ def modal_energy_shares(system: MatrixStructure, terms: Sequence[int] | Ints) ->
     return np.asarray(energies[terms].sum(axis=0) / energies.sum(axis=0))
 
 
-NAME = r"[A-Za-z_][A-Za-z0-9_]*"
 NUMBER = r"[0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)?"
-FACTOR = re.compile(
-    rf"\s*(?:(?P<name>{NAME})|(?P<number>{NUMBER}))\s*(?:(?:\^|\*\*)\s*(?P<power>-?[0-9]+))?\s*"
-)
+BASE = rf"(?:(?P<name>[A-Za-z_][A-Za-z0-9_]*)|(?P<number>{NUMBER}))"
+FACTOR = re.compile(rf"\s*{BASE}\s*(?:(?:\^|\*\*)\s*(?P<power>-?[0-9]+))?\s*")
 
 
 @dataclass(frozen=True)

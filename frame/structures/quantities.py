@@ -7,17 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-UNITS = {
-    **{"q": "m", "drift": "m", "v": "m/s", "a": "m/s^2"},
-    **{"shear": "N", "base_shear": "N", "force": "N", "phi": "rad"},
+OUTPUTS = {
+    "q": ("m", "displacement of floor"),
+    "v": ("m/s", "velocity of floor"),
+    "a": ("m/s^2", "acceleration of floor"),
+    "drift": ("m", "drift of storey"),
+    "shear": ("N", "shear force of storey"),
+    **{"base_shear": ("N", ""), "force": ("N", ""), "phi": ("rad", "")},
 }
-WORDS = {
-    "q": "displacement of floor",
-    "v": "velocity of floor",
-    "a": "acceleration of floor",
-    "drift": "drift of storey",
-    "shear": "shear force of storey",
-}
+"""Unit and words of outputs, by their names without the floor."""
 POSITIVE = "positive"
 NOT_NEGATIVE = "0 or greater"
 RATIO = "0 or greater and below 1, the critical damping"
@@ -41,7 +39,7 @@ class Output(str):
     def __new__(cls, name: str, unit: str = "") -> Output:
         """The name with a unit; without one with that of its kind, such as "m" of "q3"."""
         output = super().__new__(cls, name)
-        of_kind = UNITS.get(output._parts[0], "SI")
+        of_kind, _ = OUTPUTS.get(output._parts[0], ("SI", ""))
         output.unit = unit or (name.unit if isinstance(name, Output) else of_kind)
         return output
 
@@ -59,7 +57,7 @@ class Output(str):
     def words(self) -> str:
         """In words, with its name: "displacement of floor 3 (q3)"; else the name."""
         kind, floor = self._parts
-        words = WORDS.get(kind)
+        _, words = OUTPUTS.get(kind, ("", ""))
         return f"{words} {floor} ({self})" if words and floor else self.replace("_", " ")
 
 

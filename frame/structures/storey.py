@@ -21,13 +21,12 @@ from alphacut.frame.structures.quantities import Output, Parameter, of_storey_fr
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import checked_number, require, require_choice, require_numbers
 
+# names of the parameters that each list holds, by floor or storey, and of values that may be single
 SYMBOLS = {
     **{"masses": "m{}", "lengths": "l{}", "columns": "c{}", "stiffness": "k{}", "dampers": "d{}"},
     **{"q0": "q{}_0", "v0": "v{}_0", "second_moment": "I{}"},
 }
-"""Names of the parameters that each list holds, by floor or storey."""
 SINGLE = {"modulus": "E", "damping_ratio": "zeta", "rayleigh": "rayleigh_mass"}
-"""The same of values that may be single."""
 SPRING_KEYS = "lengths, modulus and second_moment, or stiffness (with lengths for gravity)"
 
 
@@ -71,10 +70,8 @@ class StoreyFrame:
         loads: Forces on floors.
 
     Raises:
-        RefusedError: A length of the lists differs, a mass, length, modulus, moment, stiffness or
-            number of columns is not positive, a damper or gravity is negative, a ratio is outside
-            [0, 1), the weight buckles a storey, a stiffness stands beside what makes one, or a
-            force acts on no floor.
+        RefusedError: The lists differ in length, a value is outside its range, the weight buckles a
+            storey, a stiffness stands beside what makes one, or a force acts on no floor.
 
     Example:
         >>> frame = StoreyFrame(masses=[1e3, 1e3], stiffness=[4e4, 4e4], q0=[0.1, 0.2])
@@ -146,17 +143,15 @@ class StoreyFrame:
         require_choice("damper_placement", self.damper_placement, ("ground", "storey"))
 
     def _require_springs(self) -> None:
-        needed: dict[str, object] = {"modulus": self.modulus, "second_moment": self.second_moment}
+        names = ("modulus", "second_moment", "columns", "lengths")
+        given = [x for x in names if getattr(self, x) is not None and np.size(getattr(self, x))]
+        needed = ["modulus", "second_moment", "lengths"]
         if len(self.stiffness):
-            columns = self.columns if len(self.columns) else None
-            beside = [k for k, x in {**needed, "columns": columns}.items() if x is not None]
-            allowed = "either stiffness or what makes it"
-            require(not beside, ", ".join(beside), value="there", allowed=allowed)
-            needed = {}
-        if not len(self.stiffness) or self.gravity:
-            needed["lengths"] = self.lengths if len(self.lengths) else None
-        for name, value in needed.items():
-            require(value is not None, name, value=None, allowed=SPRING_KEYS)
+            beside, allowed = ", ".join(x for x in given if x != "lengths"), "either stiffness or"
+            require(not beside, beside, value="there", allowed=f"{allowed} what makes it")
+            needed = ["lengths"] if self.gravity else []
+        for name in needed:
+            require(name in given, name, value=None, allowed=SPRING_KEYS)
 
     @property
     def floors(self) -> int:
@@ -181,7 +176,7 @@ class StoreyFrame:
         for name in ("stiffness", "masses", "lengths", "columns", "dampers", "q0", "v0"):
             if name != "lengths" or not self.stiffness or self.gravity:
                 named |= _named(SYMBOLS[name], getattr(self, name), single=False)
-        named |= {"rayleigh_mass": self.rayleigh[0], "rayleigh_stiffness": self.rayleigh[1]}
+        named |= zip(("rayleigh_mass", "rayleigh_stiffness"), self.rayleigh, strict=True)
         forces = zip(self.force_names, self.loads, strict=True)
         return named | self.ratios | {x: checked_number(x, y.amplitude) for x, y in forces}
 

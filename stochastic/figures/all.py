@@ -31,8 +31,7 @@ from alphacut.stochastic.tessellation.apollonius import (
     neighbours,
 )
 
-REDUCED = "reduced radius $r_n$ = r/a"
-"""Name of the axis."""
+REDUCED = "reduced radius $r_n$ = r/a"  # name of an axis
 CORNER_DISCS = 120  # of a larger section a corner with so many discs is drawn
 N_EQUAL = 4000  # equal discs whose direct neighbours are counted
 EQUAL = "{} equal discs of the same area fraction, not those of the section"
@@ -297,9 +296,12 @@ def draw_two_point(discs: Particles, generator: np.random.Generator) -> Figure:
     direct_offsets = {tuple(np.round(v, 12)) for v in direct.offset[direct.first == centre]}
     colours = [GREEN if tuple(np.round(v, 12)) in direct_offsets else LIGHT for v in near]
     drawn = _from_pair_distances(discs, len(near), reach, generator)
+    distance = np.hypot(*np.moveaxis(drawn[:, None] - drawn[None], -1, 0))
+    np.fill_diagonal(distance, np.inf)
+    n_overlaps = int((distance.min(axis=1) < 2 * radius).sum())
     figure, panels = _titled_panels(
         EQUAL.format(len(discs)),
-        f"pair distances alone: {_overlaps(drawn, radius)} of {len(drawn)} overlap",
+        f"pair distances alone: {n_overlaps} of {len(drawn)} overlap",
         f"the packing: {colours.count(GREEN)} of {len(near)} are direct neighbours",
     )
     limit = np.full(2, reach + radius)
@@ -321,13 +323,6 @@ def _from_pair_distances(
     distance = generator.choice(np.hypot(offset[:, 0], offset[:, 1]), number)
     angle = 2 * np.pi * generator.random(number)
     return np.asarray(distance[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1))
-
-
-def _overlaps(places: Array, radius: float) -> int:
-    """Return the number of discs of equal `radius` at centres (n, 2) that overlap another one."""
-    distance = np.hypot(*np.moveaxis(places[:, None] - places[None], -1, 0))
-    np.fill_diagonal(distance, np.inf)
-    return int((distance.min(axis=1) < 2 * radius).sum())
 
 
 def draw_overlay(picture: Array, discs: Particles) -> Figure:

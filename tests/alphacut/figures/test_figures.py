@@ -51,25 +51,14 @@ def test_every_figure_has_both_forms_and_a_caption(results):
     assert caption("fig28-envelope-E-5s-q1", paper=True) == "Fig. 28: Envelope of q1, study E-5s"
 
 
-def study(nature, **more):
-    """An envelope of one output on two levels."""
-    time = np.linspace(0, 1, 11)
-    band = np.stack([np.stack([-np.ones(11), -np.ones(11) / 2])])[..., None][0]
-    ends = {"lower": band, "upper": -band, **more}
-    axes = ("alpha", "time", "output")
-    variables = {name: (axes, values) for name, values in ends.items()}
-    coordinates = {"alpha": [0.0, 1.0], "time": time, "output": ["q1"]}
-    return xarray.Dataset(variables, coordinates, {"nature": nature})
-
-
 @pytest.mark.parametrize(("nature", "lines"), [("estimated", 2), ("guaranteed", 0)])
 def test_the_error_is_drawn_outside_bounds_that_it_may_pass(nature, lines):
-    data = study(nature, error=0.25 * np.ones((2, 11, 1)))
+    time, one = np.linspace(0, 1, 11), np.ones(11)
+    ends = {"lower": -one, "upper": one, "error": 0.25 * one}
+    lowest = xarray.Dataset({name: ("time", values) for name, values in ends.items()})
     with figure_style():
         _, axes = plt.subplots()
-        words = envelope.draw_error_band(
-            axes, data["time"].values, data.sel(output="q1").isel(alpha=0), nature, "m"
-        )
+        words = envelope.draw_error_band(axes, time, lowest, nature, "m")
         ends = sorted(float(line.get_ydata()[0]) for line in axes.lines)
     assert ends == [-1.25, 1.25][:lines]
     assert ("± 250 mm" in words) == bool(lines)
@@ -81,13 +70,8 @@ def test_numbers_and_bounds_are_drawn_with_their_own_ends():
         _, axes = plt.subplots()
         (line,) = number.plot(axes, color="red").lines
         assert line.get_xydata().tolist() == [[1, 0], [1, 0], [2, 1], [2, 1], [4, 0], [4, 0]]
-        motion = propagation.envelope(
-            StoreyFrame([1e3], stiffness=[4e4], q0=[0.1]),
-            {"m1": 1e3},
-            duration=1.0,
-            step=0.1,
-            alpha=[0, 1],
-        )
+        frame, given = StoreyFrame([1e3], stiffness=[4e4], q0=[0.1]), {"duration": 1.0, "step": 0.1}
+        motion = propagation.envelope(frame, {"m1": 1e3}, **given, alpha=[0, 1])
         bands = motion.plot(plt.subplots()[1]).collections
     ends = [band.get_paths()[0].get_extents() for band in bands]
     assert len(ends) == 2

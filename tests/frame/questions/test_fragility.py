@@ -43,17 +43,6 @@ def test_every_structure_of_the_cut_lies_in_the_band():
         assert critical.dispersion.lower[0] <= spread <= critical.dispersion.upper[0]
 
 
-def test_crisp_inputs_give_the_empirical_curve():
-    middle, _ = suite()
-    each = [peaks(x, x, x) for x in middle]
-    critical = CriticalMeasures.from_peaks(each, np.ones(len(middle)), LIMIT)
-    measure = np.sort(LIMIT / middle)
-    band = critical.band(measure * (1 + 1e-12))
-    assert band.lower[0] == pytest.approx(np.arange(1, 13) / 12)
-    assert band.upper[0] == pytest.approx(np.arange(1, 13) / 12)
-    assert critical.dispersion.lower[0] == pytest.approx(np.log(middle).std(ddof=1))
-
-
 def test_confidence_limits_are_those_of_clopper_and_pearson():
     middle, each = suite()
     critical = CriticalMeasures.from_peaks(each, np.ones(len(middle)), LIMIT)
@@ -81,9 +70,5 @@ def test_a_structure_that_may_stay_at_rest_has_no_upper_end():
     assert np.isinf(critical.high).all()
     assert critical.band(np.array([5.0])).lower[0, 0] == 0.0
     assert np.isinf(critical.dispersion.upper[0])
-
-
-def test_one_record_has_no_dispersion():
-    critical = CriticalMeasures.from_peaks([peaks(0.01, 0.02, 0.015)], [1.0], LIMIT)
     with pytest.raises(RefusedError, match="two records"):
-        _ = critical.dispersion
+        _ = CriticalMeasures.from_peaks([peaks(0.01, 0.02, 0.015)], [1.0], LIMIT).dispersion

@@ -44,10 +44,8 @@ SPRINGS = StoreyFrame((2e4, 1e4), (3.0, 2.5), stiffness=(1e6, 1e6))
     ],
 )  # fmt: skip
 def test_a_storey_frame_refuses(frame, changes, message):
-    with pytest.raises(RefusedError, match=message) as refused:
+    with pytest.raises(RefusedError, match=message):
         replace(frame, **changes)
-    assert refused.value.key
-    assert refused.value.allowed
 
 
 EYE = np.eye(2)
@@ -95,17 +93,11 @@ ONE = np.ones((1, 1))
     [
         ({"coordinates": 0}, "coordinates is 0"),
         ({"parameters": {}}, "parameters is"),
-        (
-            {"lagrangian": lambda q, v, p: p["x"] * v[0] ** 2},
-            r"KeyError\('x'\); allowed: functions of m",
-        ),
+        ({"lagrangian": lambda q, v, p: p["x"]}, r"KeyError\('x'\); allowed: functions of m"),
         ({"lagrangian": lambda q, v, p: v[1] ** 2}, "IndexError"),
         ({"lagrangian": lambda q, v, p: v[0] ** 3}, "quadratic in v"),
         ({"lagrangian": lambda q, v, p: q[0] ** 2}, "singular; allowed: inertia"),
-        (
-            {"lagrangian": lambda q, v, p: np.sin(q[0])},
-            "lagrangian is TypeError.*allowed: functions of m and the coordinates by",
-        ),
+        ({"lagrangian": lambda q, v, p: np.sin(q[0])}, "TypeError.*functions of m and the coord"),
         ({"initial": lambda p: [1.0]}, "initial is"),
         ({"initial": lambda p: ([1.0, 2.0], [0.0])}, "allowed: 1 by coordinate"),
         ({"force": lambda q, v, p: 3.0}, "force is TypeError"),
@@ -116,14 +108,12 @@ def test_a_lagrangian_system_refuses(changes, message):
         LagrangianSystem(**{**SYSTEM, **changes})
 
 
-def test_motions_refuse_unknown_names_and_odd_durations():
-    for call, message in (
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
         (lambda: LinearFlow(COLUMNS, ("m3",), 1.0, 0.1), "parameter is m3; allowed: E, I, m1"),
         (lambda: LinearFlow(COLUMNS, ("E",), 1.0, 0.3), "whole steps of 0.3 s"),
-        (
-            lambda: LinearFlow(COLUMNS, ("E",), 1.0, -0.1),
-            "step is -0.1; allowed: finite numbers greater than 0",
-        ),
+        (lambda: LinearFlow(COLUMNS, ("E",), 1.0, -0.1), "step is -0.1; .* greater than 0"),
         (lambda: LagrangianFlow(pendulum(), ("x",), 1.0, 0.1), "parameter is x; allowed: m, l"),
         (lambda: make_flow(pendulum(), ("l",), 1.0, 0.1, "euler"), "integrator is euler"),
         (
@@ -132,6 +122,8 @@ def test_motions_refuse_unknown_names_and_odd_durations():
         ),
         (lambda: pendulum(length=-1.0), "length is -1.0; allowed: finite numbers greater"),
         (lambda: Accelerogram(0.0, np.ones(3)), "accelerogram is 3 samples every 0 s"),
-    ):
-        with pytest.raises(RefusedError, match=message):
-            call()
+    ],
+)
+def test_motions_refuse_unknown_names_and_odd_durations(call, message):
+    with pytest.raises(RefusedError, match=message):
+        call()
