@@ -24,6 +24,7 @@ from alphacut.rve.spheres.result import HomogenisedSpheres, hill_average
 from alphacut.stages.cell import (
     GPA,
     ISOTROPIC,
+    UPPER_BOUND,
     CellProblem,
     constant_label,
     key_and_unit,
@@ -168,8 +169,8 @@ def summary(document: Document, convention: str) -> str:
     solver = f", {document['solver']}, iterations {iterations}" if iterations else ""
     table = text_table((convention, "value", "± error"), rows)
     text = f"{table}{document['method']}, {document['unknowns']} unknowns{solver}\n"
-    if document["declared_error"] is None:  # Galerkin: fields of a finer mesh have less energy
-        text += "C is an upper bound of this mesh: that of a finer one is smaller\n"
+    if document["declared_error"] is None:
+        text += f"{UPPER_BOUND}\n"
     return text
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -30,6 +31,7 @@ from alphacut.fuzzy.result import Nature
 from alphacut.io.arrays import text_table
 from alphacut.io.quantity import STANDARD_GRAVITY, engineering
 from alphacut.io.results import ResultsFolder
+from alphacut.report.results import AROUND
 from alphacut.stages.cell import CellProblem
 from alphacut.stages.image import image_study
 from alphacut.stages.suite import SuiteRecord, suite_records
@@ -159,15 +161,22 @@ def verify(options: argparse.Namespace, out: TextIO) -> int:
     path = Path(options.folder)
     folder, document, text = ResultsFolder.read(path), dict[str, object](), ""
     names = [x.removesuffix(".nc") for x in folder.files if re.fullmatch(r"envelope_.*\.nc", x)]
-    require(bool(names), "FOLDER", str(path), "results of a run with an envelope")
+    is_suite = any(name.startswith("record_") for name in folder.files)
+    value = f"{path}, of a suite, whose peaks the run tested as it proved them"
+    allowed = "results of a run with an envelope"
+    require(bool(names), "FOLDER", value if is_suite else str(path), allowed)
     for name in names:
         data, n_motions, verdict = folder.dataset(f"{name}.nc"), 0, "nothing in it is proved"
+        peaks = json.loads(folder.content(f"{name}.json"))["result"]["peak"].values()
+        if any(peak["nature"] == Nature.GUARANTEED for peak in peaks):
+            verdict = "its guaranteed peaks were tested by the run, nothing else in it is proved"
         if "motion_inputs" in data:  # which proved envelopes alone store
             points, motions = stored_motions(data)
             trial = Trial(envelope_of(data), *np.moveaxis(data["cut"].values, -1, 0))
             trial.require_agreement(points, motions)
             n_motions = len(points)
-            verdict = f"{n_motions} exact motions agree with it"
+            is_guaranteed = data.attrs["nature"] == Nature.GUARANTEED
+            verdict = f"{n_motions} exact motions {'agree with it' if is_guaranteed else AROUND}"
         nature = str(data.attrs["nature"])
         document[name] = {"nature": nature, "motions_tested": n_motions}
         text += f"{name}: {verdict} ({nature})\n"

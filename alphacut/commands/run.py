@@ -88,9 +88,7 @@ def add_page(parser: argparse.ArgumentParser) -> None:
         "--out", metavar="FILE.html", help="file for the page (default: FOLDER/report.html)"
     )
     parser.add_argument("--csv", metavar="FOLDER", help="folder for every table as a CSV file")
-    parser.add_argument(
-        "--tables", metavar="FOLDER", help="folder for every table in Markdown and in LaTeX"
-    )
+    parser.add_argument("--tables", metavar="FOLDER", help="folder for every table in LaTeX")
     add_quiet(parser)
 
 

@@ -16,14 +16,13 @@ from alphacut.questions.summary import Parts, Results
 from alphacut.report import tables
 from alphacut.report.results import cut_text, run_text, width_text
 from alphacut.report.tables import shown
-from alphacut.stages.cell import ISOTROPIC, constant_label
+from alphacut.stages.cell import ISOTROPIC, UPPER_BOUND, constant_label
 from alphacut.stages.identify import identify_inputs
 from alphacut.stages.image import ImageResult
 from alphacut.stages.modulus import ModulusResult
 from alphacut.stages.store import CutsResult
 from alphacut.stochastic.microstructure import fragment
 
-GALERKIN = "Error not declared: with crisp phases an upper bound of C, lower on a finer mesh\n"
 ONLY = "Plane strain alone: the other definition is for one particle of two isotropic phases"
 
 
@@ -61,7 +60,7 @@ def modulus_text(result: ModulusResult) -> str:
     return (
         cuts_text("of fibres", result.fibres, result.alpha, result.nature)
         + constants_text(result, Nature.ATTAINED)
-        + ("" if result.error else GALERKIN)
+        + (f"{UPPER_BOUND}\n" if result.particles == "mesh" else "")
         + f"{result.samples} samples, {result.solves} linear systems,"
         f" {result.seconds:.1f} s, {result.method}\n"
     )

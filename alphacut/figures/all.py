@@ -31,8 +31,6 @@ def drawings(results: Results) -> Iterator[Drawing]:
     yield from _structure_figures(results)
     if isinstance(results.learned, IdentifiedResult):
         yield "update-inputs", partial(envelope.identified_inputs, results.learned)
-    if results.suite is not None:
-        yield "spectra", partial(envelope.spectra, results.suite)
     for key, answer in results.answers.items():
         yield key, partial(envelope.DRAWINGS[key], answer)
     for task in results.tasks:

@@ -1,4 +1,4 @@
-"""Envelopes (Figs. 28 to 35), the fuzzy mapping (Fig. 20), identified inputs, answers, spectra."""
+"""Envelopes (Figs. 28 to 35), the fuzzy mapping (Fig. 20), identified inputs, and answers."""
 
 from __future__ import annotations
 
@@ -26,7 +26,6 @@ from alphacut.questions.summary import Results
 from alphacut.questions.tolerances import TolerancesAnswer
 from alphacut.stages.envelope import EnvelopeTask
 from alphacut.stages.identify import IdentifiedResult
-from alphacut.stages.suite import SuiteResult
 from alphacut.stochastic.figures.style import BLUE, GREY, INK, ORANGE, WIDTH
 
 
@@ -128,20 +127,6 @@ def identified_inputs(result: IdentifiedResult) -> Figure:
         cuts = np.array([cuts[k] for cuts in result.inputs.values()])
         intervals.append((cuts / middles, {"color": BLUE, **look}))
     return draw_bars(intervals, result.inputs, "value over the middle of what it was before")
-
-
-def spectra(suite: SuiteResult) -> Figure:
-    """Draws the response spectra of the records of a suite, their mean, and T1."""
-    figure, axes = plt.subplots()
-    periods = suite.spectra["period_s"]
-    curves = np.array([suite.spectra[name] for name in suite.records])
-    axes.plot(periods, curves.T, color=GREY, lw=0.6)
-    axes.plot(periods, curves.mean(0), color=BLUE, lw=1.6, label="mean")
-    axes.axvline(suite.period_s, color=ORANGE, lw=1.2, ls="--", label="T1")
-    label = f"Sa [m/s²], damping {suite.damping_ratio:.3g}"
-    axes.set(xscale="log", xlabel="period [s]", ylabel=label)
-    axes.legend()
-    return figure
 
 
 def draw_decision(answer: DecisionAnswer) -> Figure:

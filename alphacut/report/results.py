@@ -21,6 +21,7 @@ from alphacut.questions.question import Row, Table
 from alphacut.questions.summary import FrameResult, Parts
 from alphacut.questions.tolerances import TolerancesAnswer
 from alphacut.report.tables import unit_of
+from alphacut.stages.cell import UPPER_BOUND
 from alphacut.stages.envelope import PeakResult
 from alphacut.stages.identify import IdentifiedResult
 from alphacut.stages.image import ImageResult
@@ -39,6 +40,8 @@ EXCEEDED = {
     "undecided": "unknown",
 }
 """Verdicts on a limit as they stand in a column."""
+AROUND = "lie in the wider bounds that are proved"
+"""Where tested motions lie beside an envelope that is not guaranteed itself."""
 COMPARED = ("at the lowest α", "first", "second", "second over first")
 
 
@@ -211,8 +214,10 @@ def display_units(
 
 
 def natures(parts: Parts) -> Iterator[str]:
-    """Yields sentences on the nature of the peaks, and on the exact motions that tested them."""
+    """Yields sentences on the nature of C and of the peaks, and on motions that tested these."""
     studies = parts.envelopes.values()
+    if parts.modulus is not None and parts.modulus.particles == "mesh":
+        yield UPPER_BOUND
     outputs: dict[Nature, dict[str, None]] = {}
     for study in studies:
         for output, peak in study.peak.items():
@@ -222,8 +227,11 @@ def natures(parts: Parts) -> Iterator[str]:
         groups = [f"all {nature}" for nature in outputs]
     if groups:
         yield "Peaks are largest magnitudes over time, " + ", ".join(groups)
-    if tested := sum(study.motions_tested for study in studies):
-        yield f"{tested} exact motions by another algorithm agree with what is guaranteed."
+    for is_guaranteed in (True, False):
+        tested = [x for x in studies if (x.nature is Nature.GUARANTEED) == is_guaranteed]
+        if count := sum(study.motions_tested for study in tested):
+            where = "agree with what is guaranteed" if is_guaranteed else AROUND
+            yield f"{count} exact motions by another algorithm {where}"
 
 
 def answers(parts: Parts) -> list[Row]:

@@ -146,13 +146,6 @@ def records(result: SuiteResult) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=head)
 
 
-def spectra(result: SuiteResult) -> pd.DataFrame:
-    """Pseudo-accelerations of each record, and their mean, by period."""
-    curves = {f"{name} [m/s^2]": result.spectra[name] for name in result.records}
-    frame = pd.DataFrame({"period [s]": result.spectra["period_s"], **curves})
-    return frame.assign(**{"mean [m/s^2]": frame[[*curves]].mean(axis=1)})
-
-
 def shares(table: Mapping[str, Mapping[str, float]]) -> pd.DataFrame:
     """Each input's share in the width of each result at the lowest level, the largest first."""
     rows = [
@@ -203,8 +196,6 @@ def write_tables(parts: Parts, results: ResultsFolder, folder: Path) -> list[Pat
         data = results.dataset(f"envelope_{name}.nc")
         for output in study.min:
             found[f"envelope_{name}-{output}"] = over_time(data, output, study.units[output])
-    if parts.records is not None:
-        found["spectra"] = spectra(parts.records)
     return write_csv(found, folder)
 
 
@@ -217,23 +208,11 @@ def write_csv(found: Mapping[str, pd.DataFrame], folder: Path) -> list[Path]:
 
 
 def write_markup(named: Mapping[str, Table], folder: Path) -> list[Path]:
-    """Writes each table as a file of Markdown and one of LaTeX; returns the files."""
-    texts = {
-        folder / f"{name}{ending}": write(table)
-        for name, table in named.items()
-        for ending, write in ((".md", markdown), (".tex", latex))
-        if table.rows
-    }
+    """Writes each table as a file of LaTeX; returns the files."""
+    texts = {folder / f"{name}.tex": latex(table) for name, table in named.items() if table.rows}
     for path, text in texts.items():
         write_text(path, text, follow_links=False)
     return [*texts]
-
-
-def markdown(table: Table) -> str:
-    """A table in Markdown; the first column to the left, the others to the right."""
-    lines = [table.head, ("---", *["---:"] * (len(table.head) - 1)), *table.rows]
-    cells = ([cell.replace("|", "\\|") for cell in row] for row in lines)
-    return "".join(f"| {' | '.join(row)} |\n" for row in cells)
 
 
 def latex(table: Table) -> str:

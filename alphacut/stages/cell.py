@@ -54,6 +54,8 @@ class References(TypedDict, total=False):
 
 
 ISOTROPIC = "Hashin–Shtrikman bounds of an isotropic E"
+UPPER_BOUND = "C is an upper bound of this mesh: that of a finer one is smaller"
+"""Of a mesh of one's own by Galerkin's method, whose fields have more energy than the true ones."""
 AVERAGES = {"axes": "eq. 16", "isotropic": "isotropic"}
 """Averages of a plane stiffness by their names in a case, in words."""
 

@@ -29,8 +29,6 @@ from alphacut.stages.store import Numbers, Stage, Values
 
 FREE_PERIODS = 5
 """Natural periods of free motion after a record: by then 5 % damping leaves a fifth."""
-PERIODS: Array = np.array(np.geomspace(0.05, 4.0, 45), float)
-"""Periods of response spectra, in s."""
 MAX_CORNERS = 64
 """Corners of each cut whose means over records are computed; more take time, none is a bound."""
 NODES = 2
@@ -46,10 +44,6 @@ class NominalMode(NamedTuple):
 
     period: float
     ratio: float
-
-    def spectral_acceleration(self, ground: Accelerogram, period: float) -> float:
-        """Pseudo-acceleration of a record at a period with this damping, in m/s²."""
-        return spectral_acceleration(ground, period, min(self.ratio, 0.999))
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +84,8 @@ def _suite_record(
 ) -> SuiteRecord:
     """A recording after correction and scaling, and the length of the motion under it."""
     ground, name = recording.accelerogram(section.baseline), recording.name
-    sizes = {"PGA": ground.extremes[0], "Sa(T1)": mode.spectral_acceleration(ground, mode.period)}
+    response = spectral_acceleration(ground, mode.period, min(mode.ratio, 0.999))
+    sizes = {"PGA": ground.extremes[0], "Sa(T1)": response}
     measure = sizes.get(section.scale.measure, 1.0)
     allowed = "a record that moves something"
     require(measure > 0, f"record {name}", value="zero throughout", allowed=allowed)
@@ -219,14 +214,13 @@ class Statistics(Numbers):
 
 
 class SuiteResult(Numbers):
-    """Measures and peaks of each record, statistics of peaks, and response spectra in m/s²."""
+    """Measures and peaks of each record, and statistics of the peaks."""
 
     period_s: float
     damping_ratio: float
     alpha: Values
     records: dict[str, RecordResult]
     statistics: dict[str, Statistics]
-    spectra: dict[str, Values]
     units: dict[str, str]
 
 
@@ -260,10 +254,5 @@ def suite_result(
             for record in records
         },
         statistics=statistics,
-        spectra={"period_s": PERIODS}
-        | {
-            x.name: np.array([mode.spectral_acceleration(x.ground, float(t)) for t in PERIODS])
-            for x in records
-        },
         units=dict(units),
     )

@@ -81,7 +81,7 @@ def test_columns_of_csv_are_numbers_or_texts_and_name_units_of_the_case(folders,
     out = ["--csv", str(tmp_path), "--out", str(tmp_path / "page.html")]
     assert main(["report", str(folders["plane-frame"]), "--quiet", *out]) == 0
     tables = {x.stem: [*csv.reader(x.open(encoding="utf-8"))] for x in tmp_path.glob("*.csv")}
-    assert {"decision", "fragility", "records", "spectra"} <= set(tables)
+    assert {"decision", "fragility", "records"} <= set(tables)
     for name, (head, *rows) in tables.items():
         for title, column in zip(head, zip(*rows, strict=True), strict=True):
             kinds = {is_number(text) for text in column if text}

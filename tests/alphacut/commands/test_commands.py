@@ -14,6 +14,7 @@ from alphacut.commands import check
 from alphacut.entry import main
 from alphacut.frame import propagation
 from alphacut.frame.verification.self_test import with_motions_tested
+from alphacut.io.results import Listed, ResultsFolder
 from tests.alphacut.small import CELL, written
 
 RUN = [sys.executable, "-m", "alphacut"]
@@ -206,3 +207,28 @@ def test_a_contradiction_ends_a_run(tmp_path, capfd, monkeypatch):
 def test_a_folder_without_an_envelope_is_refused(tmp_path, capfd):
     assert main(["verify", str(tmp_path)]) == 2
     assert "allowed: results of a run with an envelope" in capfd.readouterr().err
+
+
+def test_an_envelope_around_which_bounds_are_proved_is_not_called_guaranteed(tmp_path, capfd):
+    words = ["--set", "frame.outputs=['q1']", "--set", "envelope.fuzzy=['E', 'm']"]
+    folder = str(tmp_path / "out")
+    assert main(["run", str(written(tmp_path)), "--out", folder, "--no-figures", *words]) == 0
+    told = capfd.readouterr().out
+    assert "guaranteed" not in told
+    assert "exact motions by another algorithm lie in the wider bounds that are proved" in told
+    assert main(["verify", folder]) == 0
+    told = capfd.readouterr().out
+    assert "exact motions lie in the wider bounds that are proved (estimated)" in told
+
+
+def test_peaks_that_a_question_had_proved_are_not_called_unproved(shipped_run, capfd):
+    folder = shipped_run("laboratory-frame")
+    assert main(["verify", str(folder)]) == 0
+    assert "its guaranteed peaks were tested by the run" in capfd.readouterr().out
+
+
+def test_a_suite_says_what_it_stores(tmp_path, capfd):
+    (tmp_path / "record_one.json").write_text("{}")
+    ResultsFolder(tmp_path).add_to_list({"record_one.json": Listed("", "")})
+    assert main(["verify", str(tmp_path)]) == 2
+    assert "of a suite, whose peaks the run tested as it proved them" in capfd.readouterr().err

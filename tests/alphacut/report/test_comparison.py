@@ -1,4 +1,4 @@
-"""Two runs side by side, and tables in Markdown and LaTeX."""
+"""Two runs side by side, and tables in LaTeX."""
 
 import csv
 import json
@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from alphacut.entry import main
+from alphacut.questions.question import Table
 from alphacut.questions.summary import Parts
 from alphacut.report.results import comparison
-from alphacut.report.tables import Table, latex, markdown
+from alphacut.report.tables import latex
 from alphacut.stages.suite import Statistics, SuiteResult
 from tests.alphacut.one_case import run
 
@@ -40,7 +41,7 @@ def test_statistics_of_records_stand_in_the_order_of_their_file():
     names = ["median", "84 %", "mean", "least"]
     statistics = {"q1": Statistics(proved={name: np.ones(1) for name in names})}
     facts = {"period_s": 1.0, "damping_ratio": 0.05, "alpha": np.zeros(1), "units": {"q1": "m"}}
-    parts = Parts(records=SuiteResult(**facts, records={}, statistics=statistics, spectra={}))
+    parts = Parts(records=SuiteResult(**facts, records={}, statistics=statistics))
     assert [row[0].partition(" of")[0] for row in comparison(parts, parts).rows] == names
 
 
@@ -50,12 +51,12 @@ def test_the_comparison_and_all_tables_are_written(runs, tmp_path):
     words = ["--quiet", "--csv", str(tmp_path), "--tables", str(tmp_path), "--out", str(page)]
     assert main(["report", str(a), str(b), *words]) == 0
     assert "greatest peak of q2" in page.read_text(encoding="utf-8")
-    assert "greatest peak of q2" in (tmp_path / "comparison.md").read_text(encoding="utf-8")
+    assert "greatest peak of q2" in (tmp_path / "comparison.tex").read_text(encoding="utf-8")
     with (tmp_path / "comparison.csv").open(encoding="utf-8") as file:
         assert len(list(csv.reader(file))) > 5
     assert main(["report", str(a), "--quiet", "--tables", str(tmp_path)]) == 0
     names = {path.stem for path in tmp_path.glob("*.tex")}
-    assert names == {path.stem for path in tmp_path.glob("*.md")} >= {"decision", "peaks"}
+    assert names >= {"decision", "peaks"}
     text = (tmp_path / "decision.tex").read_text(encoding="utf-8")
     assert r"$\leq$" in text
     assert "≤" not in text
@@ -74,6 +75,5 @@ def test_what_cannot_be_compared_is_said_in_one_line(runs, words, message, capsy
 
 def test_special_letters_are_those_of_the_language():
     table = Table(("a_b", "50 %"), [("x|y", "1 … 2")])
-    assert markdown(table) == "| a_b | 50 % |\n| --- | ---: |\n| x\\|y | 1 … 2 |\n"
     assert r"a\_b & 50 \%" in latex(table)
     assert r"1 \dots{} 2" in latex(table)

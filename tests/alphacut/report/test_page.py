@@ -6,16 +6,18 @@ import re
 import shutil
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature, rounded
+from alphacut.io.quantity import range_text
 from alphacut.io.results import ResultsFolder
 from alphacut.questions.decision import DecisionAnswer, LimitDecision
 from alphacut.questions.summary import FrameResult, Parts, Summary
 from alphacut.report.page import render_page
 from alphacut.report.results import answers, drivers, peak_table, run_text
-from alphacut.report.tables import write_tables
+from alphacut.report.tables import shown, write_tables
 from alphacut.stages.envelope import EnvelopeResult, PeakResult
 from alphacut.stages.store import CutsResult
 
@@ -132,6 +134,25 @@ def test_a_printed_bound_is_no_narrower_than_it_was_and_an_attained_one_no_wider
     assert high == rounded(value, "lower", Nature.ATTAINED)
     assert high - low <= 1e-3 * abs(value)
     assert float(f"{high:.4g}") == pytest.approx(high, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "nature", "text"),
+    [
+        (117.2186, 117.2186, Nature.ATTAINED, "117.22"),
+        (117.2186, 117.2187, Nature.ATTAINED, "117.22"),  # inwards they would pass each other
+        (117.2186, 117.2301, Nature.ATTAINED, "117.22 … 117.23"),
+        (117.2186, 117.2186, Nature.GUARANTEED, "117.22"),
+        (117.2186, 117.2187, Nature.GUARANTEED, "117.21 … 117.22"),
+        (-117.2187, -117.2186, Nature.GUARANTEED, "−117.22 … −117.21"),
+        (1.0, np.inf, Nature.GUARANTEED, "1.0000 … inf"),
+    ],
+)
+def test_ends_of_a_range_are_never_printed_past_each_other(low, high, nature, text):
+    assert range_text(low, high, nature, 5) == text
+    titles = {"E from [GPa]": [low], "E to [GPa]": [high], "nature": [str(nature)]}
+    lower, upper, _ = shown(pd.DataFrame(titles)).rows[0]
+    assert float(lower.replace("−", "-")) <= float(upper.replace("−", "-"))
 
 
 def test_the_first_tables_have_a_row_for_every_result(results):

@@ -44,11 +44,14 @@ def test_fuzzy_phases_of_a_mesh_run_to_a_report(tmp_path, capsys):
     text = capsys.readouterr().out
     assert "not declared" in text
     assert "guaranteed" not in text
+    assert "C is an upper bound of this mesh" in text
     cuts = json.loads((tmp_path / "out/summary.json").read_text())["modulus"]["E_GPa"]
     ends = [cuts["lower"][0], cuts["lower"][1], cuts["upper"][0]]
     assert ends == pytest.approx([modulus(e) / 1e9 for e in (75e9, 80e9, 85e9)], rel=1e-9)
     assert main(["report", str(tmp_path / "out")]) == 0
-    assert "Two particles" in (tmp_path / "out/report.html").read_text(encoding="utf-8")
+    page = (tmp_path / "out/report.html").read_text(encoding="utf-8")
+    assert "Two particles" in page
+    assert "C is an upper bound of this mesh" in page
 
 
 def test_a_mesh_that_is_refined_declares_its_error(tmp_path, capsys):

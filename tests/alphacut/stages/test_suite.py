@@ -167,12 +167,6 @@ def test_the_mean_over_records_lies_between_means_of_ends(tmp_path):
     # no number is of different structures
     assert peak["least_upper"] == [None, None]
     assert set(records["statistics"]["drift1"]) == {"proved"}
-    assert (out / "figures/spectra.svg").is_file()
-    spectra = records["spectra"]
-    exact = [
-        spectral_acceleration(grounds[0], x, records["damping_ratio"]) for x in spectra["period_s"]
-    ]
-    assert spectra[records_of(tmp_path)[0][0].name] == pytest.approx(exact)
 
 
 def test_check_shows_what_was_read_and_says_what_is_off(tmp_path, capsys):
