@@ -107,7 +107,7 @@ def main(
             os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
             return 0
         except CampaignError as error:
-            return _end_with_message(str(error), 3)
+            return _end_with_message(error.what, 3)  # its cure is an argument in Python
         except ModuleNotFoundError as error:
             return _end_with_message(missing(error), 1)
         except (RuntimeError, ValueError, ArithmeticError, OSError, MemoryError, ImportError) as e:

@@ -18,6 +18,7 @@ from alphacut.case.material import (
 from alphacut.case.radius import AnyRadius, RadiusMapSection, ThetaSection
 from alphacut.case.types import NotEmpty, Section, after, distinct, require_alone
 from alphacut.fuzzy.refused import RefusedError, require
+from alphacut.io.provenance import command_to_paste
 
 Stage = Literal["microstructure", "modulus", "envelope"]
 
@@ -85,7 +86,9 @@ class CellContent(Section):
         if self.mesh_cell is not None:
             return self.radius or ThetaSection(), self.mesh_cell
         if self.particle_cell is None:
-            raise RefusedError("cell", None, "a section [cell] with a particle")
+            value = "an image" if self.image_cell else None
+            cure = f"run {command_to_paste('modulus', 'CASE.toml')}" if value else ""
+            raise RefusedError("cell", value, "a section [cell] with a particle", cure)
         radius = self.radius_map or self.particle_cell.fraction_map
         if radius is None:
             raise RefusedError("radius", None, "a section [radius], or cell.fraction")

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -17,6 +18,7 @@ from alphacut.frame.verification.self_test import with_motions_tested
 from alphacut.io.results import Listed, ResultsFolder
 from tests.alphacut.small import CELL, written
 
+CASES = Path(__file__).parents[3] / "cases"
 RUN = [sys.executable, "-m", "alphacut"]
 
 
@@ -80,6 +82,10 @@ def test_a_cell_is_solved_at_its_modal_values(tmp_path, capfd):
 
 
 REFUSED = [
+    (
+        "cell {cases}/composite.toml",
+        "cell is an image; allowed: a section [cell] with a particle; run",
+    ),
     ("rnu case.toml", "COMMAND is rnu; allowed: run, check"),
     ("run", "CASE is missing; see alphacut run --help"),
     ("run case.toml --out", "value of --out is missing"),
@@ -110,7 +116,7 @@ REFUSED = [
 def test_bad_input_is_one_line_and_status_2(tmp_path, monkeypatch, capfd, line, words):
     monkeypatch.chdir(tmp_path)
     written(tmp_path)
-    command, *options = line.split(" --", 1)
+    command, *options = line.replace("{cases}", str(CASES)).split(" --", 1)
     arguments = command.split(" ")
     for option in options[0].split(" --") if options else ():
         name, _, value = option.partition(" ")
@@ -122,6 +128,26 @@ def test_bad_input_is_one_line_and_status_2(tmp_path, monkeypatch, capfd, line, 
     assert len(err) < 1100
     assert err[:-1].isprintable()
     assert [path.name for path in tmp_path.iterdir()] == ["case.toml"]
+
+
+AUXETIC = """
+title = "Auxetic"
+stages = ["modulus"]
+[mesh]
+file = "FOLDER/two-particles.msh"
+[cell.phases]
+matrix = { modulus = [["10 GPa", "-8 GPa", "0 GPa"], ["-8 GPa", "10 GPa", "0 GPa"], ["0 GPa", "0 GPa", "10 GPa"]] }
+particles = { modulus = [["20 GPa", "-16 GPa", "0 GPa"], ["-16 GPa", "20 GPa", "0 GPa"], ["0 GPa", "0 GPa", "20 GPa"]] }
+"""
+
+
+def test_a_sample_that_fails_is_told_without_the_advice_for_python(tmp_path, capfd):
+    pytest.importorskip("alphacut.rve.fenicsx")
+    case = written(tmp_path, AUXETIC, FOLDER=str(CASES.parent / "meshes"))
+    status, _, err = spoken(capfd, "run", case, "--no-figures", f"--out={tmp_path}/out")
+    assert status == 3
+    assert "E would be -62.71 GPa" in err
+    assert "on_failure" not in err
 
 
 def test_debug_shows_the_traceback_and_what_is_done(tmp_path, capfd):
