@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import floor, log10
 
 import numpy as np
 
 from alphacut.case.limits import DecisionSection
 from alphacut.frame.questions.peaks import ANY, passing
-from alphacut.fuzzy.result import Nature
+from alphacut.fuzzy.result import Nature, rounded
 from alphacut.io.quantity import engineering
 from alphacut.questions.question import (
     FuzzyResponse,
@@ -55,11 +56,17 @@ class LimitDecision(LimitAnswer):
         texts += [f"record {self.record}"] if self.record else []
         return f"{self.verdict}, as at {', '.join(texts)}"
 
-    def text_of(self, value: float) -> str:
-        """Text of a peak or a margin, which may be infinite; of several limits a share of them."""
+    def text_of(self, value: float, side: str, nature: Nature = Nature.GUARANTEED) -> str:
+        """Text of a bound of a peak or a margin, rounded to its side; of several limits a share.
+
+        The side is "lower" or "upper"; the bound may be infinite.
+        """
         if not np.isfinite(value):
             return "not known"
-        return engineering(value, self.unit) if self.unit else f"{value:.1%}"
+        if self.unit:
+            return engineering(rounded(value, side, nature), self.unit)
+        digits = 4 + floor(log10(abs(value))) if value else 1  # a tenth of a per cent is the last
+        return f"{rounded(value, side, nature, max(digits, 1)):.1%}"
 
 
 def degree_text(ends: tuple[float, float]) -> str:
@@ -80,7 +87,9 @@ class DecisionAnswer(LimitsAnswer[LimitDecision]):
         proved, reached, gap = "", "", ""
         if (peak := limit.peak) is not None:
             bound, inner = float(peak.proved[0]), float(peak.reached[0])
-            proved, reached = limit.text_of(bound), limit.text_of(inner)
+            side = "lower" if peak.is_least else "upper"
+            proved = limit.text_of(bound, side)
+            reached = limit.text_of(inner, side, Nature.ATTAINED)
             gap = f"{abs((bound - inner) / bound):.1%}" if bound and np.isfinite(bound) else ""
         return {
             "limit": limit.words,
@@ -88,7 +97,7 @@ class DecisionAnswer(LimitsAnswer[LimitDecision]):
             "nature": limit.nature,
             "possibility": degree_text(limit.possibility),
             "necessity": degree_text(limit.necessity),
-            "least margin": limit.text_of(float(limit.margin.lower[0])),
+            "least margin": limit.text_of(float(limit.margin.lower[0]), "lower", limit.nature),
             "peak at most": proved,
             "peak reached": reached,
             "gap": gap,

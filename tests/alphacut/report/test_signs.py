@@ -88,8 +88,11 @@ def parts_of(drawn, structure):
 
 
 def check_answer(peak, limit, cells):
-    """A row of an answer: the limit's words, the verdict, margin, bound and reached value."""
-    size = 6e-4 * sum(abs(x) for x in (*peak.proved, limit))
+    """A row of an answer: the limit's words, the verdict, margin, bound and reached value.
+
+    Texts are rounded to the side on which they stay true, by up to one unit of the fourth digit.
+    """
+    size = 1.1e-3 * sum(abs(x) for x in (*peak.proved, limit))
     output = peak.output if peak.side else f"|{peak.output}|"
     before = f"{peak.side} {output} {'≥' if peak.side == 'min' else '≤'} ".lstrip()
     assert cells["limit"].startswith(before)
@@ -98,6 +101,9 @@ def check_answer(peak, limit, cells):
     margin = peak.outwards * (limit - peak.proved[1])
     found = [quantity(cells[x]) for x in ("least margin", "peak at most", "peak reached")]
     assert found == pytest.approx([margin, peak.proved[1], peak.farthest], abs=size)
+    assert found[0] <= margin + 1e-9 * size
+    assert peak.outwards * (found[1] - peak.proved[1]) >= -1e-9 * size
+    assert peak.outwards * (found[2] - peak.farthest) <= 1e-9 * size
 
 
 def check_peak(peak, limit, cells):
