@@ -7,6 +7,7 @@ import argparse
 import ast
 import os
 from collections.abc import Iterator
+from functools import cache
 from itertools import pairwise
 
 from tests.environment.house import PACKAGES, ROOT, files_in, trees
@@ -57,13 +58,15 @@ def program_trees() -> dict[str, ast.Module]:
     return {name: x for name, x in names.items() if not name.startswith(("tests/", "docs/"))}
 
 
-def is_enumeration(node: ast.AST) -> bool:
-    return isinstance(node, ast.ClassDef) and any("Enum" in ast.unparse(x) for x in node.bases)
-
-
-ENUMERATIONS = {
-    node.name for tree in trees().values() for node in ast.walk(tree) if is_enumeration(node)
-}
+@cache
+def enumerations() -> set[str]:
+    """Names of the classes of the packages whose members are one object each."""
+    classes = (x for file in files_in(*PACKAGES) for x in trees()[file].body)
+    return {
+        node.name
+        for node in classes
+        if isinstance(node, ast.ClassDef) and any("Enum" in ast.unparse(x) for x in node.bases)
+    }
 
 
 def module_names(tree: ast.Module) -> set[str]:
@@ -83,7 +86,7 @@ def module_names(tree: ast.Module) -> set[str]:
 def is_unique(node: ast.expr) -> bool:
     """Whether a process has one object of this value, as of None and members of enumerations."""
     if isinstance(node, ast.Attribute):
-        return isinstance(node.value, ast.Name) and node.value.id in ENUMERATIONS
+        return isinstance(node.value, ast.Name) and node.value.id in enumerations()
     return isinstance(node, ast.Constant)
 
 
@@ -114,7 +117,7 @@ def test_assertions_only_tell_mypy_a_type():
 
 
 def test_a_comparison_by_identity_would_be_seen():
-    assert "Nature" in ENUMERATIONS
+    assert "Nature" in enumerations()
     assert len(program_trees()) > 200
     lines = ("from m import DISCS", "BOX = object()", "def f(): return shape is DISCS")
     more = ("x is not BOX", "x.shape is y.shape", "Nature.ATTAINED is x.nature", "a is None")
