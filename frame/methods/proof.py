@@ -15,6 +15,7 @@
 from __future__ import annotations
 
 import logging
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import comb
 from typing import ClassVar
@@ -127,14 +128,15 @@ class Proof:
             UnprovedError: The error of the modal model cannot be bounded within the tolerance, or
                 the structure has no smooth oscillating modes over the part.
         """
-        for gap in self._gaps:  # the narrowest first
-            try:
-                model, error = self._accurate_model(flow, boxes, goal.scale, gap)
-                break
-            except (GapError, BisectionError):
-                if gap == self._gaps[-1]:
-                    raise
-        return bound_levels(model, error, goal.scale, gap, self.boxes, goal.workers, goal.tick)
+
+        def within(gap: float) -> list[BoxBounds]:
+            model, error = self._accurate_model(flow, boxes, goal.scale, gap)
+            return bound_levels(model, error, goal.scale, gap, self.boxes, goal.workers, goal.tick)
+
+        for gap in self._gaps[:-1]:  # the narrowest first
+            with suppress(GapError, BisectionError):
+                return within(gap)
+        return within(self._gaps[-1])
 
     def _accurate_model(
         self, flow: LinearFlow, boxes: Boxes, scale: Array, gap: float
@@ -193,7 +195,7 @@ def bound_levels(
         progress: Called with the completed fraction.
 
     Raises:
-        ValueError: The gap is not above twice the model error.
+        BisectionError: The gap is not above twice the model error and rounding.
     """
     model, error = model.in_units(scale), model_error / scale
     rounding = Remainder(model, *model.boxes.unit(0)).margin[..., 0]
@@ -201,7 +203,8 @@ def bound_levels(
     least_gap = float((2 * error + rounding).max())
     search_gap = (1 - 1e-6) * gap - least_gap
     if search_gap <= 0:
-        raise ValueError(f"the gap {gap:.3g} is not above twice the model error, {least_gap:.3g}")
+        what = f"rounding and errors of the modes, {least_gap:.3g}, pass the gap of {gap:.3g}"
+        raise BisectionError(what, "take the method dual, a shorter duration or a wider gap")
     levels, of_levels = len(model.boxes.alpha), list[tuple[Optima, Array, int]]()
     for level in reversed(range(levels)):
         tick = subprogress(progress, len(of_levels) / levels, (len(of_levels) + 1) / levels)

@@ -21,6 +21,7 @@ exp(z) is 0 and the recurrence gives n! / (−z)ⁿ⁺¹; to the right the integ
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from math import ceil
 from threading import Lock
 from typing import Any, NamedTuple
@@ -127,12 +128,15 @@ def _absolute_moments(load: LinearPieces, offset: Array, decay: float, out: Arra
             area = x * (abs(a) + abs(b)) / 2  # ∫ |f| over x, of two triangles where f crosses zero
             if a * b < 0:
                 area = x * (a * a + b * b) / (2 * (abs(a) + abs(b)))
+            is_long, tail = decay * x > 1, largest / decay  # ∫ τⁿ exp(−g τ) dτ ≤ n!/gⁿ⁺¹
             for n in range(5):
                 total, binomial = 0.0, 1.0
                 for j in range(n, -1, -1):  # Σ C(n, j) x^(n − j) moments_j
                     total += binomial * x ** (n - j) * moments[j]
                     binomial *= j / (n - j + 1)
                 added = min(area * x**n, largest * x ** (n + 1) / (n + 1))
+                if is_long:
+                    added, tail = min(added, tail), tail * (n + 1) / decay
                 later[n] = decay_factor * total + growth * added
             if is_node:
                 out[:, node] = later
@@ -170,6 +174,8 @@ def responses_at_nodes(
     """
     length = window or len(time)
     longest = float(time[min(length, len(time) - 1)] - time[0]) if window else float(time[-1])
+    if window and history.step > longest:  # exp(σ τ) grows from an interval's beginning on
+        history = _divided(history, ceil(history.step / longest))
     times = time if node is None else time[node]
 
     def response_to_g(shifted: Array) -> tuple[Array, Array]:
@@ -184,6 +190,13 @@ def responses_at_nodes(
         return out, error
 
     return _with_sine(response_to_g, sigma, history, times[:, None])
+
+
+def _divided(history: History, parts: int) -> History:
+    """The same load with `parts` intervals between its samples in place of one."""
+    whole = np.arange(len(history.samples)) * parts
+    samples = np.interp(np.arange(whole[-1] + 1), whole, history.samples)
+    return replace(history, step=history.step / parts, samples=samples)
 
 
 def require_in_range(sigma: Array, step: float, duration: float) -> None:

@@ -153,6 +153,19 @@ def test_a_force_that_begins_after_the_end_does_nothing():
     np.testing.assert_allclose(*values, rtol=1e-12, atol=1e-12)
 
 
+@pytest.mark.parametrize("method", [Proof(), DualProof()], ids=lambda x: x.name)
+@pytest.mark.parametrize("ratio", [0.5, 0.02, 0.01])
+def test_a_stiff_structure_under_a_constant_force_is_bounded_by_its_overshoot(method, ratio):
+    """It turns by 2,200 rad in the one straight piece of the force: at most twice the static."""
+    force = Force(1, 5.0, History.constant(0.3))
+    frame = StoreyFrame([1.0], stiffness=[1e7], damping_ratio=ratio, loads=(force,))
+    given = {"duration": 1.0, "step": 0.001, "alpha": (0,), "progress": False}
+    found = envelope(frame, {"k1": Interval(0.95e7, 1.05e7)}, method=method, **given)
+    overshoot = 1 + np.exp(-np.pi * ratio / np.sqrt(1 - ratio**2))
+    assert found.upper.max() / (5 / 0.95e7) == pytest.approx(overshoot, rel=0.03)
+    assert found.lower.min() > -0.01 * 5 / 1e7
+
+
 def test_midpoint_converges_with_order_two(reference):
     errors = []
     for parts in (4, 8):

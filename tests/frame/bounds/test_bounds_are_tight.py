@@ -18,6 +18,7 @@ from alphacut.frame.bounds.model_error import (
 from alphacut.frame.bounds.newton import Optima
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.calculus.taylor_model import TaylorModel
+from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.methods.proof import bound_levels
 from alphacut.frame.modes.modal_model import ModalModel
 from alphacut.frame.response.duhamel import responses_at_nodes
@@ -97,7 +98,7 @@ def test_the_model_error_counts_on_both_sides_of_the_gap_asked_for() -> None:
     (proof,) = bound_levels(model, error, np.ones(1), gap=0.01)
     gap = (proof.outer - proof.inner).max()
     assert 2 * 0.004 < gap <= 0.01
-    with pytest.raises(ValueError, match="twice the model error"):
+    with pytest.raises(UnprovedError, match="take the method dual"):
         bound_levels(model, error, np.ones(1), gap=0.0079)
 
 

@@ -157,6 +157,16 @@ def test_windows_begin_at_rest(ground, node_step):
     assert (found[0] == 0).all()
 
 
+def test_windows_late_in_a_long_interval_of_the_load_are_exact():
+    """Up to there a growing exponent of a window's series would have grown by e⁴⁵."""
+    time, sigma = np.arange(81) * 0.02, np.array([60 + 9j])
+    (found,), _ = responses_at_nodes(sigma, LATE, time, window=4)
+    elapsed = time[1:] - time[(np.arange(80) // 4) * 4]
+    exact = np.expm1(sigma[0] * elapsed) / sigma[0]
+    late = time[1:] > 0.5
+    assert np.allclose(found[1:, 0][late], exact[late], rtol=1e-12)
+
+
 @pytest.mark.parametrize("decay", [-0.4, 0.0, 3.0])
 def test_absolute_moments_are_bounds_and_sharp(decay):
     """Against sums over 200 parts of a sample's interval; the integral of |f| itself is exact."""
