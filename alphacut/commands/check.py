@@ -15,16 +15,19 @@ import numpy as np
 
 from alphacut.case.content import Content
 from alphacut.case.loads import RecordsSection
+from alphacut.case.motion import EnvelopeSection
 from alphacut.case.parse import quantity_of
 from alphacut.case.structure import MaterialDamping, Structure
 from alphacut.case.types import Section
 from alphacut.commands.options import Command, add_common, add_quiet, write_answer
 from alphacut.commands.pipeline import cut_record_warnings, read_case, require_runnable
-from alphacut.frame import MatrixStructure, StoreyFrame
-from alphacut.frame.envelope import Ends, Envelope
-from alphacut.frame.structures.linear import frequencies
+from alphacut.frame import Exact, LinearFlow, MatrixStructure, StoreyFrame
+from alphacut.frame.boxes import AT_REST
+from alphacut.frame.envelope import Ends, Envelope, within_steps
+from alphacut.frame.structures.linear import LinearSystem, frequencies
 from alphacut.frame.structures.matrix import Monomial
 from alphacut.frame.verification.self_test import Trial, stored_motions
+from alphacut.frame.verification.step_error import node_deviation
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal, Triangular
 from alphacut.fuzzy.refused import require
 from alphacut.fuzzy.result import Nature
@@ -33,6 +36,7 @@ from alphacut.io.quantity import STANDARD_GRAVITY, engineering
 from alphacut.io.results import ResultsFolder
 from alphacut.report.results import AROUND
 from alphacut.stages.cell import CellProblem
+from alphacut.stages.envelope import WIDENING
 from alphacut.stages.image import image_study
 from alphacut.stages.suite import SuiteRecord, suite_records
 
@@ -68,11 +72,31 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
         text += f"record: {len(record.samples)} samples of {record.step:g} s, peak {peak}, {in_g}\n"
         warnings = cut_record_warnings(content, Structure(linear, {}))
         text += "".join(f"{warning}\n" for warning in warnings)
+    if linear and content.envelope is not None and content.records is None:
+        text += "".join(f"{line}\n" for line in long_steps(linear, content.envelope))
     if content.records is not None and content.envelope is not None and linear:
         records = suite_records(content.records, content.envelope, Structure(linear, {}))
         text += records_text(content.records, records)
     write_answer(options, document, out, f"{text}{options.case}: no problems\n")
     return 0
+
+
+def long_steps(linear: LinearSystem, section: EnvelopeSection) -> Iterator[str]:
+    """Yields a sentence for each output whose peak may rise much between the nodes of [envelope].
+
+    Both are those of the motion at the most plausible values.
+    """
+    flow = LinearFlow(linear, (), section.duration, section.step, Exact())
+    nominal = np.zeros((1, 0))
+    size, between = np.abs(flow.values(nominal)[0]).T, node_deviation(flow, nominal).T
+    peaks = np.maximum(size.max(1), AT_REST * flow.reach())  # at rest rounding alone moves
+    widening = within_steps(size, between).max(1) / peaks - 1
+    for name, share in zip(linear.outputs, widening, strict=True):
+        if share > WIDENING:
+            widened = (
+                f"{name}: the step of {section.step:g} s widens its bound by about {share:.1%}"
+            )
+            yield f"{widened} between nodes, one of {section.step / 2:g} s by {share / 4:.1%}"
 
 
 def records_text(section: RecordsSection, records: Sequence[SuiteRecord]) -> str:

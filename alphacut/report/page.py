@@ -23,6 +23,7 @@ from alphacut.report.results import (
     material,
     natures,
     peak_table,
+    smaller_steps,
     width_text,
 )
 from alphacut.report.tables import tables
@@ -144,7 +145,8 @@ class Page:
         yield "text", f"{MEANING}."
         for table in (material(summary), peak_table(summary), (ANSWER_HEAD, answers(summary))):
             yield ("table", *table)
-        yield from self._pieces([], [*natures(summary), *drivers(summary)])
+        lines = (*natures(summary), *smaller_steps(summary), *drivers(summary))
+        yield from self._pieces([], lines)
 
     def _particles(self) -> Iterator[str]:
         if (part := self.summary.microstructure) is None:

@@ -48,7 +48,7 @@ COMPARED = ("at the lowest α", "first", "second", "second over first")
 def run_text(parts: Parts) -> str:
     """The results of a run for the console: tables, then sentences, answers and main drivers."""
     shown = [table for table in (material(parts), peak_table(parts)) if table.rows]
-    lines = [*natures(parts)]
+    lines = [*natures(parts), *smaller_steps(parts)]
     if isinstance(parts.update, IdentifiedResult):
         shown.append(learned(parts.update))
     elif parts.update is not None:
@@ -232,6 +232,21 @@ def natures(parts: Parts) -> Iterator[str]:
         if count := sum(study.motions_tested for study in tested):
             where = "agree with what is guaranteed" if is_guaranteed else AROUND
             yield f"{count} exact motions by another algorithm {where}"
+
+
+def smaller_steps(parts: Parts) -> Iterator[str]:
+    """Yields a sentence for each peak whose bound is widened most by motions between nodes."""
+    for study in parts.envelopes.values():
+        for name, peak in study.peak.items():
+            if peak.is_widened_by_step:
+                # what motions add between nodes falls with the square of the step
+                saved, what = 0.75 * peak.between_nodes, "an error of"
+                value = float(peak.error[0]) - saved
+                if peak.nature is Nature.GUARANTEED:
+                    what = "at least" if peak.is_least else "at most"
+                    value = float(peak.far_end[0]) + (saved if peak.is_least else -saved)
+                text = engineering(value, unit_of(study.units, name))
+                yield f"{name}: a step of {study.step / 2:g} s would give {what} about {text}"
 
 
 def answers(parts: Parts) -> list[Row]:

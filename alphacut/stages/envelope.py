@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 DEFAULT_TOLERANCE = Tolerance(1e-3, "")
 """Tolerance where none is named: a fraction of each peak."""
 FOLLOWERS = ("graph-follower", "improved-graph-follower")
+WIDENING = 0.01
+"""Fraction of a peak from which on it is said that a smaller step would narrow its bound."""
 PEAK_ERROR = 5e-3
 """Error of the peaks of limited outputs that is aimed at, as a share of each."""
 
@@ -38,7 +40,8 @@ class PeakResult(Numbers):
 
     The peak is the largest magnitude, or the greatest ("max q3") or least ("min q3") value, which
     has its own sign here, so that `lower` and `upper` change places. No motion passes `proved`;
-    `reached_at` has the inputs of one that reaches the peak on the lowest level, if known.
+    `reached_at` has the inputs of one that reaches the peak on the lowest level, if known. Motions
+    may add `between_nodes` to its bound there within the steps.
     """
 
     lower: Values
@@ -49,6 +52,7 @@ class PeakResult(Numbers):
     least_upper: Values
     proved: Values
     nature: Nature
+    between_nodes: float = 0.0
     is_least: bool = False
     reached_at: dict[str, float] = Field(default={})
 
@@ -56,6 +60,14 @@ class PeakResult(Numbers):
     def far_end(self) -> Array:
         """Bound on each level of the peaks farthest out: the upper one, or that of least values."""
         return self.lower if self.is_least else self.upper
+
+    @property
+    def is_widened_by_step(self) -> bool:
+        """Whether what motions add between nodes is most of the gap or error, and much."""
+        bound, reached = float(self.far_end[0]), float(self.reached[0])
+        is_proved = self.nature is Nature.GUARANTEED
+        width = abs(bound - reached) if is_proved else float(self.error[0])
+        return self.between_nodes > max(width / 2, WIDENING * abs(bound))
 
     def gap(self, level: int) -> float:
         """Relative gap between that bound and what a motion reaches, on a level."""
@@ -83,6 +95,7 @@ class EnvelopeResult(Numbers):
     method: str
     nature: Nature
     motions_tested: int
+    step: float = 0.0
     units: dict[str, str]
     drawn: tuple[str, ...] = ()
 
@@ -146,6 +159,7 @@ class EnvelopeTask:
             method=str(data.attrs["method"]),
             nature=Nature(data.attrs["nature"]),
             motions_tested=int(data.attrs.get("motions_tested", 0)),
+            step=float(data["time"].values[1]),
             units={x: structure.unit(x) for x in (*names, *outputs_of([*peak_bounds]))},
         )
         return StageResult(numbers, data)
@@ -217,6 +231,7 @@ def peak_results(peaks: Peaks) -> PeakResults:
         is_least = name.startswith("min ")  # which `Peak` has as the greatest value of −q
         bounds = _negative(bounds) if is_least else bounds
         kind = {"nature": peak.nature, "is_least": is_least, "reached_at": peak.reached_at}
+        kind["between_nodes"] = peak.between_nodes
         results[name] = PeakResult.model_validate(bounds | kind)
     return results
 
@@ -232,6 +247,7 @@ def peaks_of(results: PeakResults, alpha: Sequence[float]) -> dict[str, Peak]:
             bounds[bound] = np.where(np.isnan(values), unknown, values)
         is_signed = name.startswith(("max ", "min "))
         kind: dict[str, Any] = {"is_signed": is_signed, "reached_at": peak.reached_at}
+        kind["between_nodes"] = peak.between_nodes
         peaks[name] = Peak(np.array(alpha), **bounds, nature=peak.nature, **kind)
     return peaks
 

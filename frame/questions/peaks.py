@@ -42,6 +42,8 @@ class Peak:
         least_upper: Upper bound of it: a peak that some motion in the cut is known not to exceed;
             infinite where none is known.
         nature: Nature of the bounds.
+        between_nodes: Part of the greatest bound on the lowest level that motions may add within
+            the steps between nodes; it falls with the square of the step.
         is_signed: Whether it is a largest value, which may be negative, instead of a magnitude.
         reached_at: Inputs in SI, by name, of the motion that reaches the peak on the lowest level;
             empty where none is known.
@@ -55,6 +57,7 @@ class Peak:
     least_lower: Array
     least_upper: Array
     nature: Nature
+    between_nodes: float = 0.0
     is_signed: bool = False
     reached_at: Mapping[str, float] = field(default_factory=dict)
 
@@ -99,7 +102,9 @@ def _peak_of(envelope: Envelope, name: str) -> Peak:
     ends_at_nodes, reached_at_nodes = (_oriented(*end, name) for end in ends)  # (A, T) each
     upper, lower = ends_at_nodes.upper.max(1), ends_at_nodes.lower.max(1)
     between = None if envelope.between is None else envelope.between[:, k]
-    above = within_steps(ends_at_nodes.upper + error, between).max(1) - upper
+    bound_at_nodes = ends_at_nodes.upper + error
+    bound = within_steps(bound_at_nodes, between).max(1)
+    above = bound - upper
     below = lower - np.maximum(ends_at_nodes.lower - error, smallest).max(1)
     least_lower, least_upper = np.full_like(upper, smallest), np.full_like(upper, np.inf)
     if envelope.least_peaks is not None and not is_signed:
@@ -115,6 +120,7 @@ def _peak_of(envelope: Envelope, name: str) -> Peak:
         least_lower=least_lower,
         least_upper=least_upper,
         nature=nature,
+        between_nodes=float(bound[0] - bound_at_nodes[0].max()),
         is_signed=is_signed,
         reached_at=_inputs_at_peak(envelope, k, name),
     )
@@ -163,6 +169,8 @@ def _tighter(first: Peak, second: Peak) -> Peak:
         rules |= {"lower": np.minimum, "upper": np.maximum, "error": np.maximum}
     ends: dict[str, Any]
     ends = {name: rule(getattr(first, name), getattr(second, name)) for name, rule in rules.items()}
+    if "upper" in ends:
+        ends["between_nodes"] = min(first, second, key=lambda x: x.upper[0]).between_nodes
     farther = first if first.reached[0] >= second.reached[0] else second
     return replace(better, reached_at=farther.reached_at, **ends)
 

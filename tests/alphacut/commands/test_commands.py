@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -40,6 +41,33 @@ def test_a_run_prints_a_table_and_leaves_its_files(tmp_path, capfd):
     summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     assert summary["envelopes"]["all"]["max"]["q1"] == pytest.approx(0.0099, abs=3e-4)
     assert {"envelope_all.nc", "summary.json"} <= {path.name for path in folder.iterdir()}
+
+
+def test_a_step_that_widens_a_bound_is_foreseen_and_said_with_what_half_of_it_gives(
+    tmp_path, capfd
+):
+    case, folder = written(tmp_path), tmp_path / "out"
+    given = (
+        "--set=frame.outputs=['a1']",
+        "--set=envelope.method=proof",
+        "--set=envelope.tolerance=0.1 %",
+    )
+    peaks, texts = [], []
+    for step in (0.1, 0.05):
+        words = (case, *given, f"--set=envelope.step={step} s")
+        foreseen = spoken(capfd, "check", *words)[1]
+        texts.append(spoken(capfd, "run", *words, "--no-figures", "--out", folder)[1])
+        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        peaks.append(summary["envelopes"]["all"]["peak"]["a1"])
+        share = re.search(
+            rf"a1: the step of {step:g} s widens its bound by about (.*)% betw", foreseen
+        )
+        assert (share is not None) == (step == 0.1)
+        widened = 100 * peaks[0]["between_nodes"] / peaks[0]["upper"][0]
+        assert share is None or 0.3 * widened < float(share[1]) < 3 * widened
+    said = re.search(r"a1: a step of 0.05 s would give at most about (.*) mm/s\^2", texts[0])
+    assert float(said[1]) == pytest.approx(1e3 * peaks[1]["upper"][0], rel=2e-3)
+    assert "would give" not in texts[1]
 
 
 def test_the_same_run_takes_what_is_there_and_fresh_computes_anew(tmp_path, capfd):
