@@ -40,8 +40,8 @@ FEW_INPUTS = 4
 """Inputs up to which the dual bound closes the gaps of peaks to the usual tolerance."""
 FINEST = 1e-4
 """Gap of peaks, as a fraction of each, below which the dual bound takes too long."""
-FOLLOWED = 0.25
-"""Fraction of the tolerance that is worth a graph: a follower's error is about four times it."""
+FOLLOWED = 0.15
+"""Fraction of the tolerance that is worth a graph: a follower's error is up to seven times it."""
 ROUNDING = 1e-9
 """Fraction of a peak by which a motion that is followed may be off."""
 
@@ -81,7 +81,6 @@ class Auto:
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
         """Return the envelope on all levels, by a proof if possible; its first note says why."""
         tolerance = flow.tolerance(self.tolerance)
-        allowed = (1 + 1e-9) * tolerance * flow.scale  # a little more for rounding
         if not isinstance(flow.flow, LinearFlow):
             follower = ImprovedFollower(0.7 * tolerance, seed=self.seed)
             return _noted(follower.run(flow, progress), f"{follower.name}: not linear")
@@ -93,7 +92,7 @@ class Auto:
             except UnprovedError as error:
                 reasons.append(f"{proof.name}: {error}")
                 continue
-            if self._is_close(proved[-1], flow, allowed):
+            if self._is_close(proved[-1], flow):
                 return _noted(proved[-1], "; ".join([f"{proof.name} succeeded", *reasons]))
             reasons.append(f"{proof.name}: its gap is wider than the tolerance")
         best = min(proved, key=lambda found: _gap(found, flow), default=None)
@@ -102,7 +101,7 @@ class Auto:
                 return _noted(best, "; ".join([f"{best.method} succeeded", *reasons]))
             followed = follower.run_pass(flow, progress, asked=_above_peaks(best))
             return _noted(_with_reached(best, flow, followed), f"{best.method} and {follower.name}")
-        found = follower.run(flow, progress, allowed if self.is_for_all_nodes else None)
+        found = follower.run(flow, progress)
         found = replace(found, outer=best.proved if best else None)
         return _noted(found, f"{follower.name}; unproved: {'; '.join(reasons)}")
 
@@ -142,37 +141,29 @@ class Auto:
         )
         return next(method for applies, method in table if applies)
 
-    def _is_close(self, proved: Envelope, flow: UnitFlow, allowed: Array) -> bool:
-        """Return whether the gap of a proof is as narrow as asked for.
-
-        A tolerance for all bounds must be met by all. Else the gap at the peaks counts: at most
-        twice a tolerance that is meant for peaks and for few inputs, or `WIDE`.
-        """
-        if self.is_for_all_nodes:
+    def _is_close(self, proved: Envelope, flow: UnitFlow) -> bool:
+        """Return whether the gap of a proof is as narrow as asked for."""
+        if self.is_for_all_nodes:  # a little more for rounding
+            allowed = (1 + 1e-9) * flow.tolerance(self.tolerance) * flow.scale
             return bool((proved.error <= allowed).all())
-        if self.tolerance is not None and flow.relative and len(flow.boxes.names) <= FEW_INPUTS:
-            return _gap(proved, flow) <= 2 * self.tolerance
-        return _gap(proved, flow) <= WIDE
+        is_of_few_inputs = flow.relative and len(flow.boxes.names) <= FEW_INPUTS
+        peak_gap = 2 * self.tolerance if self.tolerance and is_of_few_inputs else WIDE
+        return _gap(proved, flow) <= peak_gap
 
 
 def _with_reached(proved: Envelope, flow: UnitFlow, followed: PassBounds) -> Envelope:
     """Return a guaranteed envelope with larger values inside it that graphs reach."""
-    assert proved.inner is not None
     values = followed.bounds - ROUNDING * np.abs(followed.bounds).max((0, 1, 3))[:, None]
-    physical = flow.boxes.to_physical(followed.points)
-    ends, inputs = list[Array](), list[Array]()  # lower ones, then upper ones
-    for index, (sign, inner, at) in enumerate(
-        ((-1, proved.inner.lower, proved.lower_at), (1, proved.inner.upper, proved.upper_at))
-    ):
-        better = values[..., index] > sign * inner
-        ends.append(np.where(better, sign * values[..., index], inner))
-        inputs.append(np.where(better[..., None], physical[..., index, :], at))
+    outer, inner = _sides(proved)
+    better, at = values > inner, np.stack([proved.lower_at, proved.upper_at], -2)
+    inner = np.where(better, values, inner)
+    at = np.where(better[..., None], flow.boxes.to_physical(followed.points), at)
     combined = replace(
         proved,
-        inner=Ends(*ends),
-        lower_at=inputs[0],
-        upper_at=inputs[1],
-        error=np.maximum(proved.upper - ends[1], ends[0] - proved.lower),
+        inner=Ends(-inner[..., 0], inner[..., 1]),
+        lower_at=at[..., 0, :],
+        upper_at=at[..., 1, :],
+        error=(outer - inner).max(-1),
     )
     facts = {**combined.facts, "gap_of_peaks": _gap(combined, flow)}
     return replace(combined, facts=facts, notes=(combined.peak_words, *combined.notes))

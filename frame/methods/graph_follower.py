@@ -36,23 +36,17 @@ class Storage:
     """All graphs (trajectories) computed so far, and the best of them at each place.
 
     Arrays over places have shape (T, m, 2): node, output, and side (−output, output).
-
-    Attributes:
-        flow: Computes graphs.
-        points: Their unit coordinates, shape (G, d).
-        top: The best value at each place.
-        best: Which graph has it, the first where several do.
-        first: First derivatives of that graph's output, shape (T, m, 2, d).
-        second: Second ones, shape (T, m, 2, d, d).
-        steepest: Largest slope of any graph along a coordinate, shape (m,).
     """
 
     def __init__(self, flow: UnitFlow) -> None:
         d, shape = len(flow.boxes.names), (len(flow.time), len(flow.outputs), 2)
-        self.flow, self.steepest = flow, np.zeros(shape[1])
-        self.points: Array = np.empty((0, d))
+        self.flow = flow
+        self.points: Array = np.empty((0, d))  # of all graphs, in unit coordinates
+        # the best value at each place, and the first graph that has it
         self.top, self.best = np.full(shape, -np.inf), np.zeros(shape, np.int64)
+        # derivatives of that graph's output
         self.first, self.second = np.zeros((*shape, d)), np.zeros((*shape, d, d))
+        self.steepest = np.zeros(shape[1])  # slope of any graph along a coordinate, (m,)
 
     def __len__(self) -> int:
         return len(self.points)
@@ -107,23 +101,14 @@ class Storage:
 
 @dataclass(eq=False)
 class Followed:
-    """Bounds that the Graph Follower has found, and the graphs (trajectories) behind them.
+    """Upper bounds of (−output, output) that the Graph Follower has found, all (A, T, m, 2)."""
 
-    Args:
-        bounds: Upper bounds of (−output, output) after post-processing, shape (A, T, m, 2).
-        best: Index of the graph that reaches each, shape (A, T, m, 2).
-        predicted_gain: Gain over the bounds that Taylor models still predict, same shape.
-        guess: Index of the best stored graph when a node was reached, same shape (Figs. 21 to 23).
-        new: Index of the graph computed there, or −1 where the guess stays, same shape.
-        storage: All graphs.
-    """
-
-    bounds: Array
-    best: Ints
-    predicted_gain: Array
-    guess: Ints
-    new: Ints
-    storage: Storage
+    bounds: Array  # after post-processing
+    best: Ints  # index of the graph that reaches each
+    predicted_gain: Array  # over the bounds, by Taylor models
+    guess: Ints  # index of the best stored graph when a node was reached (Figs. 21 to 23)
+    new: Ints  # index of the graph computed there, or −1 where the guess stays
+    storage: Storage  # of all graphs
 
 
 @dataclass(frozen=True)

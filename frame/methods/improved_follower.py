@@ -47,12 +47,13 @@ NEAR_PEAK, PEAK_SHARE = 0.02, 0.02
 worth a graph: a Newton step or two for each peak."""
 LEAST_GAIN = 1e-10
 """Gain, as a fraction of a peak, that may be rounding."""
-MOST_PASSES = 4
-"""Passes after which an error that is not allowed is declared."""
 SPREAD = 64
 """Graphs on a spread of points per level that start the search."""
 EXPLORED = 256
 """Motions of a kind per level whose values alone are looked at, for basins that no model shows."""
+CROSSINGS, MOTIONS_PER_GRAPH, REDRAWN = 8, 8, 2.0
+"""Rounds in which crossed optima of more inputs than `MAX_GLOBAL_INPUTS` are tried, at most; their
+motions, whose values alone are looked at, for each graph; and the inputs drawn anew, on average."""
 SEED_STEP = 100_003
 """Points of the sequence between those that two seeds spread."""
 
@@ -81,59 +82,43 @@ class ImprovedFollower:
         checked_number("tolerance", self.tolerance, positive=True)
         checked_number("budget", self.budget, whole=True, least=1)
 
-    def run(
-        self, flow: UnitFlow, progress: Progress | None = None, allowed: Array | None = None
-    ) -> Envelope:
+    def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
         """Return the envelope of two passes from different points, with an estimated error.
 
         The error is twice what the Taylor models still predict and what an independent sample finds
-        beyond the bounds, and twice the difference of the two best passes. Where neighbouring
+        beyond the bounds, and twice the difference of the two passes. Where neighbouring
         trajectories diverge there is none, and the bounds are attained only.
-
-        Args:
-            flow: The motion and its boxes.
-            progress: Called with the completed fraction.
-            allowed: Error of each output, shape (m,), in its unit, above which further passes are
-                made for the bounds that have a larger one.
         """
-        start_time, passes, errors = time.perf_counter(), list[PassBounds](), np.empty(0)
-        asked = np.ones((len(flow.boxes.alpha), len(flow.time), len(flow.outputs), 2), bool)
-        limit = self._limit(flow)
-        predicted, is_stopped = np.zeros(asked.shape), False
-        while len(passes) < 2 or (len(passes) < MOST_PASSES and asked.any()):
-            # progress of two passes, and by halves of the remainder for further ones
-            ends = [0.8 * (1 - 0.5**k) if k else 0.0 for k in (len(passes), len(passes) + 1)]
-            seeded = replace(self, seed=self.seed + len(passes))
-            found = seeded.run_pass(flow, subprogress(progress, *ends), asked)
-            gain = np.where(asked, found.predicted_gain, 0.0)
-            # gains above the tolerance, which remain where the budget ended a pass, come on top
-            small, large = (np.where(x, gain, 0.0) for x in (gain <= limit, gain > limit))
-            predicted = np.maximum(predicted, small) + large
-            is_stopped = is_stopped or bool(large.any())
-            passes.append(found)
-            if len(passes) > 1:
-                values = np.sort([x.bounds for x in passes], axis=0)
-                difference = smoothed_maximum((values[-1] - values[-2]).max(-1))
-                errors = SAFETY * (predicted.max(-1) + limit[:, 0] / 2 + difference)
-                asked &= False if allowed is None else (errors > allowed)[..., None]
-        bounds, points = passes[0].bounds, passes[0].points
-        for further in passes[1:]:
-            points = np.where((further.bounds > bounds)[..., None], further.points, points)
-            bounds = np.maximum(bounds, further.bounds)
+        start_time, limit = time.perf_counter(), self._limit(flow)
+        passes = [
+            replace(self, seed=self.seed + k).run_pass(
+                flow, subprogress(progress, 0.4 * k, 0.4 * (k + 1))
+            )
+            for k in range(2)
+        ]
+        first, second = passes
+        gains = np.array([x.predicted_gain for x in passes])
+        # gains above the tolerance, which remain where the budget ended a pass, come on top
+        small, large = (np.where(x, gains, 0.0) for x in (gains <= limit, gains > limit))
+        predicted = small.max(0) + large.sum(0)
+        difference = smoothed_maximum(np.abs(second.bounds - first.bounds).max(-1))
+        points = np.where((second.bounds > first.bounds)[..., None], second.points, first.points)
+        bounds = np.maximum(first.bounds, second.bounds)
         missed, count = independent_excess(flow, bounds, subprogress(progress, 0.8, 1.0))
-        steepest = np.max([x.storage.steepest for x in passes], axis=0)
+        error = SAFETY * (predicted.max(-1) + limit[:, 0] / 2 + difference + missed[:, None])
+        steepest = np.maximum(first.storage.steepest, second.storage.steepest)
         diverges = trajectories_diverge(steepest, bounds[0])
         note = f"stopped at the budget of {self.budget} trajectories"
         return flow.envelope(
             bounds,
             flow.boxes.to_physical(points),
-            None if diverges else errors + SAFETY * missed[:, None],
+            None if diverges else error,
             method=self.name,
             nature=Nature.ATTAINED if diverges else Nature.ESTIMATED,
-            evaluations=sum(x.evaluations for x in passes) + count,
+            evaluations=first.evaluations + second.evaluations + count,
             seconds=time.perf_counter() - start_time,
             facts={"gain": self.tolerance, "order": 2},
-            notes=(note,) if is_stopped else (),
+            notes=(note,) if large.any() else (),
         )
 
     def run_pass(
@@ -158,12 +143,20 @@ class ImprovedFollower:
             # graphs at the end of the level, at most, and at its beginning
             limit, first = self.budget * (done + 1) // levels, len(storage)
             points = self._start(storage, *models.box)[: max(1, limit - len(storage))]
+            are_many = d > MAX_GLOBAL_INPUTS and isinstance(flow.flow, LinearFlow)
+            crossings = CROSSINGS if has_width and are_many else 0
             while len(points):
                 for chunk in np.array_split(points, -(-len(points) // chunk_size)):
                     models.predict(storage.add(chunk))
                     tick(min(1.0, (len(storage) - first) / max(1, limit - first)))
                 least = self._least_gains(storage, True if asked is None else asked[level])
                 points = models.proposals(least, min(BATCH, limit - len(storage)))
+                if not len(points) and crossings and len(storage) < limit:
+                    crossings -= 1
+                    crossed = models.crossed_optima(np.random.default_rng([skip, crossings]))
+                    models.explore(crossed)
+                    out.evaluations += len(crossed)
+                    points = models.proposals(least, min(BATCH, limit - len(storage)))
             # post-processing of the level
             out.bounds[level], out.points[level] = storage.top, storage.points[storage.best]
             out.predicted_gain[level] = np.maximum(models.gains, 0.0)
@@ -197,42 +190,46 @@ class ImprovedFollower:
 
 @dataclass(eq=False)
 class PassBounds:
-    """Bounds of one pass, and the graphs (trajectories) behind them.
-
-    Args:
-        bounds: Reached bounds of (−output, output), shape (A, T, m, 2).
-        points: Their unit coordinates, shape (A, T, m, 2, d).
-        predicted_gain: Gain over the bounds that the models still predict, shape (A, T, m, 2);
-            more than the tolerance where the budget ended the search.
-        storage: All graphs.
-        evaluations: Number of graphs and of motions whose values alone were looked at.
-    """
+    """Reached bounds of (−output, output) of one pass, shape (A, T, m, 2)."""
 
     bounds: Array
-    points: Array
-    predicted_gain: Array
-    storage: Storage
-    evaluations: int = 0
+    points: Array  # their unit coordinates, shape (A, T, m, 2, d)
+    predicted_gain: Array  # by the models; above the tolerance where the budget ended the pass
+    storage: Storage  # of all graphs
+    evaluations: int = 0  # graphs, and motions whose values alone were looked at
 
 
 class _LevelModels:
-    """Predictions of the stored graphs' Taylor models in one box, by place (T, m, 2).
-
-    Motions at further points (S, d) count as predictions where they exceed these.
-
-    Attributes:
-        predicted: Predicted values of (−output, output), shape (T, m, 2).
-        target: Their unit coordinates, shape (T, m, 2, d).
-    """
+    """Predictions of the stored graphs' Taylor models in one box, by place (T, m, 2)."""
 
     def __init__(self, storage: Storage, box: tuple[Array, Array], points: Array) -> None:
         self.storage, self.box = storage, box
         self.reach = REACH * np.maximum((box[1] - box[0]) / 2, 1e-300)
-        self.sampled, index = largest_values(storage.flow, points)
-        self.sampled_at = points[index]
+        # largest values of explored motions, and where they are, shape (T, m, 2, d)
+        self.sampled: Array = np.full(storage.top.shape, -np.inf)
+        self.sampled_at = np.zeros((*storage.top.shape, len(box[0])))
+        self.explore(points)
+        # the same of the models
         self.predicted, self.target = storage.top.copy(), np.zeros(self.sampled_at.shape)
         if len(storage):
             self.predict(storage.all_places)
+
+    def explore(self, points: Array) -> None:
+        """Let the values of motions at points (S, d) count as predictions where they are larger."""
+        values, index = largest_values(self.storage.flow, points)
+        better = values > self.sampled
+        self.sampled[better], self.sampled_at[better] = values[better], points[index][better]
+
+    def crossed_optima(self, rng: np.random.Generator) -> Array:
+        """Return optima of random places with some inputs of others or drawn anew, shape (S, d)."""
+        storage, d = self.storage, len(self.box[0])
+        count = MOTIONS_PER_GRAPH * len(storage)
+        own, other = storage.points[rng.choice(storage.best.ravel(), (2, count))]
+        # a third of the drawn values at the ends of their range
+        drawn = np.clip(rng.uniform(-1.5, 1.5, own.shape), -1, 1) * (self.box[1] - self.box[0]) / 2
+        drawn += (self.box[0] + self.box[1]) / 2
+        further = np.where(rng.random((count, 1)) < 0.5, drawn, other)
+        return np.where(rng.random(own.shape) < REDRAWN / d, further, own)
 
     @property
     def gains(self) -> Array:
@@ -247,10 +244,7 @@ class _LevelModels:
             self.predicted[places], self.target[places] = optima
 
     def proposals(self, least: Array, count: int) -> Array:
-        """Return the points of largest predicted gain, one per window of time, (≤ count, d).
-
-        A gain must exceed that of its place in `least` (T, m, 2); near points are left out.
-        """
+        """Return distinct points of gains above `least`, one per window of time, (≤ count, d)."""
         chosen, gains = list[Array](), self.gains / least
         windows = np.array_split(np.arange(len(gains)), max(1, min(count, len(gains))))
         for window in windows:

@@ -189,8 +189,8 @@ def bound_levels(
         model: The modal model.
         model_error: Bound of its distance from the exact motion, shape (T, m).
         scale: Unit of the gap for each output, shape (m,).
-        gap: Wanted difference between proved and attained bound.
-        budget: Most boxes per bound on average.
+        gap: Wanted difference between proved and reached bound.
+        budget: Most boxes for each bound, on average.
         workers: Threads.
         progress: Called with the completed fraction.
 
@@ -288,10 +288,7 @@ def _error_between_nodes(model: ModalModel, error: Array) -> Array:
 
 
 def tail_shares(model: ModalModel) -> Array:
-    """Return each input's fraction in the terms of highest degree of a modal model, (d,).
-
-    It estimates the input's part in the model's error.
-    """
+    """Return each input's fraction of the terms of highest degree, about its part in the error."""
     index = model.eigenvalue.exponents  # of the terms, (terms, d)
     top = index.sum(1) == model.degree
     weight = np.zeros(len(index))

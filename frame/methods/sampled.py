@@ -11,7 +11,7 @@ import numpy as np
 from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.envelope import Envelope
 from alphacut.fuzzy.arrays import Array, Ints
-from alphacut.fuzzy.progress_bar import Progress
+from alphacut.fuzzy.progress_bar import Progress, subprogress
 from alphacut.fuzzy.refused import checked_number
 from alphacut.fuzzy.result import Nature
 from alphacut.fuzzy.sets.boxes import chebyshev_points, corners
@@ -57,12 +57,10 @@ class Sampled:
             if level + 1 < levels:  # what a narrower box attains
                 bounds[level], at[level] = bounds[level + 1], at[level + 1]
             points = self.points(*flow.boxes.unit(level))
-            for number, chunk in enumerate(np.array_split(points, -(-len(points) // BATCH))):
-                values, index = largest_values(flow, chunk)
-                better = values > bounds[level]
-                bounds[level][better], at[level][better] = values[better], chunk[index][better]
-                if progress:
-                    progress((done + number * BATCH / len(points)) / levels)
+            tick = subprogress(progress, done / levels, (done + 1) / levels)
+            values, index = largest_values(flow, points, tick)
+            better = values > bounds[level]
+            bounds[level][better], at[level][better] = values[better], points[index][better]
         return flow.envelope(
             bounds,
             flow.boxes.to_physical(at),
@@ -101,7 +99,9 @@ def spread_points(lower: Array, upper: Array, count: int, skip: int) -> Array:
     return np.asarray((lower + upper) / 2 + (upper - lower) / 2 * points)
 
 
-def largest_values(flow: UnitFlow, points: Array) -> tuple[Array, Ints]:
+def largest_values(
+    flow: UnitFlow, points: Array, progress: Progress | None = None
+) -> tuple[Array, Ints]:
     """Return the largest (−output, output) of motions, shape (T, m, 2), and which has it."""
     largest: Array = np.full((len(flow.time), len(flow.outputs), 2), -np.inf)
     index: Ints = np.zeros(largest.shape, np.int64)
@@ -113,4 +113,6 @@ def largest_values(flow: UnitFlow, points: Array) -> tuple[Array, Ints]:
         value = np.take_along_axis(signed, best[None], 0)[0]
         better = value > largest
         largest[better], index[better] = value[better], first + best[better]
+        if progress:
+            progress(first / len(points))
     return largest, index

@@ -34,23 +34,14 @@ CHUNK = 4096
 
 
 class Course(NamedTuple):
-    """A load over time: g(t) sin(Ω (t − start) + phase), or g(t) where Ω is 0.
+    """A load over time: g(t) sin(Ω (t − start) + phase), or g(t) where Ω is 0."""
 
-    Args:
-        samples: Samples of g, linear between and zero outside, shape (R,).
-        step: Time between samples, in s.
-        start: Time of the first one, in s.
-        is_held: Whether the last one stays on.
-        frequency: Ω, in rad/s.
-        phase: In rad.
-    """
-
-    samples: Array
-    step: float
-    start: float = 0.0
-    is_held: bool = False
-    frequency: float = 0.0
-    phase: float = 0.0
+    samples: Array  # of g, linear between and zero outside, shape (R,)
+    step: float  # time between samples, in s
+    start: float = 0.0  # time of the first one, in s
+    is_held: bool = False  # whether the last one stays on
+    frequency: float = 0.0  # Ω, in rad/s
+    phase: float = 0.0  # in rad
 
     def values(self, times: Array) -> Array:
         """Return the load at times, shape (T,); at a jump its value after the jump."""
@@ -87,33 +78,19 @@ class Course(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class LinearMotion:
-    """M q̈ + D q̇ + K q = −M ι a(t) + Σ b f(t), a(t) linear between samples and zero outside.
+    """M q̈ + D q̇ + K q = −M ι a(t) + Σ b f(t), a(t) linear between samples and zero outside."""
 
-    Args:
-        mass: M, symmetric and positive definite, shape (n, n), in kg.
-        damping: D, shape (n, n), in N s/m.
-        stiffness: K, shape (n, n), in N/m.
-        rows: C of the outputs C [q; q̇], shape (m, 2n).
-        start: Initial state [q; q̇], shape (2n,).
-        pattern: ι, shape (n,).
-        record: Samples of a from t = 0 on, shape (R,), in m/s²; empty for none.
-        record_step: Time between samples, in s.
-        forces: b of each force, shape (n, H), in N.
-        feeds: What a unit of each force adds to the outputs at once, shape (m, H).
-        courses: f of each force.
-    """
-
-    mass: Array
-    damping: Array
-    stiffness: Array
-    rows: Array
-    start: Array
-    pattern: Array
-    record: Array
-    record_step: float
-    forces: Array
-    feeds: Array
-    courses: tuple[Course, ...] = ()
+    mass: Array  # M, symmetric and positive definite, shape (n, n), in kg
+    damping: Array  # D, shape (n, n), in N s/m
+    stiffness: Array  # K, shape (n, n), in N/m
+    rows: Array  # C of the outputs C [q; q̇], shape (m, 2n)
+    start: Array  # initial state [q; q̇], shape (2n,)
+    pattern: Array  # ι, shape (n,)
+    record: Array  # samples of a from t = 0 on, shape (R,), in m/s²; empty for none
+    record_step: float  # time between samples, in s
+    forces: Array  # b of each force, shape (n, H), in N
+    feeds: Array  # what a unit of each force adds to the outputs at once, shape (m, H)
+    courses: tuple[Course, ...] = ()  # f of each force
 
     def outputs(self, times: Array) -> tuple[Array, Array]:
         """Return outputs at times ≥ 0, rising, and bounds of their round-off, (T, m) each.
@@ -157,21 +134,13 @@ class LinearMotion:
 
 @dataclass(frozen=True, eq=False)
 class _ScaledSystem:
-    """ẋ = A x + [0; b] f(t) in the states x of `LinearMotion.outputs`.
+    """ẋ = A x + [0; b] f(t) in the states x of `LinearMotion.outputs`."""
 
-    Args:
-        matrix: A, shape (2n, 2n), in 1/s.
-        rows: Outputs of x, shape (m, 2n).
-        lowest: Least frequency, at least 1e-300 rad/s.
-        highest: Greatest frequency ω, in rad/s.
-        norm: Bound of the norm of A, in 1/s.
-    """
-
-    matrix: Array
-    rows: Array
-    lowest: float
-    highest: float
-    norm: float
+    matrix: Array  # A, shape (2n, 2n), in 1/s
+    rows: Array  # outputs of x, shape (m, 2n)
+    lowest: float  # least frequency, at least 1e-300 rad/s
+    highest: float  # greatest frequency ω, in rad/s
+    norm: float  # bound of the norm of A, in 1/s
 
     def response(
         self, start: Array, push: Array, course: Course, times: Array
@@ -204,11 +173,8 @@ class _ScaledSystem:
 
 
 def _degree(norm: float) -> int:
-    """Return the degree from which terms of exp(A τ), ‖A‖ τ ≤ `norm`, are below `TRUNCATION`.
-
-    The load enters once and its rise twice, which costs two degrees.
-    """
-    degree, term = 2, 1.0
+    """Return the degree from which terms of exp(A τ), ‖A‖ τ ≤ `norm`, are below `TRUNCATION`."""
+    degree, term = 2, 1.0  # two degrees for the load's rise, which is integrated twice
     while term > TRUNCATION:
         degree += 1
         term *= norm / (degree - 2)
@@ -216,11 +182,9 @@ def _degree(norm: float) -> int:
 
 
 def _recursion(step: Array, start: Array, forcing: Array) -> Array:
-    """Return the states x_0 … of x_{k+1} = step x_k + forcing_k, x_0 = `start`, (count, 2n).
-
-    In blocks of √count substeps: responses of all blocks from zero at once, then the state at the
-    beginning of each block, whose free motion is added.
-    """
+    """Return the states x_0 … of x_{k+1} = step x_k + forcing_k, x_0 = `start`, (count, 2n)."""
+    # In blocks of √count substeps: responses of all blocks from zero at once, then the state at the
+    # beginning of each block, whose free motion is added.
     count, size = forcing.shape
     length = isqrt(count - 1) + 1
     blocks = -(-count // length)

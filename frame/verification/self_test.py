@@ -9,7 +9,7 @@ must equal the attained bound.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -32,20 +32,15 @@ if TYPE_CHECKING:
 
 MIN_MOTIONS, MAX_MOTIONS = 24, 240
 """Fewest and most motions of a test; more than the most find little that these do not."""
-TEST_FRACTION = 0.1
-"""Fraction of the proof's work that the test may take beyond the fewest motions."""
-BOUND_WORK = 2e4
-"""Multiplications of a proof for one bound (a node, output, side and level), at least: some 20 μs.
-A larger number would make more motions."""
-TERMS = 15
-"""Terms of a motion's series within a substep, about."""
+MOTIONS_OF_LEVEL = 67.0
+"""Motions for each level, over the number of unknowns 2n: a tenth of a proof's work. A proof takes
+2·10⁴ multiplications for a bound, of which a level, node and output have two, and a motion 15 (the
+terms of its series) for each node, output, unknown and quarter of a step."""
 QUARTERS = 4
 """Parts of a step at whose ends motions are compared."""
 MAX_NUMBERS = 1_000_000
 """Most numbers of all matrices, 8 MB; structures beyond are left out, the first one never."""
 
-Variables = Mapping[str, tuple[tuple[str, ...], Array]]
-"""Arrays with the names of their axes."""
 MATRIX = ("motion", "row", "column")
 AXES = {
     "mass": MATRIX,
@@ -75,7 +70,8 @@ def with_motions_tested(envelope: Envelope, system: LinearSystem) -> Envelope:
     """
     cuts = cuts_of(envelope)
     unknowns = structures_at(system, envelope, cuts.lower[:1])[0].rows.shape[1]
-    points = motion_inputs(envelope, cuts, motion_count(envelope, unknowns))
+    count = int(np.clip(len(cuts.alpha) * MOTIONS_OF_LEVEL / unknowns, MIN_MOTIONS, MAX_MOTIONS))
+    points = motion_inputs(envelope, cuts, count)
     motions = structures_at(system, envelope, points)
     Trial(envelope, cuts.lower, cuts.upper).require_agreement(points, motions)
     facts = {**envelope.facts, "motions_tested": len(points)}
@@ -129,15 +125,6 @@ def cuts_of(envelope: Envelope) -> Boxes:
     return Boxes(names, envelope.alpha, ends[..., 0], ends[..., 1], nominal)
 
 
-def motion_count(envelope: Envelope, unknowns: int) -> int:
-    """Return the number of motions of 2n `unknowns`, at `TEST_FRACTION` of the proof's cost."""
-    nodes, outputs = envelope.lower.shape[1:]
-    # in multiplications
-    proof_cost = 2 * envelope.lower.size * BOUND_WORK
-    motion_cost = QUARTERS * nodes * outputs * unknowns * TERMS
-    return int(np.clip(TEST_FRACTION * proof_cost / motion_cost, MIN_MOTIONS, MAX_MOTIONS))
-
-
 def motion_inputs(envelope: Envelope, cuts: Boxes, most: int) -> Array:
     """Return at most `most` distinct finite inputs to test, those at peaks first, (S, n)."""
     at_peaks = [inputs_at_peaks(envelope, level) for level in range(len(envelope.alpha))]
@@ -152,11 +139,10 @@ def motion_inputs(envelope: Envelope, cuts: Boxes, most: int) -> Array:
 
 def inputs_at_peaks(envelope: Envelope, level: int) -> Array:
     """Return the distinct inputs that an envelope names at its outputs' peaks, shape (P, n)."""
-    points = []
-    for o in range(len(envelope.outputs)):
-        points.append(envelope.upper_at[level, envelope.upper[level, :, o].argmax(), o])
-        points.append(envelope.lower_at[level, envelope.lower[level, :, o].argmin(), o])
-    return _distinct(np.array(points))
+    outputs = np.arange(len(envelope.outputs))
+    high, low = envelope.upper[level].argmax(0), envelope.lower[level].argmin(0)
+    named = envelope.upper_at[level, high, outputs], envelope.lower_at[level, low, outputs]
+    return _distinct(np.concatenate(named))
 
 
 def _distinct(points: Array) -> Array:
@@ -175,16 +161,10 @@ class _Tested(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """Comparison of an envelope with exact motions.
+    """Comparison of an envelope with exact motions."""
 
-    Args:
-        envelope: Bounds, guaranteed or with guaranteed ones outside (`outer`).
-        lower: Lower ends of its inputs on all levels, shape (A, n).
-        upper: Upper ends of them.
-    """
-
-    envelope: Envelope
-    lower: Array
+    envelope: Envelope  # guaranteed, or with guaranteed bounds outside (`outer`)
+    lower: Array  # ends of its inputs on all levels, shape (A, n)
     upper: Array
 
     @cached_property
@@ -216,9 +196,7 @@ class Trial:
         """Refuse an envelope that exact motions at inputs (S, n) contradict.
 
         Raises:
-            ContradictionError: A motion leaves the bounds of a level that holds its inputs, does
-                not attain a bound that names them, or strays from straight lines between nodes by
-                more than `between`.
+            ContradictionError: As `with_motions_tested`.
         """
         for k, motion in enumerate(motions):
             point = points[k]
@@ -238,7 +216,8 @@ class Trial:
         ):
             bound = sign * _within_steps(sign * node_bound, self.between)
             excess = sign * (motion.values - bound) - motion.rounding
-            self._require(excess, bound, f"{side} bound of α = {self._alpha(level)}", motion)
+            words = f"{side} bound of α = {self.envelope.alpha[level]:g}"
+            self._require(excess, bound, words, motion)
 
     def require_attained(self, level: int, motion: _Tested) -> None:
         """Refuse attained bounds of a level that name the inputs of a motion and differ from it."""
@@ -255,7 +234,7 @@ class Trial:
             excess = np.maximum(-outside - self.tolerance, outside - self.slack)
             names_point = (at == motion.point).all(-1)
             excess = np.where(names_point, excess - at_nodes.rounding, -np.inf)
-            words = f"other than the attained {side} bound of α = {self._alpha(level)}"
+            words = f"other than the attained {side} bound of α = {envelope.alpha[level]:g}"
             self._require(excess, inner, words, at_nodes)
 
     def require_line_deviation(self, motion: _Tested) -> None:
@@ -268,15 +247,8 @@ class Trial:
         excess = np.abs(motion.values - line) - allowed - 2 * motion.rounding
         self._require(excess, line, "farther than `between` from the straight line at", motion)
 
-    def _alpha(self, level: int) -> str:
-        return f"{self.envelope.alpha[level]:g}"
-
     def _require(self, excess: Array, bound: Array, words: str, motion: _Tested) -> None:
-        """Refuse a motion whose excess (J, m) over a bound is not ≤ 0 throughout.
-
-        Raises:
-            ContradictionError: There is one; the message gives the largest.
-        """
+        """Refuse a motion whose excess (J, m) over a bound is not ≤ 0; name where it is largest."""
         if bool((excess <= 0).all()):
             return
         worst = np.where(np.isnan(excess), np.inf, excess)
@@ -294,19 +266,15 @@ class Trial:
 
 
 def _within_steps(upper: Array, between: Array) -> Array:
-    """Return upper bounds at nodes and at the quarter points of steps, shape (4 (T − 1) + 1, m).
-
-    Args:
-        upper: Upper bounds at the nodes, shape (T, m).
-        between: How far an output may exceed, within the step that ends at a node, the larger of
-            the bounds at its ends, shape (T, m); the first row is not used.
-    """
+    """Return upper bounds at nodes and quarter points of steps, (4 (T − 1) + 1, m), from (T, m)."""
     inside = np.maximum(upper[1:], upper[:-1]) + between[1:]
     parts = [upper[:-1], *[inside] * (QUARTERS - 1)]
     return np.append(np.stack(parts, 1).reshape(-1, upper.shape[1]), upper[-1:], axis=0)
 
 
-def variables(points: Array, motions: Sequence[LinearMotion]) -> Variables:
+def variables(
+    points: Array, motions: Sequence[LinearMotion]
+) -> dict[str, tuple[tuple[str, ...], Array]]:
     """Return dataset variables with inputs (S, n) and matrices of the first of S structures.
 
     As many are stored as keep three matrices each within `MAX_NUMBERS`. The numbers of a force's

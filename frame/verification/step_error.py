@@ -38,8 +38,7 @@ RELATIVE = 1e-11
 def step_error(flow: UnitFlow) -> Array:
     """Return the estimated time-stepping error of each output up to each node, shape (T, m).
 
-    It is `MARGIN` times the largest error at nominal values and corners: of a linear structure the
-    distance from the exact propagator, else that from half the step, extrapolated by the order.
+    It is `MARGIN` times the largest error (`Flow.deviations`) at nominal values and corners.
 
     Raises:
         StepError: The error of an output exceeds `DIVERGED` times its peak.
@@ -57,12 +56,9 @@ def step_error(flow: UnitFlow) -> Array:
 
 
 def with_step_error(bounds: Envelope, flow: UnitFlow, steps: Array) -> Envelope:
-    """Return the envelope with the time-stepping error added to its errors and named as a fact.
+    """Return the envelope of a flow's trajectories with the time-stepping error in its errors.
 
-    Args:
-        bounds: The envelope of the scheme's trajectories.
-        flow: These trajectories.
-        steps: From `step_error`, shape (T, m).
+    `steps` (T, m) are from `step_error`. The fact `step_error` is the largest of a displacement.
     """
     if not flow.flow.exact:
         steps = np.maximum(steps, _error_at_optima(bounds, flow.flow))
@@ -77,17 +73,10 @@ def with_step_error(bounds: Envelope, flow: UnitFlow, steps: Array) -> Envelope:
 
 
 def _error_at_optima(bounds: Envelope, flow: Flow) -> Array:
-    """Return the estimated time-stepping error of each output up to each node, shape (T, m).
-
-    It is `MARGIN` times the largest error of trajectories at inputs that attain bounds.
-
-    Corners alone do not suffice: between them a structure may resonate, which the scheme does at
-    other parameters than the exact motion, or a motion may pass near an unstable equilibrium. Of a
-    system that is not linear the peaks are compared with a method of another kind, too.
-
-    Raises:
-        StepError: The step is too coarse there.
-    """
+    """Return the time-stepping error as `step_error` does, at inputs that reach bounds."""
+    # Corners alone do not suffice: between them a structure may resonate, which the scheme does at
+    # other parameters than the exact motion, or a motion may pass near an unstable equilibrium. Of
+    # a system that is not linear the peaks are compared with a method of another kind, too.
     at, d = np.stack([bounds.lower_at, bounds.upper_at]), len(bounds.inputs)
     peaks = np.abs([bounds.lower, bounds.upper]).argmax(2)[:, :, None, :, None]
     highest = np.unique(np.take_along_axis(at, peaks, 2).reshape(-1, d), axis=0)
@@ -105,15 +94,9 @@ def _from_reference(bounds: Envelope, flow: LagrangianFlow, points: Array) -> Ar
     Raises:
         StepError: It passes `COARSE` of an output's peak.
     """
-    reference, parameters = ReferenceMotion(flow.system), flow.system.parameters
-    truth = np.stack(
-        [
-            reference.outputs(
-                {**parameters, **dict(zip(flow.names, point, strict=True))}, bounds.time
-            )
-            for point in points
-        ]
-    )
+    reference = ReferenceMotion(flow.system)
+    named = [dict(zip(flow.names, point, strict=True)) for point in points]
+    truth = np.stack([reference.outputs(flow.system.parameters | x, bounds.time) for x in named])
     error = np.abs(flow.values(points) - truth)
     relative_error = error.max(1) / np.maximum(np.abs(truth).max((0, 1)), 1e-300)
     if (relative_error > COARSE).any():
@@ -187,7 +170,7 @@ class ReferenceMotion:
         self._outputs = sympy.lambdify(arguments, seen, "math")
 
     def outputs(self, parameters: Mapping[str, float], times: Array) -> Array:
-        """Return outputs by Dormand and Prince's method of order 8 at times from the start, (T, m).
+        """Return outputs at times from the start, shape (T, m).
 
         Raises:
             FailedError: The integration does not reach the last time.

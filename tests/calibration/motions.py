@@ -20,14 +20,7 @@ POLISHED = 3
 
 @dataclass(frozen=True)
 class Drawn:
-    """A structure with fuzzy inputs and the nodes it is looked at.
-
-    Args:
-        system: The structure.
-        inputs: Fuzzy inputs by name.
-        duration: In s.
-        step: In s.
-    """
+    """A structure with fuzzy inputs, and the duration and step of its motion in s."""
 
     system: object
     inputs: dict[str, FuzzyNumber]
@@ -135,17 +128,10 @@ def polished(flow, start, low, high, bound):
 
 
 def judged(table, found, ends, quantity, case, *, tolerance=0.0, level=0, outputs=slice(None)):
-    """Adds the bounds of an envelope by what its nature promises; attained ones promise nothing.
+    """Adds the bounds of an envelope by what its nature promises; reached ones promise nothing.
 
-    Args:
-        table: The calibration.
-        found: The envelope.
-        ends: Least and greatest values that motions reach, (T, m) each.
-        quantity: Name of the row.
-        case: What tells this case from others.
-        tolerance: Error asked for, as a share of each output's peak.
-        level: Index of the cut.
-        outputs: Columns that are meant.
+    `ends` are least and greatest values that motions reach, (T, m) each, and `tolerance` is the
+    error asked for, as a share of each output's peak.
     """
     low, high = (end[:, outputs] for end in ends)
     lower, upper, errors = (x[level][:, outputs] for x in (found.lower, found.upper, found.error))

@@ -9,7 +9,6 @@ from threadpoolctl import threadpool_limits
 from alphacut import frame
 from alphacut.frame import Accelerogram, MatrixStructure, Proof, StoreyFrame, envelope
 from alphacut.frame.boxes import UnitFlow, boxes
-from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.envelope import Ends
 from alphacut.frame.methods.sampled import independent_excess
 from alphacut.fuzzy import Interval, Triangular
@@ -110,18 +109,6 @@ def test_a_follower_stays_within_proved_bounds_and_says_what_it_misses(proofs, k
     assert np.isfinite(found.proved.upper).all()
     true = proof.attained
     assert (np.abs(found.upper - true.upper) <= found.error + 1e-12).all()
-
-
-def test_a_wide_box_is_proved_in_parts():
-    inputs = {"k": Interval(40, 120)}
-    found = envelope(CHAIN, inputs, method=frame.Proof(tolerance=1e-2), **MOTION)
-    assert found.facts["parts"] > 1
-    values = trajectories(CHAIN, inputs, drawn(inputs, 0.0, 4000))
-    assert (values <= found.upper[0]).all()
-    assert (values >= found.lower[0]).all()
-    assert found.error.max() <= 1.1e-2 * np.abs(found.upper).max()
-    with pytest.raises(UnprovedError, match="too much of the gap"):
-        envelope(CHAIN, inputs, method=frame.Proof(tolerance=1e-2, parts=1), **MOTION)
 
 
 def test_auto_takes_a_proof_else_the_follower_and_says_why():
@@ -230,21 +217,6 @@ def test_a_pendulum_is_followed_to_its_error():
     assert (values >= found.lower[0] - found.error[0]).all()
     off = np.maximum(found.upper[0] - values.max(0), values.min(0) - found.lower[0])
     assert off.max() <= 0.05 * np.abs(found.upper).max()
-
-
-def test_where_neighbouring_motions_part_bounds_are_attained_and_no_more():
-    def lagrangian(q, v, p):
-        return p["m"] * v[0] ** 2 / 2 + p["k"] * q[0] ** 2 / 2 - q[0] ** 4 / 4
-
-    well = frame.LagrangianSystem(
-        1,
-        {"m": 1.0, "k": 1.0, "x": 0.0},
-        lagrangian,
-        lambda p: ([p["x"]], [0 * p["x"]]),
-        {"q": lambda q, v, p: q[0]},
-    )
-    found = envelope(well, {"x": Interval(-0.1, 0.1)}, duration=8, step=0.02, alpha=(0,))
-    assert found.nature is Nature.ATTAINED
 
 
 @pytest.mark.parametrize(

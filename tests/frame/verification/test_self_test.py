@@ -1,7 +1,6 @@
 """A guaranteed envelope that is wrong is refused by the result, whatever made it wrong."""
 
 import os
-import pickle
 import subprocess
 import sys
 from copy import copy
@@ -11,7 +10,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from alphacut.frame import StoreyFrame, envelope, propagation
+from alphacut.frame import StoreyFrame, envelope
 from alphacut.frame.envelope import Ends
 from alphacut.frame.methods.dual import DualProof
 from alphacut.frame.methods.proof import Proof
@@ -85,7 +84,7 @@ def test_agrees_with_motions_and_says_how_many(method):
     ("change", "words"),
     [
         (narrower, "the proved|lie outside the proved"),
-        (straight, "`between`|the proved"),
+        (straight, r"the proof is wrong: .* at t = .*, by .*k1 = .*, m2 = "),
         (partial(attained_off, share=-0.01), "the attained upper bound of α = 0"),
         (partial(attained_off, share=0.01), "outside the proved|the attained upper"),
         (no_number, "nan|inf"),
@@ -149,15 +148,6 @@ def test_each_check_alone_sees_its_fault(change, check):
             )
 
 
-def test_names_output_time_inputs_and_difference(monkeypatch):
-    planted(monkeypatch, METHODS[0], straight)
-    with pytest.raises(ContradictionError) as caught:
-        motion(frame(), INPUTS, method=METHODS[0])
-    text = str(pickle.loads(pickle.dumps(caught.value)))
-    assert text.startswith("the proof is wrong: ")
-    assert all(word in text for word in ("at t = ", "k1 = ", "m2 = ", ", by ", "bound of α"))
-
-
 def test_points_come_in_the_order_of_their_worth():
     found = motion(frame(), INPUTS, method=METHODS[0])
     cuts, named = cuts_of(found), self_test.inputs_at_peaks(found, 0)
@@ -171,8 +161,3 @@ def test_points_come_in_the_order_of_their_worth():
 def test_inputs_without_width_are_tested_at_their_one_point():
     found = motion(frame(), {"k1": Crisp(4e6)}, method=DualProof())
     assert found.facts["motions_tested"] == 1
-
-
-def test_what_is_not_proved_is_not_tested(monkeypatch):
-    monkeypatch.setattr(propagation, "with_motions_tested", lambda *given: pytest.fail("tested"))
-    assert "motions_tested" not in motion(frame(), INPUTS, method="quasi-monte-carlo").facts
