@@ -12,7 +12,6 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -105,41 +104,36 @@ class Auto:
         found = replace(found, outer=best.proved if best else None)
         return _noted(found, f"{follower.name}; unproved: {'; '.join(reasons)}")
 
-    def _proofs(self, flow: UnitFlow, reasons: list[str]) -> Iterator[Proof | DualProof]:
-        """Yield the proofs to try, in their order; refusals are appended to `reasons`."""
-        proof = Proof(None, self.tolerance, BOXES, workers=self.workers)
-        work = dict[str, float]()  # that is forecast
-        for method in (proof, self._dual(flow)):
-            if method is proof and len(flow.boxes.names) > MAX_PARAMETERS:
-                continue
+    def _proofs(self, flow: UnitFlow, reasons: list[str]) -> list[Proof | DualProof]:
+        """Return the proofs to try, in their order; refusals are appended to `reasons`."""
+        proof, dual = Proof(None, self.tolerance, BOXES, workers=self.workers), self._dual(flow)
+        is_of_few = len(flow.boxes.names) <= MAX_PARAMETERS
+        works = list[float]()  # that are forecast
+        methods = list[Proof | DualProof]()
+        for method in (proof, dual) if is_of_few else (dual,):
             try:
                 with refusing():
-                    work[method.name] = method.forecast(exact_flow(flow.flow), flow.boxes)
+                    works.append(method.forecast(exact_flow(flow.flow), flow.boxes))
+                methods.append(method)
             except UnprovedError as error:
                 reasons.append(f"{method.name}: {error}")
-        has_two_proofs = len(work) == 2
+        if len(methods) < 2:
+            return methods
+        undivided = replace(proof, parts=1)
         # the branch and bound has the same gap at all nodes
-        proof_first = has_two_proofs and (self.is_for_all_nodes or work["proof"] <= work["dual"])
-        table: tuple[tuple[bool, Proof | DualProof], ...] = (
-            (proof_first, replace(proof, parts=1)),
-            ("dual" in work, self._dual(flow)),
-            (has_two_proofs and not proof_first, replace(proof, parts=1)),
-            ("proof" in work and (proof_first or not has_two_proofs), proof),  # in parts of the box
-        )
-        return (method for applies, method in table if applies)
+        if self.is_for_all_nodes or works[0] <= works[1]:
+            return [undivided, dual, proof]
+        return [dual, undivided]
 
     def _dual(self, flow: UnitFlow) -> DualProof:
         """Return the dual bound with the gaps that are wanted."""
         tolerance, inputs = max(self.tolerance or DEFAULT_TOLERANCE, FINEST), len(flow.boxes.names)
-        few = flow.relative and inputs <= (MAX_PARAMETERS if self.tolerance else FEW_INPUTS)
         dual = DualProof(workers=self.workers, below=1.0 if self.magnitudes else DualProof.below)
-        table = (
-            (self.is_for_all_nodes, dual),  # gaps below the peaks stay wide in any case
-            (few, replace(dual, gap=tolerance, peaks=tolerance)),
-            (self.tolerance is not None, replace(dual, peaks=WIDE)),
-            (True, dual),
-        )
-        return next(method for applies, method in table if applies)
+        if self.is_for_all_nodes:  # gaps below the peaks stay wide in any case
+            return dual
+        if flow.relative and inputs <= (MAX_PARAMETERS if self.tolerance else FEW_INPUTS):
+            return replace(dual, gap=tolerance, peaks=tolerance)
+        return dual if self.tolerance is None else replace(dual, peaks=WIDE)
 
     def _is_close(self, proved: Envelope, flow: UnitFlow) -> bool:
         """Return whether the gap of a proof is as narrow as asked for."""

@@ -28,7 +28,6 @@ from alphacut.fuzzy.arrays import Array, Mask
 from alphacut.fuzzy.progress_bar import Progress, subprogress
 from alphacut.fuzzy.refused import checked_number
 from alphacut.fuzzy.result import Nature
-from alphacut.fuzzy.sets.boxes import chebyshev_points
 
 MAX_NUMBERS = 64e6
 """Most numbers of Taylor models computed at a time: 512 MB."""
@@ -128,59 +127,44 @@ class ImprovedFollower:
 
         `asked` (A, T, m, 2) are the bounds whose gain counts, all unless given.
         """
-        levels, storage = len(flow.boxes.alpha), Storage(flow)
-        d = len(flow.boxes.names)
+        levels, storage, d = len(flow.boxes.alpha), Storage(flow), len(flow.boxes.names)
         bounds, gains = np.zeros((2, levels, *storage.top.shape))
         out = PassBounds(bounds, np.zeros((*bounds.shape, d)), gains, storage)
         chunk_size = int(np.clip(MAX_NUMBERS / (_size_of_graph(flow) * (1 + d + d * d)), 1, BATCH))
+        nominal = flow.boxes.to_unit(flow.boxes.nominal)[None]
+        has_crossings = d > MAX_GLOBAL_INPUTS and isinstance(flow.flow, LinearFlow)
         for done, level in enumerate(reversed(range(levels))):
+            # points of the sequence that no other level and no other seed takes
             box, skip = flow.boxes.unit(level), SEED_STEP * (levels * self.seed + level + 1)
-            has_width = bool((box[1] > box[0]).any())
-            explored = spread_points(*box, EXPLORED, skip) if has_width else box[0][None]
-            models = _LevelModels(storage, box, explored)
-            out.evaluations += len(explored)
             tick = subprogress(progress, done / levels, (done + 1) / levels)
             # graphs at the end of the level, at most, and at its beginning
             limit, first = self.budget * (done + 1) // levels, len(storage)
-            points = self._start(storage, *models.box)[: max(1, limit - len(storage))]
-            are_many = d > MAX_GLOBAL_INPUTS and isinstance(flow.flow, LinearFlow)
-            crossings = CROSSINGS if has_width and are_many else 0
-            while len(points):
-                for chunk in np.array_split(points, -(-len(points) // chunk_size)):
-                    models.predict(storage.add(chunk))
-                    tick(min(1.0, (len(storage) - first) / max(1, limit - first)))
-                least = self._least_gains(storage, True if asked is None else asked[level])
-                points = models.proposals(least, min(BATCH, limit - len(storage)))
-                if not len(points) and crossings and len(storage) < limit:
-                    crossings -= 1
-                    crossed = models.crossed_optima(np.random.default_rng([skip, crossings]))
-                    models.explore(crossed)
-                    out.evaluations += len(crossed)
-                    points = models.proposals(least, min(BATCH, limit - len(storage)))
+            if (box[1] > box[0]).any():
+                explored = spread_points(*box, EXPLORED, skip)
+                points = np.vstack([nominal, explored[:SPREAD]])
+            else:  # no other points, and none once it is stored
+                explored, points = nominal, nominal[: not len(storage)]
+            models = _LevelModels(
+                storage, box, self._limit(flow), asked if asked is None else asked[level]
+            )
+            models.explore(explored)
+            for crossing in range(1 + CROSSINGS * (has_crossings and len(explored) > 1)):
+                if crossing:
+                    explored = models.crossed_optima(np.random.default_rng([skip, crossing]))
+                    models.explore(explored)
+                    points = models.proposals(limit - len(storage))
+                out.evaluations += len(explored)
+                while len(points):
+                    points = points[: max(1, limit - len(storage))]
+                    for chunk in np.array_split(points, -(-len(points) // chunk_size)):
+                        models.predict(storage.add(chunk))
+                        tick(min(1.0, (len(storage) - first) / max(1, limit - first)))
+                    points = models.proposals(limit - len(storage))
             # post-processing of the level
             out.bounds[level], out.points[level] = storage.top, storage.points[storage.best]
             out.predicted_gain[level] = np.maximum(models.gains, 0.0)
         out.evaluations += len(storage)
         return out
-
-    def _start(self, storage: Storage, lower: Array, upper: Array) -> Array:
-        """Return the first unit coordinates of a level, nominal and spread ones, shape (S, d)."""
-        boxes = storage.flow.boxes
-        nominal = boxes.to_unit(boxes.nominal)[None]
-        if not (upper > lower).any():  # no other points, and none once it is stored
-            return nominal[:0] if len(storage) else nominal
-        middle, half = (lower + upper) / 2, (upper - lower) / 2
-        # points of the sequence that no other level and no other seed takes
-        skip = 1 + len(storage) + SEED_STEP * self.seed
-        spread = chebyshev_points(len(lower), SPREAD, skip=skip)
-        return np.vstack([nominal, middle + half * spread])
-
-    def _least_gains(self, storage: Storage, asked: Mask | bool) -> Array:
-        """Return the gain of each bound that is worth a graph, shape (T, m, 2)."""
-        top = storage.top
-        near_peak = top >= (1 - NEAR_PEAK) * np.maximum(top.max(0), 0.0)
-        least = self._limit(storage.flow) * np.where(near_peak, PEAK_SHARE, 1.0)
-        return np.where(asked, np.maximum(least, LEAST_GAIN * storage.flow.peak[:, None]), np.inf)
 
     def _limit(self, flow: UnitFlow) -> Array:
         """Return the gain of each output that is left aside, shape (m, 1), rounding at least."""
@@ -202,13 +186,14 @@ class PassBounds:
 class _LevelModels:
     """Predictions of the stored graphs' Taylor models in one box, by place (T, m, 2)."""
 
-    def __init__(self, storage: Storage, box: tuple[Array, Array], points: Array) -> None:
-        self.storage, self.box = storage, box
+    def __init__(
+        self, storage: Storage, box: tuple[Array, Array], limit: Array, asked: Mask | None
+    ) -> None:
+        self.storage, self.box, self.limit, self.asked = storage, box, limit, asked
         self.reach = REACH * np.maximum((box[1] - box[0]) / 2, 1e-300)
         # largest values of explored motions, and where they are, shape (T, m, 2, d)
         self.sampled: Array = np.full(storage.top.shape, -np.inf)
         self.sampled_at = np.zeros((*storage.top.shape, len(box[0])))
-        self.explore(points)
         # the same of the models
         self.predicted, self.target = storage.top.copy(), np.zeros(self.sampled_at.shape)
         if len(storage):
@@ -243,9 +228,17 @@ class _LevelModels:
             optima = self.storage.predicted(places, self.box, maximise, reach=self.reach)
             self.predicted[places], self.target[places] = optima
 
-    def proposals(self, least: Array, count: int) -> Array:
-        """Return distinct points of gains above `least`, one per window of time, (≤ count, d)."""
-        chosen, gains = list[Array](), self.gains / least
+    @property
+    def least_gains(self) -> Array:
+        """Gain of each bound that is worth a graph, shape (T, m, 2)."""
+        top, peak = self.storage.top, self.storage.flow.peak[:, None]
+        near_peak = top >= (1 - NEAR_PEAK) * np.maximum(top.max(0), 0.0)
+        least = np.maximum(self.limit * np.where(near_peak, PEAK_SHARE, 1.0), LEAST_GAIN * peak)
+        return least if self.asked is None else np.where(self.asked, least, np.inf)
+
+    def proposals(self, count: int) -> Array:
+        """Return distinct points worth a graph, one per window of time, shape (≤ count, d)."""
+        chosen, gains, count = list[Array](), self.gains / self.least_gains, min(count, BATCH)
         windows = np.array_split(np.arange(len(gains)), max(1, min(count, len(gains))))
         for window in windows:
             for k in np.argsort(-gains[window], axis=None)[:TRIES]:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from alphacut.frame.boxes import Boxes
+from alphacut.frame.boxes import Boxes, boxes
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.structures.linear import LinearSystem, evaluate
 from alphacut.frame.structures.loads import distinct_histories
@@ -68,7 +68,7 @@ def with_motions_tested(envelope: Envelope, system: LinearSystem) -> Envelope:
         ContradictionError: An exact motion leaves proved bounds, strays farther between nodes than
             is proved, or differs from the attained bound that names its inputs.
     """
-    cuts = cuts_of(envelope)
+    cuts = boxes(envelope.inputs, list(envelope.alpha))
     unknowns = structures_at(system, envelope, cuts.lower[:1])[0].rows.shape[1]
     count = int(np.clip(len(cuts.alpha) * MOTIONS_OF_LEVEL / unknowns, MIN_MOTIONS, MAX_MOTIONS))
     points = motion_inputs(envelope, cuts, count)
@@ -114,15 +114,6 @@ def structures_at(system: LinearSystem, envelope: Envelope, points: Array) -> li
             )
         )
     return motions
-
-
-def cuts_of(envelope: Envelope) -> Boxes:
-    """Return the α-cuts of an envelope's inputs as boxes."""
-    numbers = envelope.inputs.values()
-    ends = np.array([[x.cut(float(a)) for x in numbers] for a in envelope.alpha], float)
-    nominal = np.array([x.nominal for x in numbers], float)
-    names = tuple(envelope.inputs)
-    return Boxes(names, envelope.alpha, ends[..., 0], ends[..., 1], nominal)
 
 
 def motion_inputs(envelope: Envelope, cuts: Boxes, most: int) -> Array:

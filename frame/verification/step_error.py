@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -94,9 +94,9 @@ def _from_reference(bounds: Envelope, flow: LagrangianFlow, points: Array) -> Ar
     Raises:
         StepError: It passes `COARSE` of an output's peak.
     """
-    reference = ReferenceMotion(flow.system)
     named = [dict(zip(flow.names, point, strict=True)) for point in points]
-    truth = np.stack([reference.outputs(flow.system.parameters | x, bounds.time) for x in named])
+    inputs = [{**flow.system.parameters, **x} for x in named]
+    truth = reference_motions(flow.system, inputs, bounds.time)
     error = np.abs(flow.values(points) - truth)
     relative_error = error.max(1) / np.maximum(np.abs(truth).max((0, 1)), 1e-300)
     if (relative_error > COARSE).any():
@@ -147,43 +147,39 @@ def _chord_deviation(flow: Flow, points: Array) -> Array:
     return np.asarray(np.abs(inner - chord).max((0, 2)))
 
 
-class ReferenceMotion:
-    """Hamilton's equations of a system in coordinates q and momenta π, to test time steps with.
+def reference_motions(
+    system: LagrangianSystem, points: Sequence[Mapping[str, float]], times: Array
+) -> Array:
+    """Return outputs at parameters by name and times from the start, (S, T, m), to test steps with.
 
-    Dormand and Prince's method of order 8 (Hairer, Nørsett, Wanner 1993), with SymPy's own
-    functions: it shares neither scheme nor compiled code with the midpoint rule that it judges.
+    Hamilton's equations in coordinates q and momenta π by Dormand and Prince's method of order 8
+    (Hairer, Nørsett, Wanner 1993), with SymPy's own functions: it shares neither scheme nor
+    compiled code with the midpoint rule that it judges.
+
+    Raises:
+        FailedError: The integration does not reach the last time.
     """
+    import sympy
+    from scipy.integrate import solve_ivp
 
-    def __init__(self, system: LagrangianSystem) -> None:
-        import sympy
-
-        eq, n = system.symbols, system.coordinates
-        self.names, momenta = tuple(eq.p), sympy.Matrix(sympy.symbols(f"pi:{n}", real=True))
-        velocity, (q0, v0) = eq.velocity(momenta), system.start()
-        moving = dict(zip(eq.v, velocity, strict=True))
-        start = dict(zip([*eq.q, *eq.v], [*q0, *v0], strict=True))
-        arguments = [*eq.q, *momenta, *eq.p.values()]
-        rates = [*velocity, *eq.push.subs(moving)]
-        self._rates = sympy.lambdify(arguments, rates, "math")
-        self._start = sympy.lambdify([*eq.p.values()], [*q0, *eq.momentum.subs(start)], "math")
-        seen = [system.output(name, list(velocity)) for name in system.outputs]
-        self._outputs = sympy.lambdify(arguments, seen, "math")
-
-    def outputs(self, parameters: Mapping[str, float], times: Array) -> Array:
-        """Return outputs at times from the start, shape (T, m).
-
-        Raises:
-            FailedError: The integration does not reach the last time.
-        """
-        from scipy.integrate import solve_ivp
-
-        p = [float(parameters[name]) for name in self.names]
-        start = np.array(self._start(*p), float)
-        rates = np.array(self._rates(*start, *p), float)
+    eq, n = system.symbols, system.coordinates
+    momenta = sympy.Matrix(sympy.symbols(f"pi:{n}", real=True))
+    velocity, (q0, v0) = eq.velocity(momenta), system.start()
+    moving = dict(zip(eq.v, velocity, strict=True))
+    starting = dict(zip([*eq.q, *eq.v], [*q0, *v0], strict=True))
+    arguments = [*eq.q, *momenta, *eq.p.values()]
+    rates = sympy.lambdify(arguments, [*velocity, *eq.push.subs(moving)], "math")
+    start_at = sympy.lambdify([*eq.p.values()], [*q0, *eq.momentum.subs(starting)], "math")
+    observed = [system.output(name, list(velocity)) for name in system.outputs]
+    outputs, motions = sympy.lambdify(arguments, observed, "math"), []
+    for parameters in points:
+        p = [float(parameters[name]) for name in eq.p]
+        start = np.array(start_at(*p), float)
         # sizes of the states, for the absolute tolerance
-        size = np.maximum(np.abs(start), np.abs(rates) * float(times[-1]))
+        speed = np.abs(np.array(rates(*start, *p), float))
+        size = np.maximum(np.abs(start), speed * float(times[-1]))
         found = solve_ivp(
-            lambda _, state: self._rates(*state, *p),
+            lambda _, state, p=p: rates(*state, *p),
             (float(times[0]), float(times[-1])),
             start,
             method="DOP853",
@@ -193,4 +189,5 @@ class ReferenceMotion:
         )
         if not found.success:
             raise FailedError(f"the reference motion: {found.message}")
-        return np.array([self._outputs(*state, *p) for state in found.y.T], float)
+        motions.append([outputs(*state, *p) for state in found.y.T])
+    return np.array(motions, float)

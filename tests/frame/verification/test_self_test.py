@@ -1,8 +1,5 @@
 """A guaranteed envelope that is wrong is refused by the result, whatever made it wrong."""
 
-import os
-import subprocess
-import sys
 from copy import copy
 from dataclasses import replace
 from functools import partial
@@ -11,12 +8,13 @@ import numpy as np
 import pytest
 
 from alphacut.frame import StoreyFrame, envelope
+from alphacut.frame.boxes import boxes
 from alphacut.frame.envelope import Ends
 from alphacut.frame.methods.dual import DualProof
 from alphacut.frame.methods.proof import Proof
 from alphacut.frame.structures.loads import Accelerogram
 from alphacut.frame.verification import self_test
-from alphacut.frame.verification.self_test import ContradictionError, Trial, cuts_of
+from alphacut.frame.verification.self_test import ContradictionError, Trial
 from alphacut.fuzzy import Crisp, Triangular
 from alphacut.fuzzy.refused import FailedError
 
@@ -96,49 +94,13 @@ def test_a_fault_in_the_result_raises(monkeypatch, method, change, words):
         motion(frame(), INPUTS, method=method)
 
 
-WITHOUT_LEADING_TERM = """
-import numpy as np
-from alphacut.frame import Accelerogram, DualProof, StoreyFrame, envelope
-from alphacut.frame.response import duhamel
-from alphacut.fuzzy import Triangular
-from alphacut.fuzzy.refused import FailedError
-right = duhamel.step_integrals
-
-def faulty(sigma, h, out):
-    right(sigma, h, out)
-    out[0] -= FAULT * h  # the first term of the series of J_0
-
-duhamel.step_integrals = faulty
-record = Accelerogram(0.05, np.array([0.0, 2.0, -1.0, 3.0, 1.0]))
-frame = StoreyFrame(masses=(1e3,), stiffness=(1e5,), damping_ratio=0.05, ground=record)
-motion = {"duration": 0.4, "step": 0.05, "alpha": (0.0,), "progress": False}
-try:
-    inputs, proof = {"k1": Triangular(9.9e4, 1e5, 1.01e5)}, DualProof(0.1, slabs=1, steps=2)
-    print(envelope(frame, inputs, method=proof, **motion).facts["motions_tested"])
-except FailedError as failure:
-    print(failure)
-"""
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("fault", "words"), [("0", "33"), ("1", "the proof is wrong: q1")])
-def test_integrals_of_a_step_without_their_leading_term_raise(fault, words):
-    """The dual proof's bounds and what they attain share these integrals; the motion does not."""
-    environment = os.environ | {
-        "NUMBA_DISABLE_JIT": "1"
-    }  # compiled kernels would not see the fault
-    script = [sys.executable, "-c", WITHOUT_LEADING_TERM.replace("FAULT", fault)]
-    told = subprocess.run(script, env=environment, capture_output=True, text=True, check=True)
-    assert words in told.stdout
-
-
 @pytest.mark.parametrize(
     ("change", "check"), [(smaller, "require_inside"), (straight, "require_line_deviation")]
 )
 def test_each_check_alone_sees_its_fault(change, check):
     found = motion(frame(), INPUTS, method=METHODS[0])
     faulty, others = change(found), {"require_inside", "require_line_deviation", "require_attained"}
-    cuts, points = cuts_of(found), self_test.inputs_at_peaks(found, 0)
+    cuts, points = boxes(found.inputs, found.alpha), self_test.inputs_at_peaks(found, 0)
     with pytest.MonkeyPatch.context() as patch:
         for other in others - {check}:
             patch.setattr(Trial, other, lambda *_: None)
@@ -150,7 +112,7 @@ def test_each_check_alone_sees_its_fault(change, check):
 
 def test_points_come_in_the_order_of_their_worth():
     found = motion(frame(), INPUTS, method=METHODS[0])
-    cuts, named = cuts_of(found), self_test.inputs_at_peaks(found, 0)
+    cuts, named = boxes(found.inputs, found.alpha), self_test.inputs_at_peaks(found, 0)
     points = self_test.motion_inputs(found, cuts, 24)
     assert (points[: len(named)] == named).all()
     assert [4e6, 1e3] in points.tolist()[:9]

@@ -22,7 +22,7 @@ from alphacut.frame import (
 from alphacut.frame.dynamics.flow import StepError
 from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.structures.linear import frequencies
-from alphacut.frame.verification.step_error import MARGIN, ReferenceMotion, node_deviation
+from alphacut.frame.verification.step_error import MARGIN, node_deviation, reference_motions
 from alphacut.fuzzy import Interval, Triangular
 from alphacut.fuzzy.refused import FailedError, RefusedError
 
@@ -129,7 +129,7 @@ def test_declared_errors_hold_where_bounds_are_attained(low):
 
 def test_reference_motion_is_that_of_the_equations():
     system, time = pendulum(phi0=2.0), np.linspace(0, 4, 41)
-    values = ReferenceMotion(system).outputs(system.parameters, time)
+    values = reference_motions(system, [system.parameters], time)[0]
     assert values[:, 1] == pytest.approx(angle(system.parameters, time), abs=1e-8)
     steps = make_flow(system, (), 4.0, 1e-3).values(np.zeros((1, 0)))[0, ::100]
     assert values == pytest.approx(steps, abs=2e-4)
