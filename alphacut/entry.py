@@ -178,13 +178,9 @@ def _run_command(arguments: Sequence[str], program: str, names: Mapping[str, str
         options.json = "-"
     check_destinations(by_name[options.command], options)
     with standard_output(alone=options.json == "-") as out, warnings.catch_warnings():
-        warnings.showwarning = _say_warning
+        warnings.showwarning = lambda message, *_, **__: say(f"warning: {message}")
         status: int = options.run(options, out)
         return status
-
-
-def _say_warning(message: Warning | str, *_: object, **__: object) -> None:
-    say(f"warning: {message}")
 
 
 def _end_with_message(message: str, status: int) -> int:

@@ -153,9 +153,9 @@ class Content(CellContent):
         is_framed = self.identify is None or self.frame is not None
         require(is_framed, "identify", "without a frame", "beside [frame]")
         names = [study.name for study in self.study]
-        for number, name in enumerate(names):
-            is_new, key = name not in names[:number], f"study[{number + 1}].name"
-            require(is_new, key, name, "a name of its own")
+        for number, name in enumerate(names, start=1):
+            is_first = names.index(name) == number - 1
+            require(is_first, f"study[{number}].name", name, "a name of its own")
         for section in self.questions.values():
             section.require_answerable(structure)
         if self.identify is not None:
@@ -180,8 +180,7 @@ Case = ParsedCase[Content]
 def load(path: Path | str, changes: Sequence[str] = ()) -> Case:
     """Reads a TOML case file, with changes ``KEY=VALUE`` such as ``cell.matrix_modulus=20 GPa``.
 
-    Raises:
-        BadInput: With every problem of the case.
+    BadInput has every problem of the case.
     """
     return parse(Content, path, changes)
 

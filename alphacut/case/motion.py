@@ -20,7 +20,7 @@ from alphacut.case.types import (
     after,
     text,
 )
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io import quantity
 
 EnvelopeMethod = Literal[
@@ -59,8 +59,8 @@ def _not_removed(value: object) -> object:
 
 
 def _file_name(value: str) -> str:
-    if not re.fullmatch(r"[A-Za-z0-9_+-][A-Za-z0-9_.+-]{0,63}", value) or ".." in value:
-        raise RefusedError("", value, "up to 64 letters, digits and . _ + -, as a file's name")
+    match = re.fullmatch(r"(?!.*\.\.)[A-Za-z0-9_+-][A-Za-z0-9_.+-]{0,63}", value)
+    require(bool(match), "", value, "up to 64 letters, digits and . _ + -, as a file's name")
     return value
 
 

@@ -141,8 +141,7 @@ def text(read: Callable[[object, ValidationInfo], object]) -> PlainValidator:
 
 
 def _not_empty(value: object) -> object:
-    if isinstance(value, list | tuple) and not value:
-        raise RefusedError("", "[]", "one entry or more")
+    require(bool(value) or not isinstance(value, list | tuple), "", "[]", "one entry or more")
     return value
 
 
@@ -175,8 +174,8 @@ NotEmpty = BeforeValidator(_not_empty)
 
 def rising(values: tuple[float, ...]) -> tuple[float, ...]:
     """The numbers as they are, if they rise strictly."""
-    if not values or any(a >= b for a, b in itertools.pairwise(values)):
-        raise RefusedError("", list(values), "numbers in rising order")
+    is_rising = bool(values) and all(a < b for a, b in itertools.pairwise(values))
+    require(is_rising, "", list(values), "numbers in rising order")
     return values
 
 
@@ -190,8 +189,7 @@ def case_file(value: object, info: ValidationInfo) -> Path:
 
 def distinct(values: tuple[str, ...]) -> tuple[str, ...]:
     """The names as they are, if no two are the same."""
-    if len(set(values)) < len(values):
-        raise RefusedError("", ", ".join(values), "each name once")
+    require(len(set(values)) == len(values), "", ", ".join(values), "each name once")
     return values
 
 

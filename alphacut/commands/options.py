@@ -32,13 +32,15 @@ class Parser(argparse.ArgumentParser):
         """Raises the complaint of argparse as the refusal of an argument."""
         argument, _, reason = message.removeprefix("argument ").partition(": ")
         cure = f"see {self.prog} --help"
-        choices = re.fullmatch(r"invalid choice: '(.*?)' \(choose from (.*)\)", reason)
-        if choices is not None:
-            raise RefusedError(argument, choices[1], choices[2].replace("'", ""), cure)
-        if number := re.fullmatch(r"invalid int value: '(.*)'", reason):
-            raise RefusedError(argument, number[1], "whole numbers", cure)
-        is_argument = reason.startswith("expected")  # else the names of all that are missing
-        raise RefusedError(f"value of {argument}" if is_argument else reason, None, "", cure)
+        if match := re.fullmatch(r"invalid choice: '(.*?)' \(choose from (.*)\)", reason):
+            raise RefusedError(argument, match[1], match[2].replace("'", ""), cure)
+        if match := re.fullmatch(r"invalid int value: '(.*)'", reason):
+            raise RefusedError(argument, match[1], "whole numbers", cure)
+        if reason.startswith("expected"):
+            raise RefusedError(f"value of {argument}", None, "", cure)
+        if argument == "the following arguments are required":
+            raise RefusedError(reason, None, "", cure)
+        raise RefusedError(argument, f"refused: {reason}", "", cure)
 
     def refuse(self, word: str) -> NoReturn:
         """Raises the problem of a word that is no option of this command."""

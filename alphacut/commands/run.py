@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TextIO
 
 import pandas as pd
 
-from alphacut.case.content import Case
 from alphacut.commands.options import Command, add_quiet, add_run, write_answer
 from alphacut.commands.pipeline import Pipeline, open_results
 from alphacut.fuzzy.campaign.workers import pool
@@ -23,7 +21,6 @@ from alphacut.questions.summary import SUMMARY, Results, Summary
 from alphacut.report.page import comparison_page, render_page
 from alphacut.report.results import comparison, run_text
 from alphacut.report.tables import tables, write_csv, write_markup, write_tables
-from alphacut.stages.store import StageStore
 
 PAGE = "report.html"
 
@@ -38,8 +35,30 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, out: TextIO) -> int:
     """Computes all stages of a case, draws figures and shows tables; returns exit status 0."""
     folder = options.out or f"results/{Path(options.case).stem}"
+    start, names, figures = time.perf_counter(), list[str](), not options.no_figures
     with open_results(options, folder) as (case, store):
-        summary = compute_run(case, store, options.petsc, figures=not options.no_figures)
+        with pool(store.workers) as executor:
+            first = Results(case.content)
+            results = Pipeline(first, store, options.petsc, figures, executor).run()
+            if figures:
+                from alphacut.figures.all import draw_figures  # which takes time to import
+
+                names = draw_figures(results, store, executor)
+        summary = Summary.of(
+            results,
+            format_version=FORMAT,
+            case=case.name,
+            title=case.content.title,
+            about=case.content.about,
+            case_text=case.text,
+            command=command_line(),
+            versions=versions(),
+            changes=case.changes,
+            figures=tuple(names),
+            seconds=time.perf_counter() - start,
+            fingerprints=results.fingerprints,
+        )
+        store.put_text(SUMMARY, summary.to_json())
     write_answer(options, summary.parts(), out, run_text(summary))
     if options.json != "-" and not options.quiet:
         say(f"results are in {folder}, after {summary.seconds:.0f} s")
@@ -47,36 +66,6 @@ def run(options: argparse.Namespace, out: TextIO) -> int:
             say(f"{len(store.up_to_date)} of the stages were up to date")
         say(f"next: {command_to_paste('report', folder)}")
     return 0
-
-
-def compute_run(
-    case: Case, store: StageStore, petsc: Mapping[str, str], *, figures: bool
-) -> Summary:
-    """Computes all stages of a case; returns their numbers, written last as summary.json."""
-    start = time.perf_counter()
-    with pool(store.workers) as executor:
-        results = Pipeline(Results(case.content), store, petsc, figures, executor).run()
-        names = list[str]()
-        if figures:
-            from alphacut.figures.all import draw_figures  # which takes time to import
-
-            names = draw_figures(results, store, executor)
-    summary = Summary.of(
-        results,
-        format_version=FORMAT,
-        case=case.name,
-        title=case.content.title,
-        about=case.content.about,
-        case_text=case.text,
-        command=command_line(),
-        versions=versions(),
-        changes=case.changes,
-        figures=tuple(names),
-        seconds=time.perf_counter() - start,
-        fingerprints=results.fingerprints,
-    )
-    store.put_text(SUMMARY, summary.to_json())
-    return summary
 
 
 def add_page(parser: argparse.ArgumentParser) -> None:

@@ -73,8 +73,7 @@ class ResultsFolder:
     def read(cls, path: Path) -> Self:
         """The folder with what manifest.json lists; nothing where that is missing or damaged.
 
-        Raises:
-            RefusedError: The list is of another format or program, or no regular file.
+        RefusedError of a list of another format or program, and of one that is no regular file.
         """
         file = path / MANIFEST
         if not os.path.lexists(file):
@@ -100,11 +99,9 @@ class ResultsFolder:
 
     def require_own_files(self, option: str) -> None:
         """Refuses a folder of other files, in which no run has written its list."""
-        is_new = not os.path.lexists(self.path / MANIFEST)
-        others = [x.name for x in self.path.glob("[!.]*")] if is_new else []
+        is_own = os.path.lexists(self.path / MANIFEST) or not any(self.path.glob("[!.]*"))
         allowed, cure = "an empty folder, or one of results", "name another folder"
-        value = f"{self.path}, with other files"
-        require(not others, option, value, allowed, cure)
+        require(is_own, option, f"{self.path}, with other files", allowed, cure)
 
     def made_from(self, source: str) -> tuple[str, ...]:
         """Names of the files that were made from what has this digest."""
@@ -120,11 +117,7 @@ class ResultsFolder:
         return ""
 
     def content(self, name: str) -> bytes:
-        """The content of a listed file, which is what was written.
-
-        Raises:
-            RefusedError: The file is not listed, missing, changed, or a link.
-        """
+        """The content of a listed file; RefusedError of one that is missing, changed or a link."""
         what = f"without {name} in its manifest"
         require(name in self.files, str(self.path), what, COMPLETE, RUN_AGAIN)
         file, digest = self.path / name, self.files[name].digest
@@ -169,10 +162,8 @@ class ResultsFolder:
     def put_files(self, source: str, folder: Path, before: str = "") -> None:
         """Copies all files below a folder here and lists them as made from `source`.
 
-        Other files that were made from `before` are removed.
-
-        Raises:
-            RefusedError: Something else is in the place of one.
+        Other files that were made from `before` are removed. Something else in the place of a file
+        is refused.
         """
         paths = (path for path in sorted(folder.rglob("*")) if path.is_file())
         contents = {path.relative_to(folder).as_posix(): path.read_bytes() for path in paths}

@@ -35,11 +35,8 @@ EVEN = 1e-3
 def uff_mode_rows(path: Path, floors: Mapping[str, int]) -> tuple[ModeRows, ...]:
     """Reads the modes of a universal file (data sets 55), one measurement each, by rising number.
 
-    `floors` has the floor of each measured unknown, named NODE.DIRECTION, as {"12.x": 1}.
-
-    Raises:
-        RefusedError: The file cannot be read, has no mode or one mode twice, a named unknown is not
-            in it, or a shape is complex with a modal phase collinearity below `MIN_COLLINEARITY`.
+    `floors` has the floor of each measured unknown, named NODE.DIRECTION, as {"12.x": 1}. Complex
+    shapes are refused below a modal phase collinearity of `MIN_COLLINEARITY`.
     """
     content = read_bytes(path)
     try:
@@ -130,9 +127,6 @@ def read_uff_record(name: str, content: bytes, channel: str = "") -> Recording:
 
     The stated unit says whether it is an acceleration, whatever numeric type the file gives it.
     `channel` is NODE.DIRECTION of the response, as "7.x"; it may be left out where there is one.
-
-    Raises:
-        RefusedError: The file holds no such acceleration over even times in a known unit.
     """
     try:
         parsed = [_parse_series(*rows) for rows in _data_sets(content, 58)]

@@ -116,6 +116,7 @@ REFUSED = [
     ),
     ("rnu case.toml", "COMMAND is rnu; allowed: run, check"),
     ("run", "CASE is missing; see alphacut run --help"),
+    ("run case.toml --quiet=3", "--quiet is refused: ignored explicit argument '3'"),
     ("run case.toml --out", "value of --out is missing"),
     ("run case.toml --quik", "option is --quik"),
     ("run case.toml more.toml", "option is more.toml"),
