@@ -49,9 +49,9 @@ def require_map(radius_map: RadiusMap) -> None:
     allowed = f"the shape of θ, {theta.shape}"
     has_shape = radii.shape == theta.shape
     require(has_shape, "shape of the radii", value=radii.shape, allowed=allowed)
-    fits = (radii > 0) & (radii < 1)
-    row = int(np.argmin(fits))
-    require(fits.all(), f"r at θ = {theta[row]:.4g}", value=f"{radii[row]:.4g}", allowed=RADII)
+    is_inside = (radii > 0) & (radii < 1)
+    row = int(np.argmin(is_inside))
+    require(is_inside.all(), f"r at θ = {theta[row]:.4g}", value=f"{radii[row]:.4g}", allowed=RADII)
 
 
 @dataclass(frozen=True)

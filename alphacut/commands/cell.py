@@ -86,7 +86,7 @@ def export(problem: CellProblem, path: Path) -> Document:
         fields = mesh_fields(MeshModel(mesh.file), problem.radius.law, nominal)
     else:
         model = PrismModel(mesh.size, mesh.layers, outline=nominal.outline)
-        fields = cell_fields(model, nominal.radius, nominal.matrix, nominal.inclusion)
+        fields = cell_fields(model, nominal.radius_map, nominal.matrix, nominal.inclusion)
     return {"file": str(path), "nodes": write_cell(fields, path)}
 
 

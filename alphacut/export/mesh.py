@@ -60,9 +60,9 @@ def prism_mesh(cell: Cell, mesh: Mesh) -> dict[str, Any]:
     from alphacut.rve.mesh.columns import extrude
     from alphacut.rve.mesh.prism_grid import reference_radius
 
-    radius = reference_radius(cell.radius, cell.outline)
+    radius = reference_radius(cell.radius_map, cell.outline)
     grid = extrude(size=mesh.size, radius=radius, layers=mesh.layers, outline=cell.outline)
-    points, cells = grid.positions(cell.radius), grid.cells[:, ABAQUS_ORDER]
+    points, cells = grid.positions(cell.radius_map), grid.cells[:, ABAQUS_ORDER]
     return {"points": points, "cells": cells, "phase": grid.phase}
 
 

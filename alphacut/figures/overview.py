@@ -32,9 +32,9 @@ def domains(cell: Cell, size: float, layers: int) -> Figure:
 
     `size` is the edge length of the triangles in halves of the cell's side.
     """
-    radius = reference_radius(cell.radius, cell.outline)
+    radius = reference_radius(cell.radius_map, cell.outline)
     grid = extrude(size=size, radius=radius, layers=layers, outline=cell.outline)
-    points = grid.positions(cell.radius)
+    points = grid.positions(cell.radius_map)
     # corner nodes come first, level by level of θ
     levels = points[: (layers + 1) * len(grid.plane.points)].reshape(layers + 1, -1, 3)
     figure = plt.figure(figsize=(11.0, 4.2))
@@ -47,7 +47,7 @@ def domains(cell: Cell, size: float, layers: int) -> Figure:
     plane.set(xlim=(-1, 1), ylim=(-1, 1), aspect="equal", xlabel="x$_1$/a", ylabel="x$_2$/a")
     plane.set_title(f"physical domain, θ = {middle[0, 2]:g}")
     plane.grid(visible=False)
-    law, layer_ends = cell.radius.distribution, levels[:, 0, 2]
+    law, layer_ends = cell.radius_map.distribution, levels[:, 0, 2]
     theta = np.linspace(law.lower, law.upper, 300)
     density.plot(law.pdf(theta), theta, color=BLUE, lw=1.6)
     density.fill_betweenx(theta, 0, law.pdf(theta), color=BLUE, alpha=0.15, lw=0)

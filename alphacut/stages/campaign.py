@@ -109,7 +109,7 @@ class CellCampaign(CellProblem):
         """The function that solves cells; with `estimate`, prisms declare errors at extra cost."""
         modulus = self.cell.constants.get("inclusion_modulus")
         support = None if modulus is None else tuple(modulus.support)
-        return self.model(estimate=estimate, moduli=support, petsc=self.petsc)
+        return self.model(estimate=estimate, modulus_range=support, petsc=self.petsc)
 
     @cached_property
     def nominal_estimate(self) -> HomogenisedStiffness:

@@ -66,7 +66,7 @@ def _solve_cells(
     """Result of each sample by a model of rve; `is_averaged`: E and ν of the isotropic average."""
     if isinstance(samples[0], Cell):
         first, inclusions = samples[0], [sample.inclusion for sample in samples]
-        results = model.solve(first.radius, first.matrix, inclusions)
+        results = model.solve(first.radius_map, first.matrix, inclusions)
     else:
         results = [model.solve(law, phases)[0] for phases in samples]
     return [result.with_average("isotropic") for result in results] if is_averaged else results
@@ -105,7 +105,7 @@ class CellProblem:
     def model(self, **elements: object) -> Solve:
         """The function that solves cells by the model that the sections name.
 
-        `elements` are options of the product-space elements: petsc, parallel, estimate, moduli.
+        `elements` are options of the elements: petsc, parallel, estimate, modulus_range.
         """
         is_averaged = self.average_name == "isotropic"  # of the whole plane stiffness
         try:
@@ -173,9 +173,9 @@ class CellProblem:
             return {}
         nominal: Cell = self.nominal
         matrix, inclusion = nominal.matrix, nominal.inclusion
-        rule = gauss_rule(nominal.radius.distribution, points=40)
+        rule = gauss_rule(nominal.radius_map.distribution, points=40)
         spheres, stated = self.cell.particles == "spheres", self.stated_fraction
-        radii = nominal.radius(rule.nodes)
+        radii = nominal.radius_map(rule.nodes)
         fractions = volume_fraction(radii) if spheres else nominal.fraction(rule.nodes)
         found: References = {"fraction": float(np.asarray(rule.mean(fractions)))}
         if not isinstance(matrix, Phase) or not isinstance(inclusion, Phase):

@@ -148,14 +148,14 @@ def judged_entries(own: HomogenisedStiffness, truth: HomogenisedStiffness) -> It
 def solved(model: PrismModel, cell: Cell) -> HomogenisedStiffness:
     """The cell by prisms, on a finer mesh where the one drawn folds over."""
     try:
-        return model.solve(cell.radius, cell.matrix, [cell.inclusion])[0]
+        return model.solve(cell.radius_map, cell.matrix, [cell.inclusion])[0]
     except FoldedMeshError:
         return solved(replace(model, mesh_size=model.mesh_size / 2), cell)
 
 
 def judge(cell: Cell, rng: np.random.Generator) -> list[Judgement]:
     """All numbers of one cell by prisms and slices; empty where a model refuses."""
-    parts = cell.radius, cell.matrix, [cell.inclusion]
+    parts = cell.radius_map, cell.matrix, [cell.inclusion]
     try:
         prism, slices = draw_prism(rng, cell), draw_slices(rng, cell)
         results = [solved(prism, cell), slices.solve(*parts)[0]]

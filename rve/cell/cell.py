@@ -117,13 +117,13 @@ class Cell:
     Args:
         matrix: Material outside the particle.
         inclusion: Material of the particle.
-        radius: Map θ ↦ r(θ) in (0, 1), with the law of θ.
+        radius_map: Map θ ↦ r(θ) in (0, 1), with the law of θ.
         outline: Distance of the particle's edge from its centre over r(θ), a function of the angle.
     """
 
     matrix: AnyPhase
     inclusion: AnyPhase
-    radius: RadiusMap
+    radius_map: RadiusMap
     outline: Outline = circle
 
     @property
@@ -133,7 +133,7 @@ class Cell:
 
     def fraction(self, theta: Array) -> Array:
         """Area fraction of the particle at θ of any shape."""
-        return np.asarray(area(self.outline) / AREA * self.radius(theta) ** 2)
+        return np.asarray(area(self.outline) / AREA * self.radius_map(theta) ** 2)
 
     def fractions(self, theta: Array) -> Array:
         """Area fractions of the phases at θ, shape (phases, n)."""

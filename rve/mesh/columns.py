@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 BELOW, ABOVE = [0, 1, 2, 6, 7, 9], [3, 4, 5, 12, 13, 14]
 """Nodes of a prism's triangles in Basix's order: vertices, then edges 01, 02, 12."""
-HALF_WAY = [8, 10, 11]
+MID_LEVEL = [8, 10, 11]
 """Middles of its vertical edges, above vertices 0, 1, 2."""
 
 
@@ -114,7 +114,7 @@ def grid_of(
 
 
 def _levels(prisms: Prisms) -> tuple[Array, Ints]:
-    """θ of the levels, rising, and the level of each node, −1 half-way; shapes (k,) and (n,)."""
+    """θ of the k levels, rising, and the level of each node, −1 on mid-levels, shape (n,)."""
     on_levels = np.unique(prisms.cells[:, BELOW + ABOVE])
     theta = prisms.points[:, 2]
     rising = np.sort(theta[on_levels])
@@ -136,7 +136,7 @@ def _levels(prisms: Prisms) -> tuple[Array, Ints]:
 def _columns(prisms: Prisms) -> tuple[Ints, int]:
     """Column of each node by the vertical edges of the prisms, (n,), and the number of columns."""
     below = prisms.cells[:, BELOW + BELOW[:3]].ravel()
-    above = prisms.cells[:, ABOVE + HALF_WAY].ravel()
+    above = prisms.cells[:, ABOVE + MID_LEVEL].ravel()
     size = len(prisms.points)
     links = sp.coo_matrix((np.ones(len(below), np.int8), (below, above)), (size, size))
     count, column = connected_components(links, directed=False)
@@ -144,10 +144,10 @@ def _columns(prisms: Prisms) -> tuple[Ints, int]:
 
 
 def _number_nodes(prisms: Prisms, level: Ints, planar: Ints, layers: int, vertices: int) -> Ints:
-    """New number of each node, (n,): all levels, then the planes half-way, vertices first."""
+    """New number of each node, (n,): all levels, then the mid-levels, vertices first."""
     per_level = int(planar.max()) + 1
     number = level * per_level + planar
-    half = prisms.cells[:, HALF_WAY]
+    half = prisms.cells[:, MID_LEVEL]
     below = level[prisms.cells[:, :3]]
     number[half] = (layers + 1) * per_level + below * vertices + planar[half]
     expected = (layers + 1) * per_level + layers * vertices

@@ -53,7 +53,7 @@ def refined(grid: PrismGrid) -> PrismGrid:
     among those of the finer one, whose stiffness is therefore nowhere larger.
 
     Raises:
-        MeshError: Middles of vertical edges lie at θ of their own, so that no level is half-way.
+        MeshError: Middles of vertical edges lie at θ of their own, so that there is no mid-level.
     """
     assert grid.fixed is not None
     parts = np.array([part for part in _PLANE_PARTS for _ in range(2)])  # (8, 3, 2)

@@ -1,7 +1,8 @@
 """Prism mesh of the product space: a planar mesh at a reference radius, extruded over θ.
 
-Nodes are numbered level by level: on each of the layers + 1 levels of θ all planar nodes, then,
-half-way between levels, the planar vertices (a serendipity wedge has no midpoints there).
+Nodes are numbered level by level: on each of the layers + 1 levels of θ all planar nodes, then
+the vertices on the mid-levels, half-way between two levels (a serendipity wedge has no midpoints
+there).
 """
 
 from __future__ import annotations
@@ -162,25 +163,25 @@ class PrismGrid:
         """θ of all levels over the support of a law, shape (layers + 1,)."""
         return np.asarray(law.lower + self.heights * (law.upper - law.lower))
 
-    def positions(self, radius: RadiusMap) -> Array:
+    def positions(self, radius_map: RadiusMap) -> Array:
         """(x1, x2, θ) of all nodes at a map, shape (nodes, 3)."""
         if self.fixed is not None:
             return self.fixed
-        levels = self.level_thetas(radius.distribution)
-        half_levels = (levels[1:] + levels[:-1]) / 2
-        on_levels = self._planar_positions(radius, levels)
-        on_half_levels = self._planar_positions(radius, half_levels)
+        levels = self.level_thetas(radius_map.distribution)
+        mid_levels = (levels[1:] + levels[:-1]) / 2
+        on_levels = self._planar_positions(radius_map, levels)
+        on_mid_levels = self._planar_positions(radius_map, mid_levels)
         blocks = []
         for theta, xy in (
             (levels, on_levels),
-            (half_levels, on_half_levels[:, : self.plane.vertices]),
+            (mid_levels, on_mid_levels[:, : self.plane.vertices]),
         ):
             heights = np.broadcast_to(theta[:, None, None], (*xy.shape[:2], 1))
             blocks.append(np.dstack([xy, heights]).reshape(-1, 3))
         return np.concatenate(blocks)
 
-    def _planar_positions(self, radius: RadiusMap, theta: Array) -> Array:
+    def _planar_positions(self, radius_map: RadiusMap, theta: Array) -> Array:
         """Positions of the planar nodes at each θ, shape (k, planar nodes, 2)."""
         if not self.conforming:
             return np.broadcast_to(self.plane.points, (len(theta), *self.plane.points.shape))
-        return nodes_at_radii(self.plane, radius(theta))
+        return nodes_at_radii(self.plane, radius_map(theta))

@@ -65,8 +65,8 @@ class PrismModel:
         parallel: Whether all MPI ranks work on one cell together; if not each works on its own.
         stiffness: Whether to solve a third load, for the whole planar stiffness.
         estimate: Whether to declare the errors.
-        moduli: Least and greatest modulus of the particle, in Pa, between which samples of a map
-            are projected on two solutions; None: each is solved.
+        modulus_range: Least and greatest Young's modulus of the particle, in Pa, between which
+            samples of a map are projected on two solutions; None: each is solved.
         outline: Distance of the particle's edge from its centre over r(θ), a function of the angle.
     """
 
@@ -76,7 +76,7 @@ class PrismModel:
     parallel: bool = False
     stiffness: bool = False
     estimate: bool = True
-    moduli: tuple[float, float] | None = None
+    modulus_range: tuple[float, float] | None = None
     outline: Outline = circle
     name: ClassVar[str] = "prism"
 
@@ -171,19 +171,21 @@ class PrismModel:
         self, problem: PrismProblem, matrix: AnyPhase, inclusions: Sequence[AnyPhase]
     ) -> ModulusBasis | None:
         """Reduced basis for samples that differ only in the modulus of isotropic inclusions."""
-        if not (isinstance(matrix, Phase) and self.moduli):
+        if not (isinstance(matrix, Phase) and self.modulus_range):
             return None
         phases = [phase for phase in inclusions if isinstance(phase, Phase)]
         poisson_ratios = {phase.poisson for phase in phases}
         moduli = [phase.modulus for phase in phases]
         if len(phases) < len(inclusions) or len(poisson_ratios) > 1 or self.petsc:
             return None
-        low, high = self.moduli
+        low, high = self.modulus_range
         is_within = low * (1 - ROUND_OFF) <= min(moduli) and max(moduli) <= high * (1 + ROUND_OFF)
         if low == high or not is_within:
             return None
         cell = Cell(matrix, inclusions[0], problem.map, self.outline)
-        basis = modulus_basis(problem, matrix, poisson_ratios.pop(), self.moduli, self.loads(cell))
+        basis = modulus_basis(
+            problem, matrix, poisson_ratios.pop(), self.modulus_range, self.loads(cell)
+        )
         return basis if basis.error <= TOLERANCE else None
 
 
@@ -239,9 +241,9 @@ def _reference_result(cell: Cell) -> HomogenisedStiffness:
     matrix, inclusion = cell.matrix, cell.inclusion
     if cell.square and isinstance(matrix, Phase) and isinstance(inclusion, Phase):
         series = SeriesModel(accuracy=SERIES_ACCURACY, energies=True)
-        return series.solve(cell.radius, matrix, [inclusion])[0]
+        return series.solve(cell.radius_map, matrix, [inclusion])[0]
     slices = SlicesModel(points=SLICES_POINTS, outline=cell.outline)
-    return slices.solve(cell.radius, matrix, [inclusion])[0]
+    return slices.solve(cell.radius_map, matrix, [inclusion])[0]
 
 
 def with_distance(

@@ -134,7 +134,7 @@ class PrismProblem:
         self.elastic = CellForm(self.space, point_space, measures, mixed=ignores_interface)
         self._strains = PointStrains(self.space, points)
 
-    def move(self, radius: RadiusMap) -> None:
+    def move(self, radius_map: RadiusMap) -> None:
         """Move the nodes to the interface r(θ) of a map and mark the particle (eq. 13, 14).
 
         After an error it is to be moved again before use.
@@ -143,12 +143,12 @@ class PrismProblem:
             FoldedMeshError: An element is inverted.
             RefusedError: The density of θ is not positive at a quadrature point.
         """
-        self.map = radius
-        positions, geometry = self.grid.positions(radius), self.mesh.geometry
+        self.map = radius_map
+        positions, geometry = self.grid.positions(radius_map), self.mesh.geometry
         geometry.x[:] = positions[geometry.input_global_indices]
-        self._levels = self.grid.level_thetas(radius.distribution)
+        self._levels = self.grid.level_thetas(radius_map.distribution)
         theta, _ = self.slice_rule()
-        density = radius.distribution.pdf(theta)
+        density = radius_map.distribution.pdf(theta)
         if not (density > 0).all():
             key = f"density of θ at {theta[~(density > 0)][0]:.4g}"
             cure = "shorten the support, or take the series"
@@ -157,8 +157,8 @@ class PrismProblem:
         self._require_valid_elements()
         prism_density = self.at_prisms(density)
         self.elastic.density.x.array[:] = np.repeat(prism_density, POINTS_PER_SLICE)
-        if isinstance(radius, LevelSet):
-            self.elastic.in_particle.x.array[:] = self._inside(positions, radius).ravel()
+        if isinstance(radius_map, LevelSet):
+            self.elastic.in_particle.x.array[:] = self._inside(positions, radius_map).ravel()
 
     def _require_valid_elements(self) -> None:
         """Refuse inverted elements, and nearly inverted ones about outlines that are not round."""
@@ -171,11 +171,11 @@ class PrismProblem:
             cure = "take more layers or a smaller mesh size"
             raise FoldedMeshError(f"the mesh folds over {where}", cure)
 
-    def _inside(self, positions: Array, radius: LevelSet) -> Array:
+    def _inside(self, positions: Array, level_set: LevelSet) -> Array:
         """1 at the quadrature points in the particles (z < 0 in eq. 14), else 0."""
         shapes: Array = wedge(1).tabulate(0, prism_rule()[0])[0].reshape(-1, 15)
         points = np.einsum("qn,cnd->cqd", shapes, positions[self.grid.cells[self.wedge]])
-        return radius.is_inside(points).astype(float)
+        return level_set.is_inside(points).astype(float)
 
     def strains(self, displacement: Array) -> Array:
         """(ε11, ε22, 2 ε12) at points, (cells, 3, points, 3), of displacements (nodes, 2)."""

@@ -117,12 +117,12 @@ def _separate_problem(model: PrismModel | MeshModel, law: RadiusMap | ThetaLaw) 
     """New problem for a map or law; the cached ones of the model would move to its next map."""
     if isinstance(model, MeshModel):
         cached = model.cached_problem()
-        radius: RadiusMap = mesh_law(cached.grid, law)
+        radius_map: RadiusMap = mesh_law(cached.grid, law)
     else:
         cached = model.problem(cast("RadiusMap", law))
-        radius = cached.map
+        radius_map = cached.map
     problem = PrismProblem(cached.grid, cached.comm)
-    problem.move(radius)
+    problem.move(radius_map)
     return problem
 
 

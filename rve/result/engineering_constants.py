@@ -88,7 +88,7 @@ class Mixture:
     @classmethod
     def of_cell(cls, cell: Cell) -> Self:
         """Moduli, mean area fractions and Hashin–Shtrikman bounds of z̄ of a cell of two phases."""
-        rule = gauss_rule(cell.radius.distribution, points=POINTS)
+        rule = gauss_rule(cell.radius_map.distribution, points=POINTS)
         inclusion, stiffness = cell.fraction(rule.nodes), np.array(cell.stiffness)
         axial, lateral, shear = stiffness[:, 0, 0], stiffness[:, 0, 1], stiffness[:, 2, 2]
         bulk, matrix = (axial + lateral) / 2, 1 - inclusion

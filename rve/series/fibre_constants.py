@@ -67,12 +67,12 @@ def _mean_longitudinal_shear(cell: Cell) -> tuple[float, float]:
     assert isinstance(inclusion, Phase)
 
     def mean(rule: ThetaRule) -> tuple[float, float]:
-        values, relative_errors = longitudinal_shear(cell.radius(rule.nodes), matrix, inclusion)
+        values, relative_errors = longitudinal_shear(cell.radius_map(rule.nodes), matrix, inclusion)
         total = float(rule.weights @ values)
         return total, float(rule.weights @ (values * relative_errors)) / total
 
     counts = NODES, finer_count(NODES), finer_count(finer_count(NODES))
-    rules = (gauss_rule(cell.radius.distribution, points=count) for count in counts)
+    rules = (gauss_rule(cell.radius_map.distribution, points=count) for count in counts)
     (value, error), (finer, _), (finest, _) = map(mean, rules)
     return value, error + SAFETY * max(abs(value / finer - 1), abs(value / finest - 1))
 

@@ -265,14 +265,14 @@ def mean_energies(series: Series, cell: Cell, mean: Mean) -> PhaseEnergies:
     Their error is the distance from means by two finer rules with more terms.
     """
     rule, terms = ThetaRule(mean.curve.theta, mean.curve.weights), mean.terms
-    node_radii = cell.radius(rule.nodes)
+    node_radii = cell.radius_map(rule.nodes)
     values, distances = _rule_energies(series, cell, rule, terms), []
     order = np.argsort(node_radii)
     rising_terms = np.maximum.accumulate(terms[order])
     finer = rule
     for k in range(2):
-        finer = gauss_rule(cell.radius.distribution, points=finer_count(finer.nodes.size))
-        coarse_terms = np.interp(cell.radius(finer.nodes), node_radii[order], rising_terms)
+        finer = gauss_rule(cell.radius_map.distribution, points=finer_count(finer.nodes.size))
+        coarse_terms = np.interp(cell.radius_map(finer.nodes), node_radii[order], rising_terms)
         finer_terms = np.array([_error_terms(int(np.ceil(n)))[k] for n in coarse_terms])
         distances.append(abs(values - _rule_energies(series, cell, finer, finer_terms)))
     errors = SAFETY * np.max(distances, axis=0) + _ENERGY_NOISE * values.sum(axis=(0, 1))
@@ -296,7 +296,7 @@ def _mean_moduli(
     series: Series, cell: Cell, rule: ThetaRule, terms: Ints, bulk: Array, shear: Array
 ) -> Array:
     """Mean moduli over θ, (3,), with complex K and G of matrix and particle, (2,) each."""
-    radii, total = cell.radius(rule.nodes), np.zeros(3, complex)
+    radii, total = cell.radius_map(rule.nodes), np.zeros(3, complex)
     materials = [ComplexMaterial.of_bulk_and_shear(*x) for x in zip(bulk, shear, strict=True)]
     for count in np.unique(terms):
         nodes = np.flatnonzero(terms == count)

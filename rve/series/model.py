@@ -166,7 +166,7 @@ def _system(
     return np.eye(orders.a.size) - outer * coupling, source
 
 
-def modulus(load: str, a: Array, radius: Array, contrast: Contrast) -> Array:
+def modulus_of_load(load: str, a: Array, radius: Array, contrast: Contrast) -> Array:
     """C11 + C12, C11 − C12 or C33 in Pa, (n, m), from scaled multipoles `a` of its load, (n, m, N).
 
     Mean strain and stress follow from the jumps across the cell of 2μu and of the resultant force
@@ -198,7 +198,9 @@ def plane_moduli(radius: Array, materials: Sequence[Material], harmonics: int) -
     """C11 + C12, C11 − C12 and C33 of n square cells times m inclusions, (n, m, 3), in Pa."""
     contrast = Contrast.of_materials(materials)
     columns = [
-        modulus(load, multipoles(load, radius, contrast, harmonics=harmonics), radius, contrast)
+        modulus_of_load(
+            load, multipoles(load, radius, contrast, harmonics=harmonics), radius, contrast
+        )
         for load in LOADS
     ]
     return np.stack(columns, axis=-1)

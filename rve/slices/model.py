@@ -331,11 +331,11 @@ def theta_error(cell: Cell, rule: ThetaRule, *, radii: Array, moduli: Array) -> 
         radii: Radii solved, shape (m,): those of the nodes and the two extreme ones.
         moduli: C11 + C12, C11 − C12 and C33 at `radii`, shape (m, 3).
     """
-    nodes = np.searchsorted(radii, np.round(cell.radius(rule.nodes), _DIGITS))
+    nodes = np.searchsorted(radii, np.round(cell.radius_map(rule.nodes), _DIGITS))
     weights = np.maximum(np.bincount(nodes, rule.weights, minlength=radii.size), 1e-6)
     root = np.sqrt(weights)[:, None]
-    fine = gauss_rule(cell.radius.distribution, points=_FINE)
-    fine_radii = cell.radius(fine.nodes)
+    fine = gauss_rule(cell.radius_map.distribution, points=_FINE)
+    fine_radii = cell.radius_map(fine.nodes)
 
     def mori_tanaka_moduli(r: Array) -> Array:
         bulk, shear = mori_tanaka(np.pi / 4 * r**2, [cell.matrix, cell.inclusion])

@@ -2,8 +2,8 @@
 
 P only renumbers: every node becomes one pair of unknowns or, on the fixed line, none. So it needs
 no matrix product; PETSc's local-to-global map carries it, and DOLFINx adds element matrices where
-they belong. The order is: the planar unknowns of level 0, those of vertices half-way to level 1,
-those of level 1, and so on. A rank owns whole levels with what lies above each.
+they belong. The order is: the planar unknowns of level 0, those of the vertices on
+the mid-level above, those of level 1, and so on. A rank owns levels with the mid-level above each.
 """
 
 from __future__ import annotations
@@ -92,11 +92,11 @@ class LevelNumbering:
     Attributes:
         periodicity: Unknowns of one level.
         level_size: Number of unknowns of a level.
-        half_level_size: Number of unknowns half-way between two levels: those of vertices.
+        mid_level_size: Number of unknowns of a mid-level, half-way between two: those of vertices.
         stride: Sum of both.
         size: Number of unknowns of all ranks.
         levels: Levels of this rank.
-        half_levels: Half-way levels of this rank.
+        mid_levels: Mid-levels of this rank.
         rows: Unknowns of this rank.
         layers: Layers with a cell that has one of these unknowns.
     """
@@ -104,16 +104,16 @@ class LevelNumbering:
     def __init__(self, grid: PrismGrid, comm: MPI.Intracomm) -> None:
         self.grid, self.periodicity = grid, identify(grid.plane)
         self.level_size = 2 * self.periodicity.count
-        self.half_level_size = 2 * self.periodicity.vertices
-        self.stride = self.level_size + self.half_level_size
+        self.mid_level_size = 2 * self.periodicity.vertices
+        self.stride = self.level_size + self.mid_level_size
         self.size = grid.layers * self.stride + self.level_size
-        # the last ranks have a level more, and with it nothing half-way above their last one: so
+        # the last ranks have a level more, and with it no mid-level above their last one: so
         # levels go with the prisms that are divided evenly, and few entries are of other ranks
         first, last = ((grid.layers + 1) * k // comm.size for k in (comm.rank, comm.rank + 1))
-        self.levels, self.half_levels = range(first, last), range(first, min(last, grid.layers))
+        self.levels, self.mid_levels = range(first, last), range(first, min(last, grid.layers))
         ends = (min(k * self.stride, self.size) for k in (first, last))
         self.rows = range(*ends)
-        self.layers = range(max(0, first - 1), self.half_levels.stop) if self.levels else range(0)
+        self.layers = range(max(0, first - 1), self.mid_levels.stop) if self.levels else range(0)
 
     @cached_property
     def pairs(self) -> Ints:
@@ -122,18 +122,18 @@ class LevelNumbering:
         vertices = planar[: self.grid.plane.vertices]
         first_pair = np.arange(layers + 1)[:, None] * (self.stride // 2)  # of each level
         on_levels = np.where(planar >= 0, planar + first_pair, -1)
-        half_first = first_pair[:-1] + self.level_size // 2
-        half_way = np.where(vertices >= 0, vertices + half_first, -1)
-        return np.concatenate([on_levels.ravel(), half_way.ravel()])
+        mid_first = first_pair[:-1] + self.level_size // 2
+        on_mid_levels = np.where(vertices >= 0, vertices + mid_first, -1)
+        return np.concatenate([on_levels.ravel(), on_mid_levels.ravel()])
 
     def split_levels(self, values: Array) -> tuple[Array, Array]:
-        """Copies of values on levels, (layers + 1, level_size), and half-way between them."""
+        """Copies of values on levels, (layers + 1, level_size), and on mid-levels."""
         layers = values[: self.grid.layers * self.stride].reshape(-1, self.stride)
         top = values[self.grid.layers * self.stride :][None]
         on_levels = np.concatenate([layers[:, : self.level_size], top])
         return on_levels, layers[:, self.level_size :].copy()
 
-    def join_levels(self, on_levels: Array, half_way: Array) -> Array:
-        """Vector of unknowns from values on levels and half-way, of all ranks or of this one."""
-        layers = np.concatenate([on_levels[: len(half_way)], half_way], axis=1)
-        return np.concatenate([layers.ravel(), on_levels[len(half_way) :].ravel()])
+    def join_levels(self, on_levels: Array, on_mid_levels: Array) -> Array:
+        """Vector of unknowns from values on levels and mid-levels, of all ranks or of this one."""
+        layers = np.concatenate([on_levels[: len(on_mid_levels)], on_mid_levels], axis=1)
+        return np.concatenate([layers.ravel(), on_levels[len(on_mid_levels) :].ravel()])

@@ -3,8 +3,8 @@
 On a prism mesh the stiffness is nearly a Kronecker product M ⊗ K of the mass matrix along θ,
 M_jk = ∫ f_Θ φ_j φ_k dθ, and the stiffness K of a planar cell, which drifts with the radius from
 level to level. A prism carries linear functions of θ (hats) on all nodes of its triangles and
-quadratic ones on vertices. Take hats and bubbles of θ for a basis; the nodal value half-way is then
-the bubble plus the mean of the hats at its ends. With
+quadratic ones on vertices. Take hats and bubbles of θ for a basis; the nodal value on a mid-level
+(half-way between two levels) is then the bubble plus the mean of the hats at its ends. With
 
     K_k   the block of the hats of level k over M_kk,
     K_b   the block of the bubbles between two levels over theirs, that of linear triangles,
@@ -114,26 +114,26 @@ class ThetaPreconditioner:
         self.injection = _injection(numbering)
         self.rank_vector = matrix.createVecLeft()
         self.scatter, self.full_vector = PETSc.Scatter.toAll(self.rank_vector)
-        sizes, layers = (numbering.level_size, numbering.half_level_size), numbering.grid.layers
+        sizes, layers = (numbering.level_size, numbering.mid_level_size), numbering.grid.layers
         blocks = self._blocks(matrix)
         self.levels = [
             PlaneSolver(block.PtAP(_hats(*sizes, below=k > 0, above=k < layers)), self.mass.hats[k])
             for k, block in zip(numbering.levels, blocks, strict=False)
         ]
-        self.half_levels = [
+        self.mid_levels = [
             PlaneSolver(block, self.mass.bubbles[k])
-            for k, block in zip(numbering.half_levels, blocks[len(self.levels) :], strict=True)
+            for k, block in zip(numbering.mid_levels, blocks[len(self.levels) :], strict=True)
         ]
 
     def _blocks(self, matrix: PETSc.Mat) -> list[PETSc.Mat]:
-        """Diagonal blocks of each level with its half-way neighbours, then of each half-level."""
+        """Diagonal blocks of each level with the mid-levels beside it, then of each mid-level."""
         numbering = self.numbering
-        n, v, stride = numbering.level_size, numbering.half_level_size, numbering.stride
+        n, v, stride = numbering.level_size, numbering.mid_level_size, numbering.stride
         spans = [
             (max(0, k * stride - v), min(k * stride + n + v, numbering.size))
             for k in numbering.levels
         ]
-        spans += [(k * stride + n, (k + 1) * stride) for k in numbering.half_levels]
+        spans += [(k * stride + n, (k + 1) * stride) for k in numbering.mid_levels]
         # only the first span reaches into another rank, from which PETSc fetches slowly
         first, start = [_index_range(*span) for span in spans[:1]], numbering.rows.start
         others = [_index_range(a - start, b - start) for a, b in spans[1:]]
@@ -142,7 +142,7 @@ class ThetaPreconditioner:
 
     def apply(self, _pc: PETSc.PC, residual: PETSc.Vec, result: PETSc.Vec) -> None:
         """Set the result to P⁻¹ residual; called by PETSc."""
-        numbering, v = self.numbering, self.numbering.half_level_size
+        numbering, v = self.numbering, self.numbering.mid_level_size
         # from nodal values to hats and bubbles (transposed), and back: see the head of the file
         hats, bubbles = numbering.split_levels(self._gather(residual))
         hats[:-1, :v] += bubbles / 2
@@ -158,24 +158,24 @@ class ThetaPreconditioner:
         """This rank's rows of diag(K⁻¹) (M^-½ ⊗ 1; (G^-½ ⊗ 1) Jᵀ Zᵀ) times hats and bubbles."""
         mass, numbering = self.mass, self.numbering
         root = mass.inverse_root[list(numbering.levels)]
-        bubble_root = mass.bubble_inverse_root[list(numbering.half_levels)]
+        bubble_root = mass.bubble_inverse_root[list(numbering.mid_levels)]
         projected = (bubble_root @ mass.projection.T @ hats) @ self.injection  # Jᵀ
         on_levels = self._solve_rows(self.levels, root @ hats)
-        half_way = self._solve_rows(self.half_levels, bubble_root @ bubbles - projected)
-        return numbering.join_levels(on_levels, half_way)
+        on_mid_levels = self._solve_rows(self.mid_levels, bubble_root @ bubbles - projected)
+        return numbering.join_levels(on_levels, on_mid_levels)
 
     def _multiply_theta(self, hats: Array, bubbles: Array) -> tuple[Array, Array]:
         """This rank's rows of (M^-½ ⊗ 1; Z J (G^-½ ⊗ 1)) times hats and bubbles."""
         mass, numbering = self.mass, self.numbering
         start = numbering.levels.start
-        rows = slice(start, start + len(numbering.half_levels) + 1)
+        rows = slice(start, start + len(numbering.mid_levels) + 1)
         projected = mass.projection[rows] @ mass.bubble_inverse_root @ bubbles
         rank_hats = mass.inverse_root[rows] @ hats - projected @ self.injection.T  # J
-        return rank_hats, mass.bubble_inverse_root[list(numbering.half_levels)] @ bubbles
+        return rank_hats, mass.bubble_inverse_root[list(numbering.mid_levels)] @ bubbles
 
     def view(self, _pc: PETSc.PC, viewer: PETSc.Viewer) -> None:
         """Print the number of levels and the first one's solver, for ``-rve_ksp_view``."""
-        count = f"{len(self.levels)} levels and {len(self.half_levels)} half-way on the first rank"
+        count = f"{len(self.levels)} levels and {len(self.mid_levels)} mid-levels on the first rank"
         viewer.printfASCII(f"    preconditioner along θ, {count}, each solved by\n")
         rank_viewer = viewer.getSubViewer(PETSc.COMM_SELF)
         if 0 in self.numbering.levels:  # on the rank that has it
@@ -199,7 +199,7 @@ def _index_range(first: int, last: int) -> PETSc.IS:
 
 
 def _hats(level_size: int, half_size: int, *, below: bool, above: bool) -> PETSc.Mat:
-    """Matrix from a level's unknowns to nodal values: 1 on it, ½ at vertices half-way beside it."""
+    """Matrix from a level's unknowns to nodal values: 1 on it, ½ on mid-levels beside it."""
     half, level = sp.eye(half_size, level_size) / 2, sp.eye(level_size)
     stacked = sp.vstack([half] * below + [level] + [half] * above, "csr")
     csr = stacked.indptr.astype(PETSc.IntType), stacked.indices.astype(PETSc.IntType)

@@ -99,7 +99,7 @@ def spheres_with_checks(result: HomogenisedSpheres) -> HomogenisedSpheres:
     matrix, inclusion = cell.phases
     assert isinstance(matrix, Phase)
     assert isinstance(inclusion, Phase)
-    fraction = volume_fraction(cell.radius(result.curve.theta))
+    fraction = volume_fraction(cell.radius_map(result.curve.theta))
     fractions, weights = np.stack([1 - fraction, fraction]), result.curve.weights
     stiffness = [space_stiffness(matrix), space_stiffness(inclusion)]
     energy, bulk = np.asarray(result.stiffness), float(result.moduli[0])

@@ -218,7 +218,7 @@ class PBox:
 def least_pbox(
     fit: HermiteFit, sample: AreaWeighted, band: float, *, required: SlopeBand | None = None
 ) -> PBox:
-    """P-box of least area around the fitted map that contains the sample's band.
+    """P-box of least area around the map fitted to a sample of r_n that contains the sample's band.
 
     Args:
         fit: Ends of the map and law of θ.

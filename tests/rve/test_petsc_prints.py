@@ -36,7 +36,7 @@ def test_view_and_monitor_print_to_standard_error():
     assert json.loads(done.stdout)["E_GPa"] == pytest.approx(24.8073, rel=1e-4)
     assert "KSP Object: (rve_)" in done.stderr
     assert "KSP Object: (rve_level_)" in done.stderr
-    assert "preconditioner along θ, 5 levels and 4 half-way" in done.stderr
+    assert "preconditioner along θ, 5 levels and 4 mid-levels" in done.stderr
     assert "0 KSP Residual norm" in done.stderr
     assert "Linear rve_ solve converged" in done.stderr
 

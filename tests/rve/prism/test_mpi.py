@@ -34,7 +34,7 @@ solved = []
 for layers, radius_map, options in (
     (5, radii, {"stiffness": True}),
     (3, small, {"outline": Ellipse(2.0), "petsc": MUMPS, "estimate": False}),
-    (3, radii, {"moduli": (75e9, 85e9)}),
+    (3, radii, {"modulus_range": (75e9, 85e9)}),
     (3, radii, {"petsc": {"level_pc_type": "gamg", "ksp_rtol": "1e-12"}}),
     (172, radii, {"estimate": False}),  # PETSc takes the parts of one rank in 2 goes, of the other in 3
 ):

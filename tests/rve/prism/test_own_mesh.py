@@ -81,7 +81,7 @@ def test_the_error_of_a_refined_mesh_covers_that_to_a_mesh_four_times_finer(
     assert (energy_error <= result.energies.errors + 1e-9 * result.modulus).all()
 
 
-def test_a_mesh_without_levels_half_way_is_not_refined(tmp_path):
+def test_a_mesh_without_mid_levels_is_not_refined(tmp_path):
     grid = extrude(size=0.6, radius=0.4, layers=1)
     points = grid.positions(HermiteMap(0.4, 0, 0.4, 0)).copy()
     points[grid.cells[0, 8], 2] += 0.2  # the middle of one vertical edge

@@ -92,7 +92,7 @@ def test_samples_of_one_set_up_are_those_solved_alone_bit_for_bit():
 
 def test_projected_samples_are_those_solved_whatever_their_company():
     moduli = (75e9, 77e9, 80e9, 85e9)
-    model = PrismModel(0.3, 4, moduli=(75e9, 85e9))
+    model = PrismModel(0.3, 4, modulus_range=(75e9, 85e9))
     projected = model.solve(PAPER, MATRIX, [Phase(e) for e in moduli])
     solved = PrismModel(0.3, 4).solve(PAPER, MATRIX, [Phase(e) for e in moduli])
     for one, other in zip(projected, solved, strict=True):
