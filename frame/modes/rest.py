@@ -255,6 +255,7 @@ def coupling_bounds(
     along, across = (int(np.clip(x, 1, MAX_POINTS)) + 1 for x in points)
     orders = sorted({int(x) for x in structure.order})
     table = Oscillators(grid_over(*ends, (along, across)), loads, time, orders)
+    fastest = high_omega * float(np.sqrt(1 + most**2))
     added, deviation = (np.zeros((len(time), len(structure.order))) for _ in range(2))
     for order in orders:
         o = np.flatnonzero(structure.order == order)
@@ -265,8 +266,21 @@ def coupling_bounds(
             half = np.ptp(response.value, axis=(1, 2)) / 2 + response.error
             bounds = np.outer(slope, by_slope[s, o]), 2 * np.outer(half, size[s, o])
             added[:, o] += np.minimum(*bounds)
-            deviation[:, o] += np.outer(response.line_deviation, size[s, o])
+            # of the block, or at most twice what its coupling adds within the step
+            force = loads[source].extremes[0] if source in loads else 0.0
+            in_step = _within_steps(response.largest, time, force, fastest, order)
+            slope = response_slopes(source, *in_step, low_omega, most)
+            straying = np.outer(response.line_deviation, size[s, o])
+            deviation[:, o] += np.minimum(straying, 2 * np.outer(slope, by_slope[s, o]))
     return added, deviation, ends
+
+
+def _within_steps(largest: Array, time: Array, force: float, fastest: float, order: int) -> Array:
+    """Bounds of |G| and |G′| in the step to each node by those at nodes (2, T); G = σ^order ρ."""
+    # G(t + τ) = exp(σ τ) G(t) + σ^order ∫ exp(σ s) f(t + τ − s) ds, |exp(σ τ)| ≤ 1
+    h, (G, G_slope) = np.diff(time, prepend=time[0]), np.roll(largest, 1, axis=1)
+    G_slope = G_slope + h * G + force * h * fastest ** max(order - 1, 0) * (order + fastest * h / 2)
+    return np.stack([G + force * h * fastest**order, G_slope])
 
 
 def response_slopes(source: str, G: Array, G_slope: Array, omega: float, quotient: float) -> Array:

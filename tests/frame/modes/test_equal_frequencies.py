@@ -4,7 +4,16 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from alphacut.frame import Accelerogram, DualProof, Force, History, MatrixStructure, envelope
+from alphacut.frame import (
+    Accelerogram,
+    DualProof,
+    Exact,
+    Force,
+    History,
+    LinearFlow,
+    MatrixStructure,
+    envelope,
+)
 from alphacut.frame.bounds.box import over_box, sources
 from alphacut.frame.calculus.jet import Jet
 from alphacut.frame.modes.models import MotionModels
@@ -43,6 +52,10 @@ def test_double_modes_are_proved_and_the_output_at_rest_has_no_gap(angle):
     assert np.abs(found.upper[0, :, 1]).max() < 1e-6
     assert np.abs(found.lower[0, :, 1]).max() < 1e-6
     assert found.facts["gap_of_peaks"] < 2e-3
+    flow = LinearFlow(building(angle), ("k",), 3.0, 0.001, Exact())
+    fine, nodes = flow.values(np.array([[600.0], [610.0], [620.0]]))[..., 0], np.arange(0, 3001, 10)
+    straying = [np.abs(x - np.interp(np.arange(3001), nodes, x[::10])).max() for x in fine]
+    assert max(straying) <= found.between[:, 0].max() <= 3 * max(straying)
 
 
 def test_an_oscillator_is_left_where_all_blocks_are_narrower_by_sums():
