@@ -80,7 +80,6 @@ class DecisionAnswer(LimitsAnswer[LimitDecision]):
     key = "decision"
     title = "Can or must limits be exceeded?"
     caption = "Fuzzy peak of each limited output over its limit"
-    step: float
 
     def texts_of(self, limit: LimitDecision) -> Texts:
         """Verdict, degrees, and on the lowest level margin, proved and reached peak, and gap."""
@@ -162,4 +161,4 @@ def decide(section: DecisionSection, response: FuzzyResponse) -> DecisionAnswer:
         )
         for name, answer in passing(peaks, section.limits_in_si(response.structure)).items()
     }
-    return DecisionAnswer(alpha=np.array(response.alpha), step=response.step, limits=decisions)
+    return DecisionAnswer(alpha=np.array(response.alpha), limits=decisions)

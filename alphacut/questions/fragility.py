@@ -55,7 +55,6 @@ class FragilityAnswer(LimitsAnswer[LimitFragility]):
     unit: str
     period_s: float
     damping_ratio: float
-    record_names: tuple[str, ...]
 
     def texts_of(self, limit: LimitFragility) -> Texts:
         """Median and dispersion of the critical measures."""
@@ -150,6 +149,5 @@ def fragility(section: FragilitySection, response: FuzzyResponse) -> FragilityAn
         unit=UNITS[section.measure],
         period_s=suite.period,
         damping_ratio=suite.ratio,
-        record_names=tuple(suite.peaks),
         limits=answers,
     )

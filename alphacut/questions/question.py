@@ -154,13 +154,9 @@ class LimitsAnswer(Answer, Generic[L]):
     def numbers_of(self, limit: L) -> Iterator[Record]:
         """Yields the numbers of a limit, a record a row; output, unit and limit stand before."""
 
-    def rows(self) -> list[Texts]:
-        """A row of texts for each limit."""
-        return [self.texts_of(limit) for limit in self.limits.values()]
-
     def table(self) -> Table:
-        """The rows of texts under their titles."""
-        rows = self.rows()
+        """A row of texts for each limit."""
+        rows = [self.texts_of(limit) for limit in self.limits.values()]
         return Table(tuple(rows[0]), [tuple(row.values()) for row in rows])
 
     def records(self) -> list[Record]:

@@ -27,6 +27,7 @@ from alphacut.report.results import (
     width_text,
 )
 from alphacut.report.tables import tables
+from alphacut.stages.cell import ISOTROPIC
 from alphacut.stages.envelope import EnvelopeResult
 from alphacut.stages.identify import RefutedResult
 
@@ -35,7 +36,6 @@ Piece = tuple[object, ...]
 """Name of a macro of ``report.html``, and what it shows."""
 _TABLES = tomllib.loads(Path(__file__).with_name("captions.toml").read_text(encoding="utf-8"))
 FIGURES: dict[str, str] = _TABLES["figures"] | {kind.key: kind.caption for kind in ANSWERS}
-WORDS: dict[str, str] = _TABLES["words"]
 TERMS = _TABLES["terms"] | {str(nature).capitalize(): nature.sentence for nature in Nature}
 """Terms of the page with their meaning."""
 
@@ -116,7 +116,7 @@ class Page:
         for title, pieces in (
             ("Key results", self._key_pieces()),
             ("Microstructure", of(["pbox", "p-box"], self._particles(), folded="radius_map")),
-            ("How stiff is the material?", [*of(["modulus"], folded="modulus"), *self._errors()]),
+            ("How stiff is the material?", of(["modulus"], self._references(), folded="modulus")),
             ("How stiff is the image?", of(["image"], self._image(), folded="image")),
             ("What do the measured modes teach?", of(["update-inputs"], refuted, "update")),
             ("How does the structure move?", [*plots, *of([], self._motion(), folded="peaks")]),
@@ -164,17 +164,10 @@ class Page:
             yield "The bounds are those of the image as it was segmented, in plane strain."
             yield f"Of the area: {shares}. {width_text(part)}."
 
-    def _errors(self) -> Iterator[Piece]:
-        """Yields errors of E by source, the largest violations of properties, and references."""
-        if (part := self.summary.modulus) is None:
-            return
-        rows = [(f"error: {in_words(x)}", f"{error:.2g} of E") for x, error in part.error.items()]
-        rows += [(f"check: {in_words(x)}", f"{size:.2g}") for x, size in part.checks.items()]
-        if bounds := part.references.get("hashin_shtrikman_E_GPa"):
-            text = f"{bounds[0]:.5g} GPa … {bounds[1]:.5g} GPa"
-            rows.append(("Hashin–Shtrikman bounds, isotropic composites", text))
-        head = ("source, property or reference at the nominal values", "value")
-        yield "folded", "Errors, checks and references", [("table", head, rows)]
+    def _references(self) -> Iterator[str]:
+        part = self.summary.modulus
+        if part is not None and (bounds := part.references.get("hashin_shtrikman_E_GPa")):
+            yield f"{ISOTROPIC}: {bounds[0]:.5g} … {bounds[1]:.5g} GPa."
 
     def _motion(self) -> Iterator[str]:
         studies, frame = self.summary.envelopes, self.summary.structure
@@ -212,11 +205,6 @@ class Page:
         origin = f"Made by {summary.command} in {summary.seconds:.0f} s."
         versions = ("table", ("program", "version"), [*summary.versions.items()])
         yield "folded", "Versions", [("text", origin), versions]
-
-
-def in_words(name: str) -> str:
-    """Name in words; an underscore becomes a space where there are none."""
-    return WORDS.get(name, name.replace("_", " "))
 
 
 def caption(stem: str, *, paper: bool) -> str:

@@ -13,7 +13,6 @@ from alphacut.frame.identify.identify import widest_cut
 from alphacut.frame.structures.quantities import of_storey_frame
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.refused import require
-from alphacut.fuzzy.result import Ends
 from alphacut.io.measured import ModeRows, mode_rows
 from alphacut.records.uff import ENDINGS, uff_mode_rows
 from alphacut.stages.store import CutsResult, Numbers, Values
@@ -40,7 +39,6 @@ class IdentifiedResult(Numbers):
     inputs: dict[str, CutsResult]
     narrowed: dict[str, float]
     units: dict[str, str]
-    empty_from: float | None
     claim: str
     held_out: tuple[Prediction, ...]
     prior: dict[str, tuple[float, float]]
@@ -68,16 +66,20 @@ def identify_inputs(
         posterior = identify(structure.frame, prior, learned_modes, alpha=alpha)
     except RefutedError as error:
         return RefutedResult(refuted=str(error)), structure
-    modes = sorted(mode for mode in section.held_out if mode <= structure.frame.floors)
+    predictions, held_out = posterior.predictions(), list[Prediction]()
+    for mode in sorted(mode for mode in section.held_out if mode <= structure.frame.floors):
+        low, high = (float(bounds[0, mode - 1]) for bounds in predictions)  # (levels, modes)
+        measured = float(rows[mode].frequencies.mean())
+        ends, inside = (low, high), low <= measured <= high
+        held_out.append(Prediction(mode=mode, measured=measured, predicted=ends, inside=inside))
     cuts = np.stack([posterior.lower, posterior.upper], axis=-1)  # (levels, inputs, 2)
     result = IdentifiedResult(
         alpha=posterior.alpha,
         inputs={name: CutsResult.of(cuts[:, k]) for k, name in enumerate(posterior.names)},
         narrowed=dict(posterior.narrowed),
         units={name: of_storey_frame(name).unit for name in posterior.names},
-        empty_from=posterior.empty,
         claim=str(posterior.claim),
-        held_out=tuple(_prediction(rows[mode], posterior.predictions()) for mode in modes),
+        held_out=tuple(held_out),
         prior={name: widest_cut(number) for name, number in prior.items()},
     )
     return result, replace(structure, numbers={**structure.numbers, **posterior.numbers})
@@ -116,11 +118,3 @@ def _measured_rows(section: Identify) -> tuple[ModeRows, ...]:
     if is_universal:
         return uff_mode_rows(section.measured, section.floors)
     return mode_rows(section.measured)
-
-
-def _prediction(row: ModeRows, frequencies: Ends) -> Prediction:
-    """The measured frequency of a mode beside its predicted bounds on the lowest level."""
-    low, high = (float(bounds[0, row.mode - 1]) for bounds in frequencies)  # (levels, modes)
-    measured = float(row.frequencies.mean())
-    inside = low <= measured <= high
-    return Prediction(mode=row.mode, measured=measured, predicted=(low, high), inside=inside)

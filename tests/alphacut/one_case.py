@@ -6,7 +6,7 @@ from alphacut.entry import main
 
 TEXT = """
 title = "Two floors <script>alert(1)</script>"
-about = "A frame that asks every question"
+about = "A frame that asks every question, made by `a <b> command`"
 stages = ["envelope"]
 [frame]
 modulus = "[24, 25, 26] GPa"

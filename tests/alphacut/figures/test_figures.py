@@ -99,6 +99,6 @@ def test_a_limit_of_zero_leaves_room_for_the_bars_of_others():
             from_level=0, nature="estimated", peak=None,
         )  # fmt: skip
         limits[f"{size}"] = limit.model_copy(update={"peak": object()})  # drawn are those with one
-    answer = DecisionAnswer(alpha=[0.0], step=0.1, limits={}).model_copy(update={"limits": limits})
+    answer = DecisionAnswer(alpha=[0.0], limits={}).model_copy(update={"limits": limits})
     (axes,) = envelope.draw_decision(answer).axes
     assert max(abs(end) for end in axes.get_xlim()) < 3

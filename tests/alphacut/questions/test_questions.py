@@ -146,7 +146,8 @@ def test_an_output_has_several_limits_of_each_side_and_of_its_magnitude(tmp_path
     least = limits["min drift1 >= -60 mm"]["peak"]
     assert least["proved"][0] == pytest.approx(band["min"]["drift1"], rel=0.02)
     assert least["reached"][0] >= least["proved"][0]
-    rows = DecisionAnswer.model_validate(summary["decision"]).rows()
+    head, texts = DecisionAnswer.model_validate(summary["decision"]).table()
+    rows = [dict(zip(head, row, strict=True)) for row in texts]
     words = [x["limit"] for x in rows]
     assert words[2] == "max drift1 ≤ 60.00 mm"
     assert words[4] == "min drift1 ≥ −20.00 mm"

@@ -52,12 +52,14 @@ def test_wide_tables_scroll_by_themselves(page):
     tables = re.findall(r'(<div class="scroll"[^>]*>)?<table>', page)
     assert len(tables) > 5
     assert all(tables)
-    assert re.search(r"^\.scroll \{[^}]*overflow-x: auto", page, re.MULTILINE)
+    assert re.search(r"^\.scroll \{[^}]*overflow-x: auto; margin-right: min", page, re.MULTILINE)
 
 
 def test_texts_of_the_case_are_no_markup(page):
     assert "<script>alert" not in page
     assert "Two floors &lt;script&gt;" in page
+    assert "made by <code>a &lt;b&gt; command</code></p>" in page
+    assert "`" not in page.partition("<h2>More")[0]
 
 
 def test_a_script_in_a_drawing_does_not_reach_the_page(results, tmp_path):
@@ -108,7 +110,7 @@ def test_peaks_are_stated_in_the_units_that_engineers_compare():
         margin=CutsResult.of([[0.0, 0.0]]), verdict="not exceeded", from_level=0, nature="estimated",
         peak=None,
     )  # fmt: skip
-    decision = DecisionAnswer(alpha=[0, 0.5, 1], step=0.1, limits={"drift1": limit})
+    decision = DecisionAnswer(alpha=[0, 0.5, 1], limits={"drift1": limit})
     head, rows = peak_table(peaks_of(**ends).model_copy(update={"decision": decision}))
     assert head == ("peak of", "nominal", "α = 0.5", "α = 0", "± error", "limit", "exceeded")
     assert rows[0][:5] == ("drift1, mm", "11.00", "10.5 … 11.5", "10.37 … 12.01", "0.2")
