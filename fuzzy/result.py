@@ -32,9 +32,9 @@ _MAX_LINES = 25  # lines of a text, one for each level of an output
 class Nature(StrEnum):
     """What bounds promise, from the weakest to the strongest."""
 
-    ATTAINED = "attained"
-    ESTIMATED = "estimated"
-    GUARANTEED = "guaranteed"
+    ATTAINED = "attained"  # inner bounds: some inputs reach them, others may go farther
+    ESTIMATED = "estimated"  # right to within an error that is estimated
+    GUARANTEED = "guaranteed"  # outer bounds: proved that nothing lies outside
 
     @property
     def sentence(self) -> str:

@@ -85,7 +85,7 @@ class LinearRelaxation:
         ends = np.sort([expression * self.lower, expression * self.upper], axis=0).sum(1)
         return float(ends[0]), float(ends[1])
 
-    def require_nonpositive(self, expression: Array) -> None:
+    def add_inequality(self, expression: Array) -> None:
         """Add the inequality expression ≤ 0."""
         self.rows.append(expression)
 
@@ -97,7 +97,7 @@ class LinearRelaxation:
         corners = (a * c, a * d, b * c, b * d)
         z = self.variable(min(corners), max(corners))
         for p, q, sign in ((a, c, -1), (b, d, -1), (b, c, 1), (a, d, 1)):
-            self.require_nonpositive(sign * (z - p * y - q * x + p * q * self.one))
+            self.add_inequality(sign * (z - p * y - q * x + p * q * self.one))
         return z
 
     def exponential(self, y: Array) -> Array:
@@ -107,9 +107,9 @@ class LinearRelaxation:
             return float(np.exp(low)) * self.one
         x = self.variable(float(np.exp(low)) * (1 - 1e-15), float(np.exp(high)) * (1 + 1e-15))
         for point in (low, (low + high) / 2, high):
-            self.require_nonpositive(np.exp(point) * (y + (1 - point) * self.one) - x)
+            self.add_inequality(np.exp(point) * (y + (1 - point) * self.one) - x)
         slope = np.exp(low) * np.expm1(high - low) / (high - low)
-        self.require_nonpositive(x - slope * y - (np.exp(low) - slope * low + 1e-15) * self.one)
+        self.add_inequality(x - slope * y - (np.exp(low) - slope * low + 1e-15) * self.one)
         return x
 
     def bounds(self, expression: Array) -> tuple[float, float]:
@@ -183,7 +183,7 @@ class ChainRelaxation(LinearRelaxation):
         greatest = {cut.mode: min(cut.high, float(self.highest[cut.mode - 1])) for cut in modes}
         self.is_empty = any(least[mode] > greatest[mode] for mode in least)
         for cut in () if self.is_empty else modes:
-            self.require_frequency(cut)
+            self.add_frequency(cut)
             eigenvalue = greatest[cut.mode]
             if cut.shape and (ends := self.amplitude_ranges(eigenvalue, cut)) is not None:
                 ends |= {z: known[cut.mode, z] for z in ends if (cut.mode, z) in known}
@@ -191,9 +191,9 @@ class ChainRelaxation(LinearRelaxation):
                 unmeasured = shape.keys() - cut.shape.keys()
                 self.unmeasured |= {(cut.mode, floor): shape[floor] for floor in unmeasured}
                 relative = self.variable(least[cut.mode] / eigenvalue, 1.0)
-                self.require_balance(shape, relative, eigenvalue)
+                self.add_balance(shape, relative, eigenvalue)
 
-    def require_balance(
+    def add_balance(
         self, shape: Mapping[int, Array], relative_eigenvalue: Array, eigenvalue: float
     ) -> None:
         """Add the balance at floors, T_z − T_(z+1) = λ m_z r_z, with λ over its greatest value."""
@@ -207,8 +207,8 @@ class ChainRelaxation(LinearRelaxation):
         for z, above in enumerate([*shears[1:], 0.0 * self.one]):
             inertia = self.product(relative_eigenvalue, self.product(self.mass[z], shape[z + 1]))
             imbalance = shears[z] - above - inertia * (eigenvalue * chain.mass[z] / unit)
-            self.require_nonpositive(imbalance)
-            self.require_nonpositive(-imbalance)
+            self.add_inequality(imbalance)
+            self.add_inequality(-imbalance)
 
     def amplitude_ranges(
         self, eigenvalue: float, cut: ModeCut
@@ -238,7 +238,7 @@ class ChainRelaxation(LinearRelaxation):
             amplitudes |= {int(floor) + 1: (-largest, largest) for floor in floors}
         return amplitudes
 
-    def require_frequency(self, cut: ModeCut) -> None:
+    def add_frequency(self, cut: ModeCut) -> None:
         """Add two inequalities, necessary for an eigenvalue to lie within a measured cut."""
         # low − e₁ ≤ xᵀK x / xᵀM x ≤ high + e₂ in the factors of stiffnesses and masses, x the mode
         # shape at the middle of the box. e₁ and e₂ bound the distance of quotient and eigenvalue by
@@ -268,4 +268,4 @@ class ChainRelaxation(LinearRelaxation):
         strains, inertias = strain @ np.array(self.stiffness), inertia @ np.array(self.mass)
         for end, sign in ((cut.low - error_below, -1.0), (cut.high + error_above, 1.0)):
             row = sign * (strains - end * inertias) / unit
-            self.require_nonpositive(row - 1e-12 * self.one)
+            self.add_inequality(row - 1e-12 * self.one)

@@ -194,5 +194,5 @@ def _fractions_above(peaks: Array, limits: Array) -> Array:
 
 def _bounds_over_points(values: Array, level: Array) -> Ends:
     """Return least and greatest values (A, …) over the points (points, …) of a level and higher."""
-    parts = [values[level >= k] for k in range(level.max() + 1)]
-    return Ends(np.array([x.min(0) for x in parts]), np.array([x.max(0) for x in parts]))
+    by_level = [values[level >= k] for k in range(level.max() + 1)]
+    return Ends(np.array([x.min(0) for x in by_level]), np.array([x.max(0) for x in by_level]))

@@ -183,10 +183,10 @@ class Matrices:
     def pushes(self, *, ground: bool) -> Jet:
         """Accelerations by a unit of each load, the ground's first, shape (S, n, L)."""
         shape = (*self.mass.value.shape[:-1], int(ground))
-        parts = [self.mass.like(-np.broadcast_to(self.rigid[:, : int(ground)], shape))]
+        columns = [self.mass.like(-np.broadcast_to(self.rigid[:, : int(ground)], shape))]
         if self.forces is not None:
-            parts.append(self.inverse_mass @ self.forces)
-        return concatenate(parts, -1)
+            columns.append(self.inverse_mass @ self.forces)
+        return concatenate(columns, -1)
 
     @property
     def feeds(self) -> Jet | None:

@@ -265,14 +265,14 @@ def modal_energy_shares(system: MatrixStructure, terms: Sequence[int] | Ints) ->
     shares (Johnson and Kienholz, AIAA Journal 20, 1284, 1982), with modes at nominal values.
     """
     a, b = system.massive, system.massless
-    mass, parts = system.nominal_terms("mass").sum(axis=0), system.nominal_terms("stiffness")
-    stiffness, shapes = parts.sum(axis=0), np.zeros((system.size, len(a)))
+    mass, springs = system.nominal_terms("mass").sum(axis=0), system.nominal_terms("stiffness")
+    stiffness, shapes = springs.sum(axis=0), np.zeros((system.size, len(a)))
     # static condensation: q_b = follow q_a
     follow = -np.linalg.solve(stiffness[np.ix_(b, b)], stiffness[np.ix_(b, a)])
     condensed = stiffness[np.ix_(a, a)] + stiffness[np.ix_(a, b)] @ follow
     shapes[a] = undamped_modes(mass[np.ix_(a, a)], condensed)[1]
     shapes[b] = follow @ shapes[a]
-    energies = np.einsum("ik,tij,jk->tk", shapes, parts, shapes)
+    energies = np.einsum("ik,tij,jk->tk", shapes, springs, shapes)
     return np.asarray(energies[terms].sum(axis=0) / energies.sum(axis=0))
 
 
@@ -305,9 +305,9 @@ class Monomial:
             RefusedError: The text is another kind of expression.
         """
         coefficient, powers = 1.0, dict[str, int]()
-        parts = re.split(r"(?<!\*)([*/])(?!\*)", text)  # factors, with single * and / between
-        for operator, part in zip(["*", *parts[1::2]], parts[::2], strict=True):
-            match = FACTOR.fullmatch(part)
+        tokens = re.split(r"(?<!\*)([*/])(?!\*)", text)  # factors, with single * and / between
+        for operator, token in zip(["*", *tokens[1::2]], tokens[::2], strict=True):
+            match = FACTOR.fullmatch(token)
             if match is None:
                 allowed = 'a product of powers of parameters, as "1", "Ec" or "2*E*I*l^-2"'
                 raise RefusedError("factor", repr(text[:60]), allowed)

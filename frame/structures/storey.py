@@ -298,10 +298,7 @@ def chain_matrix(links: Array) -> Array:
 
 def diagonal(values: Array) -> Array:
     """Diagonal matrices (…, n, n)."""
-    at = np.arange(values.shape[-1])
-    matrix = np.zeros((*values.shape, len(at)))
-    matrix[..., at, at] = values
-    return matrix
+    return values[..., None] * np.eye(values.shape[-1])
 
 
 def _named(

@@ -171,8 +171,8 @@ def require_points(points: int | None) -> None:
         raise RefusedError("number of points of the rule in θ", points, "2 or more")
 
 
-def require_continuous(radius_map: RadiusMap) -> Array:
-    """Radii at 2049 even steps over θ; refuses a map with a jump, whose error no rule can tell."""
+def continuous_radii(radius_map: RadiusMap) -> Array:
+    """Radii at 2049 even steps of θ; refuses maps with a jump, whose error no rule can tell."""
     require_map(radius_map)
     law = radius_map.distribution
     theta = np.linspace(law.lower, law.upper, 2049)
@@ -192,7 +192,7 @@ def require_compressible(*phases: AnyPhase) -> None:
         raise RefusedError("Poisson's ratio", f"{ratio:g}", f"values up to {MAX_POISSON:g}", cure)
 
 
-def require_parts(
+def require_solve_arguments(
     radius_map: object, matrix: object, inclusions: object, *, isotropic: bool = True
 ) -> None:
     """Refuse arguments of `solve` that are no radius map, no phase and no sequence of phases."""

@@ -32,7 +32,7 @@ from alphacut.rve.cell.cell import (
     Phase,
     require_compressible,
     require_mesh_size,
-    require_parts,
+    require_solve_arguments,
 )
 from alphacut.rve.cell.outline import Outline, circle, is_round
 from alphacut.rve.fenicsx import MPI
@@ -97,7 +97,7 @@ class PrismModel:
             FoldedMeshError: The map bends more than the layers can follow.
             RefusedError: A Poisson's ratio is above 0.45, or a radius does not fit.
         """
-        require_parts(radius_map, matrix, inclusions, isotropic=False)
+        require_solve_arguments(radius_map, matrix, inclusions, isotropic=False)
         require_compressible(matrix, *inclusions)
         started = perf_counter()
         problem = self.problem(radius_map)

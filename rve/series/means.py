@@ -15,7 +15,7 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.fuzzy.refused import FailedError, RefusedError
-from alphacut.rve.cell.cell import Cell, Phase, require_continuous
+from alphacut.rve.cell.cell import Cell, Phase, continuous_radii
 from alphacut.rve.result.result import STEP, PhaseEnergies, StressCurve
 from alphacut.stochastic import RadiusMap, ThetaRule, gauss_rule
 
@@ -220,7 +220,7 @@ def converged_means(
     Raises:
         RuleError: No rule of up to `_MAX_POINTS` nodes converges.
     """
-    require_continuous(radius_map)
+    continuous_radii(radius_map)  # refuses a jump
     count = points or max(6, int(np.ceil(1 - 0.75 * np.log10(accuracy))))
     law = radius_map.distribution
     make_rule: Callable[..., ThetaRule] = _cached_rule if isinstance(law, Hashable) else gauss_rule

@@ -32,7 +32,7 @@ from scipy.special import gammaln
 
 from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.rve.cell.cell import Cell, Phase, require_parts, require_points
+from alphacut.rve.cell.cell import Cell, Phase, require_points, require_solve_arguments
 from alphacut.rve.result.checks import with_checks
 from alphacut.rve.result.moduli import square_voigt
 from alphacut.rve.result.result import HomogenisedStiffness
@@ -265,7 +265,7 @@ class SeriesModel:
             SeriesError: Particles nearly touch.
             RuleError: No rule in θ converges (a map that is not smooth).
         """
-        require_parts(radius_map, matrix, inclusions)
+        require_solve_arguments(radius_map, matrix, inclusions)
         start = perf_counter()
 
         moduli = partial(

@@ -22,11 +22,11 @@ from alphacut.rve.cell.cell import (
     AnyPhase,
     Cell,
     Phase,
+    continuous_radii,
     require_compressible,
-    require_continuous,
     require_mesh_size,
-    require_parts,
     require_points,
+    require_solve_arguments,
 )
 from alphacut.rve.cell.outline import Outline, circle, is_round
 from alphacut.rve.fenicsx import MPI, basix, cholesky, fem, mesh_of
@@ -243,9 +243,9 @@ class SlicesModel:
             ConvergenceError: A linear system was not solved.
             RefusedError: A Poisson's ratio is above 0.45, or a radius does not fit.
         """
-        require_parts(radius_map, matrix, inclusions, isotropic=False)
+        require_solve_arguments(radius_map, matrix, inclusions, isotropic=False)
         require_compressible(matrix, *inclusions)
-        fine_radii = require_continuous(radius_map)
+        fine_radii = continuous_radii(radius_map)
         start = perf_counter()
         rule = gauss_rule(radius_map.distribution, points=self.points)
         extremes = [fine_radii.min(), fine_radii.max()]  # for the error in θ

@@ -18,7 +18,6 @@ from alphacut.frame.identify.modes import (
 from alphacut.frame.structures.linear import frequencies
 from alphacut.fuzzy import FuzzyNumber, Interval, Triangular, from_data
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.fuzzy.sets.claimed import ClaimedNumber
 
 FRAME = StoreyFrame([20e3, 15e3, 10e3], [3.0, 2.8, 2.8], 30e9, 3e-4, q0=(0.01, 0.02, 0.03))
 NAMES = ("c1", "c2", "c3")
@@ -36,16 +35,7 @@ def modes_at(chain, points):
     return chain_modes(chain.stiffness * stiffness, chain.mass * mass)
 
 
-def measured(
-    truth: np.ndarray,
-    rng: np.random.Generator,
-    *,
-    records: int = 20,
-    names: tuple[str, ...] = NAMES,
-    modes: tuple[int, ...] = (1, 2),
-    floors: tuple[int, ...] = (1, 2, 3),
-    noise: float = 0.01,
-) -> list[MeasuredMode]:
+def measured(truth, rng, *, names=NAMES, modes=(1, 2), floors=(1, 2, 3), records=20, noise=0.01):
     values, vectors = modes_at(Chain(FRAME, names), truth[None])
     found = []
     for mode in modes:
@@ -77,21 +67,12 @@ def agree(found: Identified, points: np.ndarray, level: float) -> np.ndarray:
     return np.all([(low <= x) & (x <= high) for x, (low, high) in columns], axis=0)
 
 
-def test_frequencies_over_a_box_lie_in_their_ranges_and_reach_them(
-    rng: np.random.Generator,
-) -> None:
-    names = ("E", "c2", "l1", "m3")
-    chain = Chain(FRAME, names)
+def test_ranges_of_frequencies_over_a_box_are_reached_at_its_corners():
+    chain = Chain(FRAME, ("E", "c2", "l1", "m3"))
     lower, upper = np.log([0.9, 0.8, 0.95, 0.7]), np.log([1.1, 1.3, 1.02, 1.4])
-    points = chain.nominal * np.exp(rng.uniform(lower, upper, (200, 4)))
-    low, high = eigenvalue_ranges(chain, lower, upper)
-    found = modes_at(chain, points)[0]
-    assert (found >= low).all()
-    assert (found <= high).all()
-    ends = np.exp(np.where(np.array([1, 1, -1, -1]) > 0, [lower, upper], [upper, lower]))
+    ends = np.exp([[*lower[:2], *upper[2:]], [*upper[:2], *lower[2:]]])
     reached = modes_at(chain, chain.nominal * ends)[0]
-    assert reached[0] == pytest.approx(low, rel=1e-9)
-    assert reached[1] == pytest.approx(high, rel=1e-9)
+    assert reached == pytest.approx(np.array(eigenvalue_ranges(chain, lower, upper)), rel=1e-9)
 
 
 def test_modes_of_the_chain_are_those_of_the_frame():
@@ -102,18 +83,18 @@ def test_modes_of_the_chain_are_those_of_the_frame():
     assert np.sqrt(modes_at(chain, point[None])[0][0]) == pytest.approx(other, rel=1e-10)
 
 
-def test_linear_bounds_hold_for_any_multipliers_and_tell_empty_sets() -> None:
+def test_linear_bounds_hold_for_any_multipliers_and_tell_empty_sets():
     program = LinearRelaxation(4)
     x, y = program.variable(0.0, 2.0), program.variable(-1.0, 3.0)
     z = program.product(x, y)
-    program.require_nonpositive(x + y - program.one)
+    program.add_inequality(x + y - program.one)
     assert program.bounds(z)[0] == pytest.approx(-2.0, abs=1e-9)  # x = 2, y = −1
     assert program.bounds(z)[0] <= -2.0
-    program.require_nonpositive(1.5 * program.one - x - y)
+    program.add_inequality(1.5 * program.one - x - y)
     assert program.bounds(z) == (np.inf, -np.inf)
 
 
-def test_truth_is_covered(rng: np.random.Generator) -> None:
+def test_truth_is_covered(rng):
     inside = []
     for _ in range(8):
         truth = rng.uniform(1.6, 2.4, 3)
@@ -125,13 +106,11 @@ def test_truth_is_covered(rng: np.random.Generator) -> None:
 
 
 @pytest.mark.parametrize("shown", [{}, {"floors": (1, 3)}, {"floors": ()}, {"modes": (2,)}])
-def test_a_box_holds_all_that_agrees_and_is_sharp(
-    rng: np.random.Generator, shown: dict[str, tuple[int, ...]]
-) -> None:
+def test_a_box_holds_all_that_agrees_and_is_sharp(rng, shown: dict[str, tuple[int, ...]]):
     """Frames drawn in a box wider by a tenth: those whose modes agree lie in it and its ranges."""
     prior = {**PRIOR, "c1": Triangular(1.6, 1.9, 2.4)}
     truth = np.array([1.9, 2.1, 2.2])
-    found = identify(FRAME, prior, measured(truth, rng, **shown), alpha=(0.05, 0.5))  # type: ignore[arg-type]
+    found = identify(FRAME, prior, measured(truth, rng, **shown), alpha=(0.05, 0.5))
     predicted, width = found.predictions(), found.upper - found.lower
     for row, level in enumerate(found.alpha):
         ends = found.lower[row] - 0.1 * width[row], found.upper[row] + 0.1 * width[row]
@@ -145,7 +124,7 @@ def test_a_box_holds_all_that_agrees_and_is_sharp(
             assert np.mean(np.ptp(points, axis=0) / width[row]) > 0.6
 
 
-def test_cuts_are_nested_inside_the_priors_and_feed_an_envelope(rng: np.random.Generator) -> None:
+def test_cuts_are_nested_inside_the_priors_and_feed_an_envelope(rng):
     truth = np.array([1.9, 2.1, 2.2])
     prior = {**PRIOR, "c1": Triangular(1.6, 1.9, 2.4)}
     found = identify(FRAME, prior, measured(truth, rng), alpha=(0.05, 0.25, 0.5, 1.0))
@@ -165,8 +144,8 @@ def test_cuts_are_nested_inside_the_priors_and_feed_an_envelope(rng: np.random.G
 
 
 def test_a_common_factor_of_stiffnesses_and_masses_is_not_learned(
-    rng: np.random.Generator,
-) -> None:
+    rng,
+):
     names = (*NAMES, "m1", "m2", "m3")
     nominal = Chain(FRAME, names).nominal
     prior = {name: Interval(0.8 * x, 1.2 * x) for name, x in zip(names, nominal, strict=True)}
@@ -179,7 +158,7 @@ def test_a_common_factor_of_stiffnesses_and_masses_is_not_learned(
     assert max(known.narrowed.values()) < 0.5
 
 
-def test_a_measurement_that_no_such_frame_has_is_refuted(rng: np.random.Generator) -> None:
+def test_a_measurement_that_no_such_frame_has_is_refuted(rng):
     with pytest.raises(RefutedError, match=r"storey frame with such parameters is refuted"):
         identify(FRAME, PRIOR, measured(np.full(3, 4.0), rng))
     modes = measured(np.full(3, 2.0), rng)
@@ -188,19 +167,15 @@ def test_a_measurement_that_no_such_frame_has_is_refuted(rng: np.random.Generato
         identify(FRAME, PRIOR, [first, modes[1]])
 
 
-def test_claimed_priors_are_joined_with_the_measured_claims(rng: np.random.Generator) -> None:
+def test_claimed_priors_are_joined_with_the_measured_claims(rng):
     weighed = from_data(10e3 * (1 + 0.01 * rng.standard_normal(8)), "mean", law="normal")
     prior: dict[str, FuzzyNumber] = {**PRIOR, "m3": weighed}
-    names = (*NAMES, "m3")
-    found = identify(
-        FRAME, prior, measured(np.array([2, 2, 2, 10e3]), rng, names=names), alpha=(0.05,)
-    )
-    rule = found.evidence.joint
-    assert rule is not None
-    assert "m3" in rule.names
-    assert len(rule.names) == 1 + 2 * 3
+    modes = measured(np.array([2, 2, 2, 10e3]), rng, names=(*NAMES, "m3"))
+    found = identify(FRAME, prior, modes, alpha=(0.05,))
+    names = found.evidence.joint.names
+    assert "m3" in names
+    assert len(names) == 1 + 2 * 3
     number = found.numbers["m3"]
-    assert isinstance(number, ClaimedNumber)
     assert number.cut(0.05).width <= found.evidence.cut(weighed, 0.05).width + 1e-9
     with pytest.raises(ValueError, match="which the values decide"):
         number.cut(0.01)
@@ -217,49 +192,31 @@ def identified_from(*modes, prior=PRIOR, alpha=(0.05,)):
 FIRST = MeasuredMode(1, Interval(1, 2))
 NOISE = np.random.default_rng(9).normal(size=(2, 400))
 NOISY = 2 + 0.01 * NOISE[0], dict(enumerate(1 + 0.3 * NOISE, 1))
-KNOWN = {"frequency_deviation": 0.01, "shape_deviation": 0.02}
+KNOWN, NONE = {"frequency_deviation": 0.01, "shape_deviation": 0.02}, {"shape_deviation": 0.0}
+
+
+LEVELS = r"rising in \(0, 1\]"
 
 
 @pytest.mark.parametrize(
     ("make", "message"),
     [
         (modes_like([2.0]), r"frequencies is 1 times 2; .* set frequency_deviation, such"),
-        (
-            modes_like([2.0, 2.1], {1: [0.6, 0.3], 3: [2, 1]}),
-            r"q1/q3 of floor 1 is 2 times 0.3; .* set shape_deviation, such as 0.01$",
-        ),
-        (
-            modes_like([2.0, 2.1], frequency_deviation=0.001),
-            r"frequency_deviation times the mean is 0.00205; .* explain the scatter, 0.07",
-        ),
-        (
-            modes_like([2.0, 2.01], {1: [0.5, 0.51], 2: [1, 1.02]}, shape_deviation=0.0),
-            r"shape_deviation is 0.0; allowed: finite numbers greater",
-        ),
-        (
-            modes_like(*NOISY, shape_deviation=0.3),
-            r"scatter of floor 2 is .*; allowed: .* up to 0.2",
-        ),
+        (modes_like([2.0, 2.1], {1: [0.6, 0.3], 3: [2, 1]}), r"q1/q3 of floor 1 is 2 times 0.3; "),
+        (modes_like([2, 2.1], frequency_deviation=0.001), r"is 0.00205; .* explain the scatter, "),
+        (modes_like([2.0], {1: [0.5], 2: [1]}, **KNOWN | NONE), r"shape_deviation is 0.0; allowed"),
+        (modes_like(*NOISY, shape_deviation=0.3), r"scatter of floor 2 is .*; .* up to 0.2"),
         (modes_like([2.0, 2.1], {1: [1.0]}), r"amplitudes is \[1\]; allowed: 2 of each"),
         (lambda: MeasuredMode(1, Interval(-2, -1)), r"positive values in Hz"),
-        (
-            lambda: replace(FIRST, shape={1: Interval(0, 1)}, reference=1),
-            r"reference is 1; .* beside",
-        ),
+        (lambda: replace(FIRST, shape={1: FIRST}, reference=1), r"reference is 1; .* beside"),
         (identified_from(), r"one or more, rising"),
-        (
-            identified_from(replace(FIRST, mode=4)),
-            r"modes is 4; allowed: modes and floors from 1 to 3",
-        ),
-        (
-            identified_from(FIRST, prior={"c1": Interval(-1, 2)}),
-            r"is -1.*; allowed: positive priors",
-        ),
+        (identified_from(replace(FIRST, mode=4)), r"modes is 4; allowed: modes and floors .* to 3"),
+        (identified_from(FIRST, prior={"c1": Interval(-1, 2)}), r"is -1.*: positive priors"),
         (lambda: Chain(FRAME, ("d1",)), r"parameters is d1; allowed: E, I, c1"),
         (lambda: Chain(FRAME, ("c4",)), r"parameters is c4; allowed: E, I, c1"),
-        (identified_from(FIRST, alpha=(0.0, 0.5)), r"rising in \(0, 1\]"),
-        (identified_from(FIRST, alpha=(0.5, 1.2)), r"rising in \(0, 1\]"),
-        (identified_from(FIRST, alpha=()), r"rising in \(0, 1\]"),
+        (identified_from(FIRST, alpha=(0.0, 0.5)), LEVELS),
+        (identified_from(FIRST, alpha=(0.5, 1.2)), LEVELS),
+        (identified_from(FIRST, alpha=()), LEVELS),
     ],
 )
 def test_what_makes_no_sense_is_refused(make, message):
@@ -268,9 +225,7 @@ def test_what_makes_no_sense_is_refused(make, message):
 
 
 @pytest.mark.parametrize(("count", "share"), [(1, 0.9), (3, -0.6)])
-def test_shapes_of_known_deviation_hold_the_truth_as_often_as_claimed(
-    count: int, share: float
-) -> None:
+def test_shapes_of_known_deviation_hold_the_truth_as_often_as_claimed(count: int, share: float):
     rng, held = np.random.default_rng(count), 0
     for _ in range(125):  # all floors scatter alike, and no scatter of chance is refused
         rows = np.array([[share], [1.0]]) + 0.02 * rng.standard_normal((2, count))
@@ -283,12 +238,11 @@ def test_shapes_of_known_deviation_hold_the_truth_as_often_as_claimed(
     assert 0.84 <= held / 125 <= 0.96
 
 
-def test_a_reference_is_near_the_largest_and_its_size_counts() -> None:
+def test_a_reference_is_near_the_largest_and_its_size_counts():
     """Of known deviations one value is enough."""
-    known = {"frequency_deviation": 0.01, "shape_deviation": 0.02}
-    assert measured_mode(1, [2.0], {1: [1.0], 2: [0.5]}, **known).reference == 1
-    assert measured_mode(1, [2.0], {1: [0.9], 2: [-1], 3: [1], 4: [0.93]}, **known).reference == 4
-    mode = measured_mode(1, [2.0], {1: [-1.0], 2: [0.85]}, **known)
+    assert measured_mode(1, [2.0], {1: [1.0], 2: [0.5]}, **KNOWN).reference == 1
+    assert measured_mode(1, [2.0], {1: [0.9], 2: [-1], 3: [1], 4: [0.93]}, **KNOWN).reference == 4
+    mode = measured_mode(1, [2.0], {1: [-1.0], 2: [0.85]}, **KNOWN)
     assert mode.reference == 2
     ratio = 1 / 0.85  # 2 % of the largest amplitude, over the reference's
     scatter = 0.02 * ratio * np.hypot(1, ratio)  # both amplitudes scatter
@@ -297,7 +251,7 @@ def test_a_reference_is_near_the_largest_and_its_size_counts() -> None:
     assert mode.frequency.cut(0.05) == pytest.approx((1.960801, 2.039199), abs=1e-6)
 
 
-def test_at_level_1_a_prior_that_agrees_is_a_point() -> None:
+def test_at_level_1_a_prior_that_agrees_is_a_point():
     frame = StoreyFrame([1000.0, 1000.0], stiffness=[103510.0, 103510.0])
     values, _ = modes_at(Chain(frame, ("k1", "k2")), np.full((1, 2), 103510.0))
     modes = [

@@ -1,14 +1,12 @@
-"""General Lagrangian systems: order of the schemes, derivatives, energy, agreement with the linear
-path.
-"""
+"""General Lagrangian systems: order of the scheme, derivatives, agreement with linear ones."""
 
 from __future__ import annotations
 
 import pickle
-from typing import Any
 
 import numpy as np
 
+from alphacut.frame import LinearFlow, Midpoint, StoreyFrame
 from alphacut.frame.dynamics.nonlinear import LagrangianFlow
 from alphacut.frame.structures.lagrangian import LagrangianSystem, pendulum
 
@@ -21,7 +19,7 @@ def flow(step: float) -> LagrangianFlow:
     return LagrangianFlow(SWING, NAMES, 4.0, step)
 
 
-def test_error_falls_with_order_2() -> None:
+def test_error_falls_with_order_2():
     truth = flow(0.002).values(POINT)[:, ::100]
     errors = [
         np.abs(flow(h).values(POINT)[:, :: round(0.2 / h)] - truth).max() for h in (0.1, 0.05)
@@ -29,7 +27,7 @@ def test_error_falls_with_order_2() -> None:
     assert abs(np.log2(errors[0] / errors[1]) - 2) < 0.4
 
 
-def test_derivatives_are_those_of_the_scheme() -> None:
+def test_derivatives_are_those_of_the_scheme():
     jet, f = flow(0.05).taylor(POINT), flow(0.05)
     for i in range(3):
         h = 2e-3 * np.eye(3)[i]
@@ -41,17 +39,13 @@ def test_derivatives_are_those_of_the_scheme() -> None:
     assert np.abs(f.values(POINT) - jet.value).max() < 1e-12
 
 
-def test_two_coupled_masses_agree_with_the_linear_integrator() -> None:
-    from alphacut.frame import LinearFlow, Midpoint, StoreyFrame
+def test_two_coupled_masses_agree_with_the_linear_integrator():
+    motion = ((0.3, 0.2), "ground", (0.1, 0.2), (0.0, -1.0))
+    linear = StoreyFrame((2.0, 1.0), (1.0, 1.0), 1.0, 1.0, *motion)
 
-    linear = StoreyFrame(
-        (2.0, 1.0), (1.0, 1.0), 1.0, 1.0, (0.3, 0.2), "ground", (0.1, 0.2), (0.0, -1.0)
-    )
-
-    def lagrangian(q: Any, v: Any, p: Any) -> Any:
-        return (p["m1"] * v[0] ** 2 + v[1] ** 2) / 2 - 24 * p["E"] * (
-            q[0] ** 2 + (q[1] - q[0]) ** 2
-        ) / 2
+    def lagrangian(q, v, p):
+        strains = q[0] ** 2 + (q[1] - q[0]) ** 2
+        return (p["m1"] * v[0] ** 2 + v[1] ** 2) / 2 - 24 * p["E"] * strains / 2
 
     general = LagrangianSystem(
         coordinates=2,
@@ -69,7 +63,7 @@ def test_two_coupled_masses_agree_with_the_linear_integrator() -> None:
     assert np.abs(a.second - b.second).max() < 1e-7
 
 
-def test_the_pendulum_can_be_sent_to_other_processes() -> None:
+def test_the_pendulum_can_be_sent_to_other_processes():
     system, point = pendulum(phi0=0.3), np.array([[0.3]])
     values = LagrangianFlow(system, ("phi_0",), 0.1, 0.01).values(point)
     sent = pickle.loads(pickle.dumps(system))

@@ -23,7 +23,7 @@ MATRIX = MatrixStructure(
 )
 
 
-def test_matrices_and_storeys_give_the_same_trajectories_with_derivatives() -> None:
+def test_matrices_and_storeys_give_the_same_trajectories_with_derivatives():
     point = np.array([[5.2, 2.9]])
     a, b = (
         LinearFlow(system, ("E", "m1"), 4, 0.1, Exact()).taylor(point)
@@ -36,7 +36,7 @@ def test_matrices_and_storeys_give_the_same_trajectories_with_derivatives() -> N
 MASSES, LENGTHS = (10e3, 20e3, 5e3), (3.0, 4.0, 2.5)
 
 
-def test_frequencies_are_those_of_the_chain_of_springs() -> None:
+def test_frequencies_are_those_of_the_chain_of_springs():
     columns = (4.0, 3.0, 1.0)
     k = [12 * c * 25e9 * 1e-5 / length**3 for c, length in zip(columns, LENGTHS, strict=True)]
     stiffness = np.array([[k[0] + k[1], -k[1], 0], [-k[1], k[1] + k[2], -k[2]], [0, -k[2], k[2]]])

@@ -15,7 +15,7 @@ from alphacut.frame.structures.quantities import OF_STOREY_FRAME, of_storey_fram
 FRAME = StoreyFrame((1.0, 2.0), (1.0, 1.0), 1.0, 1.0, q0=(1.0, 0.0))
 
 
-def test_a_given_unit_goes_along_with_the_name() -> None:
+def test_a_given_unit_goes_along_with_the_name():
     tip = Output("q1", "mm")
     for copy in (Output(tip), pickle.loads(pickle.dumps(tip)), deepcopy(tip)):
         assert (copy, copy.unit, type(copy)) == ("q1", "mm", Output)
@@ -28,7 +28,7 @@ def test_a_given_unit_goes_along_with_the_name() -> None:
 
 
 @pytest.mark.parametrize("kind", OF_STOREY_FRAME)
-def test_ranges_are_those_that_a_frame_accepts(kind: str) -> None:
+def test_ranges_are_those_that_a_frame_accepts(kind: str):
     one = of_storey_frame(kind)
     assert not one.admits(0.5, np.inf)
     assert not one.admits(np.nan, 0.5)
@@ -42,10 +42,10 @@ def test_ranges_are_those_that_a_frame_accepts(kind: str) -> None:
         given: object = value if kind in ("E", "I", "zeta") else (value, value)
         refused = pytest.raises(ValueError, match=re.escape(one.range))
         with nullcontext() if one.admits(value, value) else refused:
-            replace(FRAME, **{arguments[kind]: given})  # type: ignore[arg-type]
+            replace(FRAME, **{arguments[kind]: given})
 
 
-def test_names_with_floors_are_parameters_and_directions_of_a_field_are_none() -> None:
+def test_names_with_floors_are_parameters_and_directions_of_a_field_are_none():
     assert of_storey_frame("q2_0").unit == "m"
     assert of_storey_frame("zeta10").range == of_storey_frame("zeta").range
     assert (of_storey_frame("m_1").unit, of_storey_frame("m_1").range) == ("", "")
