@@ -81,10 +81,7 @@ def _structure_figures(results: Results) -> Iterator[Drawing]:
 
 
 def draw_figures(results: Results, store: StageStore, executor: Executor | None) -> list[str]:
-    """Draws all figures as SVG and PNG into figures/, unless stored ones have the same inputs.
-
-    Returns the paths of the files, relative to the folder of the results.
-    """
+    """Draws all figures anew where what they show is new; returns paths in the results' folder."""
     versions = [version_of(name) for name in ("matplotlib", "pyvista")]
     inputs = [results.content, results.answers, sorted(results.fingerprints.values()), *versions]
     compute = partial(draw_all, results, executor)

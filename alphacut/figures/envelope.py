@@ -72,8 +72,7 @@ def draw_error_band(axes: Axes, time: Array, lowest: xarray.Dataset, nature: str
 def time_axes(axes: Axes, time: Array, output: Output) -> None:
     """Axes of an output over time."""
     axes.set(xlim=(time[0], time[-1]), xlabel="time t (s)")
-    name = output.words.removesuffix(f" ({output})")
-    style.prefix_axis(axes, name, output.unit)
+    style.prefix_axis(axes, output.words.removesuffix(f" ({output})"), output.unit)
 
 
 def mapping(results: Results, *, count: int = 40, duration: float = 5.0) -> Figure:

@@ -28,10 +28,7 @@ BOX_WIDTH, PITCH = 2.4, 3.3  # width of a stage's box in Fig. 2, and distance of
 
 
 def domains(cell: Cell, size: float, layers: int) -> Figure:
-    """Fig. 1: physical, stochastic and product domain, from the mesh that is solved.
-
-    `size` is the edge length of the triangles in halves of the cell's side.
-    """
+    """Fig. 1: physical, stochastic and product domain, from a mesh, `size` in half sides."""
     radius = reference_radius(cell.radius_map, cell.outline)
     grid = extrude(size=size, radius=radius, layers=layers, outline=cell.outline)
     points = grid.positions(cell.radius_map)
@@ -134,10 +131,7 @@ CUTS = 6  # levels in Fig. 37
 
 
 def kinds_of_numbers(given: FuzzyNumber, result: FuzzyNumber) -> Figure:
-    """Fig. 36: membership functions of crisp, interval, triangular … numbers, side by side.
-
-    Four are made of the particle's Young's modulus in Pa, `given`; the last is the cell's.
-    """
+    """Fig. 36: five kinds of numbers: four of the particle's E in Pa, `given`, and the cell's E."""
     numbers: dict[str, FuzzyNumber] = {
         "crisp": Crisp(given.nominal),
         "interval": Interval(*given.cut(0.5)),

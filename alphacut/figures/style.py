@@ -15,8 +15,7 @@ from alphacut.io.quantity import MINUS, axis_prefix
 from alphacut.stochastic.figures.style import INK
 
 Colour = tuple[float, float, float, float]
-Look = dict[str, Any]
-"""Keywords of a drawing function of Matplotlib."""
+Look = dict[str, Any]  # keywords of a drawing function of Matplotlib
 
 
 def colours(alpha: Array) -> list[Colour]:

@@ -49,13 +49,12 @@ def identify(
         alpha: Levels, rising within (0, 1].
 
     Raises:
-        RefusedError: An input is no parameter of the natural modes, a mode or floor is not the
-            frame's, or levels do not rise within (0, 1].
+        RefusedError: An input is no parameter of the modes, or a mode, floor or level is not so.
         RefutedError: No parameters in the priors agree with the measurement at the lowest level.
     """
     numbers = {k: x if isinstance(x, FuzzyNumber) else Crisp(float(x)) for k, x in prior.items()}
-    _require_input(frame, measured, numbers, alpha)
     evidence = Evidence(Chain(frame, tuple(numbers)), numbers, tuple(measured))
+    _require_input(evidence, alpha, frame.floors)
     nominal, levels, empty = evidence.chain.nominal, np.asarray(alpha, float), 1.0
     boxes: list[tuple[Array, Array]] = []  # logarithms of parameters over nominal values
     for level in map(float, levels):
@@ -83,13 +82,8 @@ def identify(
     return Identified(evidence, levels, lower, upper, empty)
 
 
-def _require_input(
-    frame: StoreyFrame,
-    measured: Sequence[MeasuredMode],
-    prior: Mapping[str, FuzzyNumber],
-    alpha: Sequence[float],
-) -> None:
-    levels, n_floors = np.append(0.0, alpha), frame.floors
+def _require_input(evidence: Evidence, alpha: Sequence[float], n_floors: int) -> None:
+    levels, measured = np.append(0.0, alpha), evidence.measured
     in_range = len(levels) > 1 and levels[-1] <= 1 and bool((np.diff(levels) > 0).all())
     require(in_range, "identify.alpha", value=list(alpha), allowed="rising in (0, 1]")
     mode_numbers = [mode.mode for mode in measured]
@@ -98,7 +92,7 @@ def _require_input(
     largest = max(x for mode in measured for x in (mode.mode, mode.reference, *mode.shape))
     allowed = f"modes and floors from 1 to {n_floors}"
     require(largest <= n_floors, "identify.modes", value=largest, allowed=allowed)
-    smallest = min(widest_cut(number).lower for number in prior.values())
+    smallest = min(widest_cut(number).lower for number in evidence.prior.values())
     require(smallest > 0, "identify.parameters", value=smallest, allowed="positive priors")
 
 

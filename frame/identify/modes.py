@@ -32,19 +32,14 @@ CHANCE = 1e-6  # probability below which values contradict their deviation
 class Chain:
     """Chain of n masses on springs: a frame of which d parameters are uncertain.
 
-    Args:
-        frame: The frame.
-        names: The parameters, of "E", "I" or "I1" …, "c1" …, "l1" …, "k1" …, "m1" ….
+    They are parameters of stiffness or mass; a frame softened by weights is refused, since its
+    stiffnesses are no products of them.
 
     Attributes:
         nominal: Their nominal values, shape (d,).
         stiffness: Nominal stiffnesses, shape (n,), in N/m.
         mass: Nominal masses, shape (n,), in kg.
         powers: Exponents of the parameters in stiffnesses and masses, shape (2, n, d).
-
-    Raises:
-        RefusedError: A name is no parameter of stiffness or mass, or weights soften the storeys, so
-            that stiffnesses are no products.
     """
 
     def __init__(self, frame: StoreyFrame, names: Sequence[str]) -> None:
@@ -107,8 +102,7 @@ class MeasuredMode:
         reference: The floor whose amplitude is 1; 0 where no shape was measured.
 
     Raises:
-        RefusedError: The mode or a floor is below 1, the frequency may be 0 or less, or the
-            reference floor has an amplitude.
+        RefusedError: A number is below 1, a frequency not positive, or the reference in the shape.
     """
 
     mode: int
@@ -204,8 +198,7 @@ def measured_mode(
 
 def _mean_ratio(ratios: Array, deviation: float | None, what: str, reference: int) -> ClaimedNumber:
     """Mean of amplitude ratios (n,) as a fuzzy number, without the bias of the division."""
-    # `deviation` is that of either amplitude over the reference's mean, if known; `variance` is the
-    # reference's over its squared mean
+    # deviation of either amplitude, if known, and variance of the reference, relative to its mean
     variance = (deviation or 0.0) ** 2
     if deviation is None and len(ratios) > 1:
         variance = float(ratios.var(ddof=1) / (1 + ratios.mean() ** 2))

@@ -109,8 +109,7 @@ class LagrangianSystem:
 class Equations:
     """Symbols and expressions of a system, from its Lagrangian.
 
-    They are coordinates q, velocities v, parameters p by name, momentum ∂L/∂v, push ∂L/∂q + F and
-    mass ∂²L/∂v².
+    They are q, v, parameters p by name, momentum ∂L/∂v, push ∂L/∂q + F and mass ∂²L/∂v².
     """
 
     def __init__(self, system: LagrangianSystem) -> None:

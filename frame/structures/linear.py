@@ -205,18 +205,11 @@ def evaluate(
     derivatives: bool,
     by_ratios: bool = True,
 ) -> tuple[Matrices, Jet]:
-    """A structure's matrices and observation rows at S sets of some parameters.
+    """A structure's matrices and rows C at points (S, d) of d parameters, in SI units.
 
-    Args:
-        system: The structure.
-        names: These d parameters; others keep their nominal values.
-        points: Values, shape (S, d), in SI units.
-        derivatives: Whether to differentiate by `names`, twice.
-        by_ratios: Whether the damping matrix includes the part that is given by ratios of the
-            modes, which needs all modes.
-
-    Returns:
-        The matrices, and C with output = C [q; v], shape (S, m, 2n).
+    Output is C [q; v], C of shape (S, m, 2n). Other parameters keep their nominal values. With
+    `derivatives` all are differentiated by `names`, twice. Without `by_ratios` damping lacks the
+    part that is given by ratios of the modes, which needs all modes.
     """
     fixed = {name: x for name, x in system.parameters.items() if name not in names}
     values = np.hstack([points, np.tile(list(fixed.values()), (len(points), 1))])

@@ -154,12 +154,6 @@ class Force:
         amplitude: In N, of a storey frame the nominal value of its parameter "F" and the floor; of
             a structure from matrices a number, the name of a parameter or a function of them.
         history: f; None for an impulse at t = 0, whose amplitude is in N s ("J" and the floor).
-
-    Example:
-        >>> from alphacut.frame import StoreyFrame
-        >>> fan = Force(3, 800.0, History.harmonic(1.5))
-        >>> StoreyFrame([1e3] * 3, stiffness=[1e6] * 3, loads=[fan]).force_names
-        ('F3',)
     """
 
     at: int | Array

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-OUTPUTS = {
+OUTPUTS = {  # unit and words, by names without the floor
     "q": ("m", "displacement of floor"),
     "v": ("m/s", "velocity of floor"),
     "a": ("m/s^2", "acceleration of floor"),
@@ -15,7 +15,6 @@ OUTPUTS = {
     "shear": ("N", "shear force of storey"),
     **{"base_shear": ("N", ""), "force": ("N", ""), "phi": ("rad", "")},
 }
-"""Unit and words of outputs, by their names without the floor."""
 POSITIVE = "positive"
 NOT_NEGATIVE = "0 or greater"
 RATIO = "0 or greater and below 1, the critical damping"
@@ -86,7 +85,7 @@ class Parameter:
         return bool(np.isfinite([low, high]).all() and above.get(self.range, True))
 
 
-OF_STOREY_FRAME = {
+OF_STOREY_FRAME = {  # units and ranges of a storey frame's parameters, by names without the floor
     "E": ("Pa", POSITIVE),
     "I": ("m^4", POSITIVE),
     "m": ("kg", POSITIVE),
@@ -102,7 +101,6 @@ OF_STOREY_FRAME = {
     "F": ("N", ""),
     "J": ("N*s", ""),
 }
-"""Units and ranges of a storey frame's parameters, by their names without the floor."""
 
 
 def of_storey_frame(name: str) -> Parameter:

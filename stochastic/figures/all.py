@@ -38,11 +38,7 @@ EQUAL = "{} equal discs of the same area fraction, not those of the section"
 
 
 def draw(result: Microstructure, folder: Path) -> dict[str, list[Path]]:
-    """Write every figure of a microstructure as SVG and PNG; return the files of each name.
-
-    Statistics of direct neighbours are of discs of one size at the same area fraction, as in the
-    paper.
-    """
+    """Write every figure of a microstructure as SVG and PNG; return the files of each name."""
     first, source = result.sections[0], result.study.source
     figures: dict[str, Callable[[], Figure]] = {
         "11_radii": partial(draw_radii, result),
@@ -50,7 +46,7 @@ def draw(result: Microstructure, folder: Path) -> dict[str, list[Path]]:
         "13_pbox": partial(draw_pbox, result),
         "radius_map": partial(draw_map, result),
     }
-    if (diagram := first.diagram) is not None:
+    if (diagram := first.diagram) is not None:  # statistics of neighbours are of equal discs
         generator, equal = np.random.default_rng(result.study.seed), _equal_discs(result)
         figures |= {
             "03-04_two_point": partial(draw_two_point, equal, generator),
@@ -126,10 +122,7 @@ def draw_correlation(result: Microstructure, equal: Apollonius) -> Figure:
 
 
 def draw_areas(result: Microstructure) -> Figure:
-    """Draw the area or volume of each cell over its reduced radius r_n (Fig. 12).
-
-    Lines show the limits of r_n, a hatched band where a particle would leave its cell.
-    """
+    """Draw the size of each cell over its reduced radius r_n, and its limits (Fig. 12)."""
     figure, axes = plt.subplots()
     shape, (low, high) = result.study.shape, result.limits
     for section in result.sections:
@@ -141,8 +134,8 @@ def draw_areas(result: Microstructure) -> Figure:
         axes.axvline(limit, color=BLUE, lw=1)
     bound, unit = shape.largest, {2: "mm²", 3: "mm³"}[shape.dimensions]
     axes.axvspan(bound, bound + 0.07, facecolor="none", edgecolor=GREY, hatch="///", lw=0)
-    text = f"{shape.particles[:-1]} larger\nthan its cell "
-    axes.text(bound, axes.get_ylim()[1], text, ha="right", va="top", color=GREY)
+    text, top = f"{shape.particles[:-1]} larger\nthan its cell ", axes.get_ylim()[1]
+    axes.text(bound, top, text, ha="right", va="top", color=GREY)
     axes.set(xlabel=REDUCED, ylabel=f"{shape.cells} of the cell [{unit}]", xlim=(0, bound + 0.07))
     share = f"{100 * result.share_within:.2f} % of the {shape.cells}"
     axes.set_title(f"limits {low:.4g} and {high:.4g} contain {share}")
@@ -150,23 +143,19 @@ def draw_areas(result: Microstructure) -> Figure:
 
 
 def draw_pbox(result: Microstructure) -> Figure:
-    """Draw the distribution function of r_n, its bootstrap band and the p-box (Fig. 13).
-
-    The lower panel shows the differences from the fitted map.
-    """
+    """Draw the distribution of r_n, its bootstrap band and p-box, also less the fit (Fig. 13)."""
     size, ratios = (6.4, 5.6), (3, 1.4)
     figure, panels = plt.subplots(2, 1, figsize=size, height_ratios=ratios, sharex=True)
     axes, residual_axes = panels
     table = to_dataset(result)
     radius, cdf = table["r_n"].values, table["cdf"].values
     low, high = np.maximum(cdf - result.band, 0), np.minimum(cdf + result.band, 1)
-    band_label = f"band of ± {result.band:.2g}"
-    cells_label = f"{len(result.truncated.values)} cells"
+    cells, band_label = len(result.truncated.values), f"band of ± {result.band:.2g}"
     for panel, base in ((axes, 0 * cdf), (residual_axes, table["fitted"].values)):
         scale = 1 if panel is axes else 100
         edges = scale * (low - base), scale * (high - base)
         panel.fill_between(radius, *edges, fc=PALE, label=band_label)
-        panel.plot(radius, scale * (cdf - base), color=BLUE, label=cells_label)
+        panel.plot(radius, scale * (cdf - base), color=BLUE, label=f"{cells} cells")
         for name, label in (("pbox_upper", "p-box"), ("pbox_lower", None)):
             panel.plot(radius, scale * (table[name] - base), color=INK, lw=1, label=label)
     axes.set(ylabel=f"{result.study.shape.cells}-weighted share", ylim=(0, 1.02))
@@ -282,11 +271,9 @@ def draw_neighbours(discs: Particles) -> Figure:
 
 
 def draw_two_point(discs: Particles, generator: np.random.Generator) -> Figure:
-    """Draw why the distribution of pair distances does not describe a packing (Figs. 3, 4).
-
-    Left others drawn independently with the packing's pair distances: they overlap. Right the true
-    discs within the same distance; only direct neighbours (green) touch the centre's cell.
-    """
+    """Draw why the distribution of pair distances does not describe a packing (Figs. 3, 4)."""
+    # left discs drawn independently with the packing's pair distances: they overlap; right its own
+    # discs within the same distance, of which only direct neighbours (green) touch the central cell
     reach, radius = 3.5 * discs.spacing, float(discs.radii[0])
     centre = int(np.argmin(np.hypot(*(discs.centres - discs.size / 2).T)))
     indices = np.arange(len(discs), dtype=np.intp)
