@@ -24,7 +24,7 @@ from alphacut.case.parse import ParsedCase, parse
 from alphacut.case.structure import Frame, MaterialDamping, Pendulum, Structure
 from alphacut.case.types import require_alone
 from alphacut.fuzzy import FuzzyNumber
-from alphacut.fuzzy.refused import RefusedError, require
+from alphacut.fuzzy.refused import RefusedError, require, require_choice
 
 
 class Content(CellContent):
@@ -170,7 +170,8 @@ class Content(CellContent):
             computed = r"E|zeta\d*"
         stated = [name for name in study.fuzzy if not re.fullmatch(computed, name)]
         structure.inputs(stated, f"{key}.fuzzy")  # refuses unknown and crisp ones
-        structure.require_outputs(f"{key}.figures", study.figures)
+        for output in study.figures:
+            require_choice(f"{key}.figures", output, structure.outputs)
         envelope.require_steps(f"{key}.duration", study.duration)
 
 

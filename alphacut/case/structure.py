@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Annotated, Any, Literal, cast
@@ -144,21 +144,16 @@ class Structure:
             for member in self.fuzzy_members(name, key)
         }
 
-    def require_outputs(self, key: str, names: Iterable[str]) -> None:
-        """Refuses outputs that are not observed."""
-        for name in names:
-            require_choice(key, name, self.outputs)
-
     def require_quantities(self, key: str, names: Sequence[str]) -> None:
         """Refuses outputs that the model cannot have, though it need not observe them."""
-        if self.frame is None:
-            self.require_outputs(key, names)
-            return
-        try:
-            for name in names:
+        for name in names:
+            if self.frame is None:
+                require_choice(key, name, self.outputs)
+                continue
+            try:
                 self.frame.quantity(name)
-        except RefusedError as error:
-            raise RefusedError(key, error.value, error.allowed) from None
+            except RefusedError as error:
+                raise RefusedError(key, error.value, error.allowed) from None
 
     def model_with_outputs(
         self, key: str, outputs: tuple[str, ...]

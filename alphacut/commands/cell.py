@@ -32,25 +32,15 @@ from alphacut.stages.cell import (
     require_tolerance,
 )
 
-KEYS = {
-    "--a2": ("radius.a2", "slope of the radius at the lower end of θ"),
-    "--a4": ("radius.a4", "slope of the radius at the upper end"),
-    "--inclusion-modulus": ("cell.inclusion_modulus", "as '80 GPa'"),
-    "--method": ("modulus.method", "prism, slices, series or auto"),
-}
-"""Options that change a key of the case, each with its key and help."""
 PLANE_INDICES = "126"
 """Of Voigt: 11, 22 and 12."""
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds the options of `alphacut cell`; those of `KEYS` are short for ``--set KEY=VALUE``."""
+    """Adds the options of `alphacut cell`."""
     add_common(parser)
-    for option, (key, about) in KEYS.items():
-        as_change = f"{key}={{}}".format
-        parser.add_argument(
-            option, dest="set", action="append", type=as_change, metavar="VALUE", help=about
-        )
+    change, about = "modulus.method={}".format, "prism, slices, series or auto; short for --set"
+    parser.add_argument("--method", dest="set", action="append", type=change, help=about)
     parser.add_argument(
         "--export", metavar="FILE", help="mesh, displacements, stresses: .msh, .vtu, .xdmf, .inp"
     )

@@ -151,13 +151,9 @@ def test_waveforms_give_the_same_samples(tmp_path, file_format):
 
 
 def test_cosmos_with_numbers_that_touch(tmp_path):
-    text = written.cosmos(names=("1: 90 deg",), width=15)
-    touching = written.lines(100 * written.G * written.samples(), "10.4f", 8).replace(
-        "\n  ", "\n  "
-    )
-    start = text.index("(5E15.7)\n") + len("(5E15.7)\n")
-    end = text.index("End-of-data")
-    text = text[:start].replace("Format=(5E15.7)\n", "Format=(8F10.4)\n") + touching + text[end:]
+    head, _, further = written.cosmos(names=("1: 90 deg",), width=15).partition("(5E15.7)\n")
+    touching = written.lines(100 * written.G * written.samples(), "10.4f", 8)
+    text = f"{head}(8F10.4)\n{touching}{further[further.index('End-of-data') :]}"
     record = read_recording(saved(tmp_path, text))
     assert record.samples == pytest.approx(written.G * written.samples(), abs=1e-6)
 
