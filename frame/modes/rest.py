@@ -268,8 +268,8 @@ def coupling_bounds(
             added[:, o] += np.minimum(*bounds)
             # of the block, or at most twice what its coupling adds within the step
             force = loads[source].extremes[0] if source in loads else 0.0
-            in_step = _within_steps(response.largest, time, force, fastest, order)
-            slope = response_slopes(source, *in_step, low_omega, most)
+            G, G_slope = _within_steps(response.largest, time, force, fastest, order)
+            slope = response_slopes(source, G, G_slope, low_omega, most)
             straying = np.outer(response.line_deviation, size[s, o])
             deviation[:, o] += np.minimum(straying, 2 * np.outer(slope, by_slope[s, o]))
     return added, deviation, ends
