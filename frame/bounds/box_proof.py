@@ -138,7 +138,8 @@ class Hull:
         closed: Proved upper bounds of closed boxes, shape (A, T, m, 2).
         inner: Largest reached values, the same shape.
         at: Their inputs, shape (A, T, m, 2, n), in SI units.
-        least: Lower bound of each output's least peak, shape (A, m).
+        least_lower: Lower bound of each output's least peak over time, shape (A, m).
+        least_upper: Peak over time of a motion that peaks low, the same shape.
         facts: Numbers by name.
     """
 
@@ -149,7 +150,7 @@ class Hull:
         self.closed, self.inner = np.full((2, *shape), -np.inf)
         self.at = np.zeros((*shape, len(names)))
         self.between, self.attained_error = np.zeros((2, *shape[1:3]))
-        self.least, self.least_reached = np.full((2, levels, outputs), np.inf)
+        self.least_lower, self.least_upper = np.full((2, levels, outputs), np.inf)
         self.facts: dict[str, float] = {"parts": 0}
 
     def incumbent(self, level: int) -> Array:
@@ -167,9 +168,7 @@ class Hull:
         self.between = np.maximum(self.between, bounds.between)
         self.attained_error = np.maximum(self.attained_error, bounds.attained_error)
         if bounds.least_peaks is not None:
-            self.least_reached[level] = np.minimum(
-                self.least_reached[level], bounds.least_peaks.upper
-            )
+            self.least_upper[level] = np.minimum(self.least_upper[level], bounds.least_peaks.upper)
         for name, value in bounds.facts.items():
             earlier = self.facts.get(name, 0)
             self.facts[name] = earlier + value if name in ADDED else max(earlier, value)
@@ -188,7 +187,7 @@ class Hull:
             excess = np.nanmax(np.where(is_wrong, inner - outer, np.nan))
             what = f"attained bounds of {output} lie outside the proved ones by {excess:.3g}"
             raise FailedError(f"the proof is wrong: {what}", "keep the case and report it")
-        least_reached = self._least_reached(outer)
+        least_upper = self._least_upper(outer)
         error = (outer - inner).max(-1)
         largest = np.maximum(np.abs(outer).max((1, 3)), 1e-300)
         # the gap of an output at rest is judged by what the motion's energy allows
@@ -208,8 +207,8 @@ class Hull:
             inner=Ends(-inner[..., 0], inner[..., 1]),
             between=self.between,
             least_peaks=Ends(
-                np.maximum.accumulate(self.least, axis=0),
-                np.minimum.accumulate(least_reached[::-1], axis=0)[::-1],
+                np.maximum.accumulate(self.least_lower, axis=0),
+                np.minimum.accumulate(least_upper[::-1], axis=0)[::-1],
             ),
             attained_error=self.attained_error if self.attained_error.any() else None,
             evaluations=int(facts.pop("evaluations", inner.size)),
@@ -218,9 +217,9 @@ class Hull:
             notes=(*notes,),
         )
 
-    def _least_reached(self, outer: Array) -> Array:
+    def _least_upper(self, outer: Array) -> Array:
         """Peak over time of a motion of each level that peaks low, shape (A, m)."""
-        reached = self.least_reached
+        reached = self.least_upper
         for level, output in np.argwhere(~np.isfinite(reached)):
             # without a better one: the motion that is smallest where all motions are largest
             node, side = divmod(int(outer[level, :, output].argmin()), 2)

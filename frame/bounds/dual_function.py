@@ -169,9 +169,9 @@ def dual_value(
 ) -> float:
     """Value D(μ) of the dual function at multipliers μ (Z,), without constants and cubic parts.
 
-    Written are a subgradient (Z,) and `u` (L,), the inputs of the second maximum. `cell` (K, 4)
-    holds the first and last point along ω and along q at which each mode's table is read. |μ| and
-    data are at most `LARGEST`.
+    Written are a subgradient (Z,) and `u` (L,), the inputs that maximise the part over the box.
+    `cell` (K, 4) holds the first and last point along ω and along q = g/ω at which each mode's
+    table is read. |μ| and data are at most `LARGEST`.
     """
     modes, sources = data.share.shape
     gradient[:] = 0.0
@@ -271,15 +271,18 @@ def minimise(
 ) -> float:
     """Minimise the dual function D(μ) by deflected subgradient steps; return an upper bound.
 
-    The direction is the subgradient with a part of the last direction where these oppose one
+    D(μ) = Σ_k max over a cell of mode k's table + max over inputs u in [−1, 1]^L + Σ |μ| R bounds
+    side × output at a node for any multipliers μ of the modes' intervening variables z(u). The
+    direction is the subgradient with a part of the last direction where these oppose one
     another (Camerini, Fratta, Maffioli 1975). Its length aims at a value of D that is expected
     (Polyak 1969); less is expected after `patience` steps without a third of it. The bound is the
     least D that is met, with that of the Taylor models' cubic parts.
 
     At most `steps` values of D are taken; it ends at `target`, and D cannot fall below
-    `model_value`. Written are the best multipliers `mu` (Z,), from which it begins; `disagreement`
-    (Z,), |μ_z| times the distance of variable z between the two maxima of D, a mean that fades; and
-    `u` (L,), the inputs of the second maximum for the best multipliers.
+    `model_value`, which motions of the model reach. Written are the best multipliers `mu` (Z,),
+    from which it begins; `u` (L,), the inputs of the second maximum for them; and `disagreement`
+    (Z,): |μ_z| times the distance of variable z where the table's maximum is from z(u), a mean over
+    the steps with weights that fall by 0.8.
     """
     gradient, direction, best = np.empty(len(mu)), np.zeros(len(mu)), mu.copy()
     here = np.empty(len(u))

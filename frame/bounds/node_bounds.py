@@ -179,14 +179,14 @@ def halve_cell(cells: Cells, halved: int, count: int) -> bool:
 @loops
 def model_and_gradient(u: Array, node: int, side: float, data: Data, gradient: Array) -> float:
     """Side × output in the model at inputs u (L,), without its constants; `gradient` is written."""
-    bilinear, weight = np.empty(data.quadratic.shape[1]), np.zeros(len(data.linear))
+    bilinear, slopes = np.empty(data.quadratic.shape[1]), np.zeros(len(data.linear))
     products(u, bilinear)
-    total = response_and_gradient(u, node, side, data, weight)
+    total = response_and_gradient(u, node, side, data, slopes)
     gradient[:] = 0.0
     quadratic = np.zeros(len(bilinear))  # of the linearised response, packed by rows i ≤ j
-    for a in range(len(weight)):
-        add(gradient, weight[a], data.linear[a])
-        add(quadratic, weight[a], data.quadratic[a])
+    for a in range(len(slopes)):
+        add(gradient, slopes[a], data.linear[a])
+        add(quadratic, slopes[a], data.quadratic[a])
     for s in range(len(data.truncated_linear)):  # truncated modes
         wave = side * data.truncated_response[s, node]
         total += wave * (
@@ -204,16 +204,16 @@ def model_and_gradient(u: Array, node: int, side: float, data: Data, gradient: A
 
 
 @loops
-def response_and_gradient(u: Array, node: int, side: float, data: Data, weight: Array) -> float:
+def response_and_gradient(u: Array, node: int, side: float, data: Data, slopes: Array) -> float:
     """Sum of the modes' responses, side × output, in the model at inputs u (L,).
 
-    `weight` (Z,) is written: its gradient by all scaled intervening variables.
+    `slopes` (Z,) is written: its gradient by all scaled intervening variables.
     """
     bilinear, z = np.empty(data.quadratic.shape[1]), np.empty(len(data.linear))
     products(u, bilinear)
     for v in range(len(z)):
         z[v] = dot(data.linear[v], u) + dot(data.quadratic[v], bilinear)
-    weight[:] = 0.0
+    slopes[:] = 0.0
     total, width, sources = 0.0, int(data.points[0]), data.share.shape[1]
     for k in range(len(data.share)):  # by bilinear interpolation in the table of mode k
         first = k * (2 + sources)  # of its variables: ω, g and amplitudes
@@ -232,9 +232,9 @@ def response_and_gradient(u: Array, node: int, side: float, data: Data, weight: 
             across = side * ((1 - x) * (c - a) + x * (f - b)) / data.step[k, 1]
             amplitude = data.share[k, s] + data.reach[k, s] * z[first + 2 + s]
             total += amplitude * value
-            weight[first] += amplitude * (along - across * g / w**2) * data.radius[k, 0]
-            weight[first + 1] += amplitude * across / w * data.radius[k, 1]
-            weight[first + 2 + s] = value * data.reach[k, s]
+            slopes[first] += amplitude * (along - across * g / w**2) * data.radius[k, 0]
+            slopes[first + 1] += amplitude * across / w * data.radius[k, 1]
+            slopes[first + 2 + s] = value * data.reach[k, s]
     return total
 
 

@@ -45,7 +45,7 @@ class SubBox:
         levels: Which of all levels these are.
         peaks: Peaks of (−output, output) that are not fathomed, shape (L, m, 2).
         outer: Upper bounds of (−output, output) that are known, shape (L, T, m, 2).
-        least: Lower bounds of each output's least peak over time, shape (L, m).
+        least_lower: Lower bounds of each output's least peak over time, shape (L, m).
         is_wide: Levels on which bounds are worth little at any node, shape (L,).
         work: Fraction of all work that it is expected to take, with its halves.
         done: Completed fraction of its own bounds.
@@ -55,7 +55,7 @@ class SubBox:
     levels: list[int]
     peaks: Mask
     outer: Array
-    least: Array
+    least_lower: Array
     is_wide: Mask
     work: float = 1.0
     done: float = 0.0
@@ -64,7 +64,9 @@ class SubBox:
         """Copy on some levels, given by their rows, with the ends of `boxes` if given."""
         boxes = self.boxes.on_levels(rows) if boxes is None else boxes
         levels, peaks, outer = [self.levels[k] for k in rows], self.peaks[rows], self.outer[rows]
-        return SubBox(boxes, levels, peaks, outer, self.least[rows], self.is_wide[rows], self.work)
+        return SubBox(
+            boxes, levels, peaks, outer, self.least_lower[rows], self.is_wide[rows], self.work
+        )
 
     def bisected(self, axis: int) -> list[SubBox]:
         """Both halves along an input, each with the levels that reach it."""
@@ -215,9 +217,9 @@ class Queue:
             needed = goal.needed[k]
             box.outer[k][needed] = np.minimum(box.outer[k], bounds.outer)[needed]
             # |output| is at least −outer at any node, on either side; so is its peak over time
-            box.least[k] = np.maximum(box.least[k], -box.outer[k].min((0, 2)))
+            box.least_lower[k] = np.maximum(box.least_lower[k], -box.outer[k].min((0, 2)))
             if bounds.least_peaks is not None:
-                box.least[k] = np.maximum(box.least[k], bounds.least_peaks.lower)
+                box.least_lower[k] = np.maximum(box.least_lower[k], bounds.least_peaks.lower)
 
     def _abandon(self, box: SubBox, answers: Sequence[Answer]) -> None:
         """Abandon peaks whose gaps bisections are not expected to close.
@@ -273,7 +275,8 @@ class Queue:
                 continue
             if box.is_wide[k]:  # from here on the level's open peaks alone are bounded
                 box.is_wide[k] = False
-                self.hull.least[level] = np.minimum(self.hull.least[level], box.least[k])
+                hull = self.hull
+                hull.least_lower[level] = np.minimum(hull.least_lower[level], box.least_lower[k])
             self.hull.close(level, box.peaks[k] & ~is_open, box.outer[k])
             box.peaks[k] = is_open
 

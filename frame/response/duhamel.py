@@ -246,7 +246,7 @@ def _with_sine(
 def _respond_at_nodes(
     sigma: Array, load: LinearPieces, orders: Orders, length: int, out: Array, error: Array
 ) -> None:
-    """Write ρ of each σ (S,) to `out` (1 + len(orders), T, S), in windows of `length` nodes."""
+    """Write ρ(σ; t) at all T nodes, and its first derivatives by σ, to `out` (1 + …, T, S)."""
     for s in prange(len(sigma)):
         factors = _propagators(sigma[s], load.offsets)
         for node in range(0, max(len(load.interval) - 1, 1), length):
@@ -261,7 +261,7 @@ def _respond_at_nodes(
 def _respond_at_given(
     sigma: Array, load: LinearPieces, orders: Orders, node: Ints, out: Array, error: Array
 ) -> None:
-    """Write ρ of each row of σ (S, n) at the row's node to `out` (1 + len(orders), S, n)."""
+    """Write ρ(σ; t) of each row of σ (S, n) at its own node, and derivatives by σ, to `out`."""
     for s in prange(len(sigma)):
         here = slice(node[s], node[s] + 1)
         offsets = load.offsets[load.offset[node[s]] : load.offset[node[s]] + 1]
