@@ -51,7 +51,7 @@ def truth():
     """Lower and upper ends over a fine grid of every cut."""
     ends = {}
     for name, (function, inputs) in PROBLEMS.items():
-        steps = 201 if len(inputs) == 3 else 1001
+        steps = 151 if len(inputs) == 3 else 1001
         axes = [[np.linspace(*x.cut(a), steps) for x in inputs.values()] for a in levels(4)]
         values = [function(*np.meshgrid(*own, indexing="ij", sparse=True)) for own in axes]
         ends[name] = np.array([[v.min(), v.max()] for v in values]).T
