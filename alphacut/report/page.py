@@ -109,20 +109,20 @@ class Page:
 
         A piece is the name of a macro of the template, and what the macro shows.
         """
-        summary, of = self.summary, self._pieces
+        summary, show = self.summary, self._pieces
         refuted = [summary.update.refuted] if isinstance(summary.update, RefutedResult) else []
         shares = [SHARES] if summary.shares else []
         plots: list[Piece] = [("plot",)] if summary.envelopes else []
         for title, pieces in (
             ("Key results", self._key_pieces()),
-            ("Microstructure", of(["pbox", "p-box"], self._particles(), folded="radius_map")),
-            ("How stiff is the material?", of(["modulus"], self._references(), folded="modulus")),
-            ("How stiff is the image?", of(["image"], self._image(), folded="image")),
-            ("What do the measured modes teach?", of(["update-inputs"], refuted, "update")),
-            ("How does the structure move?", [*plots, *of([], self._motion(), folded="peaks")]),
-            ("How far does it move under each record?", of([], folded="records")),
-            *((x.title, of([x.key], [x.words()], x.key)) for x in summary.answers),
-            ("What drives the width?", of([], shares, "shares")),
+            ("Microstructure", show(["pbox", "p-box"], self._particles(), folded="radius_map")),
+            ("How stiff is the material?", show(["modulus"], self._references(), folded="modulus")),
+            ("How stiff is the image?", show(["image"], self._image(), folded="image")),
+            ("What do the measured modes teach?", show(["update-inputs"], refuted, "update")),
+            ("How does the structure move?", [*plots, *show([], self._motion(), folded="peaks")]),
+            ("How far does it move under each record?", show([], folded="records")),
+            *((x.title, show([x.key], [x.words()], x.key)) for x in summary.answers),
+            ("What drives the width?", show([], shares, "shares")),
             ("Terms", [("glossary", TERMS.items())]),
             ("More", self._more()),
         ):
