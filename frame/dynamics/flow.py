@@ -316,7 +316,7 @@ def exact_flow(flow: object) -> LinearFlow:
     """Return a flow unchanged if it is the exact motion of a linear structure.
 
     Raises:
-        UnprovedError: The system is not linear, or the integrator is not the exact one.
+        UnprovedError: It is not.
     """
     if not isinstance(flow, LinearFlow):
         raise UnprovedError("the system is not linear")

@@ -58,25 +58,15 @@ Orders = tuple[int, ...]
 
 
 class LinearPieces(NamedTuple):
-    """A load up to the last of some nodes, and where these lie.
+    """A load up to the last of T nodes, in I intervals between its samples; times in s."""
 
-    Args:
-        first: Load at the beginning of each interval between samples, shape (I,).
-        last: Load at its end.
-        step: Length of an interval, in s.
-        interval: Interval in which each node lies, rising, shape (T,).
-        offsets: Different times from an interval's beginning to a node in it, shape (P,), in s.
-        offset: Which of them is each node's, shape (T,).
-        time_rounding: Rounding of each node's time since its interval began, shape (T,), in s.
-    """
-
-    first: Array
-    last: Array
-    step: float
-    interval: Ints
-    offsets: Array
-    offset: Ints
-    time_rounding: Array
+    first: Array  # load at the beginning of each interval, (I,)
+    last: Array  # load at its end, (I,)
+    step: float  # length of an interval
+    interval: Ints  # in which each node lies, rising, (T,)
+    offsets: Array  # distinct times from an interval's beginning to a node in it, (P,)
+    offset: Ints  # which of them is each node's, (T,)
+    time_rounding: Array  # rounding of each node's time since its interval began, (T,)
 
 
 def linear_pieces(history: History, time: Array) -> LinearPieces:
@@ -200,13 +190,9 @@ def _divided(history: History, parts: int) -> History:
 
 
 def require_in_range(sigma: Array, step: float, duration: float) -> None:
-    """Refuse exponents σ (1/s) whose responses are not computed to round-off.
+    """Raise UnprovedError for exponents σ (1/s) whose responses are not computed to round-off.
 
     They are integrated over intervals of length `step` and may grow over `duration`, in s.
-
-    Raises:
-        UnprovedError: An exponent is not finite, |σ h| passes `MAX_PHASE`, or exp(σ t) grows by
-            more than exp(`MAX_GROWTH`).
     """
     phase = float(np.abs(sigma).max(initial=0.0)) * step
     growth = float(sigma.real.max(initial=-np.inf)) * duration

@@ -34,15 +34,8 @@ class LoadTable:
     R that arises in the window of t_j is Σ_i moment[j, i] x^i with x = (λ − middle) / scale; what
     earlier windows leave behind goes on as exp(λ (t_j − their end)).
 
-    Args:
-        history: a, the load.
-        time: Nodes, shape (T,), in s.
-        middle: λ in the middle of the box.
-        spread: What it strays by over the box at most, in 1/s.
-
-    Attributes:
-        truncation: Bound of what the series leave out of R, as a share of ∫ |a(s)| exp(Re λ (t −
-            s)) ds.
+    The load is a, and λ strays from `middle` by `spread` in 1/s at most. What the series leave out
+    of R is at most `truncation` times ∫ |a(s)| exp(Re λ (t − s)) ds.
 
     Raises:
         UnprovedError: Phases change by more than `REACH` over the box within a step.

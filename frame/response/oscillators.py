@@ -54,16 +54,12 @@ class ModalResponses:
     """Responses of oscillators on a grid of W frequencies and Q quotients g/ω at T nodes.
 
     Args:
-        omega: Frequencies, shape (W,), in rad/s.
-        quotient: g/ω, shape (Q,).
         value: Responses, shape (T, Q, W).
         error: Bound of their distance from bilinear interpolation, with rounding, shape (T,).
         line_deviation: Bound of their distance from a straight line in the step to each node, (T,).
         largest: Bounds of |G| and |G'| over the grid, shape (2, T).
     """
 
-    omega: Array
-    quotient: Array
     value: Array
     error: Array
     line_deviation: Array
@@ -96,11 +92,7 @@ def grid_over(
 class Oscillators:
     """Analytic functions ρ and exp(σ t) on a grid, from which all responses are read.
 
-    Args:
-        grid: Points of the oscillators.
-        loads: The loads by name.
-        time: Nodes, shape (T,), in s.
-        orders: Derivatives of the motion that are read.
+    Nodes `time` (T,) are in s, and `orders` the derivatives of the motion that are read.
     """
 
     def __init__(
@@ -142,7 +134,7 @@ class Oscillators:
         error, largest = self._error(np.abs(G).max(-1), bounds, order, start=is_start)
         error, deviation = error + rounding.max(-1), self._line_deviation(source, order)
         table = value.reshape(shape)
-        return ModalResponses(grid.omega, grid.quotient, table, error, deviation, largest)
+        return ModalResponses(table, error, deviation, largest)
 
     def _error(
         self, largest: Array, bounds: Array, order: int, *, start: bool

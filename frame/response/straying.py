@@ -33,19 +33,12 @@ MAX_ENTRIES = 1_000_000
 
 
 class Pieces(NamedTuple):
-    """Pieces of time in which a load is a line.
+    """P pieces of time in which a load is a line."""
 
-    Args:
-        time: Their ends, shape (P + 1,), in s; nodes are among them.
-        first: The load at the beginning of each, shape (P,).
-        last: The load at the end of each.
-        bend: Bound of how far it strays from the line between.
-    """
-
-    time: Array
-    first: Array
-    last: Array
-    bend: Array
+    time: Array  # their ends, (P + 1,), in s; nodes are among them
+    first: Array  # the load at the beginning of each, (P,)
+    last: Array  # the load at the end of each
+    bend: Array  # bound of how far it strays from the line between
 
 
 def line_deviations(
@@ -63,13 +56,9 @@ def line_deviations(
         sigma: Points −g + iω of a grid over q = g/ω and ω that covers the oscillators, (Q, W).
         load: The load; None for ρ = exp(σ t).
         time: Nodes, shape (T,), in s.
-        orders: Powers of σ.
+        orders: Powers of σ; the result has for each bounds in the step to each node, (2, T).
         is_force: Whether the load itself is added to the imaginary part of order 2.
-        at_nodes: ρ with two derivatives at the nodes, its rounding, and bounds of its derivatives,
-            where they are known.
-
-    Returns:
-        For each order bounds in the step to each node, shape (2, T).
+        at_nodes: ρ with two derivatives, its rounding, bounds of its derivatives, where known.
     """
     omega, quotient = sigma[0].imag, -sigma[:, 0].real / sigma[:, 0].imag
     low, fast, decay = float(omega.min()), float(np.abs(sigma).max()), float(-sigma.real.max())
