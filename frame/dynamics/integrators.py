@@ -36,17 +36,11 @@ SINE_POINTS = 16
 
 @dataclass(frozen=True, eq=False)
 class StepMap:
-    """x[k+1] = T x[k] + G load[k] with x = [q; v].
+    """x[k+1] = T x[k] + G load[k] with x = [q; v]."""
 
-    Args:
-        transfer: T, shape (S, 2n, 2n).
-        load: G, shape (S, 2n, L).
-        loads: What G acts on in each step, shape (steps, L).
-    """
-
-    transfer: Jet
-    load: Jet
-    loads: Array
+    transfer: Jet  # T, (S, 2n, 2n)
+    load: Jet  # G, (S, 2n, L)
+    loads: Array  # what G acts on in each step, (steps, L)
 
 
 @dataclass(frozen=True)

@@ -44,21 +44,13 @@ SMALL = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """p modes over the box as one invariant subspace; vectors are rows.
+    """p modes over the box as one invariant subspace; vectors are rows."""
 
-    Args:
-        modes: Their numbers from below, from 0, rising, shape (p,).
-        rate: Lᵀ: K x_j = Σ_i rate_ji M x_i, shape (p, p), in 1/s².
-        shape: x_j, shape (p, n).
-        mass_shape: M x_j, shape (p, n).
-        norm: N, x_iᵀ M x_j, shape (p, p).
-    """
-
-    modes: Ints
-    rate: TaylorModel
-    shape: TaylorModel
-    mass_shape: TaylorModel
-    norm: TaylorModel
+    modes: Ints  # their numbers from below, from 0, rising, (p,)
+    rate: TaylorModel  # Lᵀ: K x_j = Σ_i rate_ji M x_i, (p, p), in 1/s²
+    shape: TaylorModel  # x_j, (p, n)
+    mass_shape: TaylorModel  # M x_j, (p, n)
+    norm: TaylorModel  # N, x_iᵀ M x_j, (p, p)
 
     @property
     def relative_error(self) -> float:
@@ -79,19 +71,12 @@ class Block:
 
 @dataclass(frozen=True, eq=False)
 class CentredMatrices:
-    """M and K over the box in coordinates in which its middle has both diagonal.
+    """M and K over the box in coordinates in which its middle has both diagonal."""
 
-    Args:
-        mass: M, shape (n, n), as functions of the inputs that M and K depend on.
-        stiffness: K, the same.
-        basis: Displacements are basis @ x, shape (n, n).
-        modes: Number of modes; the other coordinates, which follow, have no mass.
-    """
-
-    mass: TaylorModel
-    stiffness: TaylorModel
-    basis: Array
-    modes: int
+    mass: TaylorModel  # M, (n, n), as functions of the inputs that M and K depend on
+    stiffness: TaylorModel  # K, the same
+    basis: Array  # displacements are basis @ x, (n, n)
+    modes: int  # number of modes; the other coordinates, which follow, have no mass
 
     @property
     def squared(self) -> Array:
@@ -290,18 +275,12 @@ class Comparison:
     With B = D^-½ A D^-½ and J = diag ±1, as A_jj is positive or negative, (J y)·B y has no part of
     the blocks that join rows with A_jj > 0 to those with A_jj < 0. So |B y| ≥ least |y| where no
     eigenvalue of either block, the second with its sign turned, falls below `least`.
-
-    Args:
-        distance: D = |A_jj| in the middle of the box, shape (n,).
-        spread: Bound of |A − A(0)|, shape (n, n).
-        inverse: Of the comparison matrix, a bound of |A⁻¹|; None where there is none.
-        least: Bound of both blocks of J B from below.
     """
 
-    distance: Array
-    spread: Array
-    inverse: Array | None
-    least: float
+    distance: Array  # D = |A_jj| in the middle of the box, (n,)
+    spread: Array  # bound of |A − A(0)|, (n, n)
+    inverse: Array | None  # of the comparison matrix, a bound of |A⁻¹|; None where there is none
+    least: float  # bound of both blocks of J B from below
 
     @classmethod
     def over_box(cls, matrix: TaylorModel) -> Comparison:

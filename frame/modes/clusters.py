@@ -29,24 +29,16 @@ SWEEPS = 12
 
 @dataclass(frozen=True, eq=False)
 class Subspaces:
-    """Enclosed blocks of a structure over its box.
+    """Enclosed blocks of a structure over its box."""
 
-    Args:
-        blocks: Blocks, of functions of the inputs at `used`.
-        used: Inputs that mass and stiffness depend on.
-        centre: Mass and stiffness in the coordinates of the blocks.
-        low: Least λ of all modes by number from below, shape (modes,), in 1/s².
-        high: Greatest.
-        variation: Bounds of how far M and K fall below M(0) and K(0), as shares of these.
-        along: Input whose bisection parts the closest pair that is not enclosed; None if all are.
-    """
-
-    blocks: list[Block]
-    used: Ints
-    centre: CentredMatrices
-    low: Array
-    high: Array
+    blocks: list[Block]  # functions of the inputs at `used`
+    used: Ints  # inputs that mass and stiffness depend on
+    centre: CentredMatrices  # mass and stiffness in the coordinates of the blocks
+    low: Array  # least λ of all modes by number from below, (modes,), in 1/s²
+    high: Array  # greatest
+    # bounds of how far M and K fall below M(0) and K(0), as shares of these
     variation: tuple[float, float]
+    # input whose bisection parts the closest pair that is not enclosed; None if all are
     along: int | None
 
     @property

@@ -35,30 +35,18 @@ class DampedStructure:
     Coordinates are those in which the middle of the box has M = 1 and K = diag(ω²). What moves it
     are S sources: the start, then a unit impulse of the ground and of each history of forces. Each
     starts the motion by K q(0) = static and M q̇(0) = impulse.
-
-    Args:
-        mass: M, shape (N, N).
-        damping: D without the damping by a ratio, shape (N, N).
-        stiffness: K, shape (N, N).
-        ratio: ζ of all modes, which adds 2 ζ M √(M⁻¹K) to D; None without one.
-        omega: ω, rising, shape (N,), in rad/s.
-        static: Forces of the sources, shape (N, S).
-        impulse: Impulses of the sources, shape (N, S).
-        rows: What outputs take of [q, q̇], without the damping by a ratio, shape (m, 2N).
-        reading: What outputs take of forces, as accelerations do, shape (m, N).
-        feeds: What a unit of each history of forces adds to outputs at once, shape (m, H); None if
-            nothing.
     """
 
-    mass: TaylorModel
-    damping: TaylorModel
-    stiffness: TaylorModel
-    ratio: TaylorModel | None
-    omega: Array
-    static: TaylorModel
-    impulse: TaylorModel
-    rows: TaylorModel
-    reading: TaylorModel
+    mass: TaylorModel  # M, (N, N)
+    damping: TaylorModel  # D without the damping by a ratio, (N, N)
+    stiffness: TaylorModel  # K, (N, N)
+    ratio: TaylorModel | None  # ζ of all modes, which adds 2 ζ M √(M⁻¹K) to D; None without one
+    omega: Array  # ω, rising, (N,), in rad/s
+    static: TaylorModel  # forces of the sources, (N, S)
+    impulse: TaylorModel  # impulses of the sources, (N, S)
+    rows: TaylorModel  # what outputs take of [q, q̇], without the damping by a ratio, (m, 2N)
+    reading: TaylorModel  # what outputs take of forces, as accelerations do, (m, N)
+    # what a unit of each history of forces adds to outputs at once, (m, H); None if nothing
     feeds: TaylorModel | None
 
     @classmethod
@@ -126,19 +114,12 @@ class DampedStructure:
 
 @dataclass(frozen=True, eq=False)
 class DampedModes:
-    """Polynomials of n modes of a structure with S sources, N unknowns, m outputs.
+    """Polynomials of n modes of a structure with S sources, N unknowns, m outputs."""
 
-    Args:
-        rate: λ_k, Im λ_k > 0, shape (n,), in 1/s.
-        shape: φ_k of each source, shape (S, n, N).
-        velocity: w_k ≈ λ_k φ_k, shape (S, n, N).
-        share: C_k ≈ the outputs of [φ_k, w_k], shape (S, n, m).
-    """
-
-    rate: TaylorModel
-    shape: TaylorModel
-    velocity: TaylorModel
-    share: TaylorModel
+    rate: TaylorModel  # λ_k, Im λ_k > 0, (n,), in 1/s
+    shape: TaylorModel  # φ_k of each source, (S, n, N)
+    velocity: TaylorModel  # w_k ≈ λ_k φ_k, (S, n, N)
+    share: TaylorModel  # C_k ≈ the outputs of [φ_k, w_k], (S, n, m)
 
     @classmethod
     def of_structure(cls, structure: DampedStructure, chosen: Ints) -> DampedModes:

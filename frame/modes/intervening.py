@@ -39,23 +39,14 @@ Excitation = tuple[Mapping[str, History], Array, Sequence[str]]
 
 @dataclass(frozen=True, eq=False)
 class Oscillator:
-    """Intervening variables of one mode, or of one diagonal entry of a block.
+    """Intervening variables of one mode, or of one diagonal entry of a block."""
 
-    Args:
-        omega: ω, a scalar, in rad/s.
-        decay: g, a scalar, in 1/s.
-        quotient: g/ω, a scalar.
-        share: c, shape (sources, m).
-        omega_range: Least and greatest ω.
-        quotient_range: Least and greatest g/ω.
-    """
-
-    omega: TaylorModel
-    decay: TaylorModel
-    quotient: TaylorModel
-    share: TaylorModel
-    omega_range: Ends
-    quotient_range: Ends
+    omega: TaylorModel  # ω, a scalar, in rad/s
+    decay: TaylorModel  # g, a scalar, in 1/s
+    quotient: TaylorModel  # g/ω, a scalar
+    share: TaylorModel  # c, (sources, m)
+    omega_range: Ends  # least and greatest ω
+    quotient_range: Ends  # least and greatest g/ω
 
     @property
     def models(self) -> list[TaylorModel]:
@@ -76,19 +67,12 @@ class Oscillator:
 
 @dataclass(frozen=True, eq=False)
 class BlockShares:
-    """What a block takes from the sources and gives to the outputs, without the outputs' factors.
+    """What a block takes from sources and gives to outputs, without the outputs' factors."""
 
-    Args:
-        block: The block, in the inputs of the shares.
-        read: a, shape (p, m).
-        source_forces: Xᵀ M v, shape (p, sources).
-        participation: β = N⁻¹ Xᵀ M v, shape (p, sources).
-    """
-
-    block: Block
-    read: TaylorModel
-    source_forces: TaylorModel
-    participation: TaylorModel
+    block: Block  # in the inputs of the shares
+    read: TaylorModel  # a, (p, m)
+    source_forces: TaylorModel  # Xᵀ M v, (p, sources)
+    participation: TaylorModel  # β = N⁻¹ Xᵀ M v, (p, sources)
 
     @classmethod
     def from_block(

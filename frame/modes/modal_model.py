@@ -32,25 +32,15 @@ Waves = tuple[Array, Array, Array]
 
 @dataclass(frozen=True, eq=False)
 class ModalModel:
-    """Trajectories over the unit box from polynomials in the parameters.
+    """Trajectories over the unit box from polynomials in the parameters."""
 
-    Args:
-        flow: The motion that it stands for.
-        boxes: The inputs' boxes.
-        structure: The structure over the widest of them.
-        modes: Its modes.
-        eigenvalue: λ_k, polynomials without remainders, shape (n,), in 1/s.
-        coefficient: C_k of the free motion, the same, shape (n, m).
-        loads: Responses to the loads, and what these add to outputs at once.
-    """
-
-    flow: LinearFlow
-    boxes: Boxes
-    structure: DampedStructure
-    modes: DampedModes
-    eigenvalue: TaylorModel
-    coefficient: TaylorModel
-    loads: tuple[LoadTables, ...]
+    flow: LinearFlow  # the motion that it stands for
+    boxes: Boxes  # the inputs' boxes
+    structure: DampedStructure  # the structure over the widest of them
+    modes: DampedModes  # its modes
+    eigenvalue: TaylorModel  # λ_k, polynomials without remainders, (n,), in 1/s
+    coefficient: TaylorModel  # C_k of the free motion, the same, (n, m)
+    loads: tuple[LoadTables, ...]  # responses to the loads, and what these add to outputs at once
 
     @classmethod
     def from_modes(

@@ -36,19 +36,14 @@ MAX_NODES = 500
 
 @dataclass(frozen=True, eq=False)
 class MotionModels:
-    """A structure's motion over a box.
+    """A structure's motion over a box."""
 
-    Args:
-        oscillators: Oscillators, one a mode that is enclosed.
-        truncated: Modes that are known by sums: those of a block, and all that are not enclosed.
-        added: Bound of what couples the oscillators of blocks, shape (T, m).
-        line_deviation: Bound of how far what blocks of several modes add strays from straight
-            lines between nodes, shape (T, m).
-    """
-
-    oscillators: list[Oscillator]
+    oscillators: list[Oscillator]  # one for each mode that is enclosed
+    # modes that are known by sums: those of a block, and all that are not enclosed
     truncated: list[TruncatedModes]
-    added: Array
+    added: Array  # bound of what couples the oscillators of blocks, (T, m)
+    # bound of how far what blocks of several modes add strays from straight lines between nodes,
+    # (T, m)
     line_deviation: Array
 
     def within(self, low: Array, high: Array) -> MotionModels:

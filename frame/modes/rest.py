@@ -50,20 +50,13 @@ MAX_POINTS = 120
 
 @dataclass(frozen=True, eq=False)
 class TruncatedModes:
-    """Modes that are known by sums.
+    """Modes that are known by sums."""
 
-    Args:
-        share: C, shape (sources, m).
-        amplitude: Bound of √(A B), shape (sources, m).
-        middle: Middle of the responses that the share is multiplied by, shape (sources, m, T).
-        half: Half their range, that the amplitude is multiplied by.
-        line_deviation: Bound of the motion's distance from straight lines between nodes, (T, m).
-    """
-
-    share: TaylorModel
-    amplitude: TaylorModel
-    middle: Array
-    half: Array
+    share: TaylorModel  # C, (sources, m)
+    amplitude: TaylorModel  # bound of √(A B), (sources, m)
+    middle: Array  # middle of the responses that the share is multiplied by, (sources, m, T)
+    half: Array  # half their range, that the amplitude is multiplied by
+    # bound of the motion's distance from straight lines between nodes, (T, m)
     line_deviation: Array
 
     @property

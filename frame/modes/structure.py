@@ -19,32 +19,20 @@ from alphacut.fuzzy.arrays import Array, Ints
 
 @dataclass(frozen=True, eq=False)
 class Classical:
-    """A structure over a box of d inputs, n unknowns, m outputs.
+    """A structure with classical modes over a box of d inputs; n unknowns, m outputs."""
 
-    Args:
-        mass: M, shape (n, n).
-        stiffness: K, shape (n, n).
-        rows: What outputs take of the displacements, shape (m, n).
-        factor: What they are multiplied by, shape (m,).
-        order: Which derivative of the motion they take it of, shape (m,); of order 2 with the
-            ground's acceleration added.
-        start: Initial displacements and velocities, shape (2, n).
-        pattern: ι, how the unknowns move with the ground, shape (n,).
-        forced: M⁻¹ b of each history of forces by its name, shape (n,).
-        rayleigh: a and b, shape (2,).
-        ratio: ζ_k of the modes by rising frequency, shape (modes,), none of massless unknowns.
-    """
-
-    mass: TaylorModel
-    stiffness: TaylorModel
-    rows: Array
-    factor: TaylorModel
+    mass: TaylorModel  # M, (n, n)
+    stiffness: TaylorModel  # K, (n, n)
+    rows: Array  # what outputs take of the displacements, (m, n)
+    factor: TaylorModel  # what they are multiplied by, (m,)
+    # which derivative of the motion they take it of, (m,); of order 2 with the ground's
+    # acceleration added
     order: Ints
-    start: TaylorModel
-    pattern: Array
-    rayleigh: TaylorModel
-    ratio: TaylorModel
-    forced: dict[str, TaylorModel]
+    start: TaylorModel  # initial displacements and velocities, (2, n)
+    pattern: Array  # ι, how the unknowns move with the ground, (n,)
+    rayleigh: TaylorModel  # a and b, (2,)
+    ratio: TaylorModel  # ζ_k of the modes by rising frequency, (modes,), none of massless unknowns
+    forced: dict[str, TaylorModel]  # M⁻¹ b of each history of forces by its name, (n,)
 
 
 def classical_structure(system: LinearSystem, parameters: Mapping[str, TaylorModel]) -> Classical:

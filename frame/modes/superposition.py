@@ -35,31 +35,18 @@ ENTRY_ROUNDINGS = 8
 
 @dataclass(frozen=True, eq=False)
 class Modal:
-    """Modes of a structure at S points, with bounds of what rounding leaves of the pencil.
+    """Modes of a structure at S points, with bounds of what rounding leaves of the pencil."""
 
-    Args:
-        squared: λ, shape (S, n), rising, in 1/s².
-        sigma: Exponents −g + iω, shape (S, n), in 1/s.
-        is_alike: Whether all modes of a point have one ratio of damping, shape (S,).
-        shape: Displacements of the modes, of unit mass, shape (S, n, n).
-        share: c of each source, by its name, shape (S, n).
-        share_error: Bounds of their rounding.
-        stiffness_error: G, shape (S, n, n).
-        mass_error: |F|, shape (S, n, n).
-        rows: Rows of all outputs on the state, shape (S, m, 2 n).
-        structure: The structure over the box.
-    """
-
-    squared: Array
-    sigma: Array
-    is_alike: Mask
-    shape: Array
-    share: dict[str, Array]
-    share_error: dict[str, Array]
-    stiffness_error: Array
-    mass_error: Array
-    rows: Array
-    structure: Classical
+    squared: Array  # λ, (S, n), rising, in 1/s²
+    sigma: Array  # exponents −g + iω, (S, n), in 1/s
+    is_alike: Mask  # whether all modes of a point have one ratio of damping, (S,)
+    shape: Array  # displacements of the modes, of unit mass, (S, n, n)
+    share: dict[str, Array]  # c of each source, by its name, (S, n)
+    share_error: dict[str, Array]  # bounds of their rounding
+    stiffness_error: Array  # G, (S, n, n)
+    mass_error: Array  # |F|, (S, n, n)
+    rows: Array  # rows of all outputs on the state, (S, m, 2 n)
+    structure: Classical  # the structure over the box
 
     @property
     def sigma_slope(self) -> Array:
@@ -138,19 +125,12 @@ def _residual(shape: Array, matrix: Array, diagonal: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class LoadAtNodes:
-    """Responses ρ of oscillators to a load, each row at a node.
+    """Responses ρ of oscillators to a load, each row at a node."""
 
-    Args:
-        rho: ρ and its derivative ρ′ by σ, shape (2, N, n).
-        error: Bounds of the rounding of ρ, shape (N, n).
-        impulse: Bound of |ρ| at any σ that does not grow, ∫ |f| up to the node, shape (N,).
-        value: f, shape (N,).
-    """
-
-    rho: Array
-    error: Array
-    impulse: Array
-    value: Array
+    rho: Array  # ρ and its derivative ρ′ by σ, (2, N, n)
+    error: Array  # bounds of the rounding of ρ, (N, n)
+    impulse: Array  # bound of |ρ| at any σ that does not grow, ∫ |f| up to the node, (N,)
+    value: Array  # f, (N,)
 
 
 def load_at_nodes(

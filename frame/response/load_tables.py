@@ -66,19 +66,12 @@ class LoadTable:
 
 @dataclass(frozen=True, eq=False)
 class LoadTables:
-    """Tables of all modes, made when they are first read.
+    """Tables of all modes, made when they are first read."""
 
-    Args:
-        history: a, the load.
-        time: Nodes, shape (T,), in s.
-        rate: λ_k over the unit box, polynomials, shape (n,).
-        share: What one unit of R_k puts into the outputs, polynomials, shape (n, m).
-    """
-
-    history: History
-    time: Array
-    rate: TaylorModel
-    share: TaylorModel
+    history: History  # a, the load
+    time: Array  # nodes, (T,), in s
+    rate: TaylorModel  # λ_k over the unit box, polynomials, (n,)
+    share: TaylorModel  # what one unit of R_k puts into the outputs, polynomials, (n, m)
 
     @cached_property
     def tables(self) -> list[LoadTable]:

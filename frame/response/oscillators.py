@@ -51,19 +51,13 @@ MAX_POINTS = (240, 8)
 
 @dataclass(frozen=True, eq=False)
 class ModalResponses:
-    """Responses of oscillators on a grid of W frequencies and Q quotients g/ω at T nodes.
+    """Responses of oscillators on a grid of W frequencies and Q quotients g/ω at T nodes."""
 
-    Args:
-        value: Responses, shape (T, Q, W).
-        error: Bound of their distance from bilinear interpolation, with rounding, shape (T,).
-        line_deviation: Bound of their distance from a straight line in the step to each node, (T,).
-        largest: Bounds of |G| and |G'| over the grid, shape (2, T).
-    """
-
-    value: Array
-    error: Array
+    value: Array  # responses, (T, Q, W)
+    error: Array  # bound of their distance from bilinear interpolation, with rounding, (T,)
+    # bound of their distance from a straight line in the step to each node, (T,)
     line_deviation: Array
-    largest: Array
+    largest: Array  # bounds of |G| and |G'| over the grid, (2, T)
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,16 +188,11 @@ def feedthrough(source: str, loads: Mapping[str, History], order: int, time: Arr
 
 @dataclass(frozen=True, eq=False)
 class Ranges:
-    """Bounds of λ^κ e at nodes, each of shape (powers, sources, T).
+    """Bounds of λ^κ e at nodes, each of shape (powers, sources, T)."""
 
-    Args:
-        low: Lower bounds.
-        high: Upper bounds.
-        line_deviation: Bounds of how far λ^κ e strays from a straight line in the step to a node.
-    """
-
-    low: Array
-    high: Array
+    low: Array  # lower bounds
+    high: Array  # upper bounds
+    # bounds of how far λ^κ e strays from a straight line in the step to a node
     line_deviation: Array
 
 
