@@ -50,11 +50,13 @@ def figure_style() -> Iterator[None]:
 def save(figure: Figure, stem: Path) -> list[Path]:
     """Write a figure to STEM.svg and STEM.png, close it, and return the two paths."""
     stem.parent.mkdir(parents=True, exist_ok=True)
+    for _ in range(2):  # the second layout knows where the first put axes of equal scale
+        figure.draw_without_rendering()
+    figure.set_layout_engine("none")
     files = []
     for kind in ("svg", "png"):
         partial, file = (stem.with_name(f"{stem.name}{x}.{kind}") for x in (".partial", ""))
         figure.savefig(partial, metadata={"Date": None} if kind == "svg" else None)
         files.append(partial.replace(file))
-        figure.set_layout_engine("none")  # laid out once, for both files
     plt.close(figure)
     return files
