@@ -280,6 +280,7 @@ def test_spheres_take_the_same_way_and_keep_their_fraction(tmp_path):
     assert "13_pbox" in draw(result, tmp_path)
 
 
+@pytest.mark.slow
 def test_the_papers_data_as_described(tmp_path, capsys):
     options = ["--discs", "200", "--packings", "5", "--out", str(tmp_path)]
     paper_data.main(options)
