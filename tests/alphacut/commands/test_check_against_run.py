@@ -158,7 +158,7 @@ def test_check_refuses_a_proof_of_a_schemes_motion(place, capfd):
     assert "a proof is of the exact one" in capfd.readouterr().err
 
 
-EACH = 100
+EACH = 60
 ODD = [
     "", "nan", "-inf", "1e309", "1_0", "٣", "[[", "]", '"', "\u0000", "\u001b[2J", "x" * 10_000,
     "{a = 1}", "true", "9" * 400, "../..", "−", "1e-320", "[1, [2, [3]]]", "\ud83d",

@@ -5,7 +5,8 @@ import threading
 
 import pytest
 
-from alphacut.io.files import whole_file, write_text
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.io.files import locked, whole_file, write_text
 
 
 def test_a_link_stays_and_its_target_is_replaced(tmp_path):
@@ -37,17 +38,7 @@ def test_a_file_that_fails_leaves_the_old_one(tmp_path):
     assert path.read_text(encoding="utf-8") == "old"
 
 
-def test_devices_may_be_named_for_output(tmp_path):
-    from alphacut.io.files import require_writable
-
-    require_writable("--json", str(tmp_path / "a.json"), folder=False)
-    require_writable("--json", "/dev/null", folder=False)
-
-
 def test_a_second_run_into_the_same_folder_is_refused_while_the_first_writes(tmp_path):
-    from alphacut.fuzzy.refused import RefusedError
-    from alphacut.io.files import locked
-
     place = tmp_path / "out"
     with locked("--out", place), pytest.raises(RefusedError, match="another run is writing into"):
         locked("--out", place).__enter__()

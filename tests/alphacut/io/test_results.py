@@ -197,16 +197,6 @@ def test_a_manifest_lists_no_file_outside(tmp_path):
     assert (tmp_path / "precious").exists()
 
 
-def test_a_name_damaged_in_the_manifest_of_a_linked_folder_costs_a_computation(finished, tmp_path):
-    case, out, _ = finished
-    shutil.copytree(out, tmp_path / "out")
-    (tmp_path / "link").symlink_to(tmp_path / "out")
-    manifest = tmp_path / "out" / "manifest.json"
-    manifest.write_text(manifest.read_text().replace("modulus.nc", "modulur.nc"))
-    assert run(case, tmp_path / "link", "--no-figures") == 0
-    assert numbers(tmp_path / "out")["modulus"] == numbers(out)["modulus"]
-
-
 def test_fresh_does_not_use_a_store_that_it_may_not_remove(finished, tmp_path, capfd):
     case, out, _ = finished
     copy = tmp_path / "out"
