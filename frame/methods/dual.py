@@ -39,6 +39,7 @@ can be proved."""
 WORK_OF_PASSES = 0.0, 0.05, 0.75, 1.0
 """Fractions of the work at which the passes over all nodes begin and end, about."""
 Problems = dict[tuple[int, int], OutputBounds]
+"""Bounds of an output on a side, by their indices."""
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,9 @@ The same idea as `graph_follower` (storage, Taylor models, tolerance, post-proce
 around: instead of one node after the other, every round asks the models of the best graphs at all
 nodes, takes the proposal of largest predicted gain in each window of time, and advances these
 graphs together as arrays. Nodes before and after a discovery profit alike, which is what backward
-sweeps are for; the points spread at the start look for basins independently of any model. Peaks,
-which are read more than other nodes, are followed to a smaller gain.
+sweeps are for; the points spread at the start look for basins independently of any model. With many
+inputs basins are also looked for among crossings: optima of some nodes with a few inputs of others.
+Peaks, which are read more than other nodes, are followed to a smaller gain.
 """
 
 from __future__ import annotations
@@ -147,6 +148,11 @@ class ImprovedFollower:
             models = _LevelModels(
                 storage, box, self._limit(flow), asked if asked is None else asked[level]
             )
+            if done:  # what a narrower box reaches
+                models.sampled[:], models.sampled_at[:] = (
+                    out.bounds[level + 1],
+                    out.points[level + 1],
+                )
             models.explore(explored)
             for crossing in range(1 + CROSSINGS * (has_crossings and len(explored) > 1)):
                 if crossing:
@@ -160,9 +166,16 @@ class ImprovedFollower:
                         models.predict(storage.add(chunk))
                         tick(min(1.0, (len(storage) - first) / max(1, limit - first)))
                     points = models.proposals(limit - len(storage))
+            # optima of the models that are not worth a graph are worth their values
+            if has_crossings and (models.predicted > storage.top).any():
+                targets = np.unique(models.target[models.predicted > storage.top], axis=0)
+                models.explore(targets)
+                out.evaluations += len(targets)
             # post-processing of the level
-            out.bounds[level], out.points[level] = storage.top, storage.points[storage.best]
-            out.predicted_gain[level] = np.maximum(models.gains, 0.0)
+            better, best_points = models.sampled > storage.top, storage.points[storage.best]
+            out.bounds[level] = np.maximum(models.sampled, storage.top)
+            out.points[level] = np.where(better[..., None], models.sampled_at, best_points)
+            out.predicted_gain[level] = np.maximum(models.predicted - out.bounds[level], 0.0)
         out.evaluations += len(storage)
         return out
 

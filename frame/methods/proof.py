@@ -185,14 +185,9 @@ def bound_levels(
 
     The narrowest level comes first, whose best points are good ones of the wider levels too.
 
-    Args:
-        model: The modal model.
-        model_error: Bound of its distance from the exact motion, shape (T, m).
-        scale: Unit of the gap for each output, shape (m,).
-        gap: Wanted difference between proved and reached bound.
-        budget: Most boxes for each bound, on average.
-        workers: Threads.
-        progress: Called with the completed fraction.
+    `model_error` (T, m) bounds the model's distance from the exact motion. `gap` is the wanted
+    difference of proved and reached bounds in units of `scale` (m,), `budget` the most boxes for a
+    bound, on average.
 
     Raises:
         BisectionError: The gap is not above twice the model error and rounding.

@@ -266,13 +266,11 @@ def _within_steps(upper: Array, between: Array) -> Array:
 def variables(
     points: Array, motions: Sequence[LinearMotion]
 ) -> dict[str, tuple[tuple[str, ...], Array]]:
-    """Return dataset variables with inputs (S, n) and matrices of the first of S structures.
-
-    As many are stored as keep three matrices each within `MAX_NUMBERS`. The numbers of a force's
-    course are its sample count and its fields after the samples.
-    """
+    """Return dataset variables with inputs (S, n) and matrices of the first of S structures."""
+    # as many as keep three matrices each within the limit
     count = max(1, min(len(motions), MAX_NUMBERS // (3 * motions[0].mass.size)))
     first, courses = motions[0], motions[0].courses
+    # of each course the number of samples, and the fields after these
     numbers = np.array([[len(x.samples), *x[1:]] for x in courses], float)
     samples = np.concatenate([np.zeros(0), *(x.samples for x in courses)])
     return {
