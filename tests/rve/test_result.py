@@ -152,12 +152,6 @@ def test_shear_along_the_fibres_is_dual_and_dilute():
     assert thin[0] / shear == pytest.approx(1 + 2 * np.pi / 4 * 0.01**2 * 3 / 5, rel=1e-7)
 
 
-def test_without_a_cell_there_are_no_constants():
-    result = SeriesModel().solve(PAPER, MATRIX, [PARTICLE])[0]
-    with pytest.raises(RefusedError, match="round particles and two isotropic phases"):
-        fibre_constants(replace(result, cell=None))
-
-
 @pytest.mark.parametrize("part", [0, 1, 2])
 @pytest.mark.parametrize(("matrix", "inclusion"), PAIRS)
 def test_an_error_of_the_plane_is_declared_for_all_that_follows(matrix, inclusion, part):

@@ -121,11 +121,6 @@ def test_outputs_must_agree_between_samples():
         run(changing)
 
 
-def test_a_function_of_arrays_that_reduces_them_is_run_by_points():
-    reduced = run(lambda a, b: (a * b).max(), vectorised=True)
-    assert bits(reduced) == bits(run(lambda a, b: a * b))
-
-
 def test_progress_never_falls_and_ends_at_one():
     shares = []
     propagate(model, INPUTS, Automatic(), progress=shares.append)

@@ -69,15 +69,6 @@ def test_the_search_finds_the_brute_force_bounds(problem, truth):
     assert result.evaluations == len(result.samples.points)
 
 
-@pytest.mark.parametrize("scale", [1e-13, 1e13])
-def test_the_unit_of_an_output_does_not_matter(scale):
-    function, inputs = PROBLEMS["inside"]
-    one = propagate(function, inputs, vectorised=True)
-    other = propagate(lambda **x: scale * function(**x), inputs, vectorised=True)
-    np.testing.assert_allclose(np.array(other.bounds()) / scale, one.bounds(), rtol=1e-6)
-    assert other.nature == one.nature
-
-
 def test_eight_inputs_of_stated_signs_are_proved_by_their_corners():
     inputs = {f"x{i}": Triangular(0.5, 1.0, 2.0) for i in range(8)}
     knowledge = Knowledge(dict.fromkeys(inputs, 1), source="a product of positive factors")

@@ -106,12 +106,6 @@ def test_refuses_touching_particles_with_the_error():
         square_stiffness(np.array([0.5, 0.99999]), MATRIX, [Phase(20)])
 
 
-@pytest.mark.parametrize("radius", [-0.1, 1.0, np.nan])
-def test_refuses_a_radius_outside_the_cell(radius):
-    with pytest.raises(RefusedError):
-        square_stiffness(np.array([0.5, radius]), MATRIX, [MATRIX])
-
-
 @pytest.mark.parametrize("model", [SeriesModel(), SeriesModel(points=40), SlicesModel()])
 def test_a_map_that_jumps_is_refused(model):
     with pytest.raises(RefusedError, match=r"r at θ = 0.29.* is 0.40.* and 0.70.* side by side"):
