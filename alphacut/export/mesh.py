@@ -46,7 +46,7 @@ def draw_mesh(cell: Cell, mesh: Mesh, path: Path) -> bool:
         command = ["xvfb-run", "-a", *command]
     with tempfile.TemporaryDirectory() as folder, whole_file(path) as partial:
         file = Path(folder) / "mesh.npz"
-        np.savez(file, **prism_mesh(cell, mesh))
+        np.savez(file, **_prism_mesh(cell, mesh))
         words = [*command, str(file), str(partial)]
         process = subprocess.run(words, capture_output=True, text=True, check=False)
         if process.returncode or not partial.is_file():
@@ -55,7 +55,7 @@ def draw_mesh(cell: Cell, mesh: Mesh, path: Path) -> bool:
     return True
 
 
-def prism_mesh(cell: Cell, mesh: Mesh) -> dict[str, Any]:
+def _prism_mesh(cell: Cell, mesh: Mesh) -> dict[str, Any]:
     """The mesh of a case: points (n, 3), cells (m, 15) in VTK's order and phase (m,)."""
     from alphacut.rve.mesh.columns import extrude
     from alphacut.rve.mesh.prism_grid import reference_radius
