@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import cumulative_trapezoid
 
-from alphacut.frame import Accelerogram, Exact, LinearFlow, Midpoint, StoreyFrame
+from alphacut.frame import Accelerogram, Exact, LinearFlow, StoreyFrame
 from alphacut.frame.bounds.branch_and_bound import Frontier, enclosed, examine_items
 from alphacut.frame.bounds.kernel import stays_below
 from alphacut.frame.bounds.model_error import (
@@ -22,7 +22,6 @@ from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.methods.proof import bound_levels
 from alphacut.frame.modes.modal_model import ModalModel
 from alphacut.frame.response.duhamel import responses_at_nodes
-from alphacut.frame.verification.step_error import MARGIN, step_error
 from alphacut.fuzzy import Interval
 
 PULSE = Accelerogram(0.37, np.array([1.0, 1.0, 1.0, 1.0, 1.0, 1.0]))
@@ -221,15 +220,3 @@ def test_concave_bound_is_that_of_the_curvature_it_adds() -> None:
     for shown in (stays_below, stays_below.py_func):  # compiled, and as it is read
         assert shown(g, H, low, high, 8.01, work, L)
         assert not shown(g, H, low, high, 0.49, work, L)
-
-
-def test_an_error_of_time_stepping_does_not_fall_after_it_was_seen() -> None:
-    """Beats bring two motions together again; the estimate keeps what it was before."""
-    frame = StoreyFrame((1.0,), (1.0,), 1 / 24, 1.0, q0=(1.0,))
-    flow = LinearFlow(frame, ("E",), 40.0, 0.5, Midpoint())
-    cuts = boxes({"E": Interval(0.999 / 24, 1.001 / 24)}, (0,))
-    raw = flow.deviations(cuts.nominal[None])[1][0]
-    error = step_error(UnitFlow(flow, cuts))
-    assert (np.diff(raw, axis=0) < 0).any()
-    assert (np.diff(error, axis=0) >= 0).all()
-    assert (error >= MARGIN * np.maximum.accumulate(raw, axis=0) * (1 - 1e-9)).all()

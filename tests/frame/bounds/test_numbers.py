@@ -84,9 +84,3 @@ def test_models_that_are_not_finite_are_refused(wrong):
 def test_a_descent_ends_before_its_multipliers_overflow(gain):
     mu, gradient = np.zeros(2), np.array([1e-6, 0.0])
     assert not subgradient_step(mu, gradient, np.zeros(2), gain, 1e-9)
-
-
-def test_a_descent_goes_on_with_ordinary_multipliers():
-    mu = np.zeros(2)
-    assert subgradient_step(mu, np.array([1.0, 0.5]), np.zeros(2), 0.1, 1e-9)
-    assert mu == pytest.approx([-0.08, -0.04])

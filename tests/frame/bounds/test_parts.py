@@ -160,14 +160,6 @@ def test_progress_rises_in_parts_and_within_them():
     assert 0.9 < told[-1] <= 1
 
 
-def test_the_dual_bound_tells_how_many_nodes_are_done():
-    told = []
-    given = {"duration": 3.0, "step": 0.02, "alpha": (0,), "progress": told.append}
-    envelope(spring(), {"s": Interval(0.9, 1.1)}, method=DualProof(workers=1), **given)
-    assert len(set(told)) > 5
-    assert (np.diff(told) >= 0).all()
-
-
 def test_parts_left_after_a_refusal_have_bounds():
     """A gap that is left as it is leaves no half of a refused part without bounds."""
     frame = StoreyFrame(

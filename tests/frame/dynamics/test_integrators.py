@@ -64,15 +64,3 @@ def test_derivatives_are_those_of_the_scheme(method: Integrator) -> None:
         )
         assert np.abs(jet.first[i] * p[0, i] - first).max() <= 1e-7 * np.abs(first).max()
         assert np.abs(jet.second[i] * p[0, i] * size - second).max() <= 1e-7 * np.abs(second).max()
-
-
-def test_midpoint_is_the_two_step_recurrence() -> None:
-    h, q = 0.05, [np.array([0.01, 0.03, 0.08])]
-    matrices, _ = evaluate(FRAME, (), np.zeros((1, 0)), derivatives=False)
-    M, D, K = (x.value[0] for x in (matrices.mass, matrices.damping, matrices.stiffness))
-    left, at_rest = M / h + D / 2 + h * K / 4, 2 * M / h - h * K / 2
-    right = M @ np.array([0, -0.5, -0.5]) + (M / h + D / 2 - h * K / 4) @ q[0]
-    for _ in range(200):
-        q.append(np.linalg.solve(left, right))
-        right = at_rest @ q[-1] - (M / h - D / 2 + h * K / 4) @ q[-2]
-    assert np.abs(LinearFlow(FRAME, ("E",), 10, h).values(modal(("E",)))[0] - q).max() < 1e-11

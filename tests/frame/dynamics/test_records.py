@@ -16,7 +16,7 @@ from alphacut.frame import (
 )
 from alphacut.frame.boxes import boxes
 from alphacut.frame.dynamics.flow import trajectory
-from alphacut.frame.dynamics.integrators import Integrator, RungeKutta4, linear_loads
+from alphacut.frame.dynamics.integrators import Integrator, RungeKutta4
 from alphacut.frame.modes.modal_model import ModalModel
 from alphacut.frame.structures.linear import evaluate
 from alphacut.frame.verification.exact_motion import LinearMotion
@@ -161,11 +161,3 @@ def test_fast_motions_turn_as_far_in_a_step_as_its_rule_allows(turn: float) -> N
     noise = Accelerogram(0.013, np.random.default_rng(4).standard_normal(250))
     frame = StoreyFrame((1.0,), (1.0,), (turn / 0.1) ** 2 / 24, 1.0, outputs=("q1", "v1"))
     assert deviation(replace(frame, ground=noise), 0.1) < 1e-10
-
-
-def test_the_line_in_a_step_is_the_record_where_that_is_linear() -> None:
-    samples = np.random.default_rng(4).standard_normal(9)
-    found = linear_loads([Accelerogram(0.1, samples)], 0.05, 20)
-    exact = np.interp(0.05 * np.arange(17), 0.1 * np.arange(9), samples)
-    assert found[:16] == pytest.approx(np.stack([exact[:-1], exact[1:]], -1), abs=1e-13)
-    assert found[16:] == pytest.approx(0.0, abs=1e-13)

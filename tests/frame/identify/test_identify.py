@@ -12,7 +12,6 @@ from alphacut.frame.identify.modes import (
     Chain,
     MeasuredMode,
     chain_modes,
-    eigenvalue_ranges,
     measured_mode,
 )
 from alphacut.frame.structures.linear import frequencies
@@ -65,14 +64,6 @@ def agree(found: Identified, points: np.ndarray, level: float) -> np.ndarray:
             for floor in mode.shape
         ]
     return np.all([(low <= x) & (x <= high) for x, (low, high) in columns], axis=0)
-
-
-def test_ranges_of_frequencies_over_a_box_are_reached_at_its_corners():
-    chain = Chain(FRAME, ("E", "c2", "l1", "m3"))
-    lower, upper = np.log([0.9, 0.8, 0.95, 0.7]), np.log([1.1, 1.3, 1.02, 1.4])
-    ends = np.exp([[*lower[:2], *upper[2:]], [*upper[:2], *lower[2:]]])
-    reached = modes_at(chain, chain.nominal * ends)[0]
-    assert reached == pytest.approx(np.array(eigenvalue_ranges(chain, lower, upper)), rel=1e-9)
 
 
 def test_modes_of_the_chain_are_those_of_the_frame():

@@ -1,7 +1,5 @@
 """Questions to a motion: peaks, passing of limits, tolerances, probabilities."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
@@ -13,7 +11,7 @@ from alphacut.frame.questions.probability import probabilities
 from alphacut.frame.questions.tolerances import scale_supports, tolerances
 from alphacut.fuzzy import Triangular
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.fuzzy.result import Ends, Nature
+from alphacut.fuzzy.result import Nature
 
 OUTPUTS = ("q1", "drift2", "base_shear")
 MOTION = {"dampers": (90, 60), "damper_placement": "storey", "q0": (0.05, 0.0), "v0": (0.0, 0.4)}
@@ -194,35 +192,6 @@ def test_wrong_questions_are_refused(limits, random, key):
     with pytest.raises(RefusedError) as refused:
         probabilities(FRAME, INPUTS, random, limits, **given)
     assert refused.value.key == key
-
-
-def test_peaks_of_one_side_are_those_of_its_bounds():
-    """A band from −3 … −2 to 1 … 5: the magnitude, the greatest and the negative least value."""
-    band = Ends(np.array([[[-3.0], [1.0]]]), np.array([[[-2.0], [5.0]]]))
-    exact = SimpleNamespace(
-        alpha=[0.0],
-        outputs=("q1",),
-        lower=band.lower,
-        upper=band.upper,
-        attained=band,
-        inputs={"k1": None},
-        lower_at=np.array([[[[1.0]], [[2.0]]]]),
-        upper_at=np.array([[[[3.0]], [[4.0]]]]),
-        error=np.zeros((1, 2, 1)),
-        natures=None,
-        nature=Nature.GUARANTEED,
-        between=None,
-        least_peaks=None,
-    )
-    found = peaks(exact, ["q1", "max q1", "min q1"])
-    assert bounds(found, "upper").tolist() == [5.0, 5.0, 3.0]
-    assert bounds(found, "lower").tolist() == [2.0, 1.0, 2.0]
-    assert bounds(found, "reached").tolist() == [5.0, 5.0, 3.0]
-    at = {name: peak.reached_at["k1"] for name, peak in found.items()}
-    assert at == {"q1": 4.0, "max q1": 4.0, "min q1": 1.0}
-    assert found["min q1"].greatest_bounds.upper == [3.0]
-    assert passing(found, {"min q1": 1.5})["min q1"].outcome == "exceeded"
-    assert passing(found, {"max q1": 5.5})["max q1"].outcome == "not exceeded"
 
 
 def one_level(lower, upper, reached, nature, error=0.0, outputs=("q1",)):

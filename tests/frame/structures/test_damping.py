@@ -68,16 +68,6 @@ def test_derivatives_are_those_of_the_modes_at_the_changed_parameters():
             assert np.abs(found.second[i, j] - difference).max() < 2e-5 * scale
 
 
-def test_equal_frequencies_are_no_obstacle():
-    eye, row = np.eye(2), {"q": np.array([1.0, 0.5])}
-    parts = ([("m", eye)], [("k", eye)], row)
-    same = MatrixStructure({"m": 2.0, "k": 8.0, "z": 0.1}, *parts, ratios=("z",), q0=np.ones(2))
-    found = matrices(same, ("k", "z"), np.array([[8.0, 0.1]]), derivatives=True).damping
-    assert np.allclose(found.value[0], 2 * 0.1 * 4 * eye)  # 2 ζ √(k m)
-    assert np.allclose(found.first[:, 0], np.array([2 * 0.1 * 0.25, 8.0])[:, None, None] * eye)
-    assert np.allclose(found.second[0, 0, 0], -2 * 0.1 * 4 / (4 * 64) * eye)
-
-
 def test_group_and_messages():
     assert replace(FRAME, damping_ratio=0.05).group("zeta") == ("zeta",)
     with pytest.raises(ValueError, match="parameter is zeta; allowed: m, l, c, d"):

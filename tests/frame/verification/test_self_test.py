@@ -110,16 +110,6 @@ def test_each_check_alone_sees_its_fault(change, check):
             )
 
 
-def test_points_come_in_the_order_of_their_worth():
-    found = motion(frame(), INPUTS, method=METHODS[0])
-    cuts, named = boxes(found.inputs, found.alpha), self_test.inputs_at_peaks(found, 0)
-    points = self_test.motion_inputs(found, cuts, 24)
-    assert (points[: len(named)] == named).all()
-    assert [4e6, 1e3] in points.tolist()[:9]
-    assert ((cuts.lower[0] <= points) & (points <= cuts.upper[0])).all()
-    assert len({tuple(point) for point in points.tolist()}) == len(points) == 24
-
-
 def test_inputs_without_width_are_tested_at_their_one_point():
     found = motion(frame(), {"k1": Crisp(4e6)}, method=DualProof())
     assert found.facts["motions_tested"] == 1

@@ -1,7 +1,5 @@
 """Errors of time steps and between nodes are estimated as they are, and declared in every bound."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -20,9 +18,8 @@ from alphacut.frame import (
     pendulum,
 )
 from alphacut.frame.dynamics.flow import StepError
-from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.structures.linear import frequencies
-from alphacut.frame.verification.step_error import MARGIN, node_deviation, reference_motions
+from alphacut.frame.verification.step_error import MARGIN, node_deviation
 from alphacut.fuzzy import Interval, Triangular
 from alphacut.fuzzy.refused import FailedError, RefusedError
 
@@ -127,14 +124,6 @@ def test_declared_errors_hold_where_bounds_are_attained(low):
             assert found.error[0, -1, output] < 0.1  # the error is not simply large
 
 
-def test_reference_motion_is_that_of_the_equations():
-    system, time = pendulum(phi0=2.0), np.linspace(0, 4, 41)
-    values = reference_motions(system, [system.parameters], time)[0]
-    assert values[:, 1] == pytest.approx(angle(system.parameters, time), abs=1e-8)
-    steps = make_flow(system, (), 4.0, 1e-3).values(np.zeros((1, 0)))[0, ::100]
-    assert values == pytest.approx(steps, abs=2e-4)
-
-
 def test_modes_that_turn_several_times_within_a_step_are_seen() -> None:
     for seed in range(16):
         random = np.random.default_rng(seed)
@@ -158,11 +147,3 @@ def test_the_last_of_many_trajectories_counts() -> None:
     points[-1] = 0.1
     assert node_deviation(flow, points) == pytest.approx(node_deviation(flow, points[-1:]))
     assert node_deviation(flow, points).max() > 0
-
-
-def test_a_step_counts_its_neighbours_and_a_share_of_the_largest() -> None:
-    fine = np.zeros((2, 4 * 6 + 1, 1))
-    fine[1, 4 * 2 + 1, 0] = -2.0  # in the third of six steps, a quarter after its beginning
-    flow = SimpleNamespace(finer=lambda: (SimpleNamespace(values=lambda points: fine), 4))
-    found = node_deviation(flow, np.zeros((2, 1)))
-    assert found[:, 0] == pytest.approx([0, 0.3, 3, 3, 3, 0.3, 0.3])
