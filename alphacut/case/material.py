@@ -12,6 +12,7 @@ from alphacut.case.radius import FractionMap, Number, Radius, RadiusMapSection, 
 from alphacut.case.types import (
     ALPHA,
     CaseFile,
+    CasePath,
     Length,
     Levels,
     Loss,
@@ -201,13 +202,19 @@ class RoundCell(Section):
 
 
 class ImageCell(Section):
-    """An image of the phases of a periodic cell, of a material that is the same in depth."""
+    """An image of the phases of a periodic cell that is the same in depth, or its whole volume."""
 
     methods: ClassVar = ("auto",)
     particles: ClassVar = "image"
 
-    image: CaseFile = Field(description="grey or labelled image, PNG, TIFF or .npy")
-    pixel: OneOrMany[Length] = Field(description="side of a pixel, or its width and height")
+    image: CasePath = Field(
+        description="grey or labelled image, PNG, TIFF or .npy; of a volume a TIFF stack, a folder"
+        " of slices, .npy, .mhd or .nhdr"
+    )
+    pixel: OneOrMany[Length] | None = None
+    """side of a pixel, or its width and height"""
+    voxel: OneOrMany[Length] | None = None
+    """side of a voxel, or those along x, y and z, in place of pixel: the image is a volume"""
     threshold: tuple[Number, ...] | None = None
     """grey value from which on a pixel is of the next phase"""
     labels: tuple[Annotated[float, Quantity()], ...] | None = None
@@ -242,8 +249,25 @@ class ImageCell(Section):
         n_losses = len(self.losses)
         fits = n_losses in (0, n_phases)
         require(fits, "cell.loss", f"{n_losses} loss factors", allowed)
-        n_sides, allowed = len(self.pixel), "a side, or a width and a height"
+        is_one = bool(self.pixel) != bool(self.voxel)
+        value = "beside cell.voxel" if self.pixel else None
+        require(is_one, "cell.pixel", value, "one of cell.pixel and cell.voxel")
+        n_sides, allowed = len(self.pixel or ()), "a side, or a width and a height"
         require(n_sides <= 2, "cell.pixel", n_sides, allowed)
+        n_sides, allowed = len(self.voxel or ()), "a side, or those along x, y and z"
+        require(n_sides in (0, 1, 3), "cell.voxel", n_sides, allowed)
+
+    @property
+    def dimension(self) -> int:
+        """2 of an image, 3 of a volume."""
+        return 3 if self.voxel else 2
+
+    @property
+    def sides(self) -> tuple[float, ...]:
+        """Sides of a pixel along (y, x) or of a voxel along (z, y, x), over that along x."""
+        sides: tuple[float, ...] = self.voxel or self.pixel or ()
+        sides = sides * self.dimension if len(sides) == 1 else sides
+        return tuple(side / sides[0] for side in reversed(sides))
 
 
 def _cell_kind(table: Mapping[str, object]) -> str:

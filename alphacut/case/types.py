@@ -187,6 +187,14 @@ def case_file(value: object, info: ValidationInfo) -> Path:
     return folder / value
 
 
+def case_path(value: object, info: ValidationInfo) -> Path:
+    """As `case_file`, of a file or a folder."""
+    folder: Path = (info.context or {}).get("folder", Path())
+    if isinstance(value, str) and value and (folder / value).is_dir():
+        return folder / value
+    return case_file(value, info)
+
+
 def distinct(values: tuple[str, ...]) -> tuple[str, ...]:
     """The names as they are, if no two are the same."""
     require(len(set(values)) == len(values), "", ", ".join(values), "each name once")
@@ -201,6 +209,7 @@ def require_alone(key: str, is_there: bool, other: str) -> None:
 after = AfterValidator
 """A check of a value that has its type."""
 CaseFile = Annotated[Path, text(case_file)]
+CasePath = Annotated[Path, text(case_path)]
 Names = Annotated[OneOrMany[str], after(distinct)]
 
 Modulus = Annotated[FuzzyNumber, Quantity("Pa", above=0, fuzzy=True)]

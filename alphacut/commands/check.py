@@ -62,7 +62,9 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
     }
     text = text_table(("key", "value", "kind"), rows)
     if content.image_cell is not None:
-        shares = image_study(content.image_cell).fractions.items()
+        study = image_study(content.image_cell)
+        shares = study.fractions.items()
+        text += f"image: {study.extent}\n"
         text += f"phases: {', '.join(f'{name} {share:.2%}' for name, share in shares)}\n"
     if period:
         text += f"first natural period: {period:.4g} s, at the most plausible values\n"

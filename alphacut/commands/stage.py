@@ -16,6 +16,7 @@ from alphacut.questions.summary import Parts, Results
 from alphacut.report import tables
 from alphacut.report.results import cut_text, run_text, width_text
 from alphacut.report.tables import shown
+from alphacut.rve.result.engineering_constants import PLANE_STRAIN
 from alphacut.stages.cell import ISOTROPIC, UPPER_BOUND, constant_label
 from alphacut.stages.identify import identify_inputs
 from alphacut.stages.image import ImageResult
@@ -50,9 +51,12 @@ def modulus(options: argparse.Namespace, out: TextIO) -> int:
 
 def image_text(result: ImageResult) -> str:
     """Lines on an image: its constants, area fractions, and what widens the bounds of E."""
-    shares = (f"{name}: {share:.1%} of the area\n" for name, share in result.fractions.items())
+    whole = "area" if len(result.lower_GPa) == 3 else "volume"
+    shares = (f"{name}: {share:.1%} of the {whole}\n" for name, share in result.fractions.items())
     constants = constants_text(result, Nature.GUARANTEED)
-    return f"{constants}{''.join(shares)}{width_text(result)}\n"
+    title = "tan δ, to first order in it"
+    losses = cuts_text(title, result.proved_losses, result.alpha, Nature.GUARANTEED)
+    return f"{constants}{losses}{''.join(shares)}{width_text(result)}\n"
 
 
 def modulus_text(result: ModulusResult) -> str:
@@ -69,7 +73,7 @@ def modulus_text(result: ModulusResult) -> str:
 def constants_text(part: ModulusResult | ImageResult, nature: Nature) -> str:
     """Constants along x and y by definition, loss factors, and the bounds of an isotropic E."""
     text = "".join(cuts_text(name, cuts, part.alpha, nature) for name, cuts in part.plane.items())
-    if len(part.plane) == 1:
+    if PLANE_STRAIN in part.plane and len(part.plane) == 1:
         text += f"{ONLY}\n"
     if (loss := part.loss) is not None:
         rows = []

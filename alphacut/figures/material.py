@@ -151,11 +151,19 @@ def membership(dataset: xarray.Dataset) -> Figure:
 
 
 def image(dataset: xarray.Dataset) -> Figure:
-    """Segmented phases of the image as greys, and the α-cuts of E."""
-    figure, (picture, cuts) = plt.subplots(1, 2, figsize=(WIDTH, 3.4), width_ratios=(1, 1.4))
-    picture.imshow(dataset["phase"].values, origin="lower", cmap="Greys_r")
-    picture.set(xticks=[], yticks=[], title="phases as segmented")
+    """Segmented phases as greys, of a volume on three planes in its middle, and the α-cuts of E."""
+    phase = dataset["phase"]
+    planes = [phase.isel({axis: phase.sizes[axis] // 2}) for axis in phase.dims[::-1]]
+    pictures = [phase] if phase.ndim == 2 else planes
+    ratios = [*[1.0] * len(pictures), 1.4 if len(pictures) == 1 else 2.0]
+    figure, axes = plt.subplots(1, len(ratios), figsize=(WIDTH, 3.4), width_ratios=ratios)
+    for picture, values in zip(axes, pictures, strict=False):
+        picture.imshow(values.values, origin="lower", cmap="Greys_r", vmin=0, vmax=phase.max())
+        up, right = values.dims
+        picture.set(xticks=[], yticks=[], xlabel=right, ylabel=up)
+    axes[0].set_title("phases as segmented")
     lower, upper = dataset["E"].transpose("bound", "alpha").values / GPA
-    style.shaded_cuts(cuts, dataset["alpha"].values, lower, upper)
-    style.membership_axes(cuts, "Young's modulus E, plane strain (GPa)")
+    style.shaded_cuts(axes[-1], dataset["alpha"].values, lower, upper)
+    where = ", plane strain" if phase.ndim == 2 else ""
+    style.membership_axes(axes[-1], f"Young's modulus E{where} (GPa)")
     return figure

@@ -161,8 +161,11 @@ class Page:
     def _image(self) -> Iterator[str]:
         if (part := self.summary.image) is not None:
             shares = ", ".join(f"{x} {share:.1%}" for x, share in part.fractions.items())
-            yield "The bounds are those of the image as it was segmented, in plane strain."
-            yield f"Of the area: {shares}. {width_text(part)}."
+            is_plane = len(part.lower_GPa) == 3
+            where = "image as it was segmented, in plane strain" if is_plane else "volume"
+            yield f"The bounds are those of the {where}."
+            whole = "area" if is_plane else "volume"
+            yield f"Of the {whole}: {shares}. {width_text(part)}."
 
     def _references(self) -> Iterator[str]:
         part = self.summary.modulus

@@ -20,13 +20,13 @@ from alphacut.io.provenance import file_digest
 from alphacut.rve.cell.cell import Phase
 from alphacut.rve.image.bounds import Interval
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
+from alphacut.rve.image.files import files_of, read_grid, require_memory
+from alphacut.rve.image.losses import energy_shares, loss_of_young, mean_loss
 from alphacut.rve.image.model import ImageCut, ImageModel, phase_energies, usual_division
 from alphacut.rve.image.phases import (
     ModuliImages,
     ModuliInterval,
     moduli_images,
-    read_grey,
-    require_memory,
     require_phases,
     threshold_ranges,
 )
@@ -46,7 +46,14 @@ ACCURACY = 1e-5
 """Relative energy that the solver may leave."""
 NATURE = Nature.GUARANTEED
 """Nature of all bounds: proved of the image as segmented, if it repeats itself."""
-AXES = ["11", "22", "12"]
+AXES = {2: ["11", "22", "12"], 3: ["11", "22", "33", "23", "13", "12"]}
+SPACE = "along the axes"
+"""Definition of the constants of a volume."""
+CONSTANT_NAMES = {
+    2: NAMES,
+    3: ("E_x", "E_y", "E_z", "nu_yz", "nu_xz", "nu_xy", "G_yz", "G_xz", "G_xy"),
+}
+HILL = "Hill's isotropic average"
 AlphaLevel = float | None
 """α-level, or None for the nominal values alone."""
 PhaseRanges = Callable[[AlphaLevel], tuple[Ints, Ints]]
@@ -61,17 +68,18 @@ class ImageCuts(Numbers):
 
 
 class ImageResult(Numbers):
-    """Proved bounds of an image, moduli in GPa.
+    """Proved bounds of an image or volume, moduli in GPa.
 
-    On the highest level `lower_GPa` and `upper_GPa` bound the plane stiffness in the sense of
-    Loewner, (3, 3), `nu` and `G_T_GPa` those of its average. As α-cuts `plane` has the constants
-    along x and y by definition and name, `cuts` E; `widths_GPa` has the widths of E by cause.
+    On the highest level `lower_GPa` and `upper_GPa` bound the stiffness in the sense of Loewner,
+    (3, 3) of the plane or (6, 6) of space, `nu` and `shear_GPa` those of its average. As α-cuts
+    `plane` has the constants along the axes by definition and name, `cuts` E, `proved_losses` loss
+    factors at nominal moduli to first order; `widths_GPa` has the widths of E by cause.
     """
 
     lower_GPa: Values
     upper_GPa: Values
     nu: dict[str, float]
-    G_T_GPa: dict[str, float]
+    shear_GPa: dict[str, float]
     average: str
     plane: dict[str, dict[str, CutsResult]]
     nature: Nature
@@ -82,6 +90,7 @@ class ImageResult(Numbers):
     division: int
     references: References
     loss: LossResult | None
+    proved_losses: dict[str, CutsResult]
 
     @property
     def alpha(self) -> Array:
@@ -96,7 +105,8 @@ class ImageResult(Numbers):
 
 def stage(cell: ImageCell, alpha: tuple[float, ...], average: str) -> Stage[ImageResult]:
     """The stage of an image, on some levels; E and ν are of an average of its stiffness."""
-    inputs = [cell, alpha, average, file_digest(cell.image)]
+    digests = [file_digest(file) for file in files_of(cell.image)]
+    inputs = [cell, alpha, average, digests]
     compute = partial(compute_cuts, cell, alpha, average)
     return Stage("image", inputs, ("stochastic", "rve", "fuzzy"), ImageResult, compute)
 
@@ -106,12 +116,11 @@ def compute_cuts(
 ) -> StageResult[ImageResult]:
     """Computes α-cuts of E and of the stiffness of an image, and how its sources widen E."""
     start = perf_counter()
-    study, aspect = image_study(cell), cell.pixel[-1] / cell.pixel[0]
+    study = image_study(cell)
     nominal = study.images(None, None)  # at nominal thresholds and moduli
     division, solver = usual_division(nominal), ConjugateGradient(ACCURACY)
-    rows, columns = nominal.bulk[0].shape
-    require_memory(rows, columns, division)
-    model = ImageModel(aspect, division=division, solver=solver, average=average)
+    require_memory(nominal.bulk[0].shape, division)
+    model = ImageModel(cell.sides, division=division, solver=solver, average=average)
     crisp = model.solve(nominal)
     context.tick(0.2)
     images = [study.images(level, level) for level in alpha]
@@ -132,24 +141,36 @@ def compute_cuts(
     if any(number.support.width > 0 for pair in cell.pairs for number in pair):
         widths["phases"] = max(0.0, width(None, lowest) - base)
     phase = study.phase_ranges(None)[0]
-    losses, loss = dict[str, Array](), None
+    losses, loss, proved = dict[str, Array](), None, dict[str, Array]()
     if cell.losses:
-        energies = phase_energies(crisp, nominal, phase, count=len(cell.pairs), aspect=aspect)
         phase_cuts = phase_loss_cuts(cell.losses, alpha)
-        bounds, errors = image_loss_bounds(energies, phase_cuts, average)
-        losses = dict(zip(CONSTANTS, np.moveaxis(bounds, -1, 0), strict=True))
-        loss = LossResult.of(losses, errors, Nature.ESTIMATED)
+        shares = energy_shares(model, crisp, nominal, phase, len(cell.pairs))
+        proved = {
+            name: np.array([mean_loss(parts, *cut) for cut in phase_cuts])
+            for name, parts in shares.items()
+        }
+        if cell.dimension == 2:
+            energies = phase_energies(model, crisp, nominal, phase, len(cell.pairs))
+            bounds, errors = image_loss_bounds(energies, phase_cuts, average)
+            losses = dict(zip(CONSTANTS, np.moveaxis(bounds, -1, 0), strict=True))
+            loss = LossResult.of(losses, errors, Nature.ESTIMATED)
+        else:
+            losses = {"E": loss_of_young(crisp.bounds, proved["K"], proved["G"]), **proved}
+            loss = LossResult.of(losses, None, NATURE)
     top, constants = cuts[-1], np.array([cut.constants for cut in cuts])  # (levels, constants, 2)
-    fractions = study.fractions
-    shares = np.array([*fractions.values()])
+    fractions, names = study.fractions, CONSTANT_NAMES[cell.dimension]
+    shares_of_phases = np.array([*fractions.values()])
     phases = [Phase(young.nominal, nu.nominal) for young, nu in cell.pairs]
+    is_space = cell.dimension == 3
+    classical = isotropic_bounds(shares_of_phases, phases, space=is_space)
+    by_name = dict(map(constant_cuts, names, np.moveaxis(constants, 1, 0)))
     result = ImageResult(
         lower_GPa=np.asarray(top.bounds.lower / GPA, float),
         upper_GPa=np.asarray(top.bounds.upper / GPA, float),
         nu=_bounds_by_side(top.poisson),
-        G_T_GPa=_bounds_by_side(top.bounds.shear(average), GPA),
-        average=AVERAGES[average],
-        plane={PLANE_STRAIN: dict(map(constant_cuts, NAMES, np.moveaxis(constants, 1, 0)))},
+        shear_GPa=_bounds_by_side(top.bounds.shear(average), GPA),
+        average=HILL if is_space else AVERAGES[average],
+        plane={SPACE if is_space else PLANE_STRAIN: by_name},
         nature=NATURE,
         cuts=ImageCuts(
             alpha=np.array(alpha),
@@ -159,8 +180,9 @@ def compute_cuts(
         widths_GPa={x: widths[x] / GPA for x in sorted(widths, key=lambda x: -widths[x])},
         fractions=fractions,
         division=model.division,
-        references={"hashin_shtrikman_E_GPa": isotropic_bounds(shares, phases)},
+        references={"hashin_shtrikman_E_GPa": classical},
         loss=loss,
+        proved_losses={name: CutsResult.of(cut) for name, cut in proved.items()},
     )
     return StageResult(result, _dataset(alpha, cuts, phase, losses))
 
@@ -174,8 +196,9 @@ def _require_isotropic(widest: ImageCut) -> None:
     """Refuses E and ν of an image for which the bounds do not tell that E is positive."""
     low, high = (end / GPA for end in widest.modulus)
     if low <= 0:
-        x_low, x_high, y_low, y_high = map(float, widest.constants[:2].ravel() / GPA)
-        along_axes = f"E_x {x_low:.4g} … {x_high:.4g} GPa, E_y {y_low:.4g} … {y_high:.4g} GPa"
+        ends = [(float(x), float(y)) for x, y in widest.constants / GPA]
+        along = zip("xyz"[: widest.bounds.dimension], ends, strict=False)
+        along_axes = ", ".join(f"E_{name} {x:.4g} … {y:.4g} GPa" for name, (x, y) in along)
         what = f"the bounds of E, {low:.4g} … {high:.4g} GPa, do not tell that it is positive"
         raise FailedError(what, f"take a finer image, or {along_axes}")
 
@@ -188,14 +211,16 @@ def _dataset(
 
     young, constants = np.array([x.modulus for x in cuts]), np.array([x.constants for x in cuts])
     stiffness = np.array([[cut.bounds.lower, cut.bounds.upper] for cut in cuts])
+    names = CONSTANT_NAMES[phase.ndim]
     variables: dict[str, Any] = {
         "E": (("alpha", "bound"), young, {"units": "Pa"}),
         "stiffness": (("alpha", "bound", "row", "column"), stiffness, {"units": "Pa"}),
-        **{name: (("alpha", "bound"), constants[:, k]) for k, name in enumerate(NAMES)},
+        **{name: (("alpha", "bound"), constants[:, k]) for k, name in enumerate(names)},
         **{f"loss_{name}": (("alpha", "bound"), cut) for name, cut in losses.items()},
-        "phase": (("y", "x"), phase.astype(np.float32)),
+        "phase": (("z", "y", "x")[-phase.ndim :], phase.astype(np.float32)),
     }
-    axes = {"alpha": list(alpha), "bound": ["lower", "upper"], "row": AXES, "column": AXES}
+    axes = {"alpha": list(alpha), "bound": ["lower", "upper"]}
+    axes |= dict.fromkeys(("row", "column"), AXES[phase.ndim])
     return xarray.Dataset(variables, axes, {"nature": str(NATURE)})
 
 
@@ -228,17 +253,26 @@ class ImageStudy:
     phase_ranges: PhaseRanges
     fuzzy_threshold: bool
 
+    @property
+    def extent(self) -> str:
+        """Number of pixels or voxels along each axis, in words."""
+        shape = self.phase_ranges(None)[0].shape
+        sizes = " × ".join(map(str, shape))
+        return f"{sizes} {'pixels (y, x)' if len(shape) == 2 else 'voxels (z, y, x)'}"
+
     def images(self, threshold: AlphaLevel, phases: AlphaLevel) -> ModuliImages:
         """Least and greatest moduli of each pixel, at levels of threshold and phases."""
         moduli = [
-            ModuliInterval.of_young(cut_or_nominal(young, phases), cut_or_nominal(poisson, phases))
+            ModuliInterval.of_young(
+                cut_or_nominal(young, phases), cut_or_nominal(poisson, phases), self.cell.dimension
+            )
             for young, poisson in self.cell.pairs
         ]
         return moduli_images(*self.phase_ranges(threshold), moduli)
 
     @property
     def fractions(self) -> dict[str, float]:
-        """Area fraction of each phase at the nominal values by the phase's name, dark first."""
+        """Fraction of each phase at the nominal values by the phase's name, dark first."""
         phase = self.phase_ranges(None)[0]
         shares = np.bincount(phase.ravel(), minlength=len(self.cell.pairs)) / phase.size
         if self.cell.labels is not None:
@@ -256,7 +290,7 @@ def image_study(cell: ImageCell) -> ImageStudy:
     Raises:
         RefusedError: A threshold or a label does not fit the image.
     """
-    grey = read_grey(cell.image, square=len(cell.pixel) == 1)
+    grey = read_grid(cell.image, cell.dimension, equal_sides=len(set(cell.sides)) == 1)
     if cell.labels:
         phase = np.full(grey.shape, -1)
         for number, label in enumerate(cell.labels):
@@ -268,9 +302,16 @@ def image_study(cell: ImageCell) -> ImageStudy:
         return ImageStudy(cell, lambda level: (phase, phase), False)
     thresholds = cell.threshold or ()
     require_phases(grey, tuple(number.cut(0.0) for number in thresholds))
+    is_fuzzy = any(number.support.width > 0 for number in thresholds)
+    if cell.dimension == 3:  # whose noise is not judged
+
+        def ranges_of_voxels(level: AlphaLevel) -> tuple[Ints, Ints]:
+            """Least and greatest phase of each voxel at a level."""
+            return threshold_ranges(grey, [cut_or_nominal(number, level) for number in thresholds])
+
+        return ImageStudy(cell, ranges_of_voxels, is_fuzzy)
     segmentation = segment(grey, [number.nominal for number in thresholds])
     segmentation.require_certain()
-    is_fuzzy = any(number.support.width > 0 for number in thresholds)
 
     def phase_ranges(level: AlphaLevel) -> tuple[Ints, Ints]:
         """Least and greatest phase of each pixel at a level."""

@@ -19,7 +19,7 @@ from alphacut.fuzzy.arrays import Array, Mask
 from alphacut.rve.cell.cell import Phase
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.model import ImageModel, ImageSolution, solve_image
-from alphacut.rve.image.phases import ModuliInterval, PlaneModuli, moduli_images
+from alphacut.rve.image.phases import ModuliInterval, PhaseModuli, moduli_images
 from alphacut.rve.series.model import square_stiffness
 
 RESULTS = Path(__file__).parents[1] / "results"
@@ -48,12 +48,12 @@ def between(first: Array, second: Array | float) -> Array:
     return np.asarray((first - second + 0.5) % 1 - 0.5)
 
 
-def phases_of(contrast: float, *, modulus: float = 20.0, poisson: float = 0.3) -> list[PlaneModuli]:
+def phases_of(contrast: float, *, modulus: float = 20.0, poisson: float = 0.3) -> list[PhaseModuli]:
     """Matrix and particle of one Poisson's ratio."""
-    return [PlaneModuli.of_young(e, poisson) for e in (modulus, contrast * modulus)]
+    return [PhaseModuli.of_young(e, poisson) for e in (modulus, contrast * modulus)]
 
 
-def moduli_of(mask: Mask, phases: list[PlaneModuli]) -> tuple[Array, Array]:
+def moduli_of(mask: Mask, phases: list[PhaseModuli]) -> tuple[Array, Array]:
     """K + G/3 and G of each pixel; the mask tells the second phase."""
     matrix, particle = phases
     return (
@@ -62,7 +62,7 @@ def moduli_of(mask: Mask, phases: list[PlaneModuli]) -> tuple[Array, Array]:
     )
 
 
-def round_particle(size: int, radius: float, phases: list[PlaneModuli]) -> ImageSolution:
+def round_particle(size: int, radius: float, phases: list[PhaseModuli]) -> ImageSolution:
     """Bounds of the cell with one disc, of pixels inside it and of pixels that it touches."""
     edge = np.abs(np.linspace(-1, 1, size + 1))
     near, far = np.minimum(edge[1:], edge[:-1]), np.maximum(edge[1:], edge[:-1])

@@ -17,13 +17,13 @@ from typing import Any
 import numpy as np
 
 from alphacut.frame.calculus.jet import Jet
-from alphacut.frame.calculus.kernels import compiled
 from alphacut.frame.calculus.tape import Tape, tape, with_derivatives
 from alphacut.frame.dynamics.flow import Flow, LinearFlow, StepError
 from alphacut.frame.dynamics.integrators import INTEGRATORS, Integrator
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.kernels import compiled
 from alphacut.fuzzy.refused import require_choice
 
 Expressions = tuple[list[Any], list[Any], list[Any]]

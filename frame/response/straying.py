@@ -17,11 +17,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from alphacut.frame.calculus.kernels import kernel
 from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF
 from alphacut.frame.response.duhamel import absolute_moments, responses_at_nodes
 from alphacut.frame.structures.loads import History
 from alphacut.fuzzy.arrays import Array, Ints
+from alphacut.fuzzy.kernels import kernel
 
 compiled_fast = kernel(fastmath={"reassoc", "contract"})
 PHASE = 0.5

@@ -9,22 +9,36 @@ from scipy.linalg import eigh
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import FailedError
+from alphacut.rve.image.fields.element import SHEARS
 from alphacut.rve.image.fields.energy import SAFETY, UNIT
 from alphacut.rve.result.moduli import AXES, shear_modulus, square_moduli
 
 Interval = tuple[float, float]
 
+_UNIT, _NORMAL = np.eye(6), np.kron([[1, 0], [0, 0]], np.ones((3, 3)))
+_SHEAR = 3 * _UNIT * (1 - _NORMAL)
+VOIGT = np.array([_NORMAL / 9, ((1.5 * _UNIT - 0.5) * _NORMAL + _SHEAR) / 15])
+REUSS = np.array([_NORMAL, ((6 * _UNIT - 2) * _NORMAL + _SHEAR) / 15])
+"""Sums of their products with C are K and G of Voigt's, with S 1/K and 1/G of Reuss's average."""
+
 
 @dataclass(frozen=True, eq=False)
 class StiffnessBounds:
-    """Lower ≤ C ≤ upper as quadratic forms of the mean strain, in Voigt order, (3, 3), in Pa.
+    """Lower ≤ C ≤ upper as quadratic forms of the mean strain, in Voigt order, in Pa.
 
-    The moduli C11 + C12, C11 − C12 and C33 of the square part are such forms, so that those of the
-    ends bound them, and with them whatever rises in each of the three.
+    Of the plane, (3, 3), with 2 ε12, or of space, (6, 6), with shears 23, 13, 12 and 2 ε. Moduli
+    that are such forms are bounded by those of the ends, and with them whatever rises in each of
+    them: in the plane C11 + C12, C11 − C12 and C33 of the square part; in space K and G of Voigt's
+    average and, by the compliance, of Reuss's, with Hill's (1952) mean of the two.
     """
 
     lower: Array
     upper: Array
+
+    @property
+    def dimension(self) -> int:
+        """2 in the plane, 3 in space."""
+        return 2 if len(self.lower) == 3 else 3
 
     @property
     def width(self) -> float:
@@ -33,19 +47,31 @@ class StiffnessBounds:
 
     @property
     def bulk(self) -> Interval:
-        """Bounds of the plane-strain bulk modulus K_T = (C11 + C12)/2, in Pa."""
+        """Bounds of the plane-strain bulk modulus K_T = (C11 + C12)/2 or of space's K, in Pa."""
+        if self.dimension == 3:
+            return self._hill(0)
         low, high = (float(square_moduli(end)[0]) / 2 for end in (self.lower, self.upper))
         return low - 2 * self._rounding, high + 2 * self._rounding
 
     def shear(self, average: str = AXES) -> Interval:
-        """Bounds of the shear modulus G_T of an average, in Pa."""
+        """Bounds of the shear modulus of an average, in Pa: of space's, whatever the name."""
+        if self.dimension == 3:
+            return self._hill(1)
         ends = (square_moduli(end) for end in (self.lower, self.upper))
         low, high = (float(shear_modulus(moduli, average)) for moduli in ends)
         slack = 0.0 if average == AXES else 4 * self._rounding
         return low - slack, high + slack
 
     def young(self, average: str = AXES) -> Interval:
-        """Lower and upper bound of Young's modulus E = 3 G − G²/K of an average, in Pa."""
+        """Lower and upper bound of Young's modulus of an average, in Pa.
+
+        In the plane E = 3 G − G²/K of K + G/3, in space 9 K G/(3 K + G), which rises in both.
+        """
+        if self.dimension == 3:
+            low, high = (
+                9 * k * g / (3 * k + g) for k, g in zip(self.bulk, self.shear(), strict=True)
+            )
+            return low * (1 - 8 * UNIT), high * (1 + 8 * UNIT)
         # E rises with K; with G it rises up to G = 3/2 K and falls beyond
         (min_shear, max_shear), (min_bulk, max_bulk) = self.shear(average), self.bulk
         low = min(
@@ -56,25 +82,60 @@ class StiffnessBounds:
         return low, _young(stiffest, max_bulk) + _young_rounding(stiffest, max_bulk)
 
     def poisson(self, average: str = AXES) -> Interval:
-        """Lower and upper bound of Poisson's ratio ν = (1 − G/K)/2 of an average."""
+        """Lower and upper bound of Poisson's ratio of an average.
+
+        In the plane (1 − G/K)/2 of K + G/3, in space (3 K − 2 G)/(2 (3 K + G)).
+        """
         (min_shear, max_shear), (min_bulk, max_bulk) = self.shear(average), self.bulk
+        if self.dimension == 3:
+            pairs = (min_bulk, max_shear), (max_bulk, min_shear)
+            low, high = ((3 * k - 2 * g) / (6 * k + 2 * g) for k, g in pairs)
+            return low - 8 * UNIT, high + 8 * UNIT
         max_ratio, min_ratio = max_shear / min_bulk, min_shear / max_bulk
         low = (1 - max_ratio) / 2 - UNIT * (1 + max_ratio)
         return low, (1 - min_ratio) / 2 + UNIT * (1 + min_ratio)
 
     def constants(self) -> Array:
-        """Bounds of E_x, E_y (Pa), ν_xy and G_xy (Pa) in plane strain, shape (4, 2)."""
+        """Bounds of engineering constants along the axes, in Pa, shape (constants, 2).
+
+        E_x, E_y, ν_xy and G_xy in plane strain; in space E_x, E_y, E_z, ν_yz, ν_xz, ν_xy, G_yz,
+        G_xz and G_xy. Moduli are 1/S_kk of the compliance S, ratios −S_ij/S_ii.
+        """
         low, high = inverse_below(self.upper), inverse_above(self.lower)
-        slack = 4 * UNIT
-        moduli = [(1 / high[k, k] * (1 - slack), 1 / low[k, k] * (1 + slack)) for k in range(3)]
-        # S12 differs from the middle of its bounds by at most √(d11 d22)/2 with d = high − low
-        middle, difference = (low[0, 1] + high[0, 1]) / 2, high - low
-        half_width = np.sqrt(difference[0, 0] * difference[1, 1]) / 2 + slack * abs(high).max()
+        slack, n = 4 * UNIT, self.dimension
+        diagonal = np.diagonal(high), np.diagonal(low)
+        moduli = np.stack([(1 - slack) / diagonal[0], (1 + slack) / diagonal[1]], axis=-1)
+        ratios = [self._ratio(low, high, i, j) for i, j in SHEARS[n]]
+        return np.array([*moduli[:n], *ratios, *moduli[n:]])
+
+    def entries(self) -> Array:
+        """Bounds of every entry of C, shape (n, n, 2), in Pa."""
+        middle, difference = (self.lower + self.upper) / 2, self.upper - self.lower
+        half_widths = _half_widths(difference)
+        slack = half_widths + 4 * UNIT * np.abs(self.upper).max()
+        return np.stack([middle - slack, middle + slack], axis=-1)
+
+    def _ratio(self, low: Array, high: Array, i: int, j: int) -> Interval:
+        """Bounds of −S_ij/S_ii from those of S."""
+        middle, slack = (low[i, j] + high[i, j]) / 2, 4 * UNIT
+        half_width = _half_widths(high - low)[i, j] + slack * np.abs(high).max()
         cross_terms = [-middle - half_width, -middle + half_width]
-        ratios = np.outer(cross_terms, [1 / high[0, 0], 1 / low[0, 0]])  # ν = −S12/S11
-        margin = slack * abs(ratios).max()
-        poisson = (ratios.min() - margin, ratios.max() + margin)
-        return np.array([*moduli[:2], poisson, moduli[2]])
+        ratios = np.outer(cross_terms, [1 / high[i, i], 1 / low[i, i]])
+        margin = slack * np.abs(ratios).max()
+        return float(ratios.min() - margin), float(ratios.max() + margin)
+
+    def _hill(self, modulus: int) -> Interval:
+        """Bounds of K (0) or G (1) of Hill's average of a stiffness of space."""
+        bounds = []
+        for stiffness, compliance, sign in (
+            (self.lower, inverse_above(self.lower), -1),
+            (self.upper, inverse_below(self.upper), 1),
+        ):
+            voigt = VOIGT[modulus] * stiffness
+            reuss = REUSS[modulus] * compliance
+            rounding = 64 * UNIT * (abs(voigt).sum() + abs(reuss).sum() / reuss.sum() ** 2)
+            bounds.append(float((voigt.sum() + 1 / reuss.sum()) / 2 + sign * rounding))
+        return bounds[0], bounds[1]
 
     def contains(self, stiffness: Array) -> bool:
         """True if a symmetric stiffness, shape (3, 3), lies between the bounds."""
@@ -86,6 +147,13 @@ class StiffnessBounds:
         return UNIT * float(np.abs(self.upper).max())
 
 
+def _half_widths(difference: Array) -> Array:
+    """Half the widths of the entries of a symmetric matrix whose bounds differ by so much."""
+    # |x · (A − middle) y| ≤ √(x · D x) √(y · D y)/2 with D the difference
+    diagonal = np.sqrt(np.maximum(np.diagonal(difference), 0))
+    return np.asarray(np.outer(diagonal, diagonal) / 2)
+
+
 def _young(shear: float, bulk: float) -> float:
     return 3 * shear - shear * shear / bulk
 
@@ -95,29 +163,34 @@ def _young_rounding(shear: float, bulk: float) -> float:
 
 
 def inverse_below(matrix: Array) -> Array:
-    """Lower bound of the inverses of symmetric matrices ≤ `matrix` (Loewner's order), (…, 3, 3)."""
+    """Lower bound of the inverses of symmetric matrices ≤ `matrix` (Loewner's order), (…, n, n)."""
     inverse, error = _inverse(matrix)
-    return np.asarray(inverse - error * np.eye(matrix.shape[-1]))
+    return np.asarray(inverse - error)
 
 
 def inverse_above(matrix: Array) -> Array:
-    """Upper bound of the inverses of symmetric matrices ≥ `matrix` (Loewner's order), (…, 3, 3)."""
+    """Upper bound of the inverses of symmetric matrices ≥ `matrix` (Loewner's order), (…, n, n)."""
     inverse, error = _inverse(matrix)
-    return np.asarray(inverse + error * np.eye(matrix.shape[-1]))
+    return np.asarray(inverse + error)
 
 
 def _inverse(matrix: Array) -> tuple[Array, Array]:
-    """Computed symmetric inverse (…, n, n), and a bound of the norm of its error, (…, 1, 1)."""
+    """Computed symmetric inverse and a diagonal matrix that bounds its error, (…, n, n) each."""
+    # powers of two make the diagonal near 1 without rounding, so that loads of any size count alike
+    diagonal = np.diagonal(matrix, axis1=-2, axis2=-1)
+    scale = 2.0 ** -np.round(np.log2(diagonal) / 2)
+    scaled = scale[..., :, None] * matrix * scale[..., None, :]
     # with R = I − X·matrix the true inverse is off by at most ‖R‖‖X‖/(1 − ‖R‖)
-    inverse = np.linalg.inv(matrix)
+    inverse = np.linalg.inv(scaled)
     inverse = (inverse + np.swapaxes(inverse, -1, -2)) / 2
-    residual_norm = residual_above(inverse, matrix).sum(axis=-1).max(axis=-1)
+    residual_norm = residual_above(inverse, scaled).sum(axis=-1).max(axis=-1)
     if not np.all(residual_norm < 0.5):
         what = "a bound of the compliance is singular to rounding"
         raise FailedError(what, "lower the contrast of the phases")
     inverse_norm = np.abs(inverse).sum(axis=-1).max(axis=-1)
     error = SAFETY * residual_norm / (1 - residual_norm) * inverse_norm
-    return inverse, np.asarray(error[..., None, None])
+    squares = (error[..., None] * scale**2)[..., None] * np.eye(matrix.shape[-1])
+    return scale[..., :, None] * inverse * scale[..., None, :], squares
 
 
 def residual_above(inverse: Array, matrix: Array) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from threading import Event
@@ -11,17 +11,22 @@ from typing import Any
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Ints
-from alphacut.fuzzy.refused import FailedError, RefusedError
+from alphacut.fuzzy.refused import FailedError, require
 from alphacut.rve.image.bounds import Interval, StiffnessBounds, inverse_below
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
-from alphacut.rve.image.fields.element import Element, airy_element, displacement_element
+from alphacut.rve.image.fields.element import (
+    Element,
+    airy_element,
+    displacement_element,
+    spline_element,
+)
 from alphacut.rve.image.fields.energy import (
-    UNIT_LOADS,
     SideSolution,
     coefficients,
     energies,
     solve_side,
 )
+from alphacut.rve.image.fields.grid import device_array
 from alphacut.rve.image.phases import ModuliImages
 from alphacut.rve.result.moduli import ISOTROPIC, require_average, square_moduli
 from alphacut.rve.result.result import PhaseEnergies
@@ -41,7 +46,7 @@ class ImageCut:
         bounds: Of the stiffness.
         modulus: Interval of E, in Pa, nested in those of lower levels.
         poisson: Interval of ν.
-        constants: Intervals of E_x, E_y, ν_xy and G_xy in plane strain, likewise nested.
+        constants: Intervals of the constants of `StiffnessBounds.constants`, likewise nested.
     """
 
     bounds: StiffnessBounds
@@ -52,25 +57,41 @@ class ImageCut:
 
 @dataclass(frozen=True)
 class ImageModel:
-    """Settings of the solution of an image that repeats itself.
+    """Settings of the solution of an image of pixels or voxels that repeats itself.
 
     Args:
-        aspect: Height of a pixel over its width.
-        division: Parts along each side of a pixel; see `usual_division`.
+        sides: Sides of a pixel along y and x, or of a voxel along z, y and x, over that along x.
+        division: Parts along each side of a pixel or voxel; see `usual_division`.
         solver: Stopping rule of the fields.
-        average: What E and ν are of, a name in `moduli.AVERAGES`.
+        average: What E and ν of the plane are of, a name in `moduli.AVERAGES`; in space they are of
+            Hill's isotropic average.
+        device: Where the fields are solved for: "cpu", or "cuda" by CuPy.
     """
 
-    aspect: float = 1.0
+    sides: tuple[float, ...] = (1.0, 1.0)
     division: int = 1
     solver: ConjugateGradient = field(default_factory=ConjugateGradient)
     average: str = ISOTROPIC
+    device: str = "cpu"
 
     def __post_init__(self) -> None:
         require_average(self.average)
-        if not MIN_SIDE_RATIO <= self.aspect <= 1 / MIN_SIDE_RATIO:
-            allowed = f"{MIN_SIDE_RATIO:g} to {1 / MIN_SIDE_RATIO:g}"
-            raise RefusedError("height of a pixel over its width", f"{self.aspect:.3g}", allowed)
+        allowed = f"{MIN_SIDE_RATIO:g} to {1 / MIN_SIDE_RATIO:g}"
+        for side in self.sides:
+            require(
+                MIN_SIDE_RATIO <= side <= 1 / MIN_SIDE_RATIO,
+                "side of a pixel or voxel over that along x",
+                value=f"{side:.3g}",
+                allowed=allowed,
+            )
+
+    @property
+    def elements(self) -> tuple[Element, Element]:
+        """Elements of stresses and of displacements."""
+        if len(self.sides) == 2:
+            aspect = self.sides[0] / self.sides[1]
+            return airy_element(aspect), displacement_element(aspect)
+        return spline_element(self.sides, stress=True), spline_element(self.sides, stress=False)
 
     def solve(self, images: ModuliImages, start: ImageSolution | None = None) -> ImageSolution:
         """Proved bounds of the stiffness of all images with moduli between the least and greatest.
@@ -91,26 +112,43 @@ class ImageModel:
                 is_stopped.set()
                 raise
 
-        def solve(element: Element, end: int, guess: SideSolution | None) -> SideSolution:
+        def solve(end: int, guess: SideSolution | None) -> SideSolution:
             """Fields of least energy with the least (end 0) or greatest (end 1) moduli."""
-            return solve_side(
-                element,
-                images.bulk[end],
-                images.shear[end],
-                solver=replace(self.solver, watch=raise_if_stopped),
-                division=self.division,
-                start=None if guess is None else guess.fields,
+            return self._solve_side(
+                end, images.bulk[end], images.shear[end], guess, raise_if_stopped
             )
 
-        stresses, displacements = airy_element(self.aspect), displacement_element(self.aspect)
         guesses = (None, None) if start is None else (start.lower, start.upper)
-        with ThreadPoolExecutor(2) as pool:
+        with ThreadPoolExecutor(2 if self.device == "cpu" else 1) as pool:
             try:
-                lower, upper = pool.map(solve, (stresses, displacements), (0, 1), guesses)
+                lower, upper = pool.map(solve, (0, 1), guesses)
             finally:  # Ctrl-C and errors are not to wait for the other side
                 is_stopped.set()
         bounds = StiffnessBounds(inverse_below(lower.energy.upper), upper.energy.upper)
         return ImageSolution(bounds, upper, lower)
+
+    def solve_stresses(self, bulk: Array, shear: Array, start: ImageSolution) -> SideSolution:
+        """Stresses of an image, which bound the compliance, without the displacements."""
+        return self._solve_side(0, bulk, shear, start.lower, self.solver.watch)
+
+    def _solve_side(
+        self,
+        end: int,
+        bulk: Array,
+        shear: Array,
+        guess: SideSolution | None,
+        watch: Callable[[], None],
+    ) -> SideSolution:
+        """Stresses (end 0) or displacements (end 1) of least energy."""
+        to_device = device_array(self.device)
+        return solve_side(
+            self.elements[end],
+            to_device(bulk),
+            to_device(shear),
+            solver=replace(self.solver, watch=watch),
+            division=self.division,
+            start=None if guess is None else guess.fields,
+        )
 
     def cuts(
         self, images: Sequence[ModuliImages], crisp: tuple[ModuliImages, ImageSolution]
@@ -127,7 +165,7 @@ class ImageModel:
             if not pair.equals(last_pair):
                 last_pair, solution = pair, self.solve(pair, solution)
             bounds.append(solution.bounds)
-        # of E, ν and the constants along x and y, (levels, 6, 2), each made to contain those before
+        # of E, ν and the other constants, (levels, …, 2), each made to contain those before
         intervals = np.array(
             [[x.young(self.average), x.poisson(self.average), *x.constants()] for x in bounds]
         )
@@ -167,9 +205,13 @@ def _require_overlap(name: str, inside: Interval, cut: Interval) -> None:
 
 
 def usual_division(images: ModuliImages) -> int:
-    """Elements along each side of a pixel: 2 up to `MILD` contrast and `LARGE` pixels, else 1."""
+    """Elements along each side of a pixel: 2 up to `MILD` contrast and `LARGE` pixels, else 1.
+
+    One of a voxel, since two take eight times as long and narrow the bounds by half.
+    """
     contrast = max(float(upper.max() / lower.min()) for lower, upper in (images.bulk, images.shear))
-    return 2 if contrast <= MILD and images.bulk[0].size <= LARGE else 1
+    is_small = images.bulk[0].ndim == 2 and images.bulk[0].size <= LARGE
+    return 2 if contrast <= MILD and is_small else 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,31 +224,36 @@ class ImageSolution:
 
 
 def solve_image(bulk: Array, shear: Array, **settings: Any) -> ImageSolution:
-    """Proved bounds of a periodic image of K + G/3 and G in Pa, row 0 at the bottom.
+    """Proved bounds of a periodic image of pixels or voxels.
 
-    `settings` are those of `ImageModel`.
+    Args:
+        bulk: Bulk modulus in Pa, shape (y, x) with that of plane strain, K + G/3, or (z, y, x).
+        shear: Shear modulus in Pa, same shape.
+        settings: Those of `ImageModel`.
     """
+    settings = {"sides": (1.0,) * bulk.ndim, **settings}
     return ImageModel(**settings).solve(ModuliImages((bulk, bulk), (shear, shear)))
 
 
 def phase_energies(
-    solution: ImageSolution, images: ModuliImages, phase: Ints, *, count: int, aspect: float = 1.0
+    model: ImageModel, solution: ImageSolution, images: ModuliImages, phase: Ints, count: int
 ) -> PhaseEnergies:
-    """Estimated parts of K and G of each phase in C11 + C12, C11 − C12 and C33; nothing is proved.
+    """Estimated parts of K and G of each phase in C11 + C12, C11 − C12 and C33 of the plane.
 
-    The mean of the values by displacements and by stresses, whose distance is the declared error.
+    The mean of the values by displacements and by stresses, whose distance is the declared error;
+    nothing is proved.
 
     Args:
+        model: The model of the solution.
         solution: Fields of one image.
         images: Its moduli, the least equal to the greatest.
-        phase: Number of the phase of each pixel, shape (rows, columns).
+        phase: Number of the phase of each pixel, shape (y, x).
         count: Number of phases.
-        aspect: Height of a pixel over its width.
     """
-    strain_energies = energy_parts(
-        displacement_element(aspect), solution.upper, images, phase, count
+    stress_energies, strain_energies = (
+        energy_parts(element, side, images, phase, count)
+        for element, side in zip(model.elements, (solution.lower, solution.upper), strict=True)
     )
-    stress_energies = energy_parts(airy_element(aspect), solution.lower, images, phase, count)
     # parts of the compliance S = C⁻¹ become parts of C by ∂S = −S ∂C S
     stiffness = np.linalg.inv(stress_energies.sum(axis=(0, 1)))
     by_strain = square_moduli(strain_energies)
@@ -231,6 +278,6 @@ def energy_parts(
             (deviator_rows, deviator),
         ):
             weights.append((rows, np.kron(weight * (phase == k), np.ones((divisions, divisions)))))
-    values = energies(element, side.fields, element.mean_modes(UNIT_LOADS), weights).value
+    values = energies(element, side.fields, element.mean_modes(np.eye(3)), weights).value
     by_bulk, trace_by_shear, by_deviator = np.moveaxis(values.reshape(count, 3, 3, 3), 1, 0)
     return np.stack([by_bulk, trace_by_shear + by_deviator], axis=1)

@@ -1,4 +1,4 @@
-"""Images as cells: grey values or labels from files, least and greatest moduli of each pixel.
+"""Images as cells: the phases of pixels or voxels, and the least and greatest moduli of each.
 
 The stiffness of a composite grows in the Loewner order with the tensor of every point. So the image
 of the least K + G/3 and the least G of each pixel, over all phases it may be and all moduli that
@@ -7,11 +7,9 @@ these may have, has a stiffness below every possible one.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 
@@ -23,12 +21,12 @@ NU_AT_LEAST_BULK = -0.25  # Poisson's ratio of the least plane-strain bulk modul
 
 
 @dataclass(frozen=True)
-class PlaneModuli:
-    """Moduli of an isotropic material in plane strain.
+class PhaseModuli:
+    """Moduli of an isotropic material, in plane strain or in space.
 
     Args:
-        bulk: Plane-strain bulk modulus K + G/3, in Pa, from `MIN_MODULUS` to `MAX_MODULUS`; K is
-            that of three dimensions.
+        bulk: Bulk modulus in Pa, from `MIN_MODULUS` to `MAX_MODULUS`: of plane strain K + G/3, K
+            being that of space.
         shear: Shear modulus G, in Pa, of the same range.
 
     Raises:
@@ -40,46 +38,51 @@ class PlaneModuli:
 
     def __post_init__(self) -> None:
         """Refuse moduli outside (`MIN_MODULUS`, `MAX_MODULUS`)."""
-        for name, value in (("plane-strain bulk", self.bulk), ("shear", self.shear)):
+        for name, value in (("bulk", self.bulk), ("shear", self.shear)):
             if not MIN_MODULUS < value < MAX_MODULUS:
                 allowed = f"values in ({MIN_MODULUS:g}, {MAX_MODULUS:g}) Pa"
                 raise RefusedError(f"{name} modulus of a phase", f"{value:g} Pa", allowed)
 
     @classmethod
-    def of_young(cls, modulus: float, poisson: float) -> PlaneModuli:
-        """From Young's modulus in Pa and Poisson's ratio, inside (−1, 0.5)."""
+    def of_young(cls, modulus: float, poisson: float, dimension: int = 2) -> PhaseModuli:
+        """From Young's modulus in Pa and Poisson's ratio, inside (−1, 0.5); 2 is plane strain."""
         if not -1 < poisson < 0.5:
             raise RefusedError("Poisson's ratio of a phase", poisson, "values in (-1, 0.5)")
         shear = modulus / (2 * (1 + poisson))
-        return cls(modulus / (3 * (1 - 2 * poisson)) + shear / 3, shear)
+        bulk = modulus / (3 * (1 - 2 * poisson))
+        return cls(bulk + shear / 3 if dimension == 2 else bulk, shear)
 
 
 @dataclass(frozen=True)
 class ModuliInterval:
     """All materials between the least and the greatest moduli."""
 
-    lower: PlaneModuli
-    upper: PlaneModuli
+    lower: PhaseModuli
+    upper: PhaseModuli
 
     @classmethod
-    def of_young(cls, modulus: tuple[float, float], poisson: tuple[float, float]) -> ModuliInterval:
-        """Least and greatest plane bulk and shear modulus over intervals of E (Pa) and of ν."""
-        # K + G/3 = E/(2 (1 + ν) (1 − 2 ν)) is convex in ν; G decreases
+    def of_young(
+        cls, modulus: tuple[float, float], poisson: tuple[float, float], dimension: int = 2
+    ) -> ModuliInterval:
+        """Least and greatest bulk and shear modulus over intervals of E (Pa) and of ν."""
+        # K + G/3 = E/(2 (1 + ν) (1 − 2 ν)) is convex in ν; K increases with it, G decreases
         (young_low, young_high), (nu_low, nu_high) = modulus, poisson
-        nu_softest = min(max(nu_low, NU_AT_LEAST_BULK), nu_high)
-        least_bulk = PlaneModuli.of_young(young_low, nu_softest).bulk
-        least_shear = PlaneModuli.of_young(young_low, nu_high).shear
-        greatest_bulk = max(PlaneModuli.of_young(young_high, nu).bulk for nu in poisson)
-        greatest_shear = PlaneModuli.of_young(young_high, nu_low).shear
-        return cls(PlaneModuli(least_bulk, least_shear), PlaneModuli(greatest_bulk, greatest_shear))
+        nu_softest = min(max(nu_low, NU_AT_LEAST_BULK), nu_high) if dimension == 2 else nu_low
+        least_bulk = PhaseModuli.of_young(young_low, nu_softest, dimension).bulk
+        least_shear = PhaseModuli.of_young(young_low, nu_high, dimension).shear
+        greatest = [PhaseModuli.of_young(young_high, nu, dimension) for nu in poisson]
+        greatest_bulk = max(moduli.bulk for moduli in greatest)
+        return cls(
+            PhaseModuli(least_bulk, least_shear), PhaseModuli(greatest_bulk, greatest[0].shear)
+        )
 
 
 @dataclass(frozen=True)
 class ModuliImages:
-    """Moduli of each pixel below and above all possible ones, each of shape (rows, columns), in Pa.
+    """Moduli of each cell of a grid below and above all possible ones, of its shape, in Pa.
 
     Args:
-        bulk: Least and greatest plane-strain bulk modulus K + G/3.
+        bulk: Least and greatest bulk modulus; of pixels that of plane strain, K + G/3.
         shear: Least and greatest shear modulus.
     """
 
@@ -123,89 +126,6 @@ def moduli_images(first: Ints, last: Ints, phases: Sequence[ModuliInterval]) -> 
         )
     images = [table[first, last] for table in tables]
     return ModuliImages(bulk=(images[0], images[1]), shear=(images[2], images[3]))
-
-
-PLANE_MODES = ("1", "L", "I;16", "I;16B", "I;16L", "I", "F")
-PHOTOMETRIC, WHITE_IS_ZERO = 262, 0  # tag of TIFF and its value
-SAMPLE_FORMAT, SIGNED = 339, 2
-BYTES, BYTES_PER_ELEMENT = 1.3e8, 1450
-"""Of the program, and of each element of the cuts' solutions with their first guess; within 1.25 of
-peaks measured at 128² … 512² pixels of two elements a side, and 512² and 1024² of one."""
-
-
-def read_grey(path: Path, *, square: bool = True) -> Array:
-    """Grey values of ``.png``, ``.tif`` … or ``.npy``, (rows, columns), row 0 at the bottom.
-
-    Refuses what is no plane image of numbers or too large for memory and, with `square`, a file
-    that says that its pixels are not square.
-    """
-    try:
-        values = _array(path) if path.suffix == ".npy" else _picture(path, square)
-    except (RefusedError, MemoryError):
-        raise
-    except Exception as error:  # readers of damaged files raise errors of many kinds
-        raise RefusedError(path.name, f"unreadable ({error})", "an image or an array") from error
-    if values.ndim != 2 or min(values.shape) < 2 or values.dtype.kind not in "buif":
-        what = f"{values.dtype} of shape {values.shape}"
-        raise RefusedError(path.name, what, "one plane of 2 × 2 numbers or more")
-    require_memory(*values.shape)
-    if not np.isfinite(values).all():
-        count = int((~np.isfinite(values)).sum())
-        raise RefusedError(path.name, f"with {count} values that are not finite", "numbers")
-    return np.ascontiguousarray(values[::-1])
-
-
-def _array(path: Path) -> Array:
-    # mapped: one too large for memory must come as far as the question of how large it is
-    return np.asarray(np.load(path, mmap_mode="r", allow_pickle=False))
-
-
-def _picture(path: Path, square: bool) -> Array:
-    """Read the pixels of an image file with one page of grey values, top row first."""
-    from PIL import Image
-
-    Image.MAX_IMAGE_PIXELS = None  # the memory is checked here, before the pixels are read
-    with Image.open(path) as picture:
-        mode, frames = picture.mode, getattr(picture, "n_frames", 1)
-        if mode not in PLANE_MODES or frames > 1:
-            what = f"of mode {mode} with {frames} pages"
-            raise RefusedError(path.name, what, "one page of grey values", "save the one meant")
-        dpi_x, dpi_y = map(float, picture.info.get("dpi", (1, 1)))
-        if square and abs(dpi_x / dpi_y - 1) > 0.01:
-            what = f"of pixels {dpi_x:g} by {dpi_y:g} per inch"
-            raise RefusedError(path.name, what, "square ones", "give cell.pixel = [width, height]")
-        require_memory(picture.height, picture.width)
-        values = np.asarray(picture)
-        tags = getattr(picture, "tag_v2", {})
-        greys = np.unique(values) if tags.get(PHOTOMETRIC) == WHITE_IS_ZERO else []
-        if len(greys) == 2:  # tifffile writes masks so, and readers exchange the phases
-            value = f"two-valued with white as zero, bright on {np.mean(values == greys[1]):.4g}"
-            cure = "save it as .npy or PNG, and look at the fractions that check prints"
-            raise RefusedError(path.name, value, "masks that all programs read alike", cure)
-        is_signed = tags.get(SAMPLE_FORMAT, (1,)) == (SIGNED,)
-        is_changed = (
-            is_signed if mode == "L" else not is_signed and mode == "I" and values.min() < 0
-        )
-        if is_changed:
-            what = f"of integers whose sign Pillow changes, as {values.min()}"
-            raise RefusedError(path.name, what, "values from 0 to 2³¹ − 1", "save it as .npy")
-        return values
-
-
-def needed_memory(rows: int, columns: int, division: int = 1) -> float:
-    """Bytes that the cuts of an image take with so many elements along each side of a pixel."""
-    return BYTES + BYTES_PER_ELEMENT * rows * columns * division**2
-
-
-def require_memory(rows: int, columns: int, division: int = 1) -> None:
-    """Refuse an image whose solution needs more memory than this machine has."""
-    available = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    needed = needed_memory(rows, columns, division)
-    if needed > available:
-        side = int((available / BYTES_PER_ELEMENT) ** 0.5 / division)
-        what = f"{rows} × {columns} pixels, about {needed / 1e9:.0f} GB"
-        allowed = f"up to {available / 1e9:.0f} GB of memory"
-        raise RefusedError("image", what, allowed, f"crop a piece of {side} × {side} pixels")
 
 
 def require_phases(grey: Array, thresholds: tuple[tuple[float, float], ...]) -> None:

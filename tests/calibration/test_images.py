@@ -99,7 +99,7 @@ def test_random_images():
     for k in range(40):
         rng = np.random.default_rng([seed, k])
         bulk, shear, aspect = draw(rng)
-        solution = solve_image(bulk, shear, aspect=aspect, division=int(rng.integers(1, 4)))
+        solution = solve_image(bulk, shear, sides=(aspect, 1.0), division=int(rng.integers(1, 4)))
         beside(table, rng, solution.bounds, truth(bulk, shear, aspect), k)
     table.judge()
 
@@ -115,7 +115,7 @@ def test_images_between_two():
         share = rng.choice([0.0, 1.0, rng.random()], size=(2, *bulk.shape))
         wide = 1 + rng.uniform(0, 0.3)
         images = ModuliImages((bulk, wide * bulk), (shear, wide * shear))
-        bounds = ImageModel(aspect).solve(images).bounds
+        bounds = ImageModel((aspect, 1.0)).solve(images).bounds
         inside = (m * (1 + (wide - 1) * s) for m, s in zip((bulk, shear), share, strict=True))
         beside(table, rng, bounds, truth(*inside, aspect), k, most=np.inf)
     table.judge()

@@ -34,6 +34,7 @@ DIRECT = {
     "skimage": "python3-skimage",
     "sympy": "python3-sympy",
     "threadpoolctl": "python3-threadpoolctl",
+    "tifffile": "python3-skimage",  # which depends on it
     "typing_extensions": "python3-typing-extensions",
     "ufl": "python3-dolfinx",
     "vtkmodules": "python3-pyvista",  # which depends on VTK
@@ -59,6 +60,8 @@ INDIRECT = {  # imported by others on this project's behalf
     "sphinx": "python3-sphinx",
 }
 FROM_PYPI = {  # each is needed by one comparison, or is an optional extra
+    "array_api_compat": "rve/image/fields/grid.py",
+    "cupy": "rve/image/fields/grid.py",
     "obspy": "alphacut/records/read.py",
     "openseespylinux": "benchmarks/frame/opensees.py",
 }

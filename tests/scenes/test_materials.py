@@ -9,6 +9,8 @@ import pytest
 from PIL import Image
 
 from alphacut.entry import main
+from alphacut.rve.image.model import solve_image
+from alphacut.rve.image.phases import PhaseModuli
 from tests.scenes.test_cases import overlapping_cuts
 
 ROOT = Path(__file__).parents[2]
@@ -103,3 +105,27 @@ def test_a_micrograph_has_its_proved_bounds(tmp_path):
     image = alphacut(tmp_path, *words)["image"]
     overlapping_cuts(image["cuts"], {"E_GPa": MICROGRAPH})
     assert image["nature"] == "guaranteed"
+
+
+def test_a_tomogram_has_its_proved_bounds_and_losses(tmp_path):
+    volume = np.load(ROOT / "cases/tomogram.npy")[:12, :10, :8]
+    tifffile = pytest.importorskip("tifffile")
+    tifffile.imwrite(tmp_path / "volume.tif", volume)
+    text = (ROOT / "cases/tomogram.toml").read_text(encoding="utf-8")
+    text = text.replace("tomogram.npy", "volume.tif").replace('"envelope"', "")
+    case = tmp_path / "case.toml"
+    case.write_text(text, encoding="utf-8")
+    words = f"--out={tmp_path / 'out'}", "--set=modulus.alpha=[0, 1]", "--no-figures"
+    image = alphacut(tmp_path, "run", case, *words)["image"]
+    assert image["nature"] == "guaranteed"
+    low, high = (np.array(image["cuts"]["E_GPa"][side]) for side in ("lower", "upper"))
+    phase = (volume >= 130).astype(int)  # at the nominal threshold and moduli
+    pairs = [PhaseModuli.of_young(e, nu, 3) for e, nu in ((20.0, 0.3), (80.0, 0.2))]
+    bulk, shear = (np.array([getattr(x, name) for x in pairs])[phase] for name in ("bulk", "shear"))
+    inside = solve_image(bulk, shear, division=2).bounds
+    assert (low <= inside.young()[0]).all()
+    assert (inside.young()[1] <= high).all()
+    assert (high - low)[1] < 0.1 * low[1] < (high - low)[0]
+    losses = {name: ends["lower"] for name, ends in image["proved_losses"].items()}
+    assert set(losses) == {"E_x", "E_y", "E_z", "G", "K"}
+    assert all(0.01 < loss[0] < 0.04 for loss in losses.values())

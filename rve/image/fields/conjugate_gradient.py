@@ -15,18 +15,18 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.linalg.blas import daxpy
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import FailedError
+from alphacut.rve.image.fields.grid import Fields, namespace, slabs
 
 LOG = logging.getLogger(__name__)
 
 LIMIT = 2000  # iterations; with the preconditioner, contrasts of 1e6 need fewer
 
 
-LinearMap = Callable[[Array], Array]
-"""A symmetric linear map of fields, shape (loads, unknowns, rows, columns)."""
+LinearMap = Callable[[Fields], Fields]
+"""A symmetric linear map of fields, shape (loads, unknowns, *grid)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +36,7 @@ class System:
     Args:
         operator: Positive on fields that matter.
         preconditioner: Inverse of the operator of one constant material.
-        load: Right-hand sides, shape (loads, unknowns, rows, columns).
+        load: Right-hand sides, shape (loads, unknowns, *grid).
         scale: Energy that an accuracy refers to, shape (loads,).
         least: Energy of any field over the one that it has in the constant material, at least.
         start: First guess, of the load's shape; None: zero.
@@ -44,10 +44,10 @@ class System:
 
     operator: LinearMap
     preconditioner: LinearMap
-    load: Array
+    load: Fields
     scale: Array
     least: float
-    start: Array | None = None
+    start: Fields | None = None
 
 
 @dataclass(frozen=True)
@@ -63,14 +63,14 @@ class ConjugateGradient:
     accuracy: float = 3e-6
     watch: Callable[[], None] = field(default=lambda: None, compare=False, repr=False, kw_only=True)
 
-    def solve(self, system: System) -> tuple[Array, int]:
+    def solve(self, system: System) -> tuple[Fields, int]:
         """Fields of all loads with an energy error within the accuracy, and number of iterations.
 
         Raises:
             FailedError: `LIMIT` iterations are not enough.
         """
         if system.start is None:
-            x, r = np.zeros_like(system.load), system.load.copy()
+            x, r = namespace(system.load).zeros_like(system.load), system.load.copy()
         else:
             x, r = system.start.copy(), system.load - system.operator(system.start)
         p = system.preconditioner(r)
@@ -78,13 +78,16 @@ class ConjugateGradient:
         # energy error ≤ error_factor · gamma, by the lower bound of the spectrum
         error_factor = np.full(gamma.shape, 1 / system.least)
         allowed = self.accuracy * system.scale
+        is_solved = np.zeros(gamma.shape, bool)
         for number in range(LIMIT):
             self.watch()
-            if np.all(error_factor * gamma <= allowed):
+            is_solved |= error_factor * gamma <= allowed
+            if is_solved.all():
                 LOG.debug("fields on %s points: %d iterations", x.shape[2:], number)
                 return x, number
             Ap = system.operator(p)
-            alpha = _ratio(gamma, inner(p, Ap))
+            # a load that is solved rests: its directions are rounding, and so are their steps
+            alpha = np.where(is_solved, 0, _ratio(gamma, inner(p, Ap)))
             _add_multiple(x, alpha, p)
             _add_multiple(r, -alpha, Ap)
             del Ap  # memory for the preconditioner
@@ -92,8 +95,7 @@ class ConjugateGradient:
             last_gamma, gamma = gamma, inner(r, z)
             beta = _ratio(gamma, last_gamma)
             error_factor = _radau(error_factor - alpha, beta, system.least)
-            p *= beta[:, None, None, None]
-            p += z
+            _scale_and_add(p, beta, z)
         energy_error = float((error_factor * gamma / system.scale).max())
         raise FailedError(
             f"the image's fields lack up to {energy_error:.1e} of the energy after {LIMIT}"
@@ -102,11 +104,12 @@ class ConjugateGradient:
         )
 
 
-def inner(first: Array, second: Array) -> Array:
+def inner(first: Fields, second: Fields) -> Array:
     """Inner products of fields, shape (loads,)."""
-    count = len(first)
-    pairs = first.reshape(count, -1), second.reshape(count, -1)
-    return np.asarray(np.einsum("bn,bn->b", *pairs))
+    xp = namespace(first)
+    left, right = (xp.reshape(x, (x.shape[0], 1, -1)) for x in (first, second))
+    products = left @ xp.moveaxis(right, 1, 2)
+    return np.array([float(product) for product in products[:, 0, 0]])
 
 
 def _radau(excess: Array, beta: Array, least: float) -> Array:
@@ -115,10 +118,19 @@ def _radau(excess: Array, beta: Array, least: float) -> Array:
     return np.where(excess > 0, sharper, 1 / least)
 
 
-def _add_multiple(fields: Array, factors: Array, other: Array) -> None:
-    """Add the other fields, times a factor a load, in place and without a copy."""
-    for own, factor, added in zip(fields, factors, other, strict=True):
-        daxpy(added.reshape(-1), own.reshape(-1), a=factor)
+def _add_multiple(fields: Fields, factors: Array, other: Fields) -> None:
+    """Add the other fields, times a factor a load, in place and by slabs."""
+    for slab in slabs(fields):
+        for load, factor in enumerate(factors):
+            fields[load][:, slab] += float(factor) * other[load][:, slab]
+
+
+def _scale_and_add(fields: Fields, factors: Array, other: Fields) -> None:
+    """Multiply fields by a factor a load and add the others, in place and by slabs."""
+    for slab in slabs(fields):
+        for load, factor in enumerate(factors):
+            fields[load][:, slab] *= float(factor)
+            fields[load][:, slab] += other[load][:, slab]
 
 
 def _ratio(above: Array, below: Array) -> Array:

@@ -1,117 +1,160 @@
 """Inverse of the operator of one constant material, by Fourier transform; the spectrum it leaves.
 
-With t the trace and d the deviator of a periodic fluctuation, ∫d² − ∫t² is the square of its
-rotation for a displacement and zero for a stress of Airy's function. So a part of the coefficient
-of d may stand with that of t, and of the other way round for stresses: the energy of one material
-is at least the smaller of s/s₀ and (b + s)/(b₀ + s₀) times that of another, b being the coefficient
-of t and s that of d. For displacements these are the moduli of shear and of longitudinal waves.
+With t the trace and d the deviator of a periodic fluctuation, ∫d² = c ∫t² (`trace_in_deviator`)
+plus a third square. So a part of the coefficient of d may stand with that of t: the energy of one
+material is at least the smaller of s/s₀ and (b + c s)/(b₀ + c s₀) times that of another, b being
+the coefficient of t and s that of d. For displacements these are the moduli of shear and of
+longitudinal waves.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from types import ModuleType
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy import fft
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.rve.image.fields.element import Element, blocks
+from alphacut.rve.image.fields.element import Element
+from alphacut.rve.image.fields.grid import Fields, namespace, slabs
 
-Complex = NDArray[np.complex128]
 ROUNDING = 1e-3  # of the preconditioner
+GAUGE = 1e-6  # of the trace of a block: what waves weigh is 1e-2 of it, rounding 1e-16
 
 
 @dataclass(frozen=True)
 class Reference:
-    """One constant material: coefficients of trace and deviator, positive."""
+    """One constant material: coefficients of trace and deviator, the latter positive.
+
+    `part` is the element's `trace_in_deviator`.
+    """
 
     trace: float
     deviator: float
+    part: float
 
     @classmethod
-    def of_image(cls, trace: Array, deviator: Array, *, stress: bool) -> Reference:
-        """Constant material at the geometric mean of an image's extremes, for a narrow spectrum."""
-        min_trace, min_deviator = float(trace.min()), float(deviator.min())
-        min_sum, max_sum = min_trace + min_deviator, trace.max() + deviator.max()
-        mean_sum = float(np.sqrt(min_sum * max_sum))
-        mean_deviator = float(np.sqrt(min_deviator * deviator.max()))
-        if stress:
+    def of_grid(cls, element: Element, trace: Fields, deviator: Fields) -> Reference:
+        """Constant material at the geometric mean of a grid's extremes, for a narrow spectrum."""
+        part = element.trace_in_deviator
+        (min_trace, max_trace), (min_deviator, max_deviator) = (
+            (float(x.min()), float(x.max())) for x in (trace, deviator)
+        )
+        min_sum = min_trace + part * min_deviator
+        mean_sum = float(np.sqrt(min_sum * (max_trace + part * max_deviator)))
+        mean_deviator = float(np.sqrt(min_deviator * max_deviator))
+        if element.stress and element.dimension == 2:  # where nothing is left beside the trace
             mean_deviator = mean_sum * min_deviator / min_sum
-        return cls(mean_sum - mean_deviator, mean_deviator)
+        return cls(mean_sum - part * mean_deviator, mean_deviator, part)
 
-    def lowest_energy_ratio(self, trace: Array, deviator: Array) -> float:
-        """Lower bound of the energy of fluctuations in an image over that in this material."""
+    def lowest_energy_ratio(self, trace: Fields, deviator: Fields) -> float:
+        """Lower bound of the energy of fluctuations in a grid over that in this material."""
         bulk, shear = float(trace.min()), float(deviator.min())
-        ratios = shear / self.deviator, (bulk + shear) / (self.trace + self.deviator)
-        return min(ratios) * (1 - ROUNDING)
+        sums = bulk + self.part * shear, self.trace + self.part * self.deviator
+        return min(shear / self.deviator, sums[0] / sums[1]) * (1 - ROUNDING)
 
 
 @dataclass(frozen=True, eq=False)
 class FourierPreconditioner:
-    """Inverse of the constant-coefficient operator on a periodic grid of `shape` (rows, columns).
+    """Inverse of the constant-coefficient operator on a periodic grid.
 
-    A pixel is alike turned by 180°, so that blocks are real once each unknown is taken at its
-    place in the pixel, and odd ones times i: half the memory of Hermitian blocks.
+    A cell is alike where space is mirrored at a point, so that blocks are real once each unknown is
+    taken at its place in the cell, and odd ones times i: half the memory of Hermitian blocks.
 
     Args:
-        inverse: Real symmetric blocks, shape (unknowns, unknowns, rows, waves along x).
-        phases: exp(i k·place), by i for odd unknowns, along y and x; they broadcast to
-            (unknowns, rows, waves along x).
-        shape: Rows and columns of the grid.
+        inverse: Real symmetric blocks, shape (unknowns, unknowns, *waves); along x the waves are
+            those of a real transform.
+        phases: exp(i k·place), by i for odd unknowns, along each axis; they broadcast to
+            (unknowns, *waves).
+        shape: Shape of the grid.
     """
 
-    inverse: Array
-    phases: tuple[Complex, Complex]
-    shape: tuple[int, int]
+    inverse: Fields
+    phases: tuple[Fields, ...]
+    shape: tuple[int, ...]
 
     @classmethod
     def of_material(
-        cls, element: Element, constant: Reference, shape: tuple[int, int]
+        cls, element: Element, constant: Reference, shape: tuple[int, ...], xp: ModuleType = np
     ) -> FourierPreconditioner:
-        """Inverse operator of a constant material; its rigid fields have a pseudo-inverse."""
-        ky, kx = 2 * np.pi * np.fft.fftfreq(shape[0]), 2 * np.pi * np.fft.rfftfreq(shape[1])
-        y, x, is_odd = np.array(element.places).T
-        along_y = np.exp(1j * (y[:, None, None] * ky[:, None] + np.pi / 2 * is_odd[:, None, None]))
-        along_x = np.exp(1j * x[:, None, None] * kx)
-        n = element.unknowns
-        inverse = np.empty((n, n, ky.size, kx.size))
-        for rows in blocks((n, n, ky.size, kx.size)):
-            phase = np.moveaxis(along_y[:, rows] * along_x, 0, -1)
-            symbol = fourier_blocks(element, constant, ky[rows], kx)
-            real = (np.conj(phase)[..., :, None] * symbol * phase[..., None, :]).real
-            if rows.start == 0:
-                rigid = np.linalg.pinv(real[0, 0], rcond=1e-10, hermitian=True)
-                real[0, 0] = np.eye(n)
-            solved = np.linalg.inv(real)
-            if rows.start == 0:
-                solved[0, 0] = rigid
-            symmetric = (solved + np.swapaxes(solved, -1, -2)) / 2
-            inverse[:, :, rows] = np.moveaxis(symmetric, (-2, -1), (0, 1))
-        return cls(inverse, (along_y, along_x), shape)
+        """Inverse operator of a constant material; what has no energy has a pseudo-inverse."""
+        waves = [2 * np.pi * np.fft.fftfreq(size) for size in shape[:-1]]
+        waves.append(2 * np.pi * np.fft.rfftfreq(shape[-1]))
+        n, axes = element.unknowns, range(len(shape))
+        phases = []
+        for axis, k in enumerate(waves):
+            along = np.array([place[axis] for place, _ in element.places])
+            odd = np.array([is_odd and axis == 0 for _, is_odd in element.places])
+            phase = np.exp(1j * (np.outer(along, k) + np.pi / 2 * odd[:, None]))
+            shape_of_phase = n, *(-1 if axis == other else 1 for other in axes)
+            phases.append(xp.asarray(phase.reshape(shape_of_phase)))
+        inverse = xp.empty((n, n, *(k.size for k in waves)))
+        for slab in slabs(inverse):
+            phase = xp.moveaxis(_product(phases, slab), 0, -1)
+            symbol = fourier_blocks(element, constant, [waves[0][slab], *waves[1:]], xp)
+            real = (xp.conj(phase)[..., :, None] * symbol * phase[..., None, :]).real
+            inverse[:, :, slab] = xp.moveaxis(_pseudo_inverse(xp, real), (-2, -1), (0, 1))
+        uniform = fourier_blocks(element, constant, [k[:1] for k in waves]).real.reshape(n, n)
+        energy, waves_of_cell = np.linalg.eigh(uniform)
+        # what does not vary from cell to cell: of splines alone it has no energy but rounding
+        scale = float(np.sum(element.magnitude**2)) * max(constant.trace, constant.deviator)
+        has_energy = energy > GAUGE * scale
+        gain = np.where(has_energy, 1 / np.where(has_energy, energy, 1), 0)
+        first = (slice(None), slice(None), *(0 for _ in shape))
+        inverse[first] = xp.asarray(waves_of_cell * gain @ waves_of_cell.T)
+        return cls(inverse, tuple(phases), shape)
 
-    def apply(self, fields: Array) -> Array:
-        """The inverse on fields of shape (loads, unknowns, rows, columns)."""
-        spectrum = fft.rfft2(fields)
-        for rows in blocks(spectrum.shape):
-            phase = self.phases[0][:, rows] * self.phases[1]
-            part = np.conj(phase) * spectrum[:, :, rows]
-            spectrum[:, :, rows] = phase * np.einsum(
-                "abyx,nbyx->nayx", self.inverse[:, :, rows], part
+    def apply(self, fields: Fields) -> Fields:
+        """The inverse on fields of shape (loads, unknowns, *grid)."""
+        xp = namespace(fields)
+        axes = tuple(range(2, fields.ndim))
+        spectrum = xp.fft.rfftn(fields, axes=axes)
+        for slab in slabs(spectrum):
+            phase = _product(self.phases, slab)
+            part = xp.conj(phase) * spectrum[:, :, slab]
+            spectrum[:, :, slab] = phase * xp.einsum(
+                "ab...,nb...->na...", self.inverse[:, :, slab], part
             )
-        return np.asarray(fft.irfft2(spectrum, s=self.shape, overwrite_x=True))
+        return xp.fft.irfftn(spectrum, s=self.shape, axes=axes)
 
 
-def fourier_blocks(element: Element, constant: Reference, ky: Array, kx: Array) -> Complex:
-    """Fourier symbol of a constant material at waves per pixel, (ky, kx, unknowns, unknowns)."""
-    # forms of the strain's trace and of its deviator on a pixel
+def _product(phases: tuple[Fields, ...] | list[Fields], slab: slice) -> Fields:
+    """Product of the phases along the axes, in a slab of the first."""
+    result = phases[0][:, slab]
+    for phase in phases[1:]:
+        result = result * phase
+    return result
+
+
+def _pseudo_inverse(xp: ModuleType, blocks: Fields) -> Fields:
+    """Inverse of symmetric positive blocks, (…, n, n), and nearly none of what has no energy.
+
+    Potentials without stress have none. With X = (B + ε)⁻¹ they are large in X and gone in X B X.
+    """
+    size = blocks.shape[-1]
+    trace = xp.einsum("...ii->...", blocks)[..., None, None]
+    shift = xp.where(trace > 0, GAUGE * trace, 1.0) * xp.eye(size)
+    inverse = xp.linalg.inv(blocks + shift)
+    inverse = inverse @ blocks @ inverse
+    return (inverse + xp.swapaxes(inverse, -1, -2)) / 2
+
+
+def fourier_blocks(
+    element: Element, constant: Reference, waves: list[Array], xp: ModuleType = np
+) -> Fields:
+    """Fourier symbol of a constant material at waves per cell, (*waves, unknowns, unknowns)."""
+    # forms of the strain's trace and of its deviator on a cell
     trace, deviator = (element.modes[part].T @ element.modes[part] for part in element.parts)
     matrix = constant.trace * trace + constant.deviator * deviator
-    # of each local unknown: its number in the pixel to which it belongs, rows up, columns right
-    unknown, up, right = np.array(element.local).T
-    # coupling of unknowns a and b of pixels whose distance in rows and columns is −1, 0 or 1
-    coupling = np.zeros((3, 3, element.unknowns, element.unknowns))
-    row_step, column_step = up - up[:, None] + 1, right - right[:, None] + 1
-    np.add.at(coupling, (row_step, column_step, unknown[:, None], unknown), matrix)
-    waves_y, waves_x = (np.exp(1j * np.outer(k, (-1, 0, 1))) for k in (ky, kx))
-    return np.asarray(np.einsum("yr,xs,rsab->yxab", waves_y, waves_x, coupling, optimize=True))
+    unknown = np.array([u for u, _ in element.local])
+    offsets = np.array([offset for _, offset in element.local])
+    reach = int(offsets.max())
+    # coupling of unknowns a and b of cells at a distance from −reach to reach along each axis
+    coupling = np.zeros((2 * reach + 1,) * len(waves) + (element.unknowns,) * 2)
+    steps = np.moveaxis(offsets - offsets[:, None] + reach, -1, 0)
+    np.add.at(coupling, (*steps, unknown[:, None], unknown), matrix)
+    symbol = xp.asarray(coupling)
+    for k in waves:  # each turns the first axis, a distance, into the last but two, a wave
+        factors = xp.asarray(np.exp(1j * np.outer(k, np.arange(-reach, reach + 1))))
+        symbol = xp.moveaxis(xp.tensordot(factors, symbol, axes=1), 0, len(waves) - 1)
+    return symbol

@@ -6,18 +6,18 @@ import pytest
 from alphacut.rve import Phase, SeriesModel
 from alphacut.rve.image.bounds import StiffnessBounds
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient, System, inner
-from alphacut.rve.image.fields.element import Operator, airy_element, displacement_element
+from alphacut.rve.image.fields.element import airy_element, displacement_element
 from alphacut.rve.image.fields.energy import (
-    SOLVED_LOADS,
-    UNIT_LOADS,
     coefficients,
     energies,
     minimum_energy,
     solve_side,
+    solved_loads,
 )
+from alphacut.rve.image.fields.grid import Operator
 from alphacut.rve.image.fields.preconditioner import FourierPreconditioner, Reference
 from alphacut.rve.image.model import ImageModel, energy_parts, phase_energies, solve_image
-from alphacut.rve.image.phases import ModuliInterval, PlaneModuli, moduli_images
+from alphacut.rve.image.phases import ModuliInterval, PhaseModuli, moduli_images
 from alphacut.rve.result.engineering_constants import EngineeringConstants
 from alphacut.rve.result.moduli import AVERAGES, square_moduli
 from alphacut.stochastic import HermiteMap
@@ -69,7 +69,9 @@ def test_laminates_are_inside_and_the_bounds_meet_on_them(seed):
     layers[:2] = True, False
     mask, phases = np.tile(layers, (rows, 1)), random_phases(rng)
     exact = laminate(layers.mean(), phases)
-    result = solve_image(*image_of(mask, phases), aspect=rng.uniform(0.5, 2), solver=TIGHT).bounds
+    result = solve_image(
+        *image_of(mask, phases), sides=(rng.uniform(0.5, 2), 1.0), solver=TIGHT
+    ).bounds
     assert result.contains(exact)
     assert result.width < 1e-8
     turned = solve_image(*image_of(mask.T, phases), solver=TIGHT).bounds
@@ -106,7 +108,7 @@ def test_a_perturbed_field_still_bounds(element, size):
 def energies_of(element, bulk, shear, fields):
     """Energies of fields under the unit loads."""
     weights = list(zip(element.parts, coefficients(element, bulk, shear), strict=True))
-    return energies(element, fields, element.mean_modes(UNIT_LOADS), weights)
+    return energies(element, fields, element.mean_modes(np.eye(3)), weights)
 
 
 def test_fields_stopped_early_bound_more_widely_and_enclose():
@@ -121,8 +123,10 @@ def test_fields_stopped_early_bound_more_widely_and_enclose():
 
 def test_divided_pixels_narrow_the_bounds_of_the_same_image():
     bulk, shear = image_of(discs(24, np.random.default_rng(2)), ((40.0, 25.0), (7.0, 3.0)))
-    whole = solve_image(bulk, shear, aspect=0.8, solver=ConjugateGradient(1e-7)).bounds
-    parts = solve_image(bulk, shear, aspect=0.8, division=2, solver=ConjugateGradient(1e-7)).bounds
+    whole = solve_image(bulk, shear, sides=(0.8, 1.0), solver=ConjugateGradient(1e-7)).bounds
+    parts = solve_image(
+        bulk, shear, sides=(0.8, 1.0), division=2, solver=ConjugateGradient(1e-7)
+    ).bounds
     assert np.linalg.eigvalsh(whole.upper - parts.upper)[0] > 0
     assert np.linalg.eigvalsh(parts.lower - whole.lower)[0] > 0
     assert parts.width < whole.width / 2
@@ -138,7 +142,7 @@ def test_a_homogeneous_image_is_exact():
 
 @pytest.mark.parametrize("average", AVERAGES)
 def test_e_and_nu_of_an_isotropic_material_are_its_own(average):
-    moduli = PlaneModuli.of_young(20.0, 0.3)
+    moduli = PhaseModuli.of_young(20.0, 0.3)
     exact = stiffness(moduli.bulk, moduli.shear)
     bounds = StiffnessBounds(exact, exact)
     for (low, high), value in ((bounds.young(average), 20.0), (bounds.poisson(average), 0.3)):
@@ -180,10 +184,11 @@ def test_energies_of_a_disc_of_pixels_are_near_those_of_a_round_particle():
     size, phases = 40, [Phase(20e9, 0.3), Phase(80e9, 0.2)]
     x = (np.arange(size) + 0.5) / size * 2 - 1
     inside = (x[:, None] ** 2 + x**2 < 0.36).astype(int)
-    moduli = [PlaneModuli.of_young(phase.modulus, phase.poisson) for phase in phases]
+    moduli = [PhaseModuli.of_young(phase.modulus, phase.poisson) for phase in phases]
     images = moduli_images(inside, inside, [ModuliInterval(one, one) for one in moduli])
-    solution = ImageModel(division=2).solve(images)
-    found = phase_energies(solution, images, inside, count=2)
+    model = ImageModel(division=2)
+    solution = model.solve(images)
+    found = phase_energies(model, solution, images, inside, 2)
     radius = float(np.sqrt(4 * inside.mean() / np.pi))
     cell = SeriesModel(energies=True).solve(HermiteMap(radius, 0, radius, 0), phases[0], phases[1:])
     exact = cell[0].energies.values
@@ -254,9 +259,9 @@ def test_no_system_lacks_more_energy_than_its_accuracy(element, seed):
 
 def system_of(element, trace, deviator):
     """The system of three loads on periodic fields."""
-    constant = Reference.of_image(trace, deviator, stress=element.stress)
+    constant = Reference.of_grid(element, trace, deviator)
     inverse = FourierPreconditioner.of_material(element, constant, trace.shape)
-    operator, modes = Operator(element, trace, deviator), element.mean_modes(SOLVED_LOADS)
+    operator, modes = Operator(element, trace, deviator), element.mean_modes(solved_loads(2))
     scale = minimum_energy(element, trace, deviator, modes)
     least = constant.lowest_energy_ratio(trace, deviator)
     return System(operator.apply, inverse.apply, operator.load(modes), scale, least)

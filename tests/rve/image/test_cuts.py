@@ -8,15 +8,13 @@ import numpy as np
 import pytest
 
 from alphacut.fuzzy.refused import FailedError, RefusedError
+from alphacut.rve.image.files import needed_memory, read_grid, require_memory
 from alphacut.rve.image.model import ImageModel, solve_image, usual_division
 from alphacut.rve.image.phases import (
     ModuliImages,
     ModuliInterval,
-    PlaneModuli,
+    PhaseModuli,
     moduli_images,
-    needed_memory,
-    read_grey,
-    require_memory,
     require_phases,
     threshold_ranges,
 )
@@ -38,7 +36,7 @@ def phases(alpha, ordered=True):
     matrix, particle = ((10.0, 5.0), (40.0, 25.0)) if ordered else ((10.0, 25.0), (40.0, 5.0))
     ends = [1 + s * (1 - alpha) for s in (-0.1, 0.1)]
     pairs = (matrix, particle)
-    return [ModuliInterval(*(PlaneModuli((k + g / 3) * e, g * e) for e in ends)) for k, g in pairs]
+    return [ModuliInterval(*(PhaseModuli((k + g / 3) * e, g * e) for e in ends)) for k, g in pairs]
 
 
 def images(grey, alpha, ordered=True):
@@ -88,7 +86,7 @@ def test_an_interval_of_poisson_ratios_is_enclosed_and_no_wider_than_it_must(see
     ratios = tuple(np.sort(rng.uniform(-0.5, 0.45, 2)))
     interval = ModuliInterval.of_young((2.0, 3.0), ratios)
     nu = np.linspace(*ratios, 2001)
-    ends = [[PlaneModuli.of_young(e, float(n)) for n in nu] for e in (2.0, 3.0)]
+    ends = [[PhaseModuli.of_young(e, float(n)) for n in nu] for e in (2.0, 3.0)]
     for name in ("bulk", "shear"):
         low, high = (np.array([getattr(m, name) for m in end]) for end in ends)
         assert getattr(interval.lower, name) == pytest.approx(low.min(), rel=1e-6)
@@ -126,7 +124,7 @@ def test_grey_values_are_read_as_they_are(tmp_path, name, kind):
         np.save(path, values)
     else:
         pytest.importorskip("PIL.Image").fromarray(values).save(path)
-    assert np.array_equal(read_grey(path), values[::-1])
+    assert np.array_equal(read_grid(path, 2), values[::-1])
 
 
 def test_a_mask_whose_white_is_zero_is_refused_with_its_fraction(tmp_path):
@@ -136,10 +134,10 @@ def test_a_mask_whose_white_is_zero_is_refused_with_its_fraction(tmp_path):
     for photometric in (1, 0):
         mask.save(tmp_path / "mask.tif", tiffinfo={262: photometric})
         if photometric:
-            assert read_grey(tmp_path / "mask.tif").mean() == 0.25
+            assert read_grid(tmp_path / "mask.tif", 2).mean() == 0.25
             continue
         with pytest.raises(RefusedError, match=r"white as zero, bright on 0\.25"):
-            read_grey(tmp_path / "mask.tif")
+            read_grid(tmp_path / "mask.tif", 2)
 
 
 BROKEN = {
@@ -162,7 +160,7 @@ def test_files_that_are_no_plane_grey_image_are_refused(tmp_path, name):
     else:
         pytest.importorskip("PIL.Image").fromarray(content).save(path)
     with pytest.raises(RefusedError) as error:
-        read_grey(path)
+        read_grid(path, 2)
     assert error.value.key == name
 
 
@@ -175,12 +173,12 @@ solve_image(bulk, bulk / 2)
 print(1024 * int(re.search(r"VmHWM:\\s+(\\d+)", open("/proc/self/status").read())[1]))
 """
     found = subprocess.run([sys.executable, "-c", program], capture_output=True, check=True)
-    assert 1 / 1.3 < needed_memory(256, 256) / int(found.stdout) < 1.3
+    assert 1 / 1.3 < needed_memory((256, 256)) / int(found.stdout) < 1.3
 
 
 def test_an_image_too_large_for_memory_is_refused_with_a_piece_that_fits():
     with pytest.raises(RefusedError, match=r"1000000 × 1000000 pixels, .* crop a piece of"):
-        require_memory(1_000_000, 1_000_000)
+        require_memory((1_000_000, 1_000_000))
 
 
 @pytest.mark.parametrize(

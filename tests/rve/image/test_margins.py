@@ -16,7 +16,7 @@ from alphacut.rve.image.fields.energy import (
     PIECE,
     UNIT,
     Energies,
-    _subtract_anchors,
+    _subtract_linear,
     energies,
     modes_of,
 )
@@ -51,15 +51,15 @@ def test_the_sum_of_a_piece_of_products():
 def test_the_product_of_modes_and_unknowns(element):
     count = len(element.local)
     row = int(np.argmax((element.modes != 0).sum(axis=1)))
-    used = [k for k in range(count) if element.modes[row, k] != 0 and k not in element.anchors[k]]
+    linear = {x for x in element.origins if x is not None} | {x for s in element.slopes for x in s}
+    used = [k for k in range(count) if element.modes[row, k] != 0 and k not in linear]
     fields = np.zeros((1, element.unknowns, 4, 4))
     for k in used:
-        kind, up, right = element.local[k]
+        kind, (up, right) = element.local[k]
         fields[0, kind, 1 + up, 1 + right] = (1.0 if k == used[0] else LOST) / element.modes[row, k]
-    for anchors in element.anchors:
-        for anchor in anchors:
-            kind, up, right = element.local[anchor]
-            fields[0, kind, 1 + up, 1 + right] = 0.0
+    for k in linear:
+        kind, (up, right) = element.local[k]
+        fields[0, kind, 1 + up, 1 + right] = 0.0
     ((_, _, rounding),) = modes_of(element, fields, np.zeros((len(element.modes), 1)))
     # a sum in order, the entries of the matrix off by ten units and their products by one
     error = in_order([1.0] + [LOST] * (count - 1)) + 11 * Fraction(UNIT)
@@ -67,30 +67,39 @@ def test_the_product_of_modes_and_unknowns(element):
 
 
 @pytest.mark.parametrize("element", ELEMENTS, ids=["displacement", "stress"])
-def test_the_difference_from_an_anchor(element):
-    k, (anchor, *_) = next(
-        (k, a) for k, a in enumerate(element.anchors) if len(a) == 1 and k not in a
-    )
+def test_the_difference_from_a_linear_function(element):
+    subtracted = [
+        ([] if origin is None else [origin]) + list(slopes)
+        for origin, slopes in zip(element.origins, element.slopes, strict=True)
+    ]
+    k, (other,) = next((k, x) for k, x in enumerate(subtracted) if len(x) == 1 and k not in x)
     raw = np.zeros((len(element.local), 1, 1, 1))
-    raw[k], raw[anchor] = 1.0, -LOST
-    local, doubt = _subtract_anchors(element, raw)
+    raw[k], raw[other] = 1.0, -LOST
+    local, doubt = _subtract_linear(element, raw)
     error = abs(Fraction(float(local[k, 0, 0, 0])) - 1 - Fraction(LOST))
     assert tight(Fraction(float(doubt[k, 0, 0, 0])), error)
 
 
 def test_errors_of_modes_that_all_point_one_way():
-    size, wrong = 3.0, 1e-3
-    bound = Energies(np.full((1, 1, 1), size**2), np.full((1, 1), wrong), 0.0).rounding[0, 0, 0]
-    assert tight(bound, (size + wrong) ** 2 - size**2)
+    element = ELEMENTS[0]
+    fields, means = np.zeros((2, 8, 3, 3)), np.ones((len(element.modes), 2)) * [3.0, 5.0]
+    result = energies(element, fields, means, [(element.parts[0], np.ones((3, 3)))])
+    count, unit = element.bulk_rows, Fraction(UNIT)  # of modes, each off by a unit
+    for a, b in ((0, 0), (0, 1), (1, 1)):
+        product = Fraction(float(means[0, a] * means[0, b]))
+        error = count * product * ((1 + unit) ** 2 - 1)
+        assert tight(Fraction(float(result.by_modes[0, a, b])) * Fraction(101, 100), error)
 
 
 def test_errors_of_entries_that_all_lift_one_load():
-    value, wrong = np.full((1, 3, 3), 1.0), np.full((1, 3), 1e-3)
-    one = Energies(value, wrong, 0.0)
+    scale = np.array([1.0, 1e3, 1e-3])  # loads of any size count alike
+    value, wrong = np.ones((1, 3, 3)) * np.outer(scale, scale), 1e-3
+    one = Energies(value, wrong * value, 0.0)
     lifted = one.value[0] + one.rounding[0]
-    assert np.linalg.eigvalsh(one.upper - lifted)[0] >= 0
-    half = one.value[0] + np.diag(one.rounding[0].sum(axis=1)) / 2
-    assert np.linalg.eigvalsh(half - lifted)[0] < 0
+    inverse = np.diag(1 / scale)
+    assert np.linalg.eigvalsh(inverse @ (one.upper - lifted) @ inverse)[0] >= -1e-15
+    half = one.value[0] + np.diag(np.diagonal(one.upper - one.value[0])) / 2
+    assert np.linalg.eigvalsh(inverse @ (half - lifted) @ inverse)[0] < 0
 
 
 def test_the_residual_of_an_inverse():

@@ -12,22 +12,22 @@ from pathlib import Path
 
 import pytest
 
-from alphacut.frame.calculus import kernels
+from alphacut.fuzzy import kernels
 
 FILES = {
     "__init__.py": "",
-    "frame/units.py": "FACTOR = 2.0\n",
-    "frame/helper.py": """
-from alphacut.frame.calculus.kernels import compiled
-from alphacut.frame.units import FACTOR
+    "fuzzy/units.py": "FACTOR = 2.0\n",
+    "fuzzy/helper.py": """
+from alphacut.fuzzy.kernels import compiled
+from alphacut.fuzzy.units import FACTOR
 
 @compiled
 def scaled(x):
     return FACTOR * x
 """,
-    "frame/caller.py": """
-from alphacut.frame.calculus.kernels import compiled
-from alphacut.frame.helper import scaled
+    "fuzzy/caller.py": """
+from alphacut.fuzzy.kernels import compiled
+from alphacut.fuzzy.helper import scaled
 
 @compiled
 def shifted(x):
@@ -45,18 +45,18 @@ for folder, files in json.load(sys.stdin):
     for name in [name for name in sys.modules if name.startswith("alphacut")]:
         del sys.modules[name]
     sys.path[0] = folder
-    from alphacut.frame.caller import shifted
+    from alphacut.fuzzy.caller import shifted
     print(shifted(3.0), sum(shifted.stats.cache_hits.values()))
 """
-NEW_HELPER = {"frame/helper.py": FILES["frame/helper.py"].replace("*", "-")}
-NEW_CONSTANT = {"frame/units.py": "FACTOR = 5.0\n"}
+NEW_HELPER = {"fuzzy/helper.py": FILES["fuzzy/helper.py"].replace("*", "-")}
+NEW_CONSTANT = {"fuzzy/units.py": "FACTOR = 5.0\n"}
 
 
 def results(cache: Path, *calls: tuple[Path, dict[str, str]]) -> list[tuple[float, float]]:
     """Results and cache hits of the caller in checkouts, some of whose files are changed before."""
     for folder, _ in calls:
-        (folder / "alphacut/frame/calculus").mkdir(parents=True, exist_ok=True)
-        shutil.copy(inspect.getfile(kernels), folder / "alphacut/frame/calculus/kernels.py")
+        (folder / "alphacut/fuzzy").mkdir(parents=True, exist_ok=True)
+        shutil.copy(inspect.getfile(kernels), folder / "alphacut/fuzzy/kernels.py")
     told = subprocess.run(
         [sys.executable, "-Bc", CALLS],
         env=os.environ | {"ALPHACUT_CACHE": str(cache)},
@@ -93,7 +93,7 @@ def test_code_is_neither_taken_from_other_users_nor_kept_for_ever(tmp_path: Path
     cache.chmod(0o700)
     assert results(tmp_path, (tmp_path / "checkout2", {})) == [(7, 0)]
     names = {folder.name.partition("-")[0] for folder in cache.iterdir()}
-    assert names == {"alphacut.frame.helper", "alphacut.frame.caller"}
+    assert names == {"alphacut.fuzzy.helper", "alphacut.fuzzy.caller"}
 
 
 def test_what_kernels_read_from_other_files_is_in_their_digests() -> None:

@@ -27,7 +27,7 @@ from numba.core.caching import IndexDataCacheFile
 
 with_kernels = set[str]()
 """Modules that have kernels; those of helpers come before those that call them."""
-PACKAGE = Path(__file__).parents[2]
+PACKAGE = Path(__file__).parents[1]
 IMPORT = re.compile(r"^\s*from (alphacut[\w.]*) import (?:\(([\w\s,]*)\)|([\w, ]*))", re.MULTILINE)
 VERSIONS = f"{numba.__version__} {np.__version__} {sys.version}"
 UNUSED_DAYS = 14

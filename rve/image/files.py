@@ -1,0 +1,293 @@
+"""Grey values or labels of pixels and voxels from files: images, stacks, folders, raw data.
+
+A picture is read with row 0 at the bottom, so that y points up. The axes of a volume are (z, y, x)
+as its file orders them: pages or slices along z, rows along y, columns along x.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import RefusedError, require
+
+PLANE_MODES = ("1", "L", "I;16", "I;16B", "I;16L", "I", "F")
+PHOTOMETRIC, WHITE_IS_ZERO = 262, 0  # tag of TIFF and its value
+SAMPLE_FORMAT, SIGNED = 339, 2
+BYTES = 1.3e8
+"""Of the program."""
+BYTES_PER_ELEMENT = {2: 1450, 3: 1200}
+"""Of each element of the cuts' solutions with their first guess, by dimension; within 1.25 of peaks
+at 128² … 512² pixels of two elements a side, 512² and 1024² of one, and 32³ … 96³ voxels."""
+MOST_CHANNELS = 4  # pages that a file calls channels are colours up to so many, else slices
+SLICES = (".tif", ".tiff", ".png", ".bmp")
+META_TYPES = {
+    "MET_CHAR": "i1", "MET_UCHAR": "u1", "MET_SHORT": "i2", "MET_USHORT": "u2", "MET_INT": "i4",
+    "MET_UINT": "u4", "MET_FLOAT": "f4", "MET_DOUBLE": "f8",
+}  # fmt: skip
+NRRD_TYPES = {
+    "signed char": "i1", "int8": "i1", "uchar": "u1", "unsigned char": "u1", "uint8": "u1",
+    "short": "i2", "int16": "i2", "ushort": "u2", "unsigned short": "u2", "uint16": "u2",
+    "int": "i4", "int32": "i4", "uint": "u4", "unsigned int": "u4", "uint32": "u4", "float": "f4",
+    "double": "f8",
+}  # fmt: skip
+
+
+def read_grid(path: Path, dimension: int, *, equal_sides: bool = True) -> Array:
+    """Grey values or labels, shape (y, x) of a picture or (z, y, x) of a volume.
+
+    Args:
+        path: Picture (PNG, TIFF …) or ``.npy``; of a volume a TIFF stack, a folder of pictures in
+            the order of the numbers in their names, ``.npy``, ``.mhd`` or ``.nhdr``/``.nrrd``.
+        dimension: 2 or 3.
+        equal_sides: Whether a file that says that its pixels or voxels have unequal sides is
+            refused.
+
+    Raises:
+        RefusedError: The file is none of these, of another dimension, or too large for memory.
+    """
+    try:
+        if path.suffix == ".npy":
+            # mapped: one too large for memory must come as far as the question of how large it is
+            values = np.asarray(np.load(path, mmap_mode="r", allow_pickle=False))
+        elif dimension == 2:
+            values = _picture(path, equal_sides)
+        else:
+            values = _volume(path, equal_sides)
+    except (RefusedError, MemoryError):
+        raise
+    except Exception as error:  # readers of damaged files raise errors of many kinds
+        allowed = "an image or an array" if dimension == 2 else "a volume"
+        raise RefusedError(path.name, f"unreadable ({error})", allowed) from error
+    small = min(values.shape, default=0) < 2
+    if values.ndim != dimension or small or values.dtype.kind not in "buif":
+        what = f"{values.dtype} of shape {values.shape}"
+        allowed = "one plane of 2 × 2 numbers or more"
+        cure = "a volume takes cell.voxel in place of cell.pixel" if values.ndim == 3 else ""
+        if dimension == 3:
+            allowed, cure = "numbers along three axes (z, y, x), 2 × 2 × 2 or more", ""
+            cure = "a picture takes cell.pixel in place of cell.voxel" if values.ndim == 2 else ""
+        raise RefusedError(path.name, what, allowed, cure)
+    require_memory(values.shape)
+    if not np.isfinite(values).all():
+        count = int((~np.isfinite(values)).sum())
+        raise RefusedError(path.name, f"with {count} values that are not finite", "numbers")
+    return np.ascontiguousarray(values[::-1] if dimension == 2 else values)
+
+
+def files_of(path: Path) -> list[Path]:
+    """The files that make up an image or a volume: of a head its data, of a folder its slices."""
+    if path.is_dir():
+        return sorted(file for file in path.iterdir() if file.suffix.lower() in SLICES)
+    data = []
+    if path.suffix.lower() in (".mhd", ".nhdr"):
+        head = path.read_text("latin-1")
+        names = re.findall(r"^(?:ElementDataFile\s*=|data ?file:)\s*(.+?)\s*$", head, re.M | re.I)
+        data = [path.parent / name for name in names]
+    return [path, *(file for file in data if file.is_file())]
+
+
+def _volume(path: Path, equal_sides: bool) -> Array:
+    """Numbers of a volume along the axes (z, y, x)."""
+    if path.is_dir():
+        return _slices(path, equal_sides)
+    if path.suffix.lower() in (".tif", ".tiff"):
+        return _stack(path)
+    if path.suffix.lower() in (".mhd", ".mha"):
+        return _meta_image(path, equal_sides)
+    if path.suffix.lower() in (".nhdr", ".nrrd"):
+        return _nrrd(path, equal_sides)
+    allowed = "a TIFF stack, a folder of slices, .npy, .mhd or .nhdr"
+    cure = "write raw data beside a .mhd head with DimSize, ElementType and ElementDataFile"
+    raise RefusedError(path.name, f"a file of kind {path.suffix or 'unknown'}", allowed, cure)
+
+
+def _slices(folder: Path, equal_sides: bool) -> Array:
+    """The pictures of a folder one above another, in the order of the numbers in their names."""
+    files = files_of(folder)
+    require(len(files) > 1, folder.name, f"{len(files)} pictures", "a folder of slices")
+    by_number = sorted(
+        files, key=lambda file: [int(x) for x in re.findall(r"\d+", file.stem)] or [-1]
+    )
+    first = _picture(by_number[0], equal_sides)
+    require_memory((len(files), *first.shape))
+    values = np.empty((len(files), *first.shape), first.dtype)
+    for k, file in enumerate(by_number):
+        page = _picture(file, equal_sides)
+        alike = page.shape == first.shape and page.dtype == first.dtype
+        what = f"{page.dtype} of shape {page.shape}"
+        require(alike, file.name, what, f"{first.dtype} of shape {first.shape} as the others")
+        values[k] = page
+    return values
+
+
+def _stack(path: Path) -> Array:
+    """Pages of a TIFF file; which axis they are the file says."""
+    try:
+        import tifffile
+    except ImportError:
+        cure = "install tifffile, or save the volume as .npy"
+        raise RefusedError(path.name, "a TIFF stack", "no stack without tifffile", cure) from None
+    with tifffile.TiffFile(path) as file:
+        require(len(file.series) == 1, path.name, f"{len(file.series)} series", "one volume")
+        series = file.series[0]
+        axes, shape = series.axes, series.shape
+        pages = [(a, n) for a, n in zip(axes, shape, strict=True) if a not in "YX" and n > 1]
+        is_colour = "S" in axes or any(a == "C" and n <= MOST_CHANNELS for a, n in pages)
+        is_volume = len(pages) == 1 and not is_colour
+        what = f"axes {axes} of {' × '.join(map(str, shape))}"
+        cure = "save the volume meant, one number a voxel, with axes ZYX or as .npy"
+        require(is_volume, path.name, what, "pages along z, rows, columns", cure)
+        require_memory(tuple(n for n in shape if n > 1))
+        values = np.squeeze(series.asarray())
+        photometric = getattr(file.pages[0], "photometric", None)
+        if photometric == WHITE_IS_ZERO and len(np.unique(values)) == 2:
+            _refuse_white_is_zero(path, values)
+    return np.asarray(values)
+
+
+def _meta_image(path: Path, equal_sides: bool) -> Array:
+    """Volume of a MetaImage head and its raw data."""
+    head, size = {}, 0
+    with path.open("rb") as file:
+        for line in file:
+            size += len(line)
+            key, _, value = line.decode("latin-1").partition("=")
+            head[key.strip()] = value.strip()
+            if key.strip() == "ElementDataFile":
+                break
+    data = head.get("ElementDataFile", "")
+    is_big = (
+        "true" in (head.get("BinaryDataByteOrderMSB", head.get("ElementByteOrderMSB", ""))).lower()
+    )
+    return _raw(
+        path,
+        path if data == "LOCAL" else path.parent / data,
+        sizes=head.get("DimSize", "").split(),
+        kind=META_TYPES.get(head.get("ElementType", "")),
+        is_big=is_big,
+        skip=size if data == "LOCAL" else int(head.get("HeaderSize", 0)),
+        packed=head.get("CompressedData", "False").lower() == "true",
+        spacing=head.get("ElementSpacing", "").split() if equal_sides else (),
+    )
+
+
+def _nrrd(path: Path, equal_sides: bool) -> Array:
+    """Volume of an NRRD head and its raw data, in the same file after an empty line or another."""
+    head, size = {}, 0
+    with path.open("rb") as file:
+        for line in file:
+            size += len(line)
+            text = line.decode("latin-1").strip()
+            if not text:
+                break
+            key, _, value = text.partition(":")
+            head[key.strip().lower()] = value.strip().lstrip("=").strip()
+    name = head.get("data file", head.get("datafile", ""))
+    kind = head.get("type", "")
+    directions = re.findall(r"\(([^)]*)\)", head.get("space directions", ""))
+    lengths = [math.hypot(*map(float, vector.split(","))) for vector in directions]
+    spacing = head.get("spacings", "").split() or lengths
+    return _raw(
+        path,
+        path.parent / name if name else path,
+        sizes=head.get("sizes", "").split(),
+        kind=NRRD_TYPES.get(kind),
+        is_big=head.get("endian") == "big",
+        skip=int(head.get("byte skip", 0)) if name else size,
+        packed=head.get("encoding", "raw").lower() != "raw",
+        spacing=spacing if equal_sides else (),
+    )
+
+
+def _raw(
+    path: Path,
+    data: Path,
+    *,
+    sizes: Sequence[str],
+    kind: str | None,
+    is_big: bool,
+    skip: int,
+    packed: bool,
+    spacing: Sequence[str | float],
+) -> Array:
+    """Raw numbers whose head gives sizes along x, y, z: the first one varies fastest."""
+    name = path.name
+    require(kind is not None, name, "a type that is not known", "whole numbers or floats")
+    require(not packed, name, "compressed data", "raw data", "save it without compression")
+    require(len(sizes) == 3, name, f"{len(sizes)} sizes", "three, along x, y and z")
+    require(data.is_file(), name, f"data in {data.name}", "a file beside the head")
+    if spacing and max(map(float, spacing)) > 1.01 * min(map(float, spacing)):
+        what = f"voxels of {' × '.join(f'{float(x):g}' for x in spacing)} along x, y, z"
+        raise RefusedError(name, what, "cubes", "give cell.voxel = [x, y, z]")
+    shape = tuple(int(n) for n in reversed(sizes))
+    require_memory(shape)
+    dtype = np.dtype((">" if is_big else "<") + str(kind))
+    expected = skip + math.prod(shape) * dtype.itemsize
+    found = data.stat().st_size
+    allowed = f"{expected} for {' × '.join(sizes)} of {dtype}"
+    require(found == expected, data.name, f"{found} bytes", allowed)
+    values = np.fromfile(data, dtype, offset=skip).reshape(shape)
+    return values.astype(dtype.newbyteorder("="))
+
+
+def _refuse_white_is_zero(path: Path, values: Array) -> None:
+    # tifffile writes masks so, and readers exchange the phases
+    bright = np.mean(values == values.max())
+    what = f"two-valued with white as zero, bright on {bright:.4g}"
+    cure = "save it as .npy or PNG, and look at the fractions that check prints"
+    raise RefusedError(path.name, what, "masks that all programs read alike", cure)
+
+
+def _picture(path: Path, square: bool) -> Array:
+    """Read the pixels of an image file with one page of grey values, top row first."""
+    from PIL import Image
+
+    Image.MAX_IMAGE_PIXELS = None  # the memory is checked here, before the pixels are read
+    with Image.open(path) as picture:
+        mode, frames = picture.mode, getattr(picture, "n_frames", 1)
+        if mode not in PLANE_MODES or frames > 1:
+            what = f"of mode {mode} with {frames} pages"
+            raise RefusedError(path.name, what, "one page of grey values", "save the one meant")
+        dpi_x, dpi_y = map(float, picture.info.get("dpi", (1, 1)))
+        if square and abs(dpi_x / dpi_y - 1) > 0.01:
+            what = f"of pixels {dpi_x:g} by {dpi_y:g} per inch"
+            raise RefusedError(path.name, what, "square ones", "give cell.pixel = [width, height]")
+        require_memory((picture.height, picture.width))
+        values = np.asarray(picture)
+        tags = getattr(picture, "tag_v2", {})
+        greys = np.unique(values) if tags.get(PHOTOMETRIC) == WHITE_IS_ZERO else []
+        if len(greys) == 2:
+            _refuse_white_is_zero(path, values)
+        is_signed = tags.get(SAMPLE_FORMAT, (1,)) == (SIGNED,)
+        is_changed = (
+            is_signed if mode == "L" else not is_signed and mode == "I" and values.min() < 0
+        )
+        if is_changed:
+            what = f"of integers whose sign Pillow changes, as {values.min()}"
+            raise RefusedError(path.name, what, "values from 0 to 2³¹ − 1", "save it as .npy")
+        return values
+
+
+def needed_memory(shape: tuple[int, ...], division: int = 1) -> float:
+    """Bytes that the cuts of a grid take with so many elements along each side of a cell."""
+    elements = math.prod(shape) * math.prod([division] * len(shape))
+    return BYTES + BYTES_PER_ELEMENT[len(shape)] * elements
+
+
+def require_memory(shape: tuple[int, ...], division: int = 1) -> None:
+    """Refuse a grid whose solution needs more memory than this machine has."""
+    available = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    needed, n = needed_memory(shape, division), len(shape)
+    if needed > available:
+        side = int((available / BYTES_PER_ELEMENT[n]) ** (1 / n) / division)
+        what = f"{' × '.join(map(str, shape))} {'pixels' if n == 2 else 'voxels'}"
+        allowed = f"up to {available / 1e9:.0f} GB of memory"
+        cure = f"crop a piece of {' × '.join([str(side)] * n)}"
+        raise RefusedError("image", f"{what}, about {needed / 1e9:.0f} GB", allowed, cure)

@@ -1,0 +1,99 @@
+"""Proved bounds of loss factors: how much each phase's stiffness counts in the effective one.
+
+An effective constant c that is a least energy over fields is concave in the moduli of the phases.
+So with the moduli of one phase times 1 + t,
+
+    [c(t) − c(0)]/t ≤ c′(0) ≤ [c(0) − c(−t)]/t   for any 0 < t < 1,
+
+and bounds of c bound c′(0)/c(0), the phase's share of the energy. The loss factor is the mean of
+the phases' by these shares, to first order in the loss factors; their squares are left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from alphacut.fuzzy.arrays import Array, Ints
+from alphacut.rve.image.bounds import StiffnessBounds, inverse_below
+from alphacut.rve.image.fields.energy import UNIT
+from alphacut.rve.image.model import ImageModel, ImageSolution
+from alphacut.rve.image.phases import ModuliImages
+
+MIN_CHANGE, MAX_CHANGE = 1e-6, 0.5
+CURVATURE = 0.5  # −c″/c of two phases in series with equal shares is 1/2
+ROUNDING = 64 * UNIT  # of quotients and differences, relative to 1/t
+
+
+def concave_constants(bounds: StiffnessBounds, average: str) -> dict[str, tuple[float, float]]:
+    """Bounds in Pa of constants that are least energies: E along axes, G and K of an average."""
+    low, high = bounds.constants()[: bounds.dimension].T
+    values = {f"E_{'xyz'[k]}": (float(low[k]), float(high[k])) for k in range(len(low))}
+    return {**values, "G": bounds.shear(average), "K": bounds.bulk}
+
+
+def energy_shares(
+    model: ImageModel, solution: ImageSolution, images: ModuliImages, phase: Ints, count: int
+) -> dict[str, Array]:
+    """Bounds of each phase's share of the energy, (phases, 2), by the name of the constant.
+
+    Args:
+        model: The model of the solution.
+        solution: Solution of one image.
+        images: Its moduli, the least equal to the greatest.
+        phase: Number of the phase of each pixel or voxel.
+        count: Number of phases.
+    """
+    at_zero = concave_constants(solution.bounds, model.average)
+    shares = {name: np.tile([0.0, 1.0], (count, 1)) for name in at_zero}
+    gap = max(high / low - 1 for low, high in at_zero.values())
+    # the error gap/t + CURVATURE t/2 is least here
+    t = float(np.clip(np.sqrt(2 * gap / CURVATURE), MIN_CHANGE, MAX_CHANGE))
+    for k in range(count):
+        lower = {}
+        for change in (t, -t):
+            factor = np.where(phase == k, 1 + change, 1.0)
+            (bulk, _), (shear, _) = images.bulk, images.shear
+            changed = factor * bulk, factor * shear
+            stresses = model.solve_stresses(*changed, start=solution)
+            below = inverse_below(stresses.energy.upper)
+            lower[change] = concave_constants(StiffnessBounds(below, below), model.average)
+        for name, (low, high) in at_zero.items():
+            least = (lower[t][name][0] - high) / t
+            greatest = (high - lower[-t][name][0]) / t
+            ends = least / (high if least > 0 else low), greatest / (low if greatest > 0 else high)
+            shares[name][k] = np.clip(ends + np.array([-1, 1]) * ROUNDING / t, 0, 1)
+    return shares
+
+
+def mean_loss(
+    shares: Array, lowest: Sequence[float], highest: Sequence[float]
+) -> tuple[float, float]:
+    """Bounds of Σ share · loss, where the shares, within (phases, 2), sum to 1.
+
+    Args:
+        shares: Bounds of the shares.
+        lowest: Least loss factor of each phase.
+        highest: Greatest loss factor of each phase.
+    """
+    return _least_mean(shares, np.array(lowest)), -_least_mean(shares, -np.array(highest))
+
+
+def _least_mean(shares: Array, losses: Array) -> float:
+    """Least Σ share · loss: what the least shares leave goes to the phases of the least loss."""
+    share, left = shares[:, 0].copy(), 1 - shares[:, 0].sum()
+    for k in np.argsort(losses):
+        added = min(left, shares[k, 1] - share[k])
+        share[k], left = share[k] + added, left - added
+    common = losses.min()  # equal losses are exact
+    return float(common + share @ (losses - common) - ROUNDING * np.abs(losses).max())
+
+
+def loss_of_young(bounds: StiffnessBounds, bulk: Array, shear: Array) -> Array:
+    """Bounds of the loss factor of E = 9 K G/(3 K + G) from those of K's and G's, (levels, 2)."""
+    # d ln E = w d ln K + (1 − w) d ln G with w = G/(3 K + G)
+    (low_bulk, high_bulk), (low_shear, high_shear) = bounds.bulk, bounds.shear()
+    weights = low_shear / (3 * high_bulk + low_shear), high_shear / (3 * low_bulk + high_shear)
+    means = np.array([w * bulk + (1 - w) * shear for w in weights])
+    return np.stack([means[..., 0].min(axis=0), means[..., 1].max(axis=0)], axis=-1)
