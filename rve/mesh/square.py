@@ -14,6 +14,7 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Ints, Mask
 from alphacut.rve.cell.outline import Outline, bend_radii, extents, is_round
+from alphacut.rve.interruption import uninterrupted
 
 Triangles = tuple[Array, Ints, Ints]
 Sizes = Callable[[float, float], float]
@@ -74,15 +75,16 @@ def edges(triangles: Ints, inside: Mask) -> tuple[Ints, Ints, Mask]:
 
 @contextmanager
 def model() -> Iterator[Any]:
-    """Context of Gmsh with an empty model, quiet, on one thread."""
+    """Context of Gmsh with an empty model, quiet, on one thread; Ctrl-C waits for its end."""
     import gmsh
 
-    gmsh.initialize(["", "-v", "1"], readConfigFiles=False, interruptible=False)
-    try:
-        gmsh.option.setNumber("General.NumThreads", 1)
-        yield gmsh
-    finally:
-        gmsh.finalize()
+    with uninterrupted(second_ends=True):  # Gmsh loses exceptions of functions that it calls
+        gmsh.initialize(["", "-v", "1"], readConfigFiles=False, interruptible=False)
+        try:
+            gmsh.option.setNumber("General.NumThreads", 1)
+            yield gmsh
+        finally:
+            gmsh.finalize()
 
 
 def grade(gmsh: Any, sizes: Sizes) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from alphacut.rve.cell.outline import circle
 from alphacut.rve.interruption import uninterrupted
 
 ROOT = Path(__file__).parents[2]
@@ -139,3 +140,18 @@ def test_an_interruption_waits_for_the_end_of_the_block_and_goes_before_its_erro
     with pytest.raises(KeyboardInterrupt):
         block()
     assert done == ["block"]
+
+
+def test_an_interruption_amid_meshing_arrives_after_it(handler):
+    square = pytest.importorskip("alphacut.rve.mesh.square")
+    asked = []
+
+    def size(x, y):
+        asked.append((x, y))
+        if len(asked) == 50:
+            interrupt()
+        return 0.3
+
+    with pytest.raises(KeyboardInterrupt):
+        square.triangles(0.3, 0.5, circle, size)
+    assert len(asked) > 50
