@@ -78,6 +78,8 @@ def _parse_shape(head: list[str], values: bytes | list[str]) -> Shape | None:
             raise ValueError(f"{len(numbers)} numbers at node {lines[start].strip()}")
         shape = [complex(*numbers[k : k + parts]) for k in range(0, parts * size, parts)]
         node = int(lines[start])
+        if f"{node}.x" in amplitudes:
+            raise ValueError(f"node {node} twice in a mode")
         amplitudes |= {f"{node}.{axis}": x for axis, x in zip(DIRECTIONS, shape, strict=False)}
     return int(head[6].split()[3]), hertz, amplitudes
 
