@@ -75,3 +75,31 @@ def test_a_volume_without_a_name_of_other_elements_or_in_parts_is_refused():
         gmsh.model.mesh.partition(2)
         with pytest.raises(MeshError, match="partitioned into 2 parts; write the mesh before"):
             gmsh_prisms.read(gmsh)
+
+
+def test_the_rule_of_prisms_prints_in_full_since_forms_are_told_apart_by_that():
+    points, weights = prism_rule()
+    assert "..." not in f"{points} {weights}"
+    assert len(np.unique(points.round(7), axis=0)) == len(points)  # eight digits are printed
+
+
+@pytest.mark.parametrize(("version", "copies"), [(2.2, 2), (4.1, 1)])
+def test_a_volume_in_two_groups_is_refused_from_each_version_of_msh(tmp_path, version, copies):
+    with square.model() as gmsh:
+        surfaces = [(2, square.surfaces(1.0, 0.0, circle)[0])]
+        gmsh.model.geo.extrude(surfaces, 0, 0, 1, numElements=[1], recombine=True)
+        gmsh.model.geo.synchronize()
+        gmsh.option.setNumber("Mesh.ElementOrder", 2)
+        gmsh.option.setNumber("Mesh.SecondOrderIncomplete", 1)
+        gmsh.model.mesh.generate(3)
+        count = len(gmsh.model.mesh.getElementsByType(gmsh_prisms.PRISM_15)[0])
+        for name in ("clay", "all"):
+            gmsh.model.addPhysicalGroup(3, [1], name=name)
+        gmsh.option.setNumber("Mesh.MshFileVersion", version)
+        gmsh.write(str(tmp_path / "cell.msh"))
+        gmsh.clear()
+        gmsh.open(str(tmp_path / "cell.msh"))
+        found = len(gmsh.model.mesh.getElementsByType(gmsh_prisms.PRISM_15)[0])
+        assert found == copies * count > 0
+        with pytest.raises(MeshError, match="group 'all' are in another one too"):
+            gmsh_prisms.read(gmsh)
