@@ -44,12 +44,12 @@ def random_frame(
 ) -> Drawn:
     """A frame of so many storeys, on a record or let go, and outputs of every kind."""
     n, shaken = int(rng.integers(storeys[0], storeys[1] + 1)), bool(rng.integers(2))
-    record = 2 * rng.standard_normal(200) * np.hanning(200)
+    record, step = 2 * rng.standard_normal(200) * np.hanning(200), rng.choice([0.003, 0.017, 0.2])
     system = StoreyFrame(
         rng.uniform(5e3, 3e4, n).tolist(),
         stiffness=rng.uniform(2e6, 2e7, n).tolist(),
         damping_ratio=float(rng.uniform(0.01, 0.06)) if damped else 0.0,
-        ground=Accelerogram(0.017, record) if shaken else None,
+        ground=Accelerogram(float(step), record) if shaken else None,
         q0=[] if shaken else rng.uniform(-0.05, 0.05, n).tolist(),
         outputs=(f"q{n}", "v1", f"drift{n}", "base_shear", "a2"),
     )

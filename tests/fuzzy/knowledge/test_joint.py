@@ -95,7 +95,11 @@ def test_what_values_do_not_decide_is_refused_at_the_joint_level():
     assert result.upper[0, 0] == 10
 
 
-def test_joint_coverage_holds_where_the_minimum_rule_fails():
-    scores = jointly_held(4, 300, np.random.default_rng(4))
-    assert scores["minimum"] < -4
-    assert min(scores["unknown"], scores["independent"]) > -4
+@pytest.mark.parametrize(
+    ("links", "samples"),
+    [(4, 300), *(pytest.param(links, 600, marks=pytest.mark.slow) for links in (2, 5))],
+)
+def test_joint_coverage_holds_where_the_minimum_rule_fails(links, samples, rng):
+    scores = jointly_held(links, samples, rng)
+    assert scores["minimum"] < -4.5
+    assert min(scores["unknown"], scores["independent"]) > -4.5
