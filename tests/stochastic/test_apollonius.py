@@ -120,16 +120,3 @@ def test_areas_do_not_change_with_a_common_growth_and_scale_with_the_length(seed
         assert apollonius(other).areas == pytest.approx(areas, rel=1e-9, abs=1e-12)
     scaled = apollonius(Particles(scale * centres, scale * radii, (scale, scale)))
     assert scaled.areas == pytest.approx(areas * scale**2, rel=1e-9)
-
-
-def test_disc_in_front_of_a_giant():
-    rng = np.random.default_rng(3)
-    angle = rng.random(100) * 2 * np.pi
-    around = 5 + 3.01 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    centres = np.concatenate([[(5, 5)], around])
-    radii = np.concatenate([[3.0], np.full(100, 1e-3)])
-    diagram = apollonius(Particles(centres, radii, (10, 10)))
-    assert diagram.areas.sum() == pytest.approx(100, rel=1e-13)
-    assert diagram.areas[:4] == pytest.approx(
-        [quadrature_area(diagram.discs, i) for i in range(4)], rel=1e-8
-    )

@@ -72,22 +72,6 @@ def test_fit_stays_monotone_and_nearest():
                 assert FIT.misfit(sample, slopes) <= FIT.misfit(sample, (other[0], other[1])) + 1e-5
 
 
-def holds(band, a2, a4):
-    """Both slopes lie in the band."""
-    return band.a2[0] <= a2 <= band.a2[2] and band.a4[0] <= a4 <= band.a4[2]
-
-
-def band_of(true, number, seed):
-    sample, generator = drawn(true, number, seed), np.random.default_rng(seed)
-    return slope_band(FIT, sample, level=0.999, resamples=200, generator=generator)
-
-
-def test_slopes_lie_in_their_band_for_twelve_seeds_and_those_of_another_map_do_not():
-    for seed in range(100, 112):
-        assert holds(band_of(TRUE, 2000, seed), 0.3, 0.5), seed
-    assert not holds(band_of(HermiteMap(0.13, 0.6, 0.87, 0.5), 2000, 0), 0.3, 0.5)
-
-
 @pytest.mark.parametrize("slopes", [(0.01, 0.5), (2.15, 0.3), (0.3, 2.1)])
 def test_supports_hold_the_true_slopes_and_only_monotone_maps(slopes):
     """Near the edge of what is monotone, where a band around the fitted slopes leaves it."""

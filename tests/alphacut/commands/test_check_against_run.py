@@ -152,12 +152,6 @@ def test_a_record_longer_than_the_motion_is_said(place, capfd):
     assert sentence in capfd.readouterr().err
 
 
-def test_check_refuses_a_proof_of_a_schemes_motion(place, capfd):
-    changes = ("--set=envelope.method=proof", "--set=envelope.integrator=midpoint")
-    assert main(["check", str(written(place, FRAME)), *changes]) == 1
-    assert "a proof is of the exact one" in capfd.readouterr().err
-
-
 EACH = 60
 ODD = [
     "", "nan", "-inf", "1e309", "1_0", "٣", "[[", "]", '"', "\u0000", "\u001b[2J", "x" * 10_000,

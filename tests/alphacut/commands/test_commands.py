@@ -130,6 +130,7 @@ REFUSED = [
     ("identify case.toml", "sections [identify]"),
     ("microstructure case.toml", "[microstructure]"),
     ("report none", "without summary.json"),
+    ("verify none", "allowed: results of a run with an envelope"),
     ("check case.toml --set frame.masses=[]", "frame.masses is []; allowed: one entry or more"),
     ("check case.toml -rve_ksp_rtol 1e-9", "-rve_ksp_rtol"),
     ("run case.toml -rve_ksp_rtol 1e-9", "method prism"),
@@ -257,11 +258,6 @@ def test_a_contradiction_ends_a_run(tmp_path, capfd, monkeypatch):
     err = capfd.readouterr().err
     assert "the proof is wrong: q1" in err
     assert "Traceback" not in err
-
-
-def test_a_folder_without_an_envelope_is_refused(tmp_path, capfd):
-    assert main(["verify", str(tmp_path)]) == 2
-    assert "allowed: results of a run with an envelope" in capfd.readouterr().err
 
 
 def test_an_envelope_around_which_bounds_are_proved_is_not_called_guaranteed(tmp_path, capfd):

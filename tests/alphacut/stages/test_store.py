@@ -54,15 +54,6 @@ def test_a_stage_is_computed_once_until_its_inputs_change(tmp_path):
     assert json.loads((tmp_path / "thing.json").read_text())["case"] == "the case"
 
 
-def test_a_stage_that_fails_leaves_no_file(tmp_path):
-    def compute(work):
-        raise RuntimeError("no convergence")
-
-    with pytest.raises(RuntimeError, match="no convergence"):
-        store_in(tmp_path).take(Stage("thing", 1, ("fuzzy",), dict, compute))
-    assert not list(tmp_path.iterdir())
-
-
 def test_fingerprints_do_not_depend_on_where_functions_lie_in_memory():
     content = load(ROOT / "cases" / "pendulum.toml", ()).content
     (task,) = envelope.tasks(content.envelope, ())

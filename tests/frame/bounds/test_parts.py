@@ -146,20 +146,6 @@ def test_a_soil_spring_known_within_a_factor_of_four_is_proved_in_parts(method):
     assert (again.lower == found.lower).all()
 
 
-def test_progress_rises_in_parts_and_within_them():
-    told = []
-    prove(Lipschitz(), FLOW, told.append)
-    assert told == []  # a proof that tells nothing of its parts
-    proof = Lipschitz()
-    bounds = proof.bounds
-    proof.bounds = lambda flow, cuts, goal: (goal.tick(0.5), bounds(flow, cuts, goal))[1]
-    prove(proof, FLOW, told.append)
-    assert len(told) == len(proof.seen)
-    assert (np.diff(told) >= -1e-12).all()
-    assert 0 < told[0] < 0.5
-    assert 0.9 < told[-1] <= 1
-
-
 def test_parts_left_after_a_refusal_have_bounds():
     """A gap that is left as it is leaves no half of a refused part without bounds."""
     frame = StoreyFrame(

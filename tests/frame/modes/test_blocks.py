@@ -6,7 +6,6 @@ from scipy.linalg import eigh, expm
 
 from alphacut.frame import MatrixStructure
 from alphacut.frame.bounds.box import over_box, sources
-from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes import rest
 from alphacut.frame.modes.clusters import centred_matrices, enclose_subspaces
 from alphacut.frame.modes.intervening import BlockShares, oscillators, source_patterns
@@ -283,11 +282,3 @@ def test_ranges_hold_all_responses_times_powers_of_frequency(order):
             if source == "load":
                 reached = np.ptp(scaled, axis=1)[1:] / (found.high[k, s] - found.low[k, s])[1:]
                 assert reached.max() > TIGHT
-
-
-def test_a_structure_that_moves_rigidly_is_refused_in_one_line():
-    K = np.array([[1.0, -1], [-1, 1]])
-    own = matrices([("k", K)], {"k": 1.0}, {"q": np.array([1.0, -1])}, v0=np.array([1.0, 0]))
-    structure, _, _ = over(own, {"k": 0.1})
-    with pytest.raises(UnprovedError, match="improved-graph-follower"):
-        centred_matrices(structure.mass, structure.stiffness)

@@ -13,7 +13,6 @@ from alphacut.frame.response.duhamel import (
     FROM_RECURRENCE,
     absolute_moments,
     error_of_integrals,
-    linear_pieces,
     responses_at_nodes,
     step_integrals,
 )
@@ -178,16 +177,6 @@ def test_absolute_moments_are_bounds_and_sharp(decay):
         true = (tau ** np.arange(5)[:, None] * np.exp(-decay * tau) * force).sum(-1) * part
         assert (found >= true * (1 - 1e-4)).all()
         assert found[0] <= (1.001 if decay == 0 else 1.2) * true[0]
-
-
-def test_nodes_stay_where_they_are():
-    """A node a billionth of a step beside a sample is not moved onto it; rounding of times is."""
-    ground = Accelerogram(0.1, np.ones(20))
-    time = np.array([0.0, 0.1 + 1e-10, 0.2 - 1e-10, 0.1 * 3, 0.7, 1.1])
-    found = linear_pieces(ground, time)
-    assert found.interval * 0.1 + found.offsets[found.offset] == pytest.approx(time, abs=1e-15)
-    assert np.count_nonzero(found.offsets == 0) == 1
-    assert found.interval.tolist() == [0, 1, 1, 3, 7, 11]
 
 
 @pytest.mark.parametrize("sigma", [np.nan, 2e3 + 3j, -1e12 + 1j, -1 + 1e10j])

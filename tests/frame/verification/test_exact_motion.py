@@ -1,17 +1,15 @@
 """The exact motion agrees with mpmath and with SciPy, within the round-off that it states."""
 
 import ast
-from itertools import pairwise
 from pathlib import Path
 
 import mpmath
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from alphacut.frame.verification import exact_motion
-from alphacut.frame.verification.exact_motion import Course, LinearMotion
+from alphacut.frame.verification.exact_motion import LinearMotion
 
 UNFORCED = np.zeros((0, 0)), np.zeros((0, 0))
 
@@ -75,52 +73,6 @@ def test_round_off_that_is_stated_holds_against_mpmath():
     error = np.abs(values - reference.astype(float))
     assert (error <= rounding).all()
     assert (error.max(0) >= 1e-6 * rounding.max(0)).all(), "the round-off says too little"
-
-
-COURSES = {
-    "ramp to a sine that stays": Course(np.array([0.0, 1.0]), 0.5, 0.0, True, 20.0, 0.0),
-    "sine that ends": Course(np.array([1.0, 1.0]), 0.5, 0.3, False, 20.0, 0.4),
-    "amplitude 2": Course(np.array([2.0, 2.0]), 0.5, 0.0, True, 20.0, 0.0),
-    "gusts": Course(np.array([0.5, -1.0, 2.0, 1.0]), 0.37, 0.21, False, 7.0, -1.0),
-    "gusts without a sine": Course(np.array([0.5, -1.0, 2.0, 1.0]), 0.37, 0.21, True, 0.0, 0.0),
-}
-
-
-@pytest.mark.parametrize("course", COURSES.values(), ids=COURSES)
-def test_forces_of_every_course_move_as_integrated_step_by_step(course):
-    (M, D, K, rows, start, pattern), A = chain(np.random.default_rng(6), 2)
-    A, b = A[:4, :4], np.array([300.0, 900.0])
-    push = np.append(np.zeros(2), np.linalg.solve(M, b))
-    arrays = M, D, K, rows, start, pattern, np.zeros(0), 0.0
-    times = np.arange(41) * 0.05
-    moving = LinearMotion(*arrays, b[:, None], np.zeros((3, 1)), (course,))
-    values, rounding = moving.outputs(times)
-    samples = course.start + np.arange(len(course.samples)) * course.step
-    cuts = np.unique(np.concatenate([times, samples[samples < times[-1]]]))
-    state, out = start, {0.0: rows @ start}
-    for here, there in pairwise(cuts):
-        g = course_ends(course, here, there)
-
-        def rate(t, x, step=(here, there), g=g):
-            sine = np.sin(course.frequency * (t - course.start) + course.phase)
-            return A @ x + push * np.interp(t, step, g) * (sine if course.frequency else 1.0)
-
-        found = solve_ivp(rate, (here, there), state, "DOP853", rtol=1e-12, atol=1e-14)
-        state = found.y[:, -1]
-        out[there] = rows @ state
-    reference = np.array([out[t] for t in times])
-    size = np.abs(reference).max(0)
-    assert (np.abs(values - reference) <= rounding + 1e-9 * size).all()
-    assert (rounding <= 1e-7 * size).all()
-
-
-def course_ends(course, here, there):
-    """The envelope g of a course just after one time and just before another."""
-    sampled = course.start + np.arange(len(course.samples)) * course.step
-    middle = (here + there) / 2
-    if middle < sampled[0] or (middle > sampled[-1] and not course.is_held):
-        return [0.0, 0.0]
-    return np.interp([here, there], sampled, course.samples)
 
 
 def test_free_motion_without_a_record_and_without_stiffness():
