@@ -127,13 +127,14 @@ def modes_of(
     """Yield by slabs: the slab, modes (modes, fields, *slab), bounds of their rounding."""
     xp, count = namespace(fields), len(element.local)
     matrix, magnitude = xp.asarray(element.modes), xp.asarray(element.magnitude)
+    terms = int((element.magnitude > 0).sum(axis=1).max())
     uniform = xp.reshape(xp.asarray(mean_modes), mean_modes.shape + (1,) * element.dimension)
     for slab in slabs(fields):
         local, local_error = _subtract_linear(element, gather(element, fields, slab))
         shape = (-1, *local.shape[1:])
         modes = xp.reshape(matrix @ xp.reshape(local, (count, -1)), shape)
-        # the product of matrices, and the entries of the matrix
-        local_error += (count + ENTRY) * UNIT * xp.abs(local)
+        # the sums of the product, in which zeros add no error, and the entries of the matrix
+        local_error += (terms + ENTRY) * UNIT * xp.abs(local)
         rounding = xp.reshape(magnitude @ xp.reshape(local_error, (count, -1)), shape)
         modes += uniform
         rounding += UNIT * xp.abs(modes)

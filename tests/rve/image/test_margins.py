@@ -62,7 +62,7 @@ def test_the_product_of_modes_and_unknowns(element):
         fields[0, kind, 1 + up, 1 + right] = 0.0
     ((_, _, rounding),) = modes_of(element, fields, np.zeros((len(element.modes), 1)))
     # a sum in order, the entries of the matrix off by ten units and their products by one
-    error = in_order([1.0] + [LOST] * (count - 1)) + 11 * Fraction(UNIT)
+    error = in_order([1.0] + [LOST] * (len(used) - 1)) + 11 * Fraction(UNIT)
     assert tight(Fraction(rounding[row, 0, 1, 1]), error)
 
 
