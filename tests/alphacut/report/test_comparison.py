@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 
 from alphacut.entry import main
-from alphacut.questions.question import Table
 from alphacut.questions.summary import Parts
 from alphacut.report.results import comparison
-from alphacut.report.tables import latex
 from alphacut.stages.suite import Statistics, SuiteResult
 from tests.alphacut.one_case import run
 
@@ -71,9 +69,3 @@ def test_what_cannot_be_compared_is_said_in_one_line(runs, words, message, capsy
     error = capsys.readouterr().err
     assert message in error
     assert error.count("\n") == 1
-
-
-def test_special_letters_are_those_of_the_language():
-    table = Table(("a_b", "50 %"), [("x|y", "1 … 2")])
-    assert r"a\_b & 50 \%" in latex(table)
-    assert r"1 \dots{} 2" in latex(table)

@@ -48,13 +48,6 @@ def test_the_page_asks_nothing_of_the_network_and_shows_each_figure_once(results
         assert page.count(words) == 1
 
 
-def test_wide_tables_scroll_by_themselves(page):
-    tables = re.findall(r'(<div class="scroll"[^>]*>)?<table>', page)
-    assert len(tables) > 5
-    assert all(tables)
-    assert re.search(r"^\.scroll \{[^}]*overflow-x: auto; margin-right: min", page, re.MULTILINE)
-
-
 def test_texts_of_the_case_are_no_markup(page):
     assert "<script>alert" not in page
     assert "Two floors &lt;script&gt;" in page

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from alphacut.frame import StoreyFrame, envelope
-from alphacut.frame.identify.enclosure import LinearRelaxation
 from alphacut.frame.identify.identify import Identified, RefutedError, identify
 from alphacut.frame.identify.modes import (
     Chain,
@@ -72,17 +71,6 @@ def test_modes_of_the_chain_are_those_of_the_frame():
     changes = {"lengths": (3.0, 2.7, 2.8), "masses": (21e3, 15e3, 10e3), "columns": (2, 2, 2.2)}
     other = frequencies(replace(FRAME, modulus=31e9, **changes))
     assert np.sqrt(modes_at(chain, point[None])[0][0]) == pytest.approx(other, rel=1e-10)
-
-
-def test_linear_bounds_hold_for_any_multipliers_and_tell_empty_sets():
-    program = LinearRelaxation(4)
-    x, y = program.variable(0.0, 2.0), program.variable(-1.0, 3.0)
-    z = program.product(x, y)
-    program.add_inequality(x + y - program.one)
-    assert program.bounds(z)[0] == pytest.approx(-2.0, abs=1e-9)  # x = 2, y = −1
-    assert program.bounds(z)[0] <= -2.0
-    program.add_inequality(1.5 * program.one - x - y)
-    assert program.bounds(z) == (np.inf, -np.inf)
 
 
 def test_truth_is_covered(rng):

@@ -72,15 +72,6 @@ def test_integrals_of_a_step_agree_with_forty_digits(low):
     assert IDLE <= np.max(shares) <= 1
 
 
-def test_growing_exponents_are_scaled_by_their_growth():
-    out = np.empty(4, complex)
-    for z in (30 + 5j, 400 + 900j, 699 - 2j):
-        step_integrals(z, 1.0, out)
-        for value, true in zip(out, exact_integrals(z, 1.0), strict=True):
-            # of the exponential's own condition |z|
-            assert abs(mp.mpc(complex(value)) / true - 1) < 4 * abs(z) * UNIT_ROUNDOFF
-
-
 def exact_response(sigma, ground, time):
     """ρ at one time by 40 digits, interval by interval."""
     sigma, time, h = mp.mpc(complex(sigma)), mp.mpf(float(time)), mp.mpf(ground.step)

@@ -43,9 +43,3 @@ def test_ranges_are_those_that_a_frame_accepts(kind: str):
         refused = pytest.raises(ValueError, match=re.escape(one.range))
         with nullcontext() if one.admits(value, value) else refused:
             replace(FRAME, **{arguments[kind]: given})
-
-
-def test_names_with_floors_are_parameters_and_directions_of_a_field_are_none():
-    assert of_storey_frame("q2_0").unit == "m"
-    assert of_storey_frame("zeta10").range == of_storey_frame("zeta").range
-    assert (of_storey_frame("m_1").unit, of_storey_frame("m_1").range) == ("", "")

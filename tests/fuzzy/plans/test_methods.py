@@ -199,17 +199,6 @@ def test_the_first_point_that_is_tried_may_fail_too():
     assert "skip" not in failed.value.cure
 
 
-def test_arrays_share_their_unit():
-    units = {"u": "mm", "f": "Hz"}
-    result = propagate(lambda a, b: {"u": [a, b], "f": a * b}, INPUTS, Reduced(), units=units)
-    assert dict(zip(result.outputs, result.units, strict=True)) == {
-        "u[0]": "mm",
-        "u[1]": "mm",
-        "f": "Hz",
-    }
-    assert "u[1] [mm]" in str(result)
-
-
 def test_many_outputs_are_bounded_by_corners_or_attained_by_samples_alone():
     result = propagate(lambda a, b: [a * k + b for k in range(30)], INPUTS)
     assert result.nature is Nature.ESTIMATED

@@ -107,14 +107,6 @@ def test_exchanged_mirrored_and_shifted_axes_give_the_same_bounds(rng):
         assert inverse.T @ old @ inverse == pytest.approx(new, abs=1e-10 * np.abs(new).max())
 
 
-def test_divided_voxels_narrow_the_bounds(rng):
-    phase, moduli = voxels(rng, (4, 5, 6), contrast=10.0)
-    whole, parts = (solve_image(*moduli[:, phase], division=n, solver=TIGHT).bounds for n in (1, 2))
-    for inner, outer in ((parts.upper, whole.upper), (whole.lower, parts.lower)):
-        assert np.linalg.eigvalsh(outer - inner)[0] > 0
-    assert parts.width < whole.width
-
-
 def finite_elements(bulk, shear, sides, parts):
     """Stiffness, (6, 6), by trilinear elements, assembled at Gauss points and factorised."""
     bulk, shear = (np.kron(x, np.ones((parts,) * 3)) for x in (bulk, shear))
@@ -255,16 +247,6 @@ def _components(element, fields):
         part = np.einsum("ai,bj,ck,ijkzyx->abczyx", *along, local[unknown])
         modes[component, :n, :n, :n] += part
     return modes
-
-
-def test_fuzzy_moduli_widen_and_enclose(rng):
-    phase, moduli = voxels(rng, (4, 5, 6), contrast=10.0)
-    low, high = 0.9 * moduli[:, phase], 1.1 * moduli[:, phase]
-    wide = ImageModel((1.0, 1.0, 1.0)).solve(ModuliImages((low[0], high[0]), (low[1], high[1])))
-    for factor in (0.9, 1.1):
-        inside = solve_image(*(factor * moduli[:, phase])).bounds
-        assert np.linalg.eigvalsh(inside.lower - wide.bounds.lower)[0] > -1e-12
-        assert np.linalg.eigvalsh(wide.bounds.upper - inside.upper)[0] > -1e-12
 
 
 def test_a_homogeneous_volume_is_exact_and_its_constants_are_its_own():

@@ -10,6 +10,7 @@ from alphacut.rve.series.means import RuleError, SeriesError
 from alphacut.rve.series.model import CIRCLES, SeriesModel, square_stiffness
 from alphacut.rve.slices.model import SlicesModel
 from alphacut.stochastic import HermiteMap, TruncatedNormal
+from tests.rve.test_result import Bent
 
 MATRIX = Phase(20e9)
 
@@ -112,22 +113,13 @@ def test_a_map_that_jumps_is_refused(model):
         model.solve(Jumping(), MATRIX, [Phase(80e9)])
 
 
-class Bent:
-    """r = 0.4 + 0.12 |θ − 0.3|."""
-
-    distribution = TruncatedNormal()
-
-    def __call__(self, theta):
-        return 0.4 + 0.12 * np.abs(np.asarray(theta, float) - 0.3)
-
-
 def test_a_map_that_bends_has_its_error_declared_or_does_not_settle():
     rough, finer = (
-        SeriesModel(points=n).solve(Bent(), MATRIX, [Phase(80e9)])[0] for n in (20, 300)
+        SeriesModel(points=n).solve(Bent(0.3), MATRIX, [Phase(80e9)])[0] for n in (20, 300)
     )
     assert abs(rough.modulus / finer.modulus - 1) < rough.estimated_error < 0.1
     with pytest.raises(RuleError, match="the radius map is not smooth"):
-        SeriesModel().solve(Bent(), MATRIX, [Phase(80e9)])
+        SeriesModel().solve(Bent(0.3), MATRIX, [Phase(80e9)])
 
 
 @pytest.mark.parametrize(
