@@ -11,15 +11,10 @@ from alphacut.stochastic import HermiteMap, TruncatedNormal
 
 CONE, LAW = HermiteMap(0.2, 0.1, 0.7, 0.1), TruncatedNormal(-3, 3)
 PHASES = {"inclusion": Phase(80e9), "matrix": Phase(20e9)}
-TWO = 25.739483e9  # of meshes/two-particles.msh, by plane elements of order 5
 
 
 def cone(x, y, theta):
     return np.hypot(x, y) - CONE(theta)
-
-
-def two_particles(x, y, theta):
-    return np.minimum(np.hypot(x + 0.4, y + 0.45) - 0.35, np.hypot(x - 0.45, y - 0.4) - 0.40)
 
 
 def solve(level_set, size, layers=1, law=LAW, phases=PHASES):
@@ -37,11 +32,6 @@ def test_the_cone_of_a_map_is_too_stiff_by_first_order_and_declares_no_error():
     assert abs(results[1].energies.values - right).max() < 0.02 * right.sum(axis=(0, 1)).max()
     assert not results[1].errors
     assert "error of E not declared" in repr(results[1])
-
-
-def test_two_particles_are_too_stiff_by_first_order():
-    errors = [solve(two_particles, size).modulus / TWO - 1 for size in (0.15, 0.08)]
-    assert 0.003 < errors[1] < errors[0] < 0.015  # 1.2 and 0.6 %
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ from alphacut.rve.series.means import SeriesError
 from alphacut.rve.spheres.lattice_sums import harmonics, lattice_sums
 from alphacut.rve.spheres.model import SPHERES, cubic_stiffness
 from alphacut.rve.spheres.result import volume_fraction
+from tests.rve.series.test_series import random_cells
 
 MATRIX = Phase(20e9)
 
@@ -24,15 +25,6 @@ def material(bulk, shear):
     return Phase(
         9 * bulk * shear / (3 * bulk + shear), (3 * bulk - 2 * shear) / (6 * bulk + 2 * shear)
     )
-
-
-def random_cells(count, seed, *, highest):
-    rng = np.random.default_rng(seed)
-    for _ in range(count):
-        phases = [
-            Phase(20e9 * 10 ** rng.uniform(-3, 3) ** k, rng.uniform(-0.5, 0.49)) for k in (0, 1)
-        ]
-        yield rng.uniform(0.05, highest), *phases
 
 
 @pytest.mark.parametrize("inclusion", [Phase(90e9, 0.1), Phase(1e-3, 0.2), Phase(1e22, 0.4)])
