@@ -6,7 +6,7 @@
 # Seen: of ten runs bincount and add.at give ten results, sums, products and FFTs one. Of repeated indices another value
 #   stays at each run. Indices in an array are taken modulo the length. inv and solve of a singular matrix give numbers
 #   that are not finite. With SCIPY_ARRAY_API=1 scipy.fft and scipy.ndimage take device arrays, scipy.linalg refuses them.
-# Why it matters here: a proof of the fields of an image rests on bits that repeat, and on errors that arrive.
+# Why it matters here: fields of voxels are solved for on a device as well: by slices and products alone.
 set -euo pipefail
 if ! nvidia-smi -L > /dev/null 2>&1 || ! python3 -c "import cupy, scipy" 2> /dev/null; then
     echo "no NVIDIA device with CuPy: nothing was run"
