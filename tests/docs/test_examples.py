@@ -11,16 +11,11 @@ from pathlib import Path
 
 import pytest
 
-from alphacut.frame import METHODS, Auto
-
 PACKAGES = ("alphacut.fuzzy", "alphacut.stochastic", "alphacut.rve", "alphacut.frame")
 DEMOS = Path(__file__).parents[2] / "demos"
 NAMES = [
     (package, name) for package in PACKAGES for name in importlib.import_module(package).__all__
 ]
-
-ONE_PROTOCOL = set(METHODS.values()) - {Auto}
-"""Methods of an envelope, of which one shows how each is called."""
 
 
 def examples_of(value, name):
