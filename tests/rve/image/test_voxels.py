@@ -107,6 +107,13 @@ def test_exchanged_mirrored_and_shifted_axes_give_the_same_bounds(rng):
         assert inverse.T @ old @ inverse == pytest.approx(new, abs=1e-10 * np.abs(new).max())
 
 
+def test_divided_voxels_narrow_the_bounds(rng):
+    phase, moduli = voxels(rng, (4, 5, 6), contrast=10.0)
+    whole, parts = (solve_image(*moduli[:, phase], division=n, solver=TIGHT).bounds for n in (1, 2))
+    for inner, outer in ((parts.upper, whole.upper), (whole.lower, parts.lower)):
+        assert np.linalg.eigvalsh(outer - inner)[0] > 0
+
+
 def finite_elements(bulk, shear, sides, parts):
     """Stiffness, (6, 6), by trilinear elements, assembled at Gauss points and factorised."""
     bulk, shear = (np.kron(x, np.ones((parts,) * 3)) for x in (bulk, shear))
