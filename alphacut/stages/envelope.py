@@ -134,8 +134,9 @@ class EnvelopeTask:
         first, second = (subprogress(context.tick, x, x + 0.5) for x in (0.0, 0.5))
         arguments = self.arguments(structure) | {"progress": first}
         result = frame.envelope(**arguments, relative=not self.tolerance(structure).unit)
-        signed = [name for name in self.limited if name != output_of(name)]
-        peak_bounds = peaks(result, [*map(str, result.outputs), *signed])
+        outputs = [*map(str, result.outputs)]  # of others `close_peaks` has the peaks
+        signed = [x for x in self.limited if x != output_of(x) and output_of(x) in outputs]
+        peak_bounds = peaks(result, [*outputs, *signed])
         # a second proof of many inputs is hardly tighter: the number of its parts ends it
         has_many_inputs = len(structure.inputs(self.fuzzy)) > MAX_PARAMETERS
         gap = np.inf if has_many_inputs else PEAK_ERROR

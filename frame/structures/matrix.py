@@ -96,6 +96,11 @@ class MatrixStructure:
         factors = {f"observed: {name}": factor for name, factor in self.row_factors.items()}
         for name in self.row_factors:
             require_choice("row_factors", name, self.observed)
+        simplest = {
+            name: factor.simplest if isinstance(factor, Monomial) else factor
+            for name, factor in self.row_factors.items()
+        }
+        object.__setattr__(self, "row_factors", simplest)
         for name, factor in [*factors.items(), *(("a force", x.amplitude) for x in self.loads)]:
             self._require_factor(name, factor)
         for force in self.loads:
@@ -159,6 +164,7 @@ class MatrixStructure:
         require(is_pair, f"term of {kind}", value=what, allowed=allowed)
         factor, value = term
         self._require_factor(kind, factor)
+        factor = factor.simplest if isinstance(factor, Monomial) else factor
         array, key = np.asarray(value.toarray() if hasattr(value, "toarray") else value), "array of"
         size = np.shape(self.mass[0][1])[0]
         what, allowed = f"of shape {array.shape}", f"({size}, {size})"
@@ -323,6 +329,13 @@ class Monomial:
         powers = [name if k == 1 else f"{name}^{k}" for name, k in self.powers]
         has_number = self.coefficient != 1 or not powers
         return "*".join([f"{self.coefficient:g}"] * has_number + powers)
+
+    @property
+    def simplest(self) -> Monomial | str | float:
+        """The number or the parameter's name if it is one, of which proofs know more; else itself."""
+        if not self.powers:
+            return self.coefficient
+        return self.powers[0][0] if self.powers == ((str(self), 1),) else self
 
     def __call__(self, p: Mapping[str, Any]) -> Any:
         """Value at parameters, which may be numbers, arrays or anything with × and powers."""

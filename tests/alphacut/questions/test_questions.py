@@ -121,7 +121,7 @@ duration = "2 s"
 step = "0.02 s"
 [decision]
 limits = ["drift1 <= 1 %", "drift1 <= 3 %", "max drift1 <= 60 mm", "min drift1 >= -60 mm",
-          "min drift1 >= -20 mm", "min drift1 >= -40.6 mm", "min q2 >= 1 m", "q1 <= 1 m"]
+          "min drift1 >= -20 mm", "min drift1 >= -40.6 mm", "min q2 >= 1 m", "q1 <= 1 m", "max q1 <= 2 m"]
 """
 
 
@@ -140,6 +140,7 @@ def test_an_output_has_several_limits_of_each_side_and_of_its_magnitude(tmp_path
         "min drift1 >= -40.6 mm": "can be exceeded",
         "min q2": "exceeded",
         "q1": "not exceeded",  # no output of the frame's own
+        "max q1": "not exceeded",
         "any of them": "exceeded",
     }
     band = summary["envelopes"]["all"]

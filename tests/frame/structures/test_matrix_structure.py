@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from scipy.sparse import coo_array
 
-from alphacut.frame import Exact, LinearFlow, MatrixStructure, StoreyFrame
+from alphacut.frame import Accelerogram, Exact, LinearFlow, MatrixStructure, StoreyFrame, envelope
 from alphacut.frame.structures.linear import frequencies
+from alphacut.frame.structures.matrix import Monomial
+from alphacut.fuzzy import Interval
 
 MOTION = {"dampers": (0.1, 0.2), "damper_placement": "storey", "q0": (0.1, 0.0), "v0": (0.0, 0.4)}
 STOREY = StoreyFrame((3.0, 2.0), (1.0, 1.2), 5.0, 1.0, **MOTION, outputs=("q2", "v1"))
@@ -41,3 +43,19 @@ def test_frequencies_are_those_of_the_chain_of_springs():
     exact = np.sqrt(np.sort(np.linalg.eigvals(np.diag(1 / np.array(MASSES)) @ stiffness).real))
     found = frequencies(StoreyFrame(MASSES, LENGTHS, 25e9, 1e-5, columns=columns))
     assert found == pytest.approx(exact, rel=1e-12)
+
+
+def test_factors_read_from_text_are_proved_as_names_and_numbers_are():
+    one, k = Monomial.parse("1"), Monomial.parse("k")
+    assert (one.simplest, k.simplest) == (1.0, "k")
+    assert Monomial.parse("2*k").simplest == Monomial.parse("2*k")
+    chain, eye = np.array([[2.0, -1.0], [-1.0, 1.0]]), np.eye(2)
+    record = Accelerogram(0.02, np.sin(8 * np.arange(0, 1, 0.02)))
+    dashpot = [(one, 0.5 * np.diag([1.0, 0.0]))]
+    structure = MatrixStructure(
+        {"k": 610.0}, [(one, eye)], [(k, chain)], {"q": eye[1]}, dashpot,
+        ground=record, pattern=np.ones(2),
+    )  # fmt: skip
+    fuzzy = {"k": Interval(600, 620)}
+    result = envelope(structure, fuzzy, duration=1.0, step=0.01, alpha=[0], progress=False)
+    assert result.nature == "guaranteed"
