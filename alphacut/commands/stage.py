@@ -75,7 +75,7 @@ def constants_text(part: ModulusResult | ImageResult, nature: Nature) -> str:
     text = "".join(cuts_text(name, cuts, part.alpha, nature) for name, cuts in part.plane.items())
     if PLANE_STRAIN in part.plane and len(part.plane) == 1:
         text += f"{ONLY}\n"
-    if (loss := part.loss) is not None:
+    if (loss := part.loss) is not None and loss.nature is not Nature.GUARANTEED:
         rows = []
         for name, cuts in (("E", loss.E), ("G", loss.G), ("K", loss.K)):
             texts = (cut_text(cuts, level, Nature.ATTAINED) for level in (0, -1))

@@ -157,9 +157,11 @@ def image(dataset: xarray.Dataset) -> Figure:
     pictures = [phase] if phase.ndim == 2 else planes
     ratios = [*[1.0] * len(pictures), 1.4 if len(pictures) == 1 else 2.0]
     figure, axes = plt.subplots(1, len(ratios), figsize=(WIDTH, 3.4), width_ratios=ratios)
+    sides = dict(zip(phase.dims, dataset.attrs.get("sides", ()), strict=False))
     for picture, values in zip(axes, pictures, strict=False):
-        picture.imshow(values.values, origin="lower", cmap="Greys_r", vmin=0, vmax=phase.max())
         up, right = values.dims
+        picture.imshow(values.values, origin="lower", cmap="Greys_r", vmin=0, vmax=phase.max())
+        picture.set_aspect(sides.get(up, 1) / sides.get(right, 1))
         picture.set(xticks=[], yticks=[], xlabel=right, ylabel=up)
     axes[0].set_title("phases as segmented")
     lower, upper = dataset["E"].transpose("bound", "alpha").values / GPA

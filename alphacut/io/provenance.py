@@ -81,8 +81,9 @@ def digest_of(content: bytes) -> str:
 
 
 def file_digest(path: Path) -> str:
-    """SHA-256 of the content of a file."""
-    return digest_of(path.read_bytes())
+    """SHA-256 of the content of a file, which may be larger than the memory."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _canonical(value: object) -> object:

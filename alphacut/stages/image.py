@@ -156,7 +156,7 @@ def compute_cuts(
             loss = LossResult.of(losses, errors, Nature.ESTIMATED)
         else:
             losses = {"E": loss_of_young(crisp.bounds, proved["K"], proved["G"]), **proved}
-            loss = LossResult.of(losses, None, NATURE)
+            proved, loss = losses, LossResult.of(losses, None, NATURE)
     top, constants = cuts[-1], np.array([cut.constants for cut in cuts])  # (levels, constants, 2)
     fractions, names = study.fractions, CONSTANT_NAMES[cell.dimension]
     shares_of_phases = np.array([*fractions.values()])
@@ -184,7 +184,7 @@ def compute_cuts(
         loss=loss,
         proved_losses={name: CutsResult.of(cut) for name, cut in proved.items()},
     )
-    return StageResult(result, _dataset(alpha, cuts, phase, losses))
+    return StageResult(result, _dataset(alpha, cuts, phase, losses, cell.sides))
 
 
 def _bounds_by_side(bounds: Interval, unit: float = 1.0) -> dict[str, float]:
@@ -204,9 +204,13 @@ def _require_isotropic(widest: ImageCut) -> None:
 
 
 def _dataset(
-    alpha: tuple[float, ...], cuts: Sequence[ImageCut], phase: Ints, losses: Mapping[str, Array]
+    alpha: tuple[float, ...],
+    cuts: Sequence[ImageCut],
+    phase: Ints,
+    losses: Mapping[str, Array],
+    sides: tuple[float, ...],
 ) -> xarray.Dataset:
-    """Dataset of the bounds on each level, in SI, and of the phase of each pixel."""
+    """Dataset of the bounds on each level, in SI, and of the phase of each pixel or voxel."""
     import xarray
 
     young, constants = np.array([x.modulus for x in cuts]), np.array([x.constants for x in cuts])
@@ -221,7 +225,7 @@ def _dataset(
     }
     axes = {"alpha": list(alpha), "bound": ["lower", "upper"]}
     axes |= dict.fromkeys(("row", "column"), AXES[phase.ndim])
-    return xarray.Dataset(variables, axes, {"nature": str(NATURE)})
+    return xarray.Dataset(variables, axes, {"nature": str(NATURE), "sides": sides})
 
 
 def image_loss_bounds(energies: PhaseEnergies, cuts: Array, average: str) -> tuple[Array, Array]:
@@ -290,7 +294,8 @@ def image_study(cell: ImageCell) -> ImageStudy:
     Raises:
         RefusedError: A threshold or a label does not fit the image.
     """
-    grey = read_grid(cell.image, cell.dimension, equal_sides=len(set(cell.sides)) == 1)
+    ImageModel(cell.sides)  # refuses sides too unlike
+    grey = read_grid(cell.image, cell.sides)
     if cell.labels:
         phase = np.full(grey.shape, -1)
         for number, label in enumerate(cell.labels):

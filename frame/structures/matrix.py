@@ -332,7 +332,7 @@ class Monomial:
 
     @property
     def simplest(self) -> Monomial | str | float:
-        """The number or the parameter's name if it is one, of which proofs know more; else itself."""
+        """The number or parameter's name if it is one, of which proofs know more; else itself."""
         if not self.powers:
             return self.coefficient
         return self.powers[0][0] if self.powers == ((str(self), 1),) else self

@@ -22,9 +22,9 @@ PHOTOMETRIC, WHITE_IS_ZERO = 262, 0  # tag of TIFF and its value
 SAMPLE_FORMAT, SIGNED = 339, 2
 BYTES = 1.3e8
 """Of the program."""
-BYTES_PER_ELEMENT = {2: 1450, 3: 1200}
+BYTES_PER_ELEMENT = {2: 1450, 3: 1900}
 """Of each element of the cuts' solutions with their first guess, by dimension; within 1.25 of peaks
-at 128² … 512² pixels of two elements a side, 512² and 1024² of one, and 32³ … 96³ voxels."""
+at 128² … 512² pixels of two elements a side, 512² and 1024² of one, and 96³ voxels."""
 MOST_CHANNELS = 4  # pages that a file calls channels are colours up to so many, else slices
 SLICES = (".tif", ".tiff", ".png", ".bmp")
 META_TYPES = {
@@ -39,19 +39,22 @@ NRRD_TYPES = {
 }  # fmt: skip
 
 
-def read_grid(path: Path, dimension: int, *, equal_sides: bool = True) -> Array:
+def read_grid(path: Path, sides: Sequence[float]) -> Array:
     """Grey values or labels, shape (y, x) of a picture or (z, y, x) of a volume.
 
     Args:
         path: Picture (PNG, TIFF …) or ``.npy``; of a volume a TIFF stack, a folder of pictures in
             the order of the numbers in their names, ``.npy``, ``.mhd`` or ``.nhdr``/``.nrrd``.
-        dimension: 2 or 3.
-        equal_sides: Whether a file that says that its pixels or voxels have unequal sides is
-            refused.
+        sides: Sides of a pixel along (y, x) or of a voxel along (z, y, x), in any unit.
 
     Raises:
-        RefusedError: The file is none of these, of another dimension, or too large for memory.
+        RefusedError: The file is none of these, of another dimension, too large for memory, or says
+            that its pixels or voxels have sides of other ratios.
     """
+    dimension, equal_sides = len(sides), len(set(sides)) == 1
+    if dimension == 2 and path.is_dir():
+        cure = "a volume takes cell.voxel in place of cell.pixel"
+        raise RefusedError(path.name, "a folder", "a picture", cure)
     try:
         if path.suffix == ".npy":
             # mapped: one too large for memory must come as far as the question of how large it is
@@ -59,7 +62,7 @@ def read_grid(path: Path, dimension: int, *, equal_sides: bool = True) -> Array:
         elif dimension == 2:
             values = _picture(path, equal_sides)
         else:
-            values = _volume(path, equal_sides)
+            values = _volume(path, sides)
     except (RefusedError, MemoryError):
         raise
     except Exception as error:  # readers of damaged files raise errors of many kinds
@@ -93,28 +96,43 @@ def files_of(path: Path) -> list[Path]:
     return [path, *(file for file in data if file.is_file())]
 
 
-def _volume(path: Path, equal_sides: bool) -> Array:
+def _volume(path: Path, sides: Sequence[float]) -> Array:
     """Numbers of a volume along the axes (z, y, x)."""
     if path.is_dir():
-        return _slices(path, equal_sides)
+        return _slices(path, sides[-1] == sides[-2])
     if path.suffix.lower() in (".tif", ".tiff"):
         return _stack(path)
     if path.suffix.lower() in (".mhd", ".mha"):
-        return _meta_image(path, equal_sides)
+        return _meta_image(path, sides)
     if path.suffix.lower() in (".nhdr", ".nrrd"):
-        return _nrrd(path, equal_sides)
+        return _nrrd(path, sides)
     allowed = "a TIFF stack, a folder of slices, .npy, .mhd or .nhdr"
     cure = "write raw data beside a .mhd head with DimSize, ElementType and ElementDataFile"
+    if path.suffix.lower() in (*SLICES, ".jpg", ".jpeg"):
+        cure = "a picture takes cell.pixel in place of cell.voxel"
     raise RefusedError(path.name, f"a file of kind {path.suffix or 'unknown'}", allowed, cure)
 
 
 def _slices(folder: Path, equal_sides: bool) -> Array:
     """The pictures of a folder one above another, in the order of the numbers in their names."""
     files = files_of(folder)
-    require(len(files) > 1, folder.name, f"{len(files)} pictures", "a folder of slices")
-    by_number = sorted(
-        files, key=lambda file: [int(x) for x in re.findall(r"\d+", file.stem)] or [-1]
+    require(
+        len(files) > 1,
+        folder.name,
+        f"{len(files)} pictures",
+        "a folder of slices, PNG, TIFF or BMP",
     )
+    numbers = {}
+    for file in files:
+        digits = re.findall(r"\d+", file.stem)
+        require(bool(digits), file.name, "no number", "a number in the name of each slice")
+        numbers[int(digits[-1])] = file
+    lowest, count = min(numbers), len(numbers)
+    is_whole = count == len(files) and max(numbers) - lowest == count - 1
+    missing = next((k for k in range(lowest, lowest + count) if k not in numbers), None)
+    what = f"{len(files)} pictures, none with number {missing}" if missing else "numbers twice"
+    require(is_whole, folder.name, what, "slices with numbers that follow one another")
+    by_number = [numbers[k] for k in sorted(numbers)]
     first = _picture(by_number[0], equal_sides)
     require_memory((len(files), *first.shape))
     values = np.empty((len(files), *first.shape), first.dtype)
@@ -152,7 +170,7 @@ def _stack(path: Path) -> Array:
     return np.asarray(values)
 
 
-def _meta_image(path: Path, equal_sides: bool) -> Array:
+def _meta_image(path: Path, sides: Sequence[float]) -> Array:
     """Volume of a MetaImage head and its raw data."""
     head, size = {}, 0
     with path.open("rb") as file:
@@ -174,11 +192,12 @@ def _meta_image(path: Path, equal_sides: bool) -> Array:
         is_big=is_big,
         skip=size if data == "LOCAL" else int(head.get("HeaderSize", 0)),
         packed=head.get("CompressedData", "False").lower() == "true",
-        spacing=head.get("ElementSpacing", "").split() if equal_sides else (),
+        spacing=head.get("ElementSpacing", "").split(),
+        sides=sides,
     )
 
 
-def _nrrd(path: Path, equal_sides: bool) -> Array:
+def _nrrd(path: Path, sides: Sequence[float]) -> Array:
     """Volume of an NRRD head and its raw data, in the same file after an empty line or another."""
     head, size = {}, 0
     with path.open("rb") as file:
@@ -202,7 +221,8 @@ def _nrrd(path: Path, equal_sides: bool) -> Array:
         is_big=head.get("endian") == "big",
         skip=int(head.get("byte skip", 0)) if name else size,
         packed=head.get("encoding", "raw").lower() != "raw",
-        spacing=spacing if equal_sides else (),
+        spacing=spacing,
+        sides=sides,
     )
 
 
@@ -216,6 +236,7 @@ def _raw(
     skip: int,
     packed: bool,
     spacing: Sequence[str | float],
+    sides: Sequence[float],
 ) -> Array:
     """Raw numbers whose head gives sizes along x, y, z: the first one varies fastest."""
     name = path.name
@@ -223,9 +244,11 @@ def _raw(
     require(not packed, name, "compressed data", "raw data", "save it without compression")
     require(len(sizes) == 3, name, f"{len(sizes)} sizes", "three, along x, y and z")
     require(data.is_file(), name, f"data in {data.name}", "a file beside the head")
-    if spacing and max(map(float, spacing)) > 1.01 * min(map(float, spacing)):
+    stated = np.array([*map(float, reversed(spacing))] or sides) / np.asarray(sides, float)
+    if stated.max() > 1.01 * stated.min():
         what = f"voxels of {' × '.join(f'{float(x):g}' for x in spacing)} along x, y, z"
-        raise RefusedError(name, what, "cubes", "give cell.voxel = [x, y, z]")
+        given = " : ".join(f"{side:g}" for side in reversed(sides))
+        raise RefusedError(name, what, given, "give cell.voxel = [x, y, z] as they are")
     shape = tuple(int(n) for n in reversed(sizes))
     require_memory(shape)
     dtype = np.dtype((">" if is_big else "<") + str(kind))
@@ -254,7 +277,8 @@ def _picture(path: Path, square: bool) -> Array:
         mode, frames = picture.mode, getattr(picture, "n_frames", 1)
         if mode not in PLANE_MODES or frames > 1:
             what = f"of mode {mode} with {frames} pages"
-            raise RefusedError(path.name, what, "one page of grey values", "save the one meant")
+            cure = "save the one meant as grey values; a volume takes cell.voxel"
+            raise RefusedError(path.name, what, "one page of grey values", cure)
         dpi_x, dpi_y = map(float, picture.info.get("dpi", (1, 1)))
         if square and abs(dpi_x / dpi_y - 1) > 0.01:
             what = f"of pixels {dpi_x:g} by {dpi_y:g} per inch"

@@ -77,6 +77,10 @@ class ImageModel:
     def __post_init__(self) -> None:
         require_average(self.average)
         allowed = f"{MIN_SIDE_RATIO:g} to {1 / MIN_SIDE_RATIO:g}"
+        allowed_sides = "two of a pixel or three of a voxel"
+        require(len(self.sides) in (2, 3), "sides", self.sides, allowed_sides)
+        is_whole = isinstance(self.division, int) and self.division >= 1
+        require(is_whole, "division", self.division, "a whole number from 1")
         for side in self.sides:
             require(
                 MIN_SIDE_RATIO <= side <= 1 / MIN_SIDE_RATIO,
@@ -100,6 +104,9 @@ class ImageModel:
         displacements with the greatest; each is computed on a thread. The fields of `start`, a
         solution of the same division, are the first guess.
         """
+        shape = images.bulk[0].shape
+        what = f"{len(self.sides)} for a grid of shape {shape}"
+        require(len(shape) == len(self.sides), "sides", what, "one for each axis")
         is_stopped = Event()
 
         def raise_if_stopped() -> None:
@@ -227,10 +234,24 @@ def solve_image(bulk: Array, shear: Array, **settings: Any) -> ImageSolution:
     """Proved bounds of a periodic image of pixels or voxels.
 
     Args:
-        bulk: Bulk modulus in Pa, shape (y, x) with that of plane strain, K + G/3, or (z, y, x).
-        shear: Shear modulus in Pa, same shape.
+        bulk: Bulk modulus in Pa, positive, shape (y, x) with that of plane strain, K + G/3, or
+            (z, y, x).
+        shear: Shear modulus in Pa, positive, same shape.
         settings: Those of `ImageModel`.
+
+    Returns:
+        Its `bounds` have the methods `young`, `poisson`, `shear` and `constants`.
+
+    Raises:
+        RefusedError: The arrays are not alike, or hold other than positive numbers.
     """
+    bulk, shear = (np.asarray(x, float) for x in (bulk, shear))  # the proof is of doubles
+    allowed = "two arrays of one shape (y, x) or (z, y, x)"
+    require(bulk.shape == shear.shape, "moduli", f"of shapes {bulk.shape}, {shear.shape}", allowed)
+    require(bulk.ndim in (2, 3), "moduli", f"of shape {bulk.shape}", allowed)
+    is_positive = all(bool(((x > 0) & np.isfinite(x)).all()) for x in (bulk, shear))
+    cure = "give pores a small modulus; the upper bound holds for them"
+    require(is_positive, "moduli", "0, negative or not finite", "positive numbers", cure)
     settings = {"sides": (1.0,) * bulk.ndim, **settings}
     return ImageModel(**settings).solve(ModuliImages((bulk, bulk), (shear, shear)))
 

@@ -44,7 +44,7 @@ def test_a_thin_volume_saved_as_colour_or_as_pages_is_refused(tmp_path):
     first.save(tmp_path / "five.tif", save_all=True, append_images=others)
     for name, words in (("three.tif", "mode RGB"), ("five.tif", "5 pages")):
         with pytest.raises(RefusedError, match=words):
-            read_grid(tmp_path / name, 2)
+            read_grid(tmp_path / name, (1, 1))
 
 
 def test_pixels_that_the_file_says_are_not_square_are_refused(tmp_path):
@@ -53,7 +53,7 @@ def test_pixels_that_the_file_says_are_not_square_are_refused(tmp_path):
     picture = Image.fromarray(np.arange(64, dtype=np.uint8).reshape(8, 8))
     picture.save(tmp_path / "a.tif", dpi=(100, 300))
     with pytest.raises(RefusedError, match=r"100 by 300 per inch"):
-        read_grid(tmp_path / "a.tif", 2)
+        read_grid(tmp_path / "a.tif", (1, 1))
 
 
 @pytest.mark.parametrize("kind", [np.uint32, np.int8])
@@ -68,7 +68,7 @@ def test_integers_whose_sign_pillow_changes_are_refused(tmp_path, kind):
         signed, unsigned = (struct.pack("<HHIHH", 339, 3, 1, x, 0) for x in (2, 1))
         (tmp_path / "labels.tif").write_bytes(content.replace(signed, unsigned))
     with pytest.raises(RefusedError, match="sign"):
-        read_grid(tmp_path / "labels.tif", 2)
+        read_grid(tmp_path / "labels.tif", (1, 1))
 
 
 def test_without_a_display_and_xvfb_there_is_no_picture_and_one_line(monkeypatch, capsys):

@@ -127,5 +127,5 @@ def test_a_tomogram_has_its_proved_bounds_and_losses(tmp_path):
     assert (inside.young()[1] <= high).all()
     assert (high - low)[1] < 0.1 * low[1] < (high - low)[0]
     losses = {name: ends["lower"] for name, ends in image["proved_losses"].items()}
-    assert set(losses) == {"E_x", "E_y", "E_z", "G", "K"}
+    assert set(losses) == {"E", "E_x", "E_y", "E_z", "G", "K"}
     assert all(0.01 < loss[0] < 0.04 for loss in losses.values())

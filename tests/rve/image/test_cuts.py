@@ -124,7 +124,7 @@ def test_grey_values_are_read_as_they_are(tmp_path, name, kind):
         np.save(path, values)
     else:
         pytest.importorskip("PIL.Image").fromarray(values).save(path)
-    assert np.array_equal(read_grid(path, 2), values[::-1])
+    assert np.array_equal(read_grid(path, (1, 1)), values[::-1])
 
 
 def test_a_mask_whose_white_is_zero_is_refused_with_its_fraction(tmp_path):
@@ -134,10 +134,10 @@ def test_a_mask_whose_white_is_zero_is_refused_with_its_fraction(tmp_path):
     for photometric in (1, 0):
         mask.save(tmp_path / "mask.tif", tiffinfo={262: photometric})
         if photometric:
-            assert read_grid(tmp_path / "mask.tif", 2).mean() == 0.25
+            assert read_grid(tmp_path / "mask.tif", (1, 1)).mean() == 0.25
             continue
         with pytest.raises(RefusedError, match=r"white as zero, bright on 0\.25"):
-            read_grid(tmp_path / "mask.tif", 2)
+            read_grid(tmp_path / "mask.tif", (1, 1))
 
 
 BROKEN = {
@@ -160,7 +160,7 @@ def test_files_that_are_no_plane_grey_image_are_refused(tmp_path, name):
     else:
         pytest.importorskip("PIL.Image").fromarray(content).save(path)
     with pytest.raises(RefusedError) as error:
-        read_grid(path, 2)
+        read_grid(path, (1, 1))
     assert error.value.key == name
 
 

@@ -331,3 +331,27 @@ def test_rounding_counts(rng):
 def test_a_device_that_is_not_there_is_one_line():
     with pytest.raises(RefusedError, match="device"):
         solve_image(np.ones((2, 2, 2)), np.ones((2, 2, 2)), device="cuda")
+
+
+@pytest.mark.parametrize(
+    ("bulk", "shear", "settings", "what"),
+    [
+        (np.ones((2, 2, 2)), np.ones((2, 2, 3)), {}, "shapes"),
+        (np.ones(3), np.ones(3), {}, "shape"),
+        (np.zeros((2, 2, 2)), np.ones((2, 2, 2)), {}, "positive"),
+        (np.full((2, 2), np.nan), np.ones((2, 2)), {}, "positive"),
+        (np.ones((2, 2, 2)), np.ones((2, 2, 2)), {"sides": (1.0, 1.0)}, "sides"),
+        (np.ones((2, 2)), np.ones((2, 2)), {"division": 0}, "division"),
+    ],
+)
+def test_arrays_that_are_no_moduli_of_a_grid_are_refused(bulk, shear, settings, what):
+    with pytest.raises(RefusedError, match=what):
+        solve_image(bulk, shear, **settings)
+
+
+def test_moduli_in_single_precision_are_proved_as_doubles(rng):
+    phase, moduli = voxels(rng, (3, 4, 5), contrast=20.0)
+    single = moduli[:, phase].astype(np.float32)
+    bounds, exact = solve_image(*single).bounds, solve_image(*single.astype(float)).bounds
+    assert np.array_equal(bounds.lower, exact.lower)
+    assert np.array_equal(bounds.upper, exact.upper)
