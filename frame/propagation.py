@@ -244,8 +244,11 @@ def require_admissible(system: LinearSystem | LagrangianSystem, cuts: Boxes) -> 
         require(parameter.admits(low, high), key, value=shown, allowed=parameter.range or "finite")
         nominal, sizes = abs(system.parameters.get(name, 0.0)), (abs(low), abs(high))
         is_same_unit = min(sizes) < OTHER_UNITS * nominal and OTHER_UNITS * max(sizes) > nominal
-        is_right, own = is_same_unit or nominal == 0 or not any(sizes), f"{nominal:g}"
-        allowed, cure = f"values of the size of {own}, the structure's own", "give both in SI units"
+        is_right = is_same_unit or nominal == 0 or not any(sizes)
+        allowed, cure = (
+            f"values of the size of {nominal:g}, the structure's own",
+            "give both in SI units",
+        )
         require(is_right, key, value=shown, allowed=allowed, cure=cure)
     if isinstance(system, LagrangianSystem):
         return

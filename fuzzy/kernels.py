@@ -88,9 +88,9 @@ def shared_folder(module: str) -> Path | None:
         if numba.config.CACHE_DIR or status.st_mode & 0o022 or status.st_uid != os.getuid():
             return None
         if not folder.exists():
-            for other in base.iterdir():
-                if other.stat().st_mtime < time.time() - UNUSED_DAYS * 86400:
-                    shutil.rmtree(other, ignore_errors=True)
+            for unused in base.iterdir():
+                if unused.stat().st_mtime < time.time() - UNUSED_DAYS * 86400:
+                    shutil.rmtree(unused, ignore_errors=True)
         folder.mkdir(exist_ok=True)
         os.utime(folder)
     except (OSError, RuntimeError):

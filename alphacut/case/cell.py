@@ -131,8 +131,8 @@ class CellContent(Section):
             for key in keys:
                 allowed = f"[{key}], which stage {stage} needs"
                 require(getattr(self, key) is not None, key, None, allowed)
-        other = "stage microstructure" if "microstructure" in self.stages else "cell.fraction"
-        require_alone("radius", self.radius is not None and has_radius, other)
+        source = "stage microstructure" if "microstructure" in self.stages else "cell.fraction"
+        require_alone("radius", self.radius is not None and has_radius, source)
         is_computed = "microstructure" in self.stages
         require_alone("cell.fraction", has_fraction and is_computed, "stage microstructure")
         method = self.modulus.method

@@ -51,8 +51,10 @@ def modulus(options: argparse.Namespace, out: TextIO) -> int:
 
 def image_text(result: ImageResult) -> str:
     """Lines on an image: its constants, area fractions, and what widens the bounds of E."""
-    whole = "area" if len(result.lower_GPa) == 3 else "volume"
-    shares = (f"{name}: {share:.1%} of the {whole}\n" for name, share in result.fractions.items())
+    measured = "area" if len(result.lower_GPa) == 3 else "volume"
+    shares = (
+        f"{name}: {share:.1%} of the {measured}\n" for name, share in result.fractions.items()
+    )
     constants = constants_text(result, Nature.GUARANTEED)
     title = "tan δ, to first order in it"
     losses = cuts_text(title, result.proved_losses, result.alpha, Nature.GUARANTEED)

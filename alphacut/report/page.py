@@ -164,8 +164,8 @@ class Page:
             is_plane = len(part.lower_GPa) == 3
             where = "image as it was segmented, in plane strain" if is_plane else "volume"
             yield f"The bounds are those of the {where}."
-            whole = "area" if is_plane else "volume"
-            yield f"Of the {whole}: {shares}. {width_text(part)}."
+            measured = "area" if is_plane else "volume"
+            yield f"Of the {measured}: {shares}. {width_text(part)}."
 
     def _references(self) -> Iterator[str]:
         part = self.summary.modulus

@@ -110,8 +110,8 @@ def _constants(part: ModulusResult | ImageResult) -> Iterator[Row]:
 def without_empty_columns(head: Row, rows: list[Row]) -> Table:
     """The table without columns whose cells are all empty or "none"."""
     columns = [k for k in range(len(head)) if any(row[k] not in ("", "none") for row in rows)]
-    kept = [tuple(row[k] for k in columns) for row in rows]
-    return Table(tuple(head[k] for k in columns), kept)
+    filled_rows = [tuple(row[k] for k in columns) for row in rows]
+    return Table(tuple(head[k] for k in columns), filled_rows)
 
 
 def width_text(image: ImageResult) -> str:
@@ -273,16 +273,16 @@ def drivers(parts: Parts) -> Iterator[str]:
 def comparison(first: Parts, second: Parts) -> Table:
     """Table of what both runs have: E, greatest peaks and their widths, verdicts on limits."""
     rows: list[Row] = []
-    others = {what: entry for what, _, entry in _compared_entries(second)}
+    second_entries = {what: entry for what, _, entry in _compared_entries(second)}
     for what, unit, entry in _compared_entries(first):
-        other = others.get(what)
-        if other is None:
+        second_entry = second_entries.get(what)
+        if second_entry is None:
             continue
-        if isinstance(entry, str) or isinstance(other, str):
-            rows.append((what, str(entry), str(other), ""))
+        if isinstance(entry, str) or isinstance(second_entry, str):
+            rows.append((what, str(entry), str(second_entry), ""))
         else:
-            ratio = f"{other / entry:.3f}" if entry else ""
-            rows.append((what, engineering(entry, unit), engineering(other, unit), ratio))
+            ratio = f"{second_entry / entry:.3f}" if entry else ""
+            rows.append((what, engineering(entry, unit), engineering(second_entry, unit), ratio))
     return Table(COMPARED, rows)
 
 

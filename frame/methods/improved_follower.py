@@ -222,12 +222,14 @@ class _LevelModels:
         """Return optima of random places with some inputs of others or drawn anew, shape (S, d)."""
         storage, d = self.storage, len(self.box[0])
         count = MOTIONS_PER_GRAPH * len(storage)
-        own, other = storage.points[rng.choice(storage.best.ravel(), (2, count))]
+        optima, partners = storage.points[rng.choice(storage.best.ravel(), (2, count))]
         # a third of the drawn values at the ends of their range
-        drawn = np.clip(rng.uniform(-1.5, 1.5, own.shape), -1, 1) * (self.box[1] - self.box[0]) / 2
+        drawn = (
+            np.clip(rng.uniform(-1.5, 1.5, optima.shape), -1, 1) * (self.box[1] - self.box[0]) / 2
+        )
         drawn += (self.box[0] + self.box[1]) / 2
-        further = np.where(rng.random((count, 1)) < 0.5, drawn, other)
-        return np.where(rng.random(own.shape) < REDRAWN / d, further, own)
+        further = np.where(rng.random((count, 1)) < 0.5, drawn, partners)
+        return np.where(rng.random(optima.shape) < REDRAWN / d, further, optima)
 
     @property
     def gains(self) -> Array:

@@ -191,7 +191,7 @@ def _meta_image(path: Path, sides: Sequence[float]) -> Array:
         kind=META_TYPES.get(head.get("ElementType", "")),
         is_big=is_big,
         skip=size if data == "LOCAL" else int(head.get("HeaderSize", 0)),
-        packed=head.get("CompressedData", "False").lower() == "true",
+        is_compressed=head.get("CompressedData", "False").lower() == "true",
         spacing=head.get("ElementSpacing", "").split(),
         sides=sides,
     )
@@ -220,7 +220,7 @@ def _nrrd(path: Path, sides: Sequence[float]) -> Array:
         kind=NRRD_TYPES.get(kind),
         is_big=head.get("endian") == "big",
         skip=int(head.get("byte skip", 0)) if name else size,
-        packed=head.get("encoding", "raw").lower() != "raw",
+        is_compressed=head.get("encoding", "raw").lower() != "raw",
         spacing=spacing,
         sides=sides,
     )
@@ -234,14 +234,14 @@ def _raw(
     kind: str | None,
     is_big: bool,
     skip: int,
-    packed: bool,
+    is_compressed: bool,
     spacing: Sequence[str | float],
     sides: Sequence[float],
 ) -> Array:
     """Raw numbers whose head gives sizes along x, y, z: the first one varies fastest."""
     name = path.name
     require(kind is not None, name, "a type that is not known", "whole numbers or floats")
-    require(not packed, name, "compressed data", "raw data", "save it without compression")
+    require(not is_compressed, name, "compressed data", "raw data", "save it without compression")
     require(len(sizes) == 3, name, f"{len(sizes)} sizes", "three, along x, y and z")
     require(data.is_file(), name, f"data in {data.name}", "a file beside the head")
     stated = np.array([*map(float, reversed(spacing))] or sides) / np.asarray(sides, float)

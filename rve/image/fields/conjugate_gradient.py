@@ -118,19 +118,19 @@ def _radau(excess: Array, beta: Array, least: float) -> Array:
     return np.where(excess > 0, sharper, 1 / least)
 
 
-def _add_multiple(fields: Fields, factors: Array, other: Fields) -> None:
+def _add_multiple(fields: Fields, factors: Array, added: Fields) -> None:
     """Add the other fields, times a factor a load, in place and by slabs."""
     for slab in slabs(fields):
         for load, factor in enumerate(factors):
-            fields[load][:, slab] += float(factor) * other[load][:, slab]
+            fields[load][:, slab] += float(factor) * added[load][:, slab]
 
 
-def _scale_and_add(fields: Fields, factors: Array, other: Fields) -> None:
-    """Multiply fields by a factor a load and add the others, in place and by slabs."""
+def _scale_and_add(fields: Fields, factors: Array, added: Fields) -> None:
+    """Multiply fields by a factor a load and add others, in place and by slabs."""
     for slab in slabs(fields):
         for load, factor in enumerate(factors):
             fields[load][:, slab] *= float(factor)
-            fields[load][:, slab] += other[load][:, slab]
+            fields[load][:, slab] += added[load][:, slab]
 
 
 def _ratio(above: Array, below: Array) -> Array:

@@ -112,9 +112,9 @@ class Operator:
 
 def slabs(fields: Fields) -> Iterator[slice]:
     """Slices of the first axis of the grid, each of about `SLAB` cells times loads."""
-    first, *others = fields.shape[2:]
+    first, *last_axes = fields.shape[2:]
     size = SLAB if isinstance(fields, np.ndarray) else DEVICE_SLAB
-    count = max(1, size // (fields.shape[0] * math.prod(others)))
+    count = max(1, size // (fields.shape[0] * math.prod(last_axes)))
     for start in range(0, first, count):
         yield slice(start, min(first, start + count))
 
@@ -122,8 +122,8 @@ def slabs(fields: Fields) -> Iterator[slice]:
 def gather(element: Element, fields: Fields, slab: slice) -> Fields:
     """Local unknowns of the cells of a slab, shape (local unknowns, loads, *slab)."""
     xp = namespace(fields)
-    first, *others = fields.shape[2:]
-    local = xp.empty((len(element.local), fields.shape[0], slab.stop - slab.start, *others))
+    first, *last_axes = fields.shape[2:]
+    local = xp.empty((len(element.local), fields.shape[0], slab.stop - slab.start, *last_axes))
     for k, (unknown, offset) in enumerate(element.local):
         layers = _layers(slab, offset[0], first)
         part = fields[:, unknown, layers[0]]

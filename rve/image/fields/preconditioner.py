@@ -83,10 +83,10 @@ class FourierPreconditioner:
         n, axes = element.unknowns, range(len(shape))
         phases = []
         for axis, k in enumerate(waves):
-            along = np.array([place[axis] for place, _ in element.places])
+            along = np.array([centre[axis] for centre, _ in element.places])
             odd = np.array([is_odd and axis == 0 for _, is_odd in element.places])
             phase = np.exp(1j * (np.outer(along, k) + np.pi / 2 * odd[:, None]))
-            shape_of_phase = n, *(-1 if axis == other else 1 for other in axes)
+            shape_of_phase = n, *(-1 if axis == along_axis else 1 for along_axis in axes)
             phases.append(xp.asarray(phase.reshape(shape_of_phase)))
         inverse = xp.empty((n, n, *(k.size for k in waves)))
         for slab in slabs(inverse):
