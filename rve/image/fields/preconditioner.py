@@ -88,20 +88,27 @@ class FourierPreconditioner:
             phase = np.exp(1j * (np.outer(along, k) + np.pi / 2 * odd[:, None]))
             shape_of_phase = n, *(-1 if axis == along_axis else 1 for along_axis in axes)
             phases.append(xp.asarray(phase.reshape(shape_of_phase)))
-        inverse = xp.empty((n, n, *(k.size for k in waves)))
+        inverse, first_wave = xp.empty((n, n, *(k.size for k in waves))), (0,) * len(shape)
         for slab in slabs(inverse):
             phase = xp.moveaxis(_product(phases, slab), 0, -1)
             symbol = fourier_blocks(element, constant, [waves[0][slab], *waves[1:]], xp)
             real = (xp.conj(phase)[..., :, None] * symbol * phase[..., None, :]).real
-            inverse[:, :, slab] = xp.moveaxis(_pseudo_inverse(xp, real), (-2, -1), (0, 1))
+            if slab.start == 0:
+                real[first_wave] = xp.eye(n)  # set below
+            # pixels' blocks span many orders of energy at long waves, and have no gauge
+            has_gauge = element.stress and element.dimension == 3
+            solved = _pseudo_inverse(xp, real) if has_gauge else xp.linalg.inv(real)
+            solved = (solved + xp.swapaxes(solved, -1, -2)) / 2
+            inverse[:, :, slab] = xp.moveaxis(solved, (-2, -1), (0, 1))
         uniform = fourier_blocks(element, constant, [k[:1] for k in waves]).real.reshape(n, n)
         energy, waves_of_cell = np.linalg.eigh(uniform)
         # what does not vary from cell to cell: of splines alone it has no energy but rounding
         scale = float(np.sum(element.magnitude**2)) * max(constant.trace, constant.deviator)
-        has_energy = energy > GAUGE * scale
+        has_energy = (energy > 1e-10 * energy.max()) & (energy.max() > GAUGE * scale)
         gain = np.where(has_energy, 1 / np.where(has_energy, energy, 1), 0)
-        first = (slice(None), slice(None), *(0 for _ in shape))
-        inverse[first] = xp.asarray(waves_of_cell * gain @ waves_of_cell.T)
+        inverse[(slice(None), slice(None), *first_wave)] = xp.asarray(
+            waves_of_cell * gain @ waves_of_cell.T
+        )
         return cls(inverse, tuple(phases), shape)
 
     def apply(self, fields: Fields) -> Fields:
@@ -133,10 +140,8 @@ def _pseudo_inverse(xp: ModuleType, blocks: Fields) -> Fields:
     """
     size = blocks.shape[-1]
     trace = xp.einsum("...ii->...", blocks)[..., None, None]
-    shift = xp.where(trace > 0, GAUGE * trace, 1.0) * xp.eye(size)
-    inverse = xp.linalg.inv(blocks + shift)
-    inverse = inverse @ blocks @ inverse
-    return (inverse + xp.swapaxes(inverse, -1, -2)) / 2
+    inverse = xp.linalg.inv(blocks + GAUGE * trace * xp.eye(size))
+    return inverse @ blocks @ inverse
 
 
 def fourier_blocks(

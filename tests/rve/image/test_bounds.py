@@ -285,3 +285,15 @@ def test_what_a_watch_raises_ends_both_sides_at_once():
     with pytest.raises((KeyboardInterrupt, InterruptedError)):
         solve_image(3 * shear, shear, solver=ConjugateGradient(1e-12, watch=watch))
     assert 6 <= len(calls) < 20
+
+
+@pytest.mark.parametrize("element", ELEMENTS, ids=["displacement", "stress"])
+def test_the_preconditioner_inverts_waves_of_any_length(element, rng):
+    """The longest ones of a slope have 1e-8 of the energy of the shortest."""
+    shape = 300, 2
+    constant = Reference.of_grid(element, np.full(shape, 2.0), np.full(shape, 0.7))
+    inverse = FourierPreconditioner.of_material(element, constant, shape)
+    operator = Operator(element, np.full(shape, constant.trace), np.full(shape, constant.deviator))
+    fields = inverse.apply(rng.normal(size=(1, element.unknowns, *shape)))
+    again = inverse.apply(operator.apply(fields))
+    assert np.abs(again - fields).max() < 1e-5 * np.abs(fields).max()
