@@ -34,7 +34,7 @@ from alphacut.questions.summary import ANSWERS, Results
 from alphacut.questions.tolerances import admissible_tolerances, require_admissible_scale
 from alphacut.stages import campaign, cell, envelope, identify, image, microstructure, shares, suite
 from alphacut.stages.campaign import CellCampaign
-from alphacut.stages.envelope import EnvelopeTask, PeakResults, peaks_of
+from alphacut.stages.envelope import EnvelopeTask, PeakResults, peak_results, peaks_of
 from alphacut.stages.modulus import fuzzy_loss, fuzzy_modulus, require_levels
 from alphacut.stages.store import (
     RunProgress,
@@ -206,13 +206,14 @@ class Pipeline:
         outcomes = self.store.take_all(stages, self.executor)
         by_record = {record.name: outcomes[f"record_{record.name}"].numbers for record in records}
         units = {name: structure.unit(name) for name in envelope.outputs_of(limited)}
-        self.results.suite = suite.suite_result(by_record, records, mode, alpha, units)
         peaks = {name: peaks_of(result, alpha) for name, result in by_record.items()}
-        worst = suite.worst_peaks(peaks)
-        if any(limit.side == "mean" for x in self.content.questions.values() for limit in x.limits):
-            worst = suite.with_means(worst, peaks, structure, task, records)
+        worst = suite.with_means(suite.worst_peaks(peaks), peaks, structure, task, records)
         measures = {record.name: record.measures for record in records}
         motions = SuiteResponse(mode.period, mode.ratio, measures, peaks)
+        farthest = {name: motions.record_at(name) for name in worst}
+        self.results.suite = suite.suite_result(
+            by_record, records, mode, alpha, units, peak_results(worst), farthest
+        )
         return replace(response_of(structure, task, worst), suite=motions)
 
     def _limited_peaks(self, task: EnvelopeTask, structure: Structure) -> Peaks | None:

@@ -189,7 +189,7 @@ def parse_fuzzy_in_any_unit(value: object) -> FuzzyNumber:
 
 def engineering(value: float, si: str, *, digits: int = 4) -> str:
     """Text of a value in the SI unit `si`, with a prefix if the unit takes one: ``−3.590 MN``."""
-    rounded_text = f"{value:.{digits}g}"
+    rounded_text = f"{value + 0.0:.{digits}g}"  # without the sign of −0
     rounded_value = float(rounded_text)
     if si not in PREFIXED or not 1e-12 <= abs(rounded_value) < 1e12:
         # without an exponent where that is short enough
@@ -220,8 +220,12 @@ def rounded_ends(low: float, high: float, nature: Nature, digits: int = 4) -> tu
 def range_text(low: float, high: float, nature: Nature, digits: int = 4) -> str:
     """A range rounded in- or outwards as its nature demands; one number where its ends agree."""
     ends = rounded_ends(low, high, nature, digits)
-    texts = dict.fromkeys(f"{end:#.{digits}g}".rstrip(".") for end in ends)
-    return " … ".join(texts).replace("-", MINUS)
+    return " … ".join(dict.fromkeys(number_text(end, digits) for end in ends))
+
+
+def number_text(value: float, digits: int = 4) -> str:
+    """A number with its significant digits, also those that are 0."""
+    return f"{value + 0.0:#.{digits}g}".rstrip(".").replace("-", MINUS)
 
 
 def axis_prefix(largest: float, si: str) -> tuple[float, str]:

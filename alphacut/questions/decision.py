@@ -86,8 +86,9 @@ class DecisionAnswer(LimitsAnswer[LimitDecision]):
         proved, reached, gap = "", "", ""
         if (peak := limit.peak) is not None:
             bound, inner = float(peak.proved[0]), float(peak.reached[0])
-            side = "lower" if peak.is_least else "upper"
+            side, relation = ("lower", "≥") if peak.is_least else ("upper", "≤")
             proved = limit.text_of(bound, side)
+            proved = f"{relation} {proved}" if np.isfinite(bound) else proved
             reached = limit.text_of(inner, side, Nature.ATTAINED)
             gap = f"{abs((bound - inner) / bound):.1%}" if bound and np.isfinite(bound) else ""
         return {
@@ -97,7 +98,7 @@ class DecisionAnswer(LimitsAnswer[LimitDecision]):
             "possibility": degree_text(limit.possibility),
             "necessity": degree_text(limit.necessity),
             "least margin": limit.text_of(float(limit.margin.lower[0]), "lower", limit.nature),
-            "peak at most": proved,
+            "bound of peak": proved,
             "peak reached": reached,
             "gap": gap,
         }
@@ -113,7 +114,7 @@ class DecisionAnswer(LimitsAnswer[LimitDecision]):
             "least necessity": limit.necessity[0],
             "greatest necessity": limit.necessity[1],
             "least margin": float(limit.margin.lower[0]),
-            "peak at most": None if limit.peak is None else float(limit.peak.proved[0]),
+            "bound of peak": None if limit.peak is None else float(limit.peak.proved[0]),
             "peak reached": None if limit.peak is None else float(limit.peak.reached[0]),
         }
 
@@ -138,13 +139,7 @@ def decide(section: DecisionSection, response: FuzzyResponse) -> DecisionAnswer:
     limits = section.limits_by_name
     peaks = {name: response.peaks[limit.peak] for name, limit in limits.items()}
     by_peak = peak_results(response.peaks)
-
-    def record_at(peak: str) -> str:
-        """Record of a suite under which a peak is reached; "" of a mean or without a suite."""
-        by_record = {} if response.suite is None else response.suite.peaks
-        reached = {x: float(ends[peak].reached[0]) for x, ends in by_record.items() if peak in ends}
-        return max(reached, key=lambda x: reached[x], default="")
-
+    suite = response.suite
     decisions = {
         name: LimitDecision.of(
             section,
@@ -157,7 +152,7 @@ def decide(section: DecisionSection, response: FuzzyResponse) -> DecisionAnswer:
             from_level=answer.lowest,
             nature=answer.nature,
             peak=None if name == ANY else by_peak[limits[name].peak],
-            record="" if name == ANY else record_at(limits[name].peak),
+            record="" if suite is None or name == ANY else suite.record_at(limits[name].peak),
         )
         for name, answer in passing(peaks, section.limits_in_si(response.structure)).items()
     }

@@ -44,6 +44,11 @@ class SuiteResponse:
     measures: Mapping[str, Mapping[str, float]]
     peaks: Mapping[str, Peaks]
 
+    def record_at(self, peak: str) -> str:
+        """Record under which a peak is reached that lies farthest out; "" of a mean."""
+        reached = {x: ends[peak].reached[0] for x, ends in self.peaks.items() if peak in ends}
+        return max(reached, key=lambda record: float(reached[record]), default="")
+
 
 @dataclass(frozen=True)
 class FuzzyResponse:

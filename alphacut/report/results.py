@@ -8,12 +8,15 @@ from textwrap import wrap
 
 import numpy as np
 
+from alphacut.frame.structures.quantities import output_of
 from alphacut.fuzzy.result import Nature, rounded
 from alphacut.io.arrays import text_table
 from alphacut.io.quantity import (
+    MINUS,
     STANDARD_GRAVITY,
     axis_prefix,
     engineering,
+    number_text,
     range_text,
     rounded_ends,
 )
@@ -22,24 +25,20 @@ from alphacut.questions.summary import FrameResult, Parts
 from alphacut.questions.tolerances import TolerancesAnswer
 from alphacut.report.tables import unit_of
 from alphacut.stages.cell import UPPER_BOUND
-from alphacut.stages.envelope import PeakResult
+from alphacut.stages.envelope import EnvelopeResult, PeakResult
 from alphacut.stages.identify import IdentifiedResult
 from alphacut.stages.image import ImageResult
 from alphacut.stages.modulus import ModulusResult
 from alphacut.stages.store import CutsResult
+from alphacut.stages.suite import SuiteResult
 
 MATERIAL = ("material", "most plausible", "range at α = 0", "nature", "± error")
 MEANING = "Least … largest value if every input stays in its range; α = 1: most plausible"
 """First line of all results, for readers who do not know α-cuts; "nominal" is α = 1."""
 TOLERANCE_TABLE = "table on the page and in tolerances.csv"
 ANSWER_HEAD = ("question", "answer", "nature")
-EXCEEDED = {
-    "exceeded": "yes",
-    "not exceeded": "no",
-    "can be exceeded": "can be",
-    "undecided": "unknown",
-}
-"""Verdicts on a limit as they stand in a column."""
+EXCEEDED = {"exceeded": "yes", "not exceeded": "no", "can be exceeded": "can be"}
+"""Verdicts on a limit as they stand in a column, where they are shorter there."""
 AROUND = "lie in the wider bounds that are proved"
 """Where tested motions lie beside an envelope that is not guaranteed itself."""
 COMPARED = ("at the lowest α", "first", "second", "second over first")
@@ -71,7 +70,7 @@ def cut_text(cuts: CutsResult, level: int, nature: Nature, error: float = 0.0) -
 
 def error_text(error: float, nature: Nature) -> str:
     """Error that a range leaves out; a guaranteed one leaves out none."""
-    return "none" if nature is Nature.GUARANTEED else f"{error:.2g}"
+    return "none" if nature is Nature.GUARANTEED else f"{error:.2g}".replace("-", MINUS)
 
 
 def material(parts: Parts) -> Table:
@@ -141,9 +140,12 @@ def peak_table(parts: Parts) -> Table:
     """Table of the peak of each output: its cuts, error or gap, limits and verdicts.
 
     Proved peaks have a gap; the others have the cut of a middle level as well. Each further limit
-    of a peak has a row of its own.
+    of a peak has a row of its own. Of a suite the peaks are the largest over the records, then the
+    means.
     """
-    studies = parts.envelopes
+    studies: dict[str, EnvelopeResult | SuiteResult] = {**parts.envelopes}
+    if parts.records is not None:
+        studies["records"] = parts.records
     if not studies:
         return Table((), [])
     alpha = next(iter(studies.values())).alpha
@@ -155,19 +157,22 @@ def peak_table(parts: Parts) -> Table:
     limits, rows = limits_by_peak(parts), list[Row]()
     for name, study in studies.items():
         suffix = f" ({name})" if len(studies) > 1 else ""
-        for peak_name in (name for name in study.peak if name in (study.drawn or study.peak)):
-            peak = study.peak[peak_name]
+        drawn = study.drawn if isinstance(study, EnvelopeResult) else ()
+        farthest = study.farthest_record if isinstance(study, SuiteResult) else {}
+        for peak_name in (name for name in study.peak if name in (drawn or study.peak)):
+            peak, record = study.peak[peak_name], farthest.get(peak_name, "")
             units = display_units(peak_name, unit_of(study.units, peak_name), peak, parts.structure)
             for label, factor in units:
                 cells = peak_cells(peak, factor, levels)
                 for limit, verdict in limits.get(peak_name, [(math.nan, "")]):
                     limit_text = "" if math.isnan(limit) else engineering(limit * factor, "")
-                    rows.append((label + suffix, *cells, limit_text, EXCEEDED.get(verdict, "")))
-                    cells = ("",) * len(cells)  # of further limits of the same peak
+                    exceeded = EXCEEDED.get(verdict, verdict)
+                    rows.append((label + suffix, *cells, record, limit_text, exceeded))
+                    cells, record = ("",) * len(cells), ""  # of further limits of the same peak
     titles = [f"α = {alpha[k]:g}" for k in levels]
     if alpha[-1] == 1 and not any("…" in row[1] for row in rows):
         titles[0] = "nominal"
-    head = ("peak of", *titles, "± error", "reached", "gap", "limit", "exceeded")
+    head = ("peak of", *titles, "± error", "reached", "gap", "record", "limit", "exceeded")
     return without_empty_columns(head, rows)
 
 
@@ -187,7 +192,7 @@ def peak_cells(peak: PeakResult, factor: float, levels: Sequence[int]) -> Row:
         return (*cuts, error, "", "")
     inner = "lower" if peak.is_least else "upper"
     reached = rounded(factor * float(peak.reached[0]), inner, Nature.ATTAINED)
-    return (*cuts, error, engineering(reached, ""), f"{peak.gap(0):.1%}")
+    return (*cuts, error, number_text(reached), f"{peak.gap(0):.1%}")
 
 
 def limits_by_peak(parts: Parts) -> dict[str, list[tuple[float, str]]]:
@@ -207,26 +212,30 @@ def display_units(
         return
     factor, prefixed = axis_prefix(max(abs(float(peak.lower[0])), abs(float(peak.upper[0]))), unit)
     yield f"{name}, {prefixed}", factor
-    if frame is not None and name in frame.heights_m:
-        yield "  % of storey", 100 / frame.heights_m[name]
+    height = None if frame is None else frame.heights_m.get(output_of(name))
+    if height is not None:
+        yield "  % of storey", 100 / height
     if frame is not None and unit == "N":
         yield "  % of weight", 100 / frame.weight_N
 
 
 def natures(parts: Parts) -> Iterator[str]:
     """Yields sentences on the nature of C and of the peaks, and on motions that tested these."""
-    studies = parts.envelopes.values()
+    studies, suite = parts.envelopes.values(), parts.records
     if parts.modulus is not None and parts.modulus.particles == "mesh":
         yield UPPER_BOUND
     outputs: dict[Nature, dict[str, None]] = {}
-    for study in studies:
-        for output, peak in study.peak.items():
+    for study in (*studies, suite):
+        for output, peak in (study.peak if study else {}).items():
             outputs.setdefault(peak.nature, {})[output] = None
     groups = [f"{nature} ({', '.join(names)})" for nature, names in outputs.items()]
     if len(groups) == 1:
         groups = [f"all {nature}" for nature in outputs]
     if groups:
-        yield "Peaks are largest magnitudes over time, " + ", ".join(groups)
+        over = "over time" if suite is None else "over time and records"
+        yield f"Peaks are largest magnitudes {over}, {', '.join(groups)}"
+    if suite is not None:
+        yield "A mean is that of one structure's peaks under all records"
     for is_guaranteed in (True, False):
         tested = [x for x in studies if (x.nature is Nature.GUARANTEED) == is_guaranteed]
         if count := sum(study.motions_tested for study in tested):

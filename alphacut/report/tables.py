@@ -186,7 +186,7 @@ def _text(value: object) -> str:
     if isinstance(value, str):
         return value
     number = float(value)  # type: ignore[arg-type]
-    return "" if np.isnan(number) else f"{number:.{DIGITS}g}".replace("-", MINUS)
+    return "" if np.isnan(number) else f"{number + 0.0:.{DIGITS}g}".replace("-", MINUS)
 
 
 def write_tables(parts: Parts, results: ResultsFolder, folder: Path) -> list[Path]:

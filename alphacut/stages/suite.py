@@ -10,6 +10,7 @@ from math import ceil, pi
 from typing import NamedTuple
 
 import numpy as np
+from pydantic import Field
 
 from alphacut.case.loads import RecordsSection
 from alphacut.case.motion import EnvelopeSection
@@ -214,7 +215,11 @@ class Statistics(Numbers):
 
 
 class SuiteResult(Numbers):
-    """Measures and peaks of each record, and statistics of the peaks."""
+    """Measures and peaks of each record, and statistics of the peaks.
+
+    `peak` has the largest peaks over the records, each reached under `farthest_record`, and the
+    means.
+    """
 
     period_s: float
     damping_ratio: float
@@ -222,6 +227,8 @@ class SuiteResult(Numbers):
     records: dict[str, RecordResult]
     statistics: dict[str, Statistics]
     units: dict[str, str]
+    peak: PeakResults = Field(default={})
+    farthest_record: dict[str, str] = Field(default={})
 
 
 def suite_result(
@@ -230,8 +237,10 @@ def suite_result(
     mode: NominalMode,
     alpha: Sequence[float],
     units: Mapping[str, str],
+    worst: PeakResults,
+    farthest_record: Mapping[str, str],
 ) -> SuiteResult:
-    """Numbers on a suite, from the peaks under each record by its name."""
+    """Numbers on a suite, from the peaks under each record by its name, and the `worst` ones."""
     statistics = {}
     for name, peak in next(iter(peaks.values())).items():
         sign = -1.0 if peak.is_least else 1.0  # quantiles of least values are counted from above
@@ -255,4 +264,6 @@ def suite_result(
         },
         statistics=statistics,
         units=dict(units),
+        peak=worst,
+        farthest_record=dict(farthest_record),
     )

@@ -115,7 +115,7 @@ def _peak_of(envelope: Envelope, name: str) -> Peak:
         alpha=np.asarray(envelope.alpha),
         lower=lower,
         upper=upper,
-        error=0.0 * upper if is_proved else np.maximum(above, below),
+        error=np.zeros_like(upper) if is_proved else np.maximum(above, below),
         reached=np.fmax(reached_at_nodes.upper, smallest).max(1),  # NaN where none is known
         least_lower=least_lower,
         least_upper=least_upper,

@@ -142,14 +142,16 @@ def test_fragility_of_one_storey_holds_its_closed_form(tmp_path):
         assert low > 0.9 * min(exact)
 
 
-def test_the_mean_over_records_lies_between_means_of_ends(tmp_path):
+def test_the_mean_over_records_lies_between_means_of_ends(tmp_path, capsys):
     path, out = written(tmp_path), tmp_path / "out"
     limits = 'limits = ["mean drift1 <= 9 mm"]'
     path.write_text(path.read_text() + f"\n[decision]\n{limits}\n", encoding="utf-8")
     asked = ["--set", "frame.outputs=['drift1', 'a1']"]
     assert main(["run", str(path), "--out", str(out), *asked]) == 0
     summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
-    # what is asked for has peaks, limited or not
+    # what is asked for has peaks, limited or not, and is shown
+    shown = dict(re.findall(r"^(\S.*), \w+  +(.*)$", capsys.readouterr().out, re.MULTILINE))
+    assert set(shown) == {"drift1", "a1", "mean drift1", "mean a1"}
     assert all(set(x["peak"]) == {"drift1", "a1"} for x in summary["records"]["records"].values())
     peak = summary["decision"]["limits"]["mean drift1"]["peak"]
     records = summary["records"]
@@ -165,6 +167,10 @@ def test_the_mean_over_records_lies_between_means_of_ends(tmp_path):
     assert 0.99 * max(means) <= peak["reached"][0] <= 1.004 * max(means)
     assert max(means) * 0.996 <= peak["proved"][0]
     assert peak["reached_at"] == {"k1": pytest.approx([0.96, 1.04][means[-1] > means[0]] * 8e6)}
+    assert shown["drift1"].endswith(" two")
+    reached, _, limit, verdict = shown["mean drift1"].split()[-4:]
+    assert float(reached) == pytest.approx(1e3 * peak["reached"][0], rel=1e-3)
+    assert (limit, verdict) == ("9", "yes")
     # no number is of different structures
     assert peak["least_upper"] == [None, None]
     assert set(records["statistics"]["drift1"]) == {"proved"}
