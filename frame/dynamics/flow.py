@@ -18,7 +18,7 @@ from alphacut.frame.dynamics.integrators import (
     StepMap,
     state_matrix,
 )
-from alphacut.frame.dynamics.modal_trajectory import modal_trajectory
+from alphacut.frame.dynamics.modal_trajectory import classical_trajectory, modal_trajectory
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import (
     LinearSystem,
@@ -243,7 +243,7 @@ class LinearFlow(Flow):
     def _march(self, points: Array, *, derivatives: bool) -> Jet:
         """Outputs of x[k+1] = T x[k] + G load[k] at points (S, d), shape (S, T, outputs)."""
         matrices, rows = evaluate(self.system, self.names, points, derivatives=derivatives)
-        motion = self._from_modes(matrices, rows) if derivatives and self.exact else None
+        motion = self._from_modes(matrices, rows) if self.exact else None
         if motion is None:
             motion = trajectory(self._step_map(matrices), matrices.start, rows)
         if matrices.feeds is None:
@@ -253,8 +253,11 @@ class LinearFlow(Flow):
         return motion + (matrices.feeds @ at_nodes).map(lambda x: x.swapaxes(-1, -2))
 
     def _from_modes(self, matrices: Matrices, rows: Jet) -> Jet | None:
-        """The same with two derivatives by complex modes; None where they are too near."""
+        """The same by classical modes, derivatives by complex ones; None where there are none."""
         pushes, loads = self._loads(matrices)
+        if not rows.directions:
+            values = classical_trajectory(matrices, rows, pushes, loads, self.time)
+            return None if values is None else rows.like(values)
         columns = concatenate([matrices.start, concatenate([pushes * 0.0, pushes], -2)], -1)
         return modal_trajectory(state_matrix(matrices), columns, rows, loads, self.time)
 
