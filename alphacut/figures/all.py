@@ -10,7 +10,6 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from alphacut.export.mesh import draw_mesh
 from alphacut.figures import envelope, material, overview, structure
 from alphacut.fuzzy import FuzzyNumber, PiecewiseLinear
 from alphacut.fuzzy.campaign.workers import submit
@@ -40,9 +39,12 @@ def drawings(results: Results) -> Iterator[Drawing]:
 def _material_figures(results: Results) -> Iterator[Drawing]:
     """Figures of the radius map, the modulus, the stresses and the image, by name."""
     content, mesh, modulus = results.content, results.content.mesh, results.modulus
-    if results.is_paper and content.modulus.method == "prism":
+    is_round = modulus is not None and content.particle_cell is not None
+    if is_round and content.modulus.method == "prism":
         cell = CellProblem.of(content).nominal
-        yield "fig01-domains", partial(overview.domains, cell, mesh.size, mesh.layers)
+        yield "fig15-prism-mesh", partial(overview.draw_mesh, cell, mesh.size, mesh.layers)
+        if results.is_paper:
+            yield "fig01-domains", partial(overview.domains, cell, mesh.size, mesh.layers)
     if (radius_map := content.radius_map) is not None:
         if results.microstructure is None:  # which draws its own p-box
             yield "fig13-p-box", partial(material.p_box, radius_map)
@@ -82,8 +84,8 @@ def _structure_figures(results: Results) -> Iterator[Drawing]:
 
 def draw_figures(results: Results, store: StageStore, executor: Executor | None) -> list[str]:
     """Draws all figures anew where what they show is new; returns paths in the results' folder."""
-    versions = [version_of(name) for name in ("matplotlib", "pyvista")]
-    inputs = [results.content, results.answers, sorted(results.fingerprints.values()), *versions]
+    inputs = [results.content, results.answers, sorted(results.fingerprints.values())]
+    inputs.append(version_of("matplotlib"))
     compute = partial(draw_all, results, executor)
     figures = store.take(Stage("figures", inputs, (*NESTED, "alphacut"), list[str], compute))
     before = () if results.microstructure is None else results.microstructure.files
@@ -93,10 +95,9 @@ def draw_figures(results: Results, store: StageStore, executor: Executor | None)
 def draw_all(
     results: Results, executor: Executor | None, context: StageContext
 ) -> StageResult[list[str]]:
-    """Draws all figures by `PARTS` tasks and one for the mesh; returns the names of the files."""
+    """Draws all figures by `PARTS` tasks; returns the names of the files."""
     assert context.folder is not None
-    tasks = [submit(executor, draw_mesh_figure, results, context.folder)]
-    tasks += [submit(executor, draw_part, results, context.folder, k) for k in range(PARTS)]
+    tasks = [submit(executor, draw_part, results, context.folder, k) for k in range(PARTS)]
     names = list[str]()
     for count, task in enumerate(tasks, start=1):
         names += task.result()
@@ -112,20 +113,6 @@ def draw_part(results: Results, folder: Path, part: int) -> list[str]:
             for name, draw in list(drawings(results))[part::PARTS]
             for path in save(draw(), folder / "figures" / file_stem(name, results))
         ]
-
-
-def draw_mesh_figure(results: Results, folder: Path) -> list[str]:
-    """Draws the mesh (Fig. 15) if there are prisms; returns the path in `folder` if it is drawn."""
-    content = results.content
-    if (
-        results.modulus is None
-        or content.particle_cell is None
-        or content.modulus.method != "prism"
-    ):
-        return []
-    name = f"figures/{file_stem('fig15-prism-mesh', results)}.png"
-    is_drawn = draw_mesh(CellProblem.of(content).nominal, content.mesh, folder / name)
-    return [name] if is_drawn else []
 
 
 def file_stem(name: str, results: Results) -> str:

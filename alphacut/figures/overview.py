@@ -1,4 +1,4 @@
-"""The paper's own figures: domains (Fig. 1), stages (Fig. 2), fuzzy numbers (Figs. 36, 37)."""
+"""The paper's own figures: domains (1), stages (2), prism mesh (15), fuzzy numbers (36, 37)."""
 
 from __future__ import annotations
 
@@ -24,16 +24,14 @@ from alphacut.rve.mesh.prism_grid import PrismGrid, reference_radius
 from alphacut.stochastic.figures.style import BLUE, INK, ORANGE, PURPLE
 
 MATRIX, PARTICLE = "#f6d9b8", "#b79ad9"
+CUT_MATRIX = "#f0a860"  # of the matrix that is cut open
+LIGHT = np.array([0.2, -0.5, 0.84])  # direction of the light on the mesh, a unit vector
 BOX_WIDTH, PITCH = 2.4, 3.3  # width of a stage's box in Fig. 2, and distance of the boxes
 
 
 def domains(cell: Cell, size: float, layers: int) -> Figure:
     """Fig. 1: physical, stochastic and product domain, from a mesh, `size` in half sides."""
-    radius = reference_radius(cell.radius_map, cell.outline)
-    grid = extrude(size=size, radius=radius, layers=layers, outline=cell.outline)
-    points = grid.positions(cell.radius_map)
-    # corner nodes come first, level by level of θ
-    levels = points[: (layers + 1) * len(grid.plane.points)].reshape(layers + 1, -1, 3)
+    grid, levels = prism_mesh(cell, size, layers)
     figure = plt.figure(figsize=(11.0, 4.2))
     widths = figure.add_gridspec(1, 3, width_ratios=(1, 0.8, 1.2))
     plane, density = figure.add_subplot(widths[0]), figure.add_subplot(widths[1])
@@ -55,28 +53,75 @@ def domains(cell: Cell, size: float, layers: int) -> Figure:
     return figure
 
 
-def _draw_prisms(axes: Any, grid: PrismGrid, positions: Array) -> None:
-    """Draws prisms on the particle's cone, two sides and the bottom, by nodes (θ, node, 3)."""
+def prism_mesh(cell: Cell, size: float, layers: int) -> tuple[PrismGrid, Array]:
+    """Mesh of the product domain, `size` in half sides, and its corners (levels of θ, nodes, 3)."""
+    radius = reference_radius(cell.radius_map, cell.outline)
+    grid = extrude(size=size, radius=radius, layers=layers, outline=cell.outline)
+    points = grid.positions(cell.radius_map)
+    # corner nodes come first, level by level of θ
+    return grid, points[: (layers + 1) * len(grid.plane.points)].reshape(layers + 1, -1, 3)
+
+
+def _draw_prisms(axes: Any, grid: PrismGrid, levels: Array) -> None:
+    """Draws prisms on the particle's cone, two sides and the bottom, by corners (θ, nodes, 3)."""
     plane, triangles = grid.plane.points, grid.plane.triangles[:, :3]
-    pairs = np.concatenate([triangles[:, [0, 1]], triangles[:, [0, 2]], triangles[:, [1, 2]]])
-    edges = np.unique(np.sort(pairs, axis=1), axis=0)  # corners of each, shape (edges, 2)
-    cone = layer_faces(positions, edges, grid.plane.arc)  # over edges between nodes on the particle
+    edges, _ = edges_of(triangles)
+
+    def faces_on(nodes: Mask) -> Array:
+        return layer_faces(levels, edges[nodes[edges].all(axis=1)])
+
+    cone = faces_on(grid.plane.arc)  # over edges between nodes on the particle
     axes.add_collection3d(Poly3DCollection(cone, facecolor=PARTICLE, edgecolor=PURPLE, lw=0.3))
     thin = {"facecolor": (*to_rgb(MATRIX), 0.15), "edgecolor": (*to_rgb(INK), 0.35), "lw": 0.2}
     for on_side in (plane[:, 1] <= -1 + 1e-9, plane[:, 0] >= 1 - 1e-9):
-        axes.add_collection3d(Poly3DCollection(layer_faces(positions, edges, on_side), **thin))
-    bottom = positions[0][triangles[~grid.plane.inside]]
+        axes.add_collection3d(Poly3DCollection(faces_on(on_side), **thin))
+    bottom = levels[0][triangles[~grid.plane.inside]]
     axes.add_collection3d(Poly3DCollection(bottom, facecolor=MATRIX, ec=INK, lw=0.15))
     axes.set(xlabel="x$_1$/a", ylabel="x$_2$/a", zlabel="θ", xticks=[-1, 0, 1], yticks=[-1, 0, 1])
-    axes.set(xlim=(-1, 1), ylim=(-1, 1), zlim=(positions[0, 0, 2], positions[-1, 0, 2]))
+    axes.set(xlim=(-1, 1), ylim=(-1, 1), zlim=(levels[0, 0, 2], levels[-1, 0, 2]))
     axes.set_box_aspect((1, 1, 1.2), zoom=0.85)
     axes.view_init(elev=25, azim=-55)
     axes.set_title(f"product domain, {len(grid.cells):,} prisms")
 
 
-def layer_faces(levels: Array, edges: Ints, nodes: Mask) -> Array:
-    """Side faces (n, 4, 3) of prisms over edges (edges, 2) of chosen nodes (levels, nodes, 3)."""
-    first, second = edges[nodes[edges].all(axis=1)].T
+def draw_mesh(cell: Cell, size: float, layers: int) -> Figure:
+    """Fig. 15: the prism mesh, its matrix cut open, `size` in half sides."""
+    grid, levels = prism_mesh(cell, size, layers)
+    figure = plt.figure(figsize=(6.0, 6.5))
+    axes: Any = figure.add_subplot(projection="3d")
+    triangles, is_particle = grid.plane.triangles[:, :3], grid.plane.inside
+    x, y = grid.plane.points[triangles].mean(axis=1).T[:2]
+    polygons, fills = list[Array](), list[Array]()
+    for shown, colour in (
+        (~is_particle & ~((x > 0) & (y < 0)), CUT_MATRIX),
+        (is_particle, PARTICLE),
+    ):
+        edges, count = edges_of(triangles[shown])
+        for faces in (layer_faces(levels, edges[count == 1]), levels[-1][triangles[shown]]):
+            normals = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0])
+            cosines = np.abs(normals @ LIGHT) / np.linalg.norm(normals, axis=1)
+            polygons += [*faces]
+            fills += [*np.outer(0.7 + 0.3 * cosines, to_rgb(colour))]
+    # one collection, so that farther polygons are drawn first whatever their phase
+    look: Look = {"edgecolors": "#54402c", "lw": 0.4}
+    axes.add_collection3d(Poly3DCollection(polygons, facecolors=fills, **look))
+    axes.set(xlim=(-1, 1), ylim=(-1, 1), zlim=(levels[0, 0, 2], levels[-1, 0, 2]))
+    axes.set_box_aspect((1, 1, 1.6), zoom=1.0)
+    axes.view_init(elev=25, azim=-55)
+    axes.axis("off")
+    return figure
+
+
+def edges_of(triangles: Ints) -> tuple[Ints, Ints]:
+    """Edges of triangles (n, 3), each once by its nodes, (edges, 2), and how many share each."""
+    pairs = np.concatenate([triangles[:, [0, 1]], triangles[:, [0, 2]], triangles[:, [1, 2]]])
+    edges, count = np.unique(np.sort(pairs, axis=1), axis=0, return_counts=True)
+    return edges, count
+
+
+def layer_faces(levels: Array, edges: Ints) -> Array:
+    """Side faces (n, 4, 3) of prisms over edges (edges, 2), from corners (levels, nodes, 3)."""
+    first, second = edges.T
     below, above = levels[:-1], levels[1:]
     faces = np.stack([below[:, first], below[:, second], above[:, second], above[:, first]], axis=2)
     return np.asarray(faces.reshape(-1, 4, 3))

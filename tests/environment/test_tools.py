@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 import scipy.io
 
-from alphacut.export import mesh
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.arrays import read_array
 from alphacut.io.quantity import parse_number
@@ -69,13 +68,6 @@ def test_integers_whose_sign_pillow_changes_are_refused(tmp_path, kind):
         (tmp_path / "labels.tif").write_bytes(content.replace(signed, unsigned))
     with pytest.raises(RefusedError, match="sign"):
         read_grid(tmp_path / "labels.tif", (1, 1))
-
-
-def test_without_a_display_and_xvfb_there_is_no_picture_and_one_line(monkeypatch, capsys):
-    monkeypatch.delenv("DISPLAY", raising=False)
-    monkeypatch.setenv("PATH", "")
-    assert not mesh.draw_mesh(None, None, Path("mesh.png"))
-    assert "a display or Xvfb" in capsys.readouterr().err
 
 
 def test_gmsh_takes_no_settings_of_the_caller(tmp_path):

@@ -82,9 +82,13 @@ def test_a_mesh_and_six_cuts_are_those_of_the_case():
     cell = Cell(Phase(20e9), Phase(80e9), HermiteMap(0.2, 0.1, 0.6, 0.1))
     with figure_style():
         plane, density, prisms = overview.domains(cell, 0.5, 3).axes
+        (opened,) = overview.draw_mesh(cell, 0.5, 3).axes[0].collections
         cuts = overview.alpha_cuts(Triangular(75e9, 80e9, 85e9))
     assert "3 layers" in density.get_title(loc="left")
     assert len(prisms.collections) == 4
+    assert len(opened.get_facecolor()) > 100
+    _, count = overview.edges_of(np.array([[0, 1, 2], [2, 1, 3]]))
+    assert count.tolist() == [1, 1, 2, 1, 1]  # the third edge is inside: no face of it is drawn
     assert plane.get_title(loc="left") == "physical domain, θ = -1"
     bars = [line.get_xdata() for line in cuts.axes[0].lines[1:]]
     assert np.array(bars) / 1e9 == pytest.approx(np.array([[75 + k, 85 - k] for k in range(6)]))
