@@ -69,7 +69,8 @@ class Content(CellContent):
     @property
     def has_stated_modulus(self) -> bool:
         """True if the structure needs no modulus of a stage."""
-        return self.frame is None or self.frame.has_stated_modulus
+        frame = self.frame
+        return frame is None or frame.modulus is not None or frame.stiffness is not None
 
     @property
     def structure_section(self) -> Frame | Pendulum | MatricesSection | None:
@@ -119,7 +120,8 @@ class Content(CellContent):
         """Refuses a structure at rest without loads, and what a suite of records cannot answer."""
         ground = getattr(self.structure_section, "accelerogram", None)
         is_loaded = self.records is not None or ground is not None or bool(self.force)
-        starts_at_rest = self.matrices or (self.frame and not self.frame.moves_at_start)
+        starts = (*self.frame.displacements, *self.frame.velocities) if self.frame else ()
+        starts_at_rest = (self.frame or self.matrices) and not any(any(x.support) for x in starts)
         allowed = "a start, an accelerogram, a section [records] or [[force]]"
         cure = "nothing moves the frame"
         is_moved = is_loaded or not starts_at_rest

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import BeforeValidator, Discriminator, Field, Tag
+from pydantic import Discriminator, Field, Tag
 
 from alphacut.case.radius import FractionMap, Number, Radius, RadiusMapSection, ThetaSection
 from alphacut.case.types import (
@@ -198,7 +198,9 @@ class RoundCell(Section):
             fits, value = self.fraction.support.upper < touching, f"{self.fraction.support.upper:g}"
             allowed = f"values below {touching:.6g}, where particles touch"
             require(fits, "cell.fraction", value, allowed)
-        self.require_together("cell", LOSSES, "a loss of either phase, 0 for none")
+        missing = [key for key in LOSSES if getattr(self, key) is None]
+        key, allowed = f"cell.{[*missing, ''][0]}", "a loss of either phase, 0 for none"
+        require(len(missing) != 1, key, None, allowed)
 
 
 class ImageCell(Section):
@@ -306,21 +308,12 @@ class Mesh(Section):
     """element size over half the cell's side"""
 
 
-def _not_removed(value: object) -> object:
-    if value == "extended":
-        cure = 'take "signed", in which inputs without a sign take all points'
-        raise RefusedError("", value, "general, reduced, signed", cure)
-    return value
-
-
 class ModulusSection(Section):
     """Computation of the fuzzy modulus."""
 
     method: Literal["prism", "slices", "series", "auto"] = "auto"
     """model of the cell; auto is the series"""
-    plan: Annotated[Literal["general", "reduced", "signed"], BeforeValidator(_not_removed)] = (
-        "general"
-    )
+    plan: Literal["general", "reduced", "signed"] = "general"
     """samples of the transformation method"""
     alpha: Levels = Field(default=ALPHA, description="α-levels")
     tolerance: Annotated[float, Quantity(minimum=1e-10, maximum=0.1)] | None = None

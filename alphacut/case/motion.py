@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Literal
 
-from pydantic import BeforeValidator, Field, ValidationInfo
+from pydantic import Field, ValidationInfo
 
 from alphacut.case.types import (
     ALPHA,
@@ -23,9 +23,6 @@ from alphacut.case.types import (
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io import quantity
 
-EnvelopeMethod = Literal[
-    "auto", "proof", "dual", "graph-follower", "improved-graph-follower", "quasi-monte-carlo"
-]
 MOST_STEPS = 1_000_000
 """Steps of a simulation; more do not fit into memory."""
 
@@ -49,13 +46,6 @@ def _parse_tolerance(value: object, info: ValidationInfo) -> Tolerance:
             return Tolerance(number, unit)
     allowed = 'a length, a force or a fraction of each peak, as "0.2 mm", "0.05 N", "0.1 %"'
     raise RefusedError("", value, allowed)
-
-
-def _not_removed(value: object) -> object:
-    if value == "search":
-        cure = 'take "auto", or "improved-graph-follower" with integrator = "exact"'
-        raise RefusedError("", value, ", ".join(get_args(EnvelopeMethod)), cure)
-    return value
 
 
 def _file_name(value: str) -> str:
@@ -83,7 +73,9 @@ class EnvelopeSection(Section):
         " k (stiffness), d, q0, v0, zeta (damping_ratio), rayleigh_mass, rayleigh_stiffness"
     )
     alpha: Levels = Field(default=ALPHA, description="α-levels")
-    method: Annotated[EnvelopeMethod, BeforeValidator(_not_removed)] = "auto"
+    method: Literal[
+        "auto", "proof", "dual", "graph-follower", "improved-graph-follower", "quasi-monte-carlo"
+    ] = "auto"
     """method of the envelope"""
     integrator: Literal["midpoint", "rk4", "exact"] | None = None
     """time stepping; by the method if left out"""

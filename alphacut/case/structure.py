@@ -244,21 +244,6 @@ class Frame(StructureSection):
     """observed quantities: q1, v1, a1, drift1, shear1 … (columns without dampers), base_shear"""
 
     @property
-    def has_dampers(self) -> bool:
-        """True if any damper is there."""
-        return any(number.support.upper > 0 for number in self.dampers)
-
-    @property
-    def moves_at_start(self) -> bool:
-        """True if a floor is displaced or moves at the start."""
-        return any(any(x.support) for x in (*self.displacements, *self.velocities))
-
-    @property
-    def has_stated_modulus(self) -> bool:
-        """True if it needs no modulus of a stage."""
-        return self.modulus is not None or self.stiffness is not None
-
-    @property
     def floors(self) -> int:
         """Number of floors."""
         return len(self.masses)

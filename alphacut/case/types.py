@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Self, TypeVar
@@ -47,11 +47,6 @@ class Section(BaseModel):
 
     def require_consistent(self) -> None:
         """Refuses values that do not fit each other, once each key has its value."""
-
-    def require_together(self, section: str, keys: Sequence[str], allowed: str) -> None:
-        """Refuses some keys of a section without the others."""
-        missing = [key for key in keys if getattr(self, key) is None]
-        require(len(missing) in (0, len(keys)), f"{section}.{[*missing, ''][0]}", None, allowed)
 
     @model_validator(mode="after")
     def _validate(self) -> Self:

@@ -56,7 +56,8 @@ def draw_frame(section: Frame) -> Figure:
 
 def draw_chain(section: Frame) -> Figure:
     """Fig. 27: the frame as a chain of masses and springs, with its dampers if it has any."""
-    floors, placement = section.floors, section.damper_placement if section.has_dampers else None
+    floors, has_dampers = section.floors, any(x.support.upper > 0 for x in section.dampers)
+    placement = section.damper_placement if has_dampers else None
     foot = -0.9 if placement == "ground" else -0.5
     right, width = PITCH * floors + 0.2, min(12.0, 2.2 + 1.5 * floors)  # of the axes, in inches
     height = 2.15 * width / (PITCH * floors + 0.5) + 0.1

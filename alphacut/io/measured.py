@@ -80,13 +80,12 @@ def _measurements_of_mode(
     shape = {floor: x for floor, x in amplitudes.items() if not missing[floor].all()}
     shape = shape if len(shape) > 1 else {}
     frequencies = values[:, columns["frequency"]]
-    sizes = {"frequency_std": float(frequencies.mean())}
-    if shape:
-        sizes["shape_std"] = float(max(abs(x).mean() for x in shape.values()))
-    deviations = {  # root mean squares
-        name: float(np.sqrt((values[:, columns[name]] ** 2).mean())) / size
-        for name, size in sizes.items()
-        if name in columns
-    }
-    ends = deviations.get("frequency_std"), deviations.get("shape_std")
-    return ModeRows(mode, frequencies, shape, *ends)
+    sizes = {"frequency_std": frequencies.mean()}
+    sizes |= {"shape_std": max(abs(x).mean() for x in shape.values())} if shape else {}
+    deviations = (  # root mean squares
+        float(np.sqrt((values[:, columns[name]] ** 2).mean()) / sizes[name])
+        if name in columns and name in sizes
+        else None
+        for name in ("frequency_std", "shape_std")
+    )
+    return ModeRows(mode, frequencies, shape, *deviations)

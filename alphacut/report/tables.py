@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +13,7 @@ from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document, write_text
 from alphacut.io.quantity import MINUS, rounded_ends
 from alphacut.io.results import ResultsFolder
-from alphacut.questions.question import Row, Table
+from alphacut.questions.question import Table
 from alphacut.questions.summary import Parts
 from alphacut.stages.envelope import EnvelopeResult
 from alphacut.stages.identify import IdentifiedResult
@@ -27,12 +27,8 @@ if TYPE_CHECKING:
 DIGITS = 6
 RANGES = {"E from [GPa]": "E to [GPa]", "ν from": "ν to", "least peak": "greatest peak"}
 """Columns of lower and upper ends that are rounded as the nature of their row demands."""
-SPECIAL = str.maketrans(
+SYMBOLS = str.maketrans(
     {
-        **{x: f"\\{x}" for x in "&%$#_{}"},
-        "\\": r"\textbackslash{}",
-        "~": r"\textasciitilde{}",
-        "^": r"\textasciicircum{}",
         "−": "$-$",
         "…": r"\dots{}",
         "≤": r"$\leq$",
@@ -43,7 +39,7 @@ SPECIAL = str.maketrans(
         **{x: f"${name}$" for x, name in (("α", r"\alpha"), ("ν", r"\nu"), ("ζ", r"\zeta"))},
     }
 )
-"""What LaTeX reads otherwise, or fonts do not have."""
+"""What LaTeX's fonts do not have."""
 
 
 def frames(parts: Parts) -> dict[str, pd.DataFrame]:
@@ -217,10 +213,6 @@ def write_markup(named: Mapping[str, Table], folder: Path) -> list[Path]:
 
 def latex(table: Table) -> str:
     """A tabular environment, with rules of the package booktabs."""
-
-    def lines(*rows: Row) -> Iterator[str]:
-        return (" & ".join(cell.translate(SPECIAL) for cell in row) + r" \\" for row in rows)
-
-    begin = rf"\begin{{tabular}}{{l{'r' * (len(table.head) - 1)}}}"
-    body = [begin, r"\toprule", *lines(table.head), r"\midrule", *lines(*table.rows)]
-    return "\n".join([*body, r"\bottomrule", r"\end{tabular}", ""])
+    frame, columns = pd.DataFrame(table.rows, columns=table.head), "l" + "r" * (len(table.head) - 1)
+    text = frame.to_latex(index=False, escape=True, column_format=columns)
+    return text.translate(SYMBOLS)

@@ -37,7 +37,6 @@ MESH_OPTIONS = ("petsc", "parallel")
 """Options of elements that a mesh from a file takes."""
 
 
-AnyCell = RoundCell | MeshedCell
 Solve = Callable[[Sequence[Any]], list[HomogenisedStiffness]]
 """A model of the cell: a result for each sample; the cells differ in their inclusion alone."""
 
@@ -81,7 +80,7 @@ class CellProblem:
     """
 
     radius: AnyRadius | ThetaSection
-    cell: AnyCell
+    cell: RoundCell | MeshedCell
     mesh: Mesh
     modulus: ModulusSection
     stated_fraction: float | None = None

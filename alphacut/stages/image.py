@@ -308,21 +308,17 @@ def image_study(cell: ImageCell) -> ImageStudy:
     thresholds = cell.threshold or ()
     require_phases(grey, tuple(number.cut(0.0) for number in thresholds))
     is_fuzzy = any(number.support.width > 0 for number in thresholds)
-    if cell.dimension == 3:  # whose noise is not judged
-
-        def ranges_of_voxels(level: AlphaLevel) -> tuple[Ints, Ints]:
-            """Least and greatest phase of each voxel at a level."""
-            return threshold_ranges(grey, [cut_or_nominal(number, level) for number in thresholds])
-
-        return ImageStudy(cell, ranges_of_voxels, is_fuzzy)
-    segmentation = segment(grey, [number.nominal for number in thresholds])
-    segmentation.require_certain()
+    segmentation = None  # of a volume, whose noise is not judged
+    if cell.dimension == 2:
+        segmentation = segment(grey, [number.nominal for number in thresholds])
+        segmentation.require_certain()
 
     def phase_ranges(level: AlphaLevel) -> tuple[Ints, Ints]:
         """Least and greatest phase of each pixel at a level."""
         # noise and light leave phases open, unless a fuzzy threshold says all that is not known
-        if level is not None and not is_fuzzy:
+        if segmentation is not None and level is not None and not is_fuzzy:
             return segmentation.ranges()
         return threshold_ranges(grey, [cut_or_nominal(number, level) for number in thresholds])
 
-    return ImageStudy(cell, phase_ranges, is_fuzzy or segmentation.open_fraction > 0)
+    is_open = segmentation is not None and segmentation.open_fraction > 0
+    return ImageStudy(cell, phase_ranges, is_fuzzy or is_open)
