@@ -14,13 +14,7 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature
 from alphacut.io.quantity import STANDARD_GRAVITY, engineering, range_text
-from alphacut.questions.question import (
-    FuzzyResponse,
-    LimitAnswer,
-    LimitsAnswer,
-    Record,
-    Texts,
-)
+from alphacut.questions.question import FuzzyResponse, LimitAnswer, LimitsAnswer, Record, Texts
 from alphacut.stages.store import CutsResult, Values
 
 POINTS = 60

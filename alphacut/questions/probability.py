@@ -13,13 +13,7 @@ from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.result import Ends, Nature
 from alphacut.io.quantity import range_text
-from alphacut.questions.question import (
-    FuzzyResponse,
-    LimitAnswer,
-    LimitsAnswer,
-    Record,
-    Texts,
-)
+from alphacut.questions.question import FuzzyResponse, LimitAnswer, LimitsAnswer, Record, Texts
 from alphacut.stages.store import CutsResult, Values
 
 

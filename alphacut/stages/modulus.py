@@ -19,11 +19,7 @@ from alphacut.rve.result.engineering_constants import (
     PLANE_STRAIN,
     engineering_constants,
 )
-from alphacut.rve.result.loss_factors import (
-    CONSTANTS,
-    MAX_FIRST_ORDER,
-    loss_factors,
-)
+from alphacut.rve.result.loss_factors import CONSTANTS, MAX_FIRST_ORDER, loss_factors
 from alphacut.rve.result.result import HomogenisedStiffness
 from alphacut.stages.cell import GPA, References, key_and_unit
 from alphacut.stages.store import CutsResult, Numbers, Values

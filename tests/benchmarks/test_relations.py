@@ -9,10 +9,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from alphacut.fuzzy import Interval, Knowledge, Signed, propagate
 from benchmarks.relations import cases
 from benchmarks.relations.__main__ import KINDS
-from benchmarks.relations.stated import contradictions, of_dataset, of_values
 
 CASE = """title = "Packings and a frame"
 stages = ["microstructure", "modulus", "envelope"]
@@ -98,27 +96,3 @@ def test_runs_otherwise_and_killed_at_random_times_have_the_same_bits(tmp_path):
         if kills >= 12:
             return
     pytest.fail(f"{kills} kills only")
-
-
-def test_summaries_differ_by_a_bit_or_an_order_but_not_by_times():
-    one = {"E": [1.0, {"seconds": 2.0}], "command": "a", "x": 1}
-    assert not cases.differences(*(cases.numbers(x) for x in (one, one | {"command": "b"})))
-    for two in (one | {"E": [1.0 + 2**-52, {}]}, {"x": 1, "E": [1.0, {}]}, one | {"x": True}):
-        assert cases.differences(*(cases.numbers(x) for x in (one, two)))
-
-
-def ends(low, high, inner):
-    """Statement of guaranteed bounds that are attained up to a share."""
-    inputs = {"x": Interval(low, high)}
-    made = propagate(lambda x: x, inputs, Signed(), knowledge=Knowledge({"x": 1}), progress=False)
-    return of_dataset(made.to_dataset()).assign(attained=lambda x: inner * x.bound)
-
-
-def test_what_leaves_a_guarantee_or_both_errors_is_seen():
-    wide, narrow = (ends(-x, x, 0.95) for x in (1.0, 0.9))
-    assert not contradictions(wide, wide)
-    assert "attained leaves what is proved: y by 0.05" in contradictions(wide, narrow)[0]
-    one, near, far = (of_values({"E": (x, 0.1)}) for x in (1.0, 1.19, 1.21))
-    assert not contradictions(one, near)
-    assert contradictions(one, far)
-    assert contradictions(one, near, within=1e-6)

@@ -19,13 +19,3 @@ def test_options_agree_in_e_or_say_why_there_is_none(monkeypatch, capsys):
     table = capsys.readouterr().out
     assert all(name in table for name in outcomes)
     assert "too few                 1326 does not converge" in table
-
-
-def test_another_e_is_a_fault(capsys):
-    right = solvers.Timing("theta", 40_000, 1.0, 1.0, 4, 25e9)
-    wrong = solvers.Timing("ICC", 40_000, 1.0, 1.0, 90, 25.001e9)
-    fast = solvers.Timing("MUMPS", 40_000, 2.0, 1.0, 1, 25e9)
-    assert [fault.split(" is ")[0] for fault in solvers.compare([right, wrong, fast])] == [
-        "E of ICC",
-        "MUMPS",
-    ]

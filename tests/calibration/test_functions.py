@@ -6,15 +6,7 @@ from itertools import chain
 import numpy as np
 import pytest
 
-from alphacut.fuzzy import (
-    Knowledge,
-    Nature,
-    Reduced,
-    RefusedError,
-    Signed,
-    Triangular,
-    propagate,
-)
+from alphacut.fuzzy import Knowledge, Nature, Reduced, RefusedError, Signed, Triangular, propagate
 from tests.calibration import functions
 from tests.calibration.declared import Calibration, free_seed
 

@@ -230,8 +230,7 @@ ALWAYS = 3
 
 
 @pytest.mark.parametrize(
-    "number",
-    [pytest.param(k, marks=() if k < ALWAYS else pytest.mark.slow) for k in range(30)],
+    "number", [pytest.param(k, marks=() if k < ALWAYS else pytest.mark.slow) for k in range(30)]
 )
 def test_a_right_proof_of_a_random_frame_agrees_with_its_judge_and_no_other_does(number, rng):
     """The envelope judges itself by exact motions; those of a force that differs contradict it."""

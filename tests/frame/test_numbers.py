@@ -16,11 +16,7 @@ RECORD = Accelerogram(0.05, 2 * np.sin(np.arange(30) * 0.9) * np.sin(np.arange(3
 FRAME = StoreyFrame(
     [2e4] * 3, stiffness=[4e7] * 3, damping_ratio=0.03, ground=RECORD, outputs=("q3",)
 )
-INPUTS = {
-    "k1": Interval(3.0e7, 5.0e7),
-    "m3": Interval(1.7e4, 2.3e4),
-    "zeta": Interval(0.02, 0.04),
-}
+INPUTS = {"k1": Interval(3.0e7, 5.0e7), "m3": Interval(1.7e4, 2.3e4), "zeta": Interval(0.02, 0.04)}
 NARROW = {**INPUTS, "k1": Interval(3.8e7, 4.2e7)}
 MOTION = {"duration": 0.8, "step": 0.05, "alpha": (0,), "relative": True, "progress": False}
 DUAL = DualProof(gap=1e-3, peaks=1e-3, parts=6, workers=1)

@@ -11,11 +11,7 @@ from alphacut.stochastic import HermiteMap
 RADIUS = HermiteMap(0.1337, 0.1, 0.8663, 0.1692)
 MATRIX, PARTICLE = Phase(20e9, 0.3), Phase(80e9, 0.2)
 LOSSES = np.array([[0.01, 0.02], [0.005, 0.003]])
-MODELS = [
-    SeriesModel(energies=True),
-    SlicesModel(0.5, 6),
-    PrismModel(0.5, 4, stiffness=True),
-]
+MODELS = [SeriesModel(energies=True), SlicesModel(0.5, 6), PrismModel(0.5, 4, stiffness=True)]
 
 
 def solved(model, matrix=MATRIX, particle=PARTICLE):

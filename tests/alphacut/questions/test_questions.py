@@ -34,11 +34,7 @@ def test_peaks_are_wide_where_the_gap_is_or_nothing_is_proved():
     def peak(upper, nature=Nature.GUARANTEED):
         return Peak(np.array([0.0, 1.0]), one, upper, 0 * one, one, one, one, nature)
 
-    bounds = {
-        "q1": peak(one),
-        "q2": peak(np.array([1.1, 1.0])),
-        "q3": peak(one, Nature.ESTIMATED),
-    }
+    bounds = {"q1": peak(one), "q2": peak(np.array([1.1, 1.0])), "q3": peak(one, Nature.ESTIMATED)}
     assert loose_peaks(bounds, ("q1", "q2", "q3", "max q1"), 0.05) == ("q2", "q3", "max q1")
     assert loose_peaks(bounds, ("q1", "q2"), 0.1) == ()
 

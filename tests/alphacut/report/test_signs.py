@@ -141,11 +141,8 @@ def rows_of_latex(text):
     signs = {"$-$": "−", r"$\leq$": "≤", r"$\geq$": "≥", r"\dots{}": "…", r"\_": "_", r"\%": "%", "$^2$": "²"}  # fmt: skip
     for sign, letter in signs.items():
         text = text.replace(sign, letter)
-    text = (
-        text.replace(r"\textasciicircum{}", "^")
-        .replace(r"\textmu{}", "µ")
-        .replace(r"$\alpha$", "α")
-    )
+    text = text.replace(r"\textasciicircum ", "^").replace(r"\textmu{}", "µ")
+    text = text.replace(r"$\alpha$", "α")
     rows = re.findall(r"^(.*) \\\\$", text, re.MULTILINE)
     head, *rows = (row.split(" & ") for row in rows)
     return [dict(zip(head, row, strict=True)) for row in rows]

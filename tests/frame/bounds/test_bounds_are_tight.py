@@ -9,12 +9,7 @@ from scipy.integrate import cumulative_trapezoid
 from alphacut.frame import Accelerogram, Exact, LinearFlow, StoreyFrame
 from alphacut.frame.bounds.branch_and_bound import Frontier, enclosed, examine_items
 from alphacut.frame.bounds.kernel import stays_below
-from alphacut.frame.bounds.model_error import (
-    Remainder,
-    largest_growth,
-    motion_parts,
-    proved_error,
-)
+from alphacut.frame.bounds.model_error import Remainder, largest_growth, motion_parts, proved_error
 from alphacut.frame.bounds.newton import Optima
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.calculus.taylor_model import TaylorModel

@@ -5,15 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from alphacut.frame import (
-    Accelerogram,
-    Exact,
-    Force,
-    History,
-    LinearFlow,
-    Midpoint,
-    StoreyFrame,
-)
+from alphacut.frame import Accelerogram, Exact, Force, History, LinearFlow, Midpoint, StoreyFrame
 from alphacut.frame.boxes import boxes
 from alphacut.frame.dynamics.flow import trajectory
 from alphacut.frame.dynamics.integrators import Integrator, RungeKutta4

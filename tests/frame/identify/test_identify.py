@@ -7,12 +7,7 @@ import pytest
 
 from alphacut.frame import StoreyFrame, envelope
 from alphacut.frame.identify.identify import Identified, RefutedError, identify
-from alphacut.frame.identify.modes import (
-    Chain,
-    MeasuredMode,
-    chain_modes,
-    measured_mode,
-)
+from alphacut.frame.identify.modes import Chain, MeasuredMode, chain_modes, measured_mode
 from alphacut.frame.structures.linear import frequencies
 from alphacut.fuzzy import FuzzyNumber, Interval, Triangular, from_data
 from alphacut.fuzzy.refused import RefusedError
@@ -122,9 +117,7 @@ def test_cuts_are_nested_inside_the_priors_and_feed_an_envelope(rng):
     assert "c1, c2, c3 in their cuts at α (opinions)" in str(found.claim)
 
 
-def test_a_common_factor_of_stiffnesses_and_masses_is_not_learned(
-    rng,
-):
+def test_a_common_factor_of_stiffnesses_and_masses_is_not_learned(rng):
     names = (*NAMES, "m1", "m2", "m3")
     nominal = Chain(FRAME, names).nominal
     prior = {name: Interval(0.8 * x, 1.2 * x) for name, x in zip(names, nominal, strict=True)}

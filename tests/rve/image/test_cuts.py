@@ -182,8 +182,7 @@ def test_an_image_too_large_for_memory_is_refused_with_a_piece_that_fits():
 
 
 @pytest.mark.parametrize(
-    "thresholds",
-    [((9.0, 9.0),), ((0.0, 2.0),), ((3.0, 3.5), (3.6, 4.0)), ((6.0, 6.0), (3.0, 3.0))],
+    "thresholds", [((9.0, 9.0),), ((0.0, 2.0),), ((3.0, 3.5), (3.6, 4.0)), ((6.0, 6.0), (3.0, 3.0))]
 )
 def test_thresholds_that_leave_a_phase_empty_are_refused(thresholds):
     with pytest.raises(RefusedError) as error:

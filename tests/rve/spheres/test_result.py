@@ -8,12 +8,7 @@ from alphacut.rve import Phase
 from alphacut.rve.result.checks import CertificateError
 from alphacut.rve.result.moduli import hashin_shtrikman, mori_tanaka
 from alphacut.rve.spheres.model import SphereSeriesModel
-from alphacut.rve.spheres.result import (
-    cubic_moduli,
-    cubic_voigt,
-    hill_average,
-    spheres_with_checks,
-)
+from alphacut.rve.spheres.result import cubic_moduli, cubic_voigt, hill_average, spheres_with_checks
 from alphacut.stochastic import HermiteMap
 
 MATRIX, STIFF, MAP = Phase(20e9), Phase(80e9), HermiteMap(0.1337, 0.1, 0.8663, 0.1692)
@@ -42,11 +37,7 @@ def test_bounds_meet_the_phases_and_mori_and_tanaka():
 
 @pytest.mark.parametrize(
     ("factors", "words"),
-    [
-        ((0.9, 1.0, 1.0), "Reuss|Hashin"),
-        ((1.08, 1.0, 1.0), "Hashin"),
-        ((1.0, 3.0, 1.0), "Voigt"),
-    ],
+    [((0.9, 1.0, 1.0), "Reuss|Hashin"), ((1.08, 1.0, 1.0), "Hashin"), ((1.0, 3.0, 1.0), "Voigt")],
 )
 def test_a_wrong_stiffness_has_no_certificate(factors, words):
     result = SphereSeriesModel(accuracy=1e-6).solve(MAP, MATRIX, [STIFF])[0]
