@@ -214,5 +214,5 @@ def write_markup(named: Mapping[str, Table], folder: Path) -> list[Path]:
 def latex(table: Table) -> str:
     """A tabular environment, with rules of the package booktabs."""
     frame, columns = pd.DataFrame(table.rows, columns=table.head), "l" + "r" * (len(table.head) - 1)
-    text = frame.to_latex(index=False, escape=True, column_format=columns)
+    text: str = frame.to_latex(index=False, escape=True, column_format=columns)
     return text.translate(SYMBOLS)

@@ -20,12 +20,14 @@ from alphacut.fuzzy.refused import RefusedError, require
 PLANE_MODES = ("1", "L", "I;16", "I;16B", "I;16L", "I", "F")
 PHOTOMETRIC, WHITE_IS_ZERO = 262, 0  # tag of TIFF and its value
 SAMPLE_FORMAT, SIGNED = 339, 2
-BYTES = 1.3e8
-"""Of the program."""
+PROGRAM_BYTES = 1.3e8
+"""Memory of the program and its libraries."""
 BYTES_PER_ELEMENT = {2: 1450, 3: 1900}
-"""Of each element of the cuts' solutions with their first guess, by dimension; within 1.25 of peaks
-at 128² … 512² pixels of two elements a side, 512² and 1024² of one, and 96³ voxels."""
-MOST_CHANNELS = 4  # pages that a file calls channels are colours up to so many, else slices
+"""Memory of an element in the cuts' solutions with their first guess, by dimension; within 1.25 of
+peaks at 128² … 512² pixels of two elements a side, 512² and 1024² of one, and 96³ voxels."""
+MAX_COLOURS = 4  # pages that a file calls channels are colours up to so many, else slices
+TAKE_VOXEL = "a volume takes cell.voxel in place of cell.pixel"
+TAKE_PIXEL = "a picture takes cell.pixel in place of cell.voxel"
 SLICES = (".tif", ".tiff", ".png", ".bmp")
 META_TYPES = {
     "MET_CHAR": "i1", "MET_UCHAR": "u1", "MET_SHORT": "i2", "MET_USHORT": "u2", "MET_INT": "i4",
@@ -51,31 +53,29 @@ def read_grid(path: Path, sides: Sequence[float]) -> Array:
         RefusedError: The file is none of these, of another dimension, too large for memory, or says
             that its pixels or voxels have sides of other ratios.
     """
-    dimension, equal_sides = len(sides), len(set(sides)) == 1
+    dimension, has_equal_sides = len(sides), len(set(sides)) == 1
     if dimension == 2 and path.is_dir():
-        cure = "a volume takes cell.voxel in place of cell.pixel"
-        raise RefusedError(path.name, "a folder", "a picture", cure)
+        raise RefusedError(path.name, "a folder", "a picture", TAKE_VOXEL)
     try:
         if path.suffix == ".npy":
             # mapped: one too large for memory must come as far as the question of how large it is
             values = np.asarray(np.load(path, mmap_mode="r", allow_pickle=False))
         elif dimension == 2:
-            values = _picture(path, equal_sides)
+            values = _read_picture(path, has_equal_sides)
         else:
-            values = _volume(path, sides)
+            values = _read_volume(path, sides)
     except (RefusedError, MemoryError):
         raise
     except Exception as error:  # readers of damaged files raise errors of many kinds
         allowed = "an image or an array" if dimension == 2 else "a volume"
         raise RefusedError(path.name, f"unreadable ({error})", allowed) from error
-    small = min(values.shape, default=0) < 2
-    if values.ndim != dimension or small or values.dtype.kind not in "buif":
+    is_thin = min(values.shape, default=0) < 2
+    if values.ndim != dimension or is_thin or values.dtype.kind not in "buif":
         what = f"{values.dtype} of shape {values.shape}"
         allowed = "one plane of 2 × 2 numbers or more"
-        cure = "a volume takes cell.voxel in place of cell.pixel" if values.ndim == 3 else ""
         if dimension == 3:
-            allowed, cure = "numbers along three axes (z, y, x), 2 × 2 × 2 or more", ""
-            cure = "a picture takes cell.pixel in place of cell.voxel" if values.ndim == 2 else ""
+            allowed = "numbers along three axes (z, y, x), 2 × 2 × 2 or more"
+        cure = {(2, 3): TAKE_VOXEL, (3, 2): TAKE_PIXEL}.get((dimension, values.ndim), "")
         raise RefusedError(path.name, what, allowed, cure)
     require_memory(values.shape)
     if not np.isfinite(values).all():
@@ -96,32 +96,28 @@ def files_of(path: Path) -> list[Path]:
     return [path, *(file for file in data if file.is_file())]
 
 
-def _volume(path: Path, sides: Sequence[float]) -> Array:
+def _read_volume(path: Path, sides: Sequence[float]) -> Array:
     """Numbers of a volume along the axes (z, y, x)."""
     if path.is_dir():
-        return _slices(path, sides[-1] == sides[-2])
+        return _read_slices(path, sides[-1] == sides[-2])
     if path.suffix.lower() in (".tif", ".tiff"):
-        return _stack(path)
+        return _read_stack(path)
     if path.suffix.lower() in (".mhd", ".mha"):
-        return _meta_image(path, sides)
+        return _read_meta_image(path, sides)
     if path.suffix.lower() in (".nhdr", ".nrrd"):
-        return _nrrd(path, sides)
+        return _read_nrrd(path, sides)
     allowed = "a TIFF stack, a folder of slices, .npy, .mhd or .nhdr"
     cure = "write raw data beside a .mhd head with DimSize, ElementType and ElementDataFile"
     if path.suffix.lower() in (*SLICES, ".jpg", ".jpeg"):
-        cure = "a picture takes cell.pixel in place of cell.voxel"
+        cure = TAKE_PIXEL
     raise RefusedError(path.name, f"a file of kind {path.suffix or 'unknown'}", allowed, cure)
 
 
-def _slices(folder: Path, equal_sides: bool) -> Array:
+def _read_slices(folder: Path, is_square: bool) -> Array:
     """The pictures of a folder one above another, in the order of the numbers in their names."""
     files = files_of(folder)
-    require(
-        len(files) > 1,
-        folder.name,
-        f"{len(files)} pictures",
-        "a folder of slices, PNG, TIFF or BMP",
-    )
+    allowed = "a folder of slices, PNG, TIFF or BMP"
+    require(len(files) > 1, folder.name, f"{len(files)} pictures", allowed)
     numbers = {}
     for file in files:
         digits = re.findall(r"\d+", file.stem)
@@ -133,19 +129,19 @@ def _slices(folder: Path, equal_sides: bool) -> Array:
     what = f"{len(files)} pictures, none with number {missing}" if missing else "numbers twice"
     require(is_whole, folder.name, what, "slices with numbers that follow one another")
     by_number = [numbers[k] for k in sorted(numbers)]
-    first = _picture(by_number[0], equal_sides)
+    first = _read_picture(by_number[0], is_square)
     require_memory((len(files), *first.shape))
     values = np.empty((len(files), *first.shape), first.dtype)
     for k, file in enumerate(by_number):
-        page = _picture(file, equal_sides)
-        alike = page.shape == first.shape and page.dtype == first.dtype
+        page = _read_picture(file, is_square)
+        is_alike = page.shape == first.shape and page.dtype == first.dtype
         what = f"{page.dtype} of shape {page.shape}"
-        require(alike, file.name, what, f"{first.dtype} of shape {first.shape} as the others")
+        require(is_alike, file.name, what, f"{first.dtype} of shape {first.shape} as the others")
         values[k] = page
     return values
 
 
-def _stack(path: Path) -> Array:
+def _read_stack(path: Path) -> Array:
     """Pages of a TIFF file; which axis they are the file says."""
     try:
         import tifffile
@@ -157,20 +153,18 @@ def _stack(path: Path) -> Array:
         series = file.series[0]
         axes, shape = series.axes, series.shape
         pages = [(a, n) for a, n in zip(axes, shape, strict=True) if a not in "YX" and n > 1]
-        is_colour = "S" in axes or any(a == "C" and n <= MOST_CHANNELS for a, n in pages)
+        is_colour = "S" in axes or any(a == "C" and n <= MAX_COLOURS for a, n in pages)
         is_volume = len(pages) == 1 and not is_colour
         what = f"axes {axes} of {' × '.join(map(str, shape))}"
         cure = "save the volume meant, one number a voxel, with axes ZYX or as .npy"
         require(is_volume, path.name, what, "pages along z, rows, columns", cure)
         require_memory(tuple(n for n in shape if n > 1))
         values = np.squeeze(series.asarray())
-        photometric = getattr(file.pages[0], "photometric", None)
-        if photometric == WHITE_IS_ZERO and len(np.unique(values)) == 2:
-            _refuse_white_is_zero(path, values)
+        _require_clear_mask(path, values, getattr(file.pages[0], "photometric", None))
     return np.asarray(values)
 
 
-def _meta_image(path: Path, sides: Sequence[float]) -> Array:
+def _read_meta_image(path: Path, sides: Sequence[float]) -> Array:
     """Volume of a MetaImage head and its raw data."""
     head, size = {}, 0
     with path.open("rb") as file:
@@ -181,23 +175,21 @@ def _meta_image(path: Path, sides: Sequence[float]) -> Array:
             if key.strip() == "ElementDataFile":
                 break
     data = head.get("ElementDataFile", "")
-    is_big = (
-        "true" in (head.get("BinaryDataByteOrderMSB", head.get("ElementByteOrderMSB", ""))).lower()
-    )
-    return _raw(
+    byte_order = head.get("BinaryDataByteOrderMSB", head.get("ElementByteOrderMSB", ""))
+    return _read_raw(
         path,
         path if data == "LOCAL" else path.parent / data,
         sizes=head.get("DimSize", "").split(),
         kind=META_TYPES.get(head.get("ElementType", "")),
-        is_big=is_big,
-        skip=size if data == "LOCAL" else int(head.get("HeaderSize", 0)),
+        is_big_endian="true" in byte_order.lower(),
+        n_head_bytes=size if data == "LOCAL" else int(head.get("HeaderSize", 0)),
         is_compressed=head.get("CompressedData", "False").lower() == "true",
         spacing=head.get("ElementSpacing", "").split(),
         sides=sides,
     )
 
 
-def _nrrd(path: Path, sides: Sequence[float]) -> Array:
+def _read_nrrd(path: Path, sides: Sequence[float]) -> Array:
     """Volume of an NRRD head and its raw data, in the same file after an empty line or another."""
     head, size = {}, 0
     with path.open("rb") as file:
@@ -209,36 +201,35 @@ def _nrrd(path: Path, sides: Sequence[float]) -> Array:
             key, _, value = text.partition(":")
             head[key.strip().lower()] = value.strip().lstrip("=").strip()
     name = head.get("data file", head.get("datafile", ""))
-    kind = head.get("type", "")
     directions = re.findall(r"\(([^)]*)\)", head.get("space directions", ""))
     lengths = [math.hypot(*map(float, vector.split(","))) for vector in directions]
     spacing = head.get("spacings", "").split() or lengths
-    return _raw(
+    return _read_raw(
         path,
         path.parent / name if name else path,
         sizes=head.get("sizes", "").split(),
-        kind=NRRD_TYPES.get(kind),
-        is_big=head.get("endian") == "big",
-        skip=int(head.get("byte skip", 0)) if name else size,
+        kind=NRRD_TYPES.get(head.get("type", "")),
+        is_big_endian=head.get("endian") == "big",
+        n_head_bytes=int(head.get("byte skip", 0)) if name else size,
         is_compressed=head.get("encoding", "raw").lower() != "raw",
         spacing=spacing,
         sides=sides,
     )
 
 
-def _raw(
+def _read_raw(
     path: Path,
     data: Path,
     *,
     sizes: Sequence[str],
     kind: str | None,
-    is_big: bool,
-    skip: int,
+    is_big_endian: bool,
+    n_head_bytes: int,
     is_compressed: bool,
     spacing: Sequence[str | float],
     sides: Sequence[float],
 ) -> Array:
-    """Raw numbers whose head gives sizes along x, y, z: the first one varies fastest."""
+    """Numbers (z, y, x) of raw data, whose head `path` gives sizes and spacing along x, y, z."""
     name = path.name
     require(kind is not None, name, "a type that is not known", "whole numbers or floats")
     require(not is_compressed, name, "compressed data", "raw data", "save it without compression")
@@ -251,24 +242,25 @@ def _raw(
         raise RefusedError(name, what, given, "give cell.voxel = [x, y, z] as they are")
     shape = tuple(int(n) for n in reversed(sizes))
     require_memory(shape)
-    dtype = np.dtype((">" if is_big else "<") + str(kind))
-    expected = skip + math.prod(shape) * dtype.itemsize
+    dtype = np.dtype((">" if is_big_endian else "<") + str(kind))
+    expected = n_head_bytes + math.prod(shape) * dtype.itemsize
     found = data.stat().st_size
     allowed = f"{expected} for {' × '.join(sizes)} of {dtype}"
     require(found == expected, data.name, f"{found} bytes", allowed)
-    values = np.fromfile(data, dtype, offset=skip).reshape(shape)
+    values = np.fromfile(data, dtype, offset=n_head_bytes).reshape(shape)
     return values.astype(dtype.newbyteorder("="))
 
 
-def _refuse_white_is_zero(path: Path, values: Array) -> None:
-    # tifffile writes masks so, and readers exchange the phases
-    bright = np.mean(values == values.max())
-    what = f"two-valued with white as zero, bright on {bright:.4g}"
-    cure = "save it as .npy or PNG, and look at the fractions that check prints"
-    raise RefusedError(path.name, what, "masks that all programs read alike", cure)
+def _require_clear_mask(path: Path, values: Array, photometric: object) -> None:
+    """Refuses a mask whose white is zero: tifffile writes such, and readers exchange the phases."""
+    if photometric == WHITE_IS_ZERO and len(np.unique(values)) == 2:
+        bright_fraction = np.mean(values == values.max())
+        what = f"two-valued with white as zero, bright on {bright_fraction:.4g}"
+        cure = "save it as .npy or PNG, and look at the fractions that check prints"
+        raise RefusedError(path.name, what, "masks that all programs read alike", cure)
 
 
-def _picture(path: Path, square: bool) -> Array:
+def _read_picture(path: Path, is_square: bool) -> Array:
     """Read the pixels of an image file with one page of grey values, top row first."""
     from PIL import Image
 
@@ -280,20 +272,16 @@ def _picture(path: Path, square: bool) -> Array:
             cure = "save the one meant as grey values; a volume takes cell.voxel"
             raise RefusedError(path.name, what, "one page of grey values", cure)
         dpi_x, dpi_y = map(float, picture.info.get("dpi", (1, 1)))
-        if square and abs(dpi_x / dpi_y - 1) > 0.01:
+        if is_square and abs(dpi_x / dpi_y - 1) > 0.01:
             what = f"of pixels {dpi_x:g} by {dpi_y:g} per inch"
             raise RefusedError(path.name, what, "square ones", "give cell.pixel = [width, height]")
         require_memory((picture.height, picture.width))
         values = np.asarray(picture)
         tags = getattr(picture, "tag_v2", {})
-        greys = np.unique(values) if tags.get(PHOTOMETRIC) == WHITE_IS_ZERO else []
-        if len(greys) == 2:
-            _refuse_white_is_zero(path, values)
+        _require_clear_mask(path, values, tags.get(PHOTOMETRIC))
         is_signed = tags.get(SAMPLE_FORMAT, (1,)) == (SIGNED,)
-        is_changed = (
-            is_signed if mode == "L" else not is_signed and mode == "I" and values.min() < 0
-        )
-        if is_changed:
+        is_wrapped = not is_signed and mode == "I" and values.min() < 0  # of unsigned 32 bits
+        if is_wrapped or (is_signed and mode == "L"):
             what = f"of integers whose sign Pillow changes, as {values.min()}"
             raise RefusedError(path.name, what, "values from 0 to 2³¹ − 1", "save it as .npy")
         return values
@@ -302,7 +290,7 @@ def _picture(path: Path, square: bool) -> Array:
 def needed_memory(shape: tuple[int, ...], division: int = 1) -> float:
     """Bytes that the cuts of a grid take with so many elements along each side of a cell."""
     elements = math.prod(shape) * math.prod([division] * len(shape))
-    return BYTES + BYTES_PER_ELEMENT[len(shape)] * elements
+    return PROGRAM_BYTES + BYTES_PER_ELEMENT[len(shape)] * elements
 
 
 def require_memory(shape: tuple[int, ...], division: int = 1) -> None:

@@ -34,7 +34,7 @@ def concave_constants(bounds: StiffnessBounds, average: str) -> dict[str, tuple[
 
 
 def energy_shares(
-    model: ImageModel, solution: ImageSolution, images: ModuliImages, phase: Ints, count: int
+    model: ImageModel, solution: ImageSolution, images: ModuliImages, phase: Ints, n_phases: int
 ) -> dict[str, Array]:
     """Bounds of each phase's share of the energy, (phases, 2), by the name of the constant.
 
@@ -43,27 +43,29 @@ def energy_shares(
         solution: Solution of one image.
         images: Its moduli, the least equal to the greatest.
         phase: Number of the phase of each pixel or voxel.
-        count: Number of phases.
+        n_phases: Number of phases.
     """
-    at_zero = concave_constants(solution.bounds, model.average)
-    shares = {name: np.tile([0.0, 1.0], (count, 1)) for name in at_zero}
-    gap = max(high / low - 1 for low, high in at_zero.values())
+    unchanged = concave_constants(solution.bounds, model.average)
+    shares = {name: np.tile([0.0, 1.0], (n_phases, 1)) for name in unchanged}
+    gap = max(high / low - 1 for low, high in unchanged.values())
     # the error gap/t + CURVATURE t/2 is least here
     t = float(np.clip(np.sqrt(2 * gap / CURVATURE), MIN_CHANGE, MAX_CHANGE))
-    for k in range(count):
-        lower = {}
+    for k in range(n_phases):
+        changed_lower = {}  # lower bounds of c(t) and c(−t)
         for change in (t, -t):
             factor = np.where(phase == k, 1 + change, 1.0)
-            (bulk, _), (shear, _) = images.bulk, images.shear
-            changed = factor * bulk, factor * shear
-            stresses = model.solve_stresses(*changed, start=solution)
+            moduli = factor * images.bulk[0], factor * images.shear[0]
+            stresses = model.solve_stresses(*moduli, start=solution)
             below = inverse_below(stresses.energy.upper)
-            lower[change] = concave_constants(StiffnessBounds(below, below), model.average)
-        for name, (low, high) in at_zero.items():
-            least = (lower[t][name][0] - high) / t
-            greatest = (high - lower[-t][name][0]) / t
-            ends = least / (high if least > 0 else low), greatest / (low if greatest > 0 else high)
-            shares[name][k] = np.clip(ends + np.array([-1, 1]) * ROUNDING / t, 0, 1)
+            bounds = concave_constants(StiffnessBounds(below, below), model.average)
+            changed_lower[change] = {name: low for name, (low, _) in bounds.items()}
+        for name, (low, high) in unchanged.items():
+            # c′(0), and its share of c(0), which is within low … high
+            least_slope = (changed_lower[t][name] - high) / t
+            greatest_slope = (high - changed_lower[-t][name]) / t
+            least = least_slope / (high if least_slope > 0 else low)
+            greatest = greatest_slope / (low if greatest_slope > 0 else high)
+            shares[name][k] = np.clip((least - ROUNDING / t, greatest + ROUNDING / t), 0, 1)
     return shares
 
 
@@ -82,10 +84,10 @@ def mean_loss(
 
 def _least_mean(shares: Array, losses: Array) -> float:
     """Least Σ share · loss: what the least shares leave goes to the phases of the least loss."""
-    share, left = shares[:, 0].copy(), 1 - shares[:, 0].sum()
+    share, remaining = shares[:, 0].copy(), 1 - shares[:, 0].sum()
     for k in np.argsort(losses):
-        added = min(left, shares[k, 1] - share[k])
-        share[k], left = share[k] + added, left - added
+        added = min(remaining, shares[k, 1] - share[k])
+        share[k], remaining = share[k] + added, remaining - added
     common = losses.min()  # equal losses are exact
     return float(common + share @ (losses - common) - ROUNDING * np.abs(losses).max())
 

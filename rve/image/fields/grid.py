@@ -19,8 +19,8 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.rve.image.fields.element import Element
 
-SLAB = 6144  # cells times loads worked on at once: what the second cache holds
-DEVICE_SLAB = 1 << 20  # the same on a device, which has more to do at once: a few GB
+SLAB_CELLS = 6144  # cells times loads worked on at once: what the second cache holds
+DEVICE_SLAB_CELLS = 1 << 20  # the same on a device, which has more to do at once: a few GB
 
 Fields = Any
 """Array of NumPy or of a device."""
@@ -111,9 +111,9 @@ class Operator:
 
 
 def slabs(fields: Fields) -> Iterator[slice]:
-    """Slices of the first axis of the grid, each of about `SLAB` cells times loads."""
+    """Slices of the first axis of the grid, each of about `SLAB_CELLS` cells times loads."""
     first, *last_axes = fields.shape[2:]
-    size = SLAB if isinstance(fields, np.ndarray) else DEVICE_SLAB
+    size = SLAB_CELLS if isinstance(fields, np.ndarray) else DEVICE_SLAB_CELLS
     count = max(1, size // (fields.shape[0] * math.prod(last_axes)))
     for start in range(0, first, count):
         yield slice(start, min(first, start + count))
@@ -134,7 +134,7 @@ def gather(element: Element, fields: Fields, slab: slice) -> Fields:
 
 
 def scatter(element: Element, forces: Fields, result: Fields, slab: slice) -> None:
-    """Add element forces, (local unknowns, loads, *slab), to `result`."""
+    """Adds element forces, (local unknowns, loads, *slab), to `result` (loads, unknowns, *grid)."""
     xp = namespace(result)
     for k, (unknown, offset) in enumerate(element.local):
         force, start = _roll(xp, forces[k], offset[1:]), 0
@@ -145,14 +145,14 @@ def scatter(element: Element, forces: Fields, result: Fields, slab: slice) -> No
 
 
 def _layers(slab: slice, offset: int, size: int) -> list[slice]:
-    """Where the layers of a slab lie, so many further along a periodic axis: runs in order."""
-    start, left = (slab.start + offset) % size, slab.stop - slab.start
-    runs = []
-    while left > 0:
-        count = min(left, size - start)
-        runs.append(slice(start, start + count))
-        start, left = 0, left - count
-    return runs
+    """The layers of a slab moved by an offset along a periodic axis, as one or more slices."""
+    start, remaining = (slab.start + offset) % size, slab.stop - slab.start
+    slices = []
+    while remaining > 0:
+        count = min(remaining, size - start)
+        slices.append(slice(start, start + count))
+        start, remaining = 0, remaining - count
+    return slices
 
 
 def _roll(xp: ModuleType, part: Fields, shifts: Any) -> Fields:
