@@ -1,11 +1,15 @@
 """Types of NumPy arrays, for all packages, and BLAS on one thread."""
 
+import sys
 from collections.abc import Callable
-from functools import wraps
-from typing import ParamSpec, TypeVar
+from functools import lru_cache, wraps
+from typing import TYPE_CHECKING, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from threadpoolctl import ThreadpoolController
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -23,9 +27,15 @@ def on_one_blas_thread(function: Callable[P, T]) -> Callable[P, T]:
 
     @wraps(function)
     def wrapper(*args: P.args, **kwargs: P.kwargs) -> T:
-        from threadpoolctl import threadpool_limits
-
-        with threadpool_limits(limits=1, user_api="blas"):
+        with _thread_pools(len(sys.modules)).limit(limits=1, user_api="blas"):
             return function(*args, **kwargs)
 
     return wrapper
+
+
+@lru_cache(maxsize=1)
+def _thread_pools(_modules: int) -> "ThreadpoolController":
+    """The libraries with threads; looked for (20 ms) again when more modules are loaded."""
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()

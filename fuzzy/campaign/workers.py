@@ -9,6 +9,8 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from contextlib import contextmanager
 from itertools import islice
+from multiprocessing import get_context
+from pathlib import Path
 from time import perf_counter, sleep
 from typing import ParamSpec, TypeVar
 
@@ -52,14 +54,20 @@ def pool(workers: int) -> Iterator[Executor | None]:
 
 
 def _processes(workers: int) -> Executor:
+    """Executor of processes, forked where that is safe, so that they import nothing anew."""
     from joblib.externals.loky import ProcessPoolExecutor
+
+    threads = Path("/proc/self/task")
+    # a lock that another thread holds while it is forked is never released in the child
+    is_safe = threads.exists() and len(list(threads.iterdir())) == 1
+    context = get_context("fork") if is_safe else None
 
     # loky starts its semaphore tracker here. The tracker inherits the mask of blocked signals, so
     # that a hang-up of the process group does not end it before it has freed the semaphores
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, _GROUP_SIGNALS) if _GROUP_SIGNALS else None
     try:
         executor: Executor = ProcessPoolExecutor(
-            workers, initializer=_end_with_parent, initargs=(os.getpid(),)
+            workers, context=context, initializer=_end_with_parent, initargs=(os.getpid(),)
         )
     finally:
         if mask is not None:
@@ -71,6 +79,7 @@ def _end_with_parent(parent: int) -> None:
     """Start a thread that ends this process when process `parent` has ended: no orphans remain."""
     from threading import Thread
 
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
     for number in (signal.SIGINT, *_GROUP_SIGNALS):  # sent to all; the parent decides
         signal.signal(number, signal.SIG_IGN)
 

@@ -5,9 +5,9 @@ Terms of the series at each radius, and nodes of the rule in θ, are as many as 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import partial
 from itertools import product
 from typing import NamedTuple
 
@@ -24,8 +24,6 @@ _MAX_POINTS = 1200
 SAFETY = 1.6  # of the distance of a rule in θ from two finer ones
 _NOISE = 1e-13  # of a declared error: what rounding leaves
 _ENERGY_NOISE = 1e-12  # of energies, over the modulus
-
-_cached_rule = lru_cache(maxsize=256)(gauss_rule)
 
 
 class SeriesError(FailedError):
@@ -223,14 +221,13 @@ def converged_means(
     continuous_radii(radius_map)  # refuses a jump
     count = points or max(6, int(np.ceil(1 - 0.75 * np.log10(accuracy))))
     law = radius_map.distribution
-    make_rule: Callable[..., ThetaRule] = _cached_rule if isinstance(law, Hashable) else gauss_rule
     solved: dict[int, tuple[ThetaRule, CellModuli]] = {}
     means: dict[int, Mean] = {}
     while True:
         counts = [count, finer_count(count), finer_count(finer_count(count))]
         for n in counts:
             if n not in solved:
-                rule = make_rule(law, points=n)
+                rule = gauss_rule(law, points=n)
                 solved[n] = rule, cells(radius_map(rule.nodes))
         three = [solved[n] for n in counts]
         moduli = [rule.mean(x.moduli) for rule, x in three]  # (inclusions, 3) each

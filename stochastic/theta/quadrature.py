@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -59,6 +60,8 @@ def gauss_rule(distribution: ThetaLaw, *, points: int) -> ThetaRule:
     fine Legendre rule (Gautschi, Orthogonal Polynomials, 2004, section 2.2.3), the nodes from the
     Jacobi matrix (Golub & Welsch 1969).
 
+    The rules of laws that are compared by value are cached.
+
     Raises:
         RefusedError: There is no point, or density and distribution function disagree.
 
@@ -69,6 +72,12 @@ def gauss_rule(distribution: ThetaLaw, *, points: int) -> ThetaRule:
         0.9733
     """
     checked_number("points", points, whole=True, least=1)
+    is_mutable = type(distribution).__hash__ in (None, object.__hash__)
+    rule: ThetaRule = (_stieltjes_rule if is_mutable else _cached_rule)(distribution, points)
+    return rule
+
+
+def _stieltjes_rule(distribution: ThetaLaw, points: int) -> ThetaRule:
     panels = min(math.ceil(distribution.upper - distribution.lower), _FIRST_PANELS)
     levels = np.asarray(np.linspace(distribution.lower, distribution.upper, panels + 1), float)
     legendre = np.polynomial.legendre.leggauss(16 + 2 * points)
@@ -85,7 +94,13 @@ def gauss_rule(distribution: ThetaLaw, *, points: int) -> ThetaRule:
     off_diagonal = beta[1:-1]
     jacobi = np.diag(alpha) + np.diag(off_diagonal, 1) + np.diag(off_diagonal, -1)
     nodes, vectors = np.linalg.eigh(jacobi)
-    return ThetaRule(nodes, vectors[0] ** 2)
+    rule = ThetaRule(nodes, vectors[0] ** 2)
+    for shared_array in (rule.nodes, rule.weights):
+        shared_array.flags.writeable = False
+    return rule
+
+
+_cached_rule = lru_cache(maxsize=256)(_stieltjes_rule)
 
 
 def _panel_edges(law: ThetaLaw, edges: Array, rule: tuple[Array, Array]) -> Array:
