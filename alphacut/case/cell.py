@@ -30,6 +30,8 @@ class CellContent(Section):
     about: str = Field(default="", description="a paragraph: what the case shows")
     stages: Annotated[tuple[Stage, ...], NotEmpty, after(distinct)]
     """stages that `alphacut run` computes"""
+    shares: bool = True
+    """whether to compute each input's share of the widths"""
     microstructure: object = None
     radius: AnyLaw | None = None
     cell: Cell | None = None

@@ -113,7 +113,8 @@ class Pipeline:
         results, stages, content = self.results, self.content.stages, self.content
         n_motions = len(content.records.recordings) if content.records else len(content.study) or 1
         # shares and figures come last
-        n_stages = len(stages) - 1 + n_motions + len(content.questions) + 1 + self.figures
+        n_stages = len(stages) - 1 + n_motions + len(content.questions)
+        n_stages += content.shares + self.figures
         self.store.progress.stages_left = n_stages
         if "microstructure" in stages:
             results.microstructure = self.compute_microstructure()
@@ -126,7 +127,10 @@ class Pipeline:
             self._compute_motion()
         cells = self.campaign if results.modulus is not None else None
         richest_task = max(results.tasks, key=lambda x: (len(x.fuzzy), x.duration), default=None)
-        results.shares = self.store.take(shares.stage(cells, results.structure, richest_task))
+        if content.shares:
+            peaks = results.envelopes[richest_task.name].numbers.peak if richest_task else {}
+            stage = shares.stage(cells, results.structure, richest_task, peaks)
+            results.shares = self.store.take(stage)
         return results
 
     def compute_microstructure(self) -> StageResult[Document]:

@@ -31,7 +31,10 @@ from alphacut.stages.cell import ISOTROPIC
 from alphacut.stages.envelope import EnvelopeResult
 from alphacut.stages.identify import RefutedResult
 
-SHARES = "Share of the width that is lost when an input is fixed at its nominal value."
+SHARES = (
+    "Share of the width, of peaks between those that motions reach, that is lost when an input is"
+    " fixed at its nominal value."
+)
 Piece = tuple[object, ...]
 """Name of a macro of ``report.html``, and what it shows."""
 _TABLES = tomllib.loads(Path(__file__).with_name("captions.toml").read_text(encoding="utf-8"))

@@ -276,7 +276,8 @@ def drivers(parts: Parts) -> Iterator[str]:
     for name in [name for name in parts.shares if name == "E"] + peaks[-1:]:
         (largest, share), *next_two = sorted(parts.shares[name].items(), key=lambda x: -x[1])[:3]
         more = "".join(f", {x} by {share:.0%}" for x, share in next_two)
-        yield f"Fixing {largest} narrows {name} by {share:.0%}{more}"
+        kind = "" if name == "E" else ", of the reached peaks"
+        yield f"Fixing {largest} narrows {name} by {share:.0%}{more}{kind}"
 
 
 def comparison(first: Parts, second: Parts) -> Table:

@@ -2,45 +2,42 @@
 
 The share of an input is the width that is lost when it alone is fixed at its nominal value.
 Whatever the case uses, the cell is solved by `auto` (the series where it has a formula) with a
-reduced plan; peaks of a frame come from `Auto` to `ACCURACY`, on the lowest level, of a record at
-coarser steps.
+reduced plan. Peaks of a frame are those that exact motions reach, which needs no proof.
 """
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 
-from alphacut import frame
 from alphacut.case.structure import Structure
-from alphacut.frame.questions.peaks import peaks
-from alphacut.fuzzy import Crisp, FuzzyNumber, Reduced
+from alphacut.frame.dynamics.flow import Flow
+from alphacut.frame.dynamics.nonlinear import make_flow
+from alphacut.fuzzy import FuzzyNumber, Reduced
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.propagation import Shares, width_shares
-from alphacut.fuzzy.result import Nature
 from alphacut.io.provenance import NESTED
 from alphacut.stages.campaign import OUTPUTS, CellCampaign
-from alphacut.stages.envelope import EnvelopeTask
+from alphacut.stages.envelope import EnvelopeTask, PeakResults
 from alphacut.stages.store import Stage, StageContext, StageResult
 
 ShareTable = dict[str, dict[str, float]]
 """Share of each input by result, such as E, then by input."""
-ACCURACY = 2e-3
-"""Relative error of each peak that shares of two digits need where widths are a fifth of peaks."""
 
 
 def stage(
-    campaign: CellCampaign | None, structure: Structure | None, task: EnvelopeTask | None
+    campaign: CellCampaign | None,
+    structure: Structure | None,
+    task: EnvelopeTask | None,
+    reached: PeakResults,
 ) -> Stage[ShareTable]:
     """The stage of the shares of a cell's inputs in its modulus, and of a study's in its peaks."""
     of_cell = campaign and [campaign.identity, campaign.inputs, campaign.modulus.alpha]
-    inputs = [of_cell, structure and [structure.model, structure.numbers, task]]
-    compute = partial(compute_shares, campaign, structure, task)
+    inputs = [of_cell, structure and [structure.model, structure.numbers, task, reached]]
+    compute = partial(compute_shares, campaign, structure, task, reached)
     return Stage("shares", inputs, (*NESTED, "alphacut"), ShareTable, compute)
 
 
@@ -48,6 +45,7 @@ def compute_shares(
     campaign: CellCampaign | None,
     structure: Structure | None,
     task: EnvelopeTask | None,
+    reached: PeakResults,
     context: StageContext,
 ) -> StageResult[ShareTable]:
     """Computes each input's share in the widths of E, ν and peaks on the lowest level.
@@ -60,7 +58,7 @@ def compute_shares(
         for k, name in enumerate(("E", "ν")):
             table[name] = dict(zip(shares.names, map(float, shares.share[:, k]), strict=True))
     if structure is not None and task is not None and structure.frame and len(task.fuzzy) > 1:
-        shares = peak_shares(structure.frame, structure, task)
+        shares = peak_shares(structure, task, reached)
         for k, output in enumerate(structure.outputs):
             column = map(float, shares.share[:, k])
             table[f"the peak of {output}"] = dict(zip(shares.names, column, strict=True))
@@ -81,26 +79,53 @@ def cell_shares(campaign: CellCampaign) -> Shares:
     return width_shares(bounds, campaign.inputs)
 
 
-def peak_shares(model: frame.StoreyFrame, structure: Structure, task: EnvelopeTask) -> Shares:
-    """Shares of the width of each output's peak, (inputs, outputs), by the inputs of a study."""
-    groups, step = {name: structure.fuzzy_members(name) for name in task.fuzzy}, task.section.step
-    if model.ground is not None:  # at a multiple of the step that leaves some hundred nodes
-        steps = round(task.duration / step)
-        step *= max(k for k in range(1, max(1, steps // 100) + 1) if steps % k == 0)
+def peak_shares(structure: Structure, task: EnvelopeTask, reached: PeakResults) -> Shares:
+    """Shares of the width of each output's peak, (inputs, outputs), by the inputs of a study.
+
+    The width is that between the greatest and the least peak that coordinate searches reach on the
+    lowest level; they begin at the motions with the `reached` peaks and opposite them. Without a
+    group of inputs they begin at what was found with all, moved to the group's nominal values.
+    """
+    groups = {name: structure.fuzzy_members(name) for name in task.fuzzy}
+    inputs, outputs = structure.inputs(task.fuzzy), range(len(structure.outputs))
+    flow = make_flow(structure.model, tuple(inputs), task.duration, task.section.step, "exact")
+    at = [{**reached[x].reached_at} if x in reached else {} for x in structure.outputs]
+    greatest = np.array([[x.get(name, y.nominal) for name, y in inputs.items()] for x in at])
+    found: list[Array] = []  # points of greatest and least peaks with all inputs fuzzy
 
     def bounds(numbers: Mapping[str, FuzzyNumber]) -> tuple[Array, Array]:
-        """Least and greatest peak of each output on the lowest level, shape (outputs,) each.
+        """Least and greatest peak of each output on the lowest level, shape (outputs,) each."""
+        cuts = [x.cut(task.section.alpha[0]) for x in numbers.values()]
+        nominal = [x.nominal for x in numbers.values()]
+        values: Array = np.column_stack([np.array(cuts, float), nominal])
+        opposite = values[:, 0] + values[:, 1] - greatest
+        starts: Array = np.clip(found or [greatest, opposite], values[:, 0], values[:, 1])
+        ends = [
+            [peak_by_coordinates(flow, values, starts[side, k], k, sign) for k in outputs]
+            for side, sign in enumerate((1.0, -1.0))
+        ]
+        if not found:
+            found.extend(np.array([point for _, point in row]) for row in ends)
+        largest, smallest = ([peak for peak, _ in row] for row in ends)
+        return np.array(smallest), np.array(largest)
 
-        A guaranteed upper bound is replaced by the peak that is reached, which is nearer the truth.
-        """
-        fuzzy = {name: x for name, x in numbers.items() if not isinstance(x, Crisp)}
-        method = frame.Auto(ACCURACY, peaks=True)
-        options: dict[str, Any] = {"alpha": task.section.alpha[:1], "duration": task.duration}
-        options |= {"step": step, "method": method, "progress": False}
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)
-            found = peaks(frame.envelope(model, fuzzy, **options)).values()
-        greatest = [x.reached[0] if x.nature is Nature.GUARANTEED else x.upper[0] for x in found]
-        return np.array([x.lower[0] for x in found]), np.array(greatest)
+    return width_shares(bounds, inputs, groups=groups)
 
-    return width_shares(bounds, structure.inputs(task.fuzzy), groups=groups)
+
+def peak_by_coordinates(
+    flow: Flow, values: Array, point: Array, output: int, sign: float
+) -> tuple[float, Array]:
+    """Largest `sign` times the peak of an output that steepest ascent reaches, and its inputs.
+
+    Each step moves one input to one of its `values` (inputs, 3); it begins at `point` (inputs,).
+    """
+    d, best = len(values), -np.inf
+    while True:
+        tried = np.tile(point, (1 + values.size, 1))
+        for k in range(d):
+            tried[1 + 3 * k : 4 + 3 * k, k] = values[k]
+        tried = np.unique(tried, axis=0)
+        peaks = sign * np.abs(flow.values(tried)[..., output]).max(1)
+        if peaks.max() <= best:
+            return sign * best, point
+        best, point = float(peaks.max()), tried[peaks.argmax()]
