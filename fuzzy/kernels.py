@@ -10,9 +10,7 @@ from __future__ import annotations
 
 import os
 import re
-import shutil
 import sys
-import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from functools import cache
@@ -25,13 +23,13 @@ import numba
 import numpy as np
 from numba.core.caching import IndexDataCacheFile
 
+from alphacut.fuzzy.user_cache import remove_unused, user_folder
+
 with_kernels = set[str]()
 """Modules that have kernels; those of helpers come before those that call them."""
 PACKAGE = Path(__file__).parents[1]
 IMPORT = re.compile(r"^\s*from (alphacut[\w.]*) import (?:\(([\w\s,]*)\)|([\w, ]*))", re.MULTILINE)
 VERSIONS = f"{numba.__version__} {np.__version__} {sys.version}"
-UNUSED_DAYS = 14
-"""Days after which compiled code that no process has asked for is removed."""
 
 
 def kernel(**options: object) -> Callable[[Callable[..., Any]], Any]:
@@ -76,24 +74,19 @@ class _Index(IndexDataCacheFile):  # type: ignore[misc]
 def shared_folder(module: str) -> Path | None:
     """Return the folder of a module's compiled code that all checkouts of this user share.
 
-    None where it cannot be written, where another user could write it, who could then run code as
-    this one, or where NUMBA_CACHE_DIR names a folder. A new digest clears away what is unused.
+    None where `user_folder` is, or where NUMBA_CACHE_DIR names a folder. A new digest clears away
+    what is unused.
     """
-    home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    base = Path(os.environ.get("ALPHACUT_CACHE") or Path(home, "alphacut"), "kernels")
+    base = None if numba.config.CACHE_DIR else user_folder("kernels")
+    if base is None:
+        return None
     folder = base / f"{module}-{digest(module)[:16]}"
     try:
-        base.mkdir(mode=0o700, parents=True, exist_ok=True)
-        status = base.stat()
-        if numba.config.CACHE_DIR or status.st_mode & 0o022 or status.st_uid != os.getuid():
-            return None
         if not folder.exists():
-            for unused in base.iterdir():
-                if unused.stat().st_mtime < time.time() - UNUSED_DAYS * 86400:
-                    shutil.rmtree(unused, ignore_errors=True)
+            remove_unused(base)
         folder.mkdir(exist_ok=True)
         os.utime(folder)
-    except (OSError, RuntimeError):
+    except OSError:
         return None
     return folder
 

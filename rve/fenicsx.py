@@ -6,6 +6,7 @@ takes it from here. Signals stay the program's.
 
 from __future__ import annotations
 
+import sys
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -33,7 +34,25 @@ if find_spec("dolfinx_solver"):  # where Numba is, this wheel hides the HDF5 of 
     with suppress(ImportError):
         import netCDF4  # noqa: F401
 
-with uninterrupted():
+
+@contextmanager
+def _without_numba() -> Iterator[None]:
+    """Numba cannot be imported, which takes DOLFINx as long as itself, for helpers of no use here.
+
+    Whoever wants `dolfinx.utils.numba_utils` imports Numba or DOLFINx first.
+    """
+    if is_hidden := "numba" not in sys.modules:
+        sys.modules["numba"] = None  # type: ignore[assignment]  # import raises ImportError
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ImportWarning)  # by which DOLFINx says so
+            yield
+    finally:
+        if is_hidden:
+            del sys.modules["numba"]
+
+
+with uninterrupted(), _without_numba():
     import petsc4py  # after MPI, and before DOLFINx: its wheels need that
     from mpi4py import MPI
 

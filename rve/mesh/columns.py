@@ -13,10 +13,10 @@ from scipy.sparse.csgraph import connected_components
 from alphacut.fuzzy.arrays import Array, Ints, Mask
 from alphacut.rve.cell.outline import Outline, circle, is_round
 from alphacut.rve.mesh import square
-from alphacut.rve.mesh.gmsh_prisms import INCLUSION, Prisms, extruded
+from alphacut.rve.mesh.gmsh_prisms import INCLUSION, NAMES, Prisms
 from alphacut.rve.mesh.periodicity import SAME_PLACE, MeshError
 from alphacut.rve.mesh.prism_grid import PrismGrid, Triangulation
-from alphacut.rve.mesh.square import REFINEMENTS, Sizes, bend_grading
+from alphacut.rve.mesh.square import REFINEMENTS
 
 if TYPE_CHECKING:
     from alphacut.rve.fenicsx import MPI
@@ -48,12 +48,35 @@ def extrude(
         refinement: Of the edges along an outline that is not round; see `bend_grading`.
         comm: Communicator, on whose first rank Gmsh runs; None: on this one.
     """
-    sizes = None
-    if radius and not is_round(outline):
-        sizes = partial(_capped_size, size, bend_grading(outline, radius, refinement))
-    make_prisms = partial(extruded, size, radius, outline, layers, sizes)
-    prisms = make_prisms() if comm is None else from_first_rank(comm, make_prisms)
-    return grid_of(prisms, radius, outline)
+    has_bends = bool(radius) and not is_round(outline)
+    bends = refinement if has_bends else 0.0
+    make = partial(square.triangles, size, radius, outline, refinement=bends)
+    points, triangles, phase = make() if comm is None else from_first_rank(comm, make)
+    plane = _quadratic(points, triangles, phase, radius, outline)
+    # nodes level by level, then mid-level by mid-level
+    on_levels = np.arange(layers + 1)[:, None, None] * len(plane.points) + plane.triangles
+    first_on_mid_level = (layers + 1) * len(plane.points) + np.arange(layers) * len(points)
+    cells = np.empty((layers, len(triangles), 15), np.int64)
+    cells[..., BELOW], cells[..., ABOVE] = on_levels[:-1], on_levels[1:]
+    cells[..., MID_LEVEL] = first_on_mid_level[:, None, None] + triangles
+    names = NAMES if radius else NAMES[:1]
+    heights: Array = np.asarray(np.linspace(0, 1, layers + 1), float)
+    prism_phase = np.tile(phase, layers)
+    return PrismGrid(plane, cells.reshape(-1, 15), heights, prism_phase, names, radius > 0)
+
+
+def _quadratic(
+    points: Array, triangles: Ints, phase: Ints, radius: float, outline: Outline
+) -> Triangulation:
+    """Triangulation of straight-sided triangles with the middles of their edges."""
+    inside = phase == NAMES.index(INCLUSION)
+    ends, edges, on_interface = square.edges(triangles, inside)
+    nodes = np.hstack([triangles, len(points) + edges[:, ::-1]])  # edges 01, 02, 12
+    arc = np.zeros(len(points) + len(ends), bool)
+    arc[ends[on_interface]] = True
+    arc[len(points) :] = on_interface
+    positions = np.concatenate([points, points[ends].mean(axis=1)])
+    return Triangulation(positions, len(points), ends, nodes, inside, arc, radius, outline)
 
 
 def from_first_rank(comm: MPI.Intracomm, make: Callable[[], T]) -> T:
@@ -188,7 +211,3 @@ def _rows_in(rows: Ints, candidates: Ints) -> Mask:
     """Mask of the pairs (n, 2) that are among candidates (k, 2), shape (n,)."""
     size = int(rows.max(initial=0)) + 1
     return np.isin(rows @ [size, 1], candidates @ [size, 1])
-
-
-def _capped_size(size: float, bend: Sizes, x: float, y: float) -> float:
-    return size * min(1.0, bend(x, y))

@@ -6,7 +6,6 @@ Soundness of curved triangles: det J at their quadrature points beside its mean.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from alphacut.rve.cell.cell import require_mesh_size
 from alphacut.rve.cell.outline import CLOSEST, Outline, circle, is_round, require_fit
 from alphacut.rve.fenicsx import basix
 from alphacut.rve.mesh import square
-from alphacut.rve.mesh.square import REFINEMENTS, Sizes, bend_grading, particle_grading
+from alphacut.rve.mesh.square import REFINEMENTS
 
 PARTICLE = 1  # number of its phase; the matrix is 0
 COARSEST = 0.7  # mesh size: on coarser ones small particles hide from every order
@@ -61,13 +60,11 @@ def plane_mesh(radius: float, *, size: float, outline: Outline = circle) -> Plan
     """
     require_mesh_size(size)
     require_fit(outline, radius, CLOSEST)
-    size, near_particle = min(size, COARSEST), particle_grading(outline, radius)
+    size = min(size, COARSEST)
     if is_round(outline):
-        return _graded_mesh(radius, size, outline, near_particle)
+        return _graded_mesh(radius, size, outline, 0.0)
     for refinement in REFINEMENTS:
-        bend = bend_grading(outline, radius, refinement)
-        sizes = partial(_smaller_size, near_particle, bend)
-        mesh = _graded_mesh(radius, size, outline, sizes)
+        mesh = _graded_mesh(radius, size, outline, refinement)
         if all(is_sound(mesh, order) for order in ORDERS):
             return mesh
     raise RefusedError(
@@ -84,14 +81,10 @@ def is_sound(mesh: PlaneMesh, order: int) -> bool:
     return bool((ratios > MIN_JACOBIAN_RATIO).all())
 
 
-def _smaller_size(first: Sizes, second: Sizes, x: float, y: float) -> float:
-    return min(first(x, y), second(x, y))
-
-
-def _graded_mesh(radius: float, size: float, outline: Outline, sizes: Sizes) -> PlaneMesh:
-    """Mesh with edges of length size · sizes(x1, x2), the interface's vertices on the outline."""
+def _graded_mesh(radius: float, size: float, outline: Outline, refinement: float) -> PlaneMesh:
+    """Mesh with shorter edges near the particle, the interface's vertices on the outline."""
     points, triangles, phase = square.triangles(
-        size, radius, outline, lambda x, y: size * sizes(x, y)
+        size, radius, outline, near_particle=True, refinement=refinement
     )
     inside = phase == PARTICLE
     on_interface = np.intersect1d(triangles[inside], triangles[~inside])

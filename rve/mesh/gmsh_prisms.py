@@ -1,7 +1,6 @@
 """Gmsh's quadratic prisms of the product space, and their names: to and from its model.
 
-Gmsh triangulates the cell and extrudes it along θ. Its 15-node prisms ("Prism 15", type 18) have
-Basix's order of nodes. Physical groups name phases.
+Its 15-node prisms ("Prism 15", type 18) have Basix's order of nodes. Physical groups name phases.
 """
 
 from __future__ import annotations
@@ -12,8 +11,6 @@ from typing import Any
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Ints
-from alphacut.rve.cell.outline import Outline
-from alphacut.rve.mesh import square
 from alphacut.rve.mesh.periodicity import MeshError
 
 PRISM_15 = 18
@@ -37,34 +34,6 @@ class Prisms:
     cells: Ints
     phase: Ints
     names: tuple[str, ...]
-
-
-def extruded(
-    size: float,
-    radius: float,
-    outline: Outline,
-    layers: int,
-    sizes: square.Sizes | None = None,
-) -> Prisms:
-    """Mesh the cell by Gmsh and extrude the triangles to prisms, θ from 0 to 1 in equal layers.
-
-    Arguments as of `columns.extrude`; `sizes` is the edge length at (x1, x2) in place of `size`.
-    """
-    with square.model() as gmsh:
-        surfaces = square.surfaces(size, radius, outline)
-        planes = [(2, tag) for tag in surfaces.values()]
-        extrusion = gmsh.model.geo.extrude(planes, 0, 0, 1, numElements=[layers], recombine=True)
-        gmsh.model.geo.synchronize()
-        volumes = [tag for dimension, tag in extrusion if dimension == 3]
-        for phase, volume in sorted(zip(surfaces, volumes, strict=True)):
-            gmsh.model.addPhysicalGroup(3, [volume], name=NAMES[phase])
-        if sizes:
-            square.grade(gmsh, sizes)
-        gmsh.option.setNumber("Mesh.ElementOrder", 2)
-        gmsh.option.setNumber("Mesh.SecondOrderIncomplete", 1)
-        gmsh.option.setNumber("Mesh.SecondOrderLinear", 1)  # nodes are moved to the cone later
-        gmsh.model.mesh.generate(3)
-        return read(gmsh)
 
 
 def read(gmsh: Any) -> Prisms:

@@ -5,14 +5,18 @@ Edge lengths of the planar cell: short near small particles, in gaps, and where 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
+from importlib.metadata import PackageNotFoundError, version
 from math import hypot
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Ints, Mask
+from alphacut.fuzzy.user_cache import cached_arrays
 from alphacut.rve.cell.outline import Outline, bend_radii, extents, is_round
 from alphacut.rve.interruption import uninterrupted
 
@@ -25,14 +29,51 @@ SPLINE_STEPS = 16, 128
 so that the spline keeps lobes apart. Vertices are put on the outline itself afterwards."""
 
 
-def triangles(size: float, radius: float, outline: Outline, sizes: Sizes) -> Triangles:
-    """Mesh the cell by Gmsh: vertices (n, 2), triangles (m, 3) and their phases (m,).
+def triangles(
+    size: float,
+    radius: float,
+    outline: Outline,
+    *,
+    near_particle: bool = False,
+    refinement: float = 0.0,
+) -> Triangles:
+    """Triangles of the cell by Gmsh, from the user's cache where it has meshed the same before.
 
-    Arguments as of `surfaces`; `sizes` is the edge length at (x1, x2).
+    Args:
+        size: Wanted edge length, in halves of the cell's side.
+        radius: Radius of the particle, 0 for none.
+        outline: Of the particle.
+        near_particle: Whether edges shorten by `particle_grading`.
+        refinement: Of `bend_grading`; 0: edges do not shorten at bends.
+
+    Returns:
+        Vertices, shape (n, 2), triangles, (m, 3), and their phases, (m,): matrix 0, particle 1.
+    """
+    gradings = [particle_grading(outline, radius)] if near_particle else []
+    gradings += [bend_grading(outline, radius, refinement)] if refinement else []
+    sizes = partial(_least_size, size, gradings) if gradings else None
+
+    generate = partial(gmsh_triangles, size, radius, outline, sizes)
+    angles: Array = np.asarray(np.linspace(0, 2 * np.pi, 4 * _spline_steps(outline) + 1), float)
+    numbers = [size, radius, near_particle, refinement, *extents(outline), *outline(angles)]
+    shape = np.concatenate([numbers, *map(np.ravel, bend_radii(outline))])
+    try:
+        content = f"{version('gmsh')} {Path(__file__).read_text('utf-8')}".encode()
+    except PackageNotFoundError:  # a Gmsh that does not say which it is
+        return generate()
+    points, cells, phases = cached_arrays("meshes", content + shape.tobytes(), generate)
+    return np.asarray(points, float), np.asarray(cells, np.int64), np.asarray(phases, np.int64)
+
+
+def gmsh_triangles(size: float, radius: float, outline: Outline, sizes: Sizes | None) -> Triangles:
+    """Mesh the cell by Gmsh; arguments and result as of `triangles`.
+
+    `sizes` is the edge length at (x1, x2) in place of `size`.
     """
     with model() as gmsh:
         phase_surfaces = surfaces(size, radius, outline)
-        grade(gmsh, sizes)
+        if sizes:
+            _grade(gmsh, sizes)
         gmsh.model.mesh.generate(2)
         node_tags, xyz, _ = gmsh.model.mesh.getNodes()
         number = np.zeros(int(node_tags.max()) + 1, np.int64)
@@ -87,7 +128,7 @@ def model() -> Iterator[Any]:
             gmsh.finalize()
 
 
-def grade(gmsh: Any, sizes: Sizes) -> None:
+def _grade(gmsh: Any, sizes: Sizes) -> None:
     """Let a function alone set the edge lengths of the mesh."""
     gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
     gmsh.option.setNumber("Mesh.MeshSizeFromPoints", 0)
@@ -175,6 +216,10 @@ def bend_grading(outline: Outline, radius: float, refinement: float) -> Sizes:
     radii = radius * unit_bend_radii
     factor = _PER_RADIUS / refinement
     return lambda x, y: factor * float((radii + np.hypot(px - x, py - y)).min())
+
+
+def _least_size(size: float, gradings: Sequence[Sizes], x: float, y: float) -> float:
+    return size * min(1.0, *(grading(x, y) for grading in gradings))
 
 
 def _size_near_particle(

@@ -56,7 +56,9 @@ def results(cache: Path, *calls: tuple[Path, dict[str, str]]) -> list[tuple[floa
     """Results and cache hits of the caller in checkouts, some of whose files are changed before."""
     for folder, _ in calls:
         (folder / "alphacut/fuzzy").mkdir(parents=True, exist_ok=True)
-        shutil.copy(inspect.getfile(kernels), folder / "alphacut/fuzzy/kernels.py")
+        for name in ("kernels", "user_cache", "arrays"):
+            file = Path(inspect.getfile(kernels)).with_name(f"{name}.py")
+            shutil.copy(file, folder / "alphacut/fuzzy")
     told = subprocess.run(
         [sys.executable, "-Bc", CALLS],
         env=os.environ | {"ALPHACUT_CACHE": str(cache)},

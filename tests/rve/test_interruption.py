@@ -153,5 +153,5 @@ def test_an_interruption_amid_meshing_arrives_after_it(handler):
         return 0.3
 
     with pytest.raises(KeyboardInterrupt):
-        square.triangles(0.3, 0.5, circle, size)
+        square.gmsh_triangles(0.3, 0.5, circle, size)
     assert len(asked) > 50

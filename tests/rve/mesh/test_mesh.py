@@ -8,6 +8,7 @@ pytest.importorskip("alphacut.rve.fenicsx")
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.cell.outline import Ellipse, area, circle
 from alphacut.rve.fenicsx import basix
+from alphacut.rve.mesh import square
 from alphacut.rve.mesh.columns import extrude
 from alphacut.rve.mesh.curved import curved_nodes, jacobian_ratios, plane_mesh
 from alphacut.rve.mesh.periodicity import MeshError, identify, unknowns
@@ -56,6 +57,39 @@ def test_opposite_nodes_are_one_unknown_and_all_corners_none():
             assert u == keys[x, -y]
     inner = [u for (x, y), u in keys.items() if max(abs(x), abs(y)) < 1]
     assert len(set(inner)) == len(inner)
+
+
+def test_gmsh_meshes_a_cell_again_only_if_its_file_is_not_there_whole(tmp_path, monkeypatch):
+    monkeypatch.setenv("ALPHACUT_CACHE", str(tmp_path))
+    meshed, gmsh_triangles = [], square.gmsh_triangles
+    monkeypatch.setattr(
+        square, "gmsh_triangles", lambda *cell: meshed.append(cell) or gmsh_triangles(*cell)
+    )
+
+    def has_meshed(outline, refinement=0.0):
+        """Whether Gmsh was asked for a cell, which is the same either way."""
+        before = len(meshed)
+        cell = square.triangles(0.5, 0.4, outline, refinement=refinement)
+        others = square.triangles(0.5, 0.4, outline, refinement=refinement)
+        fresh = gmsh_triangles(*meshed[-1])
+        for array, other, right in zip(cell, others, fresh, strict=True):
+            np.testing.assert_array_equal(array, right)
+            np.testing.assert_array_equal(other, right)
+        return len(meshed) > before
+
+    assert [has_meshed(Ellipse(1.5)) for _ in range(2)] == [True, False]
+    (file,) = (tmp_path / "meshes").iterdir()
+    whole = file.read_bytes()
+    assert [has_meshed(Ellipse(1.5, 1.0)), has_meshed(Ellipse(1.5), 1.1)] == [True, True]
+    others = sorted(x for x in (tmp_path / "meshes").iterdir() if x != file)
+    changed = bytearray(whole)
+    changed[len(whole) // 2] ^= 255
+    for content in (b"", whole[:-30], bytes(changed), others[0].read_bytes(), b"no file of arrays"):
+        file.write_bytes(content)
+        assert (has_meshed(Ellipse(1.5)), file.read_bytes()) == (True, whole)
+    assert {x.suffix for x in (tmp_path / "meshes").iterdir()} == {".npz"}
+    (tmp_path / "meshes").chmod(0o777)  # another user could write there
+    assert [has_meshed(circle) for _ in range(2)] == [True, True]
 
 
 def test_a_node_without_a_partner_is_refused():
