@@ -58,7 +58,11 @@ POWERS_OF_TEN = {
     "N": {"N": 0, "kN": 3, "MN": 6},
     "N/m": {"N/m": 0, "kN/m": 3, "MN/m": 6},
     "N*s/m": {"N s/m": 0, "kN s/m": 3},
+    "N*m*s": {"N m s": 0},
+    "N*m": {"N m": 0, "kN m": 3},
+    "1/s": {"1/s": 0, "Hz": 0},
     "rad": {"rad": 0},
+    "rad/s": {"rad/s": 0},
 }
 """Common units, each a power of ten of the SI unit, for which Pint (0.35 s) is not imported."""
 REFUSED = r"[%‰]|\b(per ?cent|per ?mille|pp[mb]|pixel|px|point|dot|pt|tons?)\b"

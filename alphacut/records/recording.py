@@ -72,10 +72,11 @@ class Recording:
         """Record of these samples, without their mean or their straight line of least squares."""
         if baseline == "none":
             return Accelerogram(self.step, self.samples)
-        from scipy.signal import detrend  # which takes time to import
-
-        kind = {"mean": "constant", "linear": "linear"}[baseline]
-        return Accelerogram(self.step, detrend(self.samples, type=kind))
+        samples = self.samples - self.samples.mean()
+        if baseline == "linear":
+            time = np.arange(len(samples)) - (len(samples) - 1) / 2  # in steps, of mean 0
+            samples -= time * (time @ samples) / max(time @ time, 1.0)
+        return Accelerogram(self.step, samples)
 
 
 def arias_fractions(samples: Array, step: float) -> Array:
@@ -98,8 +99,7 @@ def spectral_acceleration(ground: Accelerogram, period: float, ratio: float) -> 
     `period` T is undamped, in s; the damping `ratio` ζ is below 1. The free motion after the
     record's end is included for one period.
     """
-    from scipy.linalg import expm  # which takes time to import
-    from scipy.signal import lfilter
+    from scipy.linalg import expm, lapack  # which take time to import
 
     omega = 2 * pi / period
     substeps = max(1, ceil(ground.step * POINTS_PER_PERIOD / period))
@@ -120,5 +120,7 @@ def spectral_acceleration(ground: Accelerogram, period: float, ratio: float) -> 
     # u[k+1] = tr(A) u[k] − det(A) u[k−1] + what the loads of both steps add, by Cayley and Hamilton
     added = load[0].copy()
     added[1:] += A[0, 1] * load[1, :-1] - A[1, 1] * load[0, :-1]
-    displacement = lfilter([1.0], [1.0, -np.trace(A), np.linalg.det(A)], added)
+    # a triangular band of three; scipy.signal.lfilter takes as long to import as all of `check`
+    band = np.tile([[1.0], [-np.trace(A)], [np.linalg.det(A)]], len(added))
+    displacement = lapack.dtbtrs(band, added[:, None], uplo="L", diag="U")[0]
     return float(omega**2 * np.abs(displacement).max())

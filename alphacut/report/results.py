@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from textwrap import wrap
 
 import numpy as np
@@ -23,7 +23,6 @@ from alphacut.io.quantity import (
 from alphacut.questions.question import Row, Table
 from alphacut.questions.summary import FrameResult, Parts
 from alphacut.questions.tolerances import TolerancesAnswer
-from alphacut.report.tables import unit_of
 from alphacut.stages.cell import UPPER_BOUND
 from alphacut.stages.envelope import EnvelopeResult, PeakResult
 from alphacut.stages.identify import IdentifiedResult
@@ -318,3 +317,8 @@ def _compared_entries(parts: Parts) -> Iterator[tuple[str, str, float | str]]:
         yield limit.words, "", limit.verdict_words
     if parts.tolerances is not None and parts.tolerances.kept is not None:
         yield "scale of tolerances", "", parts.tolerances.kept
+
+
+def unit_of(units: Mapping[str, str], peak: str) -> str:
+    """SI unit of a peak such as "max q3", from those of the outputs."""
+    return units[peak.rpartition(" ")[2]]

@@ -15,6 +15,7 @@ from alphacut.io.quantity import MINUS, rounded_ends
 from alphacut.io.results import ResultsFolder
 from alphacut.questions.question import Table
 from alphacut.questions.summary import Parts
+from alphacut.report.results import unit_of
 from alphacut.stages.envelope import EnvelopeResult
 from alphacut.stages.identify import IdentifiedResult
 from alphacut.stages.image import ImageResult
@@ -118,11 +119,6 @@ def peaks(studies: Mapping[str, EnvelopeResult]) -> pd.DataFrame:
         for name, study in studies.items()
         for output, peak in study.peak.items()
     )
-
-
-def unit_of(units: Mapping[str, str], peak: str) -> str:
-    """SI unit of a peak such as "max q3", from those of the outputs."""
-    return units[peak.rpartition(" ")[2]]
 
 
 def records(result: SuiteResult) -> pd.DataFrame:

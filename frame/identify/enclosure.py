@@ -16,7 +16,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from scipy.optimize import linprog
 from scipy.sparse import csr_array, hstack
 
 from alphacut.frame.identify.modes import Chain, ModeCut, chain_modes, eigenvalue_ranges
@@ -120,6 +119,8 @@ class LinearRelaxation:
 
 def proved_minimum(objective: Array, rows: csr_array, lower: Array, upper: Array) -> float:
     """Return a lower bound of cᵀx over A x ≤ 0, l ≤ x ≤ u; infinite if the set is proved empty."""
+    from scipy.optimize import linprog  # which takes time to import
+
     right, ends = np.zeros(rows.shape[0]), np.column_stack([lower, upper])
     result = linprog(objective, A_ub=rows, b_ub=right, bounds=ends, method="highs")
     if result.status == 2 and is_proved_empty(rows, lower, upper):

@@ -52,6 +52,8 @@ def extrude(
     bends = refinement if has_bends else 0.0
     make = partial(square.triangles, size, radius, outline, refinement=bends)
     points, triangles, phase = make() if comm is None else from_first_rank(comm, make)
+    order = np.lexsort(np.sort(triangles, axis=1).T[::-1])  # neighbours are near in memory
+    triangles, phase = triangles[order], phase[order]
     plane = _quadratic(points, triangles, phase, radius, outline)
     # nodes level by level, then mid-level by mid-level
     on_levels = np.arange(layers + 1)[:, None, None] * len(plane.points) + plane.triangles
