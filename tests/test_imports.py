@@ -148,22 +148,6 @@ def test_rooms_import_in_the_order_of_the_table(package):
     assert backward(graph(), package) == []
 
 
-def test_a_circle_and_an_import_the_wrong_way_would_be_seen():
-    lazy = ast.parse("def f():\n    from alphacut.case import content\n")
-    assert uses(lazy, {"alphacut.case.content"}) == {"alphacut.case.content"}
-    assert circles({"a": {"b"}, "b": {"c"}, "c": {"b"}, "d": {"a"}}) == {"b", "c"}
-    wrong = {"alphacut.io.files": {"alphacut.case.content"}, "alphacut.case.content": set()}
-    assert backward(wrong, "alphacut") == ["alphacut.io imports alphacut.case"]
-    pair = {"alphacut.frame.bounds.level": {"alphacut.frame.boxes"}}
-    pair["alphacut.frame.boxes"] = {"alphacut.frame.bounds.box"}
-    pair["alphacut.frame.bounds.box"] = set()
-    assert circles(pair) == set()
-    assert circles(folder_imports(pair)) == {"frame.bounds", "frame.boxes"}
-    up = ("alphacut.fuzzy.plan", "alphacut.rve.cell"), ("alphacut.rve.cell", "alphacut.entry")
-    assert wrong_directions({here: {there} for here, there in up}) == set(up)
-    assert not wrong_directions({"alphacut.rve.__main__": {"alphacut.entry"}})
-
-
 def modules_after(program: str) -> set[str]:
     """Modules that a new process has after a program."""
     command = [sys.executable, "-c", f"import sys\n{program}\nprint(*sys.modules)"]

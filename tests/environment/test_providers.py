@@ -113,8 +113,3 @@ def test_the_environment_has_all_outside_the_home_folder():
         spec = find_spec(name)
         assert spec, name
         assert not Path(spec.origin or Path.home()).is_relative_to(Path.home()), name
-
-
-def test_imports_by_any_way_would_be_seen():
-    source = "import a.b\nfrom c import d\npytest.importorskip('e.f')\nimport_module('g')\n"
-    assert imports_of(ast.parse(source)) == {"a", "c", "e", "g"}
