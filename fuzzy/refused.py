@@ -60,7 +60,7 @@ class RefusedError(ValueError):
         self.key, self.value, self.allowed, self.cure, self.place = key, value, allowed, cure, place
 
         def line(value_text: str, allowed_text: str) -> str:
-            has = "is missing" if value is None else f"is {value_text}"
+            has = "is missing" if value is None else f"is {value_text or 'empty'}"
             text = f"{place}: {key} {has}" if place else f"{key} {has}"
             return f"{text}; allowed: {allowed_text}" if allowed_text else text
 

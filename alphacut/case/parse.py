@@ -165,6 +165,8 @@ def apply_changes(
         endings = (f"did you mean {full}?" for full in full_keys if full.endswith(f".{key}"))
         cure = next(endings, suggestion(key, full_keys)) or "docs/case-format.md has all keys"
         allowed = "KEY=VALUE with a full key, as cell.matrix_modulus='20 GPa'"
+        has_value = "=" in change
+        require(has_value or key not in full_keys, "--set", f"{change}, without a value", allowed)
         require(key in full_keys, "--set", f"{change}, of an unknown key", allowed, cure)
         require(key not in keys, "--set", f"{change}, of a key given before", "each key once")
         _set_key(table, key, _parse_value(value))

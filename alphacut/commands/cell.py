@@ -23,10 +23,10 @@ from alphacut.rve.series.fibre_constants import fibre_constants
 from alphacut.rve.spheres.result import HomogenisedSpheres, hill_average
 from alphacut.stages.cell import (
     GPA,
-    ISOTROPIC,
     UPPER_BOUND,
     CellProblem,
     constant_label,
+    isotropic_label,
     key_and_unit,
     require_bounds,
     require_tolerance,
@@ -154,7 +154,9 @@ def summary(document: Document, convention: str) -> str:
         for label, value, error in table_rows(document)
     ]
     if bounds := document["references"].get("hashin_shtrikman_E_GPa"):
-        rows.append((f"{ISOTROPIC}, GPa", f"{bounds[0]:.4f} … {bounds[1]:.4f}", ""))
+        rows.append(
+            (f"{isotropic_label(convention)}, GPa", f"{bounds[0]:.4f} … {bounds[1]:.4f}", "")
+        )
     iterations = ", ".join(map(str, document["iterations"]))
     solver = f", {document['solver']}, iterations {iterations}" if iterations else ""
     table = text_table((convention, "value", "± error"), rows)

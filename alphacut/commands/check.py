@@ -32,10 +32,11 @@ from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal, Triangular
 from alphacut.fuzzy.refused import require
 from alphacut.fuzzy.result import Nature
 from alphacut.io.arrays import text_table
-from alphacut.io.quantity import STANDARD_GRAVITY, engineering
+from alphacut.io.quantity import MINUS, STANDARD_GRAVITY, engineering
 from alphacut.io.results import ResultsFolder
 from alphacut.report.results import AROUND
-from alphacut.stages.cell import CellProblem
+from alphacut.rve.cell.cell import VoigtPhase
+from alphacut.stages.cell import GPA, CellProblem
 from alphacut.stages.envelope import WIDENING
 from alphacut.stages.image import image_study
 from alphacut.stages.suite import SuiteRecord, suite_records
@@ -164,6 +165,9 @@ def rows_of(prefix: str, section: Section) -> Iterator[Row]:
                         f"of the material, and {_numbers(joints, '')} of joints",
                         "computed",
                     )
+                case VoigtPhase(rows):
+                    stiffness = " | ".join(" ".join(f"{x / GPA:g}" for x in row) for row in rows)
+                    yield row_key, stiffness.replace("-", MINUS), "GPa, plane strain"
                 case float() if unit and unit.si and is_shown:
                     yield row_key, engineering(entry, unit.si), "number"
 

@@ -17,7 +17,7 @@ from alphacut.report import tables
 from alphacut.report.results import cut_text, run_text, width_text
 from alphacut.report.tables import shown
 from alphacut.rve.result.engineering_constants import PLANE_STRAIN
-from alphacut.stages.cell import ISOTROPIC, UPPER_BOUND, constant_label
+from alphacut.stages.cell import UPPER_BOUND, constant_label, isotropic_label
 from alphacut.stages.identify import identify_inputs
 from alphacut.stages.image import ImageResult
 from alphacut.stages.modulus import ModulusResult
@@ -78,24 +78,30 @@ def constants_text(part: ModulusResult | ImageResult, nature: Nature) -> str:
     if PLANE_STRAIN in part.plane and len(part.plane) == 1:
         text += f"{ONLY}\n"
     if (loss := part.loss) is not None and loss.nature is not Nature.GUARANTEED:
-        rows = []
+        rows, levels = [], end_levels(part.alpha)
         for name, cuts in (("E", loss.E), ("G", loss.G), ("K", loss.K)):
-            texts = (cut_text(cuts, level, Nature.ATTAINED) for level in (0, -1))
+            texts = (cut_text(cuts, level, Nature.ATTAINED) for level in levels.values())
             error = f"{loss.error[name]:.1e}" if loss.error else "not declared"
             rows.append((f"loss factor of {name}", *texts, error))
-        text += text_table(("tan δ = 2 ζ", "α = 0", "α = 1", "± error"), rows)
+        text += text_table(("tan δ = 2 ζ", *levels, "± error"), rows)
     if bounds := part.references.get("hashin_shtrikman_E_GPa"):
-        text += f"{ISOTROPIC}: {bounds[0]:.4f} … {bounds[1]:.4f} GPa\n"
+        text += f"{isotropic_label(part.average)}: {bounds[0]:.4f} … {bounds[1]:.4f} GPa\n"
     return text
+
+
+def end_levels(alpha: Array) -> dict[str, int]:
+    """Indices of the lowest and the highest level by their titles."""
+    return {f"α = {alpha[level]:g}": level for level in (0, len(alpha) - 1)}
 
 
 def cuts_text(title: str, cuts: Mapping[str, CutsResult], alpha: Array, nature: Nature) -> str:
     """Table of the lowest and highest cut of each constant; empty where there are none."""
+    levels = end_levels(alpha)
     rows = [
-        (constant_label(x), cut_text(ends, 0, nature), cut_text(ends, -1, nature))
+        (constant_label(x), *(cut_text(ends, level, nature) for level in levels.values()))
         for x, ends in cuts.items()
     ]
-    return text_table((title, f"α = {alpha[0]:g}", f"α = {alpha[-1]:g}"), rows) if rows else ""
+    return text_table((title, *levels), rows) if rows else ""
 
 
 def identify(options: argparse.Namespace, out: TextIO) -> int:

@@ -47,6 +47,9 @@ def prefix_axis(axes: Axes, label: str, si: str, *, across: bool = False) -> Non
 def membership_axes(axes: Axes, label: str) -> None:
     """Axes of a membership function: grade upwards from 0 to 1."""
     axes.set(xlabel=label, ylabel="membership μ", ylim=(0, 1.05))
+    low, high = axes.get_xlim()
+    if max(-low, high) > 100 * (high - low):  # numbers of many digits take more room
+        axes.locator_params(axis="x", nbins=3)
 
 
 def outline(lower: Array, upper: Array) -> Array:

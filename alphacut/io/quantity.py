@@ -232,6 +232,11 @@ def number_text(value: float, digits: int = 4) -> str:
     return f"{value + 0.0:#.{digits}g}".rstrip(".").replace("-", MINUS)
 
 
+def percent_text(share: float, places: int = 1) -> str:
+    """A share in per cent."""
+    return f"{round(share, places + 2) + 0.0:.{places}%}".replace("-", MINUS)
+
+
 def axis_prefix(largest: float, si: str) -> tuple[float, str]:
     """Factor and unit for an axis whose values reach `largest`."""
     if si not in PREFIXED or not math.isfinite(largest) or largest <= 0 or 0.1 <= largest < 1000:

@@ -10,7 +10,7 @@ import numpy as np
 from alphacut.case.limits import DecisionSection
 from alphacut.frame.questions.peaks import ANY, passing
 from alphacut.fuzzy.result import Nature, rounded
-from alphacut.io.quantity import engineering
+from alphacut.io.quantity import MINUS, engineering, percent_text
 from alphacut.questions.question import (
     FuzzyResponse,
     LimitAnswer,
@@ -66,12 +66,12 @@ class LimitDecision(LimitAnswer):
         if self.unit:
             return engineering(rounded(value, side, nature), self.unit)
         digits = 4 + floor(log10(abs(value))) if value else 1  # a tenth of a per cent is the last
-        return f"{rounded(value, side, nature, max(digits, 1)):.1%}"
+        return percent_text(rounded(value, side, nature, max(digits, 1)))
 
 
 def degree_text(ends: tuple[float, float]) -> str:
     """Bounds of a degree, or one number."""
-    return " … ".join(dict.fromkeys(f"{end:.4g}" for end in ends))
+    return " … ".join(dict.fromkeys(f"{end:.4g}" for end in ends)).replace("-", MINUS)
 
 
 class DecisionAnswer(LimitsAnswer[LimitDecision]):

@@ -12,7 +12,7 @@ from alphacut.frame.questions.probability import CONFIDENCE, probabilities
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.result import Ends, Nature
-from alphacut.io.quantity import range_text
+from alphacut.io.quantity import MINUS, range_text
 from alphacut.questions.question import FuzzyResponse, LimitAnswer, LimitsAnswer, Record, Texts
 from alphacut.stages.store import CutsResult, Values
 
@@ -60,7 +60,7 @@ class ProbabilityAnswer(LimitsAnswer[LimitProbability]):
             f"{CONFIDENCE:.0%} interval at the lowest α": range_text(
                 *limit.interval[0], Nature.GUARANTEED, 3
             ),
-            "between nodes": f"{limit.error.max():.2g}",
+            "between nodes": f"{limit.error.max():.2g}".replace("-", MINUS),
         }
 
     def numbers_of(self, limit: LimitProbability) -> Iterator[Record]:

@@ -27,7 +27,7 @@ from alphacut.report.results import (
     width_text,
 )
 from alphacut.report.tables import tables
-from alphacut.stages.cell import ISOTROPIC
+from alphacut.stages.cell import isotropic_label
 from alphacut.stages.envelope import EnvelopeResult
 from alphacut.stages.identify import RefutedResult
 
@@ -173,7 +173,7 @@ class Page:
     def _references(self) -> Iterator[str]:
         part = self.summary.modulus
         if part is not None and (bounds := part.references.get("hashin_shtrikman_E_GPa")):
-            yield f"{ISOTROPIC}: {bounds[0]:.5g} … {bounds[1]:.5g} GPa."
+            yield f"{isotropic_label(part.average)}: {bounds[0]:.5g} … {bounds[1]:.5g} GPa."
 
     def _motion(self) -> Iterator[str]:
         studies, frame = self.summary.envelopes, self.summary.structure

@@ -86,7 +86,7 @@
     }
     for (const q of ticks(view.bottom, view.top)) {
       element("line", { x1: margin.left, x2: width - margin.right, y1: y(q), y2: y(q), stroke: "#e6e6e6" }, svg);
-      element("text", { x: margin.left - 8, y: y(q) + 4, "text-anchor": "end" }, svg).textContent = String(+(q * factor).toPrecision(10)).replace("-", "\u2212");
+      element("text", { x: margin.left - 8, y: y(q) + 4, "text-anchor": "end" }, svg).textContent = String(+(q * factor).toPrecision(10)).replace(/-/g, "\u2212");
     }
     element("text", { x: (margin.left + width - margin.right) / 2, y: height - 8, "text-anchor": "middle" }, svg).textContent = "time t, s";
     const label = element("text", { x: 0, y: 0, "text-anchor": "middle", transform: `translate(16 ${(height - margin.bottom) / 2}) rotate(-90)` }, svg);
@@ -169,7 +169,7 @@
     const k = Math.round(time(at.x) / entry.step);
     if (k < 0 || k >= entry.lower[0][index].length) return;
     const [low, high] = ["lower", "upper"].map((side) => cut(entry, side, index, +slider.value)[k]);
-    readout.textContent = `t = ${(k * entry.step).toFixed(2)} s: ${low.toPrecision(4)} … ${high.toPrecision(4)} ${entry.units[index]} at α = ${(+slider.value).toFixed(2)}`;
+    readout.textContent = `t = ${(k * entry.step).toFixed(2)} s: ${[low, high].map((x) => x.toPrecision(4).replace(/-/g, "\u2212")).join(" … ")} ${entry.units[index]} at α = ${(+slider.value).toFixed(2)}`;
   });
   svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
   fillOutputs();

@@ -17,6 +17,7 @@ from alphacut.io.quantity import (
     axis_prefix,
     engineering,
     number_text,
+    percent_text,
     range_text,
     rounded_ends,
 )
@@ -31,7 +32,6 @@ from alphacut.stages.modulus import ModulusResult
 from alphacut.stages.store import CutsResult
 from alphacut.stages.suite import SuiteResult
 
-MATERIAL = ("material", "most plausible", "range at α = 0", "nature", "± error")
 MEANING = "Least … largest value if every input stays in its range; α = 1: most plausible"
 """First line of all results, for readers who do not know α-cuts; "nominal" is α = 1."""
 TOLERANCE_TABLE = "table on the page and in tolerances.csv"
@@ -75,13 +75,20 @@ def error_text(error: float, nature: Nature) -> str:
 def material(parts: Parts) -> Table:
     """Table of the elastic constants and loss factors of cell and image, and of damping ratios.
 
-    Each has its value at α = 1, the last level, its range at α = 0, the first, nature and error.
+    Each has its value on the highest level, its range on the lowest, nature and error.
     """
-    rows = [row for part in (parts.modulus, parts.image) if part for row in _constants(part)]
+    found = [part for part in (parts.modulus, parts.image) if part]
+    rows = [row for part in found for row in _constants(part)]
+    first, last = found[0].alpha[[0, -1]] if found else (0.0, 1.0)
+    nominal_title = "most plausible" if last == 1 else f"α = {last:g}"
     for name, (low, nominal, high) in parts.damping.items():
         cuts = range_text(nominal, nominal, Nature.ATTAINED), range_text(low, high, Nature.ATTAINED)
         rows.append((f"damping ratio {name}", *cuts, Nature.ATTAINED, ""))
-    return without_empty_columns(MATERIAL, rows)
+    if first == last:  # on a single level value and range are one
+        same = 2 if last == 1 else 1
+        rows = [(*row[:same], "", *row[same + 1 :]) for row in rows]
+    head = ("material", nominal_title, f"range at α = {first:g}", "nature", "± error")
+    return without_empty_columns(head, rows)
 
 
 def _constants(part: ModulusResult | ImageResult) -> Iterator[Row]:
@@ -274,9 +281,9 @@ def drivers(parts: Parts) -> Iterator[str]:
     peaks = [name for name in parts.shares if name not in ("E", "ν")]
     for name in [name for name in parts.shares if name == "E"] + peaks[-1:]:
         (largest, share), *next_two = sorted(parts.shares[name].items(), key=lambda x: -x[1])[:3]
-        more = "".join(f", {x} by {share:.0%}" for x, share in next_two)
+        more = "".join(f", {x} by {percent_text(y, 0)}" for x, y in next_two)
         kind = "" if name == "E" else ", of the reached peaks"
-        yield f"Fixing {largest} narrows {name} by {share:.0%}{more}{kind}"
+        yield f"Fixing {largest} narrows {name} by {percent_text(share, 0)}{more}{kind}"
 
 
 def comparison(first: Parts, second: Parts) -> Table:

@@ -231,6 +231,13 @@ def constant_label(key: str) -> str:
     return key.replace("nu", "ν").replace("_GPa", ", GPa")
 
 
+def isotropic_label(average: str) -> str:
+    """Label of the Hashin–Shtrikman bounds beside E of an average, in words."""
+    return (
+        f"{ISOTROPIC}, which that of {average} is not" if average == AVERAGES[AXES] else ISOTROPIC
+    )
+
+
 def require_isotropic(result: HomogenisedStiffness) -> None:
     """Refuses E and ν of a cell whose stiffness no isotropic solid has."""
     if not result.has_isotropic_constants:

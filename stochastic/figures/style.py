@@ -28,6 +28,7 @@ SETTINGS: dict[str, Any] = {
     "grid.color": "#e6e6e6",
     "grid.linewidth": 0.6,
     "axes.axisbelow": True,
+    "axes.formatter.useoffset": False,
     "axes.edgecolor": INK,
     "axes.labelcolor": INK,
     "legend.fontsize": 8,

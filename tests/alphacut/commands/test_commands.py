@@ -96,9 +96,12 @@ def test_check_prints_what_was_read(tmp_path, capfd):
                  "frame.damping_ratio 0.01 … 0.015 … 0.02 triangle"],
         "plane-frame": ["matrices.stiffness[1] Ec × matrix 18 × 18, largest 3e+09 in SI",
                         "matrices.mass[1] 1 × matrix", "matrices.parameters.m1 60000 in SI crisp"],
+        tmp_path / "auxetic": ["cell.phases.matrix.modulus 10 −8 0 | −8 10 0 | 0 0 10 GPa"],
     }  # fmt: skip
+    text = AUXETIC.replace("FOLDER", str(CASES.parent / "meshes"))
+    (tmp_path / "auxetic.toml").write_text(text, encoding="utf-8")
     for name, lines in read.items():
-        words = " ".join(spoken(capfd, "check", f"cases/{name}.toml")[1].split())
+        words = " ".join(spoken(capfd, "check", CASES / f"{name}.toml")[1].split())
         assert all(line in words for line in lines), words
 
 
@@ -132,6 +135,8 @@ REFUSED = [
     ("report none", "without summary.json"),
     ("verify none", "allowed: results of a run with an envelope"),
     ("check case.toml --set frame.masses=[]", "frame.masses is []; allowed: one entry or more"),
+    ("check case.toml --set frame.masses", "frame.masses, without a value; allowed: KEY=VALUE"),
+    ("check case.toml --set frame.masses=", "frame.masses[1] is empty; allowed: mass above 0"),
     ("check case.toml -rve_ksp_rtol 1e-9", "-rve_ksp_rtol"),
     ("run case.toml -rve_ksp_rtol 1e-9", "method prism"),
     ("check case.toml --set frame.masses=[1_0] t", "does not begin with a number"),

@@ -1,5 +1,6 @@
 """Figures: which are drawn, when they are drawn anew, what they show."""
 
+import itertools
 import json
 import os
 import shutil
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 import xarray
 
-from alphacut.figures import envelope, overview
+from alphacut.figures import envelope, material, overview
 from alphacut.frame import StoreyFrame, propagation
 from alphacut.fuzzy import Triangular
 from alphacut.questions.decision import DecisionAnswer, LimitDecision
@@ -49,6 +50,26 @@ def test_every_figure_has_both_forms_and_a_caption(results):
     words = "Figs. 21 to 25: The Graph Follower, step by step"
     assert caption("fig21-25-graph-follower", paper=True) == words
     assert caption("fig28-envelope-E-5s-q1", paper=True) == "Fig. 28: Envelope of q1, study E-5s"
+
+
+@pytest.mark.parametrize("width", [1e-6, 1e-4, 1e-2, 1.0])
+def test_numbers_of_a_narrow_axis_stand_apart_and_whole(width):
+    young = 29.8821e9 * np.array([[1 - width / 2, 1 + width / 2], [1.0, 1.0]])
+    variables = {"E": (("alpha", "bound"), young), "phase": (("y", "x"), np.eye(4))}
+    data = xarray.Dataset(variables, {"alpha": [0.0, 1.0], "bound": ["lower", "upper"]})
+    with figure_style():
+        figure = material.image(data)
+        figure.draw_without_rendering()
+        axis = figure.axes[-1].xaxis
+        low, high = axis.get_view_interval()
+        labels = [x for x in axis.get_ticklabels() if low <= x.get_position()[0] <= high]
+        boxes = [label.get_window_extent() for label in labels]
+        plt.close(figure)
+    assert len(boxes) >= 2
+    assert all(left.x1 < right.x0 for left, right in itertools.pairwise(boxes))
+    assert axis.get_offset_text().get_text() == ""
+    ends = [float(label.get_text()) for label in (labels[0], labels[-1])]
+    assert ends == pytest.approx([x.get_position()[0] for x in (labels[0], labels[-1])], rel=1e-9)
 
 
 @pytest.mark.parametrize(("nature", "lines"), [("estimated", 2), ("guaranteed", 0)])

@@ -163,6 +163,9 @@ def test_limits_and_peaks_have_the_sign_that_they_were_given(tmp_path, rng):
             sections=[("", [("table", *of_peaks), ("table", *of_limits)])],
         )  # fmt: skip
         lines = run_text(parts).splitlines()
+        written = "|".join(re.findall(r">([^<]*)</t[dh]>", page)) + "".join(lines)
+        assert "|−" in written
+        assert not re.search(r"(?<![\w.])-(?=[\d.])|(?<=\de)-(?=\d)|−0(?![.\d])", written)
         for peak_rows, rows in (
             (rows_of_latex(latex(of_peaks)), rows_of_latex(latex(of_limits))),
             tables_of_page(page),
