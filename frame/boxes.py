@@ -21,15 +21,15 @@ from alphacut.fuzzy.sets.boxes import corners
 from alphacut.fuzzy.sets.numbers import checked_levels
 
 ALPHA = (0.0, 0.25, 0.5, 0.75, 1.0)
-FAR_APART = 1.5
-"""Ratio of an input's ends from which on their geometric mean is its middle."""
+GEOMETRIC_RATIO = 1.5
+"""Ratio of an input's ends above which it is bisected at their geometric mean."""
 DEFAULT_TOLERANCE = 1e-3
 """Error wanted unless one is given, as a fraction of each output's peak."""
 AT_REST = 1e-9
 """Peak of an output, as a fraction of what the energy of the motion allows it, up to which rounding
 alone moves it; rounding is some ε (ω_max/ω₁)² of the latter."""
-CORNERS = 16
-"""Corners of the widest box that are looked at, at most."""
+MAX_PROBED_CORNERS = 16
+"""Corners of the widest box at which peaks are read for their size."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,62 +68,69 @@ class Boxes:
         ends = zip(self.names, self.lower[0].tolist(), self.upper[0].tolist(), strict=True)
         return self.numbers or {name: Interval(low, high) for name, low, high in ends}
 
-    def bisected(self, axis: int) -> list[tuple[Boxes, Ints]]:
-        """Return two halves along an input, each with the rows of the levels that intersect it."""
+    def bisect(self, axis: int) -> list[tuple[Boxes, Ints]]:
+        """Both halves along an input, each with the rows of the levels that intersect it.
+
+        The boxes of a half are those of these levels alone.
+        """
         low, high = self.lower[0, axis], self.upper[0, axis]
         # the geometric mean, since frequencies are powers of stiffnesses and masses
-        middle = np.sqrt(low * high) if low > 0 and high > FAR_APART * low else (low + high) / 2
+        middle = (
+            np.sqrt(low * high) if low > 0 and high > GEOMETRIC_RATIO * low else (low + high) / 2
+        )
         halves = []
         for ends in ((-np.inf, middle), (middle, np.inf)):
             intersects = (self.lower[:, axis] <= ends[1]) & (self.upper[:, axis] >= ends[0])
             levels = np.flatnonzero(intersects)
             low, high = np.full((2, len(self.names)), [[-np.inf], [np.inf]])
             low[axis], high[axis] = ends
-            halves.append((self.on_levels(levels).within(low, high), levels))
+            halves.append((self.on_levels(levels).intersect(low, high), levels))
         return halves
 
     def on_levels(self, levels: Ints | Sequence[int]) -> Boxes:
-        """Return the boxes of some levels, given by their rows."""
+        """The boxes of some levels, given by their rows in `alpha`."""
         levels = np.asarray(levels)
         ends = self.lower[levels], self.upper[levels]
         return Boxes(self.names, self.alpha[levels], *ends, self.nominal, self.numbers)
 
-    def within(self, low: Array, high: Array) -> Boxes:
-        """Return the intersections of the boxes with the box from `low` to `high`, (d,) each."""
+    def intersect(self, low: Array, high: Array) -> Boxes:
+        """The intersection of each box with the box from `low` to `high`, (d,) each, in SI."""
         lower, upper, nominal = (
             np.asarray(np.clip(x, low, high)) for x in (self.lower, self.upper, self.nominal)
         )
         return Boxes(self.names, self.alpha, lower, upper, nominal)
 
-    def distinct(self) -> tuple[Boxes, Array]:
-        """Return the boxes without repetitions, and the row in them of the box of each level, (A,).
+    def without_repetitions(self) -> tuple[Boxes, Array]:
+        """The boxes that differ from that of the level below, and each level's row in them, (A,).
 
         The cuts of intervals are the same at every level and need be searched once.
         """
-        ends = np.concatenate([self.lower, self.upper], 1)
-        first = np.append(True, (np.diff(ends, axis=0) != 0).any(1))  # of several equal ones
-        cuts = {"lower": self.lower[first], "upper": self.upper[first]}
-        return replace(self, alpha=self.alpha[first], **cuts), np.cumsum(first) - 1
+        ends = np.concatenate([self.lower, self.upper], axis=1)
+        is_new = np.append(True, (np.diff(ends, axis=0) != 0).any(axis=1))
+        ends_of_new = {"lower": self.lower[is_new], "upper": self.upper[is_new]}
+        return replace(self, alpha=self.alpha[is_new], **ends_of_new), np.cumsum(is_new) - 1
 
     @property
     def probes(self) -> Array:
-        """Nominal inputs and up to 16 corners of the widest box, shape (S, d), in SI units."""
+        """Nominal inputs and some corners of the widest box, shape (S, d), in SI units."""
         d = len(self.names)
-        if 2**d <= CORNERS:
+        if 2**d <= MAX_PROBED_CORNERS:
             ends = corners(-np.ones(d), np.ones(d))
         else:  # two opposite corners, others at random
-            random_corners = np.random.default_rng(7).choice([-1.0, 1.0], (CORNERS - 2, d))
+            random_corners = np.random.default_rng(7).choice(
+                [-1.0, 1.0], (MAX_PROBED_CORNERS - 2, d)
+            )
             ends = np.vstack([-np.ones(d), np.ones(d), random_corners])
         return np.asarray(np.unique(np.vstack([self.nominal, self.to_physical(ends)]), axis=0))
 
     @property
     def centre(self) -> Array:
-        """Middle of the widest box, shape (d,)."""
+        """Middle of the widest box, shape (d,), in SI units."""
         return np.asarray((self.lower[0] + self.upper[0]) / 2)
 
     @property
     def radius(self) -> Array:
-        """Half widths of the widest box, shape (d,)."""
+        """Half widths of the widest box, shape (d,), in SI units."""
         return np.asarray((self.upper[0] - self.lower[0]) / 2)
 
     def to_unit(self, points: Array) -> Array:
@@ -134,13 +141,13 @@ class Boxes:
         """Physical points of unit coordinates (…, d), never outside the widest box."""
         return np.asarray(np.clip(self.centre + self.radius * unit, self.lower[0], self.upper[0]))
 
-    def unit(self, level: int) -> tuple[Array, Array]:
-        """Return lower and upper ends (d,) of a level's box in unit coordinates."""
+    def unit_ends(self, level: int) -> tuple[Array, Array]:
+        """Lower and upper ends (d,) of the box in row `level`, in unit coordinates."""
         return self.to_unit(self.lower[level]), self.to_unit(self.upper[level])
 
 
 def boxes(inputs: Mapping[str, FuzzyNumber | float], alpha: Sequence[float] = ALPHA) -> Boxes:
-    """Return the α-cuts of fuzzy inputs as nested boxes.
+    """The α-cuts of fuzzy inputs as nested boxes.
 
     Args:
         inputs: Fuzzy numbers by name, in SI units; a plain number is a crisp one.
@@ -187,7 +194,7 @@ class UnitFlow:
         return tuple(Output(name).unit.removeprefix("SI") for name in self.outputs)
 
     def tolerance(self, value: float | None) -> float:
-        """Return `value` if given, else the default tolerance, a fraction of the peak.
+        """A tolerance: `value` if given, else `DEFAULT_TOLERANCE` of the peak.
 
         It is in units of each output's peak or, where tolerances are not relative, in the unit of
         output `reference`.
@@ -234,11 +241,11 @@ class UnitFlow:
         return np.asarray(self.peak / self.peak[self.reference])
 
     def values(self, unit: Array) -> Array:
-        """Return outputs at unit coordinates (S, d) and all nodes, shape (S, T, m)."""
+        """Outputs at unit coordinates (S, d) and all nodes, shape (S, T, m)."""
         return self.flow.values(self.boxes.to_physical(unit))
 
     def taylor(self, unit: Array) -> Jet:
-        """Return outputs with first and second derivatives by unit coordinates, shape (S, T, m)."""
+        """Outputs, (S, T, m), with first and second derivatives by the d unit coordinates."""
         jet, radius = self.flow.taylor(self.boxes.to_physical(unit)), self.boxes.radius
         jet.first[:] *= radius.reshape(-1, 1, 1, 1)
         if len(jet.second):
@@ -248,7 +255,7 @@ class UnitFlow:
     def envelope(
         self, bounds: Array, at: Array, error: Array | None = None, **fields: Any
     ) -> Envelope:
-        """Return the envelope of upper bounds of (−output, output), shape (A, T, m, 2).
+        """The envelope of upper bounds of (−output, output), shape (A, T, m, 2).
 
         Inputs `at` (A, T, m, 2, n) in SI units reach them; their `error` (A, T, m) is 0 if None.
         Further `fields` of `Envelope` are given by name.

@@ -150,7 +150,7 @@ def _build_problem(
     cuts = boxes(inputs, alpha)
     flow = make_flow(model, cuts.names, duration, step, integrator)
     require_admissible(model, cuts)
-    distinct_cuts, rows = cuts.distinct()
+    distinct_cuts, rows = cuts.without_repetitions()
     return chosen, UnitFlow(flow, distinct_cuts), cuts.alpha, rows
 
 

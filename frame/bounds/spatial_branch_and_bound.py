@@ -68,9 +68,9 @@ class SubBox:
             boxes, levels, peaks, outer, self.least_lower[rows], self.is_wide[rows], self.work
         )
 
-    def bisected(self, axis: int) -> list[SubBox]:
+    def bisect(self, axis: int) -> list[SubBox]:
         """Both halves along an input, each with the levels that reach it."""
-        return [self.on_levels(rows, half) for half, rows in self.boxes.bisected(axis)]
+        return [self.on_levels(rows, half) for half, rows in self.boxes.bisect(axis)]
 
 
 def prove(proof: BoxProof, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
@@ -288,7 +288,7 @@ class Queue:
             parent = box.boxes.on_levels([k])
             for output, side in np.argwhere(box.peaks[k]):
                 child = box.on_levels(
-                    np.array([k]), parent.within(*bounds.remaining[:, output, side])
+                    np.array([k]), parent.intersect(*bounds.remaining[:, output, side])
                 )
                 width = np.where(parent.radius > 0, parent.radius, 1.0)
                 cut = np.where(parent.radius > 0, 1 - child.boxes.radius / width, 0.0).sum()
@@ -302,7 +302,7 @@ class Queue:
                 if cut >= numbers.NARROWED:
                     yield child
                 else:
-                    yield from child.bisected(_axis(child.boxes, bounds.shares[output, side]))
+                    yield from child.bisect(_axis(child.boxes, bounds.shares[output, side]))
 
     def _halves(self, box: SubBox, answers: Sequence[Answer]) -> list[SubBox]:
         """Both halves along the input that refusals name or with the largest share of the gaps."""
@@ -318,7 +318,7 @@ class Queue:
             return []
         rows = np.flatnonzero(box.peaks.any((1, 2)))
         open_box = box.on_levels(rows)
-        return open_box.bisected(_axis(open_box.boxes, votes))
+        return open_box.bisect(_axis(open_box.boxes, votes))
 
 
 def _axis(boxes: Boxes, votes: Array) -> int:

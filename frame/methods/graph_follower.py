@@ -171,7 +171,7 @@ class GraphFollower:
         limit, bend = self.tolerance * flow.scale[:, None], float(self.order > 1)
         for done, level in enumerate(reversed(range(levels))):
             tick = subprogress(progress, done / levels, (done + 1) / levels)
-            box = flow.boxes.unit(level)
+            box = flow.boxes.unit_ends(level)
             predicted, target = storage.predicted(storage.all_places, box, local_maximum, bend=bend)
             predicted, target = predicted.reshape(shape[1:]), target.reshape(*shape[1:], -1)
             for node in range(n_nodes):

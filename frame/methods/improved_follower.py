@@ -136,7 +136,7 @@ class ImprovedFollower:
         has_crossings = d > MAX_GLOBAL_INPUTS and isinstance(flow.flow, LinearFlow)
         for done, level in enumerate(reversed(range(levels))):
             # points of the sequence that no other level and no other seed takes
-            box, skip = flow.boxes.unit(level), SEED_STEP * (levels * self.seed + level + 1)
+            box, skip = flow.boxes.unit_ends(level), SEED_STEP * (levels * self.seed + level + 1)
             tick = subprogress(progress, done / levels, (done + 1) / levels)
             # graphs at the end of the level, at most, and at its beginning
             limit, first = self.budget * (done + 1) // levels, len(storage)

@@ -193,7 +193,7 @@ def bound_levels(
         BisectionError: The gap is not above twice the model error and rounding.
     """
     model, error = model.in_units(scale), model_error / scale
-    rounding = Remainder(model, *model.boxes.unit(0)).margin[..., 0]
+    rounding = Remainder(model, *model.boxes.unit_ends(0)).margin[..., 0]
     # so that rounding does not lift the gap above what was asked for
     least_gap = float((2 * error + rounding).max())
     search_gap = (1 - 1e-6) * gap - least_gap
@@ -203,7 +203,7 @@ def bound_levels(
     levels, of_levels = len(model.boxes.alpha), list[tuple[Optima, Array, int]]()
     for level in reversed(range(levels)):
         tick = subprogress(progress, len(of_levels) / levels, (len(of_levels) + 1) / levels)
-        lower, upper = model.boxes.unit(level)
+        lower, upper = model.boxes.unit_ends(level)
         optima = first_optima(model, lower, upper, numbers.NEWTON_GAP * search_gap)
         if of_levels:  # what the level inside attains is attained here too
             inside = of_levels[-1][0]

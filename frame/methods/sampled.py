@@ -56,7 +56,7 @@ class Sampled:
         for done, level in enumerate(reversed(range(levels))):
             if level + 1 < levels:  # what a narrower box attains
                 bounds[level], at[level] = bounds[level + 1], at[level + 1]
-            points = self.points(*flow.boxes.unit(level))
+            points = self.points(*flow.boxes.unit_ends(level))
             tick = subprogress(progress, done / levels, (done + 1) / levels)
             values, index = largest_values(flow, points, tick)
             better = values > bounds[level]
@@ -79,7 +79,7 @@ def independent_excess(flow: UnitFlow, bounds: Array, progress: Progress) -> tup
     """
     largest, count = np.zeros((len(bounds), len(flow.outputs))), 0
     for level in range(len(bounds)):
-        points = spread_points(*flow.boxes.unit(level), SAMPLES, 100_003 * (level + 1))
+        points = spread_points(*flow.boxes.unit_ends(level), SAMPLES, 100_003 * (level + 1))
         values, _ = largest_values(flow, points)
         largest[level] = np.maximum((values - bounds[level]).max((0, 2)), 0.0)
         count += len(points)

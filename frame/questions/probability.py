@@ -137,7 +137,7 @@ def probabilities(
 
 def _points_of_cut(cuts: Boxes, level: int) -> Array:
     """Return corners of an α-cut and points inside it, shape (S, d), in SI units."""
-    lower, upper = cuts.unit(level)
+    lower, upper = cuts.unit_ends(level)
     if not (upper > lower).any():
         return cuts.nominal[None]
     inner = (lower + upper) / 2 + (upper - lower) / 2 * chebyshev_points(len(lower), SPREAD)

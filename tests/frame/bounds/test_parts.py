@@ -58,7 +58,7 @@ class Lipschitz:
             # |∂q/∂ω| ≤ t, |∂q/∂ζ| ≤ ω t, and δω/ω ≤ (δk/k + δm/m) / 2, of the lower ends
             size = np.sqrt(high[0] / low[1])
             each = (high - low) / 2 * [0.5 * size / low[0], 0.5 * size / low[1], size]
-            slack = (1.5 * flow.time * each.sum())[:, None, None]
+            slack = (1.5 * flow.time * each.sum() + 1e-14)[:, None, None]  # and rounding
             both = np.stack([-value, value], -1)
             at = np.broadcast_to(middle, (*both.shape, 3))
             shares = np.broadcast_to(each / max(each.sum(), 1e-300), (1, 2, 3))

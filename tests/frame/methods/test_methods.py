@@ -195,7 +195,7 @@ def test_progress_rises_to_one(name, least):
 def test_bounds_that_are_too_narrow_are_left_by_as_much():
     cut = boxes({"l": Interval(0.99, 1.01)}, (0,))
     flow = UnitFlow(frame.LagrangianFlow(frame.pendulum(), ("l",), 0.5, 0.05), cut)
-    ends = flow.values(np.linspace(*flow.boxes.unit(0), 200))
+    ends = flow.values(np.linspace(*flow.boxes.unit_ends(0), 200))
     bounds = np.stack([-ends.min(0), ends.max(0)], axis=-1)[None]
     size = 0.1 * np.ptp(ends, axis=(0, 1))
     told: list[float] = []
