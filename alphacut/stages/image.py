@@ -18,7 +18,6 @@ from alphacut.fuzzy.refused import FailedError, require
 from alphacut.fuzzy.result import Nature
 from alphacut.io.provenance import file_digest
 from alphacut.rve.cell.cell import Phase
-from alphacut.rve.image.bounds import Interval
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.files import files_of, read_grid, require_memory
 from alphacut.rve.image.losses import energy_shares, loss_of_young, mean_loss
@@ -54,6 +53,7 @@ CONSTANT_NAMES = {
     3: ("E_x", "E_y", "E_z", "nu_yz", "nu_xz", "nu_xy", "G_yz", "G_xz", "G_xy"),
 }
 HILL = "Hill's isotropic average"
+SIDES = "lower", "upper"
 AlphaLevel = float | None
 """α-level, or None for the nominal values alone."""
 PhaseRanges = Callable[[AlphaLevel], tuple[Ints, Ints]]
@@ -167,8 +167,8 @@ def compute_cuts(
     result = ImageResult(
         lower_GPa=np.asarray(top.bounds.lower / GPA, float),
         upper_GPa=np.asarray(top.bounds.upper / GPA, float),
-        nu=_bounds_by_side(top.poisson),
-        shear_GPa=_bounds_by_side(top.bounds.shear(average), GPA),
+        nu=dict(zip(SIDES, top.poisson, strict=True)),
+        shear_GPa=dict(zip(SIDES, (x / GPA for x in top.bounds.shear(average)), strict=True)),
         average=HILL if is_space else AVERAGES[average],
         plane={SPACE if is_space else PLANE_STRAIN: by_name},
         nature=NATURE,
@@ -185,11 +185,6 @@ def compute_cuts(
         proved_losses={name: CutsResult.of(cut) for name, cut in proved.items()},
     )
     return StageResult(result, _dataset(alpha, cuts, phase, losses, cell.sides))
-
-
-def _bounds_by_side(bounds: Interval, unit: float = 1.0) -> dict[str, float]:
-    """Both bounds of a number, in a unit."""
-    return {"lower": bounds[0] / unit, "upper": bounds[1] / unit}
 
 
 def _require_isotropic(widest: ImageCut) -> None:
@@ -223,7 +218,7 @@ def _dataset(
         **{f"loss_{name}": (("alpha", "bound"), cut) for name, cut in losses.items()},
         "phase": (("z", "y", "x")[-phase.ndim :], phase.astype(np.float32)),
     }
-    axes = {"alpha": list(alpha), "bound": ["lower", "upper"]}
+    axes = {"alpha": list(alpha), "bound": [*SIDES]}
     axes |= dict.fromkeys(("row", "column"), AXES[phase.ndim])
     return xarray.Dataset(variables, axes, {"nature": str(NATURE), "sides": sides})
 

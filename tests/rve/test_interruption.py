@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 
 from alphacut.rve.cell.outline import circle
-from alphacut.rve.interruption import uninterrupted
 
 ROOT = Path(__file__).parents[2]
 PROGRAM = """
@@ -101,18 +100,6 @@ else:
     assert done.stdout == f"through {ends}\n", done.stderr
 
 
-@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
-def test_handlers_that_the_block_takes_for_itself_are_given_back(name):
-    number, own = getattr(signal, name), lambda *_: None
-    before = signal.signal(number, own)
-    try:
-        with uninterrupted():
-            signal.signal(number, signal.SIG_DFL)  # as MPI does
-        assert signal.getsignal(number) is own
-    finally:
-        signal.signal(number, before)
-
-
 def interrupt():
     os.kill(os.getpid(), signal.SIGINT)
 
@@ -124,22 +111,6 @@ def handler():
     yield
     after = signal.signal(signal.SIGINT, before)
     assert after is signal.default_int_handler
-
-
-@pytest.mark.parametrize("fails", [False, True])
-def test_an_interruption_waits_for_the_end_of_the_block_and_goes_before_its_error(handler, fails):
-    done = []
-
-    @uninterrupted()
-    def block():
-        interrupt()
-        done.append("block")
-        if fails:
-            raise RuntimeError("stopped early")
-
-    with pytest.raises(KeyboardInterrupt):
-        block()
-    assert done == ["block"]
 
 
 def test_an_interruption_amid_meshing_arrives_after_it(handler):
