@@ -12,12 +12,12 @@ Neither shares elements or mesh with the prisms.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from time import perf_counter
-from typing import ClassVar
+from typing import ClassVar, TypeVar
 
 import numpy as np
 
@@ -41,6 +41,12 @@ from alphacut.rve.mesh.prism_grid import reference_radius
 from alphacut.rve.mesh.square import REFINEMENTS
 from alphacut.rve.prism.modulus_basis import TOLERANCE, ModulusBasis, modulus_basis
 from alphacut.rve.prism.problem import FoldedMeshError, PrismProblem, SliceStrains
+from alphacut.rve.prism.slices import (
+    SliceProblem,
+    cached_slice_problem,
+    is_homogeneous,
+    solve_sample,
+)
 from alphacut.rve.result.checks import ROUND_OFF, checks_within_limits, mean, stress_checks
 from alphacut.rve.result.moduli import axial_moduli
 from alphacut.rve.result.result import HomogenisedStiffness, PhaseEnergies, StressCurve
@@ -49,6 +55,8 @@ from alphacut.rve.slices.model import SlicesModel
 from alphacut.rve.solver.form import energies_by_phase, total_energy
 from alphacut.rve.solver.krylov import Solutions, SolverOptions, solve
 from alphacut.stochastic import RadiusMap
+
+AnyProblem = TypeVar("AnyProblem", PrismProblem, SliceProblem)
 
 SERIES_ACCURACY = 1e-9  # relative, of a reference by the series
 SLICES_POINTS = 14  # nodes in θ of a reference by slices
@@ -100,7 +108,7 @@ class PrismModel:
         require_solve_arguments(radius_map, matrix, inclusions, isotropic=False)
         require_compressible(matrix, *inclusions)
         started = perf_counter()
-        problem = self.problem(radius_map)
+        problem = self._slice_problem(radius_map) if self.by_slices else self.problem(radius_map)
         basis = self._basis(problem, matrix, inclusions)  # serves all inclusions
         results = []
         for inclusion in inclusions:
@@ -108,11 +116,14 @@ class PrismModel:
             if basis is not None and isinstance(inclusion, Phase):
                 strains, residual = basis.project(inclusion.modulus), basis.error
                 iterations = basis.iterations
+            elif isinstance(problem, SliceProblem):
+                strains, iterations, residual = solve_sample(
+                    problem, cell.stiffness, self.loads(cell)
+                )
             else:
-                strains, solved = solve_loads(
+                strains, iterations, residual = solve_loads(
                     problem, cell.stiffness, self.loads(cell), self.options
                 )
-                iterations, residual = solved.iterations, solved.residual
             result = prism_result(strains, cell.phases, self.loads(cell), self.options)
             result = replace(
                 result,
@@ -131,29 +142,39 @@ class PrismModel:
             started = perf_counter()
         return results
 
+    @property
+    def by_slices(self) -> bool:
+        """True for the default solver on one rank, which assembles and solves slice by slice."""
+        return not (self.parallel or self.options.overrides or self.options.environment)
+
     def problem(self, radius_map: RadiusMap) -> PrismProblem:
-        """Mesh and form for a radius map; cached, so that the next map moves the same mesh.
+        """DOLFINx's mesh and form for a map; cached, so that the next map moves the same mesh.
 
         Raises:
             FoldedMeshError: The map bends more than the layers can follow.
             RefusedError: A radius does not fit into the cell.
         """
+        return self._moved(radius_map, partial(cached_problem, parallel=self.parallel))
+
+    def _slice_problem(self, radius_map: RadiusMap) -> SliceProblem:
+        """As `problem`, by slices."""
+        return self._moved(radius_map, cached_slice_problem)
+
+    def _moved(self, radius_map: RadiusMap, cached: Callable[..., AnyProblem]) -> AnyProblem:
+        """Problem on the mesh of a map's reference radius, with its nodes moved to the map."""
         radius = reference_radius(radius_map, self.outline)
+
+        def on_mesh(refinement: float) -> AnyProblem:
+            problem = cached(self.mesh_size, radius, self.outline, refinement, self.layers)
+            problem.move(radius_map)
+            return problem
+
         if is_round(self.outline):
-            return self._moved_problem(radius_map, radius, REFINEMENTS[0])
+            return on_mesh(REFINEMENTS[0])
         for refinement in REFINEMENTS[:-1]:  # shorter edges where elements at bends fold
             with suppress(FoldedMeshError):
-                return self._moved_problem(radius_map, radius, refinement)
-        return self._moved_problem(radius_map, radius, REFINEMENTS[-1])
-
-    def _moved_problem(
-        self, radius_map: RadiusMap, radius: float, refinement: float
-    ) -> PrismProblem:
-        """Problem on the mesh of a reference radius, with its nodes moved to a map."""
-        mesh = (self.mesh_size, radius, self.outline, refinement, self.layers, self.parallel)
-        problem = cached_problem(*mesh)
-        problem.move(radius_map)
-        return problem
+                return on_mesh(refinement)
+        return on_mesh(REFINEMENTS[-1])
 
     @property
     def options(self) -> SolverOptions:
@@ -168,15 +189,17 @@ class PrismModel:
         return LOADS if cell.square and not self.stiffness else THREE_LOADS
 
     def _basis(
-        self, problem: PrismProblem, matrix: AnyPhase, inclusions: Sequence[AnyPhase]
+        self, problem: object, matrix: AnyPhase, inclusions: Sequence[AnyPhase]
     ) -> ModulusBasis | None:
         """Reduced basis for samples that differ only in the modulus of isotropic inclusions."""
-        if not (isinstance(matrix, Phase) and self.modulus_range):
+        if not (isinstance(problem, SliceProblem) and isinstance(matrix, Phase)):
+            return None
+        if not self.modulus_range:
             return None
         phases = [phase for phase in inclusions if isinstance(phase, Phase)]
         poisson_ratios = {phase.poisson for phase in phases}
         moduli = [phase.modulus for phase in phases]
-        if len(phases) < len(inclusions) or len(poisson_ratios) > 1 or self.petsc:
+        if len(phases) < len(inclusions) or len(poisson_ratios) > 1:
             return None
         low, high = self.modulus_range
         is_within = low * (1 - ROUND_OFF) <= min(moduli) and max(moduli) <= high * (1 + ROUND_OFF)
@@ -198,18 +221,18 @@ def require_prisms(mesh_size: float, layers: int) -> None:
 
 def solve_loads(
     problem: PrismProblem, stiffness: Sequence[Array], strains: Array, options: SolverOptions
-) -> tuple[SliceStrains, Solutions]:
-    """Solve for macroscopic strains, shape (loads, 3): mean strains of slices, and solutions."""
+) -> tuple[SliceStrains, tuple[int, ...], float]:
+    """As `solve_sample`, by DOLFINx's assembly and a solver of PETSc."""
     problem.assemble(stiffness)
     loads = problem.loads(strains)
-    is_homogeneous = all(np.array_equal(phase, stiffness[0]) for phase in stiffness)
-    if is_homogeneous:  # without fluctuation
+    if is_homogeneous(stiffness):  # without fluctuation
         zeros = [load.duplicate() for load in loads]
         solutions = Solutions(zeros, iterations=(0,) * len(loads), residual=0.0)
     else:
         solutions = solve(problem.solver(options), loads)
     fluctuations = [problem.field(vector) for vector in solutions.vectors]
-    return problem.slice_strains(list(zip(strains, fluctuations, strict=True))), solutions
+    means = problem.slice_strains(list(zip(strains, fluctuations, strict=True)))
+    return means, solutions.iterations, solutions.residual
 
 
 def prism_result(

@@ -13,15 +13,13 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.rve.cell.cell import AREA, Phase
-from alphacut.rve.fenicsx import PETSc
-from alphacut.rve.prism.problem import PrismProblem, SliceStrains
-from alphacut.rve.solver.krylov import SolverOptions, solve
+from alphacut.rve.prism.problem import SliceStrains
+from alphacut.rve.prism.slices import SliceProblem
+from alphacut.rve.solver.level_solver import conjugate_gradients
 
 TOLERANCE = 2e-10  # of the energy that is left out; E is off by half of it at most
 _CHEBYSHEV = (0.5 - 0.125**0.5, 0.5 + 0.125**0.5)  # nodes in [0, 1]
-_SAME = PETSc.Mat.Structure.SAME_NONZERO_PATTERN
-_MATRIX_AND_PARTICLE = slice(0, 1), slice(1, 2)  # parts of the mesh
-_LOOSE = SolverOptions(overrides={"ksp_rtol": "1e-6"})  # the error of a modulus is its square
+_LOOSE = 1e-6  # tolerance of the residuals; the error of a modulus is its square
 ROUND_OFF = 1e-9  # relative norm of what is new in a solution, below which it is left out
 
 
@@ -59,7 +57,7 @@ class ModulusBasis:
 
 
 def modulus_basis(
-    problem: PrismProblem, matrix: Phase, poisson: float, ends: tuple[float, float], strains: Array
+    problem: SliceProblem, matrix: Phase, poisson: float, ends: tuple[float, float], strains: Array
 ) -> ModulusBasis:
     """Reduced basis of the solutions at two Chebyshev moduli of the particle, with its error.
 
@@ -67,69 +65,50 @@ def modulus_basis(
     `strains` macroscopic ones, shape (loads, 3).
     """
     low, high = ends
-    phases = matrix.stiffness, Phase(high, poisson).stiffness
-    systems = [problem.assemble(phases, part).copy() for part in _MATRIX_AND_PARTICLE]
-    forces = [problem.loads(strains, part) for part in _MATRIX_AND_PARTICLE]
-    ksp, solved = None, []
-    for node in _CHEBYSHEV:
-        factor = (low + node * (high - low)) / high
-        systems[0].copy(problem.matrix, _SAME)
-        problem.matrix.axpy(factor, systems[1], _SAME)
-        ksp = ksp or problem.solver(_LOOSE)  # its factors serve both
-        loads = [_scaled_sum(f0, f1, factor) for f0, f1 in zip(*forces, strict=True)]
-        solved.append(solve(ksp, loads))
-    assert ksp is not None
-    vectors = _orthonormal_basis([v for solutions in solved for v in solutions.vectors])
-    images = [[system * v for v in vectors] for system in systems]
-    stiffness = np.array([[[v.dot(w) for w in image] for v in vectors] for image in images])
-    projected_loads = np.array([[[v.dot(f) for f in force] for v in vectors] for force in forces])
-    no_strain: Array = np.zeros(3)
+    phases = list(enumerate([matrix.stiffness, Phase(high, poisson).stiffness]))
+    parts = [problem.entries(k, stiffness) for k, stiffness in phases]
+    forces = np.array([problem.forces(k, stiffness, strains) for k, stiffness in phases])
+    factors = [(low + node * (high - low)) / high for node in _CHEBYSHEV]
+    systems = [parts[0] + factor * parts[1] for factor in factors]
+    operators = [problem.operator(system) for system in systems]
+    problem.factorise(systems[0])  # the factors serve both
+
+    def multiply(fields: Array) -> Array:
+        halves = np.split(fields, 2)
+        return np.concatenate([by(half) for by, half in zip(operators, halves, strict=True)])
+
+    loads = np.concatenate([forces[0] + factor * forces[1] for factor in factors])
+    solved = conjugate_gradients(multiply, problem.solver, loads, _LOOSE)
+    fields = _orthonormal_basis(solved.fields)
+    images = np.array([problem.operator(part)(fields) for part in parts])  # K_0 v and K_1 v
+    affine = np.zeros_like(loads[: len(strains)]), np.zeros((len(fields), 3))
     means = problem.slice_strains(
-        [(strain, None) for strain in strains] + [(no_strain, problem.field(v)) for v in vectors]
+        np.concatenate([strains, affine[1]]), np.concatenate([affine[0], fields])
     )
-    iterations = sum((solutions.iterations for solutions in solved), ())
-    basis = ModulusBasis(stiffness, projected_loads, means, iterations, ends)
-    affine_energy = AREA * np.einsum("li,ij,lj->l", strains, matrix.stiffness, strains)
+    projected = fields @ images.swapaxes(1, 2), fields @ forces.swapaxes(1, 2)
+    basis = ModulusBasis(*projected, means, solved.iterations, ends)
     # the error is largest at the ends of the range, since the nodes are those of Chebyshev
-    errors = [_residual_energy(basis, modulus, images, forces, ksp.pc) for modulus in ends]
-    return replace(basis, error=float((np.array(errors) / affine_energy).max()))
+    residuals = np.concatenate([_residuals(basis, modulus, forces, images) for modulus in ends])
+    energies = (residuals * problem.solver(residuals)).sum(axis=1)  # rᵀ P⁻¹ r
+    affine_energies = AREA * np.einsum("li,ij,lj->l", strains, matrix.stiffness, strains)
+    return replace(basis, error=float((energies.reshape(2, -1) / affine_energies).max()))
 
 
-def _residual_energy(
-    basis: ModulusBasis,
-    modulus: float,
-    images: list[list[PETSc.Vec]],
-    forces: list[list[PETSc.Vec]],
-    preconditioner: PETSc.PC,
-) -> Array:
-    """Energy rᵀ P⁻¹ r of the residual of projected solutions at a modulus in Pa, shape (loads,)."""
-    factor, energies = modulus / basis.ends[1], []
-    for k, column in enumerate(basis.coefficients(modulus).T):
-        residual = _scaled_sum(forces[0][k], forces[1][k], factor)
-        coefficients = np.concatenate([-column, -factor * column])
-        residual.maxpy(coefficients.tolist(), images[0] + images[1])
-        preconditioned = residual.duplicate()
-        preconditioner.apply(residual, preconditioned)
-        energies.append(residual.dot(preconditioned))
-    return np.array(energies)
+def _residuals(basis: ModulusBasis, modulus: float, forces: Array, images: Array) -> Array:
+    """Residuals of projected solutions at a modulus in Pa, shape (loads, size)."""
+    factor = modulus / basis.ends[1]
+    stiffness_fields = images[0] + factor * images[1]
+    projected = basis.coefficients(modulus).T @ stiffness_fields
+    return np.asarray(forces[0] + factor * forces[1] - projected)
 
 
-def _scaled_sum(matrix: PETSc.Vec, particle: PETSc.Vec, factor: float) -> PETSc.Vec:
-    """The load f_0 + factor · f_1."""
-    total = matrix.copy()
-    total.axpy(factor, particle)
-    return total
-
-
-def _orthonormal_basis(vectors: list[PETSc.Vec]) -> list[PETSc.Vec]:
+def _orthonormal_basis(vectors: Array) -> Array:
     """Orthonormal vectors of the same span by the Gram–Schmidt process, done twice for rounding."""
-    basis: list[PETSc.Vec] = []
+    basis: list[Array] = []
     for vector in vectors:
-        size = vector.norm()
+        new = vector.copy()
         for direction in [*basis, *basis]:
-            vector.axpy(-vector.dot(direction), direction)
-        is_new = vector.norm() > ROUND_OFF * size
-        if is_new:
-            vector.normalize()
-            basis.append(vector)
-    return basis
+            new -= (new @ direction) * direction
+        if np.linalg.norm(new) > ROUND_OFF * np.linalg.norm(vector):
+            basis.append(new / np.linalg.norm(new))
+    return np.array(basis)

@@ -77,16 +77,16 @@ class _NamedModel:
         started = perf_counter()
         problem, named = self.problem_of(law, phases)
         stiffness = [phase.stiffness for phase in named.values()]
-        strains, solved = solve_loads(problem, stiffness, THREE_LOADS, self.options)
+        strains, iterations, residual = solve_loads(problem, stiffness, THREE_LOADS, self.options)
         result = prism_result(strains, list(named.values()), THREE_LOADS, self.options)
-        checks = {**result.checks, "residual": solved.residual}
+        checks = {**result.checks, "residual": residual}
         energies = cast("PhaseEnergies", result.energies)
         order = [list(named).index(name) for name in phases]
         return [
             replace(
                 result,
                 unknowns=problem.numbering.size,
-                iterations=solved.iterations,
+                iterations=iterations,
                 seconds=perf_counter() - started,
                 checks=checks_within_limits(checks, discretisation=ROUGH_MESH),
                 energies=PhaseEnergies(energies.values[order], energies.errors[order]),

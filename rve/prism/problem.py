@@ -21,7 +21,7 @@ from alphacut.rve.mesh.wedge import (
     slice_weights,
     wedge,
 )
-from alphacut.rve.solver.form import ALL_PARTS, CellForm, PointStrains, strain_products
+from alphacut.rve.solver.form import CellForm, PointStrains, strain_products
 from alphacut.rve.solver.krylov import SolverOptions, krylov_solver
 from alphacut.rve.solver.numbering import (
     LevelNumbering,
@@ -30,7 +30,7 @@ from alphacut.rve.solver.numbering import (
     reduced_vector,
     zero_matrix,
 )
-from alphacut.stochastic import RadiusMap
+from alphacut.stochastic import RadiusMap, ThetaLaw
 from alphacut.stochastic.theta.quadrature import level_rule
 
 
@@ -68,6 +68,34 @@ class SliceStrains:
         """Homogenised (σ11, σ22, σ12), shape (n, 3, fields), in Pa, for the phases' stiffness."""
         stresses = [matrix @ strain for matrix, strain in zip(stiffness, self.strain, strict=True)]
         return np.asarray(sum(stresses))
+
+
+def positive_density(law: ThetaLaw, theta: Array) -> Array:
+    """Density of θ at quadrature points (n,), or a refusal where it is not positive."""
+    density = np.asarray(law.pdf(theta))
+    if not (density > 0).all():
+        key = f"density of θ at {theta[~(density > 0)][0]:.4g}"
+        cure = "shorten the support, or take the series"
+        raise RefusedError(key, f"{density.min():g}", "positive densities", cure)
+    return density
+
+
+def require_valid_elements(
+    grid: PrismGrid, areas: Array, comm: MPI.Intracomm | None = None
+) -> None:
+    """Refuse inverted elements, and nearly inverted ones about outlines that are not round.
+
+    `areas` are the weights of the points of prisms in their slices, (prisms, 3, points), of the
+    ranks of `comm` together.
+    """
+    determinants = areas / slice_weights()
+    means = determinants.mean(axis=(1, 2), keepdims=True)
+    least_ratio = 0.0 if is_round(grid.plane.outline) else MIN_JACOBIAN_RATIO
+    is_folded = bool(((means <= 0) | (determinants <= least_ratio * means)).any())
+    if comm.allreduce(int(is_folded)) if comm else is_folded:
+        where = f"where it follows the radius through {grid.layers} layers in θ"
+        cure = "take more layers or a smaller mesh size"
+        raise FoldedMeshError(f"the mesh folds over {where}", cure)
 
 
 class PrismProblem:
@@ -147,29 +175,13 @@ class PrismProblem:
         positions, geometry = self.grid.positions(radius_map), self.mesh.geometry
         geometry.x[:] = positions[geometry.input_global_indices]
         self._levels = self.grid.level_thetas(radius_map.distribution)
-        theta, _ = self.slice_rule()
-        density = radius_map.distribution.pdf(theta)
-        if not (density > 0).all():
-            key = f"density of θ at {theta[~(density > 0)][0]:.4g}"
-            cure = "shorten the support, or take the series"
-            raise RefusedError(key, f"{density.min():g}", "positive densities", cure)
+        density = positive_density(radius_map.distribution, self.slice_rule()[0])
         self.areas = self._areas()
-        self._require_valid_elements()
+        require_valid_elements(self.grid, self.areas, self.comm)
         prism_density = self.at_prisms(density)
         self.elastic.density.x.array[:] = np.repeat(prism_density, POINTS_PER_SLICE)
         if isinstance(radius_map, LevelSet):
             self.elastic.in_particle.x.array[:] = self._inside(positions, radius_map).ravel()
-
-    def _require_valid_elements(self) -> None:
-        """Refuse inverted elements, and nearly inverted ones about outlines that are not round."""
-        determinants = self.areas / slice_weights()
-        means = determinants.mean(axis=(1, 2), keepdims=True)
-        least_ratio = 0.0 if is_round(self.grid.plane.outline) else MIN_JACOBIAN_RATIO
-        is_folded = (means <= 0) | (determinants <= least_ratio * means)
-        if self.mesh.comm.allreduce(int(is_folded.any())):
-            where = f"where it follows the radius through {self.grid.layers} layers in θ"
-            cure = "take more layers or a smaller mesh size"
-            raise FoldedMeshError(f"the mesh folds over {where}", cure)
 
     def _inside(self, positions: Array, level_set: LevelSet) -> Array:
         """1 at the quadrature points in the particles (z < 0 in eq. 14), else 0."""
@@ -208,17 +220,17 @@ class PrismProblem:
         member = np.equal.outer(np.arange(self.grid.layers), self.layer).astype(float)
         return np.asarray(np.tensordot(member, values, axes=1))
 
-    def assemble(self, stiffness: Sequence[Array], parts: slice = ALL_PARTS) -> PETSc.Mat:
-        """Assemble the reduced stiffness of eq. 7, of all phases or `parts`, and return it."""
+    def assemble(self, stiffness: Sequence[Array]) -> PETSc.Mat:
+        """Assemble the reduced stiffness of eq. 7 and return it."""
         self.elastic.set_phases(stiffness)
         self.matrix.zeroEntries()
-        self.elastic.add_stiffness(self.matrix, parts)
+        self.elastic.add_stiffness(self.matrix)
         return self.matrix
 
-    def loads(self, strains: Array, parts: slice = ALL_PARTS) -> list[PETSc.Vec]:
+    def loads(self, strains: Array) -> list[PETSc.Vec]:
         """Reduced forces −⟨Bᵀ C ε̄⟩ of macroscopic strains (loads, 3), for the phases as set."""
         num_rows, size = len(self.numbering.rows), self.numbering.size
-        forces = [self.elastic.load(strain, parts) for strain in strains]
+        forces = [self.elastic.load(strain) for strain in strains]
         return [reduced_vector(force, self.local_map, num_rows, size) for force in forces]
 
     def solver(self, options: SolverOptions, matrix: PETSc.Mat | None = None) -> PETSc.KSP:
@@ -244,15 +256,15 @@ class PrismProblem:
         """Displacements of this rank's nodes, shape (nodes, 2), from reduced unknowns."""
         return self._to_nodes(vector)
 
-    def slice_strains(self, fields: Sequence[tuple[Array, Array | None]]) -> SliceStrains:
+    def slice_strains(self, fields: Sequence[tuple[Array, Array]]) -> SliceStrains:
         """Mean strains of slices by phase, area fractions and mean products, summed over ranks.
 
-        `fields` are pairs of a macroscopic strain (3,) and a fluctuation (nodes, 2), None for none.
+        `fields` are pairs of a macroscopic strain (3,) and a fluctuation (nodes, 2).
         """
         count = len(fields)
         strain = np.empty((len(self.wedge), SLICES_PER_LAYER, POINTS_PER_SLICE, 3, count))
         for k, (uniform, u) in enumerate(fields):
-            strain[..., k] = uniform if u is None else self.strains(u) + uniform
+            strain[..., k] = self.strains(u) + uniform
         areas = self.phase_areas() / AREA  # (phases, cells, 3, points)
         prism_means = np.einsum("pmsq,msqif->pmsif", areas, strain)
         means = np.stack([self.sum_by_layer(phase_means) for phase_means in prism_means])

@@ -16,9 +16,6 @@ from alphacut.rve.cell.cell import AnyPhase
 from alphacut.rve.fenicsx import PETSc, at_points, compiled, fem, petsc, ufl
 from alphacut.rve.result.moduli import moduli_of_energies
 
-ALL_PARTS = slice(None)
-"""All parts of a form."""
-
 
 def measure_of(mesh: Any, cells: Ints, metadata: dict[str, Any]) -> Any:
     """Measure of some cells of this rank; forms over any of them are compiled once."""
@@ -38,8 +35,7 @@ class CellForm:
     Args:
         space: Displacements of two components.
         points: Values at quadrature points, or in cells.
-        parts: Measures of the phases in their order, which can be assembled one by one; with
-            `mixed` one measure of all.
+        parts: Measures of the phases in their order; with `mixed` one measure of all.
         mixed: Whether `in_particle` tells the phase of points, where a mesh ignores the interface.
 
     Attributes:
@@ -78,16 +74,16 @@ class CellForm:
         for constant, value in zip(self._phases, stiffness, strict=True):
             constant.value[:] = value
 
-    def add_stiffness(self, matrix: PETSc.Mat, parts: slice = ALL_PARTS) -> None:
+    def add_stiffness(self, matrix: PETSc.Mat) -> None:
         """Add the stiffness of eq. 7 to a matrix, whose local-to-global map reduces it."""
-        for form in self._stiffness[parts]:
+        for form in self._stiffness:
             petsc.assemble_matrix(matrix, form)
         matrix.assemble()
 
-    def load(self, uniform: Array, parts: slice = ALL_PARTS) -> Array:
+    def load(self, uniform: Array) -> Array:
         """Forces −⟨Bᵀ C ε̄⟩ of a macroscopic strain (3,) on this rank's nodes, (nodes · 2,)."""
         self._uniform.value[:] = uniform
-        vectors = [fem.assemble_vector(form).array for form in self._load[parts]]
+        vectors = [fem.assemble_vector(form).array for form in self._load]
         return np.asarray(np.sum(vectors, axis=0))
 
 

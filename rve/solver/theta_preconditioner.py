@@ -111,7 +111,7 @@ class ThetaPreconditioner:
     def __init__(self, matrix: PETSc.Mat, numbering: LevelNumbering, law: ThetaLaw) -> None:
         self.numbering = numbering
         self.mass = theta_mass(law, numbering.grid.level_thetas(law))
-        self.injection = _injection(numbering)
+        self.injection = injection(numbering)
         self.rank_vector = matrix.createVecLeft()
         self.scatter, self.full_vector = PETSc.Scatter.toAll(self.rank_vector)
         sizes, layers = (numbering.level_size, numbering.mid_level_size), numbering.grid.layers
@@ -206,7 +206,7 @@ def _hats(level_size: int, half_size: int, *, below: bool, above: bool) -> PETSc
     return PETSc.Mat().createAIJ(stacked.shape, csr=(*csr, stacked.data), comm=PETSc.COMM_SELF)
 
 
-def _injection(numbering: LevelNumbering) -> sp.csr_matrix:
+def injection(numbering: LevelNumbering) -> sp.csr_matrix:
     """Matrix J from linear to quadratic triangles; midpoints get the mean of their vertices."""
     periodicity, ends = numbering.periodicity, numbering.periodicity.ends(numbering.grid.plane)
     vertices, count, is_free = periodicity.vertices, periodicity.count, ends >= 0

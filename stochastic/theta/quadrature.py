@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Hashable
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -72,9 +73,9 @@ def gauss_rule(distribution: ThetaLaw, *, points: int) -> ThetaRule:
         0.9733
     """
     checked_number("points", points, whole=True, least=1)
-    is_mutable = type(distribution).__hash__ in (None, object.__hash__)
-    rule: ThetaRule = (_stieltjes_rule if is_mutable else _cached_rule)(distribution, points)
-    return rule
+    if isinstance(distribution, Hashable) and type(distribution).__hash__ is not object.__hash__:
+        return _cached_rule(distribution, points)
+    return _stieltjes_rule(distribution, points)
 
 
 def _stieltjes_rule(distribution: ThetaLaw, points: int) -> ThetaRule:
