@@ -2,7 +2,7 @@
 
 import sys
 
-from alphacut.entry import main
+from alphacut.__main__ import main
 
 if __name__ == "__main__":
     names = {"solve": "cell"}
