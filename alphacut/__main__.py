@@ -9,5 +9,6 @@ atexit.register(gc.freeze)  # nor is it searched at the end, which takes .3 s
 
 from alphacut.entry import main  # noqa: E402
 
+__all__ = ["main"]
 if __name__ == "__main__":
     sys.exit(main())

@@ -198,7 +198,10 @@ def require_envelope(
     """
     chosen, flow, _, _ = _build_problem(model, inputs, method, **arguments)
     duration = min(FIRST_STEPS * flow.flow.step, flow.flow.duration)
-    replace(flow.flow, duration=duration).values(flow.boxes.probes)
+    first_steps = replace(flow.flow, duration=duration)
+    if isinstance(first_steps, LinearFlow):
+        first_steps = replace(first_steps, by_modes=False)  # loads no compiled code
+    first_steps.values(flow.boxes.probes)
     if isinstance(chosen, Proof | DualProof):
         with refusing():
             chosen.forecast(exact_flow(flow.flow), flow.boxes)

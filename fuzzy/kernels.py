@@ -11,17 +11,17 @@ from __future__ import annotations
 import os
 import re
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
-from functools import cache
+from functools import cache, partial, update_wrapper
 from hashlib import sha256
+from importlib.metadata import version
 from pathlib import Path
+from threading import RLock
 from typing import Any
 from uuid import uuid4
 
-import numba
 import numpy as np
-from numba.core.caching import IndexDataCacheFile
 
 from alphacut.fuzzy.user_cache import remove_unused, user_folder
 
@@ -29,7 +29,58 @@ with_kernels = set[str]()
 """Modules that have kernels; those of helpers come before those that call them."""
 PACKAGE = Path(__file__).parents[1]
 IMPORT = re.compile(r"^\s*from (alphacut[\w.]*) import (?:\(([\w\s,]*)\)|([\w, ]*))", re.MULTILINE)
-VERSIONS = f"{numba.__version__} {np.__version__} {sys.version}"
+_LOCK = RLock()
+prange = range
+"""Loop of parallel kernels, in whose module Numba's prange takes its place."""
+
+
+class Kernel:
+    """A function that Numba compiles at its first call, before which Numba is not imported."""
+
+    def __init__(self, function: Callable[..., Any], options: Mapping[str, object]) -> None:
+        update_wrapper(self, function)
+        self._function, self._options = function, options
+        self._dispatcher: Any = None
+        with_kernels.add(function.__module__)
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Call the compiled function."""
+        return self.dispatcher(*arguments)
+
+    @property
+    def dispatcher(self) -> Any:
+        """Numba's dispatcher of the function, with its code in `shared_folder`."""
+        if self._dispatcher is None:
+            with _LOCK:  # a second dispatcher would leave kernels that were compiled with the first
+                self._dispatcher = self._dispatcher or self._create()
+        return self._dispatcher
+
+    def _create(self) -> Any:
+        import numba  # which takes time to import
+
+        function, options = self._function, self._options
+        if options.get("parallel"):
+            function.__globals__["prange"] = numba.prange
+        try:
+            dispatcher = numba.njit(cache=True, **options)(function)
+            code = dispatcher._cache
+            folder = shared_folder(function.__module__) or code.cache_path
+            stamp = digest(function.__module__)
+            code._cache_file = _shared_index(str(folder), code._impl.filename_base, stamp)
+        # no folder can be written, NUMBA_DISABLE_JIT, or a Numba whose cache is another
+        except (RuntimeError, AttributeError):
+            return numba.njit(**options)(function)
+        return dispatcher
+
+    def __getattr__(self, name: str) -> Any:
+        """Return what Numba asks of a dispatcher that another kernel calls, as its type."""
+        if name.startswith("__"):
+            raise AttributeError(name)
+        return getattr(self.dispatcher, name)
+
+    def __reduce__(self) -> str:
+        """Pickle by name."""
+        return str(self.__qualname__)
 
 
 def kernel(**options: object) -> Callable[[Callable[..., Any]], Any]:
@@ -39,35 +90,22 @@ def kernel(**options: object) -> Callable[[Callable[..., Any]], Any]:
     where no folder can be written. Division by zero gives infinity or NaN, and the interpreter's
     lock is released.
     """
-    options = {"nogil": True, "error_model": "numpy", **options}
-
-    def decorate(function: Callable[..., Any]) -> Any:
-        with_kernels.add(function.__module__)
-        try:
-            dispatcher = numba.njit(cache=True, **options)(function)
-            code = dispatcher._cache
-            folder = shared_folder(function.__module__) or code.cache_path
-            stamp = digest(function.__module__)
-            code._cache_file = _Index(str(folder), code._impl.filename_base, stamp)
-        # no folder can be written, NUMBA_DISABLE_JIT, or a Numba whose cache is another
-        except (RuntimeError, AttributeError):
-            return numba.njit(**options)(function)
-        return dispatcher
-
-    return decorate
+    return partial(Kernel, options={"nogil": True, "error_model": "numpy", **options})
 
 
-class _Index(IndexDataCacheFile):  # type: ignore[misc]
+def _shared_index(folder: str, name: str, stamp: str) -> Any:
     """Numba's index of a kernel's compiled code, but with files that no other process writes."""
+    from numba.core.caching import IndexDataCacheFile
 
-    def save(self, key: object, data: object) -> None:
-        with suppress(
-            OSError
-        ):  # a full disk, or a folder that was cleared: compiled for this process
-            super().save(key, data)
+    class Index(IndexDataCacheFile):  # type: ignore[misc]
+        def save(self, key: object, data: object) -> None:
+            with suppress(OSError):  # a full disk, or a cleared folder: compiled for this process
+                super().save(key, data)
 
-    def _data_name(self, number: int) -> str:
-        return f"{self._index_name}.{uuid4().hex}.nbc"
+        def _data_name(self, number: int) -> str:
+            return f"{self._index_name}.{uuid4().hex}.nbc"
+
+    return Index(folder, name, stamp)
 
 
 @cache
@@ -77,7 +115,7 @@ def shared_folder(module: str) -> Path | None:
     None where `user_folder` is, or where NUMBA_CACHE_DIR names a folder. A new digest clears away
     what is unused.
     """
-    base = None if numba.config.CACHE_DIR else user_folder("kernels")
+    base = None if os.environ.get("NUMBA_CACHE_DIR") else user_folder("kernels")
     if base is None:
         return None
     folder = base / f"{module}-{digest(module)[:16]}"
@@ -98,7 +136,7 @@ compiled = kernel()
 def digest(module: str) -> str:
     """Return a digest of a module's text, of what it imports if it has kernels, and of versions."""
     text = _file(module).read_text("utf-8")
-    total = sha256((VERSIONS + text).encode())
+    total = sha256(f"{version('numba')} {np.__version__} {sys.version}{text}".encode())
     if module in with_kernels:
         for name in _imports(text):
             total.update(digest(name).encode())

@@ -166,3 +166,13 @@ def test_a_case_is_read_without_figures_and_questions():
     assert "alphacut.case.content" in modules
     wrong = ("matplotlib", "alphacut.figures", "alphacut.questions")
     assert not {name for name in modules if name.startswith(wrong)}
+
+
+def test_a_case_is_checked_without_what_takes_longer_to_import_than_to_use():
+    """Two motions of a building, and records of a suite with their spectral accelerations."""
+    slow = {"numba", "pandas", "pint", "xarray", "matplotlib", "scipy.signal", "scipy.stats"}
+    for case in ("building", "suite"):
+        words = ["check", f"cases/{case}.toml", "--quiet"]
+        modules = modules_after(f"from alphacut.entry import main; assert not main({words})")
+        assert "alphacut.frame.dynamics.flow" in modules
+        assert not slow & modules

@@ -89,7 +89,7 @@ def long_steps(linear: LinearSystem, section: EnvelopeSection) -> Iterator[str]:
 
     Both are those of the motion at the most plausible values.
     """
-    flow = LinearFlow(linear, (), section.duration, section.step, Exact())
+    flow = LinearFlow(linear, (), section.duration, section.step, Exact(), by_modes=False)
     nominal = np.zeros((1, 0))
     size, between = np.abs(flow.values(nominal)[0]).T, node_deviation(flow, nominal).T
     peaks = np.maximum(size.max(1), AT_REST * flow.reach())  # at rest rounding alone moves

@@ -75,7 +75,7 @@ class Recording:
         samples = self.samples - self.samples.mean()
         if baseline == "linear":
             time = np.arange(len(samples)) - (len(samples) - 1) / 2  # in steps, of mean 0
-            samples -= time * (time @ samples) / max(time @ time, 1.0)
+            samples -= time * (time @ samples) / max(float(time @ time), 1.0)
         return Accelerogram(self.step, samples)
 
 

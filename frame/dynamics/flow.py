@@ -183,6 +183,8 @@ class LinearFlow(Flow):
 
     Args:
         integrator: The method; the other arguments are those of `Flow`.
+        by_modes: Whether compiled code superposes classical modes for values of exact motions. If
+            not they are, to rounding, the same by powers of the step map, which loads no Numba.
 
     Example:
         >>> from alphacut.frame import StoreyFrame
@@ -193,6 +195,7 @@ class LinearFlow(Flow):
 
     system: LinearSystem
     integrator: Integrator = field(default_factory=Midpoint)
+    by_modes: bool = True
 
     @property
     def method(self) -> str:
@@ -243,7 +246,7 @@ class LinearFlow(Flow):
     def _march(self, points: Array, *, derivatives: bool) -> Jet:
         """Outputs of x[k+1] = T x[k] + G load[k] at points (S, d), shape (S, T, outputs)."""
         matrices, rows = evaluate(self.system, self.names, points, derivatives=derivatives)
-        motion = self._from_modes(matrices, rows) if self.exact else None
+        motion = self._from_modes(matrices, rows) if self.exact and self.by_modes else None
         if motion is None:
             motion = trajectory(self._step_map(matrices), matrices.start, rows)
         if matrices.feeds is None:
