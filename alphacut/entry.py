@@ -30,10 +30,10 @@ DEBUG = "--debug"
 COMMANDS = {
     "run": "run",
     "check": "check",
-    "microstructure": "stage",
+    "microstructure": "run",
     "cell": "cell",
-    "modulus": "stage",
-    "identify": "stage",
+    "modulus": "run",
+    "identify": "run",
     "report": "run",
     "verify": "check",
 }

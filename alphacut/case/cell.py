@@ -8,14 +8,16 @@ from pydantic import Field
 
 from alphacut.case.material import (
     AnyLaw,
+    AnyRadius,
     Cell,
     ImageCell,
     Mesh,
     MeshedCell,
     ModulusSection,
+    RadiusMapSection,
     RoundCell,
+    ThetaSection,
 )
-from alphacut.case.radius import AnyRadius, RadiusMapSection, ThetaSection
 from alphacut.case.types import NotEmpty, Section, after, distinct, require_alone
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io.provenance import command_to_paste

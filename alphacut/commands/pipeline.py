@@ -16,8 +16,8 @@ from alphacut import frame
 from alphacut.case.content import Case, Content, load
 from alphacut.case.limits import QuestionSection
 from alphacut.case.loads import RecordsSection
+from alphacut.case.material import RadiusMapSection, ThetaSection
 from alphacut.case.motion import EnvelopeSection
-from alphacut.case.radius import RadiusMapSection, ThetaSection
 from alphacut.case.structure import Structure
 from alphacut.commands.options import require_petsc
 from alphacut.frame.questions.peaks import Peaks

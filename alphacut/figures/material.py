@@ -10,7 +10,7 @@ import numpy as np
 import xarray
 from matplotlib.figure import Figure
 
-from alphacut.case.radius import RadiusMapSection
+from alphacut.case.material import RadiusMapSection
 from alphacut.case.structure import Frame
 from alphacut.figures import style
 from alphacut.fuzzy.arrays import Array

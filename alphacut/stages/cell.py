@@ -11,8 +11,14 @@ import numpy as np
 from typing_extensions import TypedDict
 
 from alphacut.case.cell import CellContent
-from alphacut.case.material import Mesh, MeshedCell, ModulusSection, RoundCell
-from alphacut.case.radius import AnyRadius, ThetaSection
+from alphacut.case.material import (
+    AnyRadius,
+    Mesh,
+    MeshedCell,
+    ModulusSection,
+    RoundCell,
+    ThetaSection,
+)
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import FailedError, RefusedError
