@@ -129,6 +129,9 @@ class Content(CellContent):
         if self.records is None:
             is_absent, allowed = self.fragility is None, "beside [records]"
             require(is_absent, "fragility", "without records", allowed)
+            for key, section in self.questions.items():
+                means = ", ".join(limit.text for limit in section.limits if limit.side == "mean")
+                require(not means, f"{key}.limits", means, "a mean over records beside [records]")
             return
         require_alone("records", ground is not None, "an accelerogram")
         if self.matrices is not None:

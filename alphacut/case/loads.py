@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from math import isclose
 from pathlib import Path
 from typing import Annotated, NamedTuple
 
@@ -174,7 +175,9 @@ def _read_recordings(value: object, info: ValidationInfo) -> tuple[Recording, ..
     for path in paths:
         try:
             recording = read_recording(path, channel, step, unit)
-            recordings.append(replace(recording, name=ENDING.sub("_", path.stem) + end))
+            remarks = (*recording.remarks, *_own_values(recording, step, unit))
+            name = ENDING.sub("_", path.stem) + end
+            recordings.append(replace(recording, name=name, remarks=remarks))
         except RefusedError as error:
             errors.append(error)
     for first in errors[:1]:  # all bad files of a folder at once, the first with its reason
@@ -183,6 +186,14 @@ def _read_recordings(value: object, info: ValidationInfo) -> tuple[Recording, ..
         cure = "; ".join(filter(None, [names and f"bad as well: {names}", first.cure]))
         raise RefusedError(first.key, first.value, first.allowed, cure)
     return tuple(recordings)
+
+
+def _own_values(recording: Recording, step: float | None, unit: str) -> Iterator[str]:
+    """Yields a clause on the step and on the unit of a file that states them otherwise."""
+    if step and not isclose(step, recording.step, rel_tol=1e-6):
+        yield f"its own step, {recording.step:g} s, is taken, not records.step"
+    if unit and acceleration_factor(unit) != acceleration_factor(recording.unit):
+        yield f"its own unit, {recording.unit}, is taken, not records.unit"
 
 
 def _parse_unit(value: object, _: ValidationInfo) -> str:

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, cast
 
 from pydantic import Field, PlainValidator, ValidationInfo
 
-from alphacut.case.types import Modulus, OneOrMany, Quantity, Section, case_file, text
+from alphacut.case.types import Modulus, NotEmpty, OneOrMany, Quantity, Section, case_file, text
 from alphacut.frame import Accelerogram, MatrixStructure, StoreyFrame
 from alphacut.frame.structures.lagrangian import LagrangianSystem, pendulum
 from alphacut.frame.structures.quantities import Output
@@ -240,7 +240,7 @@ class Frame(StructureSection):
     rayleigh_stiffness: Delay = Field(default=ZERO, description="factor b of a damping a M + b K")
     accelerogram: Annotated[Accelerogram, text(read_accelerogram)] | None = None
     """file of the ground's acceleration; motion is relative to it"""
-    outputs: tuple[str, ...] = ()
+    outputs: Annotated[tuple[str, ...], NotEmpty] = ()
     """observed quantities: q1, v1, a1, drift1, shear1 … (columns without dampers), base_shear"""
 
     @property

@@ -32,7 +32,7 @@ from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal, Triangular
 from alphacut.fuzzy.refused import require
 from alphacut.fuzzy.result import Nature
 from alphacut.io.arrays import text_table
-from alphacut.io.quantity import MINUS, STANDARD_GRAVITY, engineering
+from alphacut.io.quantity import MINUS, STANDARD_GRAVITY, engineering, percent_text
 from alphacut.io.results import ResultsFolder
 from alphacut.report.results import AROUND
 from alphacut.rve.cell.cell import VoigtPhase
@@ -106,7 +106,7 @@ def records_text(section: RecordsSection, records: Sequence[SuiteRecord]) -> str
     """Table of a suite's records, as their files hold them and as they are used; then warnings."""
     rows = []
     for raw, record in zip(section.recordings, records, strict=True):
-        counts = f"{raw.step:g} s", f"{len(raw.samples)}", f"{raw.offset_share:.2%}"
+        counts = f"{raw.step:g} s", f"{len(raw.samples)}", percent_text(raw.offset_share, 2)
         peaks = raw.peak, record.measures["PGA"], record.measures["Sa(T1)"]
         sizes = (f"{peak / GRAVITY:.3g} g" for peak in peaks)
         file_cells = raw.name, raw.file_format, raw.unit

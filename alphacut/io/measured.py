@@ -79,6 +79,8 @@ def _measurements_of_mode(
     require(is_whole, f"{path.name}, mode {mode}", "an amplitude in some rows", allowed)
     shape = {floor: x for floor, x in amplitudes.items() if not missing[floor].all()}
     shape = shape if len(shape) > 1 else {}
+    is_moved, allowed = not shape or any(map(np.any, shape.values())), "a shape that moves a floor"
+    require(is_moved, f"{path.name}, mode {mode}", "0 at every floor", allowed)
     frequencies = values[:, columns["frequency"]]
     sizes = {"frequency_std": frequencies.mean()}
     sizes |= {"shape_std": max(abs(x).mean() for x in shape.values())} if shape else {}

@@ -207,8 +207,12 @@ class CellProblem:
         except MeshError as error:
             value, allowed = f"{self.mesh.file.name}: {error.what}", "a periodic cell of prisms"
             raise RefusedError("mesh.file", value, allowed, error.cure) from None
-        mesh_law(grid, self.radius.law)  # both refuse what does not fit
-        in_order_of(grid.names, self.nominal)
+        try:
+            mesh_law(grid, self.radius.law)  # both refuse what does not fit
+            in_order_of(grid.names, self.nominal)
+        except RefusedError as error:
+            place = self.mesh.file.name
+            raise RefusedError(error.key, error.value, error.allowed, error.cure, place) from None
 
 
 def isotropic_bounds(

@@ -24,6 +24,7 @@ from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array, Mask
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.fuzzy.result import Nature
+from alphacut.io.quantity import percent_text
 from alphacut.records.recording import Recording, arias_fractions, spectral_acceleration
 from alphacut.stages.envelope import EnvelopeTask, PeakResults
 from alphacut.stages.store import Numbers, Stage, Values
@@ -101,7 +102,7 @@ def _suite_record(
     offset = float(ground.samples.mean()) / ground.extremes[0]
     warnings = [f"of record {name} {doubt}" for doubt in recording.doubts()]
     if abs(offset) > MAX_OFFSET:
-        what = f"the mean of record {name} is {offset:.1%} of its peak"
+        what = f"the mean of record {name} is {percent_text(offset)} of its peak"
         warnings.append(f'{what}; records.baseline = "mean" subtracts it')
     if cut_share > 0:
         what = f"{cut_share:.1%} of the Arias intensity of record {name}"

@@ -76,6 +76,13 @@ WRONG = [  # text in the case, its replacement; key, and what the message says
     ("title", "tilte", "tilte", "did you mean title?"),
     ("[envelope]", "[envelope]\ncertify = 3", "envelope.certify", "is an unknown key"),
     ('"1e-5 m^4"', '"1e-5 m^4" "x"', "", "is not TOML"),
+    ("[envelope]", "outputs = []\n[envelope]", "frame.outputs", "one entry or more"),
+    (
+        "[envelope]",
+        '[decision]\nlimits = ["mean q1 <= 1 mm"]\n[envelope]',
+        "decision.limits",
+        "[records]",
+    ),
 ]
 
 
