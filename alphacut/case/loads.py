@@ -23,8 +23,6 @@ from alphacut.records.recording import Baseline, Recording
 from alphacut.records.tables import read_force_history
 from alphacut.records.text_file import ACCELERATION_UNITS, acceleration_factor
 
-KINDS = ("step", "harmonic", "impulse")
-
 HISTORY = (
     '"step", "harmonic, 1.5 Hz, 90 deg", "impulse" or a file as "wind.csv", then "from 2 s" or'
     ' "static"'
