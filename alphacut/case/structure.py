@@ -27,6 +27,8 @@ Span = Annotated[FuzzyNumber, Quantity("m", above=0, fuzzy=True)]
 Moment = Annotated[FuzzyNumber, Quantity("m^4", above=0, fuzzy=True)]
 Count = Annotated[FuzzyNumber, Quantity(above=0, fuzzy=True)]
 Stiffness = Annotated[FuzzyNumber, Quantity("N/m", above=0, fuzzy=True)]
+YieldForce = Annotated[FuzzyNumber, Quantity("N", above=0, fuzzy=True)]
+Hardening = Annotated[FuzzyNumber, Quantity(minimum=0, maximum=1, fuzzy=True)]
 Damping = Annotated[FuzzyNumber, Quantity("N*s/m", minimum=0, fuzzy=True)]
 Displacement = Annotated[FuzzyNumber, Quantity("m", fuzzy=True)]
 Velocity = Annotated[FuzzyNumber, Quantity("m/s", fuzzy=True)]
@@ -228,6 +230,12 @@ class Frame(StructureSection):
     """clamped columns in each storey"""
     stiffness: OneOrMany[Stiffness] | None = None
     """stiffness of each storey, in place of columns and modulus"""
+    yield_force: OneOrMany[YieldForce] | None = None
+    """force of each storey at which its columns yield"""
+    yield_drift: OneOrMany[Span] | None = None
+    """drift at which they yield, in place of yield_force"""
+    hardening: OneOrMany[Hardening] | None = None
+    """stiffness of each storey after yielding over the initial one, 0 unless given"""
     damping_ratio: DampingRatios = Field(default=(), description=RATIO_WORDS)
     dampers: OneOrMany[Damping] = Field(default=(ZERO,), description="viscous damper of each floor")
     damper_placement: Literal["ground", "storey"] | None = None
@@ -241,7 +249,8 @@ class Frame(StructureSection):
     accelerogram: Annotated[Accelerogram, text(read_accelerogram)] | None = None
     """file of the ground's acceleration; motion is relative to it"""
     outputs: Annotated[tuple[str, ...], NotEmpty] = ()
-    """observed quantities: q1, v1, a1, drift1, shear1 … (columns without dampers), base_shear"""
+    """observed quantities: q1, v1, a1, drift1, shear1 … (columns without dampers), base_shear;
+    of columns that yield residual1, ductility1, dissipated1 … besides"""
 
     @property
     def floors(self) -> int:
@@ -289,6 +298,7 @@ class Frame(StructureSection):
             numbers["I"] = self.second_moment[0]
         for x, values in lists.items():
             numbers |= {SYMBOLS[x].format(z): number for z, number in enumerate(values, start=1)}
+        numbers |= {x: Crisp(y) for x, y in model.parameters.items() if x not in numbers}
         heights = {f"drift{z}": height for z, height in enumerate(lists["lengths"], start=1)}
         return Structure(model, {name: numbers[name] for name in model.parameters}, heights)
 

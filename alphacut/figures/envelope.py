@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 
 from alphacut.figures import style
 from alphacut.frame.dynamics.nonlinear import make_flow
+from alphacut.frame.questions.peaks import ANY
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.arrays import Array
 from alphacut.io.quantity import engineering
@@ -174,14 +175,16 @@ def draw_probability(answer: ProbabilityAnswer) -> Figure:
     """Draws the bounds of the exceedance probability of the last event over its limit, by level."""
     event = [*answer.limits.values()][-1]
     limits, *bands = (event.curve[x] for x in ("limit", "lower", "upper"))
-    limit_text = engineering(event.limit, event.unit) if event.unit else "1"
+    limit_text = "1" if event.output == ANY else engineering(event.limit, event.unit)
     is_near = event.limit <= 2 * limits[-1]
     title = f"limit {limit_text} ({'dashed' if is_near else 'far off'})"
     figure, axes = draw_probability_bands(limits, bands, answer.alpha, title)
     if is_near:
         axes.axvline(event.limit, color=ORANGE, lw=1.2, ls="--")
     axes.set_ylabel("probability of exceeding it")
-    label = f"limit of |{event.output}|" if event.unit else "all limits, over those of the case"
+    label = f"limit of |{event.output}|"
+    if event.output == ANY:
+        label = "all limits, over those of the case"
     style.prefix_axis(axes, label, event.unit, across=True)
     return figure
 

@@ -35,6 +35,7 @@ QUANTITIES = {
     "N": ("force", "0.02 N"),
     "N*s": ("impulse", "0.3 kN s"),
     "N*m": ("moment", "12 kN m"),
+    "J": ("energy", "20 kJ"),
     "1/s": ("rate", "0.05 1/s"),
     "rad": ("angle", "1.5 rad"),
     "rad/s": ("angular velocity", "0.1 rad/s"),

@@ -63,7 +63,7 @@ class LimitDecision(LimitAnswer):
         """
         if not np.isfinite(value):
             return "not known"
-        if self.unit:
+        if self.output != ANY:
             return engineering(rounded(value, side, nature), self.unit)
         digits = 4 + floor(log10(abs(value))) if value else 1  # a tenth of a per cent is the last
         return percent_text(rounded(value, side, nature, max(digits, 1)))

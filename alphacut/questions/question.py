@@ -9,7 +9,7 @@ from typing import ClassVar, Generic, NamedTuple, Self, TypeVar
 
 from alphacut.case.limits import QuestionSection, Side
 from alphacut.case.structure import Structure
-from alphacut.frame.questions.peaks import Peaks
+from alphacut.frame.questions.peaks import ANY, Peaks
 from alphacut.frame.structures.quantities import of_storey_frame
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.progress_bar import Progress
@@ -99,7 +99,7 @@ class Answer(Numbers):
 
 
 class LimitAnswer(Numbers):
-    """Part of an answer about one limit, or about any of several, which have no unit.
+    """Part of an answer about one limit, or about `ANY` of several, which have no unit.
 
     `side` is that of a `Limit`, the limit as the case gives it, in SI; 1 of several.
     """
@@ -129,8 +129,8 @@ class LimitAnswer(Numbers):
     @property
     def words(self) -> str:
         """Text of the limit, as "|drift1| ≤ 40.00 mm", or as "any of them"."""
-        if not self.unit:
-            return self.output
+        if self.output == ANY:
+            return ANY
         output = f"|{self.output}|" if self.side in ("", "mean") else self.output
         relation = "≥" if self.side == "min" else "≤"
         return f"{self.side} {output} {relation} {engineering(self.limit, self.unit)}".strip()
@@ -138,7 +138,7 @@ class LimitAnswer(Numbers):
     @property
     def event(self) -> str:
         """The event that it is exceeded: "|drift1| > 40.00 mm", or "any of them exceeded"."""
-        words = self.words if self.unit else f"{self.output} exceeded"
+        words = f"{ANY} exceeded" if self.output == ANY else self.words
         return words.translate({ord("≤"): ">", ord("≥"): "<"})
 
 

@@ -197,6 +197,12 @@ class LinearFlow(Flow):
     integrator: Integrator = field(default_factory=Midpoint)
     by_modes: bool = True
 
+    def __post_init__(self) -> None:
+        """Refuse, besides, columns that yield, whose motion is not linear."""
+        super().__post_init__()
+        value, allowed = "of columns that yield", "make_flow, which takes them"
+        require(not getattr(self.system, "hardening", ()), "flow", value=value, allowed=allowed)
+
     @property
     def method(self) -> str:
         """Name of the time stepping."""

@@ -20,8 +20,10 @@ from alphacut.frame.calculus.jet import Jet
 from alphacut.frame.calculus.tape import Tape, tape, with_derivatives
 from alphacut.frame.dynamics.flow import Flow, LinearFlow, StepError
 from alphacut.frame.dynamics.integrators import INTEGRATORS, Integrator
+from alphacut.frame.dynamics.yielding import YieldingFlow
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem
+from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.kernels import compiled
 from alphacut.fuzzy.refused import require_choice
@@ -39,7 +41,9 @@ def make_flow(
     step: float,
     integrator: str | Integrator = "midpoint",
 ) -> Flow:
-    """Create the flow of a linear structure or a Lagrangian system (of "midpoint" steps alone).
+    """Create the flow of a linear structure or another ("exact" alone where columns yield).
+
+    A Lagrangian system has "midpoint" steps alone.
 
     `names` are the uncertain parameters; duration and step are in s.
 
@@ -49,6 +53,9 @@ def make_flow(
     if isinstance(model, LagrangianSystem):
         require_choice("integrator", integrator, ["midpoint"])
         return LagrangianFlow(model, tuple(names), duration, step)
+    if isinstance(model, StoreyFrame) and model.hardening:
+        require_choice("integrator", getattr(integrator, "name", integrator), ["exact"])
+        return YieldingFlow(model, tuple(names), duration, step)
     if isinstance(integrator, str):
         require_choice("integrator", integrator, INTEGRATORS)
         integrator = INTEGRATORS[integrator]

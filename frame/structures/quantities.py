@@ -13,10 +13,14 @@ OUTPUTS = {  # unit and words, by names without the floor
     "a": ("m/s^2", "acceleration of floor"),
     "drift": ("m", "drift of storey"),
     "shear": ("N", "shear force of storey"),
+    "residual": ("m", "residual drift of storey"),
+    "ductility": ("", "ductility of storey"),
+    "dissipated": ("J", "energy dissipated in storey"),
     **{"base_shear": ("N", ""), "force": ("N", ""), "phi": ("rad", "")},
 }
 POSITIVE = "positive"
 NOT_NEGATIVE = "0 or greater"
+UP_TO_ONE = "0 to 1"
 RATIO = "0 or greater and below 1, the critical damping"
 
 
@@ -72,7 +76,7 @@ class Parameter:
     Args:
         name: As ``m2``.
         unit: SI unit; empty where it has none, or none is known.
-        range: `POSITIVE`, `NOT_NEGATIVE`, `RATIO`, or empty for any number.
+        range: `POSITIVE`, `NOT_NEGATIVE`, `UP_TO_ONE`, `RATIO`, or empty for any number.
     """
 
     name: str
@@ -82,6 +86,7 @@ class Parameter:
     def admits(self, low: float, high: float) -> bool:
         """True if all values from `low` to `high` are finite and within the range."""
         above = {POSITIVE: low > 0, NOT_NEGATIVE: low >= 0, RATIO: low >= 0 and high < 1}
+        above[UP_TO_ONE] = low >= 0 and high <= 1
         return bool(np.isfinite([low, high]).all() and above.get(self.range, True))
 
 
@@ -96,6 +101,9 @@ OF_STOREY_FRAME = {  # units and ranges of a storey frame's parameters, by names
     "rayleigh_mass": ("1/s", NOT_NEGATIVE),
     "rayleigh_stiffness": ("s", NOT_NEGATIVE),
     "zeta": ("", RATIO),
+    "fy": ("N", POSITIVE),
+    "dy": ("m", POSITIVE),
+    "hardening": ("", UP_TO_ONE),
     "q": ("m", ""),
     "v": ("m/s", ""),
     "F": ("N", ""),

@@ -25,6 +25,7 @@ from alphacut.fuzzy.refused import checked_number, require, require_choice, requ
 SYMBOLS = {
     **{"masses": "m{}", "lengths": "l{}", "columns": "c{}", "stiffness": "k{}", "dampers": "d{}"},
     **{"q0": "q{}_0", "v0": "v{}_0", "second_moment": "I{}"},
+    **{"yield_force": "fy{}", "yield_drift": "dy{}", "hardening": "hardening{}"},
 }
 SINGLE = {"modulus": "E", "damping_ratio": "zeta", "rayleigh": "rayleigh_mass"}
 SPRING_KEYS = "lengths, modulus and second_moment, or stiffness (with lengths for gravity)"
@@ -38,10 +39,12 @@ class StoreyFrame:
     storey), or "k1" … where stiffnesses are given (and "l1" … with gravity alone); "d1" …, "q1_0" …
     (initial displacements), "v1_0" … (initial velocities), "rayleigh_mass", "rayleigh_stiffness",
     and "zeta", or "zeta1" … of single modes, where there are damping ratios; "F3" of a force on
-    floor 3, "F3_2" of a second one there, "J3" of an impulse.
+    floor 3, "F3_2" of a second one there, "J3" of an impulse; of columns that yield "fy1" … or
+    "dy1" … (yield forces or drifts) and "hardening1" ….
     Outputs: "q1" … (displacement, m), "v1" … (velocity, m/s), "a1" … (absolute acceleration,
     m/s²), "drift1" … (q_z − q_(z−1), m), "shear1" … (k_z drift_z of the columns,
-    without dampers' forces, N); "base_shear" is "shear1".
+    without dampers' forces, N); "base_shear" is "shear1". Where columns yield "residual1" … (drift
+    when unloaded, m), "ductility1" … (drift over yield drift), "dissipated1" … (energy, J), too.
 
     Args:
         masses: Floors from below, in kg.
@@ -68,10 +71,16 @@ class StoreyFrame:
             storey to k_z − P_z / l_z, P_z that of all floors above it (P-Delta); 0 leaves them out.
             Rayleigh's damping and shears keep k_z.
         loads: Forces on floors.
+        yield_force: Force of each storey at which its columns yield, in N: bilinear, with kinematic
+            hardening. All damping stays that of the initial stiffness. An isolator is a soft first
+            storey; a storey of hardening 1 stays elastic.
+        yield_drift: Drift of each storey at which they yield, in m, in place of yield_force.
+        hardening: Stiffness of each storey after yielding over k_z, from 0 (the default) to 1.
 
     Raises:
         RefusedError: The lists differ in length, a value is outside its range, the weight buckles a
-            storey, a stiffness stands beside what makes one, or a force acts on no floor.
+            storey, a stiffness stands beside what makes one, a force acts on no floor, or a yield
+            force beside a yield drift.
 
     Example:
         >>> frame = StoreyFrame(masses=[1e3, 1e3], stiffness=[4e4, 4e4], q0=[0.1, 0.2])
@@ -95,6 +104,9 @@ class StoreyFrame:
     stiffness: Sequence[float] = ()
     gravity: float = 0.0
     loads: Sequence[Force] = ()
+    yield_force: Sequence[float] = ()
+    yield_drift: Sequence[float] = ()
+    hardening: Sequence[float] = ()
 
     def __post_init__(self) -> None:
         """Refuse values that are not allowed, and fill empty lists with their defaults."""
@@ -110,7 +122,10 @@ class StoreyFrame:
             name: tuple(getattr(self, name)) or (0.0,) * n for name in ("dampers", "q0", "v0")
         }
         object.__setattr__(self, "loads", tuple(self.loads))
-        filled["stiffness"] = tuple(self.stiffness)
+        for name in ("stiffness", "yield_force", "yield_drift", "hardening"):
+            filled[name] = tuple(getattr(self, name))
+        if filled["yield_force"] or filled["yield_drift"]:
+            filled["hardening"] = filled["hardening"] or (0.0,) * n
         if not filled["stiffness"]:
             filled["columns"] = tuple(self.columns) or (2.0,) * n
         for name, values in filled.items():
@@ -152,6 +167,13 @@ class StoreyFrame:
             needed = ["lengths"] if self.gravity else []
         for name in needed:
             require(name in given, name, value=None, allowed=SPRING_KEYS)
+        has_force, has_drift = bool(len(self.yield_force)), bool(len(self.yield_drift))
+        require(
+            not has_force & has_drift, "yield_force", value="there", allowed="it or yield_drift"
+        )
+        if len(self.hardening):
+            allowed = "one of them beside hardening"
+            require(has_force | has_drift, "yield_force, yield_drift", value=None, allowed=allowed)
 
     @property
     def floors(self) -> int:
@@ -173,7 +195,8 @@ class StoreyFrame:
         """Nominal values of all parameters by name, in SI units; of lists, one for each floor."""
         named: dict[str, float] = {} if self.modulus is None else {"E": self.modulus}
         named |= _named("I{}", self.moments)
-        for name in ("stiffness", "masses", "lengths", "columns", "dampers", "q0", "v0"):
+        lists = ["stiffness", "masses", "lengths", "columns", "dampers", "q0", "v0"]
+        for name in (*lists, "yield_force", "yield_drift", "hardening"):
             if name != "lengths" or not self.stiffness or self.gravity:
                 named |= _named(SYMBOLS[name], getattr(self, name), single=False)
         named |= zip(("rayleigh_mass", "rayleigh_stiffness"), self.rayleigh, strict=True)
@@ -213,6 +236,16 @@ class StoreyFrame:
         inertia = self._of_floors("I{}", p) if len(self.moments) > 1 else p["I"][..., None]
         rigidity = 12.0 * p["E"][..., None] * inertia  # 24 E I / l³ of two columns in section 6.1
         return rigidity * self._of_floors("c{}", p) * self._of_floors("l{}", p) ** -3
+
+    def yield_drifts(self, p: Mapping[str, Number]) -> Number:
+        """Drifts at which storeys yield, shape (…, n), in m."""
+        if self.yield_drift:
+            return self._of_floors("dy{}", p)
+        return self._of_floors("fy{}", p) * self.springs(p) ** -1
+
+    def hardenings(self, p: Mapping[str, Number]) -> Number:
+        """Stiffness of yielding storeys over the initial one, shape (…, n)."""
+        return self._of_floors("hardening{}", p)
 
     def softening(self, p: Mapping[str, Number]) -> Number:
         """P_z / l_z of storeys, shape (…, n), in N/m, P_z the weight of all floors above."""
@@ -257,10 +290,12 @@ class StoreyFrame:
 
     def quantity(self, name: str) -> tuple[str, int]:
         """An output's kind, such as "drift", and its floor or storey, from 0; refuses others."""
-        pattern = r"(q|v|a|drift|shear)([1-9]\d*)"
+        kinds = "q|v|a|drift|shear" + "|residual|ductility|dissipated" * bool(self.hardening)
+        pattern = rf"({kinds})([1-9]\d*)"
         match = re.fullmatch(pattern, "shear1" if name == "base_shear" else name)
         kind, z = (match[1], int(match[2])) if match else ("", 0)
-        allowed = f"q, v, a, drift or shear with a floor from 1 to {self.floors}, base_shear"
+        words = f"{', '.join(kinds.split('|')[:-1])} or {kinds.split('|')[-1]}"
+        allowed = f"{words} with a floor from 1 to {self.floors}, base_shear"
         require(0 < z <= self.floors, "output", value=name, allowed=allowed)
         return kind, z - 1
 

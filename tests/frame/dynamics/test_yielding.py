@@ -1,0 +1,142 @@
+"""Columns that yield: closed forms, linear limits, another scheme, and steps that do not matter."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from alphacut.frame import Accelerogram, Exact, Force, History, LinearFlow, StoreyFrame
+from alphacut.frame.dynamics.nonlinear import make_flow
+from alphacut.fuzzy.refused import RefusedError
+
+MASS, STIFFNESS, YIELD_FORCE = 2.0, 50.0, 3.0
+OMEGA, YIELD_DRIFT = (STIFFNESS / MASS) ** 0.5, YIELD_FORCE / STIFFNESS
+WATCHED = ("q1", "ductility1", "residual1", "dissipated1")
+
+
+def motion(frame, duration, step):
+    """Outputs of a frame at its nodes, shape (T, m)."""
+    return make_flow(frame, (), duration, step, "exact").values(np.zeros((1, 0)))[0]
+
+
+def random_frame(rng, storeys, *, weight=True):
+    """A frame that yields under a record with a jump, silence and samples beside the nodes."""
+    stiffness = rng.uniform(5e7, 1e8, storeys)
+    record = 6 * rng.normal(size=300) * np.repeat([1, 0, 1], 100)
+    yield_drift = rng.uniform(3e-3, 8e-3, storeys)
+    return StoreyFrame(
+        masses=rng.uniform(3e4, 6e4, storeys),
+        stiffness=stiffness,
+        lengths=[3.0] * storeys,
+        gravity=9.81 * weight,
+        damping_ratio=rng.uniform(0.0, 0.05),
+        dampers=rng.uniform(0, 2e5, storeys),
+        yield_force=stiffness * yield_drift,
+        hardening=rng.uniform(0.05, 0.3, storeys),
+        ground=Accelerogram(float(rng.choice([0.017, 0.02])), record),
+        outputs=(f"q{storeys}", f"a{storeys}", "v1", "drift1", "residual1", "dissipated1"),
+    )
+
+
+@pytest.mark.parametrize("load", ["impulse", "step", "pulse"])
+def test_one_storey_without_damping_follows_the_closed_forms(load, rng):
+    frame = StoreyFrame([MASS], stiffness=[STIFFNESS], yield_force=[YIELD_FORCE], outputs=WATCHED)
+    force, end = 0.0, 0.0
+    if load == "impulse":
+        velocity = float(rng.uniform(1.2, 3)) * OMEGA * YIELD_DRIFT
+        frame = replace(frame, v0=[velocity])
+        first = np.arcsin(OMEGA * YIELD_DRIFT / velocity) / OMEGA
+        velocity *= np.cos(OMEGA * first)
+        ductility = (1 + (frame.v0[0] / (OMEGA * YIELD_DRIFT)) ** 2) / 2
+    else:  # x = F/k (1 − cos ωt) up to yielding
+        ratio = float(rng.uniform(0.6, 0.9)) if load == "step" else float(rng.uniform(1.1, 2.0))
+        force = ratio * YIELD_FORCE
+        first = np.arccos(1 - 1 / ratio) / OMEGA
+        velocity = ratio * YIELD_DRIFT * OMEGA * np.sin(OMEGA * first)
+        end = first + (float(rng.uniform(0.1, 0.6)) if load == "pulse" else 1e6)
+        ductility = 0.5 / (1 - ratio)
+        history = History(end, [1.0, 1.0])
+        frame = replace(frame, loads=[Force(1, force, history)])
+    rise = (force - YIELD_FORCE) / MASS
+    if load == "pulse":
+        at_end = velocity + rise * (end - first)
+        reached = YIELD_DRIFT + (velocity + at_end) / 2 * (end - first)
+        peak = end + at_end * MASS / YIELD_FORCE
+        ductility = (reached + at_end**2 * MASS / YIELD_FORCE / 2) / YIELD_DRIFT
+    else:
+        peak = first - velocity / rise
+    found = motion(frame, 2 * peak, peak / 7)
+    plastic = (ductility - 1) * YIELD_DRIFT
+    expected = [ductility * YIELD_DRIFT, ductility, plastic, plastic * YIELD_FORCE]
+    assert found[7] == pytest.approx(expected, rel=1e-10)
+    if load != "step":  # oscillates about the residual drift, within the yield drift
+        t = found[7:, 0] - plastic
+        assert t == pytest.approx(YIELD_DRIFT * np.cos(OMEGA * peak / 7 * np.arange(8)), abs=1e-11)
+
+
+def test_a_grazed_yield_drift_is_seen_within_a_step(rng):
+    excess = 10 ** float(rng.uniform(-10, -8))
+    velocity = OMEGA * YIELD_DRIFT * (1 + 2 * excess) ** 0.5  # double roots nearly
+    frame = StoreyFrame(
+        [MASS], stiffness=[STIFFNESS], v0=[velocity], yield_force=[YIELD_FORCE], outputs=WATCHED
+    )
+    found = motion(frame, 2.0, 0.5)
+    assert found[1:, 2] == pytest.approx(excess * YIELD_DRIFT, rel=1e-2)
+
+
+def test_without_yielding_or_with_hardening_1_the_motion_is_the_linear_one(rng):
+    frame = replace(random_frame(rng, 3), outputs=("q3", "v1", "a2", "drift2", "shear2"))
+    elastic = replace(frame, yield_force=(), hardening=())
+    expected = LinearFlow(elastic, (), 6.0, 0.02, Exact()).values(np.zeros((1, 0)))[0]
+    for changes in ({"yield_force": [1e15] * 3}, {"hardening": [1.0] * 3}):
+        found = motion(replace(frame, **changes), 6.0, 0.02)
+        assert (np.abs(found - expected).max(0) <= 1e-12 * np.abs(expected).max(0)).all()
+    with pytest.raises(RefusedError, match="yield"):
+        LinearFlow(frame, (), 6.0, 0.02, Exact())
+
+
+def test_events_and_not_steps_decide(rng):
+    for storeys in (1, 2, 4):
+        frame = random_frame(rng, storeys)
+        found = motion(frame, 6.0, 0.02)
+        assert found[-1, -1] > 0  # it yields
+        for parts in (2, 5, 10):
+            finer = motion(frame, 6.0, 0.02 / parts)[::parts]
+            assert (np.abs(finer - found).max(0) <= 1e-9 * np.abs(found).max(0)).all()
+
+
+def test_motions_agree_with_central_differences_and_a_return_mapping(rng):
+    frame = random_frame(rng, 3, weight=False)
+    frame = replace(frame, damping_ratio=None, damper_placement="storey")
+    found = motion(frame, 2.0, 0.02)[:, 0]
+    coarse, fine = (central_differences(frame, 2.0, 0.02 / x)[::x] for x in (100, 200))
+    size = np.abs(found).max()
+    assert np.abs(fine - found).max() < 2e-3 * size
+    assert np.abs(2 * fine - coarse - found).max() < 1e-4 * size  # it is of first order
+
+
+def central_differences(frame, duration, h):
+    """Displacements of the top, shape (T,), with springs of a step's trial force, cut at yield."""
+    n, m, k, a = frame.floors, *map(np.array, (frame.masses, frame.stiffness, frame.hardening))
+    yield_drift, c = np.array(frame.yield_force) / k, np.array(frame.dampers)
+    q, before, plastic, out = np.zeros(n), np.zeros(n), np.zeros(n), [0.0]
+    ground = frame.ground.envelope(np.arange(round(duration / h) + 1) * h)
+    for acceleration in ground[:-1]:
+        drift, velocity = np.diff(q, prepend=0.0), np.diff(q - before, prepend=0.0) / h
+        stretch = np.clip(drift - plastic, -yield_drift, yield_drift)
+        plastic = drift - stretch
+        force = a * k * drift + (1 - a) * k * stretch + c * velocity
+        total = (np.append(force[1:], 0.0) - force) / m - acceleration
+        q, before = 2 * q - before + h**2 * total, q
+        out.append(q[-1])
+    return np.array(out)
+
+
+def test_collapse_under_weight_is_said_with_its_time():
+    frame = StoreyFrame(
+        [5e4], stiffness=[1e7], lengths=[3.0], gravity=9.81, v0=[1.0], yield_drift=[0.01],
+        hardening=[0.01], damping_ratio=0.02,
+    )  # fmt: skip
+    with pytest.raises(RefusedError, match=r"storey 1 .*collapses .*t = 0\.01\d+ s"):
+        motion(frame, 1.0, 0.1)
+    assert np.isfinite(motion(replace(frame, hardening=[0.02]), 1.0, 0.1)).all()
