@@ -30,6 +30,8 @@ class Envelope(Bounds):
         least_peaks: Proved lower bound of the smallest peak of the output in each cut, and the
             smallest that some motion does not exceed, between nodes too, each (A, m); None for what
             the bounds say.
+        searched_peaks: Bounds of the largest magnitude of each output, (A, m), where peaks were
+            searched for themselves; None for what the bounds say.
         facts: Further numbers by name. A length is that of the first displacement, of the first
             output where none is one, and a share of each peak where the tolerance was relative.
             `step_error`: what time stepping adds; `gain`: predicted gain worth a graph;
@@ -52,6 +54,7 @@ class Envelope(Bounds):
     between: Array | None = None
     attained_error: Array | None = None
     least_peaks: Ends | None = None
+    searched_peaks: Bounds | None = None
     facts: Mapping[str, float] = field(default_factory=dict)
     tested_structures: Mapping[str, tuple[tuple[str, ...], Array]] = field(default_factory=dict)
 

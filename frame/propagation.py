@@ -144,8 +144,13 @@ def _build_problem(
     allowed = "a StoreyFrame, a MatrixStructure or a LagrangianSystem"
     require(is_system, "model", value=type(model).__name__, allowed=allowed)
     chosen = _method(model, method, options)
+    has_kinks = bool(getattr(model, "hardening", ()))
+    needs_derivatives = isinstance(chosen, Proof | DualProof | GraphFollower | ImprovedFollower)
+    allowed = "auto or quasi-monte-carlo where columns yield"
+    is_possible = not (has_kinks and needs_derivatives)
+    require(is_possible, "method", value=chosen.name, allowed=allowed)
     if integrator is None:
-        is_exact = isinstance(chosen, Auto | Proof | DualProof)
+        is_exact = has_kinks or isinstance(chosen, Auto | Proof | DualProof)
         integrator = "exact" if is_exact and not isinstance(model, LagrangianSystem) else "midpoint"
     cuts = boxes(inputs, alpha)
     flow = make_flow(model, cuts.names, duration, step, integrator)
@@ -283,6 +288,9 @@ def _on_levels(bounds: Envelope, alpha: Array, which: Ints) -> Envelope:
     """Return the envelope on levels `alpha` (A,), the bounds of each copied from row `which`."""
     names = ("lower", "upper", "lower_at", "upper_at", "error")
     changes: dict[str, Any] = {name: getattr(bounds, name)[which] for name in names}
+    if (peaks := bounds.searched_peaks) is not None:
+        ends = {name: getattr(peaks, name)[which] for name in names}
+        changes["searched_peaks"] = replace(peaks, alpha=alpha, **ends)
     for name in ("inner", "outer", "least_peaks"):
         pair = getattr(bounds, name)
         changes[name] = pair and Ends(*(x[which] for x in pair))

@@ -37,12 +37,17 @@ of the velocity, by which it may be passed: so that a state just left is not met
 RESOLUTION = 2.0**-34
 """Shortest interval in which a double root is looked for: between its ends a polynomial is within
 2⁻⁷¹ of its curvature of a straight line."""
+TURN_ROUNDING = 1e-8
+"""Width in which a peak is located: its value is as exact as the square of that."""
 MAX_EVENTS = 1000
 """Events in a part of a step after which the motion has failed."""
 MAX_IMBALANCE = 1e-9
 """Energy that may be missing at the end, as a fraction of all energies that were exchanged."""
 MAX_NUMBERS = 4e6
 """Most numbers of states that are held at once: 32 MB."""
+KINDS = ("q", "drift", "shear")
+"""Outputs whose peaks are found between nodes, too."""
+AT_NODES = ("v", "a", "residual")
 RUNS, COLLAPSED, FAILED = 0, 1, 2
 
 
@@ -95,11 +100,18 @@ class YieldingFlow(Flow):
         points = np.asarray(points, float)
         per_motion = 4 * self.system.floors * len(self.time)
         chunks = np.array_split(points, -(-len(points) * per_motion // int(MAX_NUMBERS)) or 1)
-        motions = [self._outputs(chunk) for chunk in chunks]
+        motions = [self.values_and_peaks(chunk)[0] for chunk in chunks]
         return Jet.constant(np.concatenate(motions), 0)
 
-    def _outputs(self, points: Array) -> Array:
-        """Outputs at points (S, d), shape (S, T, m)."""
+    def values_and_peaks(self, points: Array) -> tuple[Array, Array]:
+        """Return trajectories (S, T, m) at points (S, d), and their largest magnitudes (S, m).
+
+        These are largest over time, of outputs of the kinds `AT_NODES` at the nodes.
+
+        Raises:
+            RefusedError: As the class.
+            StepError: Events do not end, or energy is missing.
+        """
         system, n = self.system, self.system.floors
         matrices, _ = evaluate(system, self.names, points, derivatives=False)
         named = {**system.parameters, **dict(zip(self.names, points.T, strict=True))}
@@ -114,16 +126,23 @@ class YieldingFlow(Flow):
             allowed = "forces under which no storey yields before the start"
             raise RefusedError("load", "static, and yields a storey", allowed)
         loads = list(histories(system).values())
-        edges, is_node, first, last = load_segments(loads, self.time)
         pushes = matrices.pushes(ground=system.ground is not None).value
-        rates = np.abs(np.linalg.eigvals(state_matrix(matrices).value)).max(-1)
+        fastest = float(np.abs(np.linalg.eigvals(state_matrix(matrices).value)).max())
+        parts = load_parts(loads, self.time, MAX_PHASE / max(fastest, 1e-300))
         states = np.empty((len(points), len(self.time), 4 * n))
-        ends = np.zeros((len(points), 4))
+        peaks, ends = np.zeros((len(points), 3, n)), np.zeros((len(points), 4))
         damping = np.ascontiguousarray(matrices.damping.value)
         pushes = np.ascontiguousarray(pushes)
-        _march(storeys, damping, pushes, start, rates, edges, is_node, first, last, states, ends)
+        _march(storeys, damping, pushes, start, *parts, states, peaks, ends)
         self._require_motions(points, ends)
-        return self._observed(matrices.damping.value, pushes, loads, storeys, states)
+        values = self._observed(damping, pushes, loads, storeys, states)
+        largest = np.abs(values).max(1)
+        for row, (kind, z) in enumerate(map(self.system.quantity, self.outputs)):
+            if kind in KINDS:
+                largest[:, row] = peaks[:, KINDS.index(kind), z]
+            elif kind == "ductility":
+                largest[:, row] = peaks[:, KINDS.index("drift"), z] / storeys[:, 4, z]
+        return values, largest
 
     def _require_motions(self, points: Array, ends: Array) -> None:
         """Refuse motions that collapse, whose events do not end or whose energy is not balanced.
@@ -173,35 +192,46 @@ class YieldingFlow(Flow):
         return np.stack([by_kind[kind][..., z] for kind, z in quantities], -1)
 
 
-def load_segments(loads: Sequence[History], time: Array) -> tuple[Array, Mask, Array, Array]:
+def load_parts(
+    loads: Sequence[History], time: Array, longest: float
+) -> tuple[Array, Mask, Array, Array]:
     """Return times (E + 1,) between which L loads are linear, and their values there.
 
-    The times are the nodes and all samples. Which are nodes comes second, then the values at the
-    beginning and at the end of each segment, shape (E, L), between jumps.
+    The times are the nodes, all samples, and others so that no part is longer than `longest`.
+    Which are nodes comes second, then the values at the beginning and at the end of each part,
+    shape (E, L), between jumps.
     """
     step = time[1]
     samples = [load.start + np.arange(len(load.samples)) * load.step for load in loads]
     inner = np.unique(np.concatenate([np.zeros(0), *samples]))
     inner = inner[(inner > 0) & (inner < time[-1])]
-    nearest = np.round(inner / step) * step
-    inner = inner[np.abs(inner - nearest) > SAME * step]
+    inner = inner[np.abs(inner - np.round(inner / step) * step) > SAME * step]
     inner = inner[np.diff(inner, prepend=-1.0) > SAME * step]
     edges = np.sort(np.concatenate([time, inner]))
-    first, last = np.zeros((2, len(edges) - 1, len(loads)))
+    counts = np.ceil(np.diff(edges) / longest).astype(int)
+    segment = np.repeat(np.arange(len(counts)), counts)  # of each part
+    number = np.arange(len(segment)) - np.repeat(np.cumsum(counts) - counts, counts)
+    share = np.stack([number, number + 1]) / counts[segment]
+    first, last = np.zeros((2, len(segment), len(loads)))
     for c, load in enumerate(loads):
-        first[:, c], last[:, c] = load.envelope(edges[:-1]), load.envelope(edges[1:], -1.0)
-    return edges, np.isin(edges, time), first, last
+        ends = load.envelope(edges[:-1])[segment], load.envelope(edges[1:], -1.0)[segment]
+        first[:, c], last[:, c] = ends[0] + share * (ends[1] - ends[0])
+    is_node = np.append(True, (number + 1 == counts[segment]) & np.isin(edges, time)[segment + 1])
+    times = edges[:-1][segment] + share[0] * np.diff(edges)[segment]
+    return np.append(times, edges[-1]), is_node, first, last
 
 
 @compiled
 def _march(
-    storeys: Array, damping: Array, pushes: Array, start: Array, rates: Array, edges: Array,
-    is_node: Mask, first: Array, last: Array, states: Array, ends: Array,
+    storeys: Array, damping: Array, pushes: Array, start: Array, edges: Array, is_node: Mask,
+    first: Array, last: Array, states: Array, peaks: Array, ends: Array,
 ) -> None:  # fmt: skip
-    """Write states (S, T, 4n) and ends (S, 4): status, time, storey and imbalance of energy.
+    """Write states (S, T, 4n), peaks (S, 3, n) and ends (S, 4): status, time, storey, imbalance.
+
+    Peaks are the largest magnitudes of displacements, drifts and shears.
 
     `storeys` (S, 5, n): mass, stiffness, softening by weight, hardening, yield drift; `damping`
-    (S, n, n) in N s/m, `pushes` (S, n, L) by loads, `start` (S, 2n), `rates` (S,) largest |λ|.
+    (S, n, n) in N s/m, `pushes` (S, n, L) by loads, `start` (S, 2n); parts as of `load_parts`.
     """
     n, n_loads = storeys.shape[2], pushes.shape[2]
     # coefficients by powers of the fraction of a part: q, v, drifts, damping forces
@@ -210,63 +240,50 @@ def _march(
     for s in range(len(storeys)):
         mass, k, softening, hardening, yield_drift = storeys[s]
         q, v = start[s, :n].copy(), start[s, n:].copy()
-        plastic, dissipated, direction = np.zeros((3, n))
+        plastic, dissipated, direction = np.zeros((3, n))  # direction 0: elastic, ±1: yields
         for z in range(n):  # loaded in one direction before the start
-            drift = _drift(q, z)
-            plastic[z] = drift - min(max(drift, -yield_drift[z]), yield_drift[z])
-        before = _energy(storeys[s], q, v, plastic)
-        works = np.zeros(2)  # of loads and of damping
+            d = _drift(q, z)
+            plastic[z] = d - min(max(d, -yield_drift[z]), yield_drift[z])
+        before, works, node = _energy(storeys[s], q, v, plastic), np.zeros(2), 1
         states[s, 0] = np.concatenate((q, v, plastic, dissipated))
-        node = 1
         for e in range(len(edges) - 1):
-            length = edges[e + 1] - edges[e]
-            parts = max(1, math.ceil(rates[s] * length / MAX_PHASE))
-            for part in range(parts):
-                begun = 0.0  # fraction of the part that is done
-                for event in range(MAX_EVENTS + 1):
-                    h, share = length / parts * (1 - begun), (part + begun) / parts
-                    for i in range(n):
-                        load[i] = rise[i] = 0.0
-                        for c in range(n_loads):
-                            change = last[e, c] - first[e, c]
-                            load[i] += pushes[s, i, c] * (first[e, c] + share * change)
-                            rise[i] += pushes[s, i, c] * change * (1 - begun) / parts
-                        is_yielding = direction[i] != 0
-                        tangent[i] = (hardening[i] if is_yielding else 1.0) * k[i] - softening[i]
-                        at_rest = direction[i] * yield_drift[i] if is_yielding else -plastic[i]
-                        constant[i] = (1 - hardening[i]) * k[i] * at_rest
-                    terms = _expand(
-                        mass, damping[s], tangent, constant, load, rise, h, q, v, series
-                    )
-                    at, z = _first_event(series, terms, plastic, direction, yield_drift, hardening)
-                    _add_works(mass, load, rise, series, terms, at, h, works)
-                    for i in range(n):
-                        q[i], v[i] = (
-                            _value(series[0, i], terms, at),
-                            _value(series[1, i], terms, at),
-                        )
-                    for i in range(n):
-                        if direction[i] != 0:
-                            flow = _drift(q, i) - direction[i] * yield_drift[i] - plastic[i]
-                            plastic[i] += flow
-                            work = (1 - hardening[i]) * k[i] * yield_drift[i] * abs(flow)
-                            dissipated[i] += work
-                    if z < 0:
-                        break
-                    begun += at * (1 - begun)
-                    if direction[z] != 0:
-                        direction[z] = 0.0
-                    else:
-                        direction[z] = math.copysign(1.0, _drift(q, z) - plastic[z])
-                        if softening[z] > 0 and hardening[z] * k[z] <= softening[z]:
-                            ends[s, 0] = COLLAPSED
-                    if event == MAX_EVENTS:
-                        ends[s, 0] = FAILED
-                    if ends[s, 0] != RUNS:
-                        ends[s, 1], ends[s, 2] = edges[e] + length * (part + begun) / parts, z
-                    if ends[s, 0] != RUNS or begun >= 1:
-                        break
+            length, begun = edges[e + 1] - edges[e], 0.0  # fraction of the part that is done
+            for event in range(MAX_EVENTS + 1):
+                for i in range(n):
+                    load[i] = rise[i] = 0.0
+                    for c in range(n_loads):
+                        change = last[e, c] - first[e, c]
+                        load[i] += pushes[s, i, c] * (first[e, c] + begun * change)
+                        rise[i] += pushes[s, i, c] * (1 - begun) * change
+                    spring = direction[i] * yield_drift[i] if direction[i] != 0 else -plastic[i]
+                    constant[i] = (1 - hardening[i]) * k[i] * spring
+                    tangent[i] = (hardening[i] if direction[i] != 0 else 1.0) * k[i] - softening[i]
+                h = length * (1 - begun)
+                terms = _expand(mass, damping[s], tangent, constant, load, rise, h, q, v, series)
+                at, z = _first_event(series, terms, plastic, direction, yield_drift, hardening)
+                _add_works(mass, load, rise, series, terms, at, h, works)
+                _add_peaks(series, terms, at, tangent + softening, constant, peaks[s])
+                for i in range(n):
+                    q[i] = _value(series[0, i], terms, at)
+                    v[i] = _value(series[1, i], terms, at)
+                    if direction[i] != 0:
+                        flow = _drift(q, i) - direction[i] * yield_drift[i] - plastic[i]
+                        plastic[i] += flow
+                        force = (1 - hardening[i]) * k[i] * yield_drift[i]
+                        dissipated[i] += force * abs(flow)
+                begun += at * (1 - begun)
+                if z < 0 or begun >= 1:
+                    break
+                if direction[z] != 0:
+                    direction[z] = 0.0
+                else:
+                    direction[z] = math.copysign(1.0, _drift(q, z) - plastic[z])
+                    if softening[z] > 0 and hardening[z] * k[z] <= softening[z]:
+                        ends[s, 0] = COLLAPSED
+                if event == MAX_EVENTS:
+                    ends[s, 0] = FAILED
                 if ends[s, 0] != RUNS:
+                    ends[s, 1], ends[s, 2] = edges[e] + length * begun, z
                     break
             if ends[s, 0] != RUNS:
                 break
@@ -421,6 +438,45 @@ def _energy(storeys: Array, q: Array, v: Array, plastic: Array) -> float:
 def _drift(q: Array, z: int) -> float:
     """Return the drift of a storey, counted from 0."""
     return q[z] - q[z - 1] if z else q[z]
+
+
+@compiled
+def _add_peaks(
+    series: Array, terms: int, end: float, stiffness: Array, constant: Array, peaks: Array
+) -> None:
+    """Raise largest magnitudes of q, drifts and shears (3, n) by those up to `end` of a part."""
+    for i in range(len(constant)):
+        shift, stretch = 0.0, 0.0  # bounds of how far q and the drift move from their start
+        for term in range(1, terms):
+            shift += abs(series[0, i, term])
+            stretch += abs(series[2, i, term])
+        if abs(series[0, i, 0]) + shift > peaks[0, i]:
+            for place in (0.0, _turn(series[0, i], terms, end), end):
+                peaks[0, i] = max(peaks[0, i], abs(_value(series[0, i], terms, place)))
+        force = abs(stiffness[i] * series[2, i, 0] + constant[i]) + stiffness[i] * stretch
+        if abs(series[2, i, 0]) + stretch > peaks[1, i] or force > peaks[2, i]:
+            for place in (0.0, _turn(series[2, i], terms, end), end):
+                drift = _value(series[2, i], terms, place)
+                peaks[1, i] = max(peaks[1, i], abs(drift))
+                peaks[2, i] = max(peaks[2, i], abs(stiffness[i] * drift + constant[i]))
+
+
+@compiled
+def _turn(polynomial: Array, terms: int, end: float) -> float:
+    """Return where a polynomial's slope changes its sign between 0 and `end`, else `end`."""
+    low, high, middle = 0.0, end, end
+    while high - low > TURN_ROUNDING:
+        slope = 0.0
+        for term in range(terms - 1, 0, -1):
+            slope = slope * middle + term * polynomial[term]
+        if polynomial[1] * slope < 0:
+            high = middle
+        elif middle == end:
+            return end
+        else:
+            low = middle
+        middle = (low + high) / 2
+    return middle
 
 
 @compiled

@@ -6,7 +6,8 @@
 2. A guarantee with a gap of more than a tenth of a peak is not the only answer: the improved
    follower looks for motions that reach more. Where a named tolerance is not proved, it estimates
    the envelope, and proved bounds stand outside it.
-3. Without a proof the follower remains.
+3. Without a proof the follower remains, and without derivatives, where columns yield, a search of
+   peaks.
 """
 
 from __future__ import annotations
@@ -22,10 +23,12 @@ from alphacut.frame.bounds.model_error import MAX_PARAMETERS
 from alphacut.frame.boxes import DEFAULT_TOLERANCE, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import LinearFlow, exact_flow
+from alphacut.frame.dynamics.yielding import YieldingFlow
 from alphacut.frame.envelope import Ends, Envelope
 from alphacut.frame.methods.dual import DualProof
 from alphacut.frame.methods.improved_follower import ImprovedFollower, PassBounds
 from alphacut.frame.methods.proof import Proof
+from alphacut.frame.methods.sampled import PeakSearch
 from alphacut.frame.numbers import WIDE
 from alphacut.fuzzy.arrays import Array, Mask
 from alphacut.fuzzy.progress_bar import Progress
@@ -80,6 +83,9 @@ class Auto:
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
         """Return the envelope on all levels, by a proof if possible; its first note says why."""
         tolerance = flow.tolerance(self.tolerance)
+        if isinstance(flow.flow, YieldingFlow):
+            found = PeakSearch().run(flow, progress)
+            return _noted(found, f"{PeakSearch.name}: motions of columns that yield have kinks")
         if not isinstance(flow.flow, LinearFlow):
             follower = ImprovedFollower(0.7 * tolerance, seed=self.seed)
             return _noted(follower.run(flow, progress), f"{follower.name}: not linear")

@@ -1,20 +1,25 @@
-"""Sampled motions: the envelope of a quasi-random sample, and what one finds beyond bounds."""
+"""Envelopes by motions alone: quasi-random ones or a search of peaks; what others find beyond."""
 
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 
 from alphacut.frame.boxes import UnitFlow
+from alphacut.frame.dynamics.yielding import YieldingFlow
 from alphacut.frame.envelope import Envelope
 from alphacut.fuzzy.arrays import Array, Ints
+from alphacut.fuzzy.campaign.call import Call, SpentError
+from alphacut.fuzzy.campaign.campaign import Campaign
+from alphacut.fuzzy.plans.design import bounds_of_samples
+from alphacut.fuzzy.plans.single_linkage import MIN_SAMPLES, SEED, SingleLinkage
 from alphacut.fuzzy.progress_bar import Progress, subprogress
 from alphacut.fuzzy.refused import checked_number
 from alphacut.fuzzy.result import Nature
-from alphacut.fuzzy.sets.boxes import chebyshev_points, corners
+from alphacut.fuzzy.sets.boxes import Domain, chebyshev_points, corners
 
 MAX_NUMBERS = 16e6
 """Most numbers of trajectories at a time: 128 MB."""
@@ -22,6 +27,8 @@ BATCH = 256
 """Most trajectories at a time."""
 SAMPLES = 64
 """Independent points of a kind on each level."""
+SKIPPED = 100_003
+"""Points of the sequence between those of two levels, which a search does not reach."""
 SAFETY = 2.0
 """Factor on what they find beyond the bounds, and on the gain that models still predict."""
 
@@ -71,6 +78,83 @@ class Sampled:
         )
 
 
+@dataclass(frozen=True)
+class PeakSearch:
+    """Peaks by multi-level single linkage, and the band that all motions made attain.
+
+    For columns that yield, whose motions have kinks. Peaks of magnitudes are estimated where both
+    their bounds meet the stopping rule (Boender, Rinnooy Kan 1987), though they may lie at kinks,
+    else attained. Their error is `SAFETY` times what independent motions find beyond them, and
+    `tolerance` more.
+
+    Args:
+        tolerance: Least error, as a fraction of each peak: descents stall at kinks.
+        budget: Most motions of the search.
+    """
+
+    name: ClassVar[str] = "single-linkage"
+    tolerance: float = 5e-3
+    budget: int = 20_000
+
+    def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
+        """Return the attained envelope of all outputs on all levels, with searched peaks."""
+        start_time, cuts, outputs = time.perf_counter(), flow.boxes, tuple(map(str, flow.outputs))
+        domain, motion = Domain(cuts.inputs, cuts.alpha.tolist()), flow.flow
+        assert isinstance(motion, YieldingFlow)
+        bounds = np.full((len(cuts.alpha), len(flow.time), len(outputs), 2), -np.inf)
+        at = np.zeros((*bounds.shape, len(cuts.names)))
+
+        def motion_peaks(**inputs: Array) -> dict[str, Array]:
+            """Return the peaks (S,) of motions by output, after the motions widened the band."""
+            points = np.column_stack([inputs[name] for name in cuts.names])
+            values, peaks = motion.values_and_peaks(points)
+            for level, inside in enumerate(domain.inside(points)):
+                for row in np.flatnonzero(inside):
+                    signed = np.stack([-values[row], values[row]], -1)
+                    better = signed > bounds[level]
+                    bounds[level][better], at[level][better] = signed[better], points[row]
+            return dict(zip(outputs, peaks.T, strict=True))
+
+        call = Call(motion_peaks, cuts.names, vectorised=True)
+        motion_peaks(**dict(zip(cuts.names, cuts.probes.T, strict=True)))  # raises what they do
+        campaign = Campaign(call, budget=self.budget, progress=progress)
+        campaign(cuts.nominal[None])
+        linkage, note = SingleLinkage(campaign, domain, outputs, has_kinks=True), ""
+        try:
+            if linkage.cuts:
+                widest, rng = linkage.cuts[0], np.random.default_rng([SEED, 0])
+                linkage.run(rng.random((MIN_SAMPLES, len(widest.uncertain_inputs))))
+                note = linkage.summary()
+        except SpentError as spent:
+            note = str(spent)
+        searched, motions = bounds_of_samples(domain, campaign.samples, self.name), len(campaign)
+        excess = np.zeros(searched.lower.shape)
+        for level in range(len(cuts.alpha)):
+            points = spread_points(*cuts.unit_ends(level), SAMPLES, SKIPPED * (level + 1))
+            peaks = motion.values_and_peaks(cuts.to_physical(points))[1]
+            below, above = (
+                searched.lower[level] - peaks.min(0),
+                peaks.max(0) - searched.upper[level],
+            )
+            excess[level], motions = (
+                np.maximum(np.maximum(below, above), 0.0),
+                motions + len(points),
+            )
+        is_estimate = [not linkage.cuts or linkage.is_estimate(name) for name in outputs]
+        natures = tuple(Nature.ESTIMATED if x else Nature.ATTAINED for x in is_estimate)
+        error = np.where(is_estimate, SAFETY * excess + self.tolerance * searched.upper, 0.0)
+        return flow.envelope(
+            bounds,
+            at,
+            method=self.name,
+            nature=Nature.ATTAINED,
+            evaluations=motions,
+            seconds=time.perf_counter() - start_time,
+            searched_peaks=replace(searched, error=error, natures=natures),
+            notes=(note,) if note else (),
+        )
+
+
 def independent_excess(flow: UnitFlow, bounds: Array, progress: Progress) -> tuple[Array, int]:
     """Return how far independent motions exceed the bounds on each level, and their number.
 
@@ -79,7 +163,7 @@ def independent_excess(flow: UnitFlow, bounds: Array, progress: Progress) -> tup
     """
     largest, count = np.zeros((len(bounds), len(flow.outputs))), 0
     for level in range(len(bounds)):
-        points = spread_points(*flow.boxes.unit_ends(level), SAMPLES, 100_003 * (level + 1))
+        points = spread_points(*flow.boxes.unit_ends(level), SAMPLES, SKIPPED * (level + 1))
         values, _ = largest_values(flow, points)
         largest[level] = np.maximum((values - bounds[level]).max((0, 2)), 0.0)
         count += len(points)

@@ -17,11 +17,12 @@ from typing import Any
 
 import numpy as np
 
+from alphacut.frame.dynamics.yielding import AT_NODES
 from alphacut.frame.envelope import Envelope, within_steps
 from alphacut.frame.structures.quantities import output_of
 from alphacut.fuzzy.arrays import Array, Mask
 from alphacut.fuzzy.refused import checked_number, require, require_choice
-from alphacut.fuzzy.result import Ends, Nature
+from alphacut.fuzzy.result import Bounds, Ends, Nature
 
 ANY = "any of them"  # name of the event that any of several limits is exceeded
 PEAK_BOUNDS = ("lower", "upper", "error", "reached", "least_lower", "least_upper")  # of a `Peak`
@@ -109,6 +110,12 @@ def _peak_of(envelope: Envelope, name: str) -> Peak:
     least_lower, least_upper = np.full_like(upper, smallest), np.full_like(upper, np.inf)
     if envelope.least_peaks is not None and not is_signed:
         least_lower, least_upper = (end[:, k] for end in envelope.least_peaks)
+    between_nodes = float(bound[0] - bound_at_nodes[0].max())
+    if envelope.searched_peaks is not None and not is_signed:
+        is_at_nodes = name.rstrip("0123456789") in AT_NODES
+        return _searched_peak(
+            envelope.searched_peaks, k, is_at_nodes * (bound - bound_at_nodes.max(1))
+        )
     if is_proved:
         lower, upper = np.maximum(lower, least_lower), upper + above
     return Peak(
@@ -120,9 +127,26 @@ def _peak_of(envelope: Envelope, name: str) -> Peak:
         least_lower=least_lower,
         least_upper=least_upper,
         nature=nature,
-        between_nodes=float(bound[0] - bound_at_nodes[0].max()),
+        between_nodes=between_nodes,
         is_signed=is_signed,
         reached_at=_inputs_at_peak(envelope, k, name),
+    )
+
+
+def _searched_peak(found: Bounds, k: int, between: Array) -> Peak:
+    """Return the fuzzy peak of output k by a search; `between` (A,) may be added between nodes."""
+    lower, upper = found.lower[:, k], found.upper[:, k]
+    return Peak(
+        alpha=found.alpha,
+        lower=lower,
+        upper=upper,
+        error=found.error[:, k] + between,
+        reached=upper,
+        least_lower=np.zeros_like(lower),
+        least_upper=lower + between,
+        nature=found.natures[k],
+        between_nodes=float(between[0]),
+        reached_at=dict(zip(found.inputs, found.upper_at[0, k].tolist(), strict=True)),
     )
 
 

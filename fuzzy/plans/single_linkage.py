@@ -111,6 +111,7 @@ class BoundSearch:
         plateau_samples: Samples on plateaus.
         plateaus: Values of plateaus from which a descent has started.
         optima: W different results of descents, in any cut, that are optima of this cut.
+        has_kinks: Whether kinks are expected, and the best optimum counts though it lies at one.
     """
 
     started: set[int] = field(default_factory=set)
@@ -118,6 +119,7 @@ class BoundSearch:
     plateau_samples: int = 0
     plateaus: list[float] = field(default_factory=list)
     optima: list[Optimum] = field(default_factory=list)
+    has_kinks: bool = False
 
     @property
     def best(self) -> Optimum:
@@ -133,7 +135,7 @@ class BoundSearch:
     @property
     def is_smooth(self) -> bool:
         """Whether the output is smooth at the best optimum, so that the descent did not stall."""
-        return bool(self.optima) and self.best.is_smooth
+        return bool(self.optima) and (self.has_kinks or self.best.is_smooth)
 
     def n_optima_off_corners(self, cut: CutSearch) -> int:
         """Return the number of optima that are no corner of the cut."""
@@ -168,7 +170,7 @@ class BoundSearch:
 
 
 class SingleLinkage:
-    """Search of some outputs' bounds in all cuts of a domain.
+    """Search of some outputs' bounds in all cuts of a domain; they may be expected to have kinks.
 
     Attributes:
         cuts: Cuts that have a width, from the widest on.
@@ -176,12 +178,15 @@ class SingleLinkage:
         states: State of each bound by the level of its cut.
     """
 
-    def __init__(self, campaign: Campaign, domain: Domain, outputs: tuple[str, ...]) -> None:
+    def __init__(
+        self, campaign: Campaign, domain: Domain, outputs: tuple[str, ...], has_kinks: bool = False
+    ) -> None:
         self.campaign, self.outputs = campaign, outputs
         self.cuts = list(cuts_with_width(campaign, domain))[::-1]
         self.bounds = [Bound(output, sign) for output, sign in product(outputs, (1.0, -1.0))]
         self.states = {
-            (cut.level, bound): BoundSearch() for cut, bound in product(self.cuts, self.bounds)
+            (cut.level, bound): BoundSearch(has_kinks=has_kinks)
+            for cut, bound in product(self.cuts, self.bounds)
         }
         # uniform samples of all cuts, and the level of the cut in which each was drawn
         self._points: Array = np.empty((0, len(domain.names)))
