@@ -99,7 +99,7 @@ class PeakSearch:
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
         """Return the attained envelope of all outputs on all levels, with searched peaks."""
         start_time, cuts, outputs = time.perf_counter(), flow.boxes, tuple(map(str, flow.outputs))
-        domain, motion = Domain(cuts.inputs, cuts.alpha.tolist()), flow.flow
+        domain, motion = Domain(cuts.inputs, tuple(cuts.alpha)), flow.flow
         assert isinstance(motion, YieldingFlow)
         bounds = np.full((len(cuts.alpha), len(flow.time), len(outputs), 2), -np.inf)
         at = np.zeros((*bounds.shape, len(cuts.names)))
@@ -132,14 +132,9 @@ class PeakSearch:
         for level in range(len(cuts.alpha)):
             points = spread_points(*cuts.unit_ends(level), SAMPLES, SKIPPED * (level + 1))
             peaks = motion.values_and_peaks(cuts.to_physical(points))[1]
-            below, above = (
-                searched.lower[level] - peaks.min(0),
-                peaks.max(0) - searched.upper[level],
-            )
-            excess[level], motions = (
-                np.maximum(np.maximum(below, above), 0.0),
-                motions + len(points),
-            )
+            below, above = searched.lower[level] - peaks.min(0), peaks.max(0) - searched.upper[level]
+            excess[level] = np.maximum(np.maximum(below, above), 0.0)
+            motions += len(points)
         is_estimate = [not linkage.cuts or linkage.is_estimate(name) for name in outputs]
         natures = tuple(Nature.ESTIMATED if x else Nature.ATTAINED for x in is_estimate)
         error = np.where(is_estimate, SAFETY * excess + self.tolerance * searched.upper, 0.0)
