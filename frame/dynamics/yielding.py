@@ -107,10 +107,6 @@ class YieldingFlow(Flow):
         """Return trajectories (S, T, m) at points (S, d), and their largest magnitudes (S, m).
 
         These are largest over time, of outputs of the kinds `AT_NODES` at the nodes.
-
-        Raises:
-            RefusedError: As the class.
-            StepError: Events do not end, or energy is missing.
         """
         system, n = self.system, self.system.floors
         matrices, _ = evaluate(system, self.names, points, derivatives=False)
