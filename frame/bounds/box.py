@@ -116,44 +116,45 @@ class Box:
             )
         return values_and_errors[0], values_and_errors[1]
 
-    def centre_motion(self) -> tuple[Array, Array, Array]:
+    def centre_motion(self, outputs: Ints | None = None) -> tuple[Array, Array, Array]:
         """Exact outputs in the middle of the box, their rounding and their straying, (T, m) each.
 
         The last two are bounds; straying is that from a straight line in the step to each node.
+        Outputs are those of some numbers (m,), all unless given.
         """
+        outputs = np.arange(len(self.structure.order)) if outputs is None else outputs
         modal, count = self._modal(np.zeros((1, len(self.active)))), len(self.time)
         sigma, point = modal.sigma[0], np.zeros(count, int)
         loads = {name: load_at_nodes(sigma, x, self.time) for name, x in self.loads.items()}
         columns = [
-            outputs_at(modal, point, np.full(count, output), self.time, loads)
-            for output in range(len(self.structure.order))
+            outputs_at(modal, point, np.full(count, output), self.time, loads) for output in outputs
         ]
         value, error = (np.stack(column, -1) for column in zip(*columns, strict=True))
-        return value, error, self._line_deviation(modal)
+        return value, error, self._line_deviation(modal, outputs)
 
-    def peak_over_time(self, unit: Array) -> Array:
-        """Upper bound of each output's magnitude, (m,), at one point (d,), between nodes too."""
+    def peak_over_time(self, unit: Array, outputs: Ints | None = None) -> Array:
+        """Upper bound of outputs' magnitudes, (m,), at one point (d,), between nodes too."""
         point, steps = self.inputs(unit), SUBSTEPS * (len(self.time) - 1)
         time = np.linspace(self.time[0], self.time[-1], steps + 1)
         motion = replace(self, time=time, low=point, high=point)
-        value, error, deviation = motion.centre_motion()
+        value, error, deviation = motion.centre_motion(outputs)
         return within_steps((np.abs(value) + error).T, deviation.T).max(1)
 
     def _modal(self, unit: Array) -> Modal:
         return modes_at(self.system, self.structure, self.names, self.inputs(unit), unit)
 
-    def _line_deviation(self, modal: Modal) -> Array:
+    def _line_deviation(self, modal: Modal, outputs: Ints) -> Array:
         """Bound of how far a motion strays from straight lines in the step to a node, (T, m)."""
-        outputs, orders = np.arange(len(self.structure.order)), set(map(int, self.structure.order))
+        orders = self.structure.order[outputs].tolist()
         deviation = np.zeros((len(self.time), len(outputs)))
         read = np.abs(modal.output_coefficients(np.zeros_like(outputs), outputs)[0])
         for k, sigma in enumerate(modal.sigma[0]):
             grid = Grid(np.array([sigma.imag]), np.array([-sigma.real / sigma.imag]))
-            oscillator = Oscillators(grid, self.loads, self.time, orders)
+            oscillator = Oscillators(grid, self.loads, self.time, set(orders))
             for source, share in modal.share.items():
-                for o in outputs:
-                    wave = oscillator.responses(source, int(self.structure.order[o]))
-                    deviation[:, o] += read[o, k] * abs(share[0, k]) * wave.line_deviation
+                waves = {order: oscillator.responses(source, order) for order in set(orders)}
+                for o, order in enumerate(orders):
+                    deviation[:, o] += read[o, k] * abs(share[0, k]) * waves[order].line_deviation
         return deviation
 
 

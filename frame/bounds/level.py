@@ -213,19 +213,36 @@ class OutputBounds:
         self.out[1, nodes] = np.maximum(self.out[1, nodes], new[1])
         self.out[0, nodes] = np.minimum(self.out[0, nodes], new[0])
 
+    def improve_peak(self, nodes: Ints, effort: Effort) -> None:
+        """Lower the highest bound of nodes (J,): the highest first, until one remains the highest.
+
+        Lower bounds of others would not lower that of the peak.
+        """
+        peak = -np.inf
+        for node in nodes[np.argsort(-self.out[0, nodes], kind="stable")]:
+            if self.out[0, node] <= peak:
+                break
+            self.improve(np.array([node]), effort)
+            peak = max(peak, float(self.out[0, node]))
+
 
 def improve_all(
-    jobs: Sequence[tuple[OutputBounds, Ints, Effort]], pool: ThreadPoolExecutor, tick: Progress
+    jobs: Sequence[tuple[OutputBounds, Ints, Effort]],
+    pool: ThreadPoolExecutor,
+    tick: Progress,
+    *,
+    peaks_alone: bool = False,
 ) -> None:
     """Improve bounds at nodes by threads, in blocks; each node begins where the last one ended.
 
-    Efforts are fixed before, so that no bound depends on which thread ends first.
+    Efforts are fixed before, so that no bound depends on which thread ends first. With
+    `peaks_alone` the highest bound of each job is lowered, and others for its sake.
     """
     futures = [
-        pool.submit(bounds.improve, block, effort)
+        pool.submit(bounds.improve_peak if peaks_alone else bounds.improve, block, effort)
         for bounds, nodes, effort in jobs
         if len(nodes)
-        for block in np.array_split(nodes, -(-len(nodes) // BLOCK))
+        for block in np.array_split(nodes, 1 if peaks_alone else -(-len(nodes) // BLOCK))
     ]
     for done, future in enumerate(futures, start=1):
         future.result()

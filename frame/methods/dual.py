@@ -91,6 +91,11 @@ class DualProof:
         """
         return prove(self, flow, progress)
 
+    @property
+    def bounds_peaks_alone(self) -> bool:
+        """Whether no bound below a peak is worth any work."""
+        return self.below >= 1
+
     def peak_gap(self, scale: Array, peak: Array) -> Array:
         """Return the gap at peaks that suffices, shape (m,)."""
         del scale
@@ -118,19 +123,24 @@ class DualProof:
 
     def bounds(self, flow: LinearFlow, boxes: Boxes, goal: Goal) -> list[Answer]:
         """Return bounds on each level of a box, or the refusal where modes are not enclosed."""
-        answers = list[Answer]()
+        answers, wider = list[Answer](), np.full(goal.outer.shape[1:], np.inf)
         for k, (low, high) in enumerate(zip(boxes.lower, boxes.upper, strict=True)):
             box = Box(flow.system, boxes.names, flow.time, low, high)
             try:
                 is_fuzzy = (high > low).any()
-                answers.append(self._relaxed(flow, box, goal, k) if is_fuzzy else _exact(box))
+                found = self._relaxed(flow, box, goal, k, wider) if is_fuzzy else _exact(box)
+                answers.append(found)
+                wider = found.outer  # what holds on a wider level holds on those inside it
             except UnprovedError as refusal:
                 answers.append(refusal)
         return answers
 
-    def _relaxed(self, flow: LinearFlow, box: Box, goal: Goal, k: int) -> BoxBounds:
-        """Bounds on level k by Lagrangian relaxation, and what motions at the maximisers reach."""
-        needed, outer = goal.needed[k], goal.outer[k].copy()
+    def _relaxed(self, flow: LinearFlow, box: Box, goal: Goal, k: int, wider: Array) -> BoxBounds:
+        """Bounds on level k by Lagrangian relaxation, and what motions at the maximisers reach.
+
+        Bounds `wider` (T, m, 2) of a wider level are known.
+        """
+        needed, outer = goal.needed[k], np.minimum(goal.outer[k], wider)
         nodes, outputs = np.flatnonzero(needed.any((1, 2))), np.flatnonzero(needed.any((0, 2)))
         is_complete = bool(needed.all())
         gap = (self.gap if is_complete else self.peaks) * goal.peak
@@ -140,15 +150,20 @@ class DualProof:
             index = int(np.searchsorted(outputs, o)), int(s)
             problems[o, s] = OutputBounds.initial(level, *index, gap[o], goal.incumbent[k, o, s])
             problems[o, s].out[0] = outer[nodes, o, s]
+        has_bounds = self.bounds_peaks_alone and is_complete and bool(np.isfinite(wider).all())
+        if has_bounds:  # the first pass is then of nodes whose bounds lie above the centre's peak
+            centre = flow.values(box.inputs(np.zeros((1, len(box.active)))))[0]
+            for (o, s), problem in problems.items():
+                problem.out[1] = centre[nodes, o] * (-1.0, 1.0)[s]
         with ThreadPoolExecutor(goal.workers) as pool:
             # 1. find multipliers with low bounds, and inputs with high values of the models
-            self._minimise(problems, goal, box, pool, needed[nodes], is_complete)
+            self._minimise(problems, goal, box, pool, needed[nodes], is_complete, float(has_bounds))
             unit = np.zeros((*needed.shape, len(box.active)))
             for (o, s), problem in problems.items():
                 outer[nodes, o, s], unit[nodes, o, s] = problem.out[0], problem.at
             # 2. raise the incumbents to what the exact motions at these inputs reach
             node, output, side = np.nonzero(needed)
-            value, error = box.reached(unit[needed], node, output)
+            value, error = self._reached(box, unit[needed], node, output)
             inner, attained_error = np.full(needed.shape, -np.inf), np.zeros(needed.shape[:2])
             inner[needed] = np.where(side, value, -value) - error
             np.maximum.at(attained_error, (node, output), 2 * error)
@@ -183,6 +198,14 @@ class DualProof:
             facts={"single_modes": len(level.models.oscillators)},
         )
 
+    def _reached(self, box: Box, unit: Array, node: Ints, output: Ints) -> tuple[Array, Array]:
+        """Exact values and their rounding at points (S, d), most of which may be the centre."""
+        is_moved = unit.any(1)
+        found = np.stack([x[node, output] for x in box.centre_motion()[:2]])
+        if is_moved.any():
+            found[:, is_moved] = box.reached(unit[is_moved], node[is_moved], output[is_moved])
+        return found[0], found[1]
+
     def _minimise(
         self,
         problems: Problems,
@@ -191,8 +214,12 @@ class DualProof:
         pool: ThreadPoolExecutor,
         needed: Mask,
         is_complete: bool,
+        first_slack: float,
     ) -> None:
-        """Minimise the dual functions of all bounds that are asked for, `needed` (J, m, 2)."""
+        """Minimise the dual functions of all bounds that are asked for, `needed` (J, m, 2).
+
+        `first_slack` is what the gap of a first pass may be below the peak, as `below`.
+        """
         first = next(iter(problems.values()))
         first.improve(np.arange(0), first.effort(1, 1))  # compiles before there are threads
         if not is_complete:
@@ -201,13 +228,14 @@ class DualProof:
                 (problem, np.flatnonzero(needed[:, o, s]), problem.effort(*efforts))
                 for (o, s), problem in problems.items()
             ]
-            return improve_all(jobs, pool, lambda done: None)
+            alone = self.bounds_peaks_alone
+            return improve_all(jobs, pool, lambda done: None, peaks_alone=alone)
         # a first pass shows the peaks, a second halves cells where gaps are wide, a third does so
         # further where bounds lie above a peak
         cells_at_peaks = int(numbers.CELLS_ABOVE_PEAK * self.slabs)
         for number, (cells, steps, slack, multiple) in enumerate(
             (
-                (1, 1, 0.0, 0.0),
+                (1, 1, first_slack, 0.0),
                 (self.slabs, self.steps, self.below, numbers.REMAINDER_MULTIPLE),
                 (cells_at_peaks, self.steps, 1.0, numbers.REMAINDER_MULTIPLE_AT_PEAKS),
             )
@@ -216,7 +244,8 @@ class DualProof:
                 (problem, problem.open_nodes(slack), problem.effort(cells, steps, slack, multiple))
                 for problem in problems.values()
             ]
-            improve_all(jobs, pool, subprogress(goal.tick, *WORK_OF_PASSES[number : number + 2]))
+            tick = subprogress(goal.tick, *WORK_OF_PASSES[number : number + 2])
+            improve_all(jobs, pool, tick, peaks_alone=self.bounds_peaks_alone and number == 2)
             if number == 0 and not goal.last:
                 self._require_narrow(problems, box, goal.peak)
 
@@ -245,7 +274,7 @@ class DualProof:
         for _ in range(int(numbers.LEAST_PEAK_DESCENTS)):
             tried = np.unique((unit[:, None] * moves).reshape(-1, d), axis=0)
             unit = tried[np.abs(flow.values(box.inputs(tried))).max(1).argmin(0)]
-        reached = np.array([box.peak_over_time(unit[o])[o] for o in range(count)])
+        reached = np.array([box.peak_over_time(unit[o], np.array([o]))[0] for o in range(count)])
         return Ends(np.array(bounds), reached)
 
 

@@ -10,7 +10,10 @@ degree N, which need no proof; `enclosed_block` bounds what they miss.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from hashlib import sha256
 from math import comb
+from threading import Lock
 
 import numpy as np
 
@@ -34,6 +37,8 @@ ROUNDS = 60
 SLACK = 1.001
 """Factor by which bounds must hold, so that rounding of the systems they solve does not matter."""
 
+MAX_KEPT = 8_000_000
+"""Numbers of enclosures that are kept: 64 MB; one of 12 inputs takes half a million."""
 REFINEMENTS = 8
 """Rounds that improve bounds of single entries by those of the others."""
 CORNERS = 10
@@ -88,6 +93,12 @@ class CentredMatrices:
         """1 of coordinates with mass, 0 of others, shape (n,): the diagonal of M in the middle."""
         return np.asarray(np.arange(len(self.basis)) < self.modes, float)
 
+    @cached_property
+    def digest(self) -> bytes:
+        """What tells both matrices from others."""
+        parts = (y for x in (self.mass, self.stiffness) for y in (*x.parts, x.remainder))
+        return sha256(b"".join(part.tobytes() for part in parts)).digest()
+
 
 Series = tuple[list[Array], list[Array], list[Array]]
 
@@ -98,21 +109,57 @@ def narrowest_block(
     """Enclosure of a block (p,) of modes by series of the least degree that meets the tolerance.
 
     `tolerance` is the relative error bound of L and N that suffices, clipped to [FINE, ROUGH / 2];
-    of the last degree tried if none meets it. None if its error bound exceeds `ROUGH`.
+    of the last degree tried if none meets it. None if its error bound exceeds `ROUGH`. Enclosures
+    are kept: those of the same matrices serve all levels and records that differ in damping.
     """
-    series: Series | None = None
     found, tolerance = None, min(max(tolerance, FINE), ROUGH / 2)
     max_degree, d = DEGREES[0], centre.mass.inputs
     while max_degree < DEGREES[1] and comb(d + max_degree, max_degree + 1) <= MAX_MONOMIALS:
         max_degree += 1
+    with KEPT_LOCK:
+        key = (centre.digest, block.tobytes())
+        enclosures = KEPT.pop(key, None) or Enclosures(block, rotation, centre)
+        KEPT[key] = enclosures  # the last one used
     for degree in range(DEGREES[0], max_degree + 1):
-        series = subspace_series(block, degree, centre, series)
-        found = enclosed_block(block, rotation, series, centre)
+        found = enclosures.of_degree(degree)
         if found is None and degree > DEGREES[0]:
             break  # the sums of coefficients over all degrees are too large; more only add to them
         if found is not None and found.relative_error < tolerance:
             break
+    with KEPT_LOCK:
+        while sum(x.numbers for x in KEPT.values()) > MAX_KEPT:
+            del KEPT[next(iter(KEPT))]
     return found if found is not None and found.relative_error < ROUGH else None
+
+
+class Enclosures:
+    """Enclosures of a block by series of rising degree, computed where they are asked for."""
+
+    def __init__(self, block: Ints, rotation: Array, centre: CentredMatrices) -> None:
+        self.of = block, rotation, centre
+        self.series: Series | None = None  # of the highest degree so far
+        self.found: list[Block | None] = []  # from degree DEGREES[0] on
+        self.lock = Lock()
+
+    @property
+    def numbers(self) -> int:
+        """About how many numbers it holds."""
+        return (2 + len(self.found)) * sum(x.size for parts in self.series or () for x in parts)
+
+    def of_degree(self, degree: int) -> Block | None:
+        """The enclosure by series of a degree; None where there is none."""
+        block, rotation, centre = self.of
+        with self.lock:
+            while len(self.found) <= degree - DEGREES[0]:
+                next_degree = DEGREES[0] + len(self.found)
+                self.series = subspace_series(block, next_degree, centre, self.series)
+                self.found.append(enclosed_block(block, rotation, self.series, centre))
+            return self.found[degree - DEGREES[0]]
+
+
+KEPT: dict[tuple[bytes, bytes], Enclosures] = {}
+"""Enclosures by the matrices and the numbers of the modes, those that were used last at the end."""
+KEPT_LOCK = Lock()
 
 
 def subspace_series(

@@ -24,6 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from math import comb, perm
 
 import numpy as np
@@ -94,18 +95,31 @@ class Oscillators:
     ) -> None:
         self.grid, self.loads, self.time, self.orders = grid, loads, time, orders
         self._deviations = dict[str, dict[int, Array]]()
-        sigma, t, duration = grid.sigma.ravel(), time[:, None], float(time[-1])
+        sigma, duration = grid.sigma.ravel(), float(time[-1])
         require_in_range(sigma, duration, duration)
-        free = np.exp(sigma * t)
-        rounding = UNIT_ROUNDOFF * (4 + np.abs(sigma) * t) * np.abs(free)
-        decay = float((grid.quotient[:, None] * grid.omega).min())
-        bounds = np.stack([time**n * np.exp(-decay * time) for n in range(5)])
+        self.decay = float((grid.quotient[:, None] * grid.omega).min())
         # ρ with two derivatives by σ, its rounding, and bounds of its derivatives of order 0 to 4
-        self.free = np.stack([free, t * free, t * t * free]), rounding, bounds
         self.forced = {
-            name: (*responses_at_nodes(sigma, load, time, 2), absolute_moments(decay, load, time))
+            name: (
+                *responses_at_nodes(sigma, load, time, 2),
+                absolute_moments(self.decay, load, time),
+            )
             for name, load in loads.items()
         }
+
+    @cached_property
+    def free(self) -> tuple[Array, Array, Array]:
+        """The same of exp(σ t)."""
+        sigma, t = self.grid.sigma.ravel(), self.time[:, None]
+        free = np.exp(sigma * t)
+        rounding = UNIT_ROUNDOFF * (4 + np.abs(sigma) * t) * np.abs(free)
+        bounds = np.stack([self.time**n * np.exp(-self.decay * self.time) for n in range(5)])
+        return np.stack([free, t * free, t * t * free]), rounding, bounds
+
+    def _known(self, source: str) -> tuple[Array, Array, Array]:
+        """The same of a source."""
+        forced = self.forced.get(source)
+        return self.free if forced is None else forced
 
     def responses(self, source: str, order: int) -> ModalResponses:
         """Return responses to a unit share of a source, read by the derivative ν = `order`.
@@ -114,8 +128,8 @@ class Oscillators:
         """
         grid, is_start = self.grid, source == "start"
         sigma = grid.sigma.ravel()
-        rho, rounding, bounds = self.forced.get(source, self.free)
-        G = with_power(sigma, rho, order)
+        rho, rounding, bounds = self._known(source)
+        G = with_power(sigma, rho, order) if order else rho
         omega, quotient = np.abs(sigma.imag), -sigma.real / sigma.imag
         # of the power and of what is read off
         rounding = np.abs(sigma) ** order * rounding
@@ -162,7 +176,7 @@ class Oscillators:
             self._deviations[source] = line_deviations(
                 *(self.grid.sigma, self.loads.get(source), self.time, self.orders),
                 is_force=source.startswith("force"),
-                at_nodes=self.forced.get(source, self.free),
+                at_nodes=self._known(source),
             )
         modulus, read = self._deviations[source][order]
         return modulus * (1 + self.grid.quotient[-1]) if source == "start" else read
