@@ -145,7 +145,7 @@ class Box:
 
     def _line_deviation(self, modal: Modal, outputs: Ints) -> Array:
         """Bound of how far a motion strays from straight lines in the step to a node, (T, m)."""
-        orders = self.structure.order[outputs].tolist()
+        orders = [int(order) for order in self.structure.order[outputs]]
         deviation = np.zeros((len(self.time), len(outputs)))
         read = np.abs(modal.output_coefficients(np.zeros_like(outputs), outputs)[0])
         for k, sigma in enumerate(modal.sigma[0]):
