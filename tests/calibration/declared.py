@@ -37,7 +37,6 @@ class Row:
     guaranteed: bool
     ratios: list[np.ndarray] = field(default_factory=list)
     covered: list[np.ndarray] = field(default_factory=list)
-    most: float = MOST
 
     @property
     def share(self) -> float:
@@ -54,7 +53,7 @@ class Row:
         """Whether enough is covered, and guaranteed bounds are near."""
         if not self.guaranteed:
             return self.share >= SHARE
-        return self.share == 1.0 and bool(self.quantiles[1] <= self.most)
+        return self.share == 1.0 and bool(self.quantiles[1] <= MOST)
 
 
 @dataclass
@@ -79,15 +78,11 @@ class Calibration:
         floor = np.maximum(np.maximum(true, least), ROUNDING * size)
         self._add(quantity, False, declared / floor, covered, case)
 
-    def guaranteed(
-        self, quantity: str, proved, attained, *, size=1.0, most=MOST, case: object = ""
-    ) -> None:
+    def guaranteed(self, quantity: str, proved, attained, *, size=1.0, case: object = "") -> None:
         """Adds proved lower and upper ends and those that another method attains inside, (N,) each.
 
-        `most` is what the median of their widths' ratios may be: infinite where the truth is one
-        point of many that the bounds are of. `case` tells where in a message.
+        `case` tells where in a message.
         """
-        self.rows.setdefault(quantity, Row(True, most=most))
         (low, high), (least, most) = map(np.atleast_1d, proved), map(np.atleast_1d, attained)
         slack = ROUNDING * np.asarray(size)
         inside = (least >= low - slack) & (most <= high + slack)

@@ -5,8 +5,7 @@ import pytest
 from scipy.sparse import coo_array
 from scipy.sparse.linalg import splu
 
-from alphacut.rve.image.model import ImageModel, solve_image
-from alphacut.rve.image.phases import ModuliImages
+from alphacut.rve.image.model import solve_image
 from tests.calibration.declared import Calibration, free_seed
 
 REFINEMENTS = (2, 4, 8)
@@ -81,7 +80,7 @@ def energies(stiffness, strains):
     return np.einsum("si,ij,sj->s", strains, stiffness, strains)
 
 
-def beside(table, rng, bounds, reference, case, **most):
+def beside(table, rng, bounds, reference, case):
     """Adds the energies of random strains: proved ends, and the truth between two others."""
     above, guess, doubt = reference
     strains = rng.normal(size=(STRAINS, 3))
@@ -89,7 +88,7 @@ def beside(table, rng, bounds, reference, case, **most):
     size = energies(guess, strains)
     low, high = (energies(end, strains) for end in (bounds.lower, bounds.upper))
     attained = energies(above, strains), size - doubt
-    table.guaranteed("energy", (low, high), attained, size=size, case=case, **most)
+    table.guaranteed("energy", (low, high), attained, size=size, case=case)
 
 
 @pytest.mark.slow
@@ -101,21 +100,4 @@ def test_random_images():
         bulk, shear, aspect = draw(rng)
         solution = solve_image(bulk, shear, sides=(aspect, 1.0), division=int(rng.integers(1, 4)))
         beside(table, rng, solution.bounds, truth(bulk, shear, aspect), k)
-    table.judge()
-
-
-@pytest.mark.slow
-def test_images_between_two():
-    """One image drawn between the least and the greatest moduli lies within the bounds of all."""
-    seed = free_seed("images between two")
-    table = Calibration("Images between two", seed)
-    for k in range(15):
-        rng = np.random.default_rng([seed, k])
-        bulk, shear, aspect = draw(rng)
-        share = rng.choice([0.0, 1.0, rng.random()], size=(2, *bulk.shape))
-        wide = 1 + rng.uniform(0, 0.3)
-        images = ModuliImages((bulk, wide * bulk), (shear, wide * shear))
-        bounds = ImageModel((aspect, 1.0)).solve(images).bounds
-        inside = (m * (1 + (wide - 1) * s) for m, s in zip((bulk, shear), share, strict=True))
-        beside(table, rng, bounds, truth(*inside, aspect), k, most=np.inf)
     table.judge()
