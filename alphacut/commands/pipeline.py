@@ -32,6 +32,7 @@ from alphacut.questions.probability import probability
 from alphacut.questions.question import Answer, FuzzyResponse, SuiteResponse
 from alphacut.questions.summary import ANSWERS, Results
 from alphacut.questions.tolerances import admissible_tolerances, require_admissible_scale
+from alphacut.rve.image.files import read_grid
 from alphacut.stages import campaign, cell, envelope, identify, image, microstructure, shares, suite
 from alphacut.stages.campaign import CellCampaign
 from alphacut.stages.envelope import EnvelopeTask, PeakResults, peak_results, peaks_of
@@ -111,11 +112,13 @@ class Pipeline:
     def run(self) -> Results:
         """Computes every stage of the case; returns their results."""
         results, stages, content = self.results, self.content.stages, self.content
-        n_motions = len(content.records.recordings) if content.records else len(content.study) or 1
-        # shares and figures come last
-        n_stages = len(stages) - 1 + n_motions + len(content.questions)
-        n_stages += content.shares + self.figures
-        self.store.progress.stages_left = n_stages
+        kinds = [stage for stage in stages if stage != "envelope"]
+        if "envelope" in stages and content.records is not None:
+            kinds += ["record"] * len(content.records.recordings)
+        elif "envelope" in stages:
+            kinds += ["envelope"] * max(1, len(content.study))
+        kinds += [*content.questions, *["shares"] * content.shares, *["figures"] * self.figures]
+        self.store.progress.foresee(foreseen_seconds(content), kinds)
         if "microstructure" in stages:
             results.microstructure = self.compute_microstructure()
             numbers = results.microstructure.numbers["radius"]
@@ -232,6 +235,19 @@ class Pipeline:
         compute = partial(task.compute_peaks, structure)
         stage = Stage("peaks", inputs, ("fuzzy", "frame"), PeakResults, compute)
         return peaks_of(self.store.take(stage).numbers, alpha)
+
+
+def foreseen_seconds(content: Content) -> dict[str, float]:
+    """Rough seconds of a stage of each kind on a core: their ratios are those of the progress."""
+    n_inputs = 1 if content.envelope is None else 1 + len(content.envelope.fuzzy)
+    seconds = {"envelope": 3.0 * n_inputs, "record": float(n_inputs), "probability": 5.0}
+    seconds |= {"tolerances": 10.0 * n_inputs, "decision": 0.1, "fragility": 0.5, "figures": 6.0}
+    if content.mesh_cell is not None or content.modulus.method == "prism":
+        seconds["modulus"] = 30.0
+    if (cell := content.image_cell) is not None:  # 40 µs a pixel and level, and as much for widths
+        pixels = read_grid(cell.image, cell.sides).size
+        seconds["modulus"] = seconds["image"] = 4e-5 * pixels * (len(content.modulus.alpha) + 5)
+    return seconds
 
 
 def answer_of(

@@ -131,7 +131,8 @@ class EnvelopeTask:
 
     def compute(self, structure: Structure, context: StageContext) -> StageResult[EnvelopeResult]:
         """Computes the envelope as a dataset; its extremes and the peaks of its outputs."""
-        first, second = (subprogress(context.tick, x, x + 0.5) for x in (0.0, 0.5))
+        half = 0.5 if self.limited else 1.0  # a second analysis is that of limited peaks
+        first, second = (subprogress(context.tick, *x) for x in ((0.0, half), (half, 1.0)))
         arguments = self.arguments(structure) | {"progress": first}
         result = frame.envelope(**arguments, relative=not self.tolerance(structure).unit)
         outputs = [*map(str, result.outputs)]  # of others `close_peaks` has the peaks

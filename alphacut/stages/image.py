@@ -14,6 +14,7 @@ import numpy as np
 from alphacut.case.material import ImageCell
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array, Ints
+from alphacut.fuzzy.progress_bar import subprogress
 from alphacut.fuzzy.refused import FailedError, require
 from alphacut.fuzzy.result import Nature
 from alphacut.io.provenance import file_digest
@@ -122,12 +123,14 @@ def compute_cuts(
     require_memory(nominal.bulk[0].shape, division)
     model = ImageModel(cell.sides, division=division, solver=solver, average=average)
     crisp = model.solve(nominal)
-    context.tick(0.2)
+    n_solutions = len(alpha) + 5  # with the nominal one, two tests, and the widths of two sources
+    context.tick(1 / n_solutions)
     images = [study.images(level, level) for level in alpha]
-    cuts = model.cuts(images, (nominal, crisp))
+    cuts_progress = subprogress(context.tick, 1 / n_solutions, (len(alpha) + 1) / n_solutions)
+    cuts = model.cuts(images, (nominal, crisp), cuts_progress)
     model.require_consistent(images, cuts)
     _require_isotropic(cuts[0])
-    context.tick(0.8)
+    context.tick((len(alpha) + 3) / n_solutions)
 
     def width(threshold: AlphaLevel, phases: AlphaLevel) -> float:
         """Width of E in Pa at levels of the threshold and of the phases."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Executor, as_completed
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -139,21 +139,34 @@ class Stage(Generic[T]):
 
 @dataclass
 class RunProgress:
-    """Progress of a run in one bar; each of the `stages_left` takes an equal part of what is left.
+    """Progress of a run in one bar, of which stages take parts as their foreseen `seconds`.
 
-    `show` takes the share done.
+    These are by the first word of a stage's name, else 1; `seconds_left` are those of all stages to
+    come. `show` takes the share done.
     """
 
     show: Progress = no_progress
-    stages_left: int = 1
+    seconds: Mapping[str, float] = field(default_factory=dict)
+    seconds_left: float = 1.0
     done: float = 0.0
     shown: float = 0.0
 
-    def next_part(self, count: int = 1) -> Progress:
-        """Progress of the next stages, `count` of them."""
-        first, part = self.done, count / max(count, self.stages_left)
-        self.done, self.stages_left = first + part * (1 - first), self.stages_left - count
+    def foresee(self, seconds: Mapping[str, float], names: Iterable[str]) -> None:
+        """Foresees the stages of a run by their names."""
+        self.seconds = seconds
+        self.seconds_left = self._seconds_of(names)
+
+    def next_part(self, names: Iterable[str], skipped: Iterable[str] = ()) -> Progress:
+        """Progress of the next stages by their names; `skipped` are up to date."""
+        self.seconds_left -= self._seconds_of(skipped)
+        seconds, first = self._seconds_of(names), self.done
+        if seconds:
+            self.done += (1 - first) * seconds / max(seconds, self.seconds_left)
+        self.seconds_left -= seconds
         return subprogress(self._advance, first, self.done)
+
+    def _seconds_of(self, names: Iterable[str]) -> float:
+        return sum(self.seconds.get(name.partition("_")[0], 1.0) for name in names)
 
     def _advance(self, share: float) -> None:
         self.shown = max(self.shown, share)  # a second analysis of a stage begins at 0
@@ -186,9 +199,9 @@ class StageStore:
 
         The stages that take longest come first; without executor this process computes all.
         """
-        tick = self.progress.next_part(len(stages))
         results = {stage.name: x for stage in stages if (x := self._read(stage)) is not None}
         stale = [stage for stage in stages if stage.name not in results]
+        tick = self.progress.next_part((stage.name for stage in stale), [*results])
         if executor is None or self.folder is None or len(stale) == 1:
             for k, stage in enumerate(stale):
                 stage_tick = subprogress(tick, k / len(stale), (k + 1) / len(stale))

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Ints
+from alphacut.fuzzy.progress_bar import Progress
 from alphacut.fuzzy.refused import FailedError, require
 from alphacut.rve.image.bounds import Interval, StiffnessBounds, inverse_below
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
@@ -158,13 +159,17 @@ class ImageModel:
         )
 
     def cuts(
-        self, images: Sequence[ModuliImages], crisp: tuple[ModuliImages, ImageSolution]
+        self,
+        images: Sequence[ModuliImages],
+        crisp: tuple[ModuliImages, ImageSolution],
+        progress: Progress | None = None,
     ) -> list[ImageCut]:
         """Bounds of stiffness, E, ν and engineering constants at each α-level, nested, in order.
 
         Args:
             images: Least and greatest moduli of each level, for rising α.
             crisp: A pair of images and its solution by the same model, the first guess.
+            progress: Takes the share of the levels that is done.
         """
         last_pair, solution = crisp
         bounds = []  # for falling α, from the narrowest cut to the widest
@@ -172,6 +177,8 @@ class ImageModel:
             if not pair.equals(last_pair):
                 last_pair, solution = pair, self.solve(pair, solution)
             bounds.append(solution.bounds)
+            if progress is not None:
+                progress(len(bounds) / len(images))
         # of E, ν and the other constants, (levels, …, 2), each made to contain those before
         intervals = np.array(
             [[x.young(self.average), x.poisson(self.average), *x.constants()] for x in bounds]
