@@ -112,7 +112,7 @@ class Pipeline:
     def run(self) -> Results:
         """Computes every stage of the case; returns their results."""
         results, stages, content = self.results, self.content.stages, self.content
-        kinds = [stage for stage in stages if stage != "envelope"]
+        kinds: list[str] = [stage for stage in stages if stage != "envelope"]
         if "envelope" in stages and content.records is not None:
             kinds += ["record"] * len(content.records.recordings)
         elif "envelope" in stages:
