@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import FailedError, require, require_choice
+from alphacut.fuzzy.refused import FailedError, RefusedError, require, require_choice
 
 Function = Callable[..., object]
 Layout = tuple[tuple[str, tuple[int, ...]], ...]
@@ -190,7 +190,8 @@ def _finite_array(name: str, value: ArrayLike | None) -> Array:
     array = np.ma.asanyarray(value)  # type: ignore[no-untyped-call]
     is_plain = array.dtype.kind in "biuf" and not np.ma.is_masked(array)  # type: ignore[no-untyped-call]
     is_allowed = is_plain and not hasattr(value, "units") and np.isfinite(array).all()
-    shown = " ".join(repr(value).split())[:80]
-    allowed = "finite real numbers; of one with a unit its magnitude in the unit you want"
-    require(is_allowed, f"output {name}", value=shown, allowed=allowed)
+    if not is_allowed:  # of an array repr takes longer than all else here
+        shown = " ".join(repr(value).split())[:80]
+        allowed = "finite real numbers; of one with a unit its magnitude in the unit you want"
+        raise RefusedError(f"output {name}", shown, allowed)
     return np.asarray(array, float)

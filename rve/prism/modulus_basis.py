@@ -81,10 +81,7 @@ def modulus_basis(
     solved = conjugate_gradients(multiply, problem.solver, loads, _LOOSE)
     fields = _orthonormal_basis(solved.fields)
     images = np.array([problem.operator(part)(fields) for part in parts])  # K_0 v and K_1 v
-    affine = np.zeros_like(loads[: len(strains)]), np.zeros((len(fields), 3))
-    means = problem.slice_strains(
-        np.concatenate([strains, affine[1]]), np.concatenate([affine[0], fields])
-    )
+    means = problem.slice_strains(strains, fields)
     projected = fields @ images.swapaxes(1, 2), fields @ forces.swapaxes(1, 2)
     basis = ModulusBasis(*projected, means, solved.iterations, ends)
     # the error is largest at the ends of the range, since the nodes are those of Chebyshev

@@ -70,7 +70,9 @@ def solve_sample(
     residuals = problem.solver.norms(loads - operator(solved.fields))
     load_norms = problem.solver.norms(loads)
     residual = float((residuals / np.where(load_norms > 0, load_norms, 1.0)).max())
-    return problem.slice_strains(strains, solved.fields), solved.iterations, residual
+    fields = problem.slice_strains(strains, solved.fields)
+    totals = fields.combined(np.tile(np.eye(len(strains)), (2, 1)))  # ε̄ + ε(u) of each load
+    return totals, solved.iterations, residual
 
 
 class SliceProblem:
@@ -226,31 +228,30 @@ class SliceProblem:
         bubbles[:] = self.solver.restrict(bubble)
         return fields
 
-    def slice_strains(self, uniform: Array, fields: Array) -> SliceStrains:
-        """Mean strains of slices and mean products of macroscopic strains (n, 3) plus n fields."""
+    def slice_strains(self, strains: Array, fields: Array) -> SliceStrains:
+        """Those of macroscopic strains alone, (loads, 3), then of fields alone, (n, size)."""
         count, slices = len(fields), len(self._areas)
         nodal = np.moveaxis(self._to_slices(fields).reshape(count, slices, -1, 2), 0, 2)
         nodal = np.append(nodal, np.zeros((slices, 1, count, 2)), axis=1)  # number −1: fixed nodes
         corners = nodal[:, self._unknown].reshape(*self._gradients.shape[:2], 6, -1)
         slopes = self._gradients.reshape(*corners.shape[:3], -1)  # [α, point]
         gradients = slopes.swapaxes(-1, -2) @ corners
-        gradients = gradients.reshape(*corners.shape[:2], 2, POINTS_PER_SLICE, count, 2)
-        strain = np.empty((*corners.shape[:2], POINTS_PER_SLICE, 3, count))
-        strain[..., 0, :] = gradients[:, :, 0, :, :, 0]
-        strain[..., 1, :] = gradients[:, :, 1, :, :, 1]
-        np.add(gradients[:, :, 1, :, :, 0], gradients[:, :, 0, :, :, 1], out=strain[..., 2, :])
-        strain += uniform.T
+        along_1, along_2 = np.moveaxis(gradients.reshape(*corners.shape[:2], 2, -1, count, 2), 2, 0)
+        strain = np.empty((*along_1.shape[:3], 3, len(strains) + count))
+        affine, fluctuation = np.split(strain, [len(strains)], axis=-1)  # views
+        affine[:] = strains.T
+        fluctuation[..., 0, :], fluctuation[..., 1, :] = along_1[..., 0], along_2[..., 1]
+        np.add(along_2[..., 0], along_1[..., 1], out=fluctuation[..., 2, :])
         means, fractions, products = [], [], []
         for triangles in self._phase:
             areas = self._areas[:, triangles].reshape(slices, -1) / AREA
-            of_phase = strain[:, triangles].reshape(slices, -1, 3 * count)
-            means.append((areas[:, None] @ of_phase).reshape(slices, 3, count))
+            of_phase = strain[:, triangles].reshape(slices, areas.shape[1], -1)
+            means.append((areas[:, None] @ of_phase).reshape(slices, 3, -1))
             fractions.append(areas.sum(axis=1))
             weights = (areas * self._rule.weights[:, None]).reshape(1, -1)
-            products.append(strain_products(of_phase.reshape(-1, 3, count), weights)[0])
-        theta, weights = self._rule.nodes, self._rule.weights
+            products += list(strain_products(of_phase.reshape(weights.size, 3, -1), weights))
         arrays = map(np.array, (means, fractions, products))
-        return SliceStrains(theta, weights, *arrays)
+        return SliceStrains(self._rule.nodes, self._rule.weights, *arrays)
 
 
 def _slopes(points: Array) -> Array:

@@ -124,6 +124,19 @@ ORTHOTROPIC = VoigtPhase(((90e9, 20e9, 5e9), (20e9, 50e9, 0.0), (5e9, 0.0, 30e9)
 SMALL = HermiteMap(0.2, 0.1, 0.55, 0.1)
 
 
+def test_slices_give_what_dolfinxs_assembly_and_petsc_give():
+    options = {"outline": Ellipse(2.0, 30.0), "mesh_size": 0.5, "layers": 3, "estimate": False}
+    slices = solve(SMALL, ORTHOTROPIC, **options)
+    petsc = solve(SMALL, ORTHOTROPIC, **options, petsc={"ksp_rtol": "1e-12"})
+    assert slices.solver == "theta" != petsc.solver
+    assert slices.unknowns == petsc.unknowns
+    for name in ("stiffness", "theta", "weights"):
+        ours, theirs = getattr(slices.curve, name), getattr(petsc.curve, name)
+        assert abs(ours - theirs).max() <= 1e-7 * abs(theirs).max()
+    ours, theirs = slices.energies.values, petsc.energies.values
+    assert abs(ours - theirs).max() <= 1e-9 * abs(theirs).max()
+
+
 @pytest.fixture(scope="module")
 def turned_ellipse():
     """An ellipse of an orthotropic material, both turned, by prisms and by slices."""
