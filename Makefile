@@ -51,7 +51,7 @@ charts:
 	$(IN) python -m benchmarks.frame.integrators
 	$(IN) python -m benchmarks.frame.envelopes
 	$(IN) python -m benchmarks.frame.envelopes --wide 3
-
+	$(IN) python -m benchmarks.costs
 
 stability:
 	$(IN) python -m benchmarks.rve.stability

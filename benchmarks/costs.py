@@ -1,0 +1,143 @@
+"""Cost over size: unknowns of the cell, storeys, fuzzy inputs, records, worker processes.
+
+    ./enter python -m benchmarks.costs
+
+Processor time of a first computation with code compiled, and the exponent p in seconds ~ size^p by
+least squares of the logarithms. For workers it is the clock that counts. CSV and figure go to
+benchmarks/results/.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from alphacut.frame import DualProof, StoreyFrame, envelope
+from alphacut.frame.structures.loads import Accelerogram
+from alphacut.fuzzy import Triangular
+from alphacut.rve.prism.model import PrismModel
+from benchmarks.rows import write
+from benchmarks.rve.solvers import MATRIX, PAPER, PARTICLE
+from benchmarks.synthetic_record import SyntheticRecord, write_suite
+
+RESULTS = Path(__file__).parent / "results"
+MESH_SIZES = (0.15, 0.11, 0.08, 0.055, 0.04)  # 34,000 to 385,000 unknowns
+STOREYS, INPUTS, RECORDS, WORKERS = (3, 6, 12, 24), (2, 4, 8, 12, 17), (1, 4, 11, 44), (1, 2)
+SUITE = """
+title = "Two storeys under records"
+stages = ["envelope"]
+[frame]
+stiffness = ["90 MN/m ± 6 %", "80 MN/m ± 6 %"]
+masses = ["50 t", "40 t"]
+damping_ratio = "[3, 4, 5] %"
+outputs = ["drift1", "drift2"]
+[records]
+files = ["records/*.AT2"]
+[envelope]
+fuzzy = ["k", "zeta"]
+alpha = [0, 1]
+duration = "8 s"
+step = "0.02 s"
+"""
+LABELS = {
+    "cell": "unknowns of the cell",
+    "storeys": "storeys, 5 inputs",
+    "inputs": "inputs, 8 storeys",
+    "records": "records, 3 inputs",
+    "workers": "workers, 44 records",
+}
+Row = dict[str, Any]
+
+
+def cells() -> Iterator[Row]:
+    """First solves of the paper's cell by product-space elements."""
+    PrismModel(1.0, estimate=False).solve(PAPER, MATRIX, [PARTICLE])  # loads what all need
+    for size in MESH_SIZES:
+        begun = time.process_time()
+        (result,) = PrismModel(size, estimate=False).solve(PAPER, MATRIX, [PARTICLE])
+        yield {"size of": "cell", "size": result.unknowns, "seconds": time.process_time() - begun}
+
+
+def frames() -> Iterator[Row]:
+    """Dual bounds of a frame's envelopes, at five inputs by storeys, then by inputs."""
+    for kind, storeys, inputs in (
+        *(("storeys", count, 5) for count in (3, *STOREYS)),
+        *(("inputs", 8, count) for count in (2, *INPUTS)),
+    ):
+        record = SyntheticRecord(duration=4.0)
+        numbers = {f"k{z}": 9e7 for z in range(1, storeys + 1)}
+        numbers |= {f"m{z}": 5e4 for z in range(1, storeys + 1)}
+        chosen = ["zeta", *np.ravel([[f"k{z}", f"m{z}"] for z in range(1, storeys + 1)])][:inputs]
+        frame = StoreyFrame(
+            masses=[5e4] * storeys,
+            stiffness=[9e7] * storeys,
+            damping_ratio=0.04,
+            outputs=("q1", f"q{storeys}"),
+            ground=Accelerogram(record.step, record.acceleration()),
+        )
+        nominal = {name: frame.parameters[name] for name in chosen}
+        fuzzy = {name: Triangular(0.95 * x, x, 1.05 * x) for name, x in nominal.items()}
+        begun = time.process_time()
+        envelope(frame, fuzzy, DualProof(), duration=4.0, step=0.02, alpha=(0, 1))
+        size = storeys if kind == "storeys" else inputs
+        yield {"size of": kind, "size": size, "seconds": time.process_time() - begun}
+
+
+def suites() -> Iterator[Row]:
+    """Runs of a suite by records, then by worker processes, whose clock counts."""
+    runs = [("records", count, 1) for count in (1, *RECORDS)]
+    for kind, records, workers in (*runs, *(("workers", RECORDS[-1], count) for count in WORKERS)):
+        with tempfile.TemporaryDirectory() as folder:
+            write_suite(Path(folder, "records"), records, 8.0)
+            Path(folder, "suite.toml").write_text(SUITE, encoding="utf-8")
+            words = ("run", f"{folder}/suite.toml", f"--out={folder}/results", "--no-figures")
+            command = (sys.executable, "-m", "alphacut", *words, f"--workers={workers}", "--quiet")
+            before, begun = os.times(), time.monotonic()
+            subprocess.run(command, check=True)
+            after, clock = os.times(), time.monotonic() - begun
+        used = after.children_user + after.children_system
+        seconds = used - before.children_user - before.children_system
+        size = records if kind == "records" else workers
+        yield {"size of": kind, "size": size, "seconds": clock if kind == "workers" else seconds}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print the table, write it, and draw a panel for each kind of size."""
+    import matplotlib.pyplot as plt
+
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=Path, default=RESULTS)
+    out, costs = parser.parse_args(arguments).out, dict[tuple[str, int], Row]()
+    for source in (cells, frames, suites):
+        for row in source():
+            costs[row["size of"], row["size"]] = row  # the first, repeated, loads compiled code
+            print(row["size of"], row["size"], f"{row['seconds']:.2f} s", flush=True)
+    rows, kinds = list(costs.values()), list(dict.fromkeys(kind for kind, _ in costs))
+    write(rows, out / "costs.csv")
+    figure, panels = plt.subplots(1, len(kinds), figsize=(15, 3.2), layout="constrained")
+    for axes, kind in zip(panels, kinds, strict=True):
+        line = [row for row in rows if row["size of"] == kind]
+        size, seconds = (np.array([row[key] for row in line], float) for key in ("size", "seconds"))
+        power = float(np.polyfit(np.log(size), np.log(seconds), 1)[0])
+        print(f"{kind}: seconds ~ size^{power:.2f}")
+        axes.loglog(size, seconds, "o-")
+        axes.set(xlabel=LABELS[kind], title=f"seconds ~ size^{power:.2f}")
+        axes.grid(alpha=0.25)
+    panels[0].set_ylabel("seconds of processor")
+    panels[-1].set_ylabel("seconds of the clock")
+    for suffix in (".svg", ".png"):
+        figure.savefig((out / "costs").with_suffix(suffix), dpi=160)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
