@@ -59,7 +59,8 @@ class Element:
             changes its sign where space is mirrored at a point.
         stress: Whether the modes are those of a stress, else of a strain.
         products: Of products of splines alone: tables to modes, (axis, order, mode, function);
-            terms (component, unknown, orders along the grid's axes), and their factors.
+            terms (component, unknown, orders along the grid's axes), sorted by unknown and last
+            order, and their factors.
     """
 
     unknowns: int
@@ -149,13 +150,13 @@ def spline_element(sides: tuple[float, ...], *, stress: bool) -> Element:
         else ()
         for u, offset in functions
     ]
-    indices = [
-        (component, potentials.index(potential), *orders[::-1])
+    products: list[tuple[int, ...]] = [
+        (component, potentials.index(potential), *orders[::-1], factor)
         for component, of_component in enumerate(derivatives)
-        for _, potential, orders in of_component
+        for factor, potential, orders in of_component
     ]
+    products.sort(key=lambda term: (term[1], term[-2]))  # kernels share derivatives along x
     scaled = [[table / side**order for order, table in enumerate(tables)] for side in sides]
-    factors = [factor for of_component in derivatives for factor, _, _ in of_component]
     element = _element(
         components.reshape(len(derivatives), width**n, -1),
         local=functions,
@@ -164,8 +165,9 @@ def spline_element(sides: tuple[float, ...], *, stress: bool) -> Element:
         places=[((0.0,) * n, False) for _ in potentials],
         stress=stress,
     )
+    *indices, factors = np.array(products).T
     return replace(
-        element, products=(np.array(scaled), np.array(indices), np.array(factors, float))
+        element, products=(np.array(scaled), np.stack(indices, axis=1), factors.astype(float))
     )
 
 

@@ -75,6 +75,15 @@ def energies(
         weights: Pairs of rows of modes and their coefficient in each cell, of the grid's shape,
             not negative, with a rounding error of up to `COEFFICIENT` units.
     """
+    if isinstance(fields, np.ndarray) and element.dimension == 3:
+        return _energies_by_rows(element, fields, mean_modes, weights)
+    return energies_by_matrices(element, fields, mean_modes, weights)
+
+
+def energies_by_matrices(
+    element: Element, fields: Fields, mean_modes: Array, weights: Sequence[Weighted]
+) -> Energies:
+    """As `energies`, with the element's matrices, in any library: what kernels are judged by."""
     xp, count, cells = namespace(fields), fields.shape[0], math.prod(fields.shape[2:])
     piece = PIECE if cells <= SMALL else LONG_PIECE
     sums: list[list[Array]] = [[] for _ in weights]
@@ -98,6 +107,22 @@ def energies(
         value[k] = np.reshape([math.fsum(terms) for terms in terms_of], (count, count)) / cells
     relative_rounding = SAFETY * (piece + COEFFICIENT + 5) * UNIT
     return Energies(value, by_modes / cells, relative_rounding)
+
+
+def _energies_by_rows(
+    element: Element, fields: Array, mean_modes: Array, weights: Sequence[Weighted]
+) -> Energies:
+    """As `energies`, by kernels: the weights are those of trace and deviator."""
+    from alphacut.rve.image.fields.kernels import energies_by_rows  # Numba takes its time
+
+    (_, trace), (_, deviator) = weights
+    sums = energies_by_rows(element, trace, deviator, fields, mean_modes, UNIT)
+    value, by_modes = (  # exact sums of the rows
+        np.apply_along_axis(math.fsum, -1, part.reshape(*part.shape[:3], -1)) / trace.size
+        for part in sums
+    )
+    terms = len(mean_modes) + trace.shape[-1]  # products of a voxel's modes, then of a row
+    return Energies(value, by_modes, SAFETY * (terms + COEFFICIENT + 5) * UNIT)
 
 
 def _on_host(array: Fields) -> Array:

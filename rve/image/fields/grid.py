@@ -72,9 +72,8 @@ class Operator:
     def apply(self, fields: Fields) -> Fields:
         """Nodal forces of fields, both of shape (loads, unknowns, *grid)."""
         if isinstance(fields, np.ndarray) and self.element.dimension == 3:
-            from alphacut.rve.image.fields.kernels import apply_by_rows  # Numba takes its time
-
-            return apply_by_rows(self.element, self.trace, self.deviator, fields)
+            none = np.zeros((len(self.element.modes), len(fields)))
+            return self._apply_by_rows(fields, none)
         return self.apply_by_matrices(fields)
 
     def apply_by_matrices(self, fields: Fields) -> Fields:
@@ -97,6 +96,8 @@ class Operator:
         xp = namespace(self.trace)
         shape = (mean_modes.shape[1], self.element.unknowns, *self.trace.shape)
         result = xp.zeros(shape)
+        if xp is np and self.element.dimension == 3:
+            return self._apply_by_rows(result, -mean_modes)
         trace_force, deviator_force = (
             xp.reshape(
                 xp.asarray(-(self.element.modes[part].T @ mean_modes[part])),
@@ -108,6 +109,11 @@ class Operator:
             local = trace_force * self.trace[slab] + deviator_force * self.deviator[slab]
             scatter(self.element, local, result, slab)
         return result
+
+    def _apply_by_rows(self, fields: Array, mean_modes: Array) -> Array:
+        from alphacut.rve.image.fields.kernels import apply_by_rows  # Numba takes its time
+
+        return apply_by_rows(self.element, self.trace, self.deviator, fields, mean_modes)
 
 
 def slabs(fields: Fields) -> Iterator[slice]:

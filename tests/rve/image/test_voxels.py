@@ -1,5 +1,7 @@
 """Proved bounds of voxels: exact cases, symmetries, an independent solver, the kernels, losses."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.sparse import coo_array
@@ -8,8 +10,9 @@ from scipy.sparse.linalg import splu
 from alphacut.fuzzy import RefusedError
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.fields.element import spline_element
-from alphacut.rve.image.fields.energy import energies
+from alphacut.rve.image.fields.energy import energies, energies_by_matrices
 from alphacut.rve.image.fields.grid import Operator
+from alphacut.rve.image.fields.preconditioner import FourierPreconditioner, Reference
 from alphacut.rve.image.losses import energy_shares, mean_loss
 from alphacut.rve.image.model import ImageModel, solve_image
 from alphacut.rve.image.phases import ModuliImages
@@ -176,6 +179,36 @@ def test_kernels_do_what_the_elements_matrices_do(stress, rng):
         by_matrices = operator.apply_by_matrices(fields)
         largest = np.abs(by_matrices).max()
         assert operator.apply(fields) == pytest.approx(by_matrices, abs=1e-14 * largest)
+        means = element.mean_modes(rng.normal(size=(2, 6)))
+        weights = list(zip(element.parts, (trace, deviator), strict=True))
+        found, expected = (
+            f(element, fields, means, weights) for f in (energies, energies_by_matrices)
+        )
+        assert (np.abs(found.value - expected.value) <= found.rounding + expected.rounding).all()
+        assert (found.rounding < 100 * expected.rounding).all()
+        # ⟨ε̄ + ε, A ε⟩ of the fields and the energy that they have without the uniform ones
+        alone = energies(element, fields, 0 * means, weights).value.sum(axis=0)
+        work = np.tensordot(
+            fields, operator.apply(fields) - operator.load(means), ((1, 2, 3, 4),) * 2
+        )
+        uniform = energies(element, 0 * fields, means, weights).value.sum(axis=0)
+        total = found.value.sum(axis=0) - uniform
+        assert (total + alone) * trace.size == pytest.approx(work + work.T)
+
+
+@pytest.mark.parametrize("stress", [False, True], ids=["displacement", "stress"])
+def test_the_preconditioner_in_single_precision_is_that_in_double(stress, rng):
+    element, shape = spline_element((0.7, 2.0, 1.0), stress=stress), (16, 3, 40)
+    constant = Reference(3e-12, 2e-12, element.trace_in_deviator)
+    single = FourierPreconditioner.of_material(element, constant, shape)
+    arrays = SimpleNamespace(**vars(np))  # another library than NumPy
+    double = FourierPreconditioner.of_material(element, constant, shape, arrays)
+    ones = np.ones(shape)
+    operator = Operator(element, constant.trace * ones, constant.deviator * ones)
+    forces = operator.apply(rng.normal(size=(1, element.unknowns, *shape)))
+    wrong = single.apply(forces) - double.apply(forces)
+    energy, off = (np.sum(x * operator.apply(x)) for x in (double.apply(forces), wrong))
+    assert 0 < off < 1e-8 * energy
 
 
 def test_energies_are_those_of_three_gauss_points_an_axis(rng):
