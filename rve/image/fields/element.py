@@ -265,7 +265,8 @@ def _element(
     parts = isotropic_parts(len(local[0][1]), stress=stress)
     modes = np.tensordot(parts, components, axes=1)
     magnitude = np.tensordot(abs(parts), abs(components), axes=1)
-    is_kept = magnitude.max(axis=-1) > 0  # (part, mode)
+    # (part, mode); kernels number all modes of space
+    is_kept = (magnitude.max(axis=-1) > 0) | (len(parts) == 6)
     of_voigt = np.zeros((*is_kept.shape, len(parts)))
     of_voigt[:, 0] = parts
     return Element(

@@ -17,7 +17,7 @@ import numpy as np
 from alphacut.fuzzy.arrays import Array
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient, System
 from alphacut.rve.image.fields.element import Element, isotropic_parts
-from alphacut.rve.image.fields.grid import Fields, Operator, gather, namespace, slabs
+from alphacut.rve.image.fields.grid import SLAB, Fields, Operator, gather, namespace, slabs
 from alphacut.rve.image.fields.preconditioner import FourierPreconditioner, Reference
 
 UNIT = 2.0**-53  # rounding unit
@@ -112,17 +112,41 @@ def energies_by_matrices(
 def _energies_by_rows(
     element: Element, fields: Array, mean_modes: Array, weights: Sequence[Weighted]
 ) -> Energies:
-    """As `energies`, by kernels: the weights are those of trace and deviator."""
-    from alphacut.rve.image.fields.kernels import energies_by_rows  # Numba takes its time
+    """As `energies`, from modes by kernels."""
+    from alphacut.rve.image.fields.kernels import ROUNDINGS, modes_by_rows  # Numba takes its time
 
-    (_, trace), (_, deviator) = weights
-    sums = energies_by_rows(element, trace, deviator, fields, mean_modes, UNIT)
-    value, by_modes = (  # exact sums of the rows
-        np.apply_along_axis(math.fsum, -1, part.reshape(*part.shape[:3], -1)) / trace.size
-        for part in sums
-    )
-    terms = len(mean_modes) + trace.shape[-1]  # products of a voxel's modes, then of a row
-    return Energies(value, by_modes, SAFETY * (terms + COEFFICIENT + 5) * UNIT)
+    count, (nz, ny, nx) = len(fields), fields.shape[2:]
+    n_rows, width = max(1, SLAB // (count * nx)), 1 + max(max(x) for _, x in element.local)
+    # a mode is off by at most amplification @ greatest magnitudes of each unknown at the voxel
+    unknown, magnitude = np.array([u for u, _ in element.local]), element.magnitude
+    by_unknown = [magnitude[:, unknown == u].sum(axis=1) for u in range(element.unknowns)]
+    amplification = ROUNDINGS * UNIT * np.stack(by_unknown, axis=1)
+    products, by_modes = [], np.zeros((len(weights), count, count))
+    for z in range(nz):
+        greatest = np.abs(fields[:, :, np.arange(z, z + width) % nz]).max(axis=2)
+        for axis in (2, 3):
+            greatest = np.max([np.roll(greatest, -k, axis) for k in range(width)], axis=0)
+        for first in range(0, ny, n_rows):
+            last = min(first + n_rows, ny)
+            modes = modes_by_rows(element, fields, z, first, last)
+            modes += mean_modes[:, :, None]
+            local = np.moveaxis(greatest[:, :, first:last], 1, 0).reshape(-1, *modes.shape[1:])
+            for k, (rows, weight) in enumerate(weights):
+                voxels = weight[z, first:last].ravel()
+                terms = (modes[rows] * voxels) @ np.swapaxes(modes[rows], 1, 2)
+                products.append(np.apply_along_axis(math.fsum, 0, terms))
+                # errors δa, δb of modes change a b by at most (|a| + δa/2) δb + (|b| + δb/2) δa
+                spread = amplification[rows].T
+                size = np.tensordot(spread, np.abs(modes[rows]), axes=1)
+                size += np.tensordot(spread @ spread.T / 2, local, axes=1)
+                mixed = np.sum((size * voxels) @ np.swapaxes(local, 1, 2), axis=0)
+                by_modes[k] += mixed + mixed.T
+    sums = np.reshape(products, (-1, len(weights), count, count))
+    value = np.apply_along_axis(math.fsum, 0, sums) / (nz * ny * nx)
+    value = (value + np.swapaxes(value, 1, 2)) / 2
+    terms_and_means = min(n_rows, ny) * nx + 2
+    relative_rounding = SAFETY * (terms_and_means + COEFFICIENT + 5) * UNIT
+    return Energies(value, by_modes / (nz * ny * nx), relative_rounding)
 
 
 def _on_host(array: Fields) -> Array:

@@ -34,49 +34,23 @@ def apply_by_rows(
     result = np.zeros_like(fields)
     assert element.products is not None
     parts = isotropic_parts(3, stress=element.stress)
-    uniform = np.linalg.solve(parts, _constant_modes(element, mean_modes))
+    uniform = np.linalg.solve(parts, mean_modes[element.of_voigt.any(axis=1)])
     for load, field in enumerate(fields):
         _apply(*element.products, parts[3, 3] ** 2, uniform[:, load].copy(),
                trace, deviator, field, result[load])  # fmt: skip
     return result
 
 
-def energies_by_rows(
-    element: Element, trace: Array, deviator: Array, fields: Array, mean_modes: Array, unit: float
-) -> tuple[Array, Array]:
-    """Sums over each row of products of modes, and what rounding of the modes changes in them.
+def modes_by_rows(element: Element, fields: Array, z: int, first: int, last: int) -> Array:
+    """Modes in the rows from `first` to `last` of a layer of voxels, (modes, fields, voxels).
 
-    Args:
-        element: Of products of splines.
-        trace: Weight of the trace's modes, shape (z, y, x).
-        deviator: Weight of the deviator's modes.
-        fields: Shape (fields, unknowns, z, y, x).
-        mean_modes: Modes of the uniform field to add to each, shape (modes, fields).
-        unit: Rounding unit.
-
-    Returns:
-        Both of shape (trace or deviator, fields, fields, z, y).
+    Each is off by at most `ROUNDINGS` rounding units of the sum of its terms' magnitudes.
     """
     assert element.products is not None
-    count = len(fields)
-    # errors of the constant mode of each part, and norms of those of all other modes of trace and
-    # deviator: ≤ Σ_u amplification_u · greatest magnitude of u at the voxel
-    unknown = np.array([u for u, _ in element.local])
-    is_constant = np.asarray(element.of_voigt.any(axis=1))
-    sums = np.stack([element.magnitude[:, unknown == u].sum(axis=1)
-                     for u in range(element.unknowns)], axis=1)  # fmt: skip
-    norms = [np.linalg.norm(sums[rows][~is_constant[rows]], axis=0) for rows in element.parts]
-    amplification = np.concatenate([sums[is_constant], norms])
-    products, errors = np.zeros((2, 2, count, count, *trace.shape[:2]))
-    _add_energies(*element.products, isotropic_parts(3, stress=element.stress),
-                  _constant_modes(element, mean_modes), ROUNDINGS * unit * amplification, unit,
-                  np.stack([trace, deviator]), fields, products, errors)  # fmt: skip
-    return products, errors
-
-
-def _constant_modes(element: Element, modes: Array) -> Array:
-    """Of modes (modes, fields) those that are constant, (parts, fields)."""
-    return np.ascontiguousarray(modes[element.of_voigt.any(axis=1)])
+    modes = np.zeros((len(element.modes), len(fields), (last - first) * fields.shape[-1]))
+    parts = isotropic_parts(3, stress=element.stress)
+    _add_modes(*element.products, parts, fields, z, first, last, modes)
+    return modes
 
 
 @fast
@@ -132,75 +106,28 @@ def _apply(
 
 
 @fast
-def _add_energies(
-    tables: Any, terms: Any, factors: Any, parts: Any, uniform: Any, amplification: Any,
-    unit: float, weights: Any, fields: Any, products: Any, errors: Any,
+def _add_modes(
+    tables: Any, terms: Any, factors: Any, parts: Any, fields: Any,
+    z: int, first: int, last: int, modes: Any,
 ) -> None:  # fmt: skip
-    """Add products and errors of all pairs of fields by row, (weights, fields, fields, z, y)."""
-    n, count = tables.shape[-1], len(fields)
-    nz, ny, nx = weights.shape[1:]
-    strips = np.zeros((count, len(terms), n, n, n * nx))
+    """Add modes of the trace (first part) and the deviator to `modes`, (modes, fields, voxels)."""
+    n, nx = tables.shape[-1], fields.shape[-1]
+    strips = np.zeros((len(terms), n, n, n * nx))
     by_component = np.zeros((6, n, n, n * nx))
-    modes = np.zeros((count, 6, n * n, n * nx))
     lines, shifted = np.zeros((n, n * nx)), np.empty((n, n, nx))
-    magnitude, product = np.empty((fields.shape[1], nx + n - 1)), np.empty(nx)
-    # of the constant modes of the six parts, of the other modes of trace and of deviator
-    size, error = np.zeros((8, count, nx)), np.zeros((8, count, nx))
-    for z in range(nz):
-        for y in range(1 - n, ny):
-            for a in range(count):
-                _fill_strips(
-                    tables, terms, factors, fields[a], z, y + n - 1, shifted, lines, strips[a]
-                )
-            if y < 0:
+    for a in range(len(fields)):
+        for y in range(first + 1 - n, last):
+            _fill_strips(tables, terms, factors, fields[a], z, y + n - 1, shifted, lines, strips)
+            if y < first:
                 continue
-            for a in range(count):
-                _modes_of_row(tables, terms, strips[a], y, by_component)
-                modes[a] = 0.0
-                for p in range(6):
-                    for c in range(6):
-                        if parts[p, c] != 0.0:
-                            _add_block(modes[a, p], parts[p, c], by_component[c])
-                    modes[a, p, 0, :nx] += uniform[p, a]
-                _greatest_magnitudes(fields[a], z, y, n, magnitude)
-                for kind in range(8):
-                    error[kind, a] = 0.0
-                    for u in range(len(magnitude)):
-                        factor = amplification[kind, u]
+            _modes_of_row(tables, terms, strips, y, by_component)
+            for p in range(6):
+                for c in range(6):
+                    for m in range(n**3 if parts[p, c] != 0.0 else 0):
+                        source = by_component[c, m // n**2, m // n % n, m % n * nx :]
+                        out = modes[p * n**3 + m, a, (y - first) * nx :]
                         for x in range(nx):
-                            error[kind, a, x] += factor * magnitude[u, x]
-                for p in range(6):
-                    for x in range(nx):
-                        size[p, a, x] = abs(modes[a, p, 0, x])
-                        error[p, a, x] += unit * size[p, a, x]  # of the uniform modes added
-            for group in range(2):
-                weight, first, last = weights[group, z, y], group, 1 + 5 * group
-                for a in range(count):
-                    for b in range(a, -1, -1):
-                        _multiply_modes(modes[a, first:last], modes[b, first:last], product)
-                        if a == b:  # differences of sums of 162 terms are off by 1e-13 at most
-                            rest = size[6 + group, a]
-                            for x in range(nx):
-                                rest[x] = 1.0000000000001 * product[x]
-                                for p in range(first, last):
-                                    rest[x] -= size[p, a, x] ** 2
-                                rest[x] = np.sqrt(max(rest[x], 0.0))
-                        total = 0.0
-                        for x in range(nx):
-                            total += weight[x] * product[x]
-                        products[group, a, b, z, y] = products[group, b, a, z, y] = total
-            # errors δa, δb of modes change a b by at most (|a| + δa/2) δb + (|b| + δb/2) δa
-            for kind in range(8):
-                group = 0 if kind in (0, 6) else 1
-                weight = weights[group, z, y]
-                for a in range(count):
-                    for b in range(count):
-                        change = 0.0
-                        for x in range(nx):
-                            larger = size[kind, a, x] + error[kind, a, x] / 2.0
-                            change += weight[x] * larger * error[kind, b, x]
-                        errors[group, a, b, z, y] += change
-                        errors[group, b, a, z, y] += change
+                            out[x] += parts[p, c] * source[x]
 
 
 @fast
@@ -315,60 +242,8 @@ def _add_combination(
 
 
 @fast
-def _add_block(out: Any, factor: float, block: Any) -> None:
-    """Add a multiple of a component's modes, (n, n, size), to those of a part, (n², size)."""
-    n = len(block)
-    for i in range(n):
-        for j in range(n):
-            row = block[i, j]
-            for x in range(len(row)):
-                out[i * n + j, x] += factor * row[x]
-
-
-@fast
-def _multiply_modes(first: Any, second: Any, product: Any) -> None:
-    """Sum over parts and modes of the products at each voxel of a row, (parts, n², n·nx)."""
-    nx = len(product)
-    product[:] = 0.0
-    for p in range(len(first)):
-        for m in range(first.shape[1]):
-            left, right = first[p, m], second[p, m]
-            if len(left) == 3 * nx:
-                for x in range(nx):
-                    product[x] += (
-                        left[x] * right[x]
-                        + left[nx + x] * right[nx + x]
-                        + left[2 * nx + x] * right[2 * nx + x]
-                    )
-            else:
-                for x in range(nx):
-                    product[x] += left[x] * right[x] + left[nx + x] * right[nx + x]
-
-
-@fast
-def _greatest_magnitudes(field: Any, z: int, y: int, n: int, magnitude: Any) -> None:
-    """Greatest magnitude of each unknown among those of a voxel of the row, (unknowns, nx + …)."""
-    nz, ny, nx = field.shape[1:]
-    magnitude[:] = 0.0
-    for u in range(len(field)):
-        greatest = magnitude[u]
-        for a in range(n):
-            for b in range(n):
-                row = field[u, (z + a) % nz, (y + b) % ny]
-                for x in range(nx):
-                    greatest[x] = max(greatest[x], abs(row[x]))
-        greatest[nx:] = greatest[: n - 1]
-        for x in range(nx):
-            for f in range(1, n):
-                greatest[x] = max(greatest[x], greatest[x + f])
-
-
-@fast
-def multiply_by_blocks(triangles: Any, spectra: Any) -> None:
-    """Multiply each wave of spectra, (loads, unknowns, waves), by its symmetric block, in place.
-
-    `triangles`, (entries, waves), are the lower triangles of the blocks by rows.
-    """
+def multiply_by_blocks(blocks: Any, spectra: Any) -> None:
+    """Multiply waves, (loads, unknowns, waves), by their blocks (unknowns, unknowns, waves)."""
     loads, count, waves = spectra.shape
     size = 256  # waves worked on at once: what the first cache holds
     product = np.empty((count, size), spectra.dtype)
@@ -377,13 +252,8 @@ def multiply_by_blocks(triangles: Any, spectra: Any) -> None:
             length = min(size, waves - start)
             product[:] = 0
             for a in range(count):
-                for b in range(a + 1):
-                    entry = triangles[a * (a + 1) // 2 + b, start : start + length]
-                    first, second = spectra[load, a, start:], spectra[load, b, start:]
+                for b in range(count):
                     for w in range(length):
-                        product[a, w] += entry[w] * second[w]
-                    if a != b:
-                        for w in range(length):
-                            product[b, w] += entry[w] * first[w]
+                        product[a, w] += blocks[a, b, start + w] * spectra[load, b, start + w]
             for a in range(count):
                 spectra[load, a, start : start + length] = product[a, :length]

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from types import ModuleType
 
 import numpy as np
-from scipy.fft import irfftn, rfftn
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.rve.image.fields.element import Element
@@ -62,13 +61,12 @@ class FourierPreconditioner:
     A cell is alike where space is mirrored at a point, so that blocks are real once each unknown is
     taken at its place in the cell, and odd ones times i: half the memory of Hermitian blocks.
 
-    Voxels of NumPy are transformed in single precision: each application is off by 1e-7 of the
-    residual then, and by less than `ROUNDING` of its energy, however small the residual has become.
+    Voxels are transformed in single precision: each application is off by 1e-7 of the residual
+    then, and by less than `ROUNDING` of its energy, however small the residual has become.
 
     Args:
         inverse: Real symmetric blocks, shape (unknowns, unknowns, *waves); along x the waves are
-            those of a real transform. In single precision their lower triangles times the scale,
-            shape (entries, *waves).
+            those of a real transform; times the scale.
         phases: exp(i k·place), by i for odd unknowns, along each axis; they broadcast to
             (unknowns, *waves).
         shape: Shape of the grid.
@@ -103,12 +101,10 @@ class FourierPreconditioner:
         gain = np.where(has_energy, 1 / np.where(has_energy, energy, 1), 0)
         first_block = xp.asarray(waves_of_cell * gain @ waves_of_cell.T)
         first_wave = (0,) * len(shape)
-        is_single, triangle = xp is np and element.dimension == 3, np.tril_indices(n)
-        scale = float(2.0 ** np.round(np.log2(constant.deviator))) if is_single else 1.0
-        entries = (len(triangle[0]),) if is_single else (n, n)
-        kind = xp.float32 if is_single else xp.float64
-        inverse = xp.empty((*entries, *(k.size for k in waves)), dtype=kind)
-        for slab in slabs(inverse[None] if is_single else inverse):
+        scale = float(2.0 ** np.round(np.log2(constant.deviator)))
+        kind = xp.float32 if element.dimension == 3 else xp.float64
+        inverse = xp.empty((n, n, *(k.size for k in waves)), dtype=kind)
+        for slab in slabs(inverse):
             phase = xp.moveaxis(_product(phases, slab), 0, -1)
             symbol = fourier_blocks(element, constant, [waves[0][slab], *waves[1:]], xp)
             real = (xp.conj(phase)[..., :, None] * symbol * phase[..., None, :]).real
@@ -120,34 +116,27 @@ class FourierPreconditioner:
             solved = xp.moveaxis((solved + xp.swapaxes(solved, -1, -2)) / 2, (-2, -1), (0, 1))
             if slab.start == 0:
                 solved[(slice(None), slice(None), *first_wave)] = first_block
-            if is_single:
-                inverse[:, slab] = scale * solved[triangle]
-            else:
-                inverse[:, :, slab] = solved
+            inverse[:, :, slab] = scale * solved
         return cls(inverse, tuple(phases), shape, scale)
 
     def apply(self, fields: Fields) -> Fields:
         """The inverse on fields of shape (loads, unknowns, *grid)."""
         xp = namespace(fields)
         axes = tuple(range(2, fields.ndim))
-        if self.inverse.dtype == np.float32:
+        spectrum = xp.fft.rfftn((fields / self.scale).astype(self.inverse.dtype), axes=axes)
+        if isinstance(fields, np.ndarray) and len(self.shape) == 3:
             from alphacut.rve.image.fields.kernels import multiply_by_blocks  # Numba takes its time
 
-            single = np.empty(fields.shape, np.float32)
-            np.divide(fields, self.scale, out=single, casting="same_kind")
-            waves = rfftn(single, axes=axes, overwrite_x=True)
-            multiply_by_blocks(
-                self.inverse.reshape(len(self.inverse), -1), waves.reshape(*fields.shape[:2], -1)
-            )
-            return irfftn(waves, s=self.shape, axes=axes, overwrite_x=True).astype(float)
-        spectrum = xp.fft.rfftn(fields, axes=axes)
+            blocks, waves = (x.reshape(*x.shape[:2], -1) for x in (self.inverse, spectrum))
+            multiply_by_blocks(blocks, waves)  # places are alike: no phases
+            return xp.fft.irfftn(spectrum, s=self.shape, axes=axes).astype(float, copy=False)
         for slab in slabs(spectrum):
             phase = _product(self.phases, slab)
             part = xp.conj(phase) * spectrum[:, :, slab]
             spectrum[:, :, slab] = phase * xp.einsum(
                 "ab...,nb...->na...", self.inverse[:, :, slab], part
             )
-        return xp.fft.irfftn(spectrum, s=self.shape, axes=axes)
+        return xp.fft.irfftn(spectrum, s=self.shape, axes=axes).astype(float, copy=False)
 
 
 def _product(phases: tuple[Fields, ...] | list[Fields], slab: slice) -> Fields:
