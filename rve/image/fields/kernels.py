@@ -253,7 +253,8 @@ def multiply_by_blocks(blocks: Any, spectra: Any) -> None:
             product[:] = 0
             for a in range(count):
                 for b in range(count):
+                    block, wave = blocks[a, b, start:], spectra[load, b, start:]
                     for w in range(length):
-                        product[a, w] += blocks[a, b, start + w] * spectra[load, b, start + w]
+                        product[a, w] += block[w] * wave[w]
             for a in range(count):
                 spectra[load, a, start : start + length] = product[a, :length]

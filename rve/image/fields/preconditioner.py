@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from types import ModuleType
 
 import numpy as np
+import scipy.fft
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.rve.image.fields.element import Element
@@ -123,20 +124,21 @@ class FourierPreconditioner:
         """The inverse on fields of shape (loads, unknowns, *grid)."""
         xp = namespace(fields)
         axes = tuple(range(2, fields.ndim))
-        spectrum = xp.fft.rfftn((fields / self.scale).astype(self.inverse.dtype), axes=axes)
+        fft = scipy.fft if isinstance(fields, np.ndarray) else xp.fft
+        spectrum = fft.rfftn((fields / self.scale).astype(self.inverse.dtype), axes=axes)
         if isinstance(fields, np.ndarray) and len(self.shape) == 3:
             from alphacut.rve.image.fields.kernels import multiply_by_blocks  # Numba takes its time
 
             blocks, waves = (x.reshape(*x.shape[:2], -1) for x in (self.inverse, spectrum))
             multiply_by_blocks(blocks, waves)  # places are alike: no phases
-            return xp.fft.irfftn(spectrum, s=self.shape, axes=axes).astype(float, copy=False)
+            return fft.irfftn(spectrum, s=self.shape, axes=axes).astype(float, copy=False)
         for slab in slabs(spectrum):
             phase = _product(self.phases, slab)
             part = xp.conj(phase) * spectrum[:, :, slab]
             spectrum[:, :, slab] = phase * xp.einsum(
                 "ab...,nb...->na...", self.inverse[:, :, slab], part
             )
-        return xp.fft.irfftn(spectrum, s=self.shape, axes=axes).astype(float, copy=False)
+        return fft.irfftn(spectrum, s=self.shape, axes=axes).astype(float, copy=False)
 
 
 def _product(phases: tuple[Fields, ...] | list[Fields], slab: slice) -> Fields:
