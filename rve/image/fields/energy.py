@@ -11,13 +11,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient, System
 from alphacut.rve.image.fields.element import Element, isotropic_parts
-from alphacut.rve.image.fields.grid import SLAB, Fields, Operator, gather, namespace, slabs
+from alphacut.rve.image.fields.grid import SLAB_CELLS, Fields, Operator, gather, namespace, slabs
 from alphacut.rve.image.fields.preconditioner import FourierPreconditioner, Reference
 
 UNIT = 2.0**-53  # rounding unit
@@ -75,78 +76,27 @@ def energies(
         weights: Pairs of rows of modes and their coefficient in each cell, of the grid's shape,
             not negative, with a rounding error of up to `COEFFICIENT` units.
     """
-    if isinstance(fields, np.ndarray) and element.dimension == 3:
-        return _energies_by_rows(element, fields, mean_modes, weights)
-    return energies_by_matrices(element, fields, mean_modes, weights)
-
-
-def energies_by_matrices(
-    element: Element, fields: Fields, mean_modes: Array, weights: Sequence[Weighted]
-) -> Energies:
-    """As `energies`, with the element's matrices, in any library: what kernels are judged by."""
     xp, count, cells = namespace(fields), fields.shape[0], math.prod(fields.shape[2:])
     piece = PIECE if cells <= SMALL else LONG_PIECE
     sums: list[list[Array]] = [[] for _ in weights]
     by_modes = np.zeros((len(weights), count, count))
-    for slab, modes, rounding in modes_of(element, fields, mean_modes):
+    for slab, modes, amplification, local in modes_of(element, fields, mean_modes):
         for k, (rows, weight) in enumerate(weights):
-            products = _piecewise_products(modes[rows], weight[slab], piece)
-            entries = products.reshape(-1, count**2).T
-            sums[k].append(np.array([math.fsum(terms) for terms in entries]))
+            weighted = modes[rows] * xp.reshape(weight[slab], (-1,))
+            products = _piecewise_products(modes[rows], weighted, piece)
+            sums[k].append(np.apply_along_axis(math.fsum, 0, products))
             # errors δa, δb of modes change a b by at most (|a| + δa/2) δb + (|b| + δb/2) δa
-            size, error = (
-                xp.reshape(xp.moveaxis(x, 1, 0), (count, -1))
-                for x in (xp.abs(modes[rows]), rounding[rows])
+            size, spread = xp.abs(modes[rows]), amplification[rows].T
+            errors = xp.tensordot(spread, xp.abs(weighted), axes=1)
+            errors += xp.tensordot(
+                spread @ spread.T / 2, local * xp.reshape(weight[slab], (-1,)), axes=1
             )
-            weighted = xp.reshape(xp.moveaxis(rounding[rows] * weight[slab], 1, 0), (count, -1))
-            mixed = _on_host((size + error / 2) @ weighted.T)
-            by_modes[k] += mixed + mixed.T
-    value = np.empty((len(weights), count, count))
-    for k, parts in enumerate(sums):
-        terms_of = np.array(parts).T
-        value[k] = np.reshape([math.fsum(terms) for terms in terms_of], (count, count)) / cells
+            mixed = xp.sum(errors @ xp.moveaxis(local, 1, 2), axis=0)
+            mixed += UNIT * xp.sum(size @ xp.moveaxis(xp.abs(weighted), 1, 2), axis=0)
+            by_modes[k] += _on_host(mixed + mixed.T)
+    value = np.array([np.apply_along_axis(math.fsum, 0, np.array(parts)) for parts in sums]) / cells
     relative_rounding = SAFETY * (piece + COEFFICIENT + 5) * UNIT
     return Energies(value, by_modes / cells, relative_rounding)
-
-
-def _energies_by_rows(
-    element: Element, fields: Array, mean_modes: Array, weights: Sequence[Weighted]
-) -> Energies:
-    """As `energies`, from modes by kernels."""
-    from alphacut.rve.image.fields.kernels import ROUNDINGS, modes_by_rows  # Numba takes its time
-
-    count, (nz, ny, nx) = len(fields), fields.shape[2:]
-    n_rows, width = max(1, SLAB // (count * nx)), 1 + max(max(x) for _, x in element.local)
-    # a mode is off by at most amplification @ greatest magnitudes of each unknown at the voxel
-    unknown, magnitude = np.array([u for u, _ in element.local]), element.magnitude
-    by_unknown = [magnitude[:, unknown == u].sum(axis=1) for u in range(element.unknowns)]
-    amplification = ROUNDINGS * UNIT * np.stack(by_unknown, axis=1)
-    products, by_modes = [], np.zeros((len(weights), count, count))
-    for z in range(nz):
-        greatest = np.abs(fields[:, :, np.arange(z, z + width) % nz]).max(axis=2)
-        for axis in (2, 3):
-            greatest = np.max([np.roll(greatest, -k, axis) for k in range(width)], axis=0)
-        for first in range(0, ny, n_rows):
-            last = min(first + n_rows, ny)
-            modes = modes_by_rows(element, fields, z, first, last)
-            modes += mean_modes[:, :, None]
-            local = np.moveaxis(greatest[:, :, first:last], 1, 0).reshape(-1, *modes.shape[1:])
-            for k, (rows, weight) in enumerate(weights):
-                voxels = weight[z, first:last].ravel()
-                terms = (modes[rows] * voxels) @ np.swapaxes(modes[rows], 1, 2)
-                products.append(np.apply_along_axis(math.fsum, 0, terms))
-                # errors δa, δb of modes change a b by at most (|a| + δa/2) δb + (|b| + δb/2) δa
-                spread = amplification[rows].T
-                size = np.tensordot(spread, np.abs(modes[rows]), axes=1)
-                size += np.tensordot(spread @ spread.T / 2, local, axes=1)
-                mixed = np.sum((size * voxels) @ np.swapaxes(local, 1, 2), axis=0)
-                by_modes[k] += mixed + mixed.T
-    sums = np.reshape(products, (-1, len(weights), count, count))
-    value = np.apply_along_axis(math.fsum, 0, sums) / (nz * ny * nx)
-    value = (value + np.swapaxes(value, 1, 2)) / 2
-    terms_and_means = min(n_rows, ny) * nx + 2
-    relative_rounding = SAFETY * (terms_and_means + COEFFICIENT + 5) * UNIT
-    return Energies(value, by_modes / (nz * ny * nx), relative_rounding)
 
 
 def _on_host(array: Fields) -> Array:
@@ -154,40 +104,66 @@ def _on_host(array: Fields) -> Array:
     return np.asarray(array.get() if hasattr(array, "get") else array)
 
 
-def _piecewise_products(modes: Fields, weight: Fields, piece: int) -> Array:
-    """Weighted products of all pairs of fields, symmetric, in sums of `piece` products each."""
-    xp, count = namespace(modes), modes.shape[1]
+def _piecewise_products(modes: Fields, weighted: Fields, piece: int) -> Array:
+    """Products of all pairs of fields, symmetric, (sums, fields, fields), of `piece` terms each."""
+    xp, (count, n_fields, cells) = namespace(modes), modes.shape
+    piece = min(piece, cells)
+    padding = xp.zeros((count, n_fields, -cells % piece))
 
     def cut(values: Fields) -> Fields:
-        """Values by piece, padded with zeros: shape (pieces, fields, piece)."""
-        flat = xp.reshape(xp.moveaxis(values, 1, 0), (count, -1))
-        padding = xp.zeros((count, -flat.shape[1] % piece))
-        return xp.moveaxis(
-            xp.reshape(xp.concatenate([flat, padding], axis=1), (count, -1, piece)), 1, 0
-        )
+        """Values by piece, padded with zeros: shape (modes, pieces, fields, piece)."""
+        padded = xp.concatenate([values, padding], axis=2) if padding.size else values
+        return xp.moveaxis(xp.reshape(padded, (count, n_fields, -1, piece)), 1, 2)
 
-    products = _on_host(cut(modes) @ xp.moveaxis(cut(modes * weight), 1, 2))
+    products = _on_host(cut(modes) @ xp.moveaxis(cut(weighted), 2, 3))
+    products = products.reshape(-1, n_fields, n_fields)
     return np.asarray((products + np.swapaxes(products, 1, 2)) / 2)
 
 
-def modes_of(
-    element: Element, fields: Fields, mean_modes: Array
-) -> Iterator[tuple[slice, Fields, Fields]]:
-    """Yield by slabs: the slab, modes (modes, fields, *slab), bounds of their rounding."""
-    xp, count = namespace(fields), len(element.local)
+Modes = Iterator[tuple[Any, Fields, Fields, Fields]]
+"""Slab; modes (modes, fields, cells of the slab); A and b: errors ≤ A @ b + `UNIT` · |modes|."""
+
+
+def modes_of(element: Element, fields: Fields, mean_modes: Array) -> Modes:
+    """Yield modes by slabs with bounds of their rounding: of voxels of NumPy by kernels."""
+    if isinstance(fields, np.ndarray) and element.dimension == 3:
+        return _modes_by_rows(element, fields, mean_modes)
+    return modes_by_matrices(element, fields, mean_modes)
+
+
+def modes_by_matrices(element: Element, fields: Fields, mean_modes: Array) -> Modes:
+    """As `modes_of`, with the element's matrix, in any library: what kernels are judged by."""
+    xp = namespace(fields)
     matrix, magnitude = xp.asarray(element.modes), xp.asarray(element.magnitude)
     terms = int((element.magnitude > 0).sum(axis=1).max())
-    uniform = xp.reshape(xp.asarray(mean_modes), mean_modes.shape + (1,) * element.dimension)
     for slab in slabs(fields):
-        local, local_error = _subtract_linear(element, gather(element, fields, slab))
-        shape = (-1, *local.shape[1:])
-        modes = xp.reshape(matrix @ xp.reshape(local, (count, -1)), shape)
+        pair = _subtract_linear(element, gather(element, fields, slab))
+        local, error = (xp.reshape(x, (*x.shape[:2], -1)) for x in pair)
         # the sums of the product, in which zeros add no error, and the entries of the matrix
-        local_error += (terms + ENTRY) * UNIT * xp.abs(local)
-        rounding = xp.reshape(magnitude @ xp.reshape(local_error, (count, -1)), shape)
-        modes += uniform
-        rounding += UNIT * xp.abs(modes)
-        yield slab, modes, rounding
+        error += (terms + ENTRY) * UNIT * xp.abs(local)
+        modes = xp.tensordot(matrix, local, axes=1) + xp.asarray(mean_modes)[:, :, None]
+        yield slab, modes, magnitude, error
+
+
+def _modes_by_rows(element: Element, fields: Array, mean_modes: Array) -> Modes:
+    """As `modes_of`, in pieces of a layer, so that few modes are in memory."""
+    from alphacut.rve.image.fields.kernels import ROUNDINGS, modes_by_rows  # Numba takes its time
+
+    count, (nz, ny, nx) = len(fields), fields.shape[2:]
+    n_rows, width = max(1, SLAB_CELLS // (count * nx)), 1 + max(max(x) for _, x in element.local)
+    unknown = np.array([u for u, _ in element.local])
+    by_unknown = [element.magnitude[:, unknown == u].sum(axis=1) for u in range(element.unknowns)]
+    amplification = ROUNDINGS * UNIT * np.stack(by_unknown, axis=1)
+    for z in range(nz):
+        greatest = np.abs(fields[:, :, np.arange(z, z + width) % nz]).max(axis=2)
+        for axis in (2, 3):  # of the values of an unknown at a voxel
+            greatest = np.max([np.roll(greatest, -k, axis) for k in range(width)], axis=0)
+        for first in range(0, ny, n_rows):
+            rows = slice(first, min(first + n_rows, ny))
+            modes = modes_by_rows(element, fields, z, rows.start, rows.stop)
+            modes += mean_modes[:, :, None]
+            local = np.moveaxis(greatest[:, :, rows], 1, 0).reshape(-1, *modes.shape[1:])
+            yield (z, rows), modes, amplification, local
 
 
 def _subtract_linear(element: Element, raw: Fields) -> tuple[Fields, Fields]:
