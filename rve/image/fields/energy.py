@@ -82,19 +82,19 @@ def energies(
     by_modes = np.zeros((len(weights), count, count))
     for slab, modes, amplification, local in modes_of(element, fields, mean_modes):
         for k, (rows, weight) in enumerate(weights):
-            weighted = modes[rows] * xp.reshape(weight[slab], (-1,))
+            factor = xp.reshape(weight[slab], (-1,))
+            weighted = modes[rows] * factor
             products = _piecewise_products(modes[rows], weighted, piece)
             sums[k].append(np.apply_along_axis(math.fsum, 0, products))
             # errors δa, δb of modes change a b by at most (|a| + δa/2) δb + (|b| + δb/2) δa
-            size, spread = xp.abs(modes[rows]), amplification[rows].T
-            errors = xp.tensordot(spread, xp.abs(weighted), axes=1)
-            errors += xp.tensordot(
-                spread @ spread.T / 2, local * xp.reshape(weight[slab], (-1,)), axes=1
-            )
-            mixed = xp.sum(errors @ xp.moveaxis(local, 1, 2), axis=0)
-            mixed += UNIT * xp.sum(size @ xp.moveaxis(xp.abs(weighted), 1, 2), axis=0)
+            spread = amplification[rows].T
+            larger = xp.tensordot(spread, xp.abs(weighted), axes=1)
+            larger += xp.tensordot(spread @ spread.T / 2, local * factor, axes=1)
+            mixed = xp.sum(larger @ xp.moveaxis(local, 1, 2), axis=0)
             by_modes[k] += _on_host(mixed + mixed.T)
     value = np.array([np.apply_along_axis(math.fsum, 0, np.array(parts)) for parts in sums]) / cells
+    size = np.sqrt(np.diagonal(value, axis1=1, axis2=2))
+    by_modes += 2 * UNIT * cells * size[:, :, None] * size[:, None, :]  # `UNIT` · |modes| each
     relative_rounding = SAFETY * (piece + COEFFICIENT + 5) * UNIT
     return Energies(value, by_modes / cells, relative_rounding)
 
