@@ -141,15 +141,6 @@ def spline_element(sides: tuple[float, ...], *, stress: bool) -> Element:
             components[component, :, potentials.index(potential)] += factor * modes_of(orders)
     offsets = list(product(range(width), repeat=n))
     functions = [(u, offset) for u in range(len(potentials)) for offset in offsets]
-    # linear functions have coefficients that are linear in the offset, and no stress
-    first_of = {offset: k for k, offset in enumerate(offsets)}
-    unit = [first_of[tuple(int(axis == j) for j in range(n))] for axis in range(n)]
-    slopes = [
-        tuple(u * width**n + unit[axis] for axis in range(n) for _ in range(offset[axis]))
-        if stress
-        else ()
-        for u, offset in functions
-    ]
     products: list[tuple[int, ...]] = [
         (component, potentials.index(potential), *orders[::-1], factor)
         for component, of_component in enumerate(derivatives)
@@ -160,8 +151,8 @@ def spline_element(sides: tuple[float, ...], *, stress: bool) -> Element:
     element = _element(
         components.reshape(len(derivatives), width**n, -1),
         local=functions,
-        origins=[u * width**n for u, _ in functions],
-        slopes=slopes,
+        origins=[None for _ in functions],
+        slopes=[() for _ in functions],
         places=[((0.0,) * n, False) for _ in potentials],
         stress=stress,
     )
