@@ -17,7 +17,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from time import perf_counter
-from typing import ClassVar, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
@@ -37,13 +37,12 @@ from alphacut.rve.cell.cell import (
 from alphacut.rve.cell.outline import Outline, circle, is_round
 from alphacut.rve.fenicsx import MPI
 from alphacut.rve.mesh.columns import extrude
-from alphacut.rve.mesh.prism_grid import reference_radius
+from alphacut.rve.mesh.prism_grid import PrismGrid, reference_radius
 from alphacut.rve.mesh.square import REFINEMENTS
 from alphacut.rve.prism.modulus_basis import TOLERANCE, ModulusBasis, modulus_basis
 from alphacut.rve.prism.problem import FoldedMeshError, PrismProblem, SliceStrains
 from alphacut.rve.prism.slices import (
     SliceProblem,
-    cached_slice_problem,
     is_homogeneous,
     solve_sample,
 )
@@ -158,7 +157,7 @@ class PrismModel:
 
     def _slice_problem(self, radius_map: RadiusMap) -> SliceProblem:
         """As `problem`, by slices."""
-        return self._moved(radius_map, cached_slice_problem)
+        return self._moved(radius_map, cached_slices)
 
     def _moved(self, radius_map: RadiusMap, cached: Callable[..., AnyProblem]) -> AnyProblem:
         """Problem on the mesh of a map's reference radius, with its nodes moved to the map."""
@@ -301,22 +300,28 @@ def _mean_moduli(curve: StressCurve) -> Array:
 
 
 @lru_cache(maxsize=2)
-def cached_problem(
-    size: float,
-    radius: float,
-    outline: Outline,
-    refinement: float,
-    layers: int,
-    parallel: bool,
-) -> PrismProblem:
-    """Mesh, form and numbering for any map with this reference radius; see `extrude`."""
-    comm = MPI.COMM_WORLD if parallel else MPI.COMM_SELF
-    grid = extrude(
+def cached_grid(
+    size: float, radius: float, outline: Outline, refinement: float, layers: int, parallel: bool
+) -> PrismGrid:
+    """Prisms for any map with this reference radius; see `extrude`."""
+    return extrude(
         size=size,
         radius=radius,
         layers=layers,
         outline=outline,
         refinement=refinement,
-        comm=comm,
+        comm=MPI.COMM_WORLD if parallel else MPI.COMM_SELF,
     )
-    return PrismProblem(grid, comm)
+
+
+@lru_cache(maxsize=2)
+def cached_problem(*mesh: Any, parallel: bool) -> PrismProblem:
+    """Mesh, form and numbering on a grid of `cached_grid`."""
+    comm = MPI.COMM_WORLD if parallel else MPI.COMM_SELF
+    return PrismProblem(cached_grid(*mesh, parallel), comm)
+
+
+@lru_cache(maxsize=2)
+def cached_slices(*mesh: Any) -> SliceProblem:
+    """The same on one rank, by slices."""
+    return SliceProblem(cached_grid(*mesh, False))

@@ -78,12 +78,12 @@ def modulus_basis(
         return np.concatenate([by(half) for by, half in zip(operators, halves, strict=True)])
 
     loads = np.concatenate([forces[0] + factor * forces[1] for factor in factors])
-    solved = conjugate_gradients(multiply, problem.solver, loads, _LOOSE)
-    fields = _orthonormal_basis(solved.fields)
+    solutions, iterations = conjugate_gradients(multiply, problem.solver, loads, _LOOSE)
+    fields = _orthonormal_basis(solutions)
     images = np.array([problem.operator(part)(fields) for part in parts])  # K_0 v and K_1 v
     means = problem.slice_strains(strains, fields)
     projected = fields @ images.swapaxes(1, 2), fields @ forces.swapaxes(1, 2)
-    basis = ModulusBasis(*projected, means, solved.iterations, ends)
+    basis = ModulusBasis(*projected, means, iterations, ends)
     # the error is largest at the ends of the range, since the nodes are those of Chebyshev
     residuals = np.concatenate([_residuals(basis, modulus, forces, images) for modulus in ends])
     energies = (residuals * problem.solver(residuals)).sum(axis=1)  # rᵀ P⁻¹ r

@@ -171,8 +171,8 @@ class LevelSetModel(_NamedModel):
         if not hasattr(law, "pdf"):
             raise RefusedError("law of θ", type(law).__name__, "a law, as TruncatedNormal(-3, 3)")
         named = in_order_of(NAMES, phases)
-        mesh = (self.mesh_size, 0.0, circle, REFINEMENTS[0], self.layers, self.parallel)
-        problem = cached_problem(*mesh)
+        mesh = (self.mesh_size, 0.0, circle, REFINEMENTS[0], self.layers)
+        problem = cached_problem(*mesh, parallel=self.parallel)
         problem.move(LevelSet(cast("ThetaLaw", law), self.z))
         return problem, named
 

@@ -189,10 +189,6 @@ class PrismProblem:
         points = np.einsum("qn,cnd->cqd", shapes, positions[self.grid.cells[self.wedge]])
         return level_set.is_inside(points).astype(float)
 
-    def strains(self, displacement: Array) -> Array:
-        """(ε11, ε22, 2 ε12) at points, (cells, 3, points, 3), of displacements (nodes, 2)."""
-        return self._strains(displacement).reshape(len(self.wedge), SLICES_PER_LAYER, -1, 3)
-
     def _areas(self) -> Array:
         heights = np.diff(self._levels)[self.layer]
         volume = self._strains.determinants().reshape(len(self.wedge), SLICES_PER_LAYER, -1)
@@ -264,7 +260,7 @@ class PrismProblem:
         count = len(fields)
         strain = np.empty((len(self.wedge), SLICES_PER_LAYER, POINTS_PER_SLICE, 3, count))
         for k, (uniform, u) in enumerate(fields):
-            strain[..., k] = self.strains(u) + uniform
+            strain[..., k] = self._strains(u).reshape(strain.shape[:-1]) + uniform
         areas = self.phase_areas() / AREA  # (phases, cells, 3, points)
         prism_means = np.einsum("pmsq,msqif->pmsif", areas, strain)
         means = np.stack([self.sum_by_layer(phase_means) for phase_means in prism_means])

@@ -16,22 +16,19 @@ have one pattern, found once for a mesh; a map moves the nodes alone.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
 
 import numpy as np
 import scipy.sparse as sp
 
 from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.rve.cell.cell import AREA
-from alphacut.rve.cell.outline import Outline
 from alphacut.rve.fenicsx import MPI
-from alphacut.rve.mesh.columns import extrude
 from alphacut.rve.mesh.prism_grid import PrismGrid
 from alphacut.rve.mesh.wedge import POINTS_PER_SLICE, SLICES_PER_LAYER, prism_rule, slice_weights
 from alphacut.rve.prism.problem import SliceStrains, positive_density, require_valid_elements
 from alphacut.rve.solver.form import strain_products
 from alphacut.rve.solver.krylov import DEFAULTS
-from alphacut.rve.solver.level_solver import LevelSolver, Operator, conjugate_gradients
+from alphacut.rve.solver.level_solver import LevelSolver, Operator, conjugate_gradients, stacked
 from alphacut.rve.solver.numbering import LevelNumbering
 from alphacut.rve.solver.theta_preconditioner import theta_mass
 from alphacut.stochastic import RadiusMap
@@ -66,13 +63,13 @@ def solve_sample(
         loads[:] = 0.0
     operator = problem.operator(entries)
     problem.factorise(entries)
-    solved = conjugate_gradients(operator, problem.solver, loads, RTOL)  # K U = F
-    residuals = problem.solver.norms(loads - operator(solved.fields))
+    fluctuations, iterations = conjugate_gradients(operator, problem.solver, loads, RTOL)  # K U = F
+    residuals = problem.solver.norms(loads - operator(fluctuations))
     load_norms = problem.solver.norms(loads)
     residual = float((residuals / np.where(load_norms > 0, load_norms, 1.0)).max())
-    fields = problem.slice_strains(strains, solved.fields)
+    fields = problem.slice_strains(strains, fluctuations)
     totals = fields.combined(np.tile(np.eye(len(strains)), (2, 1)))  # ε̄ + ε(u) of each load
-    return totals, solved.iterations, residual
+    return totals, iterations, residual
 
 
 class SliceProblem:
@@ -192,7 +189,7 @@ class SliceProblem:
 
     def operator(self, entries: Array) -> Operator:
         """The map x ↦ K x of fields (fields, size) for the entries of all K_s."""
-        matrix = self.solver.stacked(entries)
+        matrix = stacked(entries, self._indptr, self._indices)
 
         def multiply(fields: Array) -> Array:
             columns = self._to_slices(fields).reshape(len(fields), -1)
@@ -269,13 +266,3 @@ def _summation(places: Ints, entries: Ints, num_places: int, num_entries: int) -
     """Matrix that adds each of some entries to its place."""
     ones = np.ones(places.size)
     return sp.csr_matrix((ones, (places.ravel(), entries.ravel())), (num_places, num_entries))
-
-
-@lru_cache(maxsize=2)
-def cached_slice_problem(
-    size: float, radius: float, outline: Outline, refinement: float, layers: int
-) -> SliceProblem:
-    """Problem for any map with this reference radius; see `extrude`."""
-    return SliceProblem(
-        extrude(size=size, radius=radius, layers=layers, outline=outline, refinement=refinement)
-    )

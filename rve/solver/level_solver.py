@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
@@ -24,23 +23,15 @@ LOG = logging.getLogger(__name__)
 Operator = Callable[[Array], Array]
 
 
-@dataclass(frozen=True)
-class FieldSolutions:
-    """Solutions, shape (loads, size), and the number of iterations of each."""
-
-    fields: Array
-    iterations: tuple[int, ...]
-
-
 @uninterrupted(second_ends=True)
 def conjugate_gradients(
     operator: Operator, preconditioner: LevelSolver, loads: Array, rtol: float
-) -> FieldSolutions:
-    """Solve A x = b for loads b of shape (loads, size) by preconditioned conjugate gradients.
+) -> tuple[Array, tuple[int, ...]]:
+    """Solutions of A x = b for loads b, (loads, size), and the number of iterations of each.
 
-    As Hestenes, Stiefel (1952) with the names of Saad, Iterative Methods, algorithm 9.1; loads
-    share the calls of operator and preconditioner alone. A load ends at |r| ≤ rtol |b|, where the
-    norms are those of nodal forces.
+    Preconditioned conjugate gradients with the names of Saad, Iterative Methods, algorithm 9.1;
+    loads share no more than the calls of operator and preconditioner. A load ends at |r| ≤ rtol |b|
+    of the forces on nodes.
 
     Raises:
         ConvergenceError: A load does not end within `MAX_ITERATIONS`.
@@ -65,7 +56,7 @@ def conjugate_gradients(
         r -= alpha * Ap
         iterations += is_open
     LOG.debug("cg with theta: %s iterations", iterations)
-    return FieldSolutions(x, tuple(map(int, iterations)))
+    return x, tuple(map(int, iterations))
 
 
 class LevelSolver:
@@ -131,10 +122,6 @@ class LevelSolver:
         """Jᵀ r, shape (…, v), of values (…, n)."""
         flat = self._injection.T @ values.reshape(-1, values.shape[-1]).T
         return np.ascontiguousarray(flat.T).reshape(*values.shape[:-1], -1)
-
-    def stacked(self, entries: Array) -> sp.bsr_matrix:
-        """Block-diagonal matrix of blocks of the pattern, from entries (blocks, 4 node pairs)."""
-        return stacked(entries, self._indptr, self._indices)
 
     def factorise(self, hats: Array, bubbles: Array, mass: ThetaMass) -> None:
         """Factorise the blocks of levels, (layers + 1, 4 node pairs), and of mid-levels.
