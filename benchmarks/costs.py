@@ -53,7 +53,7 @@ LABELS = {
     "storeys": "storeys, 5 inputs",
     "inputs": "inputs, 8 storeys",
     "records": "records, 3 inputs",
-    "workers": "workers, 44 records",
+    "workers": "workers, 11 records",
 }
 Row = dict[str, Any]
 
@@ -95,7 +95,7 @@ def frames() -> Iterator[Row]:
 def suites() -> Iterator[Row]:
     """Runs of a suite by records, then by worker processes, whose clock counts."""
     runs = [("records", count, 1) for count in (1, *RECORDS)]
-    for kind, records, workers in (*runs, *(("workers", RECORDS[-1], count) for count in WORKERS)):
+    for kind, records, workers in (*runs, *(("workers", RECORDS[-2], count) for count in WORKERS)):
         with tempfile.TemporaryDirectory() as folder:
             write_suite(Path(folder, "records"), records, 8.0)
             Path(folder, "suite.toml").write_text(SUITE, encoding="utf-8")
@@ -110,20 +110,12 @@ def suites() -> Iterator[Row]:
         yield {"size of": kind, "size": size, "seconds": clock if kind == "workers" else seconds}
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Print the table, write it, and draw a panel for each kind of size."""
+def draw(rows: Sequence[Row], stem: Path) -> None:
+    """Draw seconds over size, a panel for each kind of size with its exponent."""
     import matplotlib.pyplot as plt
 
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, default=RESULTS)
-    out, costs = parser.parse_args(arguments).out, dict[tuple[str, int], Row]()
-    for source in (cells, frames, suites):
-        for row in source():
-            costs[row["size of"], row["size"]] = row  # the first, repeated, loads compiled code
-            print(row["size of"], row["size"], f"{row['seconds']:.2f} s", flush=True)
-    rows, kinds = list(costs.values()), list(dict.fromkeys(kind for kind, _ in costs))
-    write(rows, out / "costs.csv")
-    figure, panels = plt.subplots(1, len(kinds), figsize=(15, 3.2), layout="constrained")
+    kinds = list(dict.fromkeys(row["size of"] for row in rows))
+    figure, panels = plt.subplots(1, len(kinds), figsize=(15, 3.6), layout="constrained")
     for axes, kind in zip(panels, kinds, strict=True):
         line = [row for row in rows if row["size of"] == kind]
         size, seconds = (np.array([row[key] for row in line], float) for key in ("size", "seconds"))
@@ -131,11 +123,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"{kind}: seconds ~ size^{power:.2f}")
         axes.loglog(size, seconds, "o-")
         axes.set(xlabel=LABELS[kind], title=f"seconds ~ size^{power:.2f}")
+        axes.set_xticks(size, [f"{x:,.0f}" for x in size], rotation=30)
+        axes.set_yticks(seconds, [f"{x:.2g}" for x in seconds])
+        axes.minorticks_off()
         axes.grid(alpha=0.25)
-    panels[0].set_ylabel("seconds of processor")
-    panels[-1].set_ylabel("seconds of the clock")
+    panels[0].set_ylabel("seconds")
     for suffix in (".svg", ".png"):
-        figure.savefig((out / "costs").with_suffix(suffix), dpi=160)
+        figure.savefig(stem.with_suffix(suffix), dpi=160)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print the table, write it, and draw it."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=Path, default=RESULTS)
+    out, costs = parser.parse_args(arguments).out, dict[tuple[str, int], Row]()
+    for source in (cells, frames, suites):
+        for row in source():
+            costs[row["size of"], row["size"]] = row  # the first, repeated, loads compiled code
+            print(row["size of"], row["size"], f"{row['seconds']:.2f} s", flush=True)
+    write([*costs.values()], out / "costs.csv")
+    draw([*costs.values()], out / "costs")
     return 0
 
 
