@@ -141,7 +141,9 @@ class EnvelopeTask:
         # a second proof of many inputs is hardly tighter: the number of its parts ends it
         has_many_inputs = len(structure.inputs(self.fuzzy)) > MAX_PARAMETERS
         gap = np.inf if has_many_inputs else PEAK_ERROR
-        if loose := loose_peaks(peak_bounds, self.limited, gap):
+        is_searched = result.searched_peaks is not None  # a second search finds no more
+        limited = [x for x in self.limited if not is_searched or x not in peak_bounds]
+        if loose := loose_peaks(peak_bounds, limited, gap):
             tighter = replace(self, limited=loose).close_peaks(structure, second)
             peak_bounds = tightest(peak_bounds, tighter)
         data = result.to_dataset()

@@ -94,7 +94,7 @@ class PeakSearch:
 
     name: ClassVar[str] = "single-linkage"
     tolerance: float = 5e-3
-    budget: int = 20_000
+    budget: int = 12_000
 
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
         """Return the attained envelope of all outputs on all levels, with searched peaks."""

@@ -5,8 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from alphacut.frame import Accelerogram, Exact, Force, History, LinearFlow, StoreyFrame
+from alphacut.frame import (
+    Accelerogram,
+    Exact,
+    Force,
+    History,
+    LinearFlow,
+    StoreyFrame,
+    envelope,
+)
 from alphacut.frame.dynamics.nonlinear import make_flow
+from alphacut.frame.questions.peaks import peaks
+from alphacut.fuzzy import Interval, Nature
 from alphacut.fuzzy.refused import RefusedError
 
 MASS, STIFFNESS, YIELD_FORCE = 2.0, 50.0, 3.0
@@ -140,3 +150,23 @@ def test_collapse_under_weight_is_said_with_its_time():
     with pytest.raises(RefusedError, match=r"storey 1 .*collapses .*t = 0\.01\d+ s"):
         motion(frame, 1.0, 0.1)
     assert np.isfinite(motion(replace(frame, hardening=[0.02]), 1.0, 0.1)).all()
+
+
+def test_peaks_are_searched_and_proofs_are_refused(rng):
+    frame = replace(random_frame(rng, 2), outputs=("drift1", "ductility1"))
+    inputs = {x: Interval(0.9 * y, 1.1 * y) for x, y in frame.parameters.items() if x == "fy1"}
+    nodes = {"duration": 1.6, "step": 0.02, "alpha": [0.0], "progress": False}
+    found = peaks(envelope(frame, inputs, **nodes))
+    low, high = inputs["fy1"].support
+    points = np.linspace(low, high, 201)[:, None]
+    flow = make_flow(frame, ("fy1",), 1.6, 0.02, "exact")
+    finer = make_flow(frame, ("fy1",), 1.6, 0.0005, "exact")
+    reached = flow.values_and_peaks(points)[1]
+    assert np.abs(finer.values(points)).max(1) == pytest.approx(reached, rel=2e-3)
+    for peak, values in zip(found.values(), reached.T, strict=True):
+        assert peak.nature is Nature.ESTIMATED
+        assert abs(peak.upper[0] - values.max()) <= peak.error[0] <= 0.02 * peak.upper[0]
+        assert abs(peak.lower[0] - values.min()) <= peak.error[0]
+    for method in ("proof", "dual", "improved-graph-follower"):
+        with pytest.raises(RefusedError, match="auto or quasi-monte-carlo"):
+            envelope(frame, inputs, method, **nodes)
