@@ -20,7 +20,7 @@ from alphacut.fuzzy.refused import RefusedError, require
 PLANE_MODES = ("1", "L", "I;16", "I;16B", "I;16L", "I", "F")
 PHOTOMETRIC, WHITE_IS_ZERO = 262, 0  # tag of TIFF and its value
 SAMPLE_FORMAT, SIGNED = 339, 2
-PROGRAM_BYTES = 1.3e8
+PROGRAM_BYTES = 1.7e8
 """Memory of the program and its libraries."""
 BYTES_PER_ELEMENT = {2: 1450, 3: 1900}
 """Memory of an element in the cuts' solutions with their first guess, by dimension; within 1.25 of
