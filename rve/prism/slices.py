@@ -139,13 +139,18 @@ class SliceProblem:
         prisms = by_layer.swapaxes(1, 2).reshape(-1, SLICES_PER_LAYER, POINTS_PER_SLICE)
         require_valid_elements(grid, prisms)
         masses = (np.diff(levels)[:, None] * self._line_weights).ravel() * density  # f_Θ dθ
-        weighted = gradients * (self._areas * masses[:, None, None])[:, :, None]
-        products = weighted @ gradients.swapaxes(-1, -2)  # ∫ f_Θ ∂_α N_i ∂_β N_j: [iα, jβ]
-        sums = weighted.sum(axis=-1)  # ∫ f_Θ ∂_α N_i
+        weights = self._areas * masses[:, None, None]
         self._products, self._sums = (
-            [np.array([matrix @ values.ravel() for values in slices]) for matrix in by_phase]
-            for slices, by_phase in ((products, self._to_pattern), (sums, self._to_nodes))
+            [np.empty((len(masses), matrix.shape[0])) for matrix in by_phase]
+            for by_phase in (self._to_pattern, self._to_nodes)
         )
+        for k in range(len(masses)):  # one slice after another, which takes less memory
+            weighted = gradients[k] * weights[k][:, None]
+            products = weighted @ gradients[k].swapaxes(-1, -2)  # ∫ f_Θ ∂_α N_i ∂_β N_j: [iα, jβ]
+            sums = weighted.sum(axis=-1)  # ∫ f_Θ ∂_α N_i
+            for phase in range(len(self._phase)):
+                self._products[phase][k] = self._to_pattern[phase] @ products.ravel()
+                self._sums[phase][k] = self._to_nodes[phase] @ sums.ravel()
 
     def _slice_nodes(self, positions: Array) -> Array:
         """Positions of the plane nodes on the slices, (slices, nodes, 2), of those of the grid."""
@@ -227,28 +232,28 @@ class SliceProblem:
 
     def slice_strains(self, strains: Array, fields: Array) -> SliceStrains:
         """Those of macroscopic strains alone, (loads, 3), then of fields alone, (n, size)."""
-        count, slices = len(fields), len(self._areas)
+        count, slices, phases = len(fields), len(self._areas), len(self._phase)
         nodal = np.moveaxis(self._to_slices(fields).reshape(count, slices, -1, 2), 0, 2)
         nodal = np.append(nodal, np.zeros((slices, 1, count, 2)), axis=1)  # number −1: fixed nodes
-        corners = nodal[:, self._unknown].reshape(*self._gradients.shape[:2], 6, -1)
-        slopes = self._gradients.reshape(*corners.shape[:3], -1)  # [α, point]
-        gradients = slopes.swapaxes(-1, -2) @ corners
-        along_1, along_2 = np.moveaxis(gradients.reshape(*corners.shape[:2], 2, -1, count, 2), 2, 0)
-        strain = np.empty((*along_1.shape[:3], 3, len(strains) + count))
+        strain = np.empty((len(self._unknown), POINTS_PER_SLICE, 3, len(strains) + count))
         affine, fluctuation = np.split(strain, [len(strains)], axis=-1)  # views
         affine[:] = strains.T
-        fluctuation[..., 0, :], fluctuation[..., 1, :] = along_1[..., 0], along_2[..., 1]
-        np.add(along_2[..., 0], along_1[..., 1], out=fluctuation[..., 2, :])
-        means, fractions, products = [], [], []
-        for triangles in self._phase:
-            areas = self._areas[:, triangles].reshape(slices, -1) / AREA
-            of_phase = strain[:, triangles].reshape(slices, areas.shape[1], -1)
-            means.append((areas[:, None] @ of_phase).reshape(slices, 3, -1))
-            fractions.append(areas.sum(axis=1))
-            weights = (areas * self._rule.weights[:, None]).reshape(1, -1)
-            products += list(strain_products(of_phase.reshape(weights.size, 3, -1), weights))
-        arrays = map(np.array, (means, fractions, products))
-        return SliceStrains(self._rule.nodes, self._rule.weights, *arrays)
+        means, fractions = np.empty((phases, slices, *strain.shape[2:])), np.empty((phases, slices))
+        products = np.zeros((phases, *strain.shape[2:], *strain.shape[2:]))
+        for k, weight in enumerate(self._rule.weights):
+            corners = nodal[k, self._unknown].reshape(*self._unknown.shape, -1)
+            slopes = self._gradients[k].reshape(*self._unknown.shape, -1)  # [α, point]
+            gradients = slopes.swapaxes(-1, -2) @ corners
+            along = gradients.reshape(len(corners), 2, POINTS_PER_SLICE, count, 2).swapaxes(0, 1)
+            fluctuation[..., 0, :], fluctuation[..., 1, :] = along[0, ..., 0], along[1, ..., 1]
+            np.add(along[1, ..., 0], along[0, ..., 1], out=fluctuation[..., 2, :])
+            for phase, triangles in enumerate(self._phase):
+                areas = self._areas[k, triangles].ravel() / AREA
+                of_phase = strain[triangles].reshape(len(areas), *strain.shape[2:])
+                means[phase, k] = np.tensordot(areas, of_phase, axes=1)
+                fractions[phase, k] = areas.sum()
+                products[phase] += strain_products(of_phase, weight * areas[None])[0]
+        return SliceStrains(self._rule.nodes, self._rule.weights, means, fractions, products)
 
 
 def _slopes(points: Array) -> Array:
