@@ -116,7 +116,7 @@ class Stage(Generic[T]):
     """A function from objects to a result of type `kind`, in files NAME.json and NAME.nc.
 
     The result depends on the `inputs` and on the source of `packages` of this project, nothing
-    else; with `has_samples` it stores samples on the way.
+    else; with `has_samples` it stores samples on the way. `work` is compared with other stages'.
     """
 
     name: str
@@ -125,6 +125,7 @@ class Stage(Generic[T]):
     kind: type[T]
     compute: Callable[[StageContext], StageResult[T]]
     has_samples: bool = False
+    work: float = 1.0
 
     @cached_property
     def key(self) -> str:
@@ -202,17 +203,20 @@ class StageStore:
         results = {stage.name: x for stage in stages if (x := self._read(stage)) is not None}
         stale = [stage for stage in stages if stage.name not in results]
         tick = self.progress.next_part((stage.name for stage in stale), [*results])
+        total, done = sum(stage.work for stage in stale), 0.0
         if executor is None or self.folder is None or len(stale) == 1:
-            for k, stage in enumerate(stale):
-                stage_tick = subprogress(tick, k / len(stale), (k + 1) / len(stale))
+            for stage in stale:
+                stage_tick = subprogress(tick, done / total, (done + stage.work) / total)
                 results[stage.name] = self._compute(stage, stage_tick)
+                done += stage.work
             return results
         stage_of_future = {executor.submit(stage.run, StageContext()): stage for stage in stale}
-        for count, future in enumerate(as_completed(stage_of_future), start=1):
+        for future in as_completed(stage_of_future):
             stage = stage_of_future[future]
             with _naming_dead_workers(stage.name), TemporaryDirectory() as scratch:
                 results[stage.name] = self._write(stage, future.result(), Path(scratch))
-            tick(count / len(stale))
+            done += stage.work
+            tick(done / total)
         return results
 
     def _read(self, stage: Stage[T]) -> StageResult[T] | None:

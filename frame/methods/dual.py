@@ -157,7 +157,9 @@ class DualProof:
                 problem.out[1] = centre[nodes, o] * (-1.0, 1.0)[s]
         with ThreadPoolExecutor(goal.workers) as pool:
             # 1. find multipliers with low bounds, and inputs with high values of the models
-            self._minimise(problems, goal, box, pool, needed[nodes], is_complete, float(has_bounds))
+            slack, levels = float(has_bounds), len(goal.needed)
+            tick = subprogress(goal.tick, k / levels, (k + 1) / levels)
+            self._minimise(problems, goal, box, pool, needed[nodes], is_complete, slack, tick)
             unit = np.zeros((*needed.shape, len(box.active)))
             for (o, s), problem in problems.items():
                 outer[nodes, o, s], unit[nodes, o, s] = problem.out[0], problem.at
@@ -215,6 +217,7 @@ class DualProof:
         needed: Mask,
         is_complete: bool,
         first_slack: float,
+        progress: Progress,
     ) -> None:
         """Minimise the dual functions of all bounds that are asked for, `needed` (J, m, 2).
 
@@ -244,7 +247,7 @@ class DualProof:
                 (problem, problem.open_nodes(slack), problem.effort(cells, steps, slack, multiple))
                 for problem in problems.values()
             ]
-            tick = subprogress(goal.tick, *WORK_OF_PASSES[number : number + 2])
+            tick = subprogress(progress, *WORK_OF_PASSES[number : number + 2])
             improve_all(jobs, pool, tick, peaks_alone=self.bounds_peaks_alone and number == 2)
             if number == 0 and not goal.last:
                 self._require_narrow(problems, box, goal.peak)
