@@ -131,8 +131,9 @@ class LevelSolver:
         self._mass = mass
         of_vertices = [self._bubble_sums @ block.reshape(-1, 4) for block in bubbles]
         scaled = np.array(of_vertices) / mass.bubbles[:, None, None]
-        values = np.concatenate([(hats / mass.hats[:, None]).ravel(), scaled.ravel()])
-        self._values[:] = values[self._order]
+        values = (hats / mass.hats[:, None]).ravel(), scaled.ravel()
+        self._values[:] = np.concatenate(values)[self._order]
+        del values, of_vertices, scaled  # before the factors take their memory
         self._matrix.assemble()  # says that the values are new; the pattern and its analysis stay
         self._ksp.setOperators(self._matrix)
         self._ksp.setUp()
