@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -17,7 +17,14 @@ from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate
 from alphacut.frame.modes.intervening import Excitation, Oscillator
 from alphacut.frame.modes.models import MotionModels
 from alphacut.frame.modes.structure import Classical
-from alphacut.frame.response.oscillators import Grid, ModalResponses, Oscillators, grid_over
+from alphacut.frame.response.oscillators import (
+    Grid,
+    ModalResponses,
+    Oscillators,
+    grid_over,
+    read_response,
+)
+from alphacut.frame.response.straying import Response, narrowed_straying
 from alphacut.frame.structures.loads import History
 from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.fuzzy.progress_bar import Progress
@@ -103,11 +110,13 @@ class LevelModels:
         structure: The structure over the level's box.
         models: Its motion.
         tables: Responses of its oscillators.
+        excitation: The loads, nodes, and sources.
     """
 
     structure: Classical
     models: MotionModels
     tables: ResponseTables
+    excitation: Excitation
 
     def within(self, low: Array, high: Array) -> LevelModels:
         """Models over the part low ≤ u ≤ high of the box, with the same response tables."""
@@ -133,18 +142,36 @@ class LevelModels:
         excitation = (loads, time, sources)
         models = MotionModels.from_structure(structure, excitation, allowed)
         tables = response_tables(models.oscillators, excitation, structure.order)
-        return cls(structure, models, tables)
+        return cls(structure, models, tables, excitation)
 
     def line_deviation(self) -> Array:
         """Bound of how far outputs stray from straight lines in the step to each node, (T, m)."""
-        deviation: Array = self.models.line_deviation.copy()
+        others = self.models.line_deviation + sum(x.line_deviation for x in self.models.truncated)
+        by_magnitude: Array = np.array(others)
         for o, order in enumerate(map(int, self.structure.order)):
             tables = self.tables.line_deviation[order]
             for mode, table in zip(self.models.oscillators, tables, strict=True):
-                deviation[:, o] += mode.share.size()[:, o] @ table
-            for truncated in self.models.truncated:
-                deviation[:, o] += truncated.line_deviation[:, o]
-        return deviation
+                by_magnitude[:, o] += mode.share.size()[:, o] @ table
+        responses = [x for mode in self.models.oscillators for x in self._responses(mode)]
+        return narrowed_straying(responses, self.tables.time, by_magnitude, others)
+
+    def _responses(self, mode: Oscillator) -> Iterator[Response]:
+        """What a mode adds to outputs by each source, and what forces do to accelerations."""
+        (loads, _, sources), orders = self.excitation, self.structure.order
+        points = int(numbers.DEVIATION_POINTS), 3
+        sigma = grid_over(mode.omega_range, mode.quotient_range, points).sigma
+        for source, value, spread in zip(
+            sources, mode.share.value, mode.share.spread(), strict=True
+        ):
+            real, imag = (read_response(source, sigma, np.full_like(sigma, x)) for x in (1, -1j))
+            for order in map(int, set(orders)):
+                share, off = value * (orders == order), spread * (orders == order)
+                kappa = share[:, None, None] * (real + 1j * imag)
+                kappa_off = np.outer([np.abs(x).max() for x in (real, imag)], off)
+                yield Response(sigma, loads.get(source), order, kappa, kappa_off)
+                if order == 2 and source.startswith("force"):
+                    kappa, kappa_off = share[:, None, None] + 0j, np.stack([off, 0 * off])
+                    yield Response(None, loads[source], order, kappa, kappa_off)
 
 
 @dataclass(eq=False)

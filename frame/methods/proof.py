@@ -28,7 +28,6 @@ from alphacut.frame.bounds.branch_and_bound import enclosed
 from alphacut.frame.bounds.model_error import (
     MAX_PARAMETERS,
     Remainder,
-    derivative_bounds,
     largest_growth,
     motion_parts,
     proved_error,
@@ -42,7 +41,7 @@ from alphacut.frame.envelope import Envelope
 from alphacut.frame.modes.damped import require_dissipation
 from alphacut.frame.modes.modal_model import ModalModel
 from alphacut.frame.response.load_tables import Direct
-from alphacut.frame.response.straying import line_deviations
+from alphacut.frame.response.straying import Response, narrowed_straying
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.progress_bar import Progress, subprogress
 from alphacut.fuzzy.refused import checked_number
@@ -252,24 +251,23 @@ def _line_deviation(model: ModalModel) -> Array:
     omega = np.abs(rate.value.imag) - spread, np.abs(rate.value.imag) + spread
     if (omega[0] <= 0).any():
         raise UnprovedError("a mode may not oscillate", "take less damping")
-    deviation = np.zeros((len(model.time), len(model.outputs)))
+    grids = list[Array]()
+    for k in range(model.count):
+        q = min(decay[0][k] / w[k] for w in omega), max(decay[1][k] / w[k] for w in omega)
+        along_omega = np.linspace(omega[0][k], omega[1][k], int(numbers.DEVIATION_POINTS))
+        grids.append(np.multiply.outer(-np.linspace(*q, 3) + 1j, along_omega))
+    responses = list[Response]()
     for part in motion_parts(model, growth):
-        size, real, imaginary = (
-            derivative_bounds(x, reach)[0] for x in (part.share, part.share.real, part.share.imag)
-        )
         load = None if part.load is None else part.load.history
-        if isinstance(part.load, Direct):
-            deviation += 2 * part.load.history.line_deviation(model.time)[:, None] * size.sum(0)
-            continue
-        for k in range(model.count):
-            q = min(decay[0][k] / w[k] for w in omega), max(decay[1][k] / w[k] for w in omega)
-            along_omega = np.linspace(omega[0][k], omega[1][k], int(numbers.DEVIATION_POINTS))
-            sigma = np.multiply.outer(-np.linspace(*q, 3) + 1j, along_omega)
-            modulus, of_imaginary = line_deviations(sigma, load, model.time, (0,))[0]
-            of_imaginary = np.minimum(omega[1][k] * of_imaginary, modulus)  # which is over ω
-            by_parts = np.outer(modulus, real[k]) + np.outer(of_imaginary, imaginary[k])
-            deviation += 2 * np.minimum(np.outer(modulus, size[k]), by_parts)
-    return deviation
+        spreads = 2 * np.stack([part.share.real.spread(), part.share.imag.spread()], 1)
+        # of a load itself by the first mode's share
+        of_modes = [None] if isinstance(part.load, Direct) else grids
+        for k, sigma in enumerate(of_modes):
+            shape = (1, 1) if sigma is None else sigma.shape
+            kappa = np.multiply.outer(2 * part.share.value[k], np.ones(shape))
+            responses.append(Response(sigma, load, 0, kappa, spreads[k]))
+    by_magnitude = np.sum([x.line_deviation(model.time) for x in responses], axis=0)
+    return narrowed_straying(responses, model.time, by_magnitude)
 
 
 def _error_between_nodes(model: ModalModel, error: Array) -> Array:

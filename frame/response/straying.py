@@ -7,11 +7,14 @@ In a piece of time of length d, in which the load is a + b τ, the response is
 of which A exp(σ τ) alone is no line: it strays from its chord by min(|σ|² d²/8, 2) |A| at most. A
 load that strays from a line by r within the piece adds 2 d r. How far the ends of pieces lie off
 the line from node to node is read off the responses there.
+
+These bounds count modes by magnitude. Where motions of modes cancel, nodes are added within steps,
+at which responses are summed with their signs (`narrowed_straying`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from math import comb, perm, prod
 from typing import NamedTuple
 
@@ -28,6 +31,10 @@ PHASE = 0.5
 """Phase in rad that a mode or a sine takes in a piece; a piece adds its square to the bound."""
 MAX_PARTS = 16
 """Most parts into which a sine divides a piece."""
+MIN_PARTS, MAX_ADDED_PARTS = 4, 16
+"""Parts into which nodes that are added divide a step; more where few leave the bound wide."""
+TIGHT, CLOSE = 2.5, 1.25
+"""Bound over what a motion strays at which no nodes are added, and at which few suffice."""
 MAX_ENTRIES = 1_000_000
 """Responses that are held together."""
 
@@ -39,6 +46,182 @@ class Pieces(NamedTuple):
     first: Array  # the load at the beginning of each, (P,)
     last: Array  # the load at the end of each
     bend: Array  # bound of how far it strays from the line between
+
+
+class Response(NamedTuple):
+    """What an oscillator adds to m outputs, Re κ σ^order ρ, or a load itself, Re κ f."""
+
+    sigma: Array | None  # points −g + iω of a grid over q = g/ω and ω, (Q, W); None of f itself
+    load: History | None  # None for ρ = exp(σ t)
+    order: int
+    coefficient: Array  # κ at the points, (m, Q, W); of f (m, 1, 1)
+    spread: Array  # bounds of how far Re κ and Im κ are from that, (2, m)
+
+    def in_the_middle(self) -> Response:
+        """The response at one point of the grid."""
+        q, w = (n // 2 for n in self.coefficient.shape[1:])
+        point = slice(q, q + 1), slice(w, w + 1)
+        sigma = None if self.sigma is None else self.sigma[point]
+        coefficient = self.coefficient[:, *point]
+        return self._replace(sigma=sigma, coefficient=coefficient, spread=0 * self.spread)
+
+    def line_deviation(self, time: Array) -> Array:
+        """Bound of how far it strays from straight lines in the step to each node, (T, m)."""
+        kappa, (real, imag) = self.coefficient, self.spread
+        real = np.abs(kappa.real).max((1, 2)) + real
+        if self.sigma is None:
+            assert self.load is not None
+            return np.outer(self.load.line_deviation(time), real)
+        omega, order = self.sigma.imag, self.order
+        modulus, of_imaginary = line_deviations(self.sigma, self.load, time, (order,))[order]
+        size = np.hypot(real, np.abs(kappa.imag).max((1, 2)) + imag)
+        imag = np.abs(kappa.imag * omega).max((1, 2)) + omega.max() * imag
+        by_parts = np.outer(modulus, real) + np.outer(of_imaginary, imag)
+        return np.minimum(np.outer(modulus, size), by_parts)
+
+    def off_chords(self, nodes: Array, parts: int) -> tuple[Array, Array]:
+        """Its range less the step's chord at nodes but the last, (steps, parts, m) each."""
+        kappa, order = self.coefficient.reshape(len(self.coefficient), -1), self.order
+        if self.sigma is None:
+            assert self.load is not None
+            off = _off_chords(self.load.values(nodes)[:, None], nodes, parts)
+            value, margin = off * kappa[:, 0].real, np.abs(off) * self.spread[0]
+            return value - margin, value + margin
+        sigma, shape = self.sigma.ravel(), ((len(nodes) - 1) // parts, parts)
+        low, high = np.full((2, *shape, len(kappa)), np.inf)
+        # largest over the grid: of the parts of G = σ^order ρ off the chord, |G″|, rounding
+        real, imag, second, rounding = np.zeros((4, *shape))
+        for points in np.array_split(np.arange(len(sigma)), _batches(len(nodes), len(sigma))):
+            rho, error = _responses(sigma[points], self.load, nodes)
+            error += (order + 16) * UNIT_ROUNDOFF * np.abs(rho[0])
+            error = 2 * np.abs(sigma[points]) ** order * error
+            rounding = np.maximum(rounding, _with_ends(error.max(-1), parts))
+            G, _, G2 = with_power(sigma[points], _off_chords(rho, nodes, parts), order)
+            real = np.maximum(real, np.abs(G.real).max(-1))
+            imag = np.maximum(imag, np.abs(G.imag).max(-1))
+            second = np.maximum(second, np.abs(G2).max(-1))
+            for o, x in enumerate(kappa[:, points]):
+                value = x.real * G.real - x.imag * G.imag
+                low[..., o] = np.minimum(low[..., o], value.min(-1))
+                high[..., o] = np.minimum(high[..., o], -value.max(-1))
+        # between the points of the grid G strays from what is bilinear by `missed`, κ G by what κ
+        # changes in a cell besides
+        between = _between_points(self.sigma)
+        missed = between * (second + between * self._fourth_off_chords(nodes[::parts])) + rounding
+        axes = (np.diff(self.coefficient, axis=axis) for axis in (1, 2))
+        change = sum(np.abs(x).max((1, 2), initial=0.0) for x in axes)
+        margin = np.multiply.outer(missed, np.abs(kappa).max(1))
+        margin += np.multiply.outer(np.hypot(real, imag), change)
+        margin += np.multiply.outer(real + missed, self.spread[0])
+        margin += np.multiply.outer(imag + missed, self.spread[1])
+        return low - margin, margin - high
+
+    def _fourth_off_chords(self, time: Array) -> Array:
+        """Bound of |G⁗| of what G = σ^order ρ is off chords in each step, (steps, 1)."""
+        # It is h²/8 times that of G's second derivative by time, σ² G + σ^order (σ f + f′), of
+        # which what is of f has no fourth derivative by σ; nor has what jumps of f add.
+        assert self.sigma is not None
+        decay, h = float(-self.sigma.real.max()), np.diff(time)
+        moments = _moments(decay, self.load, time)[:, :-1]  # then within the step that begins there
+        force = self.load.extremes[0] if self.load else 0.0
+        for n in reversed(range(5)):
+            terms = (comb(n, j) * h ** (n - j) * moments[j] for j in range(n + 1))
+            moments[n] = sum(terms) + force * h ** (n + 1) / (n + 1)
+        growth, fast = np.exp(max(-decay, 0.0) * h), float(np.abs(self.sigma).max())
+        fourth = _fourth_derivative(self.order + 2, fast, growth * moments)
+        return (h**2 / 8 * fourth)[:, None]
+
+
+def narrowed_straying(
+    responses: Sequence[Response], time: Array, bound: Array, others: Array | float = 0.0
+) -> Array:
+    """Bound of how far Σ responses + others strays from lines in the step to each node, (T, m).
+
+    It begins at a `bound` in which responses count by magnitude; `others` (T, m) always do. A
+    motion is off its step's chord by what it strays from chords between nodes that are added within
+    the step, and by what these are off the step's chord: their largest value at the added nodes.
+    There responses are summed with their signs, so that modes cancel as they do in motions. The
+    former falls with the square of the number of parts, which suffices for a motion in the middle
+    of the box: what else is wide are the ranges over it.
+    """
+    middle = [x.in_the_middle() for x in responses]
+    by_magnitude = np.sum([x.line_deviation(time) for x in middle], axis=0).max(0)
+    off, straying = _off_and_straying(middle, time, MIN_PARTS)
+    reached = off.max(0)
+    if (by_magnitude <= TIGHT * reached).all():
+        return bound
+    is_close = ((off + straying).max(0) <= CLOSE * reached).all()
+    parts = MIN_PARTS if is_close else MAX_ADDED_PARTS
+    off, straying = _off_and_straying(responses, time, parts)
+    narrowed = np.vstack([np.zeros(off.shape[1]), off + straying])
+    return np.fmin(bound, narrowed + others)
+
+
+def _off_and_straying(
+    responses: Sequence[Response], time: Array, parts: int
+) -> tuple[Array, Array]:
+    """Bounds of Σ responses at added nodes off chords, and between these nodes, (steps, m) each."""
+    inside = time[:-1, None] + np.diff(time)[:, None] * (np.arange(parts) / parts)
+    nodes, m = np.append(inside, time[-1]), len(responses[0].coefficient)
+    low, high, size = np.zeros((3, *inside.shape, m))
+    straying = np.zeros((len(nodes), m))
+    for response in responses:
+        least, greatest = response.off_chords(nodes, parts)
+        low, high = low + least, high + greatest
+        size += np.maximum(np.abs(least), np.abs(greatest))
+        straying += response.line_deviation(nodes)
+    off = np.maximum(-low, high) + len(responses) * UNIT_ROUNDOFF * size
+    return off.max(1), straying[1:].reshape(*inside.shape, m).max(1)
+
+
+def _off_chords(values: Array, nodes: Array, parts: int) -> Array:
+    """Values (…, nodes, S) less the chords of steps of so many parts, (…, steps, parts, S)."""
+    ends, time = values[..., ::parts, None, :], nodes[::parts]
+    x = (nodes[:-1].reshape(-1, parts) - time[:-1, None]) / np.diff(time)[:, None]
+    inside = values[..., :-1, :].reshape(*values.shape[:-2], *x.shape, -1)
+    x = x[..., None]
+    return np.asarray(inside - (1 - x) * ends[..., :-1, :, :] - x * ends[..., 1:, :, :])
+
+
+def _with_ends(bound: Array, parts: int) -> Array:
+    """Bound at nodes (N,) and the greater one at the ends of their step, (steps, parts)."""
+    ends = bound[::parts]
+    return np.asarray(bound[:-1].reshape(-1, parts) + np.maximum(ends[1:], ends[:-1])[:, None])
+
+
+def _responses(sigma: Array, load: History | None, time: Array) -> tuple[Array, Array]:
+    """ρ with two derivatives by σ, (3, T, S), and bounds of its rounding, (T, S)."""
+    if load is not None:
+        return responses_at_nodes(sigma, load, time, 2)
+    rho = np.exp(sigma * time[:, None]) * time[:, None] ** np.arange(3)[:, None, None]
+    return rho, UNIT_ROUNDOFF * (4 + np.abs(sigma) * time[:, None]) * np.abs(rho[0])
+
+
+def _moments(decay: float, load: History | None, time: Array, *, is_needed: bool = True) -> Array:
+    """Bounds of ρ's derivatives by σ of order 0 to 4, (5, T); g is at least `decay`."""
+    if not is_needed:
+        return np.zeros((5, len(time)))
+    if load is not None:
+        return absolute_moments(decay, load, time)
+    return np.stack([time**n * np.exp(-decay * time) for n in range(5)])
+
+
+def _fourth_derivative(order: int, fast: float, moments: Array) -> Array:
+    """Bound of |(σ^order ρ)⁗|, (T,), from bounds of |σ| and of ρ's derivatives (5, T)."""
+    terms = (comb(4, j) * perm(order, j) * fast ** (order - j) for j in range(order + 1))
+    return np.asarray(sum(factor * moments[4 - j] for j, factor in enumerate(terms)))
+
+
+def _between_points(sigma: Array) -> float:
+    """What a function of σ strays from bilinear interpolation on a grid (Q, W), over |F″|."""
+    omega, quotient = sigma[0].imag, -sigma[:, 0].real / sigma[:, 0].imag
+    h, k_step = (float(np.diff(np.sort(x)).max(initial=0.0)) for x in (omega, quotient))
+    return float(((1 + quotient.max() ** 2) * h**2 + (omega.max() * k_step) ** 2) / 8)
+
+
+def _batches(nodes: int, points: int) -> int:
+    """Numbers of batches into which points of σ are divided, so that their responses fit."""
+    return -(-3 * nodes * points // MAX_ENTRIES)
 
 
 def line_deviations(
@@ -60,7 +243,7 @@ def line_deviations(
         is_force: Whether the load itself is added to the imaginary part of order 2.
         at_nodes: ρ with two derivatives, its rounding, bounds of its derivatives, where known.
     """
-    omega, quotient = sigma[0].imag, -sigma[:, 0].real / sigma[:, 0].imag
+    omega = sigma[0].imag
     low, fast, decay = float(omega.min()), float(np.abs(sigma).max()), float(-sigma.real.max())
     pieces = _pieces(load, time, fast)
     times, d, node = pieces.time, np.diff(pieces.time), np.searchsorted(pieces.time, time)
@@ -74,12 +257,7 @@ def line_deviations(
     off_line -= np.interp(times, time, load.values(time) if load else np.zeros(len(time)))
     off_line[0, 0] = off_line[1, -1] = 0.0
     tables = at_nodes if len(times) == len(time) else None
-    if tables:
-        bounds = tables[2]
-    elif load is None:
-        bounds = np.stack([times**n * np.exp(-decay * times) for n in range(5)])
-    else:
-        bounds = absolute_moments(decay, load, times)
+    bounds = tables[2] if tables else _moments(decay, load, times, is_needed=sigma.size > 1)
     # for each order the largest magnitudes over the grid: of F = σ^order A and F″; rounding; of H,
     # the responses off the line at ends, H″, Im H/ω, and that with the load before and after
     added = {order: off_line * (is_force and order == 2) for order in orders}
@@ -89,28 +267,18 @@ def line_deviations(
     }
     for order in orders:
         largest[order][2][3:] = np.where(fraction > 0, 0.0, np.abs(added[order]))
-    count = 1 if tables else -(-3 * len(times) * sigma.size // MAX_ENTRIES)
+    count = 1 if tables else _batches(len(times), sigma.size)
     for part in np.array_split(sigma.ravel(), count):
-        if tables:
-            rho, error = tables[:2]
-        elif load is None:
-            rho = np.exp(part * times[:, None]) * times[:, None] ** np.arange(3)[:, None, None]
-            error = UNIT_ROUNDOFF * (4 + np.abs(part) * times[:, None]) * np.abs(rho[0])
-        else:
-            rho, error = responses_at_nodes(part, load, times, 2)
+        rho, error = tables[:2] if tables else _responses(part, load, times)
         for order, (amplitude, rounding, off) in largest.items():
             _raise_amplitudes(part, rho, error, pieces.first, slope, order, amplitude, rounding)
             _raise_ends(part, rho, (left, right, fraction), added[order], order, off)
     # between the points of the grid F strays from what is bilinear by `between` |F″|
-    h, k_step = (float(np.diff(np.sort(x)).max(initial=0.0)) for x in (omega, quotient))
-    between = ((1 + quotient.max() ** 2) * h**2 + (omega.max() * k_step) ** 2) / 8
+    h, between = float(np.diff(np.sort(omega)).max(initial=0.0)), _between_points(sigma)
     growth, inside = np.exp(max(-decay, 0.0) * d), fraction > 0
     found = dict[int, Array]()
     for order, (amplitude, rounding, off) in largest.items():
-        fourth = sum(
-            comb(4, j) * perm(order, j) * fast ** (order - j) * bounds[4 - j]
-            for j in range(order + 1)
-        )
+        fourth = _fourth_derivative(order, fast, bounds)
         of_line = abs(prod(range(order - 4, order))) * np.abs(pieces.first) * low ** (order - 5)
         of_line += abs(prod(range(order - 5, order - 1))) * np.abs(slope) * low ** (order - 6)
         size = amplitude[0] + between * (amplitude[1] + between * (fourth[:-1] + of_line))

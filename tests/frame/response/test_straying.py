@@ -1,0 +1,79 @@
+"""Straying from chords is bounded over ranges of ω, g/ω and shares, with what modes cancel."""
+
+import numpy as np
+import pytest
+
+from alphacut.frame.response.duhamel import responses_at_nodes
+from alphacut.frame.response.oscillators import grid_over
+from alphacut.frame.response.straying import Response, narrowed_straying
+from alphacut.frame.structures.loads import History
+
+PARTS, TIME = 40, np.linspace(0, 1.2, 25)
+LOADS = {
+    "free": None,
+    "record": History(0.035, np.random.default_rng(3).normal(size=30)),
+    "sine": History.harmonic(2.0, 0.3, start=0.13),
+    "pulse": History(0.11, np.ones(4), start=0.07),
+}
+SHARES = np.array([1.0, -2.0, 1.0])
+
+
+def off_chords(sigma, load, order, kappa):
+    """Largest distance of Re κ σ^order ρ from the chord of each step, shape (steps,)."""
+    fine = np.linspace(TIME[0], TIME[-1], PARTS * (len(TIME) - 1) + 1)
+    rho = np.exp(sigma * fine[:, None])
+    if load is not None:
+        rho = responses_at_nodes(sigma, load, fine, 0)[0][0]
+    y = (kappa * sigma**order * rho).real.sum(1)
+    return np.abs(y - np.interp(fine, TIME, y[::PARTS]))[1:].reshape(-1, PARTS).max(1)
+
+
+@pytest.mark.parametrize("width", [0.0, 0.03, 0.3])
+@pytest.mark.parametrize("load", LOADS)
+def test_modes_that_cancel_stray_as_far_as_stated(load, width, rng):
+    """Three modes of shares 1, −2 and 1; κ = share/(iω), and up to `width` of it besides."""
+    order, quotient = int(rng.integers(3)), rng.uniform(0, 0.1)
+    omega = rng.uniform(5, 30) * np.array([1, 1.15, 1.3])
+    ends = omega[:, None] * (1 + width * np.array([-1, 1]))
+    quotients, spread = (quotient, quotient * (1 + width)), width / omega / 3
+    responses = []
+    for k, share in enumerate(SHARES):
+        sigma = grid_over(tuple(ends[k]), quotients, (4, 2)).sigma
+        kappa = share / (1j * sigma.imag[None])
+        responses.append(Response(sigma, LOADS[load], order, kappa, np.full((2, 1), spread[k])))
+    by_magnitude = np.sum([x.line_deviation(TIME) for x in responses], axis=0)
+    bound, reached = narrowed_straying(responses, TIME, by_magnitude)[1:, 0], 0.0
+    for _ in range(10):
+        w, q = ends[:, 0] + np.ptp(ends, axis=1) * rng.random(3), rng.uniform(*quotients)
+        signs = rng.choice([-1, 1], (2, 3))
+        kappa = SHARES / (1j * w) + spread * (signs[0] + 1j * signs[1])
+        off = off_chords((-q + 1j) * w, LOADS[load], order, kappa)
+        assert (off <= bound * (1 + 1e-6) + 1e-15).all()
+        reached = max(reached, off.max())
+    if not width:
+        assert bound.max() <= min(2.5 * reached, by_magnitude.max())
+
+
+@pytest.mark.parametrize("spread", [(0.0, 0.0), (0.01, 0.0), (0.0, 0.01)])
+@pytest.mark.parametrize("load", LOADS)
+def test_values_off_chords_lie_in_their_ranges(load, spread, rng):
+    """Over a coarse grid, or of κ that is off by `spread` at one point."""
+    order, parts, kappa, is_coarse = int(rng.integers(3)), 4, 0.3 + 1j, not any(spread)
+    w, q = rng.uniform(9, 15) * np.array([1, 1.2]), rng.uniform(0, 0.05) * np.array([1, 3])
+    if not is_coarse:
+        w[1], q[1] = w[0], q[0]
+    nodes = np.linspace(TIME[0], TIME[-1], parts * (len(TIME) - 1) + 1)
+    sigma = grid_over(tuple(w), tuple(q), (2, 2)).sigma
+    off = np.array(spread)[:, None]
+    response = Response(sigma, LOADS[load], order, np.full((1, 2, 2), kappa), off)
+    low, high = (x.ravel() for x in response.off_chords(nodes, parts))
+    shares = np.linspace(0, 1, 9)
+    at = ((-(q[0] + np.ptp(q) * shares[:, None]) + 1j) * (w[0] + np.ptp(w) * shares)).ravel()
+    rho = np.exp(at * nodes[:, None])
+    if LOADS[load] is not None:
+        rho = responses_at_nodes(at, LOADS[load], nodes, 0)[0][0]
+    G = at**order * rho
+    G = (G - np.array([np.interp(nodes, TIME, x) for x in G[::parts].T]).T)[:-1]
+    more = off[0] * np.abs(G.real) + off[1] * np.abs(G.imag)
+    assert (low <= ((kappa * G).real - more).min(1) + 1e-15).all()
+    assert (high >= ((kappa * G).real + more).max(1) - 1e-15).all()
