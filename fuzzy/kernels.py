@@ -34,26 +34,26 @@ prange = range
 """Loop of parallel kernels, in whose module Numba's prange takes its place."""
 
 
-class Kernel:
+class _Kernel:
     """A function that Numba compiles at its first call, before which Numba is not imported."""
 
     def __init__(self, function: Callable[..., Any], options: Mapping[str, object]) -> None:
         update_wrapper(self, function)
         self._function, self._options = function, options
-        self._dispatcher: Any = None
+        self._created: Any = None
         with_kernels.add(function.__module__)
 
     def __call__(self, *arguments: Any) -> Any:
         """Call the compiled function."""
-        return self.dispatcher(*arguments)
+        return self._dispatcher(*arguments)
 
     @property
-    def dispatcher(self) -> Any:
+    def _dispatcher(self) -> Any:
         """Numba's dispatcher of the function, with its code in `shared_folder`."""
-        if self._dispatcher is None:
+        if self._created is None:
             with _LOCK:  # a second dispatcher would leave kernels that were compiled with the first
-                self._dispatcher = self._dispatcher or self._create()
-        return self._dispatcher
+                self._created = self._created or self._create()
+        return self._created
 
     def _create(self) -> Any:
         import numba  # which takes time to import
@@ -76,7 +76,7 @@ class Kernel:
         """Return what Numba asks of a dispatcher that another kernel calls, as its type."""
         if name.startswith("__"):
             raise AttributeError(name)
-        return getattr(self.dispatcher, name)
+        return getattr(self._dispatcher, name)
 
     def __reduce__(self) -> str:
         """Pickle by name."""
@@ -90,7 +90,7 @@ def kernel(**options: object) -> Callable[[Callable[..., Any]], Any]:
     where no folder can be written. Division by zero gives infinity or NaN, and the interpreter's
     lock is released.
     """
-    return partial(Kernel, options={"nogil": True, "error_model": "numpy", **options})
+    return partial(_Kernel, options={"nogil": True, "error_model": "numpy", **options})
 
 
 def _shared_index(folder: str, name: str, stamp: str) -> Any:

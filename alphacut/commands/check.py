@@ -52,7 +52,7 @@ Row = tuple[str, str, str]
 def check(options: argparse.Namespace, out: TextIO) -> int:
     """Checks a case, and shows how it was read and its first period; returns exit status 0."""
     content = read_case(options).content
-    require_runnable(content)
+    study_of_image = require_runnable(content)
     rows, linear = list(rows_of("", content)), nominal_structure(content)
     period = 2 * pi / float(frequencies(linear)[0]) if linear else None
     document = {
@@ -63,7 +63,7 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
     }
     text = text_table(("key", "value", "kind"), rows)
     if content.image_cell is not None:
-        study = image_study(content.image_cell)
+        study = study_of_image or image_study(content.image_cell)
         shares = study.fractions.items()
         text += f"image: {study.extent}\n"
         text += f"phases: {', '.join(f'{name} {share:.2%}' for name, share in shares)}\n"

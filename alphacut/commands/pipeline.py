@@ -265,31 +265,36 @@ def response_of(
     return FuzzyResponse(structure, task.fuzzy, alpha, task.duration, step, peaks)
 
 
-def require_runnable(content: Content) -> None:
-    """Reads and builds all that the stages of a case need, so that `check` refuses it too."""
-    stages = content.stages
+def require_runnable(content: Content) -> image.ImageStudy | None:
+    """Reads and builds all that the stages of a case need, so that `check` refuses it too.
+
+    Returns the study of the image that stage modulus takes, if it takes one.
+    """
+    stages, study_of_image = content.stages, None
     if "microstructure" in stages and content.microstructure is not None:
         study = content.microstructure.study(spheres=content.has_spheres)
         if not isinstance(study.source, Simulated):
             study.source.read()
     if "modulus" in stages:
-        _require_material(content)
+        study_of_image = _require_material(content)
     if "envelope" in stages:
         _require_motion(content)
+    return study_of_image
 
 
-def _require_material(content: Content) -> None:
+def _require_material(content: Content) -> image.ImageStudy | None:
     """Requires a mesh, an image or a model of the cell that stage modulus can use."""
     if "envelope" in content.stages and not content.has_stated_modulus:
         require_levels(content.modulus.alpha, "modulus.alpha")
     if content.image_cell is not None:
-        image.image_study(content.image_cell)
-    elif "microstructure" not in content.stages:
+        return image.image_study(content.image_cell)
+    if "microstructure" not in content.stages:
         campaign = CellCampaign.of(content)
         campaign.require_mesh()
         _ = campaign.propagation  # builds the model and the plan
     elif (particle := content.particle_cell) is not None:  # whose radius is not known yet
         CellCampaign(ThetaSection(), particle, content.mesh, content.modulus).model()
+    return None
 
 
 def _require_motion(content: Content) -> None:
