@@ -173,7 +173,8 @@ class FragilitySection(QuestionSection):
         """Refuses structures whose motion is not proportional to the record, and unfit limits."""
         super().require_answerable(structure)
         linear = structure.linear
-        is_free = linear is not None and not linear.loads
+        is_elastic = not getattr(linear, "hardening", ())
+        is_free = linear is not None and not linear.loads and is_elastic
         is_at_rest = not any(np.any(getattr(linear, start, 0)) for start in ("q0", "v0"))
         allowed = "linear structures that start at rest, without forces: they scale with records"
         require(is_free and is_at_rest, "fragility", "of another motion", allowed)

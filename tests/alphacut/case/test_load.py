@@ -218,3 +218,8 @@ def test_questions_have_sections(tmp_path):
         assert words in str(problem)
     (problem,) = problems(tmp_path, text.replace("q1 <=", "q9 <="))
     assert problem.key == "decision.limits"
+
+
+def test_fragility_which_scales_motions_refuses_columns_that_yield():
+    with pytest.raises(BadInput, match="fragility"):
+        load(ROOT / "cases/suite.toml", ["frame.yield_drift=9 mm"])
