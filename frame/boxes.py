@@ -248,8 +248,7 @@ class UnitFlow:
         """Outputs, (S, T, m), with first and second derivatives by the d unit coordinates."""
         jet, radius = self.flow.taylor(self.boxes.to_physical(unit)), self.boxes.radius
         jet.first[:] *= radius.reshape(-1, 1, 1, 1)
-        if len(jet.second):
-            jet.second[:] *= np.multiply.outer(radius, radius)[..., None, None, None]
+        jet.second[:] *= np.multiply.outer(radius, radius)[..., None, None, None]
         return jet
 
     def envelope(

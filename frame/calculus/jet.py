@@ -1,8 +1,7 @@
 """Truncated Taylor polynomials of degree 2: first and second derivatives of a model.
 
 A jet is a value with its first and second derivatives with respect to d parameters. With d = 0 it
-is a plain array that costs nothing more, so the same code computes values alone; without second
-derivatives, whose array then has no entries, it computes gradients alone.
+is a plain array that costs nothing more, so the same code computes values alone.
 """
 
 from __future__ import annotations
@@ -24,8 +23,7 @@ class Jet:
     Args:
         value: Shape V.
         first: First derivatives, shape (d, *V).
-        second: Second derivatives, shape (d, d, *V), symmetric in the first two axes; (0, 0, *V)
-            where gradients are enough.
+        second: Second derivatives, shape (d, d, *V), symmetric in the first two axes.
     """
 
     value: Array
@@ -35,16 +33,14 @@ class Jet:
     __array_ufunc__ = None  # an array on the left leaves the operation to the jet
 
     @classmethod
-    def constant(cls, value: ArrayLike, directions: int, bends: int | None = None) -> Jet:
-        """A jet without dependence on any of `directions` parameters; `bends` is 0 or the same."""
-        array = np.asarray(value, float)
-        counts = (directions if bends is None else bends,) * 2
-        first = np.zeros((directions, *array.shape))
-        return cls(array, first, np.zeros((*counts, *array.shape)))
+    def constant(cls, value: ArrayLike, directions: int) -> Jet:
+        """A jet without dependence on any of `directions` parameters."""
+        array, d = np.asarray(value, float), directions
+        return cls(array, np.zeros((d, *array.shape)), np.zeros((d, d, *array.shape)))
 
     def like(self, value: ArrayLike) -> Jet:
         """A constant with as many derivatives as this jet."""
-        return Jet.constant(value, self.directions, len(self.second))
+        return Jet.constant(value, self.directions)
 
     @property
     def directions(self) -> int:
@@ -115,11 +111,8 @@ class Jet:
             return self * self
         x, k = self.value, exponent
         value, slope = x**k, k * x ** (k - 1)
-        second = slope * self.second
-        if len(second):
-            outer = self.first[:, None] * self.first[None, :]
-            second = second + k * (k - 1) * x ** (k - 2) * outer
-        return Jet(value, slope * self.first, second)
+        bend = k * (k - 1) * x ** (k - 2) * (self.first[:, None] * self.first)
+        return Jet(value, slope * self.first, slope * self.second + bend)
 
     def _lift(self, other: Jet | ArrayLike) -> Jet:
         return other if isinstance(other, Jet) else self.like(other)
@@ -134,7 +127,7 @@ def _padded(a: Jet, ndim: int) -> Jet:
     return Jet(
         a.value.reshape(padding + shape),
         a.first.reshape((a.directions, *padding, *shape)),
-        a.second.reshape((*a.second.shape[:2], *padding, *shape)),
+        a.second.reshape((a.directions, a.directions, *padding, *shape)),
     )
 
 
@@ -143,30 +136,23 @@ def _matched(a: Jet, b: Jet) -> tuple[Jet, Jet]:
 
 
 def _product(a: Jet, b: Jet, bilinear: Callable[[Array, Array], Array]) -> Jet:
-    """Product of two jets, with derivatives by Leibniz' rule.
-
-    `bilinear` is the product of arrays, linear in both: `np.multiply` or `np.matmul`.
-    """
-    value, first = bilinear(a.value, b.value), bilinear(a.first, b.value)
-    first, second = first + bilinear(a.value, b.first), np.zeros((0, 0, *value.shape))
-    if len(a.second):
-        cross = bilinear(a.first[:, None], b.first[None, :])
-        second = bilinear(a.second, b.value) + bilinear(a.value, b.second)
-        second = second + cross + cross.swapaxes(0, 1)
-    return Jet(value, first, second)
+    """Product of two jets by `np.multiply` or `np.matmul`, with derivatives by Leibniz' rule."""
+    value = bilinear(a.value, b.value)
+    if not a.directions:  # operations on empty arrays take time, too
+        return Jet(value, np.zeros((0, *value.shape)), np.zeros((0, 0, *value.shape)))
+    first = bilinear(a.first, b.value) + bilinear(a.value, b.first)
+    cross = bilinear(a.first[:, None], b.first[None, :])
+    second = bilinear(a.second, b.value) + bilinear(a.value, b.second)
+    return Jet(value, first, second + cross + cross.swapaxes(0, 1))
 
 
-def variables(
-    points: Array, names: Sequence[str], selected: Sequence[str], order: int = 2
-) -> dict[str, Jet]:
+def variables(points: Array, names: Sequence[str], selected: Sequence[str]) -> dict[str, Jet]:
     """Jets of the independent variables by name, each of shape (S,), with slope 1 by itself.
 
     `points` (S, len(names)) are their values, `selected` the names to differentiate by, in the
-    order of the derivatives, and `order` that of the highest, 1 or 2.
+    order of the derivatives.
     """
-    d = len(selected)
-    second_derivatives = d if order > 1 else 0
-    jets = {name: Jet.constant(points[:, i], d, second_derivatives) for i, name in enumerate(names)}
+    jets = {name: Jet.constant(points[:, i], len(selected)) for i, name in enumerate(names)}
     for k, name in enumerate(selected):
         jets[name].first[k] = 1.0
     return jets
@@ -176,8 +162,6 @@ def inverse(a: Jet) -> Jet:
     """Inverse of square matrices, shape (..., n, n), by one factorisation."""
     x = np.linalg.inv(a.value)
     first = -x @ a.first @ x
-    if not len(a.second):
-        return Jet(x, first, np.zeros((0, 0, *x.shape)))
     cross = -x @ a.first[:, None] @ first[None, :]
     return Jet(x, first, -x @ a.second @ x + cross + cross.swapaxes(0, 1))
 

@@ -286,12 +286,9 @@ def modal_damping(mass: Jet, stiffness: Jet, ratios: Sequence[Jet]) -> Jet:
         # f(A) of f(λ) = 2 √λ for the modes of this ratio, 0 for others
         quotients, second_quotients = _divided_differences(omega, number == k)
         f = [np.where(number == k, 2 * omega, 0.0)[:, None] * X, quotients * G]
-        second = np.zeros((0, 0, *X.shape))
-        if len(A.second):  # Daleckii, Krein 1965
-            pairs = np.einsum("sikj,asik,bskj->absij", second_quotients, G, G, optimize=True)
-            bend = quotients * (Y @ A.second @ X) + pairs + pairs.swapaxes(0, 1)
-            second = X @ bend @ Y
-        of_modes = Jet(f[0] @ Y, X @ f[1] @ Y, second)
+        pairs = np.einsum("sikj,asik,bskj->absij", second_quotients, G, G, optimize=True)
+        bend = quotients * (Y @ A.second @ X) + pairs + pairs.swapaxes(0, 1)
+        of_modes = Jet(f[0] @ Y, X @ f[1] @ Y, X @ bend @ Y)  # Daleckii, Krein 1965
         total = total + ratios[k][:, None, None] * (mass @ of_modes)
     return total
 
