@@ -2,11 +2,11 @@
 
 Example:
     >>> sorted(INTEGRATORS), len(METHODS)  # by the words of a case file
-    (['exact', 'midpoint', 'rk4'], 6)
+    (['exact', 'midpoint'], 6)
 """
 
 from alphacut.frame.dynamics.flow import LinearFlow
-from alphacut.frame.dynamics.integrators import INTEGRATORS, Exact, Midpoint, RungeKutta4
+from alphacut.frame.dynamics.integrators import INTEGRATORS, Exact, Midpoint
 from alphacut.frame.dynamics.nonlinear import LagrangianFlow
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.auto import Auto
@@ -25,6 +25,6 @@ from alphacut.frame.structures.storey import StoreyFrame
 __all__ = [
     "INTEGRATORS", "METHODS", "Accelerogram", "Auto", "DualProof", "Envelope", "Exact", "Force",
     "GraphFollower", "History", "ImprovedFollower", "LagrangianFlow", "LagrangianSystem",
-    "LinearFlow", "MatrixStructure", "Midpoint", "Output", "Parameter", "Proof", "RungeKutta4",
-    "Sampled", "StoreyFrame", "envelope", "pendulum", "require_envelope",
+    "LinearFlow", "MatrixStructure", "Midpoint", "Output", "Parameter", "Proof", "Sampled",
+    "StoreyFrame", "envelope", "pendulum", "require_envelope",
 ]  # fmt: skip

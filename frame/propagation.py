@@ -85,7 +85,7 @@ def envelope(
         step: Distance of the nodes and step of the integrator, in s.
         alpha: Levels, rising within [0, 1].
         integrator: Time stepping of linear structures, an integrator or its name: exact (of auto
-            and proofs unless given), midpoint (of all others), rk4. Of general Lagrangian systems
+            and proofs unless given), midpoint (of all others). Of general Lagrangian systems
             it is midpoint.
         relative: Whether the method's tolerance is a fraction of each output's peak at the nominal
             parameters and some corners, instead of a number in SI units.

@@ -77,7 +77,7 @@ class EnvelopeSection(Section):
         "auto", "proof", "dual", "graph-follower", "improved-graph-follower", "quasi-monte-carlo"
     ] = "auto"
     """method of the envelope"""
-    integrator: Literal["midpoint", "rk4", "exact"] | None = None
+    integrator: Literal["midpoint", "exact"] | None = None
     """time stepping; by the method if left out"""
     tolerance: Annotated[Tolerance, text(_parse_tolerance)] | None = None
     """error that is allowed: of displacements, of forces, or over each peak"""

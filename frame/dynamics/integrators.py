@@ -1,9 +1,8 @@
-"""One-step methods for linear structures, with the facts they claim.
+"""One-step methods for linear structures.
 
-Every method is a frozen dataclass with two claims that tests measure: `order`, and
-`stability_limit`, the largest ω h without growth of an undamped oscillation. All derivatives of a
-step with respect to parameters share one factorisation (`jet.inverse`): it is the scheme that is
-differentiated, not the differential equation (internal differentiation: Bock 1981).
+All derivatives of a step with respect to parameters share one factorisation (`jet.inverse`): it is
+the scheme that is differentiated, not the differential equation (internal differentiation: Bock
+1981).
 
 Loads come at their own times: linear between their samples, or that times a sine, with jumps where
 they begin or end. Neither samples nor jumps need lie on nodes.
@@ -14,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from math import ceil, inf, log2
+from math import ceil, log2
 from typing import ClassVar
 
 import numpy as np
@@ -59,8 +58,6 @@ class Midpoint:
     """
 
     name: ClassVar[str] = "midpoint"
-    order: ClassVar[float] = 2
-    stability_limit: ClassVar[float] = inf
 
     def step_map(
         self, matrices: Matrices, pushes: Jet, loads: Sequence[History], step: float, count: int
@@ -85,34 +82,10 @@ class Midpoint:
 
 
 @dataclass(frozen=True)
-class RungeKutta4:
-    """The classical explicit method of order 4; arguments and result as of `Midpoint`."""
-
-    name: ClassVar[str] = "rk4"
-    order: ClassVar[float] = 4
-    stability_limit: ClassVar[float] = 2 * 2**0.5
-
-    def step_map(
-        self, matrices: Matrices, pushes: Jet, loads: Sequence[History], step: float, count: int
-    ) -> StepMap:
-        """Return the map of each of `count` steps, by the series of exp(A h) up to h⁴."""
-        z = state_matrix(matrices) * step
-        eye, zero = np.eye(z.value.shape[-1]), pushes * 0.0
-        by_rise = eye / 2 + z * (1 / 6) + z @ z * (1 / 24)  # Σ z^(k − 2) / k!, k = 2 … 4
-        by_value = eye + z @ by_rise  # Σ z^(k − 1) / k!
-        push = concatenate([zero, pushes], -2) * step
-        value, rise = by_value @ push, by_rise @ push  # of a load f + rise · τ/h
-        load = concatenate([value - rise, rise], -1)
-        return StepMap(eye + z @ by_value, load, linear_loads(loads, step, count))
-
-
-@dataclass(frozen=True)
 class Exact:
     """Exact propagator exp(A h) and Duhamel integral; arguments and result as of `Midpoint`."""
 
     name: ClassVar[str] = "exact"
-    order: ClassVar[float] = inf
-    stability_limit: ClassVar[float] = inf
 
     def step_map(
         self, matrices: Matrices, pushes: Jet, loads: Sequence[History], step: float, count: int
@@ -148,8 +121,8 @@ class Exact:
         return StepMap(transfer, gain, np.concatenate([np.empty((count, 0)), *by_step], -1))
 
 
-Integrator = Midpoint | RungeKutta4 | Exact
-INTEGRATORS: dict[str, Integrator] = {m.name: m for m in (Midpoint(), RungeKutta4(), Exact())}
+Integrator = Midpoint | Exact
+INTEGRATORS: dict[str, Integrator] = {m.name: m for m in (Midpoint(), Exact())}
 
 
 def state_matrix(m: Matrices) -> Jet:

@@ -59,7 +59,7 @@ CHANGES = {
     "frame": [
         "tolerances.most=1.5", "tolerances.most=20", "envelope.method=proof",
         "envelope.method=search", "envelope.method=quasi-monte-carlo", "envelope.alpha=[0.5, 1]",
-        "envelope.alpha=[1]", "envelope.integrator=midpoint", "envelope.integrator=rk4",
+        "envelope.alpha=[1]", "envelope.integrator=midpoint",
         "envelope.tolerance=0.1 N", "envelope.tolerance=1 %", 'frame.outputs=["q1", "a1"]',
         'frame.outputs=["base_shear"]', 'frame.outputs=["q1", "q1"]', "frame.damping_ratio=[2, 3, 4] %",
         'decision.limits=["a1 <= 1 m/s^2"]', 'probability.random=["E", "m1"]', "frame.masses=[0.1, 9, 9] t",

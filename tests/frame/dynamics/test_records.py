@@ -8,7 +8,6 @@ import pytest
 from alphacut.frame import Accelerogram, Exact, Force, History, LinearFlow, Midpoint, StoreyFrame
 from alphacut.frame.boxes import boxes
 from alphacut.frame.dynamics.flow import trajectory
-from alphacut.frame.dynamics.integrators import Integrator, RungeKutta4
 from alphacut.frame.modes.modal_model import ModalModel
 from alphacut.frame.structures.linear import evaluate
 from alphacut.frame.verification.exact_motion import LinearMotion
@@ -129,10 +128,7 @@ def test_tables_of_the_modes_are_exact_under_any_record() -> None:
             assert (wrong < 1e-10 * np.abs(truth).max(0)).all()
 
 
-@pytest.mark.parametrize("method", [Midpoint(), RungeKutta4()], ids=str)
-def test_approximate_steps_keep_the_impulse_of_a_record_finer_than_they_are(
-    method: Integrator,
-) -> None:
+def test_approximate_steps_keep_the_impulse_of_a_record_finer_than_they_are() -> None:
     """A quarter of the step, a sixteenth of the error, though the record is cut within a step."""
     frame = StoreyFrame(
         (2e3, 1e3),
@@ -146,7 +142,7 @@ def test_approximate_steps_keep_the_impulse_of_a_record_finer_than_they_are(
     point = np.array([[frame.modulus]])
     errors = []
     for step in (0.08, 0.04, 0.02):
-        flow = LinearFlow(frame, ("E",), 4, step, method)
+        flow = LinearFlow(frame, ("E",), 4, step, Midpoint())
         errors.append(np.abs(flow.values(point)[0] - motion(frame, flow.time)).max())
     assert errors[0] / errors[2] > 12
 

@@ -84,9 +84,15 @@ def test_motions_that_do_not_exist_and_steps_that_fail_are_named():
         LinearFlow(frame, ("m1",), 1, 0.1, Exact()).values(np.array([[1e4], [0.0], [2e4]]))
     with pytest.raises(FailedError, match=r"did not converge.*it failed at a = 1e\+30"):
         LagrangianFlow(DUFFING, ("a",), 4, 1.0).values(np.array([[0.5], [0.4], [1e30], [0.3]]))
-    motion = {**MOTION, "step": 0.1, "integrator": "rk4"}
+    falling = LagrangianSystem(
+        coordinates=1,
+        parameters={"a": 3.0},
+        lagrangian=lambda q, v, p: v[0] ** 2 / 2 + p["a"] ** 2 * q[0] ** 2 / 2,
+        initial=lambda p: ([1.0], [0.0]),
+        observed={"q1": lambda q, v, p: q[0]},
+    )
     with pytest.raises(FailedError, match=r"passes the peak of q1.*take a smaller step"):
-        envelope(frame, {"E": Interval(24e9, 26e9)}, method=Sampled(4), **motion)
+        envelope(falling, {"a": Interval(2.9, 3)}, Sampled(4), duration=3, step=0.6)
 
 
 def angle(parameters, time):
