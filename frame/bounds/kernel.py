@@ -50,28 +50,25 @@ def separable_bound(g: Array, H: Array, r: Array) -> float:
 
 
 @compiled
-def stays_below(
-    g: Array, H: Array, low: Array, high: Array, allowed: float, work: Array, L: Array
-) -> bool:
-    """Whether g·x + x·H·x/2 ≤ allowed is shown for low ≤ x ≤ high; False if it stays open.
+def stays_below(g: Array, H: Array, r: Array, allowed: float, work: Array, L: Array) -> bool:
+    """Whether g·x + x·H·x/2 ≤ allowed is shown for |x| ≤ r; False if it stays open.
 
-    The quadratic plus Σ s_i (x_i − low_i)(high_i − x_i)/2 lies above it (αBB: Adjiman, Floudas
-    1998). Where that is concave, each of its tangents is a bound; they are taken at points of an
-    ascent along the axes. `work` (3, d) and `L` (d, d) are scratch.
+    The quadratic plus Σ s_i (r_i² − x_i²)/2 lies above it (αBB: Adjiman, Floudas 1998). Where that
+    is concave, each of its tangents is a bound; they are taken at points of an ascent along the
+    axes, from 0. `work` (3, d) and `L` (d, d) are scratch.
     """
     if allowed <= 0:
         return False
     d, shift, x, slope = len(g), work[0], work[1], work[2]  # shift: the s_i
+    value = 0.0
     for i in range(d):
-        width = high[i] - low[i]
-        x[i], shift[i] = max(min(0.0, high[i]), low[i]), 0.0
-        if width > 0:
-            shift[i] = allowed / (d * width * width)
-            if (high[i] <= 0 and g[i] > 0) or (low[i] >= 0 and g[i] < 0):
-                shift[i] += abs(g[i]) / width
+        x[i], slope[i], shift[i] = 0.0, g[i], 0.0
+        if r[i] > 0:
+            shift[i] = allowed / (4 * d * r[i] * r[i])
+        value += shift[i] / 2 * r[i] * r[i]
     for i in range(d):  # concave if Cholesky's factor of diag(s) − H exists, on axes with a width
         for j in range(i + 1):
-            if high[i] <= low[i] or high[j] <= low[j]:
+            if r[i] <= 0 or r[j] <= 0:
                 L[i, j] = 0.0
                 continue
             total = -H[i, j] if i != j else shift[i] - H[i, i]
@@ -83,27 +80,19 @@ def stays_below(
                 L[i, i] = sqrt(total)
             else:
                 return False
-    value = 0.0
-    for i in range(d):
-        curved = 0.0
-        for j in range(d):
-            curved += H[i, j] * x[j]
-        value += (g[i] + curved / 2) * x[i] + shift[i] / 2 * (x[i] - low[i]) * (high[i] - x[i])
-        slope[i] = g[i] + curved + shift[i] / 2 * (low[i] + high[i] - 2 * x[i])
     for _ in range(SWEEPS):
         tangent = value
         for i in range(d):
-            if high[i] > low[i]:
-                tangent += max(slope[i] * (high[i] - x[i]), slope[i] * (low[i] - x[i]))
+            tangent += abs(slope[i]) * r[i] - slope[i] * x[i]
         if tangent <= allowed:
             return True
         if value > allowed:
             return False
         for i in range(d):
-            if high[i] <= low[i]:
+            if r[i] <= 0:
                 continue
             bend = shift[i] - H[i, i]
-            step = max(min(x[i] + slope[i] / bend, high[i]), low[i]) - x[i]
+            step = max(min(x[i] + slope[i] / bend, r[i]), -r[i]) - x[i]
             value += step * (slope[i] - bend * step / 2)
             x[i] += step
             for j in range(d):
@@ -224,7 +213,7 @@ def examine(
     J, H, g, S, third_change, second_change = (
         np.empty(q), np.empty((d, d)), np.empty(d), np.empty((d, d)), np.empty(d), np.empty(d),
     )  # fmt: skip
-    low, high, work, L = np.empty(d), np.empty(d), np.empty((3, d)), np.empty((d, d))
+    work, L = np.empty((3, d)), np.empty((d, d))
     for b in range(len(radius)):
         r = radius[b]
         modes = (share[b], slope[b], phase[b], decay[b], of_rates[b], of_shares[b])
@@ -264,11 +253,7 @@ def examine(
                 if has_linear_phases:  # bound by modes of linear phase
                     room = aim - f - noise
                     room -= linear_phase_bound(g, S, waves[row], time[node], side, modes, o)
-                    for i in range(d):
-                        low[i], high[i] = -r[i], r[i]
-                    if separable_bound(g, S, r) <= room or stays_below(
-                        g, S, low, high, room, work, L
-                    ):
+                    if separable_bound(g, S, r) <= room or stays_below(g, S, r, room, work, L):
                         continue
                     for i in range(d):
                         g[i] = side * J[1 + i]
@@ -277,9 +262,8 @@ def examine(
                 if faces:
                     code[item] = FACES + faces
                     continue
-                for i in range(d):  # bound by a concave function above the quadratic
-                    low[i], high[i] = -r[i], r[i]
-                if stays_below(g, S, low, high, aim - f - missing, work, L):
+                # bound by a concave function above the quadratic
+                if stays_below(g, S, r, aim - f - missing, work, L):
                     continue
                 largest_weight = -1.0  # bisect along the axis that adds most to what is not known
                 for i in range(d):

@@ -47,7 +47,7 @@ def test_bounds_of_waves_are_reached_by_a_pulse_on_a_soft_spring(order: int) -> 
     growth = largest_growth(model.eigenvalue, np.ones(1))
     free, forced = motion_parts(model, growth)
     rate = model.eigenvalue.at(np.zeros((1, 1)))
-    time = model.time
+    time = model.flow.time
     if order < 3:
         nodes = np.arange(len(time))
         truth = model.loads[0].response(np.repeat(rate, len(nodes), 0), nodes)[order][:, 0]
@@ -79,7 +79,7 @@ def test_what_a_free_wave_does_between_nodes_is_bounded_and_half_would_not_do() 
     model = spring(1.0, None, 6.0, 0.2)
     (proof,) = bound_levels(model, np.zeros((31, 1)), np.ones(1), gap=1e-2)
     fine = np.cos(np.sqrt(1.1) * np.linspace(0, 6, 6001))  # of the fastest of the box
-    line = np.interp(np.linspace(0, 6, 6001), model.time, fine[::200])
+    line = np.interp(np.linspace(0, 6, 6001), model.flow.time, fine[::200])
     off = np.abs(fine - line).max()
     assert proof.between[1:, 0].min() / off >= 1
     assert proof.between.max() / off <= 1.3
@@ -157,7 +157,7 @@ def test_branch_and_bound_needs_all_of_the_remainder(start, gap, budget) -> None
 
 def least_closed(model: ModalModel) -> np.ndarray:
     """Of each problem the least target below which its whole box [−1, 1] is closed, shape (N,)."""
-    ends, count = np.ones(1), 2 * len(model.time)
+    ends, count = np.ones(1), 2 * len(model.flow.time)
     frontier, given = Frontier.of_box(1, count), (slice(0, 1), slice(0, count))
     low, high, remainder = np.full(count, -2.5), np.full(count, 2.5), Remainder(model, -ends, ends)
     for _ in range(30):
@@ -182,7 +182,7 @@ def test_a_box_is_closed_where_its_mode_allows_no_more(even: bool) -> None:
     values = model.values(np.linspace(-1, 1, 2001)[:, None])[..., 0]
     truth = np.stack([-values.min(0), values.max(0)], 1)
     assert (closed >= truth - 1e-7).all()
-    early = model.time <= 6  # up to 0.3 rad from the centre, where little is left out
+    early = model.flow.time <= 6  # up to 0.3 rad from the centre, where little is left out
     assert (closed - truth)[early].max() <= 4e-3
 
 
@@ -199,7 +199,7 @@ def test_rounding_of_late_phases_is_in_the_margin() -> None:
     ]
     nodes = np.array([1, 10, 100])
     for node in nodes:
-        t = np.longdouble(model.time[node])
+        t = np.longdouble(model.flow.time[node])
         exact = (
             2 * np.exp(growth * t) * (share[0] * np.cos(phase * t) - share[1] * np.sin(phase * t))
         )
@@ -210,8 +210,8 @@ def test_rounding_of_late_phases_is_in_the_margin() -> None:
 
 def test_concave_bound_is_that_of_the_curvature_it_adds() -> None:
     """x²/2 − y² on [−1, 1]² is at most 1/2, and no shift below 1 makes it concave."""
-    g, H, low, high = np.zeros(2), np.diag([1.0, -2.0]), -np.ones(2), np.ones(2)
+    g, H, r = np.zeros(2), np.diag([1.0, -2.0]), np.ones(2)
     work, L = np.empty((3, 2)), np.empty((2, 2))
     for shown in (stays_below, stays_below.py_func):  # compiled, and as it is read
-        assert shown(g, H, low, high, 8.01, work, L)
-        assert not shown(g, H, low, high, 0.49, work, L)
+        assert shown(g, H, r, 8.01, work, L)
+        assert not shown(g, H, r, 0.49, work, L)
