@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
-from typing import Any, ClassVar, Protocol
+from typing import Any, get_args
 
 import numpy as np
 
@@ -43,18 +43,9 @@ OTHER_UNITS = 500
 """Factor between a support and the structure's own value from which on units must differ."""
 
 
-class Method(Protocol):
-    """How an envelope is found; a frozen dataclass whose fields are its options."""
-
-    name: ClassVar[str]
-
-    def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
-        """Envelope of all outputs on all levels."""
-
-
-METHODS: dict[str, type[Any]] = {
-    x.name: x for x in (Auto, Proof, DualProof, GraphFollower, ImprovedFollower, Sampled)
-}
+Method = Auto | Proof | DualProof | GraphFollower | ImprovedFollower | Sampled
+"""How an envelope is found, with its options as fields."""
+METHODS: dict[str, type[Method]] = {x.name: x for x in get_args(Method)}
 """The methods by the words that a case file has for them."""
 REMOVED_METHODS = {"search": "take auto, or improved-graph-follower with the integrator exact"}
 """Cures by the words of methods that were removed."""
@@ -137,7 +128,7 @@ def _build_problem(
     step: float,
     alpha: Sequence[float] = ALPHA,
     integrator: str | Integrator | None = None,
-    **options: object,
+    **options: Any,
 ) -> tuple[Method, UnitFlow, Array, Ints]:
     """Return the method, the motion over distinct cuts, the levels, and the cut of each level."""
     is_system = isinstance(model, LagrangianSystem) or hasattr(model, "assembly")
@@ -162,15 +153,14 @@ def _build_problem(
 def _method(
     model: LinearSystem | LagrangianSystem,
     method: Method | str | None,
-    options: Mapping[str, object],
+    options: Mapping[str, Any],
 ) -> Method:
     """Return a method, given itself or by name and options; by default one that fits the model."""
     if method is None:
         method = "improved-graph-follower" if isinstance(model, LagrangianSystem) else "auto"
     if not isinstance(method, str):
-        is_method = hasattr(method, "run") and not isinstance(method, type)
         allowed = f"{', '.join(METHODS)}, or an object as Proof()"
-        require(is_method, "method", value=repr(method), allowed=allowed)
+        require(isinstance(method, Method), "method", value=repr(method), allowed=allowed)
         allowed = "none beside a method that is no name"
         require(not options, "options", value=[*options], allowed=allowed)
         return method

@@ -104,7 +104,7 @@ def examine_items(
     models over it, and `target` (N,) the values below which problems are fathomed.
     """
     centre, radius, edges = frontier.geometry(*domain, boxes)
-    n, m, d = model.count, len(model.outputs), centre.shape[1]
+    n, m, d = model.count, len(model.flow.outputs), centre.shape[1]
     box, problem = frontier.box[items] - boxes.start, frontier.problem[items]
     node, column = np.divmod(problem, 2 * m)
     is_new_row = np.append(True, (np.diff(box) != 0) | (np.diff(node) != 0))
@@ -118,7 +118,7 @@ def examine_items(
         (*starts, row_node, column),
         (radius, edges, _tables(rate, share, d)),
         _in_planes(waves).reshape(len(begin), -1),
-        model.time,
+        model.flow.time,
         _linear_phases(remainder, radius, rate[1 : 1 + d], share[0, :, 0]),
         (remainder.tensor, remainder.margin),
         target,

@@ -54,8 +54,8 @@ def proved_error(model: ModalModel) -> Array:
     by_ratio = _ratio_errors(structure, modes, norms)
     energy_rate = _energy_rates(structure, modes, norms, by_ratio)
     start, outputs = _start_errors(structure, modes, norms), modes.outputs(structure)
-    deviation = np.zeros(len(model.time))
-    output_error = np.zeros((len(model.time), len(model.outputs)))
+    deviation = np.zeros(len(model.flow.time))
+    output_error = np.zeros((len(model.flow.time), len(model.flow.outputs)))
     for s, part in enumerate(motion_parts(model, largest_growth(model.eigenvalue, reach))):
         if isinstance(part.load, Direct):
             assert structure.feeds is not None
@@ -215,7 +215,7 @@ def motion_parts(model: ModalModel, growth: Array) -> list[MotionPart]:
 
     `growth` (n,) are upper bounds of Re λ_k, in 1/s.
     """
-    time = model.time[:, None]
+    time = model.flow.time[:, None]
     divisor = np.where(growth == 0, 1.0, growth)
     free = MotionPart(
         share=model.coefficient,
@@ -230,12 +230,14 @@ def motion_parts(model: ModalModel, growth: Array) -> list[MotionPart]:
 def _forced_part(model: ModalModel, growth: Array, load: LoadTables) -> MotionPart:
     """Part of a model's motion that a load a(t) makes, w = R = ∫ exp(λ τ) a(t − τ) dτ."""
     if isinstance(load, Direct):  # w of the first mode is a(t)
-        waves: Array = np.zeros((4, len(model.time), model.count))
+        waves: Array = np.zeros((4, len(model.flow.time), model.count))
         waves[0] = np.abs(load.at_nodes(np.zeros((1, model.count)))[0])
-        return MotionPart(load.share, waves, 0 * waves[0], 0 * model.time, load.truncation, load)
+        return MotionPart(
+            load.share, waves, 0 * waves[0], 0 * model.flow.time, load.truncation, load
+        )
 
     def moments(decay: float) -> Array:  # of exp(−decay τ) |a(t − τ)|
-        return (1 + ROUNDING) * absolute_moments(decay, load.history, model.time)
+        return (1 + ROUNDING) * absolute_moments(decay, load.history, model.flow.time)
 
     undamped = moments(0.0)
     of_modes = np.stack([moments(-float(g)) for g in growth], -1)  # (5, T, n)
@@ -260,12 +262,12 @@ class Remainder:
     """
 
     def __init__(self, model: ModalModel, lower: Array, upper: Array) -> None:
-        d, n, m = len(lower), model.count, len(model.outputs)
+        d, n, m = len(lower), model.count, len(model.flow.outputs)
         reach, width = np.maximum(np.abs(lower), np.abs(upper)), upper - lower
         rate = derivative_bounds(model.eigenvalue, reach)
         growth = largest_growth(model.eigenvalue, reach)
-        third = np.zeros((len(model.time), m, d, d, d))
-        margin = np.zeros((len(model.time), m, 1 + d))
+        third = np.zeros((len(model.flow.time), m, d, d, d))
+        margin = np.zeros((len(model.flow.time), m, 1 + d))
         for part in motion_parts(model, growth):
             share = derivative_bounds(part.share, reach)
             noise = _rounding_bound(model, rate[0], part.load)
@@ -283,7 +285,7 @@ class Remainder:
                 margin[..., 0] += noise[:, k, None] * values
                 margin[..., 1:] += noise[:, k, None, None] * np.moveaxis(slopes, -1, 1)
         at_start = np.full(n, 2.0) @ model.coefficient.real  # where most modes cancel
-        third[model.time == 0] = np.moveaxis(derivative_bounds(at_start, reach)[3], -1, 0)
+        third[model.flow.time == 0] = np.moveaxis(derivative_bounds(at_start, reach)[3], -1, 0)
         self.tensor, self.margin, self.rate, self.share = (1 + 1e-9) * third, margin, rate, share
 
 
@@ -292,10 +294,10 @@ def _rounding_bound(model: ModalModel, rate: Array, load: LoadTables | None) -> 
     # that of λ enters exp(λ t) times |λ| t; terms of a load's series exceed its sum by exp(REACH)
     n_terms, d = model.eigenvalue.exponents.shape
     of_polynomial = n_terms + model.degree + 2
-    phase = rate * model.time[:, None]
+    phase = rate * model.flow.time[:, None]
     operations = of_polynomial * (2 + phase) + 12 * model.count + 4 * d**3 + 50
     if load is not None:
-        operations = operations + (8 * len(model.time) + SERIES_TERMS) * np.exp(REACH)
+        operations = operations + (8 * len(model.flow.time) + SERIES_TERMS) * np.exp(REACH)
     return np.finfo(float).eps * operations
 
 

@@ -100,7 +100,7 @@ def _newton(
 
 def _signed(model: ModalModel, points: Array, which: Ints) -> tuple[Array, Array, Array]:
     """Side × output (W,), its gradient and Hessian, of problems `which` at their points (W, d)."""
-    node, column = np.divmod(which, 2 * len(model.outputs))
+    node, column = np.divmod(which, 2 * len(model.flow.outputs))
     f, g, H = model.at(points, node, column // 2)
     side = 2.0 * (column % 2) - 1
     return side * f, side[:, None] * g, side[:, None, None] * H

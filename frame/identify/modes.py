@@ -15,7 +15,8 @@ import numpy as np
 from scipy.special import chdtri
 
 from alphacut.frame.calculus.jet import Jet
-from alphacut.frame.structures.storey import StoreyFrame, chain_matrix
+from alphacut.frame.structures.linear import undamped_modes
+from alphacut.frame.structures.storey import StoreyFrame, chain_matrix, diagonal
 from alphacut.fuzzy import FuzzyNumber, from_data
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.knowledge.from_data import from_scatter
@@ -69,14 +70,8 @@ class Chain:
 
 
 def chain_modes(stiffness: Array, mass: Array) -> tuple[Array, Array]:
-    """Return eigenvalues ω² (S, n), rising, and shapes of unit modal mass (S, floor, mode).
-
-    Stiffnesses (S, n) are in N/m, masses (S, n) in kg.
-    """
-    root = np.sqrt(mass)
-    symmetric = chain_matrix(stiffness) / root[..., :, None] / root[..., None, :]
-    values, vectors = np.linalg.eigh(symmetric)
-    return values, vectors / root[..., None]
+    """Return eigenvalues ω² (S, n) and shapes (S, floor, mode) of chains, as `undamped_modes`."""
+    return undamped_modes(diagonal(mass), chain_matrix(stiffness))
 
 
 def eigenvalue_ranges(chain: Chain, lower: Array, upper: Array) -> tuple[Array, Array]:

@@ -266,8 +266,8 @@ def _line_deviation(model: ModalModel) -> Array:
             shape = (1, 1) if sigma is None else sigma.shape
             kappa = np.multiply.outer(2 * part.share.value[k], np.ones(shape))
             responses.append(Response(sigma, load, 0, kappa, spreads[k]))
-    by_magnitude = np.sum([x.line_deviation(model.time) for x in responses], axis=0)
-    return narrowed_straying(responses, model.time, by_magnitude)
+    by_magnitude = np.sum([x.line_deviation(model.flow.time) for x in responses], axis=0)
+    return narrowed_straying(responses, model.flow.time, by_magnitude)
 
 
 def _error_between_nodes(model: ModalModel, error: Array) -> Array:

@@ -82,16 +82,6 @@ class ModalModel:
         return cls.from_modes(flow, boxes, structure, DampedModes.of_structure(structure, chosen))
 
     @property
-    def time(self) -> Array:
-        """Nodes, shape (T,), in s."""
-        return self.flow.time
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """Names of the observed quantities."""
-        return self.flow.outputs
-
-    @property
     def count(self) -> int:
         """Number of modes n."""
         return len(self.eigenvalue.value)
@@ -124,7 +114,7 @@ class ModalModel:
     @cached_property
     def of_output(self) -> list[TaylorModel]:
         """For each output λ_k, n, then C_k of each part, n."""
-        outputs = range(len(self.outputs))
+        outputs = range(len(self.flow.outputs))
         return [
             concatenate([self.eigenvalue, *(x[:, o] for x in self.shares)], -1) for o in outputs
         ]
@@ -134,7 +124,7 @@ class ModalModel:
 
         They are 2 Re Σ_k C_k w(t; λ_k) over the free motion and each load.
         """
-        n, time = self.count, self.time
+        n, time = self.count, self.flow.time
         variables = self.together.at(unit)
         rate = variables[:, :n]
         waves = [np.exp(rate[:, None] * time[:, None])] if self.started else []
@@ -169,7 +159,7 @@ class ModalModel:
         """
         parts = []
         if self.started:
-            t = self.time[node][:, None]
+            t = self.flow.time[node][:, None]
             wave = np.exp(rate * t)
             parts.append((wave, t * wave, t * t * wave))
         return parts + [load.response(rate, node) for load in self.loads]
