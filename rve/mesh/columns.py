@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from alphacut.fuzzy.arrays import Array, Ints, Mask
+from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.rve.cell.outline import Outline, circle, is_round
 from alphacut.rve.mesh import square
 from alphacut.rve.mesh.gmsh_prisms import INCLUSION, NAMES, Prisms
@@ -95,16 +95,8 @@ def from_first_rank(comm: MPI.Intracomm, make: Callable[[], T]) -> T:
     return cast("T", result)
 
 
-def grid_of(
-    prisms: Prisms, radius: float, outline: Outline = circle, *, is_fixed: bool = False
-) -> PrismGrid:
-    """Grid of prisms with nodes numbered level by level, and the planar mesh below them.
-
-    Args:
-        prisms: Of any numbering; their planar positions are those of the planar mesh.
-        radius: Of the particle in the mesh, 0 if it has none.
-        outline: Of the particle.
-        is_fixed: Whether nodes stay where the prisms have them, whatever the map.
+def grid_of(prisms: Prisms) -> PrismGrid:
+    """Grid of prisms where they are, their nodes numbered level by level, and the mesh below them.
 
     Raises:
         MeshError: They do not lie in columns, or a column does not pass all levels.
@@ -112,10 +104,10 @@ def grid_of(
     thetas, level = _levels(prisms)
     column, num_columns = _columns(prisms)
     layer = level[prisms.cells[:, 0]]
-    lowest = prisms.cells[layer == 0]
+    lowest = column[prisms.cells[layer == 0]]
     # planar nodes are the columns, vertices before edge midpoints
-    vertices = np.unique(column[lowest[:, :3]])
-    midpoints = np.setdiff1d(column[lowest[:, BELOW]], vertices)
+    vertices = np.unique(lowest[:, :3])
+    midpoints = np.setdiff1d(lowest[:, BELOW], vertices)
     planar_of_column: Ints = np.full(num_columns, -1)
     planar_of_column[vertices] = np.arange(len(vertices))
     planar_of_column[midpoints] = len(vertices) + np.arange(len(midpoints))
@@ -123,19 +115,17 @@ def grid_of(
     number = _number_nodes(prisms, level, planar, len(thetas) - 1, len(vertices))
     triangle = _triangles(planar[prisms.cells[:, :3]], layer)
     order = np.lexsort((triangle, layer))
-    cells, phase = number[prisms.cells[order]], prisms.phase[order]
-    positions: Array = np.empty((num_columns, 2))
-    lowest_nodes = np.flatnonzero(number < num_columns)
-    positions[number[lowest_nodes]] = prisms.points[lowest_nodes, :2]
-    num_triangles = int(triangle.max()) + 1
-    inside = phase[:num_triangles] == (prisms.names.index(INCLUSION) if radius else -1)
-    plane = _plane(positions, cells[:num_triangles], inside, radius, outline)
+    cells, fixed = number[prisms.cells[order]], np.empty_like(prisms.points)
+    fixed[number] = prisms.points
+    triangles = cells[: int(triangle.max()) + 1, BELOW]
+    ends: Ints = np.empty((len(midpoints), 2), np.intp)
+    for middle, corners in zip((3, 4, 5), ([0, 1], [0, 2], [1, 2]), strict=True):
+        ends[triangles[:, middle] - len(vertices)] = triangles[:, corners]
+    inside, arc = (np.zeros(count, bool) for count in (len(triangles), num_columns))
+    lowest_points = fixed[:num_columns, :2]
+    plane = Triangulation(lowest_points, len(vertices), ends, triangles, inside, arc, radius=0.0)
     heights = (thetas - thetas[0]) / (thetas[-1] - thetas[0])
-    fixed = None
-    if is_fixed:
-        fixed = np.empty_like(prisms.points)
-        fixed[number] = prisms.points
-    return PrismGrid(plane, cells, heights, phase, prisms.names, radius > 0 or is_fixed, fixed)
+    return PrismGrid(plane, cells, heights, prisms.phase[order], prisms.names, fixed=fixed)
 
 
 def _levels(prisms: Prisms) -> tuple[Array, Ints]:
@@ -188,28 +178,3 @@ def _triangles(vertices: Ints, layer: Ints) -> Ints:
     if (counts != layer.max() + 1).any():
         raise MeshError("layers of prisms differ", "extrude the whole plane")
     return np.asarray(triangle)
-
-
-def _plane(
-    points: Array, cells: Ints, inside: Mask, radius: float, outline: Outline
-) -> Triangulation:
-    """Triangulation of the lowest level, with its edges and its nodes on the interface."""
-    triangles = cells[:, BELOW]
-    vertices = int(triangles[:, :3].max()) + 1
-    ends: Ints = np.empty((len(points) - vertices, 2), np.intp)
-    for middle, (first, second) in zip((3, 4, 5), ((0, 1), (0, 2), (1, 2)), strict=True):
-        ends[triangles[:, middle] - vertices] = triangles[:, [first, second]]
-    edge_ends, _, on_interface = square.edges(triangles[:, :3], inside)
-    interface_edges = edge_ends[on_interface]
-    is_on_interface = np.zeros(len(points), bool)
-    is_on_interface[interface_edges] = True
-    is_on_interface[vertices:] = _rows_in(np.sort(ends, axis=1), interface_edges)
-    return Triangulation(
-        points, vertices, ends, triangles, inside, is_on_interface, radius, outline
-    )
-
-
-def _rows_in(rows: Ints, candidates: Ints) -> Mask:
-    """Mask of the pairs (n, 2) that are among candidates (k, 2), shape (n,)."""
-    size = int(rows.max(initial=0)) + 1
-    return np.isin(rows @ [size, 1], candidates @ [size, 1])

@@ -39,7 +39,7 @@ def read_grid(path: Path | str) -> PrismGrid:
             allowed = "files of Gmsh with 15-node prisms"
             raise RefusedError("mesh.file", path, allowed, str(error)) from None
         prisms = orient(gmsh_prisms.read(gmsh))
-    grid = grid_of(prisms, 0.0, is_fixed=True)
+    grid = grid_of(prisms)
     _require_filled(grid)
     _require_periodic_square(grid)
     _require_joined_columns(grid)
@@ -74,7 +74,7 @@ def refined(grid: PrismGrid) -> PrismGrid:
     points = (shapes @ grid.fixed[grid.cells]).reshape(-1, 3)[first]
     phase = np.repeat(grid.phase, len(parts))
     prisms = Prisms(points, nodes.reshape(-1, len(z)), phase, grid.names)
-    return grid_of(prisms, 0.0, is_fixed=True)
+    return grid_of(prisms)
 
 
 def orient(prisms: Prisms) -> Prisms:

@@ -150,11 +150,6 @@ class PrismGrid:
         return len(self.heights) - 1
 
     @property
-    def inside(self) -> Mask:
-        """Mask of the prisms in the particle."""
-        return np.tile(self.plane.inside, self.layers)
-
-    @property
     def nodes(self) -> int:
         """Number of nodes in all."""
         return (self.layers + 1) * len(self.plane.points) + self.layers * self.plane.vertices
