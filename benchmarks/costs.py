@@ -1,15 +1,14 @@
-"""Cost over size: unknowns of the cell, storeys, fuzzy inputs, records, worker processes.
+"""Cost over size: unknowns of a cell, storeys, fuzzy inputs, records, workers.
 
     ./enter python -m benchmarks.costs
 
 Processor time of a first computation with code compiled, and the exponent p in seconds ~ size^p by
-least squares of the logarithms. For workers it is the clock that counts. CSV and figure go to
-benchmarks/results/.
+least squares of the logarithms. For workers it is the clock that counts. Storeys have five inputs,
+inputs eight storeys, records three inputs, workers eleven records.
 """
 
 from __future__ import annotations
 
-import argparse
 import os
 import subprocess
 import sys
@@ -48,13 +47,6 @@ alpha = [0, 1]
 duration = "8 s"
 step = "0.02 s"
 """
-LABELS = {
-    "cell": "unknowns of the cell",
-    "storeys": "storeys, 5 inputs",
-    "inputs": "inputs, 8 storeys",
-    "records": "records, 3 inputs",
-    "workers": "workers, 11 records",
-}
 Row = dict[str, Any]
 
 
@@ -64,7 +56,8 @@ def cells() -> Iterator[Row]:
     for size in MESH_SIZES:
         begun = time.process_time()
         (result,) = PrismModel(size, estimate=False).solve(PAPER, MATRIX, [PARTICLE])
-        yield {"size of": "cell", "size": result.unknowns, "seconds": time.process_time() - begun}
+        seconds = time.process_time() - begun
+        yield {"size of": "unknowns", "size": result.unknowns, "seconds": seconds}
 
 
 def frames() -> Iterator[Row]:
@@ -84,8 +77,7 @@ def frames() -> Iterator[Row]:
             outputs=("q1", f"q{storeys}"),
             ground=Accelerogram(record.step, record.acceleration()),
         )
-        nominal = {name: frame.parameters[name] for name in chosen}
-        fuzzy = {name: Triangular(0.95 * x, x, 1.05 * x) for name, x in nominal.items()}
+        fuzzy = {x: Triangular(*frame.parameters[x] * np.array([0.95, 1, 1.05])) for x in chosen}
         begun = time.process_time()
         envelope(frame, fuzzy, DualProof(), duration=4.0, step=0.02, alpha=(0, 1))
         size = storeys if kind == "storeys" else inputs
@@ -104,13 +96,12 @@ def suites() -> Iterator[Row]:
             before, begun = os.times(), time.monotonic()
             subprocess.run(command, check=True)
             after, clock = os.times(), time.monotonic() - begun
-        used = after.children_user + after.children_system
-        seconds = used - before.children_user - before.children_system
-        size = records if kind == "records" else workers
-        yield {"size of": kind, "size": size, "seconds": clock if kind == "workers" else seconds}
+        used = np.subtract(after, before)[2:4].sum()  # user and system, of child processes
+        size, seconds = (workers, clock) if kind == "workers" else (records, used)
+        yield {"size of": kind, "size": size, "seconds": seconds}
 
 
-def draw(rows: Sequence[Row], stem: Path) -> None:
+def draw(rows: Sequence[Row]) -> None:
     """Draw seconds over size, a panel for each kind of size with its exponent."""
     import matplotlib.pyplot as plt
 
@@ -122,29 +113,26 @@ def draw(rows: Sequence[Row], stem: Path) -> None:
         power = float(np.polyfit(np.log(size), np.log(seconds), 1)[0])
         print(f"{kind}: seconds ~ size^{power:.2f}")
         axes.loglog(size, seconds, "o-")
-        axes.set(xlabel=LABELS[kind], title=f"seconds ~ size^{power:.2f}")
+        axes.set(xlabel=kind, title=f"seconds ~ size^{power:.2f}")
         axes.set_xticks(size, [f"{x:,.0f}" for x in size], rotation=30)
         axes.set_yticks(seconds, [f"{x:.2g}" for x in seconds])
         axes.minorticks_off()
         axes.grid(alpha=0.25)
     panels[0].set_ylabel("seconds")
     for suffix in (".svg", ".png"):
-        figure.savefig(stem.with_suffix(suffix), dpi=160)
+        figure.savefig(RESULTS / f"costs{suffix}", dpi=160)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def main() -> None:
     """Print the table, write it, and draw it."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, default=RESULTS)
-    out, costs = parser.parse_args(arguments).out, dict[tuple[str, int], Row]()
+    costs: dict[tuple[str, int], Row] = {}
     for source in (cells, frames, suites):
         for row in source():
             costs[row["size of"], row["size"]] = row  # the first, repeated, loads compiled code
             print(row["size of"], row["size"], f"{row['seconds']:.2f} s", flush=True)
-    write([*costs.values()], out / "costs.csv")
-    draw([*costs.values()], out / "costs")
-    return 0
+    write([*costs.values()], RESULTS / "costs.csv")
+    draw([*costs.values()])
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()
