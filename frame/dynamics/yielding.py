@@ -31,23 +31,22 @@ MAX_TERMS = 24
 """Terms of the series: 1 / 24! is 2e-24; it mostly ends sooner."""
 TERM_ROUNDING = 1e-17
 """Size of two terms in turn, as a fraction of the largest one, at which the series ends."""
+GAUSS_NODES, GAUSS_WEIGHTS = (np.polynomial.legendre.leggauss(8) + np.array([[1], [0]])) / 2
+"""Quadrature on [0, 1] of works: of products of exp(±i MAX_PHASE τ) exact to 1e-17."""
 EVENT_ROUNDING = 1e-13
 """Width in which an event is located, as a fraction of a part; and the same of the yield drift, or
 of the velocity, by which it may be passed: so that a state just left is not met again at once."""
 RESOLUTION = 2.0**-34
 """Shortest interval in which a double root is looked for: between its ends a polynomial is within
 2⁻⁷¹ of its curvature of a straight line."""
-TURN_ROUNDING = 1e-8
-"""Width in which a peak is located: its value is as exact as the square of that."""
 MAX_EVENTS = 1000
 """Events in a part of a step after which the motion has failed."""
 MAX_IMBALANCE = 1e-9
 """Energy that may be missing at the end, as a fraction of all energies that were exchanged."""
-MAX_NUMBERS = 4e6
-"""Most numbers of states that are held at once: 32 MB."""
-KINDS = ("q", "drift", "shear")
-"""Outputs whose peaks are found between nodes, too."""
+KINDS = Q, DRIFT, SHEAR, DUCTILITY, V, A, RESIDUAL, DISSIPATED = range(8)
+NAMES = ("q", "drift", "shear", "ductility", "v", "a", "residual", "dissipated")
 AT_NODES = ("v", "a", "residual")
+"""Outputs whose peaks are sought at nodes alone; dissipated energy never falls."""
 RUNS, COLLAPSED, FAILED = 0, 1, 2
 
 
@@ -97,48 +96,41 @@ class YieldingFlow(Flow):
         if derivatives:
             allowed = "methods without derivatives: auto or quasi-monte-carlo"
             raise RefusedError("method", "a follower or a proof, of columns that yield", allowed)
-        points = np.asarray(points, float)
-        per_motion = 4 * self.system.floors * len(self.time)
-        chunks = np.array_split(points, -(-len(points) * per_motion // int(MAX_NUMBERS)) or 1)
-        motions = [self.values_and_peaks(chunk)[0] for chunk in chunks]
-        return Jet.constant(np.concatenate(motions), 0)
+        return Jet.constant(self.values_and_peaks(points)[0], 0)
 
     def values_and_peaks(self, points: Array) -> tuple[Array, Array]:
         """Return trajectories (S, T, m) at points (S, d), and their largest magnitudes (S, m).
 
         These are largest over time, of outputs of the kinds `AT_NODES` at the nodes.
         """
-        system, n = self.system, self.system.floors
+        system, points, loads = self.system, np.asarray(points, float), histories(self.system)
         matrices, _ = evaluate(system, self.names, points, derivatives=False)
         named = {**system.parameters, **dict(zip(self.names, points.T, strict=True))}
         p = {x: Jet.constant(np.zeros(len(points)) + y, 0) for x, y in named.items()}
-        properties = [matrices.mass.value.diagonal(axis1=1, axis2=2), system.springs(p).value]
-        properties.append(system.softening(p).value if system.gravity else 0 * properties[1])
-        properties += [system.hardenings(p).value, system.yield_drifts(p).value]
-        storeys = np.ascontiguousarray(np.stack(properties, 1))  # (S, 5, n)
+        k, hardening, yield_drift = system.springs(p), system.hardenings(p), system.yield_drifts(p)
+        softening = system.softening(p) if system.gravity else k * 0.0
+        mass = matrices.mass.value.diagonal(axis1=1, axis2=2)
+        properties = [mass, *(x.value for x in (k, softening, hardening, yield_drift))]
         start = matrices.start.value[..., 0]
-        drift0 = np.diff(start[:, :n], prepend=0.0)
-        if matrices.static is not None and (np.abs(drift0) > storeys[:, 4]).any():
+        drift0 = np.diff(start[:, : system.floors], prepend=0.0)
+        if matrices.static is not None and (np.abs(drift0) > yield_drift.value).any():
             allowed = "forces under which no storey yields before the start"
             raise RefusedError("load", "static, and yields a storey", allowed)
-        loads = list(histories(system).values())
         pushes = matrices.pushes(ground=system.ground is not None).value
         fastest = float(np.abs(np.linalg.eigvals(state_matrix(matrices).value)).max())
-        parts = load_parts(loads, self.time, MAX_PHASE / max(fastest, 1e-300))
-        states = np.empty((len(points), len(self.time), 4 * n))
-        peaks, ends = np.zeros((len(points), 3, n)), np.zeros((len(points), 4))
-        damping = np.ascontiguousarray(matrices.damping.value)
-        pushes = np.ascontiguousarray(pushes)
-        _march(storeys, damping, pushes, start, *parts, states, peaks, ends)
+        parts = load_parts([*loads.values()], self.time, MAX_PHASE / max(fastest, 1e-300))
+        fed = np.zeros((len(self.time), len(loads)))
+        for c, load in enumerate(loads.values()):
+            if load is not system.ground:  # absolute accelerations do not contain the ground's
+                fed[:, c] = load.values(self.time)
+        kinds = [(NAMES.index(kind), z) for kind, z in map(system.quantity, self.outputs)]
+        values = np.empty((len(points), len(self.time), len(kinds)))
+        peaks, ends = np.zeros((len(points), len(kinds))), np.zeros((len(points), 4))
+        inputs = np.stack(properties, 1), matrices.damping.value, pushes, start
+        contiguous = map(np.ascontiguousarray, (*inputs, *parts, fed, np.array(kinds)))
+        _march(*contiguous, values, peaks, ends)
         self._require_motions(points, ends)
-        values = self._observed(damping, pushes, loads, storeys, states)
-        largest = np.abs(values).max(1)
-        for row, (kind, z) in enumerate(map(self.system.quantity, self.outputs)):
-            if kind in KINDS:
-                largest[:, row] = peaks[:, KINDS.index(kind), z]
-            elif kind == "ductility":
-                largest[:, row] = peaks[:, KINDS.index("drift"), z] / storeys[:, 4, z]
-        return values, largest
+        return values, peaks
 
     def _require_motions(self, points: Array, ends: Array) -> None:
         """Refuse motions that collapse, whose events do not end or whose energy is not balanced.
@@ -160,33 +152,6 @@ class YieldingFlow(Flow):
                 what = f"energy is missing at the end of a motion, {imbalance:.2g} of it"
                 raise StepError(what, "take a smaller step, or parameters where the motion exists")
 
-    def _observed(
-        self, damping: Array, pushes: Array, loads: Sequence[History], storeys: Array, states: Array
-    ) -> Array:
-        """Outputs (S, T, m) of states (S, T, 4n): q, v, plastic drifts and dissipated energies."""
-        n = self.system.floors
-        mass, k, softening, hardening, yield_drift = (storeys[:, None, x] for x in range(5))
-        q, v, plastic, dissipated = (states[..., x * n : (x + 1) * n] for x in range(4))
-        drift = np.diff(q, prepend=0.0)
-        shear = k * drift - (1 - hardening) * k * plastic
-        # drift in equilibrium without load; storeys that would yield back rest where they do
-        unloaded = k - softening
-        with np.errstate(divide="ignore"):
-            back = np.abs((1 - hardening) * k * yield_drift / (hardening * k - softening))
-        residual = np.clip((1 - hardening) * k * plastic / unloaded, -back, back)
-        net_force = shear - softening * drift
-        acceleration = np.diff(net_force, append=0.0) - np.einsum("sij,stj->sti", damping, v)
-        acceleration /= mass
-        for c, load in enumerate(loads):
-            if load is not self.system.ground:  # absolute ones do not contain the ground's
-                acceleration += load.values(self.time)[:, None] * pushes[:, None, :, c]
-        by_kind = {
-            "q": q, "v": v, "a": acceleration, "drift": drift, "shear": shear,
-            "residual": residual, "ductility": drift / yield_drift, "dissipated": dissipated,
-        }  # fmt: skip
-        quantities = map(self.system.quantity, self.outputs)
-        return np.stack([by_kind[kind][..., z] for kind, z in quantities], -1)
-
 
 def load_parts(
     loads: Sequence[History], time: Array, longest: float
@@ -203,62 +168,63 @@ def load_parts(
     inner = inner[(inner > 0) & (inner < time[-1])]
     inner = inner[np.abs(inner - np.round(inner / step) * step) > SAME * step]
     inner = inner[np.diff(inner, prepend=-1.0) > SAME * step]
-    edges = np.sort(np.concatenate([time, inner]))
-    counts = np.ceil(np.diff(edges) / longest).astype(int)
-    segment = np.repeat(np.arange(len(counts)), counts)  # of each part
-    number = np.arange(len(segment)) - np.repeat(np.cumsum(counts) - counts, counts)
-    share = np.stack([number, number + 1]) / counts[segment]
-    first, last = np.zeros((2, len(segment), len(loads)))
+    segments = np.sort(np.concatenate([time, inner]))
+    counts = np.append(0, np.cumsum(np.ceil(np.diff(segments) / longest)))
+    edges = np.interp(np.arange(counts[-1] + 1), counts, segments)
+    first, last = np.zeros((2, len(edges) - 1, len(loads)))
     for c, load in enumerate(loads):
-        ends = load.envelope(edges[:-1])[segment], load.envelope(edges[1:], -1.0)[segment]
-        first[:, c], last[:, c] = ends[0] + share * (ends[1] - ends[0])
-    is_node = np.append(True, (number + 1 == counts[segment]) & np.isin(edges, time)[segment + 1])
-    times = edges[:-1][segment] + share[0] * np.diff(edges)[segment]
-    return np.append(times, edges[-1]), is_node, first, last
+        first[:, c], last[:, c] = load.envelope(edges[:-1]), load.envelope(edges[1:], -1.0)
+    return edges, np.isin(edges, time), first, last
 
 
 @compiled
 def _march(
     storeys: Array, damping: Array, pushes: Array, start: Array, edges: Array, is_node: Mask,
-    first: Array, last: Array, states: Array, peaks: Array, ends: Array,
+    first: Array, last: Array, fed: Array, kinds: Array, values: Array, peaks: Array, ends: Array,
 ) -> None:  # fmt: skip
-    """Write states (S, T, 4n), peaks (S, 3, n) and ends (S, 4): status, time, storey, imbalance.
-
-    Peaks are the largest magnitudes of displacements, drifts and shears.
+    """Write values (S, T, m), peaks (S, m) and ends (S, 4): status, time, storey, imbalance.
 
     `storeys` (S, 5, n): mass, stiffness, softening by weight, hardening, yield drift; `damping`
-    (S, n, n) in N s/m, `pushes` (S, n, L) by loads, `start` (S, 2n); parts as of `load_parts`.
+    (S, n, n) in N s/m, `pushes` (S, n, L) by loads, `start` (S, 2n); parts as of `load_parts`;
+    `fed` (T, L): loads that act on absolute accelerations; `kinds` (m, 2): kinds and storeys.
     """
     n, n_loads = storeys.shape[2], pushes.shape[2]
-    # coefficients by powers of the fraction of a part: q, v, drifts, damping forces
-    series = np.zeros((4, n, MAX_TERMS + 1))
+    # coefficients by powers of the fraction of a part: q, v, drifts
+    series = np.zeros((3, n, MAX_TERMS + 1))
     load, rise, tangent, constant = np.zeros((4, n))
     for s in range(len(storeys)):
         mass, k, softening, hardening, yield_drift = storeys[s]
+        inverse_mass = 1 / mass
         q, v = start[s, :n].copy(), start[s, n:].copy()
         plastic, dissipated, direction = np.zeros((3, n))  # direction 0: elastic, ±1: yields
         for z in range(n):  # loaded in one direction before the start
             d = _drift(q, z)
             plastic[z] = d - min(max(d, -yield_drift[z]), yield_drift[z])
-        before, works, node = _energy(storeys[s], q, v, plastic), np.zeros(2), 1
-        states[s, 0] = np.concatenate((q, v, plastic, dissipated))
-        for e in range(len(edges) - 1):
+        before, works, node = _energy(storeys[s], q, v, plastic), np.zeros(2), 0
+        for e in range(len(edges)):
+            if is_node[e]:
+                state, push = (q, v, plastic, dissipated), (pushes[s], fed[node])
+                _observe(kinds, storeys[s], damping[s], push, state, values[s, node], peaks[s])
+                node += 1
+            if e == len(edges) - 1:
+                break
             length, begun = edges[e + 1] - edges[e], 0.0  # fraction of the part that is done
             for event in range(MAX_EVENTS + 1):
                 for i in range(n):
                     load[i] = rise[i] = 0.0
                     for c in range(n_loads):
-                        change = last[e, c] - first[e, c]
-                        load[i] += pushes[s, i, c] * (first[e, c] + begun * change)
-                        rise[i] += pushes[s, i, c] * (1 - begun) * change
+                        push_force, change = mass[i] * pushes[s, i, c], last[e, c] - first[e, c]
+                        load[i] += push_force * (first[e, c] + begun * change)
+                        rise[i] += push_force * (1 - begun) * change
                     spring = direction[i] * yield_drift[i] if direction[i] != 0 else -plastic[i]
                     constant[i] = (1 - hardening[i]) * k[i] * spring
                     tangent[i] = (hardening[i] if direction[i] != 0 else 1.0) * k[i] - softening[i]
                 h = length * (1 - begun)
-                terms = _expand(mass, damping[s], tangent, constant, load, rise, h, q, v, series)
+                terms = _expand(
+                    inverse_mass, damping[s], tangent, constant, load, rise, h, q, v, series
+                )
                 at, z = _first_event(series, terms, plastic, direction, yield_drift, hardening)
-                _add_works(mass, load, rise, series, terms, at, h, works)
-                _add_peaks(series, terms, at, tangent + softening, constant, peaks[s])
+                _add_works(damping[s], load, rise, series, terms, at, h, works)
                 for i in range(n):
                     q[i] = _value(series[0, i], terms, at)
                     v[i] = _value(series[1, i], terms, at)
@@ -267,6 +233,9 @@ def _march(
                         plastic[i] += flow
                         force = (1 - hardening[i]) * k[i] * yield_drift[i]
                         dissipated[i] += force * abs(flow)
+                _add_peaks(
+                    kinds, storeys[s], direction, constant, series, terms, at, q, v, peaks[s]
+                )
                 begun += at * (1 - begun)
                 if z < 0 or begun >= 1:
                     break
@@ -283,9 +252,6 @@ def _march(
                     break
             if ends[s, 0] != RUNS:
                 break
-            if is_node[e + 1]:
-                states[s, node] = np.concatenate((q, v, plastic, dissipated))
-                node += 1
         after, spent = _energy(storeys[s], q, v, plastic), works[1] + dissipated.sum()
         exchanged = abs(before) + abs(after) + abs(works[0]) + spent
         if exchanged > 0:
@@ -294,42 +260,42 @@ def _march(
 
 @compiled
 def _expand(
-    mass: Array, damping: Array, tangent: Array, constant: Array, load: Array, rise: Array,
+    inverse_mass: Array, damping: Array, tangent: Array, constant: Array, load: Array, rise: Array,
     h: float, q: Array, v: Array, series: Array,
 ) -> int:  # fmt: skip
-    """Write coefficients of q, v, drifts and damping forces by powers of τ/h; return their number.
+    """Write coefficients of q, v and drifts by powers of τ/h; return their number.
 
-    The storeys' net forces are tangent · drift + constant, accelerations by loads load + rise τ/h.
-    `series` has shape (4, n, powers).
+    The storeys' net forces are tangent · drift + constant, loads load + rise τ/h.
+    `series` has shape (3, n, powers).
     """
-    Q, V, drifts, resistance = series
+    Q, V, drifts = series
     n, scale, previous = len(q), 0.0, math.inf
     for i in range(n):
         Q[i, 0], V[i, 0] = q[i], v[i]
-        scale = max(scale, abs(q[i]), h * abs(v[i]))
     for term in range(MAX_TERMS + 1):
-        factor, size = h / (term + 1), 0.0
+        factor, size, below = h / (term + 1), 0.0, 0.0
         for i in range(n):
-            drifts[i, term] = Q[i, term] - Q[i - 1, term] if i else Q[i, term]
-            total = 0.0
-            for j in range(n):
-                total += damping[i, j] * V[j, term]
-            resistance[i, term] = total
-            size = max(size, abs(Q[i, term]), h * abs(V[i, term]))
+            drifts[i, term] = Q[i, term] - below
+            below = Q[i, term]
+            size += abs(Q[i, term]) + h * abs(V[i, term])
         scale = max(scale, size)
         if term == MAX_TERMS or (term > 1 and max(size, previous) <= TERM_ROUNDING * scale):
             return term + 1
-        previous = size
-        for i in range(n):
-            force = -tangent[i] * drifts[i, term] - resistance[i, term]
-            if i + 1 < n:
-                force += tangent[i + 1] * drifts[i + 1, term]
+        previous, above = size, 0.0
+        for i in range(n - 1, -1, -1):
+            column = tangent[i] * drifts[i, term]
             if term == 0:
-                force += (constant[i + 1] if i + 1 < n else 0.0) - constant[i] + mass[i] * load[i]
+                column += constant[i]
+            force = above - column
+            above = column
+            if term == 0:
+                force += load[i]
             elif term == 1:
-                force += mass[i] * rise[i]
+                force += rise[i]
+            for j in range(n):
+                force -= damping[i, j] * V[j, term]
             Q[i, term + 1] = factor * V[i, term]
-            V[i, term + 1] = factor * force / mass[i]
+            V[i, term + 1] = (factor * inverse_mass[i]) * force
     return MAX_TERMS + 1
 
 
@@ -385,14 +351,24 @@ def _first_root(polynomial: Array, terms: int, end: float) -> float:
         if min(left, right) > curvature * width**2 / 8 or (width <= RESOLUTION and right >= 0):
             low, left, width = low + width, right, 2 * width
         elif width <= RESOLUTION or (right < 0 and right - left < -curvature * width**2 / 2):
-            high = low + width
+            # Newton's steps, or halves where they leave the interval
+            high, place = low + width, low + width * left / (left - right)
             while high - low > EVENT_ROUNDING:
-                middle = (low + high) / 2
-                if _value(polynomial, terms, middle) >= 0:
-                    low = middle
+                value, slope = polynomial[terms - 1], 0.0
+                for term in range(terms - 2, -1, -1):
+                    slope = slope * place + value
+                    value = value * place + polynomial[term]
+                if value >= 0:
+                    low = place
                 else:
-                    high = middle
-            return high
+                    high = place
+                change = -value / slope
+                if not low < place + change < high:
+                    change = (low + high) / 2 - place
+                place += change
+                if abs(change) <= EVENT_ROUNDING:
+                    break
+            return place
         else:
             width /= 2
     return low if left < 0 else 1.0
@@ -400,23 +376,25 @@ def _first_root(polynomial: Array, terms: int, end: float) -> float:
 
 @compiled
 def _add_works(
-    mass: Array, load: Array, rise: Array, series: Array, terms: int, at: float, h: float,
+    damping: Array, load: Array, rise: Array, series: Array, terms: int, at: float, h: float,
     works: Array,
 ) -> None:  # fmt: skip
     """Add the work of loads and what damping takes up to a fraction of a part, ∫ v·f dt."""
-    # products of powers above the last one are rounding, too: 2^terms of it at most
-    V, resistance, power = series[1], series[3], h
-    for term in range(terms):
-        power *= at
-        damped, pushed = 0.0, 0.0
-        for i in range(len(mass)):
-            for k in range(term + 1):
-                damped += V[i, k] * resistance[i, term - k]
-            pushed += mass[i] * load[i] * V[i, term]
-            if term:
-                pushed += mass[i] * rise[i] * V[i, term - 1]
-        works[0] += pushed * power / (term + 1)
-        works[1] += damped * power / (term + 1)
+    n, V = len(load), series[1]
+    place, weight = at * GAUSS_NODES, at * h * GAUSS_WEIGHTS
+    velocity = np.empty((n, len(GAUSS_NODES)))
+    for i in range(n):
+        velocity[i] = V[i, terms - 1]
+        for term in range(terms - 2, -1, -1):
+            for g in range(len(GAUSS_NODES)):
+                velocity[i, g] = velocity[i, g] * place[g] + V[i, term]
+    for g in range(len(GAUSS_NODES)):
+        for i in range(n):
+            damped = 0.0
+            for j in range(n):
+                damped += damping[i, j] * velocity[j, g]
+            works[0] += weight[g] * velocity[i, g] * (load[i] + rise[i] * place[g])
+            works[1] += weight[g] * velocity[i, g] * damped
 
 
 @compiled
@@ -438,41 +416,77 @@ def _drift(q: Array, z: int) -> float:
 
 @compiled
 def _add_peaks(
-    series: Array, terms: int, end: float, stiffness: Array, constant: Array, peaks: Array
-) -> None:
-    """Raise largest magnitudes of q, drifts and shears (3, n) by those up to `end` of a part."""
-    for i in range(len(constant)):
-        shift, stretch = 0.0, 0.0  # bounds of how far q and the drift move from their start
-        for term in range(1, terms):
-            shift += abs(series[0, i, term])
-            stretch += abs(series[2, i, term])
-        if abs(series[0, i, 0]) + shift > peaks[0, i]:
-            for place in (0.0, _turn(series[0, i], terms, end), end):
-                peaks[0, i] = max(peaks[0, i], abs(_value(series[0, i], terms, place)))
-        force = abs(stiffness[i] * series[2, i, 0] + constant[i]) + stiffness[i] * stretch
-        if abs(series[2, i, 0]) + stretch > peaks[1, i] or force > peaks[2, i]:
-            for place in (0.0, _turn(series[2, i], terms, end), end):
-                drift = _value(series[2, i], terms, place)
-                peaks[1, i] = max(peaks[1, i], abs(drift))
-                peaks[2, i] = max(peaks[2, i], abs(stiffness[i] * drift + constant[i]))
+    kinds: Array, storeys: Array, direction: Array, constant: Array, series: Array, terms: int,
+    end: float, q: Array, v: Array, peaks: Array,
+) -> None:  # fmt: skip
+    """Raise peaks (m,) of outputs by those within a part, at whose `end` the motion is q, v."""
+    for row in range(len(kinds)):
+        kind, z = kinds[row]
+        if kind > DUCTILITY:
+            continue
+        polynomial = series[0, z] if kind == Q else series[2, z]
+        x, velocity = (q[z], v[z]) if kind == Q else (_drift(q, z), _drift(v, z))
+        scale, shift = 1.0, 0.0
+        if kind == DUCTILITY:
+            scale = 1 / storeys[4, z]
+        elif kind == SHEAR:
+            scale = (storeys[3, z] if direction[z] != 0 else 1.0) * storeys[1, z]
+            shift = constant[z]
+        peaks[row] = max(peaks[row], abs(scale * x + shift))
+        if polynomial[1] * velocity < 0:  # it turns
+            reach, slope = abs(scale * polynomial[0] + shift), np.empty(terms - 1)
+            for term in range(1, terms):
+                slope[term - 1] = math.copysign(term, polynomial[1]) * polynomial[term]
+                reach += abs(scale * polynomial[term])
+            if reach > peaks[row]:
+                turn = _value(polynomial, terms, _first_root(slope, terms - 1, end))
+                peaks[row] = max(peaks[row], abs(scale * turn + shift))
 
 
 @compiled
-def _turn(polynomial: Array, terms: int, end: float) -> float:
-    """Return where a polynomial's slope changes its sign between 0 and `end`, else `end`."""
-    low, high, middle = 0.0, end, end
-    while high - low > TURN_ROUNDING:
-        slope = 0.0
-        for term in range(terms - 1, 0, -1):
-            slope = slope * middle + term * polynomial[term]
-        if polynomial[1] * slope < 0:
-            high = middle
-        elif middle == end:
-            return end
+def _observe(
+    kinds: Array, storeys: Array, damping: Array, push: tuple[Array, Array],
+    state: tuple[Array, Array, Array, Array], values: Array, peaks: Array,
+) -> None:  # fmt: skip
+    """Write outputs (m,) at a node and raise their peaks; `push`: pushes of loads, and these."""
+    (q, v, plastic, dissipated), (pushes, loads) = state, push
+    for row in range(len(kinds)):
+        kind, z = kinds[row]
+        mass, k, softening, hardening, yield_drift = storeys[:, z]
+        drift, rest = _drift(q, z), (1 - hardening) * k * plastic[z]
+        if kind == Q:
+            value = q[z]
+        elif kind == DRIFT:
+            value = drift
+        elif kind == SHEAR:
+            value = k * drift - rest
+        elif kind == DUCTILITY:
+            value = drift / yield_drift
+        elif kind == V:
+            value = v[z]
+        elif kind == A:
+            force = -_net_force(storeys, q, plastic, z)
+            if z + 1 < len(q):
+                force += _net_force(storeys, q, plastic, z + 1)
+            for i in range(len(q)):
+                force -= damping[z, i] * v[i]
+            value = force / mass
+            for c in range(len(loads)):
+                value += pushes[z, c] * loads[c]
+        elif kind == RESIDUAL:  # in equilibrium without load, where storeys that yield back rest
+            back = abs((1 - hardening) * k * yield_drift / (hardening * k - softening))
+            value = min(max(rest / (k - softening), -back), back)
         else:
-            low = middle
-        middle = (low + high) / 2
-    return middle
+            value = dissipated[z]
+        values[row] = value
+        peaks[row] = max(peaks[row], abs(value))
+
+
+@compiled
+def _net_force(storeys: Array, q: Array, plastic: Array, z: int) -> float:
+    """Return the force of a storey's columns less that of the weight."""
+    _, k, softening, hardening, _ = storeys[:, z]
+    return (k - softening) * _drift(q, z) - (1 - hardening) * k * plastic[z]
 
 
 @compiled
