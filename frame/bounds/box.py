@@ -89,8 +89,8 @@ class Box:
             whole = self.structure
             rows, factor, order = whole.rows[outputs], whole.factor[outputs], whole.order[outputs]
             structure = replace(whole, rows=rows, factor=factor, order=order)
-            source_names, time = sources(self.system, structure), self.time[nodes]
-            return LevelModels.from_structure(structure, self.loads, time, source_names, allowed)
+            excitation = self.loads, self.time[nodes], sources(self.system, structure)
+            return LevelModels.from_structure(structure, excitation, allowed)
         except UnprovedError as refusal:
             if refusal.along is not None:  # of the active inputs; made one of all
                 refusal.along = int(self.active[refusal.along])

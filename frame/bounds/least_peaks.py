@@ -66,10 +66,7 @@ def least_peak(level: LevelModels, output: int) -> tuple[float, Array]:
 def _bounded_cell(
     sides: list[OutputBounds], motion: Array, ends: Ints, number: int, known: float
 ) -> PeakCell:
-    """Cell with the largest dual bound of a few nodes where the motion in its middle peaks.
-
-    The bound is `known`, that of a cell around it, at least.
-    """
+    """Cell with the largest dual bound of nodes where its middle's motion peaks, or `known`."""
     omega, q = ends[:, :2].sum(1) // 2, ends[:, 2:].sum(1) // 2  # points in the middle
     expected: Array = motion[np.arange(len(motion)), :, q, omega].sum(0)
     size = np.abs(expected)

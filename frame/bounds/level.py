@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -25,7 +25,6 @@ from alphacut.frame.response.oscillators import (
     read_response,
 )
 from alphacut.frame.response.straying import Response, narrowed_straying
-from alphacut.frame.structures.loads import History
 from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.fuzzy.progress_bar import Progress
 
@@ -124,12 +123,7 @@ class LevelModels:
 
     @classmethod
     def from_structure(
-        cls,
-        structure: Classical,
-        loads: Mapping[str, History],
-        time: Array,
-        sources: tuple[str, ...],
-        allowed: Array | None = None,
+        cls, structure: Classical, excitation: Excitation, allowed: Array | None = None
     ) -> LevelModels:
         """Models of a structure's motion over its box, and the response tables of its oscillators.
 
@@ -139,7 +133,6 @@ class LevelModels:
         Raises:
             UnprovedError: None of its modes can be enclosed.
         """
-        excitation = (loads, time, sources)
         models = MotionModels.from_structure(structure, excitation, allowed)
         tables = response_tables(models.oscillators, excitation, structure.order)
         return cls(structure, models, tables, excitation)
@@ -277,11 +270,7 @@ def improve_all(
 
 
 def _data(level: LevelModels, o: int, side: float) -> tuple[Data, Array]:
-    """Models and tables of output o, and constants of the motion and of a bound, (2, T).
-
-    Raises:
-        UnprovedError: A number is out of the range of the dual function.
-    """
+    """Models and tables of output o, and constants of the motion and of a bound, (2, T)."""
     modes, order = level.models.oscillators, int(level.structure.order[o])
     models = [(mode.omega[None], mode.decay[None], mode.share[:, o]) for mode in modes]
     variables = concatenate([x for of_mode in models for x in of_mode], -1)

@@ -265,13 +265,10 @@ class Queue:
         return is_open, is_open & (excess > self.wide)
 
     def _fathom(self, box: SubBox) -> None:
-        """Close peaks that are abandoned or exceed the incumbent by no more than the gap.
-
-        No peak of a level is closed while one is wide: bounds elsewhere are worth little then.
-        """
+        """Close peaks that are abandoned or exceed the incumbent by no more than the gap."""
         for k, level in enumerate(box.levels):
             is_open, is_wide = self._open_peaks(box, k)
-            if is_wide.any():
+            if is_wide.any():  # bounds of other peaks are worth little then
                 continue
             if box.is_wide[k]:  # from here on the level's open peaks alone are bounded
                 box.is_wide[k] = False

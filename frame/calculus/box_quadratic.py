@@ -70,10 +70,7 @@ def _axes_ascent(g: Array, H: Array, lower: Array, upper: Array, x: Array) -> No
 
 
 def _newton(g: Array, H: Array, lower: Array, upper: Array, x: Array) -> Array:
-    """Points (N, d) after a projected Newton step on the free axes, halved at most twice.
-
-    Where no length raises g·x + x·H·x/2, x stays as it is.
-    """
+    """Points (N, d) after a projected Newton step of length 1, ½ or ¼ on the free axes, or x."""
     slope = g + np.einsum("nij,nj->ni", H, x)
     free = ~(((x <= lower) & (slope <= 0)) | ((x >= upper) & (slope >= 0)))
     eye = np.eye(g.shape[1])

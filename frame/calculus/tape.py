@@ -91,10 +91,7 @@ class _Writer:
         return self._apply("power", self.place(base), self.place(exponent))
 
     def _apply(self, name: str, x: int, y: int | None = None) -> int:
-        """Place of the result of an operation on places x and y, written unless it is there.
-
-        `name` is one of `OPERATIONS`, or sympy's "Add" or "Mul".
-        """
+        """Place of the result of an operation on places x and y, written unless it is there."""
         instruction = {"Add": "add", "Mul": "multiply"}.get(name, name)
         row = (OPERATIONS.index(instruction), x, x if y is None else y)
         if row not in self.operation_places:

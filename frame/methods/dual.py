@@ -136,10 +136,7 @@ class DualProof:
         return answers
 
     def _relaxed(self, flow: LinearFlow, box: Box, goal: Goal, k: int, wider: Array) -> BoxBounds:
-        """Bounds on level k by Lagrangian relaxation, and what motions at the maximisers reach.
-
-        Bounds `wider` (T, m, 2) of a wider level are known.
-        """
+        """Bounds on level k by those of a wider one, and what motions at the maximisers reach."""
         needed, outer = goal.needed[k], np.minimum(goal.outer[k], wider)
         nodes, outputs = np.flatnonzero(needed.any((1, 2))), np.flatnonzero(needed.any((0, 2)))
         is_complete = bool(needed.all())
@@ -265,14 +262,11 @@ class DualProof:
     def _least_peaks(
         self, flow: LinearFlow, box: Box, level: LevelModels, pool: ThreadPoolExecutor
     ) -> Ends:
-        """Lower bound of each output's smallest peak, and the peak of a motion that peaks low.
-
-        Steepest descent over corners, one coordinate at a time, by the peaks at the nodes, begins
-        at the inputs that the lower bound names.
-        """
+        """Lower bound of each output's smallest peak, and the peak of a motion that peaks low."""
         count = len(level.structure.order)
         bounds, units = zip(*pool.map(partial(least_peak, level), range(count)), strict=True)
         unit, d = np.stack(units), len(box.active)
+        # steepest descent over corners, from the inputs that the lower bounds name
         moves = 1 - 2 * np.eye(d + 1, d)  # one coordinate changes its sign, or none
         for _ in range(int(numbers.LEAST_PEAK_DESCENTS)):
             tried = np.unique((unit[:, None] * moves).reshape(-1, d), axis=0)

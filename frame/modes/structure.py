@@ -75,11 +75,7 @@ def _accelerations(assembly: Assembly[TaylorModel], forces: TaylorModel) -> Tayl
 
 
 def _require_classical(assembly: Assembly[TaylorModel]) -> None:
-    """Refuse damping that couples the modes, and outputs that mix displacements and velocities.
-
-    Raises:
-        UnprovedError: The structure has one of these.
-    """
+    """Refuse damping that couples the modes, and outputs that mix displacements and velocities."""
     if assembly.dashpots.size().any():
         raise UnprovedError(
             "dashpots couple the modes", "give damping ratios or Rayleigh's factors in their place"

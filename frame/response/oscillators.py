@@ -24,18 +24,18 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from math import comb, perm
 
 import numpy as np
 
 from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF
-from alphacut.frame.response.duhamel import (
-    absolute_moments,
-    require_in_range,
-    responses_at_nodes,
+from alphacut.frame.response.duhamel import absolute_moments, require_in_range
+from alphacut.frame.response.straying import (
+    fourth_derivative,
+    line_deviations,
+    moments_of,
+    responses_of,
+    with_power,
 )
-from alphacut.frame.response.straying import line_deviations, with_power
 from alphacut.frame.structures.loads import History
 from alphacut.fuzzy.arrays import Array
 
@@ -99,27 +99,18 @@ class Oscillators:
         require_in_range(sigma, duration, duration)
         self.decay = float((grid.quotient[:, None] * grid.omega).min())
         # ρ with two derivatives by σ, its rounding, and bounds of its derivatives of order 0 to 4
-        self.forced = {
-            name: (
-                *responses_at_nodes(sigma, load, time, 2),
-                absolute_moments(self.decay, load, time),
-            )
-            for name, load in loads.items()
-        }
+        self._sources = {name: self._response(load) for name, load in loads.items()}
 
-    @cached_property
-    def free(self) -> tuple[Array, Array, Array]:
-        """The same of exp(σ t)."""
-        sigma, t = self.grid.sigma.ravel(), self.time[:, None]
-        free = np.exp(sigma * t)
-        rounding = UNIT_ROUNDOFF * (4 + np.abs(sigma) * t) * np.abs(free)
-        bounds = np.stack([self.time**n * np.exp(-self.decay * self.time) for n in range(5)])
-        return np.stack([free, t * free, t * t * free]), rounding, bounds
+    def _response(self, load: History | None) -> tuple[Array, Array, Array]:
+        bounds = moments_of(self.decay, load, self.time)
+        return *responses_of(self.grid.sigma.ravel(), load, self.time), bounds
 
     def _known(self, source: str) -> tuple[Array, Array, Array]:
-        """The same of a source."""
-        forced = self.forced.get(source)
-        return self.free if forced is None else forced
+        """The same of a source, of exp(σ t) where it is no load."""
+        name = source if source in self.loads else ""
+        if name not in self._sources:
+            self._sources[name] = self._response(None)
+        return self._sources[name]
 
     def responses(self, source: str, order: int) -> ModalResponses:
         """Return responses to a unit share of a source, read by the derivative ν = `order`.
@@ -153,10 +144,7 @@ class Oscillators:
         low, high, q = self.grid.omega[0], self.grid.omega[-1], self.grid.quotient[-1]
         h, k = (np.diff(x).max(initial=0.0) for x in (self.grid.omega, self.grid.quotient))
         stretch = 1 + q**2  # |dσ/dω|²
-        fourth = sum(
-            comb(4, j) * perm(order, j) * (high * stretch**0.5) ** (order - j) * bounds[4 - j]
-            for j in range(order + 1)
-        )
+        fourth = fourth_derivative(order, high * stretch**0.5, bounds)
         # half the diagonal of a cell is √(2 between)
         between = (stretch * h**2 + high**2 * k**2) / 8
         second = largest[2] + between * fourth

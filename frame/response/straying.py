@@ -92,7 +92,7 @@ class Response(NamedTuple):
         # largest over the grid: of the parts of G = σ^order ρ off the chord, |G″|, rounding
         real, imag, second, rounding = np.zeros((4, *shape))
         for points in np.array_split(np.arange(len(sigma)), _batches(len(nodes), len(sigma))):
-            rho, error = _responses(sigma[points], self.load, nodes)
+            rho, error = responses_of(sigma[points], self.load, nodes)
             error += (order + 16) * UNIT_ROUNDOFF * np.abs(rho[0])
             error = 2 * np.abs(sigma[points]) ** order * error
             rounding = np.maximum(rounding, _with_ends(error.max(-1), parts))
@@ -122,13 +122,15 @@ class Response(NamedTuple):
         # which what is of f has no fourth derivative by σ; nor has what jumps of f add.
         assert self.sigma is not None
         decay, h = float(-self.sigma.real.max()), np.diff(time)
-        moments = _moments(decay, self.load, time)[:, :-1]  # then within the step that begins there
+        moments = moments_of(decay, self.load, time)[
+            :, :-1
+        ]  # then within the step that begins there
         force = self.load.extremes[0] if self.load else 0.0
         for n in reversed(range(5)):
             terms = (comb(n, j) * h ** (n - j) * moments[j] for j in range(n + 1))
             moments[n] = sum(terms) + force * h ** (n + 1) / (n + 1)
         growth, fast = np.exp(max(-decay, 0.0) * h), float(np.abs(self.sigma).max())
-        fourth = _fourth_derivative(self.order + 2, fast, growth * moments)
+        fourth = fourth_derivative(self.order + 2, fast, growth * moments)
         return (h**2 / 8 * fourth)[:, None]
 
 
@@ -189,16 +191,16 @@ def _with_ends(bound: Array, parts: int) -> Array:
     return np.asarray(bound[:-1].reshape(-1, parts) + np.maximum(ends[1:], ends[:-1])[:, None])
 
 
-def _responses(sigma: Array, load: History | None, time: Array) -> tuple[Array, Array]:
-    """ρ with two derivatives by σ, (3, T, S), and bounds of its rounding, (T, S)."""
+def responses_of(sigma: Array, load: History | None, time: Array) -> tuple[Array, Array]:
+    """Return ρ with two derivatives by σ, (3, T, S), and bounds of its rounding, (T, S)."""
     if load is not None:
         return responses_at_nodes(sigma, load, time, 2)
     rho = np.exp(sigma * time[:, None]) * time[:, None] ** np.arange(3)[:, None, None]
     return rho, UNIT_ROUNDOFF * (4 + np.abs(sigma) * time[:, None]) * np.abs(rho[0])
 
 
-def _moments(decay: float, load: History | None, time: Array, *, is_needed: bool = True) -> Array:
-    """Bounds of ρ's derivatives by σ of order 0 to 4, (5, T); g is at least `decay`."""
+def moments_of(decay: float, load: History | None, time: Array, *, is_needed: bool = True) -> Array:
+    """Return bounds of ρ's derivatives by σ of order 0 to 4, (5, T); g is at least `decay`."""
     if not is_needed:
         return np.zeros((5, len(time)))
     if load is not None:
@@ -206,8 +208,8 @@ def _moments(decay: float, load: History | None, time: Array, *, is_needed: bool
     return np.stack([time**n * np.exp(-decay * time) for n in range(5)])
 
 
-def _fourth_derivative(order: int, fast: float, moments: Array) -> Array:
-    """Bound of |(σ^order ρ)⁗|, (T,), from bounds of |σ| and of ρ's derivatives (5, T)."""
+def fourth_derivative(order: int, fast: float, moments: Array) -> Array:
+    """Return a bound of |(σ^order ρ)⁗|, (T,), from bounds of |σ| and of ρ's derivatives (5, T)."""
     terms = (comb(4, j) * perm(order, j) * fast ** (order - j) for j in range(order + 1))
     return np.asarray(sum(factor * moments[4 - j] for j, factor in enumerate(terms)))
 
@@ -257,7 +259,7 @@ def line_deviations(
     off_line -= np.interp(times, time, load.values(time) if load else np.zeros(len(time)))
     off_line[0, 0] = off_line[1, -1] = 0.0
     tables = at_nodes if len(times) == len(time) else None
-    bounds = tables[2] if tables else _moments(decay, load, times, is_needed=sigma.size > 1)
+    bounds = tables[2] if tables else moments_of(decay, load, times, is_needed=sigma.size > 1)
     # for each order the largest magnitudes over the grid: of F = σ^order A and F″; rounding; of H,
     # the responses off the line at ends, H″, Im H/ω, and that with the load before and after
     added = {order: off_line * (is_force and order == 2) for order in orders}
@@ -269,7 +271,7 @@ def line_deviations(
         largest[order][2][3:] = np.where(fraction > 0, 0.0, np.abs(added[order]))
     count = 1 if tables else _batches(len(times), sigma.size)
     for part in np.array_split(sigma.ravel(), count):
-        rho, error = tables[:2] if tables else _responses(part, load, times)
+        rho, error = tables[:2] if tables else responses_of(part, load, times)
         for order, (amplitude, rounding, off) in largest.items():
             _raise_amplitudes(part, rho, error, pieces.first, slope, order, amplitude, rounding)
             _raise_ends(part, rho, (left, right, fraction), added[order], order, off)
@@ -278,7 +280,7 @@ def line_deviations(
     growth, inside = np.exp(max(-decay, 0.0) * d), fraction > 0
     found = dict[int, Array]()
     for order, (amplitude, rounding, off) in largest.items():
-        fourth = _fourth_derivative(order, fast, bounds)
+        fourth = fourth_derivative(order, fast, bounds)
         of_line = abs(prod(range(order - 4, order))) * np.abs(pieces.first) * low ** (order - 5)
         of_line += abs(prod(range(order - 5, order - 1))) * np.abs(slope) * low ** (order - 6)
         size = amplitude[0] + between * (amplitude[1] + between * (fourth[:-1] + of_line))

@@ -309,10 +309,8 @@ def require_modal_order(mass: Array, stiffness: Array, ratios: Array) -> None:
 
 
 def _divided_differences(omega: Array, inside: Mask) -> tuple[Array, Array]:
-    """f[λ_i, λ_j] and f[λ_i, λ_k, λ_j], (S, n, n) and (S, n, n, n), of f = 2 √λ `inside`, else 0.
-
-    Modes inside may have equal λ, not one inside and one outside.
-    """
+    """f[λ_i, λ_j], (S, n, n), and f[λ_i, λ_k, λ_j], (S, n, n, n), of f = 2 √λ `inside`, else 0."""
+    # modes inside may have equal λ, not one inside and one outside
     both_inside, sums = inside[:, None] & inside, omega[:, :, None] + omega[:, None]
     gaps = omega[:, :, None] ** 2 - omega[:, None] ** 2
     one_inside = inside[:, None] != inside

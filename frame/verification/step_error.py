@@ -89,11 +89,7 @@ def _error_at_optima(bounds: Envelope, flow: Flow) -> Array:
 
 
 def _from_reference(bounds: Envelope, flow: LagrangianFlow, points: Array) -> Array:
-    """Return the largest distance of trajectories at points (S, d) from reference motions, (T, m).
-
-    Raises:
-        StepError: It passes `COARSE` of an output's peak.
-    """
+    """Return the largest distance of motions at points (S, d) from reference motions, (T, m)."""
     named = [dict(zip(flow.names, point, strict=True)) for point in points]
     inputs = [{**flow.system.parameters, **x} for x in named]
     truth = reference_motions(flow.system, inputs, bounds.time)
@@ -134,10 +130,7 @@ def node_deviation(flow: Flow, points: Array) -> Array:
 
 
 def _chord_deviation(flow: Flow, points: Array) -> Array:
-    """Return the largest distance of trajectories at points (S, d) from chords, (T − 1, m).
-
-    A chord is the straight line between the values at both ends of a step.
-    """
+    """Return how far motions at points (S, d) are from lines between nodes, (T − 1, m)."""
     finer, parts = flow.finer()
     fine = finer.values(points)
     ends = fine[:, ::parts]

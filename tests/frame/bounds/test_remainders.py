@@ -140,7 +140,7 @@ def masses_on_springs(loose=0.0):
 def test_half_of_what_springs_and_start_are_loosened_by_would_not_do():
     springs, time, parts = masses_on_springs(0.03), np.arange(0, 44.01, 0.25), 4
     both = springs.start.loosened(np.array([[0.0] * 3, [0.1, 0.1, 0.0]]))
-    level = LevelModels.from_structure(replace(springs, start=both), {}, time, ("velocity",))
+    level = LevelModels.from_structure(replace(springs, start=both), ({}, time, ("velocity",)))
     bounds = [OutputBounds.initial(level, 0, s, 1e-6) for s in (0, 1)]
     for of_side in bounds:
         of_side.improve(np.arange(len(time)), of_side.effort(240, 100, 1.0, 0.25))
@@ -162,7 +162,7 @@ def test_half_of_the_cubic_part_would_not_do():
     own, names, centre, radius, _ = frame(1, 0.1)
     structure = along(own, names, centre, radius, 1)
     data = OutputBounds.initial(
-        LevelModels.from_structure(structure, {}, np.array([0.0, 0.1]), ("velocity",)), 0, 1, 1.0
+        LevelModels.from_structure(structure, ({}, np.array([0.0, 0.1]), ("velocity",))), 0, 1, 1.0
     ).data
     whole, mu, u = np.array([[0, 0, 0, 0]]), np.array([1.0, 0, 0]), np.empty(1)
     bound = dual_function.dual_value(mu, whole, 1, 1.0, data, np.empty(3), u) + data.omega[0, 0]
@@ -254,7 +254,7 @@ def test_forms_of_inverses_stay_within_their_rests(order):
 def test_tables_of_the_dual_have_the_rounding_of_all_sums_they_enter():
     _, _, _, _, structure = frame(2, ground=RECORD)
     time, sources = np.arange(0, 2, 0.1), ("load", "velocity")
-    level = LevelModels.from_structure(structure, {"load": RECORD}, time, sources)
+    level = LevelModels.from_structure(structure, ({"load": RECORD}, time, sources))
     unit, d = np.finfo(float).eps / 2, 4
     # a term enters sums over all variables, over pairs and single inputs, and over sources
     count = 2 * len(level.models.oscillators) * (len(sources) + 2)
