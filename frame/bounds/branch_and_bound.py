@@ -20,7 +20,7 @@ from alphacut.frame.bounds.kernel import FACES, examine
 from alphacut.frame.bounds.model_error import Remainder
 from alphacut.frame.bounds.newton import Optima, refine
 from alphacut.frame.calculus.jet import Array
-from alphacut.frame.modes.modal_model import ModalModel
+from alphacut.frame.modes.modal_model import ModalModel, in_planes, wave_factors
 from alphacut.fuzzy.arrays import Ints
 from alphacut.fuzzy.progress_bar import Progress
 
@@ -112,12 +112,11 @@ def examine_items(
     row_box, row_node = box[begin], node[begin]
     jets = model.together.jets(centre).swapaxes(0, 1)  # (q, B, n + P n m)
     rate, share = jets[..., :n], jets[..., n:].reshape(*jets.shape[:2], -1, n, m)
-    waves = np.stack([np.stack(w, 1) for w in model.waves(rate[0, row_box], row_node)], 1)
     starts = np.searchsorted(row_box, np.arange(len(centre) + 1)), np.append(begin, len(box))
     outcome: tuple[Array, Array, Array] = examine(
         (*starts, row_node, column),
-        (radius, edges, _tables(rate, share, d)),
-        _in_planes(waves).reshape(len(begin), -1),
+        (radius, edges, wave_factors(rate, share, d)),
+        model.waves(rate[0, row_box], row_node),
         model.flow.time,
         _linear_phases(remainder, radius, rate[1 : 1 + d], share[0, :, 0]),
         (remainder.tensor, remainder.margin),
@@ -141,7 +140,7 @@ def _linear_phases(
         for bounds in (remainder.rate, remainder.share)
     )
     slope = np.ascontiguousarray(slopes.imag.swapaxes(1, 2))
-    return _in_planes(share), slope, phase, decay, of_rate[:, 2:], of_share.reshape(count, 4, n, m)
+    return in_planes(share), slope, phase, decay, of_rate[:, 2:], of_share.reshape(count, 4, n, m)
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,28 +233,3 @@ class Frontier:
         ternary = (number[rows, None] - 2 * d) // 3 ** np.arange(d) % 3
         positions[rows] = np.select([ternary == 1, ternary == 2], [LOWER, UPPER], positions[rows])
         return np.asarray(positions)
-
-
-def _tables(rate: Array, C: Array, d: int) -> Array:
-    """Factors of the waves w, w′, w″ in outputs, their gradients and Hessians at B points.
-
-    Of 2 Re Σ_k C_k w(λ_k), λ (q, B, n) and C (q, B, P, n, m) with derivatives: (B, m, 6 P n, q),
-    the third axis over parts, orders of w's derivative, modes, and real and imaginary parts.
-    """
-    rate = rate[..., None, :, None]
-    out = np.zeros((*C.shape[1:3], 3, *C.shape[3:], len(C)), complex)  # (B, P, 3, n, m, q)
-    out[:, :, 0] = np.moveaxis(C, 0, -1)
-    for k in range(1, 1 + d):
-        out[:, :, 1, ..., k] = C[0] * rate[k]
-    for a, (i, j) in enumerate(zip(*np.triu_indices(d), strict=True), 1 + d):
-        x, y = rate[1 + i], rate[1 + j]
-        out[:, :, 1, ..., a] = C[1 + i] * y + C[1 + j] * x + C[0] * rate[a]
-        out[:, :, 2, ..., a] = C[0] * x * y
-    doubled = 2 * np.stack([out.real, -out.imag], 4)  # (B, P, 3, n, 2, m, q)
-    flat = doubled.reshape(len(out), -1, *out.shape[-2:])
-    return np.ascontiguousarray(flat.swapaxes(1, 2))
-
-
-def _in_planes(x: Array) -> Array:
-    """Real and imaginary parts of complex numbers along a new last axis, shape (…, 2)."""
-    return np.ascontiguousarray(x).view(float).reshape(*x.shape, 2)

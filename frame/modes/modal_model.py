@@ -7,7 +7,6 @@ the response R(t; λ) = ∫ exp(λ (t − s)) a(s) ds to a load.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -26,8 +25,6 @@ from alphacut.frame.response.load_tables import Direct, LoadTables
 from alphacut.frame.structures.linear import histories
 from alphacut.frame.structures.loads import distinct_histories
 from alphacut.fuzzy.arrays import Array, Ints
-
-Waves = tuple[Array, Array, Array]
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,40 +141,50 @@ class ModalModel:
         derivatives = np.zeros((len(unit), 1 + d + len(row)))  # value, gradient, upper triangle
         for o in np.unique(output):
             rows = np.flatnonzero(output == o)
-            jets = self.of_output[o].jets(unit[rows])
-            for number, wave in enumerate(self.waves(jets[:, 0, :n], node[rows]), 1):
-                amplitude = jets[..., number * n : (number + 1) * n]
-                derivatives[rows] += composed(jets[..., :n], amplitude, wave, d)
+            jets = self.of_output[o].jets(unit[rows]).swapaxes(0, 1)
+            rate, share = jets[..., :n], jets[..., n:].reshape(*jets.shape[:2], -1, n, 1)
+            waves = self.waves(rate[0], node[rows])
+            derivatives[rows] = (waves[:, None] @ wave_factors(rate, share, d)[:, 0])[:, 0]
         H = np.empty((len(unit), d, d))
         H[:, row, column] = H[:, column, row] = derivatives[:, 1 + d :]
         return derivatives[:, 0], derivatives[:, 1 : 1 + d], H
 
-    def waves(self, rate: Array, node: Ints) -> Sequence[Waves]:
-        """Time functions w(t; λ_k) of the free motion (if any), then of each load, at N points.
+    def waves(self, rate: Array, node: Ints) -> Array:
+        """Time functions w(t; λ_k) of the free motion (if any), then of each load, (N, 6 P n).
 
-        Each has w, dw/dλ and d²w/dλ², (N, n) each, at eigenvalues λ_k (N, n) and nodes (N,).
+        They are w, dw/dλ and d²w/dλ² of P parts and n modes, real and imaginary parts, in the order
+        of `wave_factors`, at eigenvalues λ_k (N, n) and nodes (N,).
         """
         parts = []
         if self.started:
             t = self.flow.time[node][:, None]
             wave = np.exp(rate * t)
             parts.append((wave, t * wave, t * t * wave))
-        return parts + [load.response(rate, node) for load in self.loads]
+        parts += [load.response(rate, node) for load in self.loads]
+        waves = np.stack([np.stack(part, 1) for part in parts], 1)
+        return in_planes(waves).reshape(len(rate), -1)
 
 
-def composed(rate: Array, share: Array, waves: Waves, d: int) -> Array:
-    """Value, gradient and Hessian of 2 Re Σ_k C_k w(λ_k) by the chain rule, shape (N, q).
+def wave_factors(rate: Array, C: Array, d: int) -> Array:
+    """Factors of the waves w, w′, w″ in outputs, their gradients and Hessians at B points.
 
-    The q = 1 + d + d (d + 1)/2 numbers are a value, a gradient and a Hessian's upper triangle;
-    those of λ_k and C_k have shape (N, q, n), w, dw/dλ and d²w/dλ² at λ_k (N, n) each.
+    Of 2 Re Σ_k C_k w(λ_k), λ (q, B, n) and C (q, B, P, n, m) with derivatives: (B, m, 6 P n, q),
+    the third axis over parts, orders of w's derivative, modes, and real and imaginary parts.
     """
-    w, dw, ddw = (x[:, None] for x in waves)
-    out = (share * w).real.sum(-1)
-    out[:, 1:] += (share[:, :1] * dw * rate[:, 1:]).real.sum(-1)
-    slope = rate[:, 1 : 1 + d]
-    # ∂C ∂λ w' + C ∂λ ∂λ w''/2; with its transpose, what the Hessian has of products of slopes
-    factor = share[:, 1 : 1 + d] * dw + slope * (share[:, :1] * ddw / 2)
-    half = (factor @ slope.swapaxes(1, 2)).real
-    row, column = np.triu_indices(d)
-    out[:, 1 + d :] += half[:, row, column] + half[:, column, row]
-    return np.asarray(2 * out)
+    rate = rate[..., None, :, None]
+    out = np.zeros((*C.shape[1:3], 3, *C.shape[3:], len(C)), complex)  # (B, P, 3, n, m, q)
+    out[:, :, 0] = np.moveaxis(C, 0, -1)
+    for k in range(1, 1 + d):
+        out[:, :, 1, ..., k] = C[0] * rate[k]
+    for a, (i, j) in enumerate(zip(*np.triu_indices(d), strict=True), 1 + d):
+        x, y = rate[1 + i], rate[1 + j]
+        out[:, :, 1, ..., a] = C[1 + i] * y + C[1 + j] * x + C[0] * rate[a]
+        out[:, :, 2, ..., a] = C[0] * x * y
+    doubled = 2 * np.stack([out.real, -out.imag], 4)  # (B, P, 3, n, 2, m, q)
+    flat = doubled.reshape(len(out), -1, *out.shape[-2:])
+    return np.ascontiguousarray(flat.swapaxes(1, 2))
+
+
+def in_planes(x: Array) -> Array:
+    """Real and imaginary parts of complex numbers along a new last axis, shape (…, 2)."""
+    return np.ascontiguousarray(x).view(float).reshape(*x.shape, 2)
