@@ -10,7 +10,7 @@ import pytest
 import sympy
 from scipy.linalg import sqrtm
 
-from alphacut.frame import Accelerogram, Exact, LinearFlow, MatrixStructure, Midpoint, StoreyFrame
+from alphacut.frame import Exact, LinearFlow, MatrixStructure, Midpoint, StoreyFrame
 from alphacut.frame.bounds.model_error import EnergyNorms, _ratio_errors, leibniz, proved_error
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.calculus.taylor_model import TaylorModel
@@ -19,23 +19,13 @@ from alphacut.frame.modes.damped import DampedModes, DampedStructure, require_di
 from alphacut.frame.modes.modal_model import ModalModel
 from alphacut.fuzzy import Interval
 from alphacut.fuzzy.sets.boxes import corners
+from tests.frame.methods import test_methods
 
-FRAME = StoreyFrame(
-    (20e3, 15e3, 10e3),
-    (4.0, 3.5, 3.0),
-    25e9,
-    1e-4,
-    (9e3, 5e3, 0.0),
-    q0=(0.1, 0.2, 0.25),
-    v0=(0.0, 0.5, 0.0),
-    outputs=("q3", "v1", "drift2"),
-)
+FRAME = replace(test_methods.FRAME, outputs=("q3", "v1", "drift2"))
 SHEAR = replace(
     FRAME, outputs=("base_shear",), rayleigh=(0.02, 1e-4), dampers=(), damper_placement="storey"
 )
-SHAKEN = replace(
-    FRAME, ground=Accelerogram(0.05, 3 * np.random.default_rng(8).standard_normal(120))
-)
+SHAKEN = replace(FRAME, ground=test_methods.RECORD)
 CHAIN = MatrixStructure(
     {"m": 2.0, "k": 80.0, "d": 0.3},
     mass=[("m", np.eye(2))],

@@ -122,23 +122,23 @@ def test_half_of_the_range_of_eigenvalues_would_not_do():
         assert found.high[0] == pytest.approx(3e7 / 2e4 * 1.1 / 0.9)
 
 
-def masses_on_springs(loose=0.0):
-    """Three of them beside one another, two of the same frequency, and their sum."""
+def masses_on_springs(stiffness):
+    """Three of them beside one another, and their sum."""
     arrays = [np.diag(row) for row in np.eye(3)]
-    own = MatrixStructure(
-        {"a": 1.0, "b": 1.0, "c": 3.0},
+    return MatrixStructure(
+        dict(zip("abc", stiffness, strict=True)),
         mass=[(1.0, np.eye(3))],
         stiffness=list(zip("abc", arrays, strict=True)),
         observed={"sum": np.ones(3)},
         v0=np.ones(3),
     )
-    centre = np.array([1.0, 1.0, 3.0])
-    p = TaylorModel.variables(centre, 1e-3 * centre).loosened(loose * centre)
-    return classical_structure(own, {name: p[i] for i, name in enumerate("abc")})
 
 
 def test_half_of_what_springs_and_start_are_loosened_by_would_not_do():
-    springs, time, parts = masses_on_springs(0.03), np.arange(0, 44.01, 0.25), 4
+    """Two of three masses on springs have the same frequency."""
+    centre, time, parts = np.array([1.0, 1.0, 3.0]), np.arange(0, 44.01, 0.25), 4
+    p = TaylorModel.variables(centre, 1e-3 * centre).loosened(0.03 * centre)
+    springs = classical_structure(masses_on_springs(centre), {x: p[i] for i, x in enumerate("abc")})
     both = springs.start.loosened(np.array([[0.0] * 3, [0.1, 0.1, 0.0]]))
     level = LevelModels.from_structure(replace(springs, start=both), ({}, time, ("velocity",)))
     bounds = [OutputBounds.initial(level, 0, s, 1e-6) for s in (0, 1)]

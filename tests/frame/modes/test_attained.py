@@ -9,8 +9,8 @@ from alphacut.frame.bounds.box import Box
 from alphacut.frame.methods.dual import DualProof
 from alphacut.frame.modes.superposition import modes_at
 from alphacut.frame.structures.loads import Accelerogram
-from alphacut.frame.structures.matrix import MatrixStructure
 from alphacut.fuzzy import Interval
+from tests.frame.bounds.test_remainders import masses_on_springs
 from tests.frame.calculus.test_taylor_model import exact_value
 from tests.frame.response.test_duhamel import exact_response
 
@@ -118,16 +118,8 @@ def test_eigenvalues_move_with_squared_frequencies_as_far_as_stated():
 
 def test_equal_frequencies_do_not_lift_the_rounding():
     """Two alike masses on two alike springs: the modes of the pair are any two of a plane."""
-    arrays = [np.diag(row) for row in np.eye(3)]
-    own = MatrixStructure(
-        {"a": 3.0, "b": 3.0, "c": 7.0},
-        mass=[(1.0, np.eye(3))],
-        stiffness=list(zip("abc", arrays, strict=True)),
-        observed={"sum": np.ones(3)},
-        v0=np.ones(3),
-    )
     centre, time = np.array([3.0, 3.0, 7.0]), np.arange(0, 9.01, 0.5)
-    box = Box(own, ("a", "b", "c"), time, 0.9 * centre, 1.1 * centre)
+    box = Box(masses_on_springs(centre), ("a", "b", "c"), time, 0.9 * centre, 1.1 * centre)
     value, error, _ = box.centre_motion()
     exact = np.sum(np.sin(np.sqrt(centre) * time[:, None]) / np.sqrt(centre), 1)
     assert (np.abs(value[:, 0] - exact) <= error[:, 0] + 4e-16).all()
