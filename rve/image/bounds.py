@@ -108,13 +108,6 @@ class StiffnessBounds:
         ratios = [self._ratio(low, high, i, j) for i, j in SHEARS[n]]
         return np.array([*moduli[:n], *ratios, *moduli[n:]])
 
-    def entries(self) -> Array:
-        """Bounds of every entry of C, shape (n, n, 2), in Pa."""
-        middle, difference = (self.lower + self.upper) / 2, self.upper - self.lower
-        half_widths = _half_widths(difference)
-        slack = half_widths + 4 * UNIT * np.abs(self.upper).max()
-        return np.stack([middle - slack, middle + slack], axis=-1)
-
     def _ratio(self, low: Array, high: Array, i: int, j: int) -> Interval:
         """Bounds of −S_ij/S_ii from those of S."""
         middle, slack = (low[i, j] + high[i, j]) / 2, 4 * UNIT

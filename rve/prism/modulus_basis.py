@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import orth
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.rve.cell.cell import AREA, Phase
@@ -20,7 +21,7 @@ from alphacut.rve.solver.level_solver import conjugate_gradients
 TOLERANCE = 2e-10  # of the energy that is left out; E is off by half of it at most
 _CHEBYSHEV = (0.5 - 0.125**0.5, 0.5 + 0.125**0.5)  # nodes in [0, 1]
 _LOOSE = 1e-6  # tolerance of the residuals; the error of a modulus is its square
-ROUND_OFF = 1e-9  # relative norm of what is new in a solution, below which it is left out
+ROUND_OFF = 1e-9  # singular value over the largest, below which a direction is left out
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,7 @@ def modulus_basis(
 
     loads = np.concatenate([forces[0] + factor * forces[1] for factor in factors])
     solutions, iterations = conjugate_gradients(multiply, problem.solver, loads, _LOOSE)
-    fields = _orthonormal_basis(solutions)
+    fields = np.ascontiguousarray(orth(solutions.T, rcond=ROUND_OFF).T)
     images = np.array([problem.operator(part)(fields) for part in parts])  # K_0 v and K_1 v
     means = problem.slice_strains(strains, fields)
     projected = fields @ images.swapaxes(1, 2), fields @ forces.swapaxes(1, 2)
@@ -97,15 +98,3 @@ def _residuals(basis: ModulusBasis, modulus: float, forces: Array, images: Array
     stiffness_fields = images[0] + factor * images[1]
     projected = basis.coefficients(modulus).T @ stiffness_fields
     return np.asarray(forces[0] + factor * forces[1] - projected)
-
-
-def _orthonormal_basis(vectors: Array) -> Array:
-    """Orthonormal vectors of the same span by the Gram–Schmidt process, done twice for rounding."""
-    basis: list[Array] = []
-    for vector in vectors:
-        new = vector.copy()
-        for direction in [*basis, *basis]:
-            new -= (new @ direction) * direction
-        if np.linalg.norm(new) > ROUND_OFF * np.linalg.norm(vector):
-            basis.append(new / np.linalg.norm(new))
-    return np.array(basis)

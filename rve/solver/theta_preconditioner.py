@@ -85,24 +85,12 @@ def _inverse_root(matrix: Array) -> Array:
     return np.asarray((vectors / np.sqrt(values)) @ vectors.T)
 
 
-class PlaneSolver:
-    """A solver of one level's block over its mass along θ, by default a Cholesky factor."""
-
-    def __init__(self, block: PETSc.Mat, mass: float) -> None:
-        block.scale(1 / mass)
-        self._ksp = cholesky(block, PREFIX + LEVEL)
-        self._ksp.setUp()
-        self._solution, self._load = block.createVecs()
-
-    def __call__(self, load: Array) -> Array:
-        """Solution for a load, shape (n,)."""
-        self._load.array[:] = load
-        self._ksp.solve(self._load, self._solution)
-        return np.array(self._solution.array_r)
-
-    def view(self, viewer: PETSc.Viewer) -> None:
-        """Show the solver."""
-        self._ksp.view(viewer)
+def plane_solver(block: PETSc.Mat, mass: float) -> PETSc.KSP:
+    """Solver of one level's block over its mass along θ, by default a Cholesky factor."""
+    block.scale(1 / mass)
+    ksp = cholesky(block, PREFIX + LEVEL)
+    ksp.setUp()
+    return ksp
 
 
 class ThetaPreconditioner:
@@ -117,11 +105,13 @@ class ThetaPreconditioner:
         sizes, layers = (numbering.level_size, numbering.mid_level_size), numbering.grid.layers
         blocks = self._blocks(matrix)
         self.levels = [
-            PlaneSolver(block.PtAP(_hats(*sizes, below=k > 0, above=k < layers)), self.mass.hats[k])
+            plane_solver(
+                block.PtAP(_hats(*sizes, below=k > 0, above=k < layers)), self.mass.hats[k]
+            )
             for k, block in zip(numbering.levels, blocks, strict=False)
         ]
         self.mid_levels = [
-            PlaneSolver(block, self.mass.bubbles[k])
+            plane_solver(block, self.mass.bubbles[k])
             for k, block in zip(numbering.mid_levels, blocks[len(self.levels) :], strict=True)
         ]
 
@@ -187,10 +177,12 @@ class ThetaPreconditioner:
         return np.asarray(self.full_vector.array_r)
 
     @staticmethod
-    def _solve_rows(solvers: list[PlaneSolver], rows: Array) -> Array:
+    def _solve_rows(solvers: list[PETSc.KSP], rows: Array) -> Array:
         """Solutions of this rank's blocks, one for each row."""
-        solutions = [solver(rows[k]) for k, solver in enumerate(solvers)]
-        return np.array(solutions).reshape(rows.shape)
+        solutions = np.empty_like(rows)
+        for ksp, *arrays in zip(solvers, rows, solutions, strict=True):
+            ksp.solve(*(PETSc.Vec().createWithArray(x, comm=PETSc.COMM_SELF) for x in arrays))
+        return solutions
 
 
 def _index_range(first: int, last: int) -> PETSc.IS:
