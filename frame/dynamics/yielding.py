@@ -21,7 +21,7 @@ from alphacut.frame.dynamics.integrators import SAME, Exact, state_matrix
 from alphacut.frame.structures.linear import evaluate, histories
 from alphacut.frame.structures.loads import History
 from alphacut.frame.structures.storey import StoreyFrame
-from alphacut.fuzzy.arrays import Array, Mask
+from alphacut.fuzzy.arrays import Array, Ints, Mask
 from alphacut.fuzzy.kernels import compiled
 from alphacut.fuzzy.refused import RefusedError, require
 
@@ -111,6 +111,7 @@ class YieldingFlow(Flow):
         softening = system.softening(p) if system.gravity else k * 0.0
         mass = matrices.mass.value.diagonal(axis1=1, axis2=2)
         properties = [mass, *(x.value for x in (k, softening, hardening, yield_drift))]
+        storeys = np.stack(properties, 1)  # (S, 5, n)
         start = matrices.start.value[..., 0]
         drift0 = np.diff(start[:, : system.floors], prepend=0.0)
         if matrices.static is not None and (np.abs(drift0) > yield_drift.value).any():
@@ -123,34 +124,30 @@ class YieldingFlow(Flow):
         for c, load in enumerate(loads.values()):
             if load is not system.ground:  # absolute accelerations do not contain the ground's
                 fed[:, c] = load.values(self.time)
-        kinds = [(NAMES.index(kind), z) for kind, z in map(system.quantity, self.outputs)]
+        kinds = np.array([(NAMES.index(x), z) for x, z in map(system.quantity, self.outputs)])
         values = np.empty((len(points), len(self.time), len(kinds)))
-        peaks, ends = np.zeros((len(points), len(kinds))), np.zeros((len(points), 4))
-        inputs = np.stack(properties, 1), matrices.damping.value, pushes, start
-        contiguous = map(np.ascontiguousarray, (*inputs, *parts, fed, np.array(kinds)))
-        _march(*contiguous, values, peaks, ends)
-        self._require_motions(points, ends)
+        peaks = np.zeros((len(points), len(kinds)))
+        by_motion = map(np.ascontiguousarray, (storeys, matrices.damping.value, pushes, start))
+        for s, motion in enumerate(zip(*by_motion, strict=True)):
+            end = _march(*motion, *parts, fed, kinds, values[s], peaks[s])
+            self._require_motion(points[s], *end)
         return values, peaks
 
-    def _require_motions(self, points: Array, ends: Array) -> None:
-        """Refuse motions that collapse, whose events do not end or whose energy is not balanced.
-
-        `ends` (S, 4) are status, time, storey and imbalance of energy of each.
-        """
-        for row, status in enumerate(ends[:, 0]):
-            time, storey, imbalance = (float(ends[row, x]) for x in (1, 2, 3))
-            if status == COLLAPSED:
-                where = self._point_words(points[row])
-                value = f"collapses under its weight at t = {time:.6g} s at {where}"
-                allowed = "hardening times stiffness above weight over height where it yields"
-                cure = "take more hardening, a larger yield force or a weaker load"
-                raise RefusedError(f"storey {storey + 1:g}", value, allowed, cure)
-            if status == FAILED:
-                what = f"more than {MAX_EVENTS} events in a step at t = {time:.6g} s"
-                raise StepError(what, "take a smaller step or a larger yield force")
-            if not abs(imbalance) <= MAX_IMBALANCE:
-                what = f"energy is missing at the end of a motion, {imbalance:.2g} of it"
-                raise StepError(what, "take a smaller step, or parameters where the motion exists")
+    def _require_motion(
+        self, point: Array, status: int, time: float, storey: int, imbalance: float
+    ) -> None:
+        """Refuse a motion that collapses, whose events do not end or whose energy is missing."""
+        if status == COLLAPSED:
+            value = f"collapses under its weight at t = {time:.6g} s at {self._point_words(point)}"
+            allowed = "hardening times stiffness above weight over height where it yields"
+            cure = "take more hardening, a larger yield force or a weaker load"
+            raise RefusedError(f"storey {storey + 1}", value, allowed, cure)
+        if status == FAILED:
+            what = f"more than {MAX_EVENTS} events in a step at t = {time:.6g} s"
+            raise StepError(what, "take a smaller step or a larger yield force")
+        if not abs(imbalance) <= MAX_IMBALANCE:
+            what = f"energy is missing at the end of a motion, {imbalance:.2g} of it"
+            raise StepError(what, "take a smaller step, or parameters where the motion exists")
 
 
 def load_parts(
@@ -180,82 +177,71 @@ def load_parts(
 @compiled
 def _march(
     storeys: Array, damping: Array, pushes: Array, start: Array, edges: Array, is_node: Mask,
-    first: Array, last: Array, fed: Array, kinds: Array, values: Array, peaks: Array, ends: Array,
-) -> None:  # fmt: skip
-    """Write values (S, T, m), peaks (S, m) and ends (S, 4): status, time, storey, imbalance.
+    first: Array, last: Array, fed: Array, kinds: Ints, values: Array, peaks: Array,
+) -> tuple[int, float, int, float]:  # fmt: skip
+    """Write values (T, m) and peaks (m,) of a motion; return status, time, storey, imbalance.
 
-    `storeys` (S, 5, n): mass, stiffness, softening by weight, hardening, yield drift; `damping`
-    (S, n, n) in N s/m, `pushes` (S, n, L) by loads, `start` (S, 2n); parts as of `load_parts`;
-    `fed` (T, L): loads that act on absolute accelerations; `kinds` (m, 2): kinds and storeys.
+    `storeys` (5, n): mass, stiffness, softening by weight, hardening, yield drift; `damping`
+    (n, n) in N s/m, `pushes` (n, L) by loads, `start` (2n,); parts as of `load_parts`; `fed`
+    (T, L): loads that act on absolute accelerations; `kinds` (m, 2): kinds and storeys.
     """
-    n, n_loads = storeys.shape[2], pushes.shape[2]
+    mass, k, softening, hardening, yield_drift = storeys
+    n, inverse_mass = len(mass), 1 / mass
     # coefficients by powers of the fraction of a part: q, v, drifts
     series = np.zeros((3, n, MAX_TERMS + 1))
     load, rise, tangent, constant = np.zeros((4, n))
-    for s in range(len(storeys)):
-        mass, k, softening, hardening, yield_drift = storeys[s]
-        inverse_mass = 1 / mass
-        q, v = start[s, :n].copy(), start[s, n:].copy()
-        plastic, dissipated, direction = np.zeros((3, n))  # direction 0: elastic, ±1: yields
-        for z in range(n):  # loaded in one direction before the start
-            d = _drift(q, z)
-            plastic[z] = d - min(max(d, -yield_drift[z]), yield_drift[z])
-        before, works, node = _energy(storeys[s], q, v, plastic), np.zeros(2), 0
-        for e in range(len(edges)):
-            if is_node[e]:
-                state, push = (q, v, plastic, dissipated), (pushes[s], fed[node])
-                _observe(kinds, storeys[s], damping[s], push, state, values[s, node], peaks[s])
-                node += 1
-            if e == len(edges) - 1:
+    q, v = start[:n].copy(), start[n:].copy()
+    plastic, dissipated, direction = np.zeros((3, n))  # direction 0: elastic, ±1: yields
+    for z in range(n):  # loaded in one direction before the start
+        d = _drift(q, z)
+        plastic[z] = d - min(max(d, -yield_drift[z]), yield_drift[z])
+    before, works, node = _energy(storeys, q, v, plastic), np.zeros(2), 0
+    for e in range(len(edges)):
+        if is_node[e]:
+            state = q, v, plastic, dissipated
+            _observe(kinds, storeys, damping, pushes, fed[node], state, values[node], peaks)
+            node += 1
+        if e == len(edges) - 1:
+            break
+        h = edges[e + 1] - edges[e]
+        for i in range(n):
+            load[i] = rise[i] = 0.0
+            for c in range(pushes.shape[1]):
+                load[i] += mass[i] * pushes[i, c] * first[e, c]
+                rise[i] += mass[i] * pushes[i, c] * (last[e, c] - first[e, c])
+        for event in range(MAX_EVENTS + 1):  # h is what remains of the part
+            for i in range(n):
+                spring = direction[i] * yield_drift[i] if direction[i] != 0 else -plastic[i]
+                constant[i] = (1 - hardening[i]) * k[i] * spring
+                tangent[i] = (hardening[i] if direction[i] != 0 else 1.0) * k[i] - softening[i]
+            terms = _expand(inverse_mass, damping, tangent, constant, load, rise, h, q, v, series)
+            at, z = _first_event(series, terms, plastic, direction, yield_drift, hardening)
+            _add_works(damping, load, rise, series, terms, at, h, works)
+            for i in range(n):
+                q[i] = _value(series[0, i], terms, at)
+                v[i] = _value(series[1, i], terms, at)
+                load[i] += at * rise[i]
+                rise[i] *= 1 - at
+                if direction[i] != 0:
+                    flow = _drift(q, i) - direction[i] * yield_drift[i] - plastic[i]
+                    plastic[i] += flow
+                    dissipated[i] += (1 - hardening[i]) * k[i] * yield_drift[i] * abs(flow)
+            _add_peaks(kinds, storeys, tangent, constant, series, terms, at, q, v, peaks)
+            h *= 1 - at
+            if z < 0:
                 break
-            length, begun = edges[e + 1] - edges[e], 0.0  # fraction of the part that is done
-            for event in range(MAX_EVENTS + 1):
-                for i in range(n):
-                    load[i] = rise[i] = 0.0
-                    for c in range(n_loads):
-                        push_force, change = mass[i] * pushes[s, i, c], last[e, c] - first[e, c]
-                        load[i] += push_force * (first[e, c] + begun * change)
-                        rise[i] += push_force * (1 - begun) * change
-                    spring = direction[i] * yield_drift[i] if direction[i] != 0 else -plastic[i]
-                    constant[i] = (1 - hardening[i]) * k[i] * spring
-                    tangent[i] = (hardening[i] if direction[i] != 0 else 1.0) * k[i] - softening[i]
-                h = length * (1 - begun)
-                terms = _expand(
-                    inverse_mass, damping[s], tangent, constant, load, rise, h, q, v, series
-                )
-                at, z = _first_event(series, terms, plastic, direction, yield_drift, hardening)
-                _add_works(damping[s], load, rise, series, terms, at, h, works)
-                for i in range(n):
-                    q[i] = _value(series[0, i], terms, at)
-                    v[i] = _value(series[1, i], terms, at)
-                    if direction[i] != 0:
-                        flow = _drift(q, i) - direction[i] * yield_drift[i] - plastic[i]
-                        plastic[i] += flow
-                        force = (1 - hardening[i]) * k[i] * yield_drift[i]
-                        dissipated[i] += force * abs(flow)
-                _add_peaks(
-                    kinds, storeys[s], direction, constant, series, terms, at, q, v, peaks[s]
-                )
-                begun += at * (1 - begun)
-                if z < 0 or begun >= 1:
-                    break
-                if direction[z] != 0:
-                    direction[z] = 0.0
-                else:
-                    direction[z] = math.copysign(1.0, _drift(q, z) - plastic[z])
-                    if softening[z] > 0 and hardening[z] * k[z] <= softening[z]:
-                        ends[s, 0] = COLLAPSED
-                if event == MAX_EVENTS:
-                    ends[s, 0] = FAILED
-                if ends[s, 0] != RUNS:
-                    ends[s, 1], ends[s, 2] = edges[e] + length * begun, z
-                    break
-            if ends[s, 0] != RUNS:
-                break
-        after, spent = _energy(storeys[s], q, v, plastic), works[1] + dissipated.sum()
-        exchanged = abs(before) + abs(after) + abs(works[0]) + spent
-        if exchanged > 0:
-            ends[s, 3] = (before + works[0] - after - spent) / exchanged
+            if direction[z] != 0:
+                direction[z] = 0.0
+            elif softening[z] > 0 and hardening[z] * k[z] <= softening[z]:
+                return COLLAPSED, edges[e + 1] - h, z, 0.0
+            else:
+                direction[z] = math.copysign(1.0, _drift(q, z) - plastic[z])
+            if event == MAX_EVENTS:
+                return FAILED, edges[e + 1] - h, z, 0.0
+    after, spent = _energy(storeys, q, v, plastic), works[1] + dissipated.sum()
+    exchanged = abs(before) + abs(after) + abs(works[0]) + spent
+    missing = before + works[0] - after - spent
+    return RUNS, edges[-1], -1, missing / exchanged if exchanged > 0 else 0.0
 
 
 @compiled
@@ -308,29 +294,27 @@ def _first_event(
     first, storey, drifts = 1.0, -1, series[2]
     margin = np.empty(terms)  # polynomial that is negative after the event
     for z in range(len(plastic)):
-        stretch, variation = drifts[z, 0] - plastic[z], 0.0
-        if direction[z] == 0:
-            for term in range(1, terms):
-                variation += abs(drifts[z, term])
-            if abs(stretch) + variation < yield_drift[z] or hardening[z] == 1:
+        stretch, variation, sign = drifts[z, 0] - plastic[z], 0.0, direction[z]
+        for term in range(1, terms):
+            variation += (term if sign != 0 else 1) * abs(drifts[z, term])
+        if sign != 0:  # yields until the velocity of the drift has the other sign
+            if 2 * sign * drifts[z, 1] > variation:
                 continue
-            for sign in (-1.0, 1.0):
-                margin[0] = yield_drift[z] * (1 + EVENT_ROUNDING) - sign * stretch
-                for term in range(1, terms):
-                    margin[term] = -sign * drifts[z, term]
-                at = _first_root(margin, terms, first)
-                if at < first:
-                    first, storey = at, z
-        else:  # yields until the velocity of the drift has the other sign
             for term in range(1, terms):
-                margin[term - 1] = direction[z] * term * drifts[z, term]
-                variation += abs(margin[term - 1])
-            if 2 * margin[0] > variation:
-                continue
+                margin[term - 1] = sign * term * drifts[z, term]
             margin[0] += EVENT_ROUNDING * variation
             at = _first_root(margin, terms - 1, first)
-            if at < first:
-                first, storey = at, z
+        elif abs(stretch) + variation < yield_drift[z] or hardening[z] == 1:
+            continue
+        else:
+            at = first
+            for side in (-1.0, 1.0):
+                for term in range(terms):
+                    margin[term] = -side * drifts[z, term]
+                margin[0] = yield_drift[z] * (1 + EVENT_ROUNDING) - side * stretch
+                at = min(at, _first_root(margin, terms, at))
+        if at < first:
+            first, storey = at, z
     return first, storey
 
 
@@ -416,7 +400,7 @@ def _drift(q: Array, z: int) -> float:
 
 @compiled
 def _add_peaks(
-    kinds: Array, storeys: Array, direction: Array, constant: Array, series: Array, terms: int,
+    kinds: Ints, storeys: Array, tangent: Array, constant: Array, series: Array, terms: int,
     end: float, q: Array, v: Array, peaks: Array,
 ) -> None:  # fmt: skip
     """Raise peaks (m,) of outputs by those within a part, at whose `end` the motion is q, v."""
@@ -430,8 +414,7 @@ def _add_peaks(
         if kind == DUCTILITY:
             scale = 1 / storeys[4, z]
         elif kind == SHEAR:
-            scale = (storeys[3, z] if direction[z] != 0 else 1.0) * storeys[1, z]
-            shift = constant[z]
+            scale, shift = tangent[z] + storeys[2, z], constant[z]
         peaks[row] = max(peaks[row], abs(scale * x + shift))
         if polynomial[1] * velocity < 0:  # it turns
             reach, slope = abs(scale * polynomial[0] + shift), np.empty(terms - 1)
@@ -439,17 +422,18 @@ def _add_peaks(
                 slope[term - 1] = math.copysign(term, polynomial[1]) * polynomial[term]
                 reach += abs(scale * polynomial[term])
             if reach > peaks[row]:
-                turn = _value(polynomial, terms, _first_root(slope, terms - 1, end))
-                peaks[row] = max(peaks[row], abs(scale * turn + shift))
+                place = min(_first_root(slope, terms - 1, end), end)  # 1 where rounding decides
+                turn = scale * _value(polynomial, terms, place) + shift
+                peaks[row] = max(peaks[row], abs(turn))
 
 
 @compiled
 def _observe(
-    kinds: Array, storeys: Array, damping: Array, push: tuple[Array, Array],
+    kinds: Ints, storeys: Array, damping: Array, pushes: Array, loads: Array,
     state: tuple[Array, Array, Array, Array], values: Array, peaks: Array,
 ) -> None:  # fmt: skip
-    """Write outputs (m,) at a node and raise their peaks; `push`: pushes of loads, and these."""
-    (q, v, plastic, dissipated), (pushes, loads) = state, push
+    """Write outputs (m,) at a node and raise their peaks."""
+    q, v, plastic, dissipated = state
     for row in range(len(kinds)):
         kind, z = kinds[row]
         mass, k, softening, hardening, yield_drift = storeys[:, z]
@@ -459,7 +443,7 @@ def _observe(
         elif kind == DRIFT:
             value = drift
         elif kind == SHEAR:
-            value = k * drift - rest
+            value = _net_force(storeys, q, plastic, z) + softening * drift
         elif kind == DUCTILITY:
             value = drift / yield_drift
         elif kind == V:
