@@ -152,12 +152,6 @@ def _square_loop(geo: Any, size: float) -> int:
     return int(geo.addCurveLoop(sides))
 
 
-def _poles(geo: Any, size: float, radius: float) -> list[int]:
-    """Add the points of a circle on the axes, exact, so that meshes are the same everywhere."""
-    axes = ((1, 0), (0, 1), (-1, 0), (0, -1))
-    return [geo.addPoint(radius * x, radius * y, 0, size) for x, y in axes]
-
-
 def _spline_steps(outline: Outline) -> int:
     """Steps of the spline through a quarter of an outline."""
     points, radii = bend_radii(outline)
@@ -175,7 +169,10 @@ def _particle(geo: Any, size: float, radius: float, outline: Outline) -> tuple[i
 
     centre, quarters = geo.addPoint(0, 0, 0, size), np.arange(4) * np.pi / 2
     if is_round(outline):
-        poles = _poles(geo, size, radius * float(outline(np.array(0.0))))
+        # points on the axes are exact, so that meshes are the same everywhere
+        reach = radius * float(outline(np.array(0.0)))
+        axes = ((1, 0), (0, 1), (-1, 0), (0, -1))
+        poles = [geo.addPoint(reach * x, reach * y, 0, size) for x, y in axes]
         curves = [geo.addCircleArc(poles[k], centre, poles[(k + 1) % 4]) for k in range(4)]
     else:
         poles = [add_point(angle) for angle in quarters]

@@ -118,6 +118,7 @@ class PrismProblem:
         map: The radius map.
         matrix: The reduced stiffness.
         local_map: Nodes of this rank to pairs of reduced unknowns.
+        field: From reduced unknowns to displacements of this rank's nodes, (nodes, 2).
     """
 
     def __init__(self, grid: PrismGrid, comm: MPI.Intracomm) -> None:
@@ -134,7 +135,7 @@ class PrismProblem:
         layers = grid.cells.reshape(grid.layers, -1, grid.cells.shape[1])
         cells = layers[self.numbering.layers].reshape(-1, layers.shape[-1])
         self.matrix = zero_matrix(pairs[cells], self.local_map, rows, self.numbering.size)
-        self._to_nodes = NodeScatter(pairs[self.node], self.matrix.createVecRight())
+        self.field = NodeScatter(pairs[self.node], self.matrix.createVecRight())
 
     def _node_of_dof(self) -> Ints:
         sizes, geometry = self.space.dofmap.index_map, self.mesh.geometry
@@ -178,8 +179,7 @@ class PrismProblem:
         density = positive_density(radius_map.distribution, self.slice_rule()[0])
         self.areas = self._areas()
         require_valid_elements(self.grid, self.areas, self.comm)
-        prism_density = self.at_prisms(density)
-        self.elastic.density.x.array[:] = np.repeat(prism_density, POINTS_PER_SLICE)
+        self.elastic.density.x.array[:] = np.repeat(self.at_prisms(density), POINTS_PER_SLICE)
         if isinstance(radius_map, LevelSet):
             self.elastic.in_particle.x.array[:] = self._inside(positions, radius_map).ravel()
 
@@ -225,9 +225,12 @@ class PrismProblem:
 
     def loads(self, strains: Array) -> list[PETSc.Vec]:
         """Reduced forces −⟨Bᵀ C ε̄⟩ of macroscopic strains (loads, 3), for the phases as set."""
+        return [self.reduced(self.elastic.load(strain)) for strain in strains]
+
+    def reduced(self, forces: Array) -> PETSc.Vec:
+        """Reduced vector of forces on this rank's nodes, shape (nodes · 2,)."""
         num_rows, size = len(self.numbering.rows), self.numbering.size
-        forces = [self.elastic.load(strain) for strain in strains]
-        return [reduced_vector(force, self.local_map, num_rows, size) for force in forces]
+        return reduced_vector(forces, self.local_map, num_rows, size)
 
     def solver(self, options: SolverOptions, matrix: PETSc.Mat | None = None) -> PETSc.KSP:
         """PETSc solver of the assembled stiffness, or of another reduced symmetric operator."""
@@ -243,15 +246,6 @@ class PrismProblem:
         matrix.assemble()
         return matrix
 
-    def assemble_forces(self, form: fem.Form) -> PETSc.Vec:
-        """Reduced vector Pᵀ b of a linear form of the user on `space`."""
-        values, numbering = fem.assemble_vector(form).array, self.numbering
-        return reduced_vector(values, self.local_map, len(numbering.rows), numbering.size)
-
-    def field(self, vector: PETSc.Vec) -> Array:
-        """Displacements of this rank's nodes, shape (nodes, 2), from reduced unknowns."""
-        return self._to_nodes(vector)
-
     def slice_strains(self, fields: Sequence[tuple[Array, Array]]) -> SliceStrains:
         """Mean strains of slices by phase, area fractions and mean products, summed over ranks.
 
@@ -266,15 +260,11 @@ class PrismProblem:
         means = np.stack([self.sum_by_layer(phase_means) for phase_means in prism_means])
         fractions = np.stack([self.sum_by_layer(phase.sum(axis=-1)) for phase in areas])
         theta, weights = self.slice_rule()
-        point_weights = self.at_prisms(weights)[None, :, :, None] * areas
-        point_weights = point_weights.reshape(len(areas), -1)
+        point_weights = (self.at_prisms(weights)[:, :, None] * areas).reshape(len(areas), -1)
         products = strain_products(strain.reshape(-1, 3, count), point_weights)
         means, fractions, products = map(self.comm.allreduce, (means, fractions, products))
-        phases = len(areas)
-        return SliceStrains(
-            theta=theta,
-            weights=weights,
-            strain=means.reshape(phases, -1, 3, count),
-            fractions=fractions.reshape(phases, -1),
-            products=products,
+        means, fractions = (
+            means.reshape(len(areas), -1, 3, count),
+            fractions.reshape(len(areas), -1),
         )
+        return SliceStrains(theta, weights, means, fractions, products)

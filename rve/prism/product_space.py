@@ -68,7 +68,7 @@ class ProductSpace:
 
     def assemble_vector(self, form: ufl.Form) -> PETSc.Vec:
         """Reduced vector Pᵀ b of a linear form in `space`."""
-        return self._problem.assemble_forces(self._compiled(form))
+        return self._problem.reduced(fem.assemble_vector(self._compiled(form)).array)
 
     def mean(self, form: ufl.Form) -> float:
         """Mean over cell and θ of a scalar form: its integral over that of f_Θ."""
