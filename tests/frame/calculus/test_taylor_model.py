@@ -67,7 +67,10 @@ def test_no_function_leaves_its_taylor_model(rng):
         centre, radius = rng.uniform(-1, 1, 3), 10 ** rng.uniform(-8, -0.7) * np.ones(3)
         loose = radius * rng.choice([0.0, 0.1])  # what inputs leave out, at one end of it
         inputs = TaylorModel.variables(centre, radius, order).loosened(loose)
-        model = run([inputs[i] for i in range(3)], c)
+        try:
+            model = run([inputs[i] for i in range(3)], c)
+        except UnprovedError:  # of b² + 1 with a remainder above 1
+            continue
         low, high = np.sort(rng.uniform(-1, 1, (2, 3)), axis=0)
         lower_bound, upper_bound = model.bounds()
         rows = [*zip(centre, radius, loose, strict=True)]
