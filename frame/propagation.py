@@ -212,16 +212,14 @@ def _proof_beside(method: Method, over: UnitFlow) -> Proof | None:
 
 
 def _with_proof(followed: Envelope, over: UnitFlow, proof: Proof, tick: Progress) -> Envelope:
-    """Return a follower's envelope with proved outer bounds of the exact motion, if there are.
-
-    The true bounds lie between these and what the proof reaches: the error is the larger distance.
-    """
+    """Return a follower's envelope with proved outer bounds of the exact motion, if there are."""
     assert isinstance(over.flow, LinearFlow)
     exact = replace(over, flow=replace(over.flow, integrator=Exact()))
     try:
         proved = proof.run(exact, tick)
     except UnprovedError:
         return followed
+    # the true bounds lie between these: the error is the larger distance
     both = np.array([proved.proved, proved.attained])  # (2, lower or upper, A, T, m)
     error = np.abs(np.stack([followed.lower, followed.upper]) - both).max((0, 1))
     largest = float((error / over.scale).max())

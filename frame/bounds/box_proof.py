@@ -106,8 +106,8 @@ class BoxProof(Protocol):
             UnprovedError: No part of the box can be proved.
         """
 
-    def peak_gap(self, scale: Array, peak: Array) -> Array:
-        """Return the wanted gap of the outputs' peaks, shape (m,), in their units; see `Goal`."""
+    def peak_gap(self, flow: UnitFlow) -> Array:
+        """Return the wanted gap of the outputs' peaks, shape (m,), in their units."""
 
     def bounds(self, flow: LinearFlow, boxes: Boxes, goal: Goal) -> Sequence[Answer]:
         """Return bounds on each level of a box, or the refusal of that level.

@@ -102,7 +102,7 @@ class Queue:
         with refusing():
             proof.forecast(self.flow, boxes)
         self.hull = Hull(problem, self.flow)
-        self.gap = proof.peak_gap(problem.scale, problem.peak)[:, None]
+        self.gap = proof.peak_gap(problem)[:, None]
         self.wide = numbers.WIDE * problem.peak[:, None]
         self.refusals, self.pushes = 0, 0
         self.heap: list[tuple[float, int, SubBox]] = []
@@ -222,11 +222,7 @@ class Queue:
                 box.least_lower[k] = np.maximum(box.least_lower[k], bounds.least_peaks.lower)
 
     def _abandon(self, box: SubBox, answers: Sequence[Answer]) -> None:
-        """Abandon peaks whose gaps bisections are not expected to close.
-
-        A gap has fallen by too little of an even fall over all boxes, or it will: remainders fall
-        with a power of the widths of the inputs that the gap depends on.
-        """
+        """Abandon peaks whose gaps bisections are not expected to close."""
         for k, (level, bounds) in enumerate(zip(box.levels, answers, strict=True)):
             if isinstance(bounds, UnprovedError):
                 continue
@@ -239,6 +235,7 @@ class Queue:
             self.first_gap[level][is_open] = first_gap[is_open]
             even_fall = (first_gap - self.gap) * number / max_boxes
             falls_slowly = gap > first_gap - numbers.MIN_GAP_PROGRESS * even_fall
+            # remainders fall with a power of the widths of the inputs that the gap depends on
             final_gap = gap * 2.0 ** (-numbers.GAP_POWER * halvings(bounds.shares, max_boxes))
             is_wide = gap > self.wide
             is_hopeless = (number >= numbers.GRACE) & falls_slowly | (number > max_boxes)

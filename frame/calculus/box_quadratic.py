@@ -107,11 +107,7 @@ def global_maximum(g: Array, H: Array, lower: Array, upper: Array) -> Array:
 
 
 def _face_points(g: Array, H: Array, lower: Array, upper: Array, free: tuple[int, ...]) -> Array:
-    """Stationary points of g·x + x·H·x/2 on the faces of N boxes with the same free axes.
-
-    On a face the d − free other axes are at their ends; a point outside its face is clipped to it.
-    Shape (N, 2^(d − free), d), for g (N, d), H (N, d, d) and boxes (N, d).
-    """
+    """Stationary points (N, 2^(d − free), d) on faces with these free axes, clipped to them."""
     d = g.shape[1]
     fixed = [i for i in range(d) if i not in free]
     ends = list(product((0, 1), repeat=len(fixed)))  # 0: lower, 1: upper

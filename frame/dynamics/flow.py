@@ -98,14 +98,9 @@ class Flow(ABC):
         return self.system.outputs
 
     @property
-    @abstractmethod
-    def method(self) -> str:
-        """Name of the time stepping."""
-
-    @property
     def exact(self) -> bool:
-        """True if trajectories have no error but rounding."""
-        return self.method == Exact.name
+        """True if trajectories have no error but rounding; else they are by midpoint steps."""
+        return False
 
     @abstractmethod
     def finer(self) -> tuple[Flow, int]:
@@ -204,9 +199,9 @@ class LinearFlow(Flow):
         require(not getattr(self.system, "hardening", ()), "flow", value=value, allowed=allowed)
 
     @property
-    def method(self) -> str:
-        """Name of the time stepping."""
-        return self.integrator.name
+    def exact(self) -> bool:
+        """True if the integrator is `Exact`."""
+        return isinstance(self.integrator, Exact)
 
     def finer(self) -> tuple[LinearFlow, int]:
         """Return the exact flow with steps divided into equal parts, and the number of parts."""

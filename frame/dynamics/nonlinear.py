@@ -74,11 +74,6 @@ class LagrangianFlow(Flow):
 
     system: LagrangianSystem
 
-    @property
-    def method(self) -> str:
-        """Name of the time stepping."""
-        return "midpoint"
-
     def finer(self) -> tuple[LagrangianFlow, int]:
         """Return the flow with half the step, and 2, the parts of a step; tapes are shared."""
         fine = replace(self, step=self.step / 2)

@@ -17,7 +17,7 @@ import numpy as np
 
 from alphacut.frame.calculus.jet import Jet
 from alphacut.frame.dynamics.flow import Flow, StepError
-from alphacut.frame.dynamics.integrators import SAME, Exact, state_matrix
+from alphacut.frame.dynamics.integrators import SAME, state_matrix
 from alphacut.frame.structures.linear import evaluate, histories
 from alphacut.frame.structures.loads import History
 from alphacut.frame.structures.storey import StoreyFrame
@@ -78,9 +78,9 @@ class YieldingFlow(Flow):
             require(not history.frequency, "load", value=value, allowed=allowed)
 
     @property
-    def method(self) -> str:
-        """Name of the time stepping: steps only say where the exact motion is read."""
-        return Exact.name
+    def exact(self) -> bool:
+        """True: steps only say where the exact motion is read."""
+        return True
 
     def finer(self) -> tuple[YieldingFlow, int]:
         """Return the flow with a quarter of the step, and 4."""

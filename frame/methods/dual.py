@@ -96,10 +96,9 @@ class DualProof:
         """Whether no bound below a peak is worth any work."""
         return self.below >= 1
 
-    def peak_gap(self, scale: Array, peak: Array) -> Array:
+    def peak_gap(self, flow: UnitFlow) -> Array:
         """Return the gap at peaks that suffices, shape (m,)."""
-        del scale
-        return self.peaks * peak
+        return self.peaks * flow.peak
 
     def forecast(self, flow: LinearFlow, boxes: Boxes) -> float:
         """Return the most evaluations of the dual function for a bound.
@@ -216,10 +215,7 @@ class DualProof:
         first_slack: float,
         progress: Progress,
     ) -> None:
-        """Minimise the dual functions of all bounds that are asked for, `needed` (J, m, 2).
-
-        `first_slack` is what the gap of a first pass may be below the peak, as `below`.
-        """
+        """Minimise the dual functions of bounds `needed` (J, m, 2); `first_slack` is as `below`."""
         first = next(iter(problems.values()))
         first.improve(np.arange(0), first.effort(1, 1))  # compiles before there are threads
         if not is_complete:

@@ -92,10 +92,9 @@ class Proof:
         tolerance = flow.tolerance(self.tolerance or self.gap)
         return prove(replace(self, tolerance=tolerance), flow, progress)
 
-    def peak_gap(self, scale: Array, peak: Array) -> Array:
+    def peak_gap(self, flow: UnitFlow) -> Array:
         """Return the tolerance of each output, shape (m,)."""
-        del peak
-        return scale * self._gaps[-1]
+        return flow.scale * self._gaps[-1]
 
     @property
     def _gaps(self) -> tuple[float, ...]:

@@ -164,10 +164,8 @@ def _couplings(centre: CentredMatrices, some: Ints) -> Array:
 
 
 def _nearness(centre: CentredMatrices, slopes: Array) -> Array:
-    """First-order change of λ_j − λ_k over the box, over |λ_j − λ_k| in its middle, (modes, modes).
-
-    From 1 on two modes may meet at complex inputs of sizes up to 1, where their series diverge.
-    """
+    """First-order change of λ_j − λ_k over the box, over that distance in its middle, a matrix."""
+    # from 1 on two modes may meet at complex inputs of sizes up to 1, where their series diverge
     couplings = np.abs(_couplings(centre, np.arange(centre.modes)))
     change = np.abs(slopes[:, None] - slopes).sum(-1) + 2 * couplings.sum(0)
     distance = np.abs(centre.squared[:, None] - centre.squared)

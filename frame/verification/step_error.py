@@ -65,7 +65,7 @@ def with_step_error(bounds: Envelope, flow: UnitFlow, steps: Array) -> Envelope:
     has_reference_unit = [unit == flow.units[flow.reference] for unit in flow.units]
     error, basis = bounds.error + steps, bounds.basis
     if steps.any():
-        basis = (*basis, f"{flow.flow.method} steps of {flow.time[1]:g} s")
+        basis = (*basis, f"midpoint steps of {flow.time[1]:g} s")
     facts = {"step_error": float(steps[:, has_reference_unit].max()), **bounds.facts}
     if bounds.nature is not Nature.ATTAINED:  # else how far other motions go is not known
         facts["estimated_error"] = float((error / flow.scale).max())

@@ -43,8 +43,8 @@ class Lipschitz:
     def forecast(self, flow, cuts):
         return 1.0
 
-    def peak_gap(self, scale, peak):
-        return self.gap * peak
+    def peak_gap(self, flow):
+        return self.gap * flow.peak
 
     def bounds(self, flow, cuts, goal):
         self.seen.append((cuts, goal.needed.copy()))
