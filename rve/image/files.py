@@ -22,9 +22,9 @@ PHOTOMETRIC, WHITE_IS_ZERO = 262, 0  # tag of TIFF and its value
 SAMPLE_FORMAT, SIGNED = 339, 2
 PROGRAM_BYTES = 1.7e8
 """Memory of the program and its libraries."""
-BYTES_PER_ELEMENT = {2: 1450, 3: 1900}
+BYTES_PER_ELEMENT = {2: 1450, 3: 1600}
 """Memory of an element in the cuts' solutions with their first guess, by dimension; within 1.25 of
-peaks at 128² … 512² pixels of two elements a side, 512² and 1024² of one, and 96³ voxels."""
+peaks at 128² … 512² pixels of two elements a side, 512² and 1024² of one, 64³ … 128³ voxels."""
 MAX_COLOURS = 4  # pages that a file calls channels are colours up to so many, else slices
 TAKE_VOXEL = "a volume takes cell.voxel in place of cell.pixel"
 TAKE_PIXEL = "a picture takes cell.pixel in place of cell.voxel"
