@@ -141,7 +141,8 @@ def modes_by_matrices(element: Element, fields: Fields, mean_modes: Array) -> Mo
         local, error = (xp.reshape(x, (*x.shape[:2], -1)) for x in pair)
         # the sums of the product, in which zeros add no error, and the entries of the matrix
         error += (terms + ENTRY) * UNIT * xp.abs(local)
-        modes = xp.tensordot(matrix, local, axes=1) + xp.asarray(mean_modes)[:, :, None]
+        modes = xp.tensordot(matrix, local, axes=1)
+        modes += xp.asarray(mean_modes)[:, :, None]
         yield slab, modes, magnitude, error
 
 

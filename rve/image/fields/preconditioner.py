@@ -71,7 +71,7 @@ class FourierPreconditioner:
         phases: exp(i k·place), by i for odd unknowns, along each axis; they broadcast to
             (unknowns, *waves).
         shape: Shape of the grid.
-        scale: Magnitude of the material's coefficients, a power of two.
+        scale: Magnitude of a material of voxels, a power of two; 1 for pixels.
     """
 
     inverse: Fields
@@ -102,8 +102,9 @@ class FourierPreconditioner:
         gain = np.where(has_energy, 1 / np.where(has_energy, energy, 1), 0)
         first_block = xp.asarray(waves_of_cell * gain @ waves_of_cell.T)
         first_wave = (0,) * len(shape)
-        scale = float(2.0 ** np.round(np.log2(constant.deviator)))
-        kind = xp.float32 if element.dimension == 3 else xp.float64
+        kind, scale = xp.float64, 1.0
+        if element.dimension == 3:
+            kind, scale = xp.float32, float(2.0 ** np.round(np.log2(constant.deviator)))
         inverse = xp.empty((n, n, *(k.size for k in waves)), dtype=kind)
         for slab in slabs(inverse):
             phase = xp.moveaxis(_product(phases, slab), 0, -1)
@@ -125,7 +126,9 @@ class FourierPreconditioner:
         xp = namespace(fields)
         axes = tuple(range(2, fields.ndim))
         fft = scipy.fft if isinstance(fields, np.ndarray) else xp.fft
-        spectrum = fft.rfftn((fields / self.scale).astype(self.inverse.dtype), axes=axes)
+        if self.scale != 1:
+            fields = (fields / self.scale).astype(self.inverse.dtype)
+        spectrum = fft.rfftn(fields, axes=axes)
         if isinstance(fields, np.ndarray) and len(self.shape) == 3:
             from alphacut.rve.image.fields.kernels import multiply_by_blocks  # Numba takes its time
 
