@@ -6,6 +6,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.linalg import splu
 
 from alphacut.fuzzy import RefusedError
+from alphacut.rve import Phase
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.fields.element import spline_element
 from alphacut.rve.image.fields.energy import energies, modes_by_matrices, modes_of
@@ -14,6 +15,8 @@ from alphacut.rve.image.fields.preconditioner import FourierPreconditioner, Refe
 from alphacut.rve.image.losses import energy_shares, mean_loss
 from alphacut.rve.image.model import ImageModel, solve_image
 from alphacut.rve.image.phases import ModuliImages
+from alphacut.rve.spheres.model import cubic_stiffness
+from alphacut.rve.spheres.result import cubic_voigt
 
 TIGHT = ConjugateGradient(accuracy=1e-12)
 
@@ -165,6 +168,28 @@ def test_an_independent_solver_is_never_below_and_its_limit_never_above(contrast
     assert np.linalg.eigvalsh(twice - bounds.lower)[0] > 0
     limit = twice - (once - twice) / 3  # for errors of order 2; edges make them fall more slowly
     assert np.linalg.eigvalsh(limit - bounds.lower)[0] > 0
+
+
+@pytest.mark.parametrize("contrast", [0.1, 10.0])
+def test_the_series_of_spheres_is_between_the_voxels_inside_and_those_touched(contrast):
+    radius = np.cbrt(1.2 / np.pi)  # of fraction 0.2, over half the cell's side
+    matrix, sphere = Phase(20e9, 0.2), Phase(contrast * 20e9, 0.3)
+    exact = cubic_voigt(*cubic_stiffness(radius, matrix, [sphere]).moduli[0, 0])
+    widths = []
+    for size in (8, 16):
+        far = 2 * np.arange(1, size // 2 + 1) / size  # faces of voxels on one side of the middle
+        masks = []
+        for squares in (far**2, (far - far[0]) ** 2):
+            along = np.concatenate([squares[::-1], squares])
+            masks.append(along[:, None, None] + along[:, None] + along < radius**2)
+        pairs = [
+            np.sort([np.where(mask, inside, outside) for mask in masks], axis=0)
+            for outside, inside in zip(matrix.bulk_and_shear, sphere.bulk_and_shear, strict=True)
+        ]
+        bounds = ImageModel((1.0, 1.0, 1.0)).solve(ModuliImages(*map(tuple, pairs))).bounds
+        assert bounds.contains(exact)
+        widths.append(bounds.width)
+    assert widths[1] < 0.65 * widths[0]  # of order 1 in the voxel's side
 
 
 @pytest.mark.parametrize("stress", [False, True], ids=["displacement", "stress"])
