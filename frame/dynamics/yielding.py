@@ -43,8 +43,8 @@ MAX_EVENTS = 1000
 """Events in a part of a step after which the motion has failed."""
 MAX_IMBALANCE = 1e-9
 """Energy that may be missing at the end, as a fraction of all energies that were exchanged."""
-KINDS = Q, DRIFT, SHEAR, DUCTILITY, V, A, RESIDUAL, DISSIPATED = range(8)
-NAMES = ("q", "drift", "shear", "ductility", "v", "a", "residual", "dissipated")
+KINDS = ("q", "drift", "shear", "ductility", "v", "a", "residual", "dissipated")
+Q, DRIFT, SHEAR, DUCTILITY = range(4)  # kinds whose peaks are found between nodes
 AT_NODES = ("v", "a", "residual")
 """Outputs whose peaks are sought at nodes alone; dissipated energy never falls."""
 RUNS, COLLAPSED, FAILED = 0, 1, 2
@@ -124,7 +124,7 @@ class YieldingFlow(Flow):
         for c, load in enumerate(loads.values()):
             if load is not system.ground:  # absolute accelerations do not contain the ground's
                 fed[:, c] = load.values(self.time)
-        kinds = np.array([(NAMES.index(x), z) for x, z in map(system.quantity, self.outputs)])
+        kinds = np.array([(KINDS.index(x), z) for x, z in map(system.quantity, self.outputs)])
         values = np.empty((len(points), len(self.time), len(kinds)))
         peaks = np.zeros((len(points), len(kinds)))
         by_motion = map(np.ascontiguousarray, (storeys, matrices.damping.value, pushes, start))
@@ -438,30 +438,22 @@ def _observe(
         kind, z = kinds[row]
         mass, k, softening, hardening, yield_drift = storeys[:, z]
         drift, rest = _drift(q, z), (1 - hardening) * k * plastic[z]
-        if kind == Q:
-            value = q[z]
-        elif kind == DRIFT:
-            value = drift
-        elif kind == SHEAR:
-            value = _net_force(storeys, q, plastic, z) + softening * drift
-        elif kind == DUCTILITY:
-            value = drift / yield_drift
-        elif kind == V:
-            value = v[z]
-        elif kind == A:
-            force = -_net_force(storeys, q, plastic, z)
-            if z + 1 < len(q):
-                force += _net_force(storeys, q, plastic, z + 1)
-            for i in range(len(q)):
-                force -= damping[z, i] * v[i]
-            value = force / mass
-            for c in range(len(loads)):
-                value += pushes[z, c] * loads[c]
-        elif kind == RESIDUAL:  # in equilibrium without load, where storeys that yield back rest
-            back = abs((1 - hardening) * k * yield_drift / (hardening * k - softening))
-            value = min(max(rest / (k - softening), -back), back)
-        else:
-            value = dissipated[z]
+        force = -_net_force(storeys, q, plastic, z)
+        if z + 1 < len(q):
+            force += _net_force(storeys, q, plastic, z + 1)
+        for i in range(len(q)):
+            force -= damping[z, i] * v[i]
+        acceleration = force / mass
+        for c in range(len(loads)):
+            acceleration += pushes[z, c] * loads[c]
+        # drift in equilibrium without load, where storeys that yield back rest
+        back = abs((1 - hardening) * k * yield_drift / (hardening * k - softening))
+        residual = min(max(rest / (k - softening), -back), back)
+        by_kind = (
+            q[z], drift, k * drift - rest, drift / yield_drift,
+            v[z], acceleration, residual, dissipated[z],
+        )  # fmt: skip
+        value = by_kind[kind]
         values[row] = value
         peaks[row] = max(peaks[row], abs(value))
 
