@@ -120,7 +120,7 @@ class Oscillators:
         grid, is_start = self.grid, source == "start"
         sigma = grid.sigma.ravel()
         rho, rounding, bounds = self._known(source)
-        G = with_power(sigma, rho, order) if order else rho
+        G = with_power(sigma, rho, order)
         omega, quotient = np.abs(sigma.imag), -sigma.real / sigma.imag
         # of the power and of what is read off
         rounding = np.abs(sigma) ** order * rounding

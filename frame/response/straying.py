@@ -24,9 +24,7 @@ from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF
 from alphacut.frame.response.duhamel import absolute_moments, responses_at_nodes
 from alphacut.frame.structures.loads import History
 from alphacut.fuzzy.arrays import Array, Ints
-from alphacut.fuzzy.kernels import kernel
 
-compiled_fast = kernel(fastmath={"reassoc", "contract"})
 PHASE = 0.5
 """Phase in rad that a mode or a sine takes in a piece; a piece adds its square to the bound."""
 MAX_PARTS = 16
@@ -54,7 +52,8 @@ class Response(NamedTuple):
     sigma: Array | None  # points −g + iω of a grid over q = g/ω and ω, (Q, W); None of f itself
     load: History | None  # None for ρ = exp(σ t)
     order: int
-    coefficient: Array  # κ at the points, (m, Q, W); of f (m, 1, 1)
+    # κ at the points, monotone between them along q and ω, (m, Q, W); of f (m, 1, 1)
+    coefficient: Array
     spread: Array  # bounds of how far Re κ and Im κ are from that, (2, m)
 
     def in_the_middle(self) -> Response:
@@ -80,44 +79,40 @@ class Response(NamedTuple):
         return np.minimum(np.outer(modulus, size), by_parts)
 
     def off_chords(self, nodes: Array, parts: int) -> tuple[Array, Array]:
-        """Its range less the step's chord at nodes but the last, (steps, parts, m) each."""
-        kappa, order = self.coefficient.reshape(len(self.coefficient), -1), self.order
+        """Its range at nodes less the chords of steps of so many parts, (nodes, m) each."""
+        chords = Chords.through(np.arange(0, len(nodes), parts), nodes)
+        kappa = self.coefficient.reshape(len(self.coefficient), -1)
         if self.sigma is None:
             assert self.load is not None
-            off = _off_chords(self.load.values(nodes)[:, None], nodes, parts)
+            off = chords.deviations(self.load.values(nodes)[:, None])
             value, margin = off * kappa[:, 0].real, np.abs(off) * self.spread[0]
             return value - margin, value + margin
-        sigma, shape = self.sigma.ravel(), ((len(nodes) - 1) // parts, parts)
-        low, high = np.full((2, *shape, len(kappa)), np.inf)
+        sigma = self.sigma.ravel()
+        low, high = np.full((2, len(nodes), len(kappa)), np.inf)
         # largest over the grid: of the parts of G = σ^order ρ off the chord, |G″|, rounding
-        real, imag, second, rounding = np.zeros((4, *shape))
-        for points in np.array_split(np.arange(len(sigma)), _batches(len(nodes), len(sigma))):
+        real, imag, second, rounding = largest = np.zeros((4, len(nodes)))
+        for points in _batches(len(nodes), len(sigma)):
             rho, error = responses_of(sigma[points], self.load, nodes)
-            error += (order + 16) * UNIT_ROUNDOFF * np.abs(rho[0])
-            error = 2 * np.abs(sigma[points]) ** order * error
-            rounding = np.maximum(rounding, _with_ends(error.max(-1), parts))
-            G, _, G2 = with_power(sigma[points], _off_chords(rho, nodes, parts), order)
-            real = np.maximum(real, np.abs(G.real).max(-1))
-            imag = np.maximum(imag, np.abs(G.imag).max(-1))
-            second = np.maximum(second, np.abs(G2).max(-1))
+            error = _error_with_power(sigma[points], rho[0], error, self.order)
+            G, _, G2 = with_power(sigma[points], chords.deviations(rho), self.order)
+            _raise_to(largest, G.real, G.imag, G2, error)
             for o, x in enumerate(kappa[:, points]):
                 value = x.real * G.real - x.imag * G.imag
-                low[..., o] = np.minimum(low[..., o], value.min(-1))
-                high[..., o] = np.minimum(high[..., o], -value.max(-1))
+                low[:, o] = np.minimum(low[:, o], value.min(-1))
+                high[:, o] = np.minimum(high[:, o], -value.max(-1))
         # between the points of the grid G strays from what is bilinear by `missed`, κ G by what κ
-        # changes in a cell besides
-        between = _between_points(self.sigma)
-        missed = between * (second + between * self._fourth_off_chords(nodes[::parts])) + rounding
+        # changes in a cell besides, at most what it does along its sides: it is monotone along both
+        between, fourth = _between_points(self.sigma), self._fourth_off_chords(nodes[::parts])
+        missed = between * (second + between * np.append(np.repeat(fourth, parts), 0.0))
+        missed += 2 * chords.with_ends(rounding)
         axes = (np.diff(self.coefficient, axis=axis) for axis in (1, 2))
         change = sum(np.abs(x).max((1, 2), initial=0.0) for x in axes)
-        margin = np.multiply.outer(missed, np.abs(kappa).max(1))
-        margin += np.multiply.outer(np.hypot(real, imag), change)
-        margin += np.multiply.outer(real + missed, self.spread[0])
-        margin += np.multiply.outer(imag + missed, self.spread[1])
+        margin = np.outer(missed, np.abs(kappa).max(1)) + np.outer(np.hypot(real, imag), change)
+        margin += np.stack([real + missed, imag + missed], 1) @ self.spread
         return low - margin, margin - high
 
     def _fourth_off_chords(self, time: Array) -> Array:
-        """Bound of |G⁗| of what G = σ^order ρ is off chords in each step, (steps, 1)."""
+        """Bound of |G⁗| of what G = σ^order ρ is off chords in each step, (steps,)."""
         # It is h²/8 times that of G's second derivative by time, σ² G + σ^order (σ f + f′), of
         # which what is of f has no fourth derivative by σ; nor has what jumps of f add.
         assert self.sigma is not None
@@ -130,8 +125,34 @@ class Response(NamedTuple):
             terms = (comb(n, j) * h ** (n - j) * moments[j] for j in range(n + 1))
             moments[n] = sum(terms) + force * h ** (n + 1) / (n + 1)
         growth, fast = np.exp(max(-decay, 0.0) * h), float(np.abs(self.sigma).max())
-        fourth = fourth_derivative(self.order + 2, fast, growth * moments)
-        return (h**2 / 8 * fourth)[:, None]
+        return np.asarray(h**2 / 8 * fourth_derivative(self.order + 2, fast, growth * moments))
+
+
+class Chords(NamedTuple):
+    """Straight lines from node to node at N times, of which nodes are some, the ends too."""
+
+    before: Ints  # number of the time that is the node before or at it, (N,)
+    after: Ints  # the same of the node after it
+    fraction: Array  # place between the two, 0 at a node
+
+    @classmethod
+    def through(cls, node: Ints, times: Array) -> Chords:
+        """Chords through nodes, of which the numbers among the times are given."""
+        count = np.diff(node)
+        before = np.repeat(node, np.append(count, 1))
+        after = np.append(np.repeat(node[1:], count), node[-1])
+        length = np.maximum(times[after] - times[before], 1e-300)
+        return cls(before, after, (times - times[before]) / length)
+
+    def deviations(self, values: Array) -> Array:
+        """Values (…, N, S) less their chords."""
+        x = self.fraction[:, None]
+        chords = (1 - x) * values[..., self.before, :] + x * values[..., self.after, :]
+        return np.asarray(values - chords)
+
+    def with_ends(self, bound: Array) -> Array:
+        """Bounds (N,) for values, together with those for their chords."""
+        return np.asarray(bound + np.maximum(bound[self.before], bound[self.after]))
 
 
 def narrowed_straying(
@@ -164,31 +185,15 @@ def _off_and_straying(
 ) -> tuple[Array, Array]:
     """Bounds of Σ responses at added nodes off chords, and between these nodes, (steps, m) each."""
     inside = time[:-1, None] + np.diff(time)[:, None] * (np.arange(parts) / parts)
-    nodes, m = np.append(inside, time[-1]), len(responses[0].coefficient)
-    low, high, size = np.zeros((3, *inside.shape, m))
-    straying = np.zeros((len(nodes), m))
+    nodes, shape = np.append(inside, time[-1]), (*inside.shape, -1)
+    low, high, size, straying = np.zeros((4, len(nodes), len(responses[0].coefficient)))
     for response in responses:
         least, greatest = response.off_chords(nodes, parts)
         low, high = low + least, high + greatest
         size += np.maximum(np.abs(least), np.abs(greatest))
         straying += response.line_deviation(nodes)
     off = np.maximum(-low, high) + len(responses) * UNIT_ROUNDOFF * size
-    return off.max(1), straying[1:].reshape(*inside.shape, m).max(1)
-
-
-def _off_chords(values: Array, nodes: Array, parts: int) -> Array:
-    """Values (…, nodes, S) less the chords of steps of so many parts, (…, steps, parts, S)."""
-    ends, time = values[..., ::parts, None, :], nodes[::parts]
-    x = (nodes[:-1].reshape(-1, parts) - time[:-1, None]) / np.diff(time)[:, None]
-    inside = values[..., :-1, :].reshape(*values.shape[:-2], *x.shape, -1)
-    x = x[..., None]
-    return np.asarray(inside - (1 - x) * ends[..., :-1, :, :] - x * ends[..., 1:, :, :])
-
-
-def _with_ends(bound: Array, parts: int) -> Array:
-    """Bound at nodes (N,) and the greater one at the ends of their step, (steps, parts)."""
-    ends = bound[::parts]
-    return np.asarray(bound[:-1].reshape(-1, parts) + np.maximum(ends[1:], ends[:-1])[:, None])
+    return off[:-1].reshape(shape).max(1), straying[1:].reshape(shape).max(1)
 
 
 def responses_of(sigma: Array, load: History | None, time: Array) -> tuple[Array, Array]:
@@ -199,10 +204,8 @@ def responses_of(sigma: Array, load: History | None, time: Array) -> tuple[Array
     return rho, UNIT_ROUNDOFF * (4 + np.abs(sigma) * time[:, None]) * np.abs(rho[0])
 
 
-def moments_of(decay: float, load: History | None, time: Array, *, is_needed: bool = True) -> Array:
+def moments_of(decay: float, load: History | None, time: Array) -> Array:
     """Return bounds of ρ's derivatives by σ of order 0 to 4, (5, T); g is at least `decay`."""
-    if not is_needed:
-        return np.zeros((5, len(time)))
     if load is not None:
         return absolute_moments(decay, load, time)
     return np.stack([time**n * np.exp(-decay * time) for n in range(5)])
@@ -221,9 +224,10 @@ def _between_points(sigma: Array) -> float:
     return float(((1 + quotient.max() ** 2) * h**2 + (omega.max() * k_step) ** 2) / 8)
 
 
-def _batches(nodes: int, points: int) -> int:
-    """Numbers of batches into which points of σ are divided, so that their responses fit."""
-    return -(-3 * nodes * points // MAX_ENTRIES)
+def _batches(nodes: int, points: int) -> list[slice]:
+    """Batches of points of σ whose responses at the nodes fit."""
+    size = max(MAX_ENTRIES // (3 * nodes), 1)
+    return [slice(first, first + size) for first in range(0, points, size)]
 
 
 def line_deviations(
@@ -245,147 +249,94 @@ def line_deviations(
         is_force: Whether the load itself is added to the imaginary part of order 2.
         at_nodes: ρ with two derivatives, its rounding, bounds of its derivatives, where known.
     """
-    omega = sigma[0].imag
-    low, fast, decay = float(omega.min()), float(np.abs(sigma).max()), float(-sigma.real.max())
+    omega, fast, decay = sigma[0].imag, float(np.abs(sigma).max()), float(-sigma.real.max())
+    low = float(omega.min())
     pieces = _pieces(load, time, fast)
     times, d, node = pieces.time, np.diff(pieces.time), np.searchsorted(pieces.time, time)
     slope = (pieces.last - pieces.first) / d
-    # of each end of a piece: the nodes around it, and its place between them, 0 at a node
-    left = np.repeat(node, np.diff(node, append=node[-1] + 1))
-    right = np.append(np.repeat(node[1:], np.diff(node)), node[-1])
-    fraction = (times - times[left]) / np.maximum(times[right] - times[left], 1e-300)
+    chords = Chords.through(node, times)
     # how far the load lies off the line between nodes, before and after each end
     off_line = np.stack([np.append(0.0, pieces.last), np.append(pieces.first, 0.0)])
     off_line -= np.interp(times, time, load.values(time) if load else np.zeros(len(time)))
     off_line[0, 0] = off_line[1, -1] = 0.0
     tables = at_nodes if len(times) == len(time) else None
-    bounds = tables[2] if tables else moments_of(decay, load, times, is_needed=sigma.size > 1)
-    # for each order the largest magnitudes over the grid: of F = σ^order A and F″; rounding; of H,
-    # the responses off the line at ends, H″, Im H/ω, and that with the load before and after
+    bounds = tables[2] if tables else moments_of(decay, load, times)
+    # for each order the largest over the grid: of A exp(σ τ)'s F = σ^order A and F″; rounding; of
+    # H, σ^order ρ off chords: |H|, |H″|, |Im H/ω|, and that with the load before and after
     added = {order: off_line * (is_force and order == 2) for order in orders}
-    largest = {
-        order: (np.zeros((2, len(d))), np.zeros(len(times)), np.zeros((5, len(times))))
-        for order in orders
-    }
+    inside = chords.fraction > 0
+    amplitude, rounding, off = (
+        {order: np.zeros((count, n)) for order in orders}
+        for count, n in ((2, len(d)), (1, len(times)), (5, len(times)))
+    )
     for order in orders:
-        largest[order][2][3:] = np.where(fraction > 0, 0.0, np.abs(added[order]))
-    count = 1 if tables else _batches(len(times), sigma.size)
-    for part in np.array_split(sigma.ravel(), count):
-        rho, error = tables[:2] if tables else responses_of(part, load, times)
-        for order, (amplitude, rounding, off) in largest.items():
-            _raise_amplitudes(part, rho, error, pieces.first, slope, order, amplitude, rounding)
-            _raise_ends(part, rho, (left, right, fraction), added[order], order, off)
+        off[order][3:] = np.where(inside, 0.0, np.abs(added[order]))
+    for batch in _batches(len(times), sigma.size):
+        points = sigma.ravel()[batch]
+        rho, error = (
+            (x[..., batch] for x in tables[:2]) if tables else responses_of(points, load, times)
+        )
+        A = rho[:, :-1] if load is None else rho[:, :-1] + _of_line(points, pieces.first, slope)
+        for order in orders:
+            F, _, F2 = with_power(points, A, order)
+            _raise_to(amplitude[order], F, F2)
+            _raise_to(rounding[order], _error_with_power(points, rho[0], error, order))
+        off_chords = chords.deviations(rho) if inside.any() else rho[:0]
+        for order in orders if inside.any() else ():
+            H, _, H2 = with_power(points, off_chords, order)
+            read, (before, after) = H.imag / points.imag, added[order][..., None]
+            _raise_to(off[order], H, H2, read, read + before, read + after)
     # between the points of the grid F strays from what is bilinear by `between` |F″|
     h, between = float(np.diff(np.sort(omega)).max(initial=0.0)), _between_points(sigma)
-    growth, inside = np.exp(max(-decay, 0.0) * d), fraction > 0
+    growth = np.exp(max(-decay, 0.0) * d)
     found = dict[int, Array]()
-    for order, (amplitude, rounding, off) in largest.items():
+    for order in orders:
         fourth = fourth_derivative(order, fast, bounds)
         of_line = abs(prod(range(order - 4, order))) * np.abs(pieces.first) * low ** (order - 5)
         of_line += abs(prod(range(order - 5, order - 1))) * np.abs(slope) * low ** (order - 6)
-        size = amplitude[0] + between * (amplitude[1] + between * (fourth[:-1] + of_line))
+        first, second = amplitude[order]
+        size = first + between * (second + between * (fourth[:-1] + of_line))
         bent = growth * np.minimum((fast * d) ** 2 / 8, 2.0) * size
         bent += growth * fast**order * 2 * d * pieces.bend
-        chord = np.maximum(fourth[left], fourth[right])
-        missed = inside * between * (off[1] + between * (fourth + chord))
-        at_ends = off[[0, 3, 4]]
-        at_ends[0] += missed
-        at_ends[1:] += (missed + inside * h * off[2]) / low
-        error = np.max([rounding, rounding[left], rounding[right]], axis=0)
+        size_off, second, read, *with_load = off[order]
+        missed = inside * between * (second + between * chords.with_ends(fourth))
+        missed_read = (missed + inside * h * read) / low
+        (error,) = rounding[order]
+        error = np.maximum(error, chords.with_ends(error) - error)
         bent += 4 * np.maximum(error[:-1], error[1:])
         total = np.stack([bent, bent / low + added[order].any() * pieces.bend])
-        total[0] += np.maximum(at_ends[0, :-1], at_ends[0, 1:])
-        total[1] += np.maximum(at_ends[2, :-1], at_ends[1, 1:])
+        before, after = (x + missed_read for x in with_load)
+        total[0] += np.maximum((size_off + missed)[:-1], (size_off + missed)[1:])
+        total[1] += np.maximum(after[:-1], before[1:])
         found[order] = np.zeros((2, len(time)))
         found[order][:, 1:] = np.maximum.reduceat(total, node[:-1], axis=1)
     return found
 
 
-@compiled_fast
-def _raise_amplitudes(
-    sigma: Array,
-    rho: Array,
-    error: Array,
-    first: Array,
-    slope: Array,
-    order: int,
-    amplitude: Array,
-    rounding: Array,
-) -> None:
-    """Raise to the largest at S σ: |F|, |F″| of P pieces (2, P); σ^order ρ's rounding (P + 1,)."""
-    inverse, inverse_2 = 1 / sigma, 1 / sigma**2
-    inverse_3, inverse_4 = inverse * inverse_2, inverse_2 * inverse_2
-    power, size = sigma**order, np.abs(sigma) ** order
-    power_first, power_second = 2 * order * sigma ** max(order - 1, 0), order * (order - 1.0)
+def _of_line(sigma: Array, first: Array, slope: Array) -> Array:
+    """a/σ + b/σ² of P pieces, with its first two derivatives by σ, (3, P, S)."""
+    inverse = [1 / sigma, 1 / sigma**2, 1 / sigma**3, 1 / sigma**4]
+    a, b = (1, -1, 2), (1, -2, 6)
+    terms = [[a[k] * inverse[k], b[k] * inverse[k + 1]] for k in range(3)]
+    return np.asarray(np.stack([first, slope], 1) @ np.array(terms))
+
+
+def _error_with_power(sigma: Array, rho: Array, error: Array, order: int) -> Array:
+    """Bound of rounding of σ^order ρ, (T, S), from that of ρ."""
     relative = 2 * (order + 9) * UNIT_ROUNDOFF
-    for p in range(len(rounding)):
-        largest, largest_second, total, worst = 0.0, 0.0, 0.0, rounding[p]
-        a, b = (first[p], slope[p]) if p < len(first) else (0.0, 0.0)
-        for s in range(len(sigma)):
-            r = rho[0, p, s]
-            worst = max(worst, size[s] * (error[p, s] + relative * np.sqrt(r.real**2 + r.imag**2)))
-            A = r + a * inverse[s] + b * inverse_2[s]
-            A1 = rho[1, p, s] - a * inverse_2[s] - 2 * b * inverse_3[s]
-            A2 = rho[2, p, s] + 2 * a * inverse_3[s] + 6 * b * inverse_4[s]
-            F = power[s] * A
-            F2 = power_second * A + power_first[s] * A1 + power[s] * A2
-            square, square_second = F.real**2 + F.imag**2, F2.real**2 + F2.imag**2
-            largest, largest_second = max(largest, square), max(largest_second, square_second)
-            total += abs(F.real) + abs(F.imag) + abs(F2.real) + abs(F2.imag)
-        if not total < np.inf:  # NaN, which a maximum may pass over
-            largest = largest_second = worst = np.inf
-        rounding[p] = worst
-        if p < len(first):
-            underflow = 1e-150 if total > 0 else 0.0  # squares of less may be zero
-            amplitude[0, p] = max(amplitude[0, p], np.sqrt(largest) + underflow)
-            amplitude[1, p] = max(amplitude[1, p], np.sqrt(largest_second) + underflow)
+    return np.asarray(np.abs(sigma) ** order * (error + relative * np.abs(rho)))
 
 
-@compiled_fast
-def _raise_ends(
-    sigma: Array,
-    rho: Array,
-    around: tuple[Ints, Ints, Array],
-    added: Array,
-    order: int,
-    off: Array,
-) -> None:
-    """Raise to the largest at S σ of ends between nodes: |H|, |H″|, |Im H/ω|, with load (5, P + 1).
-
-    H is σ^order ρ less the line through it at the nodes around an end; `added` is the load, off
-    its own line, before and after the end, shape (2, P + 1).
-    """
-    left, right, fraction = around
-    power = sigma**order
-    power_first, power_second = order * sigma ** max(order - 1, 0), order * (order - 1.0)
-    for p in range(len(fraction)):
-        x, i, j = fraction[p], left[p], right[p]
-        if x == 0:
-            continue
-        largest, largest_second, total = 0.0, 0.0, 0.0
-        for s in range(len(sigma)):
-            r, r1, r2 = rho[0, p, s], rho[1, p, s], rho[2, p, s]
-            r -= (1 - x) * rho[0, i, s] + x * rho[0, j, s]
-            r1 -= (1 - x) * rho[1, i, s] + x * rho[1, j, s]
-            r2 -= (1 - x) * rho[2, i, s] + x * rho[2, j, s]
-            H = power[s] * r
-            H2 = power_second * r + 2 * power_first[s] * r1 + power[s] * r2
-            read = H.imag / sigma[s].imag
-            largest = max(largest, H.real**2 + H.imag**2)
-            largest_second = max(largest_second, H2.real**2 + H2.imag**2)
-            off[2, p] = max(off[2, p], abs(read))
-            off[3, p] = max(off[3, p], abs(read + added[0, p]))
-            off[4, p] = max(off[4, p], abs(read + added[1, p]))
-            total += abs(H.real) + abs(H.imag) + abs(H2.real) + abs(H2.imag)
-        if not total < np.inf:  # NaN, which a maximum may pass over
-            largest = largest_second = off[2, p] = off[3, p] = off[4, p] = np.inf
-        underflow = 1e-150 if total > 0 else 0.0  # squares of less may be zero
-        off[0, p] = max(off[0, p], np.sqrt(largest) + underflow)
-        off[1, p] = max(off[1, p], np.sqrt(largest_second) + underflow)
+def _raise_to(largest: Array, *values: Array) -> None:
+    """Raise rows (T,) to the largest magnitude of each of the values (T, S)."""
+    for row, value in enumerate(values):
+        largest[row] = np.maximum(largest[row], np.abs(value).max(-1))
 
 
 def with_power(sigma: Array, rho: Array, order: int) -> Array:
     """σ^order ρ and its first two derivatives by σ, shape (3, T, S), from those of ρ."""
+    if not order:
+        return rho
     power, first = sigma**order, order * sigma ** max(order - 1, 0)
     second = order * (order - 1) * rho[0] + 2 * first * rho[1] + power * rho[2]
     return np.stack([power * rho[0], first * rho[0] + power * rho[1], second])

@@ -54,10 +54,12 @@ def test_modes_that_cancel_stray_as_far_as_stated(load, width, rng):
         assert bound.max() <= min(2.5 * reached, by_magnitude.max())
 
 
-@pytest.mark.parametrize("spread", [(0.0, 0.0), (0.01, 0.0), (0.0, 0.01)])
+@pytest.mark.parametrize(
+    ("spread", "fall"), [((0, 0), 0), ((0, 0), 1), ((0.01, 0), 0), ((0, 0.01), 0)]
+)
 @pytest.mark.parametrize("load", LOADS)
-def test_values_off_chords_lie_in_their_ranges(load, spread, rng):
-    """Over a coarse grid, or of κ that is off by `spread` at one point."""
+def test_values_off_chords_lie_in_their_ranges(load, spread, fall, rng):
+    """Over a coarse grid, near whose end κ may `fall`, or of κ that is off at one point."""
     order, parts, kappa, is_coarse = int(rng.integers(3)), 4, 0.3 + 1j, not any(spread)
     w, q = rng.uniform(9, 15) * np.array([1, 1.2]), rng.uniform(0, 0.05) * np.array([1, 3])
     if not is_coarse:
@@ -65,15 +67,17 @@ def test_values_off_chords_lie_in_their_ranges(load, spread, rng):
     nodes = np.linspace(TIME[0], TIME[-1], parts * (len(TIME) - 1) + 1)
     sigma = grid_over(tuple(w), tuple(q), (2, 2)).sigma
     off = np.array(spread)[:, None]
-    response = Response(sigma, LOADS[load], order, np.full((1, 2, 2), kappa), off)
+    corners = np.full((1, 2, 2), kappa) * [1, 1 - fall]
+    response = Response(sigma, LOADS[load], order, corners, off)
     low, high = (x.ravel() for x in response.off_chords(nodes, parts))
     shares = np.linspace(0, 1, 9)
     at = ((-(q[0] + np.ptp(q) * shares[:, None]) + 1j) * (w[0] + np.ptp(w) * shares)).ravel()
+    kappa = np.tile(kappa * (1 - fall * shares**20), 9)
     rho = np.exp(at * nodes[:, None])
     if LOADS[load] is not None:
         rho = responses_at_nodes(at, LOADS[load], nodes, 0)[0][0]
     G = at**order * rho
-    G = (G - np.array([np.interp(nodes, TIME, x) for x in G[::parts].T]).T)[:-1]
+    G -= np.array([np.interp(nodes, TIME, x) for x in G[::parts].T]).T
     more = off[0] * np.abs(G.real) + off[1] * np.abs(G.imag)
     assert (low <= ((kappa * G).real - more).min(1) + 1e-15).all()
     assert (high >= ((kappa * G).real + more).max(1) - 1e-15).all()
