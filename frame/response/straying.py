@@ -117,9 +117,8 @@ class Response(NamedTuple):
         # which what is of f has no fourth derivative by σ; nor has what jumps of f add.
         assert self.sigma is not None
         decay, h = float(-self.sigma.real.max()), np.diff(time)
-        moments = moments_of(decay, self.load, time)[
-            :, :-1
-        ]  # then within the step that begins there
+        moments = moments_of(decay, self.load, time)[:, :-1]
+        # then within the step that begins there
         force = self.load.extremes[0] if self.load else 0.0
         for n in reversed(range(5)):
             terms = (comb(n, j) * h ** (n - j) * moments[j] for j in range(n + 1))
