@@ -34,8 +34,10 @@ PRUNING_CELLS, PRUNING_STEPS = 24, 40
 """Most cells of a bound over an end of an input's range, and evaluations of D for each."""
 LEAST_PEAK_BISECTIONS = 48
 """Most bisections of cells; three times as many raise the bounds of six storeys by 2 %."""
-LEAST_PEAK_NODES, LEAST_PEAK_STEPS = 6, 80
-"""Nodes that are tried in a cell, and evaluations of D for each."""
+LEAST_PEAK_NODES, LEAST_PEAK_STEPS, LEAST_PEAK_PATIENCE = 4, 30, 5
+"""Nodes that are tried in a cell, evaluations of D for each, and steps without a third of the
+expected fall: multipliers begin at those of a cell before, so twice as many raise bounds by .3 %.
+"""
 LEAST_PEAK_DESCENTS = 3
 """Steps of the descent over corners to a motion that peaks low."""
 PEAK_CELLS, PEAK_STEPS = 240, 40

@@ -49,11 +49,12 @@ def least_peak(level: LevelModels, output: int) -> tuple[float, Array]:
     data = sides[0].data
     motion = np.einsum("ks,kstp->ktp", data.share, data.table)  # of each mode at its points
     motion = motion.reshape(*motion.shape[:2], -1, int(data.points[0]))  # along q, along ω
-    cells = [_bounded_cell(sides, motion, data.ends.astype(np.intp), 0, 0.0)]
+    multipliers = dict[int, Array]()  # multipliers by node, at which bounds of further cells begin
+    cells = [_bounded_cell(sides, motion, data.ends.astype(np.intp), 0, 0.0, multipliers)]
     for number in range(1, 2 * int(numbers.LEAST_PEAK_BISECTIONS), 2):
         lowest = cells[0]
         halves = [
-            _bounded_cell(sides, motion, ends, number + k, lowest.bound)
+            _bounded_cell(sides, motion, ends, number + k, lowest.bound, multipliers)
             for k, ends in enumerate(_halves(lowest, motion))
         ]
         if not halves:
@@ -64,29 +65,39 @@ def least_peak(level: LevelModels, output: int) -> tuple[float, Array]:
 
 
 def _bounded_cell(
-    sides: list[OutputBounds], motion: Array, ends: Ints, number: int, known: float
+    sides: list[OutputBounds],
+    motion: Array,
+    ends: Ints,
+    number: int,
+    outer_bound: float,
+    multipliers: dict[int, Array],
 ) -> PeakCell:
-    """Cell with the largest dual bound of nodes where its middle's motion peaks, or `known`."""
+    """Cell with the largest dual bound of nodes where its middle's motion peaks.
+
+    It is the bound of a cell around it at least; `multipliers` (Z,) by node are improved.
+    """
     omega, q = ends[:, :2].sum(1) // 2, ends[:, 2:].sum(1) // 2  # points in the middle
     expected: Array = motion[np.arange(len(motion)), :, q, omega].sum(0)
     size = np.abs(expected)
     is_peak = np.append(True, size[1:] >= size[:-1]) & np.append(size[:-1] >= size[1:], True)
-    nodes = np.argsort(np.where(is_peak, size, -1.0))[-int(numbers.LEAST_PEAK_NODES) :][::-1]
+    peaks = np.flatnonzero(is_peak)
+    nodes = peaks[np.argsort(size[peaks])[-int(numbers.LEAST_PEAK_NODES) :][::-1]]
     highest, highest_node, at = -np.inf, int(nodes[0]), np.zeros(sides[0].at.shape[1])
     for node in map(int, nodes):
         if size[node] <= highest:
             break
         bounds = sides[int(expected[node] < 0)]  # where the output is positive, of −output
-        mu, weight = np.zeros((2, len(bounds.data.linear)))
+        mu = multipliers.setdefault(node, np.zeros(len(bounds.data.linear)))
+        weight = np.zeros_like(mu)
         u, steps = np.zeros_like(at), int(numbers.LEAST_PEAK_STEPS)
         dual = minimise(
-            *(mu, ends, node, bounds.side, bounds.data, steps, int(numbers.PATIENCE)),
+            *(mu, ends, node, bounds.side, bounds.data, steps, int(numbers.LEAST_PEAK_PATIENCE)),
             *(-1e300, -size[node], weight, u),
         )
         least = -(dual + float(bounds.constant[:, node].sum()))
         if least > highest:
             highest, highest_node, at = least, node, u
-    return PeakCell(max(highest, known), number, ends, highest_node, at)
+    return PeakCell(max(highest, outer_bound), number, ends, highest_node, at)
 
 
 def _halves(cell: PeakCell, motion: Array) -> list[Ints]:

@@ -47,6 +47,7 @@ class ResponseTables:
 
     Args:
         value: For each order responses, shape (K, sources, T, Q W).
+        largest: Their largest magnitudes, shape (K, sources).
         error: Bounds of what interpolation and round-off miss, shape (K, sources, T).
         line_deviation: Bounds of their distance from straight lines between nodes, the same.
         grids: For each mode its points.
@@ -54,6 +55,7 @@ class ResponseTables:
     """
 
     value: dict[int, Array]
+    largest: dict[int, Array]
     error: dict[int, Array]
     line_deviation: dict[int, Array]
     grids: list[Grid]
@@ -80,14 +82,16 @@ def response_tables(
             found[order].append([tables.responses(source, order) for source in sources])
     # of the sums that the responses enter
     rounding = 2 * gamma(roundings(len(grids), len(sources), oscillators[0].omega.inputs))
-    value, error, deviation = dict[int, Array](), dict[int, Array](), dict[int, Array]()
+    value, largest = dict[int, Array](), dict[int, Array]()
+    error, deviation = dict[int, Array](), dict[int, Array]()
     for order, modes in found.items():
         value[order] = np.array([[x.value.reshape(len(time), -1) for x in mode] for mode in modes])
         error[order] = np.array([[x.error for x in mode] for mode in modes])
-        error[order] += rounding * np.abs(value[order]).max(-1)
+        sizes = np.abs(value[order]).max(-1)
+        largest[order], error[order] = sizes.max(-1), error[order] + rounding * sizes
         deviation[order] = np.array([[x.line_deviation for x in mode] for mode in modes])
-        require_in_range({"table": value[order]})
-    return ResponseTables(value, error, deviation, grids, time)
+        require_in_range({"table": largest[order]})
+    return ResponseTables(value, largest, error, deviation, grids, time)
 
 
 def _points(oscillators: Sequence[Oscillator], duration: float) -> tuple[int, int]:
@@ -288,7 +292,7 @@ def _data(level: LevelModels, o: int, side: float) -> tuple[Data, Array]:
     second = np.array([[grid.omega[1], grid.quotient[1]] for grid in grids])
     ends = [mode.places(grid) for mode, grid in zip(modes, grids, strict=True)]
     sizes = [np.abs(mode.share.value[:, o]) for mode in modes]
-    responses = float(np.einsum("ks,ks->", sizes, np.abs(value).max((2, 3))))
+    responses = float((np.array(sizes) * level.tables.largest[order]).sum())
     truncated_terms, constant = _truncation_terms(level, o, side)
     data = Data(
         table=value,
