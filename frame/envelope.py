@@ -70,7 +70,8 @@ class Envelope(Bounds):
             unit = f" {self.units[k]}" if self.units else ""
             proved = rounded(float(bounds[k].max()), "upper", Nature.GUARANTEED)
             inner = rounded(float(reached[k].max()), "upper", Nature.ATTAINED)
-            words.append(f"{name}: proved {proved:.4g}{unit}, reached {inner:.4g}{unit}")
+            bound = f"proved {proved:.4g}{unit}, " if np.isfinite(proved) else ""
+            words.append(f"{name}: {bound}reached {inner:.4g}{unit}")
         return "; ".join(words)
 
     def to_dataset(self) -> xarray.Dataset:

@@ -177,7 +177,8 @@ class FragilitySection(QuestionSection):
         is_free = linear is not None and not linear.loads and is_elastic
         is_at_rest = not any(np.any(getattr(linear, start, 0)) for start in ("q0", "v0"))
         allowed = "linear structures that start at rest, without forces: they scale with records"
-        require(is_free and is_at_rest, "fragility", "of another motion", allowed)
+        value = "of another motion" if is_elastic else "of columns that yield"
+        require(is_free and is_at_rest, "fragility", value, allowed)
         for limit in self.limits:
             fits = limit.sign * limit.value > 0 and limit.side != "mean"
             allowed = "limits of each record that the structure at rest keeps"

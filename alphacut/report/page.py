@@ -179,7 +179,7 @@ class Page:
         studies, frame = self.summary.envelopes, self.summary.structure
         if studies and frame is not None:
             periods = ", ".join(f"{2 * math.pi / omega:.3g}" for omega in frame.omega_rad_per_s[:4])
-            yield f"Linear elastic, with natural periods of {periods} s."
+            yield f"Natural periods of linear elastic motion: {periods} s."
         for name, study in studies.items():
             yield f"{name}: {study.method}, fuzzy {', '.join(study.fuzzy)}"
         for nature in dict.fromkeys(study.nature for study in studies.values()):

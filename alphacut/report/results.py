@@ -217,7 +217,7 @@ def display_units(
         yield f"{name}, g", 1 / float(STANDARD_GRAVITY)
         return
     factor, prefixed = axis_prefix(max(abs(float(peak.lower[0])), abs(float(peak.upper[0]))), unit)
-    yield f"{name}, {prefixed}", factor
+    yield f"{name}, {prefixed}" if prefixed else name, factor
     height = None if frame is None else frame.heights_m.get(output_of(name))
     if height is not None:
         yield "  % of storey", 100 / height

@@ -138,7 +138,7 @@ class YieldingFlow(Flow):
     ) -> None:
         """Refuse a motion that collapses, whose events do not end or whose energy is missing."""
         if status == COLLAPSED:
-            value = f"collapses under its weight at t = {time:.6g} s at {self._point_words(point)}"
+            value = f"collapsing under its weight at t = {time:.6g} s at {self._point_words(point)}"
             allowed = "hardening times stiffness above weight over height where it yields"
             cure = "take more hardening, a larger yield force or a weaker load"
             raise RefusedError(f"storey {storey + 1}", value, allowed, cure)
@@ -311,7 +311,9 @@ def _first_event(
             for side in (-1.0, 1.0):
                 for term in range(terms):
                     margin[term] = -side * drifts[z, term]
-                margin[0] = yield_drift[z] * (1 + EVENT_ROUNDING) - side * stretch
+                # a drift far above the yield drift rounds more than that: after a reversal no event
+                rounding = EVENT_ROUNDING * yield_drift[z] + 4.5e-16 * abs(drifts[z, 0])
+                margin[0] = yield_drift[z] + rounding - side * stretch
                 at = min(at, _first_root(margin, terms, at))
         if at < first:
             first, storey = at, z
