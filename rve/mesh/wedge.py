@@ -18,6 +18,8 @@ from alphacut.rve.fenicsx import basix
 SLICES_PER_LAYER = 3  # Gauss points along θ
 POINTS_PER_SLICE = 6  # quadrature points of each slice of a wedge
 PRISM = basix.CellType.prism
+TRIANGLE_NODES = [0, 1, 2, 6, 7, 9]
+"""Nodes of a wedge on its base: the vertices, the midpoints of edges (0, 1), (0, 2), (1, 2)."""
 
 
 def _span(points: Array) -> Array:

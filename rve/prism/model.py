@@ -17,7 +17,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from time import perf_counter
-from typing import Any, ClassVar, TypeVar
+from typing import ClassVar, TypeVar
 
 import numpy as np
 
@@ -59,6 +59,21 @@ AnyProblem = TypeVar("AnyProblem", PrismProblem, SliceProblem)
 
 SERIES_ACCURACY = 1e-9  # relative, of a reference by the series
 SLICES_POINTS = 14  # nodes in θ of a reference by slices
+
+
+@lru_cache(maxsize=2)
+def cached_grid(
+    size: float, radius: float, outline: Outline, refinement: float, layers: int, *, parallel: bool
+) -> PrismGrid:
+    """Prisms for any map with this reference radius; see `extrude`."""
+    return extrude(
+        size=size,
+        radius=radius,
+        layers=layers,
+        outline=outline,
+        refinement=refinement,
+        comm=MPI.COMM_WORLD if parallel else MPI.COMM_SELF,
+    )
 
 
 @dataclass(frozen=True)
@@ -159,12 +174,15 @@ class PrismModel:
         """As `problem`, by slices."""
         return self._moved(radius_map, cached_slices)
 
-    def _moved(self, radius_map: RadiusMap, cached: Callable[..., AnyProblem]) -> AnyProblem:
+    def _moved(
+        self, radius_map: RadiusMap, cached: Callable[[PrismGrid], AnyProblem]
+    ) -> AnyProblem:
         """Problem on the mesh of a map's reference radius, with its nodes moved to the map."""
         radius = reference_radius(radius_map, self.outline)
 
         def on_mesh(refinement: float) -> AnyProblem:
-            problem = cached(self.mesh_size, radius, self.outline, refinement, self.layers)
+            mesh = self.mesh_size, radius, self.outline, refinement, self.layers
+            problem = cached(cached_grid(*mesh, parallel=self.parallel))
             problem.move(radius_map)
             return problem
 
@@ -300,28 +318,9 @@ def _mean_moduli(curve: StressCurve) -> Array:
 
 
 @lru_cache(maxsize=2)
-def cached_grid(
-    size: float, radius: float, outline: Outline, refinement: float, layers: int, parallel: bool
-) -> PrismGrid:
-    """Prisms for any map with this reference radius; see `extrude`."""
-    return extrude(
-        size=size,
-        radius=radius,
-        layers=layers,
-        outline=outline,
-        refinement=refinement,
-        comm=MPI.COMM_WORLD if parallel else MPI.COMM_SELF,
-    )
-
-
-@lru_cache(maxsize=2)
-def cached_problem(*mesh: Any, parallel: bool) -> PrismProblem:
+def cached_problem(grid: PrismGrid, *, parallel: bool) -> PrismProblem:
     """Mesh, form and numbering on a grid of `cached_grid`."""
-    comm = MPI.COMM_WORLD if parallel else MPI.COMM_SELF
-    return PrismProblem(cached_grid(*mesh, parallel), comm)
+    return PrismProblem(grid, MPI.COMM_WORLD if parallel else MPI.COMM_SELF)
 
 
-@lru_cache(maxsize=2)
-def cached_slices(*mesh: Any) -> SliceProblem:
-    """The same on one rank, by slices."""
-    return SliceProblem(cached_grid(*mesh, False))
+cached_slices = lru_cache(maxsize=2)(SliceProblem)

@@ -66,9 +66,10 @@ def modulus_basis(
     `strains` macroscopic ones, shape (loads, 3).
     """
     low, high = ends
-    phases = list(enumerate([matrix.stiffness, Phase(high, poisson).stiffness]))
-    parts = [problem.entries(k, stiffness) for k, stiffness in phases]
-    forces = np.array([problem.forces(k, stiffness, strains) for k, stiffness in phases])
+    nothing, particle = np.zeros((3, 3)), Phase(high, poisson).stiffness
+    phases = [(matrix.stiffness, nothing), (nothing, particle)]
+    parts = [problem.entries(stiffness) for stiffness in phases]
+    forces = np.array([problem.forces(stiffness, strains) for stiffness in phases])
     factors = [(low + node * (high - low)) / high for node in _CHEBYSHEV]
     systems = [parts[0] + factor * parts[1] for factor in factors]
     operators = [problem.operator(system) for system in systems]

@@ -25,6 +25,7 @@ from alphacut.rve.mesh.gmsh_prisms import NAMES
 from alphacut.rve.mesh.prism_grid import FixedCell, LevelFunction, LevelSet, PrismGrid
 from alphacut.rve.mesh.square import REFINEMENTS
 from alphacut.rve.prism.model import (
+    cached_grid,
     cached_problem,
     prism_result,
     require_prisms,
@@ -172,7 +173,8 @@ class LevelSetModel(_NamedModel):
             raise RefusedError("law of θ", type(law).__name__, "a law, as TruncatedNormal(-3, 3)")
         named = in_order_of(NAMES, phases)
         mesh = (self.mesh_size, 0.0, circle, REFINEMENTS[0], self.layers)
-        problem = cached_problem(*mesh, parallel=self.parallel)
+        grid = cached_grid(*mesh, parallel=self.parallel)
+        problem = cached_problem(grid, parallel=self.parallel)
         problem.move(LevelSet(cast("ThetaLaw", law), self.z))
         return problem, named
 

@@ -16,8 +16,6 @@ have one pattern, found once for a mesh; a map moves the nodes alone.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import reduce
-from operator import iadd
 
 import numpy as np
 import scipy.sparse as sp
@@ -26,7 +24,14 @@ from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.rve.cell.cell import AREA
 from alphacut.rve.fenicsx import MPI
 from alphacut.rve.mesh.prism_grid import PrismGrid
-from alphacut.rve.mesh.wedge import POINTS_PER_SLICE, SLICES_PER_LAYER, prism_rule, slice_weights
+from alphacut.rve.mesh.wedge import (
+    POINTS_PER_SLICE,
+    SLICES_PER_LAYER,
+    TRIANGLE_NODES,
+    prism_rule,
+    slice_weights,
+    wedge,
+)
 from alphacut.rve.prism.problem import SliceStrains, positive_density, require_valid_elements
 from alphacut.rve.solver.form import strain_products
 from alphacut.rve.solver.krylov import DEFAULTS
@@ -38,7 +43,6 @@ from alphacut.stochastic.theta.quadrature import level_rule
 
 VOIGT = np.array([[0, 2], [2, 1]])  # index [c, α] of the strain that ∂_α u_c adds to
 RTOL = float(DEFAULTS["ksp_rtol"])
-EDGES = ((0, 1), (0, 2), (1, 2))  # of a triangle, by their vertices
 
 
 def is_homogeneous(stiffness: Sequence[Array]) -> bool:
@@ -58,10 +62,7 @@ def solve_sample(
     Raises:
         ConvergenceError: The tolerance of the residual, relative to the load, was not reached.
     """
-    phases = list(enumerate(stiffness))
-    # added in place: of fine meshes the entries take hundreds of MB
-    entries = reduce(iadd, (problem.entries(k, matrix) for k, matrix in phases))
-    loads = reduce(iadd, (problem.forces(k, matrix, strains) for k, matrix in phases))
+    entries, loads = problem.entries(stiffness), problem.forces(stiffness, strains)
     if is_homogeneous(stiffness):  # without fluctuation
         loads[:] = 0.0
     operator = problem.operator(entries)
@@ -89,39 +90,34 @@ class SliceProblem:
 
     def __init__(self, grid: PrismGrid) -> None:
         self.grid, self.numbering = grid, LevelNumbering(grid, MPI.COMM_SELF)
-        points, weights = prism_rule()
+        points = prism_rule()[0]
         zeta = points[::POINTS_PER_SLICE, 2]
-        self._line_weights = 2 * weights.reshape(SLICES_PER_LAYER, -1).sum(axis=1)
         self._shapes = np.array([1 - zeta, zeta, 4 * zeta * (1 - zeta)])  # of both hats, the bubble
-        self._slopes = _slopes(points[:POINTS_PER_SLICE, :2])
-        phases, periodicity = grid.phase[: len(grid.plane.triangles)], self.numbering.periodicity
-        self._phase = [np.flatnonzero(phases == k) for k in range(len(grid.names))]
+        self._prism_slopes = np.array(wedge(1).tabulate(1, points))[1:3].reshape(2, -1, 15)
+        on_base = np.array(wedge(1).tabulate(1, points[:POINTS_PER_SLICE] * [1, 1, 0]))[1:3]
+        slopes = on_base.reshape(2, POINTS_PER_SLICE, 15)[..., TRIANGLE_NODES]
+        self._slopes = slopes.swapaxes(1, 2)  # ∂N_i/∂ξ_β of a six-node triangle, [β, i, point]
+        periodicity, phase = self.numbering.periodicity, grid.phase[: len(grid.plane.triangles)]
+        self._phase = [np.flatnonzero(phase == k) for k in range(len(grid.names))]
         self._unknown = periodicity.unknown[grid.plane.triangles]  # pairs, (triangles, 6)
-        self._find_pattern(periodicity.count)
+        self._find_pattern(phase, periodicity.count)
         self.solver: LevelSolver = LevelSolver(self.numbering, self._indptr, self._indices)
 
-    def _find_pattern(self, count: int) -> None:
-        """Pattern of node pairs, and matrices that sum what stands in triangles into it."""
-        unknown, shape = self._unknown, (*self._unknown.shape, 6)
-        row, column = (np.broadcast_to(x, shape) for x in (unknown[..., None], unknown[:, None]))
-        is_free, numbers = (row >= 0) & (column >= 0), np.arange(row.size * 4).reshape(-1, 12, 12)
-        keys = np.unique((row * count + column)[is_free])
+    def _find_pattern(self, phase: Ints, count: int) -> None:
+        """Pattern of node pairs, and matrices that sum, by phase, what stands in triangles."""
+        unknown, phases = self._unknown, len(self._phase)
+        row, column = unknown[:, :, None], unknown[:, None]
+        is_free = (row >= 0) & (column >= 0)
+        keys, pair = np.unique((row * count + column)[is_free], return_inverse=True)
         self._indptr = np.searchsorted(keys, np.arange(count + 1) * count)
         self._indices = keys % count
-        self._to_pattern, self._to_nodes = [], []
-        for triangles in self._phase:
-            chosen = np.zeros(shape, bool)
-            chosen[triangles] = True
-            chosen &= is_free
-            pair = np.searchsorted(keys, (row * count + column)[chosen])
-            # entries [iα, jβ] of a triangle's matrix, (12, 12)
-            entries = numbers.reshape(-1, 6, 2, 6, 2).swapaxes(2, 3)[chosen].reshape(-1, 4)
-            places = 4 * pair[:, None] + np.arange(4)
-            self._to_pattern.append(_summation(places, entries, 4 * len(keys), numbers.size))
-            i, free = 12 * triangles[:, None] + 2 * np.arange(6), unknown[triangles] >= 0
-            places = 2 * unknown[triangles][free][:, None] + np.arange(2)
-            entries = i[free][:, None] + np.arange(2)
-            self._to_nodes.append(_summation(places, entries, 2 * count, 12 * len(unknown)))
+        places = pair * phases + np.broadcast_to(phase[:, None, None], is_free.shape)[is_free]
+        # entries [iα, jβ] of a triangle's matrix, (12, 12)
+        entries = np.arange(4 * is_free.size).reshape(-1, 6, 2, 6, 2).swapaxes(2, 3)
+        self._to_pairs = _summation(places, entries[is_free], len(keys) * phases, entries.size)
+        is_free, entries = unknown >= 0, np.arange(2 * unknown.size).reshape(-1, 6, 2)
+        places = (unknown * phases + phase[:, None])[is_free]
+        self._to_nodes = _summation(places, entries[is_free], count * phases, entries.size)
 
     def move(self, radius_map: RadiusMap) -> None:
         """Move the nodes to a map, and integrate over the slices what no stiffness changes.
@@ -133,67 +129,47 @@ class SliceProblem:
         grid, law, self.map = self.grid, radius_map.distribution, radius_map
         levels = grid.level_thetas(law)
         self._rule = level_rule(law, levels, points=SLICES_PER_LAYER)
-        density = positive_density(law, self._rule.nodes)
+        positive_density(law, self._rule.nodes)
         self._mass = theta_mass(law, levels)
-        nodes = self._slice_nodes(grid.positions(radius_map)[:, :2])
-        determinants, gradients = self._gradients_of(nodes[:, grid.plane.triangles])
-        self._gradients, self._areas = gradients, determinants * slice_weights()[0]
-        by_layer = self._areas.reshape(grid.layers, SLICES_PER_LAYER, -1, POINTS_PER_SLICE)
-        prisms = by_layer.swapaxes(1, 2).reshape(-1, SLICES_PER_LAYER, POINTS_PER_SLICE)
-        require_valid_elements(grid, prisms)
-        masses = (np.diff(levels)[:, None] * self._line_weights).ravel() * density  # f_Θ dθ
-        weights = self._areas * masses[:, None, None]
-        self._products, self._sums = (
-            [np.empty((len(masses), matrix.shape[0])) for matrix in by_phase]
-            for by_phase in (self._to_pattern, self._to_nodes)
-        )
-        for k in range(len(masses)):  # one slice after another, which takes less memory
-            weighted = gradients[k] * weights[k][:, None]
-            products = weighted @ gradients[k].swapaxes(-1, -2)  # ∫ f_Θ ∂_α N_i ∂_β N_j: [iα, jβ]
-            sums = weighted.sum(axis=-1)  # ∫ f_Θ ∂_α N_i
-            for phase in range(len(self._phase)):
-                self._products[phase][k] = self._to_pattern[phase] @ products.ravel()
-                self._sums[phase][k] = self._to_nodes[phase] @ sums.ravel()
+        self._set_jacobian(grid.positions(radius_map)[:, :2])
+        slices = len(self._areas)
+        self._products = np.empty((slices, self._to_pairs.shape[0]))
+        self._sums = np.empty((slices, self._to_nodes.shape[0]))
+        for s, weight in enumerate(self._rule.weights):  # in turn, which takes less memory
+            x, y = self._inverse[:, :, s, :, None]
+            gradients = x * self._slopes[0] + y * self._slopes[1]  # ∂_α N_i
+            gradients = gradients.transpose(1, 2, 0, 3).reshape(len(self._unknown), 12, -1)
+            weighted = weight * self._areas[s][:, None] * gradients
+            products = weighted @ gradients.swapaxes(-1, -2)  # ∫ f_Θ ∂_α N_i ∂_β N_j: [iα, jβ]
+            self._products[s] = self._to_pairs @ products.ravel()
+            self._sums[s] = self._to_nodes @ weighted.sum(axis=-1).ravel()  # ∫ f_Θ ∂_α N_i
 
-    def _slice_nodes(self, positions: Array) -> Array:
-        """Positions of the plane nodes on the slices, (slices, nodes, 2), of those of the grid."""
-        plane, layers = self.grid.plane, self.grid.layers
-        on_levels, on_mid_levels = np.split(positions, [(layers + 1) * len(plane.points)])
-        hats = on_levels.reshape(layers + 1, -1, 2)
-        means = (hats[:-1] + hats[1:])[:, : plane.vertices] / 2
-        bubbles = on_mid_levels.reshape(layers, -1, 2) - means
-        bubbles = np.concatenate([bubbles, bubbles[:, plane.ends].mean(axis=2)], axis=1)
-        lower, upper, bubble = self._shapes[:, :, None, None]
-        slices = lower * hats[:-1, None] + upper * hats[1:, None] + bubble * bubbles[:, None]
-        return np.asarray(slices.reshape(-1, *hats.shape[1:]))
-
-    def _gradients_of(self, nodes: Array) -> tuple[Array, Array]:
-        """Determinants of J at the points, (slices, triangles, 6), and ∂_α N_i, (…, iα, 6).
-
-        `nodes` are those of the triangles, (slices, triangles, 6, 2).
-        """
-        jacobian = np.swapaxes(nodes, -1, -2) @ self._slopes.reshape(6, -1)
-        (a, b), (c, d) = np.moveaxis(jacobian.reshape(*nodes.shape[:2], 2, 2, -1), (2, 3), (0, 1))
+    def _set_jacobian(self, positions: Array) -> None:
+        """Areas of the points, (slices, triangles, 6), and ∂ξ_β/∂x_α, [β, α] of the same shape."""
+        grid = self.grid
+        corners = positions[grid.cells].reshape(grid.layers, -1, 15, 2)
+        jacobian = np.einsum("bqn,ltna->abltq", self._prism_slopes, corners, optimize=True)
+        jacobian = jacobian.reshape(*jacobian.shape[:-1], SLICES_PER_LAYER, POINTS_PER_SLICE)
+        (a, b), (c, d) = jacobian  # ∂x_α/∂ξ_β, (layers, triangles, 3, 6)
         determinants = a * d - b * c
-        inverse = np.array([[d, -b], [-c, a]]) / determinants  # [β, α], of ∂ξ_β/∂x_α
-        first, second = self._slopes.swapaxes(0, 1)  # ∂N_i/∂ξ_β, (6, points)
-        gradients = np.empty((*nodes.shape, determinants.shape[-1]))
-        for alpha in range(2):
-            x, y = inverse[:, alpha, :, :, None]
-            gradients[:, :, :, alpha] = x * first + y * second
-        return determinants, gradients.reshape(*nodes.shape[:2], 12, -1)
+        areas = determinants * slice_weights()
+        require_valid_elements(grid, areas.reshape(-1, SLICES_PER_LAYER, POINTS_PER_SLICE))
+        inverse = np.array([[d, -b], [-c, a]]) / determinants
+        shape = len(self._rule.weights), -1, POINTS_PER_SLICE
+        self._areas = areas.swapaxes(1, 2).reshape(shape)
+        self._inverse = inverse.swapaxes(3, 4).reshape(2, 2, *shape)
 
-    def entries(self, phase: int, stiffness: Array) -> Array:
-        """Entries [c, d] of all K_s by a phase, (slices, node pairs, 4), for its stiffness."""
-        coefficients = stiffness[VOIGT[:, :, None, None], VOIGT]  # C[c, α, d, β]
-        products = self._products[phase].reshape(len(self._areas), -1, 4)
-        return np.asarray(products @ coefficients.transpose(1, 3, 0, 2).reshape(4, 4))
+    def entries(self, stiffness: Sequence[Array]) -> Array:
+        """Entries [c, d] of all K_s, (slices, node pairs, 4), for the stiffness of the phases."""
+        coefficients = np.array(stiffness)[:, VOIGT[:, :, None, None], VOIGT]  # [c, α, d, β]
+        by_products = coefficients.transpose(0, 2, 4, 1, 3).reshape(-1, 4)
+        return self._products.reshape(len(self._areas), -1, len(by_products)) @ by_products
 
-    def forces(self, phase: int, stiffness: Array, strains: Array) -> Array:
-        """−⟨Bᵀ C ε̄⟩ of a phase under macroscopic strains (loads, 3), shape (loads, size)."""
-        stress = (strains @ stiffness)[:, VOIGT]  # σ[load, c, α]
-        sums = self._sums[phase].reshape(len(self._areas), -1, 2)  # [slice, i, α]
-        return self._to_fields(-np.einsum("fca,sia->fsic", stress, sums))
+    def forces(self, stiffness: Sequence[Array], strains: Array) -> Array:
+        """−⟨Bᵀ C ε̄⟩ under macroscopic strains (loads, 3), shape (loads, size)."""
+        stress = (strains @ np.array(stiffness))[..., VOIGT]  # σ[phase, load, c, α]
+        sums = self._sums.reshape(len(self._areas), -1, len(stiffness), 2)  # [slice, i, phase, α]
+        return self._to_fields(-np.einsum("pfca,sipa->fsic", stress, sums, optimize=True))
 
     def operator(self, entries: Array) -> Operator:
         """The map x ↦ K x of fields (fields, size) for the entries of all K_s."""
@@ -243,34 +219,29 @@ class SliceProblem:
         affine[:] = strains.T
         means, fractions = np.empty((phases, slices, *strain.shape[2:])), np.empty((phases, slices))
         products = np.zeros((phases, *strain.shape[2:], *strain.shape[2:]))
-        for k, weight in enumerate(self._rule.weights):
-            corners = nodal[k, self._unknown].reshape(*self._unknown.shape, -1)
-            slopes = self._gradients[k].reshape(*self._unknown.shape, -1)  # [α, point]
-            gradients = slopes.swapaxes(-1, -2) @ corners
-            along = gradients.reshape(len(corners), 2, POINTS_PER_SLICE, count, 2).swapaxes(0, 1)
-            fluctuation[..., 0, :], fluctuation[..., 1, :] = along[0, ..., 0], along[1, ..., 1]
-            np.add(along[1, ..., 0], along[0, ..., 1], out=fluctuation[..., 2, :])
+        for s, weight in enumerate(self._rule.weights):
+            corners = nodal[s, self._unknown].reshape(len(self._unknown), 6, -1)
+            along_xi, along_eta = self._slopes.swapaxes(1, 2)[:, None] @ corners  # ∂u_c/∂ξ_β
+            x, y = self._inverse[:, :, s, ..., None]
+            gradients = (x * along_xi + y * along_eta).reshape(2, *strain.shape[:2], count, 2)
+            fluctuation[..., 0, :], fluctuation[..., 1, :] = (
+                gradients[0, ..., 0],
+                gradients[1, ..., 1],
+            )
+            np.add(gradients[0, ..., 1], gradients[1, ..., 0], out=fluctuation[..., 2, :])
             for phase, triangles in enumerate(self._phase):
-                areas = self._areas[k, triangles].ravel() / AREA
+                areas = self._areas[s, triangles].ravel() / AREA
                 of_phase = strain[triangles].reshape(len(areas), *strain.shape[2:])
-                means[phase, k] = np.tensordot(areas, of_phase, axes=1)
-                fractions[phase, k] = areas.sum()
+                means[phase, s] = np.tensordot(areas, of_phase, axes=1)
+                fractions[phase, s] = areas.sum()
                 products[phase] += strain_products(of_phase, weight * areas[None])[0]
         return SliceStrains(self._rule.nodes, self._rule.weights, means, fractions, products)
 
 
-def _slopes(points: Array) -> Array:
-    """∂N_i/∂ξ_β of a six-node triangle, (6, 2, points), at points (n, 2)."""
-    x, y = points.T
-    corner, slope = np.array([1 - x - y, x, y]), np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])
-    vertices = [(4 * corner[i] - 1) * slope[i][:, None] for i in range(3)]
-    middles = [
-        4 * (corner[i] * slope[j][:, None] + corner[j] * slope[i][:, None]) for i, j in EDGES
-    ]
-    return np.array(vertices + middles)
-
-
 def _summation(places: Ints, entries: Ints, num_places: int, num_entries: int) -> sp.csr_matrix:
-    """Matrix that adds each of some entries to its place."""
-    ones = np.ones(places.size)
-    return sp.csr_matrix((ones, (places.ravel(), entries.ravel())), (num_places, num_entries))
+    """Matrix that adds entries, (n, …), to the components of their places, (n,)."""
+    columns = entries.reshape(len(places), -1)
+    components = columns.shape[1]
+    rows = components * places[:, None] + np.arange(components)
+    shape = components * num_places, num_entries
+    return sp.csr_matrix((np.ones(rows.size), (rows.ravel(), columns.ravel())), shape)

@@ -17,7 +17,13 @@ from alphacut.rve.fenicsx import PETSc, cholesky
 from alphacut.rve.interruption import uninterrupted
 from alphacut.rve.solver.krylov import MAX_ITERATIONS, ConvergenceError
 from alphacut.rve.solver.numbering import LevelNumbering
-from alphacut.rve.solver.theta_preconditioner import LEVEL, PREFIX, ThetaMass, injection
+from alphacut.rve.solver.theta_preconditioner import (
+    LEVEL,
+    PREFIX,
+    ThetaMass,
+    injection,
+    vertices_beside,
+)
 
 LOG = logging.getLogger(__name__)
 Operator = Callable[[Array], Array]
@@ -71,41 +77,35 @@ class LevelSolver:
     """
 
     def __init__(self, numbering: LevelNumbering, indptr: Ints, indices: Ints) -> None:
-        self._layers, self._half_size = numbering.grid.layers, numbering.mid_level_size
+        self._numbering, self._half_size = numbering, numbering.mid_level_size
+        self._layers = numbering.grid.layers
         self._hats_size = (self._layers + 1) * numbering.level_size
         self._indptr, self._indices, self._injection = indptr, indices, injection(numbering)
-        bubble_pattern = self._find_bubble_pattern()
-        counts = 4 * len(indices) * (self._layers + 1), 4 * len(bubble_pattern[1]) * self._layers
-        # every entry of all blocks by its number from 1 on, to find its place in the whole matrix
-        numbers = np.asarray(np.arange(1, sum(counts) + 1), float)
-        levels = numbers[: counts[0]].reshape(self._layers + 1, -1)
-        mid_levels = numbers[counts[0] :].reshape(self._layers, -1)
-        stacks = stacked(levels, indptr, indices), stacked(mid_levels, *bubble_pattern)
-        blocks = sp.block_diag([stack.tocsr() for stack in stacks], "csr")
-        blocks.sort_indices()
-        self._order = blocks.data.astype(int) - 1
-        starts, columns = (x.astype(PETSc.IntType) for x in (blocks.indptr, blocks.indices))
-        self._values = np.zeros(len(self._order))
+        patterns = (indptr, indices), self._find_bubble_pattern()
+        blocks, self._orders = zip(*(_compressed(*pattern) for pattern in patterns), strict=True)
+        counts = self._layers + 1, self._layers
+        matrix = sp.block_diag(
+            [block for block, count in zip(blocks, counts, strict=True) for _ in range(count)],
+            "csr",
+        )
+        starts, columns = (x.astype(PETSc.IntType) for x in (matrix.indptr, matrix.indices))
+        self._values = matrix.data
         self._matrix = PETSc.Mat().createAIJWithArrays(
-            blocks.shape, (starts, columns, self._values), comm=PETSc.COMM_SELF
+            matrix.shape, (starts, columns, self._values), comm=PETSc.COMM_SELF
         )
         self._ksp = cholesky(self._matrix, PREFIX + LEVEL)
 
     def _find_bubble_pattern(self) -> tuple[Ints, Ints]:
         """Pattern of Jᵀ K_s J, whose entries `_bubble_sums` adds from those of K_s."""
-        J = self._injection[::2, ::2]  # of nodes; a row has two entries at most
-        slots = J.indptr[:-1, None] + np.arange(2)
-        weights = np.where(slots < J.indptr[1:, None], np.append(J.data, 0.0)[slots], 0.0)
-        vertices = np.append(J.indices, 0)[np.minimum(slots, J.nnz)]
-        row, column = np.repeat(np.arange(J.shape[0]), np.diff(self._indptr)), self._indices
-        products = weights[row][:, :, None] * weights[column][:, None]
-        keys = vertices[row][:, :, None] * J.shape[1] + vertices[column][:, None]
-        pair, a, b = np.nonzero(products)
-        found, place = np.unique(keys[pair, a, b], return_inverse=True)
-        shape = len(found), len(row)
-        self._bubble_sums = sp.csr_matrix((products[pair, a, b], (place, pair)), shape)
-        starts = np.searchsorted(found, np.arange(J.shape[1] + 1) * J.shape[1])
-        return starts, found % J.shape[1]
+        ends, count = vertices_beside(self._numbering), self._numbering.periodicity.vertices
+        row = ends[np.repeat(np.arange(len(ends)), np.diff(self._indptr))][:, :, None]
+        column = ends[self._indices][:, None]
+        is_free = (row >= 0) & (column >= 0)
+        found, place = np.unique((row * count + column)[is_free], return_inverse=True)
+        pair, quarters = np.nonzero(is_free)[0], np.full(len(place), 0.25)  # J has ½ at both ends
+        shape = len(found), len(self._indices)
+        self._bubble_sums = sp.csr_matrix((quarters, (place, pair)), shape)
+        return np.searchsorted(found, np.arange(count + 1) * count), found % count
 
     def split(self, fields: Array) -> tuple[Array, Array]:
         """Views of the hats, (fields, layers + 1, n), and the bubbles, (fields, layers, v)."""
@@ -129,11 +129,13 @@ class LevelSolver:
         Those of mid-levels are in all nodes, shape (layers, 4 node pairs).
         """
         self._mass = mass
-        of_vertices = [self._bubble_sums @ block.reshape(-1, 4) for block in bubbles]
-        scaled = np.array(of_vertices) / mass.bubbles[:, None, None]
-        values = (hats / mass.hats[:, None]).ravel(), scaled.ravel()
-        self._values[:] = np.concatenate(values)[self._order]
-        del values, of_vertices, scaled  # before the factors take their memory
+        on_levels, on_mid_levels = np.split(self._values, [hats.size])  # views
+        levels, mid_levels = on_levels.reshape(hats.shape), on_mid_levels.reshape(self._layers, -1)
+        for k, diagonal in enumerate(mass.hats):
+            levels[k] = hats[k, self._orders[0]] / diagonal
+        for k, diagonal in enumerate(mass.bubbles):
+            of_vertices = (self._bubble_sums @ bubbles[k].reshape(-1, 4)).ravel()
+            mid_levels[k] = of_vertices[self._orders[1]] / diagonal
         self._matrix.assemble()  # says that the values are new; the pattern and its analysis stay
         self._ksp.setOperators(self._matrix)
         self._ksp.setUp()
@@ -174,3 +176,11 @@ def stacked(entries: Array, indptr: Ints, indices: Ints) -> sp.bsr_matrix:
     starts = np.append(0, (number * len(indices) + indptr[1:]).ravel())
     columns = (number * nodes + indices).ravel()
     return sp.bsr_matrix((entries.reshape(-1, 2, 2), columns, starts), (2 * count * nodes,) * 2)
+
+
+def _compressed(indptr: Ints, indices: Ints) -> tuple[sp.csr_matrix, Ints]:
+    """Matrix of one block by rows, and the order of its entries in (node pairs, 4)."""
+    numbers = np.arange(1, 4 * len(indices) + 1).astype(float)  # 0 would be no entry
+    matrix = stacked(numbers[None], indptr, indices).tocsr()
+    matrix.sort_indices()
+    return matrix, matrix.data.astype(int) - 1

@@ -32,7 +32,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.rve.fenicsx import PETSc, cholesky
 from alphacut.rve.solver.numbering import LevelNumbering
 from alphacut.stochastic import ThetaLaw
@@ -198,11 +198,16 @@ def _hats(level_size: int, half_size: int, *, below: bool, above: bool) -> PETSc
     return PETSc.Mat().createAIJ(stacked.shape, csr=(*csr, stacked.data), comm=PETSc.COMM_SELF)
 
 
+def vertices_beside(numbering: LevelNumbering) -> Ints:
+    """Vertices at both ends of each node's edge, itself twice if it is one, −1 where fixed."""
+    periodicity = numbering.periodicity
+    vertices = np.repeat(np.arange(periodicity.vertices), 2).reshape(-1, 2)
+    return np.concatenate([vertices, periodicity.ends(numbering.grid.plane)])
+
+
 def injection(numbering: LevelNumbering) -> sp.csr_matrix:
     """Matrix J from linear to quadratic triangles; midpoints get the mean of their vertices."""
-    periodicity, ends = numbering.periodicity, numbering.periodicity.ends(numbering.grid.plane)
-    vertices, count, is_free = periodicity.vertices, periodicity.count, ends >= 0
-    rows = np.repeat(np.arange(vertices, count), 2).reshape(-1, 2)[is_free]
-    halves = np.full(is_free.sum(), 0.5)
-    midpoints = sp.csr_matrix((halves, (rows, ends[is_free])), (count, vertices))
-    return sp.kron(midpoints + sp.eye(count, vertices), sp.eye(2), "csr")
+    ends, vertices = vertices_beside(numbering), numbering.periodicity.vertices
+    node, end = np.nonzero(ends >= 0)
+    halves = np.full(len(node), 0.5), (node, ends[node, end])
+    return sp.kron(sp.csr_matrix(halves, (len(ends), vertices)), sp.eye(2), "csr")
