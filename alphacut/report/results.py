@@ -277,13 +277,14 @@ def answers(parts: Parts) -> list[Row]:
 
 
 def drivers(parts: Parts) -> Iterator[str]:
-    """Yields sentences on the three inputs that widen E most, and the last output's peak most."""
+    """Yields sentences on the inputs that widen E most, and the last output's peak most."""
     peaks = [name for name in parts.shares if name not in ("E", "ν")]
     for name in [name for name in parts.shares if name == "E"] + peaks[-1:]:
-        (largest, share), *next_two = sorted(parts.shares[name].items(), key=lambda x: -x[1])[:3]
-        more = "".join(f", {x} by {percent_text(y, 0)}" for x, y in next_two)
-        kind = "" if name == "E" else ", of the reached peaks"
-        yield f"Fixing {largest} narrows {name} by {percent_text(share, 0)}{more}{kind}"
+        count = 3 if name == "E" else 2
+        (largest, share), *others = sorted(parts.shares[name].items(), key=lambda x: -x[1])[:count]
+        more = "".join(f", {x} by {percent_text(y, 0)}" for x, y in others)
+        what = name.replace("the peak", "the reached peak")
+        yield f"Fixing {largest} narrows {what} by {percent_text(share, 0)}{more}"
 
 
 def comparison(first: Parts, second: Parts) -> Table:
