@@ -61,8 +61,8 @@ def envelope(dataset: xarray.Dataset, output: Output, task: EnvelopeTask) -> Fig
 
 
 def draw_error_band(axes: Axes, time: Array, lowest: xarray.Dataset, nature: str, unit: str) -> str:
-    """Draws the declared error around a band; returns it as text, empty for guaranteed bounds."""
-    if "error" not in lowest or nature == "guaranteed":
+    """Draws the declared error around a band; returns it as text, empty where none is estimated."""
+    if "error" not in lowest or nature != "estimated":
         return ""
     error = lowest["error"]
     for end in (lowest["lower"] - error, lowest["upper"] + error):
