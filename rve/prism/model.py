@@ -302,7 +302,9 @@ def with_distance(
     error = np.asarray((1 + safety * distance) * (1 + reference_errors) - 1)
     energies = result.energies
     if energies is not None and reference.energies is not None:
-        energy_errors = safety * abs(energies.values - reference.energies.values)
+        # what one part gains another loses, so that the distance of one can be small by chance
+        distances = abs(energies.values - reference.energies.values).max(axis=(0, 1), keepdims=True)
+        energy_errors = safety * np.broadcast_to(distances, energies.values.shape)
         if reference.errors:
             energy_errors = energy_errors + reference.energies.errors
         energies = PhaseEnergies(energies.values, energy_errors)
