@@ -61,10 +61,10 @@ def cached_arrays(name: str, content: bytes, make: Callable[[], Arrays]) -> Arra
         if np.array_equal(stored_key, key):
             os.utime(file)  # for `remove_unused`
             return arrays
-    made, partial = make(), folder / f"{uuid4().hex}.partial"
+    new_arrays, partial = make(), folder / f"{uuid4().hex}.partial"
     with suppress(OSError):  # a full disk, or a folder that was cleared: nothing is kept
         with partial.open("wb") as stream:
-            np.savez(stream, key, *made)
+            np.savez(stream, key, *new_arrays)
         partial.replace(file)
         remove_unused(folder)
-    return made
+    return new_arrays

@@ -281,8 +281,8 @@ def drivers(parts: Parts) -> Iterator[str]:
     peaks = [name for name in parts.shares if name not in ("E", "ν")]
     for name in [name for name in parts.shares if name == "E"] + peaks[-1:]:
         count = 3 if name == "E" else 2
-        (largest, share), *others = sorted(parts.shares[name].items(), key=lambda x: -x[1])[:count]
-        more = "".join(f", {x} by {percent_text(y, 0)}" for x, y in others)
+        (largest, share), *further = sorted(parts.shares[name].items(), key=lambda x: -x[1])[:count]
+        more = "".join(f", {x} by {percent_text(y, 0)}" for x, y in further)
         what = name.replace("the peak", "the reached peak")
         yield f"Fixing {largest} narrows {what} by {percent_text(share, 0)}{more}"
 

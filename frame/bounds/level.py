@@ -143,14 +143,16 @@ class LevelModels:
 
     def line_deviation(self) -> Array:
         """Bound of how far outputs stray from straight lines in the step to each node, (T, m)."""
-        others = self.models.line_deviation + sum(x.line_deviation for x in self.models.truncated)
-        by_magnitude: Array = np.array(others)
+        unresolved = self.models.line_deviation + sum(
+            x.line_deviation for x in self.models.truncated
+        )
+        by_magnitude: Array = np.array(unresolved)
         for o, order in enumerate(map(int, self.structure.order)):
             tables = self.tables.line_deviation[order]
             for mode, table in zip(self.models.oscillators, tables, strict=True):
                 by_magnitude[:, o] += mode.share.size()[:, o] @ table
         responses = [x for mode in self.models.oscillators for x in self._responses(mode)]
-        return narrowed_straying(responses, self.tables.time, by_magnitude, others)
+        return narrowed_straying(responses, self.tables.time, by_magnitude, unresolved)
 
     def _responses(self, mode: Oscillator) -> Iterator[Response]:
         """What a mode adds to outputs by each source, and what forces do to accelerations."""

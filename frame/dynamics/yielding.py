@@ -238,9 +238,9 @@ def _march(
                 direction[z] = math.copysign(1.0, _drift(q, z) - plastic[z])
             if event == MAX_EVENTS:
                 return FAILED, edges[e + 1] - h, z, 0.0
-    after, spent = _energy(storeys, q, v, plastic), works[1] + dissipated.sum()
-    exchanged = abs(before) + abs(after) + abs(works[0]) + spent
-    missing = before + works[0] - after - spent
+    after, dissipation = _energy(storeys, q, v, plastic), works[1] + dissipated.sum()
+    exchanged = abs(before) + abs(after) + abs(works[0]) + dissipation
+    missing = before + works[0] - after - dissipation
     return RUNS, edges[-1], -1, missing / exchanged if exchanged > 0 else 0.0
 
 
@@ -338,23 +338,23 @@ def _first_root(polynomial: Array, terms: int, end: float) -> float:
             low, left, width = low + width, right, 2 * width
         elif width <= RESOLUTION or (right < 0 and right - left < -curvature * width**2 / 2):
             # Newton's steps, or halves where they leave the interval
-            high, place = low + width, low + width * left / (left - right)
+            high, root = low + width, low + width * left / (left - right)
             while high - low > EVENT_ROUNDING:
                 value, slope = polynomial[terms - 1], 0.0
                 for term in range(terms - 2, -1, -1):
-                    slope = slope * place + value
-                    value = value * place + polynomial[term]
+                    slope = slope * root + value
+                    value = value * root + polynomial[term]
                 if value >= 0:
-                    low = place
+                    low = root
                 else:
-                    high = place
+                    high = root
                 change = -value / slope
-                if not low < place + change < high:
-                    change = (low + high) / 2 - place
-                place += change
+                if not low < root + change < high:
+                    change = (low + high) / 2 - root
+                root += change
                 if abs(change) <= EVENT_ROUNDING:
                     break
-            return place
+            return root
         else:
             width /= 2
     return low if left < 0 else 1.0
@@ -367,20 +367,20 @@ def _add_works(
 ) -> None:  # fmt: skip
     """Add the work of loads and what damping takes up to a fraction of a part, ∫ v·f dt."""
     n, V = len(load), series[1]
-    place, weight = at * GAUSS_NODES, at * h * GAUSS_WEIGHTS
+    points, weights = at * GAUSS_NODES, at * h * GAUSS_WEIGHTS
     velocity = np.empty((n, len(GAUSS_NODES)))
     for i in range(n):
         velocity[i] = V[i, terms - 1]
         for term in range(terms - 2, -1, -1):
             for g in range(len(GAUSS_NODES)):
-                velocity[i, g] = velocity[i, g] * place[g] + V[i, term]
+                velocity[i, g] = velocity[i, g] * points[g] + V[i, term]
     for g in range(len(GAUSS_NODES)):
         for i in range(n):
             damped = 0.0
             for j in range(n):
                 damped += damping[i, j] * velocity[j, g]
-            works[0] += weight[g] * velocity[i, g] * (load[i] + rise[i] * place[g])
-            works[1] += weight[g] * velocity[i, g] * damped
+            works[0] += weights[g] * velocity[i, g] * (load[i] + rise[i] * points[g])
+            works[1] += weights[g] * velocity[i, g] * damped
 
 
 @compiled
@@ -424,8 +424,8 @@ def _add_peaks(
                 slope[term - 1] = math.copysign(term, polynomial[1]) * polynomial[term]
                 reach += abs(scale * polynomial[term])
             if reach > peaks[row]:
-                place = min(_first_root(slope, terms - 1, end), end)  # 1 where rounding decides
-                turn = scale * _value(polynomial, terms, place) + shift
+                stop = min(_first_root(slope, terms - 1, end), end)  # 1 where rounding decides
+                turn = scale * _value(polynomial, terms, stop) + shift
                 peaks[row] = max(peaks[row], abs(turn))
 
 
@@ -439,7 +439,7 @@ def _observe(
     for row in range(len(kinds)):
         kind, z = kinds[row]
         mass, k, softening, hardening, yield_drift = storeys[:, z]
-        drift, rest = _drift(q, z), (1 - hardening) * k * plastic[z]
+        drift, offset_force = _drift(q, z), (1 - hardening) * k * plastic[z]
         force = -_net_force(storeys, q, plastic, z)
         if z + 1 < len(q):
             force += _net_force(storeys, q, plastic, z + 1)
@@ -450,9 +450,9 @@ def _observe(
             acceleration += pushes[z, c] * loads[c]
         # drift in equilibrium without load, where storeys that yield back rest
         back = abs((1 - hardening) * k * yield_drift / (hardening * k - softening))
-        residual = min(max(rest / (k - softening), -back), back)
+        residual = min(max(offset_force / (k - softening), -back), back)
         by_kind = (
-            q[z], drift, k * drift - rest, drift / yield_drift,
+            q[z], drift, k * drift - offset_force, drift / yield_drift,
             v[z], acceleration, residual, dissipated[z],
         )  # fmt: skip
         value = by_kind[kind]

@@ -132,8 +132,8 @@ class PeakSearch:
         for level in range(len(cuts.alpha)):
             points = spread_points(*cuts.unit_ends(level), SAMPLES, SKIPPED * (level + 1))
             peaks = motion.values_and_peaks(cuts.to_physical(points))[1]
-            beyond = searched.lower[level] - peaks.min(0), peaks.max(0) - searched.upper[level]
-            excess[level] = np.maximum(np.max(beyond, axis=0), 0.0)
+            distances = searched.lower[level] - peaks.min(0), peaks.max(0) - searched.upper[level]
+            excess[level] = np.maximum(np.max(distances, axis=0), 0.0)
             motions += len(points)
         is_estimate = [not linkage.cuts or linkage.is_estimate(name) for name in outputs]
         natures = tuple(Nature.ESTIMATED if x else Nature.ATTAINED for x in is_estimate)

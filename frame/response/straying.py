@@ -155,11 +155,11 @@ class Chords(NamedTuple):
 
 
 def narrowed_straying(
-    responses: Sequence[Response], time: Array, bound: Array, others: Array | float = 0.0
+    responses: Sequence[Response], time: Array, bound: Array, unresolved: Array | float = 0.0
 ) -> Array:
-    """Bound of how far Σ responses + others strays from lines in the step to each node, (T, m).
+    """Bound of how far Σ responses + unresolved strays from lines in the step to each node, (T, m).
 
-    It begins at a `bound` in which responses count by magnitude; `others` (T, m) always do. A
+    It begins at a `bound` in which responses count by magnitude; `unresolved` (T, m) always do. A
     motion is off its step's chord by what it strays from chords between nodes that are added within
     the step, and by what these are off the step's chord: their largest value at the added nodes.
     There responses are summed with their signs, so that modes cancel as they do in motions. The
@@ -176,7 +176,7 @@ def narrowed_straying(
     parts = MIN_PARTS if is_close else MAX_ADDED_PARTS
     off, straying = _off_and_straying(responses, time, parts)
     narrowed = np.vstack([np.zeros(off.shape[1]), off + straying])
-    return np.fmin(bound, narrowed + others)
+    return np.fmin(bound, narrowed + unresolved)
 
 
 def _off_and_straying(

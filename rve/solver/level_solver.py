@@ -101,11 +101,14 @@ class LevelSolver:
         row = ends[np.repeat(np.arange(len(ends)), np.diff(self._indptr))][:, :, None]
         column = ends[self._indices][:, None]
         is_free = (row >= 0) & (column >= 0)
-        found, place = np.unique((row * count + column)[is_free], return_inverse=True)
-        pair, quarters = np.nonzero(is_free)[0], np.full(len(place), 0.25)  # J has ½ at both ends
-        shape = len(found), len(self._indices)
-        self._bubble_sums = sp.csr_matrix((quarters, (place, pair)), shape)
-        return np.searchsorted(found, np.arange(count + 1) * count), found % count
+        entries, entry_of = np.unique((row * count + column)[is_free], return_inverse=True)
+        pair, quarters = (
+            np.nonzero(is_free)[0],
+            np.full(len(entry_of), 0.25),
+        )  # J has ½ at both ends
+        shape = len(entries), len(self._indices)
+        self._bubble_sums = sp.csr_matrix((quarters, (entry_of, pair)), shape)
+        return np.searchsorted(entries, np.arange(count + 1) * count), entries % count
 
     def split(self, fields: Array) -> tuple[Array, Array]:
         """Views of the hats, (fields, layers + 1, n), and the bubbles, (fields, layers, v)."""
