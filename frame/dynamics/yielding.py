@@ -136,7 +136,7 @@ class YieldingFlow(Flow):
     def _require_motion(
         self, point: Array, status: int, time: float, storey: int, imbalance: float
     ) -> None:
-        """Refuse a motion that collapses, whose events do not end or whose energy is missing."""
+        """Refuse a motion that collapses, has endless events or energy out of balance."""
         if status == COLLAPSED:
             value = f"collapsing under its weight at t = {time:.6g} s at {self._point_words(point)}"
             allowed = "hardening times stiffness above weight over height where it yields"
@@ -146,7 +146,7 @@ class YieldingFlow(Flow):
             what = f"more than {MAX_EVENTS} events in a step at t = {time:.6g} s"
             raise StepError(what, "take a smaller step or a larger yield force")
         if not abs(imbalance) <= MAX_IMBALANCE:
-            what = f"energy is missing at the end of a motion, {imbalance:.2g} of it"
+            what = f"the balance of energy is off by {abs(imbalance):.2g} at the end of a motion"
             raise StepError(what, "take a smaller step, or parameters where the motion exists")
 
 
