@@ -1,8 +1,7 @@
-"""A whole case: its sections, built once, what they need of each other, and its JSON Schema."""
+"""A whole case: its sections, built once, what they need of each other."""
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Sequence
 from functools import cached_property
@@ -189,12 +188,3 @@ def load(path: Path | str, changes: Sequence[str] = ()) -> Case:
     BadInput has every problem of the case.
     """
     return parse(Content, path, changes)
-
-
-def json_schema() -> str:
-    """The JSON Schema of a case file, for editors."""
-    return json.dumps(Content.model_json_schema(), indent=1, ensure_ascii=False) + "\n"
-
-
-if __name__ == "__main__":
-    print(json_schema(), end="")

@@ -76,7 +76,7 @@ def parse_limit(value: object) -> Limit:
     return Limit(cast("Side", side or ""), name, number, is_relative, str(value))
 
 
-AnyLimit = Annotated[Limit, PlainValidator(parse_limit, json_schema_input_type=str)]
+AnyLimit = Annotated[Limit, PlainValidator(parse_limit)]
 Limits = Annotated[tuple[AnyLimit, ...], NotEmpty]
 
 

@@ -46,7 +46,7 @@ def _parameter(value: object, _: ValidationInfo) -> FuzzyNumber:
         raise RefusedError("", value, 'a quantity, as "30 GPa ± 5 %" or 1.2', str(error)) from None
 
 
-Term = Annotated[tuple[Monomial, Array], PlainValidator(_term, json_schema_input_type=list[str])]
+Term = Annotated[tuple[Monomial, Array], PlainValidator(_term)]
 Parameters = dict[str, Annotated[FuzzyNumber, text(_parameter)]]
 
 

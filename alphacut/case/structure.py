@@ -91,7 +91,7 @@ def _parse_damping_ratios(value: object) -> MaterialDamping | tuple[FuzzyNumber,
 RATIO = Quantity(minimum=0, below=1, fuzzy=True)
 DampingRatios = Annotated[
     MaterialDamping | tuple[FuzzyNumber, ...],
-    PlainValidator(_parse_damping_ratios, json_schema_input_type=float | list[float | str] | str),
+    PlainValidator(_parse_damping_ratios),
 ]
 
 

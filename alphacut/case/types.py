@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Self, TypeVar
+from typing import Annotated, Self, TypeVar
 
 from pydantic import (
     AfterValidator,
@@ -20,8 +19,7 @@ from pydantic import (
     ValidationInfo,
     model_validator,
 )
-from pydantic.annotated_handlers import GetCoreSchemaHandler, GetJsonSchemaHandler
-from pydantic.json_schema import JsonSchemaValue
+from pydantic.annotated_handlers import GetCoreSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
 from alphacut.fuzzy import FuzzyNumber
@@ -115,24 +113,9 @@ class Quantity:
         """The validation by `parse`."""
         return core_schema.no_info_plain_validator_function(self.parse)
 
-    def __get_pydantic_json_schema__(
-        self, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> JsonSchemaValue:
-        """The JSON Schema: text with a unit; where there is none a number, an array or text."""
-        text = {"type": "string", "examples": [QUANTITIES[self.si][1]]}
-        kinds: list[dict[str, Any]] = []
-        if not self.si:
-            kinds.append({"type": "integer" if self.is_integer else "number"})
-        if not self.si and self.fuzzy:
-            kinds.append({"type": "array", "items": {"type": "number"}})
-        if not self.is_integer:
-            kinds.append(text)
-        return {"anyOf": kinds, "description": self.allowed}
 
-
-def text(read: Callable[[object, ValidationInfo], object]) -> PlainValidator:
-    """A key whose text a function reads, from the text and the context of the case."""
-    return PlainValidator(read, json_schema_input_type=str)
+text = PlainValidator
+"""A key whose text a function reads, from the text and the context of the case."""
 
 
 def _not_empty(value: object) -> object:
@@ -144,25 +127,8 @@ def _as_array(value: object) -> object:
     return _not_empty(value) if isinstance(value, list | tuple) else [value]
 
 
-class _OneOrMany:
-    """Validation and schema of `OneOrMany`."""
-
-    def __get_pydantic_core_schema__(
-        self, source: object, handler: GetCoreSchemaHandler
-    ) -> CoreSchema:
-        """The validation of the array."""
-        return core_schema.no_info_before_validator_function(_as_array, handler(source))
-
-    def __get_pydantic_json_schema__(
-        self, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> JsonSchemaValue:
-        """The JSON Schema: the array, or an entry."""
-        array = handler(schema)
-        return {"anyOf": [array["items"], array]}
-
-
 T = TypeVar("T")
-OneOrMany = Annotated[tuple[T, ...], _OneOrMany()]
+OneOrMany = Annotated[tuple[T, ...], BeforeValidator(_as_array)]
 """An array of which one entry may stand without brackets."""
 NotEmpty = BeforeValidator(_not_empty)
 
@@ -219,9 +185,7 @@ def _stiffness(rows: list[list[object]]) -> VoigtPhase:
         raise RefusedError("", rows, allowed) from None
 
 
-Stiffness = Annotated[
-    VoigtPhase, PlainValidator(_stiffness, json_schema_input_type=list[list[str]])
-]
+Stiffness = Annotated[VoigtPhase, PlainValidator(_stiffness)]
 ModulusOrStiffness = Annotated[
     Annotated[Modulus, Tag("<modulus>")] | Annotated[Stiffness, Tag("<stiffness>")],
     Discriminator(lambda value: "<stiffness>" if isinstance(value, list) else "<modulus>"),

@@ -16,7 +16,6 @@ DIRECT = {
     "gmsh": "python3-gmsh",
     "hypothesis": "python3-hypothesis",
     "jinja2": "python3-jinja2",
-    "jsonschema": "python3-jsonschema",
     "matplotlib": "python3-matplotlib",
     "meshio": "python3-meshio",
     "mpi4py": "python3-mpi4py",
