@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -29,16 +29,12 @@ MAX_COLOURS = 4  # pages that a file calls channels are colours up to so many, e
 TAKE_VOXEL = "a volume takes cell.voxel in place of cell.pixel"
 TAKE_PIXEL = "a picture takes cell.pixel in place of cell.voxel"
 SLICES = (".tif", ".tiff", ".png", ".bmp")
-META_TYPES = {
-    "MET_CHAR": "i1", "MET_UCHAR": "u1", "MET_SHORT": "i2", "MET_USHORT": "u2", "MET_INT": "i4",
-    "MET_UINT": "u4", "MET_FLOAT": "f4", "MET_DOUBLE": "f8",
+TYPES = {
+    "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
+    "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4",
+    "float": "f4", "double": "f8",
 }  # fmt: skip
-NRRD_TYPES = {
-    "signed char": "i1", "int8": "i1", "uchar": "u1", "unsigned char": "u1", "uint8": "u1",
-    "short": "i2", "int16": "i2", "ushort": "u2", "unsigned short": "u2", "uint16": "u2",
-    "int": "i4", "int32": "i4", "uint": "u4", "unsigned int": "u4", "uint32": "u4", "float": "f4",
-    "double": "f8",
-}  # fmt: skip
+"""Of numbers in raw data, by the names of MetaImage and NRRD without "MET_" and spaces."""
 
 
 def read_grid(path: Path, sides: Sequence[float]) -> Array:
@@ -88,12 +84,9 @@ def files_of(path: Path) -> list[Path]:
     """The files that make up an image or a volume: of a head its data, of a folder its slices."""
     if path.is_dir():
         return sorted(file for file in path.iterdir() if file.suffix.lower() in SLICES)
-    data = []
-    if path.suffix.lower() in (".mhd", ".nhdr"):
-        head = path.read_text("latin-1")
-        names = re.findall(r"^(?:ElementDataFile\s*=|data ?file:)\s*(.+?)\s*$", head, re.M | re.I)
-        data = [path.parent / name for name in names]
-    return [path, *(file for file in data if file.is_file())]
+    is_head = path.suffix.lower() in (".mhd", ".nhdr")
+    data = _data_of_head(path, _read_head(path)[0]) if is_head else path
+    return [path, data] if data != path and data.is_file() else [path]
 
 
 def _read_volume(path: Path, sides: Sequence[float]) -> Array:
@@ -102,10 +95,8 @@ def _read_volume(path: Path, sides: Sequence[float]) -> Array:
         return _read_slices(path, sides[-1] == sides[-2])
     if path.suffix.lower() in (".tif", ".tiff"):
         return _read_stack(path)
-    if path.suffix.lower() in (".mhd", ".mha"):
-        return _read_meta_image(path, sides)
-    if path.suffix.lower() in (".nhdr", ".nrrd"):
-        return _read_nrrd(path, sides)
+    if path.suffix.lower() in (".mhd", ".mha", ".nhdr", ".nrrd"):
+        return _read_raw(path, sides)
     allowed = "a TIFF stack, a folder of slices, .npy, .mhd or .nhdr"
     cure = "write raw data beside a .mhd head with DimSize, ElementType and ElementDataFile"
     if path.suffix.lower() in (*SLICES, ".jpg", ".jpeg"):
@@ -118,26 +109,24 @@ def _read_slices(folder: Path, is_square: bool) -> Array:
     files = files_of(folder)
     allowed = "a folder of slices, PNG, TIFF or BMP"
     require(len(files) > 1, folder.name, f"{len(files)} pictures", allowed)
-    numbers = {}
+    by_number = {}
     for file in files:
         digits = re.findall(r"\d+", file.stem)
         require(bool(digits), file.name, "no number", "a number in the name of each slice")
-        numbers[int(digits[-1])] = file
-    lowest, count = min(numbers), len(numbers)
-    is_whole = count == len(files) and max(numbers) - lowest == count - 1
-    missing = next((k for k in range(lowest, lowest + count) if k not in numbers), None)
-    what = f"{len(files)} pictures, none with number {missing}" if missing else "numbers twice"
-    require(is_whole, folder.name, what, "slices with numbers that follow one another")
-    by_number = [numbers[k] for k in sorted(numbers)]
-    first = _read_picture(by_number[0], is_square)
-    require_memory((len(files), *first.shape))
-    values = np.empty((len(files), *first.shape), first.dtype)
-    for k, file in enumerate(by_number):
+        by_number[int(digits[-1])] = file
+    lowest, count = min(by_number), len(files)
+    missing = [k for k in range(lowest, lowest + count) if k not in by_number]
+    what = f"{count} pictures, none with number {min(missing, default=lowest)}"
+    require(not missing, folder.name, what, "slices with numbers that follow one another")
+    first = _read_picture(by_number[lowest], is_square)
+    require_memory((count, *first.shape))
+    values = np.empty((count, *first.shape), first.dtype)
+    for k, file in by_number.items():
         page = _read_picture(file, is_square)
         is_alike = page.shape == first.shape and page.dtype == first.dtype
         what = f"{page.dtype} of shape {page.shape}"
         require(is_alike, file.name, what, f"{first.dtype} of shape {first.shape} as the others")
-        values[k] = page
+        values[k - lowest] = page
     return values
 
 
@@ -164,73 +153,45 @@ def _read_stack(path: Path) -> Array:
     return np.asarray(values)
 
 
-def _read_meta_image(path: Path, sides: Sequence[float]) -> Array:
-    """Volume of a MetaImage head and its raw data."""
+def _read_head(path: Path) -> tuple[dict[str, str], int]:
+    """Values by small keys of a MetaImage (key = value) or NRRD head (key: value); its bytes."""
     head, size = {}, 0
     with path.open("rb") as file:
         for line in file:
             size += len(line)
-            key, _, value = line.decode("latin-1").partition("=")
-            head[key.strip()] = value.strip()
-            if key.strip() == "ElementDataFile":
+            key, *value = re.split(r":=|[=:]", line.decode("latin-1").strip(), maxsplit=1)
+            head[key.strip().lower()] = "".join(value).strip()
+            if key == "" or key.strip() == "ElementDataFile":  # raw data may follow
                 break
-    data = head.get("ElementDataFile", "")
-    byte_order = head.get("BinaryDataByteOrderMSB", head.get("ElementByteOrderMSB", ""))
-    return _read_raw(
-        path,
-        path if data == "LOCAL" else path.parent / data,
-        sizes=head.get("DimSize", "").split(),
-        kind=META_TYPES.get(head.get("ElementType", "")),
-        is_big_endian="true" in byte_order.lower(),
-        n_head_bytes=size if data == "LOCAL" else int(head.get("HeaderSize", 0)),
-        is_compressed=head.get("CompressedData", "False").lower() == "true",
-        spacing=head.get("ElementSpacing", "").split(),
-        sides=sides,
+    return head, size
+
+
+def _data_of_head(path: Path, head: Mapping[str, str]) -> Path:
+    """The file of the raw data, which may be that of the head."""
+    keys = "elementdatafile", "data file", "datafile"
+    name = next((head[key] for key in keys if key in head), "LOCAL")
+    return path if name == "LOCAL" else path.parent / name
+
+
+def _read_raw(path: Path, sides: Sequence[float]) -> Array:
+    """Volume (z, y, x) of a MetaImage or NRRD head, sizes along x, y, z, and of its raw data."""
+    head, size = _read_head(path)
+
+    def value(*keys: str) -> str:
+        return next((head[key] for key in keys if key in head), "")
+
+    name, data = path.name, _data_of_head(path, head)
+    type_name = value("elementtype", "type").lower().removeprefix("met_").removeprefix("signed ")
+    kind, sizes = TYPES.get(type_name.replace("unsigned ", "u")), value("dimsize", "sizes").split()
+    byte_order = value("binarydatabyteordermsb", "elementbyteordermsb", "endian").lower()
+    is_compressed = value("compresseddata").lower() == "true" or value("encoding").lower() not in (
+        "",
+        "raw",
     )
-
-
-def _read_nrrd(path: Path, sides: Sequence[float]) -> Array:
-    """Volume of an NRRD head and its raw data, in the same file after an empty line or another."""
-    head, size = {}, 0
-    with path.open("rb") as file:
-        for line in file:
-            size += len(line)
-            text = line.decode("latin-1").strip()
-            if not text:
-                break
-            key, _, value = text.partition(":")
-            head[key.strip().lower()] = value.strip().lstrip("=").strip()
-    name = head.get("data file", head.get("datafile", ""))
-    directions = re.findall(r"\(([^)]*)\)", head.get("space directions", ""))
+    n_head_bytes = size if data == path else int(value("headersize", "byte skip") or 0)
+    directions = re.findall(r"\(([^)]*)\)", value("space directions"))
     lengths = [math.hypot(*map(float, vector.split(","))) for vector in directions]
-    spacing = head.get("spacings", "").split() or lengths
-    return _read_raw(
-        path,
-        path.parent / name if name else path,
-        sizes=head.get("sizes", "").split(),
-        kind=NRRD_TYPES.get(head.get("type", "")),
-        is_big_endian=head.get("endian") == "big",
-        n_head_bytes=int(head.get("byte skip", 0)) if name else size,
-        is_compressed=head.get("encoding", "raw").lower() != "raw",
-        spacing=spacing,
-        sides=sides,
-    )
-
-
-def _read_raw(
-    path: Path,
-    data: Path,
-    *,
-    sizes: Sequence[str],
-    kind: str | None,
-    is_big_endian: bool,
-    n_head_bytes: int,
-    is_compressed: bool,
-    spacing: Sequence[str | float],
-    sides: Sequence[float],
-) -> Array:
-    """Numbers (z, y, x) of raw data, whose head `path` gives sizes and spacing along x, y, z."""
-    name = path.name
+    spacing = value("elementspacing", "spacings").split() or lengths
     require(kind is not None, name, "a type that is not known", "whole numbers or floats")
     require(not is_compressed, name, "compressed data", "raw data", "save it without compression")
     require(len(sizes) == 3, name, f"{len(sizes)} sizes", "three, along x, y and z")
@@ -242,7 +203,7 @@ def _read_raw(
         raise RefusedError(name, what, given, "give cell.voxel = [x, y, z] as they are")
     shape = tuple(int(n) for n in reversed(sizes))
     require_memory(shape)
-    dtype = np.dtype((">" if is_big_endian else "<") + str(kind))
+    dtype = np.dtype((">" if byte_order in ("true", "big") else "<") + str(kind))
     expected = n_head_bytes + math.prod(shape) * dtype.itemsize
     found = data.stat().st_size
     allowed = f"{expected} for {' × '.join(sizes)} of {dtype}"

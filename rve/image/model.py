@@ -15,12 +15,7 @@ from alphacut.fuzzy.progress_bar import Progress
 from alphacut.fuzzy.refused import FailedError, require
 from alphacut.rve.image.bounds import Interval, StiffnessBounds, inverse_below
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
-from alphacut.rve.image.fields.element import (
-    Element,
-    airy_element,
-    displacement_element,
-    spline_element,
-)
+from alphacut.rve.image.fields.element import Element, element_of
 from alphacut.rve.image.fields.energy import (
     SideSolution,
     coefficients,
@@ -93,10 +88,7 @@ class ImageModel:
     @property
     def elements(self) -> tuple[Element, Element]:
         """Elements of stresses and of displacements."""
-        if len(self.sides) == 2:
-            aspect = self.sides[0] / self.sides[1]
-            return airy_element(aspect), displacement_element(aspect)
-        return spline_element(self.sides, stress=True), spline_element(self.sides, stress=False)
+        return element_of(self.sides, stress=True), element_of(self.sides, stress=False)
 
     def solve(self, images: ModuliImages, start: ImageSolution | None = None) -> ImageSolution:
         """Proved bounds of the stiffness of all images with moduli between the least and greatest.

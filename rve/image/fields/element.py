@@ -19,22 +19,53 @@ components, and k is K (in the plane K + G/3); with 1/(n² k), 1/(4 G) for stres
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
-from functools import cache
+from functools import cache, reduce
 from itertools import permutations, product
 
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Ints
 
-Basis = tuple[tuple[int, ...], ...]  # coefficients of 1, x, x², … on [0, 1]
-LEGENDRE: Basis = ((1,), (-1, 2), (1, -6, 6), (-1, 12, -30, 20))
-SPLINES: dict[int, Basis] = {  # of degree p, in any unit: those that do not vanish on [0, 1]
-    1: ((1, -1), (0, 1)),
-    2: ((1, -2, 1), (1, 2, -2), (0, 0, 1)),
-}
+Polynomials = tuple[tuple[int, ...], ...]  # coefficients of 1, x, x², … on [0, 1]
+LEGENDRE: Polynomials = ((1,), (-1, 2), (1, -6, 6), (-1, 12, -30, 20))
+
+
+@dataclass(frozen=True)
+class Basis:
+    """Functions of one coordinate; their products are those of an element.
+
+    Args:
+        functions: Those that do not vanish on a cell.
+        owners: Of each its number among the unknowns of a cell, and how many cells further that is.
+        places: Of each unknown its place in a cell, and whether its sign changes in a mirror.
+        linear: Of each the functions at the origin (value 0, slope 1) whose sum is its unknown in
+            any linear function; none where that is not subtracted.
+    """
+
+    functions: Polynomials
+    owners: tuple[tuple[int, int], ...]
+    places: tuple[tuple[float, bool], ...] = ((0.0, False),)
+    linear: tuple[tuple[int, ...], ...] = ((), (), ())
+
+
+LINEAR = Basis(((1, -1), (0, 1)), ((0, 0), (0, 1)))
+B_SPLINES = Basis(((1, -2, 1), (1, 2, -2), (0, 0, 1)), ((0, 0), (0, 1), (0, 2)))
+QUADRATIC = Basis(  # values at 0, 1/2 and 1
+    functions=((1, -3, 2), (0, 4, -4), (0, -1, 2)),
+    owners=((0, 0), (1, 0), (0, 1)),
+    places=((0.0, False), (0.5, False)),
+    linear=((0,), (0,), (0,)),
+)
+HERMITE = Basis(  # value and slope at 0, value and slope at 1
+    functions=((1, 0, -3, 2), (0, 1, -2, 1), (0, 0, 3, -2), (0, 0, -1, 1)),
+    owners=((0, 0), (1, 0), (0, 1), (1, 1)),
+    places=((0.0, False), (0.0, True)),
+    linear=((0,), (1,), (0, 1), (1,)),
+)
+BASES = {(2, False): QUADRATIC, (2, True): HERMITE, (3, False): LINEAR, (3, True): B_SPLINES}
+"""By the dimension and whether of stresses."""
 SHEARS = {2: ((0, 1),), 3: ((1, 2), (0, 2), (0, 1))}  # Voigt's order: 12, or 23, 13, 12
 
 
@@ -52,15 +83,13 @@ class Element:
         magnitude: Sums of the absolute terms of each entry, by which rounding is bounded.
         bulk_rows: The first so many modes belong to the trace.
         of_voigt: Constant modes of uniform fields in Voigt order, shape (modes, components).
-        origins: For each local unknown the one to subtract from it, if any.
-        slopes: And those, of what is left, to subtract then: so that a field without strain or
-            stress is taken away.
+        subtracted: For each local unknown those to subtract from it, so that a field without strain
+            or stress is taken away.
         places: Of each unknown its place in a cell of side 1 along the axes, and whether it
             changes its sign where space is mirrored at a point.
         stress: Whether the modes are those of a stress, else of a strain.
-        products: Of products of splines alone: tables to modes, (axis, order, mode, function);
-            terms (component, unknown, orders along the grid's axes), sorted by unknown and last
-            order, and their factors.
+        products: Tables to modes, (axis, order, mode, function); terms (component, unknown, orders
+            along the grid's axes), sorted by unknown and last order, and their factors.
     """
 
     unknowns: int
@@ -69,11 +98,10 @@ class Element:
     magnitude: Array
     bulk_rows: int
     of_voigt: Array
-    origins: tuple[int | None, ...]
-    slopes: tuple[tuple[int, ...], ...]
+    subtracted: tuple[tuple[int, ...], ...]
     places: tuple[tuple[tuple[float, ...], bool], ...]
     stress: bool
-    products: tuple[Array, Ints, Array] | None = None
+    products: tuple[Array, Ints, Array]
 
     @property
     def dimension(self) -> int:
@@ -116,49 +144,56 @@ def isotropic_parts(dimension: int, *, stress: bool) -> Array:
 
 
 @cache
-def spline_element(sides: tuple[float, ...], *, stress: bool) -> Element:
-    """Products of splines on a cell with `sides` along the grid's axes, in any unit.
-
-    Displacements of degree 1, whose strains may jump from cell to cell, or potentials of degree 2.
-    """
-    degree = 2 if stress else 1
-    n, width = len(sides), degree + 1
-    tables = _derivative_modes(SPLINES[degree])
+def element_of(sides: tuple[float, ...], *, stress: bool) -> Element:
+    """Element of stresses or of displacements of a cell with `sides` along the grid's axes."""
+    n = len(sides)
+    basis = BASES[n, stress]
     derivatives = stress_derivatives(n) if stress else strain_derivatives(n)
     potentials = sorted({potential for terms in derivatives for _, potential, _ in terms})
-
-    def modes_of(orders: Sequence[int]) -> Array:
-        """Matrix of a derivative, of orders along x, y, z, of one unknown."""
-        matrix = np.ones((1, 1))
-        for order, side in zip(orders[::-1], sides, strict=True):
-            matrix = np.kron(matrix, tables[order] / side**order)
-        return matrix
-
-    shape = (len(derivatives), width**n, len(potentials), width**n)
-    components = np.zeros(shape)  # (Voigt component, mode, unknown, function)
-    for component, terms in enumerate(derivatives):
-        for factor, potential, orders in terms:
-            components[component, :, potentials.index(potential)] += factor * modes_of(orders)
-    offsets = list(product(range(width), repeat=n))
-    functions = [(u, offset) for u in range(len(potentials)) for offset in offsets]
-    products: list[tuple[int, ...]] = [
+    tables = [
+        [table / side**order for order, table in enumerate(_derivative_modes(basis.functions))]
+        for side in sides
+    ]
+    terms = [
         (component, potentials.index(potential), *orders[::-1], factor)
         for component, of_component in enumerate(derivatives)
         for factor, potential, orders in of_component
     ]
-    products.sort(key=lambda term: (term[1], term[-2]))  # kernels share derivatives along x
-    scaled = [[table / side**order for order, table in enumerate(tables)] for side in sides]
-    element = _element(
-        components.reshape(len(derivatives), width**n, -1),
-        local=functions,
-        origins=[None for _ in functions],
-        slopes=[() for _ in functions],
-        places=[((0.0,) * n, False) for _ in potentials],
+    terms.sort(key=lambda term: (term[1], term[-2]))  # kernels share derivatives along x
+    functions = list(product(range(len(basis.functions)), repeat=n))
+    shape = (len(derivatives), len(functions), len(potentials), len(functions))
+    components = np.zeros(shape)  # (Voigt component, mode, potential, function)
+    for component, potential, *orders, factor in terms:
+        along_axes = (table[order] for table, order in zip(tables, orders, strict=True))
+        components[component, :, potential] += factor * reduce(np.kron, along_axes)
+    parts, components = isotropic_parts(n, stress=stress), components.reshape(*shape[:2], -1)
+    modes = np.tensordot(parts, components, axes=1)
+    magnitude = np.tensordot(abs(parts), abs(components), axes=1)
+    is_kept = magnitude.max(axis=-1) > 0  # (part, mode)
+    is_kept |= n == 3  # kernels number all modes of space
+    of_voigt = np.zeros((*is_kept.shape, len(parts)))
+    of_voigt[:, 0] = parts
+    unknowns = list(product(range(len(basis.places)), repeat=n))
+    local, subtracted = [], []
+    for potential, function in product(range(len(potentials)), functions):
+        numbers, offsets = zip(*(basis.owners[f] for f in function), strict=True)
+        local.append((potential * len(unknowns) + unknowns.index(numbers), offsets))
+        at_origin = product(*(basis.linear[f] for f in function))
+        first = potential * len(functions)
+        subtracted.append(tuple(first + functions.index(f) for f in at_origin if sum(f) <= 1))
+    places = [list(zip(*(basis.places[k] for k in numbers), strict=True)) for numbers in unknowns]
+    *indices, factors = np.array(terms).T
+    return Element(
+        unknowns=len(potentials) * len(unknowns),
+        local=tuple(local),
+        modes=np.ascontiguousarray(modes[is_kept]),
+        magnitude=magnitude[is_kept],
+        bulk_rows=int(is_kept[0].sum()),
+        of_voigt=of_voigt[is_kept],
+        subtracted=tuple(subtracted),
+        places=tuple((place, sum(odd) % 2 == 1) for place, odd in places) * len(potentials),
         stress=stress,
-    )
-    *indices, factors = np.array(products).T
-    return replace(
-        element, products=(np.array(scaled), np.stack(indices, axis=1), factors.astype(float))
+        products=(np.array(tables), np.stack(indices, axis=1), factors.astype(float)),
     )
 
 
@@ -192,89 +227,7 @@ def stress_derivatives(dimension: int) -> Derivatives:
     return by_component
 
 
-@cache
-def displacement_element(aspect: float = 1.0) -> Element:
-    """Biquadratic displacements on a pixel whose height is `aspect` times its width."""
-    basis = ((1, -3, 2), (0, 4, -4), (0, -1, 2))  # at 0, 1/2, 1
-    value, slope, _ = _derivative_modes(basis)
-    d_dx, d_dy = np.kron(value, slope), np.kron(slope, value) / aspect
-    none = np.zeros_like(d_dx)
-    nodes = list(product(range(2), range(3), range(3)))  # component, y, x
-    return _element(
-        np.array([np.hstack([d_dx, none]), np.hstack([none, d_dy]), np.hstack([d_dy, d_dx])]),
-        # a corner, two edge middles and the centre of a pixel, times two components
-        local=[(4 * c + 2 * (y % 2) + x % 2, (y // 2, x // 2)) for c, y, x in nodes],
-        origins=[9 * c for c, _, _ in nodes],
-        slopes=[() for _ in nodes],
-        places=[((y / 2, x / 2), False) for _, y, x in product(range(2), repeat=3)],
-        stress=False,
-    )
-
-
-@cache
-def airy_element(aspect: float = 1.0) -> Element:
-    """Bicubic stress element of φ and its slopes, per pixel of height `aspect` times its width."""
-    # value and slope at 0, value and slope at 1
-    basis = ((1, 0, -3, 2), (0, 1, -2, 1), (0, 0, 3, -2), (0, 0, -1, 1))
-    value, slope, curvature = _derivative_modes(basis)
-    nodes = list(product(range(2), repeat=4))  # y, whether slope in y, x, whether slope in x
-    origin, slope_y, slope_x = (nodes.index(n) for n in ((0, 0, 0, 0), (0, 1, 0, 0), (0, 0, 0, 1)))
-
-    def slopes(y: int, dy: int, x: int, dx: int) -> tuple[int, ...]:
-        """Slopes at the origin that a linear function has in an unknown."""
-        if dy or dx:
-            return () if dy and dx else (slope_y if dy else slope_x,)
-        return (slope_y,) * y + (slope_x,) * x
-
-    return _element(
-        np.array(
-            [
-                np.kron(curvature, value) / aspect**2,
-                np.kron(value, curvature),
-                -np.kron(slope, slope) / aspect,
-            ]
-        ),
-        local=[(2 * dy + dx, (y, x)) for y, dy, x, dx in nodes],
-        # the unknowns at the origin that make up a linear function at a node
-        origins=[None if dy or dx else origin for _, dy, _, dx in nodes],
-        slopes=[slopes(*node) for node in nodes],
-        places=[((0.0, 0.0), dy != dx) for dy, dx in product(range(2), repeat=2)],
-        stress=True,
-    )
-
-
-def _element(
-    components: Array,
-    local: Sequence[tuple[int, tuple[int, ...]]],
-    origins: Sequence[int | None],
-    slopes: Sequence[tuple[int, ...]],
-    places: Sequence[tuple[tuple[float, ...], bool]],
-    *,
-    stress: bool,
-) -> Element:
-    """Element from the modes of its Voigt components, (components, modes, local unknowns)."""
-    parts = isotropic_parts(len(local[0][1]), stress=stress)
-    modes = np.tensordot(parts, components, axes=1)
-    magnitude = np.tensordot(abs(parts), abs(components), axes=1)
-    # (part, mode); kernels number all modes of space
-    is_kept = (magnitude.max(axis=-1) > 0) | (len(parts) == 6)
-    of_voigt = np.zeros((*is_kept.shape, len(parts)))
-    of_voigt[:, 0] = parts
-    return Element(
-        unknowns=len(places),
-        local=tuple(local),
-        modes=np.ascontiguousarray(modes[is_kept]),
-        magnitude=magnitude[is_kept],
-        bulk_rows=int(is_kept[0].sum()),
-        of_voigt=of_voigt[is_kept],
-        origins=tuple(origins),
-        slopes=tuple(slopes),
-        places=tuple(places),
-        stress=stress,
-    )
-
-
-def _derivative_modes(basis: Basis) -> list[Array]:
+def _derivative_modes(basis: Polynomials) -> list[Array]:
     """Matrices (polynomials, functions) to orthonormal Legendre modes of derivatives 0, 1 and 2."""
     functions, matrices = list(basis), []
     count = max(map(len, basis))

@@ -169,18 +169,12 @@ def _modes_by_rows(element: Element, fields: Array, mean_modes: Array) -> Modes:
 
 def _subtract_linear(element: Element, raw: Fields) -> tuple[Fields, Fields]:
     """Local unknowns less a function without strain or stress; a bound of the rounding error."""
-    xp = namespace(raw)
-    shifted, error = raw.copy(), xp.zeros_like(raw)
-    for k, origin in enumerate(element.origins):
-        if origin is not None:
-            shifted[k] -= raw[origin]
-            error[k] = UNIT * xp.abs(shifted[k])
-    local, local_error = shifted.copy(), error.copy()
-    for k, slopes in enumerate(element.slopes):
-        for slope in slopes:
-            local[k] -= shifted[slope]
-            local_error[k] += error[slope] + UNIT * xp.abs(local[k])
-    return local, local_error
+    local, error = raw.copy(), namespace(raw).zeros_like(raw)
+    for k, subtracted in enumerate(element.subtracted):
+        for other in subtracted:
+            local[k] -= raw[other]
+            error[k] += UNIT * abs(local[k])
+    return local, error
 
 
 def solved_loads(dimension: int) -> Array:

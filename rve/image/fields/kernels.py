@@ -32,7 +32,6 @@ def apply_by_rows(
 ) -> Array:
     """Nodal forces of fields, both of shape (loads, unknowns, z, y, x), with mean modes added."""
     result = np.zeros_like(fields)
-    assert element.products is not None
     parts = isotropic_parts(3, stress=element.stress)
     uniform = np.linalg.solve(parts, mean_modes[element.of_voigt.any(axis=1)])
     for load, field in enumerate(fields):
@@ -46,7 +45,6 @@ def modes_by_rows(element: Element, fields: Array, z: int, first: int, last: int
 
     Each is off by at most `ROUNDINGS` rounding units of the sum of its terms' magnitudes.
     """
-    assert element.products is not None
     modes = np.zeros((len(element.modes), len(fields), (last - first) * fields.shape[-1]))
     parts = isotropic_parts(3, stress=element.stress)
     _add_modes(*element.products, parts, fields, z, first, last, modes)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from alphacut.rve.image.bounds import StiffnessBounds, inverse_below, residual_above
-from alphacut.rve.image.fields.element import airy_element, displacement_element
+from alphacut.rve.image.fields.element import element_of
 from alphacut.rve.image.fields.energy import (
     COEFFICIENT,
     PIECE,
@@ -23,7 +23,7 @@ from alphacut.rve.image.fields.energy import (
 from alphacut.rve.result.moduli import AVERAGES, AXES
 
 LOST = UNIT * (1 - 2.0**-20)  # just too little to change 1
-ELEMENTS = [displacement_element(), airy_element()]
+ELEMENTS = [element_of((1.0, 1.0), stress=stress) for stress in (False, True)]
 
 
 def in_order(terms):
@@ -51,7 +51,7 @@ def test_the_sum_of_a_piece_of_products():
 def test_the_product_of_modes_and_unknowns(element):
     count = len(element.local)
     row = int(np.argmax((element.modes != 0).sum(axis=1)))
-    linear = {x for x in element.origins if x is not None} | {x for s in element.slopes for x in s}
+    linear = {x for subtracted in element.subtracted for x in subtracted}
     used = [k for k in range(count) if element.modes[row, k] != 0 and k not in linear]
     fields = np.zeros((1, element.unknowns, 4, 4))
     for k in used:
@@ -69,11 +69,8 @@ def test_the_product_of_modes_and_unknowns(element):
 
 @pytest.mark.parametrize("element", ELEMENTS, ids=["displacement", "stress"])
 def test_the_difference_from_a_linear_function(element):
-    subtracted = [
-        ([] if origin is None else [origin]) + list(slopes)
-        for origin, slopes in zip(element.origins, element.slopes, strict=True)
-    ]
-    k, (other,) = next((k, x) for k, x in enumerate(subtracted) if len(x) == 1 and k not in x)
+    pairs = enumerate(element.subtracted)
+    k, (other,) = next((k, x) for k, x in pairs if len(x) == 1 and k not in x)
     raw = np.zeros((len(element.local), 1, 1, 1))
     raw[k], raw[other] = 1.0, -LOST
     local, doubt = _subtract_linear(element, raw)

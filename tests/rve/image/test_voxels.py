@@ -8,7 +8,7 @@ from scipy.sparse.linalg import splu
 from alphacut.fuzzy import RefusedError
 from alphacut.rve import Phase
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
-from alphacut.rve.image.fields.element import spline_element
+from alphacut.rve.image.fields.element import element_of
 from alphacut.rve.image.fields.energy import energies, modes_by_matrices, modes_of
 from alphacut.rve.image.fields.grid import Operator
 from alphacut.rve.image.fields.preconditioner import FourierPreconditioner, Reference
@@ -194,7 +194,7 @@ def test_the_series_of_spheres_is_between_the_voxels_inside_and_those_touched(co
 
 @pytest.mark.parametrize("stress", [False, True], ids=["displacement", "stress"])
 def test_kernels_do_what_the_elements_matrices_do(stress, rng):
-    element = spline_element((0.7, 2.0, 1.0), stress=stress)
+    element = element_of((0.7, 2.0, 1.0), stress=stress)
     for shape in ((2, 3, 4), (5, 2, 7)):
         trace, deviator = rng.uniform(0.1, 2, (2, *shape))
         operator = Operator(element, trace, deviator)
@@ -224,7 +224,7 @@ def test_kernels_do_what_the_elements_matrices_do(stress, rng):
 
 @pytest.mark.parametrize("stress", [False, True], ids=["displacement", "stress"])
 def test_the_preconditioner_inverts_one_material_to_single_precision(stress, rng):
-    element, shape = spline_element((0.7, 2.0, 1.0), stress=stress), (16, 3, 40)
+    element, shape = element_of((0.7, 2.0, 1.0), stress=stress), (16, 3, 40)
     constant = Reference(3e-12, 2e-12, element.trace_in_deviator)
     inverse = FourierPreconditioner.of_material(element, constant, shape)
     operator = Operator(element, *(x * np.ones(shape) for x in (constant.trace, constant.deviator)))
@@ -238,7 +238,7 @@ def test_the_preconditioner_inverts_one_material_to_single_precision(stress, rng
 def test_energies_are_those_of_three_gauss_points_an_axis(rng):
     """Stresses at the points by splines and Beltrami's derivatives written out."""
     sides, shape = np.array([0.7, 2.0, 1.0]), (3, 4, 5)
-    element = spline_element(tuple(sides), stress=True)
+    element = element_of(tuple(sides), stress=True)
     trace, deviator = rng.uniform(0.1, 2, (2, *shape))
     potentials = rng.normal(size=(1, 6, *shape))  # 11, 12, 13, 22, 23, 33
     points, weights = np.polynomial.legendre.leggauss(3)
@@ -286,7 +286,7 @@ def test_energies_are_those_of_three_gauss_points_an_axis(rng):
 
 def test_stresses_of_potentials_are_in_equilibrium(rng):
     """They do no work on any compatible strain, nor on a uniform one."""
-    stress, strain = (spline_element((0.7, 2.0, 1.0), stress=x) for x in (True, False))
+    stress, strain = (element_of((0.7, 2.0, 1.0), stress=x) for x in (True, False))
     shape = 4, 5, 6
     potentials = rng.normal(size=(1, 6, *shape))
     stresses = _components(stress, potentials)
@@ -375,7 +375,7 @@ def test_first_order_losses_of_an_independent_solver_are_inside(rng):
 
 def test_rounding_counts(rng):
     """Planted: sums in single precision, and the mean modes forgotten, leave the bound."""
-    element = spline_element((1.0, 1.0, 1.0), stress=True)
+    element = element_of((1.0, 1.0, 1.0), stress=True)
     fields = rng.normal(size=(1, 6, 3, 3, 3))
     means = element.mean_modes(np.eye(6)[:1])
     weights = [(rows, np.ones((3, 3, 3))) for rows in element.parts]
