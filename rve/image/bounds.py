@@ -65,35 +65,26 @@ class StiffnessBounds:
     def young(self, average: str = AXES) -> Interval:
         """Lower and upper bound of Young's modulus of an average, in Pa.
 
-        In the plane E = 3 G − G²/K of K + G/3, in space 9 K G/(3 K + G), which rises in both.
+        E = G (3 − x) with x = G/(K + G/3), where the plane's K is K + G/3 already.
         """
-        if self.dimension == 3:
-            low, high = (
-                9 * k * g / (3 * k + g) for k, g in zip(self.bulk, self.shear(), strict=True)
-            )
-            return low * (1 - 8 * UNIT), high * (1 + 8 * UNIT)
-        # E rises with K; with G it rises up to G = 3/2 K and falls beyond
+        # E rises with K; of the plane it rises with G up to G = 3/2 K and falls beyond
         (min_shear, max_shear), (min_bulk, max_bulk) = self.shear(average), self.bulk
-        low = min(
-            _young(shear, min_bulk) - _young_rounding(shear, min_bulk)
-            for shear in (min_shear, max_shear)
-        )
-        stiffest = float(np.clip(1.5 * max_bulk, min_shear, max_shear))  # G of the largest E
-        return low, _young(stiffest, max_bulk) + _young_rounding(stiffest, max_bulk)
+        shears = np.array([min_shear, np.clip(1.5 * max_bulk, min_shear, max_shear), max_shear])
+        low_ratios, high_ratios = (self._ratios(shears, bulk) for bulk in (min_bulk, max_bulk))
+        low = shears * (3 - low_ratios) - 8 * UNIT * shears * (3 + low_ratios)
+        high = shears * (3 - high_ratios) + 8 * UNIT * shears * (3 + high_ratios)
+        return float(low.min()), float(high.max())
 
     def poisson(self, average: str = AXES) -> Interval:
-        """Lower and upper bound of Poisson's ratio of an average.
-
-        In the plane (1 − G/K)/2 of K + G/3, in space (3 K − 2 G)/(2 (3 K + G)).
-        """
+        """Lower and upper bound of Poisson's ratio (1 − x)/2 of an average, x as of `young`."""
         (min_shear, max_shear), (min_bulk, max_bulk) = self.shear(average), self.bulk
-        if self.dimension == 3:
-            pairs = (min_bulk, max_shear), (max_bulk, min_shear)
-            low, high = ((3 * k - 2 * g) / (6 * k + 2 * g) for k, g in pairs)
-            return low - 8 * UNIT, high + 8 * UNIT
-        max_ratio, min_ratio = max_shear / min_bulk, min_shear / max_bulk
-        low = (1 - max_ratio) / 2 - UNIT * (1 + max_ratio)
-        return low, (1 - min_ratio) / 2 + UNIT * (1 + min_ratio)
+        max_ratio, min_ratio = self._ratios(max_shear, min_bulk), self._ratios(min_shear, max_bulk)
+        low = (1 - max_ratio) / 2 - 4 * UNIT * (1 + max_ratio)
+        return float(low), float((1 - min_ratio) / 2 + 4 * UNIT * (1 + min_ratio))
+
+    def _ratios(self, shear: Array | float, bulk: float) -> Array:
+        """G/(K + G/3) within 3 rounding units."""
+        return np.asarray(shear / (bulk if self.dimension == 2 else bulk + np.asarray(shear) / 3))
 
     def constants(self) -> Array:
         """Bounds of engineering constants along the axes, in Pa, shape (constants, 2).
@@ -110,8 +101,10 @@ class StiffnessBounds:
 
     def _ratio(self, low: Array, high: Array, i: int, j: int) -> Interval:
         """Bounds of −S_ij/S_ii from those of S."""
+        # |x · (S − middle) y| ≤ √(x · D x) √(y · D y)/2 with D = high − low
         middle, slack = (low[i, j] + high[i, j]) / 2, 4 * UNIT
-        half_width = _half_widths(high - low)[i, j] + slack * np.abs(high).max()
+        variances = np.maximum(np.diagonal(high - low)[[i, j]], 0)
+        half_width = np.sqrt(variances).prod() / 2 + slack * np.abs(high).max()
         cross_terms = [-middle - half_width, -middle + half_width]
         ratios = np.outer(cross_terms, [1 / high[i, i], 1 / low[i, i]])
         margin = slack * np.abs(ratios).max()
@@ -138,21 +131,6 @@ class StiffnessBounds:
     @property
     def _rounding(self) -> float:
         return UNIT * float(np.abs(self.upper).max())
-
-
-def _half_widths(difference: Array) -> Array:
-    """Half the widths of the entries of a symmetric matrix whose bounds differ by so much."""
-    # |x · (A − middle) y| ≤ √(x · D x) √(y · D y)/2 with D the difference
-    diagonal = np.sqrt(np.maximum(np.diagonal(difference), 0))
-    return np.asarray(np.outer(diagonal, diagonal) / 2)
-
-
-def _young(shear: float, bulk: float) -> float:
-    return 3 * shear - shear * shear / bulk
-
-
-def _young_rounding(shear: float, bulk: float) -> float:
-    return 2 * UNIT * (3 * shear + shear * shear / bulk)
 
 
 def inverse_below(matrix: Array) -> Array:

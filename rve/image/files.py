@@ -191,14 +191,14 @@ def _read_raw(path: Path, sides: Sequence[float]) -> Array:
     n_head_bytes = size if data == path else int(value("headersize", "byte skip") or 0)
     directions = re.findall(r"\(([^)]*)\)", value("space directions"))
     lengths = [math.hypot(*map(float, vector.split(","))) for vector in directions]
-    spacing = value("elementspacing", "spacings").split() or lengths
+    spacing = [*map(float, value("elementspacing", "spacings").split())] or lengths
     require(kind is not None, name, "a type that is not known", "whole numbers or floats")
     require(not is_compressed, name, "compressed data", "raw data", "save it without compression")
     require(len(sizes) == 3, name, f"{len(sizes)} sizes", "three, along x, y and z")
     require(data.is_file(), name, f"data in {data.name}", "a file beside the head")
-    stated = np.array([*map(float, reversed(spacing))] or sides) / np.asarray(sides, float)
+    stated = np.array(spacing[::-1] or sides) / np.asarray(sides, float)
     if stated.max() > 1.01 * stated.min():
-        what = f"voxels of {' × '.join(f'{float(x):g}' for x in spacing)} along x, y, z"
+        what = f"voxels of {' × '.join(f'{x:g}' for x in spacing)} along x, y, z"
         given = " : ".join(f"{side:g}" for side in reversed(sides))
         raise RefusedError(name, what, given, "give cell.voxel = [x, y, z] as they are")
     shape = tuple(int(n) for n in reversed(sizes))

@@ -109,6 +109,11 @@ class Element:
         return len(self.local[0][1])
 
     @property
+    def reach(self) -> int:
+        """Cells along an axis to the farthest that owns a local unknown."""
+        return max(max(offset) for _, offset in self.local)
+
+    @property
     def parts(self) -> tuple[slice, slice]:
         """Rows of the modes of the trace, and of those of the deviator."""
         return slice(0, self.bulk_rows), slice(self.bulk_rows, None)
@@ -166,9 +171,9 @@ def element_of(sides: tuple[float, ...], *, stress: bool) -> Element:
     for component, potential, *orders, factor in terms:
         along_axes = (table[order] for table, order in zip(tables, orders, strict=True))
         components[component, :, potential] += factor * reduce(np.kron, along_axes)
-    parts, components = isotropic_parts(n, stress=stress), components.reshape(*shape[:2], -1)
-    modes = np.tensordot(parts, components, axes=1)
-    magnitude = np.tensordot(abs(parts), abs(components), axes=1)
+    parts, by_unknown = isotropic_parts(n, stress=stress), components.reshape(*shape[:2], -1)
+    modes = np.tensordot(parts, by_unknown, axes=1)
+    magnitude = np.tensordot(abs(parts), abs(by_unknown), axes=1)
     is_kept = magnitude.max(axis=-1) > 0  # (part, mode)
     is_kept |= n == 3  # kernels number all modes of space
     of_voigt = np.zeros((*is_kept.shape, len(parts)))

@@ -151,7 +151,7 @@ def _modes_by_rows(element: Element, fields: Array, mean_modes: Array) -> Modes:
     from alphacut.rve.image.fields.kernels import ROUNDINGS, modes_by_rows  # Numba takes its time
 
     count, (nz, ny, nx) = len(fields), fields.shape[2:]
-    n_rows, width = max(1, SLAB_CELLS // (count * nx)), 1 + max(max(x) for _, x in element.local)
+    n_rows, width = max(1, SLAB_CELLS // (count * nx)), 1 + element.reach
     unknown = np.array([u for u, _ in element.local])
     by_unknown = [element.magnitude[:, unknown == u].sum(axis=1) for u in range(element.unknowns)]
     amplification = ROUNDINGS * UNIT * np.stack(by_unknown, axis=1)

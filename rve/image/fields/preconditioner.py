@@ -172,7 +172,7 @@ def fourier_blocks(
     matrix = constant.trace * trace + constant.deviator * deviator
     unknown = np.array([u for u, _ in element.local])
     offsets = np.array([offset for _, offset in element.local])
-    reach = int(offsets.max())
+    reach = element.reach
     # coupling of unknowns a and b of cells at a distance from −reach to reach along each axis
     coupling = np.zeros((2 * reach + 1,) * len(waves) + (element.unknowns,) * 2)
     steps = np.moveaxis(offsets - offsets[:, None] + reach, -1, 0)
