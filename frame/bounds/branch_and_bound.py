@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from math import factorial
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from alphacut.frame.bounds.kernel import FACES, examine
 from alphacut.frame.bounds.model_error import Remainder
 from alphacut.frame.bounds.newton import Optima, refine
 from alphacut.frame.calculus.jet import Array
+from alphacut.frame.calculus.monomials import count, monomial_values
 from alphacut.frame.modes.modal_model import ModalModel, in_planes, wave_factors
 from alphacut.fuzzy.arrays import Ints
 from alphacut.fuzzy.progress_bar import Progress
@@ -130,17 +132,16 @@ def _linear_phases(
     remainder: Remainder, radius: Array, slopes: Array, share: Array
 ) -> tuple[Array, ...]:
     """`modes` of `kernel.linear_phase_bound` for B boxes; `slopes` (d, B, n) are those of λ."""
-    slopes, (count, n, m) = slopes.swapaxes(0, 1), share.shape
+    slopes, d = slopes.swapaxes(0, 1), radius.shape[1]
     phase, decay = (np.einsum("bd,bdn->bn", radius, np.abs(x)) for x in (slopes.imag, slopes.real))
-    products = [np.ones((count, 1))]  # of no radii to three: 1, r_i, r_i r_j, r_i r_j r_k
-    for _ in range(3):
-        products.append((products[-1][..., None] * radius[:, None]).reshape(count, -1))
+    # derivatives of order k times k radii, summed, are k! times a majorant's part of degree k
+    by_degree = np.split(monomial_values(radius, 3), np.cumsum([count(d, k) for k in range(3)]), 1)
     of_rate, of_share = (
-        np.stack([p @ x.reshape(p.shape[1], -1) for p, x in zip(products, bounds, strict=True)], 1)
-        for bounds in (remainder.rate, remainder.share)
+        np.stack([factorial(k) * np.tensordot(by_degree[k], x, 1) for k, x in enumerate(parts)], 1)
+        for parts in (remainder.rate, remainder.share)
     )
     slope = np.ascontiguousarray(slopes.imag.swapaxes(1, 2))
-    return in_planes(share), slope, phase, decay, of_rate[:, 2:], of_share.reshape(count, 4, n, m)
+    return in_planes(share), slope, phase, decay, of_rate[:, 2:], of_share
 
 
 @dataclass(frozen=True, eq=False)

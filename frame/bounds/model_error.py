@@ -18,10 +18,10 @@ dτ, with g a bound of Re λ. From these follow what quadratic Taylor models of 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import combinations_with_replacement, permutations
 
 import numpy as np
 
+from alphacut.frame.calculus.monomials import count, exponents, product_part, product_places
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.damped import DampedModes, DampedStructure, norm_of
@@ -64,8 +64,8 @@ def proved_error(model: ModalModel) -> Array:
             continue
         deviation += part.push * start[s] + 2 * part.elapsed @ energy_rate[s]
         share_error = (outputs[s] - part.share).size() + by_ratio[s][:, None] * norms.reading
-        largest = derivative_bounds(part.share, reach)[0]
-        output_error += 2 * part.waves[0] @ (share_error + part.left_out[:, None] * largest)
+        left_out = part.left_out[:, None] * part.share.size()
+        output_error += 2 * part.waves[0] @ (share_error + left_out)
     return (1 + ROUNDING) * (deviation[:, None] * norms.outputs + output_error)
 
 
@@ -156,29 +156,14 @@ def _start_errors(structure: DampedStructure, modes: DampedModes, norms: EnergyN
     return np.hypot(norms.of_spring_force(spring.size()), norms.of_force(momentum.size()))
 
 
-def derivative_bounds(polynomials: TaylorModel, reach: Array) -> list[Array]:
-    """Upper bounds of the |derivatives| of polynomials over the box |u_i| ≤ reach_i.
+def majorant_parts(polynomials: TaylorModel, reach: Array) -> list[Array]:
+    """Parts of degree 0 to 3 of Σ |coefficient| (reach + v)^e in v, shapes (monomials, *V).
 
-    Returns:
-        Of order 0 to 3, shapes (d,) * order + V, V the polynomials' shape: the derivatives of
-        Σ |coefficient| u^e at u = reach.
+    At v = 0 its derivatives bound those of the polynomials, shape V, over the box |u_i| ≤ reach_i.
     """
-    size, index = np.abs(polynomials.coefficients), polynomials.exponents
-    terms, d = index.shape
-    bounds = list[Array]()
-    for order in range(4):
-        weight: Array = np.zeros((d,) * order + (terms,))
-        for axes in combinations_with_replacement(range(d), order):
-            exponent = index.copy()
-            factor: Array = np.ones(terms)
-            for axis in axes:
-                factor = factor * exponent[:, axis]
-                exponent[:, axis] -= 1
-            factor *= np.prod(reach ** np.maximum(exponent, 0), axis=1)
-            for permuted in set(permutations(axes)):
-                weight[permuted] = factor
-        bounds.append(np.tensordot(weight, size, 1))
-    return bounds
+    sizes = replace(polynomials, parts=tuple(np.abs(part) for part in polynomials.parts))
+    around = sizes.within(reach - 1, reach + 1)
+    return [around.part(degree) for degree in range(4)]
 
 
 def largest_growth(eigenvalue: TaylorModel, reach: Array) -> Array:
@@ -251,42 +236,43 @@ def _forced_part(model: ModalModel, growth: Array, load: LoadTables) -> MotionPa
 class Remainder:
     """Bounds of what quadratic Taylor models of the outputs leave out in a box, and of rounding.
 
-    They follow for the box [lower, upper] by Leibniz' rule on C_k w(t; λ_k).
+    They follow for the box [lower, upper] by majorants: derivatives of C exp(λ t) over exp(λ₀ t)
+    are no larger than those of Σ_p t^p C ρ^p / p!, ρ = λ − λ₀, with majorants of C and λ.
 
     Attributes:
         tensor: |∂³ output / ∂u_i ∂u_j ∂u_k| at most, shape (T, m, d, d, d), symmetric in the last
             three.
         margin: Rounding of values, and of slopes, at most, shape (T, m, 1 + d).
-        rate: Bounds of derivatives of the eigenvalues, orders 0 to 3, shapes (d,) * order + (n,).
-        share: The same of the shares of the last part, shapes (d,) * order + (n, m).
+        rate: Majorants of the eigenvalues, see `majorant_parts`, by degree (monomials, n).
+        share: The same of the shares of the last part, (monomials, n, m).
     """
 
     def __init__(self, model: ModalModel, lower: Array, upper: Array) -> None:
-        d, n, m = len(lower), model.count, len(model.flow.outputs)
+        d, n, m, time = len(lower), model.count, len(model.flow.outputs), model.flow.time
         reach, width = np.maximum(np.abs(lower), np.abs(upper)), upper - lower
-        rate = derivative_bounds(model.eigenvalue, reach)
         growth = largest_growth(model.eigenvalue, reach)
-        third = np.zeros((len(model.flow.time), m, d, d, d))
-        margin = np.zeros((len(model.flow.time), m, 1 + d))
+        self.rate = majorant_parts(model.eigenvalue, reach)
+        cubic, margin = np.zeros((len(time), count(d, 3), m)), np.zeros((len(time), 1 + d, m))
+        rho = [part[..., None] for part in self.rate]
         for part in motion_parts(model, growth):
-            share = derivative_bounds(part.share, reach)
-            noise = _rounding_bound(model, rate[0], part.load)
-            for k in range(n):
-                of_mode = [x[..., k, :] for x in share], [x[..., k] for x in rate]
-                sizes = []
-                for order in range(4):
-                    bounds = np.stack(leibniz(*of_mode, order))
-                    waves = 2 * part.waves[: order + 1, :, k]
-                    sizes.append(np.tensordot(waves, bounds, (0, 0)))  # (T, d, …, m)
-                third += np.moveaxis(sizes[3], -1, 1)
-                slope_change = np.einsum("tijm,j->tim", sizes[2], width)
-                slopes, mean_slope = sizes[1] + slope_change, sizes[1] + slope_change / 2
-                values = sizes[0] + np.einsum("tim,i->tm", mean_slope, width)
-                margin[..., 0] += noise[:, k, None] * values
-                margin[..., 1:] += noise[:, k, None, None] * np.moveaxis(slopes, -1, 1)
+            noise = _rounding_bound(model, self.rate[0][0], part.load)
+            self.share = power = majorant_parts(part.share, reach)
+            for p in range(4):  # power: the parts of C ρ^p / p!
+                waves = 2 * part.waves[p]
+                cubic += np.tensordot(waves, power[3], (1, 1))
+                quadratic = TaylorModel(tuple(power[:3]), np.zeros((n, m)), d)
+                largest = np.concatenate(majorant_parts(quadratic, width)[:2])  # values, slopes
+                margin += np.tensordot(noise * waves, largest, (1, 1))
+                power = [
+                    product_part(power, rho, k, d, np.multiply, lowest=(0, 1)) / (p + 1)
+                    for k in range(4)
+                ]
         at_start = np.full(n, 2.0) @ model.coefficient.real  # where most modes cancel
-        third[model.flow.time == 0] = np.moveaxis(derivative_bounds(at_start, reach)[3], -1, 0)
-        self.tensor, self.margin, self.rate, self.share = (1 + 1e-9) * third, margin, rate, share
+        cubic[time == 0] = majorant_parts(at_start, reach)[3]
+        of_exponents = np.array([1, 1, 2, 6])[exponents(d, 3)].prod(1)  # ∂³ u^e at 0, e!
+        third = (1 + 1e-9) * (cubic * of_exponents[:, None]).swapaxes(1, 2)
+        self.tensor = third[..., product_places(d, 1, 2)[:, product_places(d, 1, 1)]]
+        self.margin = margin.swapaxes(1, 2)
 
 
 def _rounding_bound(model: ModalModel, rate: Array, load: LoadTables | None) -> Array:
@@ -299,33 +285,3 @@ def _rounding_bound(model: ModalModel, rate: Array, load: LoadTables | None) -> 
     if load is not None:
         operations = operations + (8 * len(model.flow.time) + SERIES_TERMS) * np.exp(REACH)
     return np.finfo(float).eps * operations
-
-
-def leibniz(c: list[Array], r: list[Array], order: int) -> list[Array]:
-    """Bounds of derivatives of C exp(λ t) over exp(λ t), for each power of t from 0 to the order.
-
-    From bounds `c` of the derivatives of C, shapes (d,) * its order + (m,), and `r` of those of λ,
-    shapes (d,) * its order, by Leibniz' and Faà di Bruno's rules.
-    """
-    d, m = len(r[1]), c[0].shape[-1]
-    out: list[Array] = [np.zeros((d,) * order + (m,)) for _ in range(order + 1)]
-    axes = "ijk"[:order]
-    for chosen in range(2**order):
-        first_axes = "".join(a for bit, a in enumerate(axes) if chosen >> bit & 1)
-        second_axes = [a for a in axes if a not in first_axes]
-        for blocks in _partitions(second_axes):
-            factors = [c[len(first_axes)], *(r[len(block)] for block in blocks)]
-            names = ",".join([first_axes + "z", *blocks])
-            out[len(blocks)] += np.einsum(f"{names}->{axes}z", *factors)
-    return out
-
-
-def _partitions(items: list[str]) -> list[list[str]]:
-    """All set partitions of distinct letters, each a list of blocks (Faà di Bruno's formula)."""
-    if not items:
-        return [[]]
-    first, found = items[0], []
-    for part in _partitions(items[1:]):
-        found.append([first, *part])
-        found += [[*part[:k], first + part[k], *part[k + 1 :]] for k in range(len(part))]
-    return found

@@ -3,15 +3,13 @@ enough to be of use.
 """
 
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
 import pytest
-import sympy
 from scipy.linalg import sqrtm
 
 from alphacut.frame import Exact, LinearFlow, MatrixStructure, Midpoint, StoreyFrame
-from alphacut.frame.bounds.model_error import EnergyNorms, _ratio_errors, leibniz, proved_error
+from alphacut.frame.bounds.model_error import EnergyNorms, _ratio_errors, proved_error
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.calculus.unproved import UnprovedError
@@ -237,19 +235,3 @@ def test_a_damping_force_of_a_wrong_frequency_is_in_the_acceleration() -> None:
     off = np.abs(found.values(np.zeros((1, 1)))[0, 0, 0] - truth)
     assert off == pytest.approx(2 * 0.1 * 0.1)
     assert off <= proved_error(found)[0, 0] * (1 + 1e-9) <= 1.2 * off
-
-
-@pytest.mark.parametrize("order", range(4))
-def test_all_derivatives_of_a_product_of_exponentials_are_those_by_leibniz(order, rng):
-    """Of C exp(λ t) over exp(λ t) at u = 0, with C = exp(a·u) and λ = exp(b·u)."""
-    (a, b), t, u = rng.random((2, 2)), 0.7, sympy.symbols("u:2")
-    outer, inner = (
-        [np.ones(()), x, np.einsum("i,j->ij", x, x), np.einsum("i,j,k->ijk", x, x, x)]
-        for x in (a, b)
-    )
-    found = leibniz([x[..., None] for x in outer], inner, order)
-    total = sum(t**power * part for power, part in enumerate(found))[..., 0]
-    motion = sympy.exp(a @ u + t * sympy.exp(b @ u) - t)
-    for axes in product(range(2), repeat=order):
-        exact = sympy.diff(motion, *(u[axis] for axis in axes)) if axes else motion
-        assert total[axes] == pytest.approx(float(exact.subs(dict.fromkeys(u, 0))), rel=1e-12)
