@@ -100,7 +100,8 @@ class CentredMatrices:
         return sha256(b"".join(part.tobytes() for part in parts)).digest()
 
 
-Series = tuple[list[Array], list[Array], list[Array]]
+Series = list[list[Array]]
+"""Coefficients by degree of Lᵀ (monomials, p, p), of x_j and M x_j (monomials, p, n)."""
 
 
 def narrowest_block(
@@ -116,71 +117,48 @@ def narrowest_block(
     max_degree, d = DEGREES[0], centre.mass.inputs
     while max_degree < DEGREES[1] and comb(d + max_degree, max_degree + 1) <= MAX_MONOMIALS:
         max_degree += 1
+    key = (centre.digest, block.tobytes())
     with KEPT_LOCK:
-        key = (centre.digest, block.tobytes())
-        enclosures = KEPT.pop(key, None) or Enclosures(block, rotation, centre)
-        KEPT[key] = enclosures  # the last one used
-    for degree in range(DEGREES[0], max_degree + 1):
-        found = enclosures.of_degree(degree)
-        if found is None and degree > DEGREES[0]:
-            break  # the sums of coefficients over all degrees are too large; more only add to them
-        if found is not None and found.relative_error < tolerance:
-            break
-    with KEPT_LOCK:
-        while sum(x.numbers for x in KEPT.values()) > MAX_KEPT:
+        series, enclosures = KEPT[key] = KEPT.pop(key, ([], []))  # the last one used
+        for degree in range(DEGREES[0], max_degree + 1):
+            if len(enclosures) == degree - DEGREES[0]:
+                series[:] = subspace_series(block, degree, centre, series)
+                enclosures.append(enclosed_block(block, rotation, series, centre))
+            found = enclosures[degree - DEGREES[0]]
+            if found is None and degree > DEGREES[0]:
+                break  # sums of coefficients over all degrees are too large; more only add to them
+            if found is not None and found.relative_error < tolerance:
+                break
+        while sum(_numbers(*kept) for kept in KEPT.values()) > MAX_KEPT:
             del KEPT[next(iter(KEPT))]
     return found if found is not None and found.relative_error < ROUGH else None
 
 
-class Enclosures:
-    """Enclosures of a block by series of rising degree, computed where they are asked for."""
-
-    def __init__(self, block: Ints, rotation: Array, centre: CentredMatrices) -> None:
-        self.of = block, rotation, centre
-        self.series: Series | None = None  # of the highest degree so far
-        self.found: list[Block | None] = []  # from degree DEGREES[0] on
-        self.lock = Lock()
-
-    @property
-    def numbers(self) -> int:
-        """About how many numbers it holds."""
-        return (2 + len(self.found)) * sum(x.size for parts in self.series or () for x in parts)
-
-    def of_degree(self, degree: int) -> Block | None:
-        """The enclosure by series of a degree; None where there is none."""
-        block, rotation, centre = self.of
-        with self.lock:
-            while len(self.found) <= degree - DEGREES[0]:
-                next_degree = DEGREES[0] + len(self.found)
-                self.series = subspace_series(block, next_degree, centre, self.series)
-                self.found.append(enclosed_block(block, rotation, self.series, centre))
-            return self.found[degree - DEGREES[0]]
+def _numbers(series: Series, enclosures: list[Block | None]) -> int:
+    """About how many numbers a series and its enclosures hold."""
+    return (2 + len(enclosures)) * sum(part.size for parts in series for part in parts)
 
 
-KEPT: dict[tuple[bytes, bytes], Enclosures] = {}
-"""Enclosures by the matrices and the numbers of the modes, those that were used last at the end."""
+KEPT: dict[tuple[bytes, bytes], tuple[Series, list[Block | None]]] = {}
+"""Of matrices and numbers of modes the series of highest degree so far, and the enclosures by those
+of each degree from `DEGREES` on; the pair used last stands at the end."""
 KEPT_LOCK = Lock()
 
 
-def subspace_series(
-    block: Ints, degree: int, centre: CentredMatrices, lower: Series | None = None
-) -> Series:
+def subspace_series(block: Ints, degree: int, centre: CentredMatrices, lower: Series) -> Series:
     """Perturbation series of an invariant subspace K X = M X L, X the identity on the block.
 
     In degree m, (Λ − λ_j M₀) x_j + M₀ Σ_i L_ij e_i is known from lower degrees, Λ and M₀ the
     diagonals of K and M in the middle: the block's own rows give L, the others x_j. `lower` is the
-    same to a lower degree, where it is known.
-
-    Returns:
-        Coefficients of degree 0 to N of Lᵀ (monomials, p, p), of x_j and M x_j (monomials, p, n).
+    same to a lower degree, or empty.
     """
     mass, stiffness, d = centre.mass, centre.stiffness, centre.mass.inputs
     middle = centre.squared[block]
     gaps = np.diag(stiffness.value) - middle[:, None] * centre.has_mass
     gaps[:, block] = np.inf  # no correction inside the block
-    if lower is None:
+    if not lower:
         unit = np.eye(len(centre.basis))[block][None]
-        lower = [np.diag(middle)[None]], [unit], [unit]
+        lower = [[np.diag(middle)[None]], [unit], [unit]]
     rate, shape, mass_shape = (list(parts) for parts in lower)
     for m in range(len(rate), degree + 1):
         of_mass, of_stiffness = (
@@ -191,7 +169,7 @@ def subspace_series(
         rate.append(-right[:, :, block])
         shape.append(right / gaps)
         mass_shape.append(of_mass + shape[m] * centre.has_mass)
-    return rate, shape, mass_shape
+    return [rate, shape, mass_shape]
 
 
 def enclosed_block(
