@@ -276,7 +276,9 @@ def _within_steps(largest: Array, time: Array, force: float, fastest: float, ord
     return np.stack([G + force * h * fastest**order, G_slope])
 
 
-def response_slopes(source: str, G: Array, G_slope: Array, omega: float, quotient: float) -> Array:
+def response_slopes(
+    source: str, G: Array, G_slope: Array, omega: Array | float, quotient: Array | float
+) -> Array:
     """Bounds of |de/dλ| of responses e to a source, in the shape of G and G_slope.
 
     G are bounds of |σ^ν ρ|, G_slope of its derivative by σ; ω is the least, `quotient` the greatest

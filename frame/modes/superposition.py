@@ -22,6 +22,7 @@ import numpy as np
 
 from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF, gamma
 from alphacut.frame.calculus.unproved import UnprovedError
+from alphacut.frame.modes.rest import response_slopes
 from alphacut.frame.modes.structure import Classical
 from alphacut.frame.response.duhamel import absolute_moments, responses_at_nodes
 from alphacut.frame.response.oscillators import read_response
@@ -162,7 +163,7 @@ def outputs_at(
     total, error = np.zeros((2, len(point)))
     for source, load in {"velocity": free, "start": free, **loads}.items():
         order = modal.structure.order[output]
-        response = _mode_responses(sigma, slope, order, source, load, t)
+        response = _mode_responses(sigma, order, source, load, t)
         share = modal.share[source][point], modal.share_error[source][point]
         total += (read[0] * share[0] * response[0]).sum(-1)
         error += _superposition_error(modal, point, read, share, response)
@@ -172,7 +173,7 @@ def outputs_at(
 
 
 def _mode_responses(
-    sigma: Array, sigma_slope: Array, orders: Ints, source: str, load: LoadAtNodes, time: Array
+    sigma: Array, orders: Ints, source: str, load: LoadAtNodes, time: Array
 ) -> tuple[Array, Array, Array, Array]:
     """Responses e, their rounding, and bounds of |de/dλ| at the modes and at any λ, (N, n) each."""
     omega, size, order = sigma.imag, np.abs(sigma), orders[:, None]
@@ -184,14 +185,10 @@ def _mode_responses(
         direct = np.where(order == 2, load.value[:, None], 0.0)
     # |G| and |dG/dσ| at the modes, and anywhere, where |ρ| ≤ ∫ |f| and |ρ′| ≤ t ∫ |f|
     impulse, quotient = load.impulse[:, None], -sigma.real / omega
-    slopes = []
-    for rho, rho_slope in (np.abs(load.rho), (impulse, time * impulse)):
-        G_size, G_slope = power * rho, power_slope * rho + power * rho_slope
-        if source == "start":
-            by_quotient = sigma_slope * (1 + quotient) / omega * G_size
-            slopes.append(sigma_slope * (1 + quotient) * G_slope + by_quotient)
-        else:
-            slopes.append(sigma_slope * (G_slope / omega + G_size / omega**2))
+    slopes = [
+        response_slopes(source, power * rho, power_slope * rho + power * rho_slope, omega, quotient)
+        for rho, rho_slope in (np.abs(load.rho), (impulse, time * impulse))
+    ]
     error = error * (1 + quotient) if source == "start" else error / omega
     error = error + gamma(8) * np.abs(direct)
     return read_response(source, sigma, G) + direct, error, slopes[0], slopes[1]
