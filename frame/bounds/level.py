@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -41,57 +42,41 @@ BLOCK = 40
 """Nodes that one thread bounds in turn, about."""
 
 
-@dataclass(frozen=True, eq=False)
-class ResponseTables:
-    """Responses of the oscillators of a level, by order of the derivative that is observed.
+class ResponseTable(NamedTuple):
+    """Responses of K oscillators to all sources, read by one derivative of the motion."""
 
-    Args:
-        value: For each order responses, shape (K, sources, T, Q W).
-        largest: Their largest magnitudes, shape (K, sources).
-        error: Bounds of what interpolation and round-off miss, shape (K, sources, T).
-        line_deviation: Bounds of their distance from straight lines between nodes, the same.
-        grids: For each mode its points.
-        time: Nodes, shape (T,), in s.
-    """
-
-    value: dict[int, Array]
-    largest: dict[int, Array]
-    error: dict[int, Array]
-    line_deviation: dict[int, Array]
-    grids: list[Grid]
-    time: Array
+    value: Array  # responses at the points of each mode's grid, (K, sources, T, Q W)
+    largest: Array  # their largest magnitudes, (K, sources)
+    error: Array  # bounds of what interpolation and round-off miss, (K, sources, T)
+    line_deviation: Array  # bounds of their distance from straight lines between nodes, the same
 
 
 def response_tables(
-    oscillators: Sequence[Oscillator], excitation: Excitation, orders: Ints
-) -> ResponseTables:
-    """Return tables of the responses of all oscillators to all sources, with bounds of errors.
+    grids: Sequence[Grid], excitation: Excitation, orders: Ints, inputs: int
+) -> dict[int, ResponseTable]:
+    """Return tables of the responses of oscillators on grids, with bounds of errors, by order.
 
-    `orders` (m,) are the derivatives of the motion that outputs take.
+    `orders` (m,) are the derivatives of the motion that outputs take, `inputs` the number of inputs
+    of the sums that the responses enter.
 
     Raises:
         UnprovedError: A response is out of the range of the dual function.
     """
     loads, time, sources = excitation
-    points, distinct = _points(oscillators, float(time[-1])), sorted(map(int, set(orders)))
-    grids = [grid_over(mode.omega_range, mode.quotient_range, points) for mode in oscillators]
-    found = {order: list[list[ModalResponses]]() for order in distinct}
+    found = {order: list[list[ModalResponses]]() for order in sorted(map(int, set(orders)))}
     for grid in grids:
-        tables = Oscillators(grid, loads, time, distinct)
-        for order in distinct:
-            found[order].append([tables.responses(source, order) for source in sources])
-    # of the sums that the responses enter
-    rounding = 2 * gamma(roundings(len(grids), len(sources), oscillators[0].omega.inputs))
-    value, largest = dict[int, Array](), dict[int, Array]()
-    error, deviation = dict[int, Array](), dict[int, Array]()
+        oscillators = Oscillators(grid, loads, time, found)
+        for order, modes in found.items():
+            modes.append([oscillators.responses(source, order) for source in sources])
+    rounding, tables = 2 * gamma(roundings(len(grids), len(sources), inputs)), {}
     for order, modes in found.items():
-        value[order] = np.array([[x.value.reshape(len(time), -1) for x in mode] for mode in modes])
-        error[order] = np.array([[x.error for x in mode] for mode in modes])
-        sizes = np.abs(value[order]).max(-1)
-        largest[order], error[order] = sizes.max(-1), error[order] + rounding * sizes
-        deviation[order] = np.array([[x.line_deviation for x in mode] for mode in modes])
-        require_in_range({"table": largest[order]})
-    return ResponseTables(value, largest, error, deviation, grids, time)
+        value = np.array([[x.value.reshape(len(time), -1) for x in mode] for mode in modes])
+        error = np.array([[x.error for x in mode] for mode in modes])
+        deviation = np.array([[x.line_deviation for x in mode] for mode in modes])
+        sizes = np.abs(value).max(-1)
+        require_in_range({"table": sizes})
+        tables[order] = ResponseTable(value, sizes.max(-1), error + rounding * sizes, deviation)
+    return tables
 
 
 def _points(oscillators: Sequence[Oscillator], duration: float) -> tuple[int, int]:
@@ -107,19 +92,13 @@ def _points(oscillators: Sequence[Oscillator], duration: float) -> tuple[int, in
 
 @dataclass(frozen=True, eq=False)
 class LevelModels:
-    """One level's models and tables.
+    """One level's models and tables."""
 
-    Args:
-        structure: The structure over the level's box.
-        models: Its motion.
-        tables: Responses of its oscillators.
-        excitation: The loads, nodes, and sources.
-    """
-
-    structure: Classical
-    models: MotionModels
-    tables: ResponseTables
-    excitation: Excitation
+    structure: Classical  # the structure over the level's box
+    models: MotionModels  # its motion
+    grids: list[Grid]  # of each oscillator the points of its tables
+    tables: dict[int, ResponseTable]  # responses of its oscillators, by order of derivative
+    excitation: Excitation  # the loads, nodes, and sources
 
     def within(self, low: Array, high: Array) -> LevelModels:
         """Models over the part low ≤ u ≤ high of the box, with the same response tables."""
@@ -138,8 +117,11 @@ class LevelModels:
             UnprovedError: None of its modes can be enclosed.
         """
         models = MotionModels.from_structure(structure, excitation, allowed)
-        tables = response_tables(models.oscillators, excitation, structure.order)
-        return cls(structure, models, tables, excitation)
+        modes, inputs = models.oscillators, structure.start.inputs
+        points = _points(modes, float(excitation[1][-1]))
+        grids = [grid_over(mode.omega_range, mode.quotient_range, points) for mode in modes]
+        tables = response_tables(grids, excitation, structure.order, inputs)
+        return cls(structure, models, grids, tables, excitation)
 
     def line_deviation(self) -> Array:
         """Bound of how far outputs stray from straight lines in the step to each node, (T, m)."""
@@ -148,11 +130,11 @@ class LevelModels:
         )
         by_magnitude: Array = np.array(unresolved)
         for o, order in enumerate(map(int, self.structure.order)):
-            tables = self.tables.line_deviation[order]
-            for mode, table in zip(self.models.oscillators, tables, strict=True):
-                by_magnitude[:, o] += mode.share.size()[:, o] @ table
+            deviations = self.tables[order].line_deviation
+            for mode, deviation in zip(self.models.oscillators, deviations, strict=True):
+                by_magnitude[:, o] += mode.share.size()[:, o] @ deviation
         responses = [x for mode in self.models.oscillators for x in self._responses(mode)]
-        return narrowed_straying(responses, self.tables.time, by_magnitude, unresolved)
+        return narrowed_straying(responses, self.excitation[1], by_magnitude, unresolved)
 
     def _responses(self, mode: Oscillator) -> Iterator[Response]:
         """What a mode adds to outputs by each source, and what forces do to accelerations."""
@@ -286,7 +268,7 @@ def _data(level: LevelModels, o: int, side: float) -> tuple[Data, Array]:
     expected = numbers.EXPECTED_CUBIC * np.asarray(np.abs(cubic).sum(1))
     # of the sums that multipliers enter; scaled variables are at most 1, those of tables 2 or so
     of_sums = 8 * gamma(roundings(len(modes), modes[0].share.shape[0], linear.shape[1]))
-    grids, value = level.tables.grids, level.tables.value[order]
+    grids, table = level.grids, level.tables[order]
     centres, radii = (x.reshape(len(modes), -1) for x in (variables.value, radius))
     omega = np.stack([np.tile(grid.omega, len(grid.quotient)) for grid in grids])
     decay = np.stack([(grid.quotient[:, None] * grid.omega).ravel() for grid in grids])
@@ -294,10 +276,10 @@ def _data(level: LevelModels, o: int, side: float) -> tuple[Data, Array]:
     second = np.array([[grid.omega[1], grid.quotient[1]] for grid in grids])
     ends = [mode.places(grid) for mode, grid in zip(modes, grids, strict=True)]
     sizes = [np.abs(mode.share.value[:, o]) for mode in modes]
-    responses = float((np.array(sizes) * level.tables.largest[order]).sum())
+    responses = float((np.array(sizes) * table.largest).sum())
     truncated_terms, constant = _truncation_terms(level, o, side)
     data = Data(
-        table=value,
+        table=table.value,
         omega=(omega - centres[:, [0]]) / radii[:, [0]],
         decay=(decay - centres[:, [1]]) / radii[:, [1]],
         start=start,
@@ -328,10 +310,10 @@ def _truncation_terms(level: LevelModels, o: int, side: float) -> tuple[list[Arr
     Returns the three fields of `Data` on truncated modes, for what depends on the inputs, and
     constants to add to the model's value for the motion's, and to that for its bound, (2, T).
     """
-    modes, tables, order = level.models.oscillators, level.tables, int(level.structure.order[o])
-    constant: Array = np.zeros((2, len(tables.time)))
+    modes, table = level.models.oscillators, level.tables[int(level.structure.order[o])]
+    constant: Array = np.zeros((2, len(level.excitation[1])))
     constant[1] = level.models.added[:, o]
-    for mode, error in zip(modes, tables.error[order], strict=True):
+    for mode, error in zip(modes, table.error, strict=True):
         constant[1] += mode.share.size()[:, o] @ error
     d, sources = level.structure.rayleigh.inputs, modes[0].share.shape[0]
     if not level.models.truncated:

@@ -37,7 +37,7 @@ def test_models_over_a_part_bound_motions_there(box, rng):
     level = box.level()
     part, own = level.within(*ends), 2 * (unit - ends[0]) / (ends[1] - ends[0]) - 1
     for whole, narrow, grid in zip(
-        level.models.oscillators, part.models.oscillators, part.tables.grids, strict=True
+        level.models.oscillators, part.models.oscillators, part.grids, strict=True
     ):
         assert narrow.omega.at(own) == pytest.approx(whole.omega.at(unit), rel=1e-12)
         first, last = narrow.places(grid)[:2]

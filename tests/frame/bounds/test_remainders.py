@@ -259,11 +259,11 @@ def test_tables_of_the_dual_have_the_rounding_of_all_sums_they_enter():
     # a term enters sums over all variables, over pairs and single inputs, and over sources
     count = 2 * len(level.models.oscillators) * (len(sources) + 2)
     count += 2 * d**2 + 4 * d + 4 * len(sources) + 32
-    for k, grid in enumerate(level.tables.grids):
+    for k, grid in enumerate(level.grids):
         alone = Oscillators(grid, {"load": RECORD}, time, {0})
         for s, source in enumerate(sources):
             response = alone.responses(source, 0)
-            added = level.tables.error[0][k, s] - response.error
+            added = level.tables[0].error[k, s] - response.error
             size = np.abs(response.value).max((1, 2))
             assert (added >= 1.9 * count * unit * size - 1e-18).all()
             assert (added <= 2.1 * count * unit * size + 1e-18).all()
