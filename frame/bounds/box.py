@@ -31,20 +31,13 @@ class Box:
     """Inputs of a structure between two ends, d of which have a width.
 
     Unit coordinates are those of these d inputs, within [−1, 1].
-
-    Args:
-        system: The structure.
-        names: Its inputs, n of them.
-        time: Nodes, shape (T,), in s.
-        low: Lower ends, shape (n,), in SI units.
-        high: Upper ends.
     """
 
-    system: LinearSystem
-    names: tuple[str, ...]
-    time: Array
-    low: Array
-    high: Array
+    system: LinearSystem  # the structure
+    names: tuple[str, ...]  # its inputs, n of them
+    time: Array  # nodes, (T,), in s
+    low: Array  # lower ends, (n,), in SI units
+    high: Array  # upper ends
 
     @property
     def active(self) -> Ints:

@@ -23,60 +23,40 @@ ADDED = ("boxes", "evaluations")
 
 @dataclass(frozen=True, eq=False)
 class Goal:
-    """Bounds that a proof is asked for over a box of L levels, and what is known there.
+    """Bounds that a proof is asked for over a box of L levels, and what is known there."""
 
-    Args:
-        scale: Units of the tolerances of each output, shape (m,).
-        peak: Peak of each output at the nominal inputs and the probes, shape (m,).
-        needed: Bounds of (−output, output) that are asked for, shape (L, T, m, 2).
-        outer: Upper bounds that are known, the same shape; infinite where none is.
-        incumbent: Largest reached values of (−output, output), shape (L, m, 2).
-        workers: Number of threads.
-        last: Whether a refusal ends the proof, so that wide bounds are better than none.
-        tick: Called with the completed fraction.
-    """
-
-    scale: Array
-    peak: Array
-    needed: Mask
-    outer: Array
-    incumbent: Array
-    workers: int
-    last: bool
-    tick: Callable[[float], None]
+    scale: Array  # units of the tolerances of each output, (m,)
+    peak: Array  # peak of each output at the nominal inputs and the probes, (m,)
+    needed: Mask  # bounds of (−output, output) that are asked for, (L, T, m, 2)
+    outer: Array  # upper bounds that are known, the same shape; infinite where none is
+    incumbent: Array  # largest reached values of (−output, output), (L, m, 2)
+    workers: int  # number of threads
+    last: bool  # whether a refusal ends the proof, so that wide bounds are better than none
+    tick: Callable[[float], None]  # called with the completed fraction
 
 
 @dataclass(frozen=True, eq=False)
 class BoxBounds:
-    """Bounds of (−output, output) over one level of a box of n inputs.
+    """Bounds of (−output, output) over one level of a box of n inputs."""
 
-    Args:
-        outer: Proved upper bounds, shape (T, m, 2); at nodes not asked for any valid bound.
-        inner: Values that motions reach, less rounding; −inf where none is known.
-        at: Inputs of these motions, shape (T, m, 2, n), in SI units.
-        between: Largest deviation of an output from a straight line in the step before each node,
-            shape (T, m).
-        shares: Fraction of each input in the gap at each peak, shape (m, 2, n).
-        attained_error: What the exact motion at `at` may exceed `inner` by, shape (T, m).
-        remaining: Lower and upper ends of the box that may contain each peak, shape (2, m, 2, n),
-            in SI units; None for all of the box.
-        pruned: Upper bounds over the rest of the box for each peak, shape (T, m, 2); None if all of
-            the box remains.
-        least_peaks: Lower bound of each output's least peak over time, and the peak of a motion
-            that peaks low, between nodes too, (m,) each; None for what the bounds at nodes say.
-        facts: Further numbers by name.
-    """
-
-    outer: Array
-    inner: Array
-    at: Array
+    outer: Array  # proved upper bounds, (T, m, 2); at nodes not asked for any valid bound
+    inner: Array  # values that motions reach, less rounding; −inf where none is known
+    at: Array  # inputs of these motions, (T, m, 2, n), in SI units
+    # largest deviation of an output from a straight line in the step before each node, (T, m)
     between: Array
-    shares: Array
+    shares: Array  # fraction of each input in the gap at each peak, (m, 2, n)
+    # what the exact motion at `at` may exceed `inner` by, (T, m)
     attained_error: Array | float = 0.0
+    # lower and upper ends of the box that may contain each peak, (2, m, 2, n), in SI units; None
+    # for all of the box
     remaining: Array | None = None
+    # upper bounds over the rest of the box for each peak, (T, m, 2); None if all of the box
+    # remains
     pruned: Array | None = None
+    # lower bound of each output's least peak over time, and the peak of a motion that peaks low,
+    # between nodes too, (m,) each; None for what the bounds at nodes say
     least_peaks: Ends | None = None
-    facts: Mapping[str, float] = field(default_factory=dict)
+    facts: Mapping[str, float] = field(default_factory=dict)  # further numbers by name
 
 
 class BisectionError(UnprovedError):

@@ -150,16 +150,11 @@ class Frontier:
 
     Along each axis a box is a dyadic interval of the domain, 2^depth + index, or one of its ends,
     `LOWER` or `UPPER`.
-
-    Args:
-        position: Intervals of the boxes, shape (B, d).
-        box: Box of each item, rising, shape (I,).
-        problem: Number of its problem, rising for each box, shape (I,).
     """
 
-    position: Array
-    box: Array
-    problem: Array
+    position: Array  # intervals of the boxes, (B, d)
+    box: Array  # box of each item, rising, (I,)
+    problem: Array  # number of its problem, rising for each box, (I,)
 
     @classmethod
     def of_box(cls, d: int, n_problems: int) -> Frontier:

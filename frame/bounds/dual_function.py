@@ -26,52 +26,30 @@ LARGEST = 1e100
 
 
 class Data(NamedTuple):
-    """Models and tables of K modes for one output: L inputs, Z = K (2 + sources) variables.
+    """Models and tables of K modes for one output: L inputs, Z = K (2 + sources) variables."""
 
-    Args:
-        table: Responses, shape (K, sources, T, Q W).
-        omega: Scaled ω of the tables' points, shape (K, Q W).
-        decay: Scaled g of them, the same.
-        start: Least ω and q of each table, shape (K, 2).
-        step: Distances of its points, shape (K, 2).
-        points: Number of points along ω and along q, shape (2,).
-        ends: First and last point along ω and along q that the box reaches, shape (K, 4).
-        centre: Centres of ω and g, shape (K, 2).
-        radius: Their radii.
-        share: Centres of the shares, shape (K, sources).
-        reach: Their radii.
-        linear: Linear parts of all scaled variables, shape (Z, L).
-        quadratic: Quadratic parts, packed by rows, shape (Z, L (L + 1)/2).
-        cubic: Cubic parts, packed, shape (Z, monomials).
-        expected: What is expected of the cubic parts' sum for a multiplier of 1, shape (Z,).
-        remainder: Remainders, with `expected`, shape (Z,).
-        truncated_response: Middles and half ranges of truncated modes' responses, shape
-            (2 sources, T); (0, 1) if there are none.
-        truncated_linear: Linear parts of their shares and amplitudes, shape (2 sources, L).
-        truncated_quadratic: Quadratic parts.
-        grain: Distance of the values that multipliers take, shape (1,).
-    """
-
-    table: Array
-    omega: Array
-    decay: Array
-    start: Array
-    step: Array
-    points: Array
-    ends: Array
-    centre: Array
-    radius: Array
-    share: Array
-    reach: Array
-    linear: Array
-    quadratic: Array
-    cubic: Array
-    expected: Array
-    remainder: Array
+    table: Array  # responses, (K, sources, T, Q W)
+    omega: Array  # scaled ω of the tables' points, (K, Q W)
+    decay: Array  # scaled g of them, the same
+    start: Array  # least ω and q of each table, (K, 2)
+    step: Array  # distances of its points, (K, 2)
+    points: Array  # number of points along ω and along q, (2,)
+    ends: Array  # first and last point along ω and along q that the box reaches, (K, 4)
+    centre: Array  # centres of ω and g, (K, 2)
+    radius: Array  # their radii
+    share: Array  # centres of the shares, (K, sources)
+    reach: Array  # their radii
+    linear: Array  # linear parts of all scaled variables, (Z, L)
+    quadratic: Array  # quadratic parts, packed by rows, (Z, L (L + 1)/2)
+    cubic: Array  # cubic parts, packed, (Z, monomials)
+    expected: Array  # what is expected of the cubic parts' sum for a multiplier of 1, (Z,)
+    remainder: Array  # remainders, with `expected`, (Z,)
+    # middles and half ranges of truncated modes' responses, (2 sources, T); (0, 1) if there are
+    # none
     truncated_response: Array
-    truncated_linear: Array
-    truncated_quadratic: Array
-    grain: Array
+    truncated_linear: Array  # linear parts of their shares and amplitudes, (2 sources, L)
+    truncated_quadratic: Array  # quadratic parts
+    grain: Array  # distance of the values that multipliers take, (1,)
 
 
 def roundings(modes: int, sources: int, inputs: int) -> int:

@@ -23,21 +23,13 @@ from alphacut.fuzzy.arrays import Array, Ints
 
 
 class PeakCell(NamedTuple):
-    """A cell with its bound; cells are ordered by bounds, and equal ones by number.
+    """A cell with its bound; cells are ordered by bounds, and equal ones by number."""
 
-    Args:
-        bound: Lower bound of the peak over it.
-        number: Of the cell.
-        ends: First and last point of the modes' tables along ω and q, shape (K, 4).
-        node: Node of the bound.
-        at: Coordinates that the bound names, shape (d,).
-    """
-
-    bound: float
-    number: int
-    ends: Ints
-    node: int
-    at: Array
+    bound: float  # lower bound of the peak over it
+    number: int  # of the cell
+    ends: Ints  # first and last point of the modes' tables along ω and q, (K, 4)
+    node: int  # node of the bound
+    at: Array  # coordinates that the bound names, (d,)
 
 
 def least_peak(level: LevelModels, output: int) -> tuple[float, Array]:

@@ -157,25 +157,16 @@ class LevelModels:
 
 @dataclass(eq=False)
 class OutputBounds:
-    """Bounds of side × one output at all T nodes, d inputs.
+    """Bounds of side × one output at all T nodes, d inputs."""
 
-    Args:
-        index: Number of the output in the level's models, and 0 for −output or 1 for the output.
-        wanted_gap: Distance of bound and reached value that suffices.
-        reached: Largest value of side × output that is known to be reached.
-        constant: What the motion has besides the model, and what a bound has besides, (2, T).
-        data: Models and tables of the output.
-        out: Bounds and the model's values, shape (2, T).
-        at: Inputs of the model's values, shape (T, d).
-    """
-
+    # number of the output in the level's models, and 0 for −output or 1 for the output
     index: tuple[int, int]
-    wanted_gap: float
-    reached: float
-    constant: Array
-    data: Data
-    out: Array
-    at: Array
+    wanted_gap: float  # distance of bound and reached value that suffices
+    reached: float  # largest value of side × output that is known to be reached
+    constant: Array  # what the motion has besides the model, and what a bound has besides, (2, T)
+    data: Data  # models and tables of the output
+    out: Array  # bounds and the model's values, (2, T)
+    at: Array  # inputs of the model's values, (T, d)
 
     @classmethod
     def initial(

@@ -175,24 +175,14 @@ def largest_growth(eigenvalue: TaylorModel, reach: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class MotionPart:
-    """The free part of a modal model, or what one load adds.
+    """The free part of a modal model, or what one load adds."""
 
-    Args:
-        share: Coefficients C_k, polynomials, shape (n, m).
-        waves: Bounds of the derivatives of w by λ, orders 0 to 3, shape (4, T, n).
-        elapsed: Bounds of ∫ |w| from 0 to t, shape (T, n).
-        push: Bound of the impulse ∫ |a| of the load up to t, shape (T,), in m/s; 1 of the free
-            part.
-        left_out: Bound of the model's error of w, over waves[0], shape (n,).
-        load: The load; None of the free part.
-    """
-
-    share: TaylorModel
-    waves: Array
-    elapsed: Array
-    push: Array
-    left_out: Array
-    load: LoadTables | None = None
+    share: TaylorModel  # coefficients C_k, polynomials, (n, m)
+    waves: Array  # bounds of the derivatives of w by λ, orders 0 to 3, (4, T, n)
+    elapsed: Array  # bounds of ∫ |w| from 0 to t, (T, n)
+    push: Array  # bound of the impulse ∫ |a| of the load up to t, (T,), in m/s; 1 of the free part
+    left_out: Array  # bound of the model's error of w, over waves[0], (n,)
+    load: LoadTables | None = None  # the load; None of the free part
 
 
 def motion_parts(model: ModalModel, growth: Array) -> list[MotionPart]:

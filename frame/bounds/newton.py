@@ -21,15 +21,10 @@ BOX_WIDTH = 2.0
 
 @dataclass(eq=False)
 class Optima:
-    """Best points so far of N problems: of each node, output and side (−1, +1), in this order.
+    """Best points so far of N problems: of each node, output and side (−1, +1), in this order."""
 
-    Args:
-        point: Unit coordinates, shape (N, d).
-        value: side × output there, shape (N,).
-    """
-
-    point: Array
-    value: Array
+    point: Array  # unit coordinates, (N, d)
+    value: Array  # side × output there, (N,)
 
 
 def first_optima(model: ModalModel, lower: Array, upper: Array, least_gain: float) -> Optima:

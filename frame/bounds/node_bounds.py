@@ -19,50 +19,33 @@ GRID = 2.0**24
 
 
 class Effort(NamedTuple):
-    """Effort that a node is worth.
+    """Effort that a node is worth."""
 
-    Args:
-        cells: Most cells.
-        steps: Most evaluations of the dual function for a cell.
-        slack_below_peak: Addition to the wanted gap of a node below the peak, as a fraction of its
-            distance from the peak; at 1 only bounds above the peak count.
-        remainder_multiple: Least gap worth any effort, as a multiple of what the remainders of the
-            Taylor models add to the bound.
-        wanted_gap: Distance of bound and model value that suffices.
-        incumbent: The largest reached value of side × output over time.
-        patience: Steps of `minimise` after which less is expected.
-        ascents: Most steps of the model's ascent.
-        grace: Cells after which the fall of the gap counts.
-        min_progress: Least fall of the gap, as a fraction of an even fall to what suffices.
-    """
-
-    cells: int
-    steps: int
+    cells: int  # most cells
+    steps: int  # most evaluations of the dual function for a cell
+    # addition to the wanted gap of a node below the peak, as a fraction of its distance from the
+    # peak; at 1 only bounds above the peak count
     slack_below_peak: float
+    # least gap worth any effort, as a multiple of what the remainders of the Taylor models add to
+    # the bound
     remainder_multiple: float
-    wanted_gap: float
-    incumbent: float
-    patience: int
-    ascents: int
-    grace: int
-    min_progress: float
+    wanted_gap: float  # distance of bound and model value that suffices
+    incumbent: float  # the largest reached value of side × output over time
+    patience: int  # steps of `minimise` after which less is expected
+    ascents: int  # most steps of the model's ascent
+    grace: int  # cells after which the fall of the gap counts
+    min_progress: float  # least fall of the gap, as a fraction of an even fall to what suffices
 
 
 class Cells(NamedTuple):
-    """Parts of the modes' tables with their dual bounds, at most `Effort.cells` of them.
+    """Parts of the modes' tables with their dual bounds, at most `Effort.cells` of them."""
 
-    Args:
-        ends: First and last point along ω and along q = g/ω of each mode's table, shape (…, K, 4).
-        mu: Multipliers μ, shape (…, Z).
-        disagreement: |μ_z| times the distance of variable z between the inputs of the maxima over
-            the tables and over the box in D(μ), shape (…, Z).
-        value: Upper bounds D(μ) over the cells, shape (…,).
-    """
-
-    ends: Ints
-    mu: Array
+    ends: Ints  # first and last point along ω and along q = g/ω of each mode's table, (…, K, 4)
+    mu: Array  # multipliers μ, (…, Z)
+    # |μ_z| times the distance of variable z between the inputs of the maxima over the tables and
+    # over the box in D(μ), (…, Z)
     disagreement: Array
-    value: Array
+    value: Array  # upper bounds D(μ) over the cells, (…,)
 
 
 @compiled

@@ -38,27 +38,16 @@ OWN_WORK = 0.5
 
 @dataclass(eq=False)
 class SubBox:
-    """A box of inputs on L levels, with what is known and what is open there.
+    """A box of inputs on L levels, with what is known and what is open there."""
 
-    Args:
-        boxes: Its ends on each level.
-        levels: Which of all levels these are.
-        peaks: Peaks of (−output, output) that are not fathomed, shape (L, m, 2).
-        outer: Upper bounds of (−output, output) that are known, shape (L, T, m, 2).
-        least_lower: Lower bounds of each output's least peak over time, shape (L, m).
-        is_wide: Levels on which bounds are worth little at any node, shape (L,).
-        work: Fraction of all work that it is expected to take, with its halves.
-        done: Completed fraction of its own bounds.
-    """
-
-    boxes: Boxes
-    levels: list[int]
-    peaks: Mask
-    outer: Array
-    least_lower: Array
-    is_wide: Mask
-    work: float = 1.0
-    done: float = 0.0
+    boxes: Boxes  # its ends on each level
+    levels: list[int]  # which of all levels these are
+    peaks: Mask  # peaks of (−output, output) that are not fathomed, (L, m, 2)
+    outer: Array  # upper bounds of (−output, output) that are known, (L, T, m, 2)
+    least_lower: Array  # lower bounds of each output's least peak over time, (L, m)
+    is_wide: Mask  # levels on which bounds are worth little at any node, (L,)
+    work: float = 1.0  # fraction of all work that it is expected to take, with its halves
+    done: float = 0.0  # completed fraction of its own bounds
 
     def on_levels(self, rows: Ints, boxes: Boxes | None = None) -> SubBox:
         """Copy on some levels, given by their rows, with the ends of `boxes` if given."""
