@@ -37,7 +37,7 @@ from alphacut.rve.solver.form import strain_products
 from alphacut.rve.solver.krylov import DEFAULTS
 from alphacut.rve.solver.level_solver import LevelSolver, Operator, conjugate_gradients, stacked
 from alphacut.rve.solver.numbering import LevelNumbering
-from alphacut.rve.solver.theta_preconditioner import theta_mass
+from alphacut.rve.solver.theta_preconditioner import columnwise, theta_mass
 from alphacut.stochastic import RadiusMap
 from alphacut.stochastic.theta.quadrature import level_rule
 
@@ -192,21 +192,21 @@ class SliceProblem:
 
     def _to_slices(self, fields: Array) -> Array:
         """T_s x of all slices s, shape (fields, slices, 2 nodes)."""
-        hats, bubbles = self.solver.split(fields)
+        hats, bubbles = self.numbering.split(fields)
         lower, upper, bubble = self._shapes[:, :, None]
         on_slices = lower * hats[:, :-1, None] + upper * hats[:, 1:, None]
-        on_slices += bubble * self.solver.inject(bubbles)[:, :, None]
+        on_slices += bubble * columnwise(self.solver.injection, bubbles)[:, :, None]
         return np.asarray(on_slices.reshape(len(fields), -1, hats.shape[-1]))
 
     def _to_fields(self, on_slices: Array) -> Array:
         """Σ_s T_sᵀ r_s, shape (fields, size), of values on the nodes of the slices."""
         fields = np.zeros((len(on_slices), self.numbering.size))
-        hats, bubbles = self.solver.split(fields)
+        hats, bubbles = self.numbering.split(fields)
         by_layer = on_slices.reshape(*bubbles.shape[:2], SLICES_PER_LAYER, -1)
         below, above, bubble = np.moveaxis(self._shapes @ by_layer, 2, 0)
         hats[:, :-1] += below
         hats[:, 1:] += above
-        bubbles[:] = self.solver.restrict(bubble)
+        bubbles[:] = columnwise(self.solver.injection.T, bubble)
         return fields
 
     def slice_strains(self, strains: Array, fields: Array) -> SliceStrains:

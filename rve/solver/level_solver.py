@@ -20,9 +20,10 @@ from alphacut.rve.solver.numbering import LevelNumbering
 from alphacut.rve.solver.theta_preconditioner import (
     LEVEL,
     PREFIX,
+    Fields,
     ThetaMass,
     injection,
-    vertices_beside,
+    precondition,
 )
 
 LOG = logging.getLogger(__name__)
@@ -68,7 +69,7 @@ def conjugate_gradients(
 class LevelSolver:
     """P⁻¹ of `theta_preconditioner` for many fields at once.
 
-    A field is the hats of all levels, then the bubbles of all mid-levels: shape (fields, size).
+    Fields are split into hats and bubbles by the numbering.
 
     Args:
         numbering: Unknowns.
@@ -77,98 +78,66 @@ class LevelSolver:
     """
 
     def __init__(self, numbering: LevelNumbering, indptr: Ints, indices: Ints) -> None:
-        self._numbering, self._half_size = numbering, numbering.mid_level_size
-        self._layers = numbering.grid.layers
-        self._hats_size = (self._layers + 1) * numbering.level_size
-        self._indptr, self._indices, self._injection = indptr, indices, injection(numbering)
-        patterns = (indptr, indices), self._find_bubble_pattern()
-        blocks, self._orders = zip(*(_compressed(*pattern) for pattern in patterns), strict=True)
-        counts = self._layers + 1, self._layers
-        matrix = sp.block_diag(
-            [block for block, count in zip(blocks, counts, strict=True) for _ in range(count)],
-            "csr",
-        )
-        starts, columns = (x.astype(PETSc.IntType) for x in (matrix.indptr, matrix.indices))
-        self._values = matrix.data
-        self._matrix = PETSc.Mat().createAIJWithArrays(
-            matrix.shape, (starts, columns, self._values), comm=PETSc.COMM_SELF
-        )
-        self._ksp = cholesky(self._matrix, PREFIX + LEVEL)
-
-    def _find_bubble_pattern(self) -> tuple[Ints, Ints]:
-        """Pattern of Jᵀ K_s J, whose entries `_bubble_sums` adds from those of K_s."""
-        ends, count = vertices_beside(self._numbering), self._numbering.periodicity.vertices
-        row = ends[np.repeat(np.arange(len(ends)), np.diff(self._indptr))][:, :, None]
-        column = ends[self._indices][:, None]
-        is_free = (row >= 0) & (column >= 0)
-        entries, entry_of = np.unique((row * count + column)[is_free], return_inverse=True)
-        pair, quarters = (
-            np.nonzero(is_free)[0],
-            np.full(len(entry_of), 0.25),
-        )  # J has ½ at both ends
-        shape = len(entries), len(self._indices)
-        self._bubble_sums = sp.csr_matrix((quarters, (entry_of, pair)), shape)
-        return np.searchsorted(entries, np.arange(count + 1) * count), entries % count
-
-    def split(self, fields: Array) -> tuple[Array, Array]:
-        """Views of the hats, (fields, layers + 1, n), and the bubbles, (fields, layers, v)."""
-        hats, bubbles = fields[:, : self._hats_size], fields[:, self._hats_size :]
-        shapes = (len(fields), self._layers + 1, -1), (len(fields), self._layers, -1)
-        return hats.reshape(shapes[0]), bubbles.reshape(shapes[1])
-
-    def inject(self, bubbles: Array) -> Array:
-        """J b, shape (…, n), of bubbles (…, v)."""
-        flat = self._injection @ bubbles.reshape(-1, bubbles.shape[-1]).T
-        return np.ascontiguousarray(flat.T).reshape(*bubbles.shape[:-1], -1)
-
-    def restrict(self, values: Array) -> Array:
-        """Jᵀ r, shape (…, v), of values (…, n)."""
-        flat = self._injection.T @ values.reshape(-1, values.shape[-1]).T
-        return np.ascontiguousarray(flat.T).reshape(*values.shape[:-1], -1)
+        self._numbering, self._indptr, self._indices = numbering, indptr, indices
+        self.injection = injection(numbering)
+        self._restriction = sp.kron(sp.eye(numbering.grid.layers), self.injection.T, "csr")
+        self._ksp: PETSc.KSP | None = None
 
     def factorise(self, hats: Array, bubbles: Array, mass: ThetaMass) -> None:
         """Factorise the blocks of levels, (layers + 1, 4 node pairs), and of mid-levels.
 
         Those of mid-levels are in all nodes, shape (layers, 4 node pairs).
         """
-        self._mass = mass
-        on_levels, on_mid_levels = np.split(self._values, [hats.size])  # views
-        levels, mid_levels = on_levels.reshape(hats.shape), on_mid_levels.reshape(self._layers, -1)
-        for k, diagonal in enumerate(mass.hats):
-            levels[k] = hats[k, self._orders[0]] / diagonal
-        for k, diagonal in enumerate(mass.bubbles):
-            of_vertices = (self._bubble_sums @ bubbles[k].reshape(-1, 4)).ravel()
-            mid_levels[k] = of_vertices[self._orders[1]] / diagonal
+        self._mass, blocks = mass, self._blocks(hats, bubbles, mass)
+        if self._ksp is None:
+            diagonal = sp.block_diag(blocks, "csr")
+            starts, columns = (x.astype(PETSc.IntType) for x in (diagonal.indptr, diagonal.indices))
+            self._values = diagonal.data
+            self._matrix = PETSc.Mat().createAIJWithArrays(
+                diagonal.shape, (starts, columns, self._values), comm=PETSc.COMM_SELF
+            )
+            self._ksp = cholesky(self._matrix, PREFIX + LEVEL)
+        np.concatenate([block.data for block in blocks], out=self._values)
+        del blocks  # before the factors take their memory
         self._matrix.assemble()  # says that the values are new; the pattern and its analysis stay
         self._ksp.setOperators(self._matrix)
         self._ksp.setUp()
 
+    def _blocks(self, hats: Array, bubbles: Array, mass: ThetaMass) -> list[sp.csr_matrix]:
+        """diag(K_k) and diag(K_b), sorted; those of bubbles are Jᵀ K J."""
+        levels, mid_levels = (
+            stacked(entries / masses[:, None], self._indptr, self._indices).tocsr()
+            for entries, masses in ((hats, mass.hats), (bubbles, mass.bubbles))
+        )
+        reduced = self._restriction @ mid_levels @ self._restriction.T
+        reduced.sort_indices()
+        return [levels, reduced]
+
     def __call__(self, residual: Array) -> Array:
-        """P⁻¹ r of residuals (fields, size): see the head of `theta_preconditioner`."""
-        mass, (hats, bubbles) = self._mass, self.split(residual)
-        load, solution = np.empty_like(residual), np.empty_like(residual)
-        level_loads, mid_level_loads = self.split(load)
-        projected = mass.bubble_inverse_root @ mass.projection.T @ hats
-        level_loads[:] = mass.inverse_root @ hats
-        mid_level_loads[:] = mass.bubble_inverse_root @ bubbles - self.restrict(projected)
+        """P⁻¹ r of residuals, shape (fields, size)."""
+        return joined(
+            *precondition(self._mass, self.injection, self._numbering.split(residual), self._solve)
+        )
+
+    def _solve(self, hats: Array, bubbles: Array) -> Fields:
+        load = joined(hats, bubbles)
+        solution = np.empty_like(load)
         columns = [
             PETSc.Mat().createDense(x.T.shape, array=x.T, comm=PETSc.COMM_SELF)
             for x in (load, solution)
         ]
         for matrix in columns:
             matrix.assemble()
+        assert self._ksp is not None
         self._ksp.matSolve(*columns)
-        hats, bubbles = self.split(solution)
-        bubbles[:] = mass.bubble_inverse_root @ bubbles
-        hats[:] = mass.inverse_root @ hats - mass.projection @ self.inject(bubbles)
-        return solution
+        return self._numbering.split(solution)
 
     def norms(self, forces: Array) -> Array:
         """Norms of the forces on nodes, shape (fields,), of those on hats and bubbles."""
-        hats, bubbles = self.split(forces)
+        hats, bubbles = self._numbering.split(forces)
         on_levels = hats.copy()
         for levels in (on_levels[:, :-1], on_levels[:, 1:]):
-            levels[..., : self._half_size] -= bubbles / 2
+            levels[..., : self._numbering.mid_level_size] -= bubbles / 2
         return np.asarray(np.sqrt((on_levels**2).sum(axis=(1, 2)) + (bubbles**2).sum(axis=(1, 2))))
 
 
@@ -181,9 +150,6 @@ def stacked(entries: Array, indptr: Ints, indices: Ints) -> sp.bsr_matrix:
     return sp.bsr_matrix((entries.reshape(-1, 2, 2), columns, starts), (2 * count * nodes,) * 2)
 
 
-def _compressed(indptr: Ints, indices: Ints) -> tuple[sp.csr_matrix, Ints]:
-    """Matrix of one block by rows, and the order of its entries in (node pairs, 4)."""
-    numbers = np.arange(1, 4 * len(indices) + 1).astype(float)  # 0 would be no entry
-    matrix = stacked(numbers[None], indptr, indices).tocsr()
-    matrix.sort_indices()
-    return matrix, matrix.data.astype(int) - 1
+def joined(hats: Array, bubbles: Array) -> Array:
+    """Fields, (fields, size), of their hats and bubbles."""
+    return np.concatenate([x.reshape(len(x), -1) for x in (hats, bubbles)], axis=1)

@@ -9,6 +9,7 @@ the mid-level above, those of level 1, and so on. A rank owns levels with the mi
 from __future__ import annotations
 
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -126,14 +127,31 @@ class LevelNumbering:
         on_mid_levels = np.where(vertices >= 0, vertices + mid_first, -1)
         return np.concatenate([on_levels.ravel(), on_mid_levels.ravel()])
 
-    def split_levels(self, values: Array) -> tuple[Array, Array]:
-        """Copies of values on levels, (layers + 1, level_size), and on mid-levels."""
-        layers = values[: self.grid.layers * self.stride].reshape(-1, self.stride)
-        top = values[self.grid.layers * self.stride :][None]
-        on_levels = np.concatenate([layers[:, : self.level_size], top])
-        return on_levels, layers[:, self.level_size :].copy()
+    @property
+    def rank_levels(self) -> tuple[slice, slice]:
+        """Levels and mid-levels of this rank among all."""
+        levels, mid_levels = self.levels, self.mid_levels
+        return slice(levels.start, levels.stop), slice(mid_levels.start, mid_levels.stop)
 
-    def join_levels(self, on_levels: Array, on_mid_levels: Array) -> Array:
-        """Vector of unknowns from values on levels and mid-levels, of all ranks or of this one."""
-        layers = np.concatenate([on_levels[: len(on_mid_levels)], on_mid_levels], axis=1)
-        return np.concatenate([layers.ravel(), on_levels[len(on_mid_levels) :].ravel()])
+    def split(self, fields: Any) -> tuple[Any, Any]:
+        """Views of hats, (…, layers + 1, n), and bubbles, (…, layers, v), of fields, (…, size).
+
+        In these a field is the hats of all levels, then the bubbles of all mid-levels.
+        """
+        layers, first_bubble = self.grid.layers, (self.grid.layers + 1) * self.level_size
+        hats, bubbles = fields[..., :first_bubble], fields[..., first_bubble:]
+        shape = fields.shape[:-1]
+        return hats.reshape(*shape, layers + 1, -1), bubbles.reshape(*shape, layers, -1)
+
+    def nodal_values(self) -> sp.csr_matrix:
+        """Matrix from hats and bubbles, as in `split`, to unknowns: to nodal values."""
+        layers, v = self.grid.layers, self.mid_level_size
+        hats, bubbles = self.split(np.arange(self.size))
+        on_levels = np.arange(layers + 1)[:, None] * self.stride + np.arange(self.level_size)
+        on_mid_levels = np.arange(layers)[:, None] * self.stride + self.level_size + np.arange(v)
+        # a mid-level has its bubble and half of the hats above and below
+        rows = [on_levels, on_mid_levels, on_mid_levels, on_mid_levels]
+        columns = [hats, bubbles, hats[:-1, :v], hats[1:, :v]]
+        values = np.repeat([1.0, 1.0, 0.5, 0.5], [part.size for part in rows])
+        places = tuple(np.concatenate([part.ravel() for part in x]) for x in (rows, columns))
+        return sp.csr_matrix((values, places), (self.size, self.size))

@@ -21,22 +21,25 @@ Both summands are positive semidefinite, their sum is definite; P is off by the 
 K between levels, so the number of iterations depends on neither mesh size nor contrast and falls
 with more layers. Any symmetric PETSc preconditioner solves the levels (prefix ``rve_level_``).
 
-Each rank solves for its own levels and forms its own rows of the products along θ. M^-½ and G^-½
-are full, so that these need the vectors of all levels, which PETSc scatters.
+Each rank solves for its own levels. M^-½ and G^-½ are full, so that all ranks gather the residuals
+and the solutions of all levels.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import scipy.sparse as sp
 
-from alphacut.fuzzy.arrays import Array, Ints
+from alphacut.fuzzy.arrays import Array
 from alphacut.rve.fenicsx import PETSc, cholesky
 from alphacut.rve.solver.numbering import LevelNumbering
 from alphacut.stochastic import ThetaLaw
 
+Fields = tuple[Array, Array]  # hats and bubbles
 PREFIX, LEVEL = "rve_", "level_"  # of PETSc options, and after it of the levels' solvers
 
 
@@ -85,129 +88,103 @@ def _inverse_root(matrix: Array) -> Array:
     return np.asarray((vectors / np.sqrt(values)) @ vectors.T)
 
 
-def plane_solver(block: PETSc.Mat, mass: float) -> PETSc.KSP:
-    """Solver of one level's block over its mass along θ, by default a Cholesky factor."""
-    block.scale(1 / mass)
-    ksp = cholesky(block, PREFIX + LEVEL)
-    ksp.setUp()
-    return ksp
+def precondition(
+    mass: ThetaMass,
+    injection: sp.csr_matrix,
+    residual: Fields,
+    solve: Callable[[Array, Array], Fields],
+) -> Fields:
+    """P⁻¹ r in hats, (…, layers + 1, n), and bubbles, (…, layers, v), as at the head of the file.
+
+    `injection` is J, (n, v), and `solve` gives diag(K_k⁻¹) and diag(K_b⁻¹) times such values.
+    """
+    hats, bubbles = residual
+    hat_root, bubble_root = mass.inverse_root, mass.bubble_inverse_root  # M^-½, G^-½
+    projected = columnwise(injection.T, bubble_root @ mass.projection.T @ hats)
+    hats, bubbles = solve(hat_root @ hats, bubble_root @ bubbles - projected)
+    bubbles = bubble_root @ bubbles
+    return hat_root @ hats - mass.projection @ columnwise(injection, bubbles), bubbles
+
+
+def columnwise(matrix: sp.csr_matrix, values: Array) -> Array:
+    """Product of a matrix, (m, n), with the last axis of values, (…, n); shape (…, m)."""
+    product = matrix @ values.reshape(-1, values.shape[-1]).T
+    return np.ascontiguousarray(product.T).reshape(*values.shape[:-1], -1)
 
 
 class ThetaPreconditioner:
     """P⁻¹ of a reduced stiffness; a context of PETSc's ``pc_type python``."""
 
     def __init__(self, matrix: PETSc.Mat, numbering: LevelNumbering, law: ThetaLaw) -> None:
-        self.numbering = numbering
-        self.mass = theta_mass(law, numbering.grid.level_thetas(law))
-        self.injection = injection(numbering)
-        self.rank_vector = matrix.createVecLeft()
-        self.scatter, self.full_vector = PETSc.Scatter.toAll(self.rank_vector)
-        sizes, layers = (numbering.level_size, numbering.mid_level_size), numbering.grid.layers
+        self._numbering, self._comm = numbering, matrix.comm.tompi4py()
+        self._mass = theta_mass(law, numbering.grid.level_thetas(law))
+        self._injection, self._nodal_values = injection(numbering), numbering.nodal_values()
+        levels, mid_levels = numbering.rank_levels
+        masses = [*self._mass.hats[levels], *self._mass.bubbles[mid_levels]]
         blocks = self._blocks(matrix)
-        self.levels = [
-            plane_solver(
-                block.PtAP(_hats(*sizes, below=k > 0, above=k < layers)), self.mass.hats[k]
-            )
-            for k, block in zip(numbering.levels, blocks, strict=False)
-        ]
-        self.mid_levels = [
-            plane_solver(block, self.mass.bubbles[k])
-            for k, block in zip(numbering.mid_levels, blocks[len(self.levels) :], strict=True)
-        ]
+        self._solvers = [plane_solver(*block) for block in zip(blocks, masses, strict=True)]
 
-    def _blocks(self, matrix: PETSc.Mat) -> list[PETSc.Mat]:
-        """Diagonal blocks of each level with the mid-levels beside it, then of each mid-level."""
-        numbering = self.numbering
-        n, v, stride = numbering.level_size, numbering.mid_level_size, numbering.stride
-        spans = [
-            (max(0, k * stride - v), min(k * stride + n + v, numbering.size))
-            for k in numbering.levels
-        ]
-        spans += [(k * stride + n, (k + 1) * stride) for k in numbering.mid_levels]
-        # only the first span reaches into another rank, from which PETSc fetches slowly
-        first, start = [_index_range(*span) for span in spans[:1]], numbering.rows.start
-        others = [_index_range(a - start, b - start) for a, b in spans[1:]]
-        rank_matrix = matrix.getDiagonalBlock()
-        return [*matrix.createSubMatrices(first), *rank_matrix.createSubMatrices(others)]
+    def _blocks(self, matrix: PETSc.Mat) -> Iterator[sp.csr_matrix]:
+        """Diagonal blocks of this rank's levels, then of its mid-levels, in hats and bubbles."""
+        numbering, rows = self._numbering, self._numbering.rows
+        # unknowns of other ranks are those of the mid-level below the first level alone
+        first = max(0, rows.start - numbering.mid_level_size)
+        span = PETSc.IS().createStride(rows.stop - first, first, 1, comm=PETSc.COMM_SELF)
+        starts, columns, values = matrix.createSubMatrices(span)[0].getValuesCSR()
+        stiffness = sp.csr_matrix((values, columns, starts), (rows.stop - first,) * 2)
+        numbers = numbering.split(np.arange(numbering.size))
+        hats, bubbles = (x[own] for x, own in zip(numbers, numbering.rank_levels, strict=True))
+        T = self._nodal_values[first : rows.stop][:, np.append(hats, bubbles)]
+        products = T.T.tocsr() @ stiffness @ T
+        for start, stop in pairwise(np.cumsum([0, *map(len, hats), *map(len, bubbles)])):
+            yield products[start:stop, start:stop]
 
     def apply(self, _pc: PETSc.PC, residual: PETSc.Vec, result: PETSc.Vec) -> None:
         """Set the result to P⁻¹ residual; called by PETSc."""
-        numbering, v = self.numbering, self.numbering.mid_level_size
-        # from nodal values to hats and bubbles (transposed), and back: see the head of the file
-        hats, bubbles = numbering.split_levels(self._gather(residual))
-        hats[:-1, :v] += bubbles / 2
-        hats[1:, :v] += bubbles / 2
-        self.rank_vector.array[:] = self._solve_levels(hats, bubbles)
-        hats, bubbles = numbering.split_levels(self._gather(self.rank_vector))
-        hats, bubbles = self._multiply_theta(hats, bubbles)
-        layers = len(bubbles)
-        bubbles += (hats[:layers, :v] + hats[1 : layers + 1, :v]) / 2
-        result.array[:] = numbering.join_levels(hats[: len(self.levels)], bubbles)
+        forces = np.concatenate(self._comm.allgather(residual.array_r))
+        fields = self._numbering.split(self._nodal_values.T @ forces)
+        fields = precondition(self._mass, self._injection, fields, self._solve)
+        values = self._nodal_values @ np.concatenate([x.ravel() for x in fields])
+        result.array[:] = values[self._numbering.rows.start : self._numbering.rows.stop]
 
-    def _solve_levels(self, hats: Array, bubbles: Array) -> Array:
-        """This rank's rows of diag(K⁻¹) (M^-½ ⊗ 1; (G^-½ ⊗ 1) Jᵀ Zᵀ) times hats and bubbles."""
-        mass, numbering = self.mass, self.numbering
-        root = mass.inverse_root[list(numbering.levels)]
-        bubble_root = mass.bubble_inverse_root[list(numbering.mid_levels)]
-        projected = (bubble_root @ mass.projection.T @ hats) @ self.injection  # Jᵀ
-        on_levels = self._solve_rows(self.levels, root @ hats)
-        on_mid_levels = self._solve_rows(self.mid_levels, bubble_root @ bubbles - projected)
-        return numbering.join_levels(on_levels, on_mid_levels)
-
-    def _multiply_theta(self, hats: Array, bubbles: Array) -> tuple[Array, Array]:
-        """This rank's rows of (M^-½ ⊗ 1; Z J (G^-½ ⊗ 1)) times hats and bubbles."""
-        mass, numbering = self.mass, self.numbering
-        start = numbering.levels.start
-        rows = slice(start, start + len(numbering.mid_levels) + 1)
-        projected = mass.projection[rows] @ mass.bubble_inverse_root @ bubbles
-        rank_hats = mass.inverse_root[rows] @ hats - projected @ self.injection.T  # J
-        return rank_hats, mass.bubble_inverse_root[list(numbering.mid_levels)] @ bubbles
+    def _solve(self, *loads: Array) -> Fields:
+        """Solutions of all levels and of all mid-levels, of which each rank solves its own."""
+        solvers, solutions = iter(self._solvers), []
+        for load, rows in zip(loads, self._numbering.rank_levels, strict=True):
+            solution = np.empty_like(load[rows])
+            for *arrays, ksp in zip(load[rows], solution, solvers, strict=False):
+                ksp.solve(*(PETSc.Vec().createWithArray(x, comm=PETSc.COMM_SELF) for x in arrays))
+            solutions.append(np.concatenate(self._comm.allgather(solution)))
+        hats, bubbles = solutions
+        return hats, bubbles
 
     def view(self, _pc: PETSc.PC, viewer: PETSc.Viewer) -> None:
         """Print the number of levels and the first one's solver, for ``-rve_ksp_view``."""
-        count = f"{len(self.levels)} levels and {len(self.mid_levels)} mid-levels on the first rank"
+        levels, mid_levels = len(self._numbering.levels), len(self._numbering.mid_levels)
+        count = f"{levels} levels and {mid_levels} mid-levels on the first rank"
         viewer.printfASCII(f"    preconditioner along θ, {count}, each solved by\n")
         rank_viewer = viewer.getSubViewer(PETSc.COMM_SELF)
-        if 0 in self.numbering.levels:  # on the rank that has it
-            self.levels[0].view(rank_viewer)
+        if 0 in self._numbering.levels:  # on the rank that has it
+            self._solvers[0].view(rank_viewer)
         viewer.restoreSubViewer(rank_viewer)
 
-    def _gather(self, vector: PETSc.Vec) -> Array:
-        self.scatter.scatter(vector, self.full_vector)
-        return np.asarray(self.full_vector.array_r)
 
-    @staticmethod
-    def _solve_rows(solvers: list[PETSc.KSP], rows: Array) -> Array:
-        """Solutions of this rank's blocks, one for each row."""
-        solutions = np.empty_like(rows)
-        for ksp, *arrays in zip(solvers, rows, solutions, strict=True):
-            ksp.solve(*(PETSc.Vec().createWithArray(x, comm=PETSc.COMM_SELF) for x in arrays))
-        return solutions
-
-
-def _index_range(first: int, last: int) -> PETSc.IS:
-    """Indices of this rank from `first` to below `last`."""
-    return PETSc.IS().createStride(last - first, first, 1, comm=PETSc.COMM_SELF)
-
-
-def _hats(level_size: int, half_size: int, *, below: bool, above: bool) -> PETSc.Mat:
-    """Matrix from a level's unknowns to nodal values: 1 on it, ½ on mid-levels beside it."""
-    half, level = sp.eye(half_size, level_size) / 2, sp.eye(level_size)
-    stacked = sp.vstack([half] * below + [level] + [half] * above, "csr")
-    csr = stacked.indptr.astype(PETSc.IntType), stacked.indices.astype(PETSc.IntType)
-    return PETSc.Mat().createAIJ(stacked.shape, csr=(*csr, stacked.data), comm=PETSc.COMM_SELF)
-
-
-def vertices_beside(numbering: LevelNumbering) -> Ints:
-    """Vertices at both ends of each node's edge, itself twice if it is one, −1 where fixed."""
-    periodicity = numbering.periodicity
-    vertices = np.repeat(np.arange(periodicity.vertices), 2).reshape(-1, 2)
-    return np.concatenate([vertices, periodicity.ends(numbering.grid.plane)])
+def plane_solver(block: sp.csr_matrix, mass: float) -> PETSc.KSP:
+    """Solver of one level's block over its mass along θ, by default a Cholesky factor."""
+    starts, columns = (x.astype(PETSc.IntType) for x in (block.indptr, block.indices))
+    csr = starts, columns, block.data / mass
+    matrix = PETSc.Mat().createAIJ(block.shape, csr=csr, comm=PETSc.COMM_SELF)
+    ksp = cholesky(matrix, PREFIX + LEVEL)
+    ksp.setUp()
+    return ksp
 
 
 def injection(numbering: LevelNumbering) -> sp.csr_matrix:
     """Matrix J from linear to quadratic triangles; midpoints get the mean of their vertices."""
-    ends, vertices = vertices_beside(numbering), numbering.periodicity.vertices
-    node, end = np.nonzero(ends >= 0)
+    periodicity, vertices = numbering.periodicity, numbering.periodicity.vertices
+    ends = np.concatenate(
+        [np.repeat(np.arange(vertices), 2).reshape(-1, 2), periodicity.ends(numbering.grid.plane)]
+    )
+    node, end = np.nonzero(ends >= 0)  # not of fixed vertices
     halves = np.full(len(node), 0.5), (node, ends[node, end])
     return sp.kron(sp.csr_matrix(halves, (len(ends), vertices)), sp.eye(2), "csr")
