@@ -55,7 +55,7 @@ def energy_shares(
         for change in (t, -t):
             factor = np.where(phase == k, 1 + change, 1.0)
             moduli = factor * images.bulk[0], factor * images.shear[0]
-            stresses = model.solve_stresses(*moduli, start=solution)
+            stresses = model.solve_side(0, *moduli, solution.lower)
             below = inverse_below(stresses.energy.upper)
             bounds = concave_constants(StiffnessBounds(below, below), model.average)
             changed_lower[change] = {name: low for name, (low, _) in bounds.items()}

@@ -16,12 +16,7 @@ from alphacut.fuzzy.refused import FailedError, require
 from alphacut.rve.image.bounds import Interval, StiffnessBounds, inverse_below
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.fields.element import Element, element_of
-from alphacut.rve.image.fields.energy import (
-    SideSolution,
-    coefficients,
-    energies,
-    solve_side,
-)
+from alphacut.rve.image.fields.energy import SideSolution, coefficients, energies, solve_side
 from alphacut.rve.image.fields.grid import device_array
 from alphacut.rve.image.phases import ModuliImages
 from alphacut.rve.result.moduli import ISOTROPIC, require_average, square_moduli
@@ -114,9 +109,8 @@ class ImageModel:
 
         def solve(end: int, guess: SideSolution | None) -> SideSolution:
             """Fields of least energy with the least (end 0) or greatest (end 1) moduli."""
-            return self._solve_side(
-                end, images.bulk[end], images.shear[end], guess, raise_if_stopped
-            )
+            moduli = images.bulk[end], images.shear[end]
+            return self.solve_side(end, *moduli, guess, raise_if_stopped)
 
         guesses = (None, None) if start is None else (start.lower, start.upper)
         with ThreadPoolExecutor(2 if self.device == "cpu" else 1) as pool:
@@ -127,27 +121,23 @@ class ImageModel:
         bounds = StiffnessBounds(inverse_below(lower.energy.upper), upper.energy.upper)
         return ImageSolution(bounds, upper, lower)
 
-    def solve_stresses(self, bulk: Array, shear: Array, start: ImageSolution) -> SideSolution:
-        """Stresses of an image, which bound the compliance, without the displacements."""
-        return self._solve_side(0, bulk, shear, start.lower, self.solver.watch)
-
-    def _solve_side(
+    def solve_side(
         self,
         end: int,
         bulk: Array,
         shear: Array,
-        guess: SideSolution | None,
-        watch: Callable[[], None],
+        start: SideSolution | None,
+        watch: Callable[[], None] | None = None,
     ) -> SideSolution:
-        """Stresses (end 0) or displacements (end 1) of least energy."""
+        """Stresses (end 0), which bound the compliance, or displacements (1) of least energy."""
         to_device = device_array(self.device)
         return solve_side(
             self.elements[end],
             to_device(bulk),
             to_device(shear),
-            solver=replace(self.solver, watch=watch),
+            solver=replace(self.solver, watch=watch or self.solver.watch),
             division=self.division,
-            start=None if guess is None else guess.fields,
+            start=None if start is None else start.fields,
         )
 
     def cuts(
@@ -198,16 +188,12 @@ class ImageModel:
             bounds = coarse_model.solve(image).bounds
             young, poisson = bounds.young(self.average), bounds.poisson(self.average)
             for cut in containing_cuts:
-                _require_overlap("E", young, cut.modulus)
-                _require_overlap("ν", poisson, cut.poisson)
-
-
-def _require_overlap(name: str, inside: Interval, cut: Interval) -> None:
-    """Refuse the interval of an image inside a cut if it has no point in common with the cut's."""
-    if not (inside[0] <= cut[1] and cut[0] <= inside[1]):
-        what = f"{name} of an image inside a cut is {inside[0]:.9g} … {inside[1]:.9g}"
-        what += f", the cut {cut[0]:.9g} … {cut[1]:.9g}"
-        raise FailedError(f"the proof is wrong: {what}", "keep the case and report it")
+                for name, inside, end in (("E", young, cut.modulus), ("ν", poisson, cut.poisson)):
+                    if inside[0] <= end[1] and end[0] <= inside[1]:
+                        continue
+                    what = f"{name} of an image inside a cut is {inside[0]:.9g} … {inside[1]:.9g}"
+                    what += f", the cut {end[0]:.9g} … {end[1]:.9g}"
+                    raise FailedError(f"the proof is wrong: {what}", "keep the case and report it")
 
 
 def usual_division(images: ModuliImages) -> int:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import combinations_with_replacement, pairwise
 
 import numpy as np
 
@@ -114,18 +114,16 @@ def threshold_ranges(grey: Array, thresholds: Sequence[tuple[float, float]]) -> 
 
 def moduli_images(first: Ints, last: Ints, phases: Sequence[ModuliInterval]) -> ModuliImages:
     """Least and greatest moduli of each pixel over the phases `first` … `last` it may be of."""
-    tables = np.zeros((4, len(phases), len(phases)))  # by first and last
-    for code in np.unique(first * len(phases) + last):
-        a, b = divmod(int(code), len(phases))
-        candidates = phases[a : b + 1]
-        tables[:, a, b] = (
-            min(phase.lower.bulk for phase in candidates),
-            max(phase.upper.bulk for phase in candidates),
-            min(phase.lower.shear for phase in candidates),
-            max(phase.upper.shear for phase in candidates),
-        )
-    images = [table[first, last] for table in tables]
-    return ModuliImages(bulk=(images[0], images[1]), shear=(images[2], images[3]))
+    lower, upper = (
+        np.array([(end.bulk, end.shear) for end in ends])
+        for ends in ([phase.lower for phase in phases], [phase.upper for phase in phases])
+    )
+    tables = np.zeros((2, 2, len(phases), len(phases)))  # (modulus, end, first, last)
+    for a, b in combinations_with_replacement(range(len(phases)), 2):
+        tables[:, 0, a, b] = lower[a : b + 1].min(axis=0)
+        tables[:, 1, a, b] = upper[a : b + 1].max(axis=0)
+    (bulk_low, bulk_high), (shear_low, shear_high) = tables[..., first, last]
+    return ModuliImages(bulk=(bulk_low, bulk_high), shear=(shear_low, shear_high))
 
 
 def require_phases(grey: Array, thresholds: tuple[tuple[float, float], ...]) -> None:

@@ -96,7 +96,7 @@ def _rayleigh_moduli(radius: Array, matrix: float, inclusion: float, harmonics: 
     """G_L by the potential A z + Σ_P Σ_n a_n (z − P)^-n over all particles P, odd n, shape (n,)."""
     orders = 2 * np.arange(harmonics) + 1
     scale = radius[:, None] ** orders
-    images = lattice_images(lattice_sums(4 * _MOST), orders, orders)
+    images = lattice_images(lattice_sums(4 * _MOST).plain, orders, orders)
     contrast = (matrix - inclusion) / (matrix + inclusion)
     system = np.eye(harmonics) - contrast * images * scale[:, :, None] * scale[:, None, :]
     source = np.zeros((radius.size, harmonics, 1))

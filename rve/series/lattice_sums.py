@@ -19,7 +19,6 @@ from alphacut.rve.cell.cell import AREA
 
 # ζ(z + P) − ζ(z) = π conj(P) / area: Legendre's relation on the square lattice
 ZETA_PERIOD = np.pi / AREA
-_UNIT_POINTS = 208  # exponent from which |p| ≥ √2 leaves less than 1e-30
 
 
 @dataclass(frozen=True)
@@ -55,11 +54,15 @@ def lattice_sums(highest: int) -> LatticeSums:
     return LatticeSums(plain, conjugate)
 
 
-def lattice_images(sums: LatticeSums, k: Ints, n: Ints) -> Array:
-    """Taylor coefficients k of Σ (z − P)^-n over all images P ≠ 0, odd n, (len(k), len(n))."""
+def lattice_images(sums: Array, k: Ints, n: Ints) -> Array:
+    """Taylor coefficients k of Σ (z − P)^-n over all images P ≠ 0, odd n, (len(k), len(n)).
+
+    From `LatticeSums.plain`; from `LatticeSums.conjugate` those of Σ conj(P)/2 (z − P)^-n, even n,
+    with the opposite sign.
+    """
     k, n = k[:, None], n[None, :]
     log_binomial = gammaln(n + k) - gammaln(n) - gammaln(k + 1)
-    return np.asarray(-np.exp(log_binomial - (n + k) * np.log(2)) * sums.plain[n + k])  # P = 2p
+    return np.asarray(-np.exp(log_binomial - (n + k) * np.log(2)) * sums[n + k])  # P = 2p
 
 
 def _lipschitz(n: int, power: int) -> float:
@@ -71,8 +74,6 @@ def _lipschitz(n: int, power: int) -> float:
 
 def _near_points(n: int, *, conjugate: bool) -> float:
     """Σ p^-n, or Σ conj(p) p^-n, for large n over the lattice points with |m|, |j| ≤ 8."""
-    if n >= _UNIT_POINTS:  # only the four points with |p| = 1 count
-        return 4.0
     m = np.arange(-8.0, 9.0)
     p = (m[:, None] + 1j * m).ravel()
     p = p[p != 0]

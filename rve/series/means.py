@@ -183,14 +183,10 @@ def _largest_distance(coarse: Array, finer: Array, finest: Array) -> Array:
     return np.asarray(np.maximum(np.abs(coarse / finer - 1), np.abs(coarse / finest - 1)))
 
 
-@dataclass(frozen=True, eq=False)
-class Mean:
-    """One inclusion's cell over θ.
+class Mean(NamedTuple):
+    """One inclusion's cell over θ: its stiffness, and terms of the series at each node, (n,).
 
-    Args:
-        curve: With its stiffness.
-        errors: Declared relative errors of the three mean moduli by source: space, theta.
-        terms: Terms of the series at each node, shape (n,).
+    `errors` are the declared relative ones of the three mean moduli by source: space, theta.
     """
 
     curve: StressCurve

@@ -28,7 +28,6 @@ from time import perf_counter
 from typing import Any, ClassVar
 
 import numpy as np
-from scipy.special import gammaln
 
 from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.fuzzy.refused import RefusedError
@@ -99,13 +98,6 @@ class Family:
     b_to_q: Array
 
 
-def _conjugate_images(sums: LatticeSums, k: Ints, n: Ints) -> Array:
-    """Taylor coefficient k of n Σ' conj(P) (z − P)^(-n-1) for odd n."""
-    k, n = k[:, None], n[None, :]
-    halved = np.exp(gammaln(n + k + 1) - gammaln(n + 1) - gammaln(k + 1) - (n + k) * np.log(2))
-    return np.asarray(n * halved * sums.conjugate[n + k + 1])
-
-
 @cache
 def family(harmonics: int, *, hydrostatic: bool) -> Family:
     """First harmonics of a hydrostatic or a deviatoric load, with their lattice couplings."""
@@ -115,25 +107,11 @@ def family(harmonics: int, *, hydrostatic: bool) -> Family:
     return Family(
         a=a,
         b=b,
-        to_p=lattice_images(sums, b, a),
-        to_next=(a + 2)[:, None] * lattice_images(sums, a + 2, a),
-        a_to_q=_conjugate_images(sums, a, a),
-        b_to_q=lattice_images(sums, a, b),
+        to_p=lattice_images(sums.plain, b, a),
+        to_next=(a + 2)[:, None] * lattice_images(sums.plain, a + 2, a),
+        a_to_q=-2 * a * lattice_images(sums.conjugate, a, a + 1),
+        b_to_q=lattice_images(sums.plain, a, b),
     )
-
-
-def multipoles(load: str, radius: Array, contrast: Contrast, *, harmonics: int) -> Array:
-    """Multipoles a_n of φ, scaled by rⁿ, under a unit macroscopic strain, shape (n, m, N).
-
-    Args:
-        load: One of `LOADS`; of "shear" the a_n are the imaginary parts.
-        radius: Of the particles over half the cell's side, shape (n,).
-        contrast: The materials, m inclusions.
-        harmonics: Number N of multipoles.
-    """
-    orders = family(harmonics, hydrostatic=load == "hydrostatic")
-    matrices, sources = _system(orders, radius, contrast, mirror=-1.0 if load == "shear" else 1.0)
-    return np.asarray(np.linalg.solve(matrices, sources[..., None])[..., 0])
 
 
 def _system(
@@ -166,28 +144,27 @@ def _system(
     return np.eye(orders.a.size) - outer * coupling, source
 
 
-def modulus_of_load(load: str, a: Array, radius: Array, contrast: Contrast) -> Array:
-    """C11 + C12, C11 − C12 or C33 in Pa, (n, m), from scaled multipoles `a` of its load, (n, m, N).
+def modulus_of_load(load: str, radius: Array, contrast: Contrast, harmonics: int) -> Array:
+    """C11 + C12, C11 − C12 or C33 in Pa, (n, m), of n radii and m inclusions by one of `LOADS`.
 
     Mean strain and stress follow from the jumps across the cell of 2μu and of the resultant force
     φ + z conj(φ') + conj(ψ).
     """
+    orders = family(harmonics, hydrostatic=load == "hydrostatic")
+    # of "shear" the a_n are the imaginary parts
+    matrices, sources = _system(orders, radius, contrast, mirror=-1.0 if load == "shear" else 1.0)
+    a = np.linalg.solve(matrices, sources[..., None])[..., 0]  # scaled by rⁿ, (n, m, N)
     r, kappa, mu = radius[:, None], contrast.kappa, contrast.mu
     if load == "hydrostatic":
-        jump = ZETA_PERIOD * r * _dilatation_pole(a, radius, contrast)  # of ψ across the cell
-        return mu * (4 + 2 * jump) / (kappa - 1 - jump)
+        to_first = orders.to_p[0] * r ** (orders.a + 1)
+        pole = contrast.swelling * (np.einsum("nk,nmk->nm", to_first, a) + r)  # b_1
+        jump = ZETA_PERIOD * r * pole  # of ψ across the cell
+        return np.asarray(mu * (4 + 2 * jump) / (kappa - 1 - jump))
     jump = ZETA_PERIOD * r * a[..., 0]  # of φ across the cell
     natanzon_jump = _sums().natanzon_period * r * a[..., 0]
     if load == "deviator":
         return np.asarray(2 * mu * (1 + natanzon_jump + jump) / (1 + natanzon_jump - kappa * jump))
     return np.asarray(mu * (1 + natanzon_jump - jump) / (1 + natanzon_jump + kappa * jump))
-
-
-def _dilatation_pole(a: Array, radius: Array, contrast: Contrast) -> Array:
-    """Pole b_1 of ψ = swelling · (p_1 by the images + r), shape (n, m)."""
-    orders = family(a.shape[-1], hydrostatic=True)
-    to_first = orders.to_p[0] * radius[:, None] ** (orders.a + 1)
-    return np.asarray(contrast.swelling * (np.einsum("nk,nmk->nm", to_first, a) + radius[:, None]))
 
 
 def _sums() -> LatticeSums:
@@ -197,12 +174,7 @@ def _sums() -> LatticeSums:
 def plane_moduli(radius: Array, materials: Sequence[Material], harmonics: int) -> Array:
     """C11 + C12, C11 − C12 and C33 of n square cells times m inclusions, (n, m, 3), in Pa."""
     contrast = Contrast.of_materials(materials)
-    columns = [
-        modulus_of_load(
-            load, multipoles(load, radius, contrast, harmonics=harmonics), radius, contrast
-        )
-        for load in LOADS
-    ]
+    columns = [modulus_of_load(load, radius, contrast, harmonics) for load in LOADS]
     return np.stack(columns, axis=-1)
 
 
@@ -267,13 +239,8 @@ class SeriesModel:
         """
         require_solve_arguments(radius_map, matrix, inclusions)
         start = perf_counter()
-
-        moduli = partial(
-            self.series.converged_moduli,
-            matrix=matrix,
-            inclusions=inclusions,
-            tolerance=self.accuracy,
-        )
+        solver = self.series.converged_moduli
+        moduli = partial(solver, matrix=matrix, inclusions=inclusions, tolerance=self.accuracy)
         means = converged_means(radius_map, moduli, points=self.points, accuracy=self.accuracy)
         seconds = perf_counter() - start
         results = []

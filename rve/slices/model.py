@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from time import perf_counter
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.polynomial.chebyshev import chebvander
@@ -119,31 +119,30 @@ class PlaneCell:
         fields = [self._point_strains(self._to_nodes(vector)) for vector in solved.vectors]
         return np.asarray((np.stack(fields, axis=-1) + unit_strains).reshape(-1, 3, 3))
 
-    def products(self, phases: Sequence[Array]) -> Array:
-        """Means of ε_a ⊗ ε_b by phase under unit strains, shape (phases, 3, 3, 3, 3)."""
-        return strain_products(self.strains(phases), self.weights)
+    def solve(self, phases: Sequence[AnyPhase]) -> tuple[Array, Array]:
+        """Homogenised stiffness, (3, 3), and energies of the phases, (phases, 2, 3), in Pa."""
+        stiffness = [phase.stiffness for phase in phases]
+        # means of ε_a ⊗ ε_b by phase under unit strains, of which `THREE_LOADS` are sums
+        products = strain_products(self.strains(stiffness), self.weights)
+        load_products = np.einsum("piajb,ka,lb->pikjl", products, THREE_LOADS, THREE_LOADS)
+        energies = energies_by_phase(load_products, phases, THREE_LOADS)
+        return total_energy(products, stiffness), energies
 
-    def stiffness(self, phases: Sequence[Array]) -> Array:
-        """Homogenised stiffness in Pa, Voigt order, shape (3, 3), by the energy of unit strains."""
-        return total_energy(self.products(phases), phases)
 
-
-@dataclass(frozen=True)
-class Slice:
+class Slice(NamedTuple):
     """A plane cell solved by elements of order 4.
 
     Args:
         stiffness: In Pa, Voigt order, shape (3, 3).
         errors: Declared relative errors of C11 + C12, C11 − C12 and C33, shape (3,).
-        energies: Parts of the phases in these three moduli, shape (phases, 2, 3), in Pa.
-        energy_errors: Their declared errors, same shape.
+        energies: Parts of the phases in these three moduli, and their declared errors, shape
+            (2, phases, 2, 3), in Pa.
         unknowns: Number of unknowns of the linear system.
     """
 
     stiffness: Array
     errors: Array
     energies: Array
-    energy_errors: Array
     unknowns: int
 
 
@@ -165,28 +164,22 @@ def solve_slice(
     first, second = (
         plane_mesh(radius, size=size, outline=outline) for size in (mesh_size, second_size)
     )
-    cell, higher_cell = PlaneCell(first, ORDER), PlaneCell(first, REFERENCE_ORDER)
-    second_cell, slices = PlaneCell(second, REFERENCE_ORDER), []
+    cells = [PlaneCell(first, ORDER), *(PlaneCell(x, REFERENCE_ORDER) for x in (first, second))]
+    slices = []
     for inclusion in inclusions:
         phases = matrix, inclusion
         square = is_round(outline) and all(isinstance(phase, Phase) for phase in phases)
-        stiffness, energies = _solve_sample(cell, phases)
-        higher, reference_energies = _solve_sample(higher_cell, phases)
+        (stiffness, energies), (higher, reference_energies), (on_second_mesh, _) = (
+            cell.solve(phases) for cell in cells
+        )
         by_order = ORDER_SAFETY * _distance(stiffness, higher, square=square)
-        on_second_mesh, _ = _solve_sample(second_cell, phases)
         by_mesh = MESH_SAFETY * _distance(stiffness, on_second_mesh, square=square)
         contrast = inclusion.stiffness[2, 2] / matrix.stiffness[2, 2]
-        round_off = ROUND_OFF + CANCELLATION * radius * contrast
+        errors = np.maximum(by_order, by_mesh) + ROUND_OFF + CANCELLATION * radius * contrast
         noise = NOISE * energies.sum(axis=(0, 1))
-        slices.append(
-            Slice(
-                stiffness=stiffness,
-                errors=np.maximum(by_order, by_mesh) + round_off,
-                energies=energies,
-                energy_errors=ORDER_SAFETY * abs(energies - reference_energies) + noise,
-                unknowns=cell.unknowns,
-            )
-        )
+        energy_errors = ORDER_SAFETY * abs(energies - reference_energies) + noise
+        energies = np.array([energies, energy_errors])
+        slices.append(Slice(stiffness, errors, energies, cells[0].unknowns))
     return slices
 
 
@@ -194,16 +187,6 @@ def _distance(first: Array, second: Array, *, square: bool) -> Array:
     """Largest relative distance of each modulus along either axis, shape (3,)."""
     ratio = axial_moduli(first, square=square) / axial_moduli(second, square=square)
     return np.asarray((np.maximum(ratio, 1 / ratio) - 1).max(axis=0))
-
-
-def _solve_sample(cell: PlaneCell, phases: Sequence[AnyPhase]) -> tuple[Array, Array]:
-    """Stiffness, (3, 3), and energies of the phases, (phases, 2, 3), in Pa."""
-    stiffness = [phase.stiffness for phase in phases]
-    products = cell.products(stiffness)
-    # fields of `THREE_LOADS` are sums of those of unit strains
-    load_products = np.einsum("piajb,ka,lb->pikjl", products, THREE_LOADS, THREE_LOADS)
-    energies = energies_by_phase(load_products, phases, THREE_LOADS)
-    return total_energy(products, stiffness), energies
 
 
 _DIGITS = 12  # radii equal to so many decimals are one slice
@@ -232,10 +215,7 @@ class SlicesModel:
         require_points(self.points)
 
     def solve(
-        self,
-        radius_map: RadiusMap,
-        matrix: AnyPhase,
-        inclusions: Sequence[AnyPhase],
+        self, radius_map: RadiusMap, matrix: AnyPhase, inclusions: Sequence[AnyPhase]
     ) -> list[HomogenisedStiffness]:
         """Homogenised stiffness for each of `inclusions`, in their order, with energies of phases.
 
@@ -252,33 +232,34 @@ class SlicesModel:
         all_radii = np.concatenate([radius_map(rule.nodes), extremes])
         radii, indices = np.unique(np.round(all_radii, _DIGITS), return_inverse=True)
         nodes = indices[: rule.nodes.size]  # index among the radii of each node in θ
+        size, outline = self.mesh_size, self.outline
         by_radius = [
-            solve_slice(
-                radius,
-                matrix,
-                inclusions,
-                mesh_size=self.mesh_size,
-                outline=self.outline,
-            )
+            solve_slice(radius, matrix, inclusions, mesh_size=size, outline=outline)
             for radius in radii
         ]
         seconds = perf_counter() - start
         results = []
         for inclusion, *slices in zip(inclusions, *by_radius, strict=True):
             cell = Cell(matrix, inclusion, radius_map, self.outline)
-            stiffness = np.array([plane.stiffness for plane in slices])
-            errors = np.array([plane.errors for plane in slices])
-            energies = np.array([[x.energies, x.energy_errors] for x in slices])
-            curve = StressCurve.from_stiffness(rule, stiffness[nodes])
-            moduli = square_moduli(stiffness)
+            stiffness, errors, energies, unknowns = map(np.array, zip(*slices, strict=True))
+            curve, moduli = (
+                StressCurve.from_stiffness(rule, stiffness[nodes]),
+                square_moduli(stiffness),
+            )
+            mean = rule.mean(moduli[nodes])
+            space_errors = rule.mean((moduli * errors)[nodes]) / mean
+            if (
+                cell.square
+            ):  # C11 and C22 differ by the mesh alone; s11 has C11, the moduli their mean
+                space_errors[0] += abs(STRAIN * mean[0] / curve.mean[0] - 1)
             result = HomogenisedStiffness(
                 curve=curve,
                 method=self.name,
                 solver="cholesky",
-                unknowns=max(plane.unknowns for plane in slices),
+                unknowns=int(unknowns.max()),
                 seconds=seconds,
                 errors={
-                    "space": _space_errors(curve, errors[nodes], square=cell.square),
+                    "space": space_errors,
                     "theta": theta_error(cell, rule, radii=radii, moduli=moduli),
                 },
                 cell=cell,
@@ -286,16 +267,6 @@ class SlicesModel:
             )
             results.append(with_checks(result))
         return results
-
-
-def _space_errors(curve: StressCurve, error: Array, *, square: bool) -> Array:
-    """Relative errors of mean moduli over θ, (3,), from those at the nodes, (n, 3)."""
-    moduli = square_moduli(np.asarray(curve.stiffness))
-    mean = curve.weights @ moduli
-    errors = np.asarray(curve.weights @ (moduli * error) / mean)
-    if square:  # C11 and C22 differ by the mesh alone; s11 has C11, the moduli their mean
-        errors[0] += abs(STRAIN * mean[0] / curve.mean[0] - 1)
-    return errors
 
 
 def _mean_energies(

@@ -95,7 +95,8 @@ class ConjugateGradient:
             last_gamma, gamma = gamma, inner(r, z)
             beta = _ratio(gamma, last_gamma)
             error_factor = _radau(error_factor - alpha, beta, system.least)
-            _scale_and_add(p, beta, z)
+            _add_multiple(z, beta, p)
+            p = z
         energy_error = float((error_factor * gamma / system.scale).max())
         raise FailedError(
             f"the image's fields lack up to {energy_error:.1e} of the energy after {LIMIT}"
@@ -123,14 +124,6 @@ def _add_multiple(fields: Fields, factors: Array, added: Fields) -> None:
     for slab in slabs(fields):
         for load, factor in enumerate(factors):
             fields[load][:, slab] += float(factor) * added[load][:, slab]
-
-
-def _scale_and_add(fields: Fields, factors: Array, added: Fields) -> None:
-    """Multiply fields by a factor a load and add others, in place and by slabs."""
-    for slab in slabs(fields):
-        for load, factor in enumerate(factors):
-            fields[load][:, slab] *= float(factor)
-            fields[load][:, slab] += added[load][:, slab]
 
 
 def _ratio(above: Array, below: Array) -> Array:

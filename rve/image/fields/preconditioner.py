@@ -86,21 +86,21 @@ class FourierPreconditioner:
         """Inverse operator of a constant material; what has no energy has a pseudo-inverse."""
         waves = [2 * np.pi * np.fft.fftfreq(size) for size in shape[:-1]]
         waves.append(2 * np.pi * np.fft.rfftfreq(shape[-1]))
-        n, axes = element.unknowns, range(len(shape))
-        phases = []
+        n, phases = element.unknowns, []
+        is_odd = np.array([odd for _, odd in element.places])
         for axis, k in enumerate(waves):
-            along = np.array([centre[axis] for centre, _ in element.places])
-            odd = np.array([is_odd and axis == 0 for _, is_odd in element.places])
-            phase = np.exp(1j * (np.outer(along, k) + np.pi / 2 * odd[:, None]))
-            shape_of_phase = n, *(-1 if axis == along_axis else 1 for along_axis in axes)
-            phases.append(xp.asarray(phase.reshape(shape_of_phase)))
-        uniform = fourier_blocks(element, constant, [k[:1] for k in waves]).real.reshape(n, n)
-        energy, waves_of_cell = np.linalg.eigh(uniform)
+            places = [place[axis] for place, _ in element.places]
+            phase = (
+                np.exp(1j * np.outer(places, k)) * np.where(is_odd & (axis == 0), 1j, 1)[:, None]
+            )
+            ones = (1,) * (len(shape) - 1 - axis)
+            phases.append(xp.asarray(phase.reshape(n, *(1,) * axis, k.size, *ones)))
         # what does not vary from cell to cell: of splines alone it has no energy but rounding
+        uniform = fourier_blocks(element, constant, [k[:1] for k in waves]).real.reshape(n, n)
         greatest = float(np.sum(element.magnitude**2)) * max(constant.trace, constant.deviator)
-        has_energy = (energy > 1e-10 * energy.max()) & (energy.max() > GAUGE * greatest)
-        gain = np.where(has_energy, 1 / np.where(has_energy, energy, 1), 0)
-        first_block = xp.asarray(waves_of_cell * gain @ waves_of_cell.T)
+        first_block = np.zeros((n, n))
+        if np.linalg.norm(uniform, 2) > GAUGE * greatest:
+            first_block = np.linalg.pinv(uniform, rcond=1e-10, hermitian=True)
         first_wave = (0,) * len(shape)
         kind, scale = xp.float64, 1.0
         if element.dimension == 3:
@@ -117,7 +117,7 @@ class FourierPreconditioner:
             solved = _pseudo_inverse(xp, real) if has_gauge else xp.linalg.inv(real)
             solved = xp.moveaxis((solved + xp.swapaxes(solved, -1, -2)) / 2, (-2, -1), (0, 1))
             if slab.start == 0:
-                solved[(slice(None), slice(None), *first_wave)] = first_block
+                solved[(slice(None), slice(None), *first_wave)] = xp.asarray(first_block)
             inverse[:, :, slab] = scale * solved
         return cls(inverse, tuple(phases), shape, scale)
 
