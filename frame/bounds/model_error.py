@@ -257,8 +257,9 @@ class Remainder:
                     product_part(power, rho, k, d, np.multiply, lowest=(0, 1)) / (p + 1)
                     for k in range(4)
                 ]
-        at_start = np.full(n, 2.0) @ model.coefficient.real  # where most modes cancel
-        cubic[time == 0] = majorant_parts(at_start, reach)[3]
+            if part.load is None:  # the first part; at the start most of its modes cancel
+                at_start = np.full(n, 2.0) @ part.share.real
+                cubic[time == 0] = majorant_parts(at_start, reach)[3]
         of_exponents = np.array([1, 1, 2, 6])[exponents(d, 3)].prod(1)  # ∂³ u^e at 0, e!
         third = (1 + 1e-9) * (cubic * of_exponents[:, None]).swapaxes(1, 2)
         self.tensor = third[..., product_places(d, 1, 2)[:, product_places(d, 1, 1)]]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import cumulative_trapezoid
 
-from alphacut.frame import Accelerogram, Exact, LinearFlow, StoreyFrame
+from alphacut.frame import Accelerogram, Exact, Force, History, LinearFlow, StoreyFrame
 from alphacut.frame.bounds.branch_and_bound import Frontier, enclosed, examine_items
 from alphacut.frame.bounds.kernel import stays_below
 from alphacut.frame.bounds.model_error import Remainder, largest_growth, motion_parts, proved_error
@@ -44,6 +44,15 @@ def test_remainder_of_the_quadratic_model_is_that_of_a_late_oscillation(rng) -> 
         ratio = bound[node] / np.abs(np.stack([*ends], 1) / (2 * h)).max(0)
         assert (ratio >= 1).all()
         assert (ratio <= 2.5).all()
+
+
+def test_remainder_at_the_start_is_that_of_a_force_over_an_uncertain_mass() -> None:
+    loads = [Force(1, 1.0, History.constant())]
+    frame = StoreyFrame((1.0,), stiffness=(1.0,), damping_ratio=0.05, loads=loads, outputs=("a1",))
+    cuts = boxes({"m1": Interval(0.9, 1.1)}, (0,))
+    model = ModalModel.of_degree(LinearFlow(frame, ("m1",), 1.0, 0.1, Exact()), cuts, 12)
+    bound = Remainder(model, -np.ones(1), np.ones(1)).tensor[0, 0, 0, 0, 0]
+    assert bound == pytest.approx(6 * 0.1**3 / 0.9**4, rel=1e-6)  # of F/m at m = 0.9
 
 
 @pytest.mark.parametrize("order", [0, 1, 2, 3])
