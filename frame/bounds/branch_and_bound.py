@@ -65,6 +65,7 @@ def enclosed(
     """
     examined, n_problems, remainder = 0, len(optima.value), Remainder(model, lower, upper)
     frontier = Frontier.of_box(len(lower), n_problems)
+    whole_box = np.full(n_problems, np.inf)  # bounds over the undivided box: 0 of outputs at rest
 
     def examined_piece(boxes: slice, items: slice) -> tuple[Array, Array, Array]:
         target = optima.value + gap
@@ -74,7 +75,9 @@ def enclosed(
         while len(frontier) and examined + len(frontier) <= budget * n_problems:
             examined += len(frontier)
             results = pool.map(examined_piece, *zip(*frontier.pieces(PIECE), strict=True))
-            code, value, _ = (np.concatenate(x) for x in zip(*results, strict=True))
+            code, value, bound = (np.concatenate(x) for x in zip(*results, strict=True))
+            if examined == n_problems:  # all problems over the undivided box
+                whole_box = bound
             higher = np.flatnonzero(value > optima.value[frontier.problem] + HIGHER)
             if len(higher):  # the incumbent is the best of centres, refined
                 higher = higher[np.argsort(value[higher])]
@@ -85,7 +88,7 @@ def enclosed(
             frontier = frontier.children(code)
             if progress:
                 progress(1 - len(np.unique(frontier.problem)) / n_problems)
-    proved = optima.value + gap
+    proved = np.minimum(optima.value + gap, whole_box)
     for boxes, items in frontier.pieces(PIECE):  # boxes that are still open keep their own bounds
         np.maximum.at(proved, frontier.problem[items], examined_piece(boxes, items)[2])
     return proved, examined
