@@ -284,8 +284,12 @@ class Bounds:
             ends = rounded(lower, "lower", nature, 6), rounded(upper, "upper", nature, 6)
             if ends[0] > ends[1]:  # attained ends of nearly one value, rounded inwards
                 ends = lower, upper
-            head = f"{self.named[column]}, α = {_digits(alpha)}: {' … '.join(map(_digits, ends))}"
-            yield f"{head}, {error_name} {_digits(error)}{suffix}"
+            line = f"{self.named[column]}, α = {_digits(alpha)}: {' … '.join(map(_digits, ends))}"
+            if nature is Nature.ATTAINED:
+                line += " or wider"
+            if nature is not Nature.ATTAINED or error > 0:  # that of values, as of a time step
+                line += f", {error_name} {_digits(error)}"
+            yield line + suffix
 
     def plot(self, axes: Axes | None = None, output: str = "", **line: object) -> Axes:
         """Draw an output, the first by default: its membership function, or α-cuts over time.

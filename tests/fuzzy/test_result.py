@@ -74,7 +74,7 @@ def test_text_and_dataset_say_nature_error_and_unit():
         found = bounds(time=time, units=("mm",), evaluations=12)
         assert "bounds attained" in str(found)
         assert "12 evaluations" in str(found)
-        assert "y [mm], α = 0: 1 … 16, error 0" in str(found)
+        assert "y [mm], α = 0: 1 … 16 or wider" in str(found)
         with pytest.raises(RefusedError, match="output is z; allowed: y"):
             found.bounds("z")
         dataset = found.to_dataset()
