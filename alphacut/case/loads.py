@@ -120,6 +120,7 @@ def with_forces(
         for section in sections
         for unknown, (amplitude, _) in section.amplitude.items()
     ]
+    units = [unit for section in sections for _, unit in section.amplitude.values()]
     if isinstance(model, StoreyFrame):
         unknowns = [str(floor) for floor in range(1, model.floors + 1)]
     for unknown, _, _ in forces:
@@ -139,7 +140,12 @@ def with_forces(
         ]
         model = replace(model, loads=loads, parameters={**model.parameters, **nominal})
     amplitudes = {name: amplitude for name, (_, amplitude, _) in zip(names, forces, strict=True)}
-    return replace(structure, model=model, numbers={**structure.numbers, **amplitudes})
+    return replace(
+        structure,
+        model=model,
+        numbers={**structure.numbers, **amplitudes},
+        force_units=dict(zip(names, units, strict=True)),
+    )
 
 
 MAX_RECORDS = 500

@@ -99,12 +99,14 @@ DampingRatios = Annotated[
 class Structure:
     """A storey frame, a structure from matrices or a pendulum: the model at its nominal values.
 
-    `numbers` has every parameter, crisp or fuzzy, in SI; `heights` the storey's of each drift.
+    `numbers` has every parameter, crisp or fuzzy, in SI; `heights` the storey's of each drift;
+    `force_units` the SI units of the forces' amplitudes, empty of factors.
     """
 
     model: StoreyFrame | MatrixStructure | LagrangianSystem
     numbers: Mapping[str, FuzzyNumber]
     heights: Mapping[str, FuzzyNumber] = field(default_factory=dict)
+    force_units: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def frame(self) -> StoreyFrame | None:
@@ -125,6 +127,10 @@ class Structure:
         """SI unit of an output."""
         units = {str(name): Output(name).unit for name in self.outputs}
         return units.get(output) or Output(output).unit
+
+    def input_unit(self, name: str) -> str:
+        """SI unit of a parameter; empty where it has none, or none is known."""
+        return self.force_units.get(name, self.model.parameter(name).unit)
 
     def fuzzy_members(self, name: str, key: str = "envelope.fuzzy") -> tuple[str, ...]:
         """Fuzzy parameters of a name, "m" of all masses of a frame; RefusedError where none is."""

@@ -176,6 +176,8 @@ def parse_fuzzy(value: object, si: str) -> FuzzyNumber:
     ValueError as of `parse_numbers`, of more than four values, or of values that do not rise.
     """
     values = parse_numbers(value, si)
+    if isinstance(value, list) and len(value) == 1 and isinstance(value[0], str):
+        raise ValueError("a list of one text, as if of a matrix; without brackets it is a value")
     if len(values) > len(SHAPES) or list(values) != sorted(values):
         raise ValueError(f"{len(values)} values stand where one to four that rise are needed")
     return SHAPES[len(values) - 1](*values)

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from math import floor, log10
 
 import numpy as np
+from pydantic import Field
 
 from alphacut.case.limits import DecisionSection
 from alphacut.frame.questions.peaks import ANY, passing
@@ -17,7 +18,6 @@ from alphacut.questions.question import (
     LimitsAnswer,
     Record,
     Texts,
-    input_text,
 )
 from alphacut.stages.envelope import PeakResult, peak_results
 from alphacut.stages.store import CutsResult
@@ -28,7 +28,7 @@ class LimitDecision(LimitAnswer):
 
     The margin is what the greatest and the least peak leave of the limit on each level, of several
     limits as fractions of them. The verdict holds from a level on, the lowest one computed; the
-    peak is reached under `record` where a suite moves the structure.
+    peak is reached under `record` where a suite moves the structure, at inputs in `input_units`.
     """
 
     possibility: tuple[float, float]
@@ -39,6 +39,7 @@ class LimitDecision(LimitAnswer):
     nature: Nature
     peak: PeakResult | None
     record: str = ""
+    input_units: dict[str, str] = Field(default={})
 
     @property
     def verdict_words(self) -> str:
@@ -52,7 +53,8 @@ class LimitDecision(LimitAnswer):
         inputs = {} if self.peak is None else self.peak.reached_at
         if self.verdict != "can be exceeded" or not inputs:
             return self.verdict_words
-        texts = [f"{name} = {input_text(name, value)}" for name, value in inputs.items()]
+        units = self.input_units
+        texts = [f"{x} = {engineering(value, units.get(x, ''))}" for x, value in inputs.items()]
         texts += [f"record {self.record}"] if self.record else []
         return f"{self.verdict}, as at {', '.join(texts)}"
 
@@ -139,7 +141,8 @@ def decide(section: DecisionSection, response: FuzzyResponse) -> DecisionAnswer:
     limits = section.limits_by_name
     peaks = {name: response.peaks[limit.peak] for name, limit in limits.items()}
     by_peak = peak_results(response.peaks)
-    suite = response.suite
+    suite, names = response.suite, {x for peak in by_peak.values() for x in peak.reached_at}
+    units = {x: response.structure.input_unit(x) for x in sorted(names)}
     decisions = {
         name: LimitDecision.of(
             section,
@@ -153,6 +156,7 @@ def decide(section: DecisionSection, response: FuzzyResponse) -> DecisionAnswer:
             nature=answer.nature,
             peak=None if name == ANY else by_peak[limits[name].peak],
             record="" if suite is None or name == ANY else suite.record_at(limits[name].peak),
+            input_units=units,
         )
         for name, answer in passing(peaks, section.limits_in_si(response.structure)).items()
     }

@@ -10,7 +10,6 @@ from typing import ClassVar, Generic, NamedTuple, Self, TypeVar
 from alphacut.case.limits import QuestionSection, Side
 from alphacut.case.structure import Structure
 from alphacut.frame.questions.peaks import ANY, Peaks
-from alphacut.frame.structures.quantities import of_storey_frame
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.progress_bar import Progress
 from alphacut.io.quantity import engineering
@@ -71,11 +70,6 @@ class FuzzyResponse:
     def inputs(self) -> dict[str, FuzzyNumber]:
         """Fuzzy inputs by parameter."""
         return self.structure.inputs(self.fuzzy)
-
-
-def input_text(name: str, value: float) -> str:
-    """Text of the value of an input, in its unit."""
-    return engineering(value, of_storey_frame(name).unit)
 
 
 class Answer(Numbers):

@@ -8,11 +8,10 @@ from alphacut.case.limits import TolerancesSection
 from alphacut.frame.boxes import boxes
 from alphacut.frame.propagation import require_admissible
 from alphacut.frame.questions.tolerances import scale_supports, tolerances
-from alphacut.frame.structures.quantities import of_storey_frame
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature, rounded
-from alphacut.io.quantity import MINUS, rounded_ends
-from alphacut.questions.question import Answer, FuzzyResponse, Record, Row, Table, input_text
+from alphacut.io.quantity import MINUS, engineering, rounded_ends
+from alphacut.questions.question import Answer, FuzzyResponse, Record, Row, Table
 from alphacut.stages.envelope import PEAK_ERROR, PeakResults, peak_results
 from alphacut.stages.store import Numbers
 
@@ -21,6 +20,7 @@ class Support(Numbers):
     """Nominal value of an input, its support in the case, and the one with no limit exceeded."""
 
     nominal: float
+    unit: str = ""
     own: tuple[float, float]
     kept: tuple[float, float]
 
@@ -58,7 +58,7 @@ class TolerancesAnswer(Answer):
             text, relative = "–", ""
             if self.kept is not None:
                 inside = rounded_ends(*support.kept, Nature.ATTAINED)
-                text = " … ".join(dict.fromkeys(input_text(name, end) for end in inside))
+                text = " … ".join(dict.fromkeys(engineering(end, support.unit) for end in inside))
                 relative = f"about {support.nominal:g}"
                 if support.nominal:
                     relative = ", ".join(f"{x / support.nominal - 1:+.2%}" for x in support.kept)
@@ -71,7 +71,7 @@ class TolerancesAnswer(Answer):
         rows = [("scale of all ranges", "", None, self.kept, None, 1.0, None)]
         for name, support in self.supports.items():
             ends = (None, None) if self.kept is None else support.kept
-            rows.append((name, of_storey_frame(name).unit, *ends, *support.own, support.nominal))
+            rows.append((name, support.unit, *ends, *support.own, support.nominal))
         titles = ["quantity", "unit", "from", "to", "from in the case", "to in the case"]
         titles += ["most plausible", "nature"]
         return [dict(zip(titles, (*row, self.nature), strict=True)) for row in rows]
@@ -120,7 +120,12 @@ def admissible_tolerances(section: TolerancesSection, response: FuzzyResponse) -
         most=section.most,
         nature=scale.nature,
         supports={
-            name: Support(nominal=inputs[name].nominal, own=inputs[name].support, kept=ends)
+            name: Support(
+                nominal=inputs[name].nominal,
+                unit=response.structure.input_unit(name),
+                own=inputs[name].support,
+                kept=ends,
+            )
             for name, ends in scale.supports.items()
         },
     )

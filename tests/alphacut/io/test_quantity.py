@@ -41,6 +41,7 @@ WRONG = [
     ("inf GPa", "Pa", "does not begin with a number"),
     ("[3, 2, 1] m", "m", "rise"),
     ("[1, 2, 3, 4, 5] m", "m", "one to four"),
+    (["10 t"], "kg", "as if of a matrix"),
     ("[] m", "m", "does not begin with a number"),
     (True, "m", "no quantity"),
     ("5 %", "m", "wrong"),
