@@ -127,7 +127,7 @@ def _solve_fields(
     displacement = np.empty((grid.nodes, 2, len(vectors)))
     prism_strains = np.empty((len(grid.cells), NODES, 3, len(vectors)))
     for k, vector in enumerate(vectors):
-        u, uniform = problem.field(vector), np.asarray(loads[k], float)
+        u, uniform = problem.elimination.displacements(vector), np.asarray(loads[k], float)
         tensor = np.array([[uniform[0], uniform[2] / 2], [uniform[2] / 2, uniform[1]]])
         displacement[problem.node, :, k] = u + positions[problem.node, :2] @ tensor
         fluctuation.x.array[:] = u.ravel()

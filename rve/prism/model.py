@@ -247,7 +247,7 @@ def solve_loads(
         solutions = Solutions(zeros, iterations=(0,) * len(loads), residual=0.0)
     else:
         solutions = solve(problem.solver(options), loads)
-    fluctuations = [problem.field(vector) for vector in solutions.vectors]
+    fluctuations = [problem.elimination.displacements(vector) for vector in solutions.vectors]
     means = problem.slice_strains(list(zip(strains, fluctuations, strict=True)))
     return means, solutions.iterations, solutions.residual
 

@@ -23,13 +23,7 @@ from alphacut.rve.mesh.wedge import (
 )
 from alphacut.rve.solver.form import CellForm, PointStrains, strain_products
 from alphacut.rve.solver.krylov import SolverOptions, krylov_solver
-from alphacut.rve.solver.numbering import (
-    LevelNumbering,
-    NodeScatter,
-    map_of,
-    reduced_vector,
-    zero_matrix,
-)
+from alphacut.rve.solver.numbering import Elimination, LevelNumbering
 from alphacut.stochastic import RadiusMap, ThetaLaw
 from alphacut.stochastic.theta.quadrature import level_rule
 
@@ -112,13 +106,12 @@ class PrismProblem:
         wedge: Number in the grid of each of this rank's prisms, shape (m,).
         layer: Layer of each of these prisms, shape (m,).
         dx: Measure of each phase by its name, with the rule of the prisms, for forms of the user.
-        elastic: Stiffness and loads; `elastic.density` is f_Θ at the points.
+        density: f_Θ at the points.
         areas: Weights of the points in their slice, shape (cells, 3, points); a slice's sum is 4.
         numbering: Reduced unknowns.
         map: The radius map.
         matrix: The reduced stiffness.
-        local_map: Nodes of this rank to pairs of reduced unknowns.
-        field: From reduced unknowns to displacements of this rank's nodes, (nodes, 2).
+        elimination: From forces on nodes to reduced ones, and from unknowns to displacements.
     """
 
     def __init__(self, grid: PrismGrid, comm: MPI.Intracomm) -> None:
@@ -131,11 +124,12 @@ class PrismProblem:
         self._compile_forms()
         self.numbering = LevelNumbering(grid, comm)
         pairs, rows = self.numbering.pairs, self.numbering.rows
-        self.local_map = map_of(pairs[self.node], comm)
         layers = grid.cells.reshape(grid.layers, -1, grid.cells.shape[1])
         cells = layers[self.numbering.layers].reshape(-1, layers.shape[-1])
-        self.matrix = zero_matrix(pairs[cells], self.local_map, rows, self.numbering.size)
-        self.field = NodeScatter(pairs[self.node], self.matrix.createVecRight())
+        self.elimination = Elimination(
+            pairs[self.node], pairs[cells], rows, self.numbering.size, comm
+        )
+        self.matrix = self.elimination.matrix
 
     def _node_of_dof(self) -> Ints:
         sizes, geometry = self.space.dofmap.index_map, self.mesh.geometry
@@ -150,17 +144,23 @@ class PrismProblem:
             "quadrature_points": points,
             "quadrature_weights": weights,
         }
-        phase = self.grid.phase[self.wedge]
-        cells = [
-            (k, np.flatnonzero(phase == k).astype(np.int32)) for k in range(len(self.grid.names))
-        ]
+        phase, num_phases = self.grid.phase[self.wedge], len(self.grid.names)
+        cells = [(k, np.flatnonzero(phase == k).astype(np.int32)) for k in range(num_phases)]
         dx = ufl.Measure("dx", self.mesh, metadata=metadata, subdomain_data=cells)
         self.dx = {name: dx(k) for k, name in enumerate(self.grid.names)}
-        point_element = basix.ufl.quadrature_element("prism", points=points, weights=weights)
-        point_space = fem.functionspace(self.mesh, point_element)
-        ignores_interface = not self.grid.conforming
-        measures = list(self.dx.values())
-        self.elastic = CellForm(self.space, point_space, measures, mixed=ignores_interface)
+
+        def at_points(*shape: int) -> fem.FunctionSpace:
+            rule = {"points": points, "weights": weights}
+            element = basix.ufl.quadrature_element("prism", value_shape=shape, **rule)
+            return fem.functionspace(self.mesh, element)
+
+        self.density = fem.Function(at_points())
+        self._phases = np.equal.outer(np.arange(num_phases), phase)[..., None, None]
+        if self.grid.conforming:
+            stiffness_space = fem.functionspace(self.mesh, ("DG", 0, (3, 3)))
+        else:
+            stiffness_space = at_points(3, 3)
+        self._elastic = CellForm(self.space, stiffness_space, dx, self.density)
         self._strains = PointStrains(self.space, points)
 
     def move(self, radius_map: RadiusMap) -> None:
@@ -179,28 +179,17 @@ class PrismProblem:
         density = positive_density(radius_map.distribution, self.slice_rule()[0])
         self.areas = self._areas()
         require_valid_elements(self.grid, self.areas, self.comm)
-        self.elastic.density.x.array[:] = np.repeat(self.at_prisms(density), POINTS_PER_SLICE)
+        self.density.x.array[:] = np.repeat(self.at_prisms(density), POINTS_PER_SLICE)
         if isinstance(radius_map, LevelSet):
-            self.elastic.in_particle.x.array[:] = self._inside(positions, radius_map).ravel()
-
-    def _inside(self, positions: Array, level_set: LevelSet) -> Array:
-        """1 at the quadrature points in the particles (z < 0 in eq. 14), else 0."""
-        shapes: Array = wedge(1).tabulate(0, prism_rule()[0])[0].reshape(-1, 15)
-        points = np.einsum("qn,cnd->cqd", shapes, positions[self.grid.cells[self.wedge]])
-        return level_set.is_inside(points).astype(float)
+            shapes: Array = wedge(1).tabulate(0, prism_rule()[0])[0].reshape(-1, 15)
+            corners = positions[self.grid.cells[self.wedge]]
+            inside = radius_map.is_inside(np.einsum("qn,cnd->cqd", shapes, corners))  # eq. 14
+            self._phases = np.array([~inside, inside]).reshape(2, *self.areas.shape)
 
     def _areas(self) -> Array:
         heights = np.diff(self._levels)[self.layer]
         volume = self._strains.determinants().reshape(len(self.wedge), SLICES_PER_LAYER, -1)
         return np.asarray(volume / heights[:, None, None] * slice_weights())
-
-    def phase_areas(self) -> Array:
-        """`areas` of the points in each phase, 0 elsewhere, shape (phases, cells, 3, points)."""
-        if self.grid.conforming:
-            phase = self.grid.phase[self.wedge][:, None, None]
-            return np.array([self.areas * (phase == k) for k in range(len(self.grid.names))])
-        indicator = self.elastic.in_particle.x.array.reshape(self.areas.shape)
-        return np.stack([self.areas * (1 - indicator), self.areas * indicator])
 
     def slice_rule(self) -> tuple[Array, Array]:
         """θ and weights of the slices, the Gauss points of all layers, shape (3 layers,) each."""
@@ -218,19 +207,14 @@ class PrismProblem:
 
     def assemble(self, stiffness: Sequence[Array]) -> PETSc.Mat:
         """Assemble the reduced stiffness of eq. 7 and return it."""
-        self.elastic.set_phases(stiffness)
-        self.matrix.zeroEntries()
-        self.elastic.add_stiffness(self.matrix)
+        at_points = np.tensordot(self._phases, np.array(stiffness), axes=(0, 0))  # eq. 13
+        self._elastic.stiffness.x.array[:] = at_points.ravel()
+        self._elastic.assemble(self.matrix)
         return self.matrix
 
     def loads(self, strains: Array) -> list[PETSc.Vec]:
         """Reduced forces −⟨Bᵀ C ε̄⟩ of macroscopic strains (loads, 3), for the phases as set."""
-        return [self.reduced(self.elastic.load(strain)) for strain in strains]
-
-    def reduced(self, forces: Array) -> PETSc.Vec:
-        """Reduced vector of forces on this rank's nodes, shape (nodes · 2,)."""
-        num_rows, size = len(self.numbering.rows), self.numbering.size
-        return reduced_vector(forces, self.local_map, num_rows, size)
+        return [self.elimination.forces(self._elastic.load(strain)) for strain in strains]
 
     def solver(self, options: SolverOptions, matrix: PETSc.Mat | None = None) -> PETSc.KSP:
         """PETSc solver of the assembled stiffness, or of another reduced symmetric operator."""
@@ -255,7 +239,7 @@ class PrismProblem:
         strain = np.empty((len(self.wedge), SLICES_PER_LAYER, POINTS_PER_SLICE, 3, count))
         for k, (uniform, u) in enumerate(fields):
             strain[..., k] = self._strains(u).reshape(strain.shape[:-1]) + uniform
-        areas = self.phase_areas() / AREA  # (phases, cells, 3, points)
+        areas = self._phases * self.areas / AREA  # (phases, cells, 3, points)
         prism_means = np.einsum("pmsq,msqif->pmsif", areas, strain)
         means = np.stack([self.sum_by_layer(phase_means) for phase_means in prism_means])
         fractions = np.stack([self.sum_by_layer(phase.sum(axis=-1)) for phase in areas])

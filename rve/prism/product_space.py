@@ -54,7 +54,7 @@ class ProductSpace:
         self._problem = _separate_problem(model, law)
         self.space: fem.FunctionSpace = self._problem.space
         self.dx: dict[str, ufl.Measure] = self._problem.dx
-        self.density: fem.Function = self._problem.elastic.density
+        self.density: fem.Function = self._problem.density
         self._forms: dict[ufl.Form, fem.Form] = {}
 
     @staticmethod
@@ -68,7 +68,7 @@ class ProductSpace:
 
     def assemble_vector(self, form: ufl.Form) -> PETSc.Vec:
         """Reduced vector Pᵀ b of a linear form in `space`."""
-        return self._problem.reduced(fem.assemble_vector(self._compiled(form)).array)
+        return self._problem.elimination.forces(fem.assemble_vector(self._compiled(form)).array)
 
     def mean(self, form: ufl.Form) -> float:
         """Mean over cell and θ of a scalar form: its integral over that of f_Θ."""
@@ -81,7 +81,7 @@ class ProductSpace:
 
     def assign(self, function: fem.Function, vector: PETSc.Vec) -> None:
         """Set a function of `space` to the displacements of reduced unknowns."""
-        function.x.array[:] = self._problem.field(vector).ravel()
+        function.x.array[:] = self._problem.elimination.displacements(vector).ravel()
 
     def preconditioner(self, matrix: PETSc.Mat) -> ThetaPreconditioner:
         """Preconditioner along θ for `PC.setPythonContext`; the form has the density as factor."""

@@ -29,7 +29,7 @@ from alphacut.rve.cell.cell import (
     require_solve_arguments,
 )
 from alphacut.rve.cell.outline import Outline, circle, is_round
-from alphacut.rve.fenicsx import MPI, basix, cholesky, fem, mesh_of
+from alphacut.rve.fenicsx import MPI, basix, cholesky, fem, mesh_of, ufl
 from alphacut.rve.mesh.curved import PlaneMesh, curved_nodes, plane_mesh, quadrature_degree
 from alphacut.rve.mesh.periodicity import unknowns
 from alphacut.rve.result.checks import with_checks
@@ -39,12 +39,11 @@ from alphacut.rve.solver.form import (
     CellForm,
     PointStrains,
     energies_by_phase,
-    measure_of,
     strain_products,
     total_energy,
 )
 from alphacut.rve.solver.krylov import ConvergenceError, solve
-from alphacut.rve.solver.numbering import NodeScatter, map_of, reduced_vector, zero_matrix
+from alphacut.rve.solver.numbering import Elimination
 from alphacut.stochastic import RadiusMap, ThetaRule, gauss_rule
 
 PREFIX = "rve_slice_"
@@ -78,12 +77,10 @@ class PlaneCell:
         plane = mesh_of(MPI.COMM_SELF, cells, len(nodes), element)
         plane.geometry.x[:, :2] = nodes[plane.geometry.input_global_indices]
         space, degree = fem.functionspace(plane, element), quadrature_degree(order)
-        phase = mesh.phase[plane.topology.original_cell_index]
-        is_phase = np.equal.outer(np.arange(int(mesh.phase.max()) + 1), phase)
-        rule = {"quadrature_degree": degree}
-        parts = [measure_of(plane, np.flatnonzero(mask), rule) for mask in is_phase]
-        self._form = CellForm(space, fem.functionspace(plane, ("DG", 0)), parts)
-        self._form.density.x.array[:] = 1.0
+        self._phase = mesh.phase[plane.topology.original_cell_index]
+        is_phase = np.equal.outer(np.arange(int(mesh.phase.max()) + 1), self._phase)
+        dx = ufl.Measure("dx", plane, metadata={"quadrature_degree": degree})
+        self._form = CellForm(space, fem.functionspace(plane, ("DG", 0, (3, 3))), dx)
         points, weights = basix.make_quadrature(basix.CellType.triangle, degree)
         self._point_strains = PointStrains(space, points)
         areas = abs(self._point_strains.determinants()) * weights / AREA
@@ -92,10 +89,8 @@ class PlaneCell:
         positions[space.dofmap.list] = plane.geometry.x[plane.geometry.dofmap, :2]
         pairs = unknowns(positions)
         self.unknowns = 2 * (int(pairs.max()) + 1)
-        self._local = map_of(pairs, MPI.COMM_SELF)
-        rows = range(self.unknowns)
-        self._matrix = zero_matrix(pairs[space.dofmap.list], self._local, rows, self.unknowns)
-        self._to_nodes = NodeScatter(pairs, self._matrix.createVecRight())
+        cells, rows = pairs[space.dofmap.list], range(self.unknowns)
+        self._elimination = Elimination(pairs, cells, rows, self.unknowns, MPI.COMM_SELF)
 
     def strains(self, phases: Sequence[Array]) -> Array:
         """Strains at the quadrature points under unit strains, (points, 3, 3); stiffness in Pa.
@@ -103,20 +98,19 @@ class PlaneCell:
         Raises:
             ConvergenceError: The linear system was not solved.
         """
-        self._form.set_phases(phases)
-        self._matrix.zeroEntries()
-        self._form.add_stiffness(self._matrix)
-        size, unit_strains = self.unknowns, np.eye(3)
-        forces = [self._form.load(strain) for strain in unit_strains]
-        loads = [reduced_vector(force, self._local, size, size) for force in forces]
-        solved = solve(cholesky(self._matrix, PREFIX), loads)
+        matrix, unit_strains = self._elimination.matrix, np.eye(3)
+        self._form.stiffness.x.array[:] = np.array(phases)[self._phase].ravel()
+        self._form.assemble(matrix)
+        loads = [self._elimination.forces(self._form.load(strain)) for strain in unit_strains]
+        solved = solve(cholesky(matrix, PREFIX), loads)
         if not solved.residual <= RESIDUAL:
             raise ConvergenceError(
                 f"the factorisation of a plane cell leaves a relative residual of"
                 f" {solved.residual:.1e}; {RESIDUAL:g} is allowed",
                 "check the moduli, or take the series",
             )
-        fields = [self._point_strains(self._to_nodes(vector)) for vector in solved.vectors]
+        displacements = map(self._elimination.displacements, solved.vectors)
+        fields = [self._point_strains(u) for u in displacements]
         return np.asarray((np.stack(fields, axis=-1) + unit_strains).reshape(-1, 3, 3))
 
     def solve(self, phases: Sequence[AnyPhase]) -> tuple[Array, Array]:

@@ -11,16 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Ints
+from alphacut.fuzzy.arrays import Array
 from alphacut.rve.cell.cell import AnyPhase
 from alphacut.rve.fenicsx import PETSc, at_points, compiled, fem, petsc, ufl
 from alphacut.rve.result.moduli import moduli_of_energies
-
-
-def measure_of(mesh: Any, cells: Ints, metadata: dict[str, Any]) -> Any:
-    """Measure of some cells of this rank; forms over any of them are compiled once."""
-    part = [(0, np.asarray(cells, np.int32))]
-    return ufl.Measure("dx", mesh, metadata=metadata, subdomain_data=part)(0)
 
 
 def strain(u: Any) -> Any:
@@ -30,61 +24,39 @@ def strain(u: Any) -> Any:
 
 
 class CellForm:
-    """Stiffness and loads of a fluctuation in n phases; what stands in them is set anew.
+    """Stiffness and loads of a fluctuation, by the stiffness of the material at each point.
 
     Args:
         space: Displacements of two components.
-        points: Values at quadrature points, or in cells.
-        parts: Measures of the phases in their order; with `mixed` one measure of all.
-        mixed: Whether `in_particle` tells the phase of points, where a mesh ignores the interface.
+        points: Matrices (3, 3) in cells or at quadrature points.
+        dx: Measure of the cells.
+        density: f_Θ of eq. 1 at the points; 1 where there is no θ.
 
     Attributes:
-        density: f_Θ of eq. 1 at the points; 1 where there is no θ.
-        in_particle: Indicator of the particle at the points, 0 or 1 (eq. 13), if mixed.
+        stiffness: Voigt matrix C of the material, in Pa; to be set.
     """
 
     def __init__(
-        self,
-        space: fem.FunctionSpace,
-        points: fem.FunctionSpace,
-        parts: Sequence[Any],
-        *,
-        mixed: bool = False,
+        self, space: fem.FunctionSpace, points: fem.FunctionSpace, dx: Any, density: Any = 1.0
     ) -> None:
-        mesh, count = space.mesh, 2 if mixed else len(parts)
-        self.density, self.in_particle = fem.Function(points), fem.Function(points)
-        self._phases = [fem.Constant(mesh, np.zeros((3, 3))) for _ in range(count)]
-        self._uniform = fem.Constant(mesh, np.zeros(3))
+        self.stiffness = fem.Function(points)
+        self._uniform = fem.Constant(space.mesh, np.zeros(3))
         u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
-        density, of_parts = self.density, list[Any](self._phases)
-        if mixed:
-            matrix, inclusion = self._phases
-            of_parts = [matrix + self.in_particle * (inclusion - matrix)]  # eq. 13
-        self._stiffness, self._load = [], []
-        for stiffness, dx in zip(of_parts, parts, strict=True):
-            stress = stiffness * strain(u)  # eq. 6
-            # eq. 7: Galerkin's projection (eq. 4) of −div σ (eq. 2), weighted by f_Θ (eq. 1)
-            left = density * ufl.dot(stress, strain(v))
-            right = -density * ufl.dot(stiffness * self._uniform, strain(v))
-            self._stiffness.append(compiled(left * dx))
-            self._load.append(compiled(right * dx))
+        # eq. 7: Galerkin's projection (eq. 4) of −div σ (eq. 2), weighted by f_Θ (eq. 1)
+        stress, uniform_stress = self.stiffness * strain(u), self.stiffness * self._uniform  # eq. 6
+        self._stiffness = compiled(density * ufl.dot(stress, strain(v)) * dx)
+        self._load = compiled(-density * ufl.dot(uniform_stress, strain(v)) * dx)
 
-    def set_phases(self, stiffness: Sequence[Array]) -> None:
-        """Take the Voigt matrices of the phases in their order, in Pa."""
-        for constant, value in zip(self._phases, stiffness, strict=True):
-            constant.value[:] = value
-
-    def add_stiffness(self, matrix: PETSc.Mat) -> None:
-        """Add the stiffness of eq. 7 to a matrix, whose local-to-global map reduces it."""
-        for form in self._stiffness:
-            petsc.assemble_matrix(matrix, form)
+    def assemble(self, matrix: PETSc.Mat) -> None:
+        """Set a matrix, whose local-to-global map reduces it, to the stiffness of eq. 7."""
+        matrix.zeroEntries()
+        petsc.assemble_matrix(matrix, self._stiffness)
         matrix.assemble()
 
     def load(self, uniform: Array) -> Array:
         """Forces −⟨Bᵀ C ε̄⟩ of a macroscopic strain (3,) on this rank's nodes, (nodes · 2,)."""
         self._uniform.value[:] = uniform
-        vectors = [fem.assemble_vector(form).array for form in self._load]
-        return np.asarray(np.sum(vectors, axis=0))
+        return np.asarray(fem.assemble_vector(self._load).array)
 
 
 class PointStrains:

@@ -2,8 +2,8 @@
 
 P only renumbers: every node becomes one pair of unknowns or, on the fixed line, none. So it needs
 no matrix product; PETSc's local-to-global map carries it, and DOLFINx adds element matrices where
-they belong. The order is: the planar unknowns of level 0, those of the vertices on
-the mid-level above, those of level 1, and so on. A rank owns levels with the mid-level above each.
+they belong. The order is: the planar unknowns of level 0, those of the vertices on the mid-level
+above, those of level 1, and so on. A rank owns levels with the mid-level above each.
 """
 
 from __future__ import annotations
@@ -20,65 +20,65 @@ from alphacut.rve.mesh.periodicity import identify
 from alphacut.rve.mesh.prism_grid import PrismGrid
 
 
-def map_of(pairs: Ints, comm: MPI.Intracomm) -> PETSc.LGMap:
-    """PETSc's local-to-global map of nodes to their pairs of unknowns, −1 where eliminated."""
-    return PETSc.LGMap().create(pairs.astype(PETSc.IntType), bsize=2, comm=comm)
-
-
-def zero_matrix(pairs: Ints, local_map: PETSc.LGMap, rows: range, size: int) -> PETSc.Mat:
-    """PETSc matrix of zeros with the sparsity pattern of all unknowns that share a cell.
+class Elimination:
+    """The constraint u = P U of nodal values u by pairs of unknowns U, over the ranks of `comm`.
 
     Args:
-        pairs: Pair number of each node of the cells that touch these rows, −1 where eliminated,
-            shape (cells, nodes).
-        local_map: Nodes of this rank to pairs of unknowns.
+        pairs: Number p of the pair of each node of this rank, whose unknowns are 2p and 2p + 1,
+            −1 where the node is held, shape (nodes,).
+        cells: Pairs of the nodes of all cells that touch this rank's rows, shape (cells, nodes).
         rows: Unknowns of this rank.
         size: Number of unknowns of all ranks.
+        comm: Communicator.
+
+    Attributes:
+        matrix: Zeros in the pattern of all unknowns that share a cell, for Pᵀ K P.
     """
-    has_unknown = pairs >= 0
-    cell = np.broadcast_to(np.arange(len(pairs))[:, None], pairs.shape)[has_unknown]
-    ones = np.ones(len(cell), np.int8)
-    cell_to_pair = sp.csr_matrix((ones, (cell, pairs[has_unknown])), (len(pairs), size // 2))
-    pair_to_cell = cell_to_pair.T.tocsr()[rows.start // 2 : rows.stop // 2]
-    neighbours = pair_to_cell @ cell_to_pair
-    neighbours.sort_indices()
-    blocks = np.broadcast_to(np.int8(1), (neighbours.nnz, 2, 2))
-    bsr = blocks, neighbours.indices, neighbours.indptr
-    pattern = sp.bsr_matrix(bsr, shape=(len(rows), size)).tocsr()
-    indptr, indices = (x.astype(PETSc.IntType) for x in (pattern.indptr, pattern.indices))
-    sizes = (len(rows), size)
-    matrix = PETSc.Mat().createAIJ((sizes, sizes), bsize=2, comm=local_map.comm)
-    matrix.setPreallocationCSR((indptr, indices, np.zeros(pattern.nnz)))
-    matrix.setLGMap(local_map, local_map)
-    matrix.setOption(PETSc.Mat.Option.SPD, True)
-    return matrix
 
-
-def reduced_vector(values: Array, local_map: PETSc.LGMap, num_rows: int, size: int) -> PETSc.Vec:
-    """PETSc vector of unknowns, `num_rows` of `size` here: nodal values, partners' added."""
-    vector = PETSc.Vec().createMPI((num_rows, size), bsize=2, comm=local_map.comm)
-    vector.setLGMap(local_map)
-    nodes = np.arange(len(values) // 2, dtype=PETSc.IntType)
-    vector.setValuesBlockedLocal(nodes, values, addv=PETSc.InsertMode.ADD_VALUES)
-    vector.assemble()
-    return vector
-
-
-class NodeScatter:
-    """Scatter of vectors of unknowns, as `vector` is one, to this rank's nodes by `pairs`."""
-
-    def __init__(self, pairs: Ints, vector: PETSc.Vec) -> None:
+    def __init__(
+        self, pairs: Ints, cells: Ints, rows: range, size: int, comm: MPI.Intracomm
+    ) -> None:
+        self._num_nodes, self._sizes = len(pairs), (len(rows), size)
+        self._map = PETSc.LGMap().create(pairs.astype(PETSc.IntType), bsize=2, comm=comm)
+        self.matrix = self._zero_matrix(cells, rows)
         self._free_nodes = np.flatnonzero(pairs >= 0)
-        self._shape = len(pairs), 2
         blocks = pairs[self._free_nodes].astype(PETSc.IntType)
         needed = PETSc.IS().createBlock(2, blocks, comm=PETSc.COMM_SELF)
         self._values = PETSc.Vec().createSeq(2 * len(blocks), comm=PETSc.COMM_SELF)
+        vector = self.matrix.createVecRight()
         self._scatter = PETSc.Scatter().create(vector, needed, self._values, None)
 
-    def __call__(self, vector: PETSc.Vec) -> Array:
-        """Displacements of the nodes, zero where eliminated, shape (nodes, 2)."""
+    def _zero_matrix(self, cells: Ints, rows: range) -> PETSc.Mat:
+        has_unknown, size = cells >= 0, self._sizes[1]
+        cell = np.broadcast_to(np.arange(len(cells))[:, None], cells.shape)[has_unknown]
+        ones = np.ones(len(cell), np.int8)
+        cell_to_pair = sp.csr_matrix((ones, (cell, cells[has_unknown])), (len(cells), size // 2))
+        pair_to_cell = cell_to_pair.T.tocsr()[rows.start // 2 : rows.stop // 2]
+        neighbours = pair_to_cell @ cell_to_pair
+        neighbours.sort_indices()
+        blocks = np.broadcast_to(np.int8(1), (neighbours.nnz, 2, 2))
+        bsr = blocks, neighbours.indices, neighbours.indptr
+        pattern = sp.bsr_matrix(bsr, shape=self._sizes).tocsr()
+        indptr, indices = (x.astype(PETSc.IntType) for x in (pattern.indptr, pattern.indices))
+        matrix = PETSc.Mat().createAIJ((self._sizes, self._sizes), bsize=2, comm=self._map.comm)
+        matrix.setPreallocationCSR((indptr, indices, np.zeros(pattern.nnz)))
+        matrix.setLGMap(self._map, self._map)
+        matrix.setOption(PETSc.Mat.Option.SPD, True)
+        return matrix
+
+    def forces(self, values: Array) -> PETSc.Vec:
+        """Pᵀ f of forces on this rank's nodes, (nodes · 2,): those of partners are added."""
+        vector = PETSc.Vec().createMPI(self._sizes, bsize=2, comm=self._map.comm)
+        vector.setLGMap(self._map)
+        nodes = np.arange(self._num_nodes, dtype=PETSc.IntType)
+        vector.setValuesBlockedLocal(nodes, values, addv=PETSc.InsertMode.ADD_VALUES)
+        vector.assemble()
+        return vector
+
+    def displacements(self, vector: PETSc.Vec) -> Array:
+        """P U of this rank's nodes, zero where held, shape (nodes, 2)."""
         self._scatter.scatter(vector, self._values)
-        displacements = np.zeros(self._shape)
+        displacements = np.zeros((self._num_nodes, 2))
         displacements[self._free_nodes] = self._values.array_r.reshape(-1, 2)
         return displacements
 
@@ -118,7 +118,7 @@ class LevelNumbering:
 
     @cached_property
     def pairs(self) -> Ints:
-        """Number p of each node's pair of displacements, unknowns 2p and 2p + 1, −1 where held."""
+        """Number p of each node's pair of displacements, −1 where held."""
         planar, layers = self.periodicity.unknown, self.grid.layers
         vertices = planar[: self.grid.plane.vertices]
         first_pair = np.arange(layers + 1)[:, None] * (self.stride // 2)  # of each level

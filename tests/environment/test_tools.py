@@ -103,10 +103,10 @@ def test_complete_quadratic_prisms_of_gmsh_are_refused_with_its_own_option():
 def test_a_matrix_refuses_a_place_outside_of_its_pattern():
     pytest.importorskip("alphacut.rve.fenicsx")
     from alphacut.rve.fenicsx import MPI, PETSc
-    from alphacut.rve.solver.numbering import map_of, zero_matrix
+    from alphacut.rve.solver.numbering import Elimination
 
     pairs = np.array([[0, 1], [2, 3]])  # two cells without a common unknown
-    matrix = zero_matrix(pairs, map_of(np.arange(4), MPI.COMM_SELF), range(8), 8)
+    matrix = Elimination(np.arange(4), pairs, range(8), 8, MPI.COMM_SELF).matrix
     matrix.setValue(0, 3, 1.0)
     matrix.assemble()
     with pytest.raises(PETSc.Error):
