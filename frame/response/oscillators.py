@@ -39,7 +39,6 @@ from alphacut.frame.response.straying import (
 from alphacut.frame.structures.loads import History
 from alphacut.fuzzy.arrays import Array
 
-Ends = tuple[float, float]
 POWERS = (0.0, 0.5, 1.0)
 """Powers κ of λ."""
 RATIO = 1.5
@@ -98,19 +97,17 @@ class Oscillators:
         sigma, duration = grid.sigma.ravel(), float(time[-1])
         require_in_range(sigma, duration, duration)
         self.decay = float((grid.quotient[:, None] * grid.omega).min())
-        # ρ with two derivatives by σ, its rounding, and bounds of its derivatives of order 0 to 4
-        self._sources = {name: self._response(load) for name, load in loads.items()}
+        self._tables = dict[str, tuple[Array, Array, Array]]()
 
-    def _response(self, load: History | None) -> tuple[Array, Array, Array]:
-        bounds = moments_of(self.decay, load, self.time)
-        return *responses_of(self.grid.sigma.ravel(), load, self.time), bounds
-
-    def _known(self, source: str) -> tuple[Array, Array, Array]:
-        """The same of a source, of exp(σ t) where it is no load."""
-        name = source if source in self.loads else ""
-        if name not in self._sources:
-            self._sources[name] = self._response(None)
-        return self._sources[name]
+    def _table(self, source: str) -> tuple[Array, Array, Array]:
+        """ρ with two derivatives by σ, its rounding, bounds of its derivatives of order 0 to 4."""
+        load = self.loads.get(source)
+        name = source if load else ""  # exp(σ t) of velocities and starts
+        if name not in self._tables:
+            bounds = moments_of(self.decay, load, self.time)
+            rho, rounding = responses_of(self.grid.sigma.ravel(), load, self.time)
+            self._tables[name] = rho, rounding, bounds
+        return self._tables[name]
 
     def responses(self, source: str, order: int) -> ModalResponses:
         """Return responses to a unit share of a source, read by the derivative ν = `order`.
@@ -119,7 +116,7 @@ class Oscillators:
         """
         grid, is_start = self.grid, source == "start"
         sigma = grid.sigma.ravel()
-        rho, rounding, bounds = self._known(source)
+        rho, rounding, bounds = self._table(source)
         G = with_power(sigma, rho, order)
         omega, quotient = np.abs(sigma.imag), -sigma.real / sigma.imag
         # of the power and of what is read off
@@ -129,11 +126,9 @@ class Oscillators:
         value = direct + read_response(source, sigma, G[0])
         rounding = rounding * (1 + quotient) if is_start else rounding / omega
         rounding += 8 * UNIT_ROUNDOFF * np.abs(direct)
-        shape = (len(self.time), len(grid.quotient), len(grid.omega))
         error, largest = self._error(np.abs(G).max(-1), bounds, order, start=is_start)
         error, deviation = error + rounding.max(-1), self._line_deviation(source, order)
-        table = value.reshape(shape)
-        return ModalResponses(table, error, deviation, largest)
+        return ModalResponses(value.reshape(-1, *grid.sigma.shape), error, deviation, largest)
 
     def _error(
         self, largest: Array, bounds: Array, order: int, *, start: bool
@@ -164,7 +159,7 @@ class Oscillators:
             self._deviations[source] = line_deviations(
                 *(self.grid.sigma, self.loads.get(source), self.time, self.orders),
                 is_force=source.startswith("force"),
-                at_nodes=self._known(source),
+                at_nodes=self._table(source),
             )
         modulus, read = self._deviations[source][order]
         return modulus * (1 + self.grid.quotient[-1]) if source == "start" else read
@@ -217,59 +212,44 @@ def response_ranges(
         for order in orders
     }
     count = max(1, int(np.ceil(np.log(omega[1] / omega[0]) / np.log(RATIO))))
-    ratio = (omega[1] / omega[0] * (1 + 1e-9)) ** (1 / count)
+    ratio, step = (omega[1] / omega[0] * (1 + 1e-9)) ** (1 / count), np.diff(time, prepend=time[0])
     for n in range(count):
-        piece = omega[0] * ratio**n, omega[0] * ratio ** (n + 1)
-        _extend_ranges(found, (piece, quotient), loads, time, sources)
-    return found
-
-
-def _extend_ranges(
-    found: dict[int, Ranges],
-    ends: tuple[Ends, Ends],
-    loads: Mapping[str, History],
-    time: Array,
-    sources: Sequence[str],
-) -> None:
-    """Extend ranges, by order, to the oscillators of one piece of ω; `ends` bound ω and g/ω."""
-    omega, quotient = ends
-    decay, fastest = quotient[0] * omega[0], omega[1] * np.sqrt(1 + quotient[1] ** 2)
-    distance = STEP * (decay + 2 / max(float(time[-1]), 1e-300))
-    along = int(np.ceil((omega[1] - omega[0]) / distance)) + 1
-    across = int(np.ceil((quotient[1] - quotient[0]) * omega[1] / distance)) + 1
-    tables: Oscillators | None = None
-    if loads and along <= MAX_POINTS[0]:
-        points = max(along, 2), int(np.clip(across, 2, MAX_POINTS[1]))
-        tables = Oscillators(grid_over(omega, quotient, points), loads, time, found)
-    # of |ρ| of any oscillator
-    size = {name: absolute_moments(decay, x, time)[0] for name, x in loads.items()}
-    for s, source in enumerate(sources):
-        rho = size.get(source, np.exp(-decay * time))
-        before, step = np.append(rho[:1], rho[:-1]), np.diff(time, prepend=time[0])
-        in_step = before
-        if source in loads:
-            in_step = np.maximum(before + step * loads[source].extremes[0], rho)
-        for order, ranges in found.items():
-            factor = fastest**order * (1 + quotient[1] if source == "start" else 1 / omega[0])
-            direct = np.abs(feedthrough(source, loads, order, time))
-            size_at_nodes, size_in_step = factor * rho + direct, factor * in_step
-            if direct.any():
-                size_in_step = size_in_step + loads[source].extremes[0]
-            table = tables and source in loads and tables.responses(source, order)
-            for k, power in enumerate(POWERS):
-                scale = fastest ** (2 * power)
-                low, high = -scale * size_at_nodes, scale * size_at_nodes
-                deviation = 2 * scale * size_in_step
-                if tables and table:
-                    eigenvalue = np.abs(tables.grid.sigma) ** 2
-                    least, greatest = _bounds_over_cells(
-                        table.value, table.error, eigenvalue**power
-                    )
+        slowest, fastest = omega[0] * ratio**n, omega[0] * ratio ** (n + 1)
+        decay, largest = quotient[0] * slowest, fastest * np.sqrt(1 + quotient[1] ** 2)  # g, |σ|
+        distance = STEP * (decay + 2 / max(float(time[-1]), 1e-300))
+        along = int(np.ceil((fastest - slowest) / distance)) + 1
+        across = int(np.ceil((quotient[1] - quotient[0]) * fastest / distance)) + 1
+        tables: Oscillators | None = None
+        if loads and along <= MAX_POINTS[0]:
+            points = max(along, 2), int(np.clip(across, 2, MAX_POINTS[1]))
+            grid = grid_over((slowest, fastest), quotient, points)
+            tables = Oscillators(grid, loads, time, found)
+        # of |ρ| of any oscillator
+        size = {name: absolute_moments(decay, x, time)[0] for name, x in loads.items()}
+        scale = largest ** (2 * np.array(POWERS)[:, None])
+        for s, source in enumerate(sources):
+            rho = size.get(source, np.exp(-decay * time))
+            rho_in_step, force = np.append(rho[:1], rho[:-1]), 0.0
+            if source in loads:
+                force = loads[source].extremes[0]
+                rho_in_step = np.maximum(rho_in_step + step * force, rho)
+            for order, ranges in found.items():
+                factor = largest**order * (1 + quotient[1] if source == "start" else 1 / slowest)
+                direct = np.abs(feedthrough(source, loads, order, time))
+                high = scale * (factor * rho + direct)
+                low = -high
+                deviation = 2 * scale * (factor * rho_in_step + force * direct.any())
+                if tables and source in loads:
+                    table = tables.responses(source, order)
+                    powers = [np.abs(tables.grid.sigma) ** (2 * power) for power in POWERS]
+                    cells = [_bounds_over_cells(table.value, table.error, x) for x in powers]
+                    least, greatest = np.swapaxes(cells, 0, 1)
                     low, high = np.maximum(low, least), np.minimum(high, greatest)
                     deviation = np.minimum(deviation, scale * table.line_deviation)
-                ranges.low[k, s] = np.minimum(ranges.low[k, s], low)
-                ranges.high[k, s] = np.maximum(ranges.high[k, s], high)
-                ranges.line_deviation[k, s] = np.maximum(ranges.line_deviation[k, s], deviation)
+                np.minimum(ranges.low[:, s], low, out=ranges.low[:, s])
+                np.maximum(ranges.high[:, s], high, out=ranges.high[:, s])
+                np.maximum(ranges.line_deviation[:, s], deviation, out=ranges.line_deviation[:, s])
+    return found
 
 
 def _bounds_over_cells(value: Array, error: Array, factor: Array) -> tuple[Array, Array]:

@@ -12,7 +12,7 @@ substeps need to coincide with the times asked for.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import ceil, isqrt
+from math import ceil
 from typing import NamedTuple
 
 import numpy as np
@@ -183,27 +183,13 @@ def _degree(norm: float) -> int:
 
 def _recursion(step: Array, start: Array, forcing: Array) -> Array:
     """Return the states x_0 … of x_{k+1} = step x_k + forcing_k, x_0 = `start`, (count, 2n)."""
-    # In blocks of √count substeps: responses of all blocks from zero at once, then the state at the
-    # beginning of each block, whose free motion is added.
-    count, size = forcing.shape
-    length = isqrt(count - 1) + 1
-    blocks = -(-count // length)
-    filled = np.zeros((blocks * length, size))
-    filled[:count] = forcing
-    padded = np.reshape(filled, (blocks, length, size))
-    from_zero = np.zeros((length + 1, blocks, size))
-    for k in range(length):
-        from_zero[k + 1] = from_zero[k] @ step.T + padded[:, k]
-    block_step = np.linalg.matrix_power(step, length)
-    free: Array = np.zeros((blocks, size))  # at the beginnings of blocks
-    free[0] = start
-    for b in range(1, blocks):
-        free[b] = block_step @ free[b - 1] + from_zero[length, b - 1]
-    states = np.empty((blocks, length, size))
-    for k in range(length):
-        states[:, k] = free + from_zero[k]
-        free = free @ step.T
-    return states.reshape(-1, size)[:count]
+    # recursive doubling (Kogge, Stone 1973): with the states that a span of 2, 4, … substeps before
+    # each one adds, those of twice the span follow at once
+    states, span = np.vstack([start, forcing[:-1]]), 1
+    while span < len(states):
+        states[span:] += states[:-span] @ step.T
+        step, span = step @ step, 2 * span
+    return states
 
 
 def _taylor(flow: Array, degree: int, rows: Array, states: Array, times: Array) -> Array:

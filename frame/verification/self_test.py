@@ -10,8 +10,7 @@ must equal the attained bound.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -150,38 +149,25 @@ class _Tested(NamedTuple):
     rounding: Array
 
 
-@dataclass(frozen=True, eq=False)
 class Trial:
-    """Comparison of an envelope with exact motions."""
+    """Comparison of exact motions with an envelope that is guaranteed, or has proved outer bounds.
 
-    envelope: Envelope  # guaranteed, or with guaranteed bounds outside (`outer`)
-    lower: Array  # ends of its inputs on all levels, shape (A, n)
-    upper: Array
+    `lower` and `upper` are ends of its inputs on all levels, shape (A, n).
+    """
 
-    @cached_property
-    def times(self) -> Array:
-        """Nodes and the quarter points between them, shape (4 (T − 1) + 1,), in s."""
-        time = self.envelope.time
+    def __init__(self, envelope: Envelope, lower: Array, upper: Array) -> None:
+        self.envelope, self.lower, self.upper = envelope, lower, upper
+        time, shape = envelope.time, envelope.lower.shape[1:]
         inside = time[:-1, None] + np.diff(time)[:, None] * np.arange(QUARTERS) / QUARTERS
-        return np.append(inside.ravel(), time[-1])
-
-    @cached_property
-    def between(self) -> Array:
-        """What the envelope proves between nodes, (T, m); infinite where it proves nothing."""
-        bounds = self.envelope
-        return np.full(bounds.lower.shape[1:], np.inf) if bounds.between is None else bounds.between
-
-    @cached_property
-    def tolerance(self) -> Array:
-        """Distance of attained bounds from the motion that rounding explains, shape (m,)."""
-        envelope = self.envelope
-        return np.asarray(ROUND_OFF * np.maximum(-envelope.lower, envelope.upper).max((0, 1)))
-
-    @cached_property
-    def slack(self) -> Array:
-        """What the motion at named inputs may exceed attained bounds by, shape (T, m)."""
-        error = self.envelope.attained_error
-        return self.tolerance + (np.zeros_like(self.between) if error is None else error)
+        # nodes and the quarter points between them, (4 (T − 1) + 1,), in s
+        self.times = np.append(inside.ravel(), time[-1])
+        # what is proved between nodes, (T, m)
+        self.between = np.full(shape, np.inf) if envelope.between is None else envelope.between
+        # distance of attained bounds from the motion that rounding explains, (m,), and what the
+        # motion at named inputs may exceed them by, (T, m)
+        self.tolerance = ROUND_OFF * np.maximum(-envelope.lower, envelope.upper).max((0, 1))
+        error = envelope.attained_error
+        self.slack = self.tolerance + (np.zeros(shape) if error is None else error)
 
     def require_agreement(self, points: Array, motions: Sequence[LinearMotion]) -> None:
         """Refuse an envelope that exact motions at inputs (S, n) contradict.
