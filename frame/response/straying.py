@@ -44,6 +44,7 @@ class Pieces(NamedTuple):
     first: Array  # the load at the beginning of each, (P,)
     last: Array  # the load at the end of each
     bend: Array  # bound of how far it strays from the line between
+    off: Array  # how far the load at both ends is off the line from node to node, (2, P)
 
 
 class Response(NamedTuple):
@@ -70,7 +71,7 @@ class Response(NamedTuple):
         real = np.abs(kappa.real).max((1, 2)) + real
         if self.sigma is None:
             assert self.load is not None
-            return np.outer(self.load.line_deviation(time), real)
+            return np.outer(load_deviation(self.load, time), real)
         omega, order = self.sigma.imag, self.order
         modulus, of_imaginary = line_deviations(self.sigma, self.load, time, (order,))[order]
         size = np.hypot(real, np.abs(kappa.imag).max((1, 2)) + imag)
@@ -250,14 +251,12 @@ def line_deviations(
     """
     omega, fast, decay = sigma[0].imag, float(np.abs(sigma).max()), float(-sigma.real.max())
     low = float(omega.min())
-    pieces = _pieces(load, time, fast)
+    pieces = _pieces(load, time, max(fast, load.frequency if load else 0.0))
     times, d, node = pieces.time, np.diff(pieces.time), np.searchsorted(pieces.time, time)
     slope = (pieces.last - pieces.first) / d
     chords = Chords.through(node, times)
-    # how far the load lies off the line between nodes, before and after each end
-    off_line = np.stack([np.append(0.0, pieces.last), np.append(pieces.first, 0.0)])
-    off_line -= np.interp(times, time, load.values(time) if load else np.zeros(len(time)))
-    off_line[0, 0] = off_line[1, -1] = 0.0
+    # how far the load is off the line between nodes, before and after each end
+    off_line = np.stack([np.append(0.0, pieces.off[1]), np.append(pieces.off[0], 0.0)])
     tables = at_nodes if len(times) == len(time) else None
     bounds = tables[2] if tables else moments_of(decay, load, times)
     # for each order the largest over the grid: of A exp(σ τ)'s F = σ^order A and F″; rounding; of
@@ -312,6 +311,15 @@ def line_deviations(
     return found
 
 
+def load_deviation(load: History, time: Array) -> Array:
+    """Return how far a load strays from lines in the step to each node at most, shape (T,)."""
+    # pieces so short that their bend adds little to what their ends are off the line
+    pieces, bound = _pieces(load, time, 4 * load.frequency), np.zeros(len(time))
+    in_piece = np.abs(pieces.off).max(0) + pieces.bend
+    bound[1:] = np.maximum.reduceat(in_piece, np.searchsorted(pieces.time, time[:-1]))
+    return np.where(bound > 1e-12 * load.extremes[0], bound, 0.0)
+
+
 def _of_line(sigma: Array, first: Array, slope: Array) -> Array:
     """a/σ + b/σ² of P pieces, with its first two derivatives by σ, (3, P, S)."""
     inverse = [1 / sigma, 1 / sigma**2, 1 / sigma**3, 1 / sigma**4]
@@ -344,15 +352,14 @@ def with_power(sigma: Array, rho: Array, order: int) -> Array:
 def _pieces(load: History | None, time: Array, fastest: float) -> Pieces:
     """Pieces between nodes and a load's samples; shorter ones where it is multiplied by a sine."""
     if load is None:
-        return Pieces(time, *np.zeros((3, len(time) - 1)))
+        return Pieces(time, *np.zeros((3, len(time) - 1)), np.zeros((2, len(time) - 1)))
     samples = load.start + np.arange(len(load.samples)) * load.step
     samples = samples[(samples > time[0]) & (samples < time[-1])]
     later = np.searchsorted(time, samples)
     distance = np.minimum(samples - time[later - 1], time[later] - samples)
     times = np.union1d(time, samples[distance > 1e-9 * load.step])
     if load.frequency:
-        phase = np.diff(times) * max(fastest, load.frequency)
-        parts = np.clip(np.ceil(phase / PHASE), 1, MAX_PARTS).astype(int)
+        parts = np.clip(np.ceil(np.diff(times) * fastest / PHASE), 1, MAX_PARTS).astype(int)
         part = np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)
         begin, length = np.repeat(times[:-1], parts), np.repeat(np.diff(times) / parts, parts)
         times = np.append(begin + part * length, times[-1])
@@ -360,5 +367,7 @@ def _pieces(load: History | None, time: Array, fastest: float) -> Pieces:
     # |f″| ≤ Ω² |g| + 2 Ω |g′|
     largest, slope = np.maximum(np.abs(after), np.abs(before)), np.abs(before - after) / d
     bend = d**2 / 8 * load.frequency * (load.frequency * largest + 2 * slope)
-    sine = load.wave(times)
-    return Pieces(times, after * sine[:-1], before * sine[1:], bend)
+    bend = np.minimum(bend, 2 * largest)
+    sine, line = load.wave(times), np.interp(times, time, load.values(time))
+    first, last = after * sine[:-1], before * sine[1:]
+    return Pieces(times, first, last, bend, np.stack([first - line[:-1], last - line[1:]]))

@@ -115,28 +115,6 @@ class History:
         has_started, has_ended = after(position, 0), after(position, n - 1) & (not self.is_held)
         return np.asarray(np.where(has_started & ~has_ended, inside, 0.0))
 
-    def line_deviation(self, time: Array) -> Array:
-        """Upper bounds of the distance of f from a straight line in the step to each node, (T,)."""
-        # g deviates most at a sample, just before or after it. The product of its chord and the
-        # sine deviates by h²/8 times its second derivative at most, h the step.
-        h, g = np.diff(time, prepend=time[0]), self.envelope(time)
-        breaks = self.start + np.arange(len(self.samples)) * self.step
-        breaks = breaks[(breaks > time[0]) & (breaks <= time[-1] * (1 + 1e-12))]
-        # node at the end of the step in which each sample lies
-        node = np.minimum(np.searchsorted(time * (1 + 1e-12), breaks), len(time) - 1)
-        line = np.interp(breaks, time, g)
-        bound = np.zeros(len(time))
-        for side in (-1.0, 1.0):
-            distance = np.abs(self.envelope(breaks, side) - line)
-            # the value after a jump at a node belongs to the next step
-            is_node = np.abs(breaks - time[node]) < 1e-9 * self.step
-            np.maximum.at(bound, node, np.where(is_node & (side > 0), 0.0, distance))
-        if self.frequency:
-            size, rise = np.maximum(np.abs(g[1:]), np.abs(g[:-1])), np.abs(np.diff(g))
-            phase = self.frequency * h[1:]
-            bound[1:] += np.minimum(phase**2 / 8 * size + phase / 4 * rise, 2 * size)
-        return np.where(bound > 1e-12 * self.extremes[0], bound, 0.0)
-
 
 class Accelerogram(History):
     """Acceleration of the ground, samples in m/s², linear between them and zero outside them."""

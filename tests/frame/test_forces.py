@@ -26,6 +26,7 @@ from alphacut.frame.boxes import boxes
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.modal_model import ModalModel
 from alphacut.frame.response.load_tables import Direct
+from alphacut.frame.response.straying import load_deviation
 from alphacut.frame.structures.linear import evaluate
 from alphacut.frame.verification.self_test import (
     ContradictionError,
@@ -221,7 +222,7 @@ def test_no_history_strays_farther_from_its_chords_than_is_said(rng):
         inside = history.values(time[:-1] + fraction * np.diff(time))
         chord = values[:-1] + fraction * np.diff(values)
         off = np.abs(inside - chord).max(0)
-        assert (off <= history.line_deviation(time)[1:] + 1e-9 * history.extremes[0]).all()
+        assert (off <= load_deviation(history, time)[1:] + 1e-9 * history.extremes[0]).all()
 
 
 CHANGES = {"start": 0.05, "phase": 0.3, "frequency": 0.5, "samples": 0.01}
