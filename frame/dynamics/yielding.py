@@ -86,11 +86,6 @@ class YieldingFlow(Flow):
         """Return the flow with a quarter of the step, and 4."""
         return replace(self, step=self.step / 4), 4
 
-    def deviations(self, points: Array) -> tuple[Array, Array]:
-        """Return trajectories at points (S, d), and zeros of the same shape."""
-        values = self.values(points)
-        return values, np.zeros_like(values)
-
     def _march(self, points: Array, *, derivatives: bool) -> Jet:
         """Trajectories at points (S, d), shape (S, T, m); they have no derivatives."""
         if derivatives:
@@ -160,12 +155,11 @@ def load_parts(
     shape (E, L), between jumps.
     """
     step = time[1]
-    samples = [load.start + np.arange(len(load.samples)) * load.step for load in loads]
-    inner = np.unique(np.concatenate([np.zeros(0), *samples]))
-    inner = inner[(inner > 0) & (inner < time[-1])]
-    inner = inner[np.abs(inner - np.round(inner / step) * step) > SAME * step]
-    inner = inner[np.diff(inner, prepend=-1.0) > SAME * step]
-    segments = np.sort(np.concatenate([time, inner]))
+    times = [load.start + np.arange(len(load.samples)) * load.step for load in loads]
+    samples = np.unique(np.concatenate([np.zeros(0), *times]))
+    is_new = np.abs(samples - np.round(samples / step) * step) > SAME * step  # no node
+    is_new &= (samples < time[-1]) & (np.diff(samples, prepend=-1.0) > SAME * step)
+    segments = np.union1d(time, samples[is_new])
     counts = np.append(0, np.cumsum(np.ceil(np.diff(segments) / longest)))
     edges = np.interp(np.arange(counts[-1] + 1), counts, segments)
     first, last = np.zeros((2, len(edges) - 1, len(loads)))

@@ -20,11 +20,10 @@ exp(z) is 0 and the recurrence gives n! / (−z)ⁿ⁺¹; to the right the integ
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from math import ceil
 from threading import Lock
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -161,31 +160,39 @@ def responses_at_nodes(
     Raises:
         UnprovedError: A σ is out of the kernel's range.
     """
+    times = time if node is None else time[node]
+    if omega := history.frequency:
+        # f = g sin θ: ρ(σ) = [exp(iθ) ρ_g(σ − iΩ) − exp(−iθ) ρ_g(σ + iΩ)] / 2i
+        g = replace(history, frequency=0.0)
+        (minus, minus_rounding), (plus, plus_rounding) = (
+            responses_at_nodes(shifted, g, time, derivatives, node=node, window=window)
+            for shifted in (sigma - 1j * omega, sigma + 1j * omega)
+        )
+        t = times[:, None]
+        angle = omega * (t - history.start) + history.phase
+        phasor = np.exp(1j * angle)
+        size = np.abs(minus[0]) + np.abs(plus[0])
+        # rounding of an exponent changes ρ by |ρ′| ≤ t ∫ |g| exp(Re σ τ) dτ
+        slope = np.exp(np.maximum(sigma.real * t, 0.0)) * history.extremes[0] * t**2
+        rounding = (8 + np.abs(angle)) * size + (np.abs(sigma) + omega) * slope
+        error = (minus_rounding + plus_rounding) / 2 + UNIT_ROUNDOFF * rounding
+        return (phasor * minus - phasor.conj() * plus) / 2j, error
     length = window or len(time)
     longest = float(time[min(length, len(time) - 1)] - time[0]) if window else float(time[-1])
     if window and history.step > longest:  # exp(σ τ) grows from an interval's beginning on
-        history = _divided(history, ceil(history.step / longest))
-    times = time if node is None else time[node]
-
-    def response_to_g(shifted: Array) -> tuple[Array, Array]:
-        require_in_range(shifted, history.step, max(history.step, longest))
-        out = np.empty((1 + derivatives, len(times), sigma.shape[-1]), complex)
-        error, pieces = np.empty(out.shape[1:]), linear_pieces(history, time)
-        with PARALLEL_LOOP:
-            if node is None:
-                _respond_at_nodes(shifted, pieces, (0,) * derivatives, length, out, error)
-            else:
-                _respond_at_given(shifted, pieces, (0,) * derivatives, node, out, error)
-        return out, error
-
-    return _with_sine(response_to_g, sigma, history, times[:, None])
-
-
-def _divided(history: History, parts: int) -> History:
-    """The same load with `parts` intervals between its samples in place of one."""
-    whole = np.arange(len(history.samples)) * parts
-    samples = np.interp(np.arange(whole[-1] + 1), whole, history.samples)
-    return replace(history, step=history.step / parts, samples=samples)
+        parts, samples = ceil(history.step / longest), history.samples
+        places = np.arange((len(samples) - 1) * parts + 1) / parts
+        divided = np.interp(places, np.arange(len(samples)), samples)
+        history = replace(history, step=history.step / parts, samples=divided)
+    require_in_range(sigma, history.step, max(history.step, longest))
+    out = np.empty((1 + derivatives, len(times), sigma.shape[-1]), complex)
+    error, pieces = np.empty(out.shape[1:]), linear_pieces(history, time)
+    with PARALLEL_LOOP:
+        if node is None:
+            _respond_at_nodes(sigma, pieces, (0,) * derivatives, length, out, error)
+        else:
+            _respond_at_given(sigma, pieces, (0,) * derivatives, node, out, error)
+    return out, error
 
 
 def require_in_range(sigma: Array, step: float, duration: float) -> None:
@@ -201,30 +208,6 @@ def require_in_range(sigma: Array, step: float, duration: float) -> None:
             f" within {duration:g} s; allowed: {MAX_PHASE:g} rad, exp({MAX_GROWTH:g})",
             "take a shorter step of the record, or less stiff members",
         )
-
-
-def _with_sine(
-    response_to_g: Callable[[np.ndarray[Any, Any]], tuple[Array, Array]],
-    sigma: Array,
-    history: History,
-    time: Array,
-) -> tuple[Array, Array]:
-    """Return responses to f = g sin θ(t), and their rounding, from those to g at σ ± iΩ."""
-    frequency = history.frequency
-    if not frequency:
-        return response_to_g(sigma)
-    # ρ(σ) = [exp(iθ) ρ_g(σ − iΩ) − exp(−iθ) ρ_g(σ + iΩ)] / 2i
-    angle = frequency * (time - history.start) + history.phase
-    minus, minus_rounding = response_to_g(sigma - 1j * frequency)
-    plus, plus_rounding = response_to_g(sigma + 1j * frequency)
-    phasor = np.exp(1j * angle)
-    response = (phasor * minus - phasor.conj() * plus) / 2j
-    size = np.abs(minus[0]) + np.abs(plus[0])
-    # rounding of an exponent changes ρ by |ρ′| ≤ t ∫ |g| exp(Re σ τ) dτ
-    derivative_bound = np.exp(np.maximum(sigma.real * time, 0.0)) * history.extremes[0] * time**2
-    exponent_rounding = (np.abs(sigma) + frequency) * derivative_bound
-    rounding = UNIT_ROUNDOFF * ((8 + np.abs(angle)) * size + exponent_rounding)
-    return response, (minus_rounding + plus_rounding) / 2 + rounding
 
 
 @parallel

@@ -50,7 +50,9 @@ class LoadTable:
         phase = max(spread * length * h, MIN_PHASE)
         order = ceil(2.72 * phase + 18)
         self.middle, self.scale, self.time = middle, 1 / (length * h), time
-        self.ends, self.truncation = np.arange(length, steps, length), 2 * left_out(phase, order)
+        self.ends = np.arange(length, steps, length)
+        # |exp(z) − its series of n terms| ≤ |z|ⁿ/n! exp(2 |z|) for z = x τ, |z| up to `phase`
+        self.truncation = 2 * exp(order * log(phase) - lgamma(order + 1) + 2 * phase)
         # Taylor coefficients, (T, order), by Cauchy's integral over a circle of radius `phase` in x
         rate = middle + phase * self.scale * np.exp(2j * np.pi / order * np.arange(order))
         (values,), _ = responses_at_nodes(rate, history, time, window=length)
@@ -115,11 +117,6 @@ class Direct(LoadTables):
         R: Array = np.zeros(rate.shape, complex)
         R[:, 0] = self.history.values(self.time[node])
         return R, 0 * R, 0 * R
-
-
-def left_out(phase: float, order: int) -> float:
-    """Bound of |exp(x τ) − its series of `order` terms| for |x| τ up to `phase`."""
-    return exp(order * log(max(phase, 1e-300)) - lgamma(order + 1) + 2 * phase)
 
 
 @compiled

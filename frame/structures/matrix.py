@@ -93,17 +93,11 @@ class MatrixStructure:
             object.__setattr__(self, kind, tuple(terms))
         self._require_vectors()
         self._require_definite()
-        factors = {f"observed: {name}": factor for name, factor in self.row_factors.items()}
-        for name in self.row_factors:
+        for name, factor in self.row_factors.items():
             require_choice("row_factors", name, self.observed)
-        simplest = {
-            name: factor.simplest if isinstance(factor, Monomial) else factor
-            for name, factor in self.row_factors.items()
-        }
-        object.__setattr__(self, "row_factors", simplest)
-        for name, factor in [*factors.items(), *(("a force", x.amplitude) for x in self.loads)]:
-            self._require_factor(name, factor)
+            self._require_factor(f"observed: {name}", factor)
         for force in self.loads:
+            self._require_factor("a force", force.amplitude)
             missing = self.massless[np.flatnonzero(np.asarray(force.at)[self.massless])]
             what, allowed = f"on unknowns {missing}", "on unknowns that have mass"
             require(not len(missing), "force", value=what, allowed=allowed)
