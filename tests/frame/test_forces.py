@@ -15,7 +15,6 @@ from alphacut.frame import (
     Force,
     History,
     LinearFlow,
-    MatrixStructure,
     Midpoint,
     Proof,
     StoreyFrame,
@@ -262,27 +261,6 @@ def test_a_wrong_share_at_once_is_proved_to_be_no_better():
     missed = np.abs(bad.values(unit) - flow.values(cuts.to_physical(unit))).max(0)
     assert missed.max() > 1e-3
     assert (missed <= proved_error(bad) + 1e-12).all()
-
-
-def test_a_chain_from_matrices_moves_as_the_frame_does():
-    plain = replace(FRAME, ground=None, outputs=("q3", "drift2", "v1"), loads=ALL)
-    m, rows = evaluate(plain, (), np.zeros((1, 0)), derivatives=False)
-    loads = [
-        Force(np.eye(3)[x.at - 1], "F" if k == 0 else x.amplitude, x.history)
-        for k, x in enumerate(ALL)
-    ]
-    same = MatrixStructure(
-        {"F": 5e3},
-        [(1.0, m.mass.value[0])],
-        [(1.0, m.stiffness.value[0])],
-        dict(zip(plain.outputs, rows.value[0], strict=True)),
-        ratios=[0.03],
-        loads=loads,
-    )
-    given, points = (1.5, 0.02, Exact()), np.array([[4.7e3], [5.3e3]])
-    of_frame = LinearFlow(plain, ("F3",), *given).values(points)
-    of_matrices = LinearFlow(same, ("F",), *given).values(points)
-    np.testing.assert_allclose(of_frame, of_matrices, atol=1e-9 * np.abs(of_frame).max())
 
 
 @pytest.mark.parametrize(

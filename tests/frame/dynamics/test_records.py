@@ -1,18 +1,18 @@
 """Motions under records of every kind against the exact motion, which shares no code with them."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from alphacut.frame import Accelerogram, Exact, Force, History, LinearFlow, Midpoint, StoreyFrame
+from alphacut.frame import Accelerogram, Exact, Force, History, LinearFlow, StoreyFrame
 from alphacut.frame.boxes import boxes
 from alphacut.frame.dynamics.flow import trajectory
 from alphacut.frame.modes.modal_model import ModalModel
 from alphacut.frame.structures.linear import evaluate
-from alphacut.frame.verification.exact_motion import LinearMotion
+from alphacut.frame.verification.self_test import structures_at
 from alphacut.fuzzy import Interval
-from tests.frame.verification.test_exact_motion import UNFORCED
 
 STEPS = [0.01, 0.017, 1 / 128, 1 / 256, 0.05, 0.3, np.pi / 50, 0.1 / 3]
 NODES = [0.1, 0.05, 0.02, 0.013]
@@ -54,11 +54,7 @@ def random_structure(rng: np.random.Generator) -> StoreyFrame:
 
 def motion(frame: StoreyFrame, time: np.ndarray) -> np.ndarray:
     """Outputs at times by the exact motion that judges proofs."""
-    m, rows = evaluate(frame, (), np.zeros((1, 0)), derivatives=False)
-    arrays = [x.value[0] for x in (m.mass, m.damping, m.stiffness, rows)]
-    start = np.concatenate([m.q0.value[0, :, 0], m.v0.value[0, :, 0]])
-    ground, floors = frame.ground, np.ones(len(frame.masses))
-    exact = LinearMotion(*arrays, start, floors, ground.samples, ground.step, *UNFORCED)
+    (exact,) = structures_at(frame, SimpleNamespace(inputs={}), np.zeros((1, 0)))
     return exact.outputs(time)[0]
 
 
@@ -126,25 +122,6 @@ def test_tables_of_the_modes_are_exact_under_any_record() -> None:
         for values in (model.values(np.ones((1, 1)))[0], model.at(*everywhere)[0]):
             wrong = np.abs(values.reshape(truth.shape) - truth).max(0)
             assert (wrong < 1e-10 * np.abs(truth).max(0)).all()
-
-
-def test_approximate_steps_keep_the_impulse_of_a_record_finer_than_they_are() -> None:
-    """A quarter of the step, a sixteenth of the error, though the record is cut within a step."""
-    frame = StoreyFrame(
-        (2e3, 1e3),
-        (2.5, 2.5),
-        25e9,
-        1e-6,
-        (90, 90),
-        "ground",
-        ground=Accelerogram(0.003, np.cos(6 * np.arange(900) * 0.003)),
-    )
-    point = np.array([[frame.modulus]])
-    errors = []
-    for step in (0.08, 0.04, 0.02):
-        flow = LinearFlow(frame, ("E",), 4, step, Midpoint())
-        errors.append(np.abs(flow.values(point)[0] - motion(frame, flow.time)).max())
-    assert errors[0] / errors[2] > 12
 
 
 @pytest.mark.parametrize("turn", [1.99, 7.9, 31.0])

@@ -8,26 +8,37 @@ from scipy.sparse import coo_array
 
 from alphacut.frame import Accelerogram, Exact, LinearFlow, MatrixStructure, StoreyFrame, envelope
 from alphacut.frame.structures.linear import frequencies
+from alphacut.frame.structures.loads import Force, History
 from alphacut.frame.structures.matrix import Monomial
 from alphacut.fuzzy import Interval
 
 MOTION = {"dampers": (0.1, 0.2), "damper_placement": "storey", "q0": (0.1, 0.0), "v0": (0.0, 0.4)}
-STOREY = StoreyFrame((3.0, 2.0), (1.0, 1.2), 5.0, 1.0, **MOTION, outputs=("q2", "v1"))
+HISTORIES = (History(0.3, [1.0, 1.6, 0.4], is_static=True), History.harmonic(1.3, 0.4, 0.35), None)
+STOREY = StoreyFrame(
+    (3.0, 2.0), (1.0, 1.2), 5.0, 1.0, **MOTION, outputs=("q2", "v1"),
+    loads=[Force(2, 0.7, HISTORIES[0]), Force(1, 0.6, HISTORIES[1]), Force(2, 0.2, HISTORIES[2])],
+)  # fmt: skip
 TOP = 1.2**-3 * np.array([[1.0, -1.0], [-1.0, 1.0]])
 MATRIX = MatrixStructure(
-    {"E": 5.0, "m1": 3.0},
+    {"E": 5.0, "m1": 3.0, "F2": 0.7},
     mass=[("m1", np.diag([1.0, 0.0])), (2.0, np.diag([0.0, 1.0]))],
     stiffness=[(lambda p: 24 * p["E"], coo_array(np.diag([1.0, 0.0]) + TOP))],
     observed={"q2": np.array([0.0, 1.0]), "v1": np.array([0.0, 0.0, 1.0, 0.0])},
     damping=[(1.0, np.array([[0.3, -0.2], [-0.2, 0.2]]))],
     q0=np.array([0.1, 0.0]),
     v0=np.array([0.0, 0.4]),
+    loads=[
+        Force(np.array(row), amplitude, history)
+        for row, amplitude, history in zip(
+            ([0, 1.0], [1.0, 0], [0, 0.1]), ("F2", 0.6, 2.0), HISTORIES, strict=True
+        )
+    ],
 )
 
 
 def test_matrices_and_storeys_give_the_same_trajectories_with_derivatives():
-    point = np.array([[5.2, 2.9]])
-    flows = [LinearFlow(system, ("E", "m1"), 4, 0.1, Exact()) for system in (MATRIX, STOREY)]
+    names, point = ("E", "m1", "F2"), np.array([[5.2, 2.9, 0.8]])
+    flows = [LinearFlow(system, names, 4, 0.1, Exact()) for system in (MATRIX, STOREY)]
     a, b = (flow.taylor(point) for flow in flows)
     for x, y in ((a.value, b.value), (a.first, b.first), (a.second, b.second)):
         assert np.abs(x - y).max() < 1e-11 * np.abs(y).max()
