@@ -109,35 +109,55 @@ class Box:
             )
         return values_and_errors[0], values_and_errors[1]
 
-    def centre_motion(self, outputs: Ints | None = None) -> tuple[Array, Array, Array]:
-        """Exact outputs in the middle of the box, their rounding and their straying, (T, m) each.
+    @cached_property
+    def centre_modes(self) -> Modal:
+        """Modes in the middle of the box."""
+        return self._modal(np.zeros((1, len(self.active))))
 
-        The last two are bounds; straying is that from a straight line in the step to each node.
+    def centre_motion(self, outputs: Ints | slice = slice(None)) -> tuple[Array, Array]:
+        """Exact outputs in the middle of the box and bounds of their rounding, (T, m) each.
+
         Outputs are those of some numbers (m,), all unless given.
         """
-        outputs = np.arange(len(self.structure.order)) if outputs is None else outputs
-        modal, count = self._modal(np.zeros((1, len(self.active)))), len(self.time)
-        sigma, point = modal.sigma[0], np.zeros(count, int)
+        sigma, point = self.centre_modes.sigma[0], np.zeros(len(self.time), int)
         loads = {name: load_at_nodes(sigma, x, self.time) for name, x in self.loads.items()}
         columns = [
-            outputs_at(modal, point, np.full(count, output), self.time, loads) for output in outputs
+            outputs_at(self.centre_modes, point, np.full_like(point, output), self.time, loads)
+            for output in np.arange(len(self.structure.order))[outputs]
         ]
         value, error = (np.stack(column, -1) for column in zip(*columns, strict=True))
-        return value, error, self._line_deviation(modal, outputs)
+        return value, error
 
-    def peak_over_time(self, unit: Array, outputs: Ints | None = None) -> Array:
-        """Upper bound of outputs' magnitudes, (m,), at one point (d,), between nodes too."""
-        point, steps = self.inputs(unit), SUBSTEPS * (len(self.time) - 1)
-        time = np.linspace(self.time[0], self.time[-1], steps + 1)
-        motion = replace(self, time=time, low=point, high=point)
-        value, error, deviation = motion.centre_motion(outputs)
-        return within_steps((np.abs(value) + error).T, deviation.T).max(1)
+    def peak_over_time(
+        self, unit: Array, between: Array, outputs: Ints | slice = slice(None)
+    ) -> Array:
+        """Upper bound of outputs' magnitudes, (m,), at one point (d,), between nodes too.
 
-    def _modal(self, unit: Array) -> Modal:
-        return modes_at(self.system, self.structure, self.names, self.inputs(unit), unit)
+        `between` (T, m) bounds how far these outputs stray from straight lines in each step.
+        """
+        point = self.inputs(unit)
+        motion = replace(self, low=point, high=point)
+        size = motion._centre_size(outputs)
+        peak = size.max(1)
+        # steps that may hold more than the nodes are divided
+        steps = np.flatnonzero((within_steps(size, between.T) > peak[:, None]).any(0)) - 1
+        if len(steps):
+            place = np.unique(SUBSTEPS * steps[:, None] + np.arange(SUBSTEPS + 1))
+            time = np.interp(place / SUBSTEPS, np.arange(len(self.time)), self.time)
+            finer = replace(motion, time=time)
+            bound = within_steps(finer._centre_size(outputs), finer.centre_straying(outputs).T)
+            is_divided = np.diff(place, prepend=-1) == 1  # no gap between divided steps
+            peak = np.maximum(peak, bound[:, is_divided].max(1))
+        return peak
 
-    def _line_deviation(self, modal: Modal, outputs: Ints) -> Array:
-        """Bound of how far a motion strays from straight lines in the step to a node, (T, m)."""
+    def _centre_size(self, outputs: Ints | slice) -> Array:
+        """Upper bounds of outputs' magnitudes in the middle at nodes, (m, T)."""
+        value, error = self.centre_motion(outputs)
+        return (np.abs(value) + error).T
+
+    def centre_straying(self, outputs: Ints | slice = slice(None)) -> Array:
+        """Bound of how far that motion strays from straight lines in the step to a node, (T, m)."""
+        modal, outputs = self.centre_modes, np.arange(len(self.structure.order))[outputs]
         orders = [int(order) for order in self.structure.order[outputs]]
         deviation = np.zeros((len(self.time), len(outputs)))
         read = np.abs(modal.output_coefficients(np.zeros_like(outputs), outputs)[0])
@@ -149,6 +169,9 @@ class Box:
                 for o, order in enumerate(orders):
                     deviation[:, o] += read[o, k] * abs(share[0, k]) * waves[order].line_deviation
         return deviation
+
+    def _modal(self, unit: Array) -> Modal:
+        return modes_at(self.system, self.structure, self.names, self.inputs(unit), unit)
 
 
 def over_box(system: LinearSystem, names: Sequence[str], low: Array, high: Array) -> Classical:

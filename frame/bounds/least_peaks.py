@@ -17,9 +17,10 @@ from typing import NamedTuple
 import numpy as np
 
 from alphacut.frame import numbers
-from alphacut.frame.bounds.dual_function import minimise
+from alphacut.frame.bounds.dual_function import Data, minimise
 from alphacut.frame.bounds.level import LevelModels, OutputBounds
 from alphacut.fuzzy.arrays import Array, Ints
+from alphacut.fuzzy.kernels import compiled
 
 
 class PeakCell(NamedTuple):
@@ -38,16 +39,23 @@ def least_peak(level: LevelModels, output: int) -> tuple[float, Array]:
     Returned with it, 0 or more, are unit coordinates (d,) that the bound of the lowest cell names.
     """
     sides = [OutputBounds.initial(level, output, s, 0.0) for s in (0, 1)]
-    data = sides[0].data
-    motion = np.einsum("ks,kstp->ktp", data.share, data.table)  # of each mode at its points
-    motion = motion.reshape(*motion.shape[:2], -1, int(data.points[0]))  # along q, along ω
-    multipliers = dict[int, Array]()  # multipliers by node, at which bounds of further cells begin
-    cells = [_bounded_cell(sides, motion, data.ends.astype(np.intp), 0, 0.0, multipliers)]
+    both, data = (sides[0].data, sides[1].data), sides[0].data
+    constants = np.stack([bounds.constant.sum(0) for bounds in sides])
+    multipliers = np.zeros((constants.shape[1], len(data.linear)))  # of a node, for further cells
+    tuned = numbers.LEAST_PEAK_NODES, numbers.LEAST_PEAK_STEPS, numbers.LEAST_PEAK_PATIENCE
+    effort = tuple(map(int, tuned))
+
+    def bounded_cell(ends: Ints, number: int, outer_bound: float) -> PeakCell:
+        at = np.zeros(data.linear.shape[1])
+        bound, node = _bound_cell(ends, both, constants, effort, multipliers, at)
+        return PeakCell(max(bound, outer_bound), number, ends, node, at)
+
+    cells = [bounded_cell(data.ends.astype(np.int64), 0, 0.0)]
     for number in range(1, 2 * int(numbers.LEAST_PEAK_BISECTIONS), 2):
         lowest = cells[0]
         halves = [
-            _bounded_cell(sides, motion, ends, number + k, lowest.bound, multipliers)
-            for k, ends in enumerate(_halves(lowest, motion))
+            bounded_cell(ends, number + k, lowest.bound)
+            for k, ends in enumerate(_halves(lowest, data))
         ]
         if not halves:
             break
@@ -56,52 +64,60 @@ def least_peak(level: LevelModels, output: int) -> tuple[float, Array]:
     return cells[0].bound, cells[0].at
 
 
-def _bounded_cell(
-    sides: list[OutputBounds],
-    motion: Array,
+@compiled
+def _bound_cell(
     ends: Ints,
-    number: int,
-    outer_bound: float,
-    multipliers: dict[int, Array],
-) -> PeakCell:
-    """Cell with the largest dual bound of nodes where its middle's motion peaks.
+    sides: tuple[Data, Data],
+    constants: Array,
+    effort: tuple[int, int, int],
+    multipliers: Array,
+    at: Array,
+) -> tuple[float, int]:
+    """Largest dual bound over a cell at nodes where its middle's motion peaks, and its node.
 
-    It is the bound of a cell around it at least; `multipliers` (Z,) by node are improved.
+    `sides` are of −output and of the output, as `constants` (2, T) that are added to bounds;
+    `effort` are nodes to try, steps and patience. Multipliers (T, Z) are improved, `at` (d,) is
+    written.
     """
-    omega, q = ends[:, :2].sum(1) // 2, ends[:, 2:].sum(1) // 2  # points in the middle
-    expected: Array = motion[np.arange(len(motion)), :, q, omega].sum(0)
-    size = np.abs(expected)
-    is_peak = np.append(True, size[1:] >= size[:-1]) & np.append(size[:-1] >= size[1:], True)
-    peaks = np.flatnonzero(is_peak)
-    nodes = peaks[np.argsort(size[peaks])[-int(numbers.LEAST_PEAK_NODES) :][::-1]]
-    highest, highest_node, at = -np.inf, int(nodes[0]), np.zeros(sides[0].at.shape[1])
-    for node in map(int, nodes):
-        if size[node] <= highest:
+    (tries, steps, patience), data = effort, sides[0]
+    motion = np.zeros(data.table.shape[2])
+    for k in range(len(ends)):  # at the middle of the mode's cell
+        row = (ends[k, 2] + ends[k, 3]) // 2 * int(data.points[0])
+        for s in range(data.share.shape[1]):
+            waves = data.table[k, s, :, row + (ends[k, 0] + ends[k, 1]) // 2]
+            motion += data.share[k, s] * waves
+    size, untried = np.abs(motion), np.abs(motion)  # −1 where it is no peak or tried
+    for t in range(len(size)):
+        if size[t] < max(size[max(t - 1, 0)], size[min(t + 1, len(size) - 1)]):
+            untried[t] = -1.0
+    highest, highest_node = -np.inf, 0
+    u, disagreement = np.zeros(len(at)), np.empty(multipliers.shape[1])
+    for _ in range(tries):
+        node = int(untried.argmax())
+        if untried[node] <= max(highest, -1.0):
             break
-        bounds = sides[int(expected[node] < 0)]  # where the output is positive, of −output
-        mu = multipliers.setdefault(node, np.zeros(len(bounds.data.linear)))
-        weight = np.zeros_like(mu)
-        u, steps = np.zeros_like(at), int(numbers.LEAST_PEAK_STEPS)
+        untried[node], s = -1.0, int(motion[node] < 0)  # where it is positive, of −output
+        mu, side = multipliers[node], 2.0 * s - 1.0
         dual = minimise(
-            *(mu, ends, node, bounds.side, bounds.data, steps, int(numbers.LEAST_PEAK_PATIENCE)),
-            *(-1e300, -size[node], weight, u),
+            mu, ends, node, side, sides[s], steps, patience, -1e300, -size[node], disagreement, u
         )
-        least = -(dual + float(bounds.constant[:, node].sum()))
+        least = -(dual + constants[s, node])
         if least > highest:
-            highest, highest_node, at = least, node, u
-    return PeakCell(max(highest, outer_bound), number, ends, highest_node, at)
+            highest, highest_node = least, node
+            at[:] = u
+    return highest, highest_node
 
 
-def _halves(cell: PeakCell, motion: Array) -> list[Ints]:
+def _halves(cell: PeakCell, data: Data) -> list[Ints]:
     """Ends of both halves of a cell along the ω or q over which a mode varies most at its node.
 
-    They share the middle point; none where no range has a point between its ends. `motion` holds
-    each mode's response over its table, shape (K, T, Q, W).
+    They share the middle point; none where no range has a point between its ends.
     """
-    largest, chosen = -1.0, (0, 0)
+    largest, chosen, count = -1.0, (0, 0), int(data.points[0])
     for k in range(len(cell.ends)):
         first, last, low, high = map(int, cell.ends[k])
-        response = motion[k, cell.node, low : high + 1, first : last + 1]
+        table = data.table[k, :, cell.node].reshape(len(data.share[k]), -1, count)  # along q, ω
+        response = np.tensordot(data.share[k], table[:, low : high + 1, first : last + 1], 1)
         for axis, length in ((0, last - first), (2, high - low)):
             variation = float(np.ptp(response, axis=1 - axis // 2).max())
             if length > 1 and variation > largest:

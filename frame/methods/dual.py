@@ -146,16 +146,10 @@ class DualProof:
             index = int(np.searchsorted(outputs, o)), int(s)
             problems[o, s] = OutputBounds.initial(level, *index, gap[o], goal.incumbent[k, o, s])
             problems[o, s].out[0] = outer[nodes, o, s]
-        has_bounds = self.bounds_peaks_alone and is_complete and bool(np.isfinite(wider).all())
-        if has_bounds:  # the first pass is then of nodes whose bounds lie above the centre's peak
-            centre = flow.values(box.inputs(np.zeros((1, len(box.active)))))[0]
-            for (o, s), problem in problems.items():
-                problem.out[1] = centre[nodes, o] * (-1.0, 1.0)[s]
         with ThreadPoolExecutor(goal.workers) as pool:
             # 1. find multipliers with low bounds, and inputs with high values of the models
-            slack, levels = float(has_bounds), len(goal.needed)
-            tick = subprogress(goal.tick, k / levels, (k + 1) / levels)
-            self._minimise(problems, goal, box, pool, needed[nodes], is_complete, slack, tick)
+            tick = subprogress(goal.tick, k / len(goal.needed), (k + 1) / len(goal.needed))
+            self._minimise(problems, goal, flow, box, pool, needed[nodes], is_complete, tick)
             unit = np.zeros((*needed.shape, len(box.active)))
             for (o, s), problem in problems.items():
                 outer[nodes, o, s], unit[nodes, o, s] = problem.out[0], problem.at
@@ -182,12 +176,15 @@ class DualProof:
                 remaining[:, o, s] = box.inputs(np.stack([low, high]))
                 pruned[nodes[above[o, s]], o, s] = over_pruned
             # 4. bound from below how low a peak can be
-            least = self._least_peaks(flow, box, level, pool) if is_complete else None
+            between, least = np.zeros(needed.shape[:2]), None
+            if is_complete:
+                between = level.line_deviation()
+                least = self._least_peaks(flow, box, level, between, pool)
         return BoxBounds(
             outer=outer,
             inner=inner,
             at=box.inputs(unit),
-            between=level.line_deviation() if is_complete else np.zeros(needed.shape[:2]),
+            between=between,
             shares=shares,
             attained_error=attained_error,
             remaining=remaining,
@@ -199,7 +196,7 @@ class DualProof:
     def _reached(self, box: Box, unit: Array, node: Ints, output: Ints) -> tuple[Array, Array]:
         """Exact values and their rounding at points (S, d), most of which may be the centre."""
         is_moved = unit.any(1)
-        found = np.stack([x[node, output] for x in box.centre_motion()[:2]])
+        found = np.stack([x[node, output] for x in box.centre_motion()])
         if is_moved.any():
             found[:, is_moved] = box.reached(unit[is_moved], node[is_moved], output[is_moved])
         return found[0], found[1]
@@ -208,14 +205,14 @@ class DualProof:
         self,
         problems: Problems,
         goal: Goal,
+        flow: LinearFlow,
         box: Box,
         pool: ThreadPoolExecutor,
         needed: Mask,
         is_complete: bool,
-        first_slack: float,
         progress: Progress,
     ) -> None:
-        """Minimise the dual functions of bounds `needed` (J, m, 2); `first_slack` is as `below`."""
+        """Minimise the dual functions of bounds `needed` (J, m, 2), each passed over thrice."""
         first = next(iter(problems.values()))
         first.improve(np.arange(0), first.effort(1, 1))  # compiles before there are threads
         if not is_complete:
@@ -226,13 +223,24 @@ class DualProof:
             ]
             alone = self.bounds_peaks_alone
             return improve_all(jobs, pool, lambda done: None, peaks_alone=alone)
+        if self.bounds_peaks_alone:
+            # no bound at a node matters that lies below the peak in the middle of the box
+            motion = flow.values(box.inputs(np.zeros((1, len(box.active)))))[0]
+            jobs = [
+                (x, np.flatnonzero(np.isinf(x.out[0])), x.effort(1, 1)._replace(ascents=0))
+                for x in problems.values()
+            ]
+            improve_all(jobs, pool, lambda done: None)
+            for (o, _), problem in problems.items():
+                problem.out[1], problem.at[:] = motion[:, o] * problem.side, 0.0
         # a first pass shows the peaks, a second halves cells where gaps are wide, a third does so
         # further where bounds lie above a peak
         cells_at_peaks = int(numbers.CELLS_ABOVE_PEAK * self.slabs)
+        first_cells = int(numbers.FIRST_CELLS) if self.bounds_peaks_alone else self.slabs
         for number, (cells, steps, slack, multiple) in enumerate(
             (
-                (1, 1, first_slack, 0.0),
-                (self.slabs, self.steps, self.below, numbers.REMAINDER_MULTIPLE),
+                (1, 1, float(self.bounds_peaks_alone), 0.0),
+                (first_cells, self.steps, self.below, numbers.REMAINDER_MULTIPLE),
                 (cells_at_peaks, self.steps, 1.0, numbers.REMAINDER_MULTIPLE_AT_PEAKS),
             )
         ):
@@ -256,7 +264,12 @@ class DualProof:
                 raise UnprovedError(what, "take narrower inputs", int(shares.argmax()))
 
     def _least_peaks(
-        self, flow: LinearFlow, box: Box, level: LevelModels, pool: ThreadPoolExecutor
+        self,
+        flow: LinearFlow,
+        box: Box,
+        level: LevelModels,
+        between: Array,
+        pool: ThreadPoolExecutor,
     ) -> Ends:
         """Lower bound of each output's smallest peak, and the peak of a motion that peaks low."""
         count = len(level.structure.order)
@@ -267,20 +280,22 @@ class DualProof:
         for _ in range(int(numbers.LEAST_PEAK_DESCENTS)):
             tried = np.unique((unit[:, None] * moves).reshape(-1, d), axis=0)
             unit = tried[np.abs(flow.values(box.inputs(tried))).max(1).argmin(0)]
-        reached = np.array([box.peak_over_time(unit[o], np.array([o]))[0] for o in range(count)])
-        return Ends(np.array(bounds), reached)
+        reached = [
+            box.peak_over_time(unit[o], between[:, [o]], np.array([o]))[0] for o in range(count)
+        ]
+        return Ends(np.array(bounds), np.array(reached))
 
 
 def _exact(box: Box) -> BoxBounds:
     """Bounds where no input has a width: the exact motion with its rounding."""
-    value, error, deviation = box.centre_motion()
-    sides, margin = np.stack([-value, value], -1), error[..., None]
+    value, error = box.centre_motion()
+    sides, margin, between = np.stack([-value, value], -1), error[..., None], box.centre_straying()
     return BoxBounds(
         outer=sides + margin,
         inner=sides - margin,
         at=np.broadcast_to(box.low, (*sides.shape, len(box.low))).copy(),
-        between=deviation,
+        between=between,
         shares=np.zeros((*sides.shape[1:], len(box.low))),
         attained_error=2 * error,
-        least_peaks=Ends((np.abs(value) - error).max(0), box.peak_over_time(np.zeros(0))),
+        least_peaks=Ends((np.abs(value) - error).max(0), box.peak_over_time(np.zeros(0), between)),
     )

@@ -91,7 +91,7 @@ def test_motions_are_off_by_their_rounding_at_most(stiff, ground, start):
     motion = box.centre_motion()
     values, errors = (
         np.append(x, of_all[node[:4], output[:4]])
-        for x, of_all in zip((value, error), motion[:2], strict=True)
+        for x, of_all in zip((value, error), motion, strict=True)
     )
     points = np.vstack([box.inputs(unit), np.tile(box.centre, (4, 1))])
     shares = []
@@ -120,7 +120,7 @@ def test_equal_frequencies_do_not_lift_the_rounding():
     """Two alike masses on two alike springs: the modes of the pair are any two of a plane."""
     centre, time = np.array([3.0, 3.0, 7.0]), np.arange(0, 9.01, 0.5)
     box = Box(masses_on_springs(centre), ("a", "b", "c"), time, 0.9 * centre, 1.1 * centre)
-    value, error, _ = box.centre_motion()
+    value, error = box.centre_motion()
     exact = np.sum(np.sin(np.sqrt(centre) * time[:, None]) / np.sqrt(centre), 1)
     assert (np.abs(value[:, 0] - exact) <= error[:, 0] + 4e-16).all()
     assert error.max() < 1e-12
