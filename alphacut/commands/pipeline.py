@@ -29,13 +29,13 @@ from alphacut.io.results import MANIFEST, ResultsFolder
 from alphacut.questions.decision import decide
 from alphacut.questions.fragility import fragility
 from alphacut.questions.probability import probability
-from alphacut.questions.question import Answer, FuzzyResponse, SuiteResponse
+from alphacut.questions.question import Answer, FuzzyResponse
 from alphacut.questions.summary import ANSWERS, Results
 from alphacut.questions.tolerances import admissible_tolerances, require_admissible_scale
 from alphacut.rve.image.files import read_grid
 from alphacut.stages import campaign, cell, envelope, identify, image, microstructure, shares, suite
 from alphacut.stages.campaign import CellCampaign
-from alphacut.stages.envelope import EnvelopeTask, PeakResults, peak_results, peaks_of
+from alphacut.stages.envelope import EnvelopeTask, PeakResults, peaks_of
 from alphacut.stages.modulus import fuzzy_loss, fuzzy_modulus, require_levels
 from alphacut.stages.store import (
     RunProgress,
@@ -201,27 +201,18 @@ class Pipeline:
         self, section: RecordsSection, structure: Structure, task: EnvelopeTask
     ) -> FuzzyResponse:
         """Computes peaks under each record of a suite into the results; returns the response."""
-        alpha, limited = task.section.alpha, self.content.limited_outputs
-        mode = suite.nominal_mode(structure)
         records = suite.suite_records(section, task.section, structure)
         for warning in (warning for record in records for warning in record.warnings):
             say(f"warning: {warning}")
-        limited = tuple(dict.fromkeys((*structure.outputs, *limited)))
+        limited = tuple(dict.fromkeys((*structure.outputs, *self.content.limited_outputs)))
         task = replace(task, limited=limited)
         longest_first = sorted(records, key=lambda record: -record.duration)
         stages = [suite.stage(structure, task, record) for record in longest_first]
         outcomes = self.store.take_all(stages, self.executor)
         by_record = {record.name: outcomes[f"record_{record.name}"].numbers for record in records}
-        units = {name: structure.unit(name) for name in envelope.outputs_of(limited)}
-        peaks = {name: peaks_of(result, alpha) for name, result in by_record.items()}
-        worst = suite.with_means(suite.worst_peaks(peaks), peaks, structure, task, records)
-        measures = {record.name: record.measures for record in records}
-        motions = SuiteResponse(mode.period, mode.ratio, measures, peaks)
-        farthest = {name: motions.record_at(name) for name in worst}
-        self.results.suite = suite.suite_result(
-            by_record, records, mode, alpha, units, peak_results(worst), farthest
-        )
-        return replace(response_of(structure, task, worst), suite=motions)
+        result = self.results.suite = suite.suite_result(by_record, records, structure, task)
+        response = response_of(structure, task, peaks_of(result.peak, task.section.alpha))
+        return replace(response, suite=result)
 
     def _limited_peaks(self, task: EnvelopeTask, structure: Structure) -> Peaks | None:
         """Peaks for questions: of the study with [envelope]'s motion, else computed alone."""

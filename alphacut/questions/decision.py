@@ -141,8 +141,9 @@ def decide(section: DecisionSection, response: FuzzyResponse) -> DecisionAnswer:
     limits = section.limits_by_name
     peaks = {name: response.peaks[limit.peak] for name, limit in limits.items()}
     by_peak = peak_results(response.peaks)
-    suite, names = response.suite, {x for peak in by_peak.values() for x in peak.reached_at}
+    names = {x for peak in by_peak.values() for x in peak.reached_at}
     units = {x: response.structure.input_unit(x) for x in sorted(names)}
+    farthest = {} if response.suite is None else response.suite.farthest_record
     decisions = {
         name: LimitDecision.of(
             section,
@@ -155,8 +156,8 @@ def decide(section: DecisionSection, response: FuzzyResponse) -> DecisionAnswer:
             from_level=answer.lowest,
             nature=answer.nature,
             peak=None if name == ANY else by_peak[limits[name].peak],
-            record="" if suite is None or name == ANY else suite.record_at(limits[name].peak),
             input_units=units,
+            record=farthest.get("" if name == ANY else limits[name].peak, ""),
         )
         for name, answer in passing(peaks, section.limits_in_si(response.structure)).items()
     }

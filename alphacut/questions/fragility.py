@@ -15,6 +15,7 @@ from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature
 from alphacut.io.quantity import STANDARD_GRAVITY, engineering, range_text
 from alphacut.questions.question import FuzzyResponse, LimitAnswer, LimitsAnswer, Record, Texts
+from alphacut.stages.envelope import peaks_of
 from alphacut.stages.store import CutsResult, Values
 
 POINTS = 60
@@ -109,9 +110,11 @@ def fragility(section: FragilitySection, response: FuzzyResponse) -> FragilityAn
     suite, limits = response.suite, section.limits_in_si(response.structure)
     if suite is None:
         raise RefusedError("fragility", "without records", "a section [records]")
-    measures, critical, natures = [x[section.measure] for x in suite.measures.values()], {}, {}
+    records, critical, natures = suite.records.values(), {}, {}
+    measures = [record.measures[section.measure] for record in records]
+    peaks_of_records = [peaks_of(record.peak, response.alpha) for record in records]
     for name, limit in section.limits_by_name.items():
-        peaks = [x[limit.peak] for x in suite.peaks.values()]
+        peaks = [peaks[limit.peak] for peaks in peaks_of_records]
         critical[name] = CriticalMeasures.from_peaks(peaks, measures, limits[name])
         natures[name] = Nature.weakest(peak.nature for peak in peaks)
     if len(limits) > 1:
@@ -141,7 +144,7 @@ def fragility(section: FragilitySection, response: FuzzyResponse) -> FragilityAn
         alpha=np.array(response.alpha),
         measure=section.measure,
         unit=UNITS[section.measure],
-        period_s=suite.period,
-        damping_ratio=suite.ratio,
+        period_s=suite.period_s,
+        damping_ratio=suite.damping_ratio,
         limits=answers,
     )

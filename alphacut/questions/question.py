@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar, Generic, NamedTuple, Self, TypeVar
 
@@ -14,6 +14,7 @@ from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.progress_bar import Progress
 from alphacut.io.quantity import engineering
 from alphacut.stages.store import Numbers, Values
+from alphacut.stages.suite import SuiteResult
 
 Row = tuple[str, ...]
 
@@ -32,29 +33,11 @@ Record = dict[str, str | float | None]
 
 
 @dataclass(frozen=True)
-class SuiteResponse:
-    """Peaks of the structure under each record of a suite, and the records' measures, by name.
-
-    `period` in s and damping `ratio` are those of the first mode at the nominal inputs.
-    """
-
-    period: float
-    ratio: float
-    measures: Mapping[str, Mapping[str, float]]
-    peaks: Mapping[str, Peaks]
-
-    def record_at(self, peak: str) -> str:
-        """Record under which a peak is reached that lies farthest out; "" of a mean."""
-        reached = {x: ends[peak].reached[0] for x, ends in self.peaks.items() if peak in ends}
-        return max(reached, key=lambda record: float(reached[record]), default="")
-
-
-@dataclass(frozen=True)
 class FuzzyResponse:
     """Fuzzy response of the structure, as section [envelope] names it: what questions are about.
 
     `peaks` are those of the outputs, under a suite of any record; None where no question reads
-    them. `suite` has the records that move the structure one by one, if there are some.
+    them. `suite` has the results under each record, if there is a suite of them.
     """
 
     structure: Structure
@@ -63,7 +46,7 @@ class FuzzyResponse:
     duration: float
     step: float
     peaks: Peaks | None = None
-    suite: SuiteResponse | None = None
+    suite: SuiteResult | None = None
     progress: Progress | None = None
 
     @property

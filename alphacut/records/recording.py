@@ -1,9 +1,4 @@
-"""A recording of the ground's acceleration as its file holds it, its record and its spectrum.
-
-Spectra are exact for accelerations that are linear between samples: an oscillator of period T and
-damping ratio ζ moves from sample to sample by the exponential of its state matrix (Nigam, Jennings
-1969); its peak is read at points of at most a fortieth of the period.
-"""
+"""A recording of the ground's acceleration as its file holds it, its record and its measures."""
 
 from __future__ import annotations
 
@@ -15,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from alphacut.frame import Accelerogram
+from alphacut.frame import Accelerogram, Exact, LinearFlow, StoreyFrame
 from alphacut.fuzzy.arrays import Array
 from alphacut.io.quantity import factor
 
@@ -99,28 +94,9 @@ def spectral_acceleration(ground: Accelerogram, period: float, ratio: float) -> 
     `period` T is undamped, in s; the damping `ratio` ζ is below 1. The free motion after the
     record's end is included for one period.
     """
-    from scipy.linalg import expm, lapack  # which take time to import
-
-    omega = 2 * pi / period
-    substeps = max(1, ceil(ground.step * POINTS_PER_PERIOD / period))
-    substep = ground.step / substeps
-    # accelerations at the ends of all substeps, and then of zeros for one period
-    samples, zeros = ground.samples, np.zeros(ceil(period / substep))
-    positions = np.arange((len(samples) - 1) * substeps + 1) / substeps
-    values = np.interp(positions, np.arange(len(samples)), samples)
-    start, end = np.append(values[:-1], zeros), np.append(values[1:], zeros)
-    # x' = F x of x = (u, u', a, a'), with a the ground's acceleration and a' its constant slope
-    F = np.zeros((4, 4))
-    F[0, 1] = 1.0
-    F[1, :2] = -(omega**2), -2 * ratio * omega
-    F[1, 2], F[2, 3] = -1.0, 1.0
-    step_map = expm(F * substep)
-    A, b = step_map[:2, :2], step_map[:2, 2:]
-    load = b[:, :1] * start + b[:, 1:] * (end - start) / substep  # (2, steps)
-    # u[k+1] = tr(A) u[k] − det(A) u[k−1] + what the loads of both steps add, by Cayley and Hamilton
-    added = load[0].copy()
-    added[1:] += A[0, 1] * load[1, :-1] - A[1, 1] * load[0, :-1]
-    # a triangular band of three; scipy.signal.lfilter takes as long to import as all of `check`
-    band = np.tile([[1.0], [-np.trace(A)], [np.linalg.det(A)]], len(added))
-    displacement = lapack.dtbtrs(band, added[:, None], uplo="L", diag="U")[0]
-    return float(omega**2 * np.abs(displacement).max())
+    omega, substeps = 2 * pi / period, max(1, ceil(ground.step * POINTS_PER_PERIOD / period))
+    substep, length = ground.step / substeps, ground.step * (len(ground.samples) - 1)
+    duration = substep * ceil((length + period) / substep)
+    oscillator = StoreyFrame([1.0], stiffness=[omega**2], damping_ratio=ratio, ground=ground)
+    flow = LinearFlow(oscillator, (), duration, substep, Exact(), by_modes=False)
+    return float(omega**2 * np.abs(flow.values(np.zeros((1, 0)))).max())

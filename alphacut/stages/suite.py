@@ -26,7 +26,13 @@ from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.fuzzy.result import Nature
 from alphacut.io.quantity import percent_text
 from alphacut.records.recording import Recording, arias_fractions, spectral_acceleration
-from alphacut.stages.envelope import EnvelopeTask, PeakResults
+from alphacut.stages.envelope import (
+    EnvelopeTask,
+    PeakResults,
+    outputs_of,
+    peak_results,
+    peaks_of,
+)
 from alphacut.stages.store import Numbers, Stage, Values
 
 FREE_PERIODS = 5
@@ -234,19 +240,23 @@ class SuiteResult(Numbers):
 
 
 def suite_result(
-    peaks: Mapping[str, PeakResults],
+    results: Mapping[str, PeakResults],
     records: Sequence[SuiteRecord],
-    mode: NominalMode,
-    alpha: Sequence[float],
-    units: Mapping[str, str],
-    worst: PeakResults,
-    farthest_record: Mapping[str, str],
+    structure: Structure,
+    task: EnvelopeTask,
 ) -> SuiteResult:
-    """Numbers on a suite, from the peaks under each record by its name, and the `worst` ones."""
+    """Numbers on a suite, from the results under each record by its name."""
+    alpha, mode = task.section.alpha, nominal_mode(structure)
+    peaks = {name: peaks_of(result, alpha) for name, result in results.items()}
+    worst = with_means(worst_peaks(peaks), peaks, structure, task, records)
+    # of a mean there is no such record
+    farthest = {
+        x: max(peaks, key=lambda y: float(peaks[y][x].reached[0])) for x in results[records[0].name]
+    }
     statistics = {}
-    for name, peak in next(iter(peaks.values())).items():
+    for name, peak in results[records[0].name].items():
         sign = -1.0 if peak.is_least else 1.0  # quantiles of least values are counted from above
-        bounds = np.stack([x[name].proved for x in peaks.values()])  # (records, levels)
+        bounds = np.stack([x[name].proved for x in results.values()])  # (records, levels)
         proved = {"mean": bounds.mean(axis=0)}
         for quantile, share in QUANTILES.items():
             proved[quantile] = sign * np.quantile(sign * bounds, share, axis=0)
@@ -260,12 +270,12 @@ def suite_result(
                 duration_s=record.duration,
                 cut_share=record.cut_share,
                 measures=dict(record.measures),
-                peak=peaks[record.name],
+                peak=results[record.name],
             )
             for record in records
         },
         statistics=statistics,
-        units=dict(units),
-        peak=worst,
-        farthest_record=dict(farthest_record),
+        units={name: structure.unit(name) for name in outputs_of(task.limited)},
+        peak=peak_results(worst),
+        farthest_record=farthest,
     )
