@@ -126,18 +126,17 @@ class CellContent(Section):
     def _require_stages(self) -> None:
         """Refuses stages without their sections, two sources of the radius, and unfit methods."""
         has_fraction = self.particle_cell is not None and self.particle_cell.fraction is not None
-        has_radius = "microstructure" in self.stages or has_fraction
-        has_geometry = self.image_cell is not None or self.mesh_cell is not None
-        sections: dict[str, list[str]] = {stage: [stage] for stage in self.stages}
-        if "modulus" in self.stages:
-            sections["modulus"] = ["cell"] if has_radius or has_geometry else ["radius", "cell"]
-        for stage, keys in sections.items():
-            for key in keys:
+        is_computed = "microstructure" in self.stages
+        has_map = is_computed or has_fraction or self.image_cell or self.mesh_cell
+        needs: dict[str, tuple[str, ...]] = {stage: (stage,) for stage in self.stages}
+        needs["modulus"] = ("cell",) if has_map else ("radius", "cell")
+        for stage in self.stages:
+            for key in needs[stage]:
                 allowed = f"[{key}], which stage {stage} needs"
                 require(getattr(self, key) is not None, key, None, allowed)
-        source = "stage microstructure" if "microstructure" in self.stages else "cell.fraction"
-        require_alone("radius", self.radius is not None and has_radius, source)
-        is_computed = "microstructure" in self.stages
+        source = "stage microstructure" if is_computed else "cell.fraction"
+        is_repeated = self.radius is not None and (is_computed or has_fraction)
+        require_alone("radius", is_repeated, source)
         require_alone("cell.fraction", has_fraction and is_computed, "stage microstructure")
         method = self.modulus.method
         methods = (method,) if self.cell is None else self.cell.methods

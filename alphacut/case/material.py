@@ -187,21 +187,18 @@ class RoundCell(Section):
     )
     matrix_modulus: Modulus = Field(description="Young's modulus of the matrix")
     matrix_poisson: Ratio = Field(description="Poisson's ratio of the matrix")
-    inclusion_modulus: ModulusOrStiffness = Field(
-        description="Young's modulus of the particle, or three rows of its plane-strain stiffness"
-        " (11, 22, 12 with 2 ε12)"
-    )
+    inclusion_modulus: ModulusOrStiffness
+    """Young's modulus of the particle, or three rows of its plane-strain stiffness (11, 22, 12
+    with 2 ε12)"""
     inclusion_poisson: Ratio | None = None
     """Poisson's ratio of the particle, beside its modulus"""
     matrix_loss: Loss | None = None
     """loss factor tan δ of the matrix's stiffness, as 2 %"""
     inclusion_loss: Loss | None = None
     """loss factor of the particle's stiffness"""
-    fraction: Radius | None = Field(
-        default=None,
-        description="area fraction, below π/4, or volume fraction of spheres, below π/6, of"
-        " particles of one size; in place of [radius]",
-    )
+    fraction: Radius | None = None
+    """area fraction, below π/4, or volume fraction of spheres, below π/6, of particles of one
+    size; in place of [radius]"""
 
     @property
     def constants(self) -> dict[str, FuzzyNumber]:
@@ -288,10 +285,9 @@ class ImageCell(Section):
     methods: ClassVar = ("auto",)
     particles: ClassVar = "image"
 
-    image: CasePath = Field(
-        description="grey or labelled image, PNG, TIFF or .npy; of a volume a TIFF stack, a folder"
-        " of slices, .npy, .mhd or .nhdr"
-    )
+    image: CasePath
+    """grey or labelled image, PNG, TIFF or .npy; of a volume a TIFF stack, a folder of slices,
+    .npy, .mhd or .nhdr"""
     pixel: OneOrMany[Length] | None = None
     """side of a pixel, or its width and height"""
     voxel: OneOrMany[Length] | None = None
@@ -323,16 +319,13 @@ class ImageCell(Section):
         value = "beside cell.labels" if self.threshold else None
         require(has_one, "cell.threshold", value, "one of cell.threshold and cell.labels")
         n_phases = len(self.threshold) + 1 if self.threshold else len(self.labels or ())
-        allowed = f"one for each of {n_phases} phases"
-        fits = len(self.modulus) == n_phases and len(self.poisson) in (1, n_phases)
-        values = f"{len(self.modulus)} moduli and {len(self.poisson)} Poisson's ratios"
-        require(fits, "cell.modulus", values, allowed)
-        n_losses = len(self.losses)
-        fits = n_losses in (0, n_phases)
-        require(fits, "cell.loss", f"{n_losses} loss factors", allowed)
-        is_one = bool(self.pixel) != bool(self.voxel)
+        counts = {"modulus": (n_phases,), "poisson": (1, n_phases), "loss": (0, 1, n_phases)}
+        for key, fitting in counts.items():
+            n_values, allowed = len(getattr(self, key) or ()), f"one for each of {n_phases} phases"
+            require(n_values in fitting, f"cell.{key}", f"{n_values} values", allowed)
         value = "beside cell.voxel" if self.pixel else None
-        require(is_one, "cell.pixel", value, "one of cell.pixel and cell.voxel")
+        has_one = bool(self.pixel) != bool(self.voxel)
+        require(has_one, "cell.pixel", value, "one of cell.pixel and cell.voxel")
         n_sides, allowed = len(self.pixel or ()), "a side, or a width and a height"
         require(n_sides <= 2, "cell.pixel", n_sides, allowed)
         n_sides, allowed = len(self.voxel or ()), "a side, or those along x, y and z"
@@ -374,11 +367,9 @@ AnyLaw = Annotated[
 class Mesh(Section):
     """Discretisation of the product domain."""
 
-    file: CaseFile | None = Field(
-        default=None,
-        description="mesh of Gmsh, prisms of 15 nodes over [-1, 1]² and θ, in place of size and"
-        " layers; its physical groups are the phases of [cell.phases]",
-    )
+    file: CaseFile | None = None
+    """mesh of Gmsh, prisms of 15 nodes over [-1, 1]² and θ, in place of size and layers; its
+    physical groups are the phases of [cell.phases]"""
     refine: bool = False
     """whether to refine the mesh of a file once, for a declared error"""
     layers: Annotated[int, Quantity(minimum=1, maximum=10_000, is_integer=True)] = 12

@@ -74,11 +74,9 @@ class MatricesSection(StructureSection):
     """pairs [factor, file] of K"""
     damping: tuple[Term, ...] = Field(default=(), description="pairs [factor, file] of D")
     damping_ratio: DampingRatios = Field(default=(), description=RATIO_WORDS)
-    direction: str | dict[str, float] = Field(
-        default="",
-        description="direction of the ground: it moves all unknowns NODE.DIRECTION; or how it "
-        "moves each, by unknown",
-    )
+    direction: str | dict[str, float] = ""
+    """direction of the ground: it moves all unknowns NODE.DIRECTION; or how it moves each, by
+    unknown"""
     accelerogram: Annotated[Accelerogram, text(read_accelerogram)] | None = None
     """file of the ground's acceleration; motion is relative to it"""
     outputs: dict[str, ObservedRow] = Field(description="observed quantities by name")

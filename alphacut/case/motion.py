@@ -68,10 +68,9 @@ class Study(Section):
 class EnvelopeSection(Section):
     """Fuzzy forward dynamics."""
 
-    fuzzy: Names = Field(
-        description="inputs that are fuzzy; of a frame E, I, m or m1 …, l, c (columns),"
-        " k (stiffness), d, q0, v0, zeta (damping_ratio), rayleigh_mass, rayleigh_stiffness"
-    )
+    fuzzy: Names
+    """inputs that are fuzzy; of a frame E, I, m or m1 …, l, c (columns), k (stiffness), d, q0,
+    v0, zeta (damping_ratio), rayleigh_mass, rayleigh_stiffness"""
     alpha: Levels = Field(default=ALPHA, description="α-levels")
     method: Literal[
         "auto", "proof", "dual", "graph-follower", "improved-graph-follower", "quasi-monte-carlo"

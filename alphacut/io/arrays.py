@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -59,14 +59,6 @@ def _read_by_ending(path: Path, name: str) -> Array:
             what = f"array {name or 'not named'}"
             raise RefusedError(path.name, what, f"{path.name}:NAME, one of {', '.join(names)}")
         return np.asarray(file[chosen[0]])
-
-
-def columns_text(columns: Mapping[str, Array]) -> str:
-    """CSV of columns of one length by their titles, which state units; numbers in full."""
-    lines = [",".join(f'"{title}"' if "," in title else title for title in columns)]
-    rows = np.column_stack([np.asarray(column, float) for column in columns.values()])
-    lines += [",".join(map(repr, row)) for row in rows.tolist()]
-    return "\n".join(lines) + "\n"
 
 
 def text_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

@@ -40,11 +40,7 @@ class TextFile:
     def from_bytes(cls, name: str, content: bytes) -> Self:
         """The lines of a content in UTF-8 or Latin-1; RefusedError of what no text has."""
         require(b"\0" not in content, name, "no text", "a text file with a record")
-        try:
-            text = content.decode("utf-8-sig")
-        except UnicodeDecodeError:
-            text = content.decode("latin-1")
-        file = cls(name, tuple(re.split(r"\r\n|\r|\n", text)))
+        file = cls(name, tuple(re.split(r"\r\n|\r|\n", decoded(content))))
         length, longest = max((len(line), number) for number, line in enumerate(file.lines))
         if length > LONGEST_LINE:
             allowed = f"lines of up to {LONGEST_LINE:,} letters"
@@ -112,6 +108,14 @@ def choose_channel(location: str, channel: str, names: Sequence[tuple[str, ...]]
     value = f"channel {channel or 'not named'}"
     require(len(chosen) == 1, location, value, f"one of: {allowed}")
     return chosen[0]
+
+
+def decoded(content: bytes) -> str:
+    """The text of a content in UTF-8, else in Latin-1."""
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return content.decode("latin-1")
 
 
 def read_bytes(path: Path) -> bytes:

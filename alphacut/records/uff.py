@@ -15,7 +15,7 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io.measured import ModeRows
 from alphacut.records.recording import Recording
-from alphacut.records.text_file import NUMBER, choose_channel, read_bytes, recording_in_si
+from alphacut.records.text_file import NUMBER, choose_channel, decoded, read_bytes, recording_in_si
 
 ENDINGS = (".uff", ".unv")
 HEAD_LINES = {55: 8, 58: 11}
@@ -176,7 +176,7 @@ def _data_sets(content: bytes, number: int) -> Iterator[tuple[list[str], bytes |
         first = file.readline()
         if first[:7].strip() == b"58b" and number == 58:
             byte_order, _, _, size = (int(word) for word in first[7:].split()[:4])
-            head = [_text(file.readline()) for _ in range(HEAD_LINES[58])]
+            head = [decoded(file.readline()).rstrip("\r\n") for _ in range(HEAD_LINES[58])]
             # some writers put an end of line between the head and the bytes
             starts = (file.tell() + extra for extra in range(3))
             ends = (x for x in starts if content[x + size :].lstrip()[:2] == b"-1")
@@ -184,16 +184,9 @@ def _data_sets(content: bytes, number: int) -> Iterator[tuple[list[str], bytes |
             file.seek(start + max(size, 0))
             yield [*head, ">" if byte_order == BIG_ENDIAN else "<"], content[start : file.tell()]
         inside = takewhile(lambda x: x.strip() != b"-1", iter(file.readline, b""))
-        rows = [_text(row) for row in inside]
+        rows = [decoded(row).rstrip("\r\n") for row in inside]
         if first.strip() == str(number).encode():
             yield rows[: HEAD_LINES[number]], rows[HEAD_LINES[number] :]
-
-
-def _text(line: bytes) -> str:
-    try:
-        return line.decode().rstrip("\r\n")
-    except UnicodeDecodeError:
-        return line.decode("latin-1").rstrip("\r\n")
 
 
 def _parse_series(head: list[str], values: bytes | list[str]) -> _Series:

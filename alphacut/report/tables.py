@@ -28,18 +28,9 @@ if TYPE_CHECKING:
 DIGITS = 6
 RANGES = {"E from [GPa]": "E to [GPa]", "ν from": "ν to", "least peak": "greatest peak"}
 """Columns of lower and upper ends that are rounded as the nature of their row demands."""
-SYMBOLS = str.maketrans(
-    {
-        "−": "$-$",
-        "…": r"\dots{}",
-        "≤": r"$\leq$",
-        "≥": r"$\geq$",
-        "±": r"$\pm$",
-        "²": r"$^2$",
-        "µ": r"\textmu{}",
-        **{x: f"${name}$" for x, name in (("α", r"\alpha"), ("ν", r"\nu"), ("ζ", r"\zeta"))},
-    }
-)
+SIGNS = {"−": "-", "≤": r"\leq", "≥": r"\geq", "±": r"\pm", "²": "^2", "α": r"\alpha"}
+SIGNS |= {"ν": r"\nu", "ζ": r"\zeta"}
+SYMBOLS = {"…": r"\dots{}", "µ": r"\textmu{}", **{x: f"${sign}$" for x, sign in SIGNS.items()}}
 """What LaTeX's fonts do not have."""
 
 
@@ -211,4 +202,4 @@ def latex(table: Table) -> str:
     """A tabular environment, with rules of the package booktabs."""
     frame, columns = pd.DataFrame(table.rows, columns=table.head), "l" + "r" * (len(table.head) - 1)
     text: str = frame.to_latex(index=False, escape=True, column_format=columns)
-    return text.translate(SYMBOLS)
+    return text.translate(str.maketrans(SYMBOLS))

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
@@ -34,35 +33,27 @@ def stage(
     task: EnvelopeTask | None,
     reached: PeakResults,
 ) -> Stage[ShareTable]:
-    """The stage of the shares of a cell's inputs in its modulus, and of a study's in its peaks."""
-    of_cell = campaign and [campaign.identity, campaign.inputs, campaign.modulus.alpha]
-    inputs = [of_cell, structure and [structure.model, structure.numbers, task, reached]]
-    compute = partial(compute_shares, campaign, structure, task, reached)
-    return Stage("shares", inputs, (*NESTED, "alphacut"), ShareTable, compute)
-
-
-def compute_shares(
-    campaign: CellCampaign | None,
-    structure: Structure | None,
-    task: EnvelopeTask | None,
-    reached: PeakResults,
-    context: StageContext,
-) -> StageResult[ShareTable]:
-    """Computes each input's share in the widths of E, ν and peaks on the lowest level.
+    """The stage of each input's share in the widths of E, ν and peaks on the lowest level.
 
     A result of one input has none.
     """
-    table: ShareTable = {}
-    if campaign is not None and len(campaign.inputs) > 1:
-        shares = cell_shares(campaign)
-        for k, name in enumerate(("E", "ν")):
-            table[name] = dict(zip(shares.names, map(float, shares.share[:, k]), strict=True))
-    if structure is not None and task is not None and structure.frame and len(task.fuzzy) > 1:
-        shares = peak_shares(structure, task, reached)
-        for k, output in enumerate(structure.outputs):
-            column = map(float, shares.share[:, k])
-            table[f"the peak of {output}"] = dict(zip(shares.names, column, strict=True))
-    return StageResult(table)
+
+    def compute(_: StageContext) -> StageResult[ShareTable]:
+        table: ShareTable = {}
+        if campaign is not None and len(campaign.inputs) > 1:
+            shares = cell_shares(campaign)
+            for k, name in enumerate(("E", "ν")):
+                table[name] = dict(zip(shares.names, map(float, shares.share[:, k]), strict=True))
+        if structure is not None and task is not None and structure.frame and len(task.fuzzy) > 1:
+            shares = peak_shares(structure, task, reached)
+            for k, output in enumerate(structure.outputs):
+                column = map(float, shares.share[:, k])
+                table[f"the peak of {output}"] = dict(zip(shares.names, column, strict=True))
+        return StageResult(table)
+
+    of_cell = campaign and [campaign.identity, campaign.inputs, campaign.modulus.alpha]
+    inputs = [of_cell, structure and [structure.model, structure.numbers, task, reached]]
+    return Stage("shares", inputs, (*NESTED, "alphacut"), ShareTable, compute)
 
 
 def cell_shares(campaign: CellCampaign) -> Shares:
