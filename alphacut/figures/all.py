@@ -83,26 +83,25 @@ def _structure_figures(results: Results) -> Iterator[Drawing]:
 
 
 def draw_figures(results: Results, store: StageStore, executor: Executor | None) -> list[str]:
-    """Draws all figures anew where what they show is new; returns paths in the results' folder."""
+    """Draws all figures, by `PARTS` tasks, anew where what they show is new; returns their paths.
+
+    The paths are those in the results' folder.
+    """
+
+    def compute(context: StageContext) -> StageResult[list[str]]:
+        assert context.folder is not None
+        tasks = [submit(executor, draw_part, results, context.folder, k) for k in range(PARTS)]
+        names = list[str]()
+        for count, task in enumerate(tasks, start=1):
+            names += task.result()
+            context.tick(count / len(tasks))
+        return StageResult(sorted(names))
+
     inputs = [results.content, results.answers, sorted(results.fingerprints.values())]
     inputs.append(version_of("matplotlib"))
-    compute = partial(draw_all, results, executor)
     figures = store.take(Stage("figures", inputs, (*NESTED, "alphacut"), list[str], compute))
     before = () if results.microstructure is None else results.microstructure.files
     return [name for name in (*before, *figures.files) if name.startswith("figures/")]
-
-
-def draw_all(
-    results: Results, executor: Executor | None, context: StageContext
-) -> StageResult[list[str]]:
-    """Draws all figures by `PARTS` tasks; returns the names of the files."""
-    assert context.folder is not None
-    tasks = [submit(executor, draw_part, results, context.folder, k) for k in range(PARTS)]
-    names = list[str]()
-    for count, task in enumerate(tasks, start=1):
-        names += task.result()
-        context.tick(count / len(tasks))
-    return StageResult(sorted(names))
 
 
 def draw_part(results: Results, folder: Path, part: int) -> list[str]:

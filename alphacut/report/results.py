@@ -94,7 +94,7 @@ def material(parts: Parts) -> Table:
 def _constants(part: ModulusResult | ImageResult) -> Iterator[Row]:
     """Yields the row of E of a cell or an image, and those of ν, E_T and the loss factor."""
     nature, further, error = part.nature, dict[str, CutsResult](), 0.0
-    young, declares_error = part.young, True
+    young, declares_error = part.E_GPa, True
     if isinstance(part, ModulusResult):
         declares_error = part.particles != "mesh"  # which is not refined
         error = sum(part.error.values()) * float(young.upper.max())
@@ -307,7 +307,7 @@ def _compared_entries(parts: Parts) -> Iterator[tuple[str, str, float | str]]:
     """Yields what is compared of a run on the lowest level: its name, its unit, number or text."""
     for result in (parts.modulus, parts.image):
         if result is not None:
-            low, high = np.array(result.young[0]) * 1e9
+            low, high = np.array(result.E_GPa[0]) * 1e9
             yield "greatest E", "Pa", float(high)
             yield "width of E", "Pa", float(high - low)
     for study_name, study in parts.envelopes.items():

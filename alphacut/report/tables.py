@@ -66,7 +66,7 @@ def radius_map(numbers: Document) -> pd.DataFrame:
 
 def modulus(result: ModulusResult | ImageResult) -> pd.DataFrame:
     """The α-cuts of E, and of a cell those of ν and the error of E."""
-    young = result.young
+    young = result.E_GPa
     columns = {"α": result.alpha, "E from [GPa]": young.lower, "E to [GPa]": young.upper}
     if isinstance(result, ModulusResult):
         error = sum(result.error.values())

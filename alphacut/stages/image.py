@@ -61,22 +61,17 @@ PhaseRanges = Callable[[AlphaLevel], tuple[Ints, Ints]]
 """Least and greatest phase of each pixel at a level."""
 
 
-class ImageCuts(Numbers):
-    """α-cuts of E in GPa."""
-
-    alpha: Values
-    E_GPa: CutsResult
-
-
 class ImageResult(Numbers):
     """Proved bounds of an image or volume, moduli in GPa.
 
     On the highest level `lower_GPa` and `upper_GPa` bound the stiffness in the sense of Loewner,
     (3, 3) of the plane or (6, 6) of space, `nu` and `shear_GPa` those of its average. As α-cuts
-    `plane` has the constants along the axes by definition and name, `cuts` E, `proved_losses` loss
-    factors at nominal moduli to first order; `widths_GPa` has the widths of E by cause.
+    `plane` has the constants along the axes by definition and name, `proved_losses` loss factors
+    at nominal moduli to first order; `widths_GPa` has the widths of E by cause.
     """
 
+    alpha: Values
+    E_GPa: CutsResult
     lower_GPa: Values
     upper_GPa: Values
     nu: dict[str, float]
@@ -84,7 +79,6 @@ class ImageResult(Numbers):
     average: str
     plane: dict[str, dict[str, CutsResult]]
     nature: Nature
-    cuts: ImageCuts
     seconds: float
     widths_GPa: dict[str, float]
     fractions: dict[str, float]
@@ -92,16 +86,6 @@ class ImageResult(Numbers):
     references: References
     loss: LossResult | None
     proved_losses: dict[str, CutsResult]
-
-    @property
-    def alpha(self) -> Array:
-        """The levels, rising."""
-        return self.cuts.alpha
-
-    @property
-    def young(self) -> CutsResult:
-        """The α-cuts of E, in GPa."""
-        return self.cuts.E_GPa
 
 
 def stage(cell: ImageCell, alpha: tuple[float, ...], average: str) -> Stage[ImageResult]:
@@ -168,6 +152,8 @@ def compute_cuts(
     classical = isotropic_bounds(shares_of_phases, phases, space=is_space)
     by_name = dict(map(constant_cuts, names, np.moveaxis(constants, 1, 0)))
     result = ImageResult(
+        alpha=np.array(alpha),
+        E_GPa=CutsResult.of(np.array([cut.modulus for cut in cuts]) / GPA),
         lower_GPa=np.asarray(top.bounds.lower / GPA, float),
         upper_GPa=np.asarray(top.bounds.upper / GPA, float),
         nu=dict(zip(SIDES, top.poisson, strict=True)),
@@ -175,10 +161,6 @@ def compute_cuts(
         average=HILL if is_space else AVERAGES[average],
         plane={SPACE if is_space else PLANE_STRAIN: by_name},
         nature=NATURE,
-        cuts=ImageCuts(
-            alpha=np.array(alpha),
-            E_GPa=CutsResult.of(np.array([cut.modulus for cut in cuts]) / GPA),
-        ),
         seconds=perf_counter() - start,
         widths_GPa={x: widths[x] / GPA for x in sorted(widths, key=lambda x: -widths[x])},
         fractions=fractions,

@@ -80,11 +80,6 @@ class ModulusResult(Numbers):
     references: References
     loss: LossResult | None
 
-    @property
-    def young(self) -> CutsResult:
-        """The α-cuts of E, in GPa."""
-        return self.E_GPa
-
 
 def plane_outputs(result: HomogenisedStiffness) -> dict[str, float]:
     """Values by the names of `PLANE`, moduli in Pa; those of the definitions that are known."""

@@ -160,7 +160,7 @@ PARTS = {
     "modulus": same_modulus,
     "decision": same_decision,
     "envelopes": same_envelopes,
-    "image": lambda new, old: overlapping_cuts(new["cuts"], old["cuts"]),
+    "image": lambda new, old: overlapping_cuts(new, old["cuts"]),
     "microstructure": same_microstructure,
     "update": same_inputs,
     "tolerances": same_tolerances,

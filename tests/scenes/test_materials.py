@@ -103,7 +103,7 @@ def test_a_micrograph_has_its_proved_bounds(tmp_path):
     sets = "cell.threshold=['[120, 130, 140]']", "modulus.alpha=[0, 1]"
     words = "run", case, "--no-figures", f"--out={out}", *(f"--set={one}" for one in sets)
     image = alphacut(tmp_path, *words)["image"]
-    overlapping_cuts(image["cuts"], {"E_GPa": MICROGRAPH})
+    overlapping_cuts(image, {"E_GPa": MICROGRAPH})
     assert image["nature"] == "guaranteed"
 
 
@@ -118,7 +118,7 @@ def test_a_tomogram_has_its_proved_bounds_and_losses(tmp_path):
     words = f"--out={tmp_path / 'out'}", "--set=modulus.alpha=[0, 1]", "--no-figures"
     image = alphacut(tmp_path, "run", case, *words)["image"]
     assert image["nature"] == "guaranteed"
-    low, high = (np.array(image["cuts"]["E_GPa"][side]) for side in ("lower", "upper"))
+    low, high = (np.array(image["E_GPa"][side]) for side in ("lower", "upper"))
     phase = (volume >= 130).astype(int)  # at the nominal threshold and moduli
     pairs = [PhaseModuli.of_young(e, nu, 3) for e, nu in ((20.0, 0.3), (80.0, 0.2))]
     bulk, shear = (np.array([getattr(x, name) for x in pairs])[phase] for name in ("bulk", "shear"))

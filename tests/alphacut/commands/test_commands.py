@@ -70,20 +70,6 @@ def test_a_step_that_widens_a_bound_is_foreseen_and_said_with_what_half_of_it_gi
     assert "would give" not in texts[1]
 
 
-def test_the_same_run_takes_what_is_there_and_fresh_computes_anew(tmp_path, capfd):
-    case, folder = written(tmp_path, CELL), tmp_path / "out"
-    words = ("run", case, "--out", folder, "--no-figures")
-    spoken(capfd, *words)
-    first = (folder / "modulus.nc").stat().st_mtime_ns
-    assert "of the stages were up to date" in spoken(capfd, *words)[2]
-    assert (folder / "modulus.nc").stat().st_mtime_ns == first
-    spoken(capfd, *words, "--set", "cell.matrix_poisson=0.2")
-    changed = (folder / "modulus.nc").stat().st_mtime_ns
-    assert changed > first
-    spoken(capfd, *words, "--set", "cell.matrix_poisson=0.2", "--fresh")
-    assert (folder / "modulus.nc").stat().st_mtime_ns > changed
-
-
 def test_check_prints_what_was_read(tmp_path, capfd):
     status, out, _ = spoken(capfd, "check", written(tmp_path))
     assert status == 0
@@ -103,13 +89,6 @@ def test_check_prints_what_was_read(tmp_path, capfd):
     for name, lines in read.items():
         words = " ".join(spoken(capfd, "check", CASES / f"{name}.toml")[1].split())
         assert all(line in words for line in lines), words
-
-
-def test_a_cell_is_solved_at_its_modal_values(tmp_path, capfd):
-    case = written(tmp_path, CELL)
-    status, out, _ = spoken(capfd, "cell", case, "--json", "-", "--set", "modulus.tolerance=1e-3")
-    assert status == 0
-    assert json.loads(out)["E_GPa"] > 20
 
 
 REFUSED = [

@@ -26,8 +26,8 @@ def kept(folder):
     return json.loads((folder / "summary.json").read_text(encoding="utf-8"))
 
 
-def test_figures_are_drawn_once_and_anew_where_the_case_changed(results, tmp_path):
-    folder = shutil.copytree(results, tmp_path / "out")
+def test_figures_are_drawn_once_and_anew_where_the_case_changed(two_floors, tmp_path):
+    folder = shutil.copytree(two_floors, tmp_path / "out")
     drawn = folder / "figures" / "decision.png"
     os.utime(drawn, (1, 1))
     run(tmp_path)
@@ -40,12 +40,12 @@ def test_figures_are_drawn_once_and_anew_where_the_case_changed(results, tmp_pat
     assert drawn.stat().st_mtime_ns > before
 
 
-def test_every_figure_has_both_forms_and_a_caption(results):
-    names = kept(results)["figures"]
+def test_every_figure_has_both_forms_and_a_caption(two_floors):
+    names = kept(two_floors)["figures"]
     stems = {name.removeprefix("figures/").rpartition(".")[0] for name in names}
     assert {"decision", "probability", "tolerances"} <= stems
     assert set(names) == {f"figures/{stem}.{kind}" for stem in stems for kind in ("svg", "png")}
-    assert all((results / name).stat().st_size > 1000 for name in names)
+    assert all((two_floors / name).stat().st_size > 1000 for name in names)
     assert all(caption(x, paper=False)[0].isupper() and caption(x, paper=False) != x for x in stems)
     words = "Figs. 21 to 25: The Graph Follower, step by step"
     assert caption("fig21-25-graph-follower", paper=True) == words

@@ -24,8 +24,8 @@ from tests.alphacut.small import summary_of_run, written
 
 
 @pytest.fixture(scope="module")
-def summary(results):
-    return json.loads((results / "summary.json").read_text(encoding="utf-8"))
+def summary(two_floors):
+    return json.loads((two_floors / "summary.json").read_text(encoding="utf-8"))
 
 
 def test_peaks_are_wide_where_the_gap_is_or_nothing_is_proved():

@@ -15,9 +15,9 @@ from tests.alphacut.one_case import run
 
 
 @pytest.fixture(scope="module")
-def runs(results, tmp_path_factory):
+def runs(two_floors, tmp_path_factory):
     stiffer = "frame.modulus='[44, 45, 46] GPa'"
-    return results, run(tmp_path_factory.mktemp("stiffer"), "--no-figures", "--set", stiffer)
+    return two_floors, run(tmp_path_factory.mktemp("stiffer"), "--no-figures", "--set", stiffer)
 
 
 def test_two_runs_stand_side_by_side(runs, capsys):
