@@ -96,11 +96,11 @@ class ForceSection(Section):
     def require_consistent(self) -> None:
         """Refuses amplitudes whose unit is not that of the time history."""
         require(bool(self.amplitude), "force.amplitude", None, "one floor or more")
-        quantity_name, example = quantity.QUANTITIES[self.history.unit]
+        dimension = quantity.QUANTITIES[self.history.unit]
         for unknown, (_, unit) in self.amplitude.items():
             is_same, shown = unit == self.history.unit, unit or "a number"
             key = f"force.amplitude.{unknown}"
-            require(is_same, key, shown, f'{quantity_name}, as "{example}"')
+            require(is_same, key, shown, f'{dimension.name}, as "{dimension.example}"')
 
 
 def with_forces(

@@ -84,10 +84,7 @@ class MatricesSection(StructureSection):
     def structure(
         self, modulus: FuzzyNumber | None = None, loss: FuzzyNumber | None = None
     ) -> Structure:
-        """The structure from the matrices; `modulus` takes the place of parameter E.
-
-        See `StructureSection`.
-        """
+        """The structure from the matrices; `modulus` takes the place of parameter E."""
         damping = self.damping_ratio if isinstance(self.damping_ratio, MaterialDamping) else None
         ratios = {} if damping else damping_ratios_by_name(self.damping_ratio, None)
         numbers = self.parameters | ratios or {"scale": Crisp(1.0)}

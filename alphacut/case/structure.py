@@ -270,10 +270,7 @@ class Frame(StructureSection):
     def structure(
         self, modulus: FuzzyNumber | None = None, loss: FuzzyNumber | None = None
     ) -> Structure:
-        """The frame with its fuzzy parameters, and the storey heights by the names of the drifts.
-
-        See `StructureSection`.
-        """
+        """The frame with its fuzzy parameters, and the heights of storeys by their drifts."""
         # values by floor or storey, by the frame's own arguments
         lists = {x: self.per_floor(getattr(self, NAMES.get(x, x))) for x in SYMBOLS}
         lists["second_moment"] = self.second_moment or ()  # of all storeys, where it is one

@@ -70,8 +70,8 @@ class Quantity:
     @property
     def allowed(self) -> str:
         """Allowed values in words."""
-        kind, example = QUANTITIES[self.si]
-        kind = "whole number" if self.is_integer else kind
+        dimension = QUANTITIES[self.si]
+        name = "whole number" if self.is_integer else dimension.name
         bounds = {
             "above": self.above,
             "from": self.minimum,
@@ -79,8 +79,8 @@ class Quantity:
             "up to": self.maximum,
         }
         finite = [f"{word} {bound:g}" for word, bound in bounds.items() if math.isfinite(bound)]
-        words = " ".join([kind, *finite])
-        return f'{words}, as "{example}"' if self.si else words
+        words = " ".join([name, *finite])
+        return f'{words}, as "{dimension.example}"' if self.si else words
 
     def parse(self, value: object) -> object:
         """The quantity in SI that a value of the case states, such as "80 GPa ± 5 %", in range."""

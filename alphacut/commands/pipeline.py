@@ -32,7 +32,6 @@ from alphacut.questions.probability import probability
 from alphacut.questions.question import Answer, FuzzyResponse
 from alphacut.questions.summary import ANSWERS, Results
 from alphacut.questions.tolerances import admissible_tolerances, require_admissible_scale
-from alphacut.rve.image.files import read_grid
 from alphacut.stages import campaign, cell, envelope, identify, image, microstructure, shares, suite
 from alphacut.stages.campaign import CellCampaign
 from alphacut.stages.envelope import EnvelopeTask, PeakResults, peaks_of
@@ -233,12 +232,8 @@ def foreseen_seconds(content: Content) -> dict[str, float]:
     n_inputs = 1 if content.envelope is None else 1 + len(content.envelope.fuzzy)
     seconds = {"envelope": 3.0 * n_inputs, "record": float(n_inputs), "probability": 5.0}
     seconds |= {"tolerances": 10.0 * n_inputs, "decision": 0.1, "fragility": 0.5, "figures": 6.0}
-    if content.mesh_cell is not None or content.modulus.method == "prism":
-        seconds["modulus"] = 30.0
-    if (cell := content.image_cell) is not None:  # 40 µs a pixel and level, and as much for widths
-        pixels = read_grid(cell.image, cell.sides).size
-        seconds["modulus"] = seconds["image"] = 4e-5 * pixels * (len(content.modulus.alpha) + 5)
-    return seconds
+    has_elements = content.particle_cell is None or content.modulus.method == "prism"
+    return seconds | (dict.fromkeys(("modulus", "image"), 30.0) if has_elements else {})
 
 
 def answer_of(

@@ -2,17 +2,17 @@
 
 One number is crisp, two are an interval, three a triangle (lower, nominal, upper), four a
 trapezoid; a spread "± 5 %" is an interval. Units are Pint's, exactly, by way of
-decimals; the common ones stand here.
+decimals.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from decimal import Decimal
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal, Triangular
 from alphacut.fuzzy.result import Nature, rounded
@@ -20,27 +20,41 @@ from alphacut.fuzzy.result import Nature, rounded
 if TYPE_CHECKING:
     import pint
 
+
+class Dimension(NamedTuple):
+    """A physical dimension: its name, a value as a user writes it, units as powers of ten in SI.
+
+    Pint, whose import takes 0.35 s, is not needed for these units.
+    """
+
+    name: str
+    example: str
+    powers: Mapping[str, int]
+
+
 QUANTITIES = {
-    "": ("number without a unit", "0.3"),
-    "Pa": ("stress or modulus", "80 GPa"),
-    "m": ("length", "2.5 m"),
-    "m^4": ("second moment of area", "1e-6 m^4"),
-    "kg": ("mass", "20 t"),
-    "s": ("time", "30 s"),
-    "m/s": ("velocity", "-0.5 m/s"),
-    "m/s^2": ("acceleration", "9.81 m/s^2"),
-    "N*s/m": ("damping coefficient", "50 N s/m"),
-    "N*m*s": ("rotational damping coefficient", "0.1 N m s"),
-    "N/m": ("stiffness", "30 kN/m"),
-    "N": ("force", "0.02 N"),
-    "N*s": ("impulse", "0.3 kN s"),
-    "N*m": ("moment", "12 kN m"),
-    "J": ("energy", "20 kJ"),
-    "1/s": ("rate", "0.05 1/s"),
-    "rad": ("angle", "1.5 rad"),
-    "rad/s": ("angular velocity", "0.1 rad/s"),
+    "": Dimension("number without a unit", "0.3", {}),
+    "Pa": Dimension(
+        "stress or modulus", "80 GPa", {"Pa": 0, "kPa": 3, "MPa": 6, "GPa": 9, "N/mm^2": 6}
+    ),
+    "m": Dimension("length", "2.5 m", {"m": 0, "cm": -2, "mm": -3, "µm": -6}),
+    "m^4": Dimension("second moment of area", "1e-6 m^4", {"m^4": 0, "cm^4": -8, "mm^4": -12}),
+    "kg": Dimension("mass", "20 t", {"kg": 0, "t": 3}),
+    "s": Dimension("time", "30 s", {"s": 0, "ms": -3}),
+    "m/s": Dimension("velocity", "-0.5 m/s", {"m/s": 0, "mm/s": -3}),
+    "m/s^2": Dimension("acceleration", "9.81 m/s^2", {"m/s^2": 0}),
+    "N*s/m": Dimension("damping coefficient", "50 N s/m", {"N s/m": 0, "kN s/m": 3}),
+    "N*m*s": Dimension("rotational damping coefficient", "0.1 N m s", {"N m s": 0}),
+    "N/m": Dimension("stiffness", "30 kN/m", {"N/m": 0, "kN/m": 3, "MN/m": 6}),
+    "N": Dimension("force", "0.02 N", {"N": 0, "kN": 3, "MN": 6}),
+    "N*s": Dimension("impulse", "0.3 kN s", {}),
+    "N*m": Dimension("moment", "12 kN m", {"N m": 0, "kN m": 3}),
+    "J": Dimension("energy", "20 kJ", {}),
+    "1/s": Dimension("rate", "0.05 1/s", {"1/s": 0, "Hz": 0}),
+    "rad": Dimension("angle", "1.5 rad", {"rad": 0}),
+    "rad/s": Dimension("angular velocity", "0.1 rad/s", {"rad/s": 0}),
 }
-"""Name of the quantity of each SI unit, and a value as a user writes it."""
+"""Dimensions of quantities by their SI units."""
 STANDARD_GRAVITY = Decimal("9.80665")
 """In m/s², by the third General Conference on Weights and Measures, 1901."""
 UNITS_HERE = {
@@ -48,24 +62,6 @@ UNITS_HERE = {
     "m/s^2": {"g": STANDARD_GRAVITY, "gal": Decimal("0.01"), "Gal": Decimal("0.01")},
 }
 """Units that Pint takes for something else: g is no gram here, and Gal no gallon."""
-POWERS_OF_TEN = {
-    "Pa": {"Pa": 0, "kPa": 3, "MPa": 6, "GPa": 9, "N/mm^2": 6},
-    "m": {"m": 0, "cm": -2, "mm": -3, "µm": -6},
-    "m^4": {"m^4": 0, "cm^4": -8, "mm^4": -12},
-    "kg": {"kg": 0, "t": 3},
-    "s": {"s": 0, "ms": -3},
-    "m/s": {"m/s": 0, "mm/s": -3},
-    "m/s^2": {"m/s^2": 0},
-    "N": {"N": 0, "kN": 3, "MN": 6},
-    "N/m": {"N/m": 0, "kN/m": 3, "MN/m": 6},
-    "N*s/m": {"N s/m": 0, "kN s/m": 3},
-    "N*m*s": {"N m s": 0},
-    "N*m": {"N m": 0, "kN m": 3},
-    "1/s": {"1/s": 0, "Hz": 0},
-    "rad": {"rad": 0},
-    "rad/s": {"rad/s": 0},
-}
-"""Common units, each a power of ten of the SI unit, for which Pint (0.35 s) is not imported."""
 REFUSED = r"[%‰]|\b(per ?cent|per ?mille|pp[mb]|pixel|px|point|dot|pt|tons?)\b"
 """Units of print and shares, which Pint takes for numbers or lengths, and tons of several kinds."""
 LEAST, GREATEST = 1e-36, 1e18
@@ -95,10 +91,10 @@ def factor(unit: str, si: str) -> Decimal:
     """Value of one `unit` in the SI unit `si`, as 1000 of "kN" in "N"; ValueError of others."""
     if unit in UNITS_HERE.get(si, {}):
         return UNITS_HERE[si][unit]
-    if unit in POWERS_OF_TEN.get(si, {}):
-        return Decimal(10) ** POWERS_OF_TEN[si][unit]
+    if unit in QUANTITIES[si].powers:
+        return Decimal(10) ** QUANTITIES[si].powers[unit]
     if not unit:
-        raise ValueError(f"the unit is missing, such as {QUANTITIES[si][1]}")
+        raise ValueError(f"the unit is missing, such as {QUANTITIES[si].example}")
     if not si or re.search(REFUSED, unit):
         raise ValueError(f'the unit "{unit}" is wrong')
     spelt = re.sub(r"([A-Za-z])([234])(?!\w)", r"\1^\2", unit)
@@ -106,10 +102,9 @@ def factor(unit: str, si: str) -> Decimal:
         one_unit = registry().Quantity(Decimal(1), registry().parse_units(spelt))
         return Decimal(one_unit.to(si).magnitude)
     except Exception:  # Pint's parser raises whatever Python's does
-        kinds = (QUANTITIES[x][0] for x, units in POWERS_OF_TEN.items() if unit in units)
-        kind = next(kinds, "")
+        kind = next((x.name for x in QUANTITIES.values() if unit in x.powers), "")
         measured = f"is a unit of {kind}, and" if kind else "is"
-        raise ValueError(f'the unit "{unit}" {measured} no unit of {QUANTITIES[si][0]}') from None
+        raise ValueError(f'the unit "{unit}" {measured} no unit of {QUANTITIES[si].name}') from None
 
 
 def _parse_decimal(text: str, si: str) -> Decimal:

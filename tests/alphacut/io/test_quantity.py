@@ -3,7 +3,7 @@
 import pytest
 
 from alphacut.fuzzy import Crisp, Interval, Trapezoidal, Triangular
-from alphacut.io.quantity import POWERS_OF_TEN, engineering, parse_fuzzy, parse_number, registry
+from alphacut.io.quantity import QUANTITIES, engineering, parse_fuzzy, parse_number, registry
 
 RIGHT = [
     ("80 GPa", "Pa", Crisp(80e9)),
@@ -75,9 +75,9 @@ def test_numbers_for_people(value, unit, words):
     assert engineering(value, unit) == words
 
 
-@pytest.mark.parametrize("si", POWERS_OF_TEN)
+@pytest.mark.parametrize("si", QUANTITIES)
 def test_common_units_are_what_pint_says(si):
-    for unit, power in POWERS_OF_TEN[si].items():
+    for unit, power in QUANTITIES[si].powers.items():
         assert registry().Quantity(10**-power if power < 0 else 1, unit) == registry().Quantity(
             1 if power < 0 else 10**power, si
         )
