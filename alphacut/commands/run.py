@@ -155,39 +155,30 @@ def modulus(options: argparse.Namespace, out: TextIO) -> int:
     result = results.modulus or results.image
     assert result is not None
     part: ModulusResult | ImageResult = result.numbers
-    words = image_text(part) if isinstance(part, ImageResult) else modulus_text(part)
-    write_answer(options, dict(part), out, text_table(*tables.shown(tables.modulus(part))) + words)
+    text = text_table(*tables.shown(tables.modulus(part))) + constants_text(part)
+    if isinstance(part, ImageResult):
+        measured = "area" if len(part.lower_GPa) == 3 else "volume"
+        text += "".join(f"{x}: {y:.1%} of the {measured}\n" for x, y in part.fractions.items())
+        text += f"{width_text(part)}\n"
+    else:
+        text += f"{UPPER_BOUND}\n" if part.particles == "mesh" else ""
+        text += f"{part.samples} samples, {part.solves} linear systems, "
+        text += f"{part.seconds:.1f} s, {part.method}\n"
+    write_answer(options, dict(part), out, text)
     return 0
 
 
-def image_text(result: ImageResult) -> str:
-    """Lines on an image: its constants, area fractions, and what widens the bounds of E."""
-    measured = "area" if len(result.lower_GPa) == 3 else "volume"
-    shares = (
-        f"{name}: {share:.1%} of the {measured}\n" for name, share in result.fractions.items()
-    )
-    constants = constants_text(result, Nature.GUARANTEED)
-    title = "tan δ, to first order in it"
-    losses = cuts_text(title, result.proved_losses, result.alpha, Nature.GUARANTEED)
-    return f"{constants}{losses}{''.join(shares)}{width_text(result)}\n"
-
-
-def modulus_text(result: ModulusResult) -> str:
-    """Lines on a modulus: constants on the lowest and highest level, references, and the cost."""
-    return (
-        cuts_text("of fibres", result.fibres, result.alpha, result.nature)
-        + constants_text(result, Nature.ATTAINED)
-        + (f"{UPPER_BOUND}\n" if result.particles == "mesh" else "")
-        + f"{result.samples} samples, {result.solves} linear systems,"
-        f" {result.seconds:.1f} s, {result.method}\n"
-    )
-
-
-def constants_text(part: ModulusResult | ImageResult, nature: Nature) -> str:
-    """Constants along x and y by definition, loss factors, and the bounds of an isotropic E."""
-    text = "".join(cuts_text(name, cuts, part.alpha, nature) for name, cuts in part.plane.items())
-    if PLANE_STRAIN in part.plane and len(part.plane) == 1:
+def constants_text(part: ModulusResult | ImageResult) -> str:
+    """Constants of fibres, along x and y by definition, loss factors, and bounds of isotropic E."""
+    groups, nature, proved_losses = part.plane, Nature.GUARANTEED, dict[str, CutsResult]()
+    if isinstance(part, ImageResult):
+        proved_losses = part.proved_losses
+    else:  # of a cell at most E is proved
+        groups, nature = {"of fibres": part.fibres, **groups}, Nature.ATTAINED
+    text = "".join(cuts_text(name, cuts, part.alpha, nature) for name, cuts in groups.items())
+    if [*part.plane] == [PLANE_STRAIN]:
         text += f"{ONLY}\n"
+    text += cuts_text("tan δ, to first order in it", proved_losses, part.alpha, nature)
     if (loss := part.loss) is not None and loss.nature is not Nature.GUARANTEED:
         rows, levels = [], end_levels(part.alpha)
         for name, cuts in (("E", loss.E), ("G", loss.G), ("K", loss.K)):

@@ -104,8 +104,9 @@ def _constants(part: ModulusResult | ImageResult) -> Iterator[Row]:
     cuts = cut_text(young, -1, nature), cut_text(young, 0, nature, error)
     error_cell = error_text(error, nature) if declares_error else "not declared"
     yield (f"E, GPa ({part.average})", *cuts, nature, error_cell)
-    for label, values in further.items():
-        yield (label, cut_text(values, -1, nature), cut_text(values, 0, nature), nature, "")
+    for label, values in further.items():  # of a cell at most E is proved
+        cuts = (cut_text(values, level, Nature.ATTAINED) for level in (-1, 0))
+        yield (label, *cuts, Nature.ATTAINED, "")
     if (loss := part.loss) is not None:
         cuts = cut_text(loss.E, -1, loss.nature), cut_text(loss.E, 0, loss.nature)
         error_cell = error_text(loss.error["E"], loss.nature) if loss.error else ""

@@ -26,8 +26,11 @@ if TYPE_CHECKING:
     import xarray
 
 DIGITS = 6
-RANGES = {"E from [GPa]": "E to [GPa]", "ν from": "ν to", "least peak": "greatest peak"}
-"""Columns of lower and upper ends that are rounded as the nature of their row demands."""
+RANGES = (
+    ("E from [GPa]", "E to [GPa]", "nature of E"),
+    ("least peak", "greatest peak", "nature"),
+)
+"""Columns of lower and upper ends that are rounded as the nature in a third one demands."""
 SIGNS = {"−": "-", "≤": r"\leq", "≥": r"\geq", "±": r"\pm", "²": "^2", "α": r"\alpha"}
 SIGNS |= {"ν": r"\nu", "ζ": r"\zeta"}
 SYMBOLS = {"…": r"\dots{}", "µ": r"\textmu{}", **{x: f"${sign}$" for x, sign in SIGNS.items()}}
@@ -72,7 +75,7 @@ def modulus(result: ModulusResult | ImageResult) -> pd.DataFrame:
         error = sum(result.error.values())
         columns |= {"ν from": result.nu_cuts.lower, "ν to": result.nu_cuts.upper}
         columns["± E [GPa]"] = error * young.upper if error else np.full(len(young.upper), np.nan)
-    return pd.DataFrame(columns).assign(nature=str(result.nature))
+    return pd.DataFrame(columns | {"nature of E": str(result.nature)})
 
 
 def update(result: IdentifiedResult) -> pd.DataFrame:
@@ -156,11 +159,11 @@ def over_time(data: xarray.Dataset, output: str, unit: str) -> pd.DataFrame:
 def shown(frame: pd.DataFrame) -> Table:
     """A data frame as texts, without columns that are empty."""
     filled = frame.dropna(axis=1, how="all")
-    for titles in RANGES.items():
-        if titles[0] in filled:
-            columns = (filled[x] for x in (*titles, "nature"))
+    for low, high, nature in RANGES:
+        if low in filled:
+            columns = (filled[x] for x in (low, high, nature))
             ends = [rounded_ends(x, y, Nature(z), DIGITS) for x, y, z in zip(*columns, strict=True)]
-            filled = filled.assign(**dict(zip(titles, zip(*ends, strict=True), strict=True)))
+            filled = filled.assign(**dict(zip((low, high), zip(*ends, strict=True), strict=True)))
     rows = [tuple(map(_text, row)) for row in filled.itertuples(index=False)]
     return Table(tuple(map(str, filled)), rows)
 

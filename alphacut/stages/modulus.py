@@ -56,7 +56,7 @@ class LossResult(Numbers):
 
 
 class ModulusResult(Numbers):
-    """α-cuts of a cell, moduli in GPa; their nature, relative errors of E, references and cost.
+    """α-cuts of a cell, moduli in GPa; nature and relative errors of E, references and cost.
 
     `fibres` has the constants of cylinders by name, as E_T_GPa; `plane` those along x and y by
     definition and name. Errors by source and checks are the largest of all samples.

@@ -135,7 +135,7 @@ def test_what_drives_the_peak_is_one_line_of_the_largest_shares():
 )
 def test_ends_of_a_range_are_never_printed_past_each_other(low, high, nature, text):
     assert range_text(low, high, nature, 5) == text
-    titles = {"E from [GPa]": [low], "E to [GPa]": [high], "nature": [str(nature)]}
+    titles = {"E from [GPa]": [low], "E to [GPa]": [high], "nature of E": [str(nature)]}
     lower, upper, _ = shown(pd.DataFrame(titles)).rows[0]
     assert float(lower.replace("−", "-")) <= float(upper.replace("−", "-"))
 

@@ -7,8 +7,10 @@ import pytest
 from alphacut.case.content import load
 from alphacut.fuzzy.refused import FailedError
 from alphacut.fuzzy.result import Nature
+from alphacut.questions.summary import Parts
+from alphacut.report.results import material
 from alphacut.stages.campaign import PLANS, CellCampaign
-from tests.alphacut.small import CELL, written
+from tests.alphacut.small import CELL, summary_of_run, written
 
 MODELS = {
     "series": (),
@@ -34,3 +36,12 @@ def test_cuts_agree_with_a_coarser_model_and_narrower_ones_do_not(tmp_path, mode
         wrong = replace(cuts, lower=factor * cuts.lower, upper=factor * cuts.upper, inner=None)
         with pytest.raises(FailedError, match=r"the proof is wrong: E of a cell inside a cut"):
             campaign.require_consistent(wrong)
+
+
+def test_only_e_whose_signs_are_proved_is_called_guaranteed(tmp_path):
+    changes = ("--set", "modulus.plan=signed", "--set", "cell.inclusion_poisson=0.3")
+    modulus = summary_of_run(written(tmp_path, CELL), *changes)["modulus"]
+    head, rows = material(Parts.model_validate({"modulus": modulus}))
+    natures = {row[0]: row[head.index("nature")] for row in rows}
+    assert natures.pop("E, GPa (isotropic)") == "guaranteed"
+    assert natures == {"ν": "attained", "E_T, GPa": "attained"}
