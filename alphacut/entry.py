@@ -19,8 +19,15 @@ from types import FrameType
 from alphacut.commands.options import Command, Parser, require_petsc, split_petsc
 from alphacut.fuzzy.campaign.campaign import CampaignError
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.io.files import check_destinations, rank, ranks, say, standard_output
-from alphacut.io.problem import BadInput, missing
+from alphacut.io.files import (
+    BadInput,
+    check_destinations,
+    missing,
+    rank,
+    ranks,
+    say,
+    standard_output,
+)
 from alphacut.io.provenance import own_version
 from alphacut.rve.interruption import STOP_SIGNALS, uninterrupted
 

@@ -16,7 +16,7 @@ from pydantic_core import ErrorDetails
 
 from alphacut.case.types import Quantity, Section
 from alphacut.fuzzy.refused import RefusedError, printable, require
-from alphacut.io.problem import BadInput, nearest, suggestion
+from alphacut.io.files import BadInput, nearest, suggestion
 from alphacut.stochastic.particles.csv_columns import text_of
 
 KINDS = {

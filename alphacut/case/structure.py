@@ -19,7 +19,7 @@ from alphacut.frame.structures.storey import SYMBOLS
 from alphacut.fuzzy import Crisp, FuzzyNumber, PiecewiseLinear
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError, require, require_choice
-from alphacut.io.problem import suggestion
+from alphacut.io.files import suggestion
 from alphacut.records.read import read_recording
 
 Mass = Annotated[FuzzyNumber, Quantity("kg", above=0, fuzzy=True)]

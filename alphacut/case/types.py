@@ -88,15 +88,14 @@ class Quantity:
         try:
             number = self._parsed(value)
             ends = [*number.support] if isinstance(number, FuzzyNumber) else [number]
-            fits = all(self.holds(end) for end in ends)
+            fits = all(
+                self.above < end < self.below and self.minimum <= end <= self.maximum
+                for end in ends
+            )
         except ValueError as error:
             fits, cure = False, str(error)
         require(fits, "", value, self.allowed, cure=cure)
         return number
-
-    def holds(self, value: float) -> bool:
-        """True if a value is in the range."""
-        return self.above < value < self.below and self.minimum <= value <= self.maximum
 
     def _parsed(self, value: object) -> FuzzyNumber | float | int:
         if self.is_integer and isinstance(value, int) and not isinstance(value, bool):

@@ -31,7 +31,7 @@ from alphacut.frame.verification.step_error import node_deviation
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal, Triangular
 from alphacut.fuzzy.refused import require
 from alphacut.fuzzy.result import Nature
-from alphacut.io.arrays import text_table
+from alphacut.io.files import text_table
 from alphacut.io.quantity import MINUS, STANDARD_GRAVITY, engineering, percent_text
 from alphacut.io.results import ResultsFolder
 from alphacut.report.results import AROUND

@@ -10,8 +10,7 @@ from typing import NoReturn, TextIO
 
 from alphacut.case.cell import CellContent
 from alphacut.fuzzy.refused import RefusedError, require
-from alphacut.io.files import as_json, write_text
-from alphacut.io.problem import suggestion
+from alphacut.io.files import as_json, suggestion, write_text
 
 PETSC_PREFIX = "-rve_"
 

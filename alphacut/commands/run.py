@@ -19,8 +19,7 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.campaign.workers import pool
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.fuzzy.result import Nature
-from alphacut.io.arrays import text_table
-from alphacut.io.files import locked, say, write_text
+from alphacut.io.files import locked, say, text_table, write_text
 from alphacut.io.provenance import FORMAT, command_line, command_to_paste, versions
 from alphacut.io.results import ResultsFolder
 from alphacut.questions.summary import SUMMARY, Parts, Results, Summary

@@ -105,15 +105,13 @@ def draw_figures(results: Results, store: StageStore, executor: Executor | None)
 
 
 def draw_part(results: Results, folder: Path, part: int) -> list[str]:
-    """Draws the figures whose index modulo `PARTS` is `part`; returns their paths in `folder`."""
+    """Draws the figures whose index modulo `PARTS` is `part`; returns their paths in `folder`.
+
+    Only in the case of the paper names of files have the paper's numbers.
+    """
+    paths = list[Path]()
     with figure_style():
-        return [
-            str(path.relative_to(folder))
-            for name, draw in list(drawings(results))[part::PARTS]
-            for path in save(draw(), folder / "figures" / file_stem(name, results))
-        ]
-
-
-def file_stem(name: str, results: Results) -> str:
-    """Name of a figure's files: with the paper's number only in the case of the paper."""
-    return name if results.is_paper else re.sub(r"^fig[\d-]+-", "", name)
+        for name, draw in list(drawings(results))[part::PARTS]:
+            stem = name if results.is_paper else re.sub(r"^fig[\d-]+-", "", name)
+            paths += save(draw(), folder / "figures" / stem)
+    return [str(path.relative_to(folder)) for path in paths]

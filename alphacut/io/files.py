@@ -1,4 +1,4 @@
-"""Output: places that are checked, whole files, one JSON object on standard output, one voice."""
+"""Output: places that are checked, whole files, one JSON object on standard output; messages."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ import secrets
 import shutil
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout, suppress
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -22,8 +23,13 @@ MIN_FREE_BYTES = 1 << 20
 """Bytes that a disk has at least where it is not full."""
 RANKS = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "MPI_LOCALRANKID")
 SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS")
-OUTPUTS = ("out", "json", "export", "csv")
+OUTPUTS = ("out", "json", "export", "csv", "tables")
 """Options that name what is written."""
+INSIDE = "ALPHACUT_INSIDE"
+"""Variable that ./enter sets."""
+ELEMENTS = ("dolfinx", "petsc4py", "mpi4py", "basix", "ufl", "cffi", "gmsh", "meshio", "h5py")
+EXTRAS = {"skimage": "particles", **dict.fromkeys(ELEMENTS, "cell")}
+"""Extras of the installation by the libraries that they bring."""
 Document = dict[str, Any]
 """A JSON document: numbers, texts, lists and documents by name; its reader knows their types."""
 
@@ -119,6 +125,14 @@ def say(message: str) -> None:
             print(f"{bar_end}alphacut: {printable(message)}", file=sys.stderr, flush=True)
 
 
+def text_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Lines of a table of texts: the first column to the left, the others to the right."""
+    lines = [[*head], *map(list, rows)]
+    first, *further_widths = (max(len(line[k]) for line in lines) for k in range(len(head)))
+    aligned = ([line[0].ljust(first), *map(str.rjust, line[1:], further_widths)] for line in lines)
+    return "".join(f"{'  '.join(line).rstrip()}\n" for line in aligned)
+
+
 def check_destinations(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
     """Refuses options of a command that name files or folders where nothing can be written."""
     for action in parser._actions:
@@ -167,3 +181,30 @@ def locked(option: str, folder: Path) -> Iterator[None]:
         yield
     finally:
         os.close(handle)
+
+
+class BadInput(Exception):  # noqa: N818 - it names the input, not the program, as the culprit
+    """An input that cannot be used; `problems` are all that is wrong with it."""
+
+    def __init__(self, problems: Iterable[RefusedError]) -> None:
+        self.problems = tuple(problems)
+        super().__init__("\n".join(map(str, self.problems)))
+
+
+def nearest(name: str, names: Iterable[str]) -> str:
+    """The known name that comes nearest to `name`; empty if none comes near."""
+    folded = {option.lower(): option for option in names}
+    close = get_close_matches(name.lower().replace("-", "_"), folded, n=1, cutoff=0.6)
+    return folded[close[0]] if close else ""
+
+
+def suggestion(name: str, names: Iterable[str]) -> str:
+    """Words on the known name that comes nearest; empty if none comes near."""
+    return f"did you mean {close}?" if (close := nearest(name, names)) else ""
+
+
+def missing(error: ImportError) -> str:
+    """Message for an import that failed, with its cure."""
+    library = (error.name or "").partition(".")[0]
+    cure = f"pip install '.[{EXTRAS[library]}]'" if library in EXTRAS else f"install {library}"
+    return f"{error}; {cure}" + ("" if os.environ.get(INSIDE) else ", or run inside ./enter")

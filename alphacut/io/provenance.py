@@ -19,7 +19,7 @@ from types import FunctionType
 import numpy as np
 from pydantic import BaseModel
 
-from alphacut.io.problem import INSIDE
+from alphacut.io.files import INSIDE
 
 FORMAT = 4
 """Format of a folder of results. 4: a manifest of files by name, JSON beside NetCDF files."""

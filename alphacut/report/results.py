@@ -10,7 +10,7 @@ import numpy as np
 
 from alphacut.frame.structures.quantities import output_of
 from alphacut.fuzzy.result import Nature, rounded
-from alphacut.io.arrays import text_table
+from alphacut.io.files import text_table
 from alphacut.io.quantity import (
     MINUS,
     STANDARD_GRAVITY,

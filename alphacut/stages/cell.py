@@ -22,7 +22,7 @@ from alphacut.case.material import (
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import FailedError, RefusedError
-from alphacut.io.problem import missing
+from alphacut.io.files import missing
 from alphacut.rve.cell.cell import AnyPhase, Cell, Phase
 from alphacut.rve.cell.outline import circle
 from alphacut.rve.result.moduli import AXES, hashin_shtrikman, plane_constants

@@ -135,8 +135,8 @@ def stage(structure: Structure, task: EnvelopeTask, record: SuiteRecord) -> Stag
     record_task = replace(task, name=record.name, duration=record.duration)
     inputs = [loaded.model, loaded.numbers, record_task]
     compute = partial(record_task.compute_peaks, loaded, nodes=NODES)
-    stage = Stage(f"record_{record.name}", inputs, ("fuzzy", "frame"), PeakResults, compute)
-    return replace(stage, work=record.duration)
+    name, packages = f"record_{record.name}", ("fuzzy", "frame")
+    return Stage(name, inputs, packages, PeakResults, compute, work=record.duration)
 
 
 def worst_peaks(peaks: Mapping[str, Peaks]) -> dict[str, Peak]:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from alphacut.case.content import load
-from alphacut.io.problem import BadInput
+from alphacut.io.files import BadInput
 from tests.alphacut.small import written
 
 WIND = "time [s],force [kN]\n0,2\n0.5,-4\n1,3\n"

@@ -8,7 +8,7 @@ import pytest
 from alphacut.case.content import load
 from alphacut.fuzzy import Interval, Triangular
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.io.problem import BadInput
+from alphacut.io.files import BadInput
 from tests.alphacut.small import CELL, FRAME
 
 ROOT = Path(__file__).parents[3]

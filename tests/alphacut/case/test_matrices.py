@@ -9,7 +9,7 @@ from alphacut.case.content import load
 from alphacut.frame import Exact, LinearFlow, StoreyFrame
 from alphacut.frame.structures.matrix import Monomial
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.io.problem import BadInput
+from alphacut.io.files import BadInput
 
 CASE = """
 title = "Two storeys as matrices"

@@ -7,7 +7,7 @@ from alphacut.entry import main
 from alphacut.frame import Accelerogram, MatrixStructure, Proof, StoreyFrame, envelope
 from alphacut.fuzzy import Crisp, FailedError, General, RefusedError, propagate
 from alphacut.fuzzy.refused import checked_number
-from alphacut.io.problem import missing
+from alphacut.io.files import missing
 from tests.alphacut.small import FRAME, written
 
 CURE = "take it from the head of the file"

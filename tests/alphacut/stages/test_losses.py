@@ -9,7 +9,7 @@ from alphacut.case.structure import MaterialDamping
 from alphacut.frame import MatrixStructure
 from alphacut.frame.structures.matrix import modal_energy_shares
 from alphacut.fuzzy import Crisp, Triangular
-from alphacut.io.problem import BadInput
+from alphacut.io.files import BadInput
 from tests.alphacut.small import CELL, summary_of_run, written
 
 LOSSES = 'matrix_loss = "[1.4, 2, 2.6] %"\ninclusion_loss = "[0.35, 0.5, 0.65] %"\n'

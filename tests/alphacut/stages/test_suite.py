@@ -8,7 +8,7 @@ import pytest
 
 from alphacut.case.content import load
 from alphacut.entry import main
-from alphacut.io.problem import BadInput
+from alphacut.io.files import BadInput
 from alphacut.questions.fragility import FragilityAnswer
 from alphacut.records.recording import spectral_acceleration
 from alphacut.stages.suite import nominal_mode, suite_records
