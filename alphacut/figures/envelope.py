@@ -76,19 +76,19 @@ def time_axes(axes: Axes, time: Array, output: Output) -> None:
     style.prefix_axis(axes, output.words.removesuffix(f" ({output})"), output.unit)
 
 
-def mapping(results: Results, *, count: int = 40, duration: float = 5.0) -> Figure:
-    """Fig. 20: `count` motions of random inputs in the lowest cut, and the envelope around them."""
+def mapping(results: Results) -> Figure:
+    """Fig. 20: 40 motions of random inputs in the lowest cut for 5 s, and their envelope."""
     task = next((x for x in results.tasks if len(x.fuzzy) > 1), results.tasks[0])
     dataset, structure = results.envelopes[task.name].arrays.isel(alpha=0), results.structure
     assert structure is not None
     names = [str(name) for name in dataset["output"].values]
     output = names[-1] if "q" in names[-1] else names[0]  # the last one if it is a displacement
     inputs, step = structure.inputs(task.fuzzy), task.section.step
-    end = round(min(duration, task.duration) / step) * step
+    end = round(min(5.0, task.duration) / step) * step
     scheme = task.section.integrator or ("exact" if structure.frame else "midpoint")
     flow = make_flow(structure.model, tuple(inputs), end, step, scheme)
     lower, upper = np.array([x.cut(float(dataset["alpha"])) for x in inputs.values()]).T
-    points = np.random.default_rng(0).uniform(lower, upper, (count, len(inputs)))
+    points = np.random.default_rng(0).uniform(lower, upper, (40, len(inputs)))
     curves = flow.values(points)[:, :, list(flow.outputs).index(output)]
     figure, axes = plt.subplots()
     axes.plot(flow.time, curves.T, color=BLUE, lw=0.5, alpha=0.5)
@@ -97,7 +97,7 @@ def mapping(results: Results, *, count: int = 40, duration: float = 5.0) -> Figu
         axes.plot(flow.time, shown[side], color=INK, lw=1.3)
     time_axes(axes, flow.time, Output(output, structure.unit(output)))
     level = f"α = {float(dataset['alpha']):g}"
-    axes.set_title(f"{output} at {level}: {count} random motions (blue) and their envelope")
+    axes.set_title(f"{output} at {level}: {len(points)} random motions (blue) and their envelope")
     return figure
 
 
