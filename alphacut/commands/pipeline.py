@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from concurrent.futures import Executor
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from alphacut import frame
 from alphacut.case.content import Case, Content, load
@@ -26,12 +25,9 @@ from alphacut.fuzzy.progress_bar import progress_reporter
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io.files import Document, locked, rank, require_writable, say
 from alphacut.io.results import MANIFEST, ResultsFolder
-from alphacut.questions.decision import decide
-from alphacut.questions.fragility import fragility
-from alphacut.questions.probability import probability
 from alphacut.questions.question import Answer, FuzzyResponse
 from alphacut.questions.summary import ANSWERS, Results
-from alphacut.questions.tolerances import admissible_tolerances, require_admissible_scale
+from alphacut.questions.tolerances import require_admissible_scale
 from alphacut.stages import campaign, cell, envelope, identify, image, microstructure, shares, suite
 from alphacut.stages.campaign import CellCampaign
 from alphacut.stages.envelope import EnvelopeTask, PeakResults, peaks_of
@@ -77,15 +73,6 @@ def open_results(
             results.clear()
         progress = RunProgress(tick or no_progress)
         yield case, StageStore(results, case.text, fresh, options.workers, progress)
-
-
-QUESTIONS: dict[str, Callable[[Any, FuzzyResponse], Answer]] = {
-    "probability": probability,
-    "decision": decide,
-    "tolerances": admissible_tolerances,
-    "fragility": fragility,
-}
-"""Function from the section of each question and a response to the answer, by the section's key."""
 
 
 @dataclass
@@ -178,7 +165,7 @@ class Pipeline:
             response = response_of(structure, task, peaks)
         for kind in ANSWERS:
             if (question := content.questions.get(kind.key)) is not None:
-                compute, inputs = partial(answer_of, question, response), [question, response]
+                compute, inputs = partial(answer_of, kind, question, response), [question, response]
                 stage = Stage(kind.key, inputs, ("fuzzy", "frame", "alphacut"), kind, compute)
                 results.answers[kind.key] = self.store.take(stage).numbers
 
@@ -237,10 +224,10 @@ def foreseen_seconds(content: Content) -> dict[str, float]:
 
 
 def answer_of(
-    section: QuestionSection, response: FuzzyResponse, context: StageContext
+    kind: type[Answer], section: QuestionSection, response: FuzzyResponse, context: StageContext
 ) -> StageResult[Answer]:
-    """The answer to the question of a section about a response."""
-    return StageResult(QUESTIONS[section.key](section, replace(response, progress=context.tick)))
+    """The answer of a kind to the question of a section about a response."""
+    return StageResult(ANSWERS[kind](section, replace(response, progress=context.tick)))
 
 
 def response_of(

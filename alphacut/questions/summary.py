@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Self
 
@@ -15,11 +16,11 @@ from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io.files import Document, as_json
 from alphacut.io.quantity import STANDARD_GRAVITY
 from alphacut.io.results import COMPLETE, RUN_AGAIN, ResultsFolder, plain_name
-from alphacut.questions.decision import DecisionAnswer
-from alphacut.questions.fragility import FragilityAnswer
-from alphacut.questions.probability import ProbabilityAnswer
-from alphacut.questions.question import Answer
-from alphacut.questions.tolerances import TolerancesAnswer
+from alphacut.questions.decision import DecisionAnswer, decide
+from alphacut.questions.fragility import FragilityAnswer, fragility
+from alphacut.questions.probability import ProbabilityAnswer, probability
+from alphacut.questions.question import Answer, FuzzyResponse
+from alphacut.questions.tolerances import TolerancesAnswer, admissible_tolerances
 from alphacut.stages.envelope import EnvelopeResult, EnvelopeTask
 from alphacut.stages.identify import LearnedResult
 from alphacut.stages.image import ImageResult
@@ -31,13 +32,13 @@ from alphacut.stages.suite import SuiteResult
 SUMMARY = "summary.json"
 PlainName = Annotated[str, AfterValidator(plain_name)]
 """A name that leads out of no folder, as it becomes part of the name of a file."""
-ANSWERS: tuple[type[Answer], ...] = (
-    ProbabilityAnswer,
-    DecisionAnswer,
-    TolerancesAnswer,
-    FragilityAnswer,
-)
-"""Kinds of answers in the order of the report."""
+ANSWERS: dict[type[Answer], Callable[[Any, FuzzyResponse], Answer]] = {
+    ProbabilityAnswer: probability,
+    DecisionAnswer: decide,
+    TolerancesAnswer: admissible_tolerances,
+    FragilityAnswer: fragility,
+}
+"""Kinds of answers in the order of the report, each with its function of section and response."""
 
 
 class FrameResult(Numbers):
