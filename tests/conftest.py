@@ -74,9 +74,9 @@ def shipped_run(tmp_path_factory, worker_id):
 @pytest.fixture(scope="session")
 def two_floors(tmp_path_factory):
     """Folder of the results, with figures, of a frame of two floors that asks every question."""
-    from tests.alphacut import one_case
+    from tests.alphacut.small import two_floors_run
 
-    return one_case.run(tmp_path_factory.mktemp("two-floors"))
+    return two_floors_run(tmp_path_factory.mktemp("two-floors"))
 
 
 def digest(key):

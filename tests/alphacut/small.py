@@ -1,4 +1,4 @@
-"""Cases of a second for the tests of the front door."""
+"""Cases of a second for the tests of the front door, and one that asks every question."""
 
 import json
 
@@ -43,6 +43,35 @@ plan = "reduced"
 alpha = [0, 1]
 tolerance = 1e-6
 """
+TWO_FLOORS = """
+title = "Two floors <script>alert(1)</script>"
+about = "A frame that asks every question, made by `a <b> command`"
+stages = ["envelope"]
+[frame]
+modulus = "[24, 25, 26] GPa"
+second_moment = "1e-6 m^4"
+masses = ["[8.5, 9, 9.5] t", "7 t"]
+lengths = ["2.4 m", "3 m"]
+dampers = ["90 N s/m", "60 N s/m"]
+damper_placement = "storey"
+displacements = ["50 mm", "0 mm"]
+velocities = ["0 m/s", "0.4 m/s"]
+outputs = ["q2", "drift1"]
+[envelope]
+fuzzy = ["E", "m1"]
+alpha = [0, 0.5, 1]
+duration = "2 s"
+step = "0.02 s"
+[probability]
+limits = ["q2 <= 300 mm", "drift1 <= 5 %"]
+random = ["m1"]
+samples = 20
+[decision]
+limits = ["q2 <= 300 mm", "drift1 <= 5 %"]
+[tolerances]
+limits = ["q2 <= 280 mm"]
+most = 3
+"""
 
 
 def written(folder, text=FRAME, **changes):
@@ -61,3 +90,11 @@ def summary_of_run(case, *options):
     words = ["--quiet", "--no-figures", "--out", str(out), *options]
     assert main(["run", str(case), *words]) == 0
     return json.loads((out / "summary.json").read_text(encoding="utf-8"))
+
+
+def two_floors_run(folder, *options):
+    """The folder of the results of the frame of two floors."""
+    case = folder / "two-floors.toml"
+    case.write_text(TWO_FLOORS, encoding="utf-8")
+    assert main(["run", str(case), "--quiet", "--out", str(folder / "out"), *options]) == 0
+    return folder / "out"

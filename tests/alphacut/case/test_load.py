@@ -111,6 +111,7 @@ CELLS = [
     ("matrix_poisson = 0.3", "matrix_poisson = 0.5", "cell.matrix_poisson"),
     ('method = "series"', 'method = "prism"\n[cell2]\n', "cell2"),
     ('"series"', '"slices"', "modulus.method"),
+    ("a1 = 0.3\na2 = [0.1, 0.2, 0.3]\na3 = 0.6\na4 = 0.2", "theta = [-3, 3]", "radius.a1"),
 ]
 
 

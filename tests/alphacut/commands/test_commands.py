@@ -109,6 +109,8 @@ REFUSED = [
     ("identify case.toml", "sections [identify]"),
     ("microstructure case.toml", "[microstructure]"),
     ("report none", "without summary.json"),
+    ("report none nowhere", "without summary.json"),
+    ("report a b c", "3 folders; allowed: one or two"),
     ("verify none", "allowed: results of a run with an envelope"),
     ("check case.toml --set frame.masses=[]", "frame.masses is []; allowed: one entry or more"),
     ("check case.toml --set frame.masses", "frame.masses, without a value; allowed: KEY=VALUE"),

@@ -19,7 +19,7 @@ from alphacut.rve import Cell, Phase
 from alphacut.stages.store import CutsResult
 from alphacut.stochastic import HermiteMap
 from alphacut.stochastic.figures.style import figure_style
-from tests.alphacut.one_case import run
+from tests.alphacut.small import two_floors_run
 
 
 def kept(folder):
@@ -30,13 +30,13 @@ def test_figures_are_drawn_once_and_anew_where_the_case_changed(two_floors, tmp_
     folder = shutil.copytree(two_floors, tmp_path / "out")
     drawn = folder / "figures" / "decision.png"
     os.utime(drawn, (1, 1))
-    run(tmp_path)
+    two_floors_run(tmp_path)
     assert drawn.stat().st_mtime == 1
     drawn.unlink()
-    run(tmp_path)
+    two_floors_run(tmp_path)
     assert drawn.is_file()
     before = drawn.stat().st_mtime_ns
-    run(tmp_path, "--set", "decision.limits=['q2 <= 10 mm']")
+    two_floors_run(tmp_path, "--set", "decision.limits=['q2 <= 10 mm']")
     assert drawn.stat().st_mtime_ns > before
 
 

@@ -11,13 +11,15 @@ from alphacut.entry import main
 from alphacut.questions.summary import Parts
 from alphacut.report.results import comparison
 from alphacut.stages.suite import Statistics, SuiteResult
-from tests.alphacut.one_case import run
+from tests.alphacut.small import two_floors_run
 
 
 @pytest.fixture(scope="module")
 def runs(two_floors, tmp_path_factory):
     stiffer = "frame.modulus='[44, 45, 46] GPa'"
-    return two_floors, run(tmp_path_factory.mktemp("stiffer"), "--no-figures", "--set", stiffer)
+    return two_floors, two_floors_run(
+        tmp_path_factory.mktemp("stiffer"), "--no-figures", "--set", stiffer
+    )
 
 
 def test_two_runs_stand_side_by_side(runs, capsys):
@@ -58,14 +60,3 @@ def test_the_comparison_and_all_tables_are_written(runs, tmp_path):
     text = (tmp_path / "decision.tex").read_text(encoding="utf-8")
     assert r"$\leq$" in text
     assert "≤" not in text
-
-
-@pytest.mark.parametrize(
-    ("words", "message"), [(["{a}", "{a}", "{a}"], "3 folders"), (["{a}", "nowhere"], "nowhere")]
-)
-def test_what_cannot_be_compared_is_said_in_one_line(runs, words, message, capsys):
-    named = dict(zip("ab", map(str, runs), strict=True))
-    assert main(["report", *(word.format(**named) for word in words)]) == 2
-    error = capsys.readouterr().err
-    assert message in error
-    assert error.count("\n") == 1

@@ -134,13 +134,6 @@ def test_what_does_not_fit_is_refused_in_one_line(tmp_path, capsys, old, new, me
         assert "samples failed" not in said
 
 
-def test_the_law_alone_needs_a_mesh(tmp_path, capsys):
-    lines = [line for line in CELL.splitlines() if not line.startswith(("a1", "a2", "a3", "a4"))]
-    case = written(tmp_path, "\n".join([*lines[:4], "theta = [-3, 3]", *lines[4:]]))
-    assert main(["check", str(case)]) == 2
-    assert "radius.a1" in capsys.readouterr().err
-
-
 def test_phases_of_a_mesh_have_losses_by_name_whatever_their_order(tmp_path):
     lines = TEXT.splitlines()
     rows = [
