@@ -33,7 +33,8 @@ RANGES = (
 """Columns of lower and upper ends that are rounded as the nature in a third one demands."""
 SIGNS = {"−": "-", "≤": r"\leq", "≥": r"\geq", "±": r"\pm", "²": "^2", "α": r"\alpha"}
 SIGNS |= {"ν": r"\nu", "ζ": r"\zeta"}
-SYMBOLS = {"…": r"\dots{}", "µ": r"\textmu{}", **{x: f"${sign}$" for x, sign in SIGNS.items()}}
+SYMBOLS = str.maketrans({x: f"${sign}$" for x, sign in SIGNS.items()})
+SYMBOLS |= str.maketrans({"…": r"\dots{}", "µ": r"\textmu{}"})
 """What LaTeX's fonts do not have."""
 
 
@@ -205,4 +206,4 @@ def latex(table: Table) -> str:
     """A tabular environment, with rules of the package booktabs."""
     frame, columns = pd.DataFrame(table.rows, columns=table.head), "l" + "r" * (len(table.head) - 1)
     text: str = frame.to_latex(index=False, escape=True, column_format=columns)
-    return text.translate(str.maketrans(SYMBOLS))
+    return text.translate(SYMBOLS)
