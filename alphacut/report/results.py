@@ -105,8 +105,8 @@ def _constants(part: ModulusResult | ImageResult) -> Iterator[Row]:
     error_cell = error_text(error, nature) if declares_error else "not declared"
     yield (f"E, GPa ({part.average})", *cuts, nature, error_cell)
     for label, values in further.items():  # of a cell at most E is proved
-        cuts = (cut_text(values, level, Nature.ATTAINED) for level in (-1, 0))
-        yield (label, *cuts, Nature.ATTAINED, "")
+        texts = (cut_text(values, level, Nature.ATTAINED) for level in (-1, 0))
+        yield (label, *texts, Nature.ATTAINED, "")
     if (loss := part.loss) is not None:
         cuts = cut_text(loss.E, -1, loss.nature), cut_text(loss.E, 0, loss.nature)
         error_cell = error_text(loss.error["E"], loss.nature) if loss.error else ""

@@ -16,12 +16,12 @@ from alphacut.case.loads import RecordsSection
 from alphacut.case.motion import EnvelopeSection
 from alphacut.case.structure import Structure
 from alphacut.frame import Accelerogram
+from alphacut.frame.boxes import boxes
 from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.questions.peaks import PEAK_BOUNDS, Peak, Peaks
 from alphacut.frame.structures.linear import modal_damping_ratios
 from alphacut.frame.structures.quantities import output_of
-from alphacut.fuzzy import FuzzyNumber
-from alphacut.fuzzy.arrays import Array, Mask
+from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.fuzzy.result import Nature
 from alphacut.io.quantity import percent_text
@@ -169,13 +169,16 @@ def with_means(
     peaks are read at time nodes, so that the structure's own mean is no smaller.
     """
     magnitudes = tuple(name for name in worst if name == output_of(name))
-    inputs, levels = structure.inputs(task.fuzzy), task.section.alpha
-    points, inside = _tried_points(inputs, levels)
+    cuts = boxes(structure.inputs(task.fuzzy), task.section.alpha)
+    ends = (zip(low, high, strict=True) for low, high in zip(cuts.lower, cuts.upper, strict=True))
+    corners = (corner for pairs in ends for corner in islice(product(*pairs), MAX_CORNERS))
+    points = np.unique([cuts.nominal, *corners], axis=0)
+    inside = ((points >= cuts.lower[:, None]) & (points <= cuts.upper[:, None])).all(axis=-1)
     tried_means: Array = np.zeros((len(points), len(magnitudes)))
     for record in records:
         model = with_record(structure, record).model_with_outputs("records", magnitudes)
         step = task.section.step / NODES
-        flow = make_flow(model, tuple(inputs), record.duration, step, "exact")
+        flow = make_flow(model, cuts.names, record.duration, step, "exact")
         columns = [[*map(str, flow.outputs)].index(output) for output in magnitudes]
         tried_means += np.abs(flow.values(points)).max(axis=1)[:, columns] / len(records)
     found = dict(worst)
@@ -190,21 +193,9 @@ def with_means(
         minima_of_higher_cuts = np.maximum.accumulate(mean_minima[::-1])[::-1]
         means["reached"] = np.maximum(minima_of_higher_cuts, in_cuts.max(axis=1))
         means["least_upper"] = np.full_like(mean_minima, np.inf)  # nothing bounds one structure's
-        reached_at = dict(zip(inputs, points[in_cuts[0].argmax()].tolist(), strict=True))
+        reached_at = dict(zip(cuts.names, points[in_cuts[0].argmax()].tolist(), strict=True))
         found[f"mean {name}"] = replace(worst[name], reached_at=reached_at, **means)
     return found
-
-
-def _tried_points(inputs: Mapping[str, FuzzyNumber], levels: Sequence[float]) -> tuple[Array, Mask]:
-    """Nominal inputs and corners of cuts, (points, inputs); which lie in each, (levels, points)."""
-    rows = [tuple(number.nominal for number in inputs.values())]
-    for alpha in levels:
-        corners = product(*(dict.fromkeys(number.cut(alpha)) for number in inputs.values()))
-        rows += islice(corners, MAX_CORNERS)
-    points = np.array(rows, float)
-    cuts = np.array([[number.cut(alpha) for number in inputs.values()] for alpha in levels])
-    is_inside = (points >= cuts[:, None, :, 0]) & (points <= cuts[:, None, :, 1])
-    return points, np.asarray(is_inside.all(axis=-1))
 
 
 class RecordResult(Numbers):
