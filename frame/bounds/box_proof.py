@@ -112,24 +112,17 @@ def refusing() -> Iterator[None]:
 
 
 class Hull:
-    """Bounds of (−output, output) on A levels, at T nodes, of m outputs, from those of boxes.
-
-    Attributes:
-        closed: Proved upper bounds of closed boxes, shape (A, T, m, 2).
-        inner: Largest reached values, the same shape.
-        at: Their inputs, shape (A, T, m, 2, n), in SI units.
-        least_lower: Lower bound of each output's least peak over time, shape (A, m).
-        least_upper: Peak over time of a motion that peaks low, the same shape.
-        facts: Numbers by name.
-    """
+    """Bounds of (−output, output) on A levels, at T nodes, of m outputs, from those of boxes."""
 
     def __init__(self, problem: UnitFlow, flow: LinearFlow) -> None:
         self.problem, self.flow, names = problem, flow, problem.boxes.names
         levels, outputs = len(problem.boxes.alpha), len(flow.outputs)
         shape = (levels, len(flow.time), outputs, 2)
+        # proved upper bounds of closed boxes, largest reached values, and their inputs, in SI units
         self.closed, self.inner = np.full((2, *shape), -np.inf)
         self.at = np.zeros((*shape, len(names)))
         self.between, self.attained_error = np.zeros((2, *shape[1:3]))
+        # of each output's least peak over time a lower bound, and the peak of a motion that is low
         self.least_lower, self.least_upper = np.full((2, levels, outputs), np.inf)
         self.facts: dict[str, float] = {"parts": 0}
 

@@ -76,14 +76,7 @@ def prove(proof: BoxProof, flow: UnitFlow, progress: Progress | None = None) -> 
 
 
 class Queue:
-    """Open boxes, best first, and the hull of the closed ones, on A levels.
-
-    Attributes:
-        number: Boxes that a peak was bounded on, shape (A, m, 2).
-        first_gap: Its gap after the first of them.
-        abandoned: Peaks whose gaps fall too slowly.
-        gap_shares: Fraction of each input in a peak's gap, shape (A, m, 2, n).
-    """
+    """Open boxes, best first, and the hull of the closed ones, on A levels."""
 
     def __init__(self, proof: BoxProof, problem: UnitFlow) -> None:
         self.proof, self.problem, boxes = proof, problem, problem.boxes
@@ -96,10 +89,10 @@ class Queue:
         self.refusals, self.pushes = 0, 0
         self.heap: list[tuple[float, int, SubBox]] = []
         levels, _, outputs, _ = shape = self.hull.closed.shape
-        peaks = (levels, outputs, 2)
+        peaks = (levels, outputs, 2)  # boxes that each was bounded on, and its gap after the first
         self.number, self.first_gap = np.zeros(peaks, int), np.full(peaks, np.nan)
-        self.abandoned = np.zeros(peaks, bool)
-        self.gap_shares = np.zeros((*peaks, len(boxes.names)))
+        self.abandoned = np.zeros(peaks, bool)  # whose gaps fall too slowly
+        self.gap_shares = np.zeros((*peaks, len(boxes.names)))  # of each input in a peak's gap
         is_open, outer, least = np.ones(peaks, bool), np.full(shape, np.inf), np.zeros(peaks[:2])
         self._push(SubBox(boxes, [*range(levels)], is_open, outer, least, np.ones(levels, bool)))
 

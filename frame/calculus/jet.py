@@ -18,17 +18,11 @@ Array = NDArray[Any]
 
 @dataclass(frozen=True, eq=False)
 class Jet:
-    """Value of shape V with derivatives along d parameters; broadcasts over V.
+    """Value of shape V with derivatives along d parameters; broadcasts over V."""
 
-    Args:
-        value: Shape V.
-        first: First derivatives, shape (d, *V).
-        second: Second derivatives, shape (d, d, *V), symmetric in the first two axes.
-    """
-
-    value: Array
-    first: Array
-    second: Array
+    value: Array  # V
+    first: Array  # first derivatives, (d, *V)
+    second: Array  # second derivatives, (d, d, *V), symmetric in the first two axes
 
     __array_ufunc__ = None  # an array on the left leaves the operation to the jet
 

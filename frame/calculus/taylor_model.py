@@ -247,17 +247,10 @@ class TaylorModel:
     def __add__(self, other: TaylorModel | ArrayLike) -> TaylorModel:
         """Sum entry by entry, with its rounding in the remainder."""
         b = other if isinstance(other, TaylorModel) else self.like(_numbers(other))
-        shape = np.broadcast_shapes(self.shape, b.shape)
-        parts = []
-        for degree in range(max(len(self.parts), len(b.parts))):
-            kind = np.result_type(self.parts[0], b.parts[0])
-            part = np.zeros((count(self.inputs, degree), *shape), kind)
-            for x in (self, b):
-                if degree < len(x.parts):
-                    part += _padded(x.parts[degree], len(shape))
-            parts.append(part)
+        degrees, n = range(max(len(self.parts), len(b.parts))), max(len(self.shape), len(b.shape))
+        parts = tuple(_padded(self.part(k), n) + _padded(b.part(k), n) for k in degrees)
         remainder, order = self.remainder + b.remainder, max(self.order, b.order)
-        return TaylorModel(tuple(parts), remainder, self.inputs, order).with_rounding(1)
+        return TaylorModel(parts, remainder, self.inputs, order).with_rounding(1)
 
     __radd__ = __add__
 
@@ -401,6 +394,8 @@ def solve(matrix: TaylorModel, right: TaylorModel) -> TaylorModel:
     Raises:
         UnprovedError: A may be singular.
     """
+    middle_inverse = np.linalg.inv(matrix.value)
+    matrix, right = middle_inverse @ matrix, middle_inverse @ right
     found, bound = solution_series(matrix, right), inverse_bound(matrix)
     if bound is None:
         raise UnprovedError("a matrix may be singular in the box", "take narrower inputs")

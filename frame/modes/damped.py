@@ -119,7 +119,6 @@ class DampedModes:
     rate: TaylorModel  # λ_k, Im λ_k > 0, (n,), in 1/s
     shape: TaylorModel  # φ_k of each source, (S, n, N)
     velocity: TaylorModel  # w_k ≈ λ_k φ_k, (S, n, N)
-    share: TaylorModel  # C_k ≈ the outputs of [φ_k, w_k], (S, n, m)
 
     @classmethod
     def of_structure(cls, structure: DampedStructure, chosen: Ints) -> DampedModes:
@@ -137,9 +136,7 @@ class DampedModes:
         weighted = (rate * 2.0)[:, None] * (shape @ structure.mass) + shape @ damping
         norm = (weighted * shape) @ np.ones((len(structure.omega), 1))
         shape = ((force * _reciprocal(norm)).T[..., None] * shape).polynomial
-        velocity = (rate[:, None] * shape).polynomial
-        modes = cls(rate, shape, velocity, shape)
-        return cls(rate, shape, velocity, modes.outputs(structure).polynomial)
+        return cls(rate, shape, (rate[:, None] * shape).polynomial)
 
     def ratio_force(self, structure: DampedStructure) -> TaylorModel:
         """Damping force 2 ζ |λ_k| M w_k of modes by a ratio ζ, shape (S, n, N)."""

@@ -44,14 +44,15 @@ class ModalModel:
         cls, flow: LinearFlow, boxes: Boxes, structure: DampedStructure, modes: DampedModes
     ) -> ModalModel:
         """The motion that modes of a structure have."""
-        free, *forced = (modes.share[s] for s in range(modes.share.shape[0]))
+        shares = modes.outputs(structure).polynomial
+        free, *forced = (shares[s] for s in range(shares.shape[0]))
         courses = histories(flow.system).values()
         loads = [
             LoadTables(history, flow.time, modes.rate, share)
             for history, share in zip(courses, forced, strict=True)
         ]
         if structure.feeds is not None:  # 2 Re C_1 a(t) with half of it as C_1
-            first = np.zeros((modes.share.shape[1], 1))
+            first = np.zeros((shares.shape[1], 1))
             first[0] = 0.5
             for h, history in enumerate(distinct_histories(flow.system.loads)):
                 share = (structure.feeds[:, h] * first).polynomial

@@ -45,7 +45,7 @@ def classical_structure(system: LinearSystem, parameters: Mapping[str, TaylorMod
     _require_classical(assembly)
     q0, v0 = assembly.q0, assembly.v0
     if assembly.static is not None:
-        q0 = q0 + _solved(assembly.stiffness, assembly.static)[:, 0]
+        q0 = q0 + solve(assembly.stiffness, assembly.static)[:, 0]
     if assembly.impulse is not None:
         v0 = v0 + _accelerations(assembly, assembly.impulse)[:, 0]
     forced, names = dict[str, TaylorModel](), [x for x in histories(system) if x != "load"]
@@ -71,7 +71,7 @@ def classical_structure(system: LinearSystem, parameters: Mapping[str, TaylorMod
 def _accelerations(assembly: Assembly[TaylorModel], forces: TaylorModel) -> TaylorModel:
     """Accelerations M⁻¹ b by forces b, shape (n, k); zero for unknowns without mass."""
     a, n = assembly.massive, len(assembly.pattern)
-    return np.eye(n)[:, a] @ _solved(assembly.mass[a[:, None], a], forces[a])
+    return np.eye(n)[:, a] @ solve(assembly.mass[a[:, None], a], forces[a])
 
 
 def _require_classical(assembly: Assembly[TaylorModel]) -> None:
@@ -88,9 +88,3 @@ def _require_classical(assembly: Assembly[TaylorModel]) -> None:
     displacements, velocities = np.split(assembly.rows, 2, axis=1)
     if (displacements.any(1) & velocities.any(1)).any():
         raise UnprovedError("an output mixes displacements and velocities", "observe them apart")
-
-
-def _solved(matrix: TaylorModel, right: TaylorModel) -> TaylorModel:
-    """Solution A⁻¹ B as that of A₀⁻¹ A and A₀⁻¹ B, A₀ the middle of A."""
-    first: Array = np.asarray(np.linalg.inv(matrix.value))
-    return solve(first @ matrix, first @ right)

@@ -89,7 +89,7 @@ def test_what_a_damping_ratio_leaves_out_is_bounded_tightly(factor) -> None:
     found = model(damped, NARROW, 2)
     structure, rate = found.structure, found.modes.rate[:1] * factor
     lowest = structure.mass.like(np.eye(1, 3)[None])
-    modes = DampedModes(rate, lowest, lowest, lowest)
+    modes = DampedModes(rate, lowest, lowest)
     missed = 2 * 0.07 * (structure.omega[0] - np.abs(rate.value[0]))
     bound = _ratio_errors(structure, modes, EnergyNorms(structure))[0, 0]
     assert 1 - 1e-9 <= bound / np.abs(missed) <= 1.8
@@ -193,8 +193,7 @@ def oscillator(omega: complex, shape: complex, velocity: complex, **start) -> Mo
     cuts = boxes({"k1": Interval(1 - 1e-12, 1 + 1e-12)}, (0,))
     structure = DampedStructure.over_box(frame, cuts, 2)
     state = np.array([[[shape]]], complex), np.array([[[velocity]]], complex)
-    share = np.concatenate(state, -1)
-    models = (structure.mass.like(x) for x in (np.array([1j * omega]), *state, share))
+    models = (structure.mass.like(x) for x in (np.array([1j * omega]), *state))
     return ModalModel.from_modes(flow, cuts, structure, DampedModes(*models))
 
 
@@ -228,8 +227,7 @@ def test_a_damping_force_of_a_wrong_frequency_is_in_the_acceleration() -> None:
     cuts = boxes({"k1": Interval(1 - 1e-12, 1 + 1e-12)}, (0,))
     structure = DampedStructure.over_box(frame, cuts, 2)
     rate, shape, velocity = np.array([0.9j]), np.array([[[-0.5j]]]), np.array([[[0.5 + 0j]]])
-    states = [structure.mass.like(x) for x in (rate, shape, velocity, velocity)]
-    modes = DampedModes(*states[:3], DampedModes(*states).outputs(structure).polynomial)
+    modes = DampedModes(*(structure.mass.like(x) for x in (rate, shape, velocity)))
     found = ModalModel.from_modes(flow, cuts, structure, modes)
     truth = found.flow.values(np.ones((1, 1)))[0, 0, 0]
     off = np.abs(found.values(np.zeros((1, 1)))[0, 0, 0] - truth)
