@@ -16,7 +16,7 @@ from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy import FuzzyNumber, Interval
 from alphacut.fuzzy.arrays import Ints, Mask
 from alphacut.fuzzy.knowledge.joint import joined_inputs
-from alphacut.fuzzy.refused import require, require_numbers
+from alphacut.fuzzy.refused import require_numbers
 from alphacut.fuzzy.sets.boxes import corners
 from alphacut.fuzzy.sets.numbers import checked_levels
 
@@ -45,9 +45,6 @@ class Boxes:
         upper: Upper ends, shape (A, d).
         nominal: Values of membership 1, shape (d,).
         numbers: Fuzzy numbers whose cuts they are, by name; intervals where there are none.
-
-    Raises:
-        RefusedError: No parameter, or levels that do not rise within [0, 1].
     """
 
     names: tuple[str, ...]
@@ -56,11 +53,6 @@ class Boxes:
     upper: Array
     nominal: Array
     numbers: Mapping[str, FuzzyNumber] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        allowed = "fuzzy numbers by name, one at least"
-        require(bool(self.names), "inputs", value=None, allowed=allowed)
-        checked_levels(self.alpha)
 
     @property
     def inputs(self) -> Mapping[str, FuzzyNumber]:
@@ -154,12 +146,11 @@ def boxes(inputs: Mapping[str, FuzzyNumber | float], alpha: Sequence[float] = AL
         alpha: Levels, rising within [0, 1].
 
     Raises:
-        ValueError: An input is no number, or as `Boxes`.
+        RefusedError: There is no input, one is no number, or levels do not rise within [0, 1].
     """
     require_numbers("alpha", alpha)
-    levels, numbers = np.asarray(alpha, float), joined_inputs(inputs)
+    levels, numbers = np.array(checked_levels(alpha)), joined_inputs(inputs)
     cuts = np.array([[number.cut(a) for number in numbers.values()] for a in levels], float)
-    cuts = cuts.reshape(len(levels), len(numbers), 2)
     nominal = np.array([number.nominal for number in numbers.values()])
     return Boxes(tuple(numbers), levels, cuts[..., 0], cuts[..., 1], nominal, numbers)
 

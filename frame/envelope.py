@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.result import Bounds, Ends, Nature, rounded
+from alphacut.fuzzy.result import Bounds, Ends
 
 if TYPE_CHECKING:
     import xarray
@@ -40,14 +40,6 @@ class Envelope(Bounds):
             known how far other motions go; `between_nodes`: the largest value of `between`;
             `motions_tested`: exact motions that were compared with proved bounds.
         tested_structures: Their structures as arrays with axes, for `alphacut verify`.
-
-    Example:
-        >>> from alphacut.frame import StoreyFrame, envelope
-        >>> from alphacut.fuzzy import Triangular
-        >>> frame = StoreyFrame(masses=[1e3], stiffness=[4e4], q0=[0.1])
-        >>> bounds = envelope(frame, {"m1": Triangular(900, 1000, 1100)}, duration=0.5, step=0.1)
-        >>> bounds.upper.shape  # levels, nodes, outputs
-        (5, 6, 1)
     """
 
     time: Array
@@ -57,22 +49,6 @@ class Envelope(Bounds):
     searched_peaks: Bounds | None = None
     facts: Mapping[str, float] = field(default_factory=dict)
     tested_structures: Mapping[str, tuple[tuple[str, ...], Array]] = field(default_factory=dict)
-
-    @property
-    def peak_words(self) -> str:
-        """Text with each output's proved peak over time, and the reached one, in the widest cut."""
-        bounds, reached = (
-            np.maximum(pair.upper, -pair.lower)[0].T for pair in (self.proved, self.attained)
-        )  # at the nodes, (outputs, T)
-        bounds = within_steps(bounds, None if self.between is None else self.between.T)
-        words = []
-        for k, name in enumerate(self.outputs):
-            unit = f" {self.units[k]}" if self.units else ""
-            proved = rounded(float(bounds[k].max()), "upper", Nature.GUARANTEED)
-            inner = rounded(float(reached[k].max()), "upper", Nature.ATTAINED)
-            bound = f"proved {proved:.4g}{unit}, " if np.isfinite(proved) else ""
-            words.append(f"{name}: {bound}reached {inner:.4g}{unit}")
-        return "; ".join(words)
 
     def to_dataset(self) -> xarray.Dataset:
         """Return the envelope as an xarray dataset with units, ready for NetCDF.

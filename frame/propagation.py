@@ -106,7 +106,10 @@ def envelope(
     )
     flow = replace(flow, relative=relative)
     steps = step_error(flow)
-    proof = _proof_beside(chosen, flow)
+    is_cheap = isinstance(flow.flow, LinearFlow) and len(flow.boxes.names) <= MAX_INPUTS
+    proof: Proof | None = None  # of the motion that a follower has followed
+    if is_cheap and isinstance(chosen, GraphFollower | ImprovedFollower):
+        proof = Proof(gap=chosen.tolerance / 4, boxes=1000)
     with progress_reporter(progress) as tick:
         bounds = chosen.run(flow, subprogress(tick, 0.0, 0.5) if proof else tick)
         bounds = with_step_error(bounds, flow, steps)
@@ -184,12 +187,6 @@ def require_envelope(
     Raises:
         RefusedError: As `envelope`.
         UnprovedError: A proof is asked for, and there is none of such a structure.
-
-    Example:
-        >>> from alphacut.frame import StoreyFrame
-        >>> from alphacut.fuzzy import Triangular
-        >>> frame = StoreyFrame(masses=[1e3], stiffness=[4e4], q0=[0.1])
-        >>> require_envelope(frame, {"m1": Triangular(900, 1000, 1100)}, duration=0.5, step=0.1)
     """
     chosen, flow, _, _ = _build_problem(model, inputs, method, **arguments)
     duration = min(FIRST_STEPS * flow.flow.step, flow.flow.duration)
@@ -200,15 +197,6 @@ def require_envelope(
     if isinstance(chosen, Proof | DualProof):
         with refusing():
             chosen.forecast(exact_flow(flow.flow), flow.boxes)
-
-
-def _proof_beside(method: Method, over: UnitFlow) -> Proof | None:
-    """Return a proof of the motion that a follower has followed; None if it costs too much."""
-    if not isinstance(method, GraphFollower | ImprovedFollower):
-        return None
-    if not isinstance(over.flow, LinearFlow) or len(over.boxes.names) > MAX_INPUTS:
-        return None
-    return Proof(gap=method.tolerance / 4, boxes=1000)
 
 
 def _with_proof(followed: Envelope, over: UnitFlow, proof: Proof, tick: Progress) -> Envelope:

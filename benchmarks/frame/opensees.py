@@ -39,6 +39,7 @@ from alphacut.frame import (
 )
 from alphacut.frame.dynamics.integrators import INTEGRATORS
 from alphacut.frame.dynamics.nonlinear import make_flow
+from alphacut.frame.questions.peaks import peaks
 from alphacut.fuzzy import Interval
 from alphacut.fuzzy.arrays import Array
 from benchmarks.frame.plane_frame import MatrixCase
@@ -350,7 +351,7 @@ def compare(seed: int) -> dict[str, float | str]:
         "same_scheme": float(difference.max()),
         **compare_yielding(ops, np.random.default_rng(seed)),
         "nature": str(bounds.nature),
-        "peaks": bounds.peak_words,
+        "peaks": {x: [y.upper[0], y.reached[0]] for x, y in peaks(bounds).items()},
         "motions tested": bounds.facts.get("motions_tested", 0),
         "seconds": time.perf_counter() - begun,
     }

@@ -48,13 +48,6 @@ class Midpoint:
 
     Eliminating the velocity gives (M/h + D/2 + hK/4) q[k+1] = (2M/h − hK/2) q[k] − (M/h − D/2 +
     hK/4) q[k−1]. On a linear structure this is Newmark's method with β = 1/4 and γ = 1/2.
-
-    Example:
-        >>> from alphacut.frame import LinearFlow, StoreyFrame
-        >>> frame = StoreyFrame(masses=[1e3], stiffness=[4e4], q0=[0.1])
-        >>> flow = LinearFlow(frame, ("m1",), duration=1.0, step=0.1, integrator=Midpoint())
-        >>> flow.values([[1e3]])[0, -1].round(4).tolist()
-        [0.0988]
     """
 
     name: ClassVar[str] = "midpoint"

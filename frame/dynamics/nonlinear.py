@@ -64,13 +64,7 @@ def make_flow(
 
 @dataclass(frozen=True, eq=False)
 class LagrangianFlow(Flow):
-    """Trajectories of a Lagrangian system by the midpoint variational integrator.
-
-    Example:
-        >>> from alphacut.frame import pendulum
-        >>> LagrangianFlow(pendulum(), ("l",), duration=1.0, step=0.1).values([[1.0]]).shape
-        (1, 11, 2)
-    """
+    """Trajectories of a Lagrangian system by the midpoint variational integrator."""
 
     system: LagrangianSystem
 

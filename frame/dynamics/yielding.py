@@ -59,13 +59,6 @@ class YieldingFlow(Flow):
     Raises:
         RefusedError: A force is harmonic or yields a storey before the start, or a storey yields
             whose tangent stiffness is then not positive under the weight.
-
-    Example:
-        >>> from alphacut.frame import StoreyFrame
-        >>> frame = StoreyFrame(masses=[1e3], stiffness=[4e4], v0=[1.0], yield_drift=[0.05])
-        >>> flow = YieldingFlow(frame, ("dy1",), duration=0.5, step=0.25)
-        >>> flow.values([[0.05]])[0, :, 0].round(4).tolist()
-        [0.0, 0.1993, 0.2744]
     """
 
     system: StoreyFrame

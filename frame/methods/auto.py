@@ -30,7 +30,7 @@ from alphacut.frame.methods.improved_follower import ImprovedFollower, PassBound
 from alphacut.frame.methods.proof import Proof
 from alphacut.frame.methods.sampled import PeakSearch
 from alphacut.frame.numbers import WIDE
-from alphacut.fuzzy.arrays import Array, Mask
+from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.progress_bar import Progress
 from alphacut.fuzzy.refused import checked_number
 
@@ -104,7 +104,9 @@ class Auto:
         if best is not None and not self.is_for_all_nodes:
             if _gap(best, flow) <= WIDE:
                 return _noted(best, "; ".join([f"{best.method} succeeded", *reasons]))
-            followed = follower.run_pass(flow, progress, asked=_above_peaks(best))
+            outer, inner = _sides(best)  # bounds above the reached peak are worth motions
+            asked = outer > inner.max(1, keepdims=True)
+            followed = follower.run_pass(flow, progress, asked)
             return _noted(_with_reached(best, flow, followed), f"{best.method} and {follower.name}")
         found = follower.run(flow, progress)
         found = replace(found, outer=best.proved if best else None)
@@ -165,8 +167,7 @@ def _with_reached(proved: Envelope, flow: UnitFlow, followed: PassBounds) -> Env
         upper_at=at[..., 1, :],
         error=(outer - inner).max(-1),
     )
-    facts = {**combined.facts, "gap_of_peaks": _gap(combined, flow)}
-    return replace(combined, facts=facts, notes=(combined.peak_words, *combined.notes))
+    return replace(combined, facts={**combined.facts, "gap_of_peaks": _gap(combined, flow)})
 
 
 def _sides(proved: Envelope) -> tuple[Array, Array]:
@@ -174,12 +175,6 @@ def _sides(proved: Envelope) -> tuple[Array, Array]:
     assert proved.inner is not None
     outer = np.stack([-proved.lower, proved.upper], -1)
     return outer, np.stack([-proved.inner.lower, proved.inner.upper], -1)
-
-
-def _above_peaks(proved: Envelope) -> Mask:
-    """Return the mask of bounds above the reached peak of their output and side, (A, T, m, 2)."""
-    outer, inner = _sides(proved)
-    return np.asarray(outer > inner.max(1, keepdims=True))
 
 
 def _gap(proved: Envelope, flow: UnitFlow) -> float:

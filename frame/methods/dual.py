@@ -59,14 +59,6 @@ class DualProof:
 
     Raises:
         RefusedError: A value is not positive.
-
-    Example:
-        >>> from alphacut.frame import StoreyFrame, envelope
-        >>> from alphacut.fuzzy import Triangular
-        >>> frame = StoreyFrame(masses=[1e3], stiffness=[4e4], q0=[0.1])
-        >>> inputs = {"m1": Triangular(900, 1000, 1100)}
-        >>> str(envelope(frame, inputs, DualProof(), duration=0.5, step=0.1).nature)
-        'guaranteed'
     """
 
     name: ClassVar[str] = "dual"
@@ -155,7 +147,12 @@ class DualProof:
                 outer[nodes, o, s], unit[nodes, o, s] = problem.out[0], problem.at
             # 2. raise the incumbents to what the exact motions at these inputs reach
             node, output, side = np.nonzero(needed)
-            value, error = self._reached(box, unit[needed], node, output)
+            at, is_moved = unit[needed], unit[needed].any(1)  # most may be the centre
+            reached = np.stack([x[node, output] for x in box.centre_motion()])
+            if is_moved.any():
+                exact = box.reached(at[is_moved], node[is_moved], output[is_moved])
+                reached[:, is_moved] = exact
+            value, error = reached
             inner, attained_error = np.full(needed.shape, -np.inf), np.zeros(needed.shape[:2])
             inner[needed] = np.where(side, value, -value) - error
             np.maximum.at(attained_error, (node, output), 2 * error)
@@ -192,14 +189,6 @@ class DualProof:
             least_peaks=least,
             facts={"single_modes": len(level.models.oscillators)},
         )
-
-    def _reached(self, box: Box, unit: Array, node: Ints, output: Ints) -> tuple[Array, Array]:
-        """Exact values and their rounding at points (S, d), most of which may be the centre."""
-        is_moved = unit.any(1)
-        found = np.stack([x[node, output] for x in box.centre_motion()])
-        if is_moved.any():
-            found[:, is_moved] = box.reached(unit[is_moved], node[is_moved], output[is_moved])
-        return found[0], found[1]
 
     def _minimise(
         self,

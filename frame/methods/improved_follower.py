@@ -131,9 +131,12 @@ class ImprovedFollower:
         levels, storage, d = len(flow.boxes.alpha), Storage(flow), len(flow.boxes.names)
         bounds, gains = np.zeros((2, levels, *storage.top.shape))
         out = PassBounds(bounds, np.zeros((*bounds.shape, d)), gains, storage)
-        chunk_size = int(np.clip(MAX_NUMBERS / (_size_of_graph(flow) * (1 + d + d * d)), 1, BATCH))
+        states = 2 * len(frequencies(flow.flow.system)) if isinstance(flow.flow, LinearFlow) else 0
+        # of a graph: outputs at all nodes, and powers of the step map within a block of nodes
+        count = max(flow.time.size * len(flow.outputs), (isqrt(flow.time.size) + 1) * states**2)
+        chunk_size = int(np.clip(MAX_NUMBERS / (count * (1 + d + d * d)), 1, BATCH))
         nominal = flow.boxes.to_unit(flow.boxes.nominal)[None]
-        has_crossings = d > MAX_GLOBAL_INPUTS and isinstance(flow.flow, LinearFlow)
+        has_crossings = d > MAX_GLOBAL_INPUTS and states > 0
         for done, level in enumerate(reversed(range(levels))):
             # points of the sequence that no other level and no other seed takes
             box, skip = flow.boxes.unit_ends(level), SEED_STEP * (levels * self.seed + level + 1)
@@ -231,11 +234,6 @@ class _LevelModels:
         further = np.where(rng.random((count, 1)) < 0.5, drawn, partners)
         return np.where(rng.random(optima.shape) < REDRAWN / d, further, optima)
 
-    @property
-    def gains(self) -> Array:
-        """Predicted gains over the stored graphs, shape (T, m, 2)."""
-        return np.asarray(np.maximum(self.predicted, self.sampled) - self.storage.top)
-
     def predict(self, places: Places) -> None:
         """Set the predictions at places from the Taylor models of the best graphs there."""
         if len(places[0]) and (self.box[1] > self.box[0]).any():
@@ -253,7 +251,8 @@ class _LevelModels:
 
     def proposals(self, count: int) -> Array:
         """Return distinct points worth a graph, one per window of time, shape (≤ count, d)."""
-        chosen, gains, count = list[Array](), self.gains / self.least_gains, min(count, BATCH)
+        gains = (np.maximum(self.predicted, self.sampled) - self.storage.top) / self.least_gains
+        chosen, count = list[Array](), min(count, BATCH)
         windows = np.array_split(np.arange(len(gains)), max(1, min(count, len(gains))))
         for window in windows:
             for k in np.argsort(-gains[window], axis=None)[:TRIES]:
@@ -269,15 +268,6 @@ class _LevelModels:
                     chosen.append(point)
                     break
         return np.array(chosen)[:count].reshape(-1, len(self.box[0]))
-
-
-def _size_of_graph(flow: UnitFlow) -> int:
-    """Return the largest number of values that a graph is computed from."""
-    count, states = len(flow.time), 0
-    if isinstance(flow.flow, LinearFlow):
-        states = 2 * len(frequencies(flow.flow.system))
-    # outputs at all nodes, and the powers of the step map within a block of nodes
-    return max(count * len(flow.outputs), (isqrt(count) + 1) * states**2)
 
 
 def smoothed_maximum(gap: Array) -> Array:

@@ -15,6 +15,7 @@ at which responses are summed with their signs (`narrowed_straying`).
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 from math import comb, perm, prod
 from typing import NamedTuple
 
@@ -251,7 +252,7 @@ def line_deviations(
     """
     omega, fast, decay = sigma[0].imag, float(np.abs(sigma).max()), float(-sigma.real.max())
     low = float(omega.min())
-    pieces = _pieces(load, time, max(fast, load.frequency if load else 0.0))
+    pieces = _pieces(load, time, fast)
     times, d, node = pieces.time, np.diff(pieces.time), np.searchsorted(pieces.time, time)
     slope = (pieces.last - pieces.first) / d
     chords = Chords.through(node, times)
@@ -313,10 +314,14 @@ def line_deviations(
 
 def load_deviation(load: History, time: Array) -> Array:
     """Return how far a load strays from lines in the step to each node at most, shape (T,)."""
-    # pieces so short that their bend adds little to what their ends are off the line
-    pieces, bound = _pieces(load, time, 4 * load.frequency), np.zeros(len(time))
-    in_piece = np.abs(pieces.off).max(0) + pieces.bend
-    bound[1:] = np.maximum.reduceat(in_piece, np.searchsorted(pieces.time, time[:-1]))
+    g = replace(load, frequency=0.0)  # without the sine it strays most at a sample
+    pieces, bound = _pieces(g, time, 0.0), np.zeros(len(time))
+    off = np.abs(pieces.off).max(0)
+    bound[1:] = np.maximum.reduceat(off, np.searchsorted(pieces.time, time[:-1]))
+    if load.frequency:  # h²/8 |f″| of a line times the sine, in steps of length h
+        values, phase = g.values(time), load.frequency * np.diff(time)
+        size, rise = np.maximum(np.abs(values[1:]), np.abs(values[:-1])), np.abs(np.diff(values))
+        bound[1:] += np.minimum(phase**2 / 8 * size + phase / 4 * rise, 2 * size)
     return np.where(bound > 1e-12 * load.extremes[0], bound, 0.0)
 
 
@@ -359,15 +364,13 @@ def _pieces(load: History | None, time: Array, fastest: float) -> Pieces:
     distance = np.minimum(samples - time[later - 1], time[later] - samples)
     times = np.union1d(time, samples[distance > 1e-9 * load.step])
     if load.frequency:
-        parts = np.clip(np.ceil(np.diff(times) * fastest / PHASE), 1, MAX_PARTS).astype(int)
-        part = np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)
-        begin, length = np.repeat(times[:-1], parts), np.repeat(np.diff(times) / parts, parts)
-        times = np.append(begin + part * length, times[-1])
+        phase = np.diff(times) * max(fastest, load.frequency)
+        parts = np.clip(np.ceil(phase / PHASE), 1, MAX_PARTS).astype(int)
+        times = np.interp(np.arange(parts.sum() + 1), np.append(0, np.cumsum(parts)), times)
     d, after, before = np.diff(times), load.envelope(times)[:-1], load.envelope(times, -1.0)[1:]
     # |f″| ≤ Ω² |g| + 2 Ω |g′|
     largest, slope = np.maximum(np.abs(after), np.abs(before)), np.abs(before - after) / d
     bend = d**2 / 8 * load.frequency * (load.frequency * largest + 2 * slope)
-    bend = np.minimum(bend, 2 * largest)
     sine, line = load.wave(times), np.interp(times, time, load.values(time))
     first, last = after * sine[:-1], before * sine[1:]
     return Pieces(times, first, last, bend, np.stack([first - line[:-1], last - line[1:]]))

@@ -118,17 +118,12 @@ class StoreyFrame:
             is_floor = force.at in range(1, n + 1)
             require(is_floor, "floor", value=force.at, allowed=f"1 to {n}")
             checked_number("amplitude", force.amplitude)
-        filled: dict[str, Sequence[float]] = {
-            name: tuple(getattr(self, name)) or (0.0,) * n for name in ("dampers", "q0", "v0")
-        }
-        object.__setattr__(self, "loads", tuple(self.loads))
-        for name in ("stiffness", "yield_force", "yield_drift", "hardening"):
-            filled[name] = tuple(getattr(self, name))
-        if filled["yield_force"] or filled["yield_drift"]:
-            filled["hardening"] = filled["hardening"] or (0.0,) * n
-        if not filled["stiffness"]:
-            filled["columns"] = tuple(self.columns) or (2.0,) * n
-        for name, values in filled.items():
+        defaults: dict[str, tuple[float, ...]] = dict.fromkeys(("dampers", "q0", "v0"), (0.0,) * n)
+        defaults["columns"] = () if len(self.stiffness) else (2.0,) * n
+        yields = len(self.yield_force) or len(self.yield_drift)
+        defaults["hardening"] = (0.0,) * n if yields else ()
+        for name in (*defaults, "loads", "stiffness", "yield_force", "yield_drift"):
+            values = tuple(getattr(self, name)) or defaults.get(name, ())
             object.__setattr__(self, name, values)
         names = self.outputs or [f"q{z + 1}" for z in range(n)]
         object.__setattr__(self, "outputs", tuple(Output(str(name)) for name in names))

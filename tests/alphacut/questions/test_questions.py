@@ -1,7 +1,6 @@
 """Questions of a case: their answers, and what a further one touches."""
 
 import json
-import re
 
 import numpy as np
 import pytest
@@ -168,12 +167,9 @@ def test_inputs_are_shown_in_the_units_in_which_they_are_given(tmp_path):
     }
 
 
-def test_python_says_the_bound_over_time_as_the_command_does():
+def test_peaks_are_bounded_over_time_and_not_at_nodes_alone():
     ground = Accelerogram(0.02, np.sin(np.arange(60)))
     frame = StoreyFrame(masses=[1.0], stiffness=[150.0], damping_ratio=0.02, ground=ground)
     inputs = {"k1": Interval(149.0, 151.0)}
     found = envelope(frame, inputs, duration=1.2, step=0.02, alpha=[0], progress=False)
-    proved = float(re.search(r"proved (\S+) m", found.peak_words)[1])
-    bound = peaks(found)["q1"].upper[0]
-    assert bound <= proved <= 1.001 * bound
-    assert bound > np.maximum(found.upper, -found.lower).max()  # that at the nodes
+    assert peaks(found)["q1"].upper[0] > np.maximum(found.upper, -found.lower).max()
