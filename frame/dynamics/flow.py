@@ -249,11 +249,7 @@ class LinearFlow(Flow):
         motion = self._from_modes(matrices, rows) if self.exact and self.by_modes else None
         if motion is None:
             motion = trajectory(self._step_map(matrices), matrices.start, rows)
-        if matrices.feeds is None:
-            return motion
-        # accelerations among the outputs also hold the forces themselves, over the masses
-        at_nodes = np.stack([x.values(self.time) for x in distinct_histories(self.system.loads)])
-        return motion + (matrices.feeds @ at_nodes).map(lambda x: x.swapaxes(-1, -2))
+        return with_feedthrough(motion, matrices, self.system, self.time)
 
     def _from_modes(self, matrices: Matrices, rows: Jet) -> Jet | None:
         """The same by classical modes, derivatives by complex ones; None where there are none."""
@@ -263,6 +259,15 @@ class LinearFlow(Flow):
             return None if values is None else rows.like(values)
         columns = concatenate([matrices.start, concatenate([pushes * 0.0, pushes], -2)], -1)
         return modal_trajectory(state_matrix(matrices), columns, rows, loads, self.time)
+
+
+def with_feedthrough(motion: Jet, matrices: Matrices, system: LinearSystem, time: Array) -> Jet:
+    """Return outputs (S, T, m) whose accelerations also hold the forces over the masses."""
+    feeds = matrices.feeds
+    if feeds is None:
+        return motion
+    forces = np.stack([history.values(time) for history in distinct_histories(system.loads)])
+    return motion + (feeds @ forces).map(lambda x: x.swapaxes(-1, -2))
 
 
 def trajectory(step_map: StepMap, start: Jet, rows: Jet) -> Jet:

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from alphacut.frame.calculus.jet import Jet
-from alphacut.frame.dynamics.flow import Flow, StepError
+from alphacut.frame.dynamics.flow import Flow, StepError, with_feedthrough
 from alphacut.frame.dynamics.integrators import SAME, state_matrix
 from alphacut.frame.structures.linear import evaluate, histories
 from alphacut.frame.structures.loads import History
@@ -108,18 +108,15 @@ class YieldingFlow(Flow):
         pushes = matrices.pushes(ground=system.ground is not None).value
         fastest = float(np.abs(np.linalg.eigvals(state_matrix(matrices).value)).max())
         parts = load_parts([*loads.values()], self.time, MAX_PHASE / max(fastest, 1e-300))
-        fed = np.zeros((len(self.time), len(loads)))
-        for c, load in enumerate(loads.values()):
-            if load is not system.ground:  # absolute accelerations do not contain the ground's
-                fed[:, c] = load.values(self.time)
         kinds = np.array([(KINDS.index(x), z) for x, z in map(system.quantity, self.outputs)])
-        values = np.empty((len(points), len(self.time), len(kinds)))
+        values: Array = np.empty((len(points), len(self.time), len(kinds)))
         peaks = np.zeros((len(points), len(kinds)))
         by_motion = map(np.ascontiguousarray, (storeys, matrices.damping.value, pushes, start))
         for s, motion in enumerate(zip(*by_motion, strict=True)):
-            end = _march(*motion, *parts, fed, kinds, values[s], peaks[s])
+            end = _march(*motion, *parts, kinds, values[s], peaks[s])
             self._require_motion(points[s], *end)
-        return values, peaks
+        values = with_feedthrough(Jet.constant(values, 0), matrices, system, self.time).value
+        return values, np.maximum(peaks, np.abs(values).max(1))
 
     def _require_motion(
         self, point: Array, status: int, time: float, storey: int, imbalance: float
@@ -164,13 +161,13 @@ def load_parts(
 @compiled
 def _march(
     storeys: Array, damping: Array, pushes: Array, start: Array, edges: Array, is_node: Mask,
-    first: Array, last: Array, fed: Array, kinds: Ints, values: Array, peaks: Array,
+    first: Array, last: Array, kinds: Ints, values: Array, peaks: Array,
 ) -> tuple[int, float, int, float]:  # fmt: skip
-    """Write values (T, m) and peaks (m,) of a motion; return status, time, storey, imbalance.
+    """Write values (T, m) and peaks within parts (m,); return status, time, storey, imbalance.
 
     `storeys` (5, n): mass, stiffness, softening by weight, hardening, yield drift; `damping`
-    (n, n) in N s/m, `pushes` (n, L) by loads, `start` (2n,); parts as of `load_parts`; `fed`
-    (T, L): loads that act on absolute accelerations; `kinds` (m, 2): kinds and storeys.
+    (n, n) in N s/m, `pushes` (n, L) by loads, `start` (2n,); parts as of `load_parts`; `kinds`
+    (m, 2): kinds and storeys. Accelerations lack the forces over the masses.
     """
     mass, k, softening, hardening, yield_drift = storeys
     n, inverse_mass = len(mass), 1 / mass
@@ -185,8 +182,7 @@ def _march(
     before, works, node = _energy(storeys, q, v, plastic), np.zeros(2), 0
     for e in range(len(edges)):
         if is_node[e]:
-            state = q, v, plastic, dissipated
-            _observe(kinds, storeys, damping, pushes, fed[node], state, values[node], peaks)
+            _observe(kinds, storeys, damping, (q, v, plastic, dissipated), values[node])
             node += 1
         if e == len(edges) - 1:
             break
@@ -418,10 +414,10 @@ def _add_peaks(
 
 @compiled
 def _observe(
-    kinds: Ints, storeys: Array, damping: Array, pushes: Array, loads: Array,
-    state: tuple[Array, Array, Array, Array], values: Array, peaks: Array,
+    kinds: Ints, storeys: Array, damping: Array, state: tuple[Array, Array, Array, Array],
+    values: Array,
 ) -> None:  # fmt: skip
-    """Write outputs (m,) at a node and raise their peaks."""
+    """Write outputs (m,) at a node."""
     q, v, plastic, dissipated = state
     for row in range(len(kinds)):
         kind, z = kinds[row]
@@ -432,19 +428,14 @@ def _observe(
             force += _net_force(storeys, q, plastic, z + 1)
         for i in range(len(q)):
             force -= damping[z, i] * v[i]
-        acceleration = force / mass
-        for c in range(len(loads)):
-            acceleration += pushes[z, c] * loads[c]
         # drift in equilibrium without load, where storeys that yield back rest
         back = abs((1 - hardening) * k * yield_drift / (hardening * k - softening))
         residual = min(max(offset_force / (k - softening), -back), back)
         by_kind = (
             q[z], drift, k * drift - offset_force, drift / yield_drift,
-            v[z], acceleration, residual, dissipated[z],
+            v[z], force / mass, residual, dissipated[z],
         )  # fmt: skip
-        value = by_kind[kind]
-        values[row] = value
-        peaks[row] = max(peaks[row], abs(value))
+        values[row] = by_kind[kind]
 
 
 @compiled

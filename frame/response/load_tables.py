@@ -91,11 +91,10 @@ class LoadTables:
         (driven,), _ = responses_at_nodes(rate.ravel(), self.history, self.time, 0)
         return np.moveaxis(driven.reshape(len(self.time), *rate.shape), 0, 1)
 
-    def response(self, rate: Array, node: Ints) -> tuple[Array, Array, Array]:
-        """R, dR/dλ and d²R/dλ² at one node per point, each shape (N, n), for eigenvalues (N, n)."""
+    def response(self, rate: Array, node: Ints) -> Array:
+        """R, dR/dλ and d²R/dλ² at one node per point, shape (3, N, n), for eigenvalues (N, n)."""
         pairs = zip(self.tables, rate.T, strict=True)
-        R, slope, curve = np.stack([table.response(x, node) for table, x in pairs], -1)
-        return R, slope, curve
+        return np.stack([table.response(x, node) for table, x in pairs], -1)
 
 
 class Direct(LoadTables):
@@ -112,11 +111,11 @@ class Direct(LoadTables):
         R[:, :, 0] = self.history.values(self.time)
         return R
 
-    def response(self, rate: Array, node: Ints) -> tuple[Array, Array, Array]:
-        """A and its derivatives by λ, which are zero, each shape (N, n)."""
-        R: Array = np.zeros(rate.shape, complex)
-        R[:, 0] = self.history.values(self.time[node])
-        return R, 0 * R, 0 * R
+    def response(self, rate: Array, node: Ints) -> Array:
+        """A and its derivatives by λ, which are zero, shape (3, N, n)."""
+        R: Array = np.zeros((3, *rate.shape), complex)
+        R[0, :, 0] = self.history.values(self.time[node])
+        return R
 
 
 @compiled

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, reduce
 from typing import Any, Self
 
 import numpy as np
 
 from alphacut.frame.calculus.jet import Jet, variables
-from alphacut.frame.structures.linear import Assembly, Number, stack, undamped_modes
+from alphacut.frame.structures.linear import Assembly, Number, evaluate, stack, undamped_modes
 from alphacut.frame.structures.loads import Accelerogram, Factor, Force, require_loads
 from alphacut.frame.structures.quantities import RATIO, Output, Parameter
 from alphacut.fuzzy.arrays import Array, Ints
@@ -264,14 +264,12 @@ def modal_energy_shares(system: MatrixStructure, terms: Sequence[int] | Ints) ->
     frequency. The loss factor of a mode is to first order the mean of those of its parts by these
     shares (Johnson and Kienholz, AIAA Journal 20, 1284, 1982), with modes at nominal values.
     """
-    a, b = system.massive, system.massless
-    mass, springs = system.nominal_terms("mass").sum(axis=0), system.nominal_terms("stiffness")
-    stiffness, shapes = springs.sum(axis=0), np.zeros((system.size, len(a)))
-    # static condensation: q_b = follow q_a
-    follow = -np.linalg.solve(stiffness[np.ix_(b, b)], stiffness[np.ix_(b, a)])
-    condensed = stiffness[np.ix_(a, a)] + stiffness[np.ix_(a, b)] @ follow
-    shapes[a] = undamped_modes(mass[np.ix_(a, a)], condensed)[1]
-    shapes[b] = follow @ shapes[a]
+    every_unknown = {str(k): row for k, row in enumerate(np.eye(system.size))}
+    observed = replace(system, observed=every_unknown, row_factors={}, ratios=())
+    matrices, rows = evaluate(observed, (), np.zeros((1, 0)), derivatives=False)
+    modes = undamped_modes(matrices.mass.value[0], matrices.stiffness.value[0])[1]
+    shapes = rows.value[0, :, : len(modes)] @ modes
+    springs = system.nominal_terms("stiffness")
     energies = np.einsum("ik,tij,jk->tk", shapes, springs, shapes)
     return np.asarray(energies[terms].sum(axis=0) / energies.sum(axis=0))
 

@@ -109,67 +109,45 @@ class LinearMotion:
         spring, damper = reduced(self.stiffness), reduced(self.damping)
         squared = np.abs(np.linalg.eigvalsh(spring))
         omega = float(np.sqrt(squared.max())) or 1.0
+        lowest = max(float(np.sqrt(squared.min())), 1e-300)
         inverse = solve_triangular(lower, np.eye(n), lower=True)  # L⁻¹
-        system = _ScaledSystem(
-            matrix=np.block([[np.zeros((n, n)), omega * np.eye(n)], [-spring / omega, -damper]]),
-            rows=np.hstack([self.rows[:, :n] @ inverse.T, omega * self.rows[:, n:] @ inverse.T]),
-            lowest=max(float(np.sqrt(squared.min())), 1e-300),
-            highest=omega,
-            norm=omega + float(np.linalg.norm(damper)),
-        )
+        A = np.block([[np.zeros((n, n)), omega * np.eye(n)], [-spring / omega, -damper]])
+        norm = omega + float(np.linalg.norm(damper))  # of A at most
+        rows = np.hstack([self.rows[:, :n] @ inverse.T, omega * self.rows[:, n:] @ inverse.T])
+
+        def response(
+            start: Array, push: Array, course: Course, times: Array
+        ) -> tuple[Array, Array]:
+            """Outputs of ẋ = A x + [0; push] f(t), x(0) = start, and their round-off, (T, m)."""
+            last = max(float(times.max(initial=0.0)), 1e-300)
+            interval, frequency = course.step if len(course.samples) else last, course.frequency
+            parts = max(1, ceil(max(norm, frequency) * interval / MAX_NORM))
+            substep, size = interval / parts, float(np.linalg.norm(push)) or 1.0
+            load = size * course.substep_loads(parts, max(1, ceil(last / substep)))
+            flow = np.zeros((2 * n + 4, 2 * n + 4))  # of x and the load's four numbers
+            flow[: 2 * n, : 2 * n], flow[n : 2 * n, 2 * n] = A * substep, push / size * substep
+            turn = frequency * substep
+            flow[2 * n :, 2 * n :] = np.kron(np.eye(2), [[0, turn], [-turn, 0]]) + np.eye(4, k=2)
+            exact_step = expm(flow)[: 2 * n]
+            states = _recursion(exact_step[:, : 2 * n], start, load @ exact_step[:, 2 * n :].T)
+            degree, scaled = _degree(max(norm, frequency) * substep), np.asarray(times / substep)
+            values = _taylor(flow, degree, rows, np.hstack([states, load]), scaled)
+            phase = omega**2 * np.minimum(times**2, times / lowest) / 2 + frequency * times
+            rounding = n * EPSILON * (CONSTANT_ROUNDING + phase)
+            return values, rounding[:, None] * (np.abs(rows) @ np.abs(states).max(0))
+
         start = np.concatenate([lower.T @ self.start[:n], lower.T @ self.start[n:] / omega])
         ground = Course(self.record, self.record_step)
-        push = -(lower.T @ self.pattern) / omega
-        values, rounding = system.response(start, push, ground, times)
+        values, rounding = response(start, -(lower.T @ self.pattern) / omega, ground, times)
         for force, feed, course in zip(self.forces.T, self.feeds.T, self.courses, strict=True):
             acts = times >= course.start - 1e-12 * times[-1]
             if acts.any():
                 since = np.maximum(times[acts] - course.start, 0.0)
-                response = system.response(0.0 * start, inverse @ force / omega, course, since)
-                values[acts] += response[0]
-                rounding[acts] += response[1]
+                by_force = response(0.0 * start, inverse @ force / omega, course, since)
+                values[acts] += by_force[0]
+                rounding[acts] += by_force[1]
             values += feed * course.values(times)[:, None]
         return values, rounding
-
-
-@dataclass(frozen=True, eq=False)
-class _ScaledSystem:
-    """ẋ = A x + [0; b] f(t) in the states x of `LinearMotion.outputs`."""
-
-    matrix: Array  # A, shape (2n, 2n), in 1/s
-    rows: Array  # outputs of x, shape (m, 2n)
-    lowest: float  # least frequency, at least 1e-300 rad/s
-    highest: float  # greatest frequency ω, in rad/s
-    norm: float  # bound of the norm of A, in 1/s
-
-    def response(
-        self, start: Array, push: Array, course: Course, times: Array
-    ) -> tuple[Array, Array]:
-        """Return outputs at times from the load's start and their round-off, (T, m) each.
-
-        x(0) is `start` (2n,), and `push` (n,) is b of the load f, the `course`.
-        """
-        last = max(float(times.max(initial=0.0)), 1e-300)
-        interval = course.step if len(course.samples) else last
-        fastest = max(self.norm, course.frequency)
-        parts = max(1, ceil(fastest * interval / MAX_NORM))
-        substep = interval / parts
-        size = float(np.linalg.norm(push)) or 1.0
-        load = size * course.substep_loads(parts, max(1, ceil(last / substep)))
-        n = len(start)
-        flow = np.zeros((n + 4, n + 4))  # of x and the load's four numbers over a substep
-        flow[:n, :n] = self.matrix * substep
-        flow[n // 2 : n, n] = push / size * substep
-        turn = course.frequency * substep
-        flow[n:, n:] = np.kron(np.eye(2), [[0.0, turn], [-turn, 0.0]]) + np.eye(4, k=2)
-        exact_step = expm(flow)[:n]
-        states = _recursion(exact_step[:, :n], start, load @ exact_step[:, n:].T)
-        degree, scaled = _degree(fastest * substep), np.asarray(times / substep, float)
-        values = _taylor(flow, degree, self.rows, np.hstack([states, load]), scaled)
-        phase = self.highest**2 * np.minimum(times**2, times / self.lowest) / 2
-        phase += course.frequency * times
-        rounding = n / 2 * EPSILON * (CONSTANT_ROUNDING + phase)
-        return values, rounding[:, None] * (np.abs(self.rows) @ np.abs(states).max(0))
 
 
 def _degree(norm: float) -> int:
