@@ -23,7 +23,7 @@ from __future__ import annotations
 from dataclasses import replace
 from math import ceil
 from threading import Lock
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -163,10 +163,10 @@ def responses_at_nodes(
     times = time if node is None else time[node]
     if omega := history.frequency:
         # f = g sin θ: ρ(σ) = [exp(iθ) ρ_g(σ − iΩ) − exp(−iθ) ρ_g(σ + iΩ)] / 2i
+        shifted: list[Any] = [sigma - 1j * omega, sigma + 1j * omega]
         g = replace(history, frequency=0.0)
         (minus, minus_rounding), (plus, plus_rounding) = (
-            responses_at_nodes(shifted, g, time, derivatives, node=node, window=window)
-            for shifted in (sigma - 1j * omega, sigma + 1j * omega)
+            responses_at_nodes(x, g, time, derivatives, node=node, window=window) for x in shifted
         )
         t = times[:, None]
         angle = omega * (t - history.start) + history.phase

@@ -357,7 +357,8 @@ def with_power(sigma: Array, rho: Array, order: int) -> Array:
 def _pieces(load: History | None, time: Array, fastest: float) -> Pieces:
     """Pieces between nodes and a load's samples; shorter ones where it is multiplied by a sine."""
     if load is None:
-        return Pieces(time, *np.zeros((3, len(time) - 1)), np.zeros((2, len(time) - 1)))
+        zeros = np.zeros((2, len(time) - 1))
+        return Pieces(time, zeros[0], zeros[0], zeros[0], off=zeros)
     samples = load.start + np.arange(len(load.samples)) * load.step
     samples = samples[(samples > time[0]) & (samples < time[-1])]
     later = np.searchsorted(time, samples)
