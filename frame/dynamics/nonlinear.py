@@ -323,30 +323,27 @@ def _evaluate(tape: Tape, arguments: Array, out: Array) -> None:
     for k in range(len(arguments)):
         slots[k] = arguments[k]
     for k in range(len(code)):
-        slots[len(arguments) + k] = _operation(code[k, 0], slots[code[k, 1]], slots[code[k, 2]])
+        number, x, y = code[k, 0], slots[code[k, 1]], slots[code[k, 2]]
+        if number == 0:  # by the order of `tape.OPERATIONS`; functions of one argument ignore y
+            value = x + y
+        elif number == 1:
+            value = x * y
+        elif number == 2:
+            value = x**y
+        elif number == 3:
+            value = 1 / x
+        elif number == 4:
+            value = math.sqrt(x)
+        elif number == 5:
+            value = math.sin(x)
+        elif number == 6:
+            value = math.cos(x)
+        elif number == 7:
+            value = math.tan(x)
+        elif number == 8:
+            value = math.exp(x)
+        else:
+            value = math.log(x)
+        slots[len(arguments) + k] = value
     for k in range(len(results)):
         out[k] = slots[results[k]]
-
-
-@compiled
-def _operation(number: int, x: float, y: float) -> float:
-    """Operation `number` of `tape.OPERATIONS` on x and y; functions of one argument ignore y."""
-    if number == 0:
-        return x + y
-    if number == 1:
-        return x * y
-    if number == 2:
-        return x**y
-    if number == 3:
-        return 1 / x
-    if number == 4:
-        return math.sqrt(x)
-    if number == 5:
-        return math.sin(x)
-    if number == 6:
-        return math.cos(x)
-    if number == 7:
-        return math.tan(x)
-    if number == 8:
-        return math.exp(x)
-    return math.log(x)

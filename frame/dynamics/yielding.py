@@ -277,7 +277,7 @@ def _first_event(
     first, storey, drifts = 1.0, -1, series[2]
     margin = np.empty(terms)  # polynomial that is negative after the event
     for z in range(len(plastic)):
-        stretch, variation, sign = drifts[z, 0] - plastic[z], 0.0, direction[z]
+        elastic, variation, sign = drifts[z, 0] - plastic[z], 0.0, direction[z]
         for term in range(1, terms):
             variation += (term if sign != 0 else 1) * abs(drifts[z, term])
         if sign != 0:  # yields until the velocity of the drift has the other sign
@@ -287,7 +287,7 @@ def _first_event(
                 margin[term - 1] = sign * term * drifts[z, term]
             margin[0] += EVENT_ROUNDING * variation
             at = _first_root(margin, terms - 1, first)
-        elif abs(stretch) + variation < yield_drift[z] or hardening[z] == 1:
+        elif abs(elastic) + variation < yield_drift[z] or hardening[z] == 1:
             continue
         else:
             at = first
@@ -296,7 +296,7 @@ def _first_event(
                     margin[term] = -side * drifts[z, term]
                 # a drift far above the yield drift rounds more than that: after a reversal no event
                 rounding = EVENT_ROUNDING * yield_drift[z] + 4.5e-16 * abs(drifts[z, 0])
-                margin[0] = yield_drift[z] + rounding - side * stretch
+                margin[0] = yield_drift[z] + rounding - side * elastic
                 at = min(at, _first_root(margin, terms, at))
         if at < first:
             first, storey = at, z

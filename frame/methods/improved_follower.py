@@ -89,6 +89,8 @@ class ImprovedFollower:
         beyond the bounds, and twice the difference of the two passes. Where neighbouring
         trajectories diverge there is none, and the bounds are attained only.
         """
+        from scipy.ndimage import maximum_filter1d
+
         start_time, limit = time.perf_counter(), self._limit(flow)
         passes = [
             replace(self, seed=self.seed + k).run_pass(
@@ -101,7 +103,10 @@ class ImprovedFollower:
         # gains above the tolerance, which remain where the budget ended a pass, come on top
         small, large = (np.where(x, gains, 0.0) for x in (gains <= limit, gains > limit))
         predicted = small.max(0) + large.sum(0)
-        difference = smoothed_maximum(np.abs(second.bounds - first.bounds).max(-1))
+        difference = np.abs(second.bounds - first.bounds).max(-1)
+        # the largest over T/20 nodes around, at least a tenth of all
+        near = maximum_filter1d(difference, 2 * (len(flow.time) // 40) + 1, axis=1)
+        difference = np.maximum(near, 0.1 * difference.max(1, keepdims=True))
         points = np.where((second.bounds > first.bounds)[..., None], second.points, first.points)
         bounds = np.maximum(first.bounds, second.bounds)
         missed, count = independent_excess(flow, bounds, subprogress(progress, 0.8, 1.0))
@@ -268,11 +273,3 @@ class _LevelModels:
                     chosen.append(point)
                     break
         return np.array(chosen)[:count].reshape(-1, len(self.box[0]))
-
-
-def smoothed_maximum(gap: Array) -> Array:
-    """Return the largest of values (A, T, m) over T/20 nodes around, at least a tenth of all."""
-    from scipy.ndimage import maximum_filter1d
-
-    near = maximum_filter1d(gap, 2 * (gap.shape[1] // 40) + 1, axis=1)
-    return np.asarray(np.maximum(near, 0.1 * gap.max(1, keepdims=True)))

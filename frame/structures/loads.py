@@ -84,11 +84,6 @@ class History:
         return (self.step, self.samples.tobytes(), self.start, self.frequency, self.phase, *flags)
 
     @property
-    def end(self) -> float:
-        """Time of the last sample, in s; infinite where it is held."""
-        return np.inf if self.is_held else self.start + (len(self.samples) - 1) * self.step
-
-    @property
     def extremes(self) -> tuple[float, float]:
         """Bounds of ``|f|`` and of ``|f′|`` between jumps."""
         size, rise = (float(np.abs(x).max()) for x in (self.samples, np.diff(self.samples)))

@@ -264,7 +264,8 @@ def modal_energy_shares(system: MatrixStructure, terms: Sequence[int] | Ints) ->
     frequency. The loss factor of a mode is to first order the mean of those of its parts by these
     shares (Johnson and Kienholz, AIAA Journal 20, 1284, 1982), with modes at nominal values.
     """
-    every_unknown = {str(k): row for k, row in enumerate(np.eye(system.size))}
+    unit: Array = np.eye(system.size)
+    every_unknown = {str(k): unit[k] for k in range(system.size)}
     observed = replace(system, observed=every_unknown, row_factors={}, ratios=())
     matrices, rows = evaluate(observed, (), np.zeros((1, 0)), derivatives=False)
     modes = undamped_modes(matrices.mass.value[0], matrices.stiffness.value[0])[1]

@@ -121,23 +121,19 @@ def node_deviation(flow: Flow, points: Array) -> Array:
     largest of the step and its neighbours, and of `FLOOR` times that of any step, of trajectories
     at parameters (S, d) in SI units.
     """
-    chunks = np.array_split(points, -(-len(points) // CHUNK))
-    deviation = np.max([_chord_deviation(flow, chunk) for chunk in chunks], axis=0)
+    finer, parts = flow.finer()
+    fraction = (np.arange(1, parts) / parts)[:, None]
+    deviation = np.zeros((len(flow.time) - 1, len(flow.outputs)))
+    for chunk in np.array_split(points, -(-len(points) // CHUNK)):
+        fine = finer.values(chunk)
+        ends = fine[:, ::parts]
+        inner = fine[:, :-1].reshape(len(fine), -1, parts, fine.shape[-1])[:, :, 1:]
+        chord = ends[:, :-1, None] * (1 - fraction) + ends[:, 1:, None] * fraction
+        deviation = np.maximum(deviation, np.abs(inner - chord).max((0, 2)))
     # where these trajectories are straight, others may bend
     candidates = [np.roll(deviation, k, 0) for k in (-1, 0, 1)]
     candidates.append(np.broadcast_to(FLOOR * deviation.max(0), deviation.shape))
     return np.concatenate([np.zeros((1, deviation.shape[1])), MARGIN * np.max(candidates, 0)])
-
-
-def _chord_deviation(flow: Flow, points: Array) -> Array:
-    """Return how far motions at points (S, d) are from lines between nodes, (T − 1, m)."""
-    finer, parts = flow.finer()
-    fine = finer.values(points)
-    ends = fine[:, ::parts]
-    fraction = (np.arange(1, parts) / parts)[:, None]
-    inner = fine[:, :-1].reshape(len(fine), -1, parts, fine.shape[-1])[:, :, 1:]
-    chord = ends[:, :-1, None] * (1 - fraction) + ends[:, 1:, None] * fraction
-    return np.asarray(np.abs(inner - chord).max((0, 2)))
 
 
 def reference_motions(
