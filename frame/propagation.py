@@ -25,11 +25,7 @@ from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem, evaluate, require_modal_order
 from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.frame.verification.self_test import with_motions_tested
-from alphacut.frame.verification.step_error import (
-    step_error,
-    with_node_deviation,
-    with_step_error,
-)
+from alphacut.frame.verification.step_error import step_error, with_node_deviation, with_step_error
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array, Ints, on_one_blas_thread
 from alphacut.fuzzy.progress_bar import Progress, progress_reporter, subprogress

@@ -11,13 +11,7 @@ import numpy as np
 
 from alphacut.frame.calculus.jet import Array, Jet, concatenate
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.dynamics.integrators import (
-    Exact,
-    Integrator,
-    Midpoint,
-    StepMap,
-    state_matrix,
-)
+from alphacut.frame.dynamics.integrators import Exact, Integrator, Midpoint, StepMap, state_matrix
 from alphacut.frame.dynamics.modal_trajectory import classical_trajectory, modal_trajectory
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import (

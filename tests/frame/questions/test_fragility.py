@@ -5,17 +5,16 @@ import pytest
 from scipy.stats import beta
 
 from alphacut.frame.questions.fragility import CriticalMeasures, of_any_limit
-from alphacut.frame.questions.peaks import Peak
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature
+from tests.frame.questions.test_questions import one_level
 
 LIMIT = 0.02
 
 
 def peaks(lower, upper, reached):
     """Peak of an output on one level, by what is proved and reached."""
-    ends = (np.array([x]) for x in (lower, upper, 0.0, reached, 0.0, np.inf))
-    return Peak(np.zeros(1), *ends, Nature.GUARANTEED)
+    return one_level(lower, upper, reached, Nature.GUARANTEED)["q1"]
 
 
 def suite(count=12, seed=4):
