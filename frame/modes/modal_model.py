@@ -156,13 +156,13 @@ class ModalModel:
         They are w, dw/dλ and d²w/dλ² of P parts and n modes, real and imaginary parts, in the order
         of `wave_factors`, at eigenvalues λ_k (N, n) and nodes (N,).
         """
-        parts = []
+        parts = list[Array]()
         if self.started:
             t = self.flow.time[node][:, None]
             wave = np.exp(rate * t)
-            parts.append((wave, t * wave, t * t * wave))
+            parts.append(np.stack([wave, t * wave, t * t * wave]))
         parts += [load.response(rate, node) for load in self.loads]
-        waves = np.stack([np.stack(part, 1) for part in parts], 1)
+        waves = np.moveaxis(np.stack(parts), 2, 0)
         return in_planes(waves).reshape(len(rate), -1)
 
 
