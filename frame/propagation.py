@@ -133,7 +133,21 @@ def _build_problem(
     is_system = isinstance(model, LagrangianSystem) or hasattr(model, "assembly")
     allowed = "a StoreyFrame, a MatrixStructure or a LagrangianSystem"
     require(is_system, "model", value=type(model).__name__, allowed=allowed)
-    chosen = _method(model, method, options)
+    if method is None:
+        method = "improved-graph-follower" if isinstance(model, LagrangianSystem) else "auto"
+    if isinstance(method, str):
+        cure = REMOVED_METHODS.get(method, "")
+        require(method in METHODS, "method", value=method, allowed=", ".join(METHODS), cure=cure)
+        names = [field.name for field in fields(METHODS[method])]
+        for option in options:
+            require_choice(f"option of {method}", option, names)
+        chosen: Method = METHODS[method](**options)
+    else:
+        allowed = f"{', '.join(METHODS)}, or an object as Proof()"
+        require(isinstance(method, Method), "method", value=repr(method), allowed=allowed)
+        allowed = "none beside a method that is no name"
+        require(not options, "options", value=[*options], allowed=allowed)
+        chosen = method
     has_kinks = bool(getattr(model, "hardening", ()))
     needs_derivatives = isinstance(chosen, Proof | DualProof | GraphFollower | ImprovedFollower)
     allowed = "auto or quasi-monte-carlo where columns yield"
@@ -147,29 +161,6 @@ def _build_problem(
     require_admissible(model, cuts)
     distinct_cuts, rows = cuts.without_repetitions()
     return chosen, UnitFlow(flow, distinct_cuts), cuts.alpha, rows
-
-
-def _method(
-    model: LinearSystem | LagrangianSystem,
-    method: Method | str | None,
-    options: Mapping[str, Any],
-) -> Method:
-    """Return a method, given itself or by name and options; by default one that fits the model."""
-    if method is None:
-        method = "improved-graph-follower" if isinstance(model, LagrangianSystem) else "auto"
-    if not isinstance(method, str):
-        allowed = f"{', '.join(METHODS)}, or an object as Proof()"
-        require(isinstance(method, Method), "method", value=repr(method), allowed=allowed)
-        allowed = "none beside a method that is no name"
-        require(not options, "options", value=[*options], allowed=allowed)
-        return method
-    cure = REMOVED_METHODS.get(method, "")
-    require(method in METHODS, "method", value=method, allowed=", ".join(METHODS), cure=cure)
-    names = [field.name for field in fields(METHODS[method])]
-    for option in options:
-        require_choice(f"option of {method}", option, names)
-    chosen: Method = METHODS[method](**options)
-    return chosen
 
 
 def require_envelope(

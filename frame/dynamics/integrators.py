@@ -21,6 +21,7 @@ import numpy as np
 from alphacut.frame.calculus.jet import Array, Jet, concatenate, inverse
 from alphacut.frame.structures.linear import Matrices
 from alphacut.frame.structures.loads import History
+from alphacut.fuzzy.refused import require
 
 SAME = 1e-12
 """Distance of a sample from a node, as a fraction of the step, that is rounding."""
@@ -90,12 +91,16 @@ class Exact:
         `loads` the moments.
 
         Raises:
-            ValueError: A step would take more than `MAX_SUBSTEPS` substeps.
+            RefusedError: A step would take more than `MAX_SUBSTEPS` substeps.
         """
         A, substeps = state_matrix(matrices), 1
         if loads:
             fastest = float(np.abs(np.linalg.eigvals(A.value)).max())
-            substeps = _substeps(max(fastest, *(load.frequency for load in loads)), step)
+            fastest = max(fastest, *(load.frequency for load in loads), 1e-300)
+            substeps = 1 << max(0, ceil(log2(max(1.0, fastest * step / MAX_PHASE)) - 1e-9))
+            longest = f"up to {MAX_PHASE * MAX_SUBSTEPS / fastest:.2g} s"
+            allowed = f"{longest} with motions as fast as {fastest:.3g} rad/s under a load"
+            require(substeps <= MAX_SUBSTEPS, "step", value=f"{step:g} s", allowed=allowed)
         h = step / substeps
         term = concatenate([pushes * 0.0, pushes], -2)
         series = [term]
@@ -140,18 +145,6 @@ def exponential(z: Jet) -> Jet:
     for _ in range(squarings):
         series = series @ series
     return series
-
-
-def _substeps(fastest: float, step: float) -> int:
-    """Number of substeps of an exact step, a power of 2, by the largest |λ| or Ω in rad/s."""
-    substeps = 1 << max(0, ceil(log2(max(1.0, fastest * step / MAX_PHASE)) - 1e-9))
-    if substeps > MAX_SUBSTEPS:
-        raise ValueError(
-            f"step: {step:g} s with motions as fast as {fastest:.3g} rad/s under a record is"
-            f" {fastest * step:.2g} rad a step, above {MAX_PHASE * MAX_SUBSTEPS:g}; take a step of"
-            f" at most {MAX_PHASE * MAX_SUBSTEPS / fastest:.2g} s"
-        )
-    return substeps
 
 
 @lru_cache(maxsize=8)

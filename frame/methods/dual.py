@@ -150,8 +150,8 @@ class DualProof:
             at, is_moved = unit[needed], unit[needed].any(1)  # most may be the centre
             reached = np.stack([x[node, output] for x in box.centre_motion()])
             if is_moved.any():
-                exact = box.reached(at[is_moved], node[is_moved], output[is_moved])
-                reached[:, is_moved] = exact
+                moved = (at[is_moved], node[is_moved], output[is_moved])
+                reached[:, is_moved] = box.reached(*moved)
             value, error = reached
             inner, attained_error = np.full(needed.shape, -np.inf), np.zeros(needed.shape[:2])
             inner[needed] = np.where(side, value, -value) - error

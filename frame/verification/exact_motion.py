@@ -130,8 +130,13 @@ class LinearMotion:
             flow[2 * n :, 2 * n :] = np.kron(np.eye(2), [[0, turn], [-turn, 0]]) + np.eye(4, k=2)
             exact_step = expm(flow)[: 2 * n]
             states = _recursion(exact_step[:, : 2 * n], start, load @ exact_step[:, 2 * n :].T)
-            degree, scaled = _degree(max(norm, frequency) * substep), np.asarray(times / substep)
-            values = _taylor(flow, degree, rows, np.hstack([states, load]), scaled)
+            # degree from which terms of exp(A τ) are below `TRUNCATION`; two degrees are for the
+            # rise of the load, which is integrated twice
+            degree, term = 2, 1.0
+            while term > TRUNCATION:
+                degree += 1
+                term *= max(norm, frequency) * substep / (degree - 2)
+            values = _taylor(flow, degree, rows, np.hstack([states, load]), times / substep)
             phase = omega**2 * np.minimum(times**2, times / lowest) / 2 + frequency * times
             rounding = n * EPSILON * (CONSTANT_ROUNDING + phase)
             return values, rounding[:, None] * (np.abs(rows) @ np.abs(states).max(0))
@@ -148,15 +153,6 @@ class LinearMotion:
                 rounding[acts] += by_force[1]
             values += feed * course.values(times)[:, None]
         return values, rounding
-
-
-def _degree(norm: float) -> int:
-    """Return the degree from which terms of exp(A τ), ‖A‖ τ ≤ `norm`, are below `TRUNCATION`."""
-    degree, term = 2, 1.0  # two degrees for the load's rise, which is integrated twice
-    while term > TRUNCATION:
-        degree += 1
-        term *= norm / (degree - 2)
-    return degree
 
 
 def _recursion(step: Array, start: Array, forcing: Array) -> Array:
