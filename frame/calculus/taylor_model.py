@@ -394,7 +394,7 @@ def solve(matrix: TaylorModel, right: TaylorModel) -> TaylorModel:
     Raises:
         UnprovedError: A may be singular.
     """
-    middle_inverse = np.linalg.inv(matrix.value)
+    middle_inverse: Any = np.linalg.inv(matrix.value)
     matrix, right = middle_inverse @ matrix, middle_inverse @ right
     found, bound = solution_series(matrix, right), inverse_bound(matrix)
     if bound is None:
