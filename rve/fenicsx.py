@@ -20,14 +20,6 @@ from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.interruption import uninterrupted
 
-
-def require_real(scalar: type) -> None:
-    """Refuse a PETSc that was built for complex numbers."""
-    if np.issubdtype(scalar, np.complexfloating):
-        cure = "install DOLFINx with real numbers, such as python3-dolfinx-real"
-        raise RefusedError("PETSc", "built for complex numbers", "a build for real numbers", cure)
-
-
 if find_spec("dolfinx_solver"):  # where Numba is, this wheel hides the HDF5 of others after it
     with suppress(ImportError):
         import h5py  # noqa: F401
@@ -59,7 +51,9 @@ with uninterrupted(), _without_numba():
     petsc4py.init(["alphacut", "-skip_petscrc", "-no_signal_handler"])
     from petsc4py import PETSc
 
-    require_real(PETSc.ScalarType)  # before DOLFINx, which has no module for another build
+    if np.issubdtype(PETSc.ScalarType, np.complexfloating):  # for which DOLFINx has no module
+        cure = "install DOLFINx with real numbers, such as python3-dolfinx-real"
+        raise RefusedError("PETSc", "built for complex numbers", "a build for real numbers", cure)
     import basix
     import basix.ufl
     import dolfinx

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, TypeVar, cast
+from typing import TypeVar, cast
 
 import numpy as np
 import scipy.sparse as sp
@@ -17,9 +17,6 @@ from alphacut.rve.mesh.gmsh_prisms import INCLUSION, NAMES, Prisms
 from alphacut.rve.mesh.periodicity import SAME_PLACE, MeshError
 from alphacut.rve.mesh.prism_grid import PrismGrid, Triangulation
 from alphacut.rve.mesh.square import REFINEMENTS
-
-if TYPE_CHECKING:
-    from alphacut.rve.fenicsx import MPI
 
 T = TypeVar("T")
 BELOW, ABOVE = [0, 1, 2, 6, 7, 9], [3, 4, 5, 12, 13, 14]
@@ -35,7 +32,7 @@ def extrude(
     layers: int,
     outline: Outline = circle,
     refinement: float = REFINEMENTS[0],
-    comm: MPI.Intracomm | None = None,
+    parallel: bool = False,
 ) -> PrismGrid:
     """Mesh the cell by Gmsh's triangles, opposite sides matching, and extrude them over θ.
 
@@ -46,12 +43,12 @@ def extrude(
         layers: Along θ, at least 1.
         outline: Of the particle.
         refinement: Of the edges along an outline that is not round; see `bend_grading`.
-        comm: Communicator, on whose first rank Gmsh runs; None: on this one.
+        parallel: Whether Gmsh runs on the first MPI rank, for all of them.
     """
     has_bends = bool(radius) and not is_round(outline)
     bends = refinement if has_bends else 0.0
     make = partial(square.triangles, size, radius, outline, refinement=bends)
-    points, triangles, phase = make() if comm is None else from_first_rank(comm, make)
+    points, triangles, phase = from_first_rank(make) if parallel else make()
     order = np.lexsort(np.sort(triangles, axis=1).T[::-1])  # neighbours are near in memory
     triangles, phase = triangles[order], phase[order]
     plane = _quadratic(points, triangles, phase, radius, outline)
@@ -81,15 +78,17 @@ def _quadratic(
     return Triangulation(positions, len(points), ends, nodes, inside, arc, radius, outline)
 
 
-def from_first_rank(comm: MPI.Intracomm, make: Callable[[], T]) -> T:
-    """Result of `make` on the first rank, sent to all ranks; its exception is raised on all."""
+def from_first_rank(make: Callable[[], T]) -> T:
+    """Result of `make` on the first MPI rank, sent to all; its exception is raised on all."""
+    from alphacut.rve.fenicsx import MPI  # which meshes of one process do without
+
     result: T | Exception | None = None
-    if comm.rank == 0:
+    if MPI.COMM_WORLD.rank == 0:
         try:
             result = make()
         except Exception as error:  # the other ranks wait for it
             result = error
-    result = comm.bcast(result)
+    result = MPI.COMM_WORLD.bcast(result)
     if isinstance(result, Exception):
         raise result
     return cast("T", result)
@@ -102,7 +101,12 @@ def grid_of(prisms: Prisms) -> PrismGrid:
         MeshError: They do not lie in columns, or a column does not pass all levels.
     """
     thetas, level = _levels(prisms)
-    column, num_columns = _columns(prisms)
+    # columns are what the vertical edges connect
+    below = prisms.cells[:, BELOW + BELOW[:3]].ravel()
+    above = prisms.cells[:, ABOVE + MID_LEVEL].ravel()
+    links = np.ones(len(below), np.int8), (below, above)
+    graph = sp.coo_matrix(links, (len(prisms.points),) * 2)
+    num_columns, column = connected_components(graph, directed=False)
     layer = level[prisms.cells[:, 0]]
     lowest = column[prisms.cells[layer == 0]]
     # planar nodes are the columns, vertices before edge midpoints
@@ -113,7 +117,10 @@ def grid_of(prisms: Prisms) -> PrismGrid:
     planar_of_column[midpoints] = len(vertices) + np.arange(len(midpoints))
     planar = planar_of_column[column]
     number = _number_nodes(prisms, level, planar, len(thetas) - 1, len(vertices))
-    triangle = _triangles(planar[prisms.cells[:, :3]], layer)
+    below_prisms = np.sort(planar[prisms.cells[:, :3]], axis=1)
+    triangle = np.unique(below_prisms, axis=0, return_inverse=True)[1].ravel()
+    if (np.bincount(triangle) != len(thetas) - 1).any():
+        raise MeshError("layers of prisms differ", "extrude the whole plane")
     order = np.lexsort((triangle, layer))
     cells, fixed = number[prisms.cells[order]], np.empty_like(prisms.points)
     fixed[number] = prisms.points
@@ -148,16 +155,6 @@ def _levels(prisms: Prisms) -> tuple[Array, Ints]:
     return np.asarray(thetas), level
 
 
-def _columns(prisms: Prisms) -> tuple[Ints, int]:
-    """Column of each node by the vertical edges of the prisms, (n,), and the number of columns."""
-    below = prisms.cells[:, BELOW + BELOW[:3]].ravel()
-    above = prisms.cells[:, ABOVE + MID_LEVEL].ravel()
-    size = len(prisms.points)
-    links = sp.coo_matrix((np.ones(len(below), np.int8), (below, above)), (size, size))
-    count, column = connected_components(links, directed=False)
-    return np.asarray(column), int(count)
-
-
 def _number_nodes(prisms: Prisms, level: Ints, planar: Ints, layers: int, vertices: int) -> Ints:
     """New number of each node, (n,): all levels, then the mid-levels, vertices first."""
     per_level = int(planar.max()) + 1
@@ -169,12 +166,3 @@ def _number_nodes(prisms: Prisms, level: Ints, planar: Ints, layers: int, vertic
     if (planar < 0).any() or not np.array_equal(np.sort(number), np.arange(expected)):
         raise MeshError("columns of prisms do not pass all levels", "extrude the whole plane")
     return np.asarray(number)
-
-
-def _triangles(vertices: Ints, layer: Ints) -> Ints:
-    """Number of the planar triangle below each prism, by its planar vertices, (prisms, 3)."""
-    triangle = np.unique(np.sort(vertices, axis=1), axis=0, return_inverse=True)[1].ravel()
-    counts = np.bincount(triangle)
-    if (counts != layer.max() + 1).any():
-        raise MeshError("layers of prisms differ", "extrude the whole plane")
-    return np.asarray(triangle)

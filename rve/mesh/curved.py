@@ -65,7 +65,8 @@ def plane_mesh(radius: float, *, size: float, outline: Outline = circle) -> Plan
         return _graded_mesh(radius, size, outline, 0.0)
     for refinement in REFINEMENTS:
         mesh = _graded_mesh(radius, size, outline, refinement)
-        if all(is_sound(mesh, order) for order in ORDERS):
+        ratios = (jacobian_ratios(*curved_nodes(mesh, order), order) for order in ORDERS)
+        if all((ratio > MIN_JACOBIAN_RATIO).all() for ratio in ratios):
             return mesh
     raise RefusedError(
         "outline",
@@ -73,12 +74,6 @@ def plane_mesh(radius: float, *, size: float, outline: Outline = circle) -> Plan
         f"outlines with det J > {MIN_JACOBIAN_RATIO} of its mean",
         "round its corners, or take an image of it as the cell",
     )
-
-
-def is_sound(mesh: PlaneMesh, order: int) -> bool:
-    """True if det J of all elements of an order exceeds `MIN_JACOBIAN_RATIO` of its mean."""
-    ratios = jacobian_ratios(*curved_nodes(mesh, order), order)
-    return bool((ratios > MIN_JACOBIAN_RATIO).all())
 
 
 def _graded_mesh(radius: float, size: float, outline: Outline, refinement: float) -> PlaneMesh:

@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -191,16 +190,8 @@ def write(
             gmsh.model.addPhysicalGroup(3, [volume], name=name)
         gmsh.write(str(path))
         for name, values in (fields or {}).items():
-            _append_field(gmsh, str(path), model, name, values)
-
-
-def _append_field(gmsh: Any, path: str, model: str, name: str, values: Array) -> None:
-    """Append a field at the nodes of the elements, (m, 15, components), to a file with the mesh."""
-    view = gmsh.view.add(name)
-    elements = np.arange(1, len(values) + 1)
-    components = values.shape[-1]
-    gmsh.view.addHomogeneousModelData(
-        view, 0, model, "ElementNodeData", elements, values.ravel(), numComponents=components
-    )
-    gmsh.option.setNumber("PostProcessing.SaveMesh", 0)
-    gmsh.view.write(view, path, append=True)
+            view, elements = gmsh.view.add(name), np.arange(1, len(values) + 1)
+            data = view, 0, model, "ElementNodeData", elements, values.ravel()
+            gmsh.view.addHomogeneousModelData(*data, numComponents=values.shape[-1])
+            gmsh.option.setNumber("PostProcessing.SaveMesh", 0)
+            gmsh.view.write(view, str(path), append=True)

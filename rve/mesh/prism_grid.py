@@ -163,14 +163,9 @@ class PrismGrid:
         if self.fixed is not None:
             return self.fixed
         levels = self.level_thetas(radius_map.distribution)
-        mid_levels = (levels[1:] + levels[:-1]) / 2
-        on_levels = self._planar_positions(radius_map, levels)
-        on_mid_levels = self._planar_positions(radius_map, mid_levels)
-        blocks = []
-        for theta, xy in (
-            (levels, on_levels),
-            (mid_levels, on_mid_levels[:, : self.plane.vertices]),
-        ):
+        mid_levels, blocks = (levels[1:] + levels[:-1]) / 2, []
+        for theta, count in ((levels, len(self.plane.points)), (mid_levels, self.plane.vertices)):
+            xy = self._planar_positions(radius_map, theta)[:, :count]
             heights = np.broadcast_to(theta[:, None, None], (*xy.shape[:2], 1))
             blocks.append(np.dstack([xy, heights]).reshape(-1, 3))
         return np.concatenate(blocks)

@@ -5,7 +5,7 @@ Edge lengths of the planar cell: short near small particles, in gaps, and where 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
@@ -51,8 +51,11 @@ def triangles(
     """
     gradings = [particle_grading(outline, radius)] if near_particle else []
     gradings += [bend_grading(outline, radius, refinement)] if refinement else []
-    sizes = partial(_least_size, size, gradings) if gradings else None
 
+    def least_size(x: float, y: float) -> float:
+        return size * min(1.0, *(grading(x, y) for grading in gradings))
+
+    sizes = least_size if gradings else None
     generate = partial(gmsh_triangles, size, radius, outline, sizes)
     angles: Array = np.asarray(np.linspace(0, 2 * np.pi, 4 * _spline_steps(outline) + 1), float)
     numbers = [size, radius, near_particle, refinement, *extents(outline), *outline(angles)]
@@ -72,8 +75,12 @@ def gmsh_triangles(size: float, radius: float, outline: Outline, sizes: Sizes | 
     """
     with model() as gmsh:
         phase_surfaces = surfaces(size, radius, outline)
-        if sizes:
-            _grade(gmsh, sizes)
+        if sizes:  # alone set the edge lengths
+            gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
+            gmsh.option.setNumber("Mesh.MeshSizeFromPoints", 0)
+            # of the size along a curve; the default asks for thousands of points
+            gmsh.option.setNumber("Mesh.LcIntegrationPrecision", 1e-4)
+            gmsh.model.mesh.setSizeCallback(lambda dim, tag, x, y, z, lc: sizes(x, y))
         gmsh.model.mesh.generate(2)
         node_tags, xyz, _ = gmsh.model.mesh.getNodes()
         number = np.zeros(int(node_tags.max()) + 1, np.int64)
@@ -126,15 +133,6 @@ def model() -> Iterator[Any]:
             yield gmsh
         finally:
             gmsh.finalize()
-
-
-def _grade(gmsh: Any, sizes: Sizes) -> None:
-    """Let a function alone set the edge lengths of the mesh."""
-    gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
-    gmsh.option.setNumber("Mesh.MeshSizeFromPoints", 0)
-    # of the size along a curve; the default asks for thousands of points
-    gmsh.option.setNumber("Mesh.LcIntegrationPrecision", 1e-4)
-    gmsh.model.mesh.setSizeCallback(lambda dim, tag, x, y, z, lc: sizes(x, y))
 
 
 def _square_loop(geo: Any, size: float) -> int:
@@ -199,7 +197,16 @@ REFINEMENTS = (0.5, 0.75, 1.1, 1.7, 2.5, 4.0)
 def particle_grading(outline: Outline, radius: float) -> Sizes:
     """Edge length at (x1, x2) near a particle and in gaps, over the nominal one."""
     half_width, half_height, min_distance = (radius * extent for extent in extents(outline))
-    return lambda x, y: _size_near_particle(x, y, half_width, half_height, min_distance)
+
+    def over_nominal(x: float, y: float) -> float:  # Gmsh asks a point at a time: no NumPy
+        x, y = abs(x), abs(y)
+        by_distance = _PER_RADIUS * max(hypot(x, y), min_distance)
+        # width of the gap to the cell's side, which grows along it as beside a circle
+        gap_beside = 1 - half_width + y * y / (2 * half_width) + max(0.0, half_width - x)
+        gap_above = 1 - half_height + x * x / (2 * half_height) + max(0.0, half_height - y)
+        return min(1.0, by_distance, 4 * gap_beside, 4 * gap_above)
+
+    return over_nominal
 
 
 def bend_grading(outline: Outline, radius: float, refinement: float) -> Sizes:
@@ -213,19 +220,3 @@ def bend_grading(outline: Outline, radius: float, refinement: float) -> Sizes:
     radii = radius * unit_bend_radii
     factor = _PER_RADIUS / refinement
     return lambda x, y: factor * float((radii + np.hypot(px - x, py - y)).min())
-
-
-def _least_size(size: float, gradings: Sequence[Sizes], x: float, y: float) -> float:
-    return size * min(1.0, *(grading(x, y) for grading in gradings))
-
-
-def _size_near_particle(
-    x: float, y: float, half_width: float, half_height: float, min_distance: float
-) -> float:
-    """Edge length at (x, y) over the nominal one; Gmsh calls this a point at a time: no NumPy."""
-    x, y = abs(x), abs(y)
-    by_distance = _PER_RADIUS * max(hypot(x, y), min_distance)
-    # width of the gap to the cell's side, which grows along it as beside a circle
-    gap_beside = 1 - half_width + y * y / (2 * half_width) + max(0.0, half_width - x)
-    gap_above = 1 - half_height + x * x / (2 * half_height) + max(0.0, half_height - y)
-    return min(1.0, by_distance, 4 * gap_beside, 4 * gap_above)

@@ -30,13 +30,6 @@ def _span(points: Array) -> Array:
     return np.array([*quadratic, *(f * z for f in quadratic), *(f * z * z for f in linear)])
 
 
-def _coefficients() -> Array:
-    """Rows: the span in the orthonormal polynomials of degree 2 on the prism, shape (15, 18)."""
-    points, weights = basix.make_quadrature(PRISM, 4)
-    orthonormal = basix.tabulate_polynomials(basix.PolynomialType.legendre, PRISM, 2, points)
-    return np.ascontiguousarray(np.linalg.qr((_span(points) * weights @ orthonormal.T).T)[0].T)
-
-
 def _points_by_entity() -> list[list[Array]]:
     """Evaluation points for every vertex, edge, face and the cell, as Basix wants them."""
     vertices, none = basix.geometry(PRISM), np.zeros((0, 3))
@@ -48,6 +41,10 @@ def _points_by_entity() -> list[list[Array]]:
 @cache
 def wedge(components: int) -> Any:
     """UFL element of the 15-node serendipity prism with `components` values at each node."""
+    # rows: the span in the orthonormal polynomials of degree 2 on the prism, shape (15, 18)
+    at, weights = basix.make_quadrature(PRISM, 4)
+    orthonormal = basix.tabulate_polynomials(basix.PolynomialType.legendre, PRISM, 2, at)
+    coefficients = np.linalg.qr((_span(at) * weights @ orthonormal.T).T)[0].T
     points = _points_by_entity()
     # degrees of freedom are point values: one evaluation with weight 1 each
     evaluations = [
@@ -56,7 +53,7 @@ def wedge(components: int) -> Any:
     scalar = basix.ufl.custom_element(
         cell_type=PRISM,
         reference_value_shape=[],
-        wcoeffs=_coefficients(),
+        wcoeffs=np.ascontiguousarray(coefficients),
         x=points,
         M=evaluations,
         interpolation_nderivs=0,

@@ -41,11 +41,7 @@ from alphacut.rve.mesh.prism_grid import PrismGrid, reference_radius
 from alphacut.rve.mesh.square import REFINEMENTS
 from alphacut.rve.prism.modulus_basis import TOLERANCE, ModulusBasis, modulus_basis
 from alphacut.rve.prism.problem import FoldedMeshError, PrismProblem, SliceStrains
-from alphacut.rve.prism.slices import (
-    SliceProblem,
-    is_homogeneous,
-    solve_sample,
-)
+from alphacut.rve.prism.slices import SliceProblem, is_homogeneous, solve_sample
 from alphacut.rve.result.checks import ROUND_OFF, checks_within_limits, mean, stress_checks
 from alphacut.rve.result.moduli import axial_moduli
 from alphacut.rve.result.result import HomogenisedStiffness, PhaseEnergies, StressCurve
@@ -61,19 +57,8 @@ SERIES_ACCURACY = 1e-9  # relative, of a reference by the series
 SLICES_POINTS = 14  # nodes in θ of a reference by slices
 
 
-@lru_cache(maxsize=2)
-def cached_grid(
-    size: float, radius: float, outline: Outline, refinement: float, layers: int, *, parallel: bool
-) -> PrismGrid:
-    """Prisms for any map with this reference radius; see `extrude`."""
-    return extrude(
-        size=size,
-        radius=radius,
-        layers=layers,
-        outline=outline,
-        refinement=refinement,
-        comm=MPI.COMM_WORLD if parallel else MPI.COMM_SELF,
-    )
+Solved = tuple[SliceStrains, tuple[int, ...], float]  # iterations by load, largest residual
+cached_grid = lru_cache(maxsize=2)(extrude)  # prisms for any map with one reference radius
 
 
 @dataclass(frozen=True)
@@ -122,44 +107,31 @@ class PrismModel:
         require_solve_arguments(radius_map, matrix, inclusions, isotropic=False)
         require_compressible(matrix, *inclusions)
         started = perf_counter()
-        problem = self._slice_problem(radius_map) if self.by_slices else self.problem(radius_map)
+        # on one rank and without options, which are PETSc's, slice by slice
+        by_petsc = self.parallel or self.options.overrides or self.options.environment
+        moved = self.problem if by_petsc else partial(self._moved, cached=cached_slices)
+        problem = moved(radius_map)
         basis = self._basis(problem, matrix, inclusions)  # serves all inclusions
         results = []
         for inclusion in inclusions:
             cell = Cell(matrix, inclusion, radius_map, self.outline)
+            loads = self.loads(cell)
             if basis is not None and isinstance(inclusion, Phase):
-                strains, residual = basis.project(inclusion.modulus), basis.error
-                iterations = basis.iterations
+                solved = basis.project(inclusion.modulus), basis.iterations, basis.error
             elif isinstance(problem, SliceProblem):
-                strains, iterations, residual = solve_sample(
-                    problem, cell.stiffness, self.loads(cell)
-                )
+                solved = solve_sample(problem, cell.stiffness, loads)
             else:
-                strains, iterations, residual = solve_loads(
-                    problem, cell.stiffness, self.loads(cell), self.options
-                )
-            result = prism_result(strains, cell.phases, self.loads(cell), self.options)
-            result = replace(
-                result,
-                cell=cell,
-                unknowns=problem.numbering.size,
-                iterations=iterations,
-                seconds=perf_counter() - started,
-            )
+                solved = solve_loads(problem, cell.stiffness, loads, self.options)
+            result = prism_result(solved, problem.numbering.size, cell.phases, loads, self.options)
+            result = replace(result, cell=cell, seconds=perf_counter() - started)
             if self.estimate:
                 result = with_distance(result, _reference_result(cell))
             # of a mesh of triangles of order 2 where no error is declared
             allowed = 2 * result.largest_error if result.errors else 0.1 * self.mesh_size**3
-            checks = {**result.checks, "residual": residual}
-            checks = checks_within_limits(checks, discretisation=ROUND_OFF + allowed)
+            checks = checks_within_limits(result.checks, discretisation=ROUND_OFF + allowed)
             results.append(replace(result, checks=checks))
             started = perf_counter()
         return results
-
-    @property
-    def by_slices(self) -> bool:
-        """True for the default solver on one rank, which assembles and solves slice by slice."""
-        return not (self.parallel or self.options.overrides or self.options.environment)
 
     def problem(self, radius_map: RadiusMap) -> PrismProblem:
         """DOLFINx's mesh and form for a map; cached, so that the next map moves the same mesh.
@@ -170,10 +142,6 @@ class PrismModel:
         """
         return self._moved(radius_map, partial(cached_problem, parallel=self.parallel))
 
-    def _slice_problem(self, radius_map: RadiusMap) -> SliceProblem:
-        """As `problem`, by slices."""
-        return self._moved(radius_map, cached_slices)
-
     def _moved(
         self, radius_map: RadiusMap, cached: Callable[[PrismGrid], AnyProblem]
     ) -> AnyProblem:
@@ -181,8 +149,15 @@ class PrismModel:
         radius = reference_radius(radius_map, self.outline)
 
         def on_mesh(refinement: float) -> AnyProblem:
-            mesh = self.mesh_size, radius, self.outline, refinement, self.layers
-            problem = cached(cached_grid(*mesh, parallel=self.parallel))
+            grid = cached_grid(
+                size=self.mesh_size,
+                radius=radius,
+                layers=self.layers,
+                outline=self.outline,
+                refinement=refinement,
+                parallel=self.parallel,
+            )
+            problem = cached(grid)
             problem.move(radius_map)
             return problem
 
@@ -213,18 +188,16 @@ class PrismModel:
             return None
         if not self.modulus_range:
             return None
-        phases = [phase for phase in inclusions if isinstance(phase, Phase)]
-        poisson_ratios = {phase.poisson for phase in phases}
-        moduli = [phase.modulus for phase in phases]
-        if len(phases) < len(inclusions) or len(poisson_ratios) > 1:
+        (low, high), phases = self.modulus_range, [x for x in inclusions if isinstance(x, Phase)]
+        are_alike = len(phases) == len(inclusions) and len({x.poisson for x in phases}) == 1
+        within = low * (1 - ROUND_OFF), high * (1 + ROUND_OFF)
+        if low == high or not are_alike:
             return None
-        low, high = self.modulus_range
-        is_within = low * (1 - ROUND_OFF) <= min(moduli) and max(moduli) <= high * (1 + ROUND_OFF)
-        if low == high or not is_within:
+        if not all(within[0] <= phase.modulus <= within[1] for phase in phases):
             return None
         cell = Cell(matrix, inclusions[0], problem.map, self.outline)
         basis = modulus_basis(
-            problem, matrix, poisson_ratios.pop(), self.modulus_range, self.loads(cell)
+            problem, matrix, phases[0].poisson, self.modulus_range, self.loads(cell)
         )
         return basis if basis.error <= TOLERANCE else None
 
@@ -238,7 +211,7 @@ def require_prisms(mesh_size: float, layers: int) -> None:
 
 def solve_loads(
     problem: PrismProblem, stiffness: Sequence[Array], strains: Array, options: SolverOptions
-) -> tuple[SliceStrains, tuple[int, ...], float]:
+) -> Solved:
     """As `solve_sample`, by DOLFINx's assembly and a solver of PETSc."""
     problem.assemble(stiffness)
     loads = problem.loads(strains)
@@ -253,12 +226,17 @@ def solve_loads(
 
 
 def prism_result(
-    strains: SliceStrains, phases: Sequence[AnyPhase], loads: Array, options: SolverOptions
+    solved: Solved,
+    unknowns: int,
+    phases: Sequence[AnyPhase],
+    loads: Array,
+    options: SolverOptions,
 ) -> HomogenisedStiffness:
     """Stress over θ, energies and checks (Hill–Mandel, symmetry, bounds), as measured.
 
     `loads` are macroscopic strains, (2 or 3, 3); three give the whole plane stiffness.
     """
+    strains, iterations, residual = solved
     stiffness = [phase.stiffness for phase in phases]
     stress, energy = strains.stress(stiffness), total_energy(strains.products, stiffness)
     by_theta = stress @ np.linalg.inv(loads).T if len(loads) == 3 else None
@@ -268,10 +246,13 @@ def prism_result(
         StressCurve(strains.theta, strains.weights, stress[:, 0, 0], stress[:, 2, 1], by_theta),
         PrismModel.name,
         str(options),
+        unknowns,
+        iterations,
         energies=PhaseEnergies(energies, np.full(energies.shape, np.nan)),
         checks={
             "hill_mandel": float(abs(work.T - energy).max() / abs(energy).max()),
             **stress_checks(stress, loads, strains.fractions, strains.weights, phases),
+            "residual": residual,
         },
     )
 

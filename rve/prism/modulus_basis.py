@@ -87,15 +87,12 @@ def modulus_basis(
     projected = fields @ images.swapaxes(1, 2), fields @ forces.swapaxes(1, 2)
     basis = ModulusBasis(*projected, means, iterations, ends)
     # the error is largest at the ends of the range, since the nodes are those of Chebyshev
-    residuals = np.concatenate([_residuals(basis, modulus, forces, images) for modulus in ends])
+    residuals = np.concatenate(
+        [
+            forces[0] + t * forces[1] - basis.coefficients(t * high).T @ (images[0] + t * images[1])
+            for t in (low / high, 1.0)
+        ]
+    )
     energies = (residuals * problem.solver(residuals)).sum(axis=1)  # rᵀ P⁻¹ r
     affine_energies = AREA * np.einsum("li,ij,lj->l", strains, matrix.stiffness, strains)
     return replace(basis, error=float((energies.reshape(2, -1) / affine_energies).max()))
-
-
-def _residuals(basis: ModulusBasis, modulus: float, forces: Array, images: Array) -> Array:
-    """Residuals of projected solutions at a modulus in Pa, shape (loads, size)."""
-    factor = modulus / basis.ends[1]
-    stiffness_fields = images[0] + factor * images[1]
-    projected = basis.coefficients(modulus).T @ stiffness_fields
-    return np.asarray(forces[0] + factor * forces[1] - projected)

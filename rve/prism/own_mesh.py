@@ -17,13 +17,11 @@ import numpy as np
 
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.cell.cell import THREE_LOADS, AnyPhase, Phase, VoigtPhase, require_compressible
-from alphacut.rve.cell.outline import circle
 from alphacut.rve.fenicsx import MPI
 from alphacut.rve.mesh.columns import from_first_rank
 from alphacut.rve.mesh.file import read_grid, refined
 from alphacut.rve.mesh.gmsh_prisms import NAMES
 from alphacut.rve.mesh.prism_grid import FixedCell, LevelFunction, LevelSet, PrismGrid
-from alphacut.rve.mesh.square import REFINEMENTS
 from alphacut.rve.prism.model import (
     cached_grid,
     cached_problem,
@@ -78,18 +76,16 @@ class _NamedModel:
         started = perf_counter()
         problem, named = self.problem_of(law, phases)
         stiffness = [phase.stiffness for phase in named.values()]
-        strains, iterations, residual = solve_loads(problem, stiffness, THREE_LOADS, self.options)
-        result = prism_result(strains, list(named.values()), THREE_LOADS, self.options)
-        checks = {**result.checks, "residual": residual}
+        solved = solve_loads(problem, stiffness, THREE_LOADS, self.options)
+        unknowns, materials = problem.numbering.size, list(named.values())
+        result = prism_result(solved, unknowns, materials, THREE_LOADS, self.options)
         energies = cast("PhaseEnergies", result.energies)
         order = [list(named).index(name) for name in phases]
         return [
             replace(
                 result,
-                unknowns=problem.numbering.size,
-                iterations=iterations,
                 seconds=perf_counter() - started,
-                checks=checks_within_limits(checks, discretisation=ROUGH_MESH),
+                checks=checks_within_limits(result.checks, discretisation=ROUGH_MESH),
                 energies=PhaseEnergies(energies.values[order], energies.errors[order]),
             )
         ]
@@ -140,7 +136,8 @@ class MeshModel(_NamedModel):
 @lru_cache(maxsize=2)
 def _mesh_problem(path: str, _changed: int, parallel: bool, refine: bool) -> PrismProblem:
     comm = MPI.COMM_WORLD if parallel else MPI.COMM_SELF
-    grid = from_first_rank(comm, partial(read_grid, path))
+    read = partial(read_grid, path)
+    grid = from_first_rank(read) if parallel else read()
     return PrismProblem(refined(grid) if refine else grid, comm)
 
 
@@ -172,8 +169,8 @@ class LevelSetModel(_NamedModel):
         if not hasattr(law, "pdf"):
             raise RefusedError("law of θ", type(law).__name__, "a law, as TruncatedNormal(-3, 3)")
         named = in_order_of(NAMES, phases)
-        mesh = (self.mesh_size, 0.0, circle, REFINEMENTS[0], self.layers)
-        grid = cached_grid(*mesh, parallel=self.parallel)
+        size, layers, parallel = self.mesh_size, self.layers, self.parallel
+        grid = cached_grid(size=size, radius=0.0, layers=layers, parallel=parallel)
         problem = cached_problem(grid, parallel=self.parallel)
         problem.move(LevelSet(cast("ThetaLaw", law), self.z))
         return problem, named

@@ -175,35 +175,19 @@ class PrismProblem:
         self.map = radius_map
         positions, geometry = self.grid.positions(radius_map), self.mesh.geometry
         geometry.x[:] = positions[geometry.input_global_indices]
-        self._levels = self.grid.level_thetas(radius_map.distribution)
-        density = positive_density(radius_map.distribution, self.slice_rule()[0])
-        self.areas = self._areas()
+        law = radius_map.distribution
+        levels = self.grid.level_thetas(law)
+        self._rule = level_rule(law, levels, points=SLICES_PER_LAYER)
+        density = positive_density(law, self._rule.nodes).reshape(-1, SLICES_PER_LAYER)
+        volume = self._strains.determinants().reshape(len(self.wedge), SLICES_PER_LAYER, -1)
+        self.areas: Array = volume / np.diff(levels)[self.layer, None, None] * slice_weights()
         require_valid_elements(self.grid, self.areas, self.comm)
-        self.density.x.array[:] = np.repeat(self.at_prisms(density), POINTS_PER_SLICE)
+        self.density.x.array[:] = np.repeat(density[self.layer], POINTS_PER_SLICE)
         if isinstance(radius_map, LevelSet):
             shapes: Array = wedge(1).tabulate(0, prism_rule()[0])[0].reshape(-1, 15)
             corners = positions[self.grid.cells[self.wedge]]
             inside = radius_map.is_inside(np.einsum("qn,cnd->cqd", shapes, corners))  # eq. 14
             self._phases = np.array([~inside, inside]).reshape(2, *self.areas.shape)
-
-    def _areas(self) -> Array:
-        heights = np.diff(self._levels)[self.layer]
-        volume = self._strains.determinants().reshape(len(self.wedge), SLICES_PER_LAYER, -1)
-        return np.asarray(volume / heights[:, None, None] * slice_weights())
-
-    def slice_rule(self) -> tuple[Array, Array]:
-        """θ and weights of the slices, the Gauss points of all layers, shape (3 layers,) each."""
-        rule = level_rule(self.map.distribution, self._levels, points=SLICES_PER_LAYER)
-        return rule.nodes, rule.weights
-
-    def at_prisms(self, slice_values: Array) -> Array:
-        """Values of the slices, (3 layers,), repeated for this rank's prisms, shape (cells, 3)."""
-        return np.asarray(slice_values.reshape(-1, SLICES_PER_LAYER)[self.layer])
-
-    def sum_by_layer(self, values: Array) -> Array:
-        """Sums over this rank's prisms of each layer of values (cells, …), shape (layers, …)."""
-        member = np.equal.outer(np.arange(self.grid.layers), self.layer).astype(float)
-        return np.asarray(np.tensordot(member, values, axes=1))
 
     def assemble(self, stiffness: Sequence[Array]) -> PETSc.Mat:
         """Assemble the reduced stiffness of eq. 7 and return it."""
@@ -240,15 +224,17 @@ class PrismProblem:
         for k, (uniform, u) in enumerate(fields):
             strain[..., k] = self._strains(u).reshape(strain.shape[:-1]) + uniform
         areas = self._phases * self.areas / AREA  # (phases, cells, 3, points)
-        prism_means = np.einsum("pmsq,msqif->pmsif", areas, strain)
-        means = np.stack([self.sum_by_layer(phase_means) for phase_means in prism_means])
-        fractions = np.stack([self.sum_by_layer(phase.sum(axis=-1)) for phase in areas])
-        theta, weights = self.slice_rule()
-        point_weights = (self.at_prisms(weights)[:, :, None] * areas).reshape(len(areas), -1)
+
+        def over_layers(prisms: Array) -> Array:
+            """Sums, (phases, slices, …), over the prisms of each layer: (phases, cells, 3, …)."""
+            member = np.equal.outer(np.arange(self.grid.layers), self.layer).astype(float)
+            sums = self.comm.allreduce(np.stack([np.tensordot(member, x, 1) for x in prisms]))
+            return np.asarray(sums.reshape(len(areas), -1, *prisms.shape[3:]))
+
+        means = over_layers(np.einsum("pmsq,msqif->pmsif", areas, strain))
+        rule, fractions = self._rule, over_layers(areas.sum(axis=-1))
+        weights = rule.weights.reshape(-1, SLICES_PER_LAYER, 1)[self.layer]
+        point_weights = (weights * areas).reshape(len(areas), -1)
         products = strain_products(strain.reshape(-1, 3, count), point_weights)
-        means, fractions, products = map(self.comm.allreduce, (means, fractions, products))
-        means, fractions = (
-            means.reshape(len(areas), -1, 3, count),
-            fractions.reshape(len(areas), -1),
-        )
-        return SliceStrains(theta, weights, means, fractions, products)
+        products = self.comm.allreduce(products)
+        return SliceStrains(rule.nodes, rule.weights, means, fractions, products)

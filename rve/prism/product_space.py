@@ -57,10 +57,7 @@ class ProductSpace:
         self.density: fem.Function = self._problem.density
         self._forms: dict[ufl.Form, fem.Form] = {}
 
-    @staticmethod
-    def strain(u: ufl.core.expr.Expr) -> ufl.core.expr.Expr:
-        """In-plane strain (ε11, ε22, 2 ε12) of displacements (eq. 5)."""
-        return strain(u)
+    strain = staticmethod(strain)
 
     def assemble_matrix(self, form: ufl.Form) -> PETSc.Mat:
         """Reduced matrix Pᵀ A P of a bilinear form in `space`."""

@@ -224,10 +224,8 @@ class SliceProblem:
             along_xi, along_eta = self._slopes.swapaxes(1, 2)[:, None] @ corners  # ∂u_c/∂ξ_β
             x, y = self._inverse[:, :, s, ..., None]
             gradients = (x * along_xi + y * along_eta).reshape(2, *strain.shape[:2], count, 2)
-            fluctuation[..., 0, :], fluctuation[..., 1, :] = (
-                gradients[0, ..., 0],
-                gradients[1, ..., 1],
-            )
+            fluctuation[..., 0, :] = gradients[0, ..., 0]
+            fluctuation[..., 1, :] = gradients[1, ..., 1]
             np.add(gradients[0, ..., 1], gradients[1, ..., 0], out=fluctuation[..., 2, :])
             for phase, triangles in enumerate(self._phase):
                 areas = self._areas[s, triangles].ravel() / AREA

@@ -44,22 +44,15 @@ def loss_factors(result: HomogenisedStiffness, losses: Array) -> DeclaredConstan
         raise RefusedError("energies", None, "a model with energies=True")
     values, errors = first_order(energies, losses, result.constants_of)
     if losses.max() > MAX_FIRST_ORDER and energies.moduli_at is not None:
-        values = _by_complex_moduli(result, energies.moduli_at, losses)
+        assert result.cell is not None
+        phases = [phase for phase in result.cell.phases if isinstance(phase, Phase)]
+        moduli = np.array([phase.bulk_and_shear for phase in phases]) * (1 + 1j * losses)
+        constants = young_shear_bulk(energies.moduli_at(*moduli.T), result.constants_of)
+        values = constants.imag / constants.real
     else:
         errors = errors + np.ptp(losses) ** 2 * values  # second order; 0 where losses are equal
     errors = errors + ROUND_OFF * abs(values)
     return DeclaredConstants.from_arrays(CONSTANTS, values, errors)
-
-
-def _by_complex_moduli(
-    result: HomogenisedStiffness, moduli_at: Callable[[Array, Array], Array], losses: Array
-) -> Array:
-    """Loss factors Im/Re of E, G, K with complex K and G of the phases, (3,)."""
-    assert result.cell is not None
-    phases = [phase for phase in result.cell.phases if isinstance(phase, Phase)]
-    bulk, shear = (np.array([phase.bulk_and_shear for phase in phases]) * (1 + 1j * losses)).T
-    constants = young_shear_bulk(moduli_at(bulk, shear), result.constants_of)
-    return np.asarray(constants.imag / constants.real)
 
 
 def first_order(

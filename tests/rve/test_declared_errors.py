@@ -49,14 +49,3 @@ def test_the_estimates_of_rules_in_theta_are_tight():
     ratio = coarse.errors["theta"] / apart(coarse.stiffness, exact_means())
     assert (ratio > TIGHT[0]).all()
     assert (ratio < TIGHT[1]).all()
-
-
-def test_the_prism_estimate_is_tight():
-    pytest.importorskip("alphacut.rve.fenicsx")
-    from alphacut.rve.prism.model import PrismModel
-
-    model = PrismModel(mesh_size=0.5, layers=4, stiffness=True)
-    result = model.solve(PAPER, MATRIX, [PARTICLE])[0]
-    ratio = result.modulus_errors / apart(result.stiffness, exact_means())
-    assert (ratio > TIGHT[0]).all()
-    assert (ratio < TIGHT[1]).all()

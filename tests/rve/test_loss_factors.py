@@ -63,15 +63,13 @@ def test_pores_and_rigid_particles_lose_nothing_whatever_their_loss(contrast):
     assert np.allclose([*loss.values.values()], 0.02, rtol=1e-6)
 
 
-def test_errors_of_coarse_energies_cover_what_finer_ones_find():
+def test_errors_of_coarse_energies_cover_what_finer_ones_find(rng):
     """Of random cells; a tenth of the declared error would not."""
-    seed = int(np.random.SeedSequence().entropy % 2**32)
-    print(f"seed {seed}")
-    chance, covered = np.random.default_rng(seed), []
+    covered = []
     for _ in range(12):
-        first, width = chance.uniform(0.2, 0.5), chance.uniform(0.2, 0.4)
+        first, width = rng.uniform(0.2, 0.5), rng.uniform(0.2, 0.4)
         radius = HermiteMap(first, 0.1, first + width, 0.1)
-        particle = Phase(MATRIX.modulus * 10 ** chance.uniform(-2, 2), 0.2)
+        particle = Phase(MATRIX.modulus * 10 ** rng.uniform(-2, 2), 0.2)
         coarse, fine = (
             SeriesModel(points=points, accuracy=accuracy, energies=True)
             .solve(radius, MATRIX, [particle])[0]
@@ -80,20 +78,6 @@ def test_errors_of_coarse_energies_cover_what_finer_ones_find():
         )
         covered.append((abs(coarse.values - fine.values) / coarse.errors).max())
     assert 0.1 < max(covered) <= 1
-
-
-def test_losses_to_first_order_declare_what_complex_moduli_show():
-    result, losses = solved(MODELS[0]), np.array([[0.099, 0.099], [0.0, 0.0]])
-    found = loss_factors(result, losses)
-    _, only_energies = first_order(result.energies, losses, result.constants_of)
-    moduli = [
-        phase.bulk_and_shear * (1 + 1j * loss)
-        for phase, loss in zip((MATRIX, PARTICLE), losses, strict=True)
-    ]
-    mean = result.energies.moduli_at(*np.transpose(moduli))
-    young = result.constants_of(mean)[0]
-    gap = abs(found.values["E"] - young.imag / young.real)
-    assert only_energies[0] < gap <= found.errors["E"]
 
 
 def test_losses_of_spheres_are_those_of_differences_of_the_modulus():

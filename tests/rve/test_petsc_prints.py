@@ -12,16 +12,8 @@ pytest.importorskip("alphacut.rve.fenicsx")
 
 
 ROOT = Path(__file__).parents[2]
-SOLVE = [
-    "-m",
-    "rve",
-    "solve",
-    "cases/paper.toml",
-    "--set",
-    "mesh.size=0.5",
-    "--set",
-    "mesh.layers=4",
-]
+COARSE = ["--set", "mesh.size=0.5", "--set", "mesh.layers=4"]
+SOLVE = ["-m", "rve", "solve", "cases/paper.toml", *COARSE]
 
 
 def solve(*options, **environment):

@@ -46,9 +46,8 @@ def test_a_prism_that_gmsh_does_not_return_is_missed_by_its_volume(outline):
         grid_of(rest)
 
 
-def test_the_order_of_prisms_does_not_matter():
+def test_the_order_of_prisms_does_not_matter(rng):
     prisms = prisms_of(circle)
-    rng = np.random.default_rng(1)
     cells, nodes = rng.permutation(len(prisms.cells)), rng.permutation(len(prisms.points))
     place = np.argsort(nodes)
     mixed = replace(
