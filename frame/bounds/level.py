@@ -296,11 +296,7 @@ def _data(level: LevelModels, o: int, side: float) -> tuple[Data, Array]:
 
 
 def _truncation_terms(level: LevelModels, o: int, side: float) -> tuple[list[Array], Array]:
-    """Terms that truncated modes and errors add to bounds of side × output o.
-
-    Returns the three fields of `Data` on truncated modes, for what depends on the inputs, and
-    constants to add to the model's value for the motion's, and to that for its bound, (2, T).
-    """
+    """Fields of `Data` on truncated modes, and constants of the motion and of a bound, (2, T)."""
     modes, table = level.models.oscillators, level.tables[int(level.structure.order[o])]
     constant: Array = np.zeros((2, len(level.excitation[1])))
     constant[1] = level.models.added[:, o]

@@ -75,12 +75,6 @@ class EnergyNorms:
     (1 − μ) 1 ≤ M ≤ (1 + μ) 1 and (1 − κ) ω² ≤ K ≤ (1 + κ) ω² with spectral norms μ and κ of bounds
     of |M − 1| and |K − ω²| / (ω ωᵀ).
 
-    Attributes:
-        least_frequency: Lower bound of the frequencies over the box, in rad/s.
-        greatest_ratio: Largest damping ratio.
-        reading: What outputs read of a force, over its norm √(f* M⁻¹ f), shape (m,).
-        outputs: Error of outputs over a deviation √(qᵀ K q + vᵀ M v) of the motion, shape (m,).
-
     Raises:
         UnprovedError: M or K is not shown to stay positive definite.
     """
@@ -95,15 +89,17 @@ class EnergyNorms:
             raise UnprovedError(
                 "the box is so wide that mass and stiffness are not shown to stay positive definite"
             )
+        # lower bound of the frequencies over the box, in rad/s, and the largest damping ratio
         self.least_frequency = self.omega[0] * np.sqrt((1 - self.kappa) / (1 + self.mu))
         ratio = structure.ratio
         self.greatest_ratio = 0.0 if ratio is None else float(ratio.bounds()[1])
-        # √(r M rᵀ) of the rows r that are read
+        # what outputs read of a force over its norm √(f* M⁻¹ f), (m,): √(r M rᵀ) of their rows r
         self.reading = np.sqrt(1 + self.mu) * norm_of(structure.reading.size())
         of_displacement, of_velocity = np.split(structure.rows.size(), 2, axis=1)
         # accelerations read the force of the damping by a ratio too, 2 ζ ω √(vᵀ M v) at most
         highest_frequency = self.omega[-1] * np.sqrt((1 + self.kappa) / (1 - self.mu))
         by_ratio = 2 * self.greatest_ratio * highest_frequency * self.reading
+        # error of outputs over a deviation √(qᵀ K q + vᵀ M v) of the motion, (m,)
         self.outputs = np.hypot(
             self.of_spring_force(of_displacement), self.of_force(of_velocity) + by_ratio
         )
@@ -168,9 +164,7 @@ def majorant_parts(polynomials: TaylorModel, reach: Array) -> list[Array]:
 
 def largest_growth(eigenvalue: TaylorModel, reach: Array) -> Array:
     """Upper bounds of the growth rates Re λ_k over the box |u_i| ≤ reach_i, shape (n,), in 1/s."""
-    size = np.prod(reach**eigenvalue.exponents, axis=1)
-    real = eigenvalue.coefficients.real
-    return np.asarray(real[0] + size[1:] @ np.abs(real[1:]))
+    return eigenvalue.real.within(-reach, reach).bounds()[1]
 
 
 @dataclass(frozen=True, eq=False)

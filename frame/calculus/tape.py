@@ -36,7 +36,7 @@ def tape(components: Sequence[Expr], active: Sequence[Symbol], constants: Sequen
     """
     writer = _Writer([*active, *constants])
     results = np.array([writer.place(e) for e in components], np.int64)
-    code = np.array(writer.code, np.int64).reshape(-1, 3)
+    code = np.array([*writer.code], np.int64).reshape(-1, 3)
     places = np.zeros(writer.arguments + len(code) + len(writer.numbers))
     places[writer.arguments + len(code) :] = [*writer.numbers][::-1]
     return code, results, places
@@ -57,8 +57,7 @@ class _Writer:
     def __init__(self, arguments: Sequence[Symbol]) -> None:
         self.places: dict[object, int] = {x: k for k, x in enumerate(arguments)}
         self.numbers: dict[float, int] = {}
-        self.code: list[tuple[int, int, int]] = []
-        self.operation_places: dict[tuple[int, int, int], int] = {}
+        self.code: dict[tuple[int, int, int], int] = {}  # operations in order, and their places
         self.arguments = len(arguments)
 
     def place(self, e: Expr) -> int:
@@ -94,7 +93,4 @@ class _Writer:
         """Place of the result of an operation on places x and y, written unless it is there."""
         instruction = {"Add": "add", "Mul": "multiply"}.get(name, name)
         row = (OPERATIONS.index(instruction), x, x if y is None else y)
-        if row not in self.operation_places:
-            self.code.append(row)
-            self.operation_places[row] = self.arguments + len(self.code) - 1
-        return self.operation_places[row]
+        return self.code.setdefault(row, self.arguments + len(self.code))

@@ -43,22 +43,15 @@ COMPLEX = 2
 
 @dataclass(frozen=True, eq=False)
 class TaylorModel:
-    """Functions of the unit box, an array of shape V of them.
-
-    Args:
-        parts: Coefficients of degree 0, 1, …, shapes (monomials, *V), real or complex; missing ones
-            are zero.
-        remainder: Bound of what they leave out and of their rounding, shape V, never negative.
-        inputs: Number of inputs d.
-        order: Degree to which products are kept.
-    """
+    """Functions of the unit box, an array of shape V of them."""
 
     __array_ufunc__ = None  # an array on the left leaves the operation to the model
 
+    # coefficients of degree 0, 1, …, (monomials, *V), real or complex; missing ones are zero
     parts: tuple[Array, ...]
-    remainder: Array
-    inputs: int
-    order: int = ORDER
+    remainder: Array  # bound of what they leave out and of their rounding, V, never negative
+    inputs: int  # number of inputs d
+    order: int = ORDER  # degree to which products are kept
 
     @classmethod
     def constant(cls, value: ArrayLike, inputs: int, order: int = ORDER) -> TaylorModel:

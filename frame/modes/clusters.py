@@ -62,10 +62,11 @@ def enclose_subspaces(
         UnprovedError: The box is so wide that the structure may lose its mass or stiffness.
     """
     tolerances = np.zeros(centre.modes) if tolerances is None else tolerances
-    slopes = _slopes(centre)
+    couplings = _couplings(centre, np.arange(centre.modes))
+    slopes = np.diagonal(couplings, axis1=1, axis2=2).T  # ∂λ_j/∂u_i in the middle, (modes, d)
     steepest = int((np.abs(slopes) / centre.squared[:, None]).max(0).argmax())  # input, of λ
     low, high, variation = _ranges(centre, int(used[steepest]))
-    near, blocks, along = _nearness(centre, slopes), list[Block](), None
+    near, blocks, along = _nearness(centre, couplings), list[Block](), None
     free: Ints = np.arange(centre.modes)
     while len(free) and free[0] < wanted and along is None:
         modes, block = _linked(near > NEAR, free[:1], free), None
@@ -149,13 +150,6 @@ def _require_stiff(values: Array, like: Array) -> None:
         raise UnprovedError(what, "take the method improved-graph-follower")
 
 
-def _slopes(centre: CentredMatrices) -> Array:
-    """∂λ_j/∂u_i in the middle, shape (modes, d)."""
-    at = np.arange(centre.modes)
-    stiff, heavy = (x.part(1)[:, at, at] for x in (centre.stiffness, centre.mass))
-    return np.asarray((stiff - centre.squared * heavy).T)
-
-
 def _couplings(centre: CentredMatrices, some: Ints) -> Array:
     """First-order change of K − λ M between modes, λ the mean of both, shape (d, p, p)."""
     stiff, heavy = (x.part(1)[:, some[:, None], some] for x in (centre.stiffness, centre.mass))
@@ -163,11 +157,11 @@ def _couplings(centre: CentredMatrices, some: Ints) -> Array:
     return np.asarray(stiff - mean * heavy)
 
 
-def _nearness(centre: CentredMatrices, slopes: Array) -> Array:
+def _nearness(centre: CentredMatrices, couplings: Array) -> Array:
     """First-order change of λ_j − λ_k over the box, over that distance in its middle, a matrix."""
     # from 1 on two modes may meet at complex inputs of sizes up to 1, where their series diverge
-    couplings = np.abs(_couplings(centre, np.arange(centre.modes)))
-    change = np.abs(slopes[:, None] - slopes).sum(-1) + 2 * couplings.sum(0)
+    slopes = np.diagonal(couplings, axis1=1, axis2=2).T
+    change = np.abs(slopes[:, None] - slopes).sum(-1) + 2 * np.abs(couplings).sum(0)
     distance = np.abs(centre.squared[:, None] - centre.squared)
     # modes of equal frequencies have no shapes of their own, whether they part in the box or not
     equal = distance <= EQUAL * np.maximum(centre.squared[:, None], centre.squared)

@@ -169,11 +169,8 @@ def modes_wanted(
 def _truncation_error(
     read: Array, participation: Array, response: Array, squared: Array, power: float
 ) -> Array:
-    """Error of an output without the modes from k on, for each k, shape (n,).
-
-    By Cauchy and Schwarz it is the root of Σ a² Σ β² over these modes times half the range of
-    λ^power e; from power ½ on the terms a² are divided by λ, at 1 those of β² too.
-    """
+    """Error of an output without the modes from k on, for each k, shape (n,)."""
+    # √(Σ a² Σ β²) times half the range of λ^power e (Cauchy, Schwarz); from power ½ on a² is over λ
     outputs = np.cumsum((read**2 / squared ** float(power > 0))[::-1])[::-1]
     sources = np.cumsum((participation**2 / squared ** float(power == 1))[::-1])[::-1]
     scaled = response * squared[:, None] ** power
