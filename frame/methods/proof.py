@@ -24,7 +24,7 @@ import numpy as np
 
 from alphacut.frame import numbers
 from alphacut.frame.bounds.box_proof import BisectionError, BoxBounds, Goal
-from alphacut.frame.bounds.branch_and_bound import enclosed
+from alphacut.frame.bounds.branch_and_bound import Optima, enclosed, first_optima
 from alphacut.frame.bounds.model_error import (
     MAX_PARAMETERS,
     Remainder,
@@ -32,7 +32,6 @@ from alphacut.frame.bounds.model_error import (
     motion_parts,
     proved_error,
 )
-from alphacut.frame.bounds.newton import Optima, first_optima
 from alphacut.frame.bounds.spatial_branch_and_bound import prove
 from alphacut.frame.boxes import DEFAULT_TOLERANCE, Boxes, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError

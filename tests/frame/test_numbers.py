@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from alphacut.frame import Accelerogram, DualProof, Proof, StoreyFrame, envelope, numbers
-from alphacut.frame.bounds import newton
+from alphacut.frame.bounds import branch_and_bound
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.methods import proof
@@ -21,7 +21,9 @@ NARROW = {**INPUTS, "k1": Interval(3.8e7, 4.2e7)}
 MOTION = {"duration": 0.8, "step": 0.05, "alpha": (0,), "relative": True, "progress": False}
 DUAL = DualProof(gap=1e-3, peaks=1e-3, parts=6, workers=1)
 TUNED = [name for name in vars(numbers) if name.isupper()]
-READERS = [Path(module.__file__).read_text(encoding="utf-8") for module in (proof, newton)]
+READERS = [
+    Path(module.__file__).read_text(encoding="utf-8") for module in (proof, branch_and_bound)
+]
 
 
 def exact(inputs):

@@ -7,10 +7,9 @@ import pytest
 from scipy.integrate import cumulative_trapezoid
 
 from alphacut.frame import Accelerogram, Exact, Force, History, LinearFlow, StoreyFrame
-from alphacut.frame.bounds.branch_and_bound import Frontier, enclosed, examine_items
+from alphacut.frame.bounds.branch_and_bound import Frontier, Optima, enclosed, examine_items
 from alphacut.frame.bounds.kernel import stays_below
 from alphacut.frame.bounds.model_error import Remainder, largest_growth, motion_parts, proved_error
-from alphacut.frame.bounds.newton import Optima
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.calculus.unproved import UnprovedError
