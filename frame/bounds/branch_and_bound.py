@@ -5,8 +5,8 @@ fathomed for a problem by one of four tests, all but the third on its quadratic 
 that one's `Remainder`: 1. the output is monotone along an axis, and the neighbouring box, or
 the face, covers it; 2. its bound lies below the incumbent; 3. so does that of modes whose phase is
 linear in the inputs, with a remainder that holds only what else they do; 4. a concave function
-above the quadratic model (αBB) has no higher point. Else it is bisected. Incumbents are local optima
-by Newton's method with a trust region, many at a time.
+above the quadratic model (αBB) has no higher point. Else it is bisected. Incumbents are local
+optima by Newton's method with a trust region, many at a time.
 """
 
 from __future__ import annotations
