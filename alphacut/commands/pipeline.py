@@ -104,7 +104,7 @@ class Pipeline:
         elif "envelope" in stages:
             kinds += ["envelope"] * max(1, len(content.study))
         kinds += [*content.questions, *["shares"] * content.shares, *["figures"] * self.figures]
-        self.store.progress.foresee(foreseen_seconds(content), kinds)
+        self.store.progress.foresee(kinds)
         if "microstructure" in stages:
             results.microstructure = self.compute_microstructure()
             numbers = results.microstructure.numbers["radius"]
@@ -212,15 +212,6 @@ class Pipeline:
         compute = partial(task.compute_peaks, structure)
         stage = Stage("peaks", inputs, ("fuzzy", "frame"), PeakResults, compute)
         return peaks_of(self.store.take(stage).numbers, alpha)
-
-
-def foreseen_seconds(content: Content) -> dict[str, float]:
-    """Rough seconds of a stage of each kind on a core: their ratios are those of the progress."""
-    n_inputs = 1 if content.envelope is None else 1 + len(content.envelope.fuzzy)
-    seconds = {"envelope": 3.0 * n_inputs, "record": float(n_inputs), "probability": 5.0}
-    seconds |= {"tolerances": 10.0 * n_inputs, "decision": 0.1, "fragility": 0.5, "figures": 6.0}
-    has_elements = content.particle_cell is None or content.modulus.method == "prism"
-    return seconds | (dict.fromkeys(("modulus", "image"), 30.0) if has_elements else {})
 
 
 def answer_of(

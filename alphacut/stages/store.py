@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, as_completed
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -38,6 +38,9 @@ if TYPE_CHECKING:
 LOG = logging.getLogger(__name__)
 SAMPLES = "samples.db"
 """Store of the samples of a campaign, beside the results."""
+SECONDS = {"modulus": 10.0, "image": 10.0, "envelope": 10.0, "record": 3.0, "probability": 5.0}
+SECONDS |= {"tolerances": 30.0, "figures": 6.0}
+"""Rough seconds of a stage by the first word of its name, else 1, for its part of the progress."""
 
 
 class Numbers(BaseModel):
@@ -140,21 +143,18 @@ class Stage(Generic[T]):
 
 @dataclass
 class RunProgress:
-    """Progress of a run in one bar, of which stages take parts as their foreseen `seconds`.
+    """Progress of a run in one bar, of which stages take parts as their `SECONDS`.
 
-    These are by the first word of a stage's name, else 1; `seconds_left` are those of all stages to
-    come. `show` takes the share done.
+    `seconds_left` are those of all stages to come; `show` takes the share done.
     """
 
     show: Progress = no_progress
-    seconds: Mapping[str, float] = field(default_factory=dict)
     seconds_left: float = 1.0
     done: float = 0.0
     shown: float = 0.0
 
-    def foresee(self, seconds: Mapping[str, float], names: Iterable[str]) -> None:
+    def foresee(self, names: Iterable[str]) -> None:
         """Foresees the stages of a run by their names."""
-        self.seconds = seconds
         self.seconds_left = self._seconds_of(names)
 
     def next_part(self, names: Iterable[str], skipped: Iterable[str] = ()) -> Progress:
@@ -167,7 +167,7 @@ class RunProgress:
         return subprogress(self._advance, first, self.done)
 
     def _seconds_of(self, names: Iterable[str]) -> float:
-        return sum(self.seconds.get(name.partition("_")[0], 1.0) for name in names)
+        return sum(SECONDS.get(name.partition("_")[0], 1.0) for name in names)
 
     def _advance(self, share: float) -> None:
         self.shown = max(self.shown, share)  # a second analysis of a stage begins at 0

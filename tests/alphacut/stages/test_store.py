@@ -75,7 +75,7 @@ def test_a_run_has_one_progress_that_ends_once(tmp_path):
         return StageResult({})
 
     stages = [Stage(f"stage_{k}", k, ("fuzzy",), dict, compute) for k in range(6)]
-    store = store_in(tmp_path, progress=RunProgress(told.append, {"stage": 2.0}, seconds_left=10.0))
+    store = store_in(tmp_path, progress=RunProgress(told.append, seconds_left=5.0))
     store.take(stages[0])
     store.take_all(stages[1:4], None)
     assert told[-1] == pytest.approx(0.8)
