@@ -55,7 +55,7 @@ def run(options: argparse.Namespace, out: TextIO) -> int:
     require_tolerance(result.error, content.modulus.tolerance)
     references = problem.references()
     if result.has_isotropic_constants:
-        require_bounds((result.modulus, result.modulus), references, problem.cell.particles)
+        require_bounds((result.modulus / GPA,) * 2, references, problem.cell.particles)
     document = {**document_of(result), "references": references}
     if options.export:
         document["export"] = export(problem, Path(options.export))

@@ -138,11 +138,10 @@ class Pipeline:
             results.image = self.store.take(stage)
             return
         self.campaign.require_mesh()  # once, not by each sample
-        results.modulus = result = self.store.take(campaign.stage(self.campaign))
-        cell.require_tolerance(result.numbers.error, section.tolerance)
-        young = result.arrays["E"].transpose("alpha", "bound").values[-1]
-        particles = self.campaign.cell.particles
-        cell.require_bounds((young[0], young[1]), result.numbers.references, particles)
+        results.modulus = self.store.take(campaign.stage(self.campaign))
+        numbers = results.modulus.numbers
+        cell.require_tolerance(numbers.error, section.tolerance)
+        cell.require_bounds(numbers.E_GPa[-1], numbers.references, numbers.particles)
 
     def _compute_motion(self) -> None:
         """Computes the identified inputs, then the suite of records or envelopes, and answers."""

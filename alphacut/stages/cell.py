@@ -255,22 +255,19 @@ def require_isotropic(result: HomogenisedStiffness) -> None:
         raise FailedError(f"E would be {value}: 2 G_T exceeds 3 (C11 + C12)", cure)
 
 
-def require_bounds(
-    modulus_bounds: tuple[float, float], references: References, particles: str
-) -> None:
+def require_bounds(young: tuple[float, float], references: References, particles: str) -> None:
     """Refuses E of spheres outside the Hashin–Shtrikman bounds of the fraction that a case states.
 
     E is outside by more than `BOUNDS_SLACK` where the radius map holds another fraction, since
     cells denser than any cube are cut off, or because the mean over cells with different spheres
-    need not obey the bounds. `modulus_bounds` are those of E at the nominal inputs, in Pa.
+    need not obey the bounds. `young` has the bounds of E at the nominal inputs, in GPa.
     """
     if particles != "spheres" or "fraction_of_case" not in references:
         return
     low, high = references["hashin_shtrikman_E_GPa"]
     fraction = references["fraction_of_case"]
-    young_low, young_high = (bound / GPA for bound in modulus_bounds)
-    if young_high < low * (1 - BOUNDS_SLACK) or young_low > high * (1 + BOUNDS_SLACK):
-        value = f"{young_low:.5g} GPa, of a map that holds {references['fraction']:.4g}"
+    if young[1] < low * (1 - BOUNDS_SLACK) or young[0] > high * (1 + BOUNDS_SLACK):
+        value = f"{young[0]:.5g} GPa, of a map that holds {references['fraction']:.4g}"
         limits = f"Hashin–Shtrikman's {low:.5g} … {high:.5g} GPa at {fraction:g}"
         cure = f"set cell.fraction = {fraction:g} in place of [microstructure] or [radius]"
         raise RefusedError("E of spheres", value, limits, cure)

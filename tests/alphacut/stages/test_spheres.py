@@ -24,7 +24,7 @@ def test_spheres_of_one_size_hold_the_fraction_and_lie_within_its_bounds(tmp_pat
     problem = CellProblem.of(case(tmp_path, fraction))
     modulus, bounds = problem.solve().modulus, problem.references()
     assert bounds["fraction"] == pytest.approx(fraction, rel=1e-12)
-    require_bounds((modulus, modulus), bounds, problem.cell.particles)
+    require_bounds((modulus / 1e9,) * 2, bounds, problem.cell.particles)
 
 
 @pytest.mark.parametrize(
@@ -39,10 +39,10 @@ def test_a_modulus_outside_the_bounds_of_the_stated_fraction_is_refused(
     ends = np.array(bounds["hashin_shtrikman_E_GPa"])
     assert ends[0] == pytest.approx(low, rel=1e-7)
     with pytest.raises(RefusedError, match=f"E of spheres is .*set cell.fraction = {fraction:g}"):
-        require_bounds((modulus * 1e9, modulus * 1e9), bounds, "spheres")
-    for inside in ends * [0.9951, 1.0049] * 1e9:
+        require_bounds((modulus, modulus), bounds, "spheres")
+    for inside in ends * [0.9951, 1.0049]:
         require_bounds((inside, inside), bounds, "spheres")
-    for outside in ends * [0.9949, 1.0051] * 1e9:
+    for outside in ends * [0.9949, 1.0051]:
         with pytest.raises(RefusedError):
             require_bounds((outside, outside), bounds, "spheres")
 
