@@ -116,36 +116,30 @@ def with_forces(
     if model is None:
         raise RefusedError("force", "on a pendulum", "beside [frame] or [matrices]")
     forces = [
-        (unknown, amplitude, section.history.history)
+        (unknown, *amplitude, section.history.history)
         for section in sections
-        for unknown, (amplitude, _) in section.amplitude.items()
+        for unknown, amplitude in section.amplitude.items()
     ]
-    units = [unit for section in sections for _, unit in section.amplitude.values()]
     if isinstance(model, StoreyFrame):
         unknowns = [str(floor) for floor in range(1, model.floors + 1)]
-    for unknown, _, _ in forces:
+    for unknown, *_ in forces:
         require_choice("force.amplitude", unknown, unknowns)
     if isinstance(model, StoreyFrame):
-        loads = [
-            Force(int(floor), amplitude.nominal, course) for floor, amplitude, course in forces
-        ]
+        loads = [Force(int(floor), x.nominal, course) for floor, x, _, course in forces]
         model = replace(model, loads=loads)
         names = model.force_names
     else:
         names = tuple(f"F{number}" for number in range(1, len(forces) + 1))
-        nominal = {name: x.nominal for name, (_, x, _) in zip(names, forces, strict=True)}
+        nominal = {name: x.nominal for name, (_, x, *_) in zip(names, forces, strict=True)}
         loads = [
             Force(np.array([float(x == unknown) for x in unknowns]), name, course)
-            for name, (unknown, _, course) in zip(names, forces, strict=True)
+            for name, (unknown, _, _, course) in zip(names, forces, strict=True)
         ]
         model = replace(model, loads=loads, parameters={**model.parameters, **nominal})
-    amplitudes = {name: amplitude for name, (_, amplitude, _) in zip(names, forces, strict=True)}
-    return replace(
-        structure,
-        model=model,
-        numbers={**structure.numbers, **amplitudes},
-        force_units=dict(zip(names, units, strict=True)),
-    )
+    amplitudes = {name: x for name, (_, x, *_) in zip(names, forces, strict=True)}
+    units = {name: unit for name, (_, _, unit, _) in zip(names, forces, strict=True)}
+    numbers = {**structure.numbers, **amplitudes}
+    return replace(structure, model=model, numbers=numbers, force_units=units)
 
 
 MAX_RECORDS = 500
