@@ -132,11 +132,11 @@ class LinearMotion:
             states = _recursion(exact_step[:, : 2 * n], start, load @ exact_step[:, 2 * n :].T)
             # degree from which terms of exp(A τ) are below `TRUNCATION`; two degrees are for the
             # rise of the load, which is integrated twice
-            degree, term = 2, 1.0
+            degree, term, scaled = 2, 1.0, np.asarray(times / substep)
             while term > TRUNCATION:
                 degree += 1
                 term *= max(norm, frequency) * substep / (degree - 2)
-            values = _taylor(flow, degree, rows, np.hstack([states, load]), times / substep)
+            values = _taylor(flow, degree, rows, np.hstack([states, load]), scaled)
             phase = omega**2 * np.minimum(times**2, times / lowest) / 2 + frequency * times
             rounding = n * EPSILON * (CONSTANT_ROUNDING + phase)
             return values, rounding[:, None] * (np.abs(rows) @ np.abs(states).max(0))

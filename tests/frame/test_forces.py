@@ -33,7 +33,6 @@ from alphacut.frame.verification.self_test import (
     with_motions_tested,
 )
 from alphacut.fuzzy import Interval, Triangular
-from alphacut.fuzzy.refused import RefusedError
 
 GUST = History(0.3, np.array([1.0, 1.6, 0.4, 1.1, 0.9, 1.5, 0.7]), is_static=True)
 ALL = (
@@ -261,20 +260,3 @@ def test_a_wrong_share_at_once_is_proved_to_be_no_better():
     missed = np.abs(bad.values(unit) - flow.values(cuts.to_physical(unit))).max(0)
     assert missed.max() > 1e-3
     assert (missed <= proved_error(bad) + 1e-12).all()
-
-
-@pytest.mark.parametrize(
-    ("make", "words"),
-    [
-        (lambda: replace(FRAME, loads=[Force(4, 1.0, None)]), "floor is 4"),
-        (lambda: replace(FRAME, loads=[Force(1, np.nan, None)]), "amplitude"),
-        (lambda: replace(FRAME, loads=[GUST]), "loads is list"),
-        (lambda: History(0.0, np.ones(3)), "step"),
-        (lambda: History(0.1, np.ones(1)), "samples"),
-        (lambda: History.harmonic(-1.0), "frequency"),
-        (lambda: History.constant(-1.0), "start"),
-    ],
-)
-def test_forces_and_histories_that_are_none_are_refused(make, words):
-    with pytest.raises(RefusedError, match=words):
-        make()

@@ -120,16 +120,6 @@ def test_responses_are_off_by_their_rounding_at_most(case):
     assert np.allclose(named[1], error[nodes], rtol=1e-9, atol=0)
 
 
-def test_derivatives_are_those_of_the_response():
-    ground, time = Accelerogram(0.2, np.array([1.0, -2.0, 0.5, 3.0, 1.0])), np.arange(12) * 0.11
-    sigma, h = np.array([-0.6 + 20j]), 1e-5
-    value, _ = responses_at_nodes(sigma, ground, time, 2)
-    near = [responses_at_nodes(sigma + shift * h, ground, time, 0)[0][0] for shift in (-1, 0, 1)]
-    first, second = (near[2] - near[0]) / (2 * h), (near[0] - 2 * near[1] + near[2]) / h**2
-    assert np.allclose(value[1], first, rtol=1e-6, atol=1e-8)
-    assert np.allclose(value[2], second, rtol=1e-3, atol=1e-5)
-
-
 RECORD = Accelerogram(0.05, np.random.default_rng(1).normal(size=30))
 LATE = History.constant(start=0.3)  # 1 s between its samples, in which the fastest decay underflows
 

@@ -10,6 +10,8 @@ import sympy
 
 from alphacut.frame import (
     Accelerogram,
+    Force,
+    History,
     LagrangianFlow,
     LagrangianSystem,
     LinearFlow,
@@ -116,8 +118,14 @@ def test_a_lagrangian_system_refuses(changes, message):
         ),
         (lambda: pendulum(length=-1.0), "length is -1.0; allowed: finite numbers greater"),
         (lambda: Accelerogram(0.0, np.ones(3)), "accelerogram is 3 samples every 0 s"),
+        (lambda: replace(COLUMNS, loads=[Force(4, 1.0, None)]), "floor is 4"),
+        (lambda: replace(COLUMNS, loads=[Force(1, np.nan, None)]), "amplitude"),
+        (lambda: replace(COLUMNS, loads=[History.constant()]), "loads is list"),
+        (lambda: History(0.1, np.ones(1)), "history is 1 samples"),
+        (lambda: History.harmonic(-1.0), "frequency"),
+        (lambda: History.constant(-1.0), "start"),
     ],
 )
-def test_motions_refuse_unknown_names_and_odd_durations(call, message):
+def test_motions_and_loads_refuse_names_and_numbers_without_meaning(call, message):
     with pytest.raises(RefusedError, match=message):
         call()
