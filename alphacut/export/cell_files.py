@@ -10,8 +10,7 @@ import numpy as np
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.files import say, whole_file
-from alphacut.rve.mesh.file import write
-from alphacut.rve.mesh.gmsh_prisms import ABAQUS_ORDER
+from alphacut.rve.mesh.file import ABAQUS_ORDER, write
 
 if TYPE_CHECKING:
     from alphacut.rve.prism.fields import CellFields

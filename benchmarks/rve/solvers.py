@@ -24,7 +24,6 @@ import numpy as np
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.cell.cell import LOADS, Phase
 from alphacut.rve.fenicsx import PETSc
-from alphacut.rve.mesh import gmsh_prisms
 from alphacut.rve.prism.model import PrismModel
 from alphacut.rve.prism.problem import PrismProblem
 from alphacut.rve.result.result import effective_modulus
@@ -106,8 +105,7 @@ def timing(solver: str, size: float, layers: int = 12, repeat: int = 3) -> Timin
     """The fastest of a few runs, each with its set-up; one where it does not converge."""
     model = PrismModel(size, layers, estimate=False)
     problem = model.problem(PAPER)
-    named = {gmsh_prisms.MATRIX: MATRIX, gmsh_prisms.INCLUSION: PARTICLE}
-    stiffness = [named[name].stiffness for name in problem.grid.names]
+    stiffness = [MATRIX.stiffness, PARTICLE.stiffness]
     problem.assemble(stiffness)
     loads, runs = problem.loads(LOADS), []
     try:
@@ -172,11 +170,8 @@ def iterations(size: float) -> Iterator[tuple[str, float, int, int]]:
     for name, contrast, layers in settings:
         model = PrismModel(size, layers)
         problem = model.problem(MAPS[name])
-        named = {
-            gmsh_prisms.MATRIX: MATRIX,
-            gmsh_prisms.INCLUSION: Phase(MATRIX.modulus * contrast),
-        }
-        problem.assemble([named[phase].stiffness for phase in problem.grid.names])
+        particle = Phase(MATRIX.modulus * contrast)
+        problem.assemble([MATRIX.stiffness, particle.stiffness])
         solved = solve(problem.solver(model.options), problem.loads(LOADS))
         yield name, contrast, layers, max(solved.iterations)
 

@@ -13,9 +13,8 @@ from scipy.sparse.csgraph import connected_components
 from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.rve.cell.outline import Outline, circle, is_round
 from alphacut.rve.mesh import square
-from alphacut.rve.mesh.gmsh_prisms import INCLUSION, NAMES, Prisms
 from alphacut.rve.mesh.periodicity import SAME_PLACE, MeshError
-from alphacut.rve.mesh.prism_grid import PrismGrid, Triangulation
+from alphacut.rve.mesh.prism_grid import NAMES, PrismGrid, Prisms, Triangulation
 from alphacut.rve.mesh.square import REFINEMENTS
 
 T = TypeVar("T")
@@ -68,7 +67,7 @@ def _quadratic(
     points: Array, triangles: Ints, phase: Ints, radius: float, outline: Outline
 ) -> Triangulation:
     """Triangulation of straight-sided triangles with the middles of their edges."""
-    inside = phase == NAMES.index(INCLUSION)
+    inside = phase == NAMES.index("inclusion")
     ends, edges, on_interface = square.edges(triangles, inside)
     nodes = np.hstack([triangles, len(points) + edges[:, ::-1]])  # edges 01, 02, 12
     arc = np.zeros(len(points) + len(ends), bool)

@@ -1,6 +1,7 @@
 """The user's mesh: prisms of the product space in a file of Gmsh, as they are.
 
 The file is the geometry at its own θ: levels may be uneven, columns bent and phases any number.
+Gmsh's 15-node prisms ("Prism 15") have Basix's order of nodes; physical groups name phases.
 """
 
 from __future__ import annotations
@@ -8,18 +9,21 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.rve.mesh import gmsh_prisms, square
+from alphacut.rve.mesh import square
 from alphacut.rve.mesh.columns import grid_of
-from alphacut.rve.mesh.gmsh_prisms import Prisms
 from alphacut.rve.mesh.periodicity import SAME_PLACE, MeshError, partners
-from alphacut.rve.mesh.prism_grid import PrismGrid
+from alphacut.rve.mesh.prism_grid import PrismGrid, Prisms
 from alphacut.rve.mesh.wedge import prism_rule, vertices_and_midpoints, wedge
 
+PRISM_15 = 18  # Gmsh's type of the element
+ABAQUS_ORDER = [0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11]
+"""Of a prism in Abaqus and VTK: edges of the lower triangle, of the upper, and vertical ones."""
 FILLED = 1e-6  # of the cell that prisms may leave or take twice
 UPSIDE_DOWN = [3, 4, 5, 0, 1, 2, 12, 13, 8, 14, 10, 11, 6, 7, 9]
 MIRRORED = [0, 2, 1, 3, 5, 4, 7, 6, 8, 9, 11, 10, 13, 12, 14]
@@ -37,12 +41,60 @@ def read_grid(path: Path | str) -> PrismGrid:
         except Exception as error:  # Gmsh raises nothing else
             allowed = "files of Gmsh with 15-node prisms"
             raise RefusedError("mesh.file", path, allowed, str(error)) from None
-        prisms = orient(gmsh_prisms.read(gmsh))
+        prisms = orient(read_prisms(gmsh))
     grid = grid_of(prisms)
     _require_filled(grid)
     _require_periodic_square(grid)
     _require_joined_columns(grid)
     return grid
+
+
+def read_prisms(gmsh: Any) -> Prisms:
+    """All prisms of Gmsh's current model, each physical group of volumes a phase.
+
+    Raises:
+        MeshError: A volume is in no physical group or in two, or has other elements.
+    """
+    if parts := gmsh.model.getNumberOfPartitions():
+        cure = "write the mesh before it is divided among processes"
+        raise MeshError(f"the mesh is partitioned into {parts} parts", cure)
+    tags, xyz, _ = gmsh.model.mesh.getNodes()
+    number_of_tag = np.zeros(int(tags.max(initial=0)) + 1, np.int64)
+    number_of_tag[tags] = np.arange(len(tags))
+    names: list[str] = []
+    cells: list[Ints] = []
+    phases: list[Ints] = []
+    grouped: set[int] = set()
+    for _, group in gmsh.model.getPhysicalGroups(3):
+        name = gmsh.model.getPhysicalName(3, group) or f"group {group}"
+        volumes = gmsh.model.getEntitiesForPhysicalGroup(3, group).tolist()
+        if grouped & set(volumes):
+            raise MeshError(f"prisms of the physical group {name!r} are in another one too")
+        grouped |= set(volumes)
+        for volume in volumes:
+            cells.append(_cells_of(gmsh, volume, name))
+            phases.append(np.full(len(cells[-1]), len(names)))
+        names.append(name)
+    ungrouped = [tag for _, tag in gmsh.model.getEntities(3) if tag not in grouped]
+    if ungrouped or not names:
+        what = f"volume {ungrouped[0]}" if ungrouped else "the mesh"
+        raise MeshError(f"{what} has no physical group that names its phase")
+    # nodes of curves and surfaces alone belong to no prism
+    used, compact = np.unique(number_of_tag[np.concatenate(cells)], return_inverse=True)
+    points: Array = np.asarray(xyz, float).reshape(-1, 3)[used]
+    return Prisms(points, compact.reshape(-1, 15), np.concatenate(phases), tuple(names))
+
+
+def _cells_of(gmsh: Any, volume: int, name: str) -> Ints:
+    """Node tags of the prisms of a volume, shape (m, 15), in Basix's order."""
+    kinds, _, nodes = gmsh.model.mesh.getElements(3, volume)
+    if list(kinds) != [PRISM_15]:
+        found = ", ".join(gmsh.model.mesh.getElementProperties(kind)[0] for kind in kinds)
+        raise MeshError(
+            f"the physical group {name!r} holds {found or 'no elements'}",
+            "mesh with Prism 15: extrude with recombine, Mesh.SecondOrderIncomplete = 1, order 2",
+        )
+    return np.asarray(nodes[0].astype(np.int64)).reshape(-1, 15)
 
 
 def refined(grid: PrismGrid) -> PrismGrid:
@@ -185,7 +237,7 @@ def write(
         for k, (volume, name) in enumerate(zip(volumes, names, strict=True)):
             prisms = np.flatnonzero(phase == k)
             gmsh.model.mesh.addElementsByType(
-                volume, gmsh_prisms.PRISM_15, prisms + 1, (cells[prisms] + 1).ravel()
+                volume, PRISM_15, prisms + 1, (cells[prisms] + 1).ravel()
             )
             gmsh.model.addPhysicalGroup(3, [volume], name=name)
         gmsh.write(str(path))

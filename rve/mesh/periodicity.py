@@ -35,11 +35,6 @@ class Periodicity:
     vertices: int
     count: int
 
-    def ends(self, plane: Triangulation) -> Ints:
-        """Unknowns of the vertices beside each midpoint's, −1 where fixed, shape (midpoints, 2)."""
-        first = np.unique(self.unknown[plane.vertices :], return_index=True)[1]
-        return np.asarray(self.unknown[plane.ends[first]])
-
 
 @lru_cache(maxsize=4)
 def identify(plane: Triangulation) -> Periodicity:

@@ -18,6 +18,9 @@ from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.cell.outline import Outline, circle, reach, require_fit
 from alphacut.stochastic import RadiusMap, ThetaLaw, require_map
 
+NAMES = "matrix", "inclusion"
+"""Names of the phases in their order, where no file gives them."""
+
 
 @dataclass(frozen=True, eq=False)
 class Triangulation:
@@ -44,6 +47,23 @@ class Triangulation:
     arc: Mask
     radius: float
     outline: Outline = circle
+
+
+@dataclass(frozen=True, eq=False)
+class Prisms:
+    """Prisms of the product space as Gmsh numbers them.
+
+    Args:
+        points: (x1, x2, θ) of all nodes, shape (n, 3).
+        cells: Nodes of each prism in Basix's order, shape (m, 15).
+        phase: Phase of each prism, an index of `names`, shape (m,).
+        names: Names of the phases.
+    """
+
+    points: Array
+    cells: Ints
+    phase: Ints
+    names: tuple[str, ...]
 
 
 def reference_radius(radius_map: RadiusMap, outline: Outline = circle) -> float:

@@ -20,8 +20,7 @@ from alphacut.rve.cell.cell import THREE_LOADS, AnyPhase, Phase, VoigtPhase, req
 from alphacut.rve.fenicsx import MPI
 from alphacut.rve.mesh.columns import from_first_rank
 from alphacut.rve.mesh.file import read_grid, refined
-from alphacut.rve.mesh.gmsh_prisms import NAMES
-from alphacut.rve.mesh.prism_grid import FixedCell, LevelFunction, LevelSet, PrismGrid
+from alphacut.rve.mesh.prism_grid import NAMES, FixedCell, LevelFunction, LevelSet, PrismGrid
 from alphacut.rve.prism.model import (
     cached_grid,
     cached_problem,

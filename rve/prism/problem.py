@@ -120,7 +120,9 @@ class PrismProblem:
         self.space = fem.functionspace(self.mesh, wedge(2))
         self.wedge: Ints = np.asarray(self.mesh.topology.original_cell_index)
         self.layer = self.wedge // len(grid.plane.triangles)
-        self.node = self._node_of_dof()
+        sizes, geometry = self.space.dofmap.index_map, self.mesh.geometry
+        self.node: Ints = np.empty(sizes.size_local + sizes.num_ghosts, np.int64)
+        self.node[self.space.dofmap.list] = geometry.input_global_indices[geometry.dofmap]
         self._compile_forms()
         self.numbering = LevelNumbering(grid, comm)
         pairs, rows = self.numbering.pairs, self.numbering.rows
@@ -130,12 +132,6 @@ class PrismProblem:
             pairs[self.node], pairs[cells], rows, self.numbering.size, comm
         )
         self.matrix = self.elimination.matrix
-
-    def _node_of_dof(self) -> Ints:
-        sizes, geometry = self.space.dofmap.index_map, self.mesh.geometry
-        nodes = np.empty(sizes.size_local + sizes.num_ghosts, np.int64)
-        nodes[self.space.dofmap.list] = geometry.input_global_indices[geometry.dofmap]
-        return nodes
 
     def _compile_forms(self) -> None:
         points, weights = prism_rule()

@@ -181,9 +181,11 @@ def plane_solver(block: sp.csr_matrix, mass: float) -> PETSc.KSP:
 
 def injection(numbering: LevelNumbering) -> sp.csr_matrix:
     """Matrix J from linear to quadratic triangles; midpoints get the mean of their vertices."""
-    periodicity, vertices = numbering.periodicity, numbering.periodicity.vertices
+    plane, periodicity = numbering.grid.plane, numbering.periodicity
+    vertices, unknown = periodicity.vertices, periodicity.unknown
+    first = np.unique(unknown[plane.vertices :], return_index=True)[1]  # node of each midpoint's
     ends = np.concatenate(
-        [np.repeat(np.arange(vertices), 2).reshape(-1, 2), periodicity.ends(numbering.grid.plane)]
+        [np.repeat(np.arange(vertices), 2).reshape(-1, 2), unknown[plane.ends[first]]]
     )
     node, end = np.nonzero(ends >= 0)  # not of fixed vertices
     halves = np.full(len(node), 0.5), (node, ends[node, end])

@@ -85,7 +85,8 @@ with square.model() as gmsh:
 
 def test_complete_quadratic_prisms_of_gmsh_are_refused_with_its_own_option():
     pytest.importorskip("alphacut.rve.fenicsx")
-    from alphacut.rve.mesh import gmsh_prisms, square
+    from alphacut.rve.mesh import square
+    from alphacut.rve.mesh.file import read_prisms
     from alphacut.rve.mesh.periodicity import MeshError
 
     with square.model() as gmsh:
@@ -97,7 +98,7 @@ def test_complete_quadratic_prisms_of_gmsh_are_refused_with_its_own_option():
         gmsh.option.setNumber("Mesh.MeshSizeMin", 1)
         gmsh.model.mesh.generate(3)
         with pytest.raises(MeshError, match=r"Prism 18.*SecondOrderIncomplete = 1"):
-            gmsh_prisms.read(gmsh)
+            read_prisms(gmsh)
 
 
 def test_a_matrix_refuses_a_place_outside_of_its_pattern():

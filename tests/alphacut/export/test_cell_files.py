@@ -15,7 +15,7 @@ from alphacut.export.cell_files import FORMATS, write_cell
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve import Phase, PrismModel
 from alphacut.rve.mesh import square
-from alphacut.rve.mesh.gmsh_prisms import ABAQUS_ORDER
+from alphacut.rve.mesh.file import ABAQUS_ORDER
 from alphacut.rve.prism.fields import cell_fields
 from alphacut.stochastic import HermiteMap
 from tests.rve.mesh.test_prisms import volumes

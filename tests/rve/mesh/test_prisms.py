@@ -8,10 +8,11 @@ import pytest
 pytest.importorskip("alphacut.rve.fenicsx")
 
 from alphacut.rve.cell.outline import Ellipse, circle
-from alphacut.rve.mesh import gmsh_prisms, square
+from alphacut.rve.mesh import square
 from alphacut.rve.mesh.columns import extrude, grid_of
-from alphacut.rve.mesh.gmsh_prisms import Prisms
+from alphacut.rve.mesh.file import PRISM_15, read_prisms
 from alphacut.rve.mesh.periodicity import MeshError
+from alphacut.rve.mesh.prism_grid import Prisms
 from alphacut.rve.mesh.wedge import prism_rule, wedge
 from alphacut.stochastic import HermiteMap
 
@@ -70,13 +71,13 @@ def test_a_volume_without_a_name_of_other_elements_or_in_parts_is_refused():
         gmsh.model.geo.synchronize()
         gmsh.model.mesh.generate(3)
         with pytest.raises(MeshError, match="volume 1 has no physical group"):
-            gmsh_prisms.read(gmsh)
+            read_prisms(gmsh)
         gmsh.model.addPhysicalGroup(3, [1], name="clay")
         with pytest.raises(MeshError, match="'clay' holds Tetrahedron 4"):
-            gmsh_prisms.read(gmsh)
+            read_prisms(gmsh)
         gmsh.model.mesh.partition(2)
         with pytest.raises(MeshError, match="partitioned into 2 parts; write the mesh before"):
-            gmsh_prisms.read(gmsh)
+            read_prisms(gmsh)
 
 
 def test_the_rule_of_prisms_prints_in_full_since_forms_are_told_apart_by_that():
@@ -94,14 +95,14 @@ def test_a_volume_in_two_groups_is_refused_from_each_version_of_msh(tmp_path, ve
         gmsh.option.setNumber("Mesh.ElementOrder", 2)
         gmsh.option.setNumber("Mesh.SecondOrderIncomplete", 1)
         gmsh.model.mesh.generate(3)
-        count = len(gmsh.model.mesh.getElementsByType(gmsh_prisms.PRISM_15)[0])
+        count = len(gmsh.model.mesh.getElementsByType(PRISM_15)[0])
         for name in ("clay", "all"):
             gmsh.model.addPhysicalGroup(3, [1], name=name)
         gmsh.option.setNumber("Mesh.MshFileVersion", version)
         gmsh.write(str(tmp_path / "cell.msh"))
         gmsh.clear()
         gmsh.open(str(tmp_path / "cell.msh"))
-        found = len(gmsh.model.mesh.getElementsByType(gmsh_prisms.PRISM_15)[0])
+        found = len(gmsh.model.mesh.getElementsByType(PRISM_15)[0])
         assert found == copies * count > 0
         with pytest.raises(MeshError, match="group 'all' are in another one too"):
-            gmsh_prisms.read(gmsh)
+            read_prisms(gmsh)

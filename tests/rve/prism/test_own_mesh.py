@@ -16,8 +16,8 @@ from alphacut.rve import MeshModel, Phase, PrismModel
 from alphacut.rve.cell.outline import Ellipse, circle
 from alphacut.rve.mesh.columns import extrude
 from alphacut.rve.mesh.file import MIRRORED, UPSIDE_DOWN, orient, read_grid, refined, write
-from alphacut.rve.mesh.gmsh_prisms import Prisms
 from alphacut.rve.mesh.periodicity import MeshError
+from alphacut.rve.mesh.prism_grid import Prisms
 from alphacut.stochastic import HermiteMap, TruncatedNormal
 
 MESHES = Path(__file__).parents[3] / "meshes"
