@@ -38,6 +38,7 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.rve.fenicsx import PETSc, cholesky
 from alphacut.rve.solver.numbering import LevelNumbering
 from alphacut.stochastic import ThetaLaw
+from alphacut.stochastic.theta.quadrature import level_rule
 
 Fields = tuple[Array, Array]  # hats and bubbles
 PREFIX, LEVEL = "rve_", "level_"  # of PETSc options, and after it of the levels' solvers
@@ -64,11 +65,10 @@ class ThetaMass:
 
 def theta_mass(law: ThetaLaw, levels: Array) -> ThetaMass:
     """Masses along θ, weighted by the density, of hats at the levels and bubbles between them."""
-    layers, heights = len(levels) - 1, np.diff(levels)[:, None]
-    abscissae, gauss_weights = np.polynomial.legendre.leggauss(3)  # on [−1, 1]
-    t, w = (abscissae + 1) / 2, gauss_weights / 2
+    layers, points = len(levels) - 1, 3
+    t = (np.polynomial.legendre.leggauss(points)[0] + 1) / 2  # the points of a layer
     shapes = np.array([1 - t, t, 4 * t * (1 - t)])  # lower hat, upper hat, bubble of a layer
-    density = heights * w * law.pdf(levels[:-1, None] + heights * t)
+    density = level_rule(law, levels, points=points).weights.reshape(layers, points)
     layer_mass = np.einsum("lq,iq,jq->lij", density, shapes, shapes)
     k = np.arange(layers)
     number = np.stack([k, k + 1, k + layers + 1], axis=1)
