@@ -115,10 +115,11 @@ class Auto:
     def _proofs(self, flow: UnitFlow, reasons: list[str]) -> list[Proof | DualProof]:
         """Return the proofs to try, in their order; refusals are appended to `reasons`."""
         proof, dual = Proof(None, self.tolerance, BOXES, workers=self.workers), self._dual(flow)
-        is_of_few = len(flow.boxes.names) <= MAX_PARAMETERS
+        if len(flow.boxes.names) > MAX_PARAMETERS:
+            return [dual]  # which itself refuses what cannot be proved
         works = list[float]()  # that are forecast
         methods = list[Proof | DualProof]()
-        for method in (proof, dual) if is_of_few else (dual,):
+        for method in (proof, dual):
             try:
                 with refusing():
                     works.append(method.forecast(exact_flow(flow.flow), flow.boxes))

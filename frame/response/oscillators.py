@@ -118,16 +118,17 @@ class Oscillators:
         sigma = grid.sigma.ravel()
         rho, rounding, bounds = self._table(source)
         G = with_power(sigma, rho, order)
-        omega, quotient = np.abs(sigma.imag), -sigma.real / sigma.imag
-        # of the power and of what is read off
-        rounding = np.abs(sigma) ** order * rounding
-        rounding += 2 * (order + 3) * UNIT_ROUNDOFF * np.abs(G[0])
-        direct = feedthrough(source, self.loads, order, self.time)[:, None]
-        value = direct + read_response(source, sigma, G[0])
-        rounding = rounding * (1 + quotient) if is_start else rounding / omega
+        direct = feedthrough(source, self.loads, order, self.time)
+        value, sizes = read_response(source, sigma, G[0]), np.abs(G).max(-1)
+        if direct.any():
+            value += direct[:, None]
+        # of the power and of what is read off, the largest over the grid, (T,)
+        rounding = float(np.abs(sigma).max()) ** order * rounding.max(-1)
+        rounding += 2 * (order + 3) * UNIT_ROUNDOFF * sizes[0]
+        rounding = rounding * (1 + grid.quotient[-1]) if is_start else rounding / grid.omega[0]
         rounding += 8 * UNIT_ROUNDOFF * np.abs(direct)
-        error, largest = self._error(np.abs(G).max(-1), bounds, order, start=is_start)
-        error, deviation = error + rounding.max(-1), self._line_deviation(source, order)
+        error, largest = self._error(sizes, bounds, order, start=is_start)
+        error, deviation = error + rounding, self._line_deviation(source, order)
         return ModalResponses(value.reshape(-1, *grid.sigma.shape), error, deviation, largest)
 
     def _error(
