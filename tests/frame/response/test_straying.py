@@ -71,6 +71,18 @@ def test_bounds_of_crisp_modes_that_cancel_are_about_what_they_stray(rng):
     assert np.median(ratios) < 2
 
 
+@pytest.mark.parametrize("order", [0, 1, 2])
+@pytest.mark.parametrize("load", LOADS)
+def test_a_mode_alone_strays_as_far_as_its_magnitude_says(load, order, rng):
+    """Also while a load has hardly moved it yet."""
+    sigma = grid_over((omega := rng.uniform(5, 30),) * 2, (0.05, 0.05), (4, 2)).sigma
+    kappa = 1 / (1j * sigma.imag[None])
+    response = Response(sigma, LOADS[load], order, kappa, np.zeros((2, 1)))
+    bound = response.line_deviation(TIME)[1:, 0]
+    off = off_chords(np.array([-0.05 + 1j]) * omega, LOADS[load], order, 1 / (1j * omega))
+    assert (off <= bound * (1 + 1e-9) + 1e-15).all()
+
+
 @pytest.mark.parametrize(
     ("spread", "fall"), [((0, 0), 0), ((0, 0), 1), ((0.01, 0), 0), ((0, 0.01), 0)]
 )
