@@ -26,10 +26,9 @@ from alphacut.records.text_file import (
 from alphacut.stochastic.particles.csv_columns import NUMBER
 
 TIME = r"\W*(?:time|t)\b\W*([a-zµ]*)\W*[,;\s]\W*"
-HEAD = re.compile(
-    TIME + r"(?:ground\s+)?(?:acceleration|accel|acc|ag|a)\b\W*(.*?)[\s\])\"]*", re.IGNORECASE
-)
-FORCE_HEAD = re.compile(TIME + r"(?:force|load|f)\b\W*(.*?)[\s\])\"]*", re.IGNORECASE)
+UNIT = r"[^\w%‰]*(.*?)[\s\])\"]*"  # %g is a unit, and another than g
+HEAD = re.compile(TIME + rf"(?:ground\s+)?(?:acceleration|accel|acc|ag|a)\b{UNIT}", re.IGNORECASE)
+FORCE_HEAD = re.compile(TIME + rf"(?:force|load|f)\b{UNIT}", re.IGNORECASE)
 """A head of two columns: units of the times and of the values, each empty where it has none."""
 ALLOWED = "time [s],acceleration [m/s^2], [g] or [gal]"
 ALLOWED_FORCE = "time [s],force [kN], or time [s],force of a course without a unit"
@@ -69,11 +68,11 @@ class _Table:
 
 
 def is_table(file: TextFile) -> bool:
-    """True if a head is that of times and accelerations, or the last row has one or two numbers."""
+    """True if a head begins with times, or the last row has one or two numbers."""
     table = _Table.of(file)
     last = list(table.rows.values())[-1:]
     is_row = any(len(x) in (1, 2) and all(map(NUMBER.fullmatch, x)) for x in last)
-    return bool(HEAD.fullmatch(table.head)) or is_row
+    return bool(re.match(TIME, table.head, re.IGNORECASE)) or is_row
 
 
 def read_table(file: TextFile, step: float | None = None, unit: str = "") -> Recording:
@@ -94,12 +93,15 @@ def read_table(file: TextFile, step: float | None = None, unit: str = "") -> Rec
         value = table.head[:80] or f"{columns} columns without a head"
         allowed = f"a unit of {ACCELERATION_UNITS}, and a step" if columns == 1 else ALLOWED
         cure = 'records.unit = "g"' + (', records.step = "0.005 s"' if columns == 1 else "")
-        raise file.refusal(table.start, value, allowed, f"or say {cure}")
+        cure = "keep times and one component" if columns > 2 else f"or say {cure}"
+        raise file.refusal(table.start, value, allowed, cure)
     numbers, location = table.numbers(file, columns), file.location(table.start)
     if columns == 1:
         return recording_in_si(location, "one column", unit, step or 0.0, numbers[:, 0])
     step, remarks = _even_step(file, to_s * numbers[:, 0], [*table.rows])
     remarks += ("its times have no unit, taken as s",) * bool(match and not time_unit)
+    if table.head and not match:
+        remarks += (f"its head, {table.head[:40]}, is not understood: the case's unit is taken",)
     name = "CSV" if match else "two columns"
     return recording_in_si(location, name, unit, step, numbers[:, 1], "", remarks)
 

@@ -93,6 +93,8 @@ def test_columns_without_a_head_need_a_unit_and_one_column_a_step(tmp_path):
     two = saved(tmp_path, written.csv_text(mark=" ").partition("\n")[2])
     with pytest.raises(RefusedError, match=r"or say records\.unit"):
         read_recording(two)
+    other = saved(tmp_path, "s,m/s^2\n" + two.read_text(encoding="utf-8"))
+    assert "its head, s,m/s^2, is not" in " ".join(read_recording(other, unit="g").remarks)
     one = saved(tmp_path, written.lines(written.samples(), "15.7E", 1))
     with pytest.raises(RefusedError, match=r"records\.step"):
         read_recording(one, unit="g")
@@ -196,6 +198,8 @@ RECORD = "time [s],acceleration [g]\n0,0\n0.01,0.1\n0.02,-0.2\n"
     ("old", "new", "line"),
     [
         ("[g]", "[kg]", 1),
+        ("[g]", "[%g]", 1),
+        ("acc", "up [g],acc", 1),
         ("time", "zeit", 1),
         ("0.01,0.1", "0.01,1_0", 3),
         ("0.01,0.1", "0.01,٣", 3),
