@@ -177,6 +177,11 @@ class Content(CellContent):
         for output in study.figures:
             require_choice(f"{key}.figures", output, structure.outputs)
         envelope.require_steps(f"{key}.duration", study.duration)
+        for number, (history, _) in enumerate((x.history for x in self.force), start=1):
+            start, allowed = history.start if history else 0.0, f"a start below {key}.duration"
+            require(
+                start < study.duration, f"force[{number}].history", f"from {start:g} s", allowed
+            )
 
 
 Case = ParsedCase[Content]

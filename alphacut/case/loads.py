@@ -54,10 +54,10 @@ def _parse_history(value: object, info: ValidationInfo) -> ForceHistory:
             phase = quantity.parse_number(numbers[1], "rad") if numbers[1:] else 0.0
             frequency = quantity.parse_number(numbers[0], "1/s")
             return ForceHistory(History.harmonic(frequency, phase, start))
+        if kind == "step":
+            return ForceHistory(History.constant(start, is_static=bool(static)))
     except ValueError as error:
         raise RefusedError("", value, HISTORY, str(error)) from None
-    if kind == "step":
-        return ForceHistory(History.constant(start, is_static=bool(static)))
     try:
         path = case_file(kind, info)
     except RefusedError as error:

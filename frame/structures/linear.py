@@ -263,10 +263,10 @@ def modal_damping(mass: Jet, stiffness: Jet, ratios: Sequence[Jet]) -> Jet:
         RefusedError: A stiffness is not positive definite, but for rounding.
     """
     squared, X = undamped_modes(mass.value, stiffness.value)
-    ratio = (squared / abs(squared).max(-1, keepdims=True)).min()
-    key, what = "squared frequency of a damped mode", f"{ratio:.1e} of the greatest"
-    cure = "give dampers, or join storeys that are too stiff"
-    require(ratio > 1e-12, key, value=what, allowed="above rounding, 1e-12", cure=cure)
+    ratio = (squared / np.maximum(abs(squared).max(-1, keepdims=True), 1e-300)).min()
+    what = f"such that a squared frequency is {ratio:.1e} of the greatest"
+    cure = "support what moves freely, join storeys that are too stiff, or give dampers"
+    require(ratio > 1e-12, "stiffness", value=what, allowed="more than 1e-12 of it", cure=cure)
     Y, A = X.swapaxes(-1, -2) @ mass.value, inverse(mass) @ stiffness
     G, omega = Y @ A.first @ X, np.sqrt(squared)
     total, number = mass * 0.0, np.full(squared.shape[-1], 0)

@@ -47,6 +47,8 @@ def test_amplitudes_are_parameters_and_courses_have_their_files_samples(tmp_path
     assert wind.history.is_static
     assert machine.history.values([0.29, 0.3]) == pytest.approx([0.0, 1.0])
     assert hammer.history is None
+    units = {"F1": "", "F2": "", "F2_2": "N", "J1": "N*s", "m1": "kg"}  # no unit: factors of a file
+    assert {name: structure.input_unit(name) for name in units} == units
 
 
 @pytest.mark.parametrize(
@@ -60,6 +62,7 @@ def test_amplitudes_are_parameters_and_courses_have_their_files_samples(tmp_path
         ("2 Hz", "2 m", "2 m"),
         ("from 0.3 s", "static", "force[2].history"),
         ("from 0.3 s", "from -1 s", "force[2]"),
+        ("from 0.3 s", "from 1 s", "force[2].history is from 1 s"),  # at the end of the motion
         ('"wind.csv, static"', '"case.toml"', "case.toml, line"),
         ('"1 ± 10 %"', '"3 lb"', "3 lb; allowed: a force"),
         ('{ 1 = "0.4 kN s" }', "{}", "one floor or more"),

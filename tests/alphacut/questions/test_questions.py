@@ -155,18 +155,6 @@ def test_an_output_has_several_limits_of_each_side_and_of_its_magnitude(tmp_path
     assert flow.values(np.array([[stiffness]])).min(axis=1)[0, drift] < -0.0406
 
 
-def test_inputs_are_shown_in_the_units_in_which_they_are_given(tmp_path):
-    (tmp_path / "wind.csv").write_text("time [s],force [kN]\n0,0\n1,2\n2,1\n", encoding="utf-8")
-    force = '[[force]]\nhistory = "wind.csv"\namplitude = { 2 = "1 ± 10 %" }\n'
-    head = 'title = "Wind"\nstages = ["envelope"]\n'
-    structure = load(written(tmp_path, head + force + LIMITS)).content.structure
-    assert {x: structure.input_unit(x) for x in ("F2", "k1", "zeta")} == {
-        "F2": "",  # a factor of a file in newtons
-        "k1": "N/m",
-        "zeta": "",
-    }
-
-
 def test_peaks_are_bounded_over_time_and_not_at_nodes_alone():
     ground = Accelerogram(0.02, np.sin(np.arange(60)))
     frame = StoreyFrame(masses=[1.0], stiffness=[150.0], damping_ratio=0.02, ground=ground)

@@ -75,5 +75,5 @@ def test_group_and_messages():
     springs, row = np.array([[1.0, -1.0], [-1.0, 1.0]]), {"q": np.ones(2)}
     parts = ([("m", np.eye(2))], [(1.0, springs)], row)
     floating = MatrixStructure({"m": 1.0}, *parts, ratios=(0.1,), q0=np.ones(2))
-    with pytest.raises(ValueError, match="of the greatest; allowed: above rounding"):
+    with pytest.raises(ValueError, match="of the greatest; allowed: more than 1e-12"):
         LinearFlow(floating, ("m",), 1, 0.1).values(np.array([[1.0]]))
