@@ -231,9 +231,8 @@ class RecordsSection(Section):
     files: Annotated[OneOrMany[Files], NotEmpty]
     """files or patterns, as `records/*.AT2`; FILE#CHANNEL of several"""
     baseline: Baseline = Field(default="none", description="mean or straight line to subtract")
-    scale: Annotated[Scale, text(_parse_scale)] = Field(
-        default=Scale(), description='factor, "PGA = 0.3 g" or "Sa(T1) = 0.5 g"'
-    )
+    scale: Annotated[Scale, text(_parse_scale)] = Scale()
+    """factor, "PGA = 0.3 g" or "Sa(T1) = 0.5 g", of every record"""
 
     @property
     def recordings(self) -> tuple[Recording, ...]:

@@ -105,9 +105,8 @@ class ObservedRow(Section):
 
     unit: str = Field(default="m", description="SI unit of the output, as m, N or N*m")
     row: dict[str, float] = Field(description='entries of the row by unknown, as {"5.x" = 1}')
-    factor: Annotated[Monomial, text(lambda x, _: Monomial.parse(str(x)))] = Field(
-        default=Monomial(1.0, ()), description='factor of the row, as "E*I*l^-2"'
-    )
+    factor: Annotated[Monomial, text(lambda x, _: Monomial.parse(str(x)))] = Monomial(1.0, ())
+    """factor of the row, as "E*I*l^-2", 1 unless given"""
 
 
 class MatricesSection(StructureSection):

@@ -90,8 +90,7 @@ def _parse_damping_ratios(value: object) -> MaterialDamping | tuple[FuzzyNumber,
 
 RATIO = Quantity(minimum=0, below=1, fuzzy=True)
 DampingRatios = Annotated[
-    MaterialDamping | tuple[FuzzyNumber, ...],
-    PlainValidator(_parse_damping_ratios),
+    MaterialDamping | tuple[FuzzyNumber, ...], PlainValidator(_parse_damping_ratios)
 ]
 
 

@@ -153,9 +153,8 @@ def summary(document: Document, convention: str) -> str:
         for label, value, error in table_rows(document)
     ]
     if bounds := document["references"].get("hashin_shtrikman_E_GPa"):
-        rows.append(
-            (f"{isotropic_label(convention)}, GPa", f"{bounds[0]:.4f} … {bounds[1]:.4f}", "")
-        )
+        label, ends = f"{isotropic_label(convention)}, GPa", f"{bounds[0]:.4f} … {bounds[1]:.4f}"
+        rows.append((label, ends, ""))
     iterations = ", ".join(map(str, document["iterations"]))
     solver = f", {document['solver']}, iterations {iterations}" if iterations else ""
     table = text_table((convention, "value", "± error"), rows)

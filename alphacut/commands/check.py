@@ -98,10 +98,8 @@ def long_steps(linear: LinearSystem, section: EnvelopeSection) -> Iterator[str]:
     widening = within_steps(size, between).max(1) / peaks - 1
     for name, share in zip(linear.outputs, widening, strict=True):
         if share > WIDENING:
-            widened = (
-                f"{name}: the step of {section.step:g} s widens its bound by about {share:.1%}"
-            )
-            yield f"{widened} between nodes, one of {section.step / 2:g} s by {share / 4:.1%}"
+            what = f"the step of {section.step:g} s widens its bound by about {share:.1%}"
+            yield f"{name}: {what} between nodes, one of {section.step / 2:g} s by {share / 4:.1%}"
 
 
 def records_text(section: RecordsSection, records: Sequence[SuiteRecord]) -> str:
@@ -162,11 +160,8 @@ def rows_of(prefix: str, section: Section) -> Iterator[Row]:
                     size, largest = " × ".join(map(str, array.shape)), abs(array).max()
                     yield row_key, f"{factor} × matrix {size}, largest {largest:.4g}", "in SI"
                 case MaterialDamping(joints):
-                    yield (
-                        row_key,
-                        f"of the material, and {_numbers(joints, '')} of joints",
-                        "computed",
-                    )
+                    words = f"of the material, and {_numbers(joints, '')} of joints"
+                    yield row_key, words, "computed"
                 case VoigtPhase(rows):
                     stiffness = " | ".join(" ".join(f"{x / GPA:g}" for x in row) for row in rows)
                     yield row_key, stiffness.replace("-", MINUS), "GPa, plane strain"

@@ -12,13 +12,7 @@ from alphacut.case.limits import DecisionSection
 from alphacut.frame.questions.peaks import ANY, passing
 from alphacut.fuzzy.result import Nature, rounded
 from alphacut.io.quantity import MINUS, engineering, percent_text
-from alphacut.questions.question import (
-    FuzzyResponse,
-    LimitAnswer,
-    LimitsAnswer,
-    Record,
-    Texts,
-)
+from alphacut.questions.question import FuzzyResponse, LimitAnswer, LimitsAnswer, Record, Texts
 from alphacut.stages.envelope import PeakResult, peak_results
 from alphacut.stages.store import CutsResult
 

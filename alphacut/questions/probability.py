@@ -51,15 +51,13 @@ class ProbabilityAnswer(LimitsAnswer[LimitProbability]):
 
     def texts_of(self, limit: LimitProbability) -> Texts:
         """Bounds on the lowest and the highest level, and what they may miss."""
+        interval = range_text(*limit.interval[0], Nature.GUARANTEED, 3)  # rounded outwards
         return {
             "limit": limit.event,
             "at the lowest α": limit.bounds_text(0),
             "nature": limit.nature,
             "at the highest α": limit.bounds_text(-1),
-            # rounded outwards
-            f"{CONFIDENCE:.0%} interval at the lowest α": range_text(
-                *limit.interval[0], Nature.GUARANTEED, 3
-            ),
+            f"{CONFIDENCE:.0%} interval at the lowest α": interval,
             "between nodes": f"{limit.error.max():.2g}".replace("-", MINUS),
         }
 

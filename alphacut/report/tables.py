@@ -26,10 +26,7 @@ if TYPE_CHECKING:
     import xarray
 
 DIGITS = 6
-RANGES = (
-    ("E from [GPa]", "E to [GPa]", "nature of E"),
-    ("least peak", "greatest peak", "nature"),
-)
+RANGES = (("E from [GPa]", "E to [GPa]", "nature of E"), ("least peak", "greatest peak", "nature"))
 """Columns of lower and upper ends that are rounded as the nature in a third one demands."""
 SIGNS = {"−": "-", "≤": r"\leq", "≥": r"\geq", "±": r"\pm", "²": "^2", "α": r"\alpha"}
 SIGNS |= {"ν": r"\nu", "ζ": r"\zeta"}

@@ -243,9 +243,8 @@ def constant_label(key: str) -> str:
 
 def isotropic_label(average: str) -> str:
     """Label of the Hashin–Shtrikman bounds beside E of an average, in words."""
-    return (
-        f"{ISOTROPIC}, which that of {average} is not" if average == AVERAGES[AXES] else ISOTROPIC
-    )
+    is_other = average == AVERAGES[AXES]
+    return f"{ISOTROPIC}, which that of {average} is not" if is_other else ISOTROPIC
 
 
 def require_isotropic(result: HomogenisedStiffness) -> None:

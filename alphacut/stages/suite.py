@@ -26,13 +26,7 @@ from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.fuzzy.result import Nature
 from alphacut.io.quantity import percent_text
 from alphacut.records.recording import Recording, arias_fractions, spectral_acceleration
-from alphacut.stages.envelope import (
-    EnvelopeTask,
-    PeakResults,
-    outputs_of,
-    peak_results,
-    peaks_of,
-)
+from alphacut.stages.envelope import EnvelopeTask, PeakResults, outputs_of, peak_results, peaks_of
 from alphacut.stages.store import Numbers, Stage, Values
 
 FREE_PERIODS = 5
