@@ -27,25 +27,21 @@ from tests.alphacut.small import CELL, written
 ROOT = Path(alphacut.__file__).resolve().parents[1]
 
 
-def counted():
-    """A stage with the number of its computations."""
-    calls = []
-
-    def compute(work):
-        calls.append(work)
-        return StageResult({"count": len(calls)}, xarray.Dataset({"x": ((), len(calls))}))
-
-    return calls, lambda inputs: Stage("thing", inputs, ("fuzzy",), dict[str, int], compute)
-
-
 def store_in(folder, **options):
     """A store as a new process opens it."""
     return StageStore(ResultsFolder.read(folder), "the case", **options)
 
 
 def test_a_stage_is_computed_once_until_its_inputs_change(tmp_path):
-    calls, of = counted()
-    store = store_in(tmp_path)
+    calls, store = [], store_in(tmp_path)
+
+    def compute(work):
+        calls.append(work)
+        return StageResult({"count": len(calls)}, xarray.Dataset({"x": ((), len(calls))}))
+
+    def of(inputs):
+        return Stage("thing", inputs, ("fuzzy",), dict[str, int], compute)
+
     results = [store.take(of(value)) for value in (1, 1, 2, 2)]
     assert [int(result.arrays.x) for result in results] == [1, 1, 2, 2]
     assert [result.numbers["count"] for result in results] == [1, 1, 2, 2]
