@@ -28,10 +28,9 @@ MATRIX = MatrixStructure(
     q0=np.array([0.1, 0.0]),
     v0=np.array([0.0, 0.4]),
     loads=[
-        Force(np.array(row), amplitude, history)
-        for row, amplitude, history in zip(
-            ([0, 1.0], [1.0, 0], [0, 0.1]), ("F2", 0.6, 2.0), HISTORIES, strict=True
-        )
+        Force(np.array([0, 1.0]), "F2", HISTORIES[0]),
+        Force(np.array([1.0, 0]), 0.6, HISTORIES[1]),
+        Force(np.array([0, 0.1]), 2.0, HISTORIES[2]),
     ],
 )
 
