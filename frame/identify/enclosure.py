@@ -69,7 +69,7 @@ class LinearRelaxation:
         self.lower, self.upper = np.zeros((2, size))
         self.lower[0] = self.upper[0] = 1.0
         self.one: Array = np.eye(1, size)[0]
-        self.count, self.rows = 1, list[Array]()
+        self.count, self.rows = 1, list[Array]()  # rows are expressions that are 0 at most
 
     def variable(self, low: float, high: float) -> Array:
         """Add a variable between two ends and return it; without width it is a constant."""
@@ -84,10 +84,6 @@ class LinearRelaxation:
         ends = np.sort([expression * self.lower, expression * self.upper], axis=0).sum(1)
         return float(ends[0]), float(ends[1])
 
-    def add_inequality(self, expression: Array) -> None:
-        """Add the inequality expression ≤ 0."""
-        self.rows.append(expression)
-
     def product(self, x: Array, y: Array) -> Array:
         """Add and return a variable for the product x y, between four planes (McCormick 1976)."""
         (a, b), (c, d) = self.range(x), self.range(y)
@@ -96,7 +92,7 @@ class LinearRelaxation:
         corners = (a * c, a * d, b * c, b * d)
         z = self.variable(min(corners), max(corners))
         for p, q, sign in ((a, c, -1), (b, d, -1), (b, c, 1), (a, d, 1)):
-            self.add_inequality(sign * (z - p * y - q * x + p * q * self.one))
+            self.rows.append(sign * (z - p * y - q * x + p * q * self.one))
         return z
 
     def exponential(self, y: Array) -> Array:
@@ -106,9 +102,9 @@ class LinearRelaxation:
             return float(np.exp(low)) * self.one
         x = self.variable(float(np.exp(low)) * (1 - 1e-15), float(np.exp(high)) * (1 + 1e-15))
         for point in (low, (low + high) / 2, high):
-            self.add_inequality(np.exp(point) * (y + (1 - point) * self.one) - x)
+            self.rows.append(np.exp(point) * (y + (1 - point) * self.one) - x)
         slope = np.exp(low) * np.expm1(high - low) / (high - low)
-        self.add_inequality(x - slope * y - (np.exp(low) - slope * low + 1e-15) * self.one)
+        self.rows.append(x - slope * y - (np.exp(low) - slope * low + 1e-15) * self.one)
         return x
 
     def bounds(self, expression: Array) -> tuple[float, float]:
@@ -123,8 +119,11 @@ def proved_minimum(objective: Array, rows: csr_array, lower: Array, upper: Array
 
     right, ends = np.zeros(rows.shape[0]), np.column_stack([lower, upper])
     result = linprog(objective, A_ub=rows, b_ub=right, bounds=ends, method="highs")
-    if result.status == 2 and is_proved_empty(rows, lower, upper):
-        return np.inf
+    if result.status == 2:  # phase one: the least t with A x − t ≤ 0 for some x is proved positive
+        relaxed = csr_array(hstack([rows, csr_array(-np.ones((rows.shape[0], 1)))]))
+        slack = np.append(np.zeros(len(lower)), 1.0)
+        if proved_minimum(slack, relaxed, np.append(lower, 0.0), np.append(upper, 1e3)) > 0:
+            return np.inf
     multipliers = right  # zero, which leaves the bound over the box
     if result.status == 0:
         multipliers = np.minimum(result.ineqlin.marginals, 0.0)
@@ -134,14 +133,6 @@ def proved_minimum(objective: Array, rows: csr_array, lower: Array, upper: Array
     # sum of the absolute values of all terms, in proportion to which they are rounded
     sizes = np.abs(objective) + abs(rows).T @ np.abs(multipliers)
     return float(terms.sum() - ROUND_OFF * sizes @ np.maximum(np.abs(lower), np.abs(upper)))
-
-
-def is_proved_empty(rows: csr_array, lower: Array, upper: Array) -> bool:
-    """Return True if it is proved that no x in the box satisfies A x ≤ 0."""
-    # phase one: the least t with A x − t ≤ 0 for some x is proved to be positive
-    relaxed_rows = csr_array(hstack([rows, csr_array(-np.ones((rows.shape[0], 1)))]))
-    slack = np.append(np.zeros(len(lower)), 1.0)
-    return proved_minimum(slack, relaxed_rows, np.append(lower, 0.0), np.append(upper, 1e3)) > 0
 
 
 class ChainRelaxation(LinearRelaxation):
@@ -208,8 +199,8 @@ class ChainRelaxation(LinearRelaxation):
         for z, above in enumerate([*shears[1:], 0.0 * self.one]):
             inertia = self.product(relative_eigenvalue, self.product(self.mass[z], shape[z + 1]))
             imbalance = shears[z] - above - inertia * (eigenvalue * chain.mass[z] / unit)
-            self.add_inequality(imbalance)
-            self.add_inequality(-imbalance)
+            self.rows.append(imbalance)
+            self.rows.append(-imbalance)
 
     def amplitude_ranges(
         self, eigenvalue: float, cut: ModeCut
@@ -269,4 +260,4 @@ class ChainRelaxation(LinearRelaxation):
         strains, inertias = strain @ np.array(self.stiffness), inertia @ np.array(self.mass)
         for end, sign in ((cut.low - error_below, -1.0), (cut.high + error_above, 1.0)):
             row = sign * (strains - end * inertias) / unit
-            self.add_inequality(row - 1e-12 * self.one)
+            self.rows.append(row - 1e-12 * self.one)
