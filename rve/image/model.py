@@ -272,18 +272,16 @@ def energy_parts(
 ) -> Array:
     """Energies of unit strains or stresses in K and in G of each phase, shape (count, 2, 3, 3)."""
     bulk, shear = images.bulk[0], images.shear[0]  # bulk is K + G/3, the modulus of the trace
-    divisions = side.fields.shape[-2] // len(phase)
+    division = np.ones((side.fields.shape[-2] // len(phase),) * 2)
     trace, deviator = coefficients(element, bulk, shear)
-    shear_fraction = shear / (3 * bulk)  # G/3 over K + G/3
-    trace_rows, deviator_rows = element.parts
-    weights = []
-    for k in range(count):
-        for rows, weight in (
-            (trace_rows, trace * (1 - shear_fraction)),
-            (trace_rows, trace * shear_fraction),
-            (deviator_rows, deviator),
-        ):
-            weights.append((rows, np.kron(weight * (phase == k), np.ones((divisions, divisions)))))
+    by_shear = trace * shear / (3 * bulk)  # G/3 over K + G/3
+    of_trace, of_deviator = element.parts
+    rows = of_trace, of_trace, of_deviator
+    weights = [
+        (modes, np.kron(weight * (phase == k), division))
+        for k in range(count)
+        for modes, weight in zip(rows, (trace - by_shear, by_shear, deviator), strict=True)
+    ]
     values = energies(element, side.fields, element.mean_modes(np.eye(3)), weights).value
-    by_bulk, trace_by_shear, by_deviator = np.moveaxis(values.reshape(count, 3, 3, 3), 1, 0)
-    return np.stack([by_bulk, trace_by_shear + by_deviator], axis=1)
+    by_part = values.reshape(count, 3, 3, 3)
+    return np.stack([by_part[:, 0], by_part[:, 1] + by_part[:, 2]], axis=1)

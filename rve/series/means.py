@@ -92,8 +92,6 @@ class Series:
         safety: Factor of the estimated error.
         round_off: Relative, of a modulus.
         tolerance: Relative truncation error allowed by default.
-        terms: Their name in the message, such as "harmonics".
-        particles: Name of the particles that nearly touch.
     """
 
     moduli: Callable[[Array, Sequence[Material], int], Array]
@@ -105,8 +103,6 @@ class Series:
     safety: float
     round_off: float
     tolerance: float
-    terms: str
-    particles: str
 
     def converged_moduli(
         self,
@@ -162,8 +158,8 @@ class Series:
             if failed.any():
                 raise SeriesError(
                     f"the series at r = {radius[failed.any(axis=1)].max():.6g} reaches a relative"
-                    f" error of {errors[failed].max():.1e} with {self.steps[-1]} {self.terms},"
-                    f" {tolerance:.1e} is allowed: {self.particles} nearly touch",
+                    f" error of {errors[failed].max():.1e} with terms up to {self.steps[-1]},"
+                    f" {tolerance:.1e} is allowed: particles nearly touch",
                     "lower the radius or raise the tolerance",
                 )
             excess = np.log(errors.max(axis=2)[is_open] / tolerance)

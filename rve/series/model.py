@@ -188,8 +188,6 @@ CIRCLES = Series(
     safety=1.6,
     round_off=2e-15,
     tolerance=1e-12,
-    terms="harmonics",
-    particles="particles",
 )
 square_stiffness = CIRCLES.converged_moduli
 """C11 + C12, C11 − C12 and C33 of n square cells times m inclusions, with declared errors."""

@@ -5,9 +5,9 @@ The lattice is p = (i, j, k) with integers, not all zero. With Racah's spherical
 
     S_n^m = Σ C_n^m(p) |p|^(−n−1),   D_n^m = Σ C_n^m(p) |p|^(1−n);
 
-cubic symmetry leaves even n ≥ 4 and m = 0, 4, 8, …, all real. Up to n = 40 they are Epstein zeta
-functions by Ewald's split of the theta function (Borwein et al., Lattice Sums Then and Now, 2013),
-which also gives D_4, convergent only in the order of spheres; beyond, the nearest points suffice.
+cubic symmetry leaves even n ≥ 4 and m = 0, 4, 8, …, all real. They are Epstein zeta functions by
+Ewald's split of the theta function (Borwein et al., Lattice Sums Then and Now, 2013), which also
+gives D_4, convergent only in the order of spheres.
 """
 
 from __future__ import annotations
@@ -19,7 +19,6 @@ from scipy.special import gammaincc, gammaln
 
 from alphacut.fuzzy.arrays import Array
 
-_DIRECT = 40  # from this degree on, points beyond √11 are below round-off
 _REACH = 4  # of Ewald's sums: exp(−π 17) is the first term left out
 
 
@@ -52,27 +51,16 @@ def lattice_sums(highest: int) -> tuple[Array, Array]:
     that are multiples of 4 are not zero. Those of degree 0 diverge and are left out.
     """
     harmonic, biharmonic = np.zeros((2, highest + 1, highest + 1))
-    ewald_points, direct_points = _points(_REACH), _points(3)
-    radius = np.linalg.norm(direct_points, axis=1)
-    for m in range(0, highest + 1, 4):
-        ewald = harmonics(ewald_points, min(highest, _DIRECT), m)
-        direct = harmonics(direct_points, highest, m)
-        for n in range(max(4, m), highest + 1, 2):
-            if n <= _DIRECT:
-                harmonic[n, m] = _epstein(ewald[n], ewald_points, n, 1)
-                biharmonic[n, m] = _epstein(ewald[n], ewald_points, n, -1)
-            else:
-                harmonic[n, m] = direct[n] @ radius ** (-n - 1.0)
-                biharmonic[n, m] = direct[n] @ radius ** (1.0 - n)
-    return harmonic, biharmonic
-
-
-def _points(reach: int) -> Array:
-    """Lattice points of length up to √(reach² + reach), none zero, shape (k, 3)."""
-    axis = np.arange(-reach - 1.0, reach + 2)
+    axis = np.arange(-_REACH, _REACH + 1.0)
     points = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
     square = (points**2).sum(axis=1)
-    return np.asarray(points[(square > 0) & (square <= reach * (reach + 1))])
+    points = points[(square > 0) & (square <= _REACH * (_REACH + 1))]
+    for m in range(0, highest + 1, 4):
+        angular = harmonics(points, highest, m)
+        for n in range(max(4, m), highest + 1, 2):
+            harmonic[n, m] = _epstein(angular[n], points, n, 1)
+            biharmonic[n, m] = _epstein(angular[n], points, n, -1)
+    return harmonic, biharmonic
 
 
 def _epstein(angular: Array, points: Array, n: int, power: int) -> float:

@@ -46,8 +46,6 @@ SPHERES = Series(
     safety=2.0,
     round_off=2e-13,
     tolerance=1e-10,
-    terms="degrees of multipoles",
-    particles="spheres",
 )
 cubic_stiffness = SPHERES.converged_moduli
 """K, (C11 − C12)/2 and C44 of n cubic cells times m spheres, with declared errors."""

@@ -89,7 +89,8 @@ class Element:
             changes its sign where space is mirrored at a point.
         stress: Whether the modes are those of a stress, else of a strain.
         products: Tables to modes, (axis, order, mode, function); terms (component, unknown, orders
-            along the grid's axes), sorted by unknown and last order, and their factors.
+            along the grid's axes), sorted by unknown and last order; of those alike in both the
+            first and the last but one; factors of the terms.
     """
 
     unknowns: int
@@ -101,7 +102,7 @@ class Element:
     subtracted: tuple[tuple[int, ...], ...]
     places: tuple[tuple[tuple[float, ...], bool], ...]
     stress: bool
-    products: tuple[Array, Ints, Array]
+    products: tuple[Array, Ints, Ints, Array]
 
     @property
     def dimension(self) -> int:
@@ -188,6 +189,9 @@ def element_of(sides: tuple[float, ...], *, stress: bool) -> Element:
         subtracted.append(tuple(first + functions.index(f) for f in at_origin if sum(f) <= 1))
     places = [list(zip(*(basis.places[k] for k in numbers), strict=True)) for numbers in unknowns]
     *indices, factors = np.array(terms).T
+    orders = np.stack(indices, axis=1)
+    is_first = (np.diff(orders[:, [1, -1]], axis=0, prepend=-1) != 0).any(axis=1)
+    groups = np.flatnonzero([*is_first, True])
     return Element(
         unknowns=len(potentials) * len(unknowns),
         local=tuple(local),
@@ -198,7 +202,12 @@ def element_of(sides: tuple[float, ...], *, stress: bool) -> Element:
         subtracted=tuple(subtracted),
         places=tuple((place, sum(odd) % 2 == 1) for place, odd in places) * len(potentials),
         stress=stress,
-        products=(np.array(tables), np.stack(indices, axis=1), factors.astype(float)),
+        products=(
+            np.array(tables),
+            orders,
+            np.stack([groups[:-1], groups[1:]], axis=1),
+            factors.astype(float),
+        ),
     )
 
 

@@ -19,6 +19,7 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient, System
 from alphacut.rve.image.fields.element import Element, isotropic_parts
 from alphacut.rve.image.fields.grid import SLAB_CELLS, Fields, Operator, gather, namespace, slabs
+from alphacut.rve.image.fields.kernels import ROUNDINGS, modes_by_rows
 from alphacut.rve.image.fields.preconditioner import FourierPreconditioner, Reference
 
 UNIT = 2.0**-53  # rounding unit
@@ -148,8 +149,6 @@ def modes_by_matrices(element: Element, fields: Fields, mean_modes: Array) -> Mo
 
 def _modes_by_rows(element: Element, fields: Array, mean_modes: Array) -> Modes:
     """As `modes_of`, in pieces of a layer, so that few modes are in memory."""
-    from alphacut.rve.image.fields.kernels import ROUNDINGS, modes_by_rows  # Numba takes its time
-
     count, (nz, ny, nx) = len(fields), fields.shape[2:]
     n_rows, width = max(1, SLAB_CELLS // (count * nx)), 1 + element.reach
     unknown = np.array([u for u, _ in element.local])

@@ -18,6 +18,7 @@ import numpy as np
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.rve.image.fields.element import Element
+from alphacut.rve.image.fields.kernels import apply_by_rows
 
 SLAB_CELLS = 6144  # cells times loads worked on at once: what the second cache holds
 DEVICE_SLAB_CELLS = 1 << 20  # the same on a device, which has more to do at once: a few GB
@@ -73,7 +74,7 @@ class Operator:
         """Nodal forces of fields, both of shape (loads, unknowns, *grid)."""
         if isinstance(fields, np.ndarray) and self.element.dimension == 3:
             none = np.zeros((len(self.element.modes), len(fields)))
-            return self._apply_by_rows(fields, none)
+            return apply_by_rows(self.element, self.trace, self.deviator, fields, none)
         return self.apply_by_matrices(fields)
 
     def apply_by_matrices(self, fields: Fields) -> Fields:
@@ -97,7 +98,7 @@ class Operator:
         shape = (mean_modes.shape[1], self.element.unknowns, *self.trace.shape)
         result = xp.zeros(shape)
         if xp is np and self.element.dimension == 3:
-            return self._apply_by_rows(result, -mean_modes)
+            return apply_by_rows(self.element, self.trace, self.deviator, result, -mean_modes)
         trace_force, deviator_force = (
             xp.reshape(
                 xp.asarray(-(self.element.modes[part].T @ mean_modes[part])),
@@ -109,11 +110,6 @@ class Operator:
             local = trace_force * self.trace[slab] + deviator_force * self.deviator[slab]
             scatter(self.element, local, result, slab)
         return result
-
-    def _apply_by_rows(self, fields: Array, mean_modes: Array) -> Array:
-        from alphacut.rve.image.fields.kernels import apply_by_rows  # Numba takes its time
-
-        return apply_by_rows(self.element, self.trace, self.deviator, fields, mean_modes)
 
 
 def slabs(fields: Fields) -> Iterator[slice]:

@@ -6,8 +6,9 @@ then y; the transposed passes lead back. `grid.Operator` and `energy.modes_of` m
 by matrices, for arrays of any library, and are what this is tested against.
 
 Names: `tables`, (axis, order, mode, function), lead to modes along z, y, x; a term of `terms` is a
-component, an unknown and the orders of its derivative along z, y, x, sorted by unknown and the last
-order; modes have the shape (component, mode along z, along y, modes along x of a row).
+component, an unknown and the orders of its derivative along z, y, x; `groups` are the first and the
+last but one of terms of the same unknown and order along x; modes have the shape (component, mode
+along z, along y, modes along x of a row).
 """
 
 from __future__ import annotations
@@ -53,7 +54,7 @@ def modes_by_rows(element: Element, fields: Array, z: int, first: int, last: int
 
 @fast
 def _apply(
-    tables: Any, terms: Any, factors: Any, shear_factor: float, uniform: Any,
+    tables: Any, terms: Any, groups: Any, factors: Any, shear_factor: float, uniform: Any,
     trace: Any, deviator: Any, field: Any, result: Any,
 ) -> None:  # fmt: skip
     """Add the forces of one field, (unknowns, z, y, x), to the result.
@@ -68,9 +69,11 @@ def _apply(
     lines, shifted = np.zeros((n, n * nx)), np.empty((n, n, nx))
     for z in range(nz):
         for y in range(n - 1):
-            _fill_strips(tables, terms, factors, field, z, y, shifted, lines, strips)
+            _fill_strips(tables, terms, groups, factors, field, z, y, shifted, lines, strips)
         for y in range(ny):
-            _fill_strips(tables, terms, factors, field, z, y + n - 1, shifted, lines, strips)
+            _fill_strips(
+                tables, terms, groups, factors, field, z, y + n - 1, shifted, lines, strips
+            )
             _modes_of_row(tables, terms, strips, y, modes)
             for c in range(6):
                 modes[c, 0, 0, :nx] += uniform[c]
@@ -98,14 +101,14 @@ def _apply(
                     for i in range(n - dz):
                         out = sums[term, (y + b) % n, i]
                         _add_combination(out, (n - dx) * nx, n - dy, 1.0, weights, modes[c, i])
-            _add_forces(tables, terms, factors, sums, z, y, lines, shifted, result)
+            _add_forces(tables, terms, groups, factors, sums, z, y, lines, shifted, result)
         for y in range(ny, ny + n - 1):
-            _add_forces(tables, terms, factors, sums, z, y, lines, shifted, result)
+            _add_forces(tables, terms, groups, factors, sums, z, y, lines, shifted, result)
 
 
 @fast
 def _add_modes(
-    tables: Any, terms: Any, factors: Any, parts: Any, fields: Any,
+    tables: Any, terms: Any, groups: Any, factors: Any, parts: Any, fields: Any,
     z: int, first: int, last: int, modes: Any,
 ) -> None:  # fmt: skip
     """Add modes of the trace (first part) and the deviator to `modes`, (modes, fields, voxels)."""
@@ -115,7 +118,9 @@ def _add_modes(
     lines, shifted = np.zeros((n, n * nx)), np.empty((n, n, nx))
     for a in range(len(fields)):
         for y in range(first + 1 - n, last):
-            _fill_strips(tables, terms, factors, fields[a], z, y + n - 1, shifted, lines, strips)
+            _fill_strips(
+                tables, terms, groups, factors, fields[a], z, y + n - 1, shifted, lines, strips
+            )
             if y < first:
                 continue
             _modes_of_row(tables, terms, strips, y, by_component)
@@ -130,33 +135,32 @@ def _add_modes(
 
 @fast
 def _fill_strips(
-    tables: Any, terms: Any, factors: Any, field: Any, z: int, y: int,
+    tables: Any, terms: Any, groups: Any, factors: Any, field: Any, z: int, y: int,
     shifted: Any, lines: Any, strips: Any,
 ) -> None:  # fmt: skip
     """Pass the row y of the n planes from z on to modes along x, `lines`, and z."""
     n = tables.shape[-1]
     nz, ny, nx = field.shape[1:]
-    for term in range(len(terms)):
-        _, u, dz, _, dx = terms[term]
-        if _is_new(terms, term, 1):
-            for a in range(n):
-                row = field[u, (z + a) % nz, y % ny]
-                for f in range(n):
-                    for x in range(nx - f):
-                        shifted[a, f, x] = row[x + f]
-                    for x in range(f):
-                        shifted[a, f, nx - f + x] = row[x]
-        if _is_new(terms, term, 4):
-            lines[:] = 0.0
-            for a in range(n):
-                for k in range(n - dx):
-                    out = lines[a, k * nx : (k + 1) * nx]
-                    _add_combination(out, nx, n, 1.0, tables[2, dx, k], shifted[a])
+    for start, stop in groups:
+        _, u, _, _, dx = terms[start]
+        lines[:] = 0.0
+        for a in range(n):
+            row = field[u, (z + a) % nz, y % ny]
+            for f in range(n):
+                for x in range(nx - f):
+                    shifted[a, f, x] = row[x + f]
+                for x in range(f):
+                    shifted[a, f, nx - f + x] = row[x]
+            for k in range(n - dx):
+                out = lines[a, k * nx : (k + 1) * nx]
+                _add_combination(out, nx, n, 1.0, tables[2, dx, k], shifted[a])
         size = (n - dx) * nx
-        for i in range(n - dz):
-            out = strips[term, i, y % n]
-            out[:size] = 0.0
-            _add_combination(out, size, n, factors[term], tables[0, dz, i], lines)
+        for term in range(start, stop):
+            dz = terms[term, 2]
+            for i in range(n - dz):
+                out = strips[term, i, y % n]
+                out[:size] = 0.0
+                _add_combination(out, size, n, factors[term], tables[0, dz, i], lines)
 
 
 @fast
@@ -177,47 +181,29 @@ def _modes_of_row(tables: Any, terms: Any, strips: Any, y: int, modes: Any) -> N
 
 @fast
 def _add_forces(
-    tables: Any, terms: Any, factors: Any, sums: Any, z: int, y: int,
+    tables: Any, terms: Any, groups: Any, factors: Any, sums: Any, z: int, y: int,
     lines: Any, shifted: Any, result: Any,
 ) -> None:  # fmt: skip
     """Pass the sums of the row y back along z and x to the result, and empty them."""
     n = tables.shape[-1]
     nz, ny, nx = result.shape[1:]
-    for term in range(len(terms)):
-        _, u, dz, _, dx = terms[term]
-        if _is_new(terms, term, 1):
-            shifted[:] = 0.0
-        if _is_new(terms, term, 4):
-            lines[:] = 0.0
-        row_sums = sums[term, y % n]
+    for start, stop in groups:
+        _, u, _, _, dx = terms[start]
+        shifted[:], lines[:] = 0.0, 0.0
+        for term in range(start, stop):
+            dz, row_sums = terms[term, 2], sums[term, y % n]
+            for a in range(n):
+                weights = tables[0, dz, :, a]
+                _add_combination(lines[a], (n - dx) * nx, n - dz, factors[term], weights, row_sums)
+            row_sums[:] = 0.0
         for a in range(n):
-            weights = tables[0, dz, :, a]
-            _add_combination(lines[a], (n - dx) * nx, n - dz, factors[term], weights, row_sums)
-        row_sums[:] = 0.0
-        if _is_new(terms, term + 1, 4):
-            for a in range(n):
-                for f in range(n):
-                    by_mode = lines[a].reshape(n, nx)
-                    _add_combination(shifted[a, f], nx, n - dx, 1.0, tables[2, dx, :, f], by_mode)
-        if _is_new(terms, term + 1, 1):
-            for a in range(n):
-                row = result[u, (z + a) % nz, y % ny]
-                for f in range(n):
-                    for x in range(nx - f):
-                        row[x + f] += shifted[a, f, x]
-                    for x in range(f):
-                        row[x] += shifted[a, f, nx - f + x]
-
-
-@fast
-def _is_new(terms: Any, term: int, column: int) -> bool:
-    """Whether a term's unknown (column 1), or its order along x too (4), is not the last one's."""
-    is_end = term in (0, len(terms))
-    return bool(
-        is_end
-        or terms[term, 1] != terms[term - 1, 1]
-        or terms[term, column] != terms[term - 1, column]
-    )
+            row, by_mode = result[u, (z + a) % nz, y % ny], lines[a].reshape(n, nx)
+            for f in range(n):
+                _add_combination(shifted[a, f], nx, n - dx, 1.0, tables[2, dx, :, f], by_mode)
+                for x in range(nx - f):
+                    row[x + f] += shifted[a, f, x]
+                for x in range(f):
+                    row[x] += shifted[a, f, nx - f + x]
 
 
 @fast

@@ -18,6 +18,7 @@ import scipy.fft
 from alphacut.fuzzy.arrays import Array
 from alphacut.rve.image.fields.element import Element
 from alphacut.rve.image.fields.grid import Fields, namespace, slabs
+from alphacut.rve.image.fields.kernels import multiply_by_blocks
 
 ROUNDING = 1e-3  # of the preconditioner
 GAUGE = 1e-6  # of the trace of a block: what waves weigh is 1e-2 of it, rounding 1e-16
@@ -130,8 +131,6 @@ class FourierPreconditioner:
             fields = (fields / self.scale).astype(self.inverse.dtype)
         spectrum = fft.rfftn(fields, axes=axes)
         if isinstance(fields, np.ndarray) and len(self.shape) == 3:
-            from alphacut.rve.image.fields.kernels import multiply_by_blocks  # Numba takes its time
-
             blocks, waves = (x.reshape(*x.shape[:2], -1) for x in (self.inverse, spectrum))
             multiply_by_blocks(blocks, waves)  # places are alike: no phases
             return fft.irfftn(spectrum, s=self.shape, axes=axes).astype(float, copy=False)
