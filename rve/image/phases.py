@@ -66,14 +66,13 @@ class ModuliInterval:
     ) -> ModuliInterval:
         """Least and greatest bulk and shear modulus over intervals of E (Pa) and of ν."""
         # K + G/3 = E/(2 (1 + ν) (1 − 2 ν)) is convex in ν; K increases with it, G decreases
-        (young_low, young_high), (nu_low, nu_high) = modulus, poisson
-        nu_softest = min(max(nu_low, NU_AT_LEAST_BULK), nu_high) if dimension == 2 else nu_low
-        least_bulk = PhaseModuli.of_young(young_low, nu_softest, dimension).bulk
-        least_shear = PhaseModuli.of_young(young_low, nu_high, dimension).shear
-        greatest = [PhaseModuli.of_young(young_high, nu, dimension) for nu in poisson]
-        greatest_bulk = max(moduli.bulk for moduli in greatest)
+        ratios = *poisson, min(max(poisson[0], NU_AT_LEAST_BULK), poisson[1])
+        softest, stiffest = (
+            [PhaseModuli.of_young(young, nu, dimension) for nu in ratios] for young in modulus
+        )
         return cls(
-            PhaseModuli(least_bulk, least_shear), PhaseModuli(greatest_bulk, greatest[0].shear)
+            PhaseModuli(min(x.bulk for x in softest), min(x.shear for x in softest)),
+            PhaseModuli(max(x.bulk for x in stiffest), max(x.shear for x in stiffest)),
         )
 
 

@@ -89,8 +89,8 @@ class Element:
             changes its sign where space is mirrored at a point.
         stress: Whether the modes are those of a stress, else of a strain.
         products: Tables to modes, (axis, order, mode, function); terms (component, unknown, orders
-            along the grid's axes), sorted by unknown and last order; of those alike in both the
-            first and the last but one; factors of the terms.
+            along the grid's axes), sorted by unknown and last order; first and one past the last of
+            each group of terms that are alike in both; factors of the terms.
     """
 
     unknowns: int
@@ -188,10 +188,11 @@ def element_of(sides: tuple[float, ...], *, stress: bool) -> Element:
         first = potential * len(functions)
         subtracted.append(tuple(first + functions.index(f) for f in at_origin if sum(f) <= 1))
     places = [list(zip(*(basis.places[k] for k in numbers), strict=True)) for numbers in unknowns]
-    *indices, factors = np.array(terms).T
-    orders = np.stack(indices, axis=1)
-    is_first = (np.diff(orders[:, [1, -1]], axis=0, prepend=-1) != 0).any(axis=1)
-    groups = np.flatnonzero([*is_first, True])
+    table: Ints = np.array(terms)
+    indices, factors = table[:, :-1].copy(), table[:, -1].astype(float)
+    starts = 1 + np.flatnonzero(np.diff(indices[:, [1, -1]], axis=0).any(axis=1))
+    ends = np.array([0, *starts, len(terms)])
+    groups = np.stack([ends[:-1], ends[1:]], axis=1)
     return Element(
         unknowns=len(potentials) * len(unknowns),
         local=tuple(local),
@@ -202,12 +203,7 @@ def element_of(sides: tuple[float, ...], *, stress: bool) -> Element:
         subtracted=tuple(subtracted),
         places=tuple((place, sum(odd) % 2 == 1) for place, odd in places) * len(potentials),
         stress=stress,
-        products=(
-            np.array(tables),
-            orders,
-            np.stack([groups[:-1], groups[1:]], axis=1),
-            factors.astype(float),
-        ),
+        products=(np.array(tables), indices, groups, factors),
     )
 
 

@@ -226,24 +226,7 @@ def solve_side(
     trace, deviator = coefficients(element, bulk, shear)
     for axis in range(element.dimension if division > 1 else 0):
         trace, deviator = (xp.repeat(x, division, axis=axis) for x in (trace, deviator))
-    fields, iterations = _solve_loads(element, trace, deviator, solver, start)
-    to_unit_loads = xp.asarray(np.linalg.inv(solved_loads(element.dimension)))
-    for slab in slabs(fields):  # in place
-        fields[:, :, slab] = xp.tensordot(to_unit_loads, fields[:, :, slab], axes=1)
-    weights = list(zip(element.parts, (trace, deviator), strict=True))
-    energy = energies(element, fields, element.mean_modes(np.eye(fields.shape[0])), weights)
-    return SideSolution(fields, energy, iterations)
-
-
-def _solve_loads(
-    element: Element,
-    trace: Fields,
-    deviator: Fields,
-    solver: ConjugateGradient,
-    start: Fields | None,
-) -> tuple[Fields, int]:
-    """Fields of `solved_loads`, (loads, unknowns, *grid), and the largest iteration count."""
-    xp, loads = namespace(trace), solved_loads(element.dimension)
+    loads = solved_loads(element.dimension)
     modes = element.mean_modes(loads)
     constant = Reference.of_grid(element, trace, deviator)
     preconditioner = FourierPreconditioner.of_material(element, constant, trace.shape, xp)
@@ -259,7 +242,12 @@ def _solve_loads(
         system = System(operator.apply, preconditioner.apply, load, scale[part], least, guess)
         fields[part], number = solver.solve(system)
         iterations.append(number)
-    return fields, max(iterations)
+    to_unit_loads = xp.asarray(np.linalg.inv(loads))
+    for slab in slabs(fields):  # in place
+        fields[:, :, slab] = xp.tensordot(to_unit_loads, fields[:, :, slab], axes=1)
+    weights = list(zip(element.parts, (trace, deviator), strict=True))
+    energy = energies(element, fields, element.mean_modes(np.eye(len(loads))), weights)
+    return SideSolution(fields, energy, max(iterations))
 
 
 def minimum_energy(element: Element, trace: Fields, deviator: Fields, modes: Array) -> Array:

@@ -6,8 +6,8 @@ then y; the transposed passes lead back. `grid.Operator` and `energy.modes_of` m
 by matrices, for arrays of any library, and are what this is tested against.
 
 Names: `tables`, (axis, order, mode, function), lead to modes along z, y, x; a term of `terms` is a
-component, an unknown and the orders of its derivative along z, y, x; `groups` are the first and the
-last but one of terms of the same unknown and order along x; modes have the shape (component, mode
+component, an unknown and the orders of its derivative along z, y, x; `groups` are the first and one
+past the last of terms of the same unknown and order along x; modes have the shape (component, mode
 along z, along y, modes along x of a row).
 """
 
