@@ -5,7 +5,6 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import isqrt
 
 import numpy as np
 
@@ -267,35 +266,36 @@ def with_feedthrough(motion: Jet, matrices: Matrices, system: LinearSystem, time
 def trajectory(step_map: StepMap, start: Jet, rows: Jet) -> Jet:
     """Return outputs C x[k], k = 0 … steps, of x[k+1] = T x[k] + G load[k].
 
-    Nodes come in blocks of √steps: states at the first node of each block come from one another,
-    those in a block from powers of T and, all blocks at once, from the motion that starts at rest.
+    Nodes come in blocks of about √steps. Outputs of a block are C T^j times the state at its first
+    node, j by doubling, and what loads add to a motion from rest, all blocks at once. The states at
+    first nodes are a prefix scan of the states that rest and loads leave (Hillis, Steele 1986).
 
     The start has shape (S, N, 1), the rows C (S, m, N), and the outputs (S, steps + 1, m).
     """
-    loads, transfer = step_map.loads, step_map.transfer
-    count = len(loads) + 1
-    size = isqrt(len(loads)) + 1  # of a block
+    loads, power = step_map.loads, step_map.transfer
+    count, samples, m = len(loads) + 1, len(start.value), rows.value.shape[-2]
+    observed, size = rows, 1  # C T^j of the nodes j of a block, shape (S, size m, N)
+    while 2 * size**2 < count:
+        observed = concatenate([observed, observed @ power], -2)
+        power, size = power @ power, 2 * size
     blocks = -(-count // size)
-    powers = _powers(transfer, size)
-    observed = rows[:, None] @ powers  # C T^j, shape (S, size, m, N)
-    samples, m, n = len(start.value), rows.value.shape[-2], start.value.shape[-2]
-    flat = observed.map(lambda x: x.reshape((*x.shape[:-3], size * m, n)))
-    has_loads = loads.shape[1] > 0
-    if has_loads:
+    starts, outputs = start @ np.eye(1, blocks), list[Jet]()
+    if loads.shape[1]:
         padded = np.zeros((blocks * size, loads.shape[1]))
         padded[: len(loads)] = loads
         columns = padded.reshape(blocks, size, -1)
         state = step_map.load @ np.zeros((loads.shape[1], blocks))
-        outputs = []
         for k in range(size):
             outputs.append(rows @ state)  # eq. 18, of a linear structure
-            state = transfer @ state + step_map.load @ columns[:, k].T
-    block_transfer, starts = transfer @ powers[:, -1], [start]
-    for b in range(blocks - 1):
-        following = block_transfer @ starts[-1]
-        starts.append(following + state[..., b : b + 1] if has_loads else following)
-    out = flat @ concatenate(starts, -1)  # (…, S, size m, blocks)
-    if has_loads:
+            state = step_map.transfer @ state + step_map.load @ columns[:, k].T
+        starts = concatenate([start, state[..., :-1]], -1)
+    shift = 1
+    while shift < blocks:  # each state becomes the sum of T^(size i) times that i blocks before
+        carried = power @ starts[..., :-shift]
+        starts = concatenate([starts[..., :shift], starts[..., shift:] + carried], -1)
+        power, shift = power @ power, 2 * shift
+    out = observed @ starts  # (…, S, size m, blocks)
+    if outputs:
         out = out + concatenate(outputs, -2)
 
     def in_time(x: Array) -> Array:
@@ -304,17 +304,6 @@ def trajectory(step_map: StepMap, start: Jet, rows: Jet) -> Jet:
         return ordered.reshape((*lead, samples, blocks * size, m))[..., :count, :]
 
     return out.map(in_time)
-
-
-def _powers(transfer: Jet, count: int) -> Jet:
-    """The powers T^0 … T^(count − 1) of a matrix by doubling, shape (S, count, N, N)."""
-    eye = np.broadcast_to(np.eye(transfer.value.shape[-1]), transfer.value.shape)
-    powers = Jet.constant(eye, transfer.directions)[:, None]
-    next_power = transfer
-    while powers.value.shape[1] < count:
-        powers = concatenate([powers, powers @ next_power[:, None]], -3)
-        next_power = next_power @ next_power
-    return powers[:, :count]
 
 
 def exact_flow(flow: object) -> LinearFlow:
