@@ -7,6 +7,7 @@ from itertools import combinations, product
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array
+from alphacut.fuzzy.kernels import compiled
 
 FACES_UP_TO = 6
 """Number of parameters up to which all faces of the box are enumerated."""
@@ -38,50 +39,77 @@ def local_maximum(
         start: Where to start, inside the boxes.
         rounds: Most rounds; one that gains next to nothing is a problem's last.
     """
-    x = np.zeros_like(g) if start is None else np.ascontiguousarray(start, float).copy()
-    open_problems: Array = np.arange(len(g))
-    for _ in range(rounds):
-        quadratics = g[open_problems], H[open_problems]
-        boxes = lower[open_problems], upper[open_problems]
-        trial = x[open_problems]
-        before = gain(*quadratics, trial)
-        _axes_ascent(*quadratics, *boxes, trial)
-        for _ in range(2):
-            trial = _newton(*quadratics, *boxes, trial)
-        x[open_problems] = trial
-        increase = gain(*quadratics, trial) - before
-        open_problems = open_problems[increase > 1e-10 * (1e-6 + np.abs(before))]
-        if not len(open_problems):
-            break
+    x = np.zeros(g.shape) if start is None else np.array(start, float, order="C")
+    quadratics_and_boxes = (np.ascontiguousarray(array, float) for array in (g, H, lower, upper))
+    _ascend(*quadratics_and_boxes, x, rounds)
     return x
 
 
-def _axes_ascent(g: Array, H: Array, lower: Array, upper: Array, x: Array) -> None:
-    """Maximise g·x + x·H·x/2 along one axis after the other, in place, x (N, d) in the boxes."""
-    for i in range(g.shape[1]):
-        curvature = H[:, i, i]
-        slope = g[:, i] + np.einsum("nj,nj->n", H[:, i], x) - curvature * x[:, i]  # at x_i = 0
-        low, high = lower[:, i], upper[:, i]
-        end = np.where(slope * (high - low) + 0.5 * curvature * (high**2 - low**2) > 0, high, low)
-        concave = curvature < 0
-        x[:, i] = np.where(
-            concave, np.clip(-slope / np.where(concave, curvature, -1.0), low, high), end
-        )
+@compiled
+def _ascend(g: Array, H: Array, lower: Array, upper: Array, x: Array, rounds: int) -> None:
+    """Ascend to local maxima of all problems, in place, x (N, d) in the boxes."""
+    for n in range(len(g)):
+        value = _value(g[n], H[n], x[n])
+        for _ in range(rounds):
+            before = value
+            for i in range(x.shape[1]):
+                low, high, curvature = lower[n, i], upper[n, i], H[n, i, i]
+                slope = _slope(g[n], H[n], x[n], i) - curvature * x[n, i]  # at x_i = 0
+                rise = slope * (high - low) + 0.5 * curvature * (high**2 - low**2)
+                x[n, i] = high if rise > 0 else low
+                if curvature < 0:
+                    x[n, i] = min(max(-slope / curvature, low), high)
+            for _ in range(2):
+                value = _newton_step(g[n], H[n], lower[n], upper[n], x[n])
+            if not value - before > 1e-10 * (1e-6 + abs(before)):
+                break
 
 
-def _newton(g: Array, H: Array, lower: Array, upper: Array, x: Array) -> Array:
-    """Points (N, d) after a projected Newton step of length 1, ½ or ¼ on the free axes, or x."""
-    slope = g + np.einsum("nij,nj->ni", H, x)
-    free = ~(((x <= lower) & (slope <= 0)) | ((x >= upper) & (slope >= 0)))
-    eye = np.eye(g.shape[1])
-    reduced = _regular(np.where(free[:, :, None] & free[:, None, :], H, -eye))
-    step = -np.linalg.solve(reduced, np.where(free, slope, 0.0)[..., None])[..., 0]
-    best, top = x, gain(g, H, x)
+@compiled
+def _slope(g: Array, H: Array, x: Array, i: int) -> float:
+    slope = g[i]
+    for j in range(len(x)):
+        slope += H[i, j] * x[j]
+    return float(slope)
+
+
+@compiled
+def _value(g: Array, H: Array, x: Array) -> float:
+    value = 0.0
+    for i in range(len(x)):
+        value += 0.5 * x[i] * (g[i] + _slope(g, H, x, i))
+    return value
+
+
+@compiled
+def _newton_step(g: Array, H: Array, lower: Array, upper: Array, x: Array) -> float:
+    """Value after a projected Newton step of length 1, ½ or ¼ on the free axes, if it gains."""
+    d, best, start, equations = len(x), _value(g, H, x), x.copy(), np.zeros((len(x), len(x) + 1))
+    for i in range(d):  # whose right-hand side is the last column
+        equations[i, :d], equations[i, d] = H[i], -_slope(g, H, x, i)
+    for i in range(d):
+        slope = -equations[i, d]
+        if (x[i] <= lower[i] and slope <= 0) or (x[i] >= upper[i] and slope >= 0):
+            equations[i], equations[:, i] = 0.0, 0.0
+            equations[i, i] = -1.0
+    shift = SHIFT * (np.abs(equations[:, :d]).max() + 1e-100)  # as in `_regular`
+    for k in range(d):
+        equations[k, k] -= shift
+    for k in range(d):  # Gauss and Jordan's elimination
+        pivot = k + np.abs(equations[k:, k]).argmax()
+        if pivot != k:
+            equations[k], equations[pivot] = equations[pivot].copy(), equations[k].copy()
+        for i in range(d):
+            factor = equations[i, k] / equations[k, k] if i != k else 0.0
+            for j in range(k, d + 1):
+                equations[i, j] -= factor * equations[k, j]
+    step = equations[:, d] / np.diag(equations)
     for length in (1.0, 0.5, 0.25):
-        trial = np.clip(x + length * step, lower, upper)
-        value = gain(g, H, trial)
-        best, top = np.where((value > top)[:, None], trial, best), np.maximum(value, top)
-    return best
+        trial = np.minimum(np.maximum(start + length * step, lower), upper)
+        value = _value(g, H, trial)
+        if value > best:
+            best, x[:] = value, trial
+    return float(best)
 
 
 def global_maximum(g: Array, H: Array, lower: Array, upper: Array) -> Array:
