@@ -50,12 +50,12 @@ def run(options: argparse.Namespace, out: TextIO) -> int:
     folder = options.out or f"results/{Path(options.case).stem}"
     start, names, figures = time.perf_counter(), list[str](), not options.no_figures
     with open_results(options, folder) as (case, store):
+        if figures:  # before processes are forked, which then need not import it
+            from alphacut.figures.all import draw_figures  # which takes time to import
         with pool(store.workers) as executor:
             first = Results(case.content)
             results = Pipeline(first, store, options.petsc, figures, executor).run()
             if figures:
-                from alphacut.figures.all import draw_figures  # which takes time to import
-
                 names = draw_figures(results, store, executor)
         summary = Summary.of(
             results,

@@ -51,8 +51,9 @@ def figure_style() -> Iterator[None]:
 def save(figure: Figure, stem: Path) -> list[Path]:
     """Write a figure to STEM.svg and STEM.png, close it, and return the two paths."""
     stem.parent.mkdir(parents=True, exist_ok=True)
-    for _ in range(2):  # the second layout knows where the first put axes of equal scale
-        figure.draw_without_rendering()
+    if (layout := figure.get_layout_engine()) is not None:
+        for _ in range(2):  # the second knows where the first put axes of equal scale
+            layout.execute(figure)
     figure.set_layout_engine("none")
     files = []
     for kind in ("svg", "png"):
