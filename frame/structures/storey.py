@@ -254,6 +254,7 @@ class StoreyFrame:
         dashpots, unity = self._of_floors("d{}", p), p["rayleigh_mass"] * 0.0 + 1.0
         shears = [z if kind == "shear" else None for kind, z in map(self.quantity, self.outputs)]
         forces = np.array([np.eye(n)[int(force.at) - 1] for force in self.loads])
+        rows, accelerated = np.split(self._rows, [2 * n], axis=1)
         return Assembly(
             mass=self._of_floors("m{}", p).contract(floors),
             springs=links.contract(storeys),
@@ -264,8 +265,8 @@ class StoreyFrame:
             q0=self._of_floors("q{}_0", p),
             v0=self._of_floors("v{}_0", p),
             row_factors=stack([unity if z is None else links[..., z] for z in shears]),
-            rows=self._rows[:, : 2 * n],
-            accelerated=self._rows[:, 2 * n :],
+            rows=rows,
+            accelerated=accelerated,
             pattern=np.ones(n),
             massive=np.arange(n),
             loads=self.loads,
