@@ -59,9 +59,7 @@ def motion(frame: StoreyFrame, time: np.ndarray) -> np.ndarray:
 
 
 def deviation(frame: StoreyFrame, step: float) -> float:
-    """Largest error of the exact propagator as a share of the peak, over outputs and ways to
-    compute them.
-    """
+    """Largest error of exact values, by outputs and by values or derivatives, over the peak."""
     duration = round(4 / step) * step
     flow, point = LinearFlow(frame, ("E",), duration, step, Exact()), np.array([[frame.modulus]])
     truth = motion(frame, flow.time)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from alphacut.frame import LinearFlow, MatrixStructure, StoreyFrame
+from alphacut.frame import StoreyFrame
 from alphacut.frame.structures.linear import evaluate, frequencies
 
 FRAME = StoreyFrame(
@@ -66,14 +66,3 @@ def test_derivatives_are_those_of_the_modes_at_the_changed_parameters():
             difference = sum(four) / (4 * h[i] * h[j])
             scale = np.abs(found.value).max() / (modal[0, i] * modal[0, j])
             assert np.abs(found.second[i, j] - difference).max() < 2e-5 * scale
-
-
-def test_group_and_messages():
-    assert replace(FRAME, damping_ratio=0.05).group("zeta") == ("zeta",)
-    with pytest.raises(ValueError, match="parameter is zeta; allowed: m, l, c, d"):
-        FRAME.group("zeta")
-    springs, row = np.array([[1.0, -1.0], [-1.0, 1.0]]), {"q": np.ones(2)}
-    parts = ([("m", np.eye(2))], [(1.0, springs)], row)
-    floating = MatrixStructure({"m": 1.0}, *parts, ratios=(0.1,), q0=np.ones(2))
-    with pytest.raises(ValueError, match="of the greatest; allowed: more than 1e-12"):
-        LinearFlow(floating, ("m",), 1, 0.1).values(np.array([[1.0]]))

@@ -84,6 +84,7 @@ SYSTEM = {
 }
 ROUGH = {**SYSTEM, "lagrangian": lambda q, v, p: p["m"] * v[0] ** 2 - sympy.Abs(q[0])}
 ONE = np.ones((1, 1))
+FLOATING = replace(MATRICES, stiffness=[(1.0, EYE - EYE[::-1])], ratios=(0.1,))
 
 
 @pytest.mark.parametrize(
@@ -115,6 +116,11 @@ def test_a_lagrangian_system_refuses(changes, message):
         (
             lambda: LagrangianFlow(LagrangianSystem(**ROUGH), ("m",), 1.0, 0.1).values(ONE),
             "function of the lagrangian is sign; allowed: reciprocal",
+        ),
+        (lambda: COLUMNS.group("zeta"), "parameter is zeta; allowed: m, l, c, d"),
+        (
+            lambda: LinearFlow(FLOATING, ("m",), 1.0, 0.1).values(ONE),
+            "squared frequency is .* of the greatest; allowed: more than 1e-12",
         ),
         (lambda: pendulum(length=-1.0), "length is -1.0; allowed: finite numbers greater"),
         (lambda: Accelerogram(0.0, np.ones(3)), "accelerogram is 3 samples every 0 s"),
