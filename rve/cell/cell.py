@@ -152,7 +152,6 @@ class Cell:
         return isotropic and is_round(self.outline)
 
 
-HALVES = "in halves of the cell's side"
 JUMP = 0.01
 """Of radii over 1/2048 of the support of θ; twenty times as steep as maps of particles are."""
 MAX_POISSON = 0.45
@@ -162,7 +161,8 @@ MAX_POISSON = 0.45
 def require_mesh_size(size: float) -> None:
     """Refuse an edge length outside (0, 1], in halves of the cell's side."""
     if not 0 < size <= 1:
-        raise RefusedError("the mesh size", f"{size:g}", f"values in (0, 1], {HALVES}")
+        allowed = "values in (0, 1], in halves of the cell's side"
+        raise RefusedError("the mesh size", f"{size:g}", allowed)
 
 
 def require_points(points: int | None) -> None:

@@ -17,7 +17,7 @@ from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.mesh import square
 from alphacut.rve.mesh.columns import grid_of
-from alphacut.rve.mesh.periodicity import SAME_PLACE, MeshError, partners
+from alphacut.rve.mesh.periodicity import SAME_PLACE, MeshError, unknowns
 from alphacut.rve.mesh.prism_grid import PrismGrid, Prisms
 from alphacut.rve.mesh.wedge import prism_rule, vertices_and_midpoints, wedge
 
@@ -190,7 +190,7 @@ def _require_periodic_square(grid: PrismGrid) -> None:
     """Refuse levels that do not fill [−1, 1]², or whose opposite sides do not match."""
     assert grid.fixed is not None
     per_level = len(grid.plane.points)
-    lowest_partners: list[dict[int, int]] = []
+    lowest: Ints | None = None  # unknowns of its nodes, which partners have in common
     for level in range(grid.layers + 1):
         points = grid.fixed[level * per_level : (level + 1) * per_level]
         xy, theta = points[:, :2], points[0, 2]
@@ -198,15 +198,13 @@ def _require_periodic_square(grid: PrismGrid) -> None:
         if abs(box - [[-1, -1], [1, 1]]).max() > SAME_PLACE:
             shown = " × ".join(f"{low:.6g} … {high:.6g}" for low, high in box.T)
             raise MeshError(f"the level θ = {theta:.4g} spans {shown}, not −1 … 1 × −1 … 1")
-        on_side = abs(abs(xy) - 1) <= SAME_PLACE
         try:
-            pairs = [partners(xy, on_side[:, axis], axis) for axis in (0, 1)]
+            unknown = unknowns(xy)
         except MeshError as error:
             raise MeshError(f"{error.what}, on the level θ = {theta:.4g}", error.cure) from None
-        level_partners = [{int(a): int(b) for a, b in zip(*pair, strict=True)} for pair in pairs]
-        if lowest_partners and level_partners != lowest_partners:
+        if lowest is not None and not np.array_equal(unknown, lowest):
             raise MeshError(f"a column changes its partner at the level θ = {theta:.4g}")
-        lowest_partners = lowest_partners or level_partners
+        lowest = unknown
 
 
 def write(

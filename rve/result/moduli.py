@@ -72,17 +72,12 @@ def mori_tanaka(fraction: Array, phases: Sequence[AnyPhase], *, space: bool = Fa
     return np.array(estimates)
 
 
-def bulk_modulus(stiffness: Array) -> Array:
-    """In-plane bulk modulus of stiffnesses of shape (…, 3, 3), in Pa."""
-    return np.asarray((stiffness[..., 0, 0] + stiffness[..., 1, 1] + 2 * stiffness[..., 0, 1]) / 4)
-
-
 def _bulk_and_shear(phases: Sequence[AnyPhase], space: bool) -> Array:
     """K of space or of plane strain, and G, of each phase, shape (2, phases), in Pa."""
     if space:
         return np.array([phase.bulk_and_shear for phase in phases if isinstance(phase, Phase)]).T
-    stiffness = np.array([phase.stiffness for phase in phases])
-    return np.array([bulk_modulus(stiffness), stiffness[:, 2, 2]])
+    moduli = square_moduli(np.array([phase.stiffness for phase in phases]))
+    return np.array([moduli[:, 0] / 2, moduli[:, 2]])
 
 
 def _reference_terms(bulk: float, shear: float, space: bool) -> tuple[float, float]:

@@ -101,24 +101,17 @@ def krylov_solver(
     ksp = PETSc.KSP().create(matrix.comm)
     ksp.setOptionsPrefix(PREFIX)
     ksp.setOperators(matrix)
-    matrix.setNearNullSpace(translations(matrix))
+    translations = [matrix.createVecRight() for _ in range(2)]  # which multigrid takes
+    for component, vector in enumerate(translations):
+        vector.array[component::2] = 1.0
+        vector.normalize()
+    matrix.setNearNullSpace(PETSc.NullSpace().create(vectors=translations, comm=matrix.comm))
     with in_database(options), uninterrupted(second_ends=True):
         ksp.setFromOptions()
         if options.by_levels:
             ksp.pc.setPythonContext(ThetaPreconditioner(matrix, numbering, law))
         ksp.setUp()
     return ksp
-
-
-def translations(matrix: PETSc.Mat) -> PETSc.NullSpace:
-    """Near-null space for multigrid: the two translations in the plane, normalised."""
-    vectors = []
-    for component in range(2):
-        vector = matrix.createVecRight()
-        vector.array[component::2] = 1.0
-        vector.normalize()
-        vectors.append(vector)
-    return PETSc.NullSpace().create(vectors=vectors, comm=matrix.comm)
 
 
 @uninterrupted(second_ends=True)

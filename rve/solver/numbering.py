@@ -127,12 +127,6 @@ class LevelNumbering:
         on_mid_levels = np.where(vertices >= 0, vertices + mid_first, -1)
         return np.concatenate([on_levels.ravel(), on_mid_levels.ravel()])
 
-    @property
-    def rank_levels(self) -> tuple[slice, slice]:
-        """Levels and mid-levels of this rank among all."""
-        levels, mid_levels = self.levels, self.mid_levels
-        return slice(levels.start, levels.stop), slice(mid_levels.start, mid_levels.stop)
-
     def split(self, fields: Any) -> tuple[Any, Any]:
         """Views of hats, (…, layers + 1, n), and bubbles, (…, layers, v), of fields, (…, size).
 
