@@ -119,8 +119,8 @@ class ThetaPreconditioner:
         self._numbering, self._comm = numbering, matrix.comm.tompi4py()
         self._mass = theta_mass(law, numbering.grid.level_thetas(law))
         self._injection, self._nodal_values = injection(numbering), numbering.nodal_values()
-        self._rows = numbering.levels, numbering.mid_levels  # of this rank
-        masses = [*self._mass.hats[self._rows[0]], *self._mass.bubbles[self._rows[1]]]
+        levels, mid_levels = self._rank_levels = numbering.levels, numbering.mid_levels
+        masses = [*self._mass.hats[levels], *self._mass.bubbles[mid_levels]]
         blocks = self._blocks(matrix)
         self._solvers = [plane_solver(*block) for block in zip(blocks, masses, strict=True)]
 
@@ -133,7 +133,7 @@ class ThetaPreconditioner:
         starts, columns, values = matrix.createSubMatrices(span)[0].getValuesCSR()
         stiffness = sp.csr_matrix((values, columns, starts), (rows.stop - first,) * 2)
         numbers = numbering.split(np.arange(numbering.size))
-        hats, bubbles = (x[own] for x, own in zip(numbers, self._rows, strict=True))
+        hats, bubbles = (x[k] for x, k in zip(numbers, self._rank_levels, strict=True))
         T = self._nodal_values[first : rows.stop][:, np.append(hats, bubbles)]
         products = T.T.tocsr() @ stiffness @ T
         for start, stop in pairwise(np.cumsum([0, *map(len, hats), *map(len, bubbles)])):
@@ -150,8 +150,9 @@ class ThetaPreconditioner:
     def _solve(self, *loads: Array) -> Fields:
         """Solutions of all levels and of all mid-levels, of which each rank solves its own."""
         solvers, solutions = iter(self._solvers), []
-        for load, rows in zip(loads, self._rows, strict=True):
+        for load, rows in zip(loads, self._rank_levels, strict=True):
             solution = np.empty_like(load[rows])
+            # the solvers last, of which zip takes no more than there are loads
             for *arrays, ksp in zip(load[rows], solution, solvers, strict=False):
                 ksp.solve(*(PETSc.Vec().createWithArray(x, comm=PETSc.COMM_SELF) for x in arrays))
             solutions.append(np.concatenate(self._comm.allgather(solution)))
@@ -160,11 +161,11 @@ class ThetaPreconditioner:
 
     def view(self, _pc: PETSc.PC, viewer: PETSc.Viewer) -> None:
         """Print the number of levels and the first one's solver, for ``-rve_ksp_view``."""
-        levels, mid_levels = map(len, self._rows)
+        levels, mid_levels = map(len, self._rank_levels)
         count = f"{levels} levels and {mid_levels} mid-levels on the first rank"
         viewer.printfASCII(f"    preconditioner along θ, {count}, each solved by\n")
         rank_viewer = viewer.getSubViewer(PETSc.COMM_SELF)
-        if 0 in self._rows[0]:  # on the rank that has it
+        if 0 in self._rank_levels[0]:  # on the rank that has it
             self._solvers[0].view(rank_viewer)
         viewer.restoreSubViewer(rank_viewer)
 
