@@ -127,7 +127,7 @@ def model() -> Iterator[Any]:
     import gmsh
 
     with uninterrupted(second_ends=True):  # Gmsh loses exceptions of functions that it calls
-        gmsh.initialize(["", "-v", "1"], readConfigFiles=False, interruptible=False)
+        gmsh.initialize(["", "-v", "0"], readConfigFiles=False, interruptible=False)
         try:
             gmsh.option.setNumber("General.NumThreads", 1)
             yield gmsh
