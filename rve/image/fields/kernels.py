@@ -46,10 +46,10 @@ def modes_by_rows(element: Element, fields: Array, z: int, first: int, last: int
 
     Each is off by at most `ROUNDINGS` rounding units of the sum of its terms' magnitudes.
     """
-    modes = np.zeros((len(element.modes), len(fields), (last - first) * fields.shape[-1]))
+    components = np.zeros((len(element.modes), len(fields), (last - first) * fields.shape[-1]))
+    _fill_modes(*element.products, fields, z, first, last, components)
     parts = isotropic_parts(3, stress=element.stress)
-    _add_modes(*element.products, parts, fields, z, first, last, modes)
-    return modes
+    return np.asarray(parts @ components.reshape(6, -1)).reshape(components.shape)
 
 
 @fast
@@ -107,11 +107,11 @@ def _apply(
 
 
 @fast
-def _add_modes(
-    tables: Any, terms: Any, groups: Any, factors: Any, parts: Any, fields: Any,
+def _fill_modes(
+    tables: Any, terms: Any, groups: Any, factors: Any, fields: Any,
     z: int, first: int, last: int, modes: Any,
 ) -> None:  # fmt: skip
-    """Add modes of the trace (first part) and the deviator to `modes`, (modes, fields, voxels)."""
+    """Set modes of the Voigt components, (component and its modes, fields, voxels)."""
     n, nx = tables.shape[-1], fields.shape[-1]
     strips = np.zeros((len(terms), n, n, n * nx))
     by_component = np.zeros((6, n, n, n * nx))
@@ -121,16 +121,10 @@ def _add_modes(
             _fill_strips(
                 tables, terms, groups, factors, fields[a], z, y + n - 1, shifted, lines, strips
             )
-            if y < first:
-                continue
-            _modes_of_row(tables, terms, strips, y, by_component)
-            for p in range(6):
-                for c in range(6):
-                    for m in range(n**3 if parts[p, c] != 0.0 else 0):
-                        source = by_component[c, m // n**2, m // n % n, m % n * nx :]
-                        out = modes[p * n**3 + m, a, (y - first) * nx :]
-                        for x in range(nx):
-                            out[x] += parts[p, c] * source[x]
+            if y >= first:
+                _modes_of_row(tables, terms, strips, y, by_component)
+                row = slice((y - first) * nx, (y - first + 1) * nx)
+                modes[:, a, row] = by_component.reshape(6 * n**3, nx)
 
 
 @fast
