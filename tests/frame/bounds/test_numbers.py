@@ -10,7 +10,6 @@ from alphacut.frame.methods.dual import DualProof
 from alphacut.frame.methods.proof import Proof
 from alphacut.frame.structures.loads import Accelerogram
 from alphacut.fuzzy import Crisp, Triangular
-from tests.frame.bounds.test_dual_proof import CASES
 
 
 @pytest.mark.parametrize(
@@ -61,17 +60,6 @@ def test_crisp_modes_that_do_not_oscillate_are_refused():
     frame, inputs, given = oscillator(20.0, 0.2, rayleigh=(50.0, 0.0), v0=(1.0,))
     with pytest.raises(UnprovedError, match="a mode may not oscillate"):
         envelope(frame, inputs, step=0.05, method=DualProof(), progress=False, **given)
-
-
-def test_threads_do_not_change_a_bit():
-    model, fuzzy = CASES["matrices"]
-    given = {"duration": 1.0, "step": 0.02, "alpha": (0,), "progress": False}
-    first, other = (
-        envelope(model, fuzzy, method=DualProof(peaks=0.01, workers=workers), **given)
-        for workers in (1, 3)
-    )
-    for name in ("lower", "upper", "lower_at", "upper_at", "between"):
-        assert (getattr(first, name) == getattr(other, name)).all()
 
 
 @pytest.mark.parametrize("wrong", [np.nan, -np.inf, 1e101])

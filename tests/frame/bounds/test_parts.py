@@ -1,6 +1,7 @@
 """The hull of parts holds every motion, refusals are bisected, and no thread changes a bound."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -139,11 +140,11 @@ def test_a_soil_spring_known_within_a_factor_of_four_is_proved_in_parts(method):
     )
     assert (values <= found.upper[0]).all()
     assert (values >= found.lower[0]).all()
-    again = envelope(
-        spring(), fuzzy, method=type(method)(**{**vars(method), "workers": 1}), **given
+    alone, threads = (
+        envelope(spring(), fuzzy, replace(method, workers=n), **given) for n in (1, 3)
     )
-    assert (again.upper == found.upper).all()
-    assert (again.lower == found.lower).all()
+    for name in ("lower", "upper", "lower_at", "upper_at", "between"):
+        assert (getattr(alone, name) == getattr(threads, name)).all()
 
 
 def test_parts_left_after_a_refusal_have_bounds():

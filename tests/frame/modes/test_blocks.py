@@ -87,6 +87,9 @@ def test_blocks_hold_the_subspaces_of_modes_that_cross(coupling):
     assert max(len(block.modes) for block in found.blocks) > 1
     for u in draws(3):
         K, M = pencil(own, widths, centre + radius * u)
+        squared = eigh(K, M, eigvals_only=True)
+        assert (found.low <= squared * (1 + 1e-12)).all()
+        assert (squared <= found.high * (1 + 1e-12)).all()
         for block in found.blocks:
             for name, exact in exact_block(block, K, M, middle.basis).items():
                 model = getattr(block, name)
