@@ -73,12 +73,9 @@ def _bound_cell(
     multipliers: Array,
     at: Array,
 ) -> tuple[float, int]:
-    """Largest dual bound over a cell at nodes where its middle's motion peaks, and its node.
-
-    `sides` are of −output and of the output, as `constants` (2, T) that are added to bounds;
-    `effort` are nodes to try, steps and patience. Multipliers (T, Z) are improved, `at` (d,) is
-    written.
-    """
+    """Largest dual bound over a cell at peaks of its middle's motion, and its node; writes `at`."""
+    # `sides` and `constants` (2, T), added to bounds, are of −output and the output; `multipliers`
+    # (T, Z) are improved
     (tries, steps, patience), data = effort, sides[0]
     motion = np.zeros(data.table.shape[2])
     for k in range(len(ends)):  # at the middle of the mode's cell
@@ -109,10 +106,7 @@ def _bound_cell(
 
 
 def _halves(cell: PeakCell, data: Data) -> list[Ints]:
-    """Ends of both halves of a cell along the ω or q over which a mode varies most at its node.
-
-    They share the middle point; none where no range has a point between its ends.
-    """
+    """Ends of both halves along the ω or q over which a mode varies most; none if none is left."""
     largest, chosen, count = -1.0, (0, 0), int(data.points[0])
     for k in range(len(cell.ends)):
         first, last, low, high = map(int, cell.ends[k])

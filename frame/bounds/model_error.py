@@ -222,24 +222,18 @@ class Remainder:
 
     They follow for the box [lower, upper] by majorants: derivatives of C exp(λ t) over exp(λ₀ t)
     are no larger than those of Σ_p t^p C ρ^p / p!, ρ = λ − λ₀, with majorants of C and λ.
-
-    Attributes:
-        tensor: |∂³ output / ∂u_i ∂u_j ∂u_k| at most, shape (T, m, d, d, d), symmetric in the last
-            three.
-        margin: Rounding of values, and of slopes, at most, shape (T, m, 1 + d).
-        rate: Majorants of the eigenvalues, see `majorant_parts`, by degree (monomials, n).
-        share: The same of the shares of the last part, (monomials, n, m).
     """
 
     def __init__(self, model: ModalModel, lower: Array, upper: Array) -> None:
         d, n, m, time = len(lower), model.count, len(model.flow.outputs), model.flow.time
         reach, width = np.maximum(np.abs(lower), np.abs(upper)), upper - lower
         growth = largest_growth(model.eigenvalue, reach)
-        self.rate = majorant_parts(model.eigenvalue, reach)
+        self.rate = majorant_parts(model.eigenvalue, reach)  # by degree, (monomials, n)
         cubic, margin = np.zeros((len(time), count(d, 3), m)), np.zeros((len(time), 1 + d, m))
         rho = [part[..., None] for part in self.rate]
         for part in motion_parts(model, growth):
             noise = _rounding_bound(model, self.rate[0][0], part.load)
+            # of the last part, when all are done; by degree, (monomials, n, m)
             self.share = power = majorant_parts(part.share, reach)
             for p in range(4):  # power: the parts of C ρ^p / p!
                 waves = 2 * part.waves[p]
@@ -256,8 +250,9 @@ class Remainder:
                 cubic[time == 0] = majorant_parts(at_start, reach)[3]
         of_exponents = np.array([1, 1, 2, 6])[exponents(d, 3)].prod(1)  # ∂³ u^e at 0, e!
         third = (1 + 1e-9) * (cubic * of_exponents[:, None]).swapaxes(1, 2)
+        # bounds of |∂³ output / ∂u_i ∂u_j ∂u_k|, (T, m, d, d, d)
         self.tensor = third[..., product_places(d, 1, 2)[:, product_places(d, 1, 1)]]
-        self.margin = margin.swapaxes(1, 2)
+        self.margin = margin.swapaxes(1, 2)  # rounding of values, and of slopes, (T, m, 1 + d)
 
 
 def _rounding_bound(model: ModalModel, rate: Array, load: LoadTables | None) -> Array:
