@@ -193,11 +193,11 @@ def draw_tolerances(answer: TolerancesAnswer) -> Figure:
     """Draws the supports of the inputs over nominal values: in the case, and with no exceedance."""
     supports = answer.supports.values()
     nominal = np.array([[x.nominal or 1.0] for x in supports])
-    own = np.array([x.own for x in supports]) / nominal
-    kept = np.array([x.kept for x in supports]) / nominal
+    stated = np.array([x.own for x in supports]) / nominal
+    admissible = np.array([x.kept for x in supports]) / nominal
     intervals: list[tuple[Array, style.Look]] = [
-        (own, {"color": GREY, "height": 0.7, "label": "in the case"}),
-        (kept, {"color": BLUE, "height": 0.35, "label": "no limit exceeded"}),
+        (stated, {"color": GREY, "height": 0.7, "label": "in the case"}),
+        (admissible, {"color": BLUE, "height": 0.35, "label": "no limit exceeded"}),
     ]
     figure = draw_bars(intervals, answer.supports, "value over the nominal one")
     figure.axes[0].axvline(1.0, color=INK, lw=0.8)

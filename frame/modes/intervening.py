@@ -131,7 +131,7 @@ def oscillators(structure: Classical, of_block: BlockShares, found: Subspaces) -
     if len(modes) == 1:
         low, high = (float(np.sqrt(x[modes[0]])) for x in (found.low, found.high))
     a, b = structure.rayleigh[0], structure.rayleigh[1]
-    made = list[Oscillator]()
+    oscillators = list[Oscillator]()
     for j in range(len(modes)):
         squared = rate[j, j]
         decay = a * 0.5 + b * squared * 0.5 + ratio[j] * squared**0.5
@@ -142,8 +142,9 @@ def oscillators(structure: Classical, of_block: BlockShares, found: Subspaces) -
         omega_range = _overlap(_ends(omega), (float(low / np.sqrt(1 + q_high**2)), high))
         quotient_range = max(q_low, 0.0), q_high
         shares = share[j] * structure.factor
-        made.append(Oscillator(omega, decay, quotient, shares, omega_range, quotient_range))
-    return made
+        oscillator = Oscillator(omega, decay, quotient, shares, omega_range, quotient_range)
+        oscillators.append(oscillator)
+    return oscillators
 
 
 def damped_range(structure: Classical, low: float, high: float, modes: Ints) -> tuple[Ends, Ends]:

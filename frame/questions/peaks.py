@@ -179,8 +179,8 @@ def tightest(first: Peaks, second: Peaks) -> dict[str, Peak]:
     Guaranteed bounds are intersected and attained ones united; else the bounds of the stronger
     nature or of the smaller error are taken. Peaks that either analysis reaches are kept.
     """
-    both = {name: _tighter(first[name], second[name]) for name in first if name in second}
-    return {**first, **second, **both}
+    shared = {name: _tighter(first[name], second[name]) for name in first if name in second}
+    return {**first, **second, **shared}
 
 
 def _tighter(first: Peak, second: Peak) -> Peak:

@@ -182,8 +182,8 @@ def responses_at_nodes(
     if window and history.step > longest:  # exp(σ τ) grows from an interval's beginning on
         parts, samples = ceil(history.step / longest), history.samples
         places = np.arange((len(samples) - 1) * parts + 1) / parts
-        divided = np.interp(places, np.arange(len(samples)), samples)
-        history = replace(history, step=history.step / parts, samples=divided)
+        resampled = np.interp(places, np.arange(len(samples)), samples)
+        history = replace(history, step=history.step / parts, samples=resampled)
     require_in_range(sigma, history.step, max(history.step, longest))
     out = np.empty((1 + derivatives, len(times), sigma.shape[-1]), complex)
     error, pieces = np.empty(out.shape[1:]), linear_pieces(history, time)

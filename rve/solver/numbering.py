@@ -51,8 +51,8 @@ class Elimination:
     def _zero_matrix(self, cells: Ints, rows: range) -> PETSc.Mat:
         has_unknown, size = cells >= 0, self._sizes[1]
         cell = np.broadcast_to(np.arange(len(cells))[:, None], cells.shape)[has_unknown]
-        ones = np.ones(len(cell), np.int8)
-        cell_to_pair = sp.csr_matrix((ones, (cell, cells[has_unknown])), (len(cells), size // 2))
+        unit = np.ones(len(cell), np.int8)
+        cell_to_pair = sp.csr_matrix((unit, (cell, cells[has_unknown])), (len(cells), size // 2))
         pair_to_cell = cell_to_pair.T.tocsr()[rows.start // 2 : rows.stop // 2]
         neighbours = pair_to_cell @ cell_to_pair
         neighbours.sort_indices()
