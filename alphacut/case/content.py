@@ -45,9 +45,10 @@ class Content(CellContent):
 
     @property
     def questions(self) -> dict[str, QuestionSection]:
-        """Sections of questions to the motion, by their keys."""
+        """Sections of questions to the motion, by their keys, with one limit of each storey."""
         sections = (self.probability, self.decision, self.tolerances, self.fragility)
-        return {section.key: section for section in sections if section is not None}
+        given, structure = [x for x in sections if x is not None], self.structure
+        return {x.key: x if structure is None else x.with_storeys(structure) for x in given}
 
     @property
     def limited_outputs(self) -> tuple[str, ...]:

@@ -2,24 +2,26 @@
 
 A limit is a text such as "drift1 <= 40 mm" or "drift1 <= 0.5 %" of the magnitude, "max q3 <= 80 mm"
 or "min q3 >= -60 mm" of one side, "mean drift1 <= 30 mm" of the mean over the records of a suite.
+"drift <= 1/200" limits every storey, "base_shear <= 8 %" is in shares of the weight.
 """
 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
-from typing import Annotated, ClassVar, Literal, cast
+from dataclasses import dataclass, replace
+from typing import Annotated, ClassVar, Literal, Self, cast
 
 import numpy as np
 from pydantic import PlainValidator
 
 from alphacut.case.structure import Structure
 from alphacut.case.types import NotEmpty, Quantity, Section
-from alphacut.frame.structures.quantities import Output
+from alphacut.frame.structures.quantities import OUTPUTS, Output
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io import quantity
 
 Side = Literal["", "max", "min", "mean"]
+BASE_SHEAR = "base_shear"
 
 
 @dataclass(frozen=True)
@@ -27,7 +29,7 @@ class Limit:
     """Largest magnitude allowed of an output, or its greatest or least value.
 
     `side` is "max" or "min" of the output itself, "" of its magnitude, "mean" of that over records;
-    the value is in SI or, if relative, a fraction of the storey's height.
+    the value is in SI or, if relative, a fraction of the storey's height or of the weight.
     """
 
     side: Side
@@ -47,26 +49,43 @@ class Limit:
         return -1 if self.side == "min" else 1
 
     def value_in_si(self, structure: Structure, key: str) -> float:
-        """The limit in the SI unit of its output; a fraction is of the storey's least height."""
+        """The limit in the SI unit of its output; a fraction is of the least height or weight."""
         if not self.is_relative:
             return self.value
+        if self.output == BASE_SHEAR:
+            allowed = "a share of the weight beside [frame], or a force, as 90 kN"
+            require(structure.frame is not None, key, self.text, allowed)
+            return self.value * structure.least_weight
         height = structure.heights.get(self.output)
         if height is None:
             raise RefusedError(key, self.text, "a drift of a storey whose length frame.lengths has")
         return self.value * height.support.lower
 
+    def by_storey(self, structure: Structure) -> tuple[Limit, ...]:
+        """The limits of all floors or storeys of a frame that "drift" means; else itself."""
+        _, words = OUTPUTS.get(self.output, ("", ""))
+        if structure.frame is None or not words:
+            return (self,)
+        names = [f"{self.output}{z}" for z in range(1, structure.frame.floors + 1)]
+        word = rf"\b{self.output}\b"  # the "a" of "max a" alone
+        return tuple(replace(self, output=x, text=re.sub(word, x, self.text)) for x in names)
+
 
 def parse_limit(value: object) -> Limit:
     """Limit that a text such as "drift1 <= 40 mm" states; of a magnitude it is positive."""
     match = re.fullmatch(r"(?:(max|min|mean) )?(\w+)\s*(<=|>=)\s*(.+)", str(value).strip())
-    allowed = "'drift1 <= 40 mm', 'drift1 <= 0.5 %', 'max q3 <= 80 mm' or 'min q3 >= -60 mm'"
+    allowed = "'drift1 <= 40 mm', 'drift <= 1/200', 'max q3 <= 80 mm' or 'min q3 >= -60 mm'"
     if match is None or (match[3] == ">=") != (match[1] == "min"):  # only least values have >=
         raise RefusedError("", value, allowed)
     side, name, _, text = match.groups()
-    is_relative = name.startswith("drift") and text.endswith("%")
+    ratio = re.fullmatch(r"1\s*/\s*([1-9][0-9]{0,8})", text)
+    has_reference = name.startswith(("drift", "residual")) or name == BASE_SHEAR
+    is_relative = has_reference and (ratio is not None or text.endswith("%"))
     unit = "" if is_relative else Output(name).unit
     try:
-        if unit == "SI":  # the output's is not known here
+        if ratio is not None and is_relative:
+            number = 1 / int(ratio[1])
+        elif unit == "SI":  # the output's is not known here
             number = float(quantity.parse_fuzzy_in_any_unit(text).nominal)
         else:
             number = quantity.parse_number(text, unit)
@@ -91,7 +110,14 @@ class QuestionSection(Section):
     reads_peaks: ClassVar[bool] = False
     needs_magnitudes: ClassVar[bool] = False
     limits: Limits
-    """limits of outputs, 'drift1 <= 0.5 %', 'max q3 <= 80 mm', 'min q3 >= -60 mm'"""
+    """limits of outputs, 'drift1 <= 40 mm', 'max q3 <= 80 mm', 'min q3 >= -60 mm';
+    'drift <= 1 %' or 'drift <= 1/200' of the height of every storey, 'base_shear <= 8 %' of the
+    weight"""
+
+    def with_storeys(self, structure: Structure) -> Self:
+        """The section with a limit of every storey as one of each; see `Limit.by_storey`."""
+        limits = (x for limit in self.limits for x in limit.by_storey(structure))
+        return self.model_copy(update={"limits": tuple(limits)})
 
     @property
     def limits_by_name(self) -> dict[str, Limit]:

@@ -20,6 +20,7 @@ from alphacut.fuzzy import Crisp, FuzzyNumber, PiecewiseLinear
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError, require, require_choice
 from alphacut.io.files import suggestion
+from alphacut.io.quantity import STANDARD_GRAVITY
 from alphacut.records.read import read_recording
 
 Mass = Annotated[FuzzyNumber, Quantity("kg", above=0, fuzzy=True)]
@@ -98,8 +99,9 @@ DampingRatios = Annotated[
 class Structure:
     """A storey frame, a structure from matrices or a pendulum: the model at its nominal values.
 
-    `numbers` has every parameter, crisp or fuzzy, in SI; `heights` the storey's of each drift;
-    `force_units` the SI units of the forces' amplitudes, empty of factors.
+    `numbers` has every parameter, crisp or fuzzy, in SI; `heights` those of the storeys by
+    drift and residual drift; `force_units` the SI units of the forces' amplitudes, empty of
+    factors.
     """
 
     model: StoreyFrame | MatrixStructure | LagrangianSystem
@@ -111,6 +113,12 @@ class Structure:
     def frame(self) -> StoreyFrame | None:
         """The model if it is a storey frame, else None."""
         return self.model if isinstance(self.model, StoreyFrame) else None
+
+    @property
+    def least_weight(self) -> float:
+        """Weight of a frame's floors at their least masses, in N; 0 of other structures."""
+        masses = self.frame.group("m") if self.frame else ()
+        return float(STANDARD_GRAVITY) * sum(self.numbers[x].support.lower for x in masses)
 
     @property
     def linear(self) -> StoreyFrame | MatrixStructure | None:
@@ -301,7 +309,8 @@ class Frame(StructureSection):
         for x, values in lists.items():
             numbers |= {SYMBOLS[x].format(z): number for z, number in enumerate(values, start=1)}
         numbers |= {x: Crisp(y) for x, y in model.parameters.items() if x not in numbers}
-        heights = {f"drift{z}": height for z, height in enumerate(lists["lengths"], start=1)}
+        numbered = list(enumerate(lists["lengths"], start=1))
+        heights = {f"{x}{z}": height for x in ("drift", "residual") for z, height in numbered}
         return Structure(model, {name: numbers[name] for name in model.parameters}, heights)
 
     def require_consistent(self) -> None:
