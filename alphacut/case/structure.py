@@ -262,7 +262,8 @@ class Frame(StructureSection):
     accelerogram: Annotated[Accelerogram, text(read_accelerogram)] | None = None
     """file of the ground's acceleration; motion is relative to it"""
     outputs: Annotated[tuple[str, ...], NotEmpty] = ()
-    """observed quantities: q1, v1, a1, drift1, shear1 … (columns without dampers), base_shear;
+    """observed quantities: q1, v1, a1, drift1, shear1 … (columns without dampers), base_shear,
+    overturning_moment (Σ of storey shears times heights);
     of columns that yield residual1, ductility1, dissipated1 … besides"""
 
     @property

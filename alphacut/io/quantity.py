@@ -68,7 +68,7 @@ LEAST, GREATEST = 1e-36, 1e18
 """Magnitudes in SI beyond which a quantity other than 0 is a slip."""
 PREFIXES = {9: "G", 6: "M", 3: "k", 0: "", -3: "m", -6: "µ", -9: "n"}
 MINUS = "\u2212"
-PREFIXED = ("m", "m/s", "m/s^2", "N", "N/m", "Pa", "s", "rad", "W", "J")
+PREFIXED = ("m", "m/s", "m/s^2", "N", "N*m", "N/m", "Pa", "s", "rad", "W", "J")
 NUMBER = r"[-+\u2212]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
 LIST = re.compile(r"\[(.*)\]\s*(.*)", re.DOTALL)
 SPREAD = re.compile(rf"({NUMBER})\s*(.*?)\s*(?:±|\+/-)\s*({NUMBER})\s*(.*)")

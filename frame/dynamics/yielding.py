@@ -20,7 +20,7 @@ from alphacut.frame.dynamics.flow import Flow, StepError, with_feedthrough
 from alphacut.frame.dynamics.integrators import SAME, state_matrix
 from alphacut.frame.structures.linear import evaluate, histories
 from alphacut.frame.structures.loads import History
-from alphacut.frame.structures.storey import StoreyFrame
+from alphacut.frame.structures.storey import MOMENT, StoreyFrame
 from alphacut.fuzzy.arrays import Array, Ints, Mask
 from alphacut.fuzzy.kernels import compiled
 from alphacut.fuzzy.refused import RefusedError, require
@@ -43,9 +43,9 @@ MAX_EVENTS = 1000
 """Events in a part of a step after which the motion has failed."""
 MAX_IMBALANCE = 1e-9
 """Energy that may be missing at the end, as a fraction of all energies that were exchanged."""
-KINDS = ("q", "drift", "shear", "ductility", "v", "a", "residual", "dissipated")
+KINDS = ("q", "drift", "shear", "ductility", "v", "a", "residual", "dissipated", MOMENT)
 Q, DRIFT, SHEAR, DUCTILITY = range(4)  # kinds whose peaks are found between nodes
-AT_NODES = ("v", "a", "residual")
+AT_NODES = ("v", "a", "residual", MOMENT)
 """Outputs whose peaks are sought at nodes alone; dissipated energy never falls."""
 RUNS, COLLAPSED, FAILED = 0, 1, 2
 
@@ -97,9 +97,10 @@ class YieldingFlow(Flow):
         p = {x: Jet.constant(np.zeros(len(points)) + y, 0) for x, y in named.items()}
         k, hardening, yield_drift = system.springs(p), system.hardenings(p), system.yield_drifts(p)
         softening = system.softening(p) if system.gravity else k * 0.0
+        heights = system.heights(p) if len(system.lengths) else k * 0.0
         mass = matrices.mass.value.diagonal(axis1=1, axis2=2)
-        properties = [mass, *(x.value for x in (k, softening, hardening, yield_drift))]
-        storeys = np.stack(properties, 1)  # (S, 5, n)
+        properties = [mass, *(x.value for x in (k, softening, hardening, yield_drift, heights))]
+        storeys = np.stack(properties, 1)  # (S, 6, n)
         start = matrices.start.value[..., 0]
         drift0 = np.diff(start[:, : system.floors], prepend=0.0)
         if matrices.static is not None and (np.abs(drift0) > yield_drift.value).any():
@@ -165,11 +166,11 @@ def _march(
 ) -> tuple[int, float, int, float]:  # fmt: skip
     """Write values (T, m) and peaks within parts (m,); return status, time, storey, imbalance.
 
-    `storeys` (5, n): mass, stiffness, softening by weight, hardening, yield drift; `damping`
-    (n, n) in N s/m, `pushes` (n, L) by loads, `start` (2n,); parts as of `load_parts`; `kinds`
-    (m, 2): kinds and storeys. Accelerations lack the forces over the masses.
+    `storeys` (6, n): mass, stiffness, softening by weight, hardening, yield drift, height;
+    `damping` (n, n) in N s/m, `pushes` (n, L) by loads, `start` (2n,); parts as of `load_parts`;
+    `kinds` (m, 2): kinds and storeys. Accelerations lack the forces over the masses.
     """
-    mass, k, softening, hardening, yield_drift = storeys
+    mass, k, softening, hardening, yield_drift, _ = storeys
     n, inverse_mass = len(mass), 1 / mass
     # coefficients by powers of the fraction of a part: q, v, drifts
     series = np.zeros((3, n, MAX_TERMS + 1))
@@ -371,7 +372,7 @@ def _energy(storeys: Array, q: Array, v: Array, plastic: Array) -> float:
     """Return kinetic and stored energy, less the work of weights, in J."""
     total = 0.0
     for z in range(len(q)):
-        mass, k, softening, a, _ = storeys[:, z]
+        mass, k, softening, a, _, _ = storeys[:, z]
         d = _drift(q, z)
         total += mass * v[z] ** 2 + (a * k - softening) * d**2 + (1 - a) * k * (d - plastic[z]) ** 2
     return total / 2
@@ -421,19 +422,21 @@ def _observe(
     q, v, plastic, dissipated = state
     for row in range(len(kinds)):
         kind, z = kinds[row]
-        mass, k, softening, hardening, yield_drift = storeys[:, z]
+        mass, k, softening, hardening, yield_drift, _ = storeys[:, z]
         drift, offset_force = _drift(q, z), (1 - hardening) * k * plastic[z]
-        force = -_net_force(storeys, q, plastic, z)
+        force, moment = -_net_force(storeys, q, plastic, z), 0.0
         if z + 1 < len(q):
             force += _net_force(storeys, q, plastic, z + 1)
         for i in range(len(q)):
             force -= damping[z, i] * v[i]
+            shear = _net_force(storeys, q, plastic, i) + storeys[2, i] * _drift(q, i)
+            moment += storeys[5, i] * shear
         # drift in equilibrium without load, where storeys that yield back rest
         back = abs((1 - hardening) * k * yield_drift / (hardening * k - softening))
         residual = min(max(offset_force / (k - softening), -back), back)
         by_kind = (
             q[z], drift, k * drift - offset_force, drift / yield_drift,
-            v[z], force / mass, residual, dissipated[z],
+            v[z], force / mass, residual, dissipated[z], moment,
         )  # fmt: skip
         values[row] = by_kind[kind]
 
@@ -441,7 +444,7 @@ def _observe(
 @compiled
 def _net_force(storeys: Array, q: Array, plastic: Array, z: int) -> float:
     """Return the force of a storey's columns less that of the weight."""
-    _, k, softening, hardening, _ = storeys[:, z]
+    _, k, softening, hardening, _, _ = storeys[:, z]
     return (k - softening) * _drift(q, z) - (1 - hardening) * k * plastic[z]
 
 

@@ -52,7 +52,7 @@ def classical_structure(system: LinearSystem, parameters: Mapping[str, TaylorMod
     if assembly.forces is not None:
         accelerations = _accelerations(assembly, assembly.forces)
         forced = {name: accelerations[:, k] for k, name in enumerate(names)}
-    displacements, velocities = np.split(assembly.rows, 2, axis=1)
+    displacements, velocities = _constant_rows(assembly)
     ratios = assembly.ratios or [assembly.rayleigh[0] * 0.0]
     return Classical(
         mass=assembly.mass,
@@ -75,7 +75,7 @@ def _accelerations(assembly: Assembly[TaylorModel], forces: TaylorModel) -> Tayl
 
 
 def _require_classical(assembly: Assembly[TaylorModel]) -> None:
-    """Refuse damping that couples the modes, and outputs that mix displacements and velocities."""
+    """Refuse damping that couples the modes."""
     if assembly.dashpots.size().any():
         raise UnprovedError(
             "dashpots couple the modes", "give damping ratios or Rayleigh's factors in their place"
@@ -85,6 +85,14 @@ def _require_classical(assembly: Assembly[TaylorModel]) -> None:
             "Rayleigh's damping by the springs without the weights couples the modes",
             "give a damping ratio, or leave gravity out",
         )
+
+
+def _constant_rows(assembly: Assembly[TaylorModel]) -> tuple[Array, Array]:
+    """What outputs take of displacements and of velocities, not of both, shape (m, n) each."""
+    if not isinstance(assembly.rows, np.ndarray):
+        cure = "take the method proof with few inputs, or leave the overturning moment out"
+        raise UnprovedError("the overturning moment adds storeys by factors of inputs", cure)
     displacements, velocities = np.split(assembly.rows, 2, axis=1)
     if (displacements.any(1) & velocities.any(1)).any():
         raise UnprovedError("an output mixes displacements and velocities", "observe them apart")
+    return displacements, velocities

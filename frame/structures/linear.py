@@ -40,7 +40,7 @@ class Assembly(Generic[Number]):
         q0: Initial displacements, shape (…, n), in m.
         v0: Initial velocities, shape (…, n), in m/s.
         row_factors: What the outputs' rows are multiplied by, shape (…, m).
-        rows: What outputs take of [q; v], shape (m, 2n).
+        rows: What outputs take of [q; v], shape (m, 2n), or (…, m, 2n) where parameters are in it.
         accelerated: What they take of absolute accelerations, shape (m, n).
         pattern: ι, how the unknowns move rigidly with the ground, shape (n,).
         massive: Unknowns that have mass, rising.
@@ -58,7 +58,7 @@ class Assembly(Generic[Number]):
     q0: Number
     v0: Number
     row_factors: Number
-    rows: Array
+    rows: Array | Number
     accelerated: Array
     pattern: Array
     massive: Ints

@@ -16,6 +16,7 @@ OUTPUTS = {  # unit and words, by names without the floor
     "residual": ("m", "residual drift of storey"),
     "ductility": ("", "ductility of storey"),
     "dissipated": ("J", "energy dissipated in storey"),
+    "overturning_moment": ("N*m", ""),
     **{"base_shear": ("N", ""), "force": ("N", ""), "phi": ("rad", "")},
 }
 POSITIVE = "positive"

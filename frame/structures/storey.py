@@ -28,6 +28,7 @@ SYMBOLS = {
     **{"yield_force": "fy{}", "yield_drift": "dy{}", "hardening": "hardening{}"},
 }
 SINGLE = {"modulus": "E", "damping_ratio": "zeta", "rayleigh": "rayleigh_mass"}
+MOMENT = "overturning_moment"
 SPRING_KEYS = "lengths, modulus and second_moment, or stiffness (with lengths for gravity)"
 
 
@@ -36,20 +37,21 @@ class StoreyFrame:
     """Chain of n floors with k_z = 12 c_z E I / l_z³ for c_z clamped columns (2 by default).
 
     Parameters that can be uncertain: "E", "I" or "I1" …, "m1" … "mn", "l1" …, "c1" … (columns of a
-    storey), or "k1" … where stiffnesses are given (and "l1" … with gravity alone); "d1" …, "q1_0" …
+    storey), or "k1" … where stiffnesses are given (and "l1" … beside them); "d1" …, "q1_0" …
     (initial displacements), "v1_0" … (initial velocities), "rayleigh_mass", "rayleigh_stiffness",
     and "zeta", or "zeta1" … of single modes, where there are damping ratios; "F3" of a force on
     floor 3, "F3_2" of a second one there, "J3" of an impulse; of columns that yield "fy1" … or
     "dy1" … (yield forces or drifts) and "hardening1" ….
     Outputs: "q1" … (displacement, m), "v1" … (velocity, m/s), "a1" … (absolute acceleration,
     m/s²), "drift1" … (q_z − q_(z−1), m), "shear1" … (k_z drift_z of the columns,
-    without dampers' forces, N); "base_shear" is "shear1". Where columns yield "residual1" … (drift
-    when unloaded, m), "ductility1" … (drift over yield drift), "dissipated1" … (energy, J), too.
+    without dampers' forces, N); "base_shear" is "shear1", "overturning_moment" Σ_z l_z shear_z
+    (N m, where lengths are given). Where columns yield "residual1" … (drift when unloaded, m),
+    "ductility1" … (drift over yield drift), "dissipated1" … (energy, J), too.
 
     Args:
         masses: Floors from below, in kg.
         lengths: Column lengths per storey, in m; beside stiffness the storeys' heights, which
-            gravity alone needs.
+            gravity and the overturning moment need.
         modulus: Young's modulus E, in Pa.
         second_moment: Second moment of area I of one column, in m⁴: one for all storeys, or one
             for each.
@@ -192,8 +194,7 @@ class StoreyFrame:
         named |= _named("I{}", self.moments)
         lists = ["stiffness", "masses", "lengths", "columns", "dampers", "q0", "v0"]
         for name in (*lists, "yield_force", "yield_drift", "hardening"):
-            if name != "lengths" or not self.stiffness or self.gravity:
-                named |= _named(SYMBOLS[name], getattr(self, name), single=False)
+            named |= _named(SYMBOLS[name], getattr(self, name), single=False)
         named |= zip(("rayleigh_mass", "rayleigh_stiffness"), self.rayleigh, strict=True)
         forces = zip(self.force_names, self.loads, strict=True)
         return named | self.ratios | {x: checked_number(x, y.amplitude) for x, y in forces}
@@ -245,7 +246,11 @@ class StoreyFrame:
     def softening(self, p: Mapping[str, Number]) -> Number:
         """P_z / l_z of storeys, shape (…, n), in N/m, P_z the weight of all floors above."""
         above = self._of_floors("m{}", p).contract(self.gravity * np.tri(self.floors))
-        return above * self._of_floors("l{}", p) ** -1
+        return above * self.heights(p) ** -1
+
+    def heights(self, p: Mapping[str, Number]) -> Number:
+        """Heights l_z of storeys, shape (…, n), in m."""
+        return self._of_floors("l{}", p)
 
     def assembly(self, p: Mapping[str, Number]) -> Assembly[Number]:
         """Matrices, rows and loads at parameters `p`, jets or Taylor models (eq. 23)."""
@@ -254,7 +259,12 @@ class StoreyFrame:
         dashpots, unity = self._of_floors("d{}", p), p["rayleigh_mass"] * 0.0 + 1.0
         shears = [z if kind == "shear" else None for kind, z in map(self.quantity, self.outputs)]
         forces = np.array([np.eye(n)[int(force.at) - 1] for force in self.loads])
+        rows: Array | Number
         rows, accelerated = np.split(self._rows, [2 * n], axis=1)
+        if MOMENT in self.outputs:  # Σ_z l_z k_z (q_z − q_(z−1))
+            drifts = np.zeros((n, len(self.outputs), 2 * n))
+            drifts[:, self.outputs.index(MOMENT), :n] = np.eye(n) - np.eye(n, k=-1)
+            rows = (links * self.heights(p)).contract(drifts) + rows
         return Assembly(
             mass=self._of_floors("m{}", p).contract(floors),
             springs=links.contract(storeys),
@@ -278,6 +288,8 @@ class StoreyFrame:
         """Coefficients of outputs on displacements, velocities and accelerations, shape (m, 3n)."""
         rows = np.zeros((len(self.outputs), 3 * self.floors))
         for row, (kind, z) in zip(rows, map(self.quantity, self.outputs), strict=True):
+            if kind == MOMENT:  # whose row has parameters
+                continue
             block = {"v": 1, "a": 2}.get(kind, 0)  # displacements, velocities, accelerations
             row[z + self.floors * block] = 1.0
             if kind in ("drift", "shear") and z:  # of shears the stiffness is a factor besides
@@ -286,12 +298,16 @@ class StoreyFrame:
 
     def quantity(self, name: str) -> tuple[str, int]:
         """An output's kind, such as "drift", and its floor or storey, from 0; refuses others."""
+        if name == MOMENT:
+            allowed = "it beside lengths, the heights of the storeys"
+            require(len(self.lengths) > 0, "output", value=name, allowed=allowed)
+            return MOMENT, 0
         kinds = "q|v|a|drift|shear" + "|residual|ductility|dissipated" * bool(self.hardening)
         pattern = rf"({kinds})([1-9]\d*)"
         match = re.fullmatch(pattern, "shear1" if name == "base_shear" else name)
         kind, z = (match[1], int(match[2])) if match else ("", 0)
         words = f"{', '.join(kinds.split('|')[:-1])} or {kinds.split('|')[-1]}"
-        allowed = f"{words} with a floor from 1 to {self.floors}, base_shear"
+        allowed = f"{words} with a floor from 1 to {self.floors}, base_shear, {MOMENT}"
         require(0 < z <= self.floors, "output", value=name, allowed=allowed)
         return kind, z - 1
 

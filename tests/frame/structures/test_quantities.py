@@ -9,8 +9,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from alphacut.frame import Output, StoreyFrame
+from alphacut.frame import Output, StoreyFrame, envelope
+from alphacut.frame.dynamics.nonlinear import make_flow
+from alphacut.frame.questions.peaks import peaks
 from alphacut.frame.structures.quantities import OF_STOREY_FRAME, of_storey_frame
+from alphacut.fuzzy import Interval, Nature
+from alphacut.fuzzy.refused import RefusedError
 
 FRAME = StoreyFrame((1.0, 2.0), (1.0, 1.0), 1.0, 1.0, q0=(1.0, 0.0))
 
@@ -25,6 +29,29 @@ def test_a_given_unit_goes_along_with_the_name():
     assert Output("base_shear").words == "base shear"
     known = {"v12": "m/s", "max a3": "m/s^2", "drift1": "m", "base_shear": "N", "word": "SI"}
     assert {name: Output(name).unit for name in known} == known
+
+
+@pytest.mark.parametrize("yields", [False, True])
+def test_the_overturning_moment_is_that_of_the_shears_at_the_heights(yields, rng):
+    """And is proved where few inputs are fuzzy, though it adds storeys by factors of inputs."""
+    inputs, low = ("k2", "l1", "l2"), np.array([4e7, 3.0, 2.5])
+    columns = {"yield_force": [3e5, 2e5], "hardening": [0.1, 0.2]} if yields else {}
+    frame = StoreyFrame(
+        [4e4, 3e4], stiffness=[5e7, 4e7], lengths=[3, 2.5], gravity=9.81, v0=[0.2, 0.5],
+        damping_ratio=0.03, outputs=("shear1", "shear2", "overturning_moment"), **columns,
+    )  # fmt: skip
+    points = low * (1 + 0.1 * rng.random((300, 3)))
+    values = make_flow(frame, inputs, 0.3, 0.01, "exact").values(points)
+    moment = (values[..., :2] * points[:, None, 1:]).sum(-1)
+    assert values[..., 2] == pytest.approx(moment, rel=1e-12, abs=1e-6)
+    if not yields:
+        fuzzy = dict(zip(inputs, map(Interval, low, 1.1 * low), strict=True))
+        proved = envelope(frame, fuzzy, alpha=[0], duration=0.3, step=0.01)
+        peak = peaks(proved)["overturning_moment"]
+        assert peak.nature == Nature.GUARANTEED
+        assert np.abs(moment).max() <= peak.upper[0] < 1.1 * np.abs(moment).max()
+    with pytest.raises(RefusedError, match="beside lengths"):
+        replace(frame, gravity=0.0, lengths=[])
 
 
 @pytest.mark.parametrize("kind", OF_STOREY_FRAME)
