@@ -237,10 +237,7 @@ class UnitFlow:
 
     def taylor(self, unit: Array) -> Jet:
         """Outputs, (S, T, m), with first and second derivatives by the d unit coordinates."""
-        jet, radius = self.flow.taylor(self.boxes.to_physical(unit)), self.boxes.radius
-        jet.first[:] *= radius.reshape(-1, 1, 1, 1)
-        jet.second[:] *= np.multiply.outer(radius, radius)[..., None, None, None]
-        return jet
+        return self.flow.taylor(self.boxes.to_physical(unit)).rescaled(self.boxes.radius)
 
     def envelope(
         self, bounds: Array, at: Array, error: Array | None = None, **fields: Any

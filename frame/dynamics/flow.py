@@ -137,9 +137,9 @@ class Flow(ABC):
         except np.linalg.LinAlgError:
             what = f"a singular matrix at {self._failing_point(points)}"
             raise RefusedError("trajectory", what, "motions that exist", CURE) from None
-        finite = np.isfinite(motion.value).all(-1)
+        finite = np.isfinite(motion.value)
         if not finite.all():
-            row, node = np.argwhere(~finite)[0]
+            row, node, _ = np.argwhere(~finite)[0]
             where = self._point_words(points[row])
             what = f"not finite from t = {self.time[node]:g} s on at {where}"
             cure = f"{CURE}, or a smaller step"

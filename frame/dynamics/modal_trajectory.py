@@ -69,7 +69,7 @@ def modal_trajectory(
         factor = np.concatenate(factors, -1)
         motion = np.concatenate([factor.real, factor.imag], -1) @ table  # its real part
         derivatives.append(np.asarray(motion.swapaxes(-1, -2)))
-    return Jet(*derivatives)
+    return Jet.of(*derivatives)
 
 
 def _chain(a: Jet, rate: Jet) -> list[Array]:
@@ -106,8 +106,8 @@ def _modes(A: Jet) -> tuple[Jet, Jet, Jet] | None:
     cross = B[:, None] @ U - U * slope[:, None, :, None, :]
     bend = bend + cross + cross.swapaxes(0, 1)
     curve = np.diagonal(bend, axis1=-2, axis2=-1)
-    shapes = Jet(V, V @ U, V @ (bend * quotient))
-    return Jet(values, slope, curve), shapes, inverse(shapes)
+    shapes = Jet.of(V, V @ U, V @ (bend * quotient))
+    return Jet.of(values, slope, curve), shapes, inverse(shapes)
 
 
 def classical_trajectory(

@@ -137,7 +137,7 @@ class LagrangianFlow(Flow):
             what = f"a step of {self.step:g} s did not converge, or leaves the numbers"
             raise StepError(what, "take a smaller step, or parameters where the motion exists")
         # jets have the axes of the derivatives first
-        return Jet(out[0], np.moveaxis(out[1], 3, 0), np.moveaxis(out[2], (3, 4), (0, 1)))
+        return Jet.of(out[0], np.moveaxis(out[1], 3, 0), np.moveaxis(out[2], (3, 4), (0, 1)))
 
 
 @compiled

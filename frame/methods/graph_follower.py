@@ -63,7 +63,8 @@ class Storage:
     def add(self, points: Array) -> Places:
         """Compute and store the graphs at unit coordinates (S, d); return where one is now best."""
         jet, top = self.flow.taylor(points), self.top.reshape(-1)
-        self.steepest = np.maximum(self.steepest, np.abs(jet.first).max((0, 1, 2)))
+        slopes = np.abs(np.moveaxis(jet.first, -1, 0)).reshape(len(self.steepest), -1)
+        self.steepest = np.maximum(self.steepest, slopes.max(1))
         best_new = np.full(top.shape, -1)  # which of them is the best; −1 for none
         for s, value in enumerate(jet.value):
             signed = np.stack([-value, value], -1).ravel()
@@ -71,10 +72,10 @@ class Storage:
             top[better], best_new[better] = signed[better], s
         improved = np.flatnonzero(best_new >= 0)
         places: Places = np.unravel_index(improved, self.top.shape)
-        entries = best_new[improved], *places[:2]  # graph, node and output
+        best = jet[best_new[improved], *places[:2]]  # by graph, node and output
         self.best[places] = len(self) + best_new[improved]
-        self.first[places] = np.moveaxis(jet.first, 0, -1)[entries]
-        self.second[places] = np.moveaxis(jet.second, (0, 1), (-2, -1))[entries]
+        self.first[places] = best.first.T
+        self.second[places] = best.second.T
         self.points = np.vstack([self.points, points])
         return places
 

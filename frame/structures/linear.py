@@ -280,7 +280,7 @@ def modal_damping(mass: Jet, stiffness: Jet, ratios: Sequence[Jet]) -> Jet:
         f = [np.where(number == k, 2 * omega, 0.0)[:, None] * X, quotients * G]
         pairs = np.einsum("sikj,asik,bskj->absij", second_quotients, G, G, optimize=True)
         bend = quotients * (Y @ A.second @ X) + pairs + pairs.swapaxes(0, 1)
-        of_modes = Jet(f[0] @ Y, X @ f[1] @ Y, X @ bend @ Y)  # Daleckii, Krein 1965
+        of_modes = Jet.of(f[0] @ Y, X @ f[1] @ Y, X @ bend @ Y)  # Daleckii, Krein 1965
         total = total + ratios[k][:, None, None] * (mass @ of_modes)
     return total
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -187,7 +188,7 @@ class StoreyFrame:
         """Damping ratios by the names of their parameters; empty where there are none."""
         return _named("zeta{}", () if self.damping_ratio is None else self.damping_ratio)
 
-    @property
+    @cached_property
     def parameters(self) -> dict[str, float]:
         """Nominal values of all parameters by name, in SI units; of lists, one for each floor."""
         named: dict[str, float] = {} if self.modulus is None else {"E": self.modulus}
@@ -283,7 +284,7 @@ class StoreyFrame:
             columns=stack([p[x] for x in names])[..., None, :] * forces.T if names else None,
         )
 
-    @property
+    @cached_property
     def _rows(self) -> Array:
         """Coefficients of outputs on displacements, velocities and accelerations, shape (m, 3n)."""
         rows = np.zeros((len(self.outputs), 3 * self.floors))

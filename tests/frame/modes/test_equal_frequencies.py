@@ -108,9 +108,9 @@ def test_damping_by_ratios_is_smooth_where_modes_of_one_ratio_meet(rng):
         return shape @ np.diag(2 * ratios * np.sqrt(squared)) @ shape.T
 
     none = np.zeros((2, 2, 1, 4, 4))
-    mass = Jet(np.eye(4)[None], none[0], none)
-    stiffness = Jet(middle[None], change[:, None], none)
-    zeta = [Jet(np.full(1, x), np.zeros((2, 1)), np.zeros((2, 2, 1))) for x in ratios]
+    mass = Jet.of(np.eye(4)[None], none[0], none)
+    stiffness = Jet.of(middle[None], change[:, None], none)
+    zeta = [Jet.of(np.full(1, x), np.zeros((2, 1)), np.zeros((2, 2, 1))) for x in ratios]
     found = modal_damping(mass, stiffness, zeta)
     assert found.value[0] == pytest.approx(damping(0, 0), abs=1e-12)
     slope = (damping(h, 0) - damping(-h, 0)) / (2 * h)
