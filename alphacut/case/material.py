@@ -279,6 +279,14 @@ class RoundCell(Section):
         require(len(missing) != 1, key, None, allowed)
 
 
+# moduli above those of a phase make a cell that is above in the Loewner order, and those below
+LIMIT_PHASE = (
+    "a pore takes 1e-4 of its matrix's modulus, and upper bounds hold for it; "
+    "a rigid phase takes 1e4 times, and lower bounds hold"
+)
+PhaseModulus = Annotated[FuzzyNumber, Quantity("Pa", above=0, fuzzy=True, cure=LIMIT_PHASE)]
+
+
 class ImageCell(Section):
     """An image of the phases of a periodic cell that is the same in depth, or its whole volume."""
 
@@ -296,7 +304,9 @@ class ImageCell(Section):
     """grey value from which on a pixel is of the next phase"""
     labels: tuple[Annotated[float, Quantity()], ...] | None = None
     """value of each phase in a labelled image, instead of threshold"""
-    modulus: tuple[Modulus, ...] = Field(description="Young's modulus of each phase, dark first")
+    modulus: tuple[PhaseModulus, ...] = Field(
+        description="Young's modulus of each phase, dark first"
+    )
     poisson: OneOrMany[Ratio] = Field(description="Poisson's ratio of each phase")
     loss: OneOrMany[Loss] | None = None
     """loss factor tan δ of each phase's Young's modulus at real ν"""

@@ -56,7 +56,8 @@ class Section(BaseModel):
 class Quantity:
     """A quantity of a key, with its SI unit (empty for none) and the range of every value of it.
 
-    The range is open at `above` and `below`, closed at `minimum` and `maximum`.
+    The range is open at `above` and `below`, closed at `minimum` and `maximum`. `cure` is what to
+    give in place of a value that is refused.
     """
 
     si: str = ""
@@ -66,6 +67,7 @@ class Quantity:
     maximum: float = math.inf
     fuzzy: bool = False
     is_integer: bool = False
+    cure: str = ""
 
     @property
     def allowed(self) -> str:
@@ -84,7 +86,7 @@ class Quantity:
 
     def parse(self, value: object) -> object:
         """The quantity in SI that a value of the case states, such as "80 GPa ± 5 %", in range."""
-        cure = ""
+        cure = self.cure
         try:
             number = self._parsed(value)
             ends = [*number.support] if isinstance(number, FuzzyNumber) else [number]
@@ -93,7 +95,7 @@ class Quantity:
                 for end in ends
             )
         except ValueError as error:
-            fits, cure = False, str(error)
+            fits, cure = False, "; ".join(filter(None, (str(error), cure)))
         require(fits, "", value, self.allowed, cure=cure)
         return number
 

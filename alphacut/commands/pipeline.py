@@ -28,6 +28,7 @@ from alphacut.io.results import MANIFEST, ResultsFolder
 from alphacut.questions.question import Answer, FuzzyResponse
 from alphacut.questions.summary import ANSWERS, Results
 from alphacut.questions.tolerances import require_admissible_scale
+from alphacut.rve.image.fields.grid import device_array
 from alphacut.stages import campaign, cell, envelope, identify, image, microstructure, shares, suite
 from alphacut.stages.campaign import CellCampaign
 from alphacut.stages.envelope import EnvelopeTask, PeakResults, peaks_of
@@ -60,6 +61,10 @@ def open_results(
     """
     require(options.workers >= 1, "--workers", options.workers, "a whole number 1 or more")
     case, path, fresh = read_case(options), options.out or folder, getattr(options, "fresh", False)
+    if (device := getattr(options, "device", "cpu")) != "cpu":
+        has_image, allowed = case.content.image_cell is not None, "cpu for a case without an image"
+        require(has_image, "--device", device, allowed)
+        device_array(device)  # refuses one that is not there before a folder is made
     if path:
         require_writable("--out", path, folder=True)
     lock = locked("--out", Path(path)) if path and rank() == 0 else nullcontext()
@@ -84,6 +89,7 @@ class Pipeline:
     petsc: Mapping[str, str] = field(default_factory=dict)
     figures: bool = True
     executor: Executor | None = None
+    device: str = "cpu"
 
     @property
     def content(self) -> Content:
@@ -134,7 +140,8 @@ class Pipeline:
         """Computes stage modulus, of an image or of samples of a cell, and checks its errors."""
         results, section = self.results, self.content.modulus
         if self.content.image_cell is not None:
-            stage = image.stage(self.content.image_cell, section.alpha, section.average)
+            image_cell = self.content.image_cell
+            stage = image.stage(image_cell, section.alpha, section.average, self.device)
             results.image = self.store.take(stage)
             return
         self.campaign.require_mesh()  # once, not by each sample

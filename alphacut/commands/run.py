@@ -35,12 +35,19 @@ from alphacut.stages.store import CutsResult
 from alphacut.stochastic.microstructure import fragment
 
 PAGE = "report.html"
+DEVICES = "where an image is solved: cpu (default), or cuda by CuPy"
 ONLY = "Plane strain alone: the other definition is for one particle of two isotropic phases"
+
+
+def add_modulus(parser: argparse.ArgumentParser, default_place: str = "nothing is kept") -> None:
+    """Adds the options of a command that computes stage modulus."""
+    add_run(parser, default_place)
+    parser.add_argument("--device", choices=("cpu", "cuda"), default="cpu", help=DEVICES)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Adds the options of a run."""
-    add_run(parser, "results/NAME")
+    add_modulus(parser, "results/NAME")
     parser.add_argument("--fresh", action="store_true", help="compute everything anew")
     parser.add_argument("--no-figures", action="store_true", help="numbers only")
 
@@ -54,7 +61,7 @@ def run(options: argparse.Namespace, out: TextIO) -> int:
             from alphacut.figures.all import draw_figures  # which takes time to import
         with pool(store.workers) as executor:
             first = Results(case.content)
-            results = Pipeline(first, store, options.petsc, figures, executor).run()
+            results = Pipeline(first, store, options.petsc, figures, executor, options.device).run()
             if figures:
                 names = draw_figures(results, store, executor)
         summary = Summary.of(
@@ -150,7 +157,7 @@ def modulus(options: argparse.Namespace, out: TextIO) -> int:
     """Computes the fuzzy modulus of the cell, and prints its tables; returns exit status 0."""
     with open_results(options) as (case, store):
         results = Results(case.content)
-        Pipeline(results, store, options.petsc).compute_modulus()
+        Pipeline(results, store, options.petsc, device=options.device).compute_modulus()
     result = results.modulus or results.image
     assert result is not None
     part: ModulusResult | ImageResult = result.numbers
@@ -222,7 +229,7 @@ COMMANDS = {
         add_run,
         microstructure,
     ),
-    "modulus": Command("fuzzy effective modulus of the cell or of the image", add_run, modulus),
+    "modulus": Command("fuzzy effective modulus of the cell or of the image", add_modulus, modulus),
     "identify": Command("inputs of a frame from its measured natural modes", add_common, identify),
     "run": Command("run every stage of a case: files, figures, summary", add_options, run),
     "report": Command("one self-contained HTML page of a run's results", add_page, report),

@@ -88,16 +88,18 @@ class ImageResult(Numbers):
     proved_losses: dict[str, CutsResult]
 
 
-def stage(cell: ImageCell, alpha: tuple[float, ...], average: str) -> Stage[ImageResult]:
+def stage(
+    cell: ImageCell, alpha: tuple[float, ...], average: str, device: str
+) -> Stage[ImageResult]:
     """The stage of an image, on some levels; E and ν are of an average of its stiffness."""
     digests = [file_digest(file) for file in files_of(cell.image)]
-    inputs = [cell, alpha, average, digests]
-    compute = partial(compute_cuts, cell, alpha, average)
+    inputs = [cell, alpha, average, digests]  # bounds are the same on every device
+    compute = partial(compute_cuts, cell, alpha, average, device)
     return Stage("image", inputs, ("stochastic", "rve", "fuzzy"), ImageResult, compute)
 
 
 def compute_cuts(
-    cell: ImageCell, alpha: tuple[float, ...], average: str, context: StageContext
+    cell: ImageCell, alpha: tuple[float, ...], average: str, device: str, context: StageContext
 ) -> StageResult[ImageResult]:
     """Computes α-cuts of E and of the stiffness of an image, and how its sources widen E."""
     start = perf_counter()
@@ -105,7 +107,7 @@ def compute_cuts(
     nominal = study.images(None, None)  # at nominal thresholds and moduli
     division, solver = usual_division(nominal), ConjugateGradient(ACCURACY)
     require_memory(nominal.bulk[0].shape, division)
-    model = ImageModel(cell.sides, division=division, solver=solver, average=average)
+    model = ImageModel(cell.sides, division, solver, average, device)
     crisp = model.solve(nominal)
     n_solutions = len(alpha) + 5  # with the nominal one, two tests, and the widths of two sources
     context.tick(1 / n_solutions)

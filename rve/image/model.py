@@ -16,7 +16,13 @@ from alphacut.fuzzy.refused import FailedError, require
 from alphacut.rve.image.bounds import Interval, StiffnessBounds, inverse_below
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.fields.element import Element, element_of
-from alphacut.rve.image.fields.energy import SideSolution, coefficients, energies, solve_side
+from alphacut.rve.image.fields.energy import (
+    SideSolution,
+    coefficients,
+    energies,
+    on_host,
+    solve_side,
+)
 from alphacut.rve.image.fields.grid import device_array
 from alphacut.rve.image.phases import ModuliImages
 from alphacut.rve.result.moduli import ISOTROPIC, require_average, square_moduli
@@ -235,7 +241,8 @@ def solve_image(bulk: Array, shear: Array, **settings: Any) -> ImageSolution:
     require(bulk.shape == shear.shape, "moduli", f"of shapes {bulk.shape}, {shear.shape}", allowed)
     require(bulk.ndim in (2, 3), "moduli", f"of shape {bulk.shape}", allowed)
     is_positive = all(bool(((x > 0) & np.isfinite(x)).all()) for x in (bulk, shear))
-    cure = "give pores a small modulus; the upper bound holds for them"
+    cure = "give pores a small modulus, the upper bound holds for them; rigid phases a large one,"
+    cure += " the lower bound holds"
     require(is_positive, "moduli", "0, negative or not finite", "positive numbers", cure)
     settings = {"sides": (1.0,) * bulk.ndim, **settings}
     return ImageModel(**settings).solve(ModuliImages((bulk, bulk), (shear, shear)))
@@ -282,6 +289,6 @@ def energy_parts(
         for k in range(count)
         for modes, weight in zip(rows, (trace - by_shear, by_shear, deviator), strict=True)
     ]
-    values = energies(element, side.fields, element.mean_modes(np.eye(3)), weights).value
+    values = energies(element, on_host(side.fields), element.mean_modes(np.eye(3)), weights).value
     by_part = values.reshape(count, 3, 3, 3)
     return np.stack([by_part[:, 0], by_part[:, 1] + by_part[:, 2]], axis=1)

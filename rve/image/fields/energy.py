@@ -92,7 +92,7 @@ def energies(
             larger = xp.tensordot(spread, xp.abs(weighted), axes=1)
             larger += xp.tensordot(spread @ spread.T / 2, local * factor, axes=1)
             mixed = xp.sum(larger @ xp.moveaxis(local, 1, 2), axis=0)
-            by_modes[k] += _on_host(mixed + mixed.T)
+            by_modes[k] += on_host(mixed + mixed.T)
     value = np.array([np.apply_along_axis(math.fsum, 0, np.array(parts)) for parts in sums]) / cells
     size = np.sqrt(np.diagonal(value, axis1=1, axis2=2))
     by_modes += 2 * UNIT * cells * size[:, :, None] * size[:, None, :]  # `UNIT` · |modes| each
@@ -100,7 +100,7 @@ def energies(
     return Energies(value, by_modes / cells, relative_rounding)
 
 
-def _on_host(array: Fields) -> Array:
+def on_host(array: Fields) -> Array:
     """The array as NumPy's, wherever it is."""
     return np.asarray(array.get() if hasattr(array, "get") else array)
 
@@ -116,7 +116,7 @@ def _piecewise_products(modes: Fields, weighted: Fields, piece: int) -> Array:
         padded = xp.concatenate([values, padding], axis=2) if padding.size else values
         return xp.moveaxis(xp.reshape(padded, (count, n_fields, -1, piece)), 1, 2)
 
-    products = _on_host(cut(modes) @ xp.moveaxis(cut(weighted), 2, 3))
+    products = on_host(cut(modes) @ xp.moveaxis(cut(weighted), 2, 3))
     products = products.reshape(-1, n_fields, n_fields)
     return np.asarray((products + np.swapaxes(products, 1, 2)) / 2)
 
