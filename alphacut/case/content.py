@@ -149,6 +149,10 @@ class Content(CellContent):
         if structure is None or len(sections) > 1:
             value = None if structure is None else f"beside {len(sections) - 1} more"
             raise RefusedError("frame", value, "one of [frame], [matrices] and [pendulum]")
+        if getattr(structure.linear, "hardening", ()):
+            allowed = "auto or quasi-monte-carlo where columns yield"
+            is_possible = envelope.method in ("auto", "quasi-monte-carlo")
+            require(is_possible, "envelope.method", envelope.method, allowed)
         main_study = Study.model_construct(fuzzy=envelope.fuzzy, duration=envelope.duration)
         self._require_study("envelope", main_study, envelope, structure)
         for number, study in enumerate(self.study, start=1):

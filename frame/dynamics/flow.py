@@ -156,8 +156,9 @@ class Flow(ABC):
         return self._point_words(point)
 
     def _point_words(self, point: Array) -> str:
-        pairs = zip(self.names, point, strict=True)
-        return ", ".join(f"{name} = {x:g}" for name, x in pairs) or "the nominal parameters"
+        pairs, unit = zip(self.names, point, strict=True), self.system.parameter
+        numbers = (f"{name} = {x:g} {unit(name).unit}".rstrip() for name, x in pairs)
+        return ", ".join(numbers) or "the nominal parameters"
 
     @abstractmethod
     def _march(self, points: Array, *, derivatives: bool) -> Jet:

@@ -138,6 +138,7 @@ class PeakSearch:
         is_estimate = [not linkage.cuts or linkage.is_estimate(name) for name in outputs]
         natures = tuple(Nature.ESTIMATED if x else Nature.ATTAINED for x in is_estimate)
         error = np.where(is_estimate, SAFETY * excess + self.tolerance * searched.upper, 0.0)
+        error[(cuts.lower == cuts.upper).all(1)] = 0.0  # of a level with one motion, which is exact
         return flow.envelope(
             bounds,
             at,

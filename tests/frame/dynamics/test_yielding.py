@@ -17,7 +17,7 @@ from alphacut.frame import (
 from alphacut.frame.dynamics import yielding
 from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.questions.peaks import peaks
-from alphacut.fuzzy import Interval, Nature
+from alphacut.fuzzy import Nature, Triangular
 from alphacut.fuzzy.refused import RefusedError
 
 MASS, STIFFNESS, YIELD_FORCE = 2.0, 50.0, 3.0
@@ -126,8 +126,9 @@ def test_collapse_under_weight_is_said_with_its_time():
 
 def test_peaks_are_searched_and_proofs_are_refused(rng):
     frame = replace(random_frame(rng, 2), outputs=("drift1", "ductility1"))
-    inputs = {x: Interval(0.9 * y, 1.1 * y) for x, y in frame.parameters.items() if x == "fy1"}
-    nodes = {"duration": 1.6, "step": 0.02, "alpha": [0.0], "progress": False}
+    nominal = frame.parameters["fy1"]
+    inputs = {"fy1": Triangular(0.9 * nominal, nominal, 1.1 * nominal)}
+    nodes = {"duration": 1.6, "step": 0.02, "alpha": [0.0, 1.0], "progress": False}
     found = peaks(envelope(frame, inputs, **nodes))
     low, high = inputs["fy1"].support
     points = np.linspace(low, high, 201)[:, None]
@@ -139,6 +140,7 @@ def test_peaks_are_searched_and_proofs_are_refused(rng):
         assert peak.nature is Nature.ESTIMATED
         assert abs(peak.upper[0] - values.max()) <= peak.error[0] <= 0.02 * peak.upper[0]
         assert abs(peak.lower[0] - values.min()) <= peak.error[0]
+        assert peak.error[1] == 0  # of the nominal motion alone
     for method in ("proof", "dual", "improved-graph-follower"):
         with pytest.raises(RefusedError, match="auto or quasi-monte-carlo"):
             envelope(frame, inputs, method, **nodes)

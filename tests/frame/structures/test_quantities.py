@@ -36,18 +36,16 @@ def test_the_overturning_moment_is_that_of_the_shears_at_the_heights(yields, rng
     """And is proved where few inputs are fuzzy, though it adds storeys by factors of inputs."""
     inputs, low = ("k2", "l1", "l2"), np.array([4e7, 3.0, 2.5])
     columns = {"yield_force": [3e5, 2e5], "hardening": [0.1, 0.2]} if yields else {}
-    frame = StoreyFrame(
-        [4e4, 3e4], stiffness=[5e7, 4e7], lengths=[3, 2.5], gravity=9.81, v0=[0.2, 0.5],
-        damping_ratio=0.03, outputs=("shear1", "shear2", "overturning_moment"), **columns,
-    )  # fmt: skip
+    columns |= {"stiffness": [5e7, 4e7], "lengths": [3, 2.5], "gravity": 9.81}
+    observed = ("shear1", "shear2", "overturning_moment")
+    frame = StoreyFrame([4e4, 3e4], v0=[0.2, 0.5], damping_ratio=0.03, outputs=observed, **columns)
     points = low * (1 + 0.1 * rng.random((300, 3)))
     values = make_flow(frame, inputs, 0.3, 0.01, "exact").values(points)
     moment = (values[..., :2] * points[:, None, 1:]).sum(-1)
     assert values[..., 2] == pytest.approx(moment, rel=1e-12, abs=1e-6)
     if not yields:
         fuzzy = dict(zip(inputs, map(Interval, low, 1.1 * low), strict=True))
-        proved = envelope(frame, fuzzy, alpha=[0], duration=0.3, step=0.01)
-        peak = peaks(proved)["overturning_moment"]
+        peak = peaks(envelope(frame, fuzzy, alpha=[0], duration=0.3, step=0.01))[observed[2]]
         assert peak.nature == Nature.GUARANTEED
         assert np.abs(moment).max() <= peak.upper[0] < 1.1 * np.abs(moment).max()
     with pytest.raises(RefusedError, match="beside lengths"):
