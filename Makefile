@@ -48,6 +48,7 @@ lint:
 
 charts:
 	$(IN) python -m benchmarks.rve.charts
+	$(IN) python -m benchmarks.rve.voxels --chart
 	$(IN) python -m benchmarks.frame.integrators
 	$(IN) python -m benchmarks.frame.envelopes
 	$(IN) python -m benchmarks.frame.envelopes --wide 3

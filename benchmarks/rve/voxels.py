@@ -27,9 +27,9 @@ from alphacut.rve.image.phases import ModuliImages, PhaseModuli
 
 SEED = 886601
 CONTRAST = 10.0
-MUGRID = {1: (33.12699887, 0.100), 2: (32.21863113, 0.683)}
+MUGRID = {1: (33.1270, 0.10), 2: (32.2186, 0.68), 3: (31.9910, 2.31)}
 # by elements along a voxel: Voigt's K and seconds of muGrid 1.6.1, energy within 3e-6
-MUGRID_LIMIT = 31.5  # extrapolated from 2, 4 and 6 elements
+MUGRID_LIMIT = 31.705  # by Aitken's extrapolation of 1, 2 and 4 elements
 
 
 def random_volume(size: int, length: float = 4.0, fraction: float = 0.4) -> Mask:
