@@ -185,7 +185,7 @@ def constants_text(part: ModulusResult | ImageResult) -> str:
     if [*part.plane] == [PLANE_STRAIN]:
         text += f"{ONLY}\n"
     text += cuts_text("tan δ, to first order in it", proved_losses, part.alpha, nature)
-    if (loss := part.loss) is not None and loss.nature is not Nature.GUARANTEED:
+    if (loss := part.loss) is not None:
         rows, levels = [], end_levels(part.alpha)
         for name, cuts in (("E", loss.E), ("G", loss.G), ("K", loss.K)):
             texts = (cut_text(cuts, level, Nature.ATTAINED) for level in levels.values())

@@ -107,7 +107,11 @@ def _constants(part: ModulusResult | ImageResult) -> Iterator[Row]:
     for label, values in further.items():  # of a cell at most E is proved
         texts = (cut_text(values, level, Nature.ATTAINED) for level in (-1, 0))
         yield (label, *texts, Nature.ATTAINED, "")
-    if (loss := part.loss) is not None:
+    if isinstance(part, ImageResult) and part.proved_losses:
+        ends = part.proved_losses["E"]
+        cuts = cut_text(ends, -1, nature), cut_text(ends, 0, nature)
+        yield ("loss factor of E, to first order", *cuts, nature, error_text(0.0, nature))
+    elif (loss := part.loss) is not None:
         cuts = cut_text(loss.E, -1, loss.nature), cut_text(loss.E, 0, loss.nature)
         error_cell = error_text(loss.error["E"], loss.nature) if loss.error else ""
         yield ("loss factor of E", *cuts, loss.nature, error_cell)

@@ -67,7 +67,8 @@ class ImageResult(Numbers):
     On the highest level `lower_GPa` and `upper_GPa` bound the stiffness in the sense of Loewner,
     (3, 3) of the plane or (6, 6) of space, `nu` and `shear_GPa` those of its average. As α-cuts
     `plane` has the constants along the axes by definition and name, `proved_losses` loss factors
-    at nominal moduli to first order; `widths_GPa` has the widths of E by cause.
+    at nominal moduli to first order, `loss` estimates beside them of an image; `widths_GPa` has the
+    widths of E by cause.
     """
 
     alpha: Values
@@ -130,7 +131,7 @@ def compute_cuts(
     if any(number.support.width > 0 for pair in cell.pairs for number in pair):
         widths["phases"] = max(0.0, width(None, lowest) - base)
     phase = study.phase_ranges(None)[0]
-    losses, loss, proved = dict[str, Array](), None, dict[str, Array]()
+    proved, estimates = dict[str, Array](), None
     if cell.losses:
         phase_cuts = phase_loss_cuts(cell.losses, alpha)
         shares = energy_shares(model, crisp, nominal, phase, len(cell.pairs))
@@ -138,21 +139,21 @@ def compute_cuts(
             name: np.array([mean_loss(parts, *cut) for cut in phase_cuts])
             for name, parts in shares.items()
         }
+        young = loss_of_young(crisp.bounds, proved["K"], proved["G"], average)
+        proved = {"E": young, **proved}
         if cell.dimension == 2:
             energies = phase_energies(model, crisp, nominal, phase, len(cell.pairs))
             bounds, errors = image_loss_bounds(energies, phase_cuts, average)
-            losses = dict(zip(CONSTANTS, np.moveaxis(bounds, -1, 0), strict=True))
-            loss = LossResult.of(losses, errors, Nature.ESTIMATED)
-        else:
-            losses = {"E": loss_of_young(crisp.bounds, proved["K"], proved["G"]), **proved}
-            proved, loss = losses, LossResult.of(losses, None, NATURE)
+            estimated = np.moveaxis(bounds, -1, 0)  # constant by constant
+            by_name = dict[str, Array](zip(CONSTANTS, estimated, strict=True))
+            estimates = LossResult.of(by_name, errors, Nature.ESTIMATED)
     top, constants = cuts[-1], np.array([cut.constants for cut in cuts])  # (levels, constants, 2)
     fractions, names = study.fractions, CONSTANT_NAMES[cell.dimension]
     shares_of_phases = np.array([*fractions.values()])
     phases = [Phase(young.nominal, nu.nominal) for young, nu in cell.pairs]
     is_space = cell.dimension == 3
     classical = isotropic_bounds(shares_of_phases, phases, space=is_space)
-    by_name = dict(map(constant_cuts, names, np.moveaxis(constants, 1, 0)))
+    along_axes = dict(map(constant_cuts, names, np.moveaxis(constants, 1, 0)))
     result = ImageResult(
         alpha=np.array(alpha),
         E_GPa=CutsResult.of(np.array([cut.modulus for cut in cuts]) / GPA),
@@ -161,17 +162,17 @@ def compute_cuts(
         nu=dict(zip(SIDES, top.poisson, strict=True)),
         shear_GPa=dict(zip(SIDES, (x / GPA for x in top.bounds.shear(average)), strict=True)),
         average=HILL if is_space else AVERAGES[average],
-        plane={SPACE if is_space else PLANE_STRAIN: by_name},
+        plane={SPACE if is_space else PLANE_STRAIN: along_axes},
         nature=NATURE,
         seconds=perf_counter() - start,
         widths_GPa={x: widths[x] / GPA for x in sorted(widths, key=lambda x: -widths[x])},
         fractions=fractions,
         division=model.division,
         references={"hashin_shtrikman_E_GPa": classical},
-        loss=loss,
+        loss=estimates,
         proved_losses={name: CutsResult.of(cut) for name, cut in proved.items()},
     )
-    return StageResult(result, _dataset(alpha, cuts, phase, losses, cell.sides))
+    return StageResult(result, _dataset(alpha, cuts, phase, proved, cell.sides))
 
 
 def _require_isotropic(widest: ImageCut) -> None:

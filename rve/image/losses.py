@@ -92,10 +92,17 @@ def _least_mean(shares: Array, losses: Array) -> float:
     return float(common + share @ (losses - common) - ROUNDING * np.abs(losses).max())
 
 
-def loss_of_young(bounds: StiffnessBounds, bulk: Array, shear: Array) -> Array:
-    """Bounds of the loss factor of E = 9 K G/(3 K + G) from those of K's and G's, (levels, 2)."""
-    # d ln E = w d ln K + (1 − w) d ln G with w = G/(3 K + G)
-    (low_bulk, high_bulk), (low_shear, high_shear) = bounds.bulk, bounds.shear()
-    weights = low_shear / (3 * high_bulk + low_shear), high_shear / (3 * low_bulk + high_shear)
-    means = np.array([w * bulk + (1 - w) * shear for w in weights])
-    return np.stack([means[..., 0].min(axis=0), means[..., 1].max(axis=0)], axis=-1)
+def loss_of_young(bounds: StiffnessBounds, bulk: Array, shear: Array, average: str) -> Array:
+    """Bounds of the loss factor of an average's E from those of its K and G, (levels, 2) each.
+
+    Of E = 9 K G/(3 K + G), or G (3 − G/K) with the K of plane strain; positive by the bounds.
+    """
+    # d ln E = w d ln K + (1 − w) d ln G with w = G/(3 K + G), of the plane G/(3 K − G)
+    (low_bulk, high_bulk), (low_shear, high_shear) = bounds.bulk, bounds.shear(average)
+    sign = 1 if bounds.dimension == 3 else -1
+    weights = [
+        low_shear / (3 * high_bulk + sign * low_shear),
+        high_shear / (3 * low_bulk + sign * high_shear),
+    ]
+    means = [w * k + (1 - w) * g for w in weights for k in bulk.T for g in shear.T]
+    return np.stack([np.min(means, axis=0), np.max(means, axis=0)], axis=-1)

@@ -6,11 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray
 from PIL import Image
 
 from alphacut.entry import main
 from alphacut.rve.image.model import solve_image
 from alphacut.rve.image.phases import PhaseModuli
+from alphacut.stages.modulus import fuzzy_loss
 from tests.scenes.test_cases import overlapping_cuts
 
 ROOT = Path(__file__).parents[2]
@@ -92,7 +94,7 @@ def micrograph(path, *, pixels=48, discs=6):
     Image.fromarray(np.clip(130 - 30 * outside, 70, 190).astype(np.uint8)).save(path)
 
 
-def test_a_micrograph_has_its_proved_bounds(tmp_path):
+def test_a_micrograph_has_its_proved_bounds_and_losses(tmp_path):
     micrograph(tmp_path / "cell.png")
     text = (ROOT / "cases/composite.toml").read_text(encoding="utf-8")
     text = text.replace("composite.png", "cell.png")
@@ -100,11 +102,17 @@ def test_a_micrograph_has_its_proved_bounds(tmp_path):
     case = tmp_path / "case.toml"
     case.write_text(text, encoding="utf-8")
     out = tmp_path / "out"
-    sets = "cell.threshold=['[120, 130, 140]']", "modulus.alpha=[0, 1]"
+    sets = "cell.threshold=['[120, 130, 140]']", "modulus.alpha=[0, 1]", "cell.loss=['4 %', '1 %']"
     words = "run", case, "--no-figures", f"--out={out}", *(f"--set={one}" for one in sets)
     image = alphacut(tmp_path, *words)["image"]
     overlapping_cuts(image, {"E_GPa": MICROGRAPH})
     assert image["nature"] == "guaranteed"
+    for name in ("E", "G", "K"):
+        ends, estimate = image["proved_losses"][name], image["loss"][name]["lower"][1]
+        assert 0.01 < ends["lower"][1] < estimate < ends["upper"][1] < 0.04
+    proved = image["proved_losses"]["E"]
+    with xarray.open_dataset(out / "image.nc") as data:  # what a frame takes
+        assert [*fuzzy_loss(data).cut(1.0)] == [proved["lower"][1], proved["upper"][1]]
 
 
 def test_a_tomogram_has_its_proved_bounds_and_losses(tmp_path):
