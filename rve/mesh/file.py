@@ -41,8 +41,9 @@ def read_grid(path: Path | str) -> PrismGrid:
         except Exception as error:  # Gmsh raises nothing else
             allowed = "files of Gmsh with 15-node prisms"
             raise RefusedError("mesh.file", path, allowed, str(error)) from None
-        prisms = orient(read_prisms(gmsh))
-    grid = grid_of(prisms)
+        prisms = read_prisms(gmsh)
+    _require_square(prisms.points[:, :2], "the cell")
+    grid = grid_of(orient(prisms))
     _require_filled(grid)
     _require_periodic_square(grid)
     _require_joined_columns(grid)
@@ -154,8 +155,7 @@ def _require_filled(grid: PrismGrid) -> None:
         raise MeshError(what, cure)
     low, high = grid.fixed.min(axis=0), grid.fixed.max(axis=0)
     filled = float((determinants @ weights).sum() / np.prod(high - low))
-    is_square = max(abs(low[:2] + 1).max(), abs(high[:2] - 1).max()) <= SAME_PLACE
-    if is_square and abs(filled - 1) > FILLED:
+    if abs(filled - 1) > FILLED:
         cure = "give holes a phase of their own, soft as air"
         if filled > 1:
             cure = "split surfaces that lie on one another: occ.fragment, both objects removed"
@@ -186,6 +186,16 @@ def _require_joined_columns(grid: PrismGrid) -> None:
         )
 
 
+def _require_square(xy: Array, what: str) -> None:
+    """Refuse points (n, 2) whose box is not the cell's."""
+    box = np.array([xy.min(axis=0), xy.max(axis=0)])
+    if abs(box - [[-1, -1], [1, 1]]).max() > SAME_PLACE:
+        shown = " × ".join(f"{low:.6g} … {high:.6g}" for low, high in box.T)
+        # reading MSH 4.1, Gmsh puts periodic nodes where they were before it scaled the others
+        cure = "a periodic mesh that Gmsh scaled: write it with Mesh.MshFileVersion = 2.2"
+        raise MeshError(f"{what} spans {shown}, not −1 … 1 × −1 … 1", cure)
+
+
 def _require_periodic_square(grid: PrismGrid) -> None:
     """Refuse levels that do not fill [−1, 1]², or whose opposite sides do not match."""
     assert grid.fixed is not None
@@ -194,10 +204,7 @@ def _require_periodic_square(grid: PrismGrid) -> None:
     for level in range(grid.layers + 1):
         points = grid.fixed[level * per_level : (level + 1) * per_level]
         xy, theta = points[:, :2], points[0, 2]
-        box = np.array([xy.min(axis=0), xy.max(axis=0)])
-        if abs(box - [[-1, -1], [1, 1]]).max() > SAME_PLACE:
-            shown = " × ".join(f"{low:.6g} … {high:.6g}" for low, high in box.T)
-            raise MeshError(f"the level θ = {theta:.4g} spans {shown}, not −1 … 1 × −1 … 1")
+        _require_square(xy, f"the level θ = {theta:.4g}")
         try:
             unknown = unknowns(xy)
         except MeshError as error:

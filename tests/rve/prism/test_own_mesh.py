@@ -14,6 +14,7 @@ pytest.importorskip("alphacut.rve.fenicsx")
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve import MeshModel, Phase, PrismModel
 from alphacut.rve.cell.outline import Ellipse, circle
+from alphacut.rve.mesh import square
 from alphacut.rve.mesh.columns import extrude
 from alphacut.rve.mesh.file import MIRRORED, UPSIDE_DOWN, orient, read_grid, refined, write
 from alphacut.rve.mesh.periodicity import MeshError
@@ -166,7 +167,7 @@ def cut_out(points, cells, phase):
 
 def dented(points, cells, phase):
     inner = np.flatnonzero(abs(points[cells[:, 6], :2]).max(axis=1) < 0.9)[0]
-    points[cells[inner, 6], 0] += 1.0
+    points[cells[inner, 6], 0] *= -1.0
     return points, cells, phase
 
 
@@ -178,7 +179,7 @@ def begun_late(points, cells, phase):
     ("change", "message"),
     [
         (lifted, "does not stand on one level"),
-        (stretched, "the level θ = -3 spans -1.1 … 1.1"),
+        (stretched, "the cell spans -1.1 … 1.1"),
         (with_a_hole, r"the prisms fill 9\d\.\d+% .* give holes a phase of their own"),
         (twice_the_particle, r"the prisms fill 112\.\d+% .* occ.fragment"),
         (cut_out, "has a prism on one side alone: a slit; .* Coherence"),
@@ -193,6 +194,19 @@ def test_prisms_that_are_no_cell_are_refused(tmp_path, change, message):
     write(tmp_path / "bad.msh", *changed, grid.names)
     with pytest.raises(MeshError, match=message):
         read_grid(tmp_path / "bad.msh")
+
+
+@pytest.mark.parametrize(("version", "right"), [(2.2, "0.5"), (4.1, "1.5")])
+def test_a_periodic_mesh_that_gmsh_scaled_is_refused_with_the_cure(tmp_path, version, right):
+    with square.model() as gmsh:
+        gmsh.open(str(MESHES / "two-particles.msh"))
+        gmsh.option.setNumber("Mesh.MshFileVersion", version)
+        gmsh.option.setNumber("Mesh.ScalingFactor", 0.5)
+        gmsh.write(str(tmp_path / "half.msh"))
+    with pytest.raises(
+        MeshError, match=rf"spans -0.5 … {right} ×.* write it with Mesh.MshFileVersion = 2.2"
+    ):
+        read_grid(tmp_path / "half.msh")
 
 
 def test_a_file_that_is_none_is_refused(tmp_path):
