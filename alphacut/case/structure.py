@@ -259,6 +259,8 @@ class Frame(StructureSection):
     """velocity of each floor at the start"""
     rayleigh_mass: Rate = Field(default=ZERO, description="factor a of a damping a M + b K")
     rayleigh_stiffness: Delay = Field(default=ZERO, description="factor b of a damping a M + b K")
+    rayleigh_of: Literal["initial", "tangent"] = "initial"
+    """whether K there is the initial stiffness of columns that yield, or the tangent one"""
     accelerogram: Annotated[Accelerogram, text(read_accelerogram)] | None = None
     """file of the ground's acceleration; motion is relative to it"""
     outputs: Annotated[tuple[str, ...], NotEmpty] = ()
@@ -297,6 +299,7 @@ class Frame(StructureSection):
                 damper_placement=self.damper_placement or "ground",
                 outputs=self.outputs,
                 rayleigh=(self.rayleigh_mass.nominal, self.rayleigh_stiffness.nominal),
+                rayleigh_of=self.rayleigh_of,
                 ground=self.accelerogram,
                 damping_ratio=nominal_ratios[0] if len(ratios) == 1 else nominal_ratios or None,
             )

@@ -54,7 +54,8 @@ RUNS, COLLAPSED, FAILED = 0, 1, 2
 class YieldingFlow(Flow):
     """Exact trajectories of a storey frame with yielding columns.
 
-    Dashpots, Rayleigh's damping and damping ratios are those of the initial stiffness.
+    Damping ratios are those of the initial stiffness, and so is Rayleigh's damping unless
+    `rayleigh_of` is "tangent".
 
     Raises:
         RefusedError: A force is harmonic or yields a storey before the start, or a storey yields
@@ -99,8 +100,10 @@ class YieldingFlow(Flow):
         softening = system.softening(p) if system.gravity else k * 0.0
         heights = system.heights(p) if len(system.lengths) else k * 0.0
         mass = matrices.mass.value.diagonal(axis1=1, axis2=2)
-        properties = [mass, *(x.value for x in (k, softening, hardening, yield_drift, heights))]
-        storeys = np.stack(properties, 1)  # (S, 6, n)
+        is_tangent = float(system.rayleigh_of == "tangent")
+        lost = k * (1.0 - hardening) * (is_tangent * p["rayleigh_stiffness"])[:, None]
+        properties = [k, softening, hardening, yield_drift, heights, lost]
+        storeys = np.stack([mass, *(x.value for x in properties)], 1)  # (S, 7, n)
         start = matrices.start.value[..., 0]
         drift0 = np.diff(start[:, : system.floors], prepend=0.0)
         if matrices.static is not None and (np.abs(drift0) > yield_drift.value).any():
@@ -166,11 +169,12 @@ def _march(
 ) -> tuple[int, float, int, float]:  # fmt: skip
     """Write values (T, m) and peaks within parts (m,); return status, time, storey, imbalance.
 
-    `storeys` (6, n): mass, stiffness, softening by weight, hardening, yield drift, height;
-    `damping` (n, n) in N s/m, `pushes` (n, L) by loads, `start` (2n,); parts as of `load_parts`;
-    `kinds` (m, 2): kinds and storeys. Accelerations lack the forces over the masses.
+    `storeys` (7, n): mass, stiffness, softening by weight, hardening, yield drift, height, damping
+    in N s/m that is lost while it yields; `damping` (n, n) without yielding, `pushes` (n, L) by
+    loads, `start` (2n,); parts as of `load_parts`; `kinds` (m, 2): kinds and storeys. Accelerations
+    lack the forces over the masses.
     """
-    mass, k, softening, hardening, yield_drift, _ = storeys
+    mass, k, softening, hardening, yield_drift, _, lost = storeys
     n, inverse_mass = len(mass), 1 / mass
     # coefficients by powers of the fraction of a part: q, v, drifts
     series = np.zeros((3, n, MAX_TERMS + 1))
@@ -181,6 +185,7 @@ def _march(
         d = _drift(q, z)
         plastic[z] = d - min(max(d, -yield_drift[z]), yield_drift[z])
     before, works, node = _energy(storeys, q, v, plastic), np.zeros(2), 0
+    elastic_damping, damping = damping, damping.copy()
     for e in range(len(edges)):
         if is_node[e]:
             _observe(kinds, storeys, damping, (q, v, plastic, dissipated), values[node])
@@ -220,6 +225,14 @@ def _march(
                 return COLLAPSED, edges[e + 1] - h, z, 0.0
             else:
                 direction[z] = math.copysign(1.0, _drift(q, z) - plastic[z])
+            damping[:] = elastic_damping  # forces jump with it, velocities do not
+            for i in range(n):
+                if direction[i] != 0:
+                    damping[i, i] -= lost[i]
+                    if i:
+                        damping[i - 1, i - 1] -= lost[i]
+                        damping[i, i - 1] += lost[i]
+                        damping[i - 1, i] += lost[i]
             if event == MAX_EVENTS:
                 return FAILED, edges[e + 1] - h, z, 0.0
     after, dissipation = _energy(storeys, q, v, plastic), works[1] + dissipated.sum()
@@ -372,7 +385,7 @@ def _energy(storeys: Array, q: Array, v: Array, plastic: Array) -> float:
     """Return kinetic and stored energy, less the work of weights, in J."""
     total = 0.0
     for z in range(len(q)):
-        mass, k, softening, a, _, _ = storeys[:, z]
+        mass, k, softening, a = storeys[:4, z]
         d = _drift(q, z)
         total += mass * v[z] ** 2 + (a * k - softening) * d**2 + (1 - a) * k * (d - plastic[z]) ** 2
     return total / 2
@@ -422,7 +435,7 @@ def _observe(
     q, v, plastic, dissipated = state
     for row in range(len(kinds)):
         kind, z = kinds[row]
-        mass, k, softening, hardening, yield_drift, _ = storeys[:, z]
+        mass, k, softening, hardening, yield_drift = storeys[:5, z]
         drift, offset_force = _drift(q, z), (1 - hardening) * k * plastic[z]
         force, moment = -_net_force(storeys, q, plastic, z), 0.0
         if z + 1 < len(q):
@@ -444,7 +457,7 @@ def _observe(
 @compiled
 def _net_force(storeys: Array, q: Array, plastic: Array, z: int) -> float:
     """Return the force of a storey's columns less that of the weight."""
-    _, k, softening, hardening, _, _ = storeys[:, z]
+    _, k, softening, hardening = storeys[:4, z]
     return (k - softening) * _drift(q, z) - (1 - hardening) * k * plastic[z]
 
 

@@ -63,6 +63,8 @@ class StoreyFrame:
         outputs: Names of the observed quantities; all displacements when empty.
         rayleigh: Mass and stiffness factors a (1/s), b (s) of a damping a M + b K added to the
             dampers.
+        rayleigh_of: Whether K there is the initial stiffness of columns or the tangent one, of
+            which storeys that yield have hardening times k_z.
         ground: Base excitation, if any; displacements are then relative to the ground.
         damping_ratio: ζ of all modes, or a list with one of each mode by rising frequency, added to
             the other damping; it follows the parameters through the modes.
@@ -75,8 +77,8 @@ class StoreyFrame:
             Rayleigh's damping and shears keep k_z.
         loads: Forces on floors.
         yield_force: Force of each storey at which its columns yield, in N: bilinear, with kinematic
-            hardening. All damping stays that of the initial stiffness. An isolator is a soft first
-            storey; a storey of hardening 1 stays elastic.
+            hardening. Damping ratios stay those of the initial stiffness. An isolator is a soft
+            first storey; a storey of hardening 1 stays elastic.
         yield_drift: Drift of each storey at which they yield, in m, in place of yield_force.
         hardening: Stiffness of each storey after yielding over k_z, from 0 (the default) to 1.
 
@@ -110,6 +112,7 @@ class StoreyFrame:
     yield_force: Sequence[float] = ()
     yield_drift: Sequence[float] = ()
     hardening: Sequence[float] = ()
+    rayleigh_of: Literal["initial", "tangent"] = "initial"
 
     def __post_init__(self) -> None:
         """Refuse values that are not allowed, and fill empty lists with their defaults."""
@@ -154,6 +157,7 @@ class StoreyFrame:
                 what, allowed = f"a list of {np.size(values)}", f"{n}, as masses has, from below"
                 require(np.size(values) in sizes[name], name, value=what, allowed=allowed)
         require_choice("damper_placement", self.damper_placement, ("ground", "storey"))
+        require_choice("rayleigh_of", self.rayleigh_of, ("initial", "tangent"))
 
     def _require_springs(self) -> None:
         names = ("modulus", "second_moment", "columns", "lengths")

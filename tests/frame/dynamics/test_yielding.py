@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from alphacut.frame import (
     Accelerogram,
@@ -42,6 +43,8 @@ def random_frame(rng, storeys):
         gravity=9.81,
         damping_ratio=rng.uniform(0.0, 0.05),
         dampers=rng.uniform(0, 2e5, storeys),
+        rayleigh=(0.2, rng.uniform(0.0, 2e-3)),
+        rayleigh_of="tangent",
         yield_force=stiffness * yield_drift,
         hardening=rng.uniform(0.05, 0.3, storeys),
         ground=Accelerogram(float(rng.choice([0.017, 0.02])), record),
@@ -49,10 +52,21 @@ def random_frame(rng, storeys):
     )
 
 
-@pytest.mark.parametrize("load", ["impulse", "step", "pulse"])
-def test_one_storey_without_damping_follows_the_closed_forms(load, rng):
+@pytest.mark.parametrize("load", ["impulse", "damped impulse", "step", "pulse"])
+def test_one_storey_follows_the_closed_forms(load, rng):
     frame = StoreyFrame([MASS], stiffness=[STIFFNESS], yield_force=[YIELD_FORCE], outputs=WATCHED)
-    if load == "impulse":
+    if load == "damped impulse":  # without damping while it yields
+        half = float(rng.uniform(0.01, 0.1)) * OMEGA  # decay of the elastic motion
+        speed, damped = 2 * OMEGA * YIELD_DRIFT, (OMEGA**2 - half**2) ** 0.5
+        frame = replace(frame, v0=[speed], rayleigh=(0, 2 * half / OMEGA**2), rayleigh_of="tangent")
+
+        def drift_above(t):
+            return speed / damped * np.exp(-half * t) * np.sin(damped * t) - YIELD_DRIFT
+
+        force = end = 0.0
+        first = brentq(drift_above, 0, np.pi / 2 / damped, xtol=1e-16, rtol=1e-15)
+        velocity = speed * np.exp(-half * first) * np.cos(damped * first) - half * YIELD_DRIFT
+    elif load == "impulse":
         speed = float(rng.uniform(1.2, 3)) * OMEGA * YIELD_DRIFT
         frame, force, end = replace(frame, v0=[speed]), 0.0, 0.0
         first = np.arcsin(OMEGA * YIELD_DRIFT / speed) / OMEGA  # time of yielding
@@ -75,7 +89,7 @@ def test_one_storey_without_damping_follows_the_closed_forms(load, rng):
     drift = plastic + YIELD_DRIFT
     expected = [drift, drift / YIELD_DRIFT, plastic, plastic * YIELD_FORCE]
     assert found[7] == pytest.approx(expected, rel=1e-10)
-    if load != "step":  # oscillates about the residual drift, within the yield drift
+    if load in ("impulse", "pulse"):  # oscillates about the residual drift, within the yield drift
         t = found[7:, 0] - plastic
         assert t == pytest.approx(YIELD_DRIFT * np.cos(OMEGA * peak / 7 * np.arange(8)), abs=1e-11)
 
@@ -101,6 +115,19 @@ def test_without_yielding_or_with_hardening_1_the_motion_is_the_linear_one(rng):
         assert (np.abs(found - expected).max(0) <= 1e-11 * np.abs(expected).max(0)).all()
     with pytest.raises(RefusedError, match="yield"):
         LinearFlow(frame, (), 6.0, 0.02, Exact())
+
+
+def test_storeys_that_yield_from_the_start_have_tangent_stiffness_and_damping(rng):
+    stiffness, hardening = rng.uniform(5e7, 1e8, 3), rng.permutation([1.0, 0.2, 0.1])
+    rest = {"masses": [4e4] * 3, "v0": [1.0, 2.0, 3.0], "rayleigh": (0.1, 2e-3)}
+    frame = StoreyFrame(
+        **rest, stiffness=stiffness, yield_drift=[1e-14] * 3, hardening=hardening,
+        rayleigh_of="tangent", outputs=("q1", "q2", "q3", "a1", "a2", "a3"),
+    )  # fmt: skip
+    soft = StoreyFrame(**rest, stiffness=hardening * stiffness, outputs=frame.outputs)
+    expected = LinearFlow(soft, (), 0.02, 0.002, Exact()).values(np.zeros((1, 0)))[0]
+    error = np.abs(motion(frame, 0.02, 0.002) - expected)[1:]
+    assert (error <= 1e-10 * np.abs(expected).max(0)).all()
 
 
 def test_events_and_not_steps_decide_and_energy_is_balanced(rng, monkeypatch):
