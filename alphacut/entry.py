@@ -169,7 +169,6 @@ def show_log(is_on: bool) -> Iterator[None]:
 
 
 def _run_command(arguments: Sequence[str], program: str, names: Mapping[str, str]) -> int:
-    """Parses the command line and runs its command; returns the command's exit status."""
     words, petsc = split_petsc(arguments)
     # the parser of the named command alone saves the imports of the others
     named = {name: names[name] for name in words[:1] if name in names}

@@ -216,11 +216,8 @@ def require_admissible(system: LinearSystem | LagrangianSystem, cuts: Boxes) -> 
         nominal, sizes = abs(system.parameters.get(name, 0.0)), (abs(low), abs(high))
         is_same_unit = min(sizes) < OTHER_UNITS * nominal and OTHER_UNITS * max(sizes) > nominal
         is_right = is_same_unit or nominal == 0 or not any(sizes)
-        allowed, cure = (
-            f"values of the size of {nominal:g}, the structure's own",
-            "give both in SI units",
-        )
-        require(is_right, key, value=shown, allowed=allowed, cure=cure)
+        allowed = f"values of the size of {nominal:g}, the structure's own"
+        require(is_right, key, value=shown, allowed=allowed, cure="give both in SI units")
     if isinstance(system, LagrangianSystem):
         return
     if isinstance(system, StoreyFrame):

@@ -153,7 +153,6 @@ def study(
 def _sections(
     case: MicrostructureStudy, executor: Executor | None, progress: Callable[[float], None]
 ) -> list[ParticleCells]:
-    """Particles with their cells: of one image or file, or of simulated packings."""
     # packings of spheres are repeated with a volume fraction that is corrected until the fitted map
     # has the fraction of the case
     source = case.source

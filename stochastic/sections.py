@@ -107,7 +107,6 @@ def reduced_radii(sections: Sequence[ParticleCells]) -> AreaWeighted:
 
 
 def _packing_with_cells(packing: Packing, seed: np.random.SeedSequence) -> ParticleCells:
-    """Random packing with its cells."""
     return with_cells(packing.make(np.random.default_rng(seed)))
 
 

@@ -37,7 +37,6 @@ class ForceHistory(NamedTuple):
 
 
 def _parse_history(value: object, info: ValidationInfo) -> ForceHistory:
-    """Parse a time history such as "harmonic, 1.5 Hz, 90 deg, from 2 s"; see `HISTORY`."""
     kind, *words = (word.strip() for word in str(value).split(","))
     static = [word for word in words if word == "static"]
     starts = [word.removeprefix("from ") for word in words if word.startswith("from ")]
@@ -195,14 +194,12 @@ def _own_values(recording: Recording, step: float | None, unit: str) -> Iterator
 
 
 def _parse_unit(value: object, _: ValidationInfo) -> str:
-    """Parse a unit of acceleration, such as g."""
     is_unit = acceleration_factor(str(value)) is not None
     require(is_unit, "", value, f"a unit of {ACCELERATION_UNITS}")
     return str(value)
 
 
 def _parse_scale(value: object, _: ValidationInfo) -> Scale:
-    """Parse a scale such as 1.2 or "PGA = 0.3 g"."""
     allowed = 'a factor above 0 as 1.2, or "PGA = 0.3 g", or "Sa(T1) = 0.5 g"'
     measure, equals, size = (part.strip() for part in str(value).partition("="))
     try:

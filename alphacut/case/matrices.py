@@ -178,7 +178,6 @@ class MatricesSection(StructureSection):
         return damping_ratios_by_name(ratios, None)
 
     def _vector_over_unknowns(self, key: str, entries: Mapping[str, float]) -> Array:
-        """A vector over the unknowns from its entries by unknown; `key` is for messages."""
         for name in entries:
             allowed = f"unknowns, as {', '.join(self.unknowns[:6])}"
             require(name in self.unknowns, f"matrices.{key}", name, allowed)

@@ -36,7 +36,6 @@ class Tolerance:
 
 
 def _parse_tolerance(value: object, info: ValidationInfo) -> Tolerance:
-    """Parse a tolerance such as "0.2 mm" or "0.1 %"."""
     for unit in ("m", "N", ""):
         try:
             number = quantity.parse_number(value, unit)

@@ -103,7 +103,6 @@ def _without_indices(key: str) -> str:
 
 
 def _sibling_names(model: type[Section], key: str) -> list[str]:
-    """Keys and sections beside a key."""
     section, _, _ = _without_indices(key).rpartition(".")
     names = (name.rpartition(".") for name, _, _ in _walk_keys("", model))
     return [*dict.fromkeys(name for inside, _, name in names if inside == section)]

@@ -80,7 +80,6 @@ class MaterialDamping:
 
 
 def _parse_damping_ratios(value: object) -> MaterialDamping | tuple[FuzzyNumber, ...]:
-    """Parse damping ratios: "2 %" of all modes, ["2 %", "5 %"] of each, or "material + 1 %"."""
     word, plus, joints = value.partition("+") if isinstance(value, str) else ("", "", "")
     if word.strip() != "material":
         is_one_a_mode = isinstance(value, list) and any(isinstance(x, str) for x in value)

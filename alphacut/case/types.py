@@ -178,7 +178,6 @@ Modulus = Annotated[FuzzyNumber, Quantity("Pa", above=0, fuzzy=True)]
 
 
 def _stiffness(rows: list[list[object]]) -> VoigtPhase:
-    """Material of three rows of its plane-strain stiffness, as texts."""
     try:
         return VoigtPhase(tuple(tuple(quantity.parse_number(x, "Pa") for x in row) for row in rows))
     except (TypeError, ValueError):

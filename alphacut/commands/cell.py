@@ -128,7 +128,6 @@ def _constant(name: str, value: float, error: float) -> tuple[str, Document]:
 
 
 def _stresses(values: ArrayLike) -> Document:
-    """Mean stresses in GPa by name, from those in Pa."""
     return dict(zip(("s11", "s12"), np.asarray(values) / GPA, strict=True))
 
 

@@ -176,7 +176,6 @@ class Pipeline:
                 results.answers[kind.key] = self.store.take(stage).numbers
 
     def _compute_envelopes(self, structure: Structure, section: EnvelopeSection) -> None:
-        """Computes the envelopes of all studies, or of [envelope] alone, into the results."""
         results, content = self.results, self.content
         for warning in cut_record_warnings(content, structure):
             say(f"warning: {warning}")

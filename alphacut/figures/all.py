@@ -37,7 +37,6 @@ def drawings(results: Results) -> Iterator[Drawing]:
 
 
 def _material_figures(results: Results) -> Iterator[Drawing]:
-    """Figures of the radius map, the modulus, the stresses and the image, by name."""
     content, mesh, modulus = results.content, results.content.mesh, results.modulus
     is_round = modulus is not None and content.particle_cell is not None
     if is_round and content.modulus.method == "prism":
@@ -67,7 +66,6 @@ def _material_figures(results: Results) -> Iterator[Drawing]:
 
 
 def _structure_figures(results: Results) -> Iterator[Drawing]:
-    """Figures of the structure, its fuzzy mapping and a run of the Graph Follower, by name."""
     if not results.envelopes or results.structure is None:
         return
     if results.is_paper:

@@ -71,7 +71,6 @@ def read_cosmos(file: TextFile, channel: str = "") -> Recording:
 
 
 def _samples(file: TextFile, line: int, count: int, per_line: int, width: int) -> Array:
-    """The samples below the line that announces them."""
     samples = file.numbers(line + 1, line + 1 + ceil(count / max(per_line, 1)), width=width)
     file.require_count(samples, count, line)
     return samples

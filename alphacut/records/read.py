@@ -46,7 +46,6 @@ def read_recording(
 
 
 def _read_by_marks(path: Path, channel: str, step: float | None, unit: str) -> Recording:
-    """Reads a recording by the format that the marks in a file's content show."""
     content = read_bytes(path)
     if is_universal(content):
         return read_uff_record(path.name, content, channel)
@@ -65,7 +64,6 @@ def _read_by_marks(path: Path, channel: str, step: float | None, unit: str) -> R
 
 
 def _is_waveform(content: bytes) -> bool:
-    """True for a file of miniSEED or SAC."""
     for order in ("<i4", ">i4") if len(content) > SAC_HEAD else ():
         head = np.frombuffer(content[:SAC_HEAD], order)
         version, count = int(head[SAC_VERSION]), int(head[SAC_COUNT])

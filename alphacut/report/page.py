@@ -202,7 +202,6 @@ class Page:
             yield "figure", caption(stem, paper=self.paper), base64.b64encode(content).decode()
 
     def _more(self) -> Iterator[Piece]:
-        """Yields further figures, the case file, the changes of it, and versions, all folded."""
         summary = self.summary
         yield "folded", "All other figures", [*self._figures(*self.unshown)]
         yield "folded", f"Case {summary.case}", [("code", summary.case_text)]

@@ -129,7 +129,6 @@ class CellProblem:
         return partial(_solve_cells, model, self.radius.law, is_averaged)
 
     def _particle_model(self, cell: RoundCell, prism_options: Mapping[str, Any]) -> Any:
-        """The first of series, slices and prisms that the case allows."""
         tolerance, method, mesh = self.modulus.tolerance, self.modulus.method, self.mesh
         if cell.has_series and method in ("auto", "series"):
             kind, options = SeriesModel, dict[str, Any](energies=bool(cell.losses))

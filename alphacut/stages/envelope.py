@@ -199,7 +199,6 @@ class EnvelopeTask:
         return peaks(result, self.limited)
 
     def _motion(self, structure: Structure) -> dict[str, Any]:
-        """Fuzzy inputs, duration, step and levels, as arguments of `frame.envelope`."""
         return {
             "inputs": structure.inputs(self.fuzzy),
             "duration": self.duration,

@@ -110,7 +110,6 @@ def require_learnable(
 
 
 def _measured_rows(section: Identify) -> tuple[ModeRows, ...]:
-    """Measurements of all modes, from a CSV or a universal file."""
     is_universal = section.measured.suffix.lower() in ENDINGS
     allowed = "the floors of its unknowns" if is_universal else "left out beside a CSV file"
     fits = bool(section.floors) == is_universal

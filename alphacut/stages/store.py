@@ -238,7 +238,6 @@ class StageStore:
         return StageResult(numbers, folder.dataset(arrays) if arrays in files else None, files, key)
 
     def _compute(self, stage: Stage[T], tick: Progress) -> StageResult[T]:
-        """The result of a stage, computed and written."""
         LOG.info("stage %s is computed", stage.name)
         folder = self.folder
         with _naming_dead_workers(stage.name), TemporaryDirectory() as temporary:

@@ -84,7 +84,6 @@ def suite_records(
 def _suite_record(
     section: RecordsSection, envelope: EnvelopeSection, recording: Recording, mode: NominalMode
 ) -> SuiteRecord:
-    """A recording after correction and scaling, and the length of the motion under it."""
     ground, name = recording.accelerogram(section.baseline), recording.name
     response = spectral_acceleration(ground, mode.period, min(mode.ratio, 0.999))
     sizes = {"PGA": ground.extremes[0], "Sa(T1)": response}

@@ -178,7 +178,6 @@ class Queue:
         )
 
     def _bound(self, box: SubBox, goal: Goal) -> Sequence[Answer]:
-        """Bounds or refusal on each level of a box."""
         try:
             with refusing():
                 return self.proof.bounds(self.flow, box.boxes, goal)

@@ -84,32 +84,49 @@ def _value(g: Array, H: Array, x: Array) -> float:
 @compiled
 def _newton_step(g: Array, H: Array, lower: Array, upper: Array, x: Array) -> float:
     """Value after a projected Newton step of length 1, ½ or ¼ on the free axes, if it gains."""
-    d, best, start, equations = len(x), _value(g, H, x), x.copy(), np.zeros((len(x), len(x) + 1))
-    for i in range(d):  # whose right-hand side is the last column
-        equations[i, :d], equations[i, d] = H[i], -_slope(g, H, x, i)
+    d, best, start, free, step = len(x), _value(g, H, x), x.copy(), H.copy(), np.empty((len(x), 1))
     for i in range(d):
-        slope = -equations[i, d]
+        slope = _slope(g, H, x, i)
+        step[i, 0] = -slope
         if (x[i] <= lower[i] and slope <= 0) or (x[i] >= upper[i] and slope >= 0):
-            equations[i], equations[:, i] = 0.0, 0.0
-            equations[i, i] = -1.0
-    shift = SHIFT * (np.abs(equations[:, :d]).max() + 1e-100)  # as in `_regular`
+            free[i], free[:, i], step[i, 0] = 0.0, 0.0, 0.0
+            free[i, i] = -1.0
+    shift = SHIFT * (np.abs(free).max() + 1e-100)  # as in `_regular`
     for k in range(d):
-        equations[k, k] -= shift
-    for k in range(d):  # Gauss and Jordan's elimination
-        pivot = k + np.abs(equations[k:, k]).argmax()
-        if pivot != k:
-            equations[k], equations[pivot] = equations[pivot].copy(), equations[k].copy()
-        for i in range(d):
-            factor = equations[i, k] / equations[k, k] if i != k else 0.0
-            for j in range(k, d + 1):
-                equations[i, j] -= factor * equations[k, j]
-    step = equations[:, d] / np.diag(equations)
+        free[k, k] -= shift
+    solve_in_place(free, step)
     for length in (1.0, 0.5, 0.25):
-        trial = np.minimum(np.maximum(start + length * step, lower), upper)
+        trial = np.minimum(np.maximum(start + length * step[:, 0], lower), upper)
         value = _value(g, H, trial)
         if value > best:
             best, x[:] = value, trial
     return float(best)
+
+
+@compiled
+def solve_in_place(matrix: Array, b: Array) -> None:
+    """Overwrite b (n, m) with the solutions x of A x = b by elimination with row exchanges."""
+    n, m, A = len(matrix), b.shape[1], matrix.copy()
+    for k in range(n):
+        pivot = k
+        for i in range(k + 1, n):
+            if abs(A[i, k]) > abs(A[pivot, k]):
+                pivot = i
+        for j in range(n):
+            A[k, j], A[pivot, j] = A[pivot, j], A[k, j]
+        for j in range(m):
+            b[k, j], b[pivot, j] = b[pivot, j], b[k, j]
+        for i in range(k + 1, n):
+            factor = A[i, k] / A[k, k]
+            for j in range(k, n):
+                A[i, j] -= factor * A[k, j]
+            for j in range(m):
+                b[i, j] -= factor * b[k, j]
+    for k in range(n - 1, -1, -1):
+        for j in range(m):
+            for i in range(k + 1, n):
+                b[k, j] -= A[k, i] * b[i, j]
+            b[k, j] /= A[k, k]
 
 
 def global_maximum(g: Array, H: Array, lower: Array, upper: Array) -> Array:

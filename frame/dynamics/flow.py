@@ -147,7 +147,6 @@ class Flow(ABC):
         return motion
 
     def _failing_point(self, points: Array) -> str:
-        """The first of the points (S, d) at which the motion fails, as a text."""
         for point in points:
             try:
                 self._march(point[None], derivatives=False)

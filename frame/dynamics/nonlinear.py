@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from alphacut.frame.calculus.box_quadratic import solve_in_place
 from alphacut.frame.calculus.jet import Jet
 from alphacut.frame.calculus.tape import Tape, tape, with_derivatives
 from alphacut.frame.dynamics.flow import Flow, LinearFlow, StepError
@@ -202,7 +203,7 @@ def _midpoint_step(
             residual[i, 0] = flat[i] - x[n + i]
             for j in range(n):
                 jacobian[i, j] = flat[n + i * n + j]
-        _solve(jacobian, residual)
+        solve_in_place(jacobian, residual)
         change, size = 0.0, 0.0
         for i in range(n):
             arguments[i] -= residual[i, 0]
@@ -245,14 +246,14 @@ def _step_derivatives(flat: Array, n: int, x1: Array, x2: Array) -> None:
     inner2[n:m] = x2[:n]
     _chain_rule(flat, inner1, inner2, out1, out2)  # while the new coordinates are held
     new_first[:] = x1[n:] - out1[:n]
-    _solve(J, new_first)
+    solve_in_place(J, new_first)
     inner1[:n] = new_first
     _chain_rule(flat, inner1, inner2, out1, out2)
     for c in range(n):
         for i in range(d):
             for j in range(d):
                 new_second[c, i * d + j] = x2[n + c, i, j] - out2[c, i, j]
-    _solve(J, new_second)
+    solve_in_place(J, new_second)
     for c in range(n):  # coordinates and momenta after the step
         for i in range(d):
             x1[c, i], x1[n + c, i] = inner1[c, i], out1[n + c, i]
@@ -288,32 +289,6 @@ def _chain_rule(flat: Array, inner1: Array, inner2: Array, out1: Array, out2: Ar
                 for x in range(a):
                     total += flat[m + c * a + x] * inner2[x, i, j] + hessian_row[x] * inner1[x, j]
                 out2[c, i, j] = out2[c, j, i] = total
-
-
-@compiled
-def _solve(matrix: Array, b: Array) -> None:
-    """Overwrite b (n, m) with the solutions x of A x = b by elimination with row exchanges."""
-    n, m, A = len(matrix), b.shape[1], matrix.copy()
-    for k in range(n):
-        pivot = k
-        for i in range(k + 1, n):
-            if abs(A[i, k]) > abs(A[pivot, k]):
-                pivot = i
-        for j in range(n):
-            A[k, j], A[pivot, j] = A[pivot, j], A[k, j]
-        for j in range(m):
-            b[k, j], b[pivot, j] = b[pivot, j], b[k, j]
-        for i in range(k + 1, n):
-            factor = A[i, k] / A[k, k]
-            for j in range(k, n):
-                A[i, j] -= factor * A[k, j]
-            for j in range(m):
-                b[i, j] -= factor * b[k, j]
-    for k in range(n - 1, -1, -1):
-        for j in range(m):
-            for i in range(k + 1, n):
-                b[k, j] -= A[k, i] * b[i, j]
-            b[k, j] /= A[k, k]
 
 
 @compiled

@@ -135,7 +135,6 @@ class Auto:
         return [dual, undivided]
 
     def _dual(self, flow: UnitFlow) -> DualProof:
-        """Return the dual bound with the gaps that are wanted."""
         tolerance, inputs = max(self.tolerance or DEFAULT_TOLERANCE, FINEST), len(flow.boxes.names)
         dual = DualProof(workers=self.workers, below=1.0 if self.magnitudes else DualProof.below)
         if self.is_for_all_nodes:  # gaps below the peaks stay wide in any case
@@ -145,7 +144,6 @@ class Auto:
         return dual if self.tolerance is None else replace(dual, peaks=WIDE)
 
     def _is_close(self, proved: Envelope, flow: UnitFlow) -> bool:
-        """Return whether the gap of a proof is as narrow as asked for."""
         if self.is_for_all_nodes:  # a little more for rounding
             allowed = (1 + 1e-9) * flow.tolerance(self.tolerance) * flow.scale
             return bool((proved.error <= allowed).all())

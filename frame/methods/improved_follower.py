@@ -157,10 +157,8 @@ class ImprovedFollower:
                 storage, box, self._limit(flow), asked if asked is None else asked[level]
             )
             if done:  # what a narrower box reaches
-                models.sampled[:], models.sampled_at[:] = (
-                    out.bounds[level + 1],
-                    out.points[level + 1],
-                )
+                models.sampled[:] = out.bounds[level + 1]
+                models.sampled_at[:] = out.points[level + 1]
             models.explore(explored)
             for crossing in range(1 + CROSSINGS * (has_crossings and len(explored) > 1)):
                 if crossing:

@@ -291,7 +291,6 @@ def tail_shares(model: ModalModel) -> Array:
 
 
 def _max_degree(d: int) -> int:
-    """Greatest degree of polynomials in d inputs that are affordable."""
     degree = int(numbers.MAX_DEGREE)
     while comb(d + degree, d) > numbers.MAX_TERMS:
         degree -= 1

@@ -75,7 +75,6 @@ def _accelerations(assembly: Assembly[TaylorModel], forces: TaylorModel) -> Tayl
 
 
 def _require_classical(assembly: Assembly[TaylorModel]) -> None:
-    """Refuse damping that couples the modes."""
     if assembly.dashpots.size().any():
         raise UnprovedError(
             "dashpots couple the modes", "give damping ratios or Rayleigh's factors in their place"

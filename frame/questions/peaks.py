@@ -93,7 +93,6 @@ def peaks(envelope: Envelope, names: Sequence[str] = ()) -> dict[str, Peak]:
 
 
 def _peak_of(envelope: Envelope, name: str) -> Peak:
-    """Return one fuzzy peak of an envelope by its name."""
     k = [*map(str, envelope.outputs)].index(output_of(name))
     nature = envelope.natures[k] if envelope.natures else envelope.nature
     is_proved, is_signed = nature is Nature.GUARANTEED, name != output_of(name)
@@ -184,7 +183,6 @@ def tightest(first: Peaks, second: Peaks) -> dict[str, Peak]:
 
 
 def _tighter(first: Peak, second: Peak) -> Peak:
-    """Return the tighter bounds of one peak by two analyses, as `tightest` says."""
     better = max(first, second, key=lambda x: (list(Nature).index(x.nature), -x.error.max()))
     rules = {"reached": np.maximum, "least_lower": np.maximum, "least_upper": np.minimum}
     if {first.nature, second.nature} == {Nature.GUARANTEED}:
@@ -255,7 +253,6 @@ def passing(peaks: Peaks, limits: Mapping[str, float]) -> dict[str, Passing]:
 
 
 def _passing_of(peak: Peak, limit: float) -> Passing:
-    """Return the degrees to which it is possible and necessary that a peak exceeds its limit."""
     greatest, least, alpha = peak.greatest_bounds, peak.least_bounds, peak.alpha
     reaches, is_excluded = greatest.lower > limit, greatest.upper <= limit
     possibility = alpha[reaches].max(initial=0.0), _excluded(alpha, is_excluded)
@@ -273,7 +270,6 @@ def _passing_of(peak: Peak, limit: float) -> Passing:
 
 
 def _passing_of_any(answers: Mapping[str, Passing], limits: Mapping[str, float]) -> Passing:
-    """Return the degrees to which any of several limits is exceeded, by those of each limit."""
     passings = list(answers.values())
     least, greatest = (max(x.possibility[k] for x in passings) for k in (0, 1))
     relative_margins = [  # of a limit of 0 they are the sign

@@ -136,7 +136,6 @@ def inputs_at_peaks(envelope: Envelope, level: int) -> Array:
 
 
 def _distinct(points: Array) -> Array:
-    """Return points (S, n) without repetitions, in their order."""
     _, first = np.unique(points, axis=0, return_index=True)
     return np.asarray(points[np.sort(first)])
 

@@ -71,7 +71,6 @@ class Row(NamedTuple):
 
 
 def _checksum(model: bytes, point: str, layout: str, outputs: bytes) -> bytes:
-    """Return a hash (16 bytes) of the columns of a row and of their lengths."""
     parts = model, point.encode(), layout.encode(), outputs
     sizes = np.array([len(part) for part in parts], "<i8").tobytes()
     return blake2b(b"".join((sizes, *parts)), digest_size=16).digest()

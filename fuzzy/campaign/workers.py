@@ -137,7 +137,6 @@ def completed(
 
 
 def _run(call: Call, batch: list[Array]) -> tuple[list[list[Outcome]], float]:
-    """Outcomes of each call of a batch, and their wall time in s."""
     start = perf_counter()
     return [call(points) for points in batch], perf_counter() - start
 

@@ -59,7 +59,6 @@ def joined_inputs(inputs: Mapping[str, FuzzyNumber | float]) -> dict[str, FuzzyN
 
 
 def _common_quantity(claimed: Mapping[str, ClaimedNumber]) -> str:
-    """The claimed quantity, such as "median"; refuses numbers of different quantities."""
     kinds = sorted({number.claim.about for number in claimed.values()})
     cure = "say what the joint one means: jointly(inputs, means='drift of the next frame')"
     allowed = "of one kind"

@@ -114,7 +114,6 @@ def _with_errors(bounds: Bounds, is_estimated: Mask, domain: Domain) -> Bounds:
 
 
 def _listed(names: Iterable[str]) -> str:
-    """Return a text of the first four names."""
     first = list(names)
     return ", ".join(first[:4]) + (" …" if len(first) > 4 else "")
 

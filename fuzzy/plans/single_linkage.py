@@ -321,7 +321,6 @@ class SingleLinkage:
         return len(optima)
 
     def _tolerance(self, bound: Bound) -> float:
-        """Difference of values within which two optima count as equal."""
         values = self._values[bound][np.isfinite(self._values[bound])]
         return float(VALUE_TOLERANCE * np.ptp(values) + ROUNDING * np.abs(values).max())
 
@@ -330,7 +329,6 @@ class SingleLinkage:
         return np.flatnonzero((self._levels <= cut.level) & cut.contains(self._points))
 
     def _sample_up_to(self, cut: CutSearch, count: int, rounds: int) -> None:
-        """Evaluate new uniform samples of a cut until it has `count` of them."""
         missing = count - len(self._rows(cut))
         if missing > 0:
             rng = np.random.default_rng([SEED, 1 + cut.level, rounds])

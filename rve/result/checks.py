@@ -127,5 +127,4 @@ def mean(weights: Array, values: Array) -> Array:
 
 
 def _below(difference: Array) -> float:
-    """Depth of the least eigenvalue below zero."""
     return max(0.0, -float(np.linalg.eigvalsh((difference + difference.T) / 2)[0]))

@@ -236,26 +236,21 @@ class SlicesModel:
         for inclusion, *slices in zip(inclusions, *by_radius, strict=True):
             cell = Cell(matrix, inclusion, radius_map, self.outline)
             stiffness, errors, energies, unknowns = map(np.array, zip(*slices, strict=True))
-            curve, moduli = (
-                StressCurve.from_stiffness(rule, stiffness[nodes]),
-                square_moduli(stiffness),
-            )
+            curve = StressCurve.from_stiffness(rule, stiffness[nodes])
+            moduli = square_moduli(stiffness)
             mean = rule.mean(moduli[nodes])
             space_errors = rule.mean((moduli * errors)[nodes]) / mean
-            if (
-                cell.square
-            ):  # C11 and C22 differ by the mesh alone; s11 has C11, the moduli their mean
+            # C11 and C22 differ by the mesh alone; s11 has C11, the moduli their mean
+            if cell.square:
                 space_errors[0] += abs(STRAIN * mean[0] / curve.mean[0] - 1)
+            theta_errors = theta_error(cell, rule, radii=radii, moduli=moduli)
             result = HomogenisedStiffness(
                 curve=curve,
                 method=self.name,
                 solver="cholesky",
                 unknowns=int(unknowns.max()),
                 seconds=seconds,
-                errors={
-                    "space": space_errors,
-                    "theta": theta_error(cell, rule, radii=radii, moduli=moduli),
-                },
+                errors={"space": space_errors, "theta": theta_errors},
                 cell=cell,
                 energies=_mean_energies(cell, rule, radii, nodes, energies),
             )

@@ -83,7 +83,6 @@ def theta_mass(law: ThetaLaw, levels: Array) -> ThetaMass:
 
 
 def _inverse_root(matrix: Array) -> Array:
-    """Inverse square root of a symmetric positive definite matrix."""
     values, vectors = np.linalg.eigh(matrix)
     return np.asarray((vectors / np.sqrt(values)) @ vectors.T)
 

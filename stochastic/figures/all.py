@@ -180,7 +180,6 @@ def draw_map(result: Microstructure) -> Figure:
 
 
 def _circles(axes: Axes, centres: Array, radii: Array, **look: Any) -> None:
-    """Draw circles by centres, shape (n, 2), and radii, shape (n,), in m, on axes in mm."""
     width = 2e3 * radii
     position = {"offsets": 1e3 * centres, "offset_transform": axes.transData}
     axes.add_collection(EllipseCollection(width, width, 0 * width, units="xy", **position, **look))
@@ -230,7 +229,6 @@ def _corner_panels(discs: Particles, *titles: str) -> tuple[Figure, list[Axes], 
 
 
 def _titled_panels(title: str, *titles: str) -> tuple[Figure, list[Axes]]:
-    """Return a figure with two panels and its axes, with titles."""
     figure, panels = plt.subplots(1, 2, figsize=(9.6, 5.0))
     figure.suptitle(title)
     for axes, panel_title in zip(panels, titles, strict=True):
@@ -249,7 +247,6 @@ def draw_cells(diagram: Apollonius) -> Figure:
 
 
 def _voronoi(discs: Particles) -> Apollonius:
-    """Voronoi cells of the discs' centres."""
     return apollonius(replace(discs, radii=np.zeros(len(discs))))
 
 
