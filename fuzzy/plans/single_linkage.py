@@ -20,12 +20,14 @@ Samples of a cut that lie in a narrower one are uniform there too and count for 
 cuts, and descents from corners, raise W and the bound, but not N.
 
 Samples of one value lie on a plateau, from which no descent finds its way. It counts as one
-optimum, and its samples do not count as explored: its share of the cut stays uncovered. With a
-thousand of them the search of a bound ends, and the bound is attained only.
+optimum, and its samples do not count as explored: its share of the cut stays uncovered. Further
+samples lie far apart, so that few humps stay between them. With a thousand on plateaus the search
+of a bound ends, and the bound is attained only.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import product
 from math import ceil, gamma, inf, log, pi, sqrt
@@ -51,7 +53,9 @@ VALUE_TOLERANCE = 1e-5
 """Of an output's range in the widest cut: values that differ by less count as one."""
 ROUNDING = 1e-9  # the same of an output's size
 MAX_ON_PLATEAUS = 1000
-"""Samples on plateaus with which the search of a bound ends: 95 % find a cone of 0.3 % of them."""
+"""Samples on plateaus with which the search of a bound ends: 95 % of uniform ones find a cone
+of 0.3 % of them."""
+CANDIDATES = 10  # a point that fills holes: more candidates cost time and crowd the cube's faces
 EQUAL = 1e-13  # of an output's size: two samples that differ by less lie on a plateau
 _SAME_PLACE = 0.01  # of the width: optima of one value are the same there without a look between
 _BETWEEN = np.array([0.25, 0.5, 0.75])  # points of a line on which a hump is looked for
@@ -88,6 +92,27 @@ def rows_without_better_neighbour(unit: Array, values: Array, distance: float) -
     first, second = values[pairs[:, 0]], values[pairs[:, 1]]
     worse = np.concatenate([pairs[first > second, 0], pairs[second > first, 1]])
     return np.setdiff1d(np.flatnonzero(np.isfinite(values)), worse)
+
+
+def with_farthest_points(unit: Array, known: Array, rng: np.random.Generator) -> Array:
+    """Uniform points (n, d) of the unit cube of which 1,000, or all, were drawn again far apart.
+
+    Each of these is, of random candidates, the one farthest from the known points (m, d) and those
+    before it (Mitchell 1991). Of holes with 0.3 % of a cube they leave 75 times fewer than uniform
+    points in three dimensions, and half as many in six.
+    """
+    from scipy.spatial import cKDTree
+
+    count = min(len(unit), MAX_ON_PLATEAUS)
+    spread, uniform = unit[:count].copy(), unit[count:]
+    candidates = rng.random((CANDIDATES * count, unit.shape[1]))
+    distance, _ = cKDTree(np.concatenate([known, uniform])).query(candidates)
+    distance_squared = distance**2
+    for row in range(count):
+        spread[row] = candidates[distance_squared.argmax()]
+        step = candidates - spread[row]
+        np.minimum(distance_squared, np.einsum("nd,nd->n", step, step), out=distance_squared)
+    return np.concatenate([uniform, spread])
 
 
 def samples_on_plateaus(values: Array) -> Mask:
@@ -213,7 +238,7 @@ class SingleLinkage:
             for number, (cut, bounds) in enumerate(visits, start=1):
                 states = [self.states[cut.level, bound] for bound in bounds]
                 count = max(state.next_samples() for state in states)
-                self._sample_up_to(cut, count, rounds)
+                self._sample_up_to(cut, count, rounds, bounds)
                 for bound in bounds:
                     self._descend(cut, bound)
                 self.campaign.report(1 - (1 - 0.8 * number / len(visits)) / rounds)
@@ -328,11 +353,19 @@ class SingleLinkage:
         """Return the rows of the samples that are uniform in a cut: its own and of wider cuts."""
         return np.flatnonzero((self._levels <= cut.level) & cut.contains(self._points))
 
-    def _sample_up_to(self, cut: CutSearch, count: int, rounds: int) -> None:
-        missing = count - len(self._rows(cut))
+    def _sample_up_to(
+        self, cut: CutSearch, count: int, rounds: int, bounds: Sequence[Bound] = ()
+    ) -> None:
+        rows = self._rows(cut)
+        missing = count - len(rows)
         if missing > 0:
             rng = np.random.default_rng([SEED, 1 + cut.level, rounds])
-            self._add_samples(cut, rng.random((missing, len(cut.uncertain_inputs))))
+            unit = rng.random((missing, len(cut.uncertain_inputs)))
+            states = [self.states[cut.level, bound] for bound in bounds]
+            # the stopping rule is of uniform samples, but never met where plateaus are large
+            if states and all(state.plateau_samples for state in states):
+                unit = with_farthest_points(unit, cut.unit(self._points[rows]), rng)
+            self._add_samples(cut, unit)
 
     def _add_samples(self, cut: CutSearch, unit: Array) -> None:
         """Evaluate uniform samples (n, uncertain inputs) of a cut and append them."""

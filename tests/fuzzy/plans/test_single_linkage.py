@@ -87,6 +87,23 @@ def test_a_plateau_is_not_taken_as_explored(function):
     assert result.evaluations < 6000
 
 
+def test_a_cone_between_uniform_samples_is_found():
+    """It rises from a plateau and reaches 0.557376 (dense samples, local search) at a face."""
+    turn = np.array([[-0.195, -1.009, 0.167], [-0.119, -0.651, 0.234], [-0.687, 0.411, -0.583]])
+    apex = np.array([0.1221, 0.7406, 0.6893])
+
+    def function(**inputs):
+        x = np.array([*inputs.values()])
+        u, v, w = turn @ x
+        base = 0.634 * np.tanh(u) + 0.378 * v**2 + 0.63 * np.sin(1.5 * w + 4.83)
+        return np.clip(base, -0.4, 0.5) + 1.5 * max(0, 1 - 4 * np.linalg.norm(x - apex))
+
+    ends = {"x": (-0.5223, 1.1228), "y": (-0.8109, 0.7384), "z": (-1.0089, 0.5989)}
+    inputs = {name: Interval(*x) for name, x in ends.items()}
+    result = propagate(function, inputs, alpha=[0.0])
+    assert (result.lower.item(), result.upper.item()) == pytest.approx((-0.4, 0.557376), abs=2e-4)
+
+
 def flat_with_a_cone(rng):
     """Steps, or a wave cut at two values, and on its highest plateau a cone: with the apex's value."""
     n, steps = int(rng.integers(1, 4)), int(rng.integers(0, 4))
