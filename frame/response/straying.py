@@ -169,10 +169,9 @@ def narrowed_straying(
     of the box: what else is wide are the ranges over it.
     """
     middle = [x.in_the_middle() for x in responses]
-    by_magnitude = np.sum([x.line_deviation(time) for x in middle], axis=0).max(0)
     off, straying = _off_and_straying(middle, time, MIN_PARTS)
     reached = off.max(0)
-    if (by_magnitude <= TIGHT * reached).all():
+    if (bound.max(0) <= TIGHT * reached).all():
         return bound
     is_close = ((off + straying).max(0) <= CLOSE * reached).all()
     parts = MIN_PARTS if is_close else MAX_ADDED_PARTS
