@@ -51,6 +51,15 @@ class Content(CellContent):
         return {x.key: x if structure is None else x.with_storeys(structure) for x in given}
 
     @property
+    def incremental_question(self) -> FragilitySection | None:
+        """The question of fragility, with one limit of each storey, if columns yield; else None."""
+        structure = self.structure
+        if self.fragility is None or structure is None:
+            return None
+        yields = structure.frame is not None and bool(structure.frame.hardening)
+        return self.fragility.with_storeys(structure) if yields else None
+
+    @property
     def limited_outputs(self) -> tuple[str, ...]:
         """Peaks that questions compare with limits, each once, such as q3 and max q3."""
         sections = (section for section in self.questions.values() if section.reads_peaks)

@@ -194,18 +194,24 @@ class FragilitySection(QuestionSection):
     """measure of a record; T1 and ζ are the nominal structure's"""
     independent: bool = False
     """whether records count as independent draws: 95 % limits"""
+    most: Annotated[float, Quantity(above=0, maximum=100)] = 2.0
+    """of columns that yield: largest measure tried, as a multiple of the one at which the nominal
+    structure would reach all limits under all records if it were elastic"""
 
     def require_answerable(self, structure: Structure) -> None:
-        """Refuses structures whose motion is not proportional to the record, and unfit limits."""
+        """Refuses structures with forces or a start beside the record, and unfit limits."""
         super().require_answerable(structure)
         linear = structure.linear
-        is_elastic = not getattr(linear, "hardening", ())
-        is_free = linear is not None and not linear.loads and is_elastic
+        is_free = linear is not None and not linear.loads
         is_at_rest = not any(np.any(getattr(linear, start, 0)) for start in ("q0", "v0"))
-        allowed = "linear structures that start at rest, without forces: they scale with records"
-        value = "of another motion" if is_elastic else "of columns that yield"
-        require(is_free and is_at_rest, "fragility", value, allowed)
+        allowed = "linear structures and frames that yield, at rest and without forces"
+        require(is_free and is_at_rest, "fragility", "of another motion", allowed)
+        yields = bool(getattr(linear, "hardening", ()))
+        is_used = yields or not self.has_key("most")
+        require(is_used, "fragility.most", self.most, "beside columns that yield")
         for limit in self.limits:
             fits = limit.sign * limit.value > 0 and limit.side != "mean"
             allowed = "limits of each record that the structure at rest keeps"
+            if yields:
+                fits, allowed = limit.side == "", "limits of magnitudes, of columns that yield"
             require(fits, "fragility.limits", limit.text, allowed)

@@ -37,8 +37,9 @@ from alphacut.io.results import ResultsFolder
 from alphacut.report.results import AROUND
 from alphacut.rve.cell.cell import VoigtPhase
 from alphacut.stages.cell import GPA, CellProblem
-from alphacut.stages.envelope import WIDENING
+from alphacut.stages.envelope import WIDENING, tasks
 from alphacut.stages.image import image_study
+from alphacut.stages.incremental import foreseen
 from alphacut.stages.suite import SuiteRecord, suite_records
 
 if TYPE_CHECKING:
@@ -80,6 +81,10 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
     if content.records is not None and content.envelope is not None and linear:
         records = suite_records(content.records, content.envelope, Structure(linear, {}))
         text += records_text(content.records, records)
+        question, structure = content.incremental_question, content.structure
+        if question is not None and structure is not None:
+            (task,) = tasks(content.envelope, ())
+            text += f"{foreseen(question, structure, task, records)}\n"
     write_answer(options, document, out, f"{text}{options.case}: no problems\n")
     return 0
 

@@ -29,9 +29,20 @@ from alphacut.questions.question import Answer, FuzzyResponse
 from alphacut.questions.summary import ANSWERS, Results
 from alphacut.questions.tolerances import require_admissible_scale
 from alphacut.rve.image.fields.grid import device_array
-from alphacut.stages import campaign, cell, envelope, identify, image, microstructure, shares, suite
+from alphacut.stages import (
+    campaign,
+    cell,
+    envelope,
+    identify,
+    image,
+    incremental,
+    microstructure,
+    shares,
+    suite,
+)
 from alphacut.stages.campaign import CellCampaign
 from alphacut.stages.envelope import EnvelopeTask, PeakResults, peaks_of
+from alphacut.stages.incremental import IncrementalResult
 from alphacut.stages.modulus import fuzzy_loss, fuzzy_modulus, require_levels
 from alphacut.stages.store import (
     RunProgress,
@@ -106,7 +117,8 @@ class Pipeline:
         results, stages, content = self.results, self.content.stages, self.content
         kinds: list[str] = [stage for stage in stages if stage != "envelope"]
         if "envelope" in stages and content.records is not None:
-            kinds += ["record"] * len(content.records.recordings)
+            n_records, is_scaled = len(content.records.recordings), content.incremental_question
+            kinds += ["record"] * n_records + ["incremental"] * bool(is_scaled) * n_records
         elif "envelope" in stages:
             kinds += ["envelope"] * max(1, len(content.study))
         kinds += [*content.questions, *["shares"] * content.shares, *["figures"] * self.figures]
@@ -203,7 +215,12 @@ class Pipeline:
         by_record = {record.name: outcomes[f"record_{record.name}"].numbers for record in records}
         result = self.results.suite = suite.suite_result(by_record, records, structure, task)
         response = response_of(structure, task, peaks_of(result.peak, task.section.alpha))
-        return replace(response, suite=result)
+        increments = dict[str, IncrementalResult]()
+        if (question := self.content.incremental_question) is not None:
+            analyses = incremental.stages(question, structure, task, longest_first)
+            found = self.store.take_all(analyses, self.executor)
+            increments = {x.name: found[f"incremental_{x.name}"].numbers for x in records}
+        return replace(response, suite=result, increments=increments)
 
     def _limited_peaks(self, task: EnvelopeTask, structure: Structure) -> Peaks | None:
         """Peaks for questions: of the study with [envelope]'s motion, else computed alone."""

@@ -14,6 +14,7 @@ from alphacut.figures import envelope, material, overview, structure
 from alphacut.fuzzy import FuzzyNumber, PiecewiseLinear
 from alphacut.fuzzy.campaign.workers import submit
 from alphacut.io.provenance import NESTED, version_of
+from alphacut.questions.fragility import FragilityAnswer
 from alphacut.questions.summary import Results
 from alphacut.stages.cell import GPA, CellProblem
 from alphacut.stages.identify import IdentifiedResult
@@ -32,6 +33,8 @@ def drawings(results: Results) -> Iterator[Drawing]:
         yield "update-inputs", partial(envelope.identified_inputs, results.learned)
     for key, answer in results.answers.items():
         yield key, partial(envelope.DRAWINGS[key], answer)
+        if isinstance(answer, FragilityAnswer) and answer.increments:
+            yield "incremental", partial(envelope.draw_incremental, answer)
     for task in results.tasks:
         yield from envelope.drawings(task, results)
 

@@ -217,6 +217,28 @@ def draw_fragility(answer: FragilityAnswer) -> Figure:
     return figure
 
 
+def draw_incremental(answer: FragilityAnswer) -> Figure:
+    """Draws least and greatest peak found over the measure, of each limit, record and level."""
+    limits = {name: limit for name, limit in answer.limits.items() if name != ANY}
+    size = WIDTH, 0.6 + 1.9 * len(limits)
+    figure, panels = plt.subplots(len(limits), sharex=True, squeeze=False, figsize=size)
+    for axes, (name, limit) in zip(panels[:, 0], limits.items(), strict=True):
+        for increment in answer.increments.values():
+            demand = increment.demand[name]
+            bands = limit.limit * demand.lower, limit.limit * demand.upper
+            for low, high, shade in zip(*bands, style.colours(answer.alpha), strict=True):
+                axes.fill_between(increment.measure, low, high, color=shade, lw=0, alpha=0.7)
+            axes.plot(increment.measure, bands[1][-1], color=INK, lw=0.7)
+        axes.axhline(limit.limit, color=ORANGE, lw=1.2, ls="--")
+        axes.set_xlim(0.0, limit.measure[-1])
+        axes.set_ylim(0.0, 3 * limit.limit)
+        style.prefix_axis(axes, f"peak of {limit.output}", limit.unit)
+    style.prefix_axis(axes, answer.measure, answer.unit, across=True)
+    panels[0, 0].set_title(f"{len(answer.increments)} records; limits dashed")
+    style.alpha_legend(panels[0, 0], answer.alpha)
+    return figure
+
+
 DRAWINGS: dict[str, Callable[[Any], Figure]] = {
     "probability": draw_probability,
     "decision": draw_decision,

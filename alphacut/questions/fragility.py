@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import fields
+from itertools import product
 
 import numpy as np
+from pydantic import Field
 
 from alphacut.case.limits import FragilitySection
-from alphacut.frame.questions.fragility import CriticalMeasures, of_any_limit
+from alphacut.frame.questions.fragility import CriticalMeasures, ExceedanceSets, of_any_limit
+from alphacut.frame.questions.incremental import GRID_RATIO, RESOLUTION
 from alphacut.frame.questions.peaks import ANY
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
@@ -16,7 +19,9 @@ from alphacut.fuzzy.result import Nature
 from alphacut.io.quantity import STANDARD_GRAVITY, engineering, range_text
 from alphacut.questions.question import FuzzyResponse, LimitAnswer, LimitsAnswer, Record, Texts
 from alphacut.stages.envelope import peaks_of
+from alphacut.stages.incremental import IncrementalResult
 from alphacut.stages.store import CutsResult, Values
+from alphacut.stages.suite import SuiteResult
 
 POINTS = 60
 """Measures at which bands are drawn and tabulated."""
@@ -39,9 +44,19 @@ class LimitFragility(LimitAnswer):
     dispersion: CutsResult | None
     confidence: CutsResult | None
 
+    @property
+    def ends(self) -> dict[str, Array]:
+        """First crossing and last non-exceedance (levels, records); nan beyond all measures."""
+        last = np.where(np.isnan(self.critical["high"]), np.nan, self.critical["high_reached"])
+        first = self.critical["low_reached"]
+        return {"first crossing": first, "last non-exceedance": last}
+
 
 class FragilityAnswer(LimitsAnswer[LimitFragility]):
-    """Share of the suite's records under which limits are exceeded, over a measure of records."""
+    """Share of the suite's records under which limits are exceeded, over a measure of records.
+
+    `increments` are the demands over that measure of each record, of a frame that yields.
+    """
 
     key = "fragility"
     title = "Under how many records are limits exceeded?"
@@ -50,13 +65,19 @@ class FragilityAnswer(LimitsAnswer[LimitFragility]):
     unit: str
     period_s: float
     damping_ratio: float
+    increments: dict[str, IncrementalResult] = Field(default={})
+
+    @property
+    def figures(self) -> tuple[str, ...]:
+        """Names of its figures, with the curves of a frame that yields."""
+        return (self.key, "incremental")
 
     def texts_of(self, limit: LimitFragility) -> Texts:
         """Median and dispersion of the critical measures."""
         spread = "–" if limit.dispersion is None else _range_text(limit.dispersion[0], "")
         return {
             "limit": limit.words,
-            "median at the lowest α": self._median_text(limit.median[0]),
+            "median at the lowest α": self._median_text(limit.median[0]) + self._ends_text(limit),
             "nature": limit.nature,
             "dispersion": spread,
             "median at the highest α": self._median_text(limit.median[-1]),
@@ -69,6 +90,31 @@ class FragilityAnswer(LimitsAnswer[LimitFragility]):
             return text
         low, high = (end / float(STANDARD_GRAVITY) for end in ends)
         return f"{text} ({_range_text((low, high), 'g')})"
+
+    def _ends_text(self, limit: LimitFragility) -> str:
+        """Ranges over records of first crossing and last non-exceedance, of a frame that yields."""
+        if not self.increments:
+            return ""
+        texts = list[str]()
+        for words, values in limit.ends.items():
+            known = np.nan_to_num(values[0], nan=np.inf)
+            ends = float(known.min()), float(known.max())
+            texts.append(f"{words} {_range_text(ends, self.unit)}")
+        return f"; over the records {', '.join(texts)}"
+
+    def crossings(self) -> list[Record]:
+        """A row for each limit, record and level of a frame that yields: sets of measures."""
+        unit, rows = f" [{self.unit}]" if self.unit else "", list[Record]()
+        records = [*self.increments.items()]
+        for (name, limit), row in product(self.limits.items(), range(len(records))):
+            (record, increment), demand = records[row], records[row][1].demand[name]
+            for level, alpha in enumerate(self.alpha):
+                rows.append({"limit": limit.words, "record": record, "α": float(alpha)})
+                rows[-1] |= {f"{x}{unit}": y[level, row] for x, y in limit.ends.items()}
+                for who, values in (("some", demand.upper), ("all found", demand.lower)):
+                    text = _set_text(increment.measure, values[level])
+                    rows[-1] |= {f"exceeded by {who}{unit}": text}
+        return rows
 
     def numbers_of(self, limit: LimitFragility) -> Iterator[Record]:
         """Yields a record for each level."""
@@ -89,10 +135,28 @@ class FragilityAnswer(LimitsAnswer[LimitFragility]):
         text = (
             f"Measure: {self.measure}"
             f" (T1 = {self.period_s:.4g} s, ζ = {self.damping_ratio:.3g}, at the most"
-            " plausible inputs). No structure within the α-cut exceeds the limit for a share of"
-            " this suite's records outside the band. α is a level of possibility, no probability."
-            " This is damage limitation of a linear structure, not collapse."
+            " plausible inputs). α is a level of possibility, no probability."
         )
+        if self.increments:
+            text += (
+                f" Motions at measures {GRID_RATIO - 1:.0%} apart, and {RESOLUTION:.0%} where the"
+                " answer changes: an exceedance between them may be missed. Upper ends of bands"
+                " count the records under which a structure is known to exceed the limit, lower"
+                " ends those under which all structures found do."
+            )
+            collapses = [
+                name
+                for name, increment in self.increments.items()
+                if any(np.isnan(demand.upper).any() for demand in increment.demand.values())
+            ]
+            if collapses:
+                text += f" A collapse exceeds every limit: under {', '.join(collapses)}."
+        else:
+            text += (
+                " No structure within the α-cut exceeds the limit for a share of this suite's"
+                " records outside the band."
+                " This is damage limitation of a linear structure, not collapse."
+            )
         if any(limit.confidence for limit in self.limits.values()):
             text += " Dashed: pointwise 95 % limits if the records were independent draws."
         return text
@@ -105,35 +169,39 @@ def _range_text(ends: tuple[float, float], unit: str) -> str:
     return f"{range_text(*ends, Nature.GUARANTEED, 3)} {unit}".strip()
 
 
+def _set_text(measures: Array, demands: Array) -> str:
+    """Text of the measures with a demand above 1, as intervals; demands of a collapse are nan."""
+    exceeds = np.concatenate([[False], ~(demands <= 1), [False]])
+    starts, stops = np.flatnonzero(np.diff(exceeds.astype(int))).reshape(-1, 2).T
+    ends = zip(measures[starts], measures[stops - 1], strict=True)
+    return ", ".join(f"{low:.4g} … {high:.4g}" for low, high in ends)
+
+
 def fragility(section: FragilitySection, response: FuzzyResponse) -> FragilityAnswer:
     """Critical measures, bands, medians and dispersions of each limit, and of any of them."""
-    suite, limits = response.suite, section.limits_in_si(response.structure)
+    suite, increments = response.suite, {}
     if suite is None:
         raise RefusedError("fragility", "without records", "a section [records]")
-    records, critical, natures = suite.records.values(), {}, {}
-    measures = [record.measures[section.measure] for record in records]
-    peaks_of_records = [peaks_of(record.peak, response.alpha) for record in records]
-    for name, limit in section.limits_by_name.items():
-        peaks = [peaks[limit.peak] for peaks in peaks_of_records]
-        critical[name] = CriticalMeasures.from_peaks(peaks, measures, limits[name])
-        natures[name] = Nature.weakest(peak.nature for peak in peaks)
-    if len(limits) > 1:
-        critical[ANY] = of_any_limit(list(critical.values()))
-        natures[ANY] = Nature.weakest(natures.values())
-
+    if response.increments:
+        increments = {name: response.increments[name] for name in suite.records}
+        critical = _sets_by_motions(list(increments.values()))
+    else:
+        critical = _proved_measures(section, response, suite)
     answers = {}
-    for name, ends in critical.items():
+    for name, (nature, ends) in critical.items():
         finite = ends.high[np.isfinite(ends.high)]
-        largest = float(finite.max()) if finite.size else float(ends.low_reached.max())
+        largest = 1.1 * float(finite.max() if finite.size else ends.low_reached.max())
+        if increments:
+            largest = float(next(iter(increments.values())).measure[-1])  # of all records
         # from below the least critical measure to above the greatest that is finite
-        grid: Array = np.linspace(0.8 * float(ends.low.min()), 1.1 * largest, POINTS, dtype=float)
+        grid: Array = np.linspace(0.8 * float(ends.low.min()), largest, POINTS, dtype=float)
         has_spread = len(ends.low) > 1  # one record has no dispersion
         answers[name] = LimitFragility.of(
             section,
             name,
             response.structure,
-            nature=natures[name],
-            critical={x.name: getattr(ends, x.name).T for x in fields(ends)},
+            nature=nature,
+            critical={x.name: getattr(ends, x.name).T for x in fields(CriticalMeasures)},
             measure=grid,
             band=ends.band(grid)._asdict(),
             median=ends.median._asdict(),
@@ -147,4 +215,35 @@ def fragility(section: FragilitySection, response: FuzzyResponse) -> FragilityAn
         period_s=suite.period_s,
         damping_ratio=suite.damping_ratio,
         limits=answers,
+        increments=increments,
     )
+
+
+def _proved_measures(
+    section: FragilitySection, response: FuzzyResponse, suite: SuiteResult
+) -> dict[str, tuple[Nature, CriticalMeasures]]:
+    """Nature and critical measures of each limit, and of any of several, of a linear structure."""
+    records, limits = suite.records.values(), section.limits_in_si(response.structure)
+    measures = [record.measures[section.measure] for record in records]
+    peaks_of_records = [peaks_of(record.peak, response.alpha) for record in records]
+    found = {}
+    for name, limit in section.limits_by_name.items():
+        peaks = [peaks[limit.peak] for peaks in peaks_of_records]
+        nature = Nature.weakest(peak.nature for peak in peaks)
+        found[name] = nature, CriticalMeasures.from_peaks(peaks, measures, limits[name])
+    if len(limits) > 1:
+        natures, critical = zip(*found.values(), strict=True)
+        found[ANY] = Nature.weakest(natures), of_any_limit(critical)
+    return found
+
+
+def _sets_by_motions(
+    increments: Sequence[IncrementalResult],
+) -> dict[str, tuple[Nature, CriticalMeasures]]:
+    """Nature and sets of measures of each limit, and of any of several, of a frame that yields."""
+    found: dict[str, tuple[Nature, CriticalMeasures]] = {}
+    for name in increments[0].demand:
+        demands = [np.stack([x.demand[name].lower, x.demand[name].upper]) for x in increments]
+        records = [(x.measure, demand) for x, demand in zip(increments, demands, strict=True)]
+        found[name] = Nature.ESTIMATED, ExceedanceSets.from_demands(records)
+    return found

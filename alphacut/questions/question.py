@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from typing import ClassVar, Generic, NamedTuple, Self, TypeVar
 
 from alphacut.case.limits import QuestionSection, Side
@@ -13,6 +13,7 @@ from alphacut.frame.questions.peaks import ANY, Peaks
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.progress_bar import Progress
 from alphacut.io.quantity import engineering
+from alphacut.stages.incremental import IncrementalResult
 from alphacut.stages.store import Numbers, Values
 from alphacut.stages.suite import SuiteResult
 
@@ -37,7 +38,8 @@ class FuzzyResponse:
     """Fuzzy response of the structure, as section [envelope] names it: what questions are about.
 
     `peaks` are those of the outputs, under a suite of any record; None where no question reads
-    them. `suite` has the results under each record, if there is a suite of them.
+    them. `suite` has the results under each record, if there is a suite of them, and `increments`
+    those over its scales, of a frame that yields.
     """
 
     structure: Structure
@@ -47,6 +49,7 @@ class FuzzyResponse:
     step: float
     peaks: Peaks | None = None
     suite: SuiteResult | None = None
+    increments: Mapping[str, IncrementalResult] = field(default_factory=dict)
     progress: Progress | None = None
 
     @property
@@ -61,6 +64,11 @@ class Answer(Numbers):
     key: ClassVar[str]
     title: ClassVar[str]
     caption: ClassVar[str]
+
+    @property
+    def figures(self) -> tuple[str, ...]:
+        """Names of its figures."""
+        return (self.key,)
 
     @abstractmethod
     def table(self) -> Table:

@@ -124,7 +124,10 @@ class Page:
             ("What do the measured modes teach?", show(["update-inputs"], refuted, "update")),
             ("How does the structure move?", [*plots, *show([], self._motion(), folded="peaks")]),
             ("How far does it move under each record?", show([], folded="records")),
-            *((x.title, show([x.key], [x.words()], x.key)) for x in summary.answers),
+            *(
+                (x.title, show(x.figures, [x.words()], x.key, f"{x.key}_sets"))
+                for x in summary.answers
+            ),
             ("What drives the width?", show([], shares, "shares")),
             ("Terms", [("glossary", TERMS.items())]),
             ("More", self._more()),

@@ -48,6 +48,8 @@ def frames(parts: Parts) -> dict[str, pd.DataFrame]:
         ("shares", shares, parts.shares),
     )
     found = {name: frame_of(part) for name, frame_of, part in of_stages if part}
+    if parts.fragility is not None and parts.fragility.increments:
+        found["fragility_sets"] = pd.DataFrame(parts.fragility.crossings())
     return found | {answer.key: pd.DataFrame(answer.records()) for answer in parts.answers}
 
 

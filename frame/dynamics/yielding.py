@@ -87,10 +87,13 @@ class YieldingFlow(Flow):
             raise RefusedError("method", "a follower or a proof, of columns that yield", allowed)
         return Jet.constant(self.values_and_peaks(points)[0], 0)
 
-    def values_and_peaks(self, points: Array) -> tuple[Array, Array]:
+    def values_and_peaks(
+        self, points: Array, *, takes_collapse: bool = False
+    ) -> tuple[Array, Array]:
         """Return trajectories (S, T, m) at points (S, d), and their largest magnitudes (S, m).
 
-        These are largest over time, of outputs of the kinds `AT_NODES` at the nodes.
+        These are largest over time, of outputs of the kinds `AT_NODES` at the nodes. Those of a
+        motion that collapses are infinite if `takes_collapse`; else it is refused.
         """
         system, points, loads = self.system, np.asarray(points, float), histories(self.system)
         matrices, _ = evaluate(system, self.names, points, derivatives=False)
@@ -118,6 +121,9 @@ class YieldingFlow(Flow):
         by_motion = map(np.ascontiguousarray, (storeys, matrices.damping.value, pushes, start))
         for s, motion in enumerate(zip(*by_motion, strict=True)):
             end = _march(*motion, *parts, kinds, values[s], peaks[s])
+            if takes_collapse and end[0] == COLLAPSED:
+                values[s], peaks[s] = 0.0, np.inf
+                continue
             self._require_motion(points[s], *end)
         values = with_feedthrough(Jet.constant(values, 0), matrices, system, self.time).value
         return values, np.maximum(peaks, np.abs(values).max(1))

@@ -1,23 +1,23 @@
-"""Fragility of a linear structure under a suite of records, with intervals from proved peaks.
+"""Fragility under a suite of records: of linear structures from proved peaks, of others by motions.
 
 A linear structure that starts at rest and is moved by its record alone scales with it. So the
 measure of a record at which a limit L is reached is c(p) = m L / peak(p), m the record's measure as
 it is and p the inputs. Over an α-cut it ranges between m L over the greatest and m L over the least
 peak, both of which are bounded from outside (proved) and from inside (reached). α is a level of
-possibility, no probability, and is never multiplied with one.
+possibility, no probability, and is never multiplied with one. Of a frame that yields c(p) is a set.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from typing import Self
 
 import numpy as np
 
 from alphacut.frame.questions.peaks import Peak
 from alphacut.frame.questions.probability import CONFIDENCE, clopper_pearson
-from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.arrays import Array, Mask
 from alphacut.fuzzy.refused import require
 from alphacut.fuzzy.result import Ends
 
@@ -41,9 +41,11 @@ class CriticalMeasures:
     high: Array
 
     def __post_init__(self) -> None:
-        """Refuse measures that are not positive or not in rising order."""
-        ends = pairwise((self.low, self.low_reached, self.high_reached, self.high))
-        is_valid = (self.low > 0).all() and all((a <= b * (1 + 1e-9)).all() for a, b in ends)
+        """Refuse measures that are not positive, or reached outside their bounds."""
+        is_valid, beyond = bool((self.low > 0).all()), 1 + 1e-9
+        for reached in (self.low_reached, self.high_reached):
+            is_inside = (self.low <= reached * beyond) & (reached <= self.high * beyond)
+            is_valid &= bool(is_inside.all())
         require(is_valid, "critical measures", value="not rising", allowed="rising ends")
 
     @classmethod
@@ -59,6 +61,7 @@ class CriticalMeasures:
         with np.errstate(divide="ignore"):
             measure_ends = np.asarray(measures)[:, None] * limit / falling  # (4, R, A)
         low, low_reached, high_reached, high = measure_ends
+        low_reached = np.minimum(low_reached, high)  # no greatest peak is below the least one
         # the structure that reaches the greatest peak known is one of the cut
         return cls(low, low_reached, np.maximum(high_reached, low_reached), high)
 
@@ -67,16 +70,19 @@ class CriticalMeasures:
 
         They hold for every structure within the α-cut, shape (A, X) each, for measures (X,).
         """
-        return Ends(*(_counts(end, measure) / len(self.low) for end in (self.high, self.low)))
+        return Ends(*(count / len(self.low) for count in self.counts(measure)))
 
     def confidence_band(self, measure: Array) -> Ends:
         """Return 95 % limits of the probability of exceedance if records are independent draws.
 
         They are of shape (A, X) each, for measures (X,) (Clopper, Pearson 1934).
         """
-        # numbers of records that exceed for all structures of the cut, and for some
-        counts = _counts(self.high, measure), _counts(self.low, measure)
-        return clopper_pearson(*counts, len(self.low), (1 - CONFIDENCE) / 2)
+        return clopper_pearson(*self.counts(measure), len(self.low), (1 - CONFIDENCE) / 2)
+
+    def counts(self, measure: Array) -> Ends:
+        """Return numbers (A, X) of records that exceed for all structures of a cut and for some."""
+        ends = (self.high, self.low)
+        return Ends(*((end[:, :, None] < np.asarray(measure)).sum(0) for end in ends))
 
     @property
     def median(self) -> Ends:
@@ -109,6 +115,52 @@ def of_any_limit(limits: Sequence[CriticalMeasures]) -> CriticalMeasures:
     return CriticalMeasures(low, reached, reached, np.maximum(high, reached))
 
 
-def _counts(critical: Array, measure: Array) -> Array:
-    """Return numbers (A, X) of records with critical measures (R, A) below measures (X,)."""
-    return np.asarray((critical[:, :, None] < np.asarray(measure)).sum(0))
+@dataclass(frozen=True, eq=False)
+class ExceedanceSets(CriticalMeasures):
+    """Sets of measures at which structures of a frame that yields exceed a limit, by motions.
+
+    The first crossing lies between `low`, up to which no structure found exceeds the limit, and
+    `low_reached`, at which one does; the last non-exceedance between `high_reached`, at which a
+    structure keeps it, and `high`, from which on all structures found exceed it. Those that lie
+    beyond the largest measure tried are infinite.
+
+    Args:
+        measures: Measures tried under each record, rising, (X,) each.
+        exceeds: Whether all structures found exceed the limit there, and whether one does, shape
+            (2, A, X) each.
+    """
+
+    measures: Sequence[Array]
+    exceeds: Sequence[Mask]
+
+    @classmethod
+    def from_demands(cls, records: Sequence[tuple[Array, Array]]) -> Self:
+        """Return the sets of records, each by its measures (X,) and demands (2, A, X).
+
+        These are the least and the greatest peak over limit, nan where structures collapse.
+        """
+        measures, exceeds = [x for x, _ in records], [~(demand <= 1) for _, demand in records]
+        ends = []
+        for tried, (by_all, by_some) in zip(measures, exceeds, strict=True):
+            beyond, last = np.append(tried, np.inf), len(tried) - 1
+            # the first measure is kept by all structures
+            crossing = np.where(by_some.any(1), by_some.argmax(1), len(tried))
+            keeping = last - (~by_all)[:, ::-1].argmax(1)
+            ends.append(
+                [tried[crossing - 1], beyond[crossing], tried[keeping], beyond[keeping + 1]]
+            )
+        low, low_reached, high_reached, high = np.moveaxis(np.array(ends), 1, 0)
+        return cls(low, low_reached, high_reached, high, measures, exceeds)
+
+    def counts(self, measure: Array) -> Ends:
+        """Return numbers (A, X) of records that exceed for all structures found, and for some.
+
+        Between two measures tried all do if all do at both, and some do if some do at either.
+        """
+        count_all, count_some = np.zeros((2, len(self.low[0]), len(measure)))
+        for tried, (by_all, by_some) in zip(self.measures, self.exceeds, strict=True):
+            after = np.searchsorted(tried, measure)
+            before, after = np.maximum(after - 1, 0), np.minimum(after, len(tried) - 1)
+            count_all += by_all[:, before] & by_all[:, after]
+            count_some += by_some[:, before] | by_some[:, after]
+        return Ends(count_all, count_some)

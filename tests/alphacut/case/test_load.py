@@ -221,6 +221,9 @@ def test_questions_have_sections(tmp_path):
     assert problem.key == "decision.limits"
 
 
-def test_fragility_which_scales_motions_refuses_columns_that_yield():
-    with pytest.raises(BadInput, match="fragility"):
-        load(ROOT / "cases/suite.toml", ["frame.yield_drift=9 mm"])
+def test_fragility_of_columns_that_yield_is_of_magnitudes_and_has_a_largest_measure():
+    changes = ["frame.yield_drift=9 mm", "fragility.most=3"]
+    assert load(ROOT / "cases/suite.toml", changes).content.fragility.most == 3
+    for refused in (["fragility.most=3"], [*changes, "fragility.limits=['max drift1 <= 9 mm']"]):
+        with pytest.raises(BadInput, match=r"fragility\.(most|limits)"):
+            load(ROOT / "cases/suite.toml", refused)

@@ -1,0 +1,212 @@
+"""Incremental dynamic analysis of a frame that yields, over the α-cuts of its inputs.
+
+The demand of a limit is the peak over the limit. Over the scale of a record it is neither
+proportional nor monotone (Vamvatsikos, Cornell 2002), so that a limit is exceeded on a set of
+scales. Structures of each cut are moved at a grid of scales, which is bisected where the answer
+changes. An exceedance is attained by the structure that shows it; that no structure exceeds the
+limit, or that all do, is estimated: a compass search (Kolda, Lewis, Torczon 2003) has tried to
+refute it at the last such scale. Sets of nested cuts are nested, as they are of the same motions.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+
+import numpy as np
+
+from alphacut.frame.boxes import Boxes, boxes
+from alphacut.frame.dynamics.yielding import YieldingFlow
+from alphacut.frame.methods.sampled import SKIPPED, spread_points
+from alphacut.frame.structures.loads import Accelerogram
+from alphacut.frame.structures.storey import StoreyFrame
+from alphacut.fuzzy import FuzzyNumber
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.progress_bar import Progress
+
+GRID_RATIO = 1.1
+"""Ratio of neighbouring scales of the grid: what happens within a step of it may be missed."""
+RESOLUTION = 0.01
+"""Relative width to which changes are bisected."""
+SPREAD = 16
+"""Structures of a kind on each level that are moved at every scale of the grid."""
+REFINEMENT = 1.25
+"""Motions of a run over those on the grid, roughly."""
+FIRST_STEP, LAST_STEP = 1 / 4, 1 / 32
+"""Steps of a compass search, as fractions of the width of the cut."""
+ELASTIC_SCALE = 1e-6
+"""Scale at which nothing yields, for what is proportional up to the first yielding."""
+UNYIELDING_DUCTILITY = 5.0
+"""Ductility that stands for a limit of what elastic motions lack, as residual drifts."""
+SOME, ALL = 0, 1  # sides: the greatest demand of a cut, and the least one
+
+
+@dataclass(frozen=True, eq=False)
+class IncrementalDemands:
+    """Greatest and least demands found in each cut over scales of a record.
+
+    Args:
+        scales: Scales at which structures were moved, rising, shape (X,); below the first one all
+            of them are elastic and keep every limit.
+        demands: Greatest and least peak over limit of the structures of a cut that were moved,
+            shape (2, A, E, X), infinite where they collapse; of E events the last one is that any
+            of the limits is exceeded.
+        motions: Number of motions.
+    """
+
+    scales: Array
+    demands: Array
+    motions: int
+
+
+@dataclass(eq=False)
+class IncrementalAnalysis:
+    """Motions of a frame that yields under a scaled record, and the loop that chooses them.
+
+    Args:
+        model: The frame at rest, moved by the record alone.
+        inputs: Fuzzy inputs by name, in SI.
+        limits: Outputs and limits of their magnitudes, in SI.
+        duration: Length of the motions, in s.
+        step: Step at which outputs are read, in s.
+        alpha: Levels, rising.
+    """
+
+    model: StoreyFrame
+    inputs: Mapping[str, FuzzyNumber]
+    limits: Sequence[tuple[str, float]]
+    duration: float
+    step: float
+    alpha: Sequence[float]
+    cuts: Boxes = field(init=False)
+    moved: dict[float, tuple[Array, Array]] = field(init=False, default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.cuts = boxes(self.inputs, self.alpha)
+
+    def run(self, greatest_scale: float, progress: Progress | None = None) -> IncrementalDemands:
+        """Return the demands over scales up to the greatest one."""
+        structures, searched = self._spread_structures(), set[tuple[float, int, int, int]]()
+        grid = self._grid(structures, greatest_scale)
+        for done, scale in enumerate(grid):
+            self._move(scale, structures)
+            if progress:
+                progress(done / len(grid) / 2)
+        while True:
+            scales = sorted(self.moved)
+            for pair in pairwise(scales):  # what is extreme at one scale is tried at the next ones
+                extremes = np.concatenate([self._extremes(scale)[1] for scale in pair])
+                for scale in pair:
+                    self._move(scale, extremes)
+            demands = np.stack([self._extremes(scale)[0] for scale in scales], axis=-1)
+            if np.any(demands[SOME, ..., 0] > 1):  # of a structure found since
+                self._move(scales[0] / GRID_RATIO, structures)
+                continue
+            # by sides: a structure exceeds the limit, and one does not
+            is_found = np.stack([demands[SOME] > 1, demands[ALL] <= 1])
+            changes = is_found[..., 1:] != is_found[..., :-1]  # (2, A, E, X − 1)
+            ratios = np.divide(scales[1:], scales[:-1])
+            wide = np.flatnonzero(changes.any(axis=(0, 1, 2)) & (ratios > 1 + RESOLUTION))
+            for k in wide:
+                middle = float(np.sqrt(scales[k] * scales[k + 1]))
+                for scale in scales[k : k + 2]:
+                    self._move(middle, self._extremes(scale)[1])
+            if len(wide):
+                continue
+            # search where none is found, but nearest to it among such neighbours
+            with np.errstate(divide="ignore"):
+                closeness = np.stack([demands[SOME], 1 / demands[ALL]])
+            closeness[is_found] = -np.inf
+            padded = np.pad(closeness, [(0, 0)] * 3 + [(1, 1)], constant_values=-np.inf)
+            is_peak = (closeness >= padded[..., :-2]) & (closeness >= padded[..., 2:])
+            doubtful = np.argwhere(is_peak & ~is_found)
+            todo = {(scales[x], side, level, event) for side, level, event, x in doubtful}
+            todo -= searched
+            if not todo:
+                motions = sum(len(points) for points, _ in self.moved.values())
+                return IncrementalDemands(np.array(scales), demands, motions)
+            for scale, side, level, event in sorted(todo):
+                self._search(scale, side, level, event)
+            searched |= todo
+
+    def foresee(self, greatest_scale: float) -> tuple[float, float]:
+        """Return about how many motions a run up to that scale takes, and how many seconds."""
+        structures, start = self._spread_structures(), time.perf_counter()
+        rounds = REFINEMENT * len(self._grid(structures, greatest_scale))  # of all structures
+        return rounds * len(structures), rounds * (time.perf_counter() - start)
+
+    def elastic_scales(self, points: Array) -> Array:
+        """Return the scales at which structures (S, d) would reach limits if they were elastic.
+
+        Shape (S, 1 + L): the first column has the scale at which a storey yields.
+        """
+        storeys = range(1, self.model.floors + 1)
+        outputs = [(f"ductility{z}", 1.0) for z in storeys]
+        demands = self._peaks_over_limits(ELASTIC_SCALE, points, [*outputs, *self.limits])
+        n_storeys = self.model.floors
+        ductility = demands[:, :n_storeys].max(axis=1, keepdims=True)
+        demands = np.hstack([ductility, demands[:, n_storeys:]])
+        demands = np.where(demands > 0, demands, ductility / UNYIELDING_DUCTILITY)
+        return np.asarray(ELASTIC_SCALE / demands)
+
+    def _grid(self, structures: Array, greatest_scale: float) -> list[float]:
+        """Return the scales of the grid; at the first one all structures are elastic."""
+        first = min(self.elastic_scales(structures).min() / GRID_RATIO, greatest_scale / 2)
+        count = int(np.ceil(np.log(greatest_scale / first) / np.log(GRID_RATIO))) + 1
+        return [*map(float, np.geomspace(first, greatest_scale, count))]
+
+    def _peaks_over_limits(
+        self, scale: float, points: Array, limits: Sequence[tuple[str, float]]
+    ) -> Array:
+        """Return peaks over limits (S, L) at points (S, d), infinite of motions that collapse."""
+        record, outputs = self.model.ground, tuple(dict.fromkeys(output for output, _ in limits))
+        assert record is not None
+        ground = Accelerogram(record.step, scale * record.samples)
+        model = replace(self.model, ground=ground, outputs=outputs)
+        flow = YieldingFlow(model, self.cuts.names, self.duration, self.step)
+        peaks = flow.values_and_peaks(points, takes_collapse=True)[1]
+        return np.column_stack([peaks[:, outputs.index(x)] / limit for x, limit in limits])
+
+    def _spread_structures(self) -> Array:
+        """Return the nominal structure and others on each level, shape (S, d)."""
+        cuts, structures = self.cuts, [self.cuts.nominal[None]]
+        for level, (low, high) in enumerate(zip(cuts.lower, cuts.upper, strict=True)):
+            unit = spread_points(*cuts.unit_ends(level), SPREAD, SKIPPED * (level + 1))
+            structures.append(np.clip(cuts.to_physical(unit), low, high))
+        return np.asarray(np.unique(np.concatenate(structures), axis=0))
+
+    def _move(self, scale: float, points: Array) -> None:
+        """Move those of the structures (…, d) that were not moved at this scale yet."""
+        d, n_events = len(self.cuts.names), len(self.limits) + 1
+        known, demands = self.moved.get(scale, (np.empty((0, d)), np.empty((0, n_events))))
+        known_rows = {row.tobytes() for row in known}
+        points = np.unique(points.reshape(-1, d), axis=0)
+        if len(points := points[[row.tobytes() not in known_rows for row in points]]):
+            new = self._peaks_over_limits(scale, points, self.limits)
+            new = np.column_stack([new, new.max(axis=1)])
+            self.moved[scale] = np.vstack([known, points]), np.vstack([demands, new])
+
+    def _extremes(self, scale: float) -> tuple[Array, Array]:
+        """Return greatest and least demand (2, A, E) at a scale, and their inputs (2, A, E, d)."""
+        points, demands = self.moved[scale]
+        lower, upper = self.cuts.lower[:, None], self.cuts.upper[:, None]
+        is_inside = (points >= lower) & (points <= upper)
+        inside = np.all(is_inside, axis=-1, keepdims=True)  # (A, S, 1)
+        greatest = np.where(inside, demands, -1.0).argmax(axis=1)
+        finite = np.minimum(demands, np.finfo(float).max)  # of collapses, before those outside
+        rows = np.stack([greatest, np.where(inside, finite, np.inf).argmin(axis=1)])
+        return demands[rows, np.arange(demands.shape[1])], points[rows]
+
+    def _search(self, scale: float, side: int, level: int, event: int) -> None:
+        """Search the extreme demand of an event in a cut at a scale, by compass search."""
+        low, high, size = self.cuts.lower[level], self.cuts.upper[level], FIRST_STEP
+        directions = np.concatenate([np.diag(high - low), np.diag(low - high)])
+        demands, points = self._extremes(scale)
+        while size >= LAST_STEP:
+            before, point = demands[side, level, event], points[side, level, event]
+            self._move(scale, np.clip(point + size * directions, low, high))
+            demands, points = self._extremes(scale)
+            if np.isclose(demands[side, level, event], before, rtol=RESOLUTION / 10):
+                size /= 2
