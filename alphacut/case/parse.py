@@ -127,11 +127,12 @@ def _refusal(model: type[Section], key: str, detail: ErrorDetails) -> Refusal:
     words = (about and about.description) or "a section"
     if kind == "missing":
         return key, None, words, ""
-    value = _as_text(detail["input"])
+    given = detail["input"]  # as it stood in the file, near enough
+    value = f'"{given}"' if isinstance(given, str) else printable(given).replace("'", '"')
     if kind == "literal_error":
         allowed = str(context["expected"]).replace("'", '"')
         names = re.findall(r'"([^"]+)"', allowed)
-        return key, value, allowed, suggestion(str(detail["input"]), names)
+        return key, value, allowed, suggestion(str(given), names)
     if kind == "tuple_type":
         return key, value, "an array", f"write {key.rpartition('.')[2]} = [{value}]"
     return key, value, str(cause or KINDS.get(kind, detail["msg"])), ""
@@ -141,11 +142,6 @@ def _full_key(location: tuple[int | str, ...]) -> str:
     """Full name of a key, entries counted from 1, without the tags of unions, as <image>."""
     parts = (f"[{part + 1}]" if isinstance(part, int) else f".{part}" for part in location)
     return "".join(part for part in parts if not part.startswith(".<")).lstrip(".")
-
-
-def _as_text(value: object) -> str:
-    """A value as it stood in the file, near enough."""
-    return f'"{value}"' if isinstance(value, str) else printable(value).replace("'", '"')
 
 
 def _is_below(key: str, changed: Sequence[str]) -> bool:

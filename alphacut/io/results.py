@@ -107,15 +107,6 @@ class ResultsFolder:
         """Names of the files that were made from what has this digest."""
         return tuple(name for name, entry in self.files.items() if entry.source == source)
 
-    def describe_damage(self, source: str) -> str:
-        """What is wrong with a file made from this, such as "modulus.nc is changed"; else ""."""
-        for name in self.made_from(source):
-            try:
-                self.content(name)
-            except RefusedError as error:
-                return f"{name} is {error.value or 'missing'}"
-        return ""
-
     def content(self, name: str) -> bytes:
         """The content of a listed file; RefusedError of one that is missing, changed or a link."""
         what = f"without {name} in its manifest"

@@ -27,7 +27,7 @@ from pydantic import (
 
 from alphacut.fuzzy.arrays import Array, on_one_blas_thread
 from alphacut.fuzzy.progress_bar import Progress, subprogress
-from alphacut.fuzzy.refused import FailedError, require
+from alphacut.fuzzy.refused import FailedError, RefusedError, require
 from alphacut.io.files import as_json, rank, say, write_text
 from alphacut.io.provenance import build_provenance, fingerprint
 from alphacut.io.results import Listed, ResultsFolder
@@ -231,12 +231,14 @@ class StageStore:
         folder, key, name = self.folder, stage.key, f"{stage.name}.json"
         if folder is None or self.fresh or name not in (files := folder.made_from(key)):
             return None
-        if problem := folder.describe_damage(key):
+        try:
+            contents = {file: folder.content(file) for file in files}
+            document = json.loads(contents[name])["result"]
+            numbers = TypeAdapter(stage.kind).validate_python(document)
+        except RefusedError as error:
+            problem = f"{Path(error.key).name} is {error.value or 'missing'}"
             say(f"warning: {problem}; {stage.name} is computed anew")
             return None
-        try:
-            document = json.loads(folder.content(name))["result"]
-            numbers = TypeAdapter(stage.kind).validate_python(document)
         except ValidationError:  # of a front door that named numbers otherwise
             return None
         self.up_to_date.append(stage.name)

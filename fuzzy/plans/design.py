@@ -69,10 +69,15 @@ def guaranteed_bounds(bounds: Bounds, campaign: Campaign, proved: Mask) -> Bound
     """
     if not proved.any():
         return bounds
-    campaign(_test_points(Domain(bounds.inputs, tuple(bounds.alpha)), campaign))
+    domain = Domain(bounds.inputs, tuple(bounds.alpha))
+    campaign(_test_points(domain, campaign))
     samples, knowledge = campaign.samples, campaign.knowledge
     signs = knowledge.stated_signs(tuple(bounds.inputs), bounds.outputs)
-    is_exceeded = _exceeded_outputs(bounds, samples)
+    sampled = bounds_of_samples(domain, samples, "")
+    tolerance = negligible(samples.values.array)
+    below = sampled.lower < bounds.lower - tolerance
+    above = sampled.upper > bounds.upper + tolerance
+    is_exceeded = np.asarray((below | above).any(axis=0))
     words, allowed = repr(knowledge.words), "facts that hold over the whole supports"
     for column in np.flatnonzero(proved):
         pair = contradiction(samples.points, samples.values.array[:, column], signs[column])
@@ -103,14 +108,6 @@ def _test_points(domain: Domain, campaign: Campaign) -> Array:
         unit_points = quasi_random_points(len(domain.names), count, skip=len(points))
         points += list(lower[level] + widths[level] * unit_points)
     return np.array(points[: campaign.remaining]).reshape(-1, len(domain.names))
-
-
-def _exceeded_outputs(bounds: Bounds, samples: Samples) -> Mask:
-    """Mask of the outputs that exceed their bounds at a sample of the cut, shape (outputs,)."""
-    sampled = bounds_of_samples(Domain(bounds.inputs, tuple(bounds.alpha)), samples, "")
-    tolerance = negligible(samples.values.array)
-    below = sampled.lower < bounds.lower - tolerance
-    return np.asarray((below | (sampled.upper > bounds.upper + tolerance)).any(axis=0))
 
 
 def _pair_words(bounds: Bounds, pair: tuple[Array, Array] | None) -> str:

@@ -219,8 +219,13 @@ def find_effects(campaign: Campaign, domain: Domain, outputs: tuple[str, ...]) -
     """
     signs = campaign.knowledge.stated_signs(domain.names, outputs)
     lowers, uppers = domain.boxes
+    # pairs with an input at either end, the others at nominal values or at an extreme corner
+    corners = _extreme_corners(signs, lowers[0], uppers[0])
+    points = np.repeat(np.concatenate([domain.nominal[None], corners]), 2, axis=0)
     for column in np.flatnonzero(signs.any(axis=0)):
-        campaign(_sign_test_points(domain.nominal, signs, lowers[0], uppers[0], int(column)))
+        pairs = points.copy()
+        pairs[::2, column], pairs[1::2, column] = lowers[0, column], uppers[0, column]
+        campaign(np.unique(pairs, axis=0))
 
     def model(points: Array) -> Array:
         """The outputs at points (n, inputs), shape (n, outputs)."""
@@ -235,17 +240,6 @@ def find_effects(campaign: Campaign, domain: Domain, outputs: tuple[str, ...]) -
             signs = np.where(signs == 0, _observed_signs(model, box, domain.nominal, signs), signs)
         levels.append(signs)
     return np.array(levels)
-
-
-def _sign_test_points(
-    nominal: Array, signs: Signs, lower: Array, upper: Array, column: int
-) -> Array:
-    """Return points (n, inputs) that test the stated sign of the input in a column."""
-    # pairs with the input at either end, the others at nominal values or at an extreme corner
-    other_points = np.concatenate([nominal[None], _extreme_corners(signs, lower, upper)])
-    points = np.repeat(other_points, 2, axis=0)
-    points[::2, column], points[1::2, column] = lower[column], upper[column]
-    return np.asarray(np.unique(points, axis=0))
 
 
 def _extreme_corners(signs: Signs, lower: Array, upper: Array) -> Array:

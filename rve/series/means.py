@@ -35,15 +35,15 @@ class RuleError(FailedError):
 
 
 class ComplexMaterial(NamedTuple):
-    """K and G of an isotropic material, complex where it has losses, and its Poisson's ratio."""
+    """K of three dimensions and G, in Pa, of an isotropic material, complex where it has losses."""
 
     bulk_and_shear: tuple[complex, complex]
-    poisson: complex
 
-    @classmethod
-    def of_bulk_and_shear(cls, bulk: complex, shear: complex) -> ComplexMaterial:
-        """The material with K of three dimensions and G, in Pa."""
-        return cls((bulk, shear), (3 * bulk - 2 * shear) / (6 * bulk + 2 * shear))
+    @property
+    def poisson(self) -> complex:
+        """Poisson's ratio."""
+        bulk, shear = self.bulk_and_shear
+        return (3 * bulk - 2 * shear) / (6 * bulk + 2 * shear)
 
 
 Material = Phase | ComplexMaterial
@@ -286,7 +286,7 @@ def _mean_moduli(
 ) -> Array:
     """Mean moduli over θ, (3,), with complex K and G of matrix and particle, (2,) each."""
     radii, total = cell.radius_map(rule.nodes), np.zeros(3, complex)
-    materials = [ComplexMaterial.of_bulk_and_shear(*x) for x in zip(bulk, shear, strict=True)]
+    materials = [ComplexMaterial(x) for x in zip(bulk, shear, strict=True)]
     for count in np.unique(terms):
         nodes = np.flatnonzero(terms == count)
         total += rule.weights[nodes] @ series.solve(radii[nodes], materials, int(count))[:, 0]

@@ -32,13 +32,7 @@ MAX_ITERATIONS = 500
 """Iterations by the preconditioner, which takes tens at most; others may take ten times as many."""
 
 PRINTS = re.compile(r"(_view|_monitor\w*|_converged_(reason|rate))$")
-"""Options that make PETSc print."""
-
-
-def _to_standard_error(name: str, value: str) -> str:
-    """Where PETSc prints: a view, monitor or reason without a value goes to standard error."""
-    prints = PRINTS.search(name) and not value
-    return "ascii:stderr" if prints else value
+"""Options that make PETSc print: to standard error if they have no value."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +51,7 @@ class SolverOptions:
     def all(self) -> dict[str, str]:
         """Everything that is put to PETSc."""
         chosen = {**DEFAULTS, **self.environment, **self.overrides}
-        chosen = {name: _to_standard_error(name, value) for name, value in chosen.items()}
+        chosen |= {x: "ascii:stderr" for x, y in chosen.items() if PRINTS.search(x) and not y}
         max_iterations = MAX_ITERATIONS * (1 if chosen["pc_type"] == "python" else 10)
         return {"ksp_max_it": str(max_iterations), **chosen}
 

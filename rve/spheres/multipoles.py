@@ -173,7 +173,9 @@ def t_matrices(degrees: Array, matrix: Material, inclusion: Material) -> tuple[A
     ratio = inclusion.bulk_and_shear[1] / matrix.bulk_and_shear[1]
     # weights of tractions outside and inside, finite for pores and rigid spheres
     outside, inside = 1 / (1 + ratio), ratio / (1 + ratio)
-    stiffness = _surface_stiffness(n, inclusion.poisson)
+    displacement, traction = _surface_fields(n, inclusion.poisson)
+    displacement[n == 0, 1, 0] = 1.0  # ∇1 is no displacement: keeps the matrix invertible
+    stiffness = traction @ np.linalg.inv(displacement)  # traction over μ of the solid sphere
 
     def traction_mismatch(degree: Array) -> Array:
         displacement, traction = _surface_fields(degree, matrix.poisson)
@@ -186,13 +188,6 @@ def t_matrices(degrees: Array, matrix: Material, inclusion: Material) -> tuple[A
     torsion_sum = np.where(is_radial, 1.0, (n + 2) * outside + (n - 1) * inside)
     torsion = np.where(is_radial, 0.0, (n - 1) * (outside - inside) / torsion_sum)
     return np.asarray(np.linalg.solve(singular, regular)), np.asarray(torsion)
-
-
-def _surface_stiffness(n: Array, poisson: complex) -> Array:
-    """Traction over μ from displacement of the surface of a solid sphere, shape (k, 2, 2)."""
-    displacement, traction = _surface_fields(n, poisson)
-    displacement[n == 0, 1, 0] = 1.0  # ∇1 is no displacement: keeps the matrix invertible
-    return np.asarray(traction @ np.linalg.inv(displacement))
 
 
 def _surface_fields(degree: Array, poisson: complex) -> tuple[Array, Array]:

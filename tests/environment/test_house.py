@@ -1,4 +1,4 @@
-"""Checks of the house that a person need not read: public types, imports, length of help.
+"""Checks of the house that a person need not read: public types, length of help.
 
 Nothing is checked by assertions.
 """
@@ -50,14 +50,3 @@ def test_assertions_only_tell_mypy_a_type():
         for node in filter(lambda x: isinstance(x, ast.Assert), ast.walk(trees()[file])):
             text = ast.unparse(node.test)
             assert text.endswith("is not None") or text.startswith("isinstance("), (file, text)
-
-
-def test_all_imports_begin_with_alphacut():
-    """Else a class exists twice, as a package can be reached by two paths in a checkout."""
-    for file, tree in trees().items():
-        for node in ast.walk(tree):
-            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
-            if isinstance(node, ast.ImportFrom):
-                assert not node.level, file
-                names.append(node.module or "")
-            assert not {name.partition(".")[0] for name in names} & set(PACKAGES[:4]), file
