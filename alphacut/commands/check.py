@@ -39,8 +39,7 @@ from alphacut.rve.cell.cell import VoigtPhase
 from alphacut.stages.cell import GPA, CellProblem
 from alphacut.stages.envelope import WIDENING, tasks
 from alphacut.stages.image import image_study
-from alphacut.stages.incremental import foreseen
-from alphacut.stages.suite import SuiteRecord, suite_records
+from alphacut.stages.suite import SuiteRecord, incremental_analyses, suite_records
 
 if TYPE_CHECKING:
     import xarray
@@ -84,7 +83,9 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
         question, structure = content.incremental_question, content.structure
         if question is not None and structure is not None:
             (task,) = tasks(content.envelope, ())
-            text += f"{foreseen(question, structure, task, records)}\n"
+            analyses = incremental_analyses(question, structure, task, records)
+            motions, seconds = np.sum([x.foresee() for x in analyses], axis=0)
+            text += f"fragility: about {motions:,.0f} motions, {seconds:.0f} s by one process\n"
     write_answer(options, document, out, f"{text}{options.case}: no problems\n")
     return 0
 

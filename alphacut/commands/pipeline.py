@@ -29,20 +29,9 @@ from alphacut.questions.question import Answer, FuzzyResponse
 from alphacut.questions.summary import ANSWERS, Results
 from alphacut.questions.tolerances import require_admissible_scale
 from alphacut.rve.image.fields.grid import device_array
-from alphacut.stages import (
-    campaign,
-    cell,
-    envelope,
-    identify,
-    image,
-    incremental,
-    microstructure,
-    shares,
-    suite,
-)
+from alphacut.stages import campaign, cell, envelope, identify, image, microstructure, shares, suite
 from alphacut.stages.campaign import CellCampaign
 from alphacut.stages.envelope import EnvelopeTask, PeakResults, peaks_of
-from alphacut.stages.incremental import IncrementalResult
 from alphacut.stages.modulus import fuzzy_loss, fuzzy_modulus, require_levels
 from alphacut.stages.store import (
     RunProgress,
@@ -215,10 +204,12 @@ class Pipeline:
         by_record = {record.name: outcomes[f"record_{record.name}"].numbers for record in records}
         result = self.results.suite = suite.suite_result(by_record, records, structure, task)
         response = response_of(structure, task, peaks_of(result.peak, task.section.alpha))
-        increments = dict[str, IncrementalResult]()
+        increments = dict[str, suite.IncrementalResult]()
         if (question := self.content.incremental_question) is not None:
-            analyses = incremental.stages(question, structure, task, longest_first)
-            found = self.store.take_all(analyses, self.executor)
+            analyses = suite.incremental_analyses(question, structure, task, longest_first)
+            pairs = zip(longest_first, analyses, strict=True)
+            further = [suite.incremental_stage(question, *pair) for pair in pairs]
+            found = self.store.take_all(further, self.executor)
             increments = {x.name: found[f"incremental_{x.name}"].numbers for x in records}
         return replace(response, suite=result, increments=increments)
 

@@ -34,7 +34,7 @@ def drawings(results: Results) -> Iterator[Drawing]:
     for key, answer in results.answers.items():
         yield key, partial(envelope.DRAWINGS[key], answer)
         if isinstance(answer, FragilityAnswer) and answer.increments:
-            yield "incremental", partial(envelope.draw_incremental, answer)
+            yield "fragility-curves", partial(envelope.draw_incremental, answer)
     for task in results.tasks:
         yield from envelope.drawings(task, results)
 

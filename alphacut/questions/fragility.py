@@ -19,9 +19,8 @@ from alphacut.fuzzy.result import Nature
 from alphacut.io.quantity import STANDARD_GRAVITY, engineering, range_text
 from alphacut.questions.question import FuzzyResponse, LimitAnswer, LimitsAnswer, Record, Texts
 from alphacut.stages.envelope import peaks_of
-from alphacut.stages.incremental import IncrementalResult
 from alphacut.stages.store import CutsResult, Values
-from alphacut.stages.suite import SuiteResult
+from alphacut.stages.suite import IncrementalResult, SuiteResult
 
 POINTS = 60
 """Measures at which bands are drawn and tabulated."""
@@ -66,11 +65,6 @@ class FragilityAnswer(LimitsAnswer[LimitFragility]):
     period_s: float
     damping_ratio: float
     increments: dict[str, IncrementalResult] = Field(default={})
-
-    @property
-    def figures(self) -> tuple[str, ...]:
-        """Names of its figures, with the curves of a frame that yields."""
-        return (self.key, "incremental")
 
     def texts_of(self, limit: LimitFragility) -> Texts:
         """Median and dispersion of the critical measures."""

@@ -13,9 +13,8 @@ from alphacut.frame.questions.peaks import ANY, Peaks
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.progress_bar import Progress
 from alphacut.io.quantity import engineering
-from alphacut.stages.incremental import IncrementalResult
 from alphacut.stages.store import Numbers, Values
-from alphacut.stages.suite import SuiteResult
+from alphacut.stages.suite import IncrementalResult, SuiteResult
 
 Row = tuple[str, ...]
 
@@ -64,11 +63,6 @@ class Answer(Numbers):
     key: ClassVar[str]
     title: ClassVar[str]
     caption: ClassVar[str]
-
-    @property
-    def figures(self) -> tuple[str, ...]:
-        """Names of its figures."""
-        return (self.key,)
 
     @abstractmethod
     def table(self) -> Table:

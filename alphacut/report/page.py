@@ -115,6 +115,7 @@ class Page:
         summary, show = self.summary, self._pieces
         refuted = [summary.update.refuted] if isinstance(summary.update, RefutedResult) else []
         shares = [SHARES] if summary.shares else []
+        answers = [(x, (x.key, f"{x.key}-curves")) for x in summary.answers]
         plots: list[Piece] = [("plot",)] if summary.envelopes else []
         for title, pieces in (
             ("Key results", self._key_pieces()),
@@ -124,10 +125,7 @@ class Page:
             ("What do the measured modes teach?", show(["update-inputs"], refuted, "update")),
             ("How does the structure move?", [*plots, *show([], self._motion(), folded="peaks")]),
             ("How far does it move under each record?", show([], folded="records")),
-            *(
-                (x.title, show(x.figures, [x.words()], x.key, f"{x.key}_sets"))
-                for x in summary.answers
-            ),
+            *((x.title, show(names, [x.words()], x.key, f"{x.key}_sets")) for x, names in answers),
             ("What drives the width?", show([], shares, "shares")),
             ("Terms", [("glossary", TERMS.items())]),
             ("More", self._more()),

@@ -1,4 +1,4 @@
-"""Stage records: peaks of a structure under each record of a suite, one result a record."""
+"""Stage records: peaks under each record of a suite, and over its scales, one result a record."""
 
 from __future__ import annotations
 
@@ -12,13 +12,15 @@ from typing import NamedTuple
 import numpy as np
 from pydantic import Field
 
+from alphacut.case.limits import FragilitySection
 from alphacut.case.loads import RecordsSection
 from alphacut.case.motion import EnvelopeSection
 from alphacut.case.structure import Structure
 from alphacut.frame import Accelerogram
 from alphacut.frame.boxes import boxes
 from alphacut.frame.dynamics.nonlinear import make_flow
-from alphacut.frame.questions.peaks import PEAK_BOUNDS, Peak, Peaks
+from alphacut.frame.questions.incremental import ALL, SOME, IncrementalAnalysis
+from alphacut.frame.questions.peaks import ANY, PEAK_BOUNDS, Peak, Peaks
 from alphacut.frame.structures.linear import modal_damping_ratios
 from alphacut.frame.structures.quantities import output_of
 from alphacut.fuzzy.arrays import Array
@@ -27,7 +29,7 @@ from alphacut.fuzzy.result import Nature
 from alphacut.io.quantity import percent_text
 from alphacut.records.recording import Recording, arias_fractions, spectral_acceleration
 from alphacut.stages.envelope import EnvelopeTask, PeakResults, outputs_of, peak_results, peaks_of
-from alphacut.stages.store import Numbers, Stage, Values
+from alphacut.stages.store import CutsResult, Numbers, Stage, StageContext, StageResult, Values
 
 FREE_PERIODS = 5
 """Natural periods of free motion after a record: by then 5 % damping leaves a fifth."""
@@ -130,6 +132,59 @@ def stage(structure: Structure, task: EnvelopeTask, record: SuiteRecord) -> Stag
     compute = partial(record_task.compute_peaks, loaded, nodes=NODES)
     name, packages = f"record_{record.name}", ("fuzzy", "frame")
     return Stage(name, inputs, packages, PeakResults, compute, work=record.duration)
+
+
+class IncrementalResult(Numbers):
+    """Least and greatest peak over limit of the structures moved, over the measure of a record.
+
+    `demand` has them by limit, and by `ANY` of several, shape (levels, measures); null where they
+    collapse. At the first measure all structures moved are elastic and keep every limit.
+    """
+
+    measure: Values
+    demand: dict[str, CutsResult]
+
+
+def incremental_analyses(
+    section: FragilitySection,
+    structure: Structure,
+    task: EnvelopeTask,
+    records: Sequence[SuiteRecord],
+) -> list[IncrementalAnalysis]:
+    """Analyses of a frame that yields under each record, over the measure of the section."""
+    assert structure.frame is not None
+    outputs = [limit.output for limit in section.limits_by_name.values()]
+    limits = [*zip(outputs, section.limits_in_si(structure).values(), strict=True)]
+    inputs, motion, found = structure.inputs(task.fuzzy), task.section, []
+    for record in records:
+        unit_samples = np.asarray(record.ground.samples / record.measures[section.measure])
+        frame = replace(structure.frame, ground=Accelerogram(record.ground.step, unit_samples))
+        timing = record.duration, motion.step, motion.alpha
+        found.append(IncrementalAnalysis(frame, inputs, limits, *timing))
+    elastic = max(x.elastic_scales(x.cuts.nominal[None])[0, 1:].max() for x in found)
+    return [replace(x, greatest_scale=section.most * float(elastic)) for x in found]
+
+
+def incremental_stage(
+    section: FragilitySection, record: SuiteRecord, analysis: IncrementalAnalysis
+) -> Stage[IncrementalResult]:
+    """The stage that moves a frame that yields at scales of a record."""
+    names = [*section.limits_by_name, *[ANY] * (len(section.limits) > 1)]
+    name, packages = f"incremental_{record.name}", ("fuzzy", "frame")
+    compute = partial(_incremental_result, analysis, names)
+    work = record.duration
+    return Stage(name, [analysis, names], packages, IncrementalResult, compute, work=work)
+
+
+def _incremental_result(
+    analysis: IncrementalAnalysis, names: Sequence[str], context: StageContext
+) -> StageResult[IncrementalResult]:
+    measure, demands = analysis.run(context.tick)
+    demand = {
+        name: CutsResult(lower=demands[ALL, :, event], upper=demands[SOME, :, event])
+        for event, name in enumerate(names)
+    }
+    return StageResult(IncrementalResult(measure=measure, demand=demand))
 
 
 def worst_peaks(peaks: Mapping[str, Peaks]) -> dict[str, Peak]:

@@ -43,24 +43,6 @@ UNYIELDING_DUCTILITY = 5.0
 SOME, ALL = 0, 1  # sides: the greatest demand of a cut, and the least one
 
 
-@dataclass(frozen=True, eq=False)
-class IncrementalDemands:
-    """Greatest and least demands found in each cut over scales of a record.
-
-    Args:
-        scales: Scales at which structures were moved, rising, shape (X,); below the first one all
-            of them are elastic and keep every limit.
-        demands: Greatest and least peak over limit of the structures of a cut that were moved,
-            shape (2, A, E, X), infinite where they collapse; of E events the last one is that any
-            of the limits is exceeded.
-        motions: Number of motions.
-    """
-
-    scales: Array
-    demands: Array
-    motions: int
-
-
 @dataclass(eq=False)
 class IncrementalAnalysis:
     """Motions of a frame that yields under a scaled record, and the loop that chooses them.
@@ -72,6 +54,7 @@ class IncrementalAnalysis:
         duration: Length of the motions, in s.
         step: Step at which outputs are read, in s.
         alpha: Levels, rising.
+        greatest_scale: Scale up to which it goes.
     """
 
     model: StoreyFrame
@@ -80,16 +63,22 @@ class IncrementalAnalysis:
     duration: float
     step: float
     alpha: Sequence[float]
+    greatest_scale: float = 1.0
     cuts: Boxes = field(init=False)
     moved: dict[float, tuple[Array, Array]] = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
         self.cuts = boxes(self.inputs, self.alpha)
 
-    def run(self, greatest_scale: float, progress: Progress | None = None) -> IncrementalDemands:
-        """Return the demands over scales up to the greatest one."""
+    def run(self, progress: Progress | None = None) -> tuple[Array, Array]:
+        """Return scales (X,), rising, and the demands found there, shape (2, A, E, X).
+
+        These are the greatest and the least one of the structures of each cut that were moved,
+        infinite where they collapse. The last of E events is that any of the limits is exceeded.
+        At the first scale all structures moved are elastic and keep every limit.
+        """
         structures, searched = self._spread_structures(), set[tuple[float, int, int, int]]()
-        grid = self._grid(structures, greatest_scale)
+        grid = self._grid(structures)
         for done, scale in enumerate(grid):
             self._move(scale, structures)
             if progress:
@@ -125,16 +114,15 @@ class IncrementalAnalysis:
             todo = {(scales[x], side, level, event) for side, level, event, x in doubtful}
             todo -= searched
             if not todo:
-                motions = sum(len(points) for points, _ in self.moved.values())
-                return IncrementalDemands(np.array(scales), demands, motions)
+                return np.array(scales), demands
             for scale, side, level, event in sorted(todo):
                 self._search(scale, side, level, event)
             searched |= todo
 
-    def foresee(self, greatest_scale: float) -> tuple[float, float]:
-        """Return about how many motions a run up to that scale takes, and how many seconds."""
+    def foresee(self) -> tuple[float, float]:
+        """Return about how many motions a run takes, and how many seconds."""
         structures, start = self._spread_structures(), time.perf_counter()
-        rounds = REFINEMENT * len(self._grid(structures, greatest_scale))  # of all structures
+        rounds = REFINEMENT * len(self._grid(structures))  # of all structures
         return rounds * len(structures), rounds * (time.perf_counter() - start)
 
     def elastic_scales(self, points: Array) -> Array:
@@ -142,20 +130,20 @@ class IncrementalAnalysis:
 
         Shape (S, 1 + L): the first column has the scale at which a storey yields.
         """
-        storeys = range(1, self.model.floors + 1)
-        outputs = [(f"ductility{z}", 1.0) for z in storeys]
-        demands = self._peaks_over_limits(ELASTIC_SCALE, points, [*outputs, *self.limits])
         n_storeys = self.model.floors
-        ductility = demands[:, :n_storeys].max(axis=1, keepdims=True)
-        demands = np.hstack([ductility, demands[:, n_storeys:]])
+        storeys = [(f"ductility{z}", 1.0) for z in range(1, n_storeys + 1)]
+        demands = self._peaks_over_limits(ELASTIC_SCALE, points, [*storeys, *self.limits])
+        ductility, demands = np.split(demands, [n_storeys], axis=1)
+        ductility = ductility.max(axis=1, keepdims=True)
         demands = np.where(demands > 0, demands, ductility / UNYIELDING_DUCTILITY)
-        return np.asarray(ELASTIC_SCALE / demands)
+        return np.asarray(ELASTIC_SCALE / np.hstack([ductility, demands]))
 
-    def _grid(self, structures: Array, greatest_scale: float) -> list[float]:
+    def _grid(self, structures: Array) -> list[float]:
         """Return the scales of the grid; at the first one all structures are elastic."""
-        first = min(self.elastic_scales(structures).min() / GRID_RATIO, greatest_scale / 2)
-        count = int(np.ceil(np.log(greatest_scale / first) / np.log(GRID_RATIO))) + 1
-        return [*map(float, np.geomspace(first, greatest_scale, count))]
+        first, last = self.elastic_scales(structures).min() / GRID_RATIO, self.greatest_scale
+        first = min(first, last / 2)
+        count = int(np.ceil(np.log(last / first) / np.log(GRID_RATIO))) + 1
+        return [*map(float, np.geomspace(first, last, count))]
 
     def _peaks_over_limits(
         self, scale: float, points: Array, limits: Sequence[tuple[str, float]]

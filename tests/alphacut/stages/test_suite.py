@@ -4,6 +4,7 @@ import json
 import re
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from alphacut.case.content import load
@@ -189,3 +190,20 @@ def test_check_shows_what_was_read_and_says_what_is_off(tmp_path, capsys):
     assert "mean/peak" in told
     assert "the mean of record two is" in told
     assert "of the Arias intensity of record" in told
+
+
+def test_fragility_of_columns_that_yield_has_sets_of_measures_for_each_record(tmp_path):
+    text = CASE.replace("masses", 'yield_force = ["[36, 40, 46] kN"]\nmasses').replace(
+        '"k1"', '"fy1"'
+    )
+    answer = FragilityAnswer.model_validate(summary_of_run(written(tmp_path, text))["fragility"])
+    limit, rows = answer.limits["drift1"], pd.DataFrame(answer.crossings())
+    assert limit.nature == "estimated"
+    assert [*rows["record"]] == ["one", "one", "two", "two"]
+    first, last = rows["first crossing [m/s^2]"], rows["last non-exceedance [m/s^2]"]
+    # those of the most plausible structure lie between
+    assert (first[1::2] >= first[0::2].values).all()
+    assert (last[1::2] <= last[0::2].values).all()
+    for row, interval in enumerate(rows["exceeded by some [m/s^2]"]):
+        assert interval.startswith(f"{first[row]:.4g} … ")
+    assert "over the records first crossing" in answer.table().rows[0][1]
