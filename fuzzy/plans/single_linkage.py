@@ -22,7 +22,9 @@ cuts, and descents from corners, raise W and the bound, but not N.
 Samples of one value lie on a plateau, from which no descent finds its way. It counts as one
 optimum, and its samples do not count as explored: its share of the cut stays uncovered. Further
 samples lie far apart, so that few humps stay between them. With a thousand on plateaus the search
-of a bound ends, and the bound is attained only.
+of a bound ends, and the bound is attained only. Where kinks are expected a plateau is where an
+input acts on nothing, and its samples count from a thousand on: what uniform ones do not meet is
+then 0.1 % of the cut, as Bayes' rule tells, and less of those far apart.
 """
 
 from __future__ import annotations
@@ -36,7 +38,7 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Ints, Mask
 from alphacut.fuzzy.campaign.campaign import Campaign
-from alphacut.fuzzy.plans.cut import Bound, CutSearch, Optimum, cuts_with_width
+from alphacut.fuzzy.plans.cut import MIN_CHANGE, Bound, CutSearch, Optimum, cuts_with_width
 from alphacut.fuzzy.sets.boxes import Domain
 
 SEED = 0  # seed of all samples
@@ -51,6 +53,8 @@ FIRST_STEP = 0.1
 """First step of a careful descent, of the width of the cut: a longer one passes over humps."""
 VALUE_TOLERANCE = 1e-5
 """Of an output's range in the widest cut: values that differ by less count as one."""
+KINK_TOLERANCE = 1e-3
+"""The same where kinks are expected: descents stall along them, and end by 1 % of it."""
 ROUNDING = 1e-9  # the same of an output's size
 MAX_ON_PLATEAUS = 1000
 """Samples on plateaus with which the search of a bound ends: 95 % of uniform ones find a cone
@@ -152,10 +156,17 @@ class BoundSearch:
         return min(self.optima, key=lambda optimum: optimum.value)
 
     @property
+    def explored(self) -> int:
+        """Samples in basins of optima and, with kinks, on plateaus that are known well enough."""
+        are_known = self.has_kinks and self.plateau_samples >= MAX_ON_PLATEAUS
+        return self.samples + self.plateau_samples * are_known
+
+    @property
     def uncovered(self) -> float:
-        """Expected fraction of the cut that is not yet covered by the basins of optima."""
-        plateau_fraction = self.plateau_samples / max(self.samples + self.plateau_samples, 1)
-        return plateau_fraction + uncovered_fraction(self.samples, len(self.optima))
+        """Expected fraction of the cut that is not yet covered by basins and known plateaus."""
+        total = self.samples + self.plateau_samples
+        unknown_fraction = (total - self.explored) / max(total, 1)
+        return unknown_fraction + uncovered_fraction(self.explored, len(self.optima))
 
     @property
     def is_smooth(self) -> bool:
@@ -171,7 +182,7 @@ class BoundSearch:
     @property
     def is_estimate(self) -> bool:
         """Whether the stopping rule is met and the output is smooth at the best optimum."""
-        return self.samples >= MIN_SAMPLES and self.uncovered < MAX_UNCOVERED and self.is_smooth
+        return self.explored >= MIN_SAMPLES and self.uncovered < MAX_UNCOVERED and self.is_smooth
 
     @property
     def is_open(self) -> bool:
@@ -206,7 +217,7 @@ class SingleLinkage:
     def __init__(
         self, campaign: Campaign, domain: Domain, outputs: tuple[str, ...], has_kinks: bool = False
     ) -> None:
-        self.campaign, self.outputs = campaign, outputs
+        self.campaign, self.outputs, self.has_kinks = campaign, outputs, has_kinks
         self.cuts = list(cuts_with_width(campaign, domain))[::-1]
         self.bounds = [Bound(output, sign) for output, sign in product(outputs, (1.0, -1.0))]
         self.states = {
@@ -306,14 +317,15 @@ class SingleLinkage:
 
     def _descend_from(self, cut: CutSearch, bound: Bound, start: Array) -> None:
         """Descend and record the optimum; with a short step again if it left the basin."""
-        optimum = cut.descend(start, bound)
+        least_change = KINK_TOLERANCE / 100 if self.has_kinks else MIN_CHANGE
+        optimum = cut.descend(start, bound, least_change=least_change)
         self._record(optimum)
         step = cut.unit(optimum.point[None])[0] - start
         if np.abs(step).max() > FIRST_STEP:
             line = start + np.array([0.0, *_BETWEEN])[:, None] * step
             values = [*cut.values(line, bound), optimum.value]
             if (np.diff(values) > self._tolerance(bound)).any():
-                self._record(cut.descend(start, bound, FIRST_STEP))
+                self._record(cut.descend(start, bound, FIRST_STEP, least_change=least_change))
 
     def _record(self, optimum: Optimum) -> None:
         """Add an optimum to every cut of which it is one; the better of two equal ones stays."""
@@ -347,7 +359,8 @@ class SingleLinkage:
 
     def _tolerance(self, bound: Bound) -> float:
         values = self._values[bound][np.isfinite(self._values[bound])]
-        return float(VALUE_TOLERANCE * np.ptp(values) + ROUNDING * np.abs(values).max())
+        tolerance = KINK_TOLERANCE if self.has_kinks else VALUE_TOLERANCE
+        return float(tolerance * np.ptp(values) + ROUNDING * np.abs(values).max())
 
     def _rows(self, cut: CutSearch) -> Ints:
         """Return the rows of the samples that are uniform in a cut: its own and of wider cuts."""
