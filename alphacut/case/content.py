@@ -162,6 +162,8 @@ class Content(CellContent):
             allowed = "auto or quasi-monte-carlo where columns yield"
             is_possible = envelope.method in ("auto", "quasi-monte-carlo")
             require(is_possible, "envelope.method", envelope.method, allowed)
+            is_exact, allowed = envelope.integrator != "midpoint", "exact where columns yield"
+            require(is_exact, "envelope.integrator", envelope.integrator, allowed)
         main_study = Study.model_construct(fuzzy=envelope.fuzzy, duration=envelope.duration)
         self._require_study("envelope", main_study, envelope, structure)
         for number, study in enumerate(self.study, start=1):

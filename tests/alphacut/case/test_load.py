@@ -221,6 +221,12 @@ def test_questions_have_sections(tmp_path):
     assert problem.key == "decision.limits"
 
 
+def test_columns_that_yield_refuse_proofs_and_midpoint_steps_by_key():
+    for key, value in (("method", "dual"), ("integrator", "midpoint")):
+        with pytest.raises(BadInput, match=rf"envelope\.{key} is {value}; .* columns yield"):
+            load(ROOT / "cases/yielding.toml", [f"envelope.{key}={value}"])
+
+
 def test_fragility_of_columns_that_yield_is_of_magnitudes_and_has_a_largest_measure():
     changes = ["frame.yield_drift=9 mm", "fragility.most=3"]
     assert load(ROOT / "cases/suite.toml", changes).content.fragility.most == 3

@@ -18,7 +18,7 @@ from alphacut.frame import (
 from alphacut.frame.dynamics import yielding
 from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.questions.peaks import peaks
-from alphacut.fuzzy import Nature, Triangular
+from alphacut.fuzzy import Interval, Nature, Triangular
 from alphacut.fuzzy.refused import RefusedError
 
 MASS, STIFFNESS, YIELD_FORCE = 2.0, 50.0, 3.0
@@ -168,6 +168,10 @@ def test_peaks_are_searched_and_proofs_are_refused(rng):
         assert abs(peak.upper[0] - values.max()) <= peak.error[0] <= 0.02 * peak.upper[0]
         assert abs(peak.lower[0] - values.min()) <= peak.error[0]
         assert peak.error[1] == 0  # of the nominal motion alone
+    stiff = replace(frame, yield_force=[nominal, 1e12])  # hardening2 acts on nothing
+    flat = peaks(envelope(stiff, {"hardening2": Interval(0.1, 0.2)}, **nodes))["drift1"]
+    assert flat.nature is Nature.ESTIMATED
+    assert flat.lower == pytest.approx(flat.upper, rel=1e-12)
     for method in ("proof", "dual", "improved-graph-follower"):
         with pytest.raises(RefusedError, match="auto or quasi-monte-carlo"):
             envelope(frame, inputs, method, **nodes)
