@@ -51,7 +51,8 @@ class Drawn:
             self.proved[0] = max(0.0, self.proved[0])
         limits = rng.choice([*values, *self.proved], LIMITS_OF_PEAK)
         limits += size * rng.normal(size=LIMITS_OF_PEAK) * rng.choice([0.01, 0.3])
-        self.limits = [float(f"{x if side else abs(x):.7g}") for x in limits]
+        # each once: a case refuses a limit that it states twice
+        self.limits = sorted({float(f"{x if side else abs(x):.7g}") for x in limits})
 
     def text(self, limit):
         """The limit as a case has it."""
