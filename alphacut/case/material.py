@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import Discriminator, Field, Tag
+from pydantic import BeforeValidator, Discriminator, Field, Tag
 
 from alphacut.case.types import (
     ALPHA,
@@ -30,6 +30,7 @@ from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.rve.cell.cell import Phase, VoigtPhase
 from alphacut.rve.cell.outline import Ellipse, circle, reach
+from alphacut.rve.image.phases import RIGID
 from alphacut.stochastic import HermiteMap, TruncatedNormal
 from alphacut.stochastic.particles.particles import DISCS, SPHERES, Shape
 
@@ -279,12 +280,11 @@ class RoundCell(Section):
         require(len(missing) != 1, key, None, allowed)
 
 
-# moduli above those of a phase make a cell that is above in the Loewner order, and those below
-LIMIT_PHASE = (
-    "a pore takes 1e-4 of its matrix's modulus, and upper bounds hold for it; "
-    "a rigid phase takes 1e4 times, and lower bounds hold"
-)
-PhaseModulus = Annotated[FuzzyNumber, Quantity("Pa", above=0, fuzzy=True, cure=LIMIT_PHASE)]
+PhaseModulus = Annotated[
+    FuzzyNumber,
+    Quantity("Pa", minimum=0, fuzzy=True, cure='0 of a pore, or "rigid"'),
+    BeforeValidator(lambda value: f"{RIGID} Pa" if value == "rigid" else value),
+]
 
 
 class ImageCell(Section):
@@ -305,7 +305,7 @@ class ImageCell(Section):
     labels: tuple[Annotated[float, Quantity()], ...] | None = None
     """value of each phase in a labelled image, instead of threshold"""
     modulus: tuple[PhaseModulus, ...] = Field(
-        description="Young's modulus of each phase, dark first"
+        description="Young's modulus of each phase, dark first: 0 of a pore, or rigid"
     )
     poisson: OneOrMany[Ratio] = Field(description="Poisson's ratio of each phase")
     loss: OneOrMany[Loss] | None = None
@@ -316,6 +316,17 @@ class ImageCell(Section):
         """E and ν of each phase."""
         ratios = self.poisson * (len(self.modulus) if len(self.poisson) == 1 else 1)
         return tuple(zip(self.modulus, ratios, strict=True))
+
+    @property
+    def has_both_bounds(self) -> bool:
+        """Whether E has a lower and an upper bound: no phase may be a pore or rigid."""
+        return all(self._is_solid)
+
+    @property
+    def _is_solid(self) -> list[bool]:
+        """Whether each phase is neither a pore nor rigid, throughout its support."""
+        supports = [young.support for young in self.modulus]
+        return [support.lower > 0 and support.upper < RIGID for support in supports]
 
     @property
     def losses(self) -> tuple[FuzzyNumber, ...]:
@@ -333,6 +344,11 @@ class ImageCell(Section):
         for key, fitting in counts.items():
             n_values, allowed = len(getattr(self, key) or ()), f"one for each of {n_phases} phases"
             require(n_values in fitting, f"cell.{key}", f"{n_values} values", allowed)
+        allowed = "a phase that is neither a pore nor rigid"
+        require(any(self._is_solid), "cell.modulus", "none between 0 and rigid", allowed)
+        fits, allowed = self.has_both_bounds or not self.loss, "none beside a pore or a rigid phase"
+        cure = "pores in one material leave its loss factor; else take a small modulus for pores"
+        require(fits, "cell.loss", "there", allowed, cure)
         value = "beside cell.voxel" if self.pixel else None
         has_one = bool(self.pixel) != bool(self.voxel)
         require(has_one, "cell.pixel", value, "one of cell.pixel and cell.voxel")

@@ -61,7 +61,7 @@ def run_text(parts: Parts) -> str:
 
 def cut_text(cuts: CutsResult, level: int, nature: Nature, error: float = 0.0) -> str:
     """Text of one cut of a quantity with five digits; guaranteed ends contain the error."""
-    low, high = cuts[level]
+    low, high = (float(end[level]) for end in cuts.ends)
     if nature is Nature.GUARANTEED:
         low, high = max(low - error, min(low, 0.0)), high + error  # the error makes no sign
     return range_text(low, high, nature, 5)
@@ -125,7 +125,11 @@ def without_empty_columns(head: Row, rows: list[Row]) -> Table:
 
 
 def width_text(image: ImageResult) -> str:
-    """Width of E at the lowest level by what it comes from."""
+    """Width of E at the lowest level by what it comes from, or which bound it has not."""
+    if not image.lower_GPa.any():
+        return "No lower bound of the stiffness but 0: phases may be pores"
+    if not np.isfinite(image.upper_GPa).all():
+        return "No upper bound of the stiffness: phases may be rigid"
     parts = (f"{source} {width:.3g} GPa" for source, width in image.widths_GPa.items())
     return f"Width of E from {', '.join(parts)}"
 

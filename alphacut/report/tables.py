@@ -70,7 +70,8 @@ def radius_map(numbers: Document) -> pd.DataFrame:
 def modulus(result: ModulusResult | ImageResult) -> pd.DataFrame:
     """The α-cuts of E, and of a cell those of ν and the error of E."""
     young = result.E_GPa
-    columns = {"α": result.alpha, "E from [GPa]": young.lower, "E to [GPa]": young.upper}
+    lower, upper = young.ends
+    columns = {"α": result.alpha, "E from [GPa]": lower, "E to [GPa]": upper}
     if isinstance(result, ModulusResult):
         error = sum(result.error.values())
         columns |= {"ν from": result.nu_cuts.lower, "ν to": result.nu_cuts.upper}

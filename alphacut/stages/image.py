@@ -68,15 +68,15 @@ class ImageResult(Numbers):
     (3, 3) of the plane or (6, 6) of space, `nu` and `shear_GPa` those of its average. As α-cuts
     `plane` has the constants along the axes by definition and name, `proved_losses` loss factors
     at nominal moduli to first order, `loss` estimates beside them of an image; `widths_GPa` has the
-    widths of E by cause.
+    widths of E by cause. Bounds that pores or rigid phases leave unknown are null.
     """
 
     alpha: Values
     E_GPa: CutsResult
     lower_GPa: Values
     upper_GPa: Values
-    nu: dict[str, float]
-    shear_GPa: dict[str, float]
+    nu: dict[str, float | None]
+    shear_GPa: dict[str, float | None]
     average: str
     plane: dict[str, dict[str, CutsResult]]
     nature: Nature
@@ -124,12 +124,14 @@ def compute_cuts(
         (cut,) = model.cuts([study.images(threshold, phases)], (nominal, crisp))
         return float(cut.modulus[1] - cut.modulus[0])
 
-    base, lowest = width(None, None), alpha[0]
-    widths = {"discretisation": base}
-    if study.fuzzy_threshold:
-        widths["threshold"] = max(0.0, width(lowest, None) - base)
-    if any(number.support.width > 0 for pair in cell.pairs for number in pair):
-        widths["phases"] = max(0.0, width(None, lowest) - base)
+    widths = dict[str, float]()
+    if cell.has_both_bounds:
+        base, lowest = width(None, None), alpha[0]
+        widths["discretisation"] = base
+        if study.fuzzy_threshold:
+            widths["threshold"] = max(0.0, width(lowest, None) - base)
+        if any(number.support.width > 0 for pair in cell.pairs for number in pair):
+            widths["phases"] = max(0.0, width(None, lowest) - base)
     phase = study.phase_ranges(None)[0]
     proved, estimates = dict[str, Array](), None
     if cell.losses:
@@ -149,10 +151,12 @@ def compute_cuts(
             estimates = LossResult.of(by_name, errors, Nature.ESTIMATED)
     top, constants = cuts[-1], np.array([cut.constants for cut in cuts])  # (levels, constants, 2)
     fractions, names = study.fractions, CONSTANT_NAMES[cell.dimension]
-    shares_of_phases = np.array([*fractions.values()])
-    phases = [Phase(young.nominal, nu.nominal) for young, nu in cell.pairs]
-    is_space = cell.dimension == 3
-    classical = isotropic_bounds(shares_of_phases, phases, space=is_space)
+    is_space, references = cell.dimension == 3, References()
+    if cell.has_both_bounds:
+        shares_of_phases = np.array([*fractions.values()])
+        phases = [Phase(young.nominal, nu.nominal) for young, nu in cell.pairs]
+        classical = isotropic_bounds(shares_of_phases, phases, space=is_space)
+        references = {"hashin_shtrikman_E_GPa": classical}
     along_axes = dict(map(constant_cuts, names, np.moveaxis(constants, 1, 0)))
     result = ImageResult(
         alpha=np.array(alpha),
@@ -168,7 +172,7 @@ def compute_cuts(
         widths_GPa={x: widths[x] / GPA for x in sorted(widths, key=lambda x: -widths[x])},
         fractions=fractions,
         division=model.division,
-        references={"hashin_shtrikman_E_GPa": classical},
+        references=references,
         loss=estimates,
         proved_losses={name: CutsResult.of(cut) for name, cut in proved.items()},
     )
@@ -178,7 +182,7 @@ def compute_cuts(
 def _require_isotropic(widest: ImageCut) -> None:
     """Refuses E and ν of an image for which the bounds do not tell that E is positive."""
     low, high = (end / GPA for end in widest.modulus)
-    if low <= 0:
+    if low <= 0 and np.isfinite(widest.bounds.width):  # pores and rigid phases have no better
         ends = [(float(x), float(y)) for x, y in widest.constants / GPA]
         along = zip("xyz"[: widest.bounds.dimension], ends, strict=False)
         along_axes = ", ".join(f"E_{name} {x:.4g} … {y:.4g} GPa" for name, (x, y) in along)

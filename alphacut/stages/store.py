@@ -77,6 +77,12 @@ class CutsResult(Numbers):
         lower, upper = np.moveaxis(np.asarray(bounds, float), -1, 0)
         return cls(lower=lower, upper=upper)
 
+    @property
+    def ends(self) -> tuple[Array, Array]:
+        """Lower and upper bounds, infinite where there is none."""
+        lower = np.where(np.isnan(self.lower), -np.inf, self.lower)
+        return lower, np.where(np.isnan(self.upper), np.inf, self.upper)
+
     def __getitem__(self, level: int) -> tuple[float, float]:
         """Both ends on a level."""
         return float(self.lower[level]), float(self.upper[level])

@@ -26,6 +26,8 @@ REUSS = np.array([_NORMAL, ((6 * _UNIT - 2) * _NORMAL + _SHEAR) / 15])
 class StiffnessBounds:
     """Lower ≤ C ≤ upper as quadratic forms of the mean strain, in Voigt order, in Pa.
 
+    Of pores the lower one is 0, of rigid phases the upper one has an infinite diagonal.
+
     Of the plane, (3, 3), with 2 ε12, or of space, (6, 6), with shears 23, 13, 12 and 2 ε. Moduli
     that are such forms are bounded by those of the ends, and with them whatever rises in each of
     them: in the plane C11 + C12, C11 − C12 and C33 of the square part; in space K and G of Voigt's
@@ -40,9 +42,37 @@ class StiffnessBounds:
         """2 in the plane, 3 in space."""
         return 2 if len(self.lower) == 3 else 3
 
+    @classmethod
+    def of_sides(cls, lower: Array | None, upper: Array | None, dimension: int) -> StiffnessBounds:
+        """Bounds from those that there are."""
+        size = dimension + len(SHEARS[dimension])
+        lower = np.zeros((size, size)) if lower is None else lower
+        return cls(lower, np.diag(np.full(size, np.inf)) if upper is None else upper)
+
+    @property
+    def has_lower(self) -> bool:
+        """Whether the cell is known to resist."""
+        return bool(self.lower.any())
+
+    @property
+    def has_upper(self) -> bool:
+        """Whether the cell is known to yield."""
+        return bool(np.isfinite(self.upper).all())
+
+    @property
+    def _compliance(self) -> tuple[Array, Array]:
+        """Lower and upper bound of the compliance: 0 without an upper bound of the stiffness."""
+        infinite = np.full_like(self.lower, np.inf)
+        return (
+            inverse_below(self.upper) if self.has_upper else np.zeros_like(self.upper),
+            inverse_above(self.lower) if self.has_lower else infinite,
+        )
+
     @property
     def width(self) -> float:
         """Largest ratio of the upper to the lower energy over all strains, minus one."""
+        if not (self.has_lower and self.has_upper):
+            return float("inf")
         return float(eigh(self.upper, self.lower, eigvals_only=True)[-1] - 1)
 
     @property
@@ -51,29 +81,38 @@ class StiffnessBounds:
         if self.dimension == 3:
             return self._hill(0)
         low, high = (float(square_moduli(end)[0]) / 2 for end in (self.lower, self.upper))
-        return low - 2 * self._rounding, high + 2 * self._rounding
+        return low - 2 * _rounding(self.lower), high + 2 * _rounding(self.upper)
 
     def shear(self, average: str = AXES) -> Interval:
         """Bounds of the shear modulus of an average, in Pa: of space's, whatever the name."""
         if self.dimension == 3:
             return self._hill(1)
         ends = (square_moduli(end) for end in (self.lower, self.upper))
-        low, high = (float(shear_modulus(moduli, average)) for moduli in ends)
-        slack = 0.0 if average == AXES else 4 * self._rounding
-        return low - slack, high + slack
+        with np.errstate(divide="ignore"):  # a mean of 0, of infinity
+            low, high = (float(shear_modulus(moduli, average)) for moduli in ends)
+        if average == AXES:
+            return low, high
+        return low - 4 * _rounding(self.lower), high + 4 * _rounding(self.upper)
 
     def young(self, average: str = AXES) -> Interval:
         """Lower and upper bound of Young's modulus of an average, in Pa.
 
         E = G (3 − x) with x = G/(K + G/3), where the plane's K is K + G/3 already.
         """
-        # E rises with K; of the plane it rises with G up to G = 3/2 K and falls beyond
+        # E rises with K, in space with G; of the plane it rises up to G = 3/2 K and falls beyond
         (min_shear, max_shear), (min_bulk, max_bulk) = self.shear(average), self.bulk
         shears = np.array([min_shear, np.clip(1.5 * max_bulk, min_shear, max_shear), max_shear])
         low_ratios, high_ratios = (self._ratios(shears, bulk) for bulk in (min_bulk, max_bulk))
-        low = shears * (3 - low_ratios) - 8 * UNIT * shears * (3 + low_ratios)
-        high = shears * (3 - high_ratios) + 8 * UNIT * shears * (3 + high_ratios)
-        return float(low.min()), float(high.max())
+        with np.errstate(invalid="ignore"):  # without a bound
+            low = shears * (3 - low_ratios) - 8 * UNIT * shears * (3 + low_ratios)
+            high = shears * (3 - high_ratios) + 8 * UNIT * shears * (3 + high_ratios)
+        unknown = -np.inf  # of the plane E may fall below 0
+        if self.dimension == 3:
+            low, high, unknown = low[:1], high[-1:], 0.0
+        return (
+            float(low.min()) if self.has_lower else unknown,
+            float(high.max()) if self.has_upper else np.inf,
+        )
 
     def poisson(self, average: str = AXES) -> Interval:
         """Lower and upper bound of Poisson's ratio (1 − x)/2 of an average, x as of `young`."""
@@ -83,8 +122,10 @@ class StiffnessBounds:
         return float(low), float((1 - min_ratio) / 2 + 4 * UNIT * (1 + min_ratio))
 
     def _ratios(self, shear: Array | float, bulk: float) -> Array:
-        """G/(K + G/3) within 3 rounding units."""
-        return np.asarray(shear / (bulk if self.dimension == 2 else bulk + np.asarray(shear) / 3))
+        """G/(K + G/3) within 3 rounding units; K of the plane is K + G/3 already."""
+        with np.errstate(divide="ignore", invalid="ignore"):  # of 0 and infinity
+            bulk_ratio = bulk / np.asarray(shear)
+            return np.asarray(1 / (bulk_ratio if self.dimension == 2 else bulk_ratio + 1 / 3))
 
     def constants(self) -> Array:
         """Bounds of engineering constants along the axes, in Pa, shape (constants, 2).
@@ -92,15 +133,19 @@ class StiffnessBounds:
         E_x, E_y, ν_xy and G_xy in plane strain; in space E_x, E_y, E_z, ν_yz, ν_xz, ν_xy, G_yz,
         G_xz and G_xy. Moduli are 1/S_kk of the compliance S, ratios −S_ij/S_ii.
         """
-        low, high = inverse_below(self.upper), inverse_above(self.lower)
+        low, high = self._compliance
         slack, n = 4 * UNIT, self.dimension
-        diagonal = np.diagonal(high), np.diagonal(low)
-        moduli = np.stack([(1 - slack) / diagonal[0], (1 + slack) / diagonal[1]], axis=-1)
+        with np.errstate(divide="ignore"):
+            moduli = (1 + slack * np.array([-1, 1])) / np.stack(
+                [np.diagonal(high), np.diagonal(low)], axis=-1
+            )
         ratios = [self._ratio(low, high, i, j) for i, j in SHEARS[n]]
         return np.array([*moduli[:n], *ratios, *moduli[n:]])
 
     def _ratio(self, low: Array, high: Array, i: int, j: int) -> Interval:
         """Bounds of −S_ij/S_ii from those of S."""
+        if not (self.has_lower and self.has_upper):
+            return -np.inf, np.inf
         # |x · (S − middle) y| ≤ √(x · D x) √(y · D y)/2 with D = high − low
         middle, slack = (low[i, j] + high[i, j]) / 2, 4 * UNIT
         variances = np.maximum(np.diagonal(high - low)[[i, j]], 0)
@@ -112,11 +157,14 @@ class StiffnessBounds:
 
     def _hill(self, modulus: int) -> Interval:
         """Bounds of K (0) or G (1) of Hill's average of a stiffness of space."""
-        bounds = []
+        bounds, (min_compliance, max_compliance) = [], self._compliance
         for stiffness, compliance, sign in (
-            (self.lower, inverse_above(self.lower), -1),
-            (self.upper, inverse_below(self.upper), 1),
+            (self.lower, max_compliance, -1),
+            (self.upper, min_compliance, 1),
         ):
+            if not np.isfinite(stiffness).all() or not stiffness.any():
+                bounds.append(float(stiffness[0, 0]))
+                continue
             voigt = VOIGT[modulus] * stiffness
             reuss = REUSS[modulus] * compliance
             rounding = 64 * UNIT * (abs(voigt).sum() + abs(reuss).sum() / reuss.sum() ** 2)
@@ -128,9 +176,9 @@ class StiffnessBounds:
         ends = stiffness - self.lower, self.upper - stiffness
         return all(bool(np.linalg.eigvalsh(end)[0] >= 0) for end in ends)
 
-    @property
-    def _rounding(self) -> float:
-        return UNIT * float(np.abs(self.upper).max())
+
+def _rounding(stiffness: Array) -> float:
+    return UNIT * float(np.abs(stiffness).max())
 
 
 def inverse_below(matrix: Array) -> Array:

@@ -113,9 +113,11 @@ class ImageModel:
                 is_stopped.set()
                 raise
 
-        def solve(end: int, guess: SideSolution | None) -> SideSolution:
+        def solve(end: int, guess: SideSolution | None) -> SideSolution | None:
             """Fields of least energy with the least (end 0) or greatest (end 1) moduli."""
-            moduli = images.bulk[end], images.shear[end]
+            moduli = images.moduli_of_fields(end)
+            if moduli is None:
+                return None
             return self.solve_side(end, *moduli, guess, raise_if_stopped)
 
         guesses = (None, None) if start is None else (start.lower, start.upper)
@@ -124,7 +126,11 @@ class ImageModel:
                 lower, upper = pool.map(solve, (0, 1), guesses)
             finally:  # Ctrl-C and errors are not to wait for the other side
                 is_stopped.set()
-        bounds = StiffnessBounds(inverse_below(lower.energy.upper), upper.energy.upper)
+        bounds = StiffnessBounds.of_sides(
+            None if lower is None else inverse_below(lower.energy.upper),
+            None if upper is None else upper.energy.upper,
+            dimension=len(shape),
+        )
         return ImageSolution(bounds, upper, lower)
 
     def solve_side(
@@ -207,43 +213,49 @@ def usual_division(images: ModuliImages) -> int:
 
     One of a voxel, since two take eight times as long and narrow the bounds by half.
     """
-    contrast = max(float(upper.max() / lower.min()) for lower, upper in (images.bulk, images.shear))
+    with np.errstate(divide="ignore"):  # of pores
+        contrast = max(
+            float(upper.max() / lower.min()) for lower, upper in (images.bulk, images.shear)
+        )
     is_small = images.bulk[0].ndim == 2 and images.bulk[0].size <= LARGE
     return 2 if contrast <= MILD and is_small else 1
 
 
 @dataclass(frozen=True, eq=False)
 class ImageSolution:
-    """Bounds of the stiffness, and displacements (upper) and stresses (lower) that prove them."""
+    """Bounds of the stiffness, and displacements (upper) and stresses (lower) that prove them.
+
+    None for displacements where a phase is rigid, for stresses where one is a pore.
+    """
 
     bounds: StiffnessBounds
-    upper: SideSolution
-    lower: SideSolution
+    upper: SideSolution | None
+    lower: SideSolution | None
 
 
 def solve_image(bulk: Array, shear: Array, **settings: Any) -> ImageSolution:
     """Proved bounds of a periodic image of pixels or voxels.
 
     Args:
-        bulk: Bulk modulus in Pa, positive, shape (y, x) with that of plane strain, K + G/3, or
-            (z, y, x).
-        shear: Shear modulus in Pa, positive, same shape.
+        bulk: Bulk modulus in Pa, 0 in pores, infinite where rigid, shape (y, x) with that of plane
+            strain, K + G/3, or (z, y, x).
+        shear: Shear modulus in Pa, same shape.
         settings: Those of `ImageModel`.
 
     Returns:
         Its `bounds` have the methods `young`, `poisson`, `shear` and `constants`.
 
     Raises:
-        RefusedError: The arrays are not alike, or hold other than positive numbers.
+        RefusedError: The arrays are not alike, or hold negative numbers or none but 0 and infinity.
     """
     bulk, shear = (np.asarray(x, float) for x in (bulk, shear))  # the proof is of doubles
     allowed = "two arrays of one shape (y, x) or (z, y, x)"
     require(bulk.shape == shear.shape, "moduli", f"of shapes {bulk.shape}, {shear.shape}", allowed)
     require(bulk.ndim in (2, 3), "moduli", f"of shape {bulk.shape}", allowed)
-    is_positive = all(bool(((x > 0) & np.isfinite(x)).all()) for x in (bulk, shear))
-    cure = "give pores a small modulus, the upper bound holds for them; rigid phases a large one,"
-    cure += " the lower bound holds"
-    require(is_positive, "moduli", "0, negative or not finite", "positive numbers", cure)
+    for values in (bulk, shear):
+        require(bool((values >= 0).all()), "moduli", "negative or nan", "numbers from 0")
+        is_solid = bool(((values > 0) & np.isfinite(values)).any())
+        require(is_solid, "moduli", "0 or infinite throughout", "a material with both bounds")
     settings = {"sides": (1.0,) * bulk.ndim, **settings}
     return ImageModel(**settings).solve(ModuliImages((bulk, bulk), (shear, shear)))
 
@@ -263,6 +275,8 @@ def phase_energies(
         phase: Number of the phase of each pixel, shape (y, x).
         count: Number of phases.
     """
+    assert solution.lower is not None
+    assert solution.upper is not None
     stress_energies, strain_energies = (
         energy_parts(element, side, images, phase, count)
         for element, side in zip(model.elements, (solution.lower, solution.upper), strict=True)

@@ -7,6 +7,7 @@ these may have, has a stiffness below every possible one.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations_with_replacement, pairwise
@@ -17,6 +18,10 @@ from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.fuzzy.refused import RefusedError
 
 MIN_MODULUS, MAX_MODULUS = 1e-60, 1e60  # Pa; products of four moduli must be numbers
+RIGID = 1e18  # Young's modulus in Pa from which on a phase is taken as rigid
+PORE_RATIO, RIGID_RATIO = 1e-6, 1e4
+"""Moduli that fields take for a pore and a rigid phase, over the least and the greatest of others:
+more for rigid ones takes a multiple of the iterations, which for pores grow by the logarithm."""
 NU_AT_LEAST_BULK = -0.25  # Poisson's ratio of the least plane-strain bulk modulus at a fixed E
 
 
@@ -25,8 +30,8 @@ class PhaseModuli:
     """Moduli of an isotropic material, in plane strain or in space.
 
     Args:
-        bulk: Bulk modulus in Pa, from `MIN_MODULUS` to `MAX_MODULUS`: of plane strain K + G/3, K
-            being that of space.
+        bulk: Bulk modulus in Pa, from `MIN_MODULUS` to `MAX_MODULUS`, 0 of a pore or infinite of a
+            rigid phase: of plane strain K + G/3, K being that of space.
         shear: Shear modulus G, in Pa, of the same range.
 
     Raises:
@@ -39,15 +44,19 @@ class PhaseModuli:
     def __post_init__(self) -> None:
         """Refuse moduli outside (`MIN_MODULUS`, `MAX_MODULUS`)."""
         for name, value in (("bulk", self.bulk), ("shear", self.shear)):
-            if not MIN_MODULUS < value < MAX_MODULUS:
+            if value not in (0.0, math.inf) and not MIN_MODULUS < value < MAX_MODULUS:
                 allowed = f"values in ({MIN_MODULUS:g}, {MAX_MODULUS:g}) Pa"
                 raise RefusedError(f"{name} modulus of a phase", f"{value:g} Pa", allowed)
 
     @classmethod
     def of_young(cls, modulus: float, poisson: float, dimension: int = 2) -> PhaseModuli:
-        """From Young's modulus in Pa and Poisson's ratio, inside (−1, 0.5); 2 is plane strain."""
+        """From Young's modulus in Pa and Poisson's ratio, inside (−1, 0.5); 2 is plane strain.
+
+        A modulus from `RIGID` on is infinite.
+        """
         if not -1 < poisson < 0.5:
             raise RefusedError("Poisson's ratio of a phase", poisson, "values in (-1, 0.5)")
+        modulus = math.inf if modulus >= RIGID else modulus
         shear = modulus / (2 * (1 + poisson))
         bulk = modulus / (3 * (1 - 2 * poisson))
         return cls(bulk + shear / 3 if dimension == 2 else bulk, shear)
@@ -91,8 +100,27 @@ class ModuliImages:
     @property
     def geometric_mean(self) -> ModuliImages:
         """Image of the geometric means of the least and the greatest moduli."""
-        bulk, shear = (np.sqrt(low * high) for low, high in (self.bulk, self.shear))
+        with np.errstate(invalid="ignore"):  # 0 times infinity, which is taken as 0
+            bulk, shear = (
+                np.where(low > 0, np.sqrt(low * high), 0) for low, high in (self.bulk, self.shear)
+            )
         return ModuliImages((bulk, bulk), (shear, shear))
+
+    def moduli_of_fields(self, end: int) -> tuple[Array, Array] | None:
+        """Bulk and shear moduli for stresses (end 0) or displacements (1); None if none bounds.
+
+        Pores leave no stress to bound from below, rigid phases no displacement from above. The
+        other bound holds with a pore a little too stiff, and a rigid phase too soft, since stiffer
+        phases make a stiffer cell.
+        """
+        moduli = self.bulk[end], self.shear[end]
+        if any(np.any(np.isinf(x) if end else x == 0) for x in moduli):
+            return None
+        limited = []
+        for values in moduli:
+            others = values[(values > 0) & np.isfinite(values)]
+            limited.append(np.clip(values, PORE_RATIO * others.min(), RIGID_RATIO * others.max()))
+        return limited[0], limited[1]
 
     def equals(self, images: ModuliImages) -> bool:
         """True if both are the same moduli everywhere."""

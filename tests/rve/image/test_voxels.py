@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.linalg import eigh
 from scipy.sparse import coo_array
 from scipy.sparse.linalg import splu
 
@@ -183,6 +184,35 @@ def test_the_series_of_spheres_is_between_the_voxels_inside_and_those_touched(co
         assert bounds.contains(exact)
         widths.append(bounds.width)
     assert widths[1] < 0.65 * widths[0]  # of order 1 in the voxel's side
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_pores_are_bounded_from_above_and_rigid_phases_from_below(dimension, rng):
+    (_, moduli), phase = voxels(rng, (3, 4, 4), contrast=3.0), np.ones((3, 4, 4), int)
+    phase[1, 1:3, 1:3] = 0
+    phase = phase if dimension == 3 else phase[1:2]
+    soft, hard = (finite_elements(*(moduli * [r, 1])[:, phase], (1.0,) * 3, 2) for r in (1e-9, 1e9))
+    plane = np.ix_([0, 1, 5], [0, 1, 5])
+    if dimension == 2:
+        phase, soft, hard = phase[0], soft[plane], hard[plane]
+        moduli = np.array([moduli[0] + moduli[1] / 3, moduli[1]])
+    pore, limit, rigid, near = (
+        solve_image(*(moduli * [r, 1])[:, phase]).bounds for r in (0, 1e-4, np.inf, 1e3)
+    )
+    if dimension == 3:  # elements of the plane are not nested in finer ones of degree 1
+        assert eigh(soft, pore.upper, eigvals_only=True)[-1] <= 1
+    between = eigh(pore.upper, limit.upper, eigvals_only=True)
+    assert 0.97 < between[0] <= between[-1] <= 1 + 1e-5
+    assert eigh(rigid.lower, hard, eigvals_only=True)[-1] <= 1
+    assert eigh(rigid.lower, near.lower, eigvals_only=True)[0] >= 1 - 1e-5
+    assert not pore.lower.any()
+    for bounds, side in ((pore, 0), (rigid, 1)):
+        unknown = bounds.constants()[[0, dimension, -1], side]  # of E, ν and G
+        assert np.array_equal(unknown, [[0, -np.inf, 0], [np.inf] * 3][side])
+        for modulus in (bounds.bulk, bounds.shear(), *bounds.constants()[:dimension]):
+            assert np.isfinite(modulus[1 - side])
+            assert modulus[side] == [0, np.inf][side]
+        assert not (bounds.young()[0] > 0 and side == 0)
 
 
 @pytest.mark.parametrize("stress", [False, True], ids=["displacement", "stress"])
@@ -370,8 +400,8 @@ def test_a_device_that_is_not_there_is_one_line():
     [
         (np.ones((2, 2, 2)), np.ones((2, 2, 3)), {}, "shapes"),
         (np.ones(3), np.ones(3), {}, "shape"),
-        (np.zeros((2, 2, 2)), np.ones((2, 2, 2)), {}, "positive"),
-        (np.full((2, 2), np.nan), np.ones((2, 2)), {}, "positive"),
+        (np.zeros((2, 2, 2)), np.ones((2, 2, 2)), {}, "throughout"),
+        (np.full((2, 2), np.nan), np.ones((2, 2)), {}, "negative or nan"),
         (np.ones((2, 2, 2)), np.ones((2, 2, 2)), {"sides": (1.0, 1.0)}, "sides"),
         (np.ones((2, 2)), np.ones((2, 2)), {"division": 0}, "division"),
     ],
