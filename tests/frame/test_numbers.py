@@ -7,10 +7,9 @@ import pytest
 
 from alphacut.frame import Accelerogram, DualProof, Proof, StoreyFrame, envelope, numbers
 from alphacut.frame.bounds import branch_and_bound
-from alphacut.frame.dynamics.flow import LinearFlow
-from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.methods import proof
 from alphacut.fuzzy import Interval
+from tests.frame.motions import exact_motions, random_points, require_inside
 
 RECORD = Accelerogram(0.05, 2 * np.sin(np.arange(30) * 0.9) * np.sin(np.arange(30) * 0.2))
 FRAME = StoreyFrame(
@@ -26,15 +25,6 @@ READERS = [
 ]
 
 
-def exact(inputs):
-    """Exact motions of the corners and of points of the box, shape (S, T)."""
-    low, high = np.array([number.support for number in inputs.values()]).T
-    unit = np.random.default_rng(5).random((200, len(low)))
-    unit[::2] = unit[::2].round()
-    flow = LinearFlow(FRAME, tuple(inputs), 0.8, 0.05, Exact())
-    return flow.values(low + unit * (high - low))[..., 0]
-
-
 @pytest.mark.parametrize("factor", [0.5, 2])
 @pytest.mark.parametrize("name", TUNED)
 def test_bounds_hold_with_half_and_twice_a_number(name, factor, monkeypatch):
@@ -42,9 +32,8 @@ def test_bounds_hold_with_half_and_twice_a_number(name, factor, monkeypatch):
     monkeypatch.setattr(numbers, name, type(value)(value * factor))
     inputs = NARROW if is_of_proof else INPUTS
     found = envelope(FRAME, inputs, Proof(workers=1) if is_of_proof else DUAL, **MOTION)
-    motions = exact(inputs)
-    peak = np.abs(motions).max()
-    assert (motions <= found.upper[0, :, 0] + 1e-9 * peak).all()
-    assert (motions >= found.lower[0, :, 0] - 1e-9 * peak).all()
+    points = random_points(inputs, 200, np.random.default_rng(5))
+    motions = exact_motions(FRAME, points, inputs, 0.8, 0.05)
+    require_inside(motions, found, slack=1e-9)
     assert np.abs(motions).max(1).min() >= found.least_peaks.lower[0, 0]
     assert found.facts["gap_of_peaks"] < 0.2  # and are worth something

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from alphacut.frame import Accelerogram, DualProof, Force, Proof, StoreyFrame, envelope
-from alphacut.frame.dynamics.flow import LinearFlow
-from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.structures.loads import History
 from alphacut.fuzzy import Triangular
+from tests.frame.motions import exact_motions, random_points
 
 FLOORS, PARTS = 4, 20
 NOISE = np.random.default_rng(800900).normal(size=300)
@@ -36,14 +35,12 @@ def test_between_is_at_most_three_times_the_true_straying(proof, load, periods):
     )
     step = periods * SHORTEST_PERIOD
     steps = int(1.5 / step)
-    unit = np.random.default_rng(1).random((24, 2))
-    unit[::2] = unit[::2].round()
-    flow = LinearFlow(frame, tuple(CENTRE), steps * step, step / PARTS, Exact())
-    values = flow.values(np.array([*CENTRE.values()]) * (0.97 + 0.06 * unit))
+    inputs = {name: Triangular(0.97 * value, value, 1.03 * value) for name, value in CENTRE.items()}
+    points = random_points(inputs, 24, np.random.default_rng(1))
+    values = exact_motions(frame, points, inputs, steps * step, step / PARTS)
     nodes, x = values[:, ::PARTS, None], np.arange(PARTS)[:, None] / PARTS
     chord = (1 - x) * nodes[:, :-1] + x * nodes[:, 1:]
     off = np.abs(values[:, :-1].reshape(chord.shape) - chord).max((0, 2))
-    inputs = {name: Triangular(0.97 * value, value, 1.03 * value) for name, value in CENTRE.items()}
     given = {"duration": steps * step, "step": step, "alpha": (0,), "progress": False}
     between = envelope(frame, inputs, proof, **given).between
     assert (off <= between[1:] * (1 + 1e-9)).all()

@@ -7,13 +7,12 @@ from alphacut.frame import StoreyFrame, envelope
 from alphacut.frame.bounds import dual_function as kernel
 from alphacut.frame.bounds.box import Box
 from alphacut.frame.bounds.level import OutputBounds
-from alphacut.frame.dynamics.flow import LinearFlow
-from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.methods.dual import DualProof
 from alphacut.frame.structures.loads import Accelerogram
 from alphacut.frame.structures.matrix import MatrixStructure
 from alphacut.fuzzy import Triangular
 from alphacut.fuzzy.result import Nature
+from tests.frame.motions import exact_motions, random_points, require_inside
 
 
 def record(seconds=6.0, step=0.02, seed=1):
@@ -114,30 +113,19 @@ CASES = {
 }
 
 
-def points(found, level, rng, count=300):
-    """Corners and points of a level's box, shape (S, d)."""
-    ends = np.array([number.cut(found.alpha[level]) for number in found.inputs.values()])
-    d = len(ends)
-    unit = np.vstack([rng.integers(0, 2, (count, d)), rng.uniform(0, 1, (count, d))])
-    return ends[:, 0] + unit * (ends[:, 1] - ends[:, 0])
-
-
 @pytest.fixture(scope="module", params=list(CASES))
 def case(request):
     model, fuzzy = CASES[request.param]
-    found = envelope(
-        model, fuzzy, duration=3.0, step=0.05, alpha=(0, 1), method=DualProof(), progress=False
-    )
-    return found, LinearFlow(model, list(fuzzy), 3.0, 0.05, Exact())
+    given = {"duration": 3.0, "step": 0.05, "alpha": (0, 1), "progress": False}
+    return model, envelope(model, fuzzy, method=DualProof(), **given)
 
 
 def test_no_exact_motion_leaves_a_bound_and_peaks_have_small_gaps(case, rng):
-    found, flow = case
-    for level in range(len(found.alpha)):
-        values = flow.values(points(found, level, rng))
-        slack = 1e-9 * np.abs(values).max((0, 1))
-        assert (values.max(0) <= found.upper[level] + slack).all()
-        assert (values.min(0) >= found.lower[level] - slack).all()
+    model, found = case
+    for level, alpha in enumerate(found.alpha):
+        points = random_points(found.inputs, 600, rng, alpha)
+        motions = exact_motions(model, points, found.inputs, 3.0, 0.05)
+        require_inside(motions, found, level, slack=1e-9)
     assert found.nature == Nature.GUARANTEED
     assert found.facts["gap_of_peaks"] < 0.06
     assert (np.nanmedian(found.error[1], 0) <= 0.08 * np.abs(found.upper[1]).max(0)).all()
@@ -155,7 +143,7 @@ def test_any_multipliers_bound_any_motion(rng):
     time = np.arange(0, 4.01, 0.5)
     level, centre, radius = level_of(model, fuzzy, time)
     unit = rng.uniform(-1, 1, (200, 7)).round(rng.integers(0, 2))
-    values = LinearFlow(model, list(fuzzy), 4.0, 0.5, Exact()).values(centre + radius * unit)
+    values = exact_motions(model, centre + radius * unit, fuzzy, 4.0, 0.5)
     for o in range(len(level.structure.order)):
         for s, side in enumerate((-1.0, 1.0)):
             problem = OutputBounds.initial(level, o, s, 1.0)

@@ -5,10 +5,9 @@ import pytest
 
 from alphacut.frame import DualProof, Proof, StoreyFrame, envelope
 from alphacut.frame.bounds.box import Box
-from alphacut.frame.dynamics.flow import LinearFlow
-from alphacut.frame.dynamics.integrators import Exact
 from alphacut.fuzzy import Interval, Triangular
 from tests.frame.bounds.test_dual_proof import each_storey, record, storeys
+from tests.frame.motions import exact_motions, random_points
 
 MODEL = storeys(3, damping_ratio=0.03, ground=record(), outputs=("q3", "drift1"))
 FUZZY = each_storey(3) | {"zeta": Triangular(0.02, 0.03, 0.04)}
@@ -22,11 +21,8 @@ def found():
 
 def lowest(rng, alpha, count=3000):
     """Smallest peaks of random motions of a cut, (m,)."""
-    low, high = np.array([number.cut(alpha) for number in FUZZY.values()]).T
-    unit = rng.random((count, len(low)))
-    unit[::2] = unit[::2].round()
-    values = LinearFlow(MODEL, tuple(FUZZY), 4.0, 0.05, Exact()).values(low + unit * (high - low))
-    return np.abs(values).max(1).min(0)
+    points = random_points(FUZZY, count, rng, alpha)
+    return np.abs(exact_motions(MODEL, points, FUZZY, 4.0, 0.05)).max(1).min(0)
 
 
 def test_no_motion_peaks_lower(found, rng):
@@ -43,7 +39,7 @@ def test_the_peak_of_a_motion_holds_between_nodes(rng):
     unit = rng.uniform(-1, 1, len(low))
     box = Box(MODEL, tuple(FUZZY), np.linspace(0.0, 4.0, 81), low, high)
     bound = box.peak_over_time(unit, box.level().line_deviation())
-    fine = LinearFlow(MODEL, tuple(FUZZY), 4.0, 0.001, Exact()).values(box.inputs(unit)[None])[0]
+    fine = exact_motions(MODEL, box.inputs(unit)[None], FUZZY, 4.0, 0.001)[0]
     peak = np.abs(fine).max(0)
     assert (peak <= bound).all()
     np.testing.assert_allclose(bound, peak, rtol=0.05)
@@ -57,9 +53,6 @@ def test_both_proofs_know_a_least_peak_and_a_motion_near_it(method):
     inputs = {"k1": Interval(3.8e7, 4.2e7), "m3": Interval(1.9e4, 2.1e4)}
     found = envelope(frame, inputs, method, duration=2.0, step=0.02, alpha=(0,), progress=False)
     proved, reached = (float(bound[0, 0]) for bound in found.least_peaks)
-    unit = np.random.default_rng(0).random((500, 2))
-    unit[::2] = unit[::2].round()
-    points = np.array([3.8e7, 1.9e4]) + unit * [4e6, 2e3]
-    motions = LinearFlow(frame, tuple(inputs), 2.0, 0.02, Exact()).values(points)
-    lowest = np.abs(motions).max(1).min()
+    points = random_points(inputs, 500, np.random.default_rng(0))
+    lowest = np.abs(exact_motions(frame, points, inputs, 2.0, 0.02)).max(1).min()
     assert 0.95 * lowest <= proved <= lowest <= reached <= 1.08 * lowest

@@ -3,17 +3,10 @@
 import numpy as np
 import pytest
 
-from alphacut.frame import (
-    Accelerogram,
-    Envelope,
-    Exact,
-    LinearFlow,
-    MatrixStructure,
-    Proof,
-    envelope,
-)
+from alphacut.frame import Accelerogram, Envelope, MatrixStructure, Proof, envelope
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.fuzzy import Interval
+from tests.frame.motions import exact_motions, require_inside
 
 STEP, DURATION = 0.05, 3.0
 
@@ -42,10 +35,9 @@ def proof_of(coupling: float, width: float) -> Envelope:
 def test_a_proof_holds_where_frequencies_come_near(coupling, widest, rng):
     width = rng.uniform(0.25, 1.0) * widest
     points = np.linspace(100 - width, 100 + width, 801)[:, None]
-    values = LinearFlow(twins(coupling), ("k",), DURATION, STEP, Exact()).values(points)
+    values = exact_motions(twins(coupling), points, ("k",), DURATION, STEP)
     proof = proof_of(coupling, width)
-    assert (values <= proof.upper[0] + 1e-12).all()
-    assert (values >= proof.lower[0] - 1e-12).all()
+    require_inside(values, proof, slack=1e-12)
     assert proof.error.max() <= 1.1e-2 * np.abs(values).max()
 
 
@@ -77,7 +69,5 @@ def test_equal_modes_with_dashpots_are_proved_where_one_input_moves_both(fuzzy, 
     inputs = {fuzzy: Interval(0.98 * value, 1.02 * value)}
     found = envelope(system, inputs, Proof(), duration=2.0, step=0.05, alpha=(0,), progress=False)
     points = np.linspace(0.98 * value, 1.02 * value, 81)[:, None]
-    motions = LinearFlow(system, (fuzzy,), 2.0, 0.05, Exact()).values(points)
+    require_inside(exact_motions(system, points, inputs, 2.0, 0.05), found, slack=1e-11)
     assert found.facts["gap_of_peaks"] < 1e-3
-    assert (motions <= found.upper[0] + 1e-9).all()
-    assert (motions >= found.lower[0] - 1e-9).all()

@@ -14,6 +14,7 @@ from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.fuzzy import Interval, Triangular
+from tests.frame.motions import exact_motions, random_points, require_inside
 
 NAMES = ("k", "m", "z")
 SYSTEM = MatrixStructure(
@@ -67,20 +68,12 @@ class Lipschitz:
         return found
 
 
-def points(alpha, count=3000):
-    low, high = np.array([number.cut(alpha) for number in FUZZY.values()]).T
-    unit = np.random.default_rng(3).random((count, 3))
-    unit[::3] = unit[::3].round()
-    return low + unit * (high - low)
-
-
-def test_the_hull_of_all_parts_holds_every_motion_and_closes_the_gaps_of_peaks():
+def test_the_hull_of_all_parts_holds_every_motion_and_closes_the_gaps_of_peaks(rng):
     proof = Lipschitz()
     found = prove(proof, FLOW)
     for level, alpha in enumerate(found.alpha):
-        values = FLOW.flow.values(points(alpha))
-        assert (values <= found.upper[level] + 1e-12).all()
-        assert (values >= found.lower[level] - 1e-12).all()
+        values = FLOW.flow.values(random_points(FUZZY, 3000, rng, alpha))
+        require_inside(values, found, level, slack=1e-12)
     assert (found.upper.max(1) - found.inner.upper.max(1) <= 0.3 * FLOW.peak).all()
     assert (found.inner.lower.min(1) - found.lower.min(1) <= 0.3 * FLOW.peak).all()
     assert len(proof.seen) > 10
@@ -107,13 +100,12 @@ def test_what_no_bisection_cures_is_refused():
         prove(proof, FLOW)
 
 
-def test_a_gap_that_falls_too_slowly_is_left_and_its_bounds_stay():
+def test_a_gap_that_falls_too_slowly_is_left_and_its_bounds_stay(rng):
     found = prove(Lipschitz(parts=12, gap=1e-6), FLOW)
     assert found.facts["parts"] < 60
     words = r"gap of q, .* of its peak: \d+% of it by [kmz], which is to be narrowed first"
     assert re.fullmatch(words, found.notes[0])
-    values = FLOW.flow.values(points(0))
-    assert (values <= found.upper[0] + 1e-12).all()
+    require_inside(FLOW.flow.values(random_points(FUZZY, 3000, rng)), found, slack=1e-12)
 
 
 def spring():
@@ -135,11 +127,8 @@ def test_a_soil_spring_known_within_a_factor_of_four_is_proved_in_parts(method):
     found = envelope(spring(), fuzzy, method=method, **given)
     assert found.facts["parts"] > 1
     assert found.facts["gap_of_peaks"] <= 1.1e-3
-    values = LinearFlow(spring(), ("s",), 3.0, 0.05, Exact()).values(
-        np.linspace(0.5, 2.0, 4001)[:, None]
-    )
-    assert (values <= found.upper[0]).all()
-    assert (values >= found.lower[0]).all()
+    points = np.linspace(0.5, 2.0, 4001)[:, None]
+    require_inside(exact_motions(spring(), points, fuzzy, 3.0, 0.05), found)
     alone, threads = (
         envelope(spring(), fuzzy, replace(method, workers=n), **given) for n in (1, 3)
     )

@@ -14,6 +14,7 @@ from alphacut.frame.methods.sampled import independent_excess
 from alphacut.fuzzy import Interval, Triangular
 from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.fuzzy.result import Nature
+from tests.frame.motions import exact_motions, random_points, require_inside
 
 FRAME = StoreyFrame(
     (20e3, 15e3, 10e3),
@@ -54,18 +55,9 @@ def proofs():
     }
 
 
-def trajectories(system, inputs, points, step=0.05, duration=4.0):
+def trajectories(system, inputs, points, duration=4.0):
     """Exact motions at the nodes of `MOTION`."""
-    flow = frame.LinearFlow(system, tuple(inputs), duration, step, frame.Exact())
-    return flow.values(points)
-
-
-def drawn(inputs, alpha, count=600):
-    """Random points of a cut, and its corners."""
-    low, high = np.array([number.cut(alpha) for number in inputs.values()]).T
-    share = np.random.default_rng(4).random((count, len(inputs)))
-    corners = np.array(np.meshgrid(*[(0, 1)] * len(inputs))).reshape(len(inputs), -1).T
-    return low + (high - low) * np.vstack([share, corners])
+    return exact_motions(system, points, inputs, duration, 0.05)
 
 
 def attained(found, system, inputs):
@@ -81,7 +73,7 @@ def attained(found, system, inputs):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_proof_contains_every_motion_and_nearly_attains_its_bounds(proofs, kind):
+def test_a_proof_contains_every_motion_and_nearly_attains_its_bounds(proofs, kind, rng):
     system, inputs = KINDS[kind]
     found = proofs[kind]
     peak = np.abs(found.upper).max((0, 1))
@@ -89,9 +81,8 @@ def test_a_proof_contains_every_motion_and_nearly_attains_its_bounds(proofs, kin
     assert (found.error.max((0, 1)) <= 1e-5 * peak * 1.3).all()
     assert attained(found, system, inputs) <= 1e-5 * peak.max()
     for level, alpha in enumerate(found.alpha):
-        values = trajectories(system, inputs, drawn(inputs, alpha))
-        assert (values <= found.upper[level] + 1e-12 * peak).all()
-        assert (values >= found.lower[level] - 1e-12 * peak).all()
+        values = trajectories(system, inputs, random_points(inputs, 600, rng, alpha))
+        require_inside(values, found, level, slack=1e-12)
 
 
 @pytest.mark.parametrize("method", [frame.GraphFollower(tolerance=1e-3),
@@ -133,7 +124,7 @@ def test_auto_takes_a_proof_else_the_follower_and_says_why():
 
 
 @pytest.mark.parametrize("dashpots", [(), (0.0, 2e4, 5e3)])
-def test_more_inputs_than_a_proof_takes_are_followed_to_the_error_allowed(dashpots):
+def test_more_inputs_than_a_proof_takes_are_followed_to_the_error_allowed(dashpots, rng):
     names = ["k1", "k2", "k3", "m1", "m2", "m3", "zeta"]
     start = {"q0": (0.01, 0.02, 0.03), "damping_ratio": 0.03, "dampers": dashpots}
     system = StoreyFrame((2e4,) * 3, stiffness=(8e6,) * 3, **start)
@@ -141,11 +132,10 @@ def test_more_inputs_than_a_proof_takes_are_followed_to_the_error_allowed(dashpo
     motion = {**MOTION, "alpha": (0,), "duration": 1.6, "integrator": "exact"}
     method = frame.Auto(1e-3) if dashpots else frame.ImprovedFollower(2e-4)
     found = envelope(system, inputs, method=method, **motion)
-    values = trajectories(system, inputs, drawn(inputs, 0.0, 10_000), duration=1.6)
+    values = trajectories(system, inputs, random_points(inputs, 10_000, rng), duration=1.6)
     assert found.method == "improved-graph-follower"
     assert attained(found, system, inputs) <= 1e-9 * np.abs(found.upper).max()
-    assert (values <= found.upper[0] + found.error[0]).all()
-    assert (values >= found.lower[0] - found.error[0]).all()
+    require_inside(values, found)
     peak = np.maximum(found.upper, -found.lower).max(1)
     assert (values.max(0).max(0) <= found.upper[0].max(0) * (1 + 1e-9)).all()
     assert (found.error.max(1) <= (2e-3 if dashpots else 2e-2) * peak).all()
@@ -208,15 +198,14 @@ def test_bounds_about_a_separatrix_are_attained_and_no_more(start, nature):
     assert found.nature is nature
 
 
-def test_a_pendulum_is_followed_to_its_error():
+def test_a_pendulum_is_followed_to_its_error(rng):
     system = frame.pendulum()
     inputs = {"l": Triangular(0.95, 1, 1.05), "phi_0": Triangular(1.4, 1.5, 1.6)}
     motion = {**MOTION, "relative": False, "step": 0.01, "duration": 2.5}
     found = envelope(system, inputs, method=frame.ImprovedFollower(1e-2), **motion)
     flow = frame.LagrangianFlow(system, tuple(inputs), 2.5, 0.01)
-    values = flow.values(drawn(inputs, 0.0, 2000))
-    assert (values <= found.upper[0] + found.error[0]).all()
-    assert (values >= found.lower[0] - found.error[0]).all()
+    values = flow.values(random_points(inputs, 2000, rng))
+    require_inside(values, found)
     off = np.maximum(found.upper[0] - values.max(0), values.min(0) - found.lower[0])
     assert off.max() <= 0.05 * np.abs(found.upper).max()
 

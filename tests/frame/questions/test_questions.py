@@ -4,14 +4,13 @@ import numpy as np
 import pytest
 
 from alphacut.frame import StoreyFrame, envelope
-from alphacut.frame.dynamics.flow import LinearFlow
-from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.questions.peaks import ANY, Peak, passing, peaks, tightest
 from alphacut.frame.questions.probability import probabilities
 from alphacut.frame.questions.tolerances import scale_supports, tolerances
 from alphacut.fuzzy import Triangular
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature
+from tests.frame.motions import exact_motions, random_points
 
 OUTPUTS = ("q1", "drift2", "base_shear")
 MOTION = {"dampers": (90, 60), "damper_placement": "storey", "q0": (0.05, 0.0), "v0": (0.0, 0.4)}
@@ -24,9 +23,8 @@ ONE = StoreyFrame(  # q = v0 / ω sin ωt with ω² = 24 E I / (l³ m): it peaks
 
 
 def motions(frame, inputs, count, *, level=0.0, duration=5, step=0.02):
-    rng = np.random.default_rng()
-    points = np.column_stack([rng.uniform(*inputs[name].cut(level), count) for name in inputs])
-    return np.abs(LinearFlow(frame, tuple(inputs), duration, step, Exact()).values(points)).max(1)
+    points = random_points(inputs, count, np.random.default_rng(), level)
+    return np.abs(exact_motions(frame, points, inputs, duration, step)).max(1)
 
 
 def amplitude(mass):
@@ -160,7 +158,7 @@ def test_probabilities_are_nested_and_agree_with_independent_draws(rng):
     assert (*curve[:, 0, 0], curve[1, 0, -1]) == (1, 1, 0)
     draws = rng.normal(0.4, 0.1, 4000)
     points = np.column_stack([np.full(4000, 25e9), np.full(4000, 7e3), draws])
-    size = np.abs(LinearFlow(FRAME, ("E", "m2", "v2_0"), 4, 0.05, Exact()).values(points)).max(1)
+    size = np.abs(exact_motions(FRAME, points, ("E", "m2", "v2_0"), 4, 0.05)).max(1)
     share = (size[:, 1] > 0.16).mean()
     low, high = one.interval[:, -1]
     assert low < share < high

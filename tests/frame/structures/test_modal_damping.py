@@ -5,11 +5,10 @@ import pytest
 from scipy.linalg import eigh
 
 from alphacut.frame import Accelerogram, MatrixStructure, StoreyFrame, envelope
-from alphacut.frame.dynamics.flow import LinearFlow
-from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.verification.exact_motion import LinearMotion
 from alphacut.fuzzy import Interval, Triangular
 from alphacut.fuzzy.refused import RefusedError
+from tests.frame.motions import exact_motions, random_points, require_inside
 from tests.frame.verification.test_exact_motion import UNFORCED
 
 RATIOS = (0.02, 0.05, 0.08)
@@ -45,9 +44,8 @@ def exact(k1, m3, zeta1, zeta3, duration=3.0, step=0.05):
 
 
 def test_motions_are_those_of_an_independent_calculation(rng):
-    flow = LinearFlow(FRAME, tuple(FUZZY), 3.0, 0.05, Exact())
-    points = rng.uniform(*np.array([x.support for x in FUZZY.values()]).T, (4, 4))
-    for point, motion in zip(points, flow.values(points), strict=True):
+    points = random_points(FUZZY, 8, rng)
+    for point, motion in zip(points, exact_motions(FRAME, points, FUZZY, 3.0, 0.05), strict=True):
         reference = exact(*point)
         assert motion == pytest.approx(reference, abs=1e-9 * np.abs(reference).max())
 
@@ -56,13 +54,8 @@ def test_bounds_hold_motions_and_are_near(rng):
     given = {"duration": 3.0, "step": 0.05, "alpha": (0,), "progress": False}
     found = envelope(FRAME, FUZZY, **given)
     assert found.method == "dual"
-    low, high = np.array([x.support for x in FUZZY.values()]).T
-    unit = rng.random((40, 4))
-    unit[::2] = unit[::2].round()
-    values = np.stack([exact(*point) for point in low + unit * (high - low)])
-    slack = 1e-9 * np.abs(values).max()
-    assert (values <= found.upper[0] + slack).all()
-    assert (values >= found.lower[0] - slack).all()
+    values = np.stack([exact(*point) for point in random_points(FUZZY, 40, rng)])
+    require_inside(values, found, slack=1e-9)
     assert found.facts["gap_of_peaks"] <= 2e-3
 
 
