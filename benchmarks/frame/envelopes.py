@@ -17,14 +17,7 @@ from typing import Any, ClassVar
 import matplotlib.pyplot as plt
 import numpy as np
 
-from alphacut.frame import (
-    GraphFollower,
-    ImprovedFollower,
-    Proof,
-    Sampled,
-    StoreyFrame,
-    envelope,
-)
+from alphacut.frame import GraphFollower, ImprovedFollower, Proof, Sampled, StoreyFrame, envelope
 from alphacut.fuzzy import Interval, Triangular
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.sets.boxes import corners

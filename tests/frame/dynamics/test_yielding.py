@@ -6,15 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from alphacut.frame import (
-    Accelerogram,
-    Exact,
-    Force,
-    History,
-    LinearFlow,
-    StoreyFrame,
-    envelope,
-)
+from alphacut.frame import Accelerogram, Exact, Force, History, LinearFlow, StoreyFrame, envelope
 from alphacut.frame.dynamics import yielding
 from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.questions.peaks import peaks

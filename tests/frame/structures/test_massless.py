@@ -5,11 +5,10 @@ import pytest
 
 from alphacut.frame import DualProof, MatrixStructure, Proof, envelope
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.dynamics.flow import LinearFlow
-from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.structures.loads import Accelerogram
 from alphacut.fuzzy import Interval
 from alphacut.fuzzy.refused import RefusedError
+from tests.frame.motions import exact_motions
 
 K = np.array([[3.0, -1, 0, 0], [-1, 2, -1, 0], [0, -1, 1.5, -0.4], [0, 0, -0.4, 1.0]])
 SOIL = np.diag([0, 0, 0, 1.0])
@@ -32,10 +31,7 @@ def frame(light=0.0, **values):
 
 def test_motions_are_the_limit_of_small_masses():
     points = np.array([[1.0, 1.0], [1.1, 0.7]])
-    motions = [
-        LinearFlow(frame(light), ["k", "s"], 2.0, 0.05, Exact()).values(points)
-        for light in (0.0, 1e-7)
-    ]
+    motions = [exact_motions(frame(x), points, ("k", "s"), 2.0, 0.05) for x in (0.0, 1e-7)]
     size = np.abs(motions[0]).max((0, 1))
     assert (np.abs(motions[0] - motions[1]).max((0, 1)) < 1e-4 * size).all()
 
