@@ -167,7 +167,9 @@ class Bounds:
     def _check_proof(self) -> None:
         """Raise `FailedError` if cuts are not nested or attained bounds lie outside proved ones."""
         # differences within the stated errors and round-off are allowed
-        round_off, error = self._round_off, np.nan_to_num(self.error)
+        size = np.maximum(np.abs(self.lower), np.abs(self.upper))
+        round_off = ROUND_OFF * size.max(axis=tuple(range(size.ndim - 1)))  # of each output
+        error = np.nan_to_num(self.error)
         estimated = np.where(self._guaranteed, 0.0, error)
         slack = 2 * round_off + error[1:] + error[:-1]  # between two levels
         inner, outer = self.attained, self.proved
@@ -181,13 +183,6 @@ class Bounds:
             if (excess > 0).any():
                 output = self.outputs[int(np.nanargmax(excess) % len(self.outputs))]
                 raise FailedError(f"{what}: of {output}, by up to {np.nanmax(excess):.3g}")
-
-    @property
-    def _round_off(self) -> Array:
-        """Largest difference due to rounding of each output, shape (m,)."""
-        axes = tuple(range(self.lower.ndim - 1))
-        size = np.maximum(np.abs(self.lower), np.abs(self.upper)).max(axis=axes)
-        return np.asarray(ROUND_OFF * size)
 
     @cached_property
     def _guaranteed(self) -> Mask:
@@ -248,7 +243,11 @@ class Bounds:
     def __str__(self) -> str:
         """Return nature, basis and cost, a line for each level of the first outputs, the notes."""
         count = max(1, _MAX_LINES // len(self.alpha))  # outputs that are shown
-        lines = [self._head]
+        basis = f" (given that {' and '.join(self.basis)})" if self.basis else ""
+        time = "" if self.time is None else f" over {self.time[0]:g} … {self.time[-1]:g} s"
+        budget = f" of at most {self.budget:,}" if self.budget else ""
+        cost = f"{self.evaluations:,} evaluations{budget}, {self.seconds:.2g} s"
+        lines = [f"bounds {self.nature}{basis}{time} by the method {self.method}: {cost}"]
         for column in range(len(self.outputs))[:count]:
             lines += self._lines(column)
         hidden = len(self.outputs) - count
@@ -257,14 +256,6 @@ class Bounds:
         return "\n".join([*lines, *self.notes, *([str(self.claim)] if self.claim.rule else [])])
 
     __repr__ = __str__
-
-    @property
-    def _head(self) -> str:
-        basis = f" (given that {' and '.join(self.basis)})" if self.basis else ""
-        time = "" if self.time is None else f" over {self.time[0]:g} … {self.time[-1]:g} s"
-        budget = f" of at most {self.budget:,}" if self.budget else ""
-        cost = f"{self.evaluations:,} evaluations{budget}, {self.seconds:.2g} s"
-        return f"bounds {self.nature}{basis}{time} by the method {self.method}: {cost}"
 
     @property
     def named(self) -> tuple[str, ...]:

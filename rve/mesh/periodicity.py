@@ -6,14 +6,10 @@ translation u = c(θ) costs no energy at any θ.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import lru_cache
-
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Ints, Mask
 from alphacut.fuzzy.refused import FailedError
-from alphacut.rve.mesh.prism_grid import Triangulation
 
 SAME_PLACE = 1e-8
 """Distance below which two nodes coincide, in halves of the side: far above the noise of Gmsh's
@@ -22,25 +18,6 @@ coordinates (3e-13), far below the shortest edge (1e-4). More would join nodes o
 
 class MeshError(FailedError):
     """A mesh of the cell is invalid."""
-
-
-@dataclass(frozen=True, eq=False)
-class Periodicity:
-    """Unknowns of a planar mesh after identification, vertices before edge midpoints.
-
-    `unknown` of each planar node, −1 at the corners, (n,); `vertices` and `count` in all.
-    """
-
-    unknown: Ints
-    vertices: int
-    count: int
-
-
-@lru_cache(maxsize=4)
-def identify(plane: Triangulation) -> Periodicity:
-    """Periodic unknowns of a planar mesh; cached."""
-    unknown = unknowns(plane.points)
-    return Periodicity(unknown, int(unknown[: plane.vertices].max()) + 1, int(unknown.max()) + 1)
 
 
 def unknowns(points: Array) -> Ints:

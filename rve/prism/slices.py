@@ -97,10 +97,10 @@ class SliceProblem:
         on_base = np.array(wedge(1).tabulate(1, points[:POINTS_PER_SLICE] * [1, 1, 0]))[1:3]
         slopes = on_base.reshape(2, POINTS_PER_SLICE, 15)[..., TRIANGLE_NODES]
         self._slopes = slopes.swapaxes(1, 2)  # ∂N_i/∂ξ_β of a six-node triangle, [β, i, point]
-        periodicity, phase = self.numbering.periodicity, grid.phase[: len(grid.plane.triangles)]
+        phase = grid.phase[: len(grid.plane.triangles)]
         self._phase = [np.flatnonzero(phase == k) for k in range(len(grid.names))]
-        self._unknown = periodicity.unknown[grid.plane.triangles]  # pairs, (triangles, 6)
-        self._find_pattern(phase, periodicity.count)
+        self._unknown = self.numbering.planar[grid.plane.triangles]  # pairs, (triangles, 6)
+        self._find_pattern(phase, self.numbering.level_size // 2)
         self.solver: LevelSolver = LevelSolver(self.numbering, self._indptr, self._indices)
 
     def _find_pattern(self, phase: Ints, count: int) -> None:

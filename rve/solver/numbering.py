@@ -16,7 +16,7 @@ import scipy.sparse as sp
 
 from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.rve.fenicsx import MPI, PETSc
-from alphacut.rve.mesh.periodicity import identify
+from alphacut.rve.mesh.periodicity import unknowns
 from alphacut.rve.mesh.prism_grid import PrismGrid
 
 
@@ -91,7 +91,7 @@ class LevelNumbering:
         comm: Communicator.
 
     Attributes:
-        periodicity: Unknowns of one level.
+        planar: Unknown of each planar node, −1 at the corners, shape (n,); vertices' come first.
         level_size: Number of unknowns of a level.
         mid_level_size: Number of unknowns of a mid-level, half-way between two: those of vertices.
         stride: Sum of both.
@@ -103,9 +103,9 @@ class LevelNumbering:
     """
 
     def __init__(self, grid: PrismGrid, comm: MPI.Intracomm) -> None:
-        self.grid, self.periodicity = grid, identify(grid.plane)
-        self.level_size = 2 * self.periodicity.count
-        self.mid_level_size = 2 * self.periodicity.vertices
+        self.grid, self.planar = grid, unknowns(grid.plane.points)
+        self.level_size = 2 * (int(self.planar.max()) + 1)
+        self.mid_level_size = 2 * (int(self.planar[: grid.plane.vertices].max()) + 1)
         self.stride = self.level_size + self.mid_level_size
         self.size = grid.layers * self.stride + self.level_size
         # the last ranks have a level more, and with it no mid-level above their last one: so
@@ -119,7 +119,7 @@ class LevelNumbering:
     @cached_property
     def pairs(self) -> Ints:
         """Number p of each node's pair of displacements, −1 where held."""
-        planar, layers = self.periodicity.unknown, self.grid.layers
+        planar, layers = self.planar, self.grid.layers
         vertices = planar[: self.grid.plane.vertices]
         first_pair = np.arange(layers + 1)[:, None] * (self.stride // 2)  # of each level
         on_levels = np.where(planar >= 0, planar + first_pair, -1)

@@ -181,8 +181,8 @@ def plane_solver(block: sp.csr_matrix, mass: float) -> PETSc.KSP:
 
 def injection(numbering: LevelNumbering) -> sp.csr_matrix:
     """Matrix J from linear to quadratic triangles; midpoints get the mean of their vertices."""
-    plane, periodicity = numbering.grid.plane, numbering.periodicity
-    vertices, unknown = periodicity.vertices, periodicity.unknown
+    plane, unknown = numbering.grid.plane, numbering.planar
+    vertices = numbering.mid_level_size // 2
     first = np.unique(unknown[plane.vertices :], return_index=True)[1]  # node of each midpoint's
     ends = np.concatenate(
         [np.repeat(np.arange(vertices), 2).reshape(-1, 2), unknown[plane.ends[first]]]

@@ -231,16 +231,13 @@ def least_pbox(
     Raises:
         FailedError: No p-box of monotone cubics with these ends contains the sample.
     """
+    # a linear program in the ends of the supports, (a2L, a2U, a4L, a4U): which contain these slopes
+    from scipy.optimize import linprog
+
     a2, a4 = fit.slopes(sample)
     part = SlopeBand((a2,) * 3, (a4,) * 3) if required is None else required.monotone_part(fit)
-    inner_a2, inner_a4 = (a2, *part.a2), (a4, *part.a4)  # which the supports contain
+    inner_a2, inner_a4 = (a2, *part.a2), (a4, *part.a4)
     limits = [(0, min(inner_a2)), (max(inner_a2), None), (0, min(inner_a4)), (max(inner_a4), None)]
-    ends = _least_area_supports(fit, limits, *_containment(fit, sample, band))
-    return PBox(fit, (ends[0], a2, ends[1]), (ends[2], a4, ends[3]))
-
-
-def _containment(fit: HermiteFit, sample: AreaWeighted, band: float) -> tuple[Array, Array]:
-    """Matrix (k, 4) and right side (k,) by which (a2L, a2U, a4L, a4U) contain the sample's band."""
     # at each step of the sample's distribution function the greatest radius must reach the value
     # where the band's lower edge rises, and the least must not pass it where the upper edge does
     steps, before, after = sample.steps
@@ -254,27 +251,19 @@ def _containment(fit: HermiteFit, sample: AreaWeighted, band: float) -> tuple[Ar
     rest, zero = values - fit.a1 * h1 - fit.a3 * h3, np.zeros_like(h2)  # for a2 h2 + a4 h4
     greatest = np.stack([zero, -h2, -h4, zero], axis=1)
     least = np.stack([h2, zero, zero, h4], axis=1)
-    matrix = np.where(is_lower_edge[:, None], greatest, least)
-    return matrix, np.where(is_lower_edge, -rest, rest)
-
-
-def _least_area_supports(
-    fit: HermiteFit, limits: list[tuple[float, float | None]], matrix: Array, right_side: Array
-) -> list[float]:
-    """Supports (a2L, a2U, a4L, a4U) of least area, by a linear program: matrix @ ends ≤ right."""
-    from scipy.optimize import linprog
-
-    monotone = np.zeros((4, SLOPES.shape[1], 4))
+    containment = np.where(is_lower_edge[:, None], greatest, least)
+    monotone = np.zeros((4, SLOPES.shape[1], 4))  # of the maps at the four corners
     for corner, (i, j) in enumerate(product((0, 1), (2, 3))):
         monotone[corner, :, i], monotone[corner, :, j] = -SLOPES[1], -SLOPES[3]
     h2, h4 = fit.mean_shapes
     result = linprog(
         [-h2, h2, -h4, h4],
-        A_ub=np.concatenate([matrix, *monotone]),
-        b_ub=np.concatenate([right_side, np.tile(fit.base_slopes + 1e-9, 4)]),
+        A_ub=np.concatenate([containment, *monotone]),
+        b_ub=np.append(np.where(is_lower_edge, -rest, rest), np.tile(fit.base_slopes + 1e-9, 4)),
         bounds=limits,
     )
     if result.status != 0:
         what = f"no p-box of monotone cubics from {fit.a1:g} to {fit.a3:g}"
         raise FailedError(f"{what} contains the distribution", "widen the limits, or the band")
-    return [float(x) for x in result.x]
+    least_a2, greatest_a2, least_a4, greatest_a4 = map(float, result.x)
+    return PBox(fit, (least_a2, a2, greatest_a2), (least_a4, a4, greatest_a4))

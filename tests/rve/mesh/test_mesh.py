@@ -11,7 +11,7 @@ from alphacut.rve.fenicsx import basix
 from alphacut.rve.mesh import square
 from alphacut.rve.mesh.columns import extrude
 from alphacut.rve.mesh.curved import curved_nodes, jacobian_ratios, plane_mesh
-from alphacut.rve.mesh.periodicity import MeshError, identify, unknowns
+from alphacut.rve.mesh.periodicity import MeshError, unknowns
 from alphacut.rve.mesh.prism_grid import nodes_at_radii, reference_radius
 from alphacut.stochastic import HermiteMap
 
@@ -46,8 +46,8 @@ def test_sliding_keeps_triangles_sound_and_the_interface_on_its_outline(outline)
 
 def test_opposite_nodes_are_one_unknown_and_all_corners_none():
     plane = extrude(size=0.3, radius=0.6, layers=1).plane
-    unknown = identify(plane).unknown
-    keys = {tuple(np.round(p, 7)): u for p, u in zip(plane.points, unknown, strict=True)}
+    pairs = zip(plane.points, unknowns(plane.points), strict=True)
+    keys = {tuple(np.round(p, 7)): u for p, u in pairs}
     for (x, y), u in keys.items():
         if abs(x) == abs(y) == 1:
             assert u == -1
