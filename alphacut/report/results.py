@@ -250,7 +250,7 @@ def natures(parts: Parts) -> Iterator[str]:
         over = "over time" if suite is None else "over time and records"
         yield f"Peaks are largest magnitudes {over}, {', '.join(groups)}"
     if suite is not None:
-        yield "A mean is that of one structure's peaks; its bounds are means of each record's bounds"
+        yield "A mean is that of one structure's peaks; its bounds are means of the records' bounds"
     for is_guaranteed in (True, False):
         tested = [x for x in studies if (x.nature is Nature.GUARANTEED) == is_guaranteed]
         if count := sum(study.motions_tested for study in tested):
