@@ -98,13 +98,11 @@ def test_limits_without_a_meaning_are_refused(text):
         parse_limit(text)
 
 
-def test_random_inputs_have_the_shape_of_their_membership():
-    count, seed = 20_000, np.random.SeedSequence().entropy
-    draws = shaped_like(Triangular(0, 1, 3))(np.random.default_rng(seed), count)
-    six_deviations = 6 / np.sqrt(count)
-    density_deviation, below_deviation = np.sqrt(7 / 18), np.sqrt(2 / 9)
-    assert abs(draws.mean() - 4 / 3) < density_deviation * six_deviations, f"seed {seed}"
-    assert abs((draws < 1).mean() - 1 / 3) < below_deviation * six_deviations, f"seed {seed}"
+def test_random_inputs_have_the_shape_of_their_membership(rng):
+    draws = shaped_like(Triangular(0, 1, 3))(rng, 20_000)
+    six_deviations = 6 / np.sqrt(20_000)
+    assert abs(draws.mean() - 4 / 3) < np.sqrt(7 / 18) * six_deviations
+    assert abs((draws < 1).mean() - 1 / 3) < np.sqrt(2 / 9) * six_deviations
 
 
 def test_every_question_is_complete():
