@@ -18,16 +18,11 @@ from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.slices.model import SlicesModel
 from alphacut.rve.solver.krylov import ConvergenceError
 from alphacut.stochastic import HermiteMap
+from tests.rve.series.test_series import EXACT
 from tests.stochastic.test_laws import Own
 
 PAPER = HermiteMap(0.1337, 0.1, 0.8663, 0.1692)
 MATRIX, PARTICLE = Phase(20e9), Phase(80e9)
-# σ11 and σ12 of crisp cells under eq. 15, in GPa
-EXACT = {
-    0.2: (0.396401666057, 0.158812312491),
-    0.5: (0.467852842132, 0.186140947852),
-    0.8: (0.667472541097, 0.255628130639),
-}
 # E of the paper's cell by mesh size, in GPa, as another assembly and solver gave it
 PAPERS = {0.08: 24.771441129, 0.04: 24.771113420}
 
@@ -217,18 +212,6 @@ def test_a_mesh_that_folds_over_is_refused_with_its_cure():
 def test_what_petsc_does_not_take_or_reach_is_an_error(petsc, error, message):
     with pytest.raises(error, match=message):
         solve(mesh_size=0.4, layers=3, petsc=petsc)
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"mesh_size": 0.0}, r"the mesh size is 0; allowed: values in \(0, 1\]"),
-        ({"layers": 0}, "the number of layers is 0; allowed: 1 or more"),
-    ],
-)
-def test_an_option_out_of_range_is_refused(options, message):
-    with pytest.raises(RefusedError, match=message):
-        PrismModel(**options)
 
 
 def test_nearly_incompressible_phases_are_referred_to_the_series():

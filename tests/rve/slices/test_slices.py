@@ -72,18 +72,6 @@ def test_a_cell_on_its_turned_mesh_has_the_turned_stiffness(motion, turn, inclus
     assert abs(stiffness[0, 0] - stiffness[1, 1]) > 1e-2 * scale
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"mesh_size": 2}, "the mesh size is 2; allowed"),
-        ({"points": 1}, "is 1; allowed: 2 or more"),
-    ],
-)
-def test_refuses_options_out_of_range(options, message):
-    with pytest.raises(RefusedError, match=message):
-        SlicesModel(**options)
-
-
 def true_errors(solved, radius, matrix, inclusion):
     exact = square_stiffness(np.array([radius]), matrix, [inclusion]).matrix[0, 0]
     return abs(square_moduli(exact) / square_moduli(solved.stiffness) - 1)

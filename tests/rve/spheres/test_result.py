@@ -3,7 +3,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve import Phase
 from alphacut.rve.result.checks import CertificateError
 from alphacut.rve.result.moduli import hashin_shtrikman, mori_tanaka
@@ -45,9 +44,3 @@ def test_a_wrong_stiffness_has_no_certificate(factors, words):
     wrong = replace(result.curve, stiffness=cubic_voigt(*moduli.T))
     with pytest.raises(CertificateError, match=words):
         spheres_with_checks(replace(result, curve=wrong))
-
-
-@pytest.mark.parametrize("options", [{"points": 1}, {"accuracy": 1e-12}, {"accuracy": np.nan}])
-def test_a_resolution_out_of_range_is_refused(options):
-    with pytest.raises(RefusedError):
-        SphereSeriesModel(**options)
