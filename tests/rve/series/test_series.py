@@ -91,6 +91,19 @@ def test_declared_error_holds_and_is_no_fable():
     assert np.median(ratios) < 30
 
 
+def test_estimates_of_the_series_and_of_rules_in_theta_are_tight():
+    cells, exact = (
+        square_stiffness(np.array([0.9]), MATRIX, [Phase(80e9)], tolerance=x) for x in (1e-4, 1e-12)
+    )
+    ratio = cells.errors / abs(cells.moduli / exact.moduli - 1)
+    assert 1.0 < ratio.min() <= ratio.max() < 1.8
+    cell = HermiteMap(0.1337, 0.1, 0.8663, 0.1692), MATRIX, [Phase(80e9)]
+    coarse, fine = (model.solve(*cell)[0] for model in (SeriesModel(points=6), SeriesModel()))
+    true = abs(square_moduli(coarse.stiffness) / square_moduli(fine.stiffness) - 1)
+    ratio = coarse.errors["theta"] / true
+    assert 1.0 < ratio.min() <= ratio.max() < 1.8
+
+
 @pytest.mark.parametrize("contrast", [1e-6, 1e6])
 def test_extreme_contrast_is_the_limit_of_a_hole_or_a_rigid_disc(contrast):
     radius = np.array([1e-6, 0.5, 0.98])

@@ -99,6 +99,15 @@ def test_coarse_meshes_hide_no_small_particle_from_both_orders(radius, matrix, i
     assert (true <= solved.errors[[0, 2]]).all()
 
 
+@pytest.mark.parametrize(
+    ("radius", "modulus", "size"), [(0.68, 4e8, 0.69), (0.88, 7e8, 0.56), (0.67, 1e9, 0.99)]
+)
+def test_the_estimate_of_a_slice_is_tight(radius, modulus, size):
+    [solved] = solve_slice(radius, MATRIX, [Phase(modulus)], mesh_size=size)
+    ratio = solved.errors / true_errors(solved, radius, MATRIX, Phase(modulus))
+    assert 1.0 < ratio.min() < 1.8
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_the_error_counts_what_cancels_about_a_stiff_particle(seed):
     """Contrasts from 1e7 to 1e10: two orders agree by chance, and both are off."""
