@@ -8,36 +8,22 @@ from pathlib import Path
 
 from tests.environment.house import FOLDERS, ROOT, trees
 
-DIRECT = {
+SAME = (
+    "distributed dolfinx gmsh hypothesis jinja2 matplotlib meshio mpi4py numba numpy pint "
+    "pytest pydantic pyvista scipy skimage sympy threadpoolctl xarray"
+)
+"""Packages that are named python3- and as they are imported."""
+DIRECT = {name: f"python3-{name}" for name in SAME.split()} | {
     "PIL": "python3-matplotlib",  # which depends on Pillow, by pip too
     "basix": "python3-dolfinx",
-    "distributed": "python3-distributed",
-    "dolfinx": "python3-dolfinx",
-    "gmsh": "python3-gmsh",
-    "hypothesis": "python3-hypothesis",
-    "jinja2": "python3-jinja2",
-    "matplotlib": "python3-matplotlib",
-    "meshio": "python3-meshio",
-    "mpi4py": "python3-mpi4py",
     "mpmath": "python3-sympy",  # which depends on it
-    "numba": "python3-numba",
-    "numpy": "python3-numpy",
     "pandas": "python3-xarray",  # which depends on it
     "petsc4py": "python3-petsc4py-real",
-    "pint": "python3-pint",
-    "pytest": "python3-pytest",
-    "pydantic": "python3-pydantic",
     "pydantic_core": "python3-pydantic",  # which depends on it
-    "pyvista": "python3-pyvista",
-    "scipy": "python3-scipy",
-    "skimage": "python3-skimage",
-    "sympy": "python3-sympy",
-    "threadpoolctl": "python3-threadpoolctl",
     "tifffile": "python3-skimage",  # which depends on it
     "typing_extensions": "python3-typing-extensions",
     "ufl": "python3-dolfinx",
     "vtkmodules": "python3-pyvista",  # which depends on VTK
-    "xarray": "python3-xarray",
 }
 LOCAL = {"_typeshed", "mpl_toolkits", "plane"}
 """Names within others: of mypy, of Matplotlib, and meshes/plane.py."""
