@@ -282,7 +282,7 @@ class RoundCell(Section):
 
 PhaseModulus = Annotated[
     FuzzyNumber,
-    Quantity("Pa", minimum=0, fuzzy=True, cure='0 of a pore, or "rigid"'),
+    Quantity("Pa", minimum=0, fuzzy=True, cure='"0 GPa" of a pore, or "rigid"'),
     BeforeValidator(lambda value: f"{RIGID} Pa" if value == "rigid" else value),
 ]
 

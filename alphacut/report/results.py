@@ -126,10 +126,10 @@ def without_empty_columns(head: Row, rows: list[Row]) -> Table:
 
 def width_text(image: ImageResult) -> str:
     """Width of E at the lowest level by what it comes from, or which bound it has not."""
-    if not image.lower_GPa.any():
-        return "No lower bound of the stiffness but 0: phases may be pores"
-    if not np.isfinite(image.upper_GPa).all():
-        return "No upper bound of the stiffness: phases may be rigid"
+    low, high = image.E_GPa.ends
+    if not (low[0] > 0 and np.isfinite(high[0])):
+        unknown = ["lower"] * (low[0] <= 0) + ["upper"] * np.isinf(high[0])
+        return f"No {' or '.join(unknown)} bound of E: phases may be pores or rigid"
     parts = (f"{source} {width:.3g} GPa" for source, width in image.widths_GPa.items())
     return f"Width of E from {', '.join(parts)}"
 

@@ -125,7 +125,8 @@ def compute_cuts(
         return float(cut.modulus[1] - cut.modulus[0])
 
     widths = dict[str, float]()
-    if cell.has_both_bounds:
+    has_both_bounds = np.isfinite(cuts[0].bounds.width)
+    if has_both_bounds:
         base, lowest = width(None, None), alpha[0]
         widths["discretisation"] = base
         if study.fuzzy_threshold:
@@ -152,7 +153,7 @@ def compute_cuts(
     top, constants = cuts[-1], np.array([cut.constants for cut in cuts])  # (levels, constants, 2)
     fractions, names = study.fractions, CONSTANT_NAMES[cell.dimension]
     is_space, references = cell.dimension == 3, References()
-    if cell.has_both_bounds:
+    if has_both_bounds:
         shares_of_phases = np.array([*fractions.values()])
         phases = [Phase(young.nominal, nu.nominal) for young, nu in cell.pairs]
         classical = isotropic_bounds(shares_of_phases, phases, space=is_space)
