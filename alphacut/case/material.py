@@ -318,15 +318,9 @@ class ImageCell(Section):
         return tuple(zip(self.modulus, ratios, strict=True))
 
     @property
-    def has_both_bounds(self) -> bool:
-        """Whether E has a lower and an upper bound: no phase may be a pore or rigid."""
-        return all(self._is_solid)
-
-    @property
-    def _is_solid(self) -> list[bool]:
+    def is_solid(self) -> list[bool]:
         """Whether each phase is neither a pore nor rigid, throughout its support."""
-        supports = [young.support for young in self.modulus]
-        return [support.lower > 0 and support.upper < RIGID for support in supports]
+        return [young.support.lower > 0 and young.support.upper < RIGID for young in self.modulus]
 
     @property
     def losses(self) -> tuple[FuzzyNumber, ...]:
@@ -345,8 +339,8 @@ class ImageCell(Section):
             n_values, allowed = len(getattr(self, key) or ()), f"one for each of {n_phases} phases"
             require(n_values in fitting, f"cell.{key}", f"{n_values} values", allowed)
         allowed = "a phase that is neither a pore nor rigid"
-        require(any(self._is_solid), "cell.modulus", "none between 0 and rigid", allowed)
-        fits, allowed = self.has_both_bounds or not self.loss, "none beside a pore or a rigid phase"
+        require(any(self.is_solid), "cell.modulus", "none between 0 and rigid", allowed)
+        fits, allowed = all(self.is_solid) or not self.loss, "none beside a pore or a rigid phase"
         cure = "pores in one material leave its loss factor; else take a small modulus for pores"
         require(fits, "cell.loss", "there", allowed, cure)
         value = "beside cell.voxel" if self.pixel else None

@@ -264,7 +264,7 @@ def _require_material(content: Content) -> image.ImageStudy | None:
     if "envelope" in content.stages and not content.has_stated_modulus:
         require_levels(content.modulus.alpha, "modulus.alpha")
     if content.image_cell is not None:
-        fits = content.image_cell.has_both_bounds or "envelope" not in content.stages
+        fits = all(content.image_cell.is_solid) or "envelope" not in content.stages
         cure = "give a pore a small modulus, a rigid phase a large one, or take stage modulus alone"
         require(fits, "cell.modulus", "0 or rigid", "both bounds of E, for a frame", cure)
         return image.image_study(content.image_cell)

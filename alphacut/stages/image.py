@@ -20,7 +20,7 @@ from alphacut.fuzzy.result import Nature
 from alphacut.io.provenance import file_digest
 from alphacut.rve.cell.cell import Phase
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
-from alphacut.rve.image.files import files_of, read_grid, require_memory
+from alphacut.rve.image.files import files_of, needed_memory, read_grid, require_memory
 from alphacut.rve.image.losses import energy_shares, loss_of_young, mean_loss
 from alphacut.rve.image.model import ImageCut, ImageModel, phase_energies, usual_division
 from alphacut.rve.image.phases import (
@@ -146,10 +146,7 @@ def compute_cuts(
         proved = {"E": young, **proved}
         if cell.dimension == 2:
             energies = phase_energies(model, crisp, nominal, phase, len(cell.pairs))
-            bounds, errors = image_loss_bounds(energies, phase_cuts, average)
-            estimated = np.moveaxis(bounds, -1, 0)  # constant by constant
-            by_name = dict[str, Array](zip(CONSTANTS, estimated, strict=True))
-            estimates = LossResult.of(by_name, errors, Nature.ESTIMATED)
+            estimates = estimated_losses(energies, phase_cuts, average)
     top, constants = cuts[-1], np.array([cut.constants for cut in cuts])  # (levels, constants, 2)
     fractions, names = study.fractions, CONSTANT_NAMES[cell.dimension]
     is_space, references = cell.dimension == 3, References()
@@ -216,17 +213,19 @@ def _dataset(
     return xarray.Dataset(variables, axes, {"nature": str(NATURE), "sides": sides})
 
 
-def image_loss_bounds(energies: PhaseEnergies, cuts: Array, average: str) -> tuple[Array, Array]:
-    """Bounds of the loss factors of E, G, K at nominal moduli, (levels, 2, 3), and errors, (3,)."""
+def estimated_losses(energies: PhaseEnergies, cuts: Array, average: str) -> LossResult:
+    """Loss factors of E, G and K of an image at nominal moduli, from cuts (levels, 2, phases)."""
     constants_of = partial(plane_constants, average=average)
     fractions, _ = energies.energy_fractions(constants_of)
     corners = loss_corners(cuts, fractions)
     # level l, end e, constant c, phase p, K or G x
-    bounds = np.einsum("lecpx,pxc->lec", corners, fractions)
+    bounds = np.einsum("lecpx,pxc->cle", corners, fractions)
     largest = corners[0, 1, 0]
     _, errors = first_order(energies, largest, constants_of)
     # what the first order leaves out is of the order of the squared difference of losses
-    return bounds, errors + np.ptp(largest) ** 2 * bounds[0, 1]
+    errors = errors + np.ptp(largest) ** 2 * bounds[:, 0, 1]
+    named = dict[str, Array](zip(CONSTANTS, bounds, strict=True))
+    return LossResult.of(named, errors, Nature.ESTIMATED)
 
 
 def cut_or_nominal(number: FuzzyNumber, level: AlphaLevel) -> tuple[float, float]:
@@ -247,10 +246,13 @@ class ImageStudy:
 
     @property
     def extent(self) -> str:
-        """Number of pixels or voxels along each axis, in words."""
-        shape = self.phase_ranges(None)[0].shape
+        """Number of pixels or voxels along each axis, and memory of their solution, in words."""
+        nominal = self.images(None, None)
+        shape = nominal.bulk[0].shape
         sizes = " × ".join(map(str, shape))
-        return f"{sizes} {'pixels (y, x)' if len(shape) == 2 else 'voxels (z, y, x)'}"
+        gigabytes = needed_memory(shape, usual_division(nominal)) / 1e9
+        axes = "pixels (y, x)" if len(shape) == 2 else "voxels (z, y, x)"
+        return f"{sizes} {axes}, about {gigabytes:.1f} GB of memory"
 
     def images(self, threshold: AlphaLevel, phases: AlphaLevel) -> ModuliImages:
         """Least and greatest moduli of each pixel, at levels of threshold and phases."""

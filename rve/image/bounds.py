@@ -62,11 +62,9 @@ class StiffnessBounds:
     @property
     def _compliance(self) -> tuple[Array, Array]:
         """Lower and upper bound of the compliance: 0 without an upper bound of the stiffness."""
-        infinite = np.full_like(self.lower, np.inf)
-        return (
-            inverse_below(self.upper) if self.has_upper else np.zeros_like(self.upper),
-            inverse_above(self.lower) if self.has_lower else infinite,
-        )
+        low = inverse_below(self.upper) if self.has_upper else np.zeros_like(self.upper)
+        high = inverse_above(self.lower) if self.has_lower else np.full_like(self.lower, np.inf)
+        return low, high
 
     @property
     def width(self) -> float:
@@ -157,24 +155,27 @@ class StiffnessBounds:
 
     def _hill(self, modulus: int) -> Interval:
         """Bounds of K (0) or G (1) of Hill's average of a stiffness of space."""
-        bounds, (min_compliance, max_compliance) = [], self._compliance
-        for stiffness, compliance, sign in (
-            (self.lower, max_compliance, -1),
-            (self.upper, min_compliance, 1),
-        ):
-            if not np.isfinite(stiffness).all() or not stiffness.any():
-                bounds.append(float(stiffness[0, 0]))
-                continue
-            voigt = VOIGT[modulus] * stiffness
-            reuss = REUSS[modulus] * compliance
-            rounding = 64 * UNIT * (abs(voigt).sum() + abs(reuss).sum() / reuss.sum() ** 2)
-            bounds.append(float((voigt.sum() + 1 / reuss.sum()) / 2 + sign * rounding))
-        return bounds[0], bounds[1]
+        least, greatest = self._compliance
+        low, high = 0.0, np.inf
+        if self.has_lower:
+            value, rounding = _hill_mean(self.lower, greatest, modulus)
+            low = value - rounding
+        if self.has_upper:
+            value, rounding = _hill_mean(self.upper, least, modulus)
+            high = value + rounding
+        return low, high
 
     def contains(self, stiffness: Array) -> bool:
         """True if a symmetric stiffness, shape (3, 3), lies between the bounds."""
         ends = stiffness - self.lower, self.upper - stiffness
         return all(bool(np.linalg.eigvalsh(end)[0] >= 0) for end in ends)
+
+
+def _hill_mean(stiffness: Array, compliance: Array, modulus: int) -> tuple[float, float]:
+    """Mean of Voigt's and Reuss's K (0) or G (1), and a bound of its rounding."""
+    voigt, reuss = VOIGT[modulus] * stiffness, REUSS[modulus] * compliance
+    rounding = 64 * UNIT * (abs(voigt).sum() + abs(reuss).sum() / reuss.sum() ** 2)
+    return float((voigt.sum() + 1 / reuss.sum()) / 2), float(rounding)
 
 
 def _rounding(stiffness: Array) -> float:

@@ -127,10 +127,7 @@ def gather(element: Element, fields: Fields, slab: slice) -> Fields:
     first, *last_axes = fields.shape[2:]
     local = xp.empty((len(element.local), fields.shape[0], slab.stop - slab.start, *last_axes))
     for k, (unknown, offset) in enumerate(element.local):
-        layers = _layers(slab, offset[0], first)
-        part = fields[:, unknown, layers[0]]
-        if len(layers) > 1:
-            part = xp.concatenate([fields[:, unknown, layer] for layer in layers], axis=1)
+        part = fields[:, unknown, _layers(slab, offset[0], first)]
         local[k] = _roll(xp, part, [-shift for shift in offset[1:]])
     return local
 
@@ -139,22 +136,14 @@ def scatter(element: Element, forces: Fields, result: Fields, slab: slice) -> No
     """Adds element forces, (local unknowns, loads, *slab), to `result` (loads, unknowns, *grid)."""
     xp = namespace(result)
     for k, (unknown, offset) in enumerate(element.local):
-        force, start = _roll(xp, forces[k], offset[1:]), 0
-        for layer in _layers(slab, offset[0], result.shape[2]):
-            stop = start + layer.stop - layer.start
-            result[:, unknown, layer] += force[:, start:stop]
-            start = stop
+        layers = _layers(slab, offset[0], result.shape[2])
+        result[:, unknown, layers] += _roll(xp, forces[k], offset[1:])
 
 
-def _layers(slab: slice, offset: int, size: int) -> list[slice]:
-    """The layers of a slab moved by an offset along a periodic axis, as one or more slices."""
-    start, remaining = (slab.start + offset) % size, slab.stop - slab.start
-    slices = []
-    while remaining > 0:
-        count = min(remaining, size - start)
-        slices.append(slice(start, start + count))
-        start, remaining = 0, remaining - count
-    return slices
+def _layers(slab: slice, offset: int, size: int) -> slice | list[int]:
+    """The layers of a slab moved by an offset along a periodic axis: a slice if none wraps."""
+    start, stop = slab.start + offset, slab.stop + offset
+    return slice(start, stop) if stop <= size else [k % size for k in range(start, stop)]
 
 
 def _roll(xp: ModuleType, part: Fields, shifts: Any) -> Fields:
