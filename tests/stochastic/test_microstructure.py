@@ -106,13 +106,10 @@ def test_circles_from_a_file(tmp_path, text):
         (GOOD + "11,11,4\n", "row 5", "do not overlap"),
         (GOOD + "35,35,-1\n", "row 5", "radii from"),
         (GOOD + "35,,1\n", "row 5, column 2", "numbers"),
-        (GOOD + "35,nan,1\n", "row 5, column 2", "numbers"),
-        (GOOD + "35,1_0,1\n", "row 5, column 2", "numbers"),
         (GOOD + "35,٣٥,1\n", "row 5, column 2", "numbers"),
         (GOOD + "35,85,1\n", "row 5", "places in the section of 40 × 40 mm"),
         (GOOD.replace("y [mm]", "y"), "header", "'y [mm]'"),
         (GOOD.replace("r [mm]", "r [kg]"), "header", "'d [mm]'"),
-        (GOOD.replace("r [mm]", "q [mm]"), "header", "'d [mm]'"),
         (GOOD.replace(",", ";").replace("12", "1,2"), "row 3, column 2", "numbers"),
         ("", "circles.csv", "rows of numbers"),
         ("\udcff", "circles.csv", "text files in UTF-8"),
@@ -204,12 +201,9 @@ def test_study_of_packings(result):
         assert section.cells.sum() == pytest.approx(section.particles.measure, rel=1e-10)
     assert numbers["mean_area_fraction_of_map"] == pytest.approx(0.2, abs=0.005)
     assert result.pbox.excess(result.truncated) <= result.band + 1e-6
-
-
-def test_fragment_is_toml_that_gives_the_map(result):
-    text = fragment(summary(result))
+    text = fragment(numbers)  # TOML that gives the map
     radius = tomllib.loads(text)["radius"]
-    assert f"of the particles: {summary(result)['area_fraction']:.4f}" in text
+    assert f"of the particles: {numbers['area_fraction']:.4f}" in text
     assert (radius["a1"], radius["a3"], radius["theta"]) == (0.15, 0.85, [-3, 3])
     assert radius["a2"] == pytest.approx(result.pbox.a2, rel=1e-7)
 

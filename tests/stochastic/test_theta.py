@@ -4,7 +4,7 @@ degrees and orders.
 
 import numpy as np
 import pytest
-from scipy import integrate, stats
+from scipy import stats
 
 from alphacut.stochastic import HermiteMap, TruncatedNormal, gauss_rule
 from alphacut.stochastic.theta.quadrature import between_nodes, level_rule
@@ -65,16 +65,6 @@ def test_extremes_against_dense_sampling(case):
 def test_radius_outside_the_cell_is_refused(change):
     with pytest.raises(ValueError, match=r"inside \(0, 1\)"):
         HermiteMap(**(PAPER | change))
-
-
-def test_mean_area_fraction_of_the_paper():
-    radius, law = HermiteMap(**PAPER), TruncatedNormal()
-    exact, _ = integrate.quad(
-        lambda t: np.pi / 4 * radius(t) ** 2 * law.pdf(t), -3, 3, epsabs=1e-14
-    )
-    rule = gauss_rule(law, points=4)  # r² f_Θ needs degree 6
-    assert rule.mean(np.pi / 4 * radius(rule.nodes) ** 2) == pytest.approx(exact, abs=1e-14)
-    assert exact == pytest.approx(0.2092, abs=5e-5)
 
 
 @pytest.mark.parametrize("support", SUPPORTS)
