@@ -84,12 +84,17 @@ def written(folder, text=FRAME, **changes):
     return path
 
 
+def summary_of(folder):
+    """The summary in a folder of results."""
+    return json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+
+
 def summary_of_run(case, *options):
     """The summary of a run of a case without figures, into the folder beside it."""
     out = case.parent / "out"
     words = ["--quiet", "--no-figures", "--out", str(out), *options]
     assert main(["run", str(case), *words]) == 0
-    return json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    return summary_of(out)
 
 
 def two_floors_run(folder, *options):

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 import xarray
 
+from tests.alphacut.small import summary_of
+
 GOLDEN = json.loads((Path(__file__).parent / "golden.json").read_text(encoding="utf-8"))
 SERIES, LEVELS = ("modulus.method=series",), ("modulus.alpha=[0, 1]",)
 SHORT = ("envelope.duration=1 s", "envelope.step=0.02 s", "envelope.alpha=[0, 1]")
@@ -36,13 +38,6 @@ WHOLE = (
     "yielding",
 )
 UNDECLARED = 0.02  # share of the peak by which attained bounds without an error may differ
-
-
-def summary_of(folder):
-    """The summary in a folder of results."""
-    return json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-
-
 STRENGTH = {"inner": 0, "attained": 0, "searched": 0, "estimated": 1, "guaranteed": 2}
 
 

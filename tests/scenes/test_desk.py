@@ -1,7 +1,6 @@
 """The engineer's desk, cases shortened: a suite, wind on floors, matrices with a member's moment."""
 
 import csv
-import json
 import os
 import shutil
 import subprocess
@@ -12,6 +11,7 @@ import numpy as np
 import pytest
 
 from alphacut.entry import main
+from tests.alphacut.small import summary_of
 
 ROOT = Path(__file__).parents[2]
 FEW = "records.files=['suite/record-200[1-3].AT2']"
@@ -27,13 +27,13 @@ GOLDEN = {
 }
 
 
-def summary_of(case, shipped_run):
+def quick(case, shipped_run):
     """The summary of a case, made quick."""
-    return json.loads((shipped_run(case, QUICK[case]) / "summary.json").read_text(encoding="utf-8"))
+    return summary_of(shipped_run(case, QUICK[case]))
 
 
 def test_a_suite_has_its_golden_fragility(shipped_run):
-    answer = summary_of("suite", shipped_run)["fragility"]
+    answer = quick("suite", shipped_run)["fragility"]
     limit = answer["limits"]["drift1"]
     assert limit["nature"] == "guaranteed"
     low, reached, inner, high = (
@@ -46,7 +46,7 @@ def test_a_suite_has_its_golden_fragility(shipped_run):
 
 
 def test_wind_has_its_golden_peaks(shipped_run):
-    study = summary_of("wind", shipped_run)["envelopes"]["all"]
+    study = quick("wind", shipped_run)["envelopes"]["all"]
     peaks = study["peak"]
     for name, value in GOLDEN["wind"].items():
         assert peaks[name]["nature"] == "guaranteed"
@@ -56,7 +56,7 @@ def test_wind_has_its_golden_peaks(shipped_run):
 
 
 def test_a_frame_from_matrices_answers_all_questions(shipped_run):
-    summary = summary_of("plane-frame", shipped_run)
+    summary = quick("plane-frame", shipped_run)
     limits = summary["decision"]["limits"]
     assert {limits[name]["nature"] for name in ("roof", "moment")} == {"guaranteed"}
     assert limits["moment"]["unit"] == "N*m"
@@ -99,7 +99,7 @@ def test_three_ranks_give_the_bits_of_one_process(shipped_run, tmp_path):
     env = os.environ | {"OMP_NUM_THREADS": "1"}
     made = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, env=env)
     assert made.returncode == 0, made.stderr
-    summary = json.loads((tmp_path / "out/summary.json").read_text(encoding="utf-8"))
-    expected = summary_of("suite", shipped_run)
+    summary = summary_of(tmp_path / "out")
+    expected = quick("suite", shipped_run)
     assert summary["records"]["records"] == expected["records"]["records"]
     assert summary["fragility"] == expected["fragility"]

@@ -1,6 +1,5 @@
 """Commands: what they print, how they end, and that nothing is left where they refuse."""
 
-import json
 import os
 import re
 import signal
@@ -17,7 +16,7 @@ from alphacut.entry import main
 from alphacut.frame import propagation
 from alphacut.frame.verification.self_test import with_motions_tested
 from alphacut.io.results import Listed, ResultsFolder
-from tests.alphacut.small import CELL, written
+from tests.alphacut.small import CELL, summary_of, written
 
 CASES = Path(__file__).parents[3] / "cases"
 RUN = [sys.executable, "-m", "alphacut"]
@@ -38,7 +37,7 @@ def test_a_run_prints_a_table_and_leaves_its_files(tmp_path, capfd):
     assert max(map(len, out.splitlines())) <= 80
     assert out.splitlines()[1].startswith("peak of")
     assert "results are in" in err
-    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    summary = summary_of(folder)
     assert summary["envelopes"]["all"]["max"]["q1"] == pytest.approx(0.0099, abs=3e-4)
     assert {"envelope_all.nc", "summary.json"} <= {path.name for path in folder.iterdir()}
 
@@ -57,7 +56,7 @@ def test_a_step_that_widens_a_bound_is_foreseen_and_said_with_what_half_of_it_gi
         words = (case, *given, f"--set=envelope.step={step} s")
         foreseen = spoken(capfd, "check", *words)[1]
         texts.append(spoken(capfd, "run", *words, "--no-figures", "--out", folder)[1])
-        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        summary = summary_of(folder)
         peaks.append(summary["envelopes"]["all"]["peak"]["a1"])
         share = re.search(
             rf"a1: the step of {step:g} s widens its bound by about (.*)% betw", foreseen

@@ -1,7 +1,6 @@
 """Figures: which are drawn, when they are drawn anew, what they show."""
 
 import itertools
-import json
 import os
 import shutil
 
@@ -19,11 +18,7 @@ from alphacut.rve import Cell, Phase
 from alphacut.stages.store import CutsResult
 from alphacut.stochastic import HermiteMap
 from alphacut.stochastic.figures.style import figure_style
-from tests.alphacut.small import two_floors_run
-
-
-def kept(folder):
-    return json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+from tests.alphacut.small import summary_of, two_floors_run
 
 
 def test_figures_are_drawn_once_and_anew_where_the_case_changed(two_floors, tmp_path):
@@ -41,7 +36,7 @@ def test_figures_are_drawn_once_and_anew_where_the_case_changed(two_floors, tmp_
 
 
 def test_every_figure_has_both_forms_and_a_caption(two_floors):
-    names = kept(two_floors)["figures"]
+    names = summary_of(two_floors)["figures"]
     stems = {name.removeprefix("figures/").rpartition(".")[0] for name in names}
     assert {"decision", "probability", "tolerances"} <= stems
     assert set(names) == {f"figures/{stem}.{kind}" for stem in stems for kind in ("svg", "png")}

@@ -14,7 +14,7 @@ import pytest
 from alphacut.entry import main
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.results import Listed, ResultsFolder
-from tests.alphacut.small import CELL, written
+from tests.alphacut.small import CELL, summary_of, written
 
 
 def run(case, folder, *options):
@@ -23,7 +23,7 @@ def run(case, folder, *options):
 
 def numbers(folder):
     """Numbers of a summary, without what differs between two runs."""
-    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    summary = summary_of(folder)
     parts = ("modulus", "envelopes", "shares", "figures", "microstructure")
     kept = {key: part for key, part in summary.items() if key in parts}
 

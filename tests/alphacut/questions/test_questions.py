@@ -1,7 +1,5 @@
 """Questions of a case: their answers, and what a further one touches."""
 
-import json
-
 import numpy as np
 import pytest
 
@@ -18,12 +16,12 @@ from alphacut.questions.decision import DecisionAnswer
 from alphacut.questions.probability import shaped_like
 from alphacut.questions.summary import ANSWERS
 from alphacut.stages.envelope import loose_peaks
-from tests.alphacut.small import summary_of_run, written
+from tests.alphacut.small import summary_of, summary_of_run, written
 
 
 @pytest.fixture(scope="module")
 def summary(two_floors):
-    return json.loads((two_floors / "summary.json").read_text(encoding="utf-8"))
+    return summary_of(two_floors)
 
 
 def test_peaks_are_wide_where_the_gap_is_or_nothing_is_proved():

@@ -1,7 +1,6 @@
 """Two runs side by side, and tables in LaTeX."""
 
 import csv
-import json
 import re
 
 import numpy as np
@@ -11,7 +10,7 @@ from alphacut.entry import main
 from alphacut.questions.summary import Parts
 from alphacut.report.results import comparison
 from alphacut.stages.suite import Statistics, SuiteResult
-from tests.alphacut.small import two_floors_run
+from tests.alphacut.small import summary_of, two_floors_run
 
 
 @pytest.fixture(scope="module")
@@ -27,10 +26,7 @@ def test_two_runs_stand_side_by_side(runs, capsys):
     assert main(["report", str(a), str(b)]) == 0
     head, *lines = (re.split(" {2,}", x) for x in capsys.readouterr().out.splitlines())
     rows = {line[0]: dict(zip(head, line, strict=False)) for line in lines}
-    peaks = [
-        json.loads((x / "summary.json").read_text())["envelopes"]["all"]["peak"]["q2"]["upper"][0]
-        for x in runs
-    ]
+    peaks = [summary_of(x)["envelopes"]["all"]["peak"]["q2"]["upper"][0] for x in runs]
     ratio = float(rows["greatest peak of q2"]["second over first"])
     assert ratio == pytest.approx(peaks[1] / peaks[0], abs=1e-3)
     assert rows["|q2| ≤ 300.0 mm"]["first"] == "not exceeded"

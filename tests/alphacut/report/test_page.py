@@ -20,10 +20,7 @@ from alphacut.report.results import answers, drivers, peak_table, run_text
 from alphacut.report.tables import shown, write_tables
 from alphacut.stages.envelope import EnvelopeResult, PeakResult
 from alphacut.stages.store import CutsResult
-
-
-def summary_of(folder):
-    return json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+from tests.alphacut.small import summary_of
 
 
 def changed(two_floors, folder, **keys):

@@ -1,6 +1,5 @@
 """A suite of records: measures, scaling, peaks by record, fragility against its closed form."""
 
-import json
 import re
 
 import numpy as np
@@ -13,7 +12,7 @@ from alphacut.io.files import BadInput
 from alphacut.questions.fragility import FragilityAnswer
 from alphacut.records.recording import spectral_acceleration
 from alphacut.stages.suite import nominal_mode, suite_records
-from tests.alphacut.small import summary_of_run
+from tests.alphacut.small import summary_of, summary_of_run
 
 CASE = """
 title = "One storey under two records"
@@ -152,7 +151,7 @@ def test_the_mean_over_records_lies_between_means_of_ends(tmp_path, capsys):
     path.write_text(path.read_text() + f"\n[decision]\n{limits}\n", encoding="utf-8")
     asked = ["--set", "frame.outputs=['drift1', 'a1']"]
     assert main(["run", str(path), "--out", str(out), *asked]) == 0
-    summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    summary = summary_of(out)
     # what is asked for has peaks, limited or not, and is shown
     shown = dict(re.findall(r"^(\S.*), \w+  +(.*)$", capsys.readouterr().out, re.MULTILINE))
     assert set(shown) == {"drift1", "a1", "mean drift1", "mean a1"}
