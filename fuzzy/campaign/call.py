@@ -50,12 +50,8 @@ class Values:
 
     def column(self, name: str) -> int:
         """Index of a column."""
-        require_choice("output", name, self._column_of)
-        return self._column_of[name]
-
-    @cached_property
-    def _column_of(self) -> dict[str, int]:
-        return {name: column for column, name in enumerate(self.columns)}
+        require_choice("output", name, self.columns)
+        return self.columns.index(name)
 
 
 @dataclass(frozen=True, eq=False)

@@ -76,11 +76,22 @@ def windows(n: int, quantile: float | None, open_ends: tuple[bool, bool]) -> Win
         quantile: Probability of the quantile in (0, 1); None for the next value.
         open_ends: Ends without a physical bound: their gaps are removed first.
     """
-    inside, below, above = _gaps(n, quantile)
+    from scipy.stats import binom
+
+    # probability of the quantity in each gap, in all lower and in all higher ones
+    gaps = np.arange(n + 1)
+    if quantile is None:
+        inside, below, above = np.full(n + 1, 1 / (n + 1)), gaps / (n + 1), (n - gaps) / (n + 1)
+    else:
+        law = binom(n, quantile)
+        inside, below, above = law.pmf(gaps), law.cdf(gaps - 1), law.sf(gaps)
     low, high, level = 0, n, 0.0
     windows_by_level = {level: (low, high)}
     while low < high:
-        if _removes_lowest((inside, below, above), low, high, open_ends):
+        # a gap at an open end first, then the less probable one, then that where less was removed
+        is_low_closed, is_high_closed = not open_ends[0] or low > 0, not open_ends[1] or high < n
+        lowest, highest = (inside[low], below[low]), (inside[high], above[high])
+        if (is_low_closed, *lowest) <= (is_high_closed, *highest):
             low += 1
         else:
             high -= 1
@@ -89,32 +100,6 @@ def windows(n: int, quantile: float | None, open_ends: tuple[bool, bool]) -> Win
     windows_by_level.pop(1.0, None)
     first, last = np.array(list(windows_by_level.values())).T
     return Windows(np.array(list(windows_by_level)), first, last)
-
-
-def _gaps(n: int, quantile: float | None) -> tuple[Array, Array, Array]:
-    """Probability of the quantity in each of the n + 1 gaps, in all lower, in all higher ones."""
-    from scipy.stats import binom
-
-    gaps = np.arange(n + 1)
-    if quantile is None:
-        return np.full(n + 1, 1 / (n + 1)), gaps / (n + 1), (n - gaps) / (n + 1)
-    law = binom(n, quantile)
-    return law.pmf(gaps), law.cdf(gaps - 1), law.sf(gaps)
-
-
-def _removes_lowest(
-    gaps: tuple[Array, Array, Array], low: int, high: int, open_ends: tuple[bool, bool]
-) -> bool:
-    """True if the next gap to remove is the lowest of the window, False if it is the highest."""
-    probability, below, above = gaps
-    # a gap at an open end first, then the less probable one, then that where less was removed
-    low_is_open = open_ends[0] and low == 0
-    high_is_open = open_ends[1] and high == len(probability) - 1
-    if low_is_open != high_is_open:
-        return low_is_open
-    if probability[low] != probability[high]:
-        return bool(probability[low] < probability[high])
-    return bool(below[low] <= above[high])
 
 
 def rank_cuts(data: Observations, quantile: float | None) -> tuple[Stepwise, float]:

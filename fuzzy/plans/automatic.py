@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -68,8 +69,8 @@ class Automatic:
         linkage, ended, notes = None, False, list[str]()
         if cuts := list(cuts_with_width(campaign, domain)):
             try:
-                walk = SignWalk(campaign, cuts[-1])
-                monotone = walk.corners_suffice()
+                walk = walk_signs(campaign, cuts[-1])
+                monotone = walk.monotone
                 if monotone.any():
                     which = f"keep their sign at {walk.n_points} points"
                     notes.append(
@@ -118,78 +119,73 @@ def _listed(names: Iterable[str]) -> str:
     return ", ".join(first[:4]) + (" …" if len(first) > 4 else "")
 
 
-class SignWalk:
-    """Differences of every input along a walk through the widest cut.
+class SignWalk(NamedTuple):
+    """What differences of every input tell of the outputs.
 
-    Attributes:
-        steps: Points along the walk at which each input is changed.
+    Args:
         samples: Points of the walk between which each input changes once, in unit coordinates,
-            shape (steps + 1, uncertain inputs): a Latin hypercube sample of the cut.
+            shape (steps + 1, uncertain inputs): a Latin hypercube sample of the widest cut.
+        n_points: Points of the widest cut at which each input is changed alone.
         is_constant: Outputs that are the same all along the walk, a mask (outputs,).
+        monotone: Outputs that two corners of each cut bound, by all samples, a mask (outputs,).
     """
 
-    def __init__(self, campaign: Campaign, widest: CutSearch) -> None:
-        from scipy.stats import qmc
+    samples: Array
+    n_points: int
+    is_constant: Mask
+    monotone: Mask
 
-        self.campaign, self.cut = campaign, widest
-        inputs = len(widest.uncertain_inputs)
-        self.steps = _WALK if inputs > 1 else _WALK_OF_ONE
-        hypercube = qmc.LatinHypercube(inputs, rng=np.random.default_rng([SEED, 0]))
-        self.samples: Array = hypercube.random(self.steps + 1)
-        self.is_constant: Mask = np.zeros(0, bool)
 
-    @property
-    def n_points(self) -> int:
-        """Points of the widest cut at which each input is changed alone."""
-        return self.steps + 2 * (2 if len(self.cut.uncertain_inputs) > 1 else 1)
+def walk_signs(campaign: Campaign, widest: CutSearch) -> SignWalk:
+    """Change every input alone along a walk through the widest cut, and beside its corners.
 
-    def corners_suffice(self) -> Mask:
-        """Return the outputs that two corners of each cut bound, by all samples, a mask (outputs,).
+    The corners that bound an output by these signs are samples of the campaign afterwards.
+    """
+    from scipy.stats import qmc
 
-        Evaluates those corners, which are samples of the campaign afterwards.
-        """
-        signs = self._signs_along_walk()
-        monotone: Mask = np.asarray((signs != 0).all(axis=1)) & ~self.is_constant
-        for pattern in np.unique(signs[monotone], axis=0):
-            self._evaluate_corners(pattern)
-        samples = self.campaign.samples
-        points = samples.points[:, self.cut.uncertain_inputs]
-        for column in np.flatnonzero(monotone):
-            values = samples.values.array[:, column]
-            monotone[column] = contradiction(points, values, signs[column]) is None
-        return monotone
+    inputs = len(widest.uncertain_inputs)
+    count = _WALK if inputs > 1 else _WALK_OF_ONE
+    hypercube = qmc.LatinHypercube(inputs, rng=np.random.default_rng([SEED, 0]))
+    turns: Array = hypercube.random(count + 1)
+    walk = np.empty((count * inputs + 1, inputs))
+    for column in range(inputs):  # each step changes one input, in turn
+        changes = np.arange(len(walk)) + inputs - 1 - column
+        walk[:, column] = turns[changes // inputs, column]
+    values = campaign(widest.points(walk)).array
+    tolerance = negligible(campaign.samples.values.array)
+    directions = np.sign(np.diff(walk, axis=0).sum(axis=1))
+    differences = np.diff(values, axis=0) * directions[:, None]
+    by_input = differences.reshape(count, inputs, -1)
+    falls, rises = (by_input < -tolerance).any(axis=0), (by_input > tolerance).any(axis=0)
+    is_unknown = (falls & rises) | np.isnan(by_input).any(axis=0)
+    # an input with an effect here and none there: on a plateau corners tell nothing
+    is_tied = np.abs(by_input) <= EQUAL * np.abs(values).max(axis=0)
+    is_unknown |= is_tied.any(axis=0) & ~is_tied.all(axis=0)
+    is_constant = np.asarray(is_tied.all(axis=(0, 1)))
+    signs = np.where(is_unknown, 0, np.where(falls, -1, 1)).astype(np.int8).T
+    monotone: Mask = np.asarray((signs != 0).all(axis=1)) & ~is_constant
+    for pattern in np.unique(signs[monotone], axis=0):
+        _evaluate_corners(campaign, widest, pattern, turns[:2])
+    samples = campaign.samples
+    points = samples.points[:, widest.uncertain_inputs]
+    for column in np.flatnonzero(monotone):
+        output = samples.values.array[:, column]
+        monotone[column] = contradiction(points, output, signs[column]) is None
+    return SignWalk(turns, count + 2 * (2 if inputs > 1 else 1), is_constant, monotone)
 
-    def _signs_along_walk(self) -> Signs:
-        """Signs of all differences along the walk, 0 where mixed, (outputs, uncertain inputs)."""
-        inputs = len(self.cut.uncertain_inputs)
-        steps = self.steps * inputs
-        walk = np.empty((steps + 1, inputs))
-        for column in range(inputs):  # each step changes one input, in turn
-            changes = np.arange(steps + 1) + inputs - 1 - column
-            walk[:, column] = self.samples[changes // inputs, column]
-        values = self.campaign(self.cut.points(walk)).array
-        tolerance = negligible(self.campaign.samples.values.array)
-        directions = np.sign(np.diff(walk, axis=0).sum(axis=1))
-        differences = np.diff(values, axis=0) * directions[:, None]
-        by_input = differences.reshape(self.steps, inputs, -1)
-        falls, rises = (by_input < -tolerance).any(axis=0), (by_input > tolerance).any(axis=0)
-        is_unknown = (falls & rises) | np.isnan(by_input).any(axis=0)
-        # an input with an effect here and none there: on a plateau corners tell nothing
-        is_tied = np.abs(by_input) <= EQUAL * np.abs(values).max(axis=0)
-        is_unknown |= is_tied.any(axis=0) & ~is_tied.all(axis=0)
-        self.is_constant = np.asarray(is_tied.all(axis=(0, 1)))
-        return np.where(is_unknown, 0, np.where(falls, -1, 1)).astype(np.int8).T
 
-    def _evaluate_corners(self, signs: Signs) -> None:
-        """Evaluate extreme corners of each cut for such signs, and steps from the widest."""
-        greatest = (signs > 0).astype(float)
-        corners = np.stack([greatest, 1 - greatest])
-        steps = np.eye(len(signs)) * (1 - 2 * corners[:, None])  # inwards
-        scaled_steps = _SMALL_STEP * steps
-        if len(signs) > 1:
-            scaled_steps = np.concatenate([scaled_steps, self.samples[:2, None] * steps], axis=1)
-        neighbours = corners[:, None] + scaled_steps
-        self.campaign(self.cut.points(neighbours.reshape(-1, len(signs))))
-        for cut in cuts_with_width(self.campaign, self.cut.domain):
-            extremes = corners[:, np.isin(self.cut.uncertain_inputs, cut.uncertain_inputs)]
-            self.campaign(cut.points(np.concatenate([extremes, cut.corners])))
+def _evaluate_corners(
+    campaign: Campaign, widest: CutSearch, signs: Signs, large_steps: Array
+) -> None:
+    """Evaluate extreme corners of each cut for such signs, and steps from the widest."""
+    greatest = (signs > 0).astype(float)
+    corners = np.stack([greatest, 1 - greatest])
+    steps = np.eye(len(signs)) * (1 - 2 * corners[:, None])  # inwards
+    scaled_steps = _SMALL_STEP * steps
+    if len(signs) > 1:
+        scaled_steps = np.concatenate([scaled_steps, large_steps[:, None] * steps], axis=1)
+    neighbours = corners[:, None] + scaled_steps
+    campaign(widest.points(neighbours.reshape(-1, len(signs))))
+    for cut in cuts_with_width(campaign, widest.domain):
+        extremes = corners[:, np.isin(widest.uncertain_inputs, cut.uncertain_inputs)]
+        campaign(cut.points(np.concatenate([extremes, cut.corners])))

@@ -69,7 +69,9 @@ def _dipoles(
     """Force dipoles of n times m spheres over r³ under unit strains, shape (n, m, loads)."""
     # singular amplitudes = T (regular amplitudes of the far field and of all images)
     poles = Multipoles.up_to(degree, shear=shear)
-    regular_scale, singular_scale = (radius[:, None] ** power for power in _powers(poles))
+    # powers of r scale amplitudes to r = 1, over one load's; solution 1 of degree 0 is none
+    powers = np.maximum(poles.n + poles.kind - 2, 0), poles.n + 3 - poles.kind
+    regular_scale, singular_scale = (radius[:, None] ** power for power in powers)
     images = couplings(degree, matrix.poisson, shear=shear)
     images = images * regular_scale[..., None] * singular_scale[:, None]
     order = 2 if shear else 0
@@ -93,12 +95,6 @@ def _dipoles(
         source = np.broadcast_to(source, (*system.shape[:2], len(loads)))
         dipoles[:, j] = np.linalg.solve(system, source)[:, dipole_rows, columns]
     return dipoles
-
-
-def _powers(poles: Multipoles) -> tuple[Array, Array]:
-    """Powers of r that scale regular and singular amplitudes to r = 1, over one load's."""
-    kind = poles.kind - 2
-    return np.maximum(poles.n + kind, 0), poles.n + 1 - kind  # solution 1 of degree 0 is none
 
 
 @lru_cache(maxsize=1024)

@@ -84,7 +84,14 @@ def couplings(highest: int, poisson: complex, *, shear: bool) -> Array:
         of_m = _coupling(target, source, _Pair(n, m, k, j), poisson, sums)
         of_minus_m = _coupling(target, source, _Pair(n, -m, k, j), poisson, sums)
         coupling[np.ix_(rows, columns)] = of_m + np.where(m > 0, sign * of_minus_m, 0.0)
-    return _with_periodic_strain(coupling, poles, poisson, shear=shear)
+    # less the mean strain of the sums of degree −2
+    order = 2 if shear else 0
+    polarised_ball = 16 * np.pi * (4 - 5 * poisson) / (15 * VOLUME)  # strain of Eshelby's ball
+    coupling[poles.index_of(1, 2, order), poles.index_of(3, 2, order)] -= polarised_ball
+    if not shear:  # the periodic 1/r has the Laplacian 4π/V besides its poles: strain 4π/(3V)
+        dilatation = 4 * np.pi / (6 * VOLUME * (1 - 2 * poisson))
+        coupling[poles.index_of(3, 0, 0), poles.index_of(1, 0, 0)] -= dilatation
+    return coupling
 
 
 @dataclass(frozen=True)
@@ -141,19 +148,6 @@ def _projection_factor(pair: _Pair) -> Array:
     a, b = degree - order, degree + order
     sides = q * (q - 1) * b * (b + 1) + p * (p - 1) * a * (a + 1)
     return np.asarray(1.0 * p * q * a * b - sides / 2)
-
-
-def _with_periodic_strain(
-    coupling: Array, poles: Multipoles, poisson: complex, *, shear: bool
-) -> Array:
-    """The couplings, changed in place, less the mean strain of the sums of degree −2."""
-    m = 2 if shear else 0
-    polarised_ball = 16 * np.pi * (4 - 5 * poisson) / (15 * VOLUME)  # strain of Eshelby's ball
-    coupling[poles.index_of(1, 2, m), poles.index_of(3, 2, m)] -= polarised_ball
-    if not shear:  # the periodic 1/r has the Laplacian 4π/V besides its poles: strain 4π/(3V)
-        dilatation = 4 * np.pi / (6 * VOLUME * (1 - 2 * poisson))
-        coupling[poles.index_of(3, 0, 0), poles.index_of(1, 0, 0)] -= dilatation
-    return coupling
 
 
 def t_matrices(degrees: Array, matrix: Material, inclusion: Material) -> tuple[Array, Array]:

@@ -8,7 +8,6 @@ the nearest monotone one in the same norm is taken.
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -154,7 +153,7 @@ class SlopeBand:
         upper = np.maximum(np.clip(upper, least, greatest), fitted)
         for fraction in np.linspace(1, 0, 201):
             low, high = fitted + fraction * (lower - fitted), fitted + fraction * (upper - fitted)
-            if all(map(fit.is_monotone, itertools.product(*zip(low, high, strict=True)))):
+            if all(map(fit.is_monotone, product(*zip(low, high, strict=True)))):
                 break
         ends = zip(low, fitted, high, strict=True)
         a2, a4 = ((float(x), float(y), float(z)) for x, y, z in ends)
