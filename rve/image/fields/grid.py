@@ -148,9 +148,6 @@ def _layers(slab: slice, offset: int, size: int) -> slice | list[int]:
 
 def _roll(xp: ModuleType, part: Fields, shifts: Any) -> Fields:
     """The part rolled along the last axes, where a shift is not zero."""
-    axes = [axis for axis, shift in enumerate(shifts) if shift]
-    if not axes:
+    if not any(shifts):
         return part
-    return xp.roll(
-        part, tuple(shifts[axis] for axis in axes), axis=tuple(axis - len(shifts) for axis in axes)
-    )
+    return xp.roll(part, tuple(shifts), axis=tuple(range(-len(shifts), 0)))

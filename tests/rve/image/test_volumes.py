@@ -5,7 +5,7 @@ import pytest
 from PIL import Image
 
 from alphacut.fuzzy import RefusedError
-from alphacut.rve.image.files import files_of, needed_memory, read_grid, require_memory
+from alphacut.rve.image.files import files_of, read_grid, require_memory
 
 tifffile = pytest.importorskip("tifffile")
 SHAPE, CUBE = (12, 5, 7), (1, 1, 1)
@@ -111,7 +111,10 @@ def test_slices_that_are_not_alike_and_bent_voxels_are_told(tmp_path):
     assert [file.name for file in files_of(tmp_path / "c.mhd")] == ["c.mhd", "c.raw"]
 
 
-def test_a_volume_too_large_is_told_what_fits():
-    assert needed_memory((64, 64, 64)) < 7e8
-    with pytest.raises(RefusedError, match=r"10000 × 10000 × 10000 voxels.*crop a piece of \d+ × "):
-        require_memory((10_000,) * 3)
+@pytest.mark.parametrize(
+    ("shape", "what"),
+    [((10**4,) * 3, "10000 × 10000 × 10000 voxels"), ((10**6,) * 2, "1000000 × 1000000 pixels")],
+)
+def test_a_grid_too_large_is_told_what_fits(shape, what):
+    with pytest.raises(RefusedError, match=rf"{what}.*crop a piece of \d+ × "):
+        require_memory(shape)
