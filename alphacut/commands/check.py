@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     import xarray
 
 GRAVITY = float(STANDARD_GRAVITY)
+USUAL_PERIODS = 1e-3, 60.0  # in s: towers have 10 s at most, machine parts seldom below 1 ms
 KINDS = {Crisp: "crisp", Interval: "interval", Triangular: "triangle", Trapezoidal: "trapezoid"}
 Row = tuple[str, str, str]
 
@@ -69,6 +70,10 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
         text += f"phases: {', '.join(f'{name} {share:.2%}' for name, share in shares)}\n"
     if period:
         text += f"first natural period: {period:.4g} s, at the most plausible values\n"
+        if not USUAL_PERIODS[0] <= period <= USUAL_PERIODS[1]:
+            text += (
+                "this is an unusual period: are units right, mass and stiffness not exchanged?\n"
+            )
     if linear and (record := linear.ground):
         peak = engineering(record.extremes[0], "m/s^2")
         in_g = f"{record.extremes[0] / GRAVITY:.3g} g"

@@ -73,6 +73,9 @@ def test_check_prints_what_was_read(tmp_path, capfd):
     status, out, _ = spoken(capfd, "check", written(tmp_path))
     assert status == 0
     assert "first natural period" in out
+    assert "unusual" not in out
+    soft = "--set=frame.modulus=[22, 24, 26] kPa"
+    assert "unusual period" in spoken(capfd, "check", written(tmp_path), soft)[1]
     assert "22.00 GPa … 24.00 GPa … 26.00 GPa  triangle" in out
     assert out.endswith("no problems\n")
     read = {

@@ -9,7 +9,7 @@ from scipy.linalg import eigh
 from alphacut.frame import StoreyFrame
 from alphacut.frame.bounds import dual_function
 from alphacut.frame.bounds.box import over_box
-from alphacut.frame.bounds.level import LevelModels, OutputBounds
+from alphacut.frame.bounds.level import LevelModels, OutputBounds, _data
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.modes.clusters import centred_matrices, enclose_subspaces
 from alphacut.frame.modes.rest import inverse_form
@@ -230,7 +230,7 @@ def test_forms_of_inverses_stay_within_their_rests(order):
     assert 3e-3 <= max(shares) <= 1
 
 
-def test_tables_of_the_dual_have_the_rounding_of_all_sums_they_enter():
+def test_tables_of_the_dual_have_the_rounding_of_all_sums_they_enter(monkeypatch):
     _, _, _, _, structure = frame(2, ground=RECORD)
     time, sources = np.arange(0, 2, 0.1), ("load", "velocity")
     level = LevelModels.from_structure(structure, ({"load": RECORD}, time, sources))
@@ -246,3 +246,8 @@ def test_tables_of_the_dual_have_the_rounding_of_all_sums_they_enter():
             size = np.abs(response.value).max((1, 2))
             assert (added >= 1.9 * count * unit * size - 1e-18).all()
             assert (added <= 2.1 * count * unit * size + 1e-18).all()
+    # and variables, which multipliers enter too
+    with_rounding = _data(level, 0, 1.0)[0].remainder
+    monkeypatch.setattr("alphacut.frame.bounds.level.gamma", lambda _: 0.0)
+    added = with_rounding - _data(level, 0, 1.0)[0].remainder
+    assert (added >= 7.9 * count * unit).all()
