@@ -213,12 +213,10 @@ def usual_division(images: ModuliImages) -> int:
 
     One of a voxel, since two take eight times as long and narrow the bounds by half.
     """
-    with np.errstate(divide="ignore"):  # of pores
-        contrast = max(
-            float(upper.max() / lower.min()) for lower, upper in (images.bulk, images.shear)
-        )
+    pairs = images.bulk, images.shear
+    is_mild = all(upper.max() <= MILD * lower.min() for lower, upper in pairs)
     is_small = images.bulk[0].ndim == 2 and images.bulk[0].size <= LARGE
-    return 2 if contrast <= MILD and is_small else 1
+    return 2 if is_mild and is_small else 1
 
 
 @dataclass(frozen=True, eq=False)

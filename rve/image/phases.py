@@ -116,11 +116,9 @@ class ModuliImages:
         moduli = self.bulk[end], self.shear[end]
         if any(np.any(np.isinf(x) if end else x == 0) for x in moduli):
             return None
-        limited = []
-        for values in moduli:
-            others = values[(values > 0) & np.isfinite(values)]
-            limited.append(np.clip(values, PORE_RATIO * others.min(), RIGID_RATIO * others.max()))
-        return limited[0], limited[1]
+        others = [x[(x > 0) & np.isfinite(x)] for x in moduli]
+        ends = [(PORE_RATIO * x.min(), RIGID_RATIO * x.max()) for x in others]
+        return np.clip(moduli[0], *ends[0]), np.clip(moduli[1], *ends[1])
 
     def equals(self, images: ModuliImages) -> bool:
         """True if both are the same moduli everywhere."""
