@@ -118,7 +118,9 @@ def segment(grey: Array, thresholds: Sequence[float]) -> Segmentation:
         RefusedError: A class has no pixel, or grey values are clipped.
     """
     values, borders = np.asarray(grey, float), tuple(map(float, thresholds))
-    polynomials = _polynomials(values.shape)  # of the light
+    y, x = np.meshgrid(*(np.linspace(-1, 1, count) for count in values.shape), indexing="ij")
+    polynomials = np.stack([x, y, x * x, x * y, y * y], axis=-1).reshape(-1, 5)  # of the light
+    polynomials -= polynomials.mean(axis=0)
     light, last_labels = np.zeros_like(values), None
     for _ in range(_MAX_ITERATIONS):
         labels = np.searchsorted(borders, values - light, side="right")
@@ -167,13 +169,6 @@ def _is_flat(grey: Array, contrast: float) -> bool:
     fractions = counts[order] / grey.size
     are_distant = (np.diff(np.sort(values[order])) >= _FLAT_GAP * contrast).all()
     return bool(fractions[0] >= _FLAT or (are_distant and fractions.sum() >= _FLAT))
-
-
-def _polynomials(shape: tuple[int, ...]) -> Array:
-    """x, y, x², xy and y² of mean zero on the pixels, shape (pixels, 5)."""
-    y, x = np.meshgrid(*(np.linspace(-1, 1, count) for count in shape), indexing="ij")
-    columns = np.stack([x, y, x * x, x * y, y * y], axis=-1).reshape(-1, 5)
-    return np.asarray(columns - columns.mean(axis=0))
 
 
 def _fit_light(

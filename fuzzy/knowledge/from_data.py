@@ -66,7 +66,11 @@ def from_data(
         number, decided = mean_cuts(data), 0.0
     else:
         number, decided = student_cuts(data)
-    return ClaimedNumber(number, CoverageClaim(claim, _conditions(data, law, bounds)), decided)
+    drawn = f"{len(data.values)} values drawn alike and independently"
+    conditions = [f"{drawn} from a {law} law" if law else drawn]
+    if bounds is not None:
+        conditions.append("bounds [{:g}, {:g}]".format(*data.bounds))
+    return ClaimedNumber(number, CoverageClaim(claim, tuple(conditions)), decided)
 
 
 def _quantile(claim: str) -> float | None:
@@ -76,17 +80,6 @@ def _quantile(claim: str) -> float | None:
         return float(number[1])
     require(claim in ("next value", "mean", "median"), "claim", value=repr(claim), allowed=CLAIMS)
     return 0.5 if claim == "median" else None
-
-
-def _conditions(data: Observations, law: str | None, bounds: Limits | None) -> tuple[str, ...]:
-    """Conditions of the claim, in words."""
-    low, high = data.bounds
-    conditions = [f"{len(data.values)} values drawn alike and independently"]
-    if law:
-        conditions[0] += f" from a {law} law"
-    if bounds is not None:
-        conditions.append(f"bounds [{low:g}, {high:g}]")
-    return tuple(conditions)
 
 
 def mean_cuts(data: Observations) -> Stepwise:

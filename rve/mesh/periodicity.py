@@ -21,11 +21,15 @@ class MeshError(FailedError):
 
 
 def unknowns(points: Array) -> Ints:
-    """Number of each node's unknown, the same for periodic partners, −1 at corners, shape (n,)."""
+    """Number of each node's unknown, the same for periodic partners, −1 at corners, shape (n,).
+
+    Raises:
+        MeshError: A node on a side has no partner within `SAME_PLACE`.
+    """
     on_side = abs(abs(points) - 1) <= SAME_PLACE
     representative: Ints = np.arange(len(points))
     for axis in (0, 1):
-        first, second = partners(points, on_side[:, axis], axis)
+        first, second = _partners(points, on_side[:, axis], axis)
         representative[first] = representative[second] = np.minimum(first, second)
     free = ~on_side.all(axis=1)
     unknown: Ints = np.full(len(points), -1)
@@ -33,17 +37,8 @@ def unknowns(points: Array) -> Ints:
     return unknown
 
 
-def partners(points: Array, on_side: Mask, axis: int) -> tuple[Ints, Ints]:
-    """Nodes of the side x = −1 and their partners on x = 1, (k,) each, sorted along the side.
-
-    Args:
-        points: Positions, shape (n, 2).
-        on_side: Mask of the nodes on one of the two sides, shape (n,).
-        axis: 0 for the sides x1 = ±1, 1 for x2 = ±1.
-
-    Raises:
-        MeshError: A node has no partner within `SAME_PLACE`.
-    """
+def _partners(points: Array, on_side: Mask, axis: int) -> tuple[Ints, Ints]:
+    """Nodes of the side x = −1 and their partners on x = 1, (k,) each, sorted along the side."""
     tangential = points[:, 1 - axis]
     is_first = points[:, axis] < 0
     first, second = (np.flatnonzero(on_side & mask) for mask in (is_first, ~is_first))

@@ -185,13 +185,11 @@ class PrismGrid:
         levels = self.level_thetas(radius_map.distribution)
         mid_levels, blocks = (levels[1:] + levels[:-1]) / 2, []
         for theta, count in ((levels, len(self.plane.points)), (mid_levels, self.plane.vertices)):
-            xy = self._planar_positions(radius_map, theta)[:, :count]
+            shape = len(theta), *self.plane.points.shape
+            xy = np.broadcast_to(self.plane.points, shape)
+            if self.conforming:
+                xy = nodes_at_radii(self.plane, radius_map(theta))
+            xy = xy[:, :count]
             heights = np.broadcast_to(theta[:, None, None], (*xy.shape[:2], 1))
             blocks.append(np.dstack([xy, heights]).reshape(-1, 3))
         return np.concatenate(blocks)
-
-    def _planar_positions(self, radius_map: RadiusMap, theta: Array) -> Array:
-        """Positions of the planar nodes at each θ, shape (k, planar nodes, 2)."""
-        if not self.conforming:
-            return np.broadcast_to(self.plane.points, (len(theta), *self.plane.points.shape))
-        return nodes_at_radii(self.plane, radius_map(theta))

@@ -138,20 +138,6 @@ def square_moduli(stiffness: Array) -> Array:
     return np.stack([mean + lateral, mean - lateral, stiffness[..., 2, 2]], axis=-1)
 
 
-def moduli_of_energies(energies: Array, loads: Array) -> Array:
-    """C11 + C12, C11 − C12 and C33 from the energies of loads, shape (…, 3), in Pa.
-
-    Args:
-        energies: Mean of σ_a : ε_a for each load a, shape (…, loads), in Pa.
-        loads: `LOADS` or `THREE_LOADS`; without the third, C11 − C12 is nan.
-    """
-    moduli = np.full((*energies.shape[:-1], 3), np.nan)
-    columns = (0, 2, 1)  # of the moduli that the equibiaxial, shear and deviatoric load give
-    for k, strain in enumerate(loads):
-        moduli[..., columns[k]] = energies[..., k] / np.dot(strain, strain)
-    return moduli
-
-
 def axial_moduli(stiffness: Array, *, square: bool) -> Array:
     """C11 + C12, C11 − C12 and C33 of a plane stiffness (…, 3, 3), shape (…, 1 or 3, 3).
 

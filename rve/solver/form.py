@@ -14,7 +14,6 @@ import numpy as np
 from alphacut.fuzzy.arrays import Array
 from alphacut.rve.cell.cell import AnyPhase
 from alphacut.rve.fenicsx import PETSc, at_points, compiled, fem, petsc, ufl
-from alphacut.rve.result.moduli import moduli_of_energies
 
 
 def strain(u: Any) -> Any:
@@ -100,7 +99,12 @@ def total_energy(products: Array, stiffness: Sequence[Array]) -> Array:
 def energies_by_phase(products: Array, phases: Sequence[AnyPhase], loads: Array) -> Array:
     """Σ ε : C_X ε of X = K, G of each phase in the three moduli, (phases, 2, 3), in Pa.
 
-    C_X is what X gives to the phase's stiffness; `loads` are the fields' macroscopic strains.
+    C_X is what X gives to the phase's stiffness; `loads` are the fields' macroscopic strains,
+    `LOADS` or `THREE_LOADS`; without the third, parts of C11 − C12 are nan.
     """
     parts = np.array([phase.stiffness_parts for phase in phases])
-    return moduli_of_energies(np.einsum("pxij,piaja->pxa", parts, products), loads)
+    energies = np.einsum("pxij,piaja->pxa", parts, products)
+    moduli = np.full((*energies.shape[:-1], 3), np.nan)
+    columns = [0, 2, 1][: len(loads)]  # what the equibiaxial, shear and deviatoric load give
+    moduli[..., columns] = energies / (loads**2).sum(axis=1)
+    return moduli

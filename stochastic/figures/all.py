@@ -279,7 +279,11 @@ def draw_two_point(discs: Particles, generator: np.random.Generator) -> Figure:
     direct = neighbours(discs)
     direct_offsets = {tuple(np.round(v, 12)) for v in direct.offset[direct.first == centre]}
     colours = [GREEN if tuple(np.round(v, 12)) in direct_offsets else LIGHT for v in near]
-    drawn = _from_pair_distances(discs, len(near), reach, generator)
+    pairs = KDTree(discs.centres, boxsize=discs.size).query_pairs(reach, output_type="ndarray")
+    pair_distances = np.hypot(*discs.separation(pairs[:, 0], pairs[:, 1]).T)
+    radial = generator.choice(pair_distances, len(near))
+    angle = 2 * np.pi * generator.random(len(near))
+    drawn = radial[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     distance = np.hypot(*np.moveaxis(drawn[:, None] - drawn[None], -1, 0))
     np.fill_diagonal(distance, np.inf)
     n_overlaps = int((distance.min(axis=1) < 2 * radius).sum())
@@ -295,18 +299,6 @@ def draw_two_point(discs: Particles, generator: np.random.Generator) -> Figure:
         _circles(axes, centres, radii, facecolor=colour, edgecolor=GREY, alpha=0.8)
         _view(axes, -limit, limit)
     return figure
-
-
-def _from_pair_distances(
-    discs: Particles, number: int, reach: float, generator: np.random.Generator
-) -> Array:
-    """Return points (number, 2), in m, at random angles and pair distances of the discs."""
-    tree = KDTree(discs.centres, boxsize=discs.size)
-    pairs = tree.query_pairs(reach, output_type="ndarray")
-    offset = discs.separation(pairs[:, 0], pairs[:, 1])
-    distance = generator.choice(np.hypot(offset[:, 0], offset[:, 1]), number)
-    angle = 2 * np.pi * generator.random(number)
-    return np.asarray(distance[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1))
 
 
 def draw_overlay(picture: Array, discs: Particles) -> Figure:
