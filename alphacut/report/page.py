@@ -158,8 +158,10 @@ class Page:
         count, kind = part.get("discs", part.get("spheres")), part["particles"]
         cells = "volume" if kind == "spheres" else "area"
         stated, mapped = part["fraction_of_case"], part[f"mean_{cells}_fraction_of_map"]
+        measured = part[f"{cells}_fraction"]
         beside = "" if stated is None else f"; the case says {stated:.4g}"
         yield f"{count:,} {kind} in {part['packings']} sections or cubes."
+        beside += f"; the {kind} themselves {measured:.4f}"
         yield f"Of the {cells} of the cells the map's particles take {mapped:.4f}{beside}."
 
     def _image(self) -> Iterator[str]:
