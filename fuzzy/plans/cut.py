@@ -23,7 +23,7 @@ _FACE = 1e-9  # of the width: a point this close to a face of the cut lies on it
 _STEEPNESS = 4.0  # of the objective's unit: so first steps mostly reach a face at once
 _FLAT = 1e-12  # ranges of the output over the width of the cut: no slope
 # ranges of the output at which a descent ends: by its last step, and by its slope
-MIN_CHANGE, _MIN_SLOPE = 5e-10, 2.5e-6
+_MIN_CHANGE, _MIN_SLOPE = 5e-10, 2.5e-6
 _MAX_ITERATIONS = 50  # of a descent
 _MAX_CORNER_INPUTS = 6  # inputs up to which all corners are evaluated, 64 at most
 _FAILED = 1e6  # ranges of the output that stand for a sample without a value
@@ -99,19 +99,11 @@ class CutSearch:
         slopes = np.abs(finite - here) / _LARGE_DIFFERENCE / self.output_range(output)
         return float(slopes.max(initial=0.0))
 
-    def descend(
-        self,
-        start: Array,
-        bound: Bound,
-        first_step: float = inf,
-        *,
-        least_change: float = MIN_CHANGE,
-    ) -> Optimum:
+    def descend(self, start: Array, bound: Bound, first_step: float = inf) -> Optimum:
         """Return the local optimum that a descent by L-BFGS-B reaches inside the cut.
 
         The gradient is one of differences. `first_step` limits the first step in unit coordinates:
-        a short one does not leave the basin of the start (uncertain inputs,). It ends with a step
-        that changes the output by less than `least_change` of its range.
+        a short one does not leave the basin of the start (uncertain inputs,).
         """
         from scipy.optimize import minimize
 
@@ -131,7 +123,7 @@ class CutSearch:
         slope = float(np.linalg.norm(change(start)[1]))
         factor = min(_STEEPNESS, first_step / max(slope, _FLAT))
 
-        options = {"ftol": least_change * factor, "gtol": _MIN_SLOPE * factor}
+        options = {"ftol": _MIN_CHANGE * factor, "gtol": _MIN_SLOPE * factor}
         result = minimize(
             lambda unit: tuple(factor * x for x in change(unit)),
             start,

@@ -19,6 +19,9 @@ straight line from its start to its end is made again with a short first step.
 Samples of a cut that lie in a narrower one are uniform there too and count for it. Optima of other
 cuts, and descents from corners, raise W and the bound, but not N.
 
+Where kinks are expected descents stall along them. A sample or a stall from which the output falls
+all along the straight line to a better optimum is in the basin of that, and is no optimum itself.
+
 Samples of one value lie on a plateau, from which no descent finds its way. It counts as one
 optimum, and its samples do not count as explored: its share of the cut stays uncovered. Further
 samples lie far apart, so that few humps stay between them. With a thousand on plateaus the search
@@ -38,7 +41,7 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Ints, Mask
 from alphacut.fuzzy.campaign.campaign import Campaign
-from alphacut.fuzzy.plans.cut import MIN_CHANGE, Bound, CutSearch, Optimum, cuts_with_width
+from alphacut.fuzzy.plans.cut import Bound, CutSearch, Optimum, cuts_with_width
 from alphacut.fuzzy.sets.boxes import Domain
 
 SEED = 0  # seed of all samples
@@ -53,8 +56,6 @@ FIRST_STEP = 0.1
 """First step of a careful descent, of the width of the cut: a longer one passes over humps."""
 VALUE_TOLERANCE = 1e-5
 """Of an output's range in the widest cut: values that differ by less count as one."""
-KINK_TOLERANCE = 1e-3
-"""The same where kinks are expected: descents stall along them, and end by 1 % of it."""
 ROUNDING = 1e-9  # the same of an output's size
 MAX_ON_PLATEAUS = 1000
 """Samples on plateaus with which the search of a bound ends: 95 % of uniform ones find a cone
@@ -63,6 +64,7 @@ CANDIDATES = 10  # a point that fills holes: more candidates cost time and crowd
 EQUAL = 1e-13  # of an output's size: two samples that differ by less lie on a plateau
 _SAME_PLACE = 0.01  # of the width: optima of one value are the same there without a look between
 _BETWEEN = np.array([0.25, 0.5, 0.75])  # points of a line on which a hump is looked for
+_FALLING = np.array([0.0, 0.02, 0.1, 0.25, 0.5, 0.75])  # of a line from a stall: near it most
 _MIN_NEW = 15  # samples that a round adds
 
 
@@ -317,15 +319,16 @@ class SingleLinkage:
 
     def _descend_from(self, cut: CutSearch, bound: Bound, start: Array) -> None:
         """Descend and record the optimum; with a short step again if it left the basin."""
-        least_change = KINK_TOLERANCE / 100 if self.has_kinks else MIN_CHANGE
-        optimum = cut.descend(start, bound, least_change=least_change)
+        if self.has_kinks and self._falls(cut, start, self.states[cut.level, bound].optima):
+            return
+        optimum = cut.descend(start, bound)
         self._record(optimum)
         step = cut.unit(optimum.point[None])[0] - start
         if np.abs(step).max() > FIRST_STEP:
             line = start + np.array([0.0, *_BETWEEN])[:, None] * step
             values = [*cut.values(line, bound), optimum.value]
             if (np.diff(values) > self._tolerance(bound)).any():
-                self._record(cut.descend(start, bound, FIRST_STEP, least_change=least_change))
+                self._record(cut.descend(start, bound, FIRST_STEP))
 
     def _record(self, optimum: Optimum) -> None:
         """Add an optimum to every cut of which it is one; the better of two equal ones stays."""
@@ -338,6 +341,21 @@ class SingleLinkage:
                 optima.append(optimum)
             elif optimum.value < optima[index].value:
                 optima[index] = optimum
+            if self.has_kinks:
+                units = cut.unit(np.stack([x.point for x in optima]))
+                better = [[y for y in optima if y.value < x.value] for x in optima]
+                stalls = [self._falls(cut, *pair) for pair in zip(units, better, strict=True)]
+                optima[:] = [x for x, is_stall in zip(optima, stalls, strict=True) if not is_stall]
+
+    def _falls(self, cut: CutSearch, start: Array, optima: list[Optimum]) -> bool:
+        """Return whether the output falls all along a line from a point (d,) to an optimum."""
+        if not optima:
+            return False
+        steps = cut.unit(np.stack([x.point for x in optima])) - start
+        points = (start + _FALLING[:, None, None] * steps).reshape(-1, len(start))
+        values = cut.values(points, optima[0].bound).reshape(len(_FALLING), -1)
+        changes = np.diff(np.vstack([values, [x.value for x in optima]]), axis=0)
+        return bool((changes <= 0).all(0).any())
 
     def _index_of_equal(self, cut: CutSearch, optimum: Optimum) -> int:
         """Index of an equal optimum in the list of a cut; its length if there is none."""
@@ -359,8 +377,7 @@ class SingleLinkage:
 
     def _tolerance(self, bound: Bound) -> float:
         values = self._values[bound][np.isfinite(self._values[bound])]
-        tolerance = KINK_TOLERANCE if self.has_kinks else VALUE_TOLERANCE
-        return float(tolerance * np.ptp(values) + ROUNDING * np.abs(values).max())
+        return float(VALUE_TOLERANCE * np.ptp(values) + ROUNDING * np.abs(values).max())
 
     def _rows(self, cut: CutSearch) -> Ints:
         """Return the rows of the samples that are uniform in a cut: its own and of wider cuts."""
