@@ -344,7 +344,7 @@ class SingleLinkage:
             if self.has_kinks:
                 units = cut.unit(np.stack([x.point for x in optima]))
                 better = [[y for y in optima if y.value < x.value] for x in optima]
-                stalls = [self._falls(cut, x, to) for x, to in zip(units, better, strict=True)]
+                stalls = [self._falls(cut, units[k], to) for k, to in enumerate(better)]
                 optima[:] = [x for x, is_stall in zip(optima, stalls, strict=True) if not is_stall]
 
     def _falls(self, cut: CutSearch, start: Array, optima: list[Optimum]) -> bool:
