@@ -224,11 +224,11 @@ def draw_incremental(answer: FragilityAnswer) -> Figure:
     figure, panels = plt.subplots(len(limits), sharex=True, squeeze=False, figsize=size)
     for axes, (name, limit) in zip(panels[:, 0], limits.items(), strict=True):
         for increment in answer.increments.values():
-            demand = increment.demand[name]
-            bands = limit.limit * demand.lower, limit.limit * demand.upper
-            for low, high, shade in zip(*bands, style.colours(answer.alpha), strict=True):
-                axes.fill_between(increment.measure, low, high, color=shade, lw=0, alpha=0.7)
-            axes.plot(increment.measure, bands[1][-1], color=INK, lw=0.7)
+            measure, (high, low) = increment.measure, limit.limit * increment.demands[name]
+            for level, shade in enumerate(style.colours(answer.alpha)):
+                band: style.Look = {"color": shade, "lw": 0, "alpha": 0.7}
+                axes.fill_between(measure, low[level], high[level], **band)
+            axes.plot(measure, high[-1], color=INK, lw=0.7)
         axes.axhline(limit.limit, color=ORANGE, lw=1.2, ls="--")
         axes.set_xlim(0.0, limit.measure[-1])
         axes.set_ylim(0.0, 3 * limit.limit)

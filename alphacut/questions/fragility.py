@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import fields
-from itertools import product
 
 import numpy as np
 from pydantic import Field
@@ -99,15 +98,16 @@ class FragilityAnswer(LimitsAnswer[LimitFragility]):
     def crossings(self) -> list[Record]:
         """A row for each limit, record and level of a frame that yields: sets of measures."""
         unit, rows = f" [{self.unit}]" if self.unit else "", list[Record]()
-        records = [*self.increments.items()]
-        for (name, limit), row in product(self.limits.items(), range(len(records))):
-            (record, increment), demand = records[row], records[row][1].demand[name]
-            for level, alpha in enumerate(self.alpha):
-                rows.append({"limit": limit.words, "record": record, "α": float(alpha)})
-                rows[-1] |= {f"{x}{unit}": y[level, row] for x, y in limit.ends.items()}
-                for who, values in (("some", demand.upper), ("all found", demand.lower)):
-                    text = _set_text(increment.measure, values[level])
-                    rows[-1] |= {f"exceeded by {who}{unit}": text}
+        for name, limit in self.limits.items():
+            for column, (record, increment) in enumerate(self.increments.items()):
+                for level, alpha in enumerate(self.alpha):
+                    some, all_found = increment.demands[name][:, level]
+                    sets = {"exceeded by some": some, "exceeded by all found": all_found}
+                    rows.append({"limit": limit.words, "record": record, "α": float(alpha)})
+                    for title, measures in limit.ends.items():
+                        rows[-1][f"{title}{unit}"] = measures[level, column]
+                    for title, demands in sets.items():
+                        rows[-1][f"{title}{unit}"] = _set_text(increment.measure, demands)
         return rows
 
     def numbers_of(self, limit: LimitFragility) -> Iterator[Record]:
@@ -136,13 +136,11 @@ class FragilityAnswer(LimitsAnswer[LimitFragility]):
                 f" Motions at measures {GRID_RATIO - 1:.0%} apart, and {RESOLUTION:.0%} where the"
                 " answer changes: an exceedance between them may be missed. Upper ends of bands"
                 " count the records under which a structure is known to exceed the limit, lower"
-                " ends those under which all structures found do."
+                " ends those under which all structures found do. Medians reach from those of"
+                " first crossings to those of last non-exceedances."
             )
-            collapses = [
-                name
-                for name, increment in self.increments.items()
-                if any(np.isnan(demand.upper).any() for demand in increment.demand.values())
-            ]
+            tried = self.increments.items()
+            collapses = [x for x, y in tried if np.isnan([*y.demands.values()]).any()]
             if collapses:
                 text += f" A collapse exceeds every limit: under {', '.join(collapses)}."
         else:
@@ -173,12 +171,15 @@ def _set_text(measures: Array, demands: Array) -> str:
 
 def fragility(section: FragilitySection, response: FuzzyResponse) -> FragilityAnswer:
     """Critical measures, bands, medians and dispersions of each limit, and of any of them."""
-    suite, increments = response.suite, {}
+    suite, increments = response.suite, dict[str, IncrementalResult]()
+    critical = dict[str, tuple[Nature, CriticalMeasures]]()
     if suite is None:
         raise RefusedError("fragility", "without records", "a section [records]")
     if response.increments:
         increments = {name: response.increments[name] for name in suite.records}
-        critical = _sets_by_motions(list(increments.values()))
+        for name in next(iter(increments.values())).demands:
+            tried = [(x.measure, x.demands[name]) for x in increments.values()]
+            critical[name] = Nature.ESTIMATED, ExceedanceSets.from_demands(tried)
     else:
         critical = _proved_measures(section, response, suite)
     answers = {}
@@ -228,16 +229,4 @@ def _proved_measures(
     if len(limits) > 1:
         natures, critical = zip(*found.values(), strict=True)
         found[ANY] = Nature.weakest(natures), of_any_limit(critical)
-    return found
-
-
-def _sets_by_motions(
-    increments: Sequence[IncrementalResult],
-) -> dict[str, tuple[Nature, CriticalMeasures]]:
-    """Nature and sets of measures of each limit, and of any of several, of a frame that yields."""
-    found: dict[str, tuple[Nature, CriticalMeasures]] = {}
-    for name in increments[0].demand:
-        demands = [np.stack([x.demand[name].lower, x.demand[name].upper]) for x in increments]
-        records = [(x.measure, demand) for x, demand in zip(increments, demands, strict=True)]
-        found[name] = Nature.ESTIMATED, ExceedanceSets.from_demands(records)
     return found

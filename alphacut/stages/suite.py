@@ -19,7 +19,7 @@ from alphacut.case.structure import Structure
 from alphacut.frame import Accelerogram
 from alphacut.frame.boxes import boxes
 from alphacut.frame.dynamics.nonlinear import make_flow
-from alphacut.frame.questions.incremental import ALL, SOME, IncrementalAnalysis
+from alphacut.frame.questions.incremental import IncrementalAnalysis
 from alphacut.frame.questions.peaks import ANY, PEAK_BOUNDS, Peak, Peaks
 from alphacut.frame.structures.linear import modal_damping_ratios
 from alphacut.frame.structures.quantities import output_of
@@ -29,7 +29,7 @@ from alphacut.fuzzy.result import Nature
 from alphacut.io.quantity import percent_text
 from alphacut.records.recording import Recording, arias_fractions, spectral_acceleration
 from alphacut.stages.envelope import EnvelopeTask, PeakResults, outputs_of, peak_results, peaks_of
-from alphacut.stages.store import CutsResult, Numbers, Stage, StageContext, StageResult, Values
+from alphacut.stages.store import Numbers, Stage, StageContext, StageResult, Values
 
 FREE_PERIODS = 5
 """Natural periods of free motion after a record: by then 5 % damping leaves a fifth."""
@@ -135,14 +135,14 @@ def stage(structure: Structure, task: EnvelopeTask, record: SuiteRecord) -> Stag
 
 
 class IncrementalResult(Numbers):
-    """Least and greatest peak over limit of the structures moved, over the measure of a record.
+    """Greatest and least peak over limit of the structures moved, over the measure of a record.
 
-    `demand` has them by limit, and by `ANY` of several, shape (levels, measures); null where they
-    collapse. At the first measure all structures moved are elastic and keep every limit.
+    `demands` has them by limit, and by `ANY` of several, shape (2, levels, measures); null where
+    they collapse. At the first measure all structures moved are elastic and keep every limit.
     """
 
     measure: Values
-    demand: dict[str, CutsResult]
+    demands: dict[str, Values]
 
 
 def incremental_analyses(
@@ -166,25 +166,21 @@ def incremental_analyses(
 
 
 def incremental_stage(
-    section: FragilitySection, record: SuiteRecord, analysis: IncrementalAnalysis
+    section: FragilitySection, name: str, analysis: IncrementalAnalysis
 ) -> Stage[IncrementalResult]:
-    """The stage that moves a frame that yields at scales of a record."""
+    """The stage that moves a frame that yields at scales of the record of a name."""
     names = [*section.limits_by_name, *[ANY] * (len(section.limits) > 1)]
-    name, packages = f"incremental_{record.name}", ("fuzzy", "frame")
-    compute = partial(_incremental_result, analysis, names)
-    work = record.duration
-    return Stage(name, [analysis, names], packages, IncrementalResult, compute, work=work)
+    inputs, packages = [analysis, names], ("fuzzy", "frame")
+    compute, work = partial(_incremental_result, analysis, names), analysis.duration
+    return Stage(f"incremental_{name}", inputs, packages, IncrementalResult, compute, work=work)
 
 
 def _incremental_result(
     analysis: IncrementalAnalysis, names: Sequence[str], context: StageContext
 ) -> StageResult[IncrementalResult]:
-    measure, demands = analysis.run(context.tick)
-    demand = {
-        name: CutsResult(lower=demands[ALL, :, event], upper=demands[SOME, :, event])
-        for event, name in enumerate(names)
-    }
-    return StageResult(IncrementalResult(measure=measure, demand=demand))
+    measure, demands = analysis.run(context.tick)  # (2, A, E, X)
+    by_limit = {name: demands[:, :, event] for event, name in enumerate(names)}
+    return StageResult(IncrementalResult(measure=measure, demands=by_limit))
 
 
 def worst_peaks(peaks: Mapping[str, Peaks]) -> dict[str, Peak]:

@@ -126,8 +126,8 @@ class ExceedanceSets(CriticalMeasures):
 
     Args:
         measures: Measures tried under each record, rising, (X,) each.
-        exceeds: Whether all structures found exceed the limit there, and whether one does, shape
-            (2, A, X) each.
+        exceeds: Whether a structure exceeds the limit there, and whether all structures found do,
+            shape (2, A, X) each.
     """
 
     measures: Sequence[Array]
@@ -137,11 +137,11 @@ class ExceedanceSets(CriticalMeasures):
     def from_demands(cls, records: Sequence[tuple[Array, Array]]) -> Self:
         """Return the sets of records, each by its measures (X,) and demands (2, A, X).
 
-        These are the least and the greatest peak over limit, nan where structures collapse.
+        These are the greatest and the least peak over limit, nan where structures collapse.
         """
         measures, exceeds = [x for x, _ in records], [~(demand <= 1) for _, demand in records]
         ends = []
-        for tried, (by_all, by_some) in zip(measures, exceeds, strict=True):
+        for tried, (by_some, by_all) in zip(measures, exceeds, strict=True):
             beyond, last = np.append(tried, np.inf), len(tried) - 1
             # the first measure is kept by all structures
             crossing = np.where(by_some.any(1), by_some.argmax(1), len(tried))
@@ -158,7 +158,7 @@ class ExceedanceSets(CriticalMeasures):
         Between two measures tried all do if all do at both, and some do if some do at either.
         """
         count_all, count_some = np.zeros((2, len(self.low[0]), len(measure)))
-        for tried, (by_all, by_some) in zip(self.measures, self.exceeds, strict=True):
+        for tried, (by_some, by_all) in zip(self.measures, self.exceeds, strict=True):
             after = np.searchsorted(tried, measure)
             before, after = np.maximum(after - 1, 0), np.minimum(after, len(tried) - 1)
             count_all += by_all[:, before] & by_all[:, after]
