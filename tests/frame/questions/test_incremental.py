@@ -77,3 +77,20 @@ def test_sets_that_are_no_intervals_agree_with_dense_scales(rng):
     # cuts are nested, and so are their sets
     assert (np.diff(exceeds_by_some, axis=0) <= 0).all()
     assert (np.diff(exceeds_by_all, axis=0) >= 0).all()
+
+
+def test_a_search_finds_exceedance_below_that_of_the_structures_of_the_grid():
+    rng = np.random.default_rng(3)  # of a motion whose greatest drift lies inside the cut
+    stiffness = rng.uniform(100, 400, 2).tolist()
+    ground = Accelerogram(0.05, rng.normal(size=60))
+    spring = {"stiffness": stiffness, "yield_force": [1.0, 0.8], "damping_ratio": 0.02}
+    frame = StoreyFrame([1.0, 1.0], **spring, ground=ground)
+    inputs = {
+        name: Triangular(*(frame.parameters[name] * x for x in (0.85, 1, 1.15)))
+        for name in ("fy1", "k1", "k2", "m2")
+    }
+    analysis = IncrementalAnalysis(frame, inputs, [("drift2", 0.00668)], 4.0, 0.05, (0.0,), 2.0)
+    scales, demands = analysis.run()
+    crossing = scales[(demands[0, 0, 0] > 1).argmax()]
+    structures = analysis._spread_structures()
+    assert analysis._peaks_over_limits(1.02 * crossing, structures, analysis.limits).max() < 0.99
