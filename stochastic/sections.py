@@ -92,7 +92,10 @@ def reduced_radii(sections: Sequence[ParticleCells]) -> AreaWeighted:
     its particle is refused.
     """
     if len(sections) == 1:
-        groups = [_patches(sections[0])]
+        particles, counted = sections[0].particles, sections[0].counted
+        patch = (PATCHES * particles.centres[counted] / particles.size).astype(int)
+        base = PATCHES ** np.arange(len(particles.size))[::-1]
+        groups = [np.minimum(patch, PATCHES - 1) @ base]
     else:
         groups = [np.full(len(section.counted), k) for k, section in enumerate(sections)]
     sample = AreaWeighted.from_values(
@@ -108,14 +111,6 @@ def reduced_radii(sections: Sequence[ParticleCells]) -> AreaWeighted:
 
 def _packing_with_cells(packing: Packing, seed: np.random.SeedSequence) -> ParticleCells:
     return with_cells(packing.make(np.random.default_rng(seed)))
-
-
-def _patches(section: ParticleCells) -> Ints:
-    """Return the number of the patch in which each counted cell lies, shape (k,)."""
-    particles = section.particles
-    patch = (PATCHES * particles.centres[section.counted] / particles.size).astype(int)
-    base = PATCHES ** np.arange(len(particles.size))[::-1]
-    return np.asarray(np.minimum(patch, PATCHES - 1) @ base)
 
 
 def cell_volumes(spheres: Particles) -> Array:

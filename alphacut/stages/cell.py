@@ -29,8 +29,9 @@ from alphacut.rve.result.moduli import AXES, hashin_shtrikman, plane_constants
 from alphacut.rve.result.result import HomogenisedStiffness
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.spheres.model import SphereSeriesModel
-from alphacut.rve.spheres.result import hill_average, volume_fraction
+from alphacut.rve.spheres.result import hill_average
 from alphacut.stochastic import TruncatedNormal, gauss_rule
+from alphacut.stochastic.particles.particles import SPHERES
 
 GPA = 1e9
 TOLERANCE_PART = 0.4
@@ -180,7 +181,7 @@ class CellProblem:
         rule = gauss_rule(nominal.radius_map.distribution, points=40)
         spheres, stated = self.cell.particles == "spheres", self.stated_fraction
         radii = nominal.radius_map(rule.nodes)
-        fractions = volume_fraction(radii) if spheres else nominal.fraction(rule.nodes)
+        fractions = SPHERES.fractions(radii) if spheres else nominal.fraction(rule.nodes)
         found: References = {"fraction": float(np.asarray(rule.mean(fractions)))}
         if not isinstance(matrix, Phase) or not isinstance(inclusion, Phase):
             return found

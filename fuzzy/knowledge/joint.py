@@ -43,10 +43,15 @@ def jointly(
     claimed = {name: number for name, number in inputs.items() if isinstance(number, ClaimedNumber)}
     if not claimed:
         return dict(inputs)
-    quantity = means or _common_quantity(claimed)
-    rule = JointRule(tuple(claimed), independent, quantity, named=bool(means))
-    if independent:
-        _require_different_values(claimed)
+    kinds = sorted({number.claim.about for number in claimed.values()})
+    cure = "say what the joint one means: jointly(inputs, means='drift of the next frame')"
+    is_told, allowed = bool(means) or len(kinds) == 1, "of one kind"
+    require(is_told, "claims of the inputs", value=kinds, allowed=allowed, cure=cure)
+    rule = JointRule(tuple(claimed), independent, means or kinds[0], named=bool(means))
+    for (first, number), (second, second_number) in combinations(claimed.items(), 2):
+        cure = f"{first} and {second} rest on the same values"
+        is_allowed = not independent or number.number != second_number.number
+        require(is_allowed, "independent", value=True, allowed="False", cure=cure)
     return {**inputs, **{name: _join_levels(number, rule) for name, number in claimed.items()}}
 
 
@@ -56,22 +61,6 @@ def joined_inputs(inputs: Mapping[str, FuzzyNumber | float]) -> dict[str, FuzzyN
     rules = {number.joint for number in numbers.values() if isinstance(number, ClaimedNumber)}
     are_joined = len(rules) == 1 and None not in rules
     return numbers if are_joined else fuzzy_inputs(jointly(numbers))
-
-
-def _common_quantity(claimed: Mapping[str, ClaimedNumber]) -> str:
-    kinds = sorted({number.claim.about for number in claimed.values()})
-    cure = "say what the joint one means: jointly(inputs, means='drift of the next frame')"
-    allowed = "of one kind"
-    require(len(kinds) == 1, "claims of the inputs", value=kinds, allowed=allowed, cure=cure)
-    return kinds[0]
-
-
-def _require_different_values(claimed: Mapping[str, ClaimedNumber]) -> None:
-    """Refuse inputs stated to be independent of which two have the same cuts, from one sample."""
-    for (first, number), (second, second_number) in combinations(claimed.items(), 2):
-        cure = f"{first} and {second} rest on the same values"
-        is_other = number.number != second_number.number
-        require(is_other, "independent", value=True, allowed="False", cure=cure)
 
 
 def _join_levels(number: ClaimedNumber, rule: JointRule) -> ClaimedNumber:

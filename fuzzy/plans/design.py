@@ -82,7 +82,11 @@ def guaranteed_bounds(bounds: Bounds, campaign: Campaign, proved: Mask) -> Bound
     for column in np.flatnonzero(proved):
         pair = contradiction(samples.points, samples.values.array[:, column], signs[column])
         agrees, key = pair is None and not is_exceeded[column], bounds.outputs[column]
-        cure = f"samples contradict it{_pair_words(bounds, pair)}"
+        cure = "samples contradict it"
+        if pair is not None:
+            named = (zip(bounds.inputs, point, strict=True) for point in pair)
+            first, second = (", ".join(f"{name} = {x:.6g}" for name, x in xs) for xs in named)
+            cure += f": at {first} it is larger than at {second}"
         require(agrees, f"knowledge of {key}", value=words, allowed=allowed, cure=cure)
     natures = tuple(Nature.GUARANTEED if x else Nature.ATTAINED for x in proved)
     evidence = f"which {len(samples.points):,} samples do not contradict"
@@ -108,14 +112,3 @@ def _test_points(domain: Domain, campaign: Campaign) -> Array:
         unit_points = quasi_random_points(len(domain.names), count, skip=len(points))
         points += list(lower[level] + widths[level] * unit_points)
     return np.array(points[: campaign.remaining]).reshape(-1, len(domain.names))
-
-
-def _pair_words(bounds: Bounds, pair: tuple[Array, Array] | None) -> str:
-    """Text that names the two samples which contradict a sign; empty without a pair."""
-    if pair is None:
-        return ""
-    first, second = (
-        ", ".join(f"{name} = {x:.6g}" for name, x in zip(bounds.inputs, point, strict=True))
-        for point in pair
-    )
-    return f": at {first} it is larger than at {second}"

@@ -17,6 +17,7 @@ from alphacut.rve.cell.cell import Phase
 from alphacut.rve.result.checks import ROUND_OFF, bulk_check, checks_within_limits, order_checks
 from alphacut.rve.result.moduli import hashin_shtrikman
 from alphacut.rve.result.result import HomogenisedStiffness
+from alphacut.stochastic.particles.particles import SPHERES
 
 
 def cubic_voigt(bulk: Array, deviator: Array, shear: Array) -> Array:
@@ -51,15 +52,6 @@ def hill_average(moduli: Array) -> Array:
     return np.stack([young, (3 * bulk - 2 * shear) / (6 * bulk + 2 * shear)], axis=-1)
 
 
-def space_stiffness(phase: Phase) -> Array:
-    """Stiffness in Voigt order (11, 22, 33, 23, 13, 12 with 2 ε), shape (6, 6), in Pa."""
-    bulk, shear = phase.bulk_and_shear
-    return cubic_voigt(bulk, shear, shear)
-
-
-VOLUME_OF_UNIT_SPHERE = np.pi / 6  # over the cell's volume at r = 1: fraction = π r³/6
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class HomogenisedSpheres(HomogenisedStiffness):
     """Effective behaviour of the simple cubic array with what it cost.
@@ -87,21 +79,14 @@ class HomogenisedSpheres(HomogenisedStiffness):
         return float(hill_shear(moduli))
 
 
-def volume_fraction(radius: Array) -> Array:
-    """Share of the cell that a sphere takes, π r³/6, of radii over half the cell's side."""
-    return np.asarray(VOLUME_OF_UNIT_SPHERE * np.asarray(radius) ** 3)
-
-
 def spheres_with_checks(result: HomogenisedSpheres) -> HomogenisedSpheres:
     """Copy of a result with the relative violations of symmetry and bounds as its checks."""
     cell = result.cell
     assert cell is not None
-    matrix, inclusion = cell.phases
-    assert isinstance(matrix, Phase)
-    assert isinstance(inclusion, Phase)
-    fraction = volume_fraction(cell.radius_map(result.curve.theta))
+    fraction = SPHERES.fractions(cell.radius_map(result.curve.theta))
     fractions, weights = np.stack([1 - fraction, fraction]), result.curve.weights
-    stiffness = [space_stiffness(matrix), space_stiffness(inclusion)]
+    moduli = [phase.bulk_and_shear for phase in cell.phases if isinstance(phase, Phase)]
+    stiffness = [cubic_voigt(bulk, shear, shear) for bulk, shear in moduli]
     energy, bulk = np.asarray(result.stiffness), float(result.moduli[0])
     checks = order_checks(energy, np.eye(6), fractions, weights, stiffness)
     checks |= bulk_check(bulk, hashin_shtrikman(fractions, cell.phases, space=True)[0] @ weights)

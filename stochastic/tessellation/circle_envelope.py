@@ -102,7 +102,7 @@ def _sweep(
     a: Array, b: Array, c: Array, table: Ints, group: Ints
 ) -> tuple[Ints, Ints, Array, Array]:
     """Arcs of n upper envelopes by one sweep around the circle, from functions in tables (n, w)."""
-    row = np.arange(len(a), dtype=np.intp)
+    row: Ints = np.arange(len(a), dtype=np.intp)
     highest = np.argmax(np.hypot(a, b) + c, axis=1)  # its maximum is on the envelope
     phi = np.arctan2(b[row, highest], a[row, highest])
     open_rows, limit = row, phi + 2 * np.pi
@@ -117,14 +117,9 @@ def _sweep(
             a, b, c, phi = a[is_open], b[is_open], c[is_open], phi[is_open]
             open_rows, limit = open_rows[is_open], limit[is_open]
         if not len(open_rows):
-            return _arcs_between(crossings, table, group)
-    raise FailedError("an envelope did not close after four times as many steps as functions")
-
-
-def _arcs_between(
-    crossings: list[tuple[Ints, Ints, Array]], table: Ints, group: Ints
-) -> tuple[Ints, Ints, Array, Array]:
-    """Arcs between the crossings of a sweep: row, column that becomes uppermost, φ of each."""
+            break
+    else:
+        raise FailedError("an envelope did not close after four times as many steps as functions")
     row, column, start = map(np.concatenate, zip(*crossings, strict=True))
     order = np.argsort(row, kind="stable")
     row, start = row[order], start[order]
