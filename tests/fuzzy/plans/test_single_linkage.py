@@ -98,9 +98,8 @@ def test_a_cone_between_uniform_samples_is_found():
         base = 0.634 * np.tanh(u) + 0.378 * v**2 + 0.63 * np.sin(1.5 * w + 4.83)
         return np.clip(base, -0.4, 0.5) + 1.5 * max(0, 1 - 4 * np.linalg.norm(x - apex))
 
-    ends = {"x": (-0.5223, 1.1228), "y": (-0.8109, 0.7384), "z": (-1.0089, 0.5989)}
-    inputs = {name: Interval(*x) for name, x in ends.items()}
-    result = propagate(function, inputs, alpha=[0.0])
+    ends = (-0.5223, 1.1228), (-0.8109, 0.7384), (-1.0089, 0.5989)
+    result = propagate(function, {f"x{k}": Interval(*x) for k, x in enumerate(ends)}, alpha=[0.0])
     assert (result.lower.item(), result.upper.item()) == pytest.approx((-0.4, 0.557376), abs=2e-4)
 
 
