@@ -77,16 +77,6 @@ def critical_distance(samples: int, inputs: int, sigma: float = SIGMA_ONE_HUMP) 
     return float(ball ** (1 / inputs) / sqrt(pi))
 
 
-def uncovered_fraction(samples: int, optima: int) -> float:
-    """Return the expected fraction of the cut in basins not yet seen (Boender, Rinnooy Kan 1987).
-
-    It is infinite with fewer than two samples or no optimum.
-    """
-    if samples < 2 or not optima:
-        return inf
-    return optima * (optima + 1) / (samples * (samples - 1))
-
-
 def rows_without_better_neighbour(unit: Array, values: Array, distance: float) -> Ints:
     """Rows of the samples (n, d), in unit coordinates, without a better one within a distance.
 
@@ -166,9 +156,11 @@ class BoundSearch:
     @property
     def uncovered(self) -> float:
         """Expected fraction of the cut that is not yet covered by basins and known plateaus."""
+        N, W = self.explored, len(self.optima)
+        if N < 2 or not W:
+            return inf
         total = self.samples + self.plateau_samples
-        unknown_fraction = (total - self.explored) / max(total, 1)
-        return unknown_fraction + uncovered_fraction(self.explored, len(self.optima))
+        return (total - N) / total + W * (W + 1) / (N * (N - 1))  # Boender, Rinnooy Kan 1987
 
     @property
     def is_smooth(self) -> bool:

@@ -48,16 +48,15 @@ def fields(path: Path) -> list[tuple[int, list[str]]]:
         allowed = "a header with units, and rows of numbers below it"
         raise RefusedError(path.name, f"{len(lines)} lines", allowed)
     separator = next((mark for mark in ";\t" if mark in lines[0][1]), ",")
-    return [(row, cells_of(path.name, row, line, separator)) for row, line in lines]
-
-
-def cells_of(name: str, row: int, line: str, separator: str) -> list[str]:
-    """Return the fields of line `row` of the file `name`; refuse one that is too long."""
-    try:
-        return next(csv.reader([line], delimiter=separator))
-    except csv.Error:
-        what, allowed = f"{len(line):,} letters", f"fields up to {csv.field_size_limit():,} letters"
-        raise RefusedError(f"{name}, row {row}", what, allowed) from None
+    rows = []
+    for row, line in lines:
+        try:
+            rows.append((row, next(csv.reader([line], delimiter=separator))))
+        except csv.Error:  # a field is too long
+            what, most = f"{len(line):,} letters", f"{csv.field_size_limit():,}"
+            allowed = f"fields up to {most} letters"
+            raise RefusedError(f"{path.name}, row {row}", what, allowed) from None
+    return rows
 
 
 def text_of(path: Path) -> str:
