@@ -35,11 +35,12 @@ from alphacut.rve.cell.cell import Cell, Phase, require_points, require_solve_ar
 from alphacut.rve.result.checks import with_checks
 from alphacut.rve.result.moduli import square_voigt
 from alphacut.rve.result.result import HomogenisedStiffness
-from alphacut.rve.series.lattice_sums import ZETA_PERIOD, LatticeSums, lattice_images, lattice_sums
+from alphacut.rve.series.lattice_sums import ZETA_PERIOD, lattice_images, lattice_sums
 from alphacut.rve.series.means import Material, Series, converged_means, mean_energies
 from alphacut.stochastic import RadiusMap
 
 MAX_HARMONICS = 160  # per potential and load; reaches r = 0.999
+HIGHEST_SUM = 12 * MAX_HARMONICS + 8  # order of the lattice sums that couple so many
 LOADS = ("hydrostatic", "deviator", "shear")
 
 
@@ -101,7 +102,7 @@ class Family:
 @cache
 def family(harmonics: int, *, hydrostatic: bool) -> Family:
     """First harmonics of a hydrostatic or a deviatoric load, with their lattice couplings."""
-    sums = _sums()
+    sums = lattice_sums(HIGHEST_SUM)
     a = 4 * np.arange(harmonics) + (3 if hydrostatic else 1)
     b = 4 * np.arange(harmonics) + (1 if hydrostatic else 3)
     return Family(
@@ -161,14 +162,10 @@ def modulus_of_load(load: str, radius: Array, contrast: Contrast, harmonics: int
         jump = ZETA_PERIOD * r * pole  # of ψ across the cell
         return np.asarray(mu * (4 + 2 * jump) / (kappa - 1 - jump))
     jump = ZETA_PERIOD * r * a[..., 0]  # of φ across the cell
-    natanzon_jump = _sums().natanzon_period * r * a[..., 0]
+    natanzon_jump = lattice_sums(HIGHEST_SUM).natanzon_period * r * a[..., 0]
     if load == "deviator":
         return np.asarray(2 * mu * (1 + natanzon_jump + jump) / (1 + natanzon_jump - kappa * jump))
     return np.asarray(mu * (1 + natanzon_jump - jump) / (1 + natanzon_jump + kappa * jump))
-
-
-def _sums() -> LatticeSums:
-    return lattice_sums(12 * MAX_HARMONICS + 8)
 
 
 def plane_moduli(radius: Array, materials: Sequence[Material], harmonics: int) -> Array:

@@ -16,11 +16,6 @@ from alphacut.rve.spheres.multipoles import VOLUME, Multipoles, couplings, t_mat
 from alphacut.rve.spheres.result import HomogenisedSpheres, cubic_voigt, spheres_with_checks
 
 
-def unknowns(degree: int) -> int:
-    """Amplitudes of one load up to a degree."""
-    return 3 * (degree + 2) ** 2 // 16
-
-
 def space_moduli(radius: Array, materials: Sequence[Material], degree: int) -> Array:
     """K, (C11 − C12)/2 and C44 of n cubic cells times m spheres, (n, m, 3), in Pa.
 
@@ -42,7 +37,7 @@ SPHERES = Series(
     steps=(4, 6, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 56, 64),  # reaches 1e-8 at r = 0.985
     decay=2.0,
     start=1 / 3,  # terms cost their sixth power, so that a first try costs little
-    unknowns=unknowns,
+    unknowns=lambda degree: 3 * (degree + 2) ** 2 // 16,  # amplitudes of one load
     safety=2.0,
     round_off=2e-13,
     tolerance=1e-10,
