@@ -50,6 +50,18 @@ class Envelope(Bounds):
     facts: Mapping[str, float] = field(default_factory=dict)
     tested_structures: Mapping[str, tuple[tuple[str, ...], Array]] = field(default_factory=dict)
 
+    def _extremes(self, column: int) -> tuple[Array, Array, Array]:
+        """Return bounds of an output over time, and their error, (A,) each."""
+        between = None if self.between is None else self.between[:, column]
+        lower = -within_steps(-self.lower[..., column], between).max(axis=1)
+        upper = within_steps(self.upper[..., column], between).max(axis=1)
+        # of those at the nodes, and what the steps between them add
+        error, added = (
+            self.error[..., column].max(axis=1),
+            0.0 if between is None else between.max(),
+        )
+        return lower, upper, error + added
+
     def to_dataset(self) -> xarray.Dataset:
         """Return the envelope as an xarray dataset with units, ready for NetCDF.
 
@@ -84,9 +96,9 @@ class Envelope(Bounds):
 
 
 def within_steps(size: Array, between: Array | None) -> Array:
-    """Return upper bounds of a magnitude over the step before each node, shape (…, T).
+    """Return upper bounds of a function over the step before each node, shape (…, T).
 
-    `size` is its magnitude at nodes, shape (…, T), and `between` what it may exceed both ends of
+    `size` is an upper bound at nodes, shape (…, T), and `between` what it may exceed both ends of
     each step by, the same shape; None for nothing.
     """
     if between is None:

@@ -264,10 +264,8 @@ class Bounds:
         return tuple(f"{name} [{unit}]" if unit else name for name, unit in pairs)
 
     def _lines(self, column: int) -> Iterator[str]:
-        """Yield a line of text for each level of an output; of one over time its extremes."""
-        lowers, uppers, errors = (x[..., column] for x in (self.lower, self.upper, self.error))
-        if self.time is not None:
-            lowers, uppers, errors = lowers.min(axis=1), uppers.max(axis=1), errors.max(axis=1)
+        """Yield a line of text for each level of an output."""
+        lowers, uppers, errors = self._extremes(column)
         nature = self.nature_of(self.outputs[column])
         suffix = f", {nature}" if nature != self.nature else ""
         error_name = "gap to attained" if nature is Nature.GUARANTEED else "error"
@@ -281,6 +279,10 @@ class Bounds:
             if nature is not Nature.ATTAINED or error > 0:  # that of values, as of a time step
                 line += f", {error_name} {_digits(error)}"
             yield line + suffix
+
+    def _extremes(self, column: int) -> tuple[Array, Array, Array]:
+        """Return lower and upper bounds of an output, and their error, (A,) each."""
+        return self.lower[..., column], self.upper[..., column], self.error[..., column]
 
     def plot(self, axes: Axes | None = None, output: str = "", **line: object) -> Axes:
         """Draw an output, the first by default: its membership function, or α-cuts over time.

@@ -1,5 +1,7 @@
 """Questions of a case: their answers, and what a further one touches."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -170,3 +172,5 @@ def test_peaks_are_bounded_over_time_and_not_at_nodes_alone():
     inputs = {"k1": Interval(149.0, 151.0)}
     found = envelope(frame, inputs, duration=1.2, step=0.02, alpha=[0], progress=False)
     assert peaks(found)["q1"].upper[0] > np.maximum(found.upper, -found.lower).max()
+    printed = re.search(r"(\S+) … (\S+), gap", str(found)).groups()
+    assert max(abs(float(x)) for x in printed) == pytest.approx(peaks(found)["q1"].upper[0], 1e-4)
