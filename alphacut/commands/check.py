@@ -89,7 +89,7 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
         if question is not None and structure is not None:
             (task,) = tasks(content.envelope, ())
             analyses = incremental_analyses(question, structure, task, records)
-            motions, seconds = np.sum([x.foresee() for x in analyses], axis=0)
+            motions, seconds = np.sum([x.foresee() for x in analyses.values()], axis=0)
             text += f"fragility: about {motions:,.0f} motions, {seconds:.0f} s by one process\n"
     write_answer(options, document, out, f"{text}{options.case}: no problems\n")
     return 0

@@ -207,8 +207,7 @@ class Pipeline:
         increments = dict[str, suite.IncrementalResult]()
         if (question := self.content.incremental_question) is not None:
             analyses = suite.incremental_analyses(question, structure, task, longest_first)
-            pairs = zip((x.name for x in longest_first), analyses, strict=True)
-            further = [suite.incremental_stage(question, *pair) for pair in pairs]
+            further = [suite.incremental_stage(question, *item) for item in analyses.items()]
             found = self.store.take_all(further, self.executor)
             increments = {x.name: found[f"incremental_{x.name}"].numbers for x in records}
         return replace(response, suite=result, increments=increments)

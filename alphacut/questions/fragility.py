@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import fields
 
 import numpy as np
 from pydantic import Field
 
 from alphacut.case.limits import FragilitySection
-from alphacut.frame.questions.fragility import CriticalMeasures, ExceedanceSets, of_any_limit
+from alphacut.frame.questions.fragility import CriticalMeasures, of_any_limit
 from alphacut.frame.questions.incremental import GRID_RATIO, RESOLUTION
 from alphacut.frame.questions.peaks import ANY
 from alphacut.fuzzy.arrays import Array
@@ -24,6 +23,8 @@ from alphacut.stages.suite import IncrementalResult, SuiteResult
 POINTS = 60
 """Measures at which bands are drawn and tabulated."""
 UNITS = {"Sa(T1)": "m/s^2", "PGA": "m/s^2", "scale": ""}
+ENDS = {"first crossing": "low_reached", "last non-exceedance": "high_reached"}
+"""Fields of `CriticalMeasures` of frames that yield by their titles."""
 
 
 class LimitFragility(LimitAnswer):
@@ -41,13 +42,6 @@ class LimitFragility(LimitAnswer):
     median: CutsResult
     dispersion: CutsResult | None
     confidence: CutsResult | None
-
-    @property
-    def ends(self) -> dict[str, Array]:
-        """First crossing and last non-exceedance (levels, records); nan beyond all measures."""
-        last = np.where(np.isnan(self.critical["high"]), np.nan, self.critical["high_reached"])
-        first = self.critical["low_reached"]
-        return {"first crossing": first, "last non-exceedance": last}
 
 
 class FragilityAnswer(LimitsAnswer[LimitFragility]):
@@ -89,10 +83,9 @@ class FragilityAnswer(LimitsAnswer[LimitFragility]):
         if not self.increments:
             return ""
         texts = list[str]()
-        for words, values in limit.ends.items():
-            known = np.nan_to_num(values[0], nan=np.inf)
-            ends = float(known.min()), float(known.max())
-            texts.append(f"{words} {_range_text(ends, self.unit)}")
+        for title, end in ENDS.items():
+            measures = np.nan_to_num(limit.critical[end][0], nan=np.inf)
+            texts.append(f"{title} {_range_text((measures.min(), measures.max()), self.unit)}")
         return f"; over the records {', '.join(texts)}"
 
     def crossings(self) -> list[Record]:
@@ -104,8 +97,8 @@ class FragilityAnswer(LimitsAnswer[LimitFragility]):
                     some, all_found = increment.demands[name][:, level]
                     sets = {"exceeded by some": some, "exceeded by all found": all_found}
                     rows.append({"limit": limit.words, "record": record, "α": float(alpha)})
-                    for title, measures in limit.ends.items():
-                        rows[-1][f"{title}{unit}"] = measures[level, column]
+                    for title, end in ENDS.items():
+                        rows[-1][f"{title}{unit}"] = limit.critical[end][level, column]
                     for title, demands in sets.items():
                         rows[-1][f"{title}{unit}"] = _set_text(increment.measure, demands)
         return rows
@@ -171,15 +164,14 @@ def _set_text(measures: Array, demands: Array) -> str:
 
 def fragility(section: FragilitySection, response: FuzzyResponse) -> FragilityAnswer:
     """Critical measures, bands, medians and dispersions of each limit, and of any of them."""
-    suite, increments = response.suite, dict[str, IncrementalResult]()
+    suite, increments = response.suite, response.increments
     critical = dict[str, tuple[Nature, CriticalMeasures]]()
     if suite is None:
         raise RefusedError("fragility", "without records", "a section [records]")
-    if response.increments:
-        increments = {name: response.increments[name] for name in suite.records}
+    if increments:
         for name in next(iter(increments.values())).demands:
             tried = [(x.measure, x.demands[name]) for x in increments.values()]
-            critical[name] = Nature.ESTIMATED, ExceedanceSets.from_demands(tried)
+            critical[name] = Nature.ESTIMATED, CriticalMeasures.from_demands(tried)
     else:
         critical = _proved_measures(section, response, suite)
     answers = {}
@@ -196,7 +188,9 @@ def fragility(section: FragilitySection, response: FuzzyResponse) -> FragilityAn
             name,
             response.structure,
             nature=nature,
-            critical={x.name: getattr(ends, x.name).T for x in fields(CriticalMeasures)},
+            critical={
+                x: getattr(ends, x).T for x in ("low", "low_reached", "high_reached", "high")
+            },
             measure=grid,
             band=ends.band(grid)._asdict(),
             median=ends.median._asdict(),
@@ -210,7 +204,7 @@ def fragility(section: FragilitySection, response: FuzzyResponse) -> FragilityAn
         period_s=suite.period_s,
         damping_ratio=suite.damping_ratio,
         limits=answers,
-        increments=increments,
+        increments=dict(increments),
     )
 
 

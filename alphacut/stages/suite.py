@@ -150,19 +150,20 @@ def incremental_analyses(
     structure: Structure,
     task: EnvelopeTask,
     records: Sequence[SuiteRecord],
-) -> list[IncrementalAnalysis]:
-    """Analyses of a frame that yields under each record, over the measure of the section."""
+) -> dict[str, IncrementalAnalysis]:
+    """Analyses of a frame that yields by the record's name, over the measure of the section."""
     assert structure.frame is not None
     outputs = [limit.output for limit in section.limits_by_name.values()]
     limits = [*zip(outputs, section.limits_in_si(structure).values(), strict=True)]
-    inputs, motion, found = structure.inputs(task.fuzzy), task.section, []
+    inputs, motion, found = structure.inputs(task.fuzzy), task.section, {}
     for record in records:
         unit_samples = np.asarray(record.ground.samples / record.measures[section.measure])
         frame = replace(structure.frame, ground=Accelerogram(record.ground.step, unit_samples))
         timing = record.duration, motion.step, motion.alpha
-        found.append(IncrementalAnalysis(frame, inputs, limits, *timing))
-    elastic = max(x.elastic_scales(x.cuts.nominal[None])[0, 1:].max() for x in found)
-    return [replace(x, greatest_scale=section.most * float(elastic)) for x in found]
+        found[record.name] = IncrementalAnalysis(frame, inputs, limits, *timing)
+    elastic = max(x.elastic_scales(x.cuts.nominal[None])[0, 1:].max() for x in found.values())
+    greatest = section.most * float(elastic)
+    return {name: replace(x, greatest_scale=greatest) for name, x in found.items()}
 
 
 def incremental_stage(

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 
@@ -32,13 +31,15 @@ class CriticalMeasures:
         high_reached: A structure of the cut is known not to exceed it up to here, shape (R, A).
         high: Every structure of the cut exceeds it above; infinite where no peak is known to be
             larger than zero, shape (R, A).
-
+        sets: Of motions, the measures (X,) under each record, rising, and whether some structure,
+            and all structures found, exceed the limit there, shape (2, A, X).
     """
 
     low: Array
     low_reached: Array
     high_reached: Array
     high: Array
+    sets: Sequence[tuple[Array, Mask]] = ()
 
     def __post_init__(self) -> None:
         """Refuse measures that are not positive, or reached outside their bounds."""
@@ -65,6 +66,26 @@ class CriticalMeasures:
         # the structure that reaches the greatest peak known is one of the cut
         return cls(low, low_reached, np.maximum(high_reached, low_reached), high)
 
+    @classmethod
+    def from_demands(cls, records: Sequence[tuple[Array, Array]]) -> CriticalMeasures:
+        """Return the critical measures of R records by measures tried (X,) and demands (2, A, X).
+
+        These are the greatest and the least peak over limit of the structures found, nan where they
+        collapse; at the first measure all keep the limit. The first crossing lies between `low` and
+        `low_reached`, the last non-exceedance between `high_reached` and `high`; those that lie
+        beyond the largest measure are infinite.
+        """
+        sets = [(tried, ~(demands <= 1)) for tried, demands in records]
+        ends = []
+        for tried, (by_some, by_all) in sets:
+            beyond, last = np.append(tried, np.inf), len(tried) - 1
+            crossing = np.where(by_some.any(1), by_some.argmax(1), len(tried))
+            after = len(tried) - (~by_all)[:, ::-1].argmax(1)
+            high_reached = np.where(after > last, np.inf, tried[after - 1])
+            ends.append([tried[crossing - 1], beyond[crossing], high_reached, beyond[after]])
+        low, low_reached, high_reached, high = np.moveaxis(np.array(ends), 1, 0)
+        return cls(low, low_reached, high_reached, high, sets)
+
     def band(self, measure: Array) -> Ends:
         """Return bounds of the fraction of the records under which a structure exceeds the limit.
 
@@ -80,9 +101,21 @@ class CriticalMeasures:
         return clopper_pearson(*self.counts(measure), len(self.low), (1 - CONFIDENCE) / 2)
 
     def counts(self, measure: Array) -> Ends:
-        """Return numbers (A, X) of records that exceed for all structures of a cut and for some."""
-        ends = (self.high, self.low)
-        return Ends(*((end[:, :, None] < np.asarray(measure)).sum(0) for end in ends))
+        """Return numbers (A, X) of records that exceed for all structures of a cut and for some.
+
+        Between two measures tried all do if all do at both, and some do if some do at either.
+        """
+        if not self.sets:
+            return Ends(
+                *((x[:, :, None] < np.asarray(measure)).sum(0) for x in (self.high, self.low))
+            )
+        count_all, count_some = np.zeros((2, len(self.low[0]), len(measure)))
+        for tried, (by_some, by_all) in self.sets:
+            after = np.searchsorted(tried, measure)
+            before, after = np.maximum(after - 1, 0), np.minimum(after, len(tried) - 1)
+            count_all += by_all[:, before] & by_all[:, after]
+            count_some += by_some[:, before] | by_some[:, after]
+        return Ends(count_all, count_some)
 
     @property
     def median(self) -> Ends:
@@ -113,54 +146,3 @@ def of_any_limit(limits: Sequence[CriticalMeasures]) -> CriticalMeasures:
     ends = ("low", "low_reached", "high")
     low, reached, high = (np.min([getattr(x, end) for x in limits], axis=0) for end in ends)
     return CriticalMeasures(low, reached, reached, np.maximum(high, reached))
-
-
-@dataclass(frozen=True, eq=False)
-class ExceedanceSets(CriticalMeasures):
-    """Sets of measures at which structures of a frame that yields exceed a limit, by motions.
-
-    The first crossing lies between `low`, up to which no structure found exceeds the limit, and
-    `low_reached`, at which one does; the last non-exceedance between `high_reached`, at which a
-    structure keeps it, and `high`, from which on all structures found exceed it. Those that lie
-    beyond the largest measure tried are infinite.
-
-    Args:
-        measures: Measures tried under each record, rising, (X,) each.
-        exceeds: Whether a structure exceeds the limit there, and whether all structures found do,
-            shape (2, A, X) each.
-    """
-
-    measures: Sequence[Array]
-    exceeds: Sequence[Mask]
-
-    @classmethod
-    def from_demands(cls, records: Sequence[tuple[Array, Array]]) -> Self:
-        """Return the sets of records, each by its measures (X,) and demands (2, A, X).
-
-        These are the greatest and the least peak over limit, nan where structures collapse.
-        """
-        measures, exceeds = [x for x, _ in records], [~(demand <= 1) for _, demand in records]
-        ends = []
-        for tried, (by_some, by_all) in zip(measures, exceeds, strict=True):
-            beyond, last = np.append(tried, np.inf), len(tried) - 1
-            # the first measure is kept by all structures
-            crossing = np.where(by_some.any(1), by_some.argmax(1), len(tried))
-            keeping = last - (~by_all)[:, ::-1].argmax(1)
-            ends.append(
-                [tried[crossing - 1], beyond[crossing], tried[keeping], beyond[keeping + 1]]
-            )
-        low, low_reached, high_reached, high = np.moveaxis(np.array(ends), 1, 0)
-        return cls(low, low_reached, high_reached, high, measures, exceeds)
-
-    def counts(self, measure: Array) -> Ends:
-        """Return numbers (A, X) of records that exceed for all structures found, and for some.
-
-        Between two measures tried all do if all do at both, and some do if some do at either.
-        """
-        count_all, count_some = np.zeros((2, len(self.low[0]), len(measure)))
-        for tried, (by_some, by_all) in zip(self.measures, self.exceeds, strict=True):
-            after = np.searchsorted(tried, measure)
-            before, after = np.maximum(after - 1, 0), np.minimum(after, len(tried) - 1)
-            count_all += by_all[:, before] & by_all[:, after]
-            count_some += by_some[:, before] | by_some[:, after]
-        return Ends(count_all, count_some)

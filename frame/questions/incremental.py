@@ -91,7 +91,7 @@ class IncrementalAnalysis:
                     self._move(scale, extremes)
             demands = np.stack([self._extremes(scale)[0] for scale in scales], axis=-1)
             if np.any(demands[SOME, ..., 0] > 1):  # of a structure found since
-                self._move(scales[0] / GRID_RATIO, structures)
+                self._move(scales[0] / GRID_RATIO, self.cuts.nominal)
                 continue
             # by sides: a structure exceeds the limit, and one does not
             is_found = np.stack([demands[SOME] > 1, demands[ALL] <= 1])
@@ -99,14 +99,11 @@ class IncrementalAnalysis:
             ratios = np.divide(scales[1:], scales[:-1])
             wide = np.flatnonzero(changes.any(axis=(0, 1, 2)) & (ratios > 1 + RESOLUTION))
             for k in wide:
-                middle = float(np.sqrt(scales[k] * scales[k + 1]))
-                for scale in scales[k : k + 2]:
-                    self._move(middle, self._extremes(scale)[1])
+                self._move(float(np.sqrt(scales[k] * scales[k + 1])), self.cuts.nominal)
             if len(wide):
                 continue
             # search where none is found, but nearest to it among such neighbours
-            with np.errstate(divide="ignore"):
-                closeness = np.stack([demands[SOME], 1 / demands[ALL]])
+            closeness = np.stack([demands[SOME], -demands[ALL]])
             closeness[is_found] = -np.inf
             padded = np.pad(closeness, [(0, 0)] * 3 + [(1, 1)], constant_values=-np.inf)
             is_peak = (closeness >= padded[..., :-2]) & (closeness >= padded[..., 2:])

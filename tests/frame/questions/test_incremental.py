@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from alphacut.frame import Accelerogram, StoreyFrame, envelope
-from alphacut.frame.questions.fragility import CriticalMeasures, ExceedanceSets
+from alphacut.frame.questions.fragility import CriticalMeasures
 from alphacut.frame.questions.incremental import GRID_RATIO, RESOLUTION, IncrementalAnalysis
 from alphacut.frame.questions.peaks import peaks
 from alphacut.fuzzy import Triangular
@@ -17,7 +17,7 @@ STEADY = Accelerogram(0.1, np.ones(60))
 
 def sets_of(*case):
     scales, demands = IncrementalAnalysis(*case).run()
-    return ExceedanceSets.from_demands([(scales, demands[:, :, 0])])
+    return CriticalMeasures.from_demands([(scales, demands[:, :, 0])])
 
 
 @pytest.mark.parametrize("gravity", [0.0, 9.81])
