@@ -179,7 +179,8 @@ def fragility(section: FragilitySection, response: FuzzyResponse) -> FragilityAn
         finite = ends.high[np.isfinite(ends.high)]
         largest = 1.1 * float(finite.max() if finite.size else ends.low_reached.max())
         if increments:
-            largest = float(next(iter(increments.values())).measure[-1])  # of all records
+            most = float(next(iter(increments.values())).measure[-1])  # of all records
+            largest = min(largest, most) if np.isfinite(ends.high).all() else most
         # from below the least critical measure to above the greatest that is finite
         grid: Array = np.linspace(0.8 * float(ends.low.min()), largest, POINTS, dtype=float)
         has_spread = len(ends.low) > 1  # one record has no dispersion
