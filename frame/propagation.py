@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
+from time import perf_counter
 from typing import Any, get_args
 
 import numpy as np
@@ -97,6 +98,7 @@ def envelope(
         >>> str(bounds.nature)
         'guaranteed'
     """
+    start = perf_counter()
     chosen, flow, levels, rows = _build_problem(
         model, inputs, method, duration, step, alpha, integrator, **options
     )
@@ -116,7 +118,7 @@ def envelope(
             bounds = with_motions_tested(bounds, model)
         if tick:
             tick(1.0)
-    return _on_levels(bounds, levels, rows)
+    return replace(_on_levels(bounds, levels, rows), seconds=perf_counter() - start)
 
 
 def _build_problem(

@@ -146,7 +146,7 @@ class Hull:
             earlier = self.facts.get(name, 0)
             self.facts[name] = earlier + value if name in ADDED else max(earlier, value)
 
-    def envelope(self, method: str, seconds: float, notes: Iterable[str]) -> Envelope:
+    def envelope(self, method: str, notes: Iterable[str]) -> Envelope:
         """Return the guaranteed envelope; raise if a reached bound lies outside a proved one."""
         # what holds in a wider cut holds in a narrower one, whose motions are in the wider one too
         outer, inner, at = np.minimum.accumulate(self.closed, axis=0), self.inner, self.at
@@ -185,7 +185,6 @@ class Hull:
             ),
             attained_error=self.attained_error if self.attained_error.any() else None,
             evaluations=int(facts.pop("evaluations", inner.size)),
-            seconds=seconds,
             facts=facts,
             notes=(*notes,),
         )

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import logging
 import os
-import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -69,10 +68,9 @@ def prove(proof: BoxProof, flow: UnitFlow, progress: Progress | None = None) -> 
         UnprovedError: The system is not linear, its integrator not the exact one, or bounds are not
             proved.
     """
-    start_time = time.perf_counter()
     queue = Queue(proof, flow)
     queue.run(progress)
-    return queue.hull.envelope(proof.name, time.perf_counter() - start_time, queue.notes())
+    return queue.hull.envelope(proof.name, queue.notes())
 
 
 class Queue:

@@ -8,7 +8,6 @@ more than an explicit tolerance.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
@@ -145,7 +144,6 @@ class GraphFollower:
         finds beyond the bounds. Where neighbouring trajectories diverge there is none, and the
         bounds are attained only.
         """
-        start_time = time.perf_counter()
         followed = self.follow(flow, subprogress(progress, 0.0, 0.8))
         missed, count = independent_excess(flow, followed.bounds, subprogress(progress, 0.8, 1.0))
         diverges = trajectories_diverge(followed.storage.steepest, followed.bounds[0])
@@ -157,7 +155,6 @@ class GraphFollower:
             method=self.name,
             nature=Nature.ATTAINED if diverges else Nature.ESTIMATED,
             evaluations=len(followed.storage) + count,
-            seconds=time.perf_counter() - start_time,
             facts={"order": self.order, "gain": self.tolerance},
         )
 

@@ -11,7 +11,6 @@ Peaks, which are read more than other nodes, are followed to a smaller gain.
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, replace
 from math import isqrt
 from typing import ClassVar
@@ -91,7 +90,7 @@ class ImprovedFollower:
         """
         from scipy.ndimage import maximum_filter1d
 
-        start_time, limit = time.perf_counter(), self._limit(flow)
+        limit = self._limit(flow)
         passes = [
             replace(self, seed=self.seed + k).run_pass(
                 flow, subprogress(progress, 0.4 * k, 0.4 * (k + 1))
@@ -121,7 +120,6 @@ class ImprovedFollower:
             method=self.name,
             nature=Nature.ATTAINED if diverges else Nature.ESTIMATED,
             evaluations=first.evaluations + second.evaluations + count,
-            seconds=time.perf_counter() - start_time,
             facts={"gain": self.tolerance, "order": 2},
             notes=(note,) if large.any() else (),
         )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -57,7 +56,7 @@ class Sampled:
 
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
         """Return the attained envelope of all outputs on all levels."""
-        start_time, levels = time.perf_counter(), len(flow.boxes.alpha)
+        levels = len(flow.boxes.alpha)
         shape = (levels, len(flow.time), len(flow.outputs), 2)
         bounds, at = np.full(shape, -np.inf), np.zeros((*shape, len(flow.boxes.names)))
         for done, level in enumerate(reversed(range(levels))):
@@ -74,7 +73,6 @@ class Sampled:
             method=self.name,
             nature=Nature.ATTAINED,
             evaluations=levels * self.samples,
-            seconds=time.perf_counter() - start_time,
         )
 
 
@@ -98,7 +96,7 @@ class PeakSearch:
 
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
         """Return the attained envelope of all outputs on all levels, with searched peaks."""
-        start_time, cuts, outputs = time.perf_counter(), flow.boxes, tuple(map(str, flow.outputs))
+        cuts, outputs = flow.boxes, tuple(map(str, flow.outputs))
         domain, motion = Domain(cuts.inputs, tuple(cuts.alpha)), flow.flow
         assert isinstance(motion, YieldingFlow)
         bounds = np.full((len(cuts.alpha), len(flow.time), len(outputs), 2), -np.inf)
@@ -145,7 +143,6 @@ class PeakSearch:
             method=self.name,
             nature=Nature.ATTAINED,
             evaluations=motions,
-            seconds=time.perf_counter() - start_time,
             searched_peaks=replace(searched, error=error, natures=natures),
             notes=(note,) if note else (),
         )

@@ -134,9 +134,7 @@ class StiffnessBounds:
         low, high = self._compliance
         slack, n = 4 * UNIT, self.dimension
         with np.errstate(divide="ignore"):
-            moduli = (1 + slack * np.array([-1, 1])) / np.stack(
-                [np.diagonal(high), np.diagonal(low)], axis=-1
-            )
+            moduli = np.array([1 - slack, 1 + slack]) / np.diagonal([high, low], 0, 1, 2).T
         ratios = [self._ratio(low, high, i, j) for i, j in SHEARS[n]]
         return np.array([*moduli[:n], *ratios, *moduli[n:]])
 
@@ -156,13 +154,8 @@ class StiffnessBounds:
     def _hill(self, modulus: int) -> Interval:
         """Bounds of K (0) or G (1) of Hill's average of a stiffness of space."""
         least, greatest = self._compliance
-        low, high = 0.0, np.inf
-        if self.has_lower:
-            value, rounding = _hill_mean(self.lower, greatest, modulus)
-            low = value - rounding
-        if self.has_upper:
-            value, rounding = _hill_mean(self.upper, least, modulus)
-            high = value + rounding
+        low = _hill_mean(self.lower, greatest, modulus, -1) if self.has_lower else 0.0
+        high = _hill_mean(self.upper, least, modulus, 1) if self.has_upper else np.inf
         return low, high
 
     def contains(self, stiffness: Array) -> bool:
@@ -171,11 +164,11 @@ class StiffnessBounds:
         return all(bool(np.linalg.eigvalsh(end)[0] >= 0) for end in ends)
 
 
-def _hill_mean(stiffness: Array, compliance: Array, modulus: int) -> tuple[float, float]:
-    """Mean of Voigt's and Reuss's K (0) or G (1), and a bound of its rounding."""
+def _hill_mean(stiffness: Array, compliance: Array, modulus: int, side: int) -> float:
+    """Bound of the mean of Voigt's and Reuss's K (0) or G (1), below (side −1) or above (1)."""
     voigt, reuss = VOIGT[modulus] * stiffness, REUSS[modulus] * compliance
     rounding = 64 * UNIT * (abs(voigt).sum() + abs(reuss).sum() / reuss.sum() ** 2)
-    return float((voigt.sum() + 1 / reuss.sum()) / 2), float(rounding)
+    return float((voigt.sum() + 1 / reuss.sum()) / 2 + side * rounding)
 
 
 def _rounding(stiffness: Array) -> float:
