@@ -53,11 +53,10 @@ class Content(CellContent):
     @property
     def incremental_question(self) -> FragilitySection | None:
         """The question of fragility, with one limit of each storey, if columns yield; else None."""
-        structure = self.structure
-        if self.fragility is None or structure is None:
+        question, structure = self.fragility, self.structure
+        if question is None or structure is None or not getattr(structure.linear, "hardening", ()):
             return None
-        yields = structure.frame is not None and bool(structure.frame.hardening)
-        return self.fragility.with_storeys(structure) if yields else None
+        return question.with_storeys(structure)
 
     @property
     def limited_outputs(self) -> tuple[str, ...]:

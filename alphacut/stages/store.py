@@ -38,15 +38,8 @@ if TYPE_CHECKING:
 LOG = logging.getLogger(__name__)
 SAMPLES = "samples.db"
 """Store of the samples of a campaign, beside the results."""
-SECONDS = {
-    "modulus": 10.0,
-    "image": 10.0,
-    "envelope": 10.0,
-    "record": 3.0,
-    "incremental": 5.0,
-    "probability": 5.0,
-}
-SECONDS |= {"tolerances": 30.0, "figures": 6.0}
+SECONDS = {"modulus": 10.0, "image": 10.0, "envelope": 10.0, "record": 3.0, "incremental": 5.0}
+SECONDS |= {"probability": 5.0, "tolerances": 30.0, "figures": 6.0}
 """Rough seconds of a stage by the first word of its name, else 1, for its part of the progress."""
 
 

@@ -155,13 +155,13 @@ def incremental_analyses(
     assert structure.frame is not None
     outputs = [limit.output for limit in section.limits_by_name.values()]
     limits = [*zip(outputs, section.limits_in_si(structure).values(), strict=True)]
-    inputs, motion, found = structure.inputs(task.fuzzy), task.section, {}
+    cuts, found = boxes(structure.inputs(task.fuzzy), task.section.alpha), {}
     for record in records:
         unit_samples = np.asarray(record.ground.samples / record.measures[section.measure])
         frame = replace(structure.frame, ground=Accelerogram(record.ground.step, unit_samples))
-        timing = record.duration, motion.step, motion.alpha
-        found[record.name] = IncrementalAnalysis(frame, inputs, limits, *timing)
-    elastic = max(x.elastic_scales(x.cuts.nominal[None])[0, 1:].max() for x in found.values())
+        motion = record.duration, task.section.step
+        found[record.name] = IncrementalAnalysis(frame, cuts, limits, *motion)
+    elastic = max(x.elastic_scales(cuts.nominal[None])[0, 1:].max() for x in found.values())
     greatest = section.most * float(elastic)
     return {name: replace(x, greatest_scale=greatest) for name, x in found.items()}
 

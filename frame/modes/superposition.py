@@ -66,11 +66,7 @@ class Modal:
 
 
 def modes_at(
-    system: LinearSystem,
-    structure: Classical,
-    names: Sequence[str],
-    points: Array,
-    unit: Array,
+    system: LinearSystem, structure: Classical, names: Sequence[str], points: Array, unit: Array
 ) -> Modal:
     """Modes of a structure at S values of its inputs `names`, with bounds of their rounding.
 
@@ -144,11 +140,7 @@ def load_at_nodes(
 
 
 def outputs_at(
-    modal: Modal,
-    point: Ints,
-    output: Ints,
-    time: Array,
-    loads: Mapping[str, LoadAtNodes],
+    modal: Modal, point: Ints, output: Ints, time: Array, loads: Mapping[str, LoadAtNodes]
 ) -> tuple[Array, Array]:
     """Exact values of outputs at points and nodes, and bounds of their rounding, (N,) each.
 

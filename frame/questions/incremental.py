@@ -11,18 +11,17 @@ refute it at the last such scale. Sets of nested cuts are nested, as they are of
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
 
-from alphacut.frame.boxes import Boxes, boxes
+from alphacut.frame.boxes import Boxes
 from alphacut.frame.dynamics.yielding import YieldingFlow
 from alphacut.frame.methods.sampled import SKIPPED, spread_points
 from alphacut.frame.structures.loads import Accelerogram
 from alphacut.frame.structures.storey import StoreyFrame
-from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.progress_bar import Progress
 
@@ -49,26 +48,20 @@ class IncrementalAnalysis:
 
     Args:
         model: The frame at rest, moved by the record alone.
-        inputs: Fuzzy inputs by name, in SI.
+        cuts: α-cuts of the fuzzy inputs.
         limits: Outputs and limits of their magnitudes, in SI.
         duration: Length of the motions, in s.
         step: Step at which outputs are read, in s.
-        alpha: Levels, rising.
         greatest_scale: Scale up to which it goes.
     """
 
     model: StoreyFrame
-    inputs: Mapping[str, FuzzyNumber]
+    cuts: Boxes
     limits: Sequence[tuple[str, float]]
     duration: float
     step: float
-    alpha: Sequence[float]
     greatest_scale: float = 1.0
-    cuts: Boxes = field(init=False)
     moved: dict[float, tuple[Array, Array]] = field(init=False, default_factory=dict)
-
-    def __post_init__(self) -> None:
-        self.cuts = boxes(self.inputs, self.alpha)
 
     def run(self, progress: Progress | None = None) -> tuple[Array, Array]:
         """Return scales (X,), rising, and the demands found there, shape (2, A, E, X).

@@ -91,10 +91,7 @@ class PrismModel:
         require_prisms(self.mesh_size, self.layers)
 
     def solve(
-        self,
-        radius_map: RadiusMap,
-        matrix: AnyPhase,
-        inclusions: Sequence[AnyPhase],
+        self, radius_map: RadiusMap, matrix: AnyPhase, inclusions: Sequence[AnyPhase]
     ) -> list[HomogenisedStiffness]:
         """Homogenised stiffness for each of `inclusions`, in their order, on one mesh.
 
@@ -226,11 +223,7 @@ def solve_loads(
 
 
 def prism_result(
-    solved: Solved,
-    unknowns: int,
-    phases: Sequence[AnyPhase],
-    loads: Array,
-    options: SolverOptions,
+    solved: Solved, unknowns: int, phases: Sequence[AnyPhase], loads: Array, options: SolverOptions
 ) -> HomogenisedStiffness:
     """Stress over θ, energies and checks (Hill–Mandel, symmetry, bounds), as measured.
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from alphacut.frame import Accelerogram, StoreyFrame, envelope
+from alphacut.frame.boxes import boxes
 from alphacut.frame.questions.fragility import CriticalMeasures
 from alphacut.frame.questions.incremental import GRID_RATIO, RESOLUTION, IncrementalAnalysis
 from alphacut.frame.questions.peaks import peaks
@@ -28,7 +29,8 @@ def test_a_steady_push_exceeds_a_ductility_at_the_closed_form(gravity, rng):
     yield_force = Triangular(*rng.uniform([8, 10, 11], [9, 10, 13]))
     spring = {"stiffness": [90.0], "yield_force": [10.0], "lengths": [3.0], "gravity": gravity}
     frame = StoreyFrame([2.0], **spring, ground=STEADY)
-    sets = sets_of(frame, {"fy1": yield_force}, [("ductility1", limit)], 6.0, 0.1, ALPHA, 20.0)
+    cuts = boxes({"fy1": yield_force}, ALPHA)
+    sets = sets_of(frame, cuts, [("ductility1", limit)], 6.0, 0.1, 20.0)
     factor = 1 - 2 * gravity / 3 / 90 if gravity else 2 - 1 / limit
     lowest, highest = np.array([yield_force.cut(x) for x in ALPHA]).T / 4 * factor
     for before, after, exact in (
@@ -45,11 +47,11 @@ def test_a_frame_that_stays_elastic_has_the_critical_scales_of_the_linear_one(rn
     fixed = {"stiffness": [90.0, 70.0], "damping_ratio": 0.05, "outputs": ["drift1"]}
     linear = StoreyFrame([2.0, 1.0], **fixed, ground=ground)
     inputs, limit = {"k1": Triangular(80.0, 90.0, 95.0), "m2": Triangular(0.9, 1.0, 1.2)}, 0.05
-    motion = {"duration": 4.0, "step": 0.01, "alpha": ALPHA}
-    proved = peaks(envelope(linear, inputs, **motion))["drift1"]
+    motion, cuts = {"duration": 4.0, "step": 0.01}, boxes(inputs, ALPHA)
+    proved = peaks(envelope(linear, inputs, **motion, alpha=ALPHA))["drift1"]
     exact = CriticalMeasures.from_peaks([proved], [1.0], limit)
     yields = replace(linear, yield_drift=[1e-3, 1e-3], hardening=[1.0, 1.0])
-    sets = sets_of(yields, inputs, [("drift1", limit)], *motion.values(), 2 * exact.high.max())
+    sets = sets_of(yields, cuts, [("drift1", limit)], *motion.values(), 2 * exact.high.max())
     assert (sets.low_reached >= exact.low * (1 - 1e-9)).all()
     assert (sets.low <= exact.low_reached * 1.002).all()
     assert (sets.high_reached <= exact.high * (1 + 1e-9)).all()
@@ -60,15 +62,15 @@ def test_sets_that_are_no_intervals_agree_with_dense_scales(rng):
     ground = Accelerogram(0.05, rng.normal(size=60))
     frame = StoreyFrame([1.0], stiffness=[200.0], yield_force=[1.0], ground=ground)
     inputs = {"fy1": Triangular(0.95, 1.0, 1.05), "k1": Triangular(190.0, 200.0, 210.0)}
-    motion, nominal = (4.0, 0.05, (0.0, 1.0)), np.array([[1.0, 200.0]])
-    analysis = IncrementalAnalysis(frame, inputs, [("residual1", 1.0)], *motion)
+    cuts, motion, nominal = boxes(inputs, (0.0, 1.0)), (4.0, 0.05), np.array([[1.0, 200.0]])
+    analysis = IncrementalAnalysis(frame, cuts, [("residual1", 1.0)], *motion)
     scales = np.geomspace(0.8, 8, 160) * analysis.elastic_scales(nominal)[0, 0]
     points = np.vstack([nominal, rng.uniform((0.95, 190.0), (1.05, 210.0), (60, 2))])
     dense = np.array([analysis._peaks_over_limits(x, points, analysis.limits) for x in scales])
     of_nominal = dense[:, 0]
     limits = np.quantile(of_nominal, np.linspace(0.3, 0.9, 40))
     limit = max(limits, key=lambda x: np.diff(of_nominal > x, axis=0).sum())  # crossed most often
-    sets = sets_of(frame, inputs, [("residual1", limit)], *motion, scales[-1])
+    sets = sets_of(frame, cuts, [("residual1", limit)], *motion, scales[-1])
     exceeds_by_all, exceeds_by_some = sets.counts(scales)
     for level, structures in enumerate((dense, dense[:, :1])):
         exceeds = structures[..., 0] > limit
@@ -92,7 +94,8 @@ def test_a_search_finds_exceedance_below_that_of_the_structures_of_the_grid():
         name: Triangular(*(frame.parameters[name] * x for x in (0.85, 1, 1.15)))
         for name in ("fy1", "k1", "k2", "m2")
     }
-    analysis = IncrementalAnalysis(frame, inputs, [("drift2", 0.00668)], 4.0, 0.05, (0.0,), 2.0)
+    cuts = boxes(inputs, (0.0,))
+    analysis = IncrementalAnalysis(frame, cuts, [("drift2", 0.00668)], 4.0, 0.05, 2.0)
     scales, demands = analysis.run()
     crossing = scales[(demands[0, 0, 0] > 1).argmax()]
     structures = analysis._spread_structures()
