@@ -155,13 +155,9 @@ def _face_points(g: Array, H: Array, lower: Array, upper: Array, free: tuple[int
     """Stationary points (N, 2^(d − free), d) on faces with these free axes, clipped to them."""
     d = g.shape[1]
     fixed = [i for i in range(d) if i not in free]
-    ends = list(product((0, 1), repeat=len(fixed)))  # 0: lower, 1: upper
-    corners = np.array(ends, int).reshape(len(ends), len(fixed))
-    points = np.zeros((len(g), len(corners), d))
-    for column, i in enumerate(fixed):
-        points[:, :, i] = np.where(
-            corners[None, :, column] == 0, lower[:, None, i], upper[:, None, i]
-        )
+    is_upper = np.array([*product((False, True), repeat=len(fixed))], bool)  # (corners, fixed)
+    points = np.zeros((len(g), len(is_upper), d))
+    points[:, :, fixed] = np.where(is_upper, upper[:, None, fixed], lower[:, None, fixed])
     if free:
         f = list(free)
         block = _regular(H[:, f][:, :, f])

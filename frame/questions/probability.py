@@ -49,7 +49,6 @@ class Probability:
             with probability `CONFIDENCE` over the draws, shape (2, A).
         limits: Other limits, shape (L,), in SI units; as fractions of their limits for `ANY`.
         curve: Least and greatest probability of exceeding each of them, shape (2, A, L).
-        evaluations: Motions computed.
     """
 
     lower: Array
@@ -58,7 +57,6 @@ class Probability:
     interval: Array
     limits: Array
     curve: Array
-    evaluations: int
 
 
 def probabilities(
@@ -169,7 +167,6 @@ def _probability(event: Array, level: Array, limit: float, *, has_random: bool) 
         interval=np.stack(interval),
         limits=limits[:-1] * limit,
         curve=np.stack([low[:, :-1], high[:, :-1]]),
-        evaluations=ratio.size,
     )
 
 

@@ -37,7 +37,6 @@ class Tolerances:
         passed: Least scale tried at which a computed motion exceeds a limit; infinite without one.
         supports: Supports at the scale `admissible`, by input, in SI units.
         nature: Weakest nature of the envelopes that `admissible` rests on.
-        envelopes: Number of envelopes computed.
     """
 
     admissible: float | None
@@ -45,7 +44,6 @@ class Tolerances:
     passed: float
     supports: Mapping[str, tuple[float, float]]
     nature: Nature
-    envelopes: int
 
 
 def scale_supports(inputs: Mapping[str, FuzzyNumber], scale: float) -> dict[str, FuzzyNumber]:
@@ -130,7 +128,6 @@ def tolerances(
         passed=passed,
         supports={name: number.support for name, number in scale_supports(inputs, low).items()},
         nature=Nature.weakest(peaks_at(low)[name].nature for name in limits),
-        envelopes=len(tried),
     )
 
 
