@@ -230,7 +230,7 @@ def draw_incremental(answer: FragilityAnswer) -> Figure:
                 axes.fill_between(measure, low[level], high[level], **band)
             axes.plot(measure, high[-1], color=INK, lw=0.7)
         axes.axhline(limit.limit, color=ORANGE, lw=1.2, ls="--")
-        axes.set_xlim(0.0, limit.measure[-1])
+        axes.set_xlim(0.0, max(x.measure[-1] for x in limits.values()))
         axes.set_ylim(0.0, 3 * limit.limit)
         style.prefix_axis(axes, f"peak of {limit.output}", limit.unit)
     style.prefix_axis(axes, answer.measure, answer.unit, across=True)

@@ -82,10 +82,8 @@ class FragilityAnswer(LimitsAnswer[LimitFragility]):
         """Ranges over records of first crossing and last non-exceedance, of a frame that yields."""
         if not self.increments:
             return ""
-        texts = list[str]()
-        for title, end in ENDS.items():
-            measures = np.nan_to_num(limit.critical[end][0], nan=np.inf)
-            texts.append(f"{title} {_range_text((measures.min(), measures.max()), self.unit)}")
+        ends = {x: np.nan_to_num(limit.critical[end][0], nan=np.inf) for x, end in ENDS.items()}
+        texts = (f"{x} {_range_text((y.min(), y.max()), self.unit)}" for x, y in ends.items())
         return f"; over the records {', '.join(texts)}"
 
     def crossings(self) -> list[Record]:
@@ -130,7 +128,8 @@ class FragilityAnswer(LimitsAnswer[LimitFragility]):
                 " answer changes: an exceedance between them may be missed. Upper ends of bands"
                 " count the records under which a structure is known to exceed the limit, lower"
                 " ends those under which all structures found do. Medians reach from those of"
-                " first crossings to those of last non-exceedances."
+                " first crossings to those of last non-exceedances. Sets end with the largest"
+                " measure tried; fragility.most tries more."
             )
             tried = self.increments.items()
             collapses = [x for x, y in tried if np.isnan([*y.demands.values()]).any()]
@@ -148,7 +147,9 @@ class FragilityAnswer(LimitsAnswer[LimitFragility]):
 
 
 def _range_text(ends: tuple[float, float], unit: str) -> str:
-    """Text of a range; its upper end may be infinite ("no end")."""
+    """Text of a range; its ends may be infinite."""
+    if not np.isfinite(ends[0]):
+        return "beyond all measures tried"
     if not np.isfinite(ends[1]):
         return f"{engineering(ends[0], unit)} … no end"
     return f"{range_text(*ends, Nature.GUARANTEED, 3)} {unit}".strip()
@@ -183,7 +184,6 @@ def fragility(section: FragilitySection, response: FuzzyResponse) -> FragilityAn
             largest = min(largest, most) if np.isfinite(ends.high).all() else most
         # from below the least critical measure to above the greatest that is finite
         grid: Array = np.linspace(0.8 * float(ends.low.min()), largest, POINTS, dtype=float)
-        has_spread = len(ends.low) > 1  # one record has no dispersion
         answers[name] = LimitFragility.of(
             section,
             name,
@@ -195,7 +195,7 @@ def fragility(section: FragilitySection, response: FuzzyResponse) -> FragilityAn
             measure=grid,
             band=ends.band(grid)._asdict(),
             median=ends.median._asdict(),
-            dispersion=ends.dispersion._asdict() if has_spread else None,
+            dispersion=ends.dispersion._asdict() if len(suite.records) > 1 else None,
             confidence=ends.confidence_band(grid)._asdict() if section.independent else None,
         )
     return FragilityAnswer(

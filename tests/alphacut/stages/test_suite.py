@@ -8,6 +8,7 @@ import pytest
 
 from alphacut.case.content import load
 from alphacut.entry import main
+from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.files import BadInput
 from alphacut.questions.fragility import FragilityAnswer
 from alphacut.records.recording import spectral_acceleration
@@ -88,6 +89,12 @@ def test_what_makes_no_suite_is_one_line(tmp_path, old, new, message):
     with pytest.raises(BadInput) as caught:
         records_of(tmp_path, old, new)
     assert message in str(caught.value)
+
+
+def test_a_record_of_zeros_is_refused(tmp_path):
+    (tmp_path / "zero.csv").write_text("time [s],acceleration [m/s^2]\n0,0\n0.02,0\n0.04,0\n")
+    with pytest.raises(RefusedError, match="record zero is zero throughout"):
+        records_of(tmp_path, "one.csv", "zero.csv")
 
 
 def test_columns_without_a_head_have_step_and_unit_from_the_case(tmp_path):
@@ -206,3 +213,17 @@ def test_fragility_of_columns_that_yield_has_sets_of_measures_for_each_record(tm
     for row, interval in enumerate(rows["exceeded by some [m/s^2]"]):
         assert interval.startswith(f"{first[row]:.4g} … ")
     assert "over the records first crossing" in answer.table().rows[0][1]
+    # the band is drawn where it changes, though measures were tried far beyond
+    assert limit.measure[0] < first.min() < last.max() < limit.measure[-1] < 1.2 * last.max()
+    assert [limit.band.lower[0, 0], limit.band.lower[0, -1]] == [0.0, 1.0]
+
+
+def test_a_limit_that_no_measure_tried_exceeds_is_said_to_be_so(tmp_path):
+    text = CASE.replace("masses", 'yield_force = ["40 kN ± 9 %"]\nmasses').replace("k1", "fy1")
+    path = written(tmp_path, text + "most = 0.1\n")
+    answer = FragilityAnswer.model_validate(summary_of_run(path)["fragility"])
+    words = answer.table().rows[0][1]
+    assert "mm/s^2 … no end" in words
+    assert "first crossing beyond all measures tried" in words
+    assert "inf " not in words
+    assert "fragility.most tries more" in answer.words()
