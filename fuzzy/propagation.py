@@ -129,7 +129,6 @@ def propagate(
 
 
 def _require_method(method: Plan) -> None:
-    """Refuse an object without a method `run(campaign, domain)`, such as a class."""
     is_plan = hasattr(method, "run") and not isinstance(method, type)
     is_plan = is_plan and len(signature(method.run).parameters) == 2  # campaign and domain
     allowed = "an object such as General() or Signed()"

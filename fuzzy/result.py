@@ -264,7 +264,6 @@ class Bounds:
         return tuple(f"{name} [{unit}]" if unit else name for name, unit in pairs)
 
     def _lines(self, column: int) -> Iterator[str]:
-        """Yield a line of text for each level of an output."""
         lowers, uppers, errors = self._extremes(column)
         nature = self.nature_of(self.outputs[column])
         suffix = f", {nature}" if nature != self.nature else ""

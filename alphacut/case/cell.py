@@ -124,7 +124,6 @@ class CellContent(Section):
         require(tolerance is None or has_error, "modulus.tolerance", tolerance, allowed, cure=cure)
 
     def _require_stages(self) -> None:
-        """Refuses stages without their sections, two sources of the radius, and unfit methods."""
         has_fraction = self.particle_cell is not None and self.particle_cell.fraction is not None
         is_computed = "microstructure" in self.stages
         has_map = is_computed or has_fraction or self.image_cell or self.mesh_cell

@@ -149,7 +149,6 @@ class Content(CellContent):
             require(not getattr(self, key), key, "beside [records]", allowed)
 
     def _require_envelope(self) -> None:
-        """Refuses two structures or none, and studies and questions that do not fit it."""
         envelope, structure = self.envelope, self.structure
         if envelope is None or "envelope" not in self.stages:
             return
@@ -183,7 +182,6 @@ class Content(CellContent):
     def _require_study(
         self, key: str, study: Study, envelope: EnvelopeSection, structure: Structure
     ) -> None:
-        """Refuses inputs, outputs and a duration that a study of the structure cannot have."""
         computed = "E" if "modulus" in self.stages else "(?!)"  # which matches no name
         if self.has_material_damping:
             computed = r"E|zeta\d*"

@@ -259,7 +259,6 @@ def require_runnable(content: Content) -> image.ImageStudy | None:
 
 
 def _require_material(content: Content) -> image.ImageStudy | None:
-    """Requires a mesh, an image or a model of the cell that stage modulus can use."""
     if "envelope" in content.stages and not content.has_stated_modulus:
         require_levels(content.modulus.alpha, "modulus.alpha")
     if content.image_cell is not None:

@@ -316,9 +316,9 @@ def _compared_entries(parts: Parts) -> Iterator[tuple[str, str, float | str]]:
     """Yields what is compared of a run on the lowest level: its name, its unit, number or text."""
     for result in (parts.modulus, parts.image):
         if result is not None:
-            low, high = np.array(result.E_GPa[0]) * 1e9
-            yield "greatest E", "Pa", float(high)
-            yield "width of E", "Pa", float(high - low)
+            low, high = (1e9 * float(end[0]) for end in result.E_GPa.ends)
+            entries = {"greatest E": high, "width of E": high - low}
+            yield from ((what, "Pa", x) for what, x in entries.items() if math.isfinite(x))
     for study_name, study in parts.envelopes.items():
         for output, peak in study.peak.items():
             name = output if study_name == "all" else f"{output} ({study_name})"

@@ -178,7 +178,6 @@ def compute_cuts(
 
 
 def _require_isotropic(widest: ImageCut) -> None:
-    """Refuses E and ν of an image for which the bounds do not tell that E is positive."""
     low, high = (end / GPA for end in widest.modulus)
     if low <= 0 and np.isfinite(widest.bounds.width):  # pores and rigid phases have no better
         ends = [(float(x), float(y)) for x, y in widest.constants / GPA]

@@ -126,7 +126,6 @@ class LagrangianFlow(Flow):
         return [with_derivatives(*expression) for expression in self._expressions]
 
     def _march(self, points: Array, *, derivatives: bool) -> Jet:
-        """Trajectories at points (S, d) by the midpoint rule, shape (S, T, outputs)."""
         d = len(self.names) if derivatives else 0
         constants = [x for name, x in self.system.parameters.items() if name not in self.names]
         inputs = np.hstack([points, np.tile(constants, (len(points), 1))])

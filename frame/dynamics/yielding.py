@@ -81,7 +81,6 @@ class YieldingFlow(Flow):
         return replace(self, step=self.step / 4), 4
 
     def _march(self, points: Array, *, derivatives: bool) -> Jet:
-        """Trajectories at points (S, d), shape (S, T, m); they have no derivatives."""
         if derivatives:
             allowed = "methods without derivatives: auto or quasi-monte-carlo"
             raise RefusedError("method", "a follower or a proof, of columns that yield", allowed)
@@ -131,7 +130,6 @@ class YieldingFlow(Flow):
     def _require_motion(
         self, point: Array, status: int, time: float, storey: int, imbalance: float
     ) -> None:
-        """Refuse a motion that collapses, has endless events or energy out of balance."""
         if status == COLLAPSED:
             value = f"collapsing under its weight at t = {time:.6g} s at {self._point_words(point)}"
             allowed = "hardening times stiffness above weight over height where it yields"
@@ -437,7 +435,6 @@ def _observe(
     kinds: Ints, storeys: Array, damping: Array, state: tuple[Array, Array, Array, Array],
     values: Array,
 ) -> None:  # fmt: skip
-    """Write outputs (m,) at a node."""
     q, v, plastic, dissipated = state
     for row in range(len(kinds)):
         kind, z = kinds[row]
@@ -469,7 +466,6 @@ def _net_force(storeys: Array, q: Array, plastic: Array, z: int) -> float:
 
 @compiled
 def _value(polynomial: Array, terms: int, at: float) -> float:
-    """Return the value of a polynomial by Horner's rule."""
     value = polynomial[terms - 1]
     for term in range(terms - 2, -1, -1):
         value = value * at + polynomial[term]
