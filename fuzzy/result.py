@@ -281,7 +281,9 @@ class Bounds:
 
     def _extremes(self, column: int) -> tuple[Array, Array, Array]:
         """Return lower and upper bounds of an output, and their error, (A,) each."""
-        return self.lower[..., column], self.upper[..., column], self.error[..., column]
+        lower, upper, error = (x[..., column] for x in (self.lower, self.upper, self.error))
+        over_time = tuple(range(1, lower.ndim))
+        return lower.min(axis=over_time), upper.max(axis=over_time), error.max(axis=over_time)
 
     def plot(self, axes: Axes | None = None, output: str = "", **line: object) -> Axes:
         """Draw an output, the first by default: its membership function, or α-cuts over time.
