@@ -42,13 +42,6 @@ class StiffnessBounds:
         """2 in the plane, 3 in space."""
         return 2 if len(self.lower) == 3 else 3
 
-    @classmethod
-    def of_sides(cls, lower: Array | None, upper: Array | None, dimension: int) -> StiffnessBounds:
-        """Bounds from those that there are."""
-        size = dimension + len(SHEARS[dimension])
-        lower = np.zeros((size, size)) if lower is None else lower
-        return cls(lower, np.diag(np.full(size, np.inf)) if upper is None else upper)
-
     @property
     def has_lower(self) -> bool:
         """Whether the cell is known to resist."""

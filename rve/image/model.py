@@ -126,12 +126,10 @@ class ImageModel:
                 lower, upper = pool.map(solve, (0, 1), guesses)
             finally:  # Ctrl-C and errors are not to wait for the other side
                 is_stopped.set()
-        bounds = StiffnessBounds.of_sides(
-            None if lower is None else inverse_below(lower.energy.upper),
-            None if upper is None else upper.energy.upper,
-            dimension=len(shape),
-        )
-        return ImageSolution(bounds, upper, lower)
+        size = 3 * (len(shape) - 1)  # strains of the plane and of space in Voigt's order: 3 and 6
+        least = np.zeros((size, size)) if lower is None else inverse_below(lower.energy.upper)
+        greatest = np.diag(np.full(size, np.inf)) if upper is None else upper.energy.upper
+        return ImageSolution(StiffnessBounds(least, greatest), upper, lower)
 
     def solve_side(
         self,
