@@ -103,8 +103,8 @@ class YieldingFlow(Flow):
         heights = system.heights(p) if len(system.lengths) else k * 0.0
         mass = matrices.mass.value.diagonal(axis1=1, axis2=2)
         is_tangent = float(system.rayleigh_of == "tangent")
-        lost = k * (1.0 - hardening) * (is_tangent * p["rayleigh_stiffness"])[:, None]
-        properties = [k, softening, hardening, yield_drift, heights, lost]
+        lost_damping = k * (1.0 - hardening) * (is_tangent * p["rayleigh_stiffness"])[:, None]
+        properties = [k, softening, hardening, yield_drift, heights, lost_damping]
         storeys = np.stack([mass, *(x.value for x in properties)], 1)  # (S, 7, n)
         start = matrices.start.value[..., 0]
         drift0 = np.diff(start[:, : system.floors], prepend=0.0)
@@ -178,7 +178,7 @@ def _march(
     loads, `start` (2n,); parts as of `load_parts`; `kinds` (m, 2): kinds and storeys. Accelerations
     lack the forces over the masses.
     """
-    mass, k, softening, hardening, yield_drift, _, lost = storeys
+    mass, k, softening, hardening, yield_drift, _, lost_damping = storeys
     n, inverse_mass = len(mass), 1 / mass
     # coefficients by powers of the fraction of a part: q, v, drifts
     series = np.zeros((3, n, MAX_TERMS + 1))
@@ -232,11 +232,11 @@ def _march(
             damping[:] = elastic_damping  # forces jump with it, velocities do not
             for i in range(n):
                 if direction[i] != 0:
-                    damping[i, i] -= lost[i]
+                    damping[i, i] -= lost_damping[i]
                     if i:
-                        damping[i - 1, i - 1] -= lost[i]
-                        damping[i, i - 1] += lost[i]
-                        damping[i - 1, i] += lost[i]
+                        damping[i - 1, i - 1] -= lost_damping[i]
+                        damping[i, i - 1] += lost_damping[i]
+                        damping[i - 1, i] += lost_damping[i]
             if event == MAX_EVENTS:
                 return FAILED, edges[e + 1] - h, z, 0.0
     after, dissipation = _energy(storeys, q, v, plastic), works[1] + dissipated.sum()

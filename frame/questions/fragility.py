@@ -43,9 +43,9 @@ class CriticalMeasures:
 
     def __post_init__(self) -> None:
         """Refuse measures that are not positive, or reached outside their bounds."""
-        is_valid, beyond = bool((self.low > 0).all()), 1 + 1e-9
+        is_valid, rounding = bool((self.low > 0).all()), 1 + 1e-9
         for reached in (self.low_reached, self.high_reached):
-            is_inside = (self.low <= reached * beyond) & (reached <= self.high * beyond)
+            is_inside = (self.low <= reached * rounding) & (reached <= self.high * rounding)
             is_valid &= bool(is_inside.all())
         require(is_valid, "critical measures", value="not rising", allowed="rising ends")
 
@@ -78,11 +78,13 @@ class CriticalMeasures:
         sets = [(tried, ~(demands <= 1)) for tried, demands in records]
         ends = []
         for tried, (by_some, by_all) in sets:
-            beyond, last = np.append(tried, np.inf), len(tried) - 1
+            or_infinite, last = np.append(tried, np.inf), len(tried) - 1
             crossing = np.where(by_some.any(1), by_some.argmax(1), len(tried))
             after = len(tried) - (~by_all)[:, ::-1].argmax(1)
             high_reached = np.where(after > last, np.inf, tried[after - 1])
-            ends.append([tried[crossing - 1], beyond[crossing], high_reached, beyond[after]])
+            ends.append(
+                [tried[crossing - 1], or_infinite[crossing], high_reached, or_infinite[after]]
+            )
         low, low_reached, high_reached, high = np.moveaxis(np.array(ends), 1, 0)
         return cls(low, low_reached, high_reached, high, sets)
 

@@ -158,13 +158,13 @@ class IncrementalAnalysis:
     def _move(self, scale: float, points: Array) -> None:
         """Move those of the structures (…, d) that were not moved at this scale yet."""
         d, n_events = len(self.cuts.names), len(self.limits) + 1
-        known, demands = self.moved.get(scale, (np.empty((0, d)), np.empty((0, n_events))))
-        known_rows = {row.tobytes() for row in known}
+        moved, demands = self.moved.get(scale, (np.empty((0, d)), np.empty((0, n_events))))
+        known_rows = {row.tobytes() for row in moved}
         points = np.unique(points.reshape(-1, d), axis=0)
         if len(points := points[[row.tobytes() not in known_rows for row in points]]):
             new = self._peaks_over_limits(scale, points, self.limits)
             new = np.column_stack([new, new.max(axis=1)])
-            self.moved[scale] = np.vstack([known, points]), np.vstack([demands, new])
+            self.moved[scale] = np.vstack([moved, points]), np.vstack([demands, new])
 
     def _extremes(self, scale: float) -> tuple[Array, Array]:
         """Return greatest and least demand (2, A, E) at a scale, and their inputs (2, A, E, d)."""

@@ -116,8 +116,8 @@ class ModuliImages:
         moduli = self.bulk[end], self.shear[end]
         if any(np.any(np.isinf(x) if end else x == 0) for x in moduli):
             return None
-        others = [x[(x > 0) & np.isfinite(x)] for x in moduli]
-        ends = [(PORE_RATIO * x.min(), RIGID_RATIO * x.max()) for x in others]
+        finite = [x[(x > 0) & np.isfinite(x)] for x in moduli]
+        ends = [(PORE_RATIO * x.min(), RIGID_RATIO * x.max()) for x in finite]
         return np.clip(moduli[0], *ends[0]), np.clip(moduli[1], *ends[1])
 
     def equals(self, images: ModuliImages) -> bool:
