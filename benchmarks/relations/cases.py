@@ -78,15 +78,16 @@ def start(case: Problem, out: Path, way: Way = PLAIN) -> subprocess.Popen[str]:
     )
 
 
-def was_killed(started: subprocess.Popen[str], seconds: float) -> bool:
-    """Whether a run had not ended after so many seconds; it is killed then with its workers."""
+def kill_after(started: subprocess.Popen[str], out: Path, seconds: float) -> None:
+    """Kills a run with its workers if it has not ended after so many seconds."""
     with suppress(subprocess.TimeoutExpired):
         started.communicate(timeout=seconds)
-        return False
+        return
     with suppress(ProcessLookupError):
         os.killpg(started.pid, signal.SIGKILL)
+    # ranks of mpirun have process groups of their own
+    subprocess.run(["pkill", "-KILL", "-f", "--", f"--out={out} "], check=False)
     started.communicate()
-    return True
 
 
 def summary_of(started: subprocess.Popen[str], out: Path) -> dict[str, Any]:
@@ -134,7 +135,7 @@ def ways_checked(
         for number, row in enumerate(rows):
             out = Path(folder, str(number))
             if row["killed"] == "yes":
-                was_killed(start(case, out, row), float(chance.uniform(0.1, 0.9)) * seconds)
+                kill_after(start(case, out, row), out, float(chance.uniform(0.1, 0.9)) * seconds)
             name = ", ".join(f"{key} {x}" for key, x in row.items() if x != PLAIN[key])
             try:
                 found = numbers(summary_of(start(case, out, row), out))

@@ -31,8 +31,8 @@ RESOLUTION = 0.01
 """Relative width to which changes are bisected."""
 SPREAD = 16
 """Structures of a kind on each level that are moved at every scale of the grid."""
-REFINEMENT = 1.25
-"""Motions of a run over those on the grid, roughly."""
+SEARCHES = 0.035
+"""Motions of searches over those on the grid, by inputs and events, roughly."""
 FIRST_STEP, LAST_STEP = 1 / 4, 1 / 32
 """Steps of a compass search, as fractions of the width of the cut."""
 ELASTIC_SCALE = 1e-6
@@ -112,7 +112,8 @@ class IncrementalAnalysis:
     def foresee(self) -> tuple[float, float]:
         """Return about how many motions a run takes, and how many seconds."""
         structures, start = self._spread_structures(), time.perf_counter()
-        rounds = REFINEMENT * len(self._grid(structures))  # of all structures
+        searched = SEARCHES * len(self.cuts.names) * (len(self.limits) + 1)
+        rounds = (1 + searched) * len(self._grid(structures))  # of all structures
         return rounds * len(structures), rounds * (time.perf_counter() - start)
 
     def elastic_scales(self, points: Array) -> Array:
