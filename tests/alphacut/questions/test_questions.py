@@ -172,5 +172,7 @@ def test_peaks_are_bounded_over_time_and_not_at_nodes_alone():
     inputs = {"k1": Interval(149.0, 151.0)}
     found = envelope(frame, inputs, duration=1.2, step=0.02, alpha=[0], progress=False)
     assert peaks(found)["q1"].upper[0] > np.maximum(found.upper, -found.lower).max()
-    printed = re.search(r"(\S+) … (\S+), gap", str(found)).groups()
-    assert max(abs(float(x)) for x in printed) == pytest.approx(peaks(found)["q1"].upper[0], 1e-4)
+    low, high = map(float, re.search(r"(\S+) … (\S+), gap", str(found)).groups())
+    assert max(-low, high) == pytest.approx(peaks(found)["q1"].upper[0], 1e-4)
+    assert low < found.lower.min() - 1e-5
+    assert high > found.upper.max() + 1e-5
