@@ -16,9 +16,9 @@ from contextlib import contextmanager
 from importlib import import_module
 from types import FrameType
 
+from alphacut.base.errors import RefusedError
 from alphacut.commands.options import Command, Parser, require_petsc, split_petsc
 from alphacut.fuzzy.campaign.campaign import CampaignError
-from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.files import (
     BadInput,
     check_destinations,

@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array
+from alphacut.base.arrays import Array
 
 
 @dataclass(frozen=True)

@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
+from alphacut.base.arrays import Ints, Mask
+from alphacut.base.errors import require_numbers
 from alphacut.frame.calculus.jet import Array, Jet
 from alphacut.frame.dynamics.flow import Flow
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy import FuzzyNumber, Interval
-from alphacut.fuzzy.arrays import Ints, Mask
 from alphacut.fuzzy.knowledge.joint import joined_inputs
-from alphacut.fuzzy.refused import require_numbers
 from alphacut.fuzzy.sets.boxes import corners
 from alphacut.fuzzy.sets.numbers import checked_levels
 

@@ -9,6 +9,9 @@ from typing import Any, get_args
 
 import numpy as np
 
+from alphacut.base.arrays import Array, Ints, on_one_blas_thread
+from alphacut.base.errors import require, require_choice
+from alphacut.base.progress_bar import Progress, progress_reporter, subprogress
 from alphacut.frame.bounds.box_proof import refusing
 from alphacut.frame.boxes import ALPHA, Boxes, UnitFlow, boxes
 from alphacut.frame.calculus.unproved import UnprovedError
@@ -28,9 +31,6 @@ from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.frame.verification.self_test import with_motions_tested
 from alphacut.frame.verification.step_error import step_error, with_node_deviation, with_step_error
 from alphacut.fuzzy import FuzzyNumber
-from alphacut.fuzzy.arrays import Array, Ints, on_one_blas_thread
-from alphacut.fuzzy.progress_bar import Progress, progress_reporter, subprogress
-from alphacut.fuzzy.refused import require, require_choice
 
 FIRST_STEPS = 3
 """Steps of the motions that show whether they exist."""

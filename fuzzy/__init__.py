@@ -1,5 +1,6 @@
 """Fuzzy inputs through any model: α-cuts, methods of search, bounds."""
 
+from alphacut.base.errors import FailedError, RefusedError
 from alphacut.fuzzy.campaign.store import Store
 from alphacut.fuzzy.knowledge.from_data import from_data
 from alphacut.fuzzy.knowledge.joint import jointly
@@ -7,7 +8,6 @@ from alphacut.fuzzy.knowledge.known import Knowledge
 from alphacut.fuzzy.plans.automatic import Automatic
 from alphacut.fuzzy.plans.transformation import General, Reduced, Signed
 from alphacut.fuzzy.propagation import propagate, width_shares
-from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.fuzzy.result import Bounds, Nature
 from alphacut.fuzzy.sets.boxes import levels
 from alphacut.fuzzy.sets.numbers import (

@@ -13,7 +13,9 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array
+from alphacut.base.arrays import Array
+from alphacut.base.errors import require, require_choice
+from alphacut.base.progress_bar import Progress, progress_reporter
 from alphacut.fuzzy.campaign.call import Call, Function
 from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.campaign.store import Identity, Store, model_key
@@ -22,8 +24,6 @@ from alphacut.fuzzy.knowledge.joint import joined_inputs
 from alphacut.fuzzy.knowledge.known import Knowledge
 from alphacut.fuzzy.plans.automatic import Automatic
 from alphacut.fuzzy.plans.design import Plan
-from alphacut.fuzzy.progress_bar import Progress, progress_reporter
-from alphacut.fuzzy.refused import require, require_choice
 from alphacut.fuzzy.result import Bounds, Nature
 from alphacut.fuzzy.sets.boxes import Domain, fuzzy_inputs, levels
 from alphacut.fuzzy.sets.numbers import Crisp, FuzzyNumber

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Mask
+from alphacut.base.arrays import Array, Mask
+from alphacut.base.errors import FailedError, require, require_choice
 from alphacut.fuzzy.knowledge.joint import JointClaim
-from alphacut.fuzzy.refused import FailedError, require, require_choice
 from alphacut.fuzzy.sets.claimed import ClaimedNumber
 from alphacut.fuzzy.sets.numbers import Stepwise, checked_levels, new_axes, outer_steps
 

@@ -16,8 +16,8 @@ from typing import Any
 import cffi
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Ints
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.base.arrays import Array, Ints
+from alphacut.base.errors import RefusedError
 from alphacut.rve.interruption import uninterrupted
 
 if find_spec("dolfinx_solver"):  # where Numba is, this wheel hides the HDF5 of others after it

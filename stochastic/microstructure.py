@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from alphacut.fuzzy.refused import require
+from alphacut.base.errors import require
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
 from alphacut.stochastic.fit.hermite_fit import HermiteFit, PBox, SlopeBand, least_pbox, slope_band
 from alphacut.stochastic.particles.measured import CircleFile, SectionImage

@@ -14,8 +14,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import require
+from alphacut.base.arrays import Array
+from alphacut.base.errors import require
 from alphacut.stochastic.theta.law import ThetaLaw, TruncatedNormal, require_support
 
 RADII = "radii inside (0, 1), in halves of the cell's side"

@@ -12,8 +12,8 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Ints
-from alphacut.fuzzy.refused import FailedError, require
+from alphacut.base.arrays import Array, Ints
+from alphacut.base.errors import FailedError, require
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
 from alphacut.stochastic.particles.packing import Packing
 from alphacut.stochastic.particles.particles import DISCS, Particles

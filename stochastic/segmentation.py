@@ -19,8 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import maximum_filter, median_filter, minimum_filter, percentile_filter
 
-from alphacut.fuzzy.arrays import Array, Ints, Mask
-from alphacut.fuzzy.refused import RefusedError, require
+from alphacut.base.arrays import Array, Ints, Mask
+from alphacut.base.errors import RefusedError, require
 
 CONFIDENT = 3.0  # deviations of the noise
 MAX_OPEN = 0.15  # area that may be open, over that of the smallest class

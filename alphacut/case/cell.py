@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from alphacut.base.errors import RefusedError, require
 from alphacut.case.material import (
     AnyLaw,
     AnyRadius,
@@ -19,7 +20,6 @@ from alphacut.case.material import (
     ThetaSection,
 )
 from alphacut.case.types import NotEmpty, Section, after, distinct, require_alone
-from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io.provenance import command_to_paste
 
 Stage = Literal["microstructure", "modulus", "envelope"]

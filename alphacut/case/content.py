@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
 
+from alphacut.base.errors import RefusedError, require, require_choice
 from alphacut.case.cell import CellContent
 from alphacut.case.limits import (
     DecisionSection,
@@ -23,7 +24,6 @@ from alphacut.case.parse import ParsedCase, parse
 from alphacut.case.structure import Frame, MaterialDamping, Pendulum, Structure
 from alphacut.case.types import require_alone
 from alphacut.fuzzy import FuzzyNumber
-from alphacut.fuzzy.refused import RefusedError, require, require_choice
 
 
 class Content(CellContent):

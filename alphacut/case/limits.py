@@ -14,10 +14,10 @@ from typing import Annotated, ClassVar, Literal, Self, cast
 import numpy as np
 from pydantic import PlainValidator
 
+from alphacut.base.errors import RefusedError, require
 from alphacut.case.structure import Structure
 from alphacut.case.types import NotEmpty, Quantity, Section
 from alphacut.frame.structures.quantities import OUTPUTS, Output
-from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io import quantity
 
 Side = Literal["", "max", "min", "mean"]

@@ -12,11 +12,11 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from pydantic import Field, ValidationInfo
 
+from alphacut.base.errors import RefusedError, require, require_choice
 from alphacut.case.structure import Structure
 from alphacut.case.types import NotEmpty, OneOrMany, Section, Time, case_file, text
 from alphacut.frame import Force, History, StoreyFrame
 from alphacut.fuzzy import FuzzyNumber
-from alphacut.fuzzy.refused import RefusedError, require, require_choice
 from alphacut.io import quantity
 from alphacut.records.read import read_recording
 from alphacut.records.recording import Baseline, Recording

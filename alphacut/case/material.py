@@ -10,6 +10,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 
+from alphacut.base.errors import RefusedError, require
 from alphacut.case.types import (
     ALPHA,
     CaseFile,
@@ -27,7 +28,6 @@ from alphacut.case.types import (
     rising,
 )
 from alphacut.fuzzy import Crisp, FuzzyNumber
-from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.rve.cell.cell import Phase, VoigtPhase
 from alphacut.rve.cell.outline import Ellipse, circle, reach
 from alphacut.rve.image.phases import RIGID

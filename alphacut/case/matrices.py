@@ -10,6 +10,8 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, PlainValidator, ValidationInfo
 
+from alphacut.base.arrays import Array
+from alphacut.base.errors import RefusedError, printable, require
 from alphacut.case.structure import (
     LOSS_STAND_IN,
     RATIO_WORDS,
@@ -25,8 +27,6 @@ from alphacut.frame import Accelerogram, MatrixStructure
 from alphacut.frame.structures.matrix import Monomial, modal_energy_shares
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy import Crisp, FuzzyNumber
-from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError, printable, require
 from alphacut.io.quantity import parse_fuzzy_in_any_unit
 
 ENDINGS = (".mtx", ".npz", ".npy", ".csv")

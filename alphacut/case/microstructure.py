@@ -6,8 +6,8 @@ from typing import Annotated
 
 from pydantic import Field
 
+from alphacut.base.errors import require
 from alphacut.case.types import CaseFile, Fraction, Length, Quantity, Section, after, rising
-from alphacut.fuzzy.refused import require
 from alphacut.stochastic.microstructure import MicrostructureStudy
 from alphacut.stochastic.particles.measured import CircleFile, SectionImage
 from alphacut.stochastic.particles.packing import Packing

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, ValidationInfo
 
+from alphacut.base.errors import RefusedError, require
 from alphacut.case.types import (
     ALPHA,
     CaseFile,
@@ -20,7 +21,6 @@ from alphacut.case.types import (
     after,
     text,
 )
-from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io import quantity
 
 MOST_STEPS = 1_000_000

@@ -14,8 +14,8 @@ from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
+from alphacut.base.errors import RefusedError, printable, require
 from alphacut.case.types import Quantity, Section
-from alphacut.fuzzy.refused import RefusedError, printable, require
 from alphacut.io.files import BadInput, nearest, suggestion
 from alphacut.stochastic.particles.csv_columns import text_of
 

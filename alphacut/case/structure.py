@@ -11,14 +11,14 @@ from typing import Annotated, Any, Literal, cast
 
 from pydantic import Field, PlainValidator, ValidationInfo
 
+from alphacut.base.arrays import Array
+from alphacut.base.errors import RefusedError, require, require_choice
 from alphacut.case.types import Modulus, NotEmpty, OneOrMany, Quantity, Section, case_file, text
 from alphacut.frame import Accelerogram, MatrixStructure, StoreyFrame
 from alphacut.frame.structures.lagrangian import LagrangianSystem, pendulum
 from alphacut.frame.structures.quantities import Output
 from alphacut.frame.structures.storey import SYMBOLS
 from alphacut.fuzzy import Crisp, FuzzyNumber, PiecewiseLinear
-from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError, require, require_choice
 from alphacut.io.files import suggestion
 from alphacut.io.quantity import STANDARD_GRAVITY
 from alphacut.records.read import read_recording

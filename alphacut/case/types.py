@@ -22,8 +22,8 @@ from pydantic import (
 from pydantic.annotated_handlers import GetCoreSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
+from alphacut.base.errors import RefusedError, require
 from alphacut.fuzzy import FuzzyNumber
-from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io import quantity
 from alphacut.io.quantity import QUANTITIES
 from alphacut.rve.cell.cell import VoigtPhase

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 import numpy as np
 
+from alphacut.base.errors import require
 from alphacut.case.content import Content
 from alphacut.case.loads import RecordsSection
 from alphacut.case.motion import EnvelopeSection
@@ -29,7 +30,6 @@ from alphacut.frame.structures.matrix import Monomial
 from alphacut.frame.verification.self_test import Trial, stored_motions
 from alphacut.frame.verification.step_error import node_deviation
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal, Triangular
-from alphacut.fuzzy.refused import require
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import text_table
 from alphacut.io.quantity import MINUS, STANDARD_GRAVITY, engineering, percent_text

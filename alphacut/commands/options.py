@@ -8,8 +8,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NoReturn, TextIO
 
+from alphacut.base.errors import RefusedError, require
 from alphacut.case.cell import CellContent
-from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io.files import as_json, suggestion, write_text
 
 PETSC_PREFIX = "-rve_"

@@ -12,6 +12,8 @@ from functools import partial
 from pathlib import Path
 
 from alphacut import frame
+from alphacut.base.errors import RefusedError, require
+from alphacut.base.progress_bar import progress_reporter
 from alphacut.case.content import Case, Content, load
 from alphacut.case.limits import QuestionSection
 from alphacut.case.loads import RecordsSection
@@ -21,8 +23,6 @@ from alphacut.case.structure import Structure
 from alphacut.commands.options import require_petsc
 from alphacut.frame.questions.peaks import Peaks
 from alphacut.fuzzy import Crisp, Triangular
-from alphacut.fuzzy.progress_bar import progress_reporter
-from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io.files import Document, locked, rank, require_writable, say
 from alphacut.io.results import MANIFEST, ResultsFolder
 from alphacut.questions.question import Answer, FuzzyResponse

@@ -13,11 +13,11 @@ from typing import TextIO
 
 import pandas as pd
 
+from alphacut.base.arrays import Array
+from alphacut.base.errors import RefusedError, require
 from alphacut.commands.options import Command, add_common, add_quiet, add_run, write_answer
 from alphacut.commands.pipeline import Pipeline, open_results, read_case
-from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.campaign.workers import pool
-from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import locked, say, text_table, write_text
 from alphacut.io.provenance import FORMAT, command_line, command_to_paste, versions

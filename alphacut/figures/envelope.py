@@ -14,11 +14,11 @@ import xarray
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from alphacut.base.arrays import Array
 from alphacut.figures import style
 from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.questions.peaks import ANY
 from alphacut.frame.structures.quantities import Output
-from alphacut.fuzzy.arrays import Array
 from alphacut.io.quantity import engineering
 from alphacut.questions.decision import DecisionAnswer, degree_text
 from alphacut.questions.fragility import FragilityAnswer

@@ -10,10 +10,10 @@ import numpy as np
 import xarray
 from matplotlib.figure import Figure
 
+from alphacut.base.arrays import Array
 from alphacut.case.material import RadiusMapSection
 from alphacut.case.structure import Frame
 from alphacut.figures import style
-from alphacut.fuzzy.arrays import Array
 from alphacut.stages.cell import GPA
 from alphacut.stages.modulus import ModulusResult
 from alphacut.stages.store import StageResult

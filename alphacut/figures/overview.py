@@ -12,10 +12,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
+from alphacut.base.arrays import Array, Ints, Mask
 from alphacut.figures import style
 from alphacut.figures.style import Look
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal
-from alphacut.fuzzy.arrays import Array, Ints, Mask
 from alphacut.io.quantity import axis_prefix
 from alphacut.questions.summary import Results
 from alphacut.rve.cell.cell import Cell

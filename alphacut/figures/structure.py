@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from alphacut.base.arrays import Array
 from alphacut.case.structure import Frame
 from alphacut.figures.style import Look, prefix_axis
 from alphacut.frame.boxes import UnitFlow, boxes
@@ -15,7 +16,6 @@ from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.methods.graph_follower import Followed, GraphFollower
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy import Crisp
-from alphacut.fuzzy.arrays import Array
 from alphacut.questions.summary import Results
 from alphacut.stages.envelope import EnvelopeTask
 from alphacut.stochastic.figures.style import BLUE, GREY, INK, ORANGE

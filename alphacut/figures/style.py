@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from alphacut.fuzzy.arrays import Array
+from alphacut.base.arrays import Array
 from alphacut.io.quantity import MINUS, axis_prefix
 from alphacut.stochastic.figures.style import INK
 

@@ -17,7 +17,7 @@ from typing import Any, TextIO
 import numpy as np
 from pydantic_core import to_json
 
-from alphacut.fuzzy.refused import FailedError, RefusedError, printable, require
+from alphacut.base.errors import FailedError, RefusedError, printable, require
 
 MIN_FREE_BYTES = 1 << 20
 """Bytes that a disk has at least where it is not full."""

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import require
+from alphacut.base.arrays import Array
+from alphacut.base.errors import require
 from alphacut.stochastic.particles.csv_columns import fields, number
 
 HEAD = re.compile(r"\s*(mode|frequency(_std)?\s*(\[Hz\])?|shape_std|q[1-9]\d*)\s*")

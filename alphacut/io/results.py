@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Self
 
 from pydantic import AfterValidator, TypeAdapter, ValidationError
 
-from alphacut.fuzzy.refused import RefusedError, require
+from alphacut.base.errors import RefusedError, require
 from alphacut.io.files import as_json, whole_file
 from alphacut.io.provenance import FORMAT, command_to_paste, digest_of
 

@@ -7,10 +7,10 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from pydantic import Field
 
+from alphacut.base.arrays import Array
 from alphacut.case.limits import ProbabilitySection
 from alphacut.frame.questions.probability import CONFIDENCE, probabilities
 from alphacut.fuzzy import FuzzyNumber
-from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.result import Ends, Nature
 from alphacut.io.quantity import MINUS, range_text
 from alphacut.questions.question import FuzzyResponse, LimitAnswer, LimitsAnswer, Record, Texts

@@ -9,10 +9,10 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import AfterValidator, Field, ValidationError
 
+from alphacut.base.errors import RefusedError, require
 from alphacut.case.content import Content
 from alphacut.case.structure import Structure
 from alphacut.frame.structures.linear import frequencies
-from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io.files import Document, as_json
 from alphacut.io.quantity import STANDARD_GRAVITY
 from alphacut.io.results import COMPLETE, RUN_AGAIN, ResultsFolder, plain_name

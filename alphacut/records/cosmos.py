@@ -16,7 +16,7 @@ from math import ceil
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array
+from alphacut.base.arrays import Array
 from alphacut.records.recording import Recording
 from alphacut.records.text_file import TextFile, choose_channel, recording_in_si
 

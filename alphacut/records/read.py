@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from alphacut.fuzzy.refused import RefusedError, require
+from alphacut.base.errors import RefusedError, require
 from alphacut.records.cosmos import is_cosmos, read_cosmos
 from alphacut.records.networks import FORMATS
 from alphacut.records.recording import Recording

@@ -10,8 +10,8 @@ from typing import Literal
 
 import numpy as np
 
+from alphacut.base.arrays import Array
 from alphacut.frame import Accelerogram, Exact, LinearFlow, StoreyFrame
-from alphacut.fuzzy.arrays import Array
 from alphacut.io.quantity import factor
 
 Baseline = Literal["none", "mean", "linear"]

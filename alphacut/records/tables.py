@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import require
+from alphacut.base.arrays import Array
+from alphacut.base.errors import require
 from alphacut.io.quantity import factor
 from alphacut.records.recording import Recording
 from alphacut.records.text_file import (

@@ -11,8 +11,8 @@ from typing import Self
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError, require
+from alphacut.base.arrays import Array
+from alphacut.base.errors import RefusedError, require
 from alphacut.io.quantity import STANDARD_GRAVITY, factor
 from alphacut.records.recording import Recording
 

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError, require
+from alphacut.base.arrays import Array
+from alphacut.base.errors import RefusedError, require
 from alphacut.io.measured import ModeRows
 from alphacut.records.recording import Recording
 from alphacut.records.text_file import NUMBER, choose_channel, decoded, read_bytes, recording_in_si

@@ -9,7 +9,7 @@ import tomllib
 from collections.abc import Iterable, Iterator
 from pathlib import Path, PurePosixPath
 
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.base.errors import RefusedError
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document, say
 from alphacut.io.results import ResultsFolder

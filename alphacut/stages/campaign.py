@@ -8,11 +8,11 @@ from functools import cached_property, partial
 
 import numpy as np
 
+from alphacut.base.arrays import Array, on_one_blas_thread
+from alphacut.base.errors import FailedError
 from alphacut.case.material import MeshedCell
 from alphacut.fuzzy import FuzzyNumber, General, Knowledge, Reduced, Signed, propagate
-from alphacut.fuzzy.arrays import Array, on_one_blas_thread
 from alphacut.fuzzy.plans.design import Plan
-from alphacut.fuzzy.refused import FailedError
 from alphacut.fuzzy.result import Bounds, Nature
 from alphacut.io.files import Document
 from alphacut.io.provenance import file_digest, source_digest, versions

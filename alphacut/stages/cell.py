@@ -10,6 +10,8 @@ from typing import Any, Self, cast
 import numpy as np
 from typing_extensions import TypedDict
 
+from alphacut.base.arrays import Array
+from alphacut.base.errors import FailedError, RefusedError
 from alphacut.case.cell import CellContent
 from alphacut.case.material import (
     AnyRadius,
@@ -20,8 +22,6 @@ from alphacut.case.material import (
     ThetaSection,
 )
 from alphacut.fuzzy import FuzzyNumber
-from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.io.files import missing
 from alphacut.rve.cell.cell import AnyPhase, Cell, Phase
 from alphacut.rve.cell.outline import circle

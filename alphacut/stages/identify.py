@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from alphacut.base.errors import require
 from alphacut.case.motion import Identify
 from alphacut.case.structure import Structure
 from alphacut.frame.identify import MeasuredMode, RefutedError, identify, measured_mode
 from alphacut.frame.identify.identify import widest_cut
 from alphacut.frame.structures.quantities import of_storey_frame
 from alphacut.fuzzy import FuzzyNumber
-from alphacut.fuzzy.refused import require
 from alphacut.io.measured import ModeRows, mode_rows
 from alphacut.records.uff import ENDINGS, uff_mode_rows
 from alphacut.stages.store import CutsResult, Numbers, Values

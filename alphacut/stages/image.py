@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from alphacut.base.arrays import Array, Ints
+from alphacut.base.errors import FailedError, require
+from alphacut.base.progress_bar import subprogress
 from alphacut.case.material import ImageCell
 from alphacut.fuzzy import FuzzyNumber
-from alphacut.fuzzy.arrays import Array, Ints
-from alphacut.fuzzy.progress_bar import subprogress
-from alphacut.fuzzy.refused import FailedError, require
 from alphacut.fuzzy.result import Nature
 from alphacut.io.provenance import file_digest
 from alphacut.rve.cell.cell import Phase

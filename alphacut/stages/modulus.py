@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from alphacut.base.arrays import Array
+from alphacut.base.errors import require
 from alphacut.fuzzy import Crisp, FuzzyNumber
-from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import require
 from alphacut.fuzzy.result import Bounds, Nature
 from alphacut.fuzzy.sets.numbers import outer_steps
 from alphacut.rve.result.engineering_constants import (

@@ -12,11 +12,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from alphacut.base.arrays import Array
 from alphacut.case.structure import Structure
 from alphacut.frame.dynamics.flow import Flow
 from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.fuzzy import FuzzyNumber, Reduced
-from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.propagation import Shares, width_shares
 from alphacut.io.provenance import NESTED
 from alphacut.stages.campaign import OUTPUTS, CellCampaign

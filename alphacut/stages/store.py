@@ -25,9 +25,9 @@ from pydantic import (
     ValidationError,
 )
 
-from alphacut.fuzzy.arrays import Array, on_one_blas_thread
-from alphacut.fuzzy.progress_bar import Progress, subprogress
-from alphacut.fuzzy.refused import FailedError, RefusedError, require
+from alphacut.base.arrays import Array, on_one_blas_thread
+from alphacut.base.errors import FailedError, RefusedError, require
+from alphacut.base.progress_bar import Progress, subprogress
 from alphacut.io.files import as_json, rank, say, write_text
 from alphacut.io.provenance import build_provenance, fingerprint
 from alphacut.io.results import Listed, ResultsFolder

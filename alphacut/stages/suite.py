@@ -12,6 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from pydantic import Field
 
+from alphacut.base.arrays import Array
+from alphacut.base.errors import RefusedError, require
 from alphacut.case.limits import FragilitySection
 from alphacut.case.loads import RecordsSection
 from alphacut.case.motion import EnvelopeSection
@@ -23,8 +25,6 @@ from alphacut.frame.questions.incremental import IncrementalAnalysis
 from alphacut.frame.questions.peaks import ANY, PEAK_BOUNDS, Peak, Peaks
 from alphacut.frame.structures.linear import modal_damping_ratios
 from alphacut.frame.structures.quantities import output_of
-from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.fuzzy.result import Nature
 from alphacut.io.quantity import percent_text
 from alphacut.records.recording import Recording, arias_fractions, spectral_acceleration

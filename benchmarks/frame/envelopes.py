@@ -17,9 +17,9 @@ from typing import Any, ClassVar
 import matplotlib.pyplot as plt
 import numpy as np
 
+from alphacut.base.arrays import Array
 from alphacut.frame import GraphFollower, ImprovedFollower, Proof, Sampled, StoreyFrame, envelope
 from alphacut.fuzzy import Interval, Triangular
-from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.sets.boxes import corners
 from benchmarks.rows import write
 

@@ -11,9 +11,9 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 
+from alphacut.base.arrays import Array
 from alphacut.frame import INTEGRATORS, Exact, LinearFlow
 from alphacut.frame.structures.linear import evaluate
-from alphacut.fuzzy.arrays import Array
 from benchmarks.frame.envelopes import FRAME, RESULTS
 from benchmarks.rows import write
 

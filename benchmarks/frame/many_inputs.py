@@ -19,12 +19,12 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 
+from alphacut.base.errors import FailedError
 from alphacut.frame import Envelope, StoreyFrame, envelope
 from alphacut.frame.methods.dual import DualProof
 from alphacut.frame.methods.proof import Proof
 from alphacut.frame.structures.loads import Accelerogram
 from alphacut.fuzzy import FuzzyNumber, Triangular
-from alphacut.fuzzy.refused import FailedError
 from benchmarks.rows import write
 from benchmarks.synthetic_record import SyntheticRecord
 

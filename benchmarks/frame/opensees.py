@@ -26,6 +26,7 @@ from typing import Any
 
 import numpy as np
 
+from alphacut.base.arrays import Array
 from alphacut.frame import (
     Accelerogram,
     DualProof,
@@ -41,7 +42,6 @@ from alphacut.frame.dynamics.integrators import INTEGRATORS
 from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.questions.peaks import peaks
 from alphacut.fuzzy import Interval
-from alphacut.fuzzy.arrays import Array
 from benchmarks.frame.plane_frame import MatrixCase
 
 WHEEL = "openseespylinux==3.8.0.0"

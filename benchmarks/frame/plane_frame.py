@@ -19,9 +19,9 @@ import numpy as np
 from scipy.io import mmwrite
 from scipy.sparse import coo_array
 
+from alphacut.base.arrays import Array
 from alphacut.frame import MatrixStructure, Output
 from alphacut.frame.structures.loads import Accelerogram, Factor
-from alphacut.fuzzy.arrays import Array
 from benchmarks.synthetic_record import SyntheticRecord
 
 SPAN, HEIGHT = 6.0, 3.2

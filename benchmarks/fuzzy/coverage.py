@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
+from alphacut.base.arrays import Array
 from alphacut.fuzzy import FuzzyNumber, RefusedError, Triangular, from_data, jointly
-from alphacut.fuzzy.arrays import Array
 from benchmarks.rows import write
 
 ALPHA = np.array([0.05, 0.1, 0.2, 0.35, 0.5, 0.7, 0.9])

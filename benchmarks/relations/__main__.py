@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from alphacut.fuzzy.refused import FailedError, RefusedError
+from alphacut.base.errors import FailedError, RefusedError
 from benchmarks.relations import cases, frames, functions, materials
 from benchmarks.relations.relation import Chance, Kind
 

@@ -18,9 +18,9 @@ from typing import Any
 
 import xarray as xr
 
+from alphacut.base.errors import FailedError
 from alphacut.case.content import load
 from alphacut.case.motion import EnvelopeSection
-from alphacut.fuzzy.refused import FailedError
 from benchmarks.relations.relation import Chance, Kind, Problem, Relation
 from benchmarks.relations.stated import of_dataset
 

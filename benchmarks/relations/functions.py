@@ -12,8 +12,8 @@ from multiprocessing import get_context
 import numpy as np
 import xarray as xr
 
+from alphacut.base.arrays import Array
 from alphacut.fuzzy import Automatic, General, Knowledge, Signed, Triangular, propagate
-from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.plans.design import Plan
 from benchmarks.relations.relation import (
     ONE_LEVEL,

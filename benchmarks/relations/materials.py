@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 from scipy.ndimage import gaussian_filter
 
-from alphacut.fuzzy.arrays import Array
+from alphacut.base.arrays import Array
 from alphacut.rve import Ellipse, Phase, SeriesModel, SlicesModel
 from alphacut.rve.image.model import solve_image
 from alphacut.stochastic import HermiteMap

@@ -15,7 +15,7 @@ from time import perf_counter
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Mask
+from alphacut.base.arrays import Array, Mask
 from alphacut.rve.cell.cell import Phase
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.model import ImageModel, ImageSolution, solve_image

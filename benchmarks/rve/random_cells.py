@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from alphacut.fuzzy.refused import FailedError, RefusedError
+from alphacut.base.errors import FailedError, RefusedError
 from alphacut.rve.cell.cell import Cell, Phase, VoigtPhase
 from alphacut.rve.cell.outline import Ellipse, circle
 from alphacut.rve.prism.model import PrismModel

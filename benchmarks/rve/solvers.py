@@ -21,7 +21,7 @@ from time import perf_counter, process_time
 
 import numpy as np
 
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.base.errors import RefusedError
 from alphacut.rve.cell.cell import LOADS, Phase
 from alphacut.rve.fenicsx import PETSc
 from alphacut.rve.prism.model import PrismModel

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from alphacut.fuzzy.arrays import Array
+from alphacut.base.arrays import Array
 from alphacut.rve import PrismModel, SlicesModel
 from alphacut.rve.cell.cell import Phase
 from alphacut.rve.series.model import SeriesModel

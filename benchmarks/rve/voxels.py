@@ -19,7 +19,7 @@ from time import perf_counter, process_time
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Mask
+from alphacut.base.arrays import Array, Mask
 from alphacut.rve.image.bounds import StiffnessBounds
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.model import ImageModel

@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from alphacut.base.arrays import Array, Ints
 from alphacut.frame.bounds.level import LevelModels
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.calculus.unproved import UnprovedError
@@ -17,7 +18,6 @@ from alphacut.frame.modes.superposition import Modal, load_at_nodes, modes_at, o
 from alphacut.frame.response.oscillators import Grid, Oscillators
 from alphacut.frame.structures.linear import LinearSystem, histories
 from alphacut.frame.structures.loads import History
-from alphacut.fuzzy.arrays import Array, Ints
 
 MAX_ENTRIES = 400_000
 """Entries of the matrices of all points whose exact motions are computed together."""

@@ -9,12 +9,12 @@ from typing import ClassVar, Protocol
 
 import numpy as np
 
+from alphacut.base.arrays import Array, Mask
+from alphacut.base.errors import FailedError
 from alphacut.frame.boxes import Boxes, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.envelope import Ends, Envelope, within_steps
-from alphacut.fuzzy.arrays import Array, Mask
-from alphacut.fuzzy.refused import FailedError
 from alphacut.fuzzy.result import Nature
 
 ADDED = ("boxes", "evaluations")

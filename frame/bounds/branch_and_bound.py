@@ -18,6 +18,8 @@ from math import factorial
 
 import numpy as np
 
+from alphacut.base.arrays import Ints
+from alphacut.base.progress_bar import Progress
 from alphacut.frame import numbers
 from alphacut.frame.bounds.kernel import FACES, examine
 from alphacut.frame.bounds.model_error import Remainder
@@ -25,8 +27,6 @@ from alphacut.frame.calculus.box_quadratic import gain, global_maximum, local_ma
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.monomials import count, monomial_values
 from alphacut.frame.modes.modal_model import ModalModel, in_planes, wave_factors
-from alphacut.fuzzy.arrays import Ints
-from alphacut.fuzzy.progress_bar import Progress
 from alphacut.fuzzy.sets.boxes import chebyshev_points
 
 PIECE = 30_000

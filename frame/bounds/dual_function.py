@@ -17,9 +17,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from alphacut.base.arrays import Array, Ints
+from alphacut.base.kernels import compiled, kernel
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.fuzzy.arrays import Array, Ints
-from alphacut.fuzzy.kernels import compiled, kernel
 
 LARGEST = 1e100
 """Magnitude of models, tables and multipliers at most: no sum of their products overflows."""

@@ -16,8 +16,8 @@ from math import inf, sqrt
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Ints
-from alphacut.fuzzy.kernels import compiled
+from alphacut.base.arrays import Array, Ints
+from alphacut.base.kernels import compiled
 
 FACES = 16
 """Codes from here on confine an item to faces: plus 3^axis, once for lower and twice for upper."""

@@ -16,11 +16,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from alphacut.base.arrays import Array, Ints
+from alphacut.base.kernels import compiled
 from alphacut.frame import numbers
 from alphacut.frame.bounds.dual_function import Data, minimise
 from alphacut.frame.bounds.level import LevelModels, OutputBounds
-from alphacut.fuzzy.arrays import Array, Ints
-from alphacut.fuzzy.kernels import compiled
 
 
 class PeakCell(NamedTuple):

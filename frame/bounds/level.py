@@ -9,6 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from alphacut.base.arrays import Array, Ints
+from alphacut.base.progress_bar import Progress
 from alphacut.frame import numbers
 from alphacut.frame.bounds.dual_function import Data, require_in_range, roundings
 from alphacut.frame.bounds.node_bounds import Effort, bound_nodes
@@ -26,8 +28,6 @@ from alphacut.frame.response.oscillators import (
     read_response,
 )
 from alphacut.frame.response.straying import Response, narrowed_straying
-from alphacut.fuzzy.arrays import Array, Ints
-from alphacut.fuzzy.progress_bar import Progress
 
 POINTS = (8, 80), (3, 12)
 """Least and most points of a mode's table along ω and along q = g/ω."""

@@ -21,6 +21,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from alphacut.base.arrays import Array
 from alphacut.frame.calculus.monomials import count, exponents, product_part, product_places
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.calculus.unproved import UnprovedError
@@ -28,7 +29,6 @@ from alphacut.frame.modes.damped import DampedModes, DampedStructure, norm_of
 from alphacut.frame.modes.modal_model import ModalModel
 from alphacut.frame.response.duhamel import absolute_moments
 from alphacut.frame.response.load_tables import REACH, Direct, LoadTables
-from alphacut.fuzzy.arrays import Array
 
 ROUNDING = 1e-9
 """Relative rounding of norms and of integrals over a load, of a million intervals at most."""

@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from alphacut.base.arrays import Array, Ints
+from alphacut.base.kernels import compiled
 from alphacut.frame.bounds.dual_function import Data, add, dot, loops, minimise, products
-from alphacut.fuzzy.arrays import Array, Ints
-from alphacut.fuzzy.kernels import compiled
 
 GRID = 2.0**24
 """Steps of the model's ascent in unit coordinates, so that rounding does not lead it elsewhere."""

@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from alphacut.base.arrays import Array, Ints
 from alphacut.frame import numbers
 from alphacut.frame.bounds.level import LevelModels, OutputBounds
 from alphacut.frame.bounds.node_bounds import response_and_gradient
-from alphacut.fuzzy.arrays import Array, Ints
 
 FRACTIONS = (0.25, 0.5)
 """Fractions of an input's range that are tried, the second where the first can be pruned."""

@@ -18,14 +18,14 @@ from heapq import heappop, heappush
 
 import numpy as np
 
+from alphacut.base.arrays import Array, Ints, Mask
+from alphacut.base.progress_bar import Progress
 from alphacut.frame import numbers
 from alphacut.frame.bounds.box_proof import Answer, BisectionError, BoxProof, Goal, Hull, refusing
 from alphacut.frame.boxes import Boxes, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import exact_flow
 from alphacut.frame.envelope import Envelope
-from alphacut.fuzzy.arrays import Array, Ints, Mask
-from alphacut.fuzzy.progress_bar import Progress
 
 LOG = logging.getLogger(__name__)
 

@@ -6,8 +6,8 @@ from itertools import combinations, product
 
 import numpy as np
 
+from alphacut.base.kernels import compiled
 from alphacut.frame.calculus.jet import Array
-from alphacut.fuzzy.kernels import compiled
 
 FACES_UP_TO = 6
 """Number of parameters up to which all faces of the box are enumerated."""

@@ -14,8 +14,8 @@ from math import comb
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Ints
-from alphacut.fuzzy.kernels import compiled
+from alphacut.base.arrays import Array, Ints
+from alphacut.base.kernels import compiled
 
 SMALL = 300_000
 """Multiplications by one coefficient up to which a loop over all pairs is faster than products of

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Ints
-from alphacut.fuzzy.refused import require_choice
+from alphacut.base.arrays import Array, Ints
+from alphacut.base.errors import require_choice
 
 if TYPE_CHECKING:
     from sympy import Expr, Symbol

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from alphacut.base.arrays import Array, Ints
 from alphacut.frame.calculus.monomials import (
     convolve,
     count,
@@ -33,7 +34,6 @@ from alphacut.frame.calculus.monomials import (
 )
 from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF, gamma
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.fuzzy.arrays import Array, Ints
 
 ORDER = 3
 """Order of a Taylor model unless another is given."""

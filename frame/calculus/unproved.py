@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from alphacut.fuzzy.refused import FailedError
+from alphacut.base.errors import FailedError
 
 
 class UnprovedError(FailedError):

@@ -8,6 +8,13 @@ from functools import cached_property
 
 import numpy as np
 
+from alphacut.base.errors import (
+    FailedError,
+    RefusedError,
+    checked_number,
+    require,
+    require_choice,
+)
 from alphacut.frame.calculus.jet import Array, Jet, concatenate
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.integrators import Exact, Integrator, Midpoint, StepMap, state_matrix
@@ -21,13 +28,6 @@ from alphacut.frame.structures.linear import (
     histories,
 )
 from alphacut.frame.structures.loads import History, distinct_histories
-from alphacut.fuzzy.refused import (
-    FailedError,
-    RefusedError,
-    checked_number,
-    require,
-    require_choice,
-)
 
 MAX_STEPS = 10_000_000
 """Most steps of a motion: bounds of one output at two levels are 320 MB of them."""

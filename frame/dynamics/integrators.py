@@ -18,10 +18,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from alphacut.base.errors import require
 from alphacut.frame.calculus.jet import Array, Jet, concatenate, inverse
 from alphacut.frame.structures.linear import Matrices
 from alphacut.frame.structures.loads import History
-from alphacut.fuzzy.refused import require
 
 SAME = 1e-12
 """Distance of a sample from a node, as a fraction of the step, that is rounding."""

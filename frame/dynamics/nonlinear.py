@@ -16,6 +16,9 @@ from typing import Any
 
 import numpy as np
 
+from alphacut.base.arrays import Array
+from alphacut.base.errors import require_choice
+from alphacut.base.kernels import compiled
 from alphacut.frame.calculus.box_quadratic import solve_in_place
 from alphacut.frame.calculus.jet import Jet
 from alphacut.frame.calculus.tape import Tape, tape, with_derivatives
@@ -25,9 +28,6 @@ from alphacut.frame.dynamics.yielding import YieldingFlow
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.frame.structures.storey import StoreyFrame
-from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.kernels import compiled
-from alphacut.fuzzy.refused import require_choice
 
 Expressions = tuple[list[Any], list[Any], list[Any]]
 """Components, and the symbols they depend on: those to differentiate by, and others."""

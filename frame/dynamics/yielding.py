@@ -15,15 +15,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from alphacut.base.arrays import Array, Ints, Mask
+from alphacut.base.errors import RefusedError, require
+from alphacut.base.kernels import compiled
 from alphacut.frame.calculus.jet import Jet
 from alphacut.frame.dynamics.flow import Flow, StepError, with_feedthrough
 from alphacut.frame.dynamics.integrators import SAME, state_matrix
 from alphacut.frame.structures.linear import evaluate, histories
 from alphacut.frame.structures.loads import History
 from alphacut.frame.structures.storey import MOMENT, StoreyFrame
-from alphacut.fuzzy.arrays import Array, Ints, Mask
-from alphacut.fuzzy.kernels import compiled
-from alphacut.fuzzy.refused import RefusedError, require
 
 MAX_PHASE = 1.0
 """Largest |λ| h of a part of a step: the series of exp(A h) then has no cancellation."""

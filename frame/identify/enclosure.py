@@ -18,9 +18,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from scipy.sparse import csr_array, hstack
 
+from alphacut.base.arrays import Array
 from alphacut.frame.identify.modes import Chain, ModeCut, chain_modes, eigenvalue_ranges
 from alphacut.frame.structures.storey import chain_matrix
-from alphacut.fuzzy.arrays import Array
 
 MAX_PASSES = 6  # over all ends
 MIN_PROGRESS = 0.03  # fraction of the widths that a pass must take off to be worth another one

@@ -15,13 +15,13 @@ from functools import cached_property
 
 import numpy as np
 
+from alphacut.base.arrays import Array
+from alphacut.base.errors import FailedError, require
 from alphacut.frame.identify.enclosure import enclosure
 from alphacut.frame.identify.modes import Chain, MeasuredMode, ModeCut, eigenvalue_ranges
 from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.fuzzy import Crisp, FuzzyNumber
-from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.knowledge.joint import JointClaim
-from alphacut.fuzzy.refused import FailedError, require
 from alphacut.fuzzy.result import Ends
 from alphacut.fuzzy.sets.claimed import ClaimedNumber, CoverageClaim, JointRule
 from alphacut.fuzzy.sets.numbers import Cut, outer_steps

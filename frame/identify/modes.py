@@ -14,13 +14,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.special import chdtri
 
+from alphacut.base.arrays import Array
+from alphacut.base.errors import RefusedError, checked_number, require
 from alphacut.frame.calculus.jet import Jet
 from alphacut.frame.structures.linear import undamped_modes
 from alphacut.frame.structures.storey import StoreyFrame, chain_matrix, diagonal
 from alphacut.fuzzy import FuzzyNumber, from_data
-from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.knowledge.from_data import from_scatter
-from alphacut.fuzzy.refused import RefusedError, checked_number, require
 from alphacut.fuzzy.sets.claimed import ClaimedNumber
 from alphacut.fuzzy.sets.numbers import Cut
 

@@ -18,6 +18,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from alphacut.base.arrays import Array
+from alphacut.base.errors import checked_number
+from alphacut.base.progress_bar import Progress
 from alphacut.frame.bounds.box_proof import refusing
 from alphacut.frame.bounds.model_error import MAX_PARAMETERS
 from alphacut.frame.boxes import DEFAULT_TOLERANCE, UnitFlow
@@ -30,9 +33,6 @@ from alphacut.frame.methods.improved_follower import ImprovedFollower, PassBound
 from alphacut.frame.methods.proof import Proof
 from alphacut.frame.methods.sampled import PeakSearch
 from alphacut.frame.numbers import WIDE
-from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.progress_bar import Progress
-from alphacut.fuzzy.refused import checked_number
 
 LOG = logging.getLogger(__name__)
 

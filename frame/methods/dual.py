@@ -15,6 +15,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from alphacut.base.arrays import Array, Ints, Mask
+from alphacut.base.errors import checked_number
+from alphacut.base.progress_bar import Progress, subprogress
 from alphacut.frame import numbers
 from alphacut.frame.bounds.box import Box
 from alphacut.frame.bounds.box_proof import Answer, BoxBounds, Goal
@@ -27,9 +30,6 @@ from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.envelope import Ends, Envelope
 from alphacut.frame.structures.linear import frequencies
-from alphacut.fuzzy.arrays import Array, Ints, Mask
-from alphacut.fuzzy.progress_bar import Progress, subprogress
-from alphacut.fuzzy.refused import checked_number
 
 DRIFT = 1e-6
 """Lowest frequency over the highest at which rounding of the stiffness may hide a drift."""

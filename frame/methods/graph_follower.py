@@ -14,13 +14,13 @@ from typing import ClassVar
 
 import numpy as np
 
+from alphacut.base.arrays import Array, Ints
+from alphacut.base.errors import checked_number, require
+from alphacut.base.progress_bar import Progress, subprogress
 from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.calculus.box_quadratic import gain, local_maximum
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.sampled import SAFETY, independent_excess
-from alphacut.fuzzy.arrays import Array, Ints
-from alphacut.fuzzy.progress_bar import Progress, subprogress
-from alphacut.fuzzy.refused import checked_number, require
 from alphacut.fuzzy.result import Nature
 
 MAX_RATIO = 8.0

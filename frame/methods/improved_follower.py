@@ -17,6 +17,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from alphacut.base.arrays import Array, Mask
+from alphacut.base.errors import checked_number
+from alphacut.base.progress_bar import Progress, subprogress
 from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.calculus.box_quadratic import global_maximum, local_maximum
 from alphacut.frame.dynamics.flow import LinearFlow
@@ -24,9 +27,6 @@ from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.graph_follower import Places, Storage, trajectories_diverge
 from alphacut.frame.methods.sampled import SAFETY, independent_excess, largest_values, spread_points
 from alphacut.frame.structures.linear import frequencies
-from alphacut.fuzzy.arrays import Array, Mask
-from alphacut.fuzzy.progress_bar import Progress, subprogress
-from alphacut.fuzzy.refused import checked_number
 from alphacut.fuzzy.result import Nature
 
 MAX_NUMBERS = 64e6

@@ -22,6 +22,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from alphacut.base.arrays import Array
+from alphacut.base.errors import checked_number
+from alphacut.base.progress_bar import Progress, subprogress
 from alphacut.frame import numbers
 from alphacut.frame.bounds.box_proof import BisectionError, BoxBounds, Goal
 from alphacut.frame.bounds.branch_and_bound import Optima, enclosed, first_optima
@@ -41,9 +44,6 @@ from alphacut.frame.modes.damped import require_dissipation
 from alphacut.frame.modes.modal_model import ModalModel
 from alphacut.frame.response.load_tables import Direct
 from alphacut.frame.response.straying import Response, narrowed_straying
-from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.progress_bar import Progress, subprogress
-from alphacut.fuzzy.refused import checked_number
 
 LOG = logging.getLogger(__name__)
 

@@ -7,16 +7,16 @@ from typing import ClassVar
 
 import numpy as np
 
+from alphacut.base.arrays import Array, Ints
+from alphacut.base.errors import checked_number
+from alphacut.base.progress_bar import Progress, subprogress
 from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.dynamics.yielding import YieldingFlow
 from alphacut.frame.envelope import Envelope
-from alphacut.fuzzy.arrays import Array, Ints
 from alphacut.fuzzy.campaign.call import Call, SpentError
 from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.plans.design import bounds_of_samples
 from alphacut.fuzzy.plans.single_linkage import MIN_SAMPLES, SEED, SingleLinkage
-from alphacut.fuzzy.progress_bar import Progress, subprogress
-from alphacut.fuzzy.refused import checked_number
 from alphacut.fuzzy.result import Nature
 from alphacut.fuzzy.sets.boxes import Domain, chebyshev_points, corners
 

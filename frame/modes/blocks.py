@@ -17,10 +17,10 @@ from threading import Lock
 
 import numpy as np
 
+from alphacut.base.arrays import Array, Ints, Mask
 from alphacut.frame.calculus.monomials import matmul, monomials, product_part
 from alphacut.frame.calculus.rounding import gamma
 from alphacut.frame.calculus.taylor_model import TaylorModel, inverse_bound
-from alphacut.fuzzy.arrays import Array, Ints, Mask
 
 MAX_MONOMIALS = 33_000
 """Monomials of the series' highest degree, at most."""

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from alphacut.base.arrays import Array, Ints, Mask
 from alphacut.frame.calculus.rounding import gamma
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.blocks import Block, CentredMatrices, eigenvalue_drop, narrowest_block
 from alphacut.frame.structures.linear import undamped_modes
-from alphacut.fuzzy.arrays import Array, Ints, Mask
 
 NEAR = 2.0
 """First-order change of the distance of two λ over the box, as a share of that distance, from which

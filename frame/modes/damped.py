@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import eigh
 
+from alphacut.base.arrays import Array, Ints, Mask
 from alphacut.frame.boxes import Boxes
 from alphacut.frame.calculus.monomials import matmul, product_part
 from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate, solution_series, solve
@@ -22,7 +23,6 @@ from alphacut.frame.structures.linear import LinearSystem
 from alphacut.frame.structures.loads import History
 from alphacut.frame.structures.matrix import MatrixStructure
 from alphacut.frame.structures.storey import StoreyFrame
-from alphacut.fuzzy.arrays import Array, Ints, Mask
 
 EQUAL = 1e-6
 """Relative distance of two eigenvalues below which they count as equal."""

@@ -19,6 +19,7 @@ from math import comb
 
 import numpy as np
 
+from alphacut.base.arrays import Array, Ints
 from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate, solve
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.blocks import Block
@@ -26,7 +27,6 @@ from alphacut.frame.modes.clusters import Subspaces
 from alphacut.frame.modes.structure import Classical
 from alphacut.frame.response.oscillators import Grid
 from alphacut.frame.structures.loads import History
-from alphacut.fuzzy.arrays import Array, Ints
 
 MAX_PAIRS = 100_000
 """Pairs of coefficients in a product of two polynomials at most; a pair takes 3 ns."""

@@ -12,6 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
+from alphacut.base.arrays import Array, Ints
 from alphacut.frame.boxes import Boxes
 from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate
 from alphacut.frame.dynamics.flow import LinearFlow, exact_flow
@@ -24,7 +25,6 @@ from alphacut.frame.modes.damped import (
 from alphacut.frame.response.load_tables import Direct, LoadTables
 from alphacut.frame.structures.linear import histories
 from alphacut.frame.structures.loads import distinct_histories
-from alphacut.fuzzy.arrays import Array, Ints
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from alphacut.base.arrays import Array
 from alphacut.frame.calculus.rounding import gamma
 from alphacut.frame.calculus.taylor_model import TaylorModel, all_within
 from alphacut.frame.calculus.unproved import UnprovedError
@@ -28,7 +29,6 @@ from alphacut.frame.modes.rest import (
 from alphacut.frame.modes.structure import Classical
 from alphacut.frame.response.duhamel import responses_at_nodes
 from alphacut.frame.response.oscillators import POWERS, feedthrough, read_response
-from alphacut.fuzzy.arrays import Array
 
 MAX_NODES = 500
 """Nodes at most at which the number of modes that are worth enclosing is estimated."""

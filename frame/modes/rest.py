@@ -27,6 +27,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from alphacut.base.arrays import Array
 from alphacut.frame.calculus.taylor_model import TaylorModel, solution_series, solve
 from alphacut.frame.modes.clusters import Subspaces
 from alphacut.frame.modes.intervening import (
@@ -38,7 +39,6 @@ from alphacut.frame.modes.intervening import (
 )
 from alphacut.frame.modes.structure import Classical
 from alphacut.frame.response.oscillators import Oscillators, Ranges, grid_over, response_ranges
-from alphacut.fuzzy.arrays import Array
 
 UNKNOWN = 1e60
 """Stands for a sum that is not known."""

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from alphacut.base.arrays import Array, Ints
 from alphacut.frame.calculus.taylor_model import TaylorModel, solve
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.structures.linear import Assembly, LinearSystem, histories, stack
-from alphacut.fuzzy.arrays import Array, Ints
 
 
 @dataclass(frozen=True, eq=False)

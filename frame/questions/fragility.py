@@ -14,10 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from alphacut.base.arrays import Array, Mask
+from alphacut.base.errors import require
 from alphacut.frame.questions.peaks import Peak
 from alphacut.frame.questions.probability import CONFIDENCE, clopper_pearson
-from alphacut.fuzzy.arrays import Array, Mask
-from alphacut.fuzzy.refused import require
 from alphacut.fuzzy.result import Ends
 
 

@@ -17,13 +17,13 @@ from itertools import pairwise
 
 import numpy as np
 
+from alphacut.base.arrays import Array
+from alphacut.base.progress_bar import Progress
 from alphacut.frame.boxes import Boxes
 from alphacut.frame.dynamics.yielding import YieldingFlow
 from alphacut.frame.methods.sampled import SKIPPED, spread_points
 from alphacut.frame.structures.loads import Accelerogram
 from alphacut.frame.structures.storey import StoreyFrame
-from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.progress_bar import Progress
 
 GRID_RATIO = 1.1
 """Ratio of neighbouring scales of the grid: what happens within a step of it may be missed."""

@@ -17,11 +17,11 @@ from typing import Any
 
 import numpy as np
 
+from alphacut.base.arrays import Array, Mask
+from alphacut.base.errors import checked_number, require, require_choice
 from alphacut.frame.dynamics.yielding import AT_NODES
 from alphacut.frame.envelope import Envelope, within_steps
 from alphacut.frame.structures.quantities import output_of
-from alphacut.fuzzy.arrays import Array, Mask
-from alphacut.fuzzy.refused import checked_number, require, require_choice
 from alphacut.fuzzy.result import Bounds, Ends, Nature
 
 ANY = "any of them"  # name of the event that any of several limits is exceeded

@@ -14,6 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from alphacut.base.arrays import Array
+from alphacut.base.errors import require
+from alphacut.base.progress_bar import Progress
 from alphacut.frame.boxes import ALPHA, Boxes, boxes
 from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.envelope import within_steps
@@ -22,9 +25,6 @@ from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.frame.verification.step_error import MARGIN, node_deviation
 from alphacut.fuzzy import FuzzyNumber
-from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.progress_bar import Progress
-from alphacut.fuzzy.refused import require
 from alphacut.fuzzy.result import Ends
 from alphacut.fuzzy.sets.boxes import chebyshev_points, corners
 

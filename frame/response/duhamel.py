@@ -27,11 +27,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from alphacut.base.arrays import Array, Ints
+from alphacut.base.kernels import compiled, kernel, prange
 from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.structures.loads import History
-from alphacut.fuzzy.arrays import Array, Ints
-from alphacut.fuzzy.kernels import compiled, kernel, prange
 
 parallel = kernel(parallel=True)
 PARALLEL_LOOP = Lock()

@@ -12,13 +12,13 @@ from math import ceil, exp, lgamma, log
 import numpy as np
 from numpy.typing import NDArray
 
+from alphacut.base.arrays import Ints
+from alphacut.base.kernels import compiled
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.response.duhamel import responses_at_nodes
 from alphacut.frame.structures.loads import History
-from alphacut.fuzzy.arrays import Ints
-from alphacut.fuzzy.kernels import compiled
 
 Complex = NDArray[np.complex128]
 REACH = 6.0

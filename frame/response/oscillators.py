@@ -27,6 +27,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from alphacut.base.arrays import Array
 from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF
 from alphacut.frame.response.duhamel import absolute_moments, require_in_range
 from alphacut.frame.response.straying import (
@@ -37,7 +38,6 @@ from alphacut.frame.response.straying import (
     with_power,
 )
 from alphacut.frame.structures.loads import History
-from alphacut.fuzzy.arrays import Array
 
 POWERS = (0.0, 0.5, 1.0)
 """Powers κ of λ."""

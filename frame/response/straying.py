@@ -21,10 +21,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from alphacut.base.arrays import Array, Ints
 from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF
 from alphacut.frame.response.duhamel import absolute_moments, responses_at_nodes
 from alphacut.frame.structures.loads import History
-from alphacut.fuzzy.arrays import Array, Ints
 
 PHASE = 0.5
 """Phase in rad that a mode or a sine takes in a piece; a piece adds its square to the bound."""

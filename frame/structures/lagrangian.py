@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from alphacut.base.errors import RefusedError, checked_number, require
 from alphacut.frame.structures.quantities import Output, Parameter
-from alphacut.fuzzy.refused import RefusedError, checked_number, require
 
 if TYPE_CHECKING:
     from sympy import Expr, Matrix

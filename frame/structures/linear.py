@@ -14,12 +14,12 @@ from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
+from alphacut.base.arrays import Array, Ints, Mask
+from alphacut.base.errors import RefusedError, require
 from alphacut.frame.calculus.jet import Jet, concatenate, inverse, variables
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.structures.loads import Accelerogram, Force, History, distinct_histories
 from alphacut.frame.structures.quantities import Parameter
-from alphacut.fuzzy.arrays import Array, Ints, Mask
-from alphacut.fuzzy.refused import RefusedError, require
 
 Number = TypeVar("Number", Jet, TaylorModel)
 

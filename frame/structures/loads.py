@@ -8,8 +8,8 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError, checked_number, require
+from alphacut.base.arrays import Array
+from alphacut.base.errors import RefusedError, checked_number, require
 
 Factor = Callable[[Mapping[str, Any]], Any]
 

@@ -10,18 +10,18 @@ from typing import Any, Self
 
 import numpy as np
 
-from alphacut.frame.calculus.jet import Jet, variables
-from alphacut.frame.structures.linear import Assembly, Number, evaluate, stack, undamped_modes
-from alphacut.frame.structures.loads import Accelerogram, Factor, Force, require_loads
-from alphacut.frame.structures.quantities import RATIO, Output, Parameter
-from alphacut.fuzzy.arrays import Array, Ints
-from alphacut.fuzzy.refused import (
+from alphacut.base.arrays import Array, Ints
+from alphacut.base.errors import (
     RefusedError,
     checked_number,
     require,
     require_choice,
     require_numbers,
 )
+from alphacut.frame.calculus.jet import Jet, variables
+from alphacut.frame.structures.linear import Assembly, Number, evaluate, stack, undamped_modes
+from alphacut.frame.structures.loads import Accelerogram, Factor, Force, require_loads
+from alphacut.frame.structures.quantities import RATIO, Output, Parameter
 
 KINDS = ("mass", "damping", "stiffness")
 Terms = Sequence[tuple[Factor | str | float, Array]]

@@ -15,14 +15,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from alphacut.base.arrays import Array
+from alphacut.base.errors import FailedError
 from alphacut.frame.boxes import Boxes, boxes
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.structures.linear import LinearSystem, evaluate
 from alphacut.frame.structures.loads import distinct_histories
 from alphacut.frame.structures.quantities import Output
 from alphacut.frame.verification.exact_motion import Course, LinearMotion
-from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import FailedError
 from alphacut.fuzzy.result import ROUND_OFF
 from alphacut.fuzzy.sets.boxes import quasi_random_points
 

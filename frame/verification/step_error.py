@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from alphacut.base.arrays import Array
+from alphacut.base.errors import FailedError
 from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.dynamics.flow import Flow, StepError
 from alphacut.frame.dynamics.nonlinear import LagrangianFlow
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.structures.lagrangian import LagrangianSystem
-from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import FailedError
 from alphacut.fuzzy.result import Nature
 
 OPTIMA = 64

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import FailedError, RefusedError, require, require_choice
+from alphacut.base.arrays import Array
+from alphacut.base.errors import FailedError, RefusedError, require, require_choice
 
 Function = Callable[..., object]
 Layout = tuple[tuple[str, tuple[int, ...]], ...]

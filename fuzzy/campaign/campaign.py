@@ -10,7 +10,8 @@ from time import perf_counter
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array
+from alphacut.base.arrays import Array
+from alphacut.base.errors import FailedError, checked_number
 from alphacut.fuzzy.campaign.call import (
     Call,
     Failure,
@@ -25,7 +26,6 @@ from alphacut.fuzzy.campaign.call import (
 from alphacut.fuzzy.campaign.store import Store, point_key
 from alphacut.fuzzy.campaign.workers import completed
 from alphacut.fuzzy.knowledge.known import Knowledge
-from alphacut.fuzzy.refused import FailedError, checked_number
 from alphacut.fuzzy.sets.boxes import Domain, quasi_random_points
 
 LOG = logging.getLogger(__name__)

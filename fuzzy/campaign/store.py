@@ -23,9 +23,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array
+from alphacut.base.arrays import Array
+from alphacut.base.errors import FailedError, require
 from alphacut.fuzzy.campaign.call import Layout, Sample, named_point
-from alphacut.fuzzy.refused import FailedError, require
 
 Identity = Mapping[str, object]
 _WRITE_TIMEOUT = 60.0  # seconds to wait for another campaign's write

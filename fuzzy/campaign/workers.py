@@ -16,9 +16,9 @@ from typing import ParamSpec, TypeVar
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array
+from alphacut.base.arrays import Array
+from alphacut.base.errors import FailedError, checked_number
 from alphacut.fuzzy.campaign.call import Call, Outcome, named_point
-from alphacut.fuzzy.refused import FailedError, checked_number
 
 P = ParamSpec("P")
 T = TypeVar("T")

@@ -12,9 +12,9 @@ from typing import Literal
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array
+from alphacut.base.arrays import Array
+from alphacut.base.errors import checked_number, require
 from alphacut.fuzzy.knowledge.order_statistics import Limits, Observations, Values, rank_cuts
-from alphacut.fuzzy.refused import checked_number, require
 from alphacut.fuzzy.sets.claimed import ClaimedNumber, CoverageClaim
 from alphacut.fuzzy.sets.numbers import Stepwise
 

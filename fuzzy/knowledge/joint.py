@@ -13,7 +13,7 @@ from itertools import combinations
 
 import numpy as np
 
-from alphacut.fuzzy.refused import require
+from alphacut.base.errors import require
 from alphacut.fuzzy.sets.boxes import fuzzy_inputs
 from alphacut.fuzzy.sets.claimed import ClaimedNumber, CoverageClaim, JointRule
 from alphacut.fuzzy.sets.numbers import FuzzyNumber, Stepwise

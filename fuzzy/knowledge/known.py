@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import checked_number, require, require_choice
+from alphacut.base.arrays import Array
+from alphacut.base.errors import checked_number, require, require_choice
 
 Signs = NDArray[np.int8]
 ROUND_OFF = 1e-11

@@ -21,8 +21,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from alphacut.fuzzy.arrays import Array, Ints
-from alphacut.fuzzy.refused import checked_number, require
+from alphacut.base.arrays import Array, Ints
+from alphacut.base.errors import checked_number, require
 from alphacut.fuzzy.sets.numbers import Stepwise
 
 Values = Sequence[float] | NDArray[np.float64]

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Mask
+from alphacut.base.arrays import Array, Mask
 from alphacut.fuzzy.campaign.call import SpentError
 from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.knowledge.known import Signs, contradiction, negligible

@@ -10,7 +10,7 @@ from math import inf
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Mask
+from alphacut.base.arrays import Array, Mask
 from alphacut.fuzzy.campaign.call import SpentError
 from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.sets.boxes import Domain

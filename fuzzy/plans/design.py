@@ -7,11 +7,11 @@ from typing import Protocol
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Mask
+from alphacut.base.arrays import Array, Mask
+from alphacut.base.errors import FailedError, require
 from alphacut.fuzzy.campaign.call import Samples
 from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.knowledge.known import contradiction, negligible
-from alphacut.fuzzy.refused import FailedError, require
 from alphacut.fuzzy.result import Bounds, Ends, Nature
 from alphacut.fuzzy.sets.boxes import Domain, quasi_random_points
 

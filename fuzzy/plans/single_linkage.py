@@ -39,7 +39,7 @@ from math import ceil, gamma, inf, log, pi, sqrt
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Ints, Mask
+from alphacut.base.arrays import Array, Ints, Mask
 from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.plans.cut import Bound, CutSearch, Optimum, cuts_with_width
 from alphacut.fuzzy.sets.boxes import Domain

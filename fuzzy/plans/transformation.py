@@ -21,12 +21,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Ints, Mask
+from alphacut.base.arrays import Array, Ints, Mask
+from alphacut.base.errors import require, require_choice
 from alphacut.fuzzy.campaign.call import Samples
 from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.knowledge.known import Signs
 from alphacut.fuzzy.plans.design import bounds_of_samples, guaranteed_bounds
-from alphacut.fuzzy.refused import require, require_choice
 from alphacut.fuzzy.result import Bounds, Ends
 from alphacut.fuzzy.sets.boxes import Domain, quasi_random_points
 from alphacut.fuzzy.sets.numbers import FuzzyNumber

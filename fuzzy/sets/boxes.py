@@ -8,8 +8,8 @@ from itertools import product
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Mask
-from alphacut.fuzzy.refused import checked_number, require
+from alphacut.base.arrays import Array, Mask
+from alphacut.base.errors import checked_number, require
 from alphacut.fuzzy.sets.claimed import ClaimedNumber
 from alphacut.fuzzy.sets.numbers import Crisp, FuzzyNumber, checked_levels
 

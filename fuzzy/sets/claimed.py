@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.base.arrays import Array
+from alphacut.base.errors import RefusedError
 from alphacut.fuzzy.sets.numbers import Cut, Cuts, FuzzyNumber, Stepwise, checked_level
 
 

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import checked_number, require
+from alphacut.base.arrays import Array
+from alphacut.base.errors import checked_number, require
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

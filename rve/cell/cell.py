@@ -9,8 +9,8 @@ from numbers import Real
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.base.arrays import Array
+from alphacut.base.errors import RefusedError
 from alphacut.rve.cell.outline import Outline, area, circle, is_round
 from alphacut.stochastic import RadiusMap, require_map
 

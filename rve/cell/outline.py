@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.base.arrays import Array
+from alphacut.base.errors import RefusedError
 
 Outline = Callable[[Array], Array]
 """Takes angles φ of any shape, gives s(φ) > 0 of the same; smooth, of period 2π."""

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import eigh
 
-from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import FailedError
+from alphacut.base.arrays import Array
+from alphacut.base.errors import FailedError
 from alphacut.rve.image.fields.element import SHEARS
 from alphacut.rve.image.fields.energy import SAFETY, UNIT
 from alphacut.rve.result.moduli import AXES, shear_modulus, square_moduli

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError, require
+from alphacut.base.arrays import Array
+from alphacut.base.errors import RefusedError, require
 
 PLANE_MODES = ("1", "L", "I;16", "I;16B", "I;16L", "I", "F")
 PHOTOMETRIC, WHITE_IS_ZERO = 262, 0  # tag of TIFF and its value

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Ints
+from alphacut.base.arrays import Array, Ints
 from alphacut.rve.image.bounds import StiffnessBounds, inverse_below
 from alphacut.rve.image.fields.energy import UNIT
 from alphacut.rve.image.model import ImageModel, ImageSolution

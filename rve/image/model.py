@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Ints
-from alphacut.fuzzy.progress_bar import Progress
-from alphacut.fuzzy.refused import FailedError, require
+from alphacut.base.arrays import Array, Ints
+from alphacut.base.errors import FailedError, require
+from alphacut.base.progress_bar import Progress
 from alphacut.rve.image.bounds import Interval, StiffnessBounds, inverse_below
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.fields.element import Element, element_of

@@ -14,8 +14,8 @@ from itertools import combinations_with_replacement, pairwise
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Ints
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.base.arrays import Array, Ints
+from alphacut.base.errors import RefusedError
 
 MIN_MODULUS, MAX_MODULUS = 1e-60, 1e60  # Pa; products of four moduli must be numbers
 RIGID = 1e18  # Young's modulus in Pa from which on a phase is taken as rigid

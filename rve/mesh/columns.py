@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from alphacut.fuzzy.arrays import Array, Ints
+from alphacut.base.arrays import Array, Ints
 from alphacut.rve.cell.outline import Outline, circle, is_round
 from alphacut.rve.mesh import square
 from alphacut.rve.mesh.periodicity import SAME_PLACE, MeshError

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Ints, Mask
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.base.arrays import Array, Ints, Mask
+from alphacut.base.errors import RefusedError
 from alphacut.rve.cell.cell import require_mesh_size
 from alphacut.rve.cell.outline import CLOSEST, Outline, circle, is_round, require_fit
 from alphacut.rve.fenicsx import basix

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Ints
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.base.arrays import Array, Ints
+from alphacut.base.errors import RefusedError
 from alphacut.rve.mesh import square
 from alphacut.rve.mesh.columns import grid_of
 from alphacut.rve.mesh.periodicity import SAME_PLACE, MeshError, unknowns

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Ints, Mask
-from alphacut.fuzzy.refused import FailedError
+from alphacut.base.arrays import Array, Ints, Mask
+from alphacut.base.errors import FailedError
 
 SAME_PLACE = 1e-8
 """Distance below which two nodes coincide, in halves of the side: far above the noise of Gmsh's

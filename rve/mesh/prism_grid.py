@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from alphacut.fuzzy.arrays import Array, Ints, Mask
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.base.arrays import Array, Ints, Mask
+from alphacut.base.errors import RefusedError
 from alphacut.rve.cell.outline import Outline, circle, reach, require_fit
 from alphacut.stochastic import RadiusMap, ThetaLaw, require_map
 

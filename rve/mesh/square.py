@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Ints, Mask
-from alphacut.fuzzy.user_cache import cached_arrays
+from alphacut.base.arrays import Array, Ints, Mask
+from alphacut.base.user_cache import cached_arrays
 from alphacut.rve.cell.outline import Outline, bend_radii, extents, is_round
 from alphacut.rve.interruption import uninterrupted
 

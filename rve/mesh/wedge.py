@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array
+from alphacut.base.arrays import Array
 from alphacut.rve.fenicsx import basix
 
 SLICES_PER_LAYER = 3  # Gauss points along θ

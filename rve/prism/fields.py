@@ -8,7 +8,7 @@ from itertools import permutations
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Ints
+from alphacut.base.arrays import Array, Ints
 from alphacut.rve.cell.cell import THREE_LOADS, AnyPhase, Cell
 from alphacut.rve.fenicsx import at_points, fem
 from alphacut.rve.mesh.wedge import vertices_and_midpoints

@@ -21,8 +21,8 @@ from typing import ClassVar, TypeVar
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.base.arrays import Array
+from alphacut.base.errors import RefusedError
 from alphacut.rve.cell.cell import (
     LOADS,
     STRAIN,

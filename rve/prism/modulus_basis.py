@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import orth
 
-from alphacut.fuzzy.arrays import Array
+from alphacut.base.arrays import Array
 from alphacut.rve.cell.cell import AREA, Phase
 from alphacut.rve.prism.problem import SliceStrains
 from alphacut.rve.prism.slices import SliceProblem

@@ -15,7 +15,7 @@ from typing import ClassVar, cast
 
 import numpy as np
 
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.base.errors import RefusedError
 from alphacut.rve.cell.cell import THREE_LOADS, AnyPhase, Phase, VoigtPhase, require_compressible
 from alphacut.rve.fenicsx import MPI
 from alphacut.rve.mesh.columns import from_first_rank

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Ints
-from alphacut.fuzzy.refused import FailedError, RefusedError
+from alphacut.base.arrays import Array, Ints
+from alphacut.base.errors import FailedError, RefusedError
 from alphacut.rve.cell.cell import AREA
 from alphacut.rve.cell.outline import is_round
 from alphacut.rve.fenicsx import MPI, PETSc, basix, fem, mesh_of, petsc, ufl

@@ -11,7 +11,7 @@ from typing import cast
 
 import numpy as np
 
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.base.errors import RefusedError
 from alphacut.rve.fenicsx import PETSc, compiled, fem, ufl
 from alphacut.rve.prism.model import PrismModel
 from alphacut.rve.prism.own_mesh import MeshModel, mesh_law

@@ -20,7 +20,7 @@ from collections.abc import Sequence
 import numpy as np
 import scipy.sparse as sp
 
-from alphacut.fuzzy.arrays import Array, Ints
+from alphacut.base.arrays import Array, Ints
 from alphacut.rve.cell.cell import AREA
 from alphacut.rve.fenicsx import MPI
 from alphacut.rve.mesh.prism_grid import PrismGrid

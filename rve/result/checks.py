@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import FailedError
+from alphacut.base.arrays import Array
+from alphacut.base.errors import FailedError
 from alphacut.rve.cell.cell import AnyPhase, Phase
 from alphacut.rve.result.moduli import hashin_shtrikman, reuss, voigt
 from alphacut.rve.result.result import HomogenisedStiffness

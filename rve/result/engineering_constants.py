@@ -22,7 +22,7 @@ from typing import Self
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array
+from alphacut.base.arrays import Array
 from alphacut.rve.cell.cell import Cell, Phase
 from alphacut.rve.result.result import HomogenisedStiffness
 from alphacut.stochastic import gauss_rule

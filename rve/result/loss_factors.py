@@ -13,8 +13,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.base.arrays import Array
+from alphacut.base.errors import RefusedError
 from alphacut.rve.cell.cell import Phase
 from alphacut.rve.result.result import (
     DeclaredConstants,

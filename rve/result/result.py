@@ -8,8 +8,8 @@ from itertools import product
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.base.arrays import Array
+from alphacut.base.errors import RefusedError
 from alphacut.rve.cell.cell import STRAIN, Cell
 from alphacut.rve.result.moduli import (
     AVERAGES,

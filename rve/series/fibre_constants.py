@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.base.arrays import Array
+from alphacut.base.errors import RefusedError
 from alphacut.rve.cell.cell import Cell, Phase
 from alphacut.rve.result.engineering_constants import Mixture
 from alphacut.rve.result.result import DeclaredConstants, HomogenisedStiffness

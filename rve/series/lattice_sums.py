@@ -14,7 +14,7 @@ from functools import cache, cached_property
 import numpy as np
 from scipy.special import gammaln, zeta
 
-from alphacut.fuzzy.arrays import Array, Ints
+from alphacut.base.arrays import Array, Ints
 from alphacut.rve.cell.cell import AREA
 
 # ζ(z + P) − ζ(z) = π conj(P) / area: Legendre's relation on the square lattice

@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Ints
-from alphacut.fuzzy.refused import FailedError, RefusedError
+from alphacut.base.arrays import Array, Ints
+from alphacut.base.errors import FailedError, RefusedError
 from alphacut.rve.cell.cell import Cell, Phase, continuous_radii
 from alphacut.rve.result.result import STEP, PhaseEnergies, StressCurve
 from alphacut.stochastic import RadiusMap, ThetaRule, gauss_rule

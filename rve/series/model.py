@@ -29,8 +29,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Ints
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.base.arrays import Array, Ints
+from alphacut.base.errors import RefusedError
 from alphacut.rve.cell.cell import Cell, Phase, require_points, require_solve_arguments
 from alphacut.rve.result.checks import with_checks
 from alphacut.rve.result.moduli import square_voigt

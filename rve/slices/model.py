@@ -14,7 +14,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from numpy.polynomial.chebyshev import chebvander
 
-from alphacut.fuzzy.arrays import Array, Ints
+from alphacut.base.arrays import Array, Ints
 from alphacut.rve.cell.cell import (
     AREA,
     STRAIN,

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array
+from alphacut.base.arrays import Array
 from alphacut.rve.cell.cell import AnyPhase
 from alphacut.rve.fenicsx import PETSc, at_points, compiled, fem, petsc, ufl
 

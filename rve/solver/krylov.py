@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from alphacut.fuzzy.refused import FailedError, RefusedError
+from alphacut.base.errors import FailedError, RefusedError
 from alphacut.rve.fenicsx import PETSc, option_is_used
 from alphacut.rve.interruption import uninterrupted
 from alphacut.rve.solver.numbering import LevelNumbering

@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 import scipy.sparse as sp
 
-from alphacut.fuzzy.arrays import Array, Ints
+from alphacut.base.arrays import Array, Ints
 from alphacut.rve.fenicsx import PETSc, cholesky
 from alphacut.rve.interruption import uninterrupted
 from alphacut.rve.solver.krylov import MAX_ITERATIONS, ConvergenceError

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from alphacut.fuzzy.arrays import Array, Ints
+from alphacut.base.arrays import Array, Ints
 from alphacut.rve.fenicsx import MPI, PETSc
 from alphacut.rve.mesh.periodicity import unknowns
 from alphacut.rve.mesh.prism_grid import PrismGrid

@@ -34,7 +34,7 @@ from itertools import pairwise
 import numpy as np
 import scipy.sparse as sp
 
-from alphacut.fuzzy.arrays import Array
+from alphacut.base.arrays import Array
 from alphacut.rve.fenicsx import PETSc, cholesky
 from alphacut.rve.solver.numbering import LevelNumbering
 from alphacut.stochastic import ThetaLaw

@@ -17,7 +17,7 @@ from functools import cache
 import numpy as np
 from scipy.special import gammaincc, gammaln
 
-from alphacut.fuzzy.arrays import Array
+from alphacut.base.arrays import Array
 
 _REACH = 4  # of Ewald's sums: exp(−π 17) is the first term left out
 

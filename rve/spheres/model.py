@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array
+from alphacut.base.arrays import Array
 from alphacut.rve.series.means import Material, Series
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.spheres.multipoles import VOLUME, Multipoles, couplings, t_matrices

@@ -25,7 +25,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.special import gammaln
 
-from alphacut.fuzzy.arrays import Array
+from alphacut.base.arrays import Array
 from alphacut.rve.series.means import Material
 from alphacut.rve.spheres.lattice_sums import lattice_sums
 

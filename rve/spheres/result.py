@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array
+from alphacut.base.arrays import Array
 from alphacut.rve.cell.cell import Phase
 from alphacut.rve.result.checks import ROUND_OFF, bulk_check, checks_within_limits, order_checks
 from alphacut.rve.result.moduli import hashin_shtrikman

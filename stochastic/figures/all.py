@@ -15,7 +15,7 @@ from matplotlib.collections import EllipseCollection, LineCollection
 from matplotlib.figure import Figure
 from scipy.spatial import KDTree
 
-from alphacut.fuzzy.arrays import Array
+from alphacut.base.arrays import Array
 from alphacut.stochastic.figures import style
 from alphacut.stochastic.figures.style import BLUE, GREEN, GREY, INK, LIGHT, ORANGE, PALE
 from alphacut.stochastic.microstructure import Microstructure, to_dataset

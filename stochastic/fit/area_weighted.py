@@ -9,8 +9,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from alphacut.fuzzy.arrays import Array, Ints
-from alphacut.fuzzy.refused import require
+from alphacut.base.arrays import Array, Ints
+from alphacut.base.errors import require
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.polynomial import Polynomial, polynomial
 from numpy.typing import ArrayLike
 
-from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import FailedError
+from alphacut.base.arrays import Array
+from alphacut.base.errors import FailedError
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
 from alphacut.stochastic.radius_map import HermiteMap
 from alphacut.stochastic.theta.law import TruncatedNormal

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Ints
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.base.arrays import Array, Ints
+from alphacut.base.errors import RefusedError
 
 METRES = {"m": 1.0, "dm": 0.1, "cm": 1e-2, "mm": 1e-3, "µm": 1e-6, "μm": 1e-6, "um": 1e-6}
 METRES |= {"micron": 1e-6, "nm": 1e-9, "in": 0.0254, "inch": 0.0254, "ft": 0.3048}

@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from alphacut.fuzzy.arrays import Array, Mask
-from alphacut.fuzzy.refused import RefusedError, checked_number, require
+from alphacut.base.arrays import Array, Mask
+from alphacut.base.errors import RefusedError, checked_number, require
 from alphacut.stochastic.particles.csv_columns import length_columns
 from alphacut.stochastic.particles.particles import Particles, close_pairs, surface_distance
 from alphacut.stochastic.particles.radius_laws import require_radii

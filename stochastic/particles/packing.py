@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import KDTree
 
-from alphacut.fuzzy.arrays import Array, Ints, Mask
-from alphacut.fuzzy.refused import FailedError, checked_number, require
+from alphacut.base.arrays import Array, Ints, Mask
+from alphacut.base.errors import FailedError, checked_number, require
 from alphacut.stochastic.particles.particles import (
     DISCS,
     Particles,

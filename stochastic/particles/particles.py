@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import KDTree
 
-from alphacut.fuzzy.arrays import Array, Ints, Mask
+from alphacut.base.arrays import Array, Ints, Mask
 
 
 @dataclass(frozen=True)

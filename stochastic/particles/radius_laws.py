@@ -10,8 +10,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import require
+from alphacut.base.arrays import Array
+from alphacut.base.errors import require
 from alphacut.stochastic.particles.csv_columns import length_columns
 from alphacut.stochastic.theta.law import TruncatedNormal
 

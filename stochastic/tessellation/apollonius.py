@@ -16,8 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Ints
-from alphacut.fuzzy.refused import require
+from alphacut.base.arrays import Array, Ints
+from alphacut.base.errors import require
 from alphacut.stochastic.particles.particles import Pairs, Particles, pairs_within
 from alphacut.stochastic.tessellation.circle_envelope import (
     Arcs,

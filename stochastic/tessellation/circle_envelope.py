@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Ints
-from alphacut.fuzzy.refused import FailedError
+from alphacut.base.arrays import Array, Ints
+from alphacut.base.errors import FailedError
 
 
 def anomaly(psi: Array, near: Array, far: Array) -> Array:

@@ -10,8 +10,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import require
+from alphacut.base.arrays import Array
+from alphacut.base.errors import require
 
 MIN_WIDTH = 1e-4  # of a support over its greater end, so that rounding is small beside it
 

@@ -9,8 +9,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import checked_number, require
+from alphacut.base.arrays import Array
+from alphacut.base.errors import checked_number, require
 from alphacut.stochastic.theta.law import ThetaLaw
 
 MASS_GAP = 1e-8

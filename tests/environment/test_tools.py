@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import scipy.io
 
+from alphacut.base.errors import RefusedError
 from alphacut.case.matrices import read_array
-from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.quantity import parse_number
 from alphacut.rve.image.files import read_grid
 

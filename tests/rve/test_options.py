@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from alphacut import rve
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.base.errors import RefusedError
 from alphacut.rve.spheres.model import SphereSeriesModel
 
 POINTS, ACCURACY = (

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.base.errors import RefusedError
 from alphacut.rve import Phase, effective_modulus
 from alphacut.rve.cell.cell import STRAIN
 from alphacut.rve.result.moduli import (

@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 from scipy.ndimage import gaussian_filter
 
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.base.errors import RefusedError
 from alphacut.stochastic import microstructure
 from alphacut.stochastic.figures.all import draw
 from alphacut.stochastic.fit.area_weighted import AreaWeighted

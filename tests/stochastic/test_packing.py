@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from alphacut.fuzzy.refused import FailedError, RefusedError
+from alphacut.base.errors import FailedError, RefusedError
 from alphacut.stochastic.particles.packing import Packing, random_sequential, relax_random_centres
 from alphacut.stochastic.particles.particles import DISCS, SPHERES, Particles
 from alphacut.stochastic.particles.radius_laws import LogNormalRadii, MeasuredRadii

@@ -16,8 +16,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import FailedError
+from alphacut.base.arrays import Array
+from alphacut.base.errors import FailedError
 from alphacut.rve.image.fields.grid import Fields, namespace, slabs
 
 LOG = logging.getLogger(__name__)

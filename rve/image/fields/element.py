@@ -26,7 +26,7 @@ from itertools import permutations, product
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Ints
+from alphacut.base.arrays import Array, Ints
 
 Polynomials = tuple[tuple[int, ...], ...]  # coefficients of 1, x, x², … on [0, 1]
 LEGENDRE: Polynomials = ((1,), (-1, 2), (1, -6, 6), (-1, 12, -30, 20))

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array
+from alphacut.base.arrays import Array
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient, System
 from alphacut.rve.image.fields.element import Element, isotropic_parts
 from alphacut.rve.image.fields.grid import SLAB_CELLS, Fields, Operator, gather, namespace, slabs

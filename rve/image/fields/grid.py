@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError, require
+from alphacut.base.arrays import Array
+from alphacut.base.errors import RefusedError, require
 from alphacut.rve.image.fields.element import Element
 from alphacut.rve.image.fields.kernels import apply_by_rows
 

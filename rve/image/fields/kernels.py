@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.kernels import kernel
+from alphacut.base.arrays import Array
+from alphacut.base.kernels import kernel
 from alphacut.rve.image.fields.element import Element, isotropic_parts
 
 ROUNDINGS = 32

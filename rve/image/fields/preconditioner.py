@@ -15,7 +15,7 @@ from types import ModuleType
 import numpy as np
 import scipy.fft
 
-from alphacut.fuzzy.arrays import Array
+from alphacut.base.arrays import Array
 from alphacut.rve.image.fields.element import Element
 from alphacut.rve.image.fields.grid import Fields, namespace, slabs
 from alphacut.rve.image.fields.kernels import multiply_by_blocks

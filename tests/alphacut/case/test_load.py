@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from alphacut.base.errors import RefusedError
 from alphacut.case.content import load
 from alphacut.fuzzy import Interval, Triangular
-from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.files import BadInput
 from tests.alphacut.small import CELL, FRAME
 

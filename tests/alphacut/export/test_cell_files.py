@@ -11,8 +11,8 @@ import pytest
 
 pytest.importorskip("alphacut.rve.fenicsx")
 
+from alphacut.base.errors import RefusedError
 from alphacut.export.cell_files import FORMATS, write_cell
-from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve import Phase, PrismModel
 from alphacut.rve.mesh import square
 from alphacut.rve.mesh.file import ABAQUS_ORDER

@@ -5,7 +5,7 @@ import threading
 
 import pytest
 
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.base.errors import RefusedError
 from alphacut.io.files import locked, whole_file, write_text
 
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from alphacut.base.errors import checked_number
 from alphacut.entry import main
 from alphacut.frame import Accelerogram, MatrixStructure, Proof, StoreyFrame, envelope
 from alphacut.fuzzy import Crisp, FailedError, General, RefusedError, propagate
-from alphacut.fuzzy.refused import checked_number
 from alphacut.io.files import missing
 from tests.alphacut.small import FRAME, written
 

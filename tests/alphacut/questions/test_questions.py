@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 
+from alphacut.base.errors import RefusedError
 from alphacut.case.content import Content, load
 from alphacut.case.limits import Limit, parse_limit
 from alphacut.figures.envelope import DRAWINGS
@@ -12,7 +13,6 @@ from alphacut.frame import Accelerogram, StoreyFrame, envelope
 from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.questions.peaks import Peak, peaks
 from alphacut.fuzzy import Interval, Triangular
-from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature
 from alphacut.questions.decision import DecisionAnswer
 from alphacut.questions.probability import shaped_like

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.base.errors import RefusedError
 from alphacut.records.read import read_recording
 from tests.alphacut.records import samples as written
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.base.errors import RefusedError
 from alphacut.records.read import read_recording
 from alphacut.records.uff import phase_collinearity, uff_mode_rows
 from tests.alphacut.records.samples import uff55, uff58

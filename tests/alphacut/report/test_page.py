@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.base.errors import RefusedError
 from alphacut.fuzzy.result import Nature
 from alphacut.io.quantity import range_text
 from alphacut.io.results import ResultsFolder

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import pytest
 
+from alphacut.base.errors import FailedError
 from alphacut.case.content import load
-from alphacut.fuzzy.refused import FailedError
 from alphacut.fuzzy.result import Nature
 from alphacut.questions.summary import Parts
 from alphacut.report.results import material

@@ -12,10 +12,10 @@ import xarray
 from pydantic import TypeAdapter
 
 import alphacut
+from alphacut.base.errors import FailedError, RefusedError
 from alphacut.case.content import load
 from alphacut.entry import main
 from alphacut.frame.questions.peaks import Peak
-from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import as_json
 from alphacut.io.results import ResultsFolder

@@ -6,9 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from alphacut.base.errors import RefusedError
 from alphacut.case.content import load
 from alphacut.entry import main
-from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.files import BadInput
 from alphacut.questions.fragility import FragilityAnswer
 from alphacut.records.recording import spectral_acceleration

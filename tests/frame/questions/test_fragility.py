@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.stats import beta
 
+from alphacut.base.errors import RefusedError
 from alphacut.frame.questions.fragility import CriticalMeasures, of_any_limit
-from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature
 from tests.frame.questions.test_questions import one_level
 

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from alphacut.base.errors import RefusedError
 from alphacut.frame import StoreyFrame, envelope
 from alphacut.frame.questions.peaks import ANY, Peak, passing, peaks, tightest
 from alphacut.frame.questions.probability import probabilities
 from alphacut.frame.questions.tolerances import scale_supports, tolerances
 from alphacut.fuzzy import Triangular
-from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature
 from tests.frame.motions import exact_motions, random_points
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from alphacut.base.errors import RefusedError
 from alphacut.frame import DualProof, MatrixStructure, Proof, envelope
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.structures.loads import Accelerogram
 from alphacut.fuzzy import Interval
-from alphacut.fuzzy.refused import RefusedError
 from tests.frame.motions import exact_motions
 
 K = np.array([[3.0, -1, 0, 0], [-1, 2, -1, 0], [0, -1, 1.5, -0.4], [0, 0, -0.4, 1.0]])

@@ -7,6 +7,7 @@ from functools import partial
 import numpy as np
 import pytest
 
+from alphacut.base.errors import FailedError
 from alphacut.frame import StoreyFrame, envelope
 from alphacut.frame.boxes import boxes
 from alphacut.frame.envelope import Ends
@@ -16,7 +17,6 @@ from alphacut.frame.structures.loads import Accelerogram
 from alphacut.frame.verification import self_test
 from alphacut.frame.verification.self_test import ContradictionError, Trial
 from alphacut.fuzzy import Crisp, Triangular
-from alphacut.fuzzy.refused import FailedError
 
 INPUTS = {"k1": Triangular(3.9e6, 4e6, 4.1e6), "m2": Triangular(990.0, 1e3, 1020.0)}
 METHODS = [Proof(gap=1e-5), DualProof(gap=1e-3)]

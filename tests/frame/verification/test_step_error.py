@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from alphacut.base.errors import FailedError, RefusedError
 from alphacut.frame import (
     Accelerogram,
     Exact,
@@ -21,7 +22,6 @@ from alphacut.frame.dynamics.flow import StepError
 from alphacut.frame.structures.linear import frequencies
 from alphacut.frame.verification.step_error import MARGIN, node_deviation
 from alphacut.fuzzy import Interval, Triangular
-from alphacut.fuzzy.refused import FailedError, RefusedError
 
 DUFFING = LagrangianSystem(
     1,

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from alphacut.fuzzy.refused import FailedError, RefusedError
+from alphacut.base.errors import FailedError, RefusedError
 from alphacut.rve.image.files import needed_memory, read_grid
 from alphacut.rve.image.model import ImageModel, solve_image, usual_division
 from alphacut.rve.image.phases import (

@@ -5,7 +5,7 @@ import pytest
 
 pytest.importorskip("alphacut.rve.fenicsx")
 
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.base.errors import RefusedError
 from alphacut.rve.cell.outline import Ellipse, area, circle
 from alphacut.rve.fenicsx import basix
 from alphacut.rve.mesh import square

@@ -83,7 +83,7 @@ WITHOUT_GMSH = """
 import sys
 from mpi4py import MPI
 sys.modules.update({"gmsh": None} if MPI.COMM_WORLD.rank else {})
-from alphacut.fuzzy.refused import FailedError
+from alphacut.base.errors import FailedError
 from alphacut.rve import Phase, PrismModel, MeshModel
 from alphacut.stochastic import HermiteMap, TruncatedNormal
 

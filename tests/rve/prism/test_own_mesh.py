@@ -11,7 +11,7 @@ from scipy.spatial import KDTree
 
 pytest.importorskip("alphacut.rve.fenicsx")
 
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.base.errors import RefusedError
 from alphacut.rve import MeshModel, Phase, PrismModel
 from alphacut.rve.cell.outline import Ellipse, circle
 from alphacut.rve.mesh import square

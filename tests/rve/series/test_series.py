@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.base.errors import RefusedError
 from alphacut.rve import Phase
 from alphacut.rve.result.moduli import square_moduli
 from alphacut.rve.series.means import RuleError, SeriesError

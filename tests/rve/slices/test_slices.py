@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.base.errors import RefusedError
 from alphacut.rve import Phase
 from alphacut.rve.cell.cell import Cell, VoigtPhase
 from alphacut.rve.cell.outline import Ellipse, circle

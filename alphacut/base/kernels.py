@@ -23,7 +23,7 @@ from uuid import uuid4
 
 import numpy as np
 
-from alphacut.fuzzy.user_cache import remove_unused, user_folder
+from alphacut.base.user_cache import remove_unused, user_folder
 
 with_kernels = set[str]()
 """Modules that have kernels; those of helpers come before those that call them."""

@@ -12,13 +12,13 @@ from pathlib import Path
 
 import pytest
 
-from alphacut.fuzzy import kernels
+from alphacut.base import kernels
 
 FILES = {
     "__init__.py": "",
     "fuzzy/units.py": "FACTOR = 2.0\n",
     "fuzzy/helper.py": """
-from alphacut.fuzzy.kernels import compiled
+from alphacut.base.kernels import compiled
 from alphacut.fuzzy.units import FACTOR
 
 @compiled
@@ -26,7 +26,7 @@ def scaled(x):
     return FACTOR * x
 """,
     "fuzzy/caller.py": """
-from alphacut.fuzzy.kernels import compiled
+from alphacut.base.kernels import compiled
 from alphacut.fuzzy.helper import scaled
 
 @compiled
