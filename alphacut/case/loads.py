@@ -51,7 +51,7 @@ def _parse_history(value: object, info: ValidationInfo) -> ForceHistory:
         start = quantity.parse_number(starts[0], "s") if starts else 0.0
         if kind == "harmonic":
             phase = quantity.parse_number(numbers[1], "rad") if numbers[1:] else 0.0
-            frequency = quantity.parse_number(numbers[0], "1/s")
+            frequency = quantity.parse_number(numbers[0], "Hz")
             return ForceHistory(History.harmonic(frequency, phase, start))
         if kind == "step":
             return ForceHistory(History.constant(start, is_static=bool(static)))

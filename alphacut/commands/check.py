@@ -15,14 +15,14 @@ import numpy as np
 
 from alphacut.base.errors import require
 from alphacut.case.content import Content
-from alphacut.case.loads import RecordsSection
+from alphacut.case.loads import ForceHistory, RecordsSection
 from alphacut.case.motion import EnvelopeSection
 from alphacut.case.parse import quantity_of
 from alphacut.case.structure import MaterialDamping, Structure
 from alphacut.case.types import Section
 from alphacut.commands.options import Command, add_common, add_quiet, write_answer
 from alphacut.commands.pipeline import cut_record_warnings, read_case, require_runnable
-from alphacut.frame import Exact, LinearFlow, MatrixStructure, StoreyFrame
+from alphacut.frame import Exact, History, LinearFlow, MatrixStructure, StoreyFrame
 from alphacut.frame.boxes import AT_REST
 from alphacut.frame.envelope import Ends, Envelope, within_steps
 from alphacut.frame.structures.linear import LinearSystem, frequencies
@@ -167,6 +167,9 @@ def rows_of(prefix: str, section: Section) -> Iterator[Row]:
                     yield row_key, words, kind
                 case (FuzzyNumber() as force, str(si)):
                     yield row_key, _numbers(force, si), KINDS.get(type(force), "fuzzy")
+                case ForceHistory(History(frequency=omega)) if omega:
+                    hertz, period = (engineering(x, "") for x in (omega / (2 * pi), 2 * pi / omega))
+                    yield row_key, f"{hertz} Hz, period {period} s", "harmonic"
                 case (Monomial() as factor, np.ndarray() as array):
                     size, largest = " × ".join(map(str, array.shape)), abs(array).max()
                     yield row_key, f"{factor} × matrix {size}, largest {largest:.4g}", "in SI"

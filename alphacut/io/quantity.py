@@ -51,6 +51,7 @@ QUANTITIES = {
     "N*m": Dimension("moment", "12 kN m", {"N m": 0, "kN m": 3}),
     "J": Dimension("energy", "20 kJ", {}),
     "1/s": Dimension("rate", "0.05 1/s", {"1/s": 0, "Hz": 0}),
+    "Hz": Dimension("frequency", "1.5 Hz", {"Hz": 0, "1/s": 0}),
     "rad": Dimension("angle", "1.5 rad", {"rad": 0}),
     "rad/s": Dimension("angular velocity", "0.1 rad/s", {"rad/s": 0}),
 }
@@ -100,11 +101,33 @@ def factor(unit: str, si: str) -> Decimal:
     spelt = re.sub(r"([A-Za-z])([234])(?!\w)", r"\1^\2", unit)
     try:
         one_unit = registry().Quantity(Decimal(1), registry().parse_units(spelt))
-        return Decimal(one_unit.to(si).magnitude)
+        return Decimal(one_unit.to(_pint_target(one_unit, si)).magnitude)
     except Exception:  # Pint's parser raises whatever Python's does
         kind = next((x.name for x in QUANTITIES.values() if unit in x.powers), "")
         measured = f"is a unit of {kind}, and" if kind else "is"
         raise ValueError(f'the unit "{unit}" {measured} no unit of {QUANTITIES[si].name}') from None
+
+
+def _pint_target(one_unit: pint.Quantity[Decimal], si: str) -> str:
+    """Return the unit to which Pint must convert a unit so that the result is in the SI unit `si`.
+
+    Pint's radian is the number 1, so that it takes 1 rad/s for 1 Hz, and 1 Hz for 1 rad/s. A
+    frequency counts turns: where its unit contains an angle, it is converted to turns per second.
+
+    Raises:
+        ValueError: A frequency has another power of an angle or a unit of data, or an angular
+            velocity is in hertz.
+    """
+    if si == "rad/s" and any("hertz" in name for name, _ in one_unit.unit_items()):
+        raise ValueError("hertz count turns, not radians")
+    if si != "Hz":
+        return si
+    powers = dict(one_unit.to_root_units().unit_items())
+    if powers == {"second": -1}:
+        return "Hz"
+    if powers == {"radian": 1, "second": -1}:
+        return "turn/s"
+    raise ValueError("neither turns nor angles per time")
 
 
 def _parse_decimal(text: str, si: str) -> Decimal:

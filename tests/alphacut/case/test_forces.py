@@ -4,6 +4,9 @@ import numpy as np
 import pytest
 
 from alphacut.case.content import load
+from alphacut.entry import main
+from alphacut.frame import envelope
+from alphacut.frame.envelope import within_steps
 from alphacut.io.files import BadInput
 from tests.alphacut.small import written
 
@@ -51,6 +54,55 @@ def test_amplitudes_are_parameters_and_courses_have_their_files_samples(tmp_path
     assert {name: structure.input_unit(name) for name in units} == units
 
 
+MACHINE = """
+title = "A machine below resonance"
+stages = ["envelope"]
+[frame]
+masses = ["50 t"]
+stiffness = ["10 MN/m ± 1 %"]
+damping_ratio = "0 %"
+outputs = ["q1"]
+[[force]]
+history = "harmonic, 1.5 Hz"
+amplitude = { 1 = "10 kN" }
+[envelope]
+fuzzy = ["k1"]
+alpha = [0, 1]
+duration = "6 s"
+step = "0.01 s"
+"""
+
+
+@pytest.mark.parametrize(
+    "frequency", ["1.5 Hz", "9.42477796076938 rad/s", "90 rpm", "540 deg/s", "1.5 turn/s"]
+)
+def test_a_frequency_counts_turns_in_whatever_unit_it_is_given(tmp_path, capsys, frequency):
+    case = written(tmp_path, MACHINE, **{"1.5 Hz": frequency})
+    assert main(["check", str(case)]) == 0
+    assert "1.5 Hz, period 0.6667 s" in capsys.readouterr().out
+    (machine,) = load(case).content.structure.model.loads
+    assert machine.history.frequency == pytest.approx(3 * np.pi, rel=1e-14)
+
+
+def test_bounds_under_a_machine_in_turns_per_minute_hold_the_largest_displacement(tmp_path):
+    structure = load(written(tmp_path, MACHINE, **{"1.5 Hz": "90 rpm"})).content.structure
+    found = envelope(
+        structure.model, structure.inputs(("k1",)), alpha=(1,), duration=6.0, step=0.01
+    )
+    # q(t) = F/(m (ω² - Ω²)) (sin Ω t - Ω/ω sin ω t), without damping, at rest at t = 0
+    mass, force, turning, time = 50e3, 10e3, 2 * np.pi * 1.5, np.linspace(0.0, 6.0, 60001)
+    omega = np.sqrt(np.linspace(9.9e6, 10.1e6, 41) / mass)[:, None]
+    amplitude = force / (mass * (omega**2 - turning**2))
+    shape = np.sin(turning * time) - turning / omega * np.sin(omega * time)
+    largest = np.abs(amplitude * shape).max()
+    assert largest == pytest.approx(3.0055e-3, rel=1e-4)
+    size = np.maximum(found.upper, -found.lower)[0, :, 0]
+    bound = within_steps(size, found.between[:, 0]).max()
+    assert largest <= bound <= 3.0095e-3
+    attained = np.maximum(found.inner.upper, -found.inner.lower).max()
+    assert 3.002e-3 <= attained <= largest
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
@@ -60,6 +112,7 @@ def test_amplitudes_are_parameters_and_courses_have_their_files_samples(tmp_path
         ('"0.4 kN s"', '"0.4 kN"', "force.amplitude.1 is N"),
         (", 2 Hz, 90 deg", "", "force[2].history is harmonic"),
         ("2 Hz", "2 m", "2 m"),
+        ("2 Hz", "2 s", "no unit of frequency"),
         ("from 0.3 s", "static", "force[2].history"),
         ("from 0.3 s", "from -1 s", "force[2]"),
         ("from 0.3 s", "from 1 s", "force[2].history is from 1 s"),  # at the end of the motion

@@ -1,5 +1,7 @@
 """Quantities as engineers write them become SI."""
 
+import math
+
 import pytest
 
 from alphacut.fuzzy import Crisp, Interval, Trapezoidal, Triangular
@@ -18,6 +20,15 @@ RIGHT = [
     ([1, 2], "", Interval(1, 2)),
     ("0.25 g", "m/s^2", Crisp(0.25 * 9.80665)),
     ("3 cm4", "m^4", Crisp(3e-8)),
+    ("1.5 Hz", "Hz", Crisp(1.5)),
+    ("1.5e-3 kHz", "Hz", Crisp(1.5)),
+    ("90 1/min", "Hz", Crisp(1.5)),
+    ("1.5 turn/s", "Hz", Crisp(1.5)),
+    ("90 rpm", "Hz", Crisp(1.5)),
+    ("540 deg/s", "Hz", Crisp(1.5)),
+    ("9.42477796076937971538793014983851 rad/s", "Hz", Crisp(1.5)),
+    ("[90, 120] rpm", "Hz", Interval(1.5, 2.0)),
+    ("180 deg/s", "rad/s", Crisp(math.pi)),
 ]
 
 
@@ -47,6 +58,12 @@ WRONG = [
     ("5 %", "m", "wrong"),
     ("3 px", "m", "wrong"),
     ("9" * 2000, "", "too long"),
+    ("2 s", "Hz", "no unit of frequency"),
+    ("2 rad", "Hz", "no unit of frequency"),
+    ("2 rad^2/s", "Hz", "no unit of frequency"),
+    ("2 bit/s", "Hz", "no unit of frequency"),
+    ("2 Hz", "rad/s", "no unit of angular velocity"),
+    ("2 kHz", "rad/s", "no unit of angular velocity"),
 ]
 
 
