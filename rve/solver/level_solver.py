@@ -23,6 +23,7 @@ from alphacut.rve.solver.theta_preconditioner import (
     Fields,
     ThetaMass,
     injection,
+    interpolated_vertices,
     precondition,
 )
 
@@ -80,8 +81,27 @@ class LevelSolver:
     def __init__(self, numbering: LevelNumbering, indptr: Ints, indices: Ints) -> None:
         self._numbering, self._indptr, self._indices = numbering, indptr, indices
         self.injection = injection(numbering)
-        self._restriction = sp.kron(sp.eye(numbering.grid.layers), self.injection.T, "csr")
+        self._find_reduced_pattern()
         self._ksp: PETSc.KSP | None = None
+
+    def _find_reduced_pattern(self) -> None:
+        """Find the pattern of Jᵀ K J, and the matrix that gives its entries from those of K.
+
+        The entries are (Jᵀ K J)_ij = Σ_ab J_ai K_ab J_bj with J_ai = 1/2 for each of the two
+        vertices i of node a. SciPy's product Jᵀ K J would leave out sums that are zero by chance,
+        so that its pattern depends on the stiffness.
+        """
+        ends, pairs = interpolated_vertices(self._numbering), len(self._indices)
+        vertices = self._numbering.mid_level_size // 2
+        nodes = np.repeat(np.arange(len(ends)), np.diff(self._indptr))
+        row, column = ends[nodes][:, :, None], ends[self._indices][:, None, :]
+        is_free = (row >= 0) & (column >= 0)
+        keys, place = np.unique((row * vertices + column)[is_free], return_inverse=True)
+        pair = np.broadcast_to(np.arange(pairs)[:, None, None], is_free.shape)[is_free]
+        quarters = np.full(len(place), 0.25), (place, pair)
+        self._reduction = sp.csr_matrix(quarters, (len(keys), pairs))
+        self._reduced_indptr = np.searchsorted(keys, np.arange(vertices + 1) * vertices)
+        self._reduced_indices = keys % vertices
 
     def factorise(self, hats: Array, bubbles: Array, mass: ThetaMass) -> None:
         """Factorise the blocks of levels, (layers + 1, 4 node pairs), and of mid-levels.
@@ -104,14 +124,12 @@ class LevelSolver:
         self._ksp.setUp()
 
     def _blocks(self, hats: Array, bubbles: Array, mass: ThetaMass) -> list[sp.csr_matrix]:
-        """diag(K_k) and diag(K_b), sorted; those of bubbles are Jᵀ K J."""
-        levels, mid_levels = (
-            stacked(entries / masses[:, None], self._indptr, self._indices).tocsr()
-            for entries, masses in ((hats, mass.hats), (bubbles, mass.bubbles))
-        )
-        reduced = self._restriction @ mid_levels @ self._restriction.T
-        reduced.sort_indices()
-        return [levels, reduced]
+        """Return diag(K_k) and diag(K_b), sorted; those of bubbles are Jᵀ K J."""
+        levels = stacked(hats / mass.hats[:, None], self._indptr, self._indices)
+        pairs = (bubbles / mass.bubbles[:, None]).reshape(len(bubbles), -1, 4)
+        entries = np.array([self._reduction @ layer for layer in pairs])
+        reduced = stacked(entries, self._reduced_indptr, self._reduced_indices)
+        return [levels.tocsr(), reduced.tocsr()]
 
     def __call__(self, residual: Array) -> Array:
         """P⁻¹ r of residuals, shape (fields, size)."""

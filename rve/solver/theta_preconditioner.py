@@ -34,7 +34,7 @@ from itertools import pairwise
 import numpy as np
 import scipy.sparse as sp
 
-from alphacut.base.arrays import Array
+from alphacut.base.arrays import Array, Ints
 from alphacut.rve.fenicsx import PETSc, cholesky
 from alphacut.rve.solver.numbering import LevelNumbering
 from alphacut.stochastic import ThetaLaw
@@ -181,12 +181,19 @@ def plane_solver(block: sp.csr_matrix, mass: float) -> PETSc.KSP:
 
 def injection(numbering: LevelNumbering) -> sp.csr_matrix:
     """Matrix J from linear to quadratic triangles; midpoints get the mean of their vertices."""
-    plane, unknown = numbering.grid.plane, numbering.planar
-    vertices = numbering.mid_level_size // 2
-    first = np.unique(unknown[plane.vertices :], return_index=True)[1]  # node of each midpoint's
-    ends = np.concatenate(
-        [np.repeat(np.arange(vertices), 2).reshape(-1, 2), unknown[plane.ends[first]]]
-    )
+    ends = interpolated_vertices(numbering)
     node, end = np.nonzero(ends >= 0)  # not of fixed vertices
     halves = np.full(len(node), 0.5), (node, ends[node, end])
-    return sp.kron(sp.csr_matrix(halves, (len(ends), vertices)), sp.eye(2), "csr")
+    shape = len(ends), numbering.mid_level_size // 2
+    return sp.kron(sp.csr_matrix(halves, shape), sp.eye(2), "csr")
+
+
+def interpolated_vertices(numbering: LevelNumbering) -> Ints:
+    """Return the two vertices whose mean each free node of a plane gets, −1 for a fixed one.
+
+    Shape (nodes, 2), in numbers of the unknown pairs. A vertex has itself twice.
+    """
+    plane, unknown = numbering.grid.plane, numbering.planar
+    vertices = np.arange(numbering.mid_level_size // 2)
+    first = np.unique(unknown[plane.vertices :], return_index=True)[1]  # node of each midpoint's
+    return np.concatenate([np.stack([vertices, vertices], axis=1), unknown[plane.ends[first]]])
