@@ -24,6 +24,13 @@ from alphacut.stochastic import RadiusMap, ThetaLaw
 ASYMMETRY = 1e-8
 """Largest |(A − Aᵀ) x| over |A x| of a symmetric operator; round-off leaves some 1e-15."""
 
+ARITIES = {
+    0: "scalar form (without test or trial function)",
+    1: "linear form (with a test function)",
+    2: "bilinear form (with a trial and a test function)",
+}
+"""What a form is called by its number of arguments."""
+
 
 class ProductSpace:
     """Periodic fluctuations on cell × θ, zero on the line of one corner over θ.
@@ -61,11 +68,12 @@ class ProductSpace:
 
     def assemble_matrix(self, form: ufl.Form) -> PETSc.Mat:
         """Reduced matrix Pᵀ A P of a bilinear form in `space`."""
-        return self._problem.assemble_operator(self._compiled(form))
+        return self._problem.assemble_operator(self._compiled(form, num_arguments=2))
 
     def assemble_vector(self, form: ufl.Form) -> PETSc.Vec:
         """Reduced vector Pᵀ b of a linear form in `space`."""
-        return self._problem.elimination.forces(fem.assemble_vector(self._compiled(form)).array)
+        values = fem.assemble_vector(self._compiled(form, num_arguments=1)).array
+        return self._problem.elimination.forces(values)
 
     def mean(self, form: ufl.Form) -> float:
         """Mean over cell and θ of a scalar form: its integral over that of f_Θ."""
@@ -74,7 +82,8 @@ class ProductSpace:
         return self._integral(form) / total
 
     def _integral(self, form: ufl.Form) -> float:
-        return float(self._problem.comm.allreduce(fem.assemble_scalar(self._compiled(form))))
+        scalar = fem.assemble_scalar(self._compiled(form, num_arguments=0))
+        return float(self._problem.comm.allreduce(scalar))
 
     def assign(self, function: fem.Function, vector: PETSc.Vec) -> None:
         """Set a function of `space` to the displacements of reduced unknowns."""
@@ -103,11 +112,35 @@ class ProductSpace:
         options = SolverOptions(self._petsc if petsc_options is None else petsc_options)
         return solve(self._problem.solver(options, matrix), loads)
 
-    def _compiled(self, form: ufl.Form) -> fem.Form:
-        """The compiled form; its coefficients keep the values that they have when assembled."""
+    def _compiled(self, form: ufl.Form, *, num_arguments: int) -> fem.Form:
+        """Return the compiled form; its coefficients keep the values that they have when assembled.
+
+        DOLFINx assembles by the number of the form's arguments (test and trial functions) and by
+        their spaces without a check, and would write beyond its arrays.
+
+        Raises:
+            RefusedError: It is no form on this mesh with `num_arguments` arguments in `space`.
+        """
+        require_form(form, space=self.space, num_arguments=num_arguments)
         if form not in self._forms:
             self._forms[form] = compiled(form)
         return self._forms[form]
+
+
+def require_form(form: object, *, space: fem.FunctionSpace, num_arguments: int) -> None:
+    """Refuse what is no form on the mesh of `space` with that many arguments, all in `space`."""
+    allowed = f"a {ARITIES[num_arguments]}, in `space` of this ProductSpace"
+    cure = "write it with `ufl.TrialFunction(space)`, `ufl.TestFunction(space)` and its `dx`"
+    if not isinstance(form, ufl.Form):
+        raise RefusedError("form", type(form).__name__, allowed, cure)
+    arguments = form.arguments()
+    if len(arguments) != num_arguments:
+        value = f"a {ARITIES.get(len(arguments), 'multilinear form')}"
+        raise RefusedError("form", value, allowed, cure)
+    in_space = all(argument.ufl_function_space() == space for argument in arguments)
+    domains = form.ufl_domains()
+    if not in_space or any(domain != space.mesh.ufl_domain() for domain in domains):
+        raise RefusedError("form", "a form on another space or mesh", allowed, cure)
 
 
 def _separate_problem(model: PrismModel | MeshModel, law: RadiusMap | ThetaLaw) -> PrismProblem:

@@ -69,6 +69,36 @@ def test_functions_take_reduced_unknowns_and_means_are_over_area_and_law(cell, e
     assert fraction == pytest.approx(radius, rel=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("method", "allowed"),
+    [("mean", "scalar"), ("assemble_vector", "linear"), ("assemble_matrix", "bilinear")],
+)
+def test_a_form_that_would_be_written_beyond_arrays_is_refused(cell, elastic, method, allowed):
+    v, dx = ufl.TestFunction(cell.space), cell.dx["matrix"]
+    forms = {"scalar": cell.density * dx, "linear": cell.density * v[0] * dx}
+    forms["bilinear"] = elastic
+    for arity, form in forms.items():
+        for _ in range(2):  # also where another method has compiled it
+            if arity != allowed:
+                with pytest.raises(RefusedError, match=f"form is a {arity} .*allowed: a {allowed}"):
+                    getattr(cell, method)(form)
+            else:
+                getattr(cell, method)(form)
+    with pytest.raises(RefusedError, match=f"form is float; allowed: a {allowed}"):
+        getattr(cell, method)(1.0)
+
+
+def test_a_form_on_another_space_or_mesh_is_refused(cell):
+    other = ProductSpace(MODEL, CONE)
+    w = ufl.TestFunction(fem.functionspace(cell.space.mesh, ("DG", 0)))
+    with pytest.raises(RefusedError, match="another space or mesh"):
+        cell.assemble_vector(cell.density * w * cell.dx["matrix"])
+    with pytest.raises(RefusedError, match="another space or mesh"):
+        cell.assemble_vector(other.density * ufl.TestFunction(other.space)[0] * other.dx["matrix"])
+    with pytest.raises(RefusedError, match="another space or mesh"):
+        cell.mean(other.density * other.dx["matrix"])
+
+
 def test_an_operator_without_symmetry_is_refused_and_not_solved_wrongly(cell, elastic):
     matrix = cell.assemble_matrix(elastic)
     columns, values = matrix.getRow(0)
