@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from alphacut.frame import DualProof, StoreyFrame, envelope
-from alphacut.frame.structures.loads import Accelerogram
+from alphacut.frame.records.history import Accelerogram
 from alphacut.fuzzy import Triangular
 from alphacut.rve.prism.model import PrismModel
 from benchmarks.rows import write

@@ -16,8 +16,9 @@ from alphacut.frame.methods.improved_follower import ImprovedFollower
 from alphacut.frame.methods.proof import Proof
 from alphacut.frame.methods.sampled import Sampled
 from alphacut.frame.propagation import METHODS, envelope, require_envelope
+from alphacut.frame.records.history import Accelerogram, History
 from alphacut.frame.structures.lagrangian import LagrangianSystem, pendulum
-from alphacut.frame.structures.loads import Accelerogram, Force, History
+from alphacut.frame.structures.loads import Force
 from alphacut.frame.structures.matrix import MatrixStructure
 from alphacut.frame.structures.quantities import Output, Parameter
 from alphacut.frame.structures.storey import StoreyFrame

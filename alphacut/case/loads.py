@@ -16,12 +16,13 @@ from alphacut.base.errors import RefusedError, require, require_choice
 from alphacut.case.structure import Structure
 from alphacut.case.types import NotEmpty, OneOrMany, Section, Time, case_file, text
 from alphacut.frame import Force, History, StoreyFrame
+from alphacut.frame.records.read import read_recording
+from alphacut.frame.records.recording import Baseline, Recording
+from alphacut.frame.records.tables import read_force_history
+from alphacut.frame.records.text_file import ACCELERATION_UNITS
+from alphacut.frame.records.units import acceleration_factor
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.io import quantity
-from alphacut.records.read import read_recording
-from alphacut.records.recording import Baseline, Recording
-from alphacut.records.tables import read_force_history
-from alphacut.records.text_file import ACCELERATION_UNITS, acceleration_factor
 
 HISTORY = (
     '"step", "harmonic, 1.5 Hz, 90 deg", "impulse" or a file as "wind.csv", then "from 2 s" or'

@@ -15,13 +15,13 @@ from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, require, require_choice
 from alphacut.case.types import Modulus, NotEmpty, OneOrMany, Quantity, Section, case_file, text
 from alphacut.frame import Accelerogram, MatrixStructure, StoreyFrame
+from alphacut.frame.records.read import read_recording
 from alphacut.frame.structures.lagrangian import LagrangianSystem, pendulum
 from alphacut.frame.structures.quantities import Output
 from alphacut.frame.structures.storey import SYMBOLS
 from alphacut.fuzzy import Crisp, FuzzyNumber, PiecewiseLinear
 from alphacut.io.files import suggestion
 from alphacut.io.quantity import STANDARD_GRAVITY
-from alphacut.records.read import read_recording
 
 Mass = Annotated[FuzzyNumber, Quantity("kg", above=0, fuzzy=True)]
 Span = Annotated[FuzzyNumber, Quantity("m", above=0, fuzzy=True)]

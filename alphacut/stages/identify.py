@@ -11,10 +11,10 @@ from alphacut.case.motion import Identify
 from alphacut.case.structure import Structure
 from alphacut.frame.identify import MeasuredMode, RefutedError, identify, measured_mode
 from alphacut.frame.identify.identify import widest_cut
+from alphacut.frame.records.measured import ModeRows, mode_rows
+from alphacut.frame.records.uff import ENDINGS, uff_mode_rows
 from alphacut.frame.structures.quantities import of_storey_frame
 from alphacut.fuzzy import FuzzyNumber
-from alphacut.io.measured import ModeRows, mode_rows
-from alphacut.records.uff import ENDINGS, uff_mode_rows
 from alphacut.stages.store import CutsResult, Numbers, Values
 
 

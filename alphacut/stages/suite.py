@@ -23,11 +23,12 @@ from alphacut.frame.boxes import boxes
 from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.questions.incremental import IncrementalAnalysis
 from alphacut.frame.questions.peaks import ANY, PEAK_BOUNDS, Peak, Peaks
+from alphacut.frame.questions.spectral import spectral_acceleration
+from alphacut.frame.records.recording import Recording, arias_fractions
 from alphacut.frame.structures.linear import modal_damping_ratios
 from alphacut.frame.structures.quantities import output_of
 from alphacut.fuzzy.result import Nature
 from alphacut.io.quantity import percent_text
-from alphacut.records.recording import Recording, arias_fractions, spectral_acceleration
 from alphacut.stages.envelope import EnvelopeTask, PeakResults, outputs_of, peak_results, peaks_of
 from alphacut.stages.store import Numbers, Stage, StageContext, StageResult, Values
 

@@ -23,7 +23,7 @@ from alphacut.base.errors import FailedError
 from alphacut.frame import Envelope, StoreyFrame, envelope
 from alphacut.frame.methods.dual import DualProof
 from alphacut.frame.methods.proof import Proof
-from alphacut.frame.structures.loads import Accelerogram
+from alphacut.frame.records.history import Accelerogram
 from alphacut.fuzzy import FuzzyNumber, Triangular
 from benchmarks.rows import write
 from benchmarks.synthetic_record import SyntheticRecord

@@ -21,7 +21,8 @@ from scipy.sparse import coo_array
 
 from alphacut.base.arrays import Array
 from alphacut.frame import MatrixStructure, Output
-from alphacut.frame.structures.loads import Accelerogram, Factor
+from alphacut.frame.records.history import Accelerogram
+from alphacut.frame.structures.loads import Factor
 from benchmarks.synthetic_record import SyntheticRecord
 
 SPAN, HEIGHT = 6.0, 3.2

@@ -15,9 +15,9 @@ from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.envelope import within_steps
 from alphacut.frame.modes.structure import Classical, classical_structure
 from alphacut.frame.modes.superposition import Modal, load_at_nodes, modes_at, outputs_at
+from alphacut.frame.records.history import History
 from alphacut.frame.response.oscillators import Grid, Oscillators
 from alphacut.frame.structures.linear import LinearSystem, histories
-from alphacut.frame.structures.loads import History
 
 MAX_ENTRIES = 400_000
 """Entries of the matrices of all points whose exact motions are computed together."""

@@ -19,6 +19,7 @@ from alphacut.frame.calculus.jet import Array, Jet, concatenate
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.integrators import Exact, Integrator, Midpoint, StepMap, state_matrix
 from alphacut.frame.dynamics.modal_trajectory import classical_trajectory, modal_trajectory
+from alphacut.frame.records.history import History
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import (
     LinearSystem,
@@ -27,7 +28,7 @@ from alphacut.frame.structures.linear import (
     frequencies,
     histories,
 )
-from alphacut.frame.structures.loads import History, distinct_histories
+from alphacut.frame.structures.loads import distinct_histories
 
 MAX_STEPS = 10_000_000
 """Most steps of a motion: bounds of one output at two levels are 320 MB of them."""

@@ -20,8 +20,8 @@ import numpy as np
 
 from alphacut.base.errors import require
 from alphacut.frame.calculus.jet import Array, Jet, concatenate, inverse
+from alphacut.frame.records.history import History
 from alphacut.frame.structures.linear import Matrices
-from alphacut.frame.structures.loads import History
 
 SAME = 1e-12
 """Distance of a sample from a node, as a fraction of the step, that is rounding."""

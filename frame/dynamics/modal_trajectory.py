@@ -15,9 +15,9 @@ import numpy as np
 from alphacut.base.kernels import compiled
 from alphacut.frame.calculus.jet import Array, Jet, inverse
 from alphacut.frame.calculus.unproved import UnprovedError
+from alphacut.frame.records.history import History
 from alphacut.frame.response.duhamel import responses_at_nodes, step_integrals
 from alphacut.frame.structures.linear import Matrices, undamped_modes
-from alphacut.frame.structures.loads import History
 
 MIN_DISTANCE = 1e-4
 """Relative distance of two eigenvalues below which second derivatives of their modes lose more than

@@ -21,8 +21,8 @@ from alphacut.base.kernels import compiled
 from alphacut.frame.calculus.jet import Jet
 from alphacut.frame.dynamics.flow import Flow, StepError, with_feedthrough
 from alphacut.frame.dynamics.integrators import SAME, state_matrix
+from alphacut.frame.records.history import History
 from alphacut.frame.structures.linear import evaluate, histories
-from alphacut.frame.structures.loads import History
 from alphacut.frame.structures.storey import MOMENT, StoreyFrame
 
 MAX_PHASE = 1.0

@@ -18,9 +18,9 @@ from alphacut.frame.boxes import Boxes
 from alphacut.frame.calculus.monomials import matmul, product_part
 from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate, solution_series, solve
 from alphacut.frame.calculus.unproved import UnprovedError
+from alphacut.frame.records.history import History
 from alphacut.frame.response.duhamel import absolute_moments
 from alphacut.frame.structures.linear import LinearSystem
-from alphacut.frame.structures.loads import History
 from alphacut.frame.structures.matrix import MatrixStructure
 from alphacut.frame.structures.storey import StoreyFrame
 

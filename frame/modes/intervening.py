@@ -25,8 +25,8 @@ from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.blocks import Block
 from alphacut.frame.modes.clusters import Subspaces
 from alphacut.frame.modes.structure import Classical
+from alphacut.frame.records.history import History
 from alphacut.frame.response.oscillators import Grid
-from alphacut.frame.structures.loads import History
 
 MAX_PAIRS = 100_000
 """Pairs of coefficients in a product of two polynomials at most; a pair takes 3 ns."""

@@ -25,10 +25,10 @@ from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF, gamma
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.rest import response_slopes
 from alphacut.frame.modes.structure import Classical
+from alphacut.frame.records.history import History
 from alphacut.frame.response.duhamel import absolute_moments, responses_at_nodes
 from alphacut.frame.response.oscillators import read_response
 from alphacut.frame.structures.linear import LinearSystem, evaluate, histories, undamped_modes
-from alphacut.frame.structures.loads import History
 
 ENTRY_ROUNDINGS = 8
 """Roundings of an entry of M, K and of output rows, as a stiffness 12 c E I / l³ takes."""

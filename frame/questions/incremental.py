@@ -22,7 +22,7 @@ from alphacut.base.progress_bar import Progress
 from alphacut.frame.boxes import Boxes
 from alphacut.frame.dynamics.yielding import YieldingFlow
 from alphacut.frame.methods.sampled import SKIPPED, spread_points
-from alphacut.frame.structures.loads import Accelerogram
+from alphacut.frame.records.history import Accelerogram
 from alphacut.frame.structures.storey import StoreyFrame
 
 GRID_RATIO = 1.1

@@ -31,7 +31,7 @@ from alphacut.base.arrays import Array, Ints
 from alphacut.base.kernels import compiled, kernel, prange
 from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.structures.loads import History
+from alphacut.frame.records.history import History
 
 parallel = kernel(parallel=True)
 PARALLEL_LOOP = Lock()

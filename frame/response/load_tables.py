@@ -17,8 +17,8 @@ from alphacut.base.kernels import compiled
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.calculus.unproved import UnprovedError
+from alphacut.frame.records.history import History
 from alphacut.frame.response.duhamel import responses_at_nodes
-from alphacut.frame.structures.loads import History
 
 Complex = NDArray[np.complex128]
 REACH = 6.0

@@ -29,6 +29,7 @@ import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF
+from alphacut.frame.records.history import History
 from alphacut.frame.response.duhamel import absolute_moments, require_in_range
 from alphacut.frame.response.straying import (
     fourth_derivative,
@@ -37,7 +38,6 @@ from alphacut.frame.response.straying import (
     responses_of,
     with_power,
 )
-from alphacut.frame.structures.loads import History
 
 POWERS = (0.0, 0.5, 1.0)
 """Powers κ of λ."""

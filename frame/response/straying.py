@@ -23,8 +23,8 @@ import numpy as np
 
 from alphacut.base.arrays import Array, Ints
 from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF
+from alphacut.frame.records.history import History
 from alphacut.frame.response.duhamel import absolute_moments, responses_at_nodes
-from alphacut.frame.structures.loads import History
 
 PHASE = 0.5
 """Phase in rad that a mode or a sine takes in a piece; a piece adds its square to the bound."""

@@ -18,7 +18,8 @@ from alphacut.base.arrays import Array, Ints, Mask
 from alphacut.base.errors import RefusedError, require
 from alphacut.frame.calculus.jet import Jet, concatenate, inverse, variables
 from alphacut.frame.calculus.taylor_model import TaylorModel
-from alphacut.frame.structures.loads import Accelerogram, Force, History, distinct_histories
+from alphacut.frame.records.history import Accelerogram, History
+from alphacut.frame.structures.loads import Force, distinct_histories
 from alphacut.frame.structures.quantities import Parameter
 
 Number = TypeVar("Number", Jet, TaylorModel)

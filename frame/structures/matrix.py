@@ -19,8 +19,9 @@ from alphacut.base.errors import (
     require_numbers,
 )
 from alphacut.frame.calculus.jet import Jet, variables
+from alphacut.frame.records.history import Accelerogram
 from alphacut.frame.structures.linear import Assembly, Number, evaluate, stack, undamped_modes
-from alphacut.frame.structures.loads import Accelerogram, Factor, Force, require_loads
+from alphacut.frame.structures.loads import Factor, Force, require_loads
 from alphacut.frame.structures.quantities import RATIO, Output, Parameter
 
 KINDS = ("mass", "damping", "stiffness")

@@ -18,8 +18,9 @@ import numpy as np
 from alphacut.base.arrays import Array
 from alphacut.base.errors import checked_number, require, require_choice, require_numbers
 from alphacut.frame.calculus.jet import Jet
+from alphacut.frame.records.history import Accelerogram
 from alphacut.frame.structures.linear import Assembly, Number, stack
-from alphacut.frame.structures.loads import Accelerogram, Force, require_loads
+from alphacut.frame.structures.loads import Force, require_loads
 from alphacut.frame.structures.quantities import Output, Parameter, of_storey_frame
 
 # names of the parameters that each list holds, by floor or storey, and of values that may be single

@@ -47,7 +47,7 @@ INDIRECT = {  # imported by others on this project's behalf
 FROM_PYPI = {  # each is needed by one comparison, or is an optional extra
     "array_api_compat": "rve/image/fields/grid.py",
     "cupy": "rve/image/fields/grid.py",
-    "obspy": "alphacut/records/read.py",
+    "obspy": "frame/records/read.py",
     "openseespylinux": "benchmarks/frame/opensees.py",
 }
 

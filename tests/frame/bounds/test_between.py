@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from alphacut.frame import Accelerogram, DualProof, Force, Proof, StoreyFrame, envelope
-from alphacut.frame.structures.loads import History
+from alphacut.frame.records.history import History
 from alphacut.fuzzy import Triangular
 from tests.frame.motions import exact_motions, random_points
 

@@ -8,7 +8,7 @@ from alphacut.frame.bounds import dual_function as kernel
 from alphacut.frame.bounds.box import Box
 from alphacut.frame.bounds.level import OutputBounds
 from alphacut.frame.methods.dual import DualProof
-from alphacut.frame.structures.loads import Accelerogram
+from alphacut.frame.records.history import Accelerogram
 from alphacut.frame.structures.matrix import MatrixStructure
 from alphacut.fuzzy import Triangular
 from alphacut.fuzzy.result import Nature

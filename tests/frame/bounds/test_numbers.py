@@ -8,7 +8,7 @@ from alphacut.frame.bounds.dual_function import require_in_range, subgradient_st
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.methods.dual import DualProof
 from alphacut.frame.methods.proof import Proof
-from alphacut.frame.structures.loads import Accelerogram
+from alphacut.frame.records.history import Accelerogram
 from alphacut.fuzzy import Crisp, Triangular
 
 

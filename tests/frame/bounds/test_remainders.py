@@ -14,8 +14,8 @@ from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.modes.clusters import centred_matrices, enclose_subspaces
 from alphacut.frame.modes.rest import inverse_form
 from alphacut.frame.modes.structure import classical_structure
+from alphacut.frame.records.history import Accelerogram
 from alphacut.frame.response.oscillators import Grid, Oscillators
-from alphacut.frame.structures.loads import Accelerogram
 from alphacut.frame.structures.matrix import MatrixStructure
 
 TIGHT = 0.5

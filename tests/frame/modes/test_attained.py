@@ -8,7 +8,7 @@ from alphacut.frame import StoreyFrame, envelope
 from alphacut.frame.bounds.box import Box
 from alphacut.frame.methods.dual import DualProof
 from alphacut.frame.modes.superposition import modes_at
-from alphacut.frame.structures.loads import Accelerogram
+from alphacut.frame.records.history import Accelerogram
 from alphacut.fuzzy import Interval
 from tests.frame.bounds.test_remainders import masses_on_springs
 from tests.frame.calculus.test_taylor_model import exact_value

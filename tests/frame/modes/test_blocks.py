@@ -11,13 +11,13 @@ from alphacut.frame.modes.clusters import centred_matrices, enclose_subspaces
 from alphacut.frame.modes.intervening import BlockShares, oscillators, source_patterns
 from alphacut.frame.modes.models import MotionModels, inverse
 from alphacut.frame.modes.rest import coupling_bounds, response_slopes
+from alphacut.frame.records.history import Accelerogram
 from alphacut.frame.response.oscillators import (
     Oscillators,
     grid_over,
     read_response,
     response_ranges,
 )
-from alphacut.frame.structures.loads import Accelerogram
 
 TIGHT = 0.5
 """Share of a bound that something reaches: half the bound would be passed."""

@@ -8,6 +8,7 @@ import pytest
 
 from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF
 from alphacut.frame.calculus.unproved import UnprovedError
+from alphacut.frame.records.history import Accelerogram, History
 from alphacut.frame.response.duhamel import (
     ERROR_OF_INTEGRALS,
     FROM_RECURRENCE,
@@ -16,7 +17,6 @@ from alphacut.frame.response.duhamel import (
     responses_at_nodes,
     step_integrals,
 )
-from alphacut.frame.structures.loads import Accelerogram, History
 
 IDLE = 0.01
 """Share of a bound of rounding that the largest of some errors reaches at least."""

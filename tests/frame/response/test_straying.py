@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from alphacut.frame.records.history import History
 from alphacut.frame.response.duhamel import responses_at_nodes
 from alphacut.frame.response.oscillators import grid_over
 from alphacut.frame.response.straying import Response, narrowed_straying
-from alphacut.frame.structures.loads import History
 
 PARTS, TIME = 40, np.linspace(0, 1.2, 25)
 LOADS = {

@@ -6,7 +6,7 @@ import pytest
 from alphacut.base.errors import RefusedError
 from alphacut.frame import DualProof, MatrixStructure, Proof, envelope
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.structures.loads import Accelerogram
+from alphacut.frame.records.history import Accelerogram
 from alphacut.fuzzy import Interval
 from tests.frame.motions import exact_motions
 

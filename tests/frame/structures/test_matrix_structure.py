@@ -7,8 +7,9 @@ import pytest
 from scipy.sparse import coo_array
 
 from alphacut.frame import Accelerogram, Exact, LinearFlow, MatrixStructure, StoreyFrame, envelope
+from alphacut.frame.records.history import History
 from alphacut.frame.structures.linear import frequencies
-from alphacut.frame.structures.loads import Force, History
+from alphacut.frame.structures.loads import Force
 from alphacut.frame.structures.matrix import Monomial
 from alphacut.fuzzy import Interval
 

@@ -13,7 +13,7 @@ from alphacut.frame.boxes import boxes
 from alphacut.frame.envelope import Ends
 from alphacut.frame.methods.dual import DualProof
 from alphacut.frame.methods.proof import Proof
-from alphacut.frame.structures.loads import Accelerogram
+from alphacut.frame.records.history import Accelerogram
 from alphacut.frame.verification import self_test
 from alphacut.frame.verification.self_test import ContradictionError, Trial
 from alphacut.fuzzy import Crisp, Triangular

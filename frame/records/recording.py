@@ -1,18 +1,17 @@
-"""A recording of the ground's acceleration as its file holds it, its record and its measures."""
+"""A recording of the ground's acceleration as its file holds it, and its correction."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import ceil, pi
 from typing import Literal
 
 import numpy as np
 
 from alphacut.base.arrays import Array
-from alphacut.frame import Accelerogram, Exact, LinearFlow, StoreyFrame
-from alphacut.io.quantity import factor
+from alphacut.frame.records.history import Accelerogram
+from alphacut.frame.records.units import STANDARD_GRAVITY
 
 Baseline = Literal["none", "mean", "linear"]
 LARGEST_PEAK = 5.0
@@ -55,7 +54,7 @@ class Recording:
     def doubts(self) -> Iterator[str]:
         """Yield clauses on what a user should look at: unusual values, a vertical channel."""
         yield from self.remarks
-        peak_in_g = self.peak / float(factor("g", "m/s^2"))
+        peak_in_g = self.peak / STANDARD_GRAVITY
         if peak_in_g > LARGEST_PEAK:
             yield f"its peak is {peak_in_g:.3g} g: check the unit {self.unit}"
         if not USUAL_STEPS[0] <= self.step <= USUAL_STEPS[1]:
@@ -82,21 +81,3 @@ def arias_fractions(samples: Array, step: float) -> Array:
     left, right = samples[:-1], samples[1:]
     intensity = np.append(0.0, np.cumsum(left**2 + left * right + right**2)) * step / 3
     return np.asarray(intensity / intensity[-1] if intensity[-1] > 0 else intensity)
-
-
-POINTS_PER_PERIOD = 40
-"""A peak of a sine read at points this far apart is low by at most 1 − cos(π/40) = 0.3 %."""
-
-
-def spectral_acceleration(ground: Accelerogram, period: float, ratio: float) -> float:
-    """Pseudo-acceleration ω² max |u| of an oscillator at rest at the start, in m/s².
-
-    `period` T is undamped, in s; the damping `ratio` ζ is below 1. The free motion after the
-    record's end is included for one period.
-    """
-    omega, substeps = 2 * pi / period, max(1, ceil(ground.step * POINTS_PER_PERIOD / period))
-    substep, length = ground.step / substeps, ground.step * (len(ground.samples) - 1)
-    duration = substep * ceil((length + period) / substep)
-    oscillator = StoreyFrame([1.0], stiffness=[omega**2], damping_ratio=ratio, ground=ground)
-    flow = LinearFlow(oscillator, (), duration, substep, Exact(), by_modes=False)
-    return float(omega**2 * np.abs(flow.values(np.zeros((1, 0)))).max())

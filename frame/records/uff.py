@@ -13,9 +13,15 @@ import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, require
-from alphacut.io.measured import ModeRows
-from alphacut.records.recording import Recording
-from alphacut.records.text_file import NUMBER, choose_channel, decoded, read_bytes, recording_in_si
+from alphacut.frame.records.measured import ModeRows
+from alphacut.frame.records.recording import Recording
+from alphacut.frame.records.text_file import (
+    NUMBER,
+    choose_channel,
+    decoded,
+    read_bytes,
+    recording_in_si,
+)
 
 ENDINGS = (".uff", ".unv")
 HEAD_LINES = {55: 8, 58: 11}

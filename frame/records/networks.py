@@ -13,8 +13,8 @@ from __future__ import annotations
 import re
 from math import ceil
 
-from alphacut.records.recording import Recording
-from alphacut.records.text_file import ACCELERATION_UNITS, NUMBER, TextFile, recording_in_si
+from alphacut.frame.records.recording import Recording
+from alphacut.frame.records.text_file import ACCELERATION_UNITS, NUMBER, TextFile, recording_in_si
 
 PEER_HEAD_LINES = 12
 """Lines in which a head ends; most have four."""

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from alphacut.base.errors import RefusedError
-from alphacut.records.read import read_recording
-from tests.alphacut.records import samples as written
+from alphacut.frame.records.read import read_recording
+from tests.frame.records import samples as written
 
 NAMED = "NPTS=   400, DT=   .0050 SEC,"
 HEADS = (

@@ -17,8 +17,8 @@ from math import ceil
 import numpy as np
 
 from alphacut.base.arrays import Array
-from alphacut.records.recording import Recording
-from alphacut.records.text_file import TextFile, choose_channel, recording_in_si
+from alphacut.frame.records.recording import Recording
+from alphacut.frame.records.text_file import TextFile, choose_channel, recording_in_si
 
 FORTRAN = r"\(\s*(\d*)\s*[A-Za-z](\d+)(?:\.\d+\w*)?\s*\)"
 """Numbers in a line and characters of one, as in (8f10.6)."""

@@ -14,15 +14,14 @@ import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import require
-from alphacut.io.quantity import factor
-from alphacut.records.recording import Recording
-from alphacut.records.text_file import (
+from alphacut.frame.records.recording import Recording
+from alphacut.frame.records.text_file import (
     ACCELERATION_UNITS,
     TextFile,
-    acceleration_factor,
     read_bytes,
     recording_in_si,
 )
+from alphacut.frame.records.units import NEWTONS, SECONDS, acceleration_factor
 from alphacut.stochastic.particles.csv_columns import NUMBER
 
 TIME = r"\W*(?:time|t)\b\W*([a-zµ]*)\W*[,;\s]\W*"
@@ -87,7 +86,7 @@ def read_table(file: TextFile, step: float | None = None, unit: str = "") -> Rec
     columns = len(next(iter(table.rows.values())))
     match = HEAD.fullmatch(table.head) if columns == 2 else None
     time_unit, head_unit = match.groups() if match else ("", "")
-    unit, to_s = head_unit or unit, _factor_to_seconds(time_unit)
+    unit, to_s = head_unit or unit, SECONDS.get(time_unit or "s", 0.0)
     is_complete = to_s > 0 and acceleration_factor(unit) is not None
     if columns > 2 or not is_complete or (columns == 1 and step is None):
         value = table.head[:80] or f"{columns} columns without a head"
@@ -104,14 +103,6 @@ def read_table(file: TextFile, step: float | None = None, unit: str = "") -> Rec
         remarks += (f"its head, {table.head[:40]}, is not understood: the case's unit is taken",)
     name = "CSV" if match else "two columns"
     return recording_in_si(location, name, unit, step, numbers[:, 1], "", remarks)
-
-
-def _factor_to_seconds(unit: str) -> float:
-    """Factor of a unit of time, by default s; 0 of others."""
-    try:
-        return float(factor(unit or "s", "s"))
-    except ValueError:
-        return 0.0
 
 
 def _even_step(
@@ -147,13 +138,13 @@ def read_force_history(path: Path) -> tuple[float, Array, bool]:
     file = TextFile.from_bytes(path.name, read_bytes(path))
     table = _Table.of(file)
     match = FORCE_HEAD.fullmatch(table.head)
-    to_s = _factor_to_seconds(match[1]) if match and match[1] else 0.0
+    to_s = SECONDS.get(match[1], 0.0) if match and match[1] else 0.0
     if match is None or not table.rows or to_s == 0:
         raise file.refusal(table.start, table.head[:80] or "without a head", ALLOWED_FORCE)
-    try:
-        to_si = float(factor(match[2], "N" if match[2] else ""))
-    except ValueError as error:
-        raise file.refusal(table.start, table.head[:80], ALLOWED_FORCE, str(error)) from None
+    to_si = NEWTONS.get(match[2], 0.0) if match[2] else 1.0
+    if to_si == 0:
+        cure = f"units are {', '.join(NEWTONS)}"
+        raise file.refusal(table.start, table.head[:80], ALLOWED_FORCE, cure)
     numbers = table.numbers(file, 2)
     step, _ = _even_step(file, to_s * numbers[:, 0], [*table.rows], from_zero=True)
     samples = np.asarray(to_si * numbers[:, 1])

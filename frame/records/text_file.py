@@ -13,15 +13,11 @@ import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, require
-from alphacut.io.quantity import STANDARD_GRAVITY, factor
-from alphacut.records.recording import Recording
+from alphacut.frame.records.recording import Recording
+from alphacut.frame.records.units import acceleration_factor
 
 NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eEdD][-+]?[0-9]+)?")
 """A number as C, Python or FORTRAN writes it; D stands for E."""
-GRAVITY_UNIT = re.compile(r"(?:10\*?)?g(?:'s|s)?(/10|\*10)?", re.IGNORECASE)
-PER_SECOND_SQUARED = re.compile(
-    r"(cm|m)\s*/\s*(?:s(?:ec)?\s*/\s*s(?:ec)?|s(?:ec)?\s*(?:\^|\*\*)?\s*(?:2|²))", re.IGNORECASE
-)
 LONGEST_LINE = 10_000
 """Letters of a line; formats have about 80, and searches of a line take their square."""
 ACCELERATION_UNITS = "g, gal, cm/s^2 or m/s^2"
@@ -125,16 +121,3 @@ def read_bytes(path: Path) -> bytes:
     except OSError as error:
         reason = str(error.strerror or "unreadable").lower().removeprefix("is ")
         raise RefusedError(str(path), reason, "a file with a record") from None
-
-
-def acceleration_factor(unit: str) -> float | None:
-    """Factor to m/s² of a unit of acceleration as files of records write it; None if unknown."""
-    text = unit.strip().strip("()[]").strip().rstrip(".")
-    if match := GRAVITY_UNIT.fullmatch(text):
-        return float(STANDARD_GRAVITY) * {"": 1.0, "/10": 0.1}.get(match[1] or "", 10.0)
-    if match := PER_SECOND_SQUARED.fullmatch(text):
-        return {"cm": 0.01, "m": 1.0}[match[1].lower()]
-    try:
-        return float(factor("gal" if text.lower() in ("gal", "gals") else text, "m/s^2"))
-    except ValueError:
-        return None

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from alphacut.base.errors import RefusedError
-from alphacut.records.read import read_recording
-from alphacut.records.uff import phase_collinearity, uff_mode_rows
-from tests.alphacut.records.samples import uff55, uff58
+from alphacut.frame.records.read import read_recording
+from alphacut.frame.records.uff import phase_collinearity, uff_mode_rows
+from tests.frame.records.samples import uff55, uff58
 
 FLOORS = {"11.x": 1, "12.x": 2, "13.x": 3}
 SHAPE = np.array([0.4, 0.8, 1.0])

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from alphacut.base.errors import RefusedError, require
-from alphacut.records.cosmos import is_cosmos, read_cosmos
-from alphacut.records.networks import FORMATS
-from alphacut.records.recording import Recording
-from alphacut.records.tables import is_table, read_table
-from alphacut.records.text_file import TextFile, choose_channel, read_bytes, recording_in_si
-from alphacut.records.uff import is_universal, read_uff_record
+from alphacut.frame.records.cosmos import is_cosmos, read_cosmos
+from alphacut.frame.records.networks import FORMATS
+from alphacut.frame.records.recording import Recording
+from alphacut.frame.records.tables import is_table, read_table
+from alphacut.frame.records.text_file import TextFile, choose_channel, read_bytes, recording_in_si
+from alphacut.frame.records.uff import is_universal, read_uff_record
 
 READ = "PEER AT2, COSMOS, CSMIP, SMC, K-NET, ESM, miniSEED, SAC, UFF 58, CSV"
 MINISEED = re.compile(rb"[0-9 ]{6}[DRQM][ \0]|MS\x03")

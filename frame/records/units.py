@@ -1,0 +1,40 @@
+"""Units as files of records write them, and their factors to SI."""
+
+from __future__ import annotations
+
+import re
+
+STANDARD_GRAVITY = 9.80665
+"""In m/s², by the third General Conference on Weights and Measures, 1901."""
+METRES = {
+    "nm": 1e-9, "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "mm": 1e-3, "cm": 1e-2, "dm": 0.1, "m": 1.0,
+    "km": 1e3, "in": 0.0254, "inch": 0.0254, "inches": 0.0254, "ft": 0.3048, "foot": 0.3048,
+    "feet": 0.3048,
+}  # fmt: skip
+SECONDS = {
+    "ns": 1e-9, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "ms": 1e-3, "msec": 1e-3, "s": 1.0, "sec": 1.0,
+    "secs": 1.0, "second": 1.0, "seconds": 1.0, "min": 60.0, "h": 3600.0,
+}  # fmt: skip
+NEWTONS = {
+    "N": 1.0, "kN": 1e3, "MN": 1e6, "mN": 1e-3, "kgf": STANDARD_GRAVITY, "lbf": 4.4482216152605,
+    "kip": 4448.2216152605,
+}  # fmt: skip
+GRAVITY_UNIT = re.compile(r"(?:10\*?)?g(?:'s|s)?(/10|\*10)?", re.IGNORECASE)
+GALS = {"gal": 1e-2, "gals": 1e-2, "mgal": 1e-5}
+_SECOND = r"s(?:ec)?"
+PER_SECOND_SQUARED = re.compile(
+    rf"([a-zµμ]+?)\s*(?:/\s*{_SECOND}\s*/\s*{_SECOND}"
+    rf"|(?:/\s*{_SECOND}|[\s*·]\s*s)\s*(?:\^|\*\*)?\s*[-−]?[2²])",
+    re.IGNORECASE,
+)
+"""A length over a second squared, as cm/s^2, CM/SEC**2, cm/s/s or cm s-2."""
+
+
+def acceleration_factor(unit: str) -> float | None:
+    """Factor to m/s² of a unit of acceleration as files of records write it; None if unknown."""
+    text = unit.strip().strip("()[]").strip().rstrip(".")
+    if match := GRAVITY_UNIT.fullmatch(text):
+        return STANDARD_GRAVITY * {"": 1.0, "/10": 0.1}.get(match[1] or "", 10.0)
+    if match := PER_SECOND_SQUARED.fullmatch(text):
+        return METRES.get(match[1].lower())
+    return GALS.get(text.lower())

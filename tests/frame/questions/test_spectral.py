@@ -1,0 +1,24 @@
+"""Spectral acceleration of a record, against a dense integration."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from alphacut.frame import Accelerogram
+from alphacut.frame.questions.spectral import spectral_acceleration
+
+
+@pytest.mark.parametrize("period", [0.05, 0.3, 2.0])
+def test_peaks_are_those_of_a_dense_integration(period):
+    samples = np.random.default_rng(8).normal(size=61)
+    ground, omega, ratio = Accelerogram(0.02, samples), 2 * np.pi / period, 0.05
+
+    def rate(t, y):
+        load = np.interp(t, 0.02 * np.arange(61), samples, right=0.0)
+        return [y[1], -load - 2 * ratio * omega * y[1] - omega**2 * y[0]]
+
+    times = np.linspace(0, 1.2 + period, 4001)
+    step = min(0.002, period / 50)
+    motion = solve_ivp(rate, (0, times[-1]), [0, 0], t_eval=times, rtol=1e-9, max_step=step)
+    exact = omega**2 * abs(motion.y[0]).max()
+    assert spectral_acceleration(ground, period, ratio) == pytest.approx(exact, rel=4e-3)
