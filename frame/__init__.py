@@ -17,6 +17,7 @@ from alphacut.frame.methods.proof import Proof
 from alphacut.frame.methods.sampled import Sampled
 from alphacut.frame.propagation import METHODS, envelope, require_envelope
 from alphacut.frame.records.history import Accelerogram, History
+from alphacut.frame.records.suite import read_record, read_suite
 from alphacut.frame.structures.lagrangian import LagrangianSystem, pendulum
 from alphacut.frame.structures.loads import Force
 from alphacut.frame.structures.matrix import MatrixStructure
@@ -27,5 +28,5 @@ __all__ = [
     "INTEGRATORS", "METHODS", "Accelerogram", "Auto", "DualProof", "Envelope", "Exact", "Force",
     "GraphFollower", "History", "ImprovedFollower", "LagrangianFlow", "LagrangianSystem",
     "LinearFlow", "MatrixStructure", "Midpoint", "Output", "Parameter", "Proof", "Sampled",
-    "StoreyFrame", "envelope", "pendulum", "require_envelope",
+    "StoreyFrame", "envelope", "pendulum", "read_record", "read_suite", "require_envelope",
 ]  # fmt: skip

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import isclose
 from pathlib import Path
 from typing import Annotated, NamedTuple
 
@@ -16,8 +14,8 @@ from alphacut.base.errors import RefusedError, require, require_choice
 from alphacut.case.structure import Structure
 from alphacut.case.types import NotEmpty, OneOrMany, Section, Time, case_file, text
 from alphacut.frame import Force, History, StoreyFrame
-from alphacut.frame.records.read import read_recording
 from alphacut.frame.records.recording import Baseline, Recording
+from alphacut.frame.records.suite import MAX_RECORDS, read_recordings, require_distinct
 from alphacut.frame.records.tables import read_force_history
 from alphacut.frame.records.text_file import ACCELERATION_UNITS
 from alphacut.frame.records.units import acceleration_factor
@@ -142,11 +140,6 @@ def with_forces(
     return replace(structure, model=model, numbers=numbers, force_units=units)
 
 
-MAX_RECORDS = 500
-
-ENDING = re.compile(r"[^A-Za-z0-9_+-]+")
-
-
 @dataclass(frozen=True)
 class Scale:
     """Scale of every record: a factor, or the value in m/s² of the measure "PGA" or "Sa(T1)"."""
@@ -166,32 +159,8 @@ def _read_recordings(value: object, info: ValidationInfo) -> tuple[Recording, ..
     paths = sorted(path for path in folder.glob(pattern) if path.is_file())
     allowed += f"; 1 to {MAX_RECORDS} files"
     require(0 < len(paths) <= MAX_RECORDS, "", value, allowed)
-    end = f"_{channel}" if channel else ""
     step, unit = info.data.get("step"), info.data.get("unit") or ""
-    recordings: list[Recording] = []
-    errors: list[RefusedError] = []
-    for path in paths:
-        try:
-            recording = read_recording(path, channel, step, unit)
-            remarks = (*recording.remarks, *_own_values(recording, step, unit))
-            name = ENDING.sub("_", path.stem) + end
-            recordings.append(replace(recording, name=name, remarks=remarks))
-        except RefusedError as error:
-            errors.append(error)
-    for first in errors[:1]:  # all bad files of a folder at once, the first with its reason
-        names = ", ".join(error.key.partition(",")[0] for error in errors[1:])
-        # in the cure, which is never cut off
-        cure = "; ".join(filter(None, [names and f"bad as well: {names}", first.cure]))
-        raise RefusedError(first.key, first.value, first.allowed, cure)
-    return tuple(recordings)
-
-
-def _own_values(recording: Recording, step: float | None, unit: str) -> Iterator[str]:
-    """Yields a clause on the step and on the unit of a file that states them otherwise."""
-    if step and not isclose(step, recording.step, rel_tol=1e-6):
-        yield f"its own step, {recording.step:g} s, is taken, not records.step"
-    if unit and acceleration_factor(unit) != acceleration_factor(recording.unit):
-        yield f"its own unit, {recording.unit}, is taken, not records.unit"
+    return read_recordings(paths, channel=channel, step=step, unit=unit)
 
 
 def _parse_unit(value: object, _: ValidationInfo) -> str:
@@ -239,6 +208,4 @@ class RecordsSection(Section):
 
     def require_consistent(self) -> None:
         """Refuses two files of the same name, which is that of their results."""
-        names = [recording.name for recording in self.recordings]
-        repeated = ", ".join(sorted({name for name in names if names.count(name) > 1}))
-        require(not repeated, "records.files", repeated, "each file once, by its name")
+        require_distinct("records.files", self.recordings)

@@ -14,8 +14,7 @@ from pydantic import Field, PlainValidator, ValidationInfo
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, require, require_choice
 from alphacut.case.types import Modulus, NotEmpty, OneOrMany, Quantity, Section, case_file, text
-from alphacut.frame import Accelerogram, MatrixStructure, StoreyFrame
-from alphacut.frame.records.read import read_recording
+from alphacut.frame import Accelerogram, MatrixStructure, StoreyFrame, read_record
 from alphacut.frame.structures.lagrangian import LagrangianSystem, pendulum
 from alphacut.frame.structures.quantities import Output
 from alphacut.frame.structures.storey import SYMBOLS
@@ -188,10 +187,10 @@ class Structure:
 def read_accelerogram(value: object, info: ValidationInfo) -> Accelerogram:
     """Record of a file that the case names; warns of what is unusual in it."""
     path = case_file(value, info)
-    recording = read_recording(path)
-    for doubt in recording.doubts():
-        warnings.warn(f"of {path.name} {doubt}", stacklevel=2)
-    return recording.accelerogram()
+    ground = read_record(path)
+    for remark in ground.remarks:
+        warnings.warn(f"of {path.name} {remark}", stacklevel=2)
+    return ground
 
 
 def damping_ratios_by_name(

@@ -108,7 +108,15 @@ class History:
         return np.asarray(np.where(has_started & ~has_ended, inside, 0.0))
 
 
+@dataclass(frozen=True, eq=False)
 class Accelerogram(History):
-    """Acceleration of the ground, samples in m/s², linear between them and zero outside them."""
+    """Acceleration of the ground, samples in m/s², linear between them and zero outside them.
+
+    Args:
+        name: What a table or a message calls it; empty, or of `read_record` that of the file.
+        remarks: Clauses on what is unusual in the file, or was taken for granted.
+    """
 
     key: ClassVar[str] = "accelerogram"
+    name: str = field(default="", kw_only=True)
+    remarks: tuple[str, ...] = field(default=(), kw_only=True, repr=False)

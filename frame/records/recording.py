@@ -64,13 +64,13 @@ class Recording:
 
     def accelerogram(self, baseline: Baseline = "none") -> Accelerogram:
         """Record of these samples, without their mean or their straight line of least squares."""
-        if baseline == "none":
-            return Accelerogram(self.step, self.samples)
-        samples = self.samples - self.samples.mean()
+        samples = self.samples
+        if baseline != "none":
+            samples = samples - samples.mean()
         if baseline == "linear":
             time = np.arange(len(samples)) - (len(samples) - 1) / 2  # in steps, of mean 0
-            samples -= time * (time @ samples) / max(float(time @ time), 1.0)
-        return Accelerogram(self.step, samples)
+            samples = samples - time * (time @ samples) / max(float(time @ time), 1.0)
+        return Accelerogram(self.step, samples, name=self.name, remarks=tuple(self.doubts()))
 
 
 def arias_fractions(samples: Array, step: float) -> Array:

@@ -124,7 +124,7 @@ def test_what_is_unusual_in_a_record_is_a_warning(tmp_path):
     warnings = "\n".join(warning for record in records for warning in record.warnings)
     assert "of record late its times begin at 10 s" in warnings
     assert "of record late its peak is 6.12 g" in warnings
-    assert "of record late its own unit, m/s^2, is taken, not records.unit" in warnings
+    assert "of record late its own unit, m/s^2, is taken, not g" in warnings
     assert "records.step" not in warnings
 
 

@@ -1,0 +1,163 @@
+"""Records of the ground's acceleration from files: one, and a suite of them."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from glob import glob
+from math import isclose
+from pathlib import Path
+from typing import get_args
+
+from alphacut.base.errors import RefusedError, checked_number, require, require_choice
+from alphacut.frame.records.history import Accelerogram
+from alphacut.frame.records.read import read_recording
+from alphacut.frame.records.recording import Baseline, Recording
+from alphacut.frame.records.text_file import ACCELERATION_UNITS
+from alphacut.frame.records.units import acceleration_factor
+
+MAX_RECORDS = 500
+"""Files of a suite; more are a slip in the pattern."""
+NO_NAME = re.compile(r"[^A-Za-z0-9_+-]+")
+"""Characters of a file's name that the name of its results does not have."""
+
+
+def read_record(
+    path: str | Path,
+    *,
+    channel: str = "",
+    step: float | None = None,
+    unit: str = "",
+    baseline: Baseline = "none",
+) -> Accelerogram:
+    """Read a record of the ground's acceleration from a file as networks publish them.
+
+    Read are PEER AT2, COSMOS, CSMIP, SMC, K-NET, ESM, miniSEED, SAC, UFF 58 and tables (CSV); the
+    marks in a file say which it is.
+
+    Args:
+        path: The file.
+        channel: Number, orientation or code of the channel, as "1", "90 deg" or "HNE", in a file
+            of several.
+        step: Time between samples, in s, of a file that does not state it.
+        unit: Unit of a file that states none, as "g", "gal" or "cm/s^2".
+        baseline: What is subtracted from the samples: "none", their "mean", or their straight line
+            of least squares ("linear").
+
+    Returns:
+        Samples in m/s². `name` is the file's without ending; `remarks` are clauses on what is
+        unusual, or was taken for granted.
+
+    Raises:
+        RefusedError: The file cannot be read, is of another format, or does not fit its own head;
+            the message names the line.
+
+    Example:
+        >>> ground = read_record("cases/suite/record-2001.AT2")
+        >>> ground.name, len(ground.samples), ground.step
+        ('record-2001', 501, 0.02)
+    """
+    _require_arguments(step, unit, baseline=baseline)
+    (recording,) = read_recordings([Path(path)], channel=channel, step=step, unit=unit)
+    return recording.accelerogram(baseline)
+
+
+def read_suite(
+    files: str | Path | Sequence[str | Path],
+    *,
+    channel: str = "",
+    step: float | None = None,
+    unit: str = "",
+    baseline: Baseline = "none",
+) -> tuple[Accelerogram, ...]:
+    """Read a suite of records: all files that the patterns match, each pattern's by their names.
+
+    Args:
+        files: A file or a pattern, as "records/*.AT2", or several of them.
+        channel: Channel of every file, as of `read_record`.
+        step: Time between samples, in s, of files that do not state it.
+        unit: Unit of files that state none.
+        baseline: What is subtracted from each record, as of `read_record`.
+
+    Raises:
+        RefusedError: There is no file, or two have the same name; else as `read_record`, with
+            every file that cannot be read named at once.
+
+    Example:
+        >>> suite = read_suite("cases/suite/*.AT2", baseline="mean")
+        >>> len(suite), suite[0].name
+        (11, 'record-2001')
+    """
+    _require_arguments(step, unit, baseline=baseline)
+    paths: list[Path] = []
+    for pattern in [files] if isinstance(files, str | Path) else files:
+        is_file = Path(pattern).is_file()
+        paths += [Path(pattern)] if is_file else map(Path, sorted(glob(str(pattern))))
+    recordings = read_recordings(paths, channel=channel, step=step, unit=unit, shown=files)
+    require_distinct("files", recordings)
+    return tuple(recording.accelerogram(baseline) for recording in recordings)
+
+
+def read_recordings(
+    paths: Sequence[Path],
+    *,
+    channel: str = "",
+    step: float | None = None,
+    unit: str = "",
+    shown: object = None,
+) -> tuple[Recording, ...]:
+    """Read a channel of each file, in their order.
+
+    `channel`, `step` in s and `unit` are those of `read_record`; `shown` are the files as the
+    caller gave them, for the message that there is none.
+
+    Raises:
+        RefusedError: There is no file, or more than `MAX_RECORDS`; or some cannot be read: all of
+            them at once, the first with its reason.
+    """
+    is_suite = 0 < len(paths) <= MAX_RECORDS
+    require(is_suite, "files", shown, allowed=f"1 to {MAX_RECORDS} files, and {len(paths)} match")
+    recordings: list[Recording] = []
+    errors: list[RefusedError] = []
+    for path in paths:
+        try:
+            recording = read_recording(path, channel, step, unit)
+        except RefusedError as error:
+            errors.append(error)
+            continue
+        remarks = (*recording.remarks, *_own_values(recording, step, unit))
+        name = NO_NAME.sub("_", path.stem) + (f"_{channel}" if channel else "")
+        recordings.append(replace(recording, name=name, remarks=remarks))
+    if errors:
+        first, *others = errors
+        cures = [first.cure] if first.cure else []
+        if others:  # in the cure, which is never cut off
+            names = ", ".join(error.key.partition(",")[0] for error in others)
+            cures.insert(0, f"bad as well: {names}")
+        raise RefusedError(first.key, first.value, first.allowed, "; ".join(cures))
+    return tuple(recordings)
+
+
+def require_distinct(key: str, recordings: Sequence[Recording]) -> None:
+    """Refuse two recordings of the same name, which is that of their results."""
+    counts = Counter(recording.name for recording in recordings)
+    repeated = ", ".join(sorted(name for name, count in counts.items() if count > 1))
+    require(not repeated, key, repeated, allowed="each file once, by its name")
+
+
+def _require_arguments(step: float | None, unit: str, *, baseline: str) -> None:
+    if step is not None:
+        checked_number("step", step, positive=True)
+    is_known = not unit or acceleration_factor(unit) is not None
+    require(is_known, "unit", unit, allowed=f"a unit of {ACCELERATION_UNITS}")
+    require_choice("baseline", baseline, get_args(Baseline))
+
+
+def _own_values(recording: Recording, step: float | None, unit: str) -> Iterator[str]:
+    """Yield a clause on a step and on a unit that the file states otherwise than the caller."""
+    if step and not isclose(step, recording.step, rel_tol=1e-6):
+        yield f"its own step, {recording.step:g} s, is taken, not {step:g} s"
+    if unit and acceleration_factor(unit) != acceleration_factor(recording.unit):
+        yield f"its own unit, {recording.unit}, is taken, not {unit}"

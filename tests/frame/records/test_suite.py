@@ -1,0 +1,67 @@
+"""Records and suites read from files in Python."""
+
+import numpy as np
+import pytest
+
+from alphacut.base.errors import RefusedError
+from alphacut.frame import Accelerogram, read_record, read_suite
+
+
+def write_column(path, samples):
+    path.write_text("".join(f"{x:.17g}\n" for x in samples))
+    return path
+
+
+def test_a_column_is_read_with_its_step_and_unit(tmp_path, rng):
+    samples = rng.normal(size=30)
+    path = write_column(tmp_path / "north south.txt", samples)
+    record = read_record(path, step=0.02, unit="gal")
+    assert isinstance(record, Accelerogram)
+    assert (record.name, record.step) == ("north_south", 0.02)
+    assert record.samples == pytest.approx(0.01 * samples, rel=1e-15)
+    centred = read_record(str(path), step=0.02, unit="gal", baseline="mean")
+    assert centred.samples == pytest.approx(0.01 * (samples - samples.mean()), abs=1e-15)
+
+
+def test_a_suite_is_read_by_the_names_of_its_files(tmp_path, rng):
+    all_samples = {name: rng.normal(size=10) for name in ("b", "a", "c")}
+    for name, samples in all_samples.items():
+        write_column(tmp_path / f"{name}.txt", samples)
+    options = {"step": 0.02, "unit": "m/s^2", "baseline": "mean"}
+    suite = read_suite(f"{tmp_path}/*.txt", **options)
+    assert [record.name for record in suite] == ["a", "b", "c"]
+    for record in suite:
+        samples = all_samples[record.name]
+        assert record.samples == pytest.approx(samples - samples.mean(), abs=1e-15)
+    listed = read_suite([tmp_path / "c.txt", f"{tmp_path}/[ab].txt"], **options)
+    assert [record.name for record in listed] == ["c", "a", "b"]
+
+
+def test_what_is_unusual_is_a_remark(tmp_path):
+    path = tmp_path / "late.csv"
+    rows = "".join(f"{10 + 0.02 * k:.2f},{60 * np.sin(k)}\n" for k in range(80))
+    path.write_text(f"time [s],acceleration [m/s^2]\n{rows}")
+    remarks = "; ".join(read_record(path, unit="g").remarks)
+    for words in ("begin at 10 s", "peak is 6.12 g", "its own unit, m/s^2, is taken, not g"):
+        assert words in remarks
+
+
+@pytest.mark.parametrize(
+    ("files", "options", "message"),
+    [
+        ("*.none", {}, r"files is .*\*.none; allowed: 1 to 500 files, and 0 match"),
+        ([], {}, "files is .*0 match"),
+        (["a.txt", "a.txt"], {}, "files is a; allowed: each file once"),
+        ("a.txt", {"step": 0.0}, "step is 0.0; allowed: finite numbers greater than 0"),
+        ("a.txt", {"step": float("nan")}, "step is nan"),
+        ("a.txt", {"baseline": "median"}, "baseline is median; allowed: none, mean, linear"),
+        ("a.txt", {"unit": "furlongs"}, "furlongs"),
+        ("missing.txt", {}, "0 match"),
+    ],
+)
+def test_other_files_and_arguments_are_refused(tmp_path, files, options, message):
+    write_column(tmp_path / "a.txt", [1.0, 2.0])
+    is_one = isinstance(files, str)
+    paths = f"{tmp_path}/{files}" if is_one else [f"{tmp_path}/{name}" for name in files]
+    with pytest.raises(RefusedError, match=message):
+        read_suite(paths, **{"step": 0.02, "unit": "g"} | options)
