@@ -11,8 +11,8 @@ from alphacut.case.motion import Identify
 from alphacut.case.structure import Structure
 from alphacut.frame.identify import MeasuredMode, RefutedError, identify, measured_mode
 from alphacut.frame.identify.identify import widest_cut
-from alphacut.frame.records.measured import ModeRows, mode_rows
-from alphacut.frame.records.uff import ENDINGS, uff_mode_rows
+from alphacut.frame.identify.mode_rows import ModeRows, mode_rows
+from alphacut.frame.identify.uff_modes import ENDINGS, uff_mode_rows
 from alphacut.frame.structures.quantities import of_storey_frame
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.stages.store import CutsResult, Numbers, Values

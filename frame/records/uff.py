@@ -1,128 +1,38 @@
-"""Universal files: mode shapes (data sets 55) and time histories (data sets 58, text or binary)."""
+"""Universal files: their data sets, and time histories (data sets 58, text or binary)."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from io import BytesIO
 from itertools import takewhile
-from math import ceil
-from pathlib import Path
 
 import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, require
-from alphacut.frame.records.measured import ModeRows
 from alphacut.frame.records.recording import Recording
 from alphacut.frame.records.text_file import (
     NUMBER,
     choose_channel,
     decoded,
-    read_bytes,
     recording_in_si,
 )
 
-ENDINGS = (".uff", ".unv")
 HEAD_LINES = {55: 8, 58: 11}
 """Lines of the head of each data set that is read."""
-NORMAL_MODE, COMPLEX_MODES = 2, (3, 7)
 TIME_HISTORY, TIME = 1, 17
 """Function type of a time history, and type of an axis of times, in data set 58."""
 BIG_ENDIAN, DOUBLE, COMPLEX = 2, (4, 6), (5, 6)
 """Codes of byte order and of values."""
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
-MIN_COLLINEARITY = 0.9
-"""Modal phase collinearity below which a complex shape has no real one (Pappa, Elliott 1993)."""
 EVEN = 1e-3
 """Fraction of a step by which times may be uneven besides the rounding of their digits."""
 
 
-def uff_mode_rows(path: Path, floors: Mapping[str, int]) -> tuple[ModeRows, ...]:
-    """Reads the modes of a universal file (data sets 55), one measurement each, by rising number.
-
-    `floors` has the floor of each measured unknown, named NODE.DIRECTION, as {"12.x": 1}. Complex
-    shapes are refused below a modal phase collinearity of `MIN_COLLINEARITY`.
-    """
-    content = read_bytes(path)
-    try:
-        sets = [_parse_shape(*rows) for rows in _data_sets(content, 55)]
-    except (ValueError, IndexError) as error:
-        allowed = "data sets 55 of a universal file"
-        raise RefusedError(path.name, str(error)[:80], allowed) from None
-    modes: dict[int, ModeRows] = {}  # by number
-    for mode, frequency, amplitudes in filter(None, sets):
-        is_new, key = mode not in modes, f"{path.name}, data set 55"
-        require(is_new, key, f"mode {mode} again", "each mode once")
-        key = f"{path.name}, mode {mode}"
-        is_positive, value = 0 < frequency < np.inf, f"{frequency:g} Hz"
-        require(is_positive, f"{key}: frequency", value, "above 0 Hz")
-        shape = _real_amplitudes(key, amplitudes, floors)
-        modes[mode] = ModeRows(mode, np.array([frequency]), shape if len(shape) > 1 else {})
-    require(bool(modes), path.name, "without a mode", "a data set 55 of a normal or complex mode")
-    return tuple(modes[number] for number in sorted(modes))
-
-
-Shape = tuple[int, float, dict[str, complex]]
-"""A data set 55: number of the mode, frequency in Hz, amplitudes by NODE.DIRECTION."""
-
-
-def _parse_shape(head: list[str], values: bytes | list[str]) -> Shape | None:
-    """The mode shape of a data set 55; None of another analysis."""
-    _, analysis, _, _, kind, size = (int(word) for word in head[5].split()[:6])
-    if analysis not in (NORMAL_MODE, *COMPLEX_MODES):
-        return None
-    reals, parts = _floats(head[7]), 2 if kind in COMPLEX else 1
-    # of a complex mode the eigenvalue s has |s|/2π
-    hertz = reals[0] if analysis == NORMAL_MODE else abs(complex(*reals[:2])) / (2 * np.pi)
-    amplitudes: dict[str, complex] = {}
-    lines = [str(line) for line in values if str(line).strip()]
-    step = 1 + ceil(parts * size / 6)  # lines of a node: its number, then six numbers a line
-    for start in range(0, len(lines), step):
-        numbers = _floats(" ".join(lines[start + 1 : start + step]))
-        if len(numbers) != parts * size:
-            raise ValueError(f"{len(numbers)} numbers at node {lines[start].strip()}")
-        shape = [complex(*numbers[k : k + parts]) for k in range(0, parts * size, parts)]
-        node = int(lines[start])
-        if f"{node}.x" in amplitudes:
-            raise ValueError(f"node {node} twice in a mode")
-        amplitudes |= {f"{node}.{axis}": x for axis, x in zip(DIRECTIONS, shape, strict=False)}
-    return int(head[6].split()[3]), hertz, amplitudes
-
-
-def _floats(line: str) -> list[float]:
+def floats(line: str) -> list[float]:
+    """Return the numbers of a line, as FORTRAN or C write them."""
     return [float(number.upper().replace("D", "E")) for number in NUMBER.findall(line)]
-
-
-def _real_amplitudes(
-    key: str, amplitudes: Mapping[str, complex], floors: Mapping[str, int]
-) -> dict[int, Array]:
-    """Real amplitude of a mode, of shape (1,), on each floor of the unknowns in `floors`."""
-    missing = [name for name in floors if name.lower() not in amplitudes]
-    value, allowed = f"without {', '.join(missing)}", f"unknowns of {[*amplitudes][:8]} …"
-    require(not missing, key, value, allowed)
-    values = np.array([amplitudes[name.lower()] for name in floors])
-    require(np.isfinite(values).all(), key, "not finite", "finite amplitudes")
-    collinearity = phase_collinearity(values)
-    allowed = f"a modal phase collinearity from {MIN_COLLINEARITY:g} on"
-    require(collinearity >= MIN_COLLINEARITY, key, f"complex: {collinearity:.3f}", allowed)
-    # the real part, after a turn of all phases that makes it largest
-    turn = np.exp(-0.5j * np.angle((values**2).sum()))
-    real_parts = (values * turn).real
-    return {floor: real_parts[k : k + 1] for k, floor in enumerate(floors.values())}
-
-
-def phase_collinearity(shape: Array) -> float:
-    """Modal phase collinearity of a complex shape, 1 where all phases are equal or opposite.
-
-    (λ₁ − λ₂)²/(λ₁ + λ₂)² with the eigenvalues λ of the covariance of real and imaginary parts
-    (Pappa, Elliott 1993).
-    """
-    parts = np.stack([shape.real, shape.imag])
-    covariance = parts @ parts.T
-    difference = (covariance[0, 0] - covariance[1, 1]) ** 2 + 4 * covariance[0, 1] ** 2
-    total = np.trace(covariance) ** 2
-    return float(difference / total) if total > 0 else 1.0
 
 
 def is_universal(content: bytes) -> bool:
@@ -137,7 +47,7 @@ def read_uff_record(name: str, content: bytes, channel: str = "") -> Recording:
     `channel` is NODE.DIRECTION of the response, as "7.x"; it may be left out where there is one.
     """
     try:
-        parsed = [_parse_series(*rows) for rows in _data_sets(content, 58)]
+        parsed = [_parse_series(*rows) for rows in data_sets(content, 58)]
     except (ValueError, IndexError) as error:
         raise RefusedError(name, str(error)[:80], "data sets 58 of a universal file") from None
     sets = {series.name: series for series in parsed}
@@ -170,7 +80,7 @@ class _Series:
     samples: Array
 
 
-def _data_sets(content: bytes, number: int) -> Iterator[tuple[list[str], bytes | list[str]]]:
+def data_sets(content: bytes, number: int) -> Iterator[tuple[list[str], bytes | list[str]]]:
     """Yields the head of each data set of a number, and its values: lines, or bytes of a 58b.
 
     The head of a data set in bytes ends with their byte order, < or >.
@@ -211,7 +121,7 @@ def _parse_series(head: list[str], values: bytes | list[str]) -> _Series:
         times = None if is_even else table["time"].astype(float)
         samples = table["value"][:, 0].astype(float)
     else:
-        numbers = np.array([number for line in values for number in _floats(line)])
+        numbers = np.array([number for line in values for number in floats(line)])
         rows = numbers[: count * columns]  # what follows is padding
         rows = rows[: len(rows) // columns * columns].reshape(-1, columns)
         times = None if is_even else rows[:, 0]

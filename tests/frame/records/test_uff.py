@@ -5,62 +5,13 @@ import pytest
 
 from alphacut.base.errors import RefusedError
 from alphacut.frame.records.read import read_recording
-from alphacut.frame.records.uff import phase_collinearity, uff_mode_rows
-from tests.frame.records.samples import uff55, uff58
-
-FLOORS = {"11.x": 1, "12.x": 2, "13.x": 3}
-SHAPE = np.array([0.4, 0.8, 1.0])
-
-
-def test_collinearity_of_a_turned_shape_is_one_and_of_a_running_wave_zero():
-    assert phase_collinearity(SHAPE * np.exp(0.7j)) == pytest.approx(1.0)
-    assert phase_collinearity(np.exp(1j * np.array([0, np.pi / 2]))) == pytest.approx(0, abs=1e-12)
+from tests.frame.records.samples import uff58
 
 
 def saved(folder, content):
     path = folder / "record.uff"
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
     return path
-
-
-def modes_of(folder, *sets, floors=FLOORS):
-    return uff_mode_rows(saved(folder, "".join(sets)), floors)
-
-
-@pytest.mark.parametrize("size", [3, 6])
-def test_modes_are_read_with_their_floors(tmp_path, size):
-    sets = (uff55(k, [*SHAPE, 9.0], frequency=1.5 * k, size=size) for k in (2, 1))
-    first, second = modes_of(tmp_path, *sets)
-    assert [first.mode, second.mode] == [1, 2]
-    assert second.frequencies == pytest.approx([3.0])
-    assert [first.amplitudes[k][0] for k in (1, 2, 3)] == pytest.approx(SHAPE)
-
-
-@pytest.mark.parametrize("size", [3, 6])
-def test_a_complex_shape_is_turned_to_its_real_one_or_refused(tmp_path, size):
-    changes = {"eigenvalue": -0.1 + 6.0j, "size": size}
-    phases = np.exp(1j * np.array([0.3, 0.3, 0.3, 0.0]))
-    (row,) = modes_of(tmp_path, uff55(1, phases * [*SHAPE, 9.0], **changes))
-    ratios = [row.amplitudes[k][0] / row.amplitudes[3][0] for k in (1, 2)]
-    assert ratios == pytest.approx(SHAPE[:2], rel=1e-5)  # six digits in the file
-    assert row.frequencies == pytest.approx(abs(-0.1 + 6.0j) / (2 * np.pi), rel=1e-5)
-    phases[1] *= np.exp(1.2j)
-    with pytest.raises(RefusedError, match="complex: 0"):
-        modes_of(tmp_path, uff55(1, phases * [*SHAPE, 9.0], **changes))
-
-
-def test_modes_that_are_not_there_are_refused(tmp_path):
-    mode = uff55(1, [*SHAPE, 9.0])
-    for sets, floors, words in (
-        ([mode], {"99.x": 1}, r"without 99\.x"),
-        ([mode, mode], FLOORS, "mode 1 again"),
-        ([uff55(1, [*SHAPE, 9.0], nodes=(11, 12, 13, 12))], FLOORS, "node 12 twice"),
-        (["no universal file\n"], FLOORS, "without a mode"),
-        ([mode.replace("         3\n", "         6\n", 1)], FLOORS, "data sets 55"),
-        ([mode.replace("1.50000E+00", "0.00000E+00", 1)], FLOORS, "frequency is 0 Hz"),
-    ):
-        with pytest.raises(RefusedError, match=words):
-            modes_of(tmp_path, *sets, floors=floors)
 
 
 WAVE = np.sin(9 * 0.005 * np.arange(400))
