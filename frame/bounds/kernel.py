@@ -210,7 +210,7 @@ def examine(
     d, m, q = radius.shape[1], tables.shape[1], tables.shape[3]
     code, value = np.zeros(len(column), np.int64), np.zeros(len(column))
     bound = np.zeros(len(column))
-    J, H, g, S, third_change, second_change = (
+    J, H, g, S, slope_margin, second_change = (
         np.empty(q), np.empty((d, d)), np.empty(d), np.empty((d, d)), np.empty(d), np.empty(d),
     )  # fmt: skip
     work, L = np.empty((3, d)), np.empty((d, d))
@@ -225,21 +225,23 @@ def examine(
                 if o != before:
                     expand_output(waves[row], tables[b, o], J, H)
                     before = o
-                for i in range(d):  # slope changes over the box: by H; twice that by third order
-                    third_change[i] = second_change[i] = 0.0
+                # With the third derivatives |T_ijk| at most `third`, the slope along axis i differs
+                # from g_i by Σ |H_ij| r_j and, by Taylor's theorem, Σ |T_ijk| r_j r_k / 2 at most.
+                for i in range(d):
+                    third_change = second_change[i] = 0.0
                     for j in range(d):
                         second_change[i] += abs(H[i, j]) * r[j]
                         for k in range(d):
-                            third_change[i] += third[node, o, i, j, k] * r[j] * r[k]
-                    missing += third_change[i] * r[i] / 6
+                            third_change += third[node, o, i, j, k] * r[j] * r[k]
+                    slope_margin[i] = third_change / 2 + margin[node, o, 1 + i]
+                    missing += third_change * r[i] / 6
                 f, aim = side * J[0], target[node * 2 * m + column[item]]
                 faces, stride, is_monotone_inside = 0, 1, False
                 for i in range(d):
                     g[i] = side * J[1 + i]
                     for j in range(d):
                         S[i, j] = side * H[i, j]
-                    slope_margin = third_change[i] / 2 + margin[node, o, 1 + i]
-                    if r[i] > 0 and abs(g[i]) > second_change[i] + slope_margin:
+                    if r[i] > 0 and abs(g[i]) > second_change[i] + slope_margin[i]:
                         up = 1 if g[i] > 0 else 0
                         if edges[b, up, i]:
                             faces += stride * (1 + up)
@@ -267,8 +269,7 @@ def examine(
                     continue
                 largest_weight = -1.0  # bisect along the axis that adds most to what is not known
                 for i in range(d):
-                    slope_margin = third_change[i] / 2 + margin[node, o, 1 + i]
-                    weight = r[i] * (2 * slope_margin + second_change[i] / 2)
+                    weight = r[i] * (2 * slope_margin[i] + second_change[i] / 2)
                     if r[i] > 0 and weight > largest_weight:
                         largest_weight, code[item] = weight, 1 + i
     return code, value, bound
