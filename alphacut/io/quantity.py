@@ -108,7 +108,7 @@ def factor(unit: str, si: str) -> Decimal:
         raise ValueError(f'the unit "{unit}" {measured} no unit of {QUANTITIES[si].name}') from None
 
 
-def _pint_target(one_unit: pint.Quantity[Decimal], si: str) -> str:
+def _pint_target(one_unit: pint.Quantity, si: str) -> str:
     """Return the unit to which Pint must convert a unit so that the result is in the SI unit `si`.
 
     Pint's radian is the number 1, so that it takes 1 rad/s for 1 Hz, and 1 Hz for 1 rad/s. A
