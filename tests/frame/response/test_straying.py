@@ -110,3 +110,53 @@ def test_values_off_chords_lie_in_their_ranges(load, spread, fall, rng):
     more = off[0] * np.abs(G.real) + off[1] * np.abs(G.imag)
     assert (low <= ((kappa * G).real - more).min(1) + 1e-15).all()
     assert (high >= ((kappa * G).real + more).max(1) - 1e-15).all()
+
+
+@pytest.mark.parametrize("order", [0, 1, 2])
+def test_resonance_between_two_points_of_a_grid_is_in_the_bound(order, rng):
+    """A mode strays most at a frequency between the grid's two, in which it hardly resonates.
+
+    The load has many samples within a step, so that the bound consists of what the response is off
+    the chord of the step there, and of what that may be between the frequencies.
+    """
+    middle = rng.uniform(15, 20)
+    step = (TIME[1] - TIME[0]) / PARTS
+    samples = np.sin(middle * np.arange(0.0, TIME[-1] + step, step))
+    load = History(step, samples)
+    width = rng.uniform(0.15, 0.25)
+    sigma = grid_over((middle * (1 - width), middle * (1 + width)), (0.0, 0.0), (2, 1)).sigma
+    response = Response(sigma, load, order, 1 / (1j * sigma.imag[None]), np.zeros((2, 1)))
+    bound = response.line_deviation(TIME)[1:, 0]
+    fine = np.linspace(TIME[0], TIME[-1], PARTS * (len(TIME) - 1) + 1)
+    for omega in middle * np.linspace(1 - width, 1 + width, 11):
+        sigma = np.array([1j * omega])
+        rho = responses_at_nodes(sigma, load, fine, 0)[0][0, :, 0]
+        y = (sigma**order * rho).imag / omega
+        off = np.abs(y - np.interp(fine, TIME, y[::PARTS]))[1:].reshape(-1, PARTS).max(1)
+        assert (off <= bound * (1 + 1e-9) + 1e-15).all()
+
+
+def test_values_off_chords_between_two_points_of_a_grid_are_in_their_range(rng):
+    """Of free oscillation, exp(i ω t) off its chord is a phase at late times, a cosine with κ.
+
+    With κ turned so that the cosine is highest between the two frequencies of the grid, where each
+    value of the grid is smaller by (h t)²/8 of it; h is the distance of the frequencies.
+    """
+    omega, parts = rng.uniform(8, 12), 4
+    nodes = rng.uniform(60, 100) + np.linspace(0.0, 0.4, parts + 1)
+    late = nodes[parts // 2]
+    h = rng.uniform(0.1, 0.3) / late
+    chord = np.interp(np.arange(parts + 1), [0, parts], [0.0, 1.0])
+
+    def off_the_chord(omega):
+        motion = np.exp(1j * omega * nodes)
+        return motion - (1 - chord) * motion[0] - chord * motion[-1]
+
+    kappa = np.exp(-1j * np.angle(off_the_chord(omega)[parts // 2]))
+    sigma = grid_over((omega - h / 2, omega + h / 2), (0.0, 0.0), (2, 1)).sigma
+    response = Response(sigma, None, 0, np.full((1, *sigma.shape), kappa), np.zeros((2, 1)))
+    low, high = response.off_chords(nodes, parts)
+    for at in omega + h * np.linspace(-0.5, 0.5, 21):
+        off = (kappa * off_the_chord(at)).real
+        assert (low[:, 0] <= off + 1e-12).all()
+        assert (off - 1e-12 <= high[:, 0]).all()
