@@ -14,6 +14,7 @@ from functools import cached_property
 from hashlib import sha256
 from math import comb
 from threading import Lock
+from typing import NamedTuple
 
 import numpy as np
 
@@ -172,6 +173,41 @@ def subspace_series(block: Ints, degree: int, centre: CentredMatrices, lower: Se
     return [rate, shape, mass_shape]
 
 
+class RightSides(NamedTuple):
+    """Bounds of the right sides of the equations of `enclosed_block`."""
+
+    of_shape: Array  # of the equation of Z, its rows the modes of the block, (p, n)
+    of_rate: Array  # of the transposed equation of N D, (p, p)
+
+
+class SubspaceEquations(NamedTuple):
+    """Bounds over the box of the magnitudes in the equations of `enclosed_block`.
+
+    Matrices of p modes have the modes as rows: `coupling` is |Fᵀ| for the F of these equations.
+    """
+
+    residual: Array  # |Rᵀ|, (p, n)
+    shape: Array  # |X̃ᵀ|, (p, n)
+    mass_shape: Array  # |(M X̃)ᵀ|, (p, n)
+    mass: Array  # |M|, (n, n)
+    coupling: Array  # |Fᵀ|, L̃ᵀ off its diagonal, (p, p)
+    difference: Array  # |L̃_jj − L̃_ii|, (p, p)
+
+    def right_sides(self, Y: Array, E: Array) -> RightSides:
+        """Bounds for all Z and D with |Zᵀ| ≤ `Y` (p, n) and |Dᵀ| ≤ `E` (p, p).
+
+        They also bound how fast the right sides change: where Z and D change by θ Y and θ E at
+        most, the right sides change by θ times the bounds at most. This takes twice the products of
+        the unknowns, since |D Z − D′ Z′| ≤ |D − D′| |Z| + |D′| |Z − Z′|.
+        """
+        R, X, MX, M, F, difference = self
+        of_shape = R + E @ MX + (F + 2 * E) @ Y @ M
+        W = Y @ MX.T
+        # L̃ᵀW − W L̃ by its diagonal, |L̃_jj − L̃_ii| W, and by F
+        of_rate = R @ X.T + Y @ R.T + difference * W + W @ F.T + F @ W + 2 * E @ W
+        return RightSides(of_shape, of_rate)
+
+
 def enclosed_block(
     block: Ints, rotation: Array, series: Series, centre: CentredMatrices
 ) -> Block | None:
@@ -186,8 +222,8 @@ def enclosed_block(
     1. The matrices on the left are bounded away from singular (`Comparison`).
     2. Where bounds |Z| ≤ Y and |D| ≤ E give themselves back through these equations, Brouwer's
        theorem gives a subspace there, at every u of the box (as Rump 2001). Products of the
-       unknowns count twice, so the map contracts: the subspace is the only one there and
-       continuous in u.
+       unknowns count twice (`SubspaceEquations.right_sides`), so the map contracts: the subspace
+       is the only one there and continuous in u.
     3. The equations' derivative is then regular, which it would not be if L shared an eigenvalue
        with the modes outside. So no mode of a block ever meets another of outside: a block holds
        the same numbers of modes, counted from below, as in the middle, and blocks are M-orthogonal.
@@ -216,20 +252,22 @@ def enclosed_block(
     inverse_norm = inverse_bound(norm)
     if inverse_norm is None:
         return None
-    R, M = (x @ stiffness - L @ Mx).size(), mass.size()
-    X, MX, diagonal = x.size(), Mx.size(), L[np.arange(p), np.arange(p)]
-    F = L.size() * (1.0 - np.eye(p))
-    difference = (diagonal[:, None] - diagonal[None, :]).size()  # |L̃_jj − L̃_ii|
-    Y, E = np.zeros_like(R), np.zeros_like(F)
+    diagonal = L[np.arange(p), np.arange(p)]
+    equations = SubspaceEquations(
+        residual=(x @ stiffness - L @ Mx).size(),
+        shape=x.size(),
+        mass_shape=Mx.size(),
+        mass=mass.size(),
+        coupling=L.size() * (1.0 - np.eye(p)),
+        difference=(diagonal[:, None] - diagonal[None, :]).size(),
+    )
+    Y, E = np.zeros_like(equations.residual), np.zeros_like(equations.coupling)
     for _ in range(ROUNDS):
-        right = R + E @ MX + (F + 2 * E) @ Y @ M
+        right = equations.right_sides(Y, E)
         new_Y = np.zeros_like(Y)
         for j, system in enumerate(systems):
-            new_Y[j, o] = system.solution_bounds(right[j, o])
-        W = Y @ MX.T
-        # L̃ᵀW − W L̃ by its diagonal, |L̃_jj − L̃_ii| W, and by F
-        new_E = R @ X.T + Y @ R.T + difference * W + W @ F.T + F @ W + 2 * E @ W
-        new_E = new_E @ inverse_norm
+            new_Y[j, o] = system.solution_bounds(right.of_shape[j, o])
+        new_E = right.of_rate @ inverse_norm
         if not (new_Y.max() < MAX_SHAPE and np.isfinite(new_E).all()):
             return None
         if (SLACK * new_Y <= Y).all() and (SLACK * new_E <= E).all():
@@ -237,7 +275,8 @@ def enclosed_block(
         Y, E = 1.02 * np.maximum(new_Y, Y), 1.02 * np.maximum(new_E, E)
     else:
         return None
-    norm_error = Y @ MX.T
+    norm_error = Y @ equations.mass_shape.T
+    M = equations.mass
     norm = norm.loosened(norm_error + norm_error.T + Y @ M @ Y.T)
     return Block(block, L.loosened(E), x.loosened(Y), Mx.loosened(Y @ M), norm)
 

@@ -7,6 +7,7 @@ from scipy.linalg import eigh, expm
 from alphacut.frame import MatrixStructure
 from alphacut.frame.bounds.box import over_box, sources
 from alphacut.frame.modes import rest
+from alphacut.frame.modes.blocks import SubspaceEquations
 from alphacut.frame.modes.clusters import centred_matrices, enclose_subspaces
 from alphacut.frame.modes.intervening import BlockShares, oscillators, source_patterns
 from alphacut.frame.modes.models import MotionModels, inverse
@@ -285,3 +286,51 @@ def test_ranges_hold_all_responses_times_powers_of_frequency(order):
             if source == "load":
                 reached = np.ptp(scaled, axis=1)[1:] / (found.high[k, s] - found.low[k, s])[1:]
                 assert reached.max() > TIGHT
+
+
+def random_signs(rng, shape, size):
+    """Matrices of random signs, (20000, *shape), with entries of about a size."""
+    magnitude = size * rng.uniform(0.5, 1.5, shape)
+    return magnitude * rng.choice([-1.0, 1.0], (20_000, *shape))
+
+
+@pytest.mark.parametrize("modes", [1, 2])
+@pytest.mark.parametrize("kind", ["values", "changes"])
+def test_right_sides_of_a_subspace_are_bounded_and_so_is_how_fast_they_change(kind, modes, rng):
+    """Of random matrices whose magnitudes attain their bounds, transposed as in the code.
+
+    The bounds of changes make the map contract, on which continuity of a block in the inputs rests.
+    """
+    p, n = modes, 2
+    change = 1e-3
+    unknown, residual = (0.05, 1.0) if kind == "values" else (1.0, 0.0)
+    R, X, MX, Z = (random_signs(rng, (p, n), size) for size in (residual, 1.0, 1.0, unknown))
+    M = random_signs(rng, (n, n), 1.0)
+    L = random_signs(rng, (p, p), 1.0)
+    D = random_signs(rng, (p, p), unknown)
+    diagonal = np.diagonal(L, axis1=1, axis2=2)
+    F = L * (1 - np.eye(p))
+
+    def right_sides(Z, D):
+        W = Z @ MX.swapaxes(1, 2)
+        of_shape = -R + D @ MX + (D + F) @ Z @ M
+        of_rate = R @ X.swapaxes(1, 2) + Z @ R.swapaxes(1, 2)
+        of_rate += W @ L.swapaxes(1, 2) - L @ W - D @ W
+        return of_shape, of_rate
+
+    bounds = SubspaceEquations(
+        residual=np.abs(R[0]),
+        shape=np.abs(X[0]),
+        mass_shape=np.abs(MX[0]),
+        mass=np.abs(M[0]),
+        coupling=np.abs(F[0]),
+        difference=np.abs(diagonal[:, :, None] - diagonal[:, None, :]).max(0),
+    ).right_sides(np.abs(Z[0]), np.abs(D[0]))
+    found = right_sides(Z, D)
+    if kind == "changes":
+        nearby = right_sides((1 - change) * Z, (1 - change) * D)
+        found = [(x - y) / change for x, y in zip(found, nearby, strict=True)]
+    for exact, bound in zip(found, bounds, strict=True):
+        largest = np.abs(exact).max(0)
+        assert (largest <= bound * (1 + 1e-9)).all()
+        assert (largest >= 0.8 * bound).all()
