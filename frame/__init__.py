@@ -9,6 +9,7 @@ from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import INTEGRATORS, Exact, Midpoint
 from alphacut.frame.dynamics.nonlinear import LagrangianFlow
 from alphacut.frame.envelope import Envelope
+from alphacut.frame.identify import identify, read_modes
 from alphacut.frame.methods.auto import Auto
 from alphacut.frame.methods.dual import DualProof
 from alphacut.frame.methods.graph_follower import GraphFollower
@@ -28,5 +29,6 @@ __all__ = [
     "INTEGRATORS", "METHODS", "Accelerogram", "Auto", "DualProof", "Envelope", "Exact", "Force",
     "GraphFollower", "History", "ImprovedFollower", "LagrangianFlow", "LagrangianSystem",
     "LinearFlow", "MatrixStructure", "Midpoint", "Output", "Parameter", "Proof", "Sampled",
-    "StoreyFrame", "envelope", "pendulum", "read_record", "read_suite", "require_envelope",
+    "StoreyFrame", "envelope", "identify", "pendulum", "read_modes", "read_record", "read_suite",
+    "require_envelope",
 ]  # fmt: skip

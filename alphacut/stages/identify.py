@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
-import numpy as np
-
-from alphacut.base.errors import require
+from alphacut.base.errors import RefusedError, require
 from alphacut.case.motion import Identify
 from alphacut.case.structure import Structure
-from alphacut.frame.identify import MeasuredMode, RefutedError, identify, measured_mode
-from alphacut.frame.identify.identify import widest_cut
-from alphacut.frame.identify.mode_rows import ModeRows, mode_rows
-from alphacut.frame.identify.uff_modes import ENDINGS, uff_mode_rows
-from alphacut.frame.structures.quantities import of_storey_frame
-from alphacut.fuzzy import FuzzyNumber
+from alphacut.frame import identify, read_modes
+from alphacut.frame.identify.identify import Evidence, Identified
 from alphacut.stages.store import CutsResult, Numbers, Values
 
 
@@ -60,60 +55,47 @@ def identify_inputs(
 
     Where the measurement refutes the frame, the result says so and the structure is as before.
     """
-    rows, learned_modes, prior = require_learnable(section, structure, alpha)
+    learned = identify(**_arguments(section, structure, alpha))
+    if learned.is_refuted:
+        return RefutedResult(refuted=learned.refutation), structure
+    numbers = {**structure.numbers, **learned.inputs}
+    return _stored(learned), replace(structure, numbers=numbers)
+
+
+def require_learnable(section: Identify, structure: Structure, alpha: tuple[float, ...]) -> None:
+    """Refuses what `identify_inputs` refuses."""
+    Evidence.of(**_arguments(section, structure, alpha))
+
+
+def _arguments(section: Identify, structure: Structure, alpha: tuple[float, ...]) -> dict[str, Any]:
+    """Arguments of `identify` for a section; RefusedError where it makes none."""
+    require(alpha[0] > 0, "envelope.alpha", value=list(alpha), allowed="levels above 0")
     assert structure.frame is not None
     try:
-        posterior = identify(structure.frame, prior, learned_modes, alpha=alpha)
-    except RefutedError as error:
-        return RefutedResult(refuted=str(error)), structure
-    predictions, held_out = posterior.predictions(), list[Prediction]()
-    for mode in sorted(mode for mode in section.held_out if mode <= structure.frame.floors):
-        low, high = (float(bounds[0, mode - 1]) for bounds in predictions)  # (levels, modes)
-        measured = float(rows[mode].frequencies.mean())
-        ends, inside = (low, high), low <= measured <= high
-        held_out.append(Prediction(mode=mode, measured=measured, predicted=ends, inside=inside))
-    cuts = np.stack([posterior.lower, posterior.upper], axis=-1)  # (levels, inputs, 2)
-    result = IdentifiedResult(
-        alpha=posterior.alpha,
-        inputs={name: CutsResult.of(cuts[:, k]) for k, name in enumerate(posterior.names)},
-        narrowed=dict(posterior.narrowed),
-        units={name: of_storey_frame(name).unit for name in posterior.names},
-        claim=str(posterior.claim),
-        held_out=tuple(held_out),
-        prior={name: widest_cut(number) for name, number in prior.items()},
-    )
-    return result, replace(structure, numbers={**structure.numbers, **posterior.numbers})
-
-
-def require_learnable(
-    section: Identify, structure: Structure, alpha: tuple[float, ...]
-) -> tuple[dict[int, ModeRows], list[MeasuredMode], dict[str, FuzzyNumber]]:
-    """Measurements by mode; the modes to learn from, without held-out ones; the prior inputs."""
-    require(alpha[0] > 0, "envelope.alpha", value=list(alpha), allowed="levels above 0")
-    rows = {row.mode: row for row in _measured_rows(section)}
-    allowed, held_out = f"some of modes {[*rows]}, not all", section.held_out
-    fits, value = set(held_out) < set(rows), ", ".join(map(str, held_out))
-    require(fits, "identify.held_out", value=value, allowed=allowed)
-    learned = [
-        measured_mode(
-            mode,
-            row.frequencies,
-            {floor: [*map(float, values)] for floor, values in row.amplitudes.items()},
-            # the section's standard deviations stand in where the file has none
-            frequency_deviation=row.frequency_deviation or section.frequency_deviation,
-            shape_deviation=row.shape_deviation or section.shape_deviation,
+        modes = read_modes(
+            section.measured,
+            frequency_deviation=section.frequency_deviation,
+            shape_deviation=section.shape_deviation,
+            floors=section.floors,
         )
-        for mode, row in rows.items()
-        if mode not in held_out
-    ]
-    return rows, learned, structure.inputs(section.learn, "identify.learn")
+    except RefusedError as error:
+        is_own = error.key in type(section).model_fields
+        key = f"identify.{error.key}" if is_own else error.key
+        raise RefusedError(key, error.value, error.allowed, error.cure) from None
+    inputs = structure.inputs(section.learn, "identify.learn")
+    options = {"held_out": section.held_out, "alpha": alpha}
+    return {"frame": structure.frame, "inputs": inputs, "modes": modes, **options}
 
 
-def _measured_rows(section: Identify) -> tuple[ModeRows, ...]:
-    is_universal = section.measured.suffix.lower() in ENDINGS
-    allowed = "the floors of its unknowns" if is_universal else "left out beside a CSV file"
-    fits = bool(section.floors) == is_universal
-    require(fits, "identify.floors", value=section.floors or None, allowed=allowed)
-    if is_universal:
-        return uff_mode_rows(section.measured, section.floors)
-    return mode_rows(section.measured)
+def _stored(learned: Identified) -> IdentifiedResult:
+    answer = learned.answer
+    inputs = {name: CutsResult(**ends._asdict()) for name, ends in answer.inputs.items()}
+    return IdentifiedResult(
+        alpha=answer.alpha,
+        inputs=inputs,
+        narrowed=dict(answer.narrowed),
+        units=dict(answer.units),
+        claim=answer.claim,
+        held_out=tuple(Prediction(**vars(mode)) for mode in answer.held_out),
+        prior=dict(answer.prior),
+    )

@@ -12,13 +12,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import FailedError, require
 from alphacut.frame.identify.enclosure import enclosure
+from alphacut.frame.identify.learned import LearnedInputs, Predictions
 from alphacut.frame.identify.modes import Chain, MeasuredMode, ModeCut, eigenvalue_ranges
+from alphacut.frame.structures.quantities import of_storey_frame
 from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.fuzzy.knowledge.joint import JointClaim
@@ -30,32 +33,45 @@ ALPHA = (0.05, 0.1, 0.25, 0.5, 0.75, 1.0)
 
 
 class RefutedError(FailedError):
-    """No parameters in the priors agree with the measurement at the lowest level."""
+    """The inputs of a refuted frame were asked for: it has none that agree with its modes."""
 
 
 def identify(
     frame: StoreyFrame,
-    prior: Mapping[str, FuzzyNumber | float],
-    measured: Sequence[MeasuredMode],
+    inputs: Mapping[str, FuzzyNumber | float],
+    modes: Sequence[MeasuredMode],
     *,
+    held_out: Sequence[int] = (),
     alpha: Sequence[float] = ALPHA,
 ) -> Identified:
     """Return boxes of a frame's parameters that agree with its measured natural modes.
 
+    A frame that no parameters fit is refuted; this is a result, see `Identified.refutation`.
+
     Args:
         frame: The frame; damping, initial motion and outputs do not matter.
-        prior: Fuzzy numbers of parameters of stiffness and mass, in SI units.
-        measured: The measured modes, by rising number.
+        inputs: Fuzzy numbers of parameters of stiffness and mass, in SI units, as they are known
+            before the measurement.
+        modes: The measured modes, by rising number; see `read_modes` and `measured_mode`.
+        held_out: Numbers of modes that are predicted, and not learned from.
         alpha: Levels, rising within (0, 1].
 
     Raises:
-        RefusedError: An input is no parameter of the modes, or a mode, floor or level is not so.
-        RefutedError: No parameters in the priors agree with the measurement at the lowest level.
+        RefusedError: An input is no parameter of the modes; a mode, floor or level is not as said;
+            no mode is left to learn from, or one has values without scatter.
+
+    Example:
+        >>> from alphacut.frame.identify import measured_mode
+        >>> from alphacut.fuzzy import Interval
+        >>> modes = [measured_mode(1, [0.98, 1.0, 1.01]), measured_mode(2, [2.6, 2.61])]
+        >>> frame = StoreyFrame([1.0, 1.0], stiffness=[100.0, 100.0])
+        >>> learned = identify(frame, {"k1": Interval(50, 200)}, modes, held_out=[2])
+        >>> learned.is_refuted, learned.narrowed["k1"] < 0.5
+        (False, True)
     """
-    numbers = {k: x if isinstance(x, FuzzyNumber) else Crisp(float(x)) for k, x in prior.items()}
-    evidence = Evidence(Chain(frame, tuple(numbers)), numbers, tuple(measured))
-    _require_input(evidence, alpha, frame.floors)
-    nominal, levels, empty = evidence.chain.nominal, np.asarray(alpha, float), 1.0
+    evidence = Evidence.of(frame, inputs, modes, held_out=held_out, alpha=alpha)
+    numbers, nominal = evidence.prior, evidence.chain.nominal
+    levels, empty = np.asarray(alpha, float), 1.0
     boxes: list[tuple[Array, Array]] = []  # logarithms of parameters over nominal values
     for level in map(float, levels):
         cuts = [evidence.cut(x, level) for x in numbers.values()]
@@ -69,31 +85,14 @@ def identify(
             break
         boxes.append(box)
     if not boxes:
-        raise RefutedError(
-            f"no parameters in their priors agree with the measured modes at α = {levels[0]:g}:"
-            f" a storey frame with such parameters is refuted (by chance with P <= {levels[0]:g})",
-            "widen the priors, or check masses and numbers of modes",
-        )
+        nothing = np.full((len(levels), len(numbers)), np.inf)
+        return Identified(evidence, levels, nothing, -nothing, empty)
     boxes += [boxes[-1]] * (len(levels) - len(boxes))
     lower, upper = (nominal * np.exp(np.stack(side)) for side in zip(*boxes, strict=True))
     least, greatest = np.array([widest_cut(x) for x in numbers.values()]).T
     # rounding of exp, outwards and within the priors
     lower, upper = np.maximum(lower * (1 - 4e-16), least), np.minimum(upper * (1 + 4e-16), greatest)
     return Identified(evidence, levels, lower, upper, empty)
-
-
-def _require_input(evidence: Evidence, alpha: Sequence[float], n_floors: int) -> None:
-    levels, measured = np.append(0.0, alpha), evidence.measured
-    in_range = len(levels) > 1 and levels[-1] <= 1 and bool((np.diff(levels) > 0).all())
-    require(in_range, "identify.alpha", value=list(alpha), allowed="rising in (0, 1]")
-    mode_numbers = [mode.mode for mode in measured]
-    are_rising = bool(mode_numbers) and sorted(set(mode_numbers)) == mode_numbers
-    require(are_rising, "identify.modes", value=mode_numbers, allowed="one or more, rising")
-    largest = max(x for mode in measured for x in (mode.mode, mode.reference, *mode.shape))
-    allowed = f"modes and floors from 1 to {n_floors}"
-    require(largest <= n_floors, "identify.modes", value=largest, allowed=allowed)
-    smallest = min(widest_cut(number).lower for number in evidence.prior.values())
-    require(smallest > 0, "identify.parameters", value=smallest, allowed="positive priors")
 
 
 def widest_cut(number: FuzzyNumber) -> Cut:
@@ -103,11 +102,55 @@ def widest_cut(number: FuzzyNumber) -> Cut:
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """Opinions and claims on a frame's parameters and on its modes, these by rising number."""
+    """Opinions and claims on a frame's parameters and on its modes.
+
+    Args:
+        chain: The frame.
+        prior: Its parameters before the measurement, in SI.
+        measured: The modes that are learned from, by rising number.
+        held_out: The modes that are not, by rising number.
+    """
 
     chain: Chain
     prior: Mapping[str, FuzzyNumber]
     measured: tuple[MeasuredMode, ...]
+    held_out: tuple[MeasuredMode, ...] = ()
+
+    @classmethod
+    def of(
+        cls,
+        frame: StoreyFrame,
+        inputs: Mapping[str, FuzzyNumber | float],
+        modes: Sequence[MeasuredMode],
+        *,
+        held_out: Sequence[int],
+        alpha: Sequence[float],
+    ) -> Self:
+        """Return what `identify` learns from; refuse what it refuses."""
+        levels = np.append(0.0, alpha)
+        in_range = len(levels) > 1 and levels[-1] <= 1 and bool((np.diff(levels) > 0).all())
+        require(in_range, "identify.alpha", value=list(alpha), allowed="rising in (0, 1]")
+        mode_numbers = [mode.mode for mode in modes]
+        are_rising = bool(modes) and sorted(set(mode_numbers)) == mode_numbers
+        require(are_rising, "identify.modes", value=mode_numbers, allowed="one or more, rising")
+        is_part = set(held_out) < set(mode_numbers)
+        shown, allowed = ", ".join(map(str, held_out)), f"some of modes {mode_numbers}, not all"
+        require(is_part, "identify.held_out", value=shown, allowed=allowed)
+        learned = tuple(mode for mode in modes if mode.mode not in held_out)
+        largest = max(x for mode in learned for x in (mode.mode, mode.reference, *mode.shape))
+        allowed = f"modes and floors from 1 to {frame.floors}"
+        require(largest <= frame.floors, "identify.modes", value=largest, allowed=allowed)
+        for mode in learned:
+            mode.require_scatter()
+        prior = {
+            name: number if isinstance(number, FuzzyNumber) else Crisp(float(number))
+            for name, number in inputs.items()
+        }
+        chain = Chain(frame, tuple(prior))
+        smallest = min(widest_cut(number).lower for number in prior.values())
+        require(smallest > 0, "identify.parameters", value=smallest, allowed="positive priors")
+        rest = tuple(mode for mode in modes if mode.mode in held_out)
+        return cls(chain, prior, learned, rest)
 
     @cached_property
     def numbers(self) -> dict[str, FuzzyNumber]:
@@ -134,14 +177,14 @@ class Evidence:
 
 @dataclass(frozen=True, eq=False)
 class Identified:
-    """Parameters that agree with measured modes.
+    """Parameters of a frame that agree with its measured modes, in proved boxes.
 
     Args:
         evidence: Priors and measured modes.
         alpha: Levels, shape (A,), rising.
         lower: Lower ends of boxes proved to hold the sets, shape (A, d), in SI units. From `empty`
-            on they repeat the last one that is not proved empty.
-        upper: Upper ends.
+            on they repeat the last one that is not proved empty; of a refuted frame they are +∞.
+        upper: Upper ends; of a refuted frame −∞.
         empty: Least level whose set is proved empty; 1 if none is.
     """
 
@@ -157,6 +200,23 @@ class Identified:
         return self.evidence.chain.names
 
     @property
+    def is_refuted(self) -> bool:
+        """Whether no parameters in their priors agree with the modes at the lowest level."""
+        return bool(self.empty <= self.alpha[0])
+
+    @property
+    def refutation(self) -> str:
+        """What the measurement says of a refuted frame; empty of others."""
+        if not self.is_refuted:
+            return ""
+        level = f"{self.alpha[0]:g}"
+        return (
+            f"no parameters in their priors agree with the measured modes at α = {level}:"
+            f" a storey frame with such parameters is refuted (by chance with P <= {level});"
+            " widen the priors, or check masses and numbers of modes"
+        )
+
+    @property
     def claim(self) -> JointClaim:
         """Coverage of the boxes: the claims, and the conditions under which they hold."""
         joint = JointClaim.from_inputs(self.evidence.numbers)
@@ -164,12 +224,17 @@ class Identified:
         return JointClaim(self.evidence.joint, (*joint.conditions, *model), joint.opinions)
 
     @property
-    def numbers(self) -> dict[str, FuzzyNumber]:
+    def inputs(self) -> dict[str, FuzzyNumber]:
         """Identified parameters as fuzzy numbers, by name, for an envelope.
 
         Their cuts are the sides of the boxes; below the lowest level they are the prior's support.
         Where priors or measurements are claims, so are the numbers, with one joint confidence.
+
+        Raises:
+            RefutedError: The frame is refuted.
         """
+        if self.is_refuted:
+            raise RefutedError(self.refutation)
         rule, priors = self.evidence.joint, self.evidence.prior
         numbers: dict[str, FuzzyNumber] = {}
         for column, name in enumerate(self.names):
@@ -186,14 +251,47 @@ class Identified:
 
     @property
     def narrowed(self) -> dict[str, float]:
-        """Width of each parameter's lowest cut over that of its prior."""
-        evidence, level = self.evidence, float(self.alpha[0])
-        widths = np.array([evidence.cut(evidence.prior[name], level).width for name in self.names])
-        return dict(zip(self.names, map(float, (self.upper - self.lower)[0] / widths), strict=True))
+        """Width of each parameter's box at the lowest level over that of its prior there."""
+        level = float(self.alpha[0])
+        cuts = [self.evidence.cut(number, level) for number in self.evidence.prior.values()]
+        fractions = (self.upper - self.lower)[0] / np.array([cut.width for cut in cuts])
+        return dict(zip(self.names, fractions.tolist(), strict=True))
 
-    def predictions(self) -> Ends:
-        """Return proved ends of all n natural frequencies on each level, (A, n) each, in Hz."""
+    def predictions(self) -> Predictions:
+        """Return proved bounds of all n natural frequencies on each level.
+
+        Of a refuted frame there are none: lower bounds are +∞ and upper ones −∞.
+        """
         chain = self.evidence.chain
-        boxes = np.log(np.stack([self.lower, self.upper], axis=1) / chain.nominal)  # (A, 2, d)
-        ranges = np.array([eigenvalue_ranges(chain, *box) for box in boxes])
-        return Ends(*np.sqrt(np.maximum(ranges, 0.0)).swapaxes(0, 1) / (2 * np.pi))
+        measured = [*self.evidence.measured, *self.evidence.held_out]
+        means = {mode.mode: mode.frequency.nominal for mode in measured}
+        ends = np.full((2, len(self.alpha), len(chain.mass)), np.inf)
+        ends[1] = -np.inf
+        if not self.is_refuted:
+            boxes = np.log(np.stack([self.lower, self.upper], axis=1) / chain.nominal)  # (A, 2, d)
+            eigenvalues = np.array([eigenvalue_ranges(chain, *box) for box in boxes])  # (A, 2, n)
+            ends = np.sqrt(np.maximum(eigenvalues, 0.0)).swapaxes(0, 1) / (2 * np.pi)
+        learned_from = tuple(mode.mode for mode in self.evidence.measured)
+        return Predictions(self.alpha, ends[0], ends[1], measured=means, learned_from=learned_from)
+
+    @cached_property
+    def answer(self) -> LearnedInputs:
+        """What was learned, as data for tables and files."""
+        if self.is_refuted:
+            return LearnedInputs(self.alpha, {}, {}, {}, "", (), {}, refuted=self.refutation)
+        return LearnedInputs(
+            alpha=self.alpha,
+            inputs={
+                name: Ends(self.lower[:, column], self.upper[:, column])
+                for column, name in enumerate(self.names)
+            },
+            narrowed=self.narrowed,
+            units={name: of_storey_frame(name).unit for name in self.names},
+            claim=str(self.claim),
+            held_out=self.predictions().held_out,
+            prior={name: widest_cut(number) for name, number in self.evidence.prior.items()},
+        )
+
+    def __str__(self) -> str:
+        """Return the words of `answer`: each parameter before and after, and the held-out modes."""
+        return str(self.answer)

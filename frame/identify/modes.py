@@ -19,9 +19,8 @@ from alphacut.base.errors import RefusedError, checked_number, require
 from alphacut.frame.calculus.jet import Jet
 from alphacut.frame.structures.linear import undamped_modes
 from alphacut.frame.structures.storey import StoreyFrame, chain_matrix, diagonal
-from alphacut.fuzzy import FuzzyNumber, from_data
+from alphacut.fuzzy import Crisp, FuzzyNumber, from_data
 from alphacut.fuzzy.knowledge.from_data import from_scatter
-from alphacut.fuzzy.sets.claimed import ClaimedNumber
 from alphacut.fuzzy.sets.numbers import Cut
 
 ROUND_OFF = 1e-13  # share of the largest eigenvalue by which a computed one may be wrong
@@ -120,6 +119,15 @@ class MeasuredMode:
         amplitudes = {f"shape{self.mode}_{floor}": number for floor, number in self.shape.items()}
         return {f"f{self.mode}": self.frequency, **amplitudes}
 
+    def require_scatter(self) -> None:
+        """Refuse a crisp frequency or amplitude, from which nothing can be learned."""
+        for name, number in self.quantities.items():
+            kind = "frequency" if number is self.frequency else "shape"
+            value, allowed = f"{name} = {number.nominal:.4g} without scatter", "values that scatter"
+            cure = f"measure several times, or set {kind}_deviation, such as 0.01"
+            is_wide = not isinstance(number, Crisp)
+            require(is_wide, f"mode {self.mode}", value=value, allowed=allowed, cure=cure)
+
     def ranges(self, cut: Callable[[FuzzyNumber], Cut]) -> ModeCut:
         """Return ranges of eigenvalue and amplitudes, given a function that cuts fuzzy numbers."""
         low, high = (2 * np.pi * np.maximum(cut(self.frequency), 0.0)) ** 2
@@ -157,13 +165,14 @@ def measured_mode(
         shapes: Measured amplitudes by floor, as many of each as frequencies. Each set is divided by
             that of the reference floor, the highest with a mean near the largest.
         frequency_deviation: Standard deviation of one value as a fraction of it, where it is known
-            from elsewhere; from the values' own scatter otherwise, which takes two at least.
+            from elsewhere; from the values' own scatter otherwise. Of values without scatter the
+            number is crisp: nothing is learned from such a mode, but it can be held out.
         shape_deviation: The same of any amplitude, as a fraction of the largest of the mode. Those
             of all floors are taken to scatter alike.
 
     Raises:
-        RefusedError: Values are too few or contradict their deviation, counts differ, or an
-            amplitude of the reference is 0 or scatters by more than `MAX_SCATTER`.
+        RefusedError: Values contradict their deviation, counts differ, or an amplitude of the
+            reference is 0 or scatters by more than `MAX_SCATTER`.
     """
     values = np.asarray(frequencies, float)
     rows = {floor: np.asarray(row, float) for floor, row in (shapes or {}).items()}
@@ -191,7 +200,7 @@ def measured_mode(
     return MeasuredMode(mode, number, shape, reference)
 
 
-def _mean_ratio(ratios: Array, deviation: float | None, what: str, reference: int) -> ClaimedNumber:
+def _mean_ratio(ratios: Array, deviation: float | None, what: str, reference: int) -> FuzzyNumber:
     """Mean of amplitude ratios (n,) as a fuzzy number, without the bias of the division."""
     # deviation of either amplitude, if known, and variance of the reference, relative to its mean
     variance = (deviation or 0.0) ** 2
@@ -208,13 +217,15 @@ def _mean_ratio(ratios: Array, deviation: float | None, what: str, reference: in
     return _mean(np.asarray(ratios / mean_of_inverse), combined, what, "shape_deviation")
 
 
-def _mean(values: Array, deviation: float | None, what: str, key: str) -> ClaimedNumber:
-    """Mean of measured values (n,) as a fuzzy number with a claim; refuses unknown scatter."""
+def _mean(values: Array, deviation: float | None, what: str, key: str) -> FuzzyNumber:
+    """Return the mean of measured values, shape (n,), as a number with a claim.
+
+    Without a known deviation, values that do not scatter make a crisp number.
+    """
     count = len(values)
     if deviation is None:
-        value, cure = f"{count} times {values[0]:g}", f"set {key}, such as 0.01"
-        scatters = not np.allclose(values, values[0], 1e-12, 0.0)
-        require(scatters, what, value=value, allowed="values that scatter", cure=cure)
+        if np.allclose(values, values[0], 1e-12, 0.0):
+            return Crisp(float(values.mean()))
         return from_data(values, "mean", law="normal")
     checked_number(f"{what}: {key}", deviation, positive=True)
     scatter = float(values.std(ddof=1)) if count > 1 else 0.0

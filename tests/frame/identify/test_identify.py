@@ -100,7 +100,7 @@ def test_cuts_are_nested_inside_the_priors_and_feed_an_envelope(rng):
     assert max(found.narrowed.values()) < 0.5
     after, before = (
         envelope(FRAME, inputs, duration=1.0, step=0.05, alpha=(0.05,))
-        for inputs in (found.numbers, prior)
+        for inputs in (found.inputs, prior)
     )
     assert (after.upper - after.lower).mean() < 0.5 * (before.upper - before.lower).mean()
     assert "c1, c2, c3 in their cuts at α (opinions)" in str(found.claim)
@@ -120,12 +120,15 @@ def test_a_common_factor_of_stiffnesses_and_masses_is_not_learned(rng):
 
 
 def test_a_measurement_that_no_such_frame_has_is_refuted(rng):
-    with pytest.raises(RefutedError, match=r"storey frame with such parameters is refuted"):
-        identify(FRAME, PRIOR, measured(np.full(3, 4.0), rng))
+    refuted = identify(FRAME, PRIOR, measured(np.full(3, 4.0), rng), held_out=[2])
+    assert refuted.is_refuted
+    assert "storey frame with such parameters is refuted" in str(refuted)
+    assert "refuted" in str(refuted.predictions())
+    with pytest.raises(RefutedError, match="refuted"):
+        _ = refuted.inputs
     modes = measured(np.full(3, 2.0), rng)
     first = MeasuredMode(1, modes[0].frequency, {**modes[0].shape, 1: Interval(0.8, 0.9)}, 3)
-    with pytest.raises(RefutedError):
-        identify(FRAME, PRIOR, [first, modes[1]])
+    assert identify(FRAME, PRIOR, [first, modes[1]]).is_refuted
 
 
 def test_claimed_priors_are_joined_with_the_measured_claims(rng):
@@ -136,7 +139,7 @@ def test_claimed_priors_are_joined_with_the_measured_claims(rng):
     names = found.evidence.joint.names
     assert "m3" in names
     assert len(names) == 1 + 2 * 3
-    number = found.numbers["m3"]
+    number = found.inputs["m3"]
     assert number.cut(0.05).width <= found.evidence.cut(weighed, 0.05).width + 1e-9
     with pytest.raises(ValueError, match="which the values decide"):
         number.cut(0.01)
@@ -148,6 +151,14 @@ def modes_like(frequencies, shapes=None, **deviations):
 
 def identified_from(*modes, prior=PRIOR, alpha=(0.05,)):
     return lambda: identify(FRAME, prior, modes, alpha=alpha)
+
+
+def held_out_of(*modes, held_out):
+    return lambda: identify(FRAME, PRIOR, modes, held_out=held_out)
+
+
+def learned_from(frequencies, shapes=None):
+    return lambda: identify(FRAME, PRIOR, [measured_mode(1, frequencies, shapes)])
 
 
 FIRST = MeasuredMode(1, Interval(1, 2))
@@ -162,8 +173,14 @@ LEVELS = r"rising in \(0, 1\]"
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (modes_like([2.0]), r"frequencies is 1 times 2; .* set frequency_deviation, such"),
-        (modes_like([2.0, 2.1], {1: [0.6, 0.3], 3: [2, 1]}), r"q1/q3 of floor 1 is 2 times 0.3; "),
+        (
+            learned_from([2.0]),
+            r"mode 1 is f1 = 2 without scatter; .* set frequency_deviation, such",
+        ),
+        (
+            learned_from([2.0, 2.1], {1: [0.6, 0.3], 3: [2, 1]}),
+            r"shape1_1 = 0.3 without scatter; .* set shape_deviation",
+        ),
         (modes_like([2, 2.1], frequency_deviation=0.001), r"is 0.00205; .* explain the scatter, "),
         (modes_like([2.0], {1: [0.5], 2: [1]}, **KNOWN | NONE), r"shape_deviation is 0.0; allowed"),
         (modes_like(*NOISY, shape_deviation=0.3), r"scatter of floor 2 is .*; .* up to 0.2"),
@@ -171,6 +188,8 @@ LEVELS = r"rising in \(0, 1\]"
         (lambda: MeasuredMode(1, Interval(-2, -1)), r"positive values in Hz"),
         (lambda: replace(FIRST, shape={1: FIRST}, reference=1), r"reference is 1; .* beside"),
         (identified_from(), r"one or more, rising"),
+        (held_out_of(FIRST, held_out=[1]), r"held_out is 1; allowed: some of modes \[1\], not all"),
+        (held_out_of(FIRST, held_out=[2]), r"held_out is 2; allowed: some of modes"),
         (identified_from(replace(FIRST, mode=4)), r"modes is 4; allowed: modes and floors .* to 3"),
         (identified_from(FIRST, prior={"c1": Interval(-1, 2)}), r"is -1.*: positive priors"),
         (lambda: Chain(FRAME, ("d1",)), r"parameters is d1; allowed: E, I, c1"),

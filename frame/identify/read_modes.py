@@ -1,0 +1,66 @@
+"""Measured modes from files, as fuzzy numbers with claims."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from alphacut.base.errors import checked_number, require
+from alphacut.frame.identify.mode_rows import mode_rows
+from alphacut.frame.identify.modes import MeasuredMode, measured_mode
+from alphacut.frame.identify.uff_modes import ENDINGS, uff_mode_rows
+
+
+def read_modes(
+    path: str | Path,
+    *,
+    frequency_deviation: float | None = None,
+    shape_deviation: float | None = None,
+    floors: Mapping[str, int] | None = None,
+) -> tuple[MeasuredMode, ...]:
+    """Read the measured natural modes of a frame from a CSV file or a universal file.
+
+    A CSV file has the head ``mode,frequency [Hz],q1,q2`` with the floors that were measured, and a
+    row for each measurement of a mode. ``frequency_std [Hz]`` and ``shape_std``, the standard
+    deviations of an operational modal analysis, may stand before ``q1``. A universal file (ending
+    .uff or .unv) has the modes in data sets 55.
+
+    Args:
+        path: The file.
+        frequency_deviation: Standard deviation of a measured frequency over its mean, where the
+            file has none; the scatter of several rows of a mode where this is None too.
+        shape_deviation: Standard deviation of an amplitude over the largest of its mode, likewise.
+        floors: Of a universal file, the floor of each unknown that was measured, by NODE.DIRECTION,
+            as ``{"12.x": 1}``.
+
+    Returns:
+        The modes by rising number.
+
+    Raises:
+        RefusedError: The file cannot be read, floors are given beside a CSV file or missing beside
+            a universal one, or the measurements contradict their deviation.
+
+    Example:
+        >>> modes = read_modes("cases/laboratory-frame.modes.csv", frequency_deviation=0.01)
+        >>> [mode.mode for mode in modes], round(modes[0].frequency.nominal, 3)
+        ([1, 2, 3, 4], 0.883)
+    """
+    deviations = {"frequency_deviation": frequency_deviation, "shape_deviation": shape_deviation}
+    for key, deviation in deviations.items():
+        if deviation is not None:
+            checked_number(key, deviation, positive=True)
+    file = Path(path)
+    is_universal = file.suffix.lower() in ENDINGS
+    allowed = "the floors of its unknowns" if is_universal else "left out beside a CSV file"
+    require(bool(floors) == is_universal, "floors", floors or None, allowed)
+    rows = uff_mode_rows(file, floors or {}) if is_universal else mode_rows(file)
+    return tuple(
+        measured_mode(
+            row.mode,
+            row.frequencies,
+            {floor: [*map(float, amplitudes)] for floor, amplitudes in row.amplitudes.items()},
+            frequency_deviation=row.frequency_deviation or frequency_deviation,
+            shape_deviation=row.shape_deviation or shape_deviation,
+        )
+        for row in rows
+    )

@@ -1,0 +1,64 @@
+"""Measured modes read in Python: deviations of the file and of the caller, and modes held out."""
+
+import pytest
+
+from alphacut.base.errors import RefusedError
+from alphacut.frame import StoreyFrame, identify, read_modes
+from alphacut.fuzzy import Crisp, Interval
+from tests.frame.records.samples import uff55
+
+MODES = "mode,frequency [Hz],q1,q2\n1,1.5,0.5,1\n1,1.6,0.52,1\n2,4,-1,0.5\n"
+
+
+def written(folder, text=MODES, name="modes.csv"):
+    path = folder / name
+    path.write_text(text)
+    return path
+
+
+def test_several_rows_scatter_and_a_single_one_takes_the_given_deviation(tmp_path):
+    first, second = read_modes(written(tmp_path))
+    assert first.frequency.nominal == pytest.approx(1.55)
+    assert isinstance(second.frequency, Crisp)
+    _, known = read_modes(str(written(tmp_path)), frequency_deviation=0.01, shape_deviation=0.02)
+    low, high = known.frequency.cut(0.05)
+    assert (low, high) == pytest.approx((4 - 1.96 * 0.04, 4 + 1.96 * 0.04), abs=2e-4)
+
+
+def test_a_deviation_in_the_file_counts_before_the_given_one(tmp_path):
+    text = "mode,frequency [Hz],frequency_std [Hz],q1,q2\n1,4,0.08,-1,0.5\n"
+    (mode,) = read_modes(written(tmp_path, text), frequency_deviation=0.01, shape_deviation=0.02)
+    assert mode.frequency.cut(0.05).width == pytest.approx(2 * 1.96 * 0.08, abs=4e-4)
+
+
+def test_a_mode_without_scatter_can_be_held_out_and_not_learned_from(tmp_path):
+    frame = StoreyFrame([1.0, 1.0], stiffness=[250.0, 250.0])
+    inputs = {"k1": Interval(100, 500), "k2": Interval(100, 500)}
+    modes = read_modes(written(tmp_path))
+    learned = identify(frame, inputs, modes, held_out=[2])
+    (prediction,) = learned.predictions().held_out
+    assert (prediction.mode, prediction.measured) == (2, 4.0)
+    with pytest.raises(RefusedError, match=r"f2 = 4 without scatter; .* frequency_deviation"):
+        identify(frame, inputs, modes)
+
+
+def test_a_universal_file_is_read_by_the_floors_of_its_unknowns(tmp_path):
+    path = written(tmp_path, uff55(1, [0.4, 0.8, 1.0, 9.0]), "modes.uff")
+    floors = {"11.x": 1, "13.x": 2}
+    (mode,) = read_modes(path, floors=floors, frequency_deviation=0.01, shape_deviation=0.02)
+    assert (mode.mode, mode.reference) == (1, 2)
+    assert mode.shape[1].nominal == pytest.approx(0.4, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "message"),
+    [
+        ("modes.csv", {"floors": {"1.x": 1}}, "floors is .*; allowed: left out beside a CSV file"),
+        ("modes.uff", {}, "floors is missing; allowed: the floors of its unknowns"),
+        ("modes.csv", {"frequency_deviation": 0}, "frequency_deviation is 0; .* greater than 0"),
+        ("modes.csv", {"shape_deviation": -0.1}, "shape_deviation is -0.1; .* greater than 0"),
+    ],
+)
+def test_other_arguments_are_refused(tmp_path, name, options, message):
+    with pytest.raises(RefusedError, match=message):
+        read_modes(written(tmp_path, name=name), **options)
