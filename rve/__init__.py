@@ -14,33 +14,47 @@ from typing import TYPE_CHECKING, Any
 from alphacut.rve.cell.cell import LOADS, STRAIN, Cell, Phase, VoigtPhase
 from alphacut.rve.cell.outline import Ellipse
 from alphacut.rve.result.result import HomogenisedStiffness, StressCurve, effective_modulus
-from alphacut.rve.series.model import SeriesModel
 
 if TYPE_CHECKING:
+    from alphacut.rve.engineering import constants
+    from alphacut.rve.fuzzy_cell import FuzzyStiffness, fuzzy_stiffness
     from alphacut.rve.prism.fields import cell_fields
     from alphacut.rve.prism.model import PrismModel
     from alphacut.rve.prism.own_mesh import LevelSetModel, MeshModel
     from alphacut.rve.prism.product_space import ProductSpace
+    from alphacut.rve.result.loss_factors import loss_factors
+    from alphacut.rve.result.reference_bounds import ReferenceBounds, reference_bounds
+    from alphacut.rve.series.model import SeriesModel
     from alphacut.rve.slices.model import SlicesModel
+    from alphacut.rve.spheres.model import SpheresModel
 
 __all__ = [
-    "LOADS", "STRAIN", "Cell", "Ellipse", "HomogenisedStiffness", "LevelSetModel",
-    "MeshModel", "Phase", "PrismModel", "ProductSpace", "SeriesModel", "SlicesModel",
-    "StressCurve", "VoigtPhase", "cell_fields", "effective_modulus",
+    "LOADS", "STRAIN", "Cell", "Ellipse", "FuzzyStiffness", "HomogenisedStiffness",
+    "LevelSetModel", "MeshModel", "Phase", "PrismModel", "ProductSpace", "ReferenceBounds",
+    "SeriesModel", "SlicesModel", "SpheresModel", "StressCurve", "VoigtPhase", "cell_fields",
+    "constants", "effective_modulus", "fuzzy_stiffness", "loss_factors", "reference_bounds",
 ]  # fmt: skip
-WITH_DOLFINX = {
+AT_FIRST_USE = {
+    "FuzzyStiffness": "fuzzy_cell",
     "LevelSetModel": "prism.own_mesh",
     "MeshModel": "prism.own_mesh",
     "PrismModel": "prism.model",
     "ProductSpace": "prism.product_space",
+    "ReferenceBounds": "result.reference_bounds",
+    "SeriesModel": "series.model",
     "SlicesModel": "slices.model",
+    "SpheresModel": "spheres.model",
     "cell_fields": "prism.fields",
+    "constants": "engineering",
+    "fuzzy_stiffness": "fuzzy_cell",
+    "loss_factors": "result.loss_factors",
+    "reference_bounds": "result.reference_bounds",
 }
-"""Module of each exported name whose import needs DOLFINx."""
+"""Module of each exported name that is imported at its first use: some need DOLFINx."""
 
 
 def __getattr__(name: str) -> Any:
-    """Return an exported name that needs DOLFINx, imported at its first use (PEP 562)."""
-    if name in WITH_DOLFINX:
-        return getattr(import_module(f"alphacut.rve.{WITH_DOLFINX[name]}"), name)
+    """Return an exported name of `AT_FIRST_USE` (PEP 562)."""
+    if name in AT_FIRST_USE:
+        return getattr(import_module(f"alphacut.rve.{AT_FIRST_USE[name]}"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

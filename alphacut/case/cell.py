@@ -9,7 +9,6 @@ from pydantic import Field
 from alphacut.base.errors import RefusedError, require
 from alphacut.case.material import (
     AnyLaw,
-    AnyRadius,
     Cell,
     ImageCell,
     Mesh,
@@ -21,6 +20,7 @@ from alphacut.case.material import (
 )
 from alphacut.case.types import NotEmpty, Section, after, distinct, require_alone
 from alphacut.io.provenance import command_to_paste
+from alphacut.stochastic import FractionMap
 
 Stage = Literal["microstructure", "modulus", "envelope"]
 
@@ -85,7 +85,9 @@ class CellContent(Section):
         return self.radius if isinstance(self.radius, RadiusMapSection) else None
 
     @property
-    def random_cell(self) -> tuple[AnyRadius | ThetaSection, RoundCell | MeshedCell]:
+    def random_cell(
+        self,
+    ) -> tuple[RadiusMapSection | ThetaSection | FractionMap, RoundCell | MeshedCell]:
         """The radius map, or the law of θ of a mesh, and the phases; RefusedError without them."""
         if self.mesh_cell is not None:
             return self.radius or ThetaSection(), self.mesh_cell

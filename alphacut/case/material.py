@@ -5,12 +5,11 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Annotated, ClassVar, Literal
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 
-from alphacut.base.errors import RefusedError, require
+from alphacut.base.errors import RefusedError, require, require_choice
 from alphacut.case.types import (
     ALPHA,
     CaseFile,
@@ -27,11 +26,12 @@ from alphacut.case.types import (
     after,
     rising,
 )
-from alphacut.fuzzy import Crisp, FuzzyNumber
+from alphacut.fuzzy import FuzzyNumber
 from alphacut.rve.cell.cell import Phase, VoigtPhase
 from alphacut.rve.cell.outline import Ellipse, circle, reach
 from alphacut.rve.image.phases import RIGID
-from alphacut.stochastic import HermiteMap, TruncatedNormal
+from alphacut.rve.models import MODELS, fitting_models
+from alphacut.stochastic import FractionMap, HermiteMap, TruncatedNormal
 from alphacut.stochastic.particles.particles import DISCS, SPHERES, Shape
 
 Radius = Annotated[FuzzyNumber, Quantity(above=0, below=1, fuzzy=True)]
@@ -52,6 +52,11 @@ class ThetaSection(Section):
         """Law of θ, a normal one cut off at both ends."""
         return TruncatedNormal(*self.theta)
 
+    @property
+    def nominal(self) -> HermiteMap | TruncatedNormal:
+        """The law of θ, as that of a mesh from a file."""
+        return self.law
+
 
 class RadiusMapSection(ThetaSection):
     """Random radius of the particle over half the cell's side, a map of θ (the paper's eq. 12)."""
@@ -65,6 +70,11 @@ class RadiusMapSection(ThetaSection):
     def numbers(self) -> dict[str, FuzzyNumber]:
         """Parameters of the map by name: the factors a1 … a4 of the functions of eq. 12."""
         return {"a1": self.a1, "a2": self.a2, "a3": self.a3, "a4": self.a4}
+
+    @property
+    def nominal(self) -> HermiteMap:
+        """The map at the nominal values of its parameters."""
+        return self.at({name: number.nominal for name, number in self.numbers.items()})
 
     def at(self, values: Mapping[str, float]) -> HermiteMap:
         """The map at crisp values of its parameters."""
@@ -80,34 +90,6 @@ class RadiusMapSection(ThetaSection):
                 self.at(corner)  # refuses such a map
             except RefusedError as error:
                 raise RefusedError("radius", corner, error.allowed, error.cure) from None
-
-
-@dataclass(frozen=True)
-class FractionMap:
-    """Radius map of particles that take the same `fraction` of the cell at all θ."""
-
-    fraction: FuzzyNumber
-    shape: Shape
-    theta: tuple[float, float] = (-3.0, 3.0)
-
-    @property
-    def numbers(self) -> dict[str, FuzzyNumber]:
-        """Parameters of the map by name."""
-        return {"fraction": self.fraction}
-
-    @property
-    def law(self) -> TruncatedNormal:
-        """Law of θ, on which nothing depends."""
-        return TruncatedNormal(*self.theta)
-
-    def at(self, values: Mapping[str, float]) -> HermiteMap:
-        """The map at a crisp fraction."""
-        radius = self.shape.reduced_radius(values["fraction"])
-        return HermiteMap(radius, 0.0, radius, 0.0, self.law)
-
-
-AnyRadius = RadiusMapSection | FractionMap
-"""The random radius of a case, of [radius] or of cell.fraction."""
 
 
 class PhaseSection(Section):
@@ -126,13 +108,13 @@ class PhaseSection(Section):
         allowed = "poisson beside Young's modulus, none beside a stiffness"
         require(isotropic == (self.poisson is not None), "", value, allowed)
 
-    def phase(self, modulus: float | None) -> Phase | VoigtPhase:
-        """The material, with its Young's modulus in Pa where it is isotropic."""
+    @property
+    def nominal(self) -> Phase | VoigtPhase:
+        """The material at its nominal Young's modulus, if it is isotropic."""
         if isinstance(self.modulus, VoigtPhase):
             return self.modulus
-        assert modulus is not None
         assert self.poisson is not None
-        return Phase(modulus, self.poisson)
+        return Phase(self.modulus.nominal, self.poisson)
 
 
 class MeshedCell(Section):
@@ -140,20 +122,27 @@ class MeshedCell(Section):
 
     methods: ClassVar = ("auto", "prism")
     particles: ClassVar = "mesh"  # in results
-    is_fibre: ClassVar = False
-    has_series: ClassVar = False
 
     phases: dict[str, PhaseSection] = Field(description="phase of each physical group of volumes")
 
     @property
     def constants(self) -> dict[str, FuzzyNumber]:
-        """Young's moduli by input, as steel_modulus; "scale" = 1 where no phase is isotropic."""
-        moduli = {
+        """Young's moduli of isotropic phases by input, as steel_modulus."""
+        return {
             f"{name}_modulus": phase.modulus
             for name, phase in self.phases.items()
             if isinstance(phase.modulus, FuzzyNumber)
         }
-        return moduli or {"scale": Crisp(1.0)}  # a campaign needs an input
+
+    @property
+    def nominal_phases(self) -> dict[str, Phase | VoigtPhase]:
+        """Phases by name at the nominal values."""
+        return {name: phase.nominal for name, phase in self.phases.items()}
+
+    @property
+    def loss_names(self) -> tuple[str, ...]:
+        """Names of the loss factors as inputs, in the order of `losses`."""
+        return tuple(f"{name}_loss" for name in self.phases)[: len(self.losses)]
 
     @property
     def losses(self) -> tuple[FuzzyNumber, ...]:
@@ -228,16 +217,23 @@ class RoundCell(Section):
         return modulus if isinstance(modulus, VoigtPhase) else None
 
     @property
-    def has_series(self) -> bool:
-        """True where the series has a formula: round particles of one isotropic material."""
-        return self.outline is None and self.stiffness is None
+    def particle_kind(self) -> str:
+        """Kind of the particles without their measures: cylinders, ellipses or spheres."""
+        return self.particles.partition("(")[0]
 
     @property
     def methods(self) -> tuple[str, ...]:
-        """Models that can solve it."""
-        if self.particles == "spheres":
-            return "series", "auto"
-        return (*(["series"] if self.has_series else []), "auto", "slices", "prism")
+        """Words for the models that can solve it."""
+        return "auto", *fitting_models(self.particle_kind, is_isotropic=self.stiffness is None)
+
+    @property
+    def nominal_phases(self) -> tuple[Phase, Phase | VoigtPhase]:
+        """Matrix and particle at the nominal values."""
+        matrix = Phase(self.matrix_modulus.nominal, self.matrix_poisson.nominal)
+        if isinstance(self.inclusion_modulus, VoigtPhase):
+            return matrix, self.inclusion_modulus
+        assert self.inclusion_poisson is not None
+        return matrix, Phase(self.inclusion_modulus.nominal, self.inclusion_poisson.nominal)
 
     @property
     def shape(self) -> Shape:
@@ -247,7 +243,9 @@ class RoundCell(Section):
     @property
     def fraction_map(self) -> FractionMap | None:
         """The radius map of particles of one size; None where `fraction` is missing."""
-        return None if self.fraction is None else FractionMap(self.fraction, self.shape)
+        if self.fraction is None:
+            return None
+        return FractionMap(self.fraction.nominal, self.shape)
 
     @property
     def losses(self) -> tuple[FuzzyNumber, ...]:
@@ -257,9 +255,9 @@ class RoundCell(Section):
         return self.matrix_loss, self.inclusion_loss
 
     @property
-    def is_fibre(self) -> bool:
-        """True for round fibres of an isotropic material in a matrix alone."""
-        return self.has_series and self.particles == "cylinders"
+    def loss_names(self) -> tuple[str, ...]:
+        """Names of the loss factors as inputs, in the order of `losses`."""
+        return LOSSES if self.losses else ()
 
     def require_consistent(self) -> None:
         """Refuses unknown shapes, keys too few or too many, touching particles, and odd rings."""
@@ -398,11 +396,17 @@ class Mesh(Section):
     """element size over half the cell's side"""
 
 
+def known_method(name: str) -> str:
+    """Return a word for a model of the cell, or refuse another one."""
+    require_choice("", name, dict.fromkeys(("auto", *(entry.name for entry in MODELS))))
+    return name
+
+
 class ModulusSection(Section):
     """Computation of the fuzzy modulus."""
 
-    method: Literal["prism", "slices", "series", "auto"] = "auto"
-    """model of the cell; auto is the series"""
+    method: Annotated[str, after(known_method)] = "auto"
+    """model of the cell, prism, slices or series; auto is the series"""
     plan: Literal["general", "reduced", "signed"] = "general"
     """samples of the transformation method"""
     alpha: Levels = Field(default=ALPHA, description="α-levels")

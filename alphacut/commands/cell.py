@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from alphacut.case.cell import CellContent
+from alphacut.case.material import MeshedCell
 from alphacut.case.parse import parse
 from alphacut.commands.options import Command, add_common, require_petsc, write_answer
 from alphacut.io.files import Document, ranks, text_table
@@ -49,9 +50,9 @@ def run(options: argparse.Namespace, out: TextIO) -> int:
     """Solves the cell at the nominal values, checks and writes its result; exit status 0."""
     content = parse(CellContent, options.case, options.set).content
     require_petsc(options.petsc, content)
-    problem = CellProblem.of(content)
+    problem = CellProblem.of(content, options.petsc)
     problem.require_mesh()
-    result = problem.solve(petsc=options.petsc, parallel=ranks() > 1, estimate=True)
+    result = problem.solve(parallel=ranks() > 1)
     require_tolerance(result.error, content.modulus.tolerance)
     references = problem.references()
     if result.has_isotropic_constants:
@@ -70,10 +71,12 @@ def export(problem: CellProblem, path: Path) -> Document:
     from alphacut.rve.prism.model import PrismModel
     from alphacut.rve.prism.own_mesh import MeshModel
 
-    mesh, nominal = problem.mesh, problem.nominal
-    if mesh.file is not None:
-        fields = mesh_fields(MeshModel(mesh.file), problem.radius.law, nominal)
+    mesh, cell = problem.mesh, problem.cell
+    if isinstance(cell, MeshedCell):
+        assert mesh.file is not None
+        fields = mesh_fields(MeshModel(mesh.file), problem.nominal_radius, cell.nominal_phases)
     else:
+        nominal = problem.nominal
         model = PrismModel(mesh.size, mesh.layers, outline=nominal.outline)
         fields = cell_fields(model, nominal.radius_map, nominal.matrix, nominal.inclusion)
     return {"file": str(path), "nodes": write_cell(fields, path)}
@@ -114,8 +117,7 @@ def document_of(result: HomogenisedStiffness) -> Document:
 
 def fibres(result: HomogenisedStiffness) -> Document:
     """Constants of fibres with their declared errors, moduli in GPa; empty for other particles."""
-    cell = result.cell
-    if isinstance(result, HomogenisedSpheres) or cell is None or not cell.square:
+    if not result.is_of_fibres:
         return {}
     constants = fibre_constants(result)
     return dict(_constant(x, value, constants.errors[x]) for x, value in constants.values.items())

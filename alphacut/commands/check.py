@@ -137,7 +137,8 @@ def nominal_structure(content: Content) -> StoreyFrame | MatrixStructure | None:
     if content.has_stated_modulus:
         return content.structure.linear
     cell = content.particle_cell
-    if cell is None or not cell.has_series or not (content.radius_map or cell.fraction_map):
+    has_series = cell is not None and "series" in cell.methods
+    if cell is None or not has_series or not (content.radius_map or cell.fraction_map):
         return None
     section = content.modulus.model_copy(update={"method": "auto", "tolerance": 1e-4})
     result = replace(CellProblem.of(content), modulus=section).solve()

@@ -29,8 +29,17 @@ from alphacut.questions.question import Answer, FuzzyResponse
 from alphacut.questions.summary import ANSWERS, Results
 from alphacut.questions.tolerances import require_admissible_scale
 from alphacut.rve.image.fields.grid import device_array
-from alphacut.stages import campaign, cell, envelope, identify, image, microstructure, shares, suite
-from alphacut.stages.campaign import CellCampaign
+from alphacut.stages import (
+    cell,
+    envelope,
+    identify,
+    image,
+    microstructure,
+    modulus,
+    shares,
+    suite,
+)
+from alphacut.stages.cell import CellProblem
 from alphacut.stages.envelope import EnvelopeTask, PeakResults, peaks_of
 from alphacut.stages.modulus import fuzzy_loss, fuzzy_modulus, require_levels
 from alphacut.stages.store import (
@@ -97,9 +106,9 @@ class Pipeline:
         return self.results.content
 
     @property
-    def campaign(self) -> CellCampaign:
+    def campaign(self) -> CellProblem:
         """Samples of a cell that is no image."""
-        return CellCampaign.of(self.content, petsc=self.petsc)
+        return CellProblem.of(self.content, self.petsc)
 
     def run(self) -> Results:
         """Computes every stage of the case; returns their results."""
@@ -146,7 +155,7 @@ class Pipeline:
             results.image = self.store.take(stage)
             return
         self.campaign.require_mesh()  # once, not by each sample
-        results.modulus = self.store.take(campaign.stage(self.campaign))
+        results.modulus = self.store.take(modulus.stage(self.campaign))
         numbers = results.modulus.numbers
         cell.require_tolerance(numbers.error, section.tolerance)
         cell.require_bounds(numbers.E_GPa[-1], numbers.references, numbers.particles)
@@ -267,11 +276,11 @@ def _require_material(content: Content) -> image.ImageStudy | None:
         require(fits, "cell.modulus", "0 or rigid", "both bounds of E, for a frame", cure)
         return image.image_study(content.image_cell)
     if "microstructure" not in content.stages:
-        campaign = CellCampaign.of(content)
-        campaign.require_mesh()
-        _ = campaign.propagation  # builds the model and the plan
+        problem = CellProblem.of(content)
+        problem.require_mesh()
+        problem.model()
     elif (particle := content.particle_cell) is not None:  # whose radius is not known yet
-        CellCampaign(ThetaSection(), particle, content.mesh, content.modulus).model()
+        CellProblem(ThetaSection(), particle, content.mesh, content.modulus).model()
     return None
 
 
@@ -298,7 +307,7 @@ def _with_stand_ins(content: Content, structure: Structure) -> Structure:
         return structure
     numbers, has_cuts = dict(structure.numbers), content.modulus.alpha != (1.0,)
     is_fuzzy = content.image_cell is not None or "microstructure" in content.stages
-    inputs = () if is_fuzzy else CellCampaign.of(content).inputs.values()
+    inputs = () if is_fuzzy else CellProblem.of(content).inputs.values()
     is_fuzzy = has_cuts and (is_fuzzy or any(number.support.width > 0 for number in inputs))
     if "E" in numbers:
         young = numbers["E"].nominal

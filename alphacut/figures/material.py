@@ -23,11 +23,6 @@ from alphacut.stochastic.figures.style import BLUE, GREY, HEIGHT, INK, ORANGE, P
 SHOWN_LEVEL = 0.5
 
 
-def nominal_map(section: RadiusMapSection) -> HermiteMap:
-    """The radius map at the nominal values."""
-    return section.at({name: number.nominal for name, number in section.numbers.items()})
-
-
 def distribution(radius: HermiteMap, at: Array) -> Array:
     """Probabilities P(r ≤ at) of the radius under the law of θ, in the shape of `at`."""
     law = radius.distribution
@@ -49,7 +44,7 @@ def p_box(section: RadiusMapSection) -> Figure:
     ends, shade = (family.min(0), family.max(0)), "p-box, α = 0"
     axes.fill_between(at, *ends, color=PURPLE, alpha=0.15, lw=0, label=shade)
     axes.plot(at, np.transpose(ends), color=INK, lw=1)
-    nominal = distribution(nominal_map(section), at)
+    nominal = distribution(section.nominal, at)
     axes.plot(at, nominal, color=PURPLE, lw=1.8, label="nominal map")
     axes.set(xlabel="reduced radius r$_n$ = r/a", ylabel="cumulative distribution", ylim=(0, 1.02))
     axes.legend(loc="lower right")
@@ -60,7 +55,7 @@ def cone(section: RadiusMapSection) -> Figure:
     """Fig. 14: the particle in the product domain, of radius r(θ) at every θ."""
     figure = plt.figure(figsize=(5.0, 5.4))
     axes: Any = figure.add_subplot(projection="3d")
-    radius = nominal_map(section)
+    radius = section.nominal
     theta, angle = np.linspace(*section.theta, 80)[:, None], np.linspace(0, 2 * np.pi, 80)
     x, y = radius(theta) * np.cos(angle), radius(theta) * np.sin(angle)
     axes.plot_surface(x, y, np.broadcast_to(theta, (80, 80)), color=PURPLE, alpha=0.65, lw=0)

@@ -1,51 +1,38 @@
-"""The cell of a case: its parts at crisp values, its model and what E is compared with."""
+"""The cell of a case: its nominal parts and fuzzy inputs, and the model that it asks for."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import partial
-from typing import Any, Self, cast
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Self
 
-import numpy as np
 from typing_extensions import TypedDict
 
-from alphacut.base.arrays import Array
 from alphacut.base.errors import FailedError, RefusedError
 from alphacut.case.cell import CellContent
 from alphacut.case.material import (
-    AnyRadius,
     Mesh,
     MeshedCell,
     ModulusSection,
+    RadiusMapSection,
     RoundCell,
     ThetaSection,
 )
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.io.files import missing
-from alphacut.rve.cell.cell import AnyPhase, Cell, Phase
+from alphacut.rve.cell.cell import Cell, Phase
+from alphacut.rve.cell.model import AnyModel, Resolution
 from alphacut.rve.cell.outline import circle
-from alphacut.rve.result.moduli import AXES, hashin_shtrikman, plane_constants
+from alphacut.rve.fuzzy_cell import Phases
+from alphacut.rve.models import fitting_models
+from alphacut.rve.result.moduli import AXES
+from alphacut.rve.result.reference_bounds import reference_bounds
 from alphacut.rve.result.result import HomogenisedStiffness
-from alphacut.rve.series.model import SeriesModel
-from alphacut.rve.spheres.model import SphereSeriesModel
-from alphacut.rve.spheres.result import hill_average
-from alphacut.stochastic import TruncatedNormal, gauss_rule
-from alphacut.stochastic.particles.particles import SPHERES
+from alphacut.stochastic import FractionMap, gauss_rule
 
 GPA = 1e9
-TOLERANCE_PART = 0.4
-"""Fraction of the tolerance for the series at each θ, and again for the quadrature in θ."""
-SPHERE_TOLERANCE = 1e-5
-"""Default tolerance of E of spheres, relative: 1e-9 takes seconds near a reduced radius of 0.97."""
 BOUNDS_SLACK = 5e-3
 """Allowed relative distance of E outside its bounds: packings meet a fraction to 0.5 %."""
-MESH_OPTIONS = ("petsc", "parallel")
-"""Options of elements that a mesh from a file takes."""
-
-
-Solve = Callable[[Sequence[Any]], list[HomogenisedStiffness]]
-"""A model of the cell: a result for each sample; the cells differ in their inclusion alone."""
 
 
 class References(TypedDict, total=False):
@@ -64,109 +51,130 @@ UPPER_BOUND = "C is an upper bound of this mesh: that of a finer one is smaller"
 """Of a mesh of one's own by Galerkin's method, whose fields have more energy than the true ones."""
 AVERAGES = {"axes": "eq. 16", "isotropic": "isotropic"}
 """Averages of a plane stiffness by their names in a case, in words."""
-
-
-def _solve_cells(
-    model: Any, law: TruncatedNormal, is_averaged: bool, samples: Sequence[Any]
-) -> list[HomogenisedStiffness]:
-    """Result of each sample by a model of rve; `is_averaged`: E and ν of the isotropic average."""
-    if isinstance(samples[0], Cell):
-        first, inclusions = samples[0], [sample.inclusion for sample in samples]
-        results = model.solve(first.radius_map, first.matrix, inclusions)
-    else:
-        results = [model.solve(law, phases)[0] for phases in samples]
-    return [result.with_average("isotropic") for result in results] if is_averaged else results
+NODES = 40
+"""Nodes in θ of a mean fraction."""
 
 
 @dataclass(frozen=True)
 class CellProblem:
     """A cell that is no image, as the sections of a case state it.
 
-    `radius` is the map of a round particle, or the law of θ of a mesh from a file;
-    `stated_fraction` is what the particles take of the cell as the case says.
+    Args:
+        radius: Radius map of a round particle as its section, the map of particles of one size, or
+            the law of θ of a mesh from a file.
+        cell: Its phases.
+        mesh: Discretisation.
+        modulus: What is computed, and by which model.
+        stated_fraction: Fraction of the cell that the particles take as the case says, if it does.
+        petsc: PETSc options without their prefix `rve_`.
     """
 
-    radius: AnyRadius | ThetaSection
+    radius: RadiusMapSection | ThetaSection | FractionMap
     cell: RoundCell | MeshedCell
     mesh: Mesh
     modulus: ModulusSection
     stated_fraction: float | None = None
+    petsc: Mapping[str, str] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, content: CellContent, **further: object) -> Self:
-        """The cell of a case, with further fields of this class."""
-        sections = *content.random_cell, content.mesh, content.modulus
-        return cls(*sections, content.stated_fraction, **cast("dict[str, Any]", further))
+    def of(cls, content: CellContent, petsc: Mapping[str, str] | None = None) -> Self:
+        """Return the cell of a case."""
+        radius, cell = content.random_cell
+        stated = content.stated_fraction
+        return cls(radius, cell, content.mesh, content.modulus, stated, petsc or {})
 
     @property
     def numbers(self) -> dict[str, FuzzyNumber]:
-        """Inputs of the cell by name, crisp or fuzzy, in SI."""
-        return getattr(self.radius, "numbers", {}) | self.cell.constants
+        """Parameters of the cell by name, crisp or fuzzy, in SI."""
+        of_radius = getattr(self.radius, "numbers", {})
+        if isinstance(self.cell, RoundCell) and self.cell.fraction is not None:
+            of_radius = {"fraction": self.cell.fraction}
+        return of_radius | self.cell.constants
+
+    @property
+    def inputs(self) -> dict[str, FuzzyNumber]:
+        """Fuzzy inputs by name, in SI; one crisp modulus where none is fuzzy."""
+        numbers = self.numbers
+        fuzzy = {name: number for name, number in numbers.items() if number.support.width > 0}
+        names = ("inclusion_modulus", "matrix_modulus", *numbers)
+        return fuzzy or next(({x: numbers[x]} for x in names if x in numbers), {})
+
+    @property
+    def nominal_radius(self) -> Any:
+        """Radius map at the nominal values; of a mesh the law of θ."""
+        if isinstance(self.radius, FractionMap):
+            return self.radius
+        return self.radius.nominal
+
+    @property
+    def nominal_phases(self) -> Phases:
+        """Phases at the nominal values: matrix and particle, or those of a mesh by name."""
+        return self.cell.nominal_phases
+
+    @property
+    def nominal(self) -> Cell:
+        """The cell with one particle at the nominal values of its inputs."""
+        assert isinstance(self.cell, RoundCell)
+        matrix, inclusion = self.cell.nominal_phases
+        return Cell(matrix, inclusion, self.nominal_radius, self.cell.outline or circle)
+
+    @property
+    def average(self) -> str | None:
+        """Average of a plane stiffness that the case asks for; None of spheres."""
+        return None if self.cell.particles == "spheres" else self.modulus.average
 
     @property
     def average_name(self) -> str:
         """Average of the stiffness that gives E and ν: "eq. 16", "isotropic" or "spheres"."""
-        return "spheres" if self.cell.particles == "spheres" else AVERAGES[self.modulus.average]
+        return "spheres" if self.average is None else AVERAGES[self.average]
 
-    def model(self, **elements: object) -> Solve:
-        """The function that solves cells by the model that the sections name.
+    def model(self, *, estimate: bool = True, parallel: bool = False) -> AnyModel:
+        """Return the model that the sections name.
 
-        `elements` are options of the elements: petsc, parallel, estimate, modulus_range.
+        With `estimate` it declares errors, if need be by a reference solution; `parallel` says
+        whether all MPI ranks work on one cell together.
+
+        Raises:
+            RefusedError: The model needs DOLFINx, which is not installed.
         """
-        is_averaged = self.average_name == "isotropic"  # of the whole plane stiffness
         try:
-            if isinstance(self.cell, RoundCell):
-                model = self._particle_model(self.cell, {"stiffness": is_averaged, **elements})
-            else:
+            if isinstance(self.cell, MeshedCell):
                 from alphacut.rve.prism.own_mesh import MeshModel
 
                 assert self.mesh.file is not None
-                options = {name: x for name, x in elements.items() if name in MESH_OPTIONS}
-                mesh, refine = self.mesh.file, self.mesh.refine
-                model = MeshModel(mesh, refine=refine, **cast("dict[str, Any]", options))
+                options: Any = {"petsc": self.petsc, "parallel": parallel}
+                return MeshModel(self.mesh.file, refine=self.mesh.refine, **options)
+            fitting = fitting_models(
+                self.cell.particle_kind, is_isotropic=self.cell.stiffness is None
+            )
+            name = self.modulus.method
+            entry = next(iter(fitting.values())) if name == "auto" else fitting[name]
+            return entry.load().with_resolution(
+                Resolution(
+                    tolerance=self.modulus.tolerance,
+                    mesh_size=self.mesh.size,
+                    layers=self.mesh.layers,
+                    outline=self.cell.outline or circle,
+                    whole_stiffness=self.average != AXES,
+                    energies=bool(self.cell.losses),
+                    petsc=self.petsc,
+                    parallel=parallel,
+                    estimate=estimate,
+                )
+            )
         except ImportError as error:
             value, cure = self.modulus.method, missing(error)
             raise RefusedError("modulus.method", value, "series", cure) from None
-        return partial(_solve_cells, model, self.radius.law, is_averaged)
 
-    def _particle_model(self, cell: RoundCell, prism_options: Mapping[str, Any]) -> Any:
-        tolerance, method, mesh = self.modulus.tolerance, self.modulus.method, self.mesh
-        if cell.has_series and method in ("auto", "series"):
-            kind, options = SeriesModel, dict[str, Any](energies=bool(cell.losses))
-            if cell.particles == "spheres":
-                kind, tolerance = SphereSeriesModel, tolerance or SPHERE_TOLERANCE
-            if tolerance is not None:
-                options["accuracy"] = max(TOLERANCE_PART * tolerance, kind.MIN_ACCURACY)
-            return kind(**options)
-        outline = cell.outline or circle
-        if method in ("auto", "slices"):
-            from alphacut.rve.slices.model import SlicesModel
-
-            return SlicesModel(mesh_size=mesh.size, outline=outline)
-        from alphacut.rve.prism.model import PrismModel
-
-        return PrismModel(mesh.size, mesh.layers, outline=outline, **prism_options)
-
-    def at(self, values: Mapping[str, float]) -> Cell | dict[str, AnyPhase]:
-        """The cell at crisp values of the inputs, in SI; of a mesh its phases by group."""
+    def solve(self, **options: bool) -> HomogenisedStiffness:
+        """Return the homogenised stiffness at the nominal values; `options` as of `model`."""
+        model: Any = self.model(**options)
         if isinstance(self.cell, MeshedCell):
-            phases = self.cell.phases.items()
-            return {name: phase.phase(values.get(f"{name}_modulus")) for name, phase in phases}
-        radius = cast("AnyRadius", self.radius).at(values)
-        matrix = Phase(values["matrix_modulus"], values["matrix_poisson"])
-        inclusion: AnyPhase | None = self.cell.stiffness
-        if inclusion is None:
-            inclusion = Phase(values["inclusion_modulus"], values["inclusion_poisson"])
-        return Cell(matrix, inclusion, radius, self.cell.outline or circle)
-
-    @property
-    def nominal(self) -> Any:
-        """The cell at the nominal values of its inputs."""
-        return self.at({name: number.nominal for name, number in self.numbers.items()})
-
-    def solve(self, **elements: object) -> HomogenisedStiffness:
-        """The homogenised stiffness at the nominal values; `elements` as those of `model`."""
-        return self.model(**elements)([self.nominal])[0]
+            result: HomogenisedStiffness = model.solve(self.nominal_radius, self.nominal_phases)[0]
+        else:
+            cell = self.nominal
+            result = model.solve(cell.radius_map, cell.matrix, [cell.inclusion])[0]
+        return result if self.average is None else result.with_average(self.average)
 
     def references(self) -> References:
         """Particle fraction and Hashin–Shtrikman bounds of E at the nominal inputs.
@@ -176,24 +184,27 @@ class CellProblem:
         """
         if isinstance(self.cell, MeshedCell):
             return {}
-        nominal: Cell = self.nominal
-        matrix, inclusion = nominal.matrix, nominal.inclusion
-        rule = gauss_rule(nominal.radius_map.distribution, points=40)
-        spheres, stated = self.cell.particles == "spheres", self.stated_fraction
-        radii = nominal.radius_map(rule.nodes)
-        fractions = SPHERES.fractions(radii) if spheres else nominal.fraction(rule.nodes)
-        found: References = {"fraction": float(np.asarray(rule.mean(fractions)))}
-        if not isinstance(matrix, Phase) or not isinstance(inclusion, Phase):
+        radius, stated = self.nominal_radius, self.stated_fraction
+        rule = gauss_rule(radius.distribution, points=NODES)
+        is_space = self.cell.particles == "spheres"
+        if is_space:
+            fractions = self.cell.shape.fractions(radius(rule.nodes))
+        else:
+            fractions = self.nominal.fraction(rule.nodes)
+        found: References = {"fraction": float(rule.mean(fractions))}
+        phases = [x for x in self.cell.nominal_phases if isinstance(x, Phase)]
+        if len(phases) < 2:
             return found
-        fraction = np.asarray(found["fraction"] if stated is None else stated)
+        fraction = found["fraction"]
         if stated is not None:
-            found["fraction_of_case"] = stated
-        fractions, phases = np.array([1 - fraction, fraction]), [matrix, inclusion]
-        found["hashin_shtrikman_E_GPa"] = isotropic_bounds(fractions, phases, space=spheres)
+            fraction = found["fraction_of_case"] = stated
+        bounds = reference_bounds(phases, fractions=[1 - fraction, fraction], space=is_space)
+        lower, upper = bounds.young
+        found["hashin_shtrikman_E_GPa"] = lower / GPA, upper / GPA
         return found
 
     def require_mesh(self) -> None:
-        """Refuses a mesh file that is no periodic cell of prisms, or does not fit [cell.phases]."""
+        """Refuse a mesh file that is no periodic cell of prisms, or does not fit [cell.phases]."""
         if self.mesh.file is None:
             return
         try:
@@ -208,27 +219,11 @@ class CellProblem:
             value, allowed = f"{self.mesh.file.name}: {error.what}", "a periodic cell of prisms"
             raise RefusedError("mesh.file", value, allowed, error.cure) from None
         try:
-            mesh_law(grid, self.radius.law)  # both refuse what does not fit
-            in_order_of(grid.names, self.nominal)
+            mesh_law(grid, self.nominal_radius)  # both refuse what does not fit
+            in_order_of(grid.names, self.nominal_phases)
         except RefusedError as error:
             place = self.mesh.file.name
             raise RefusedError(error.key, error.value, error.allowed, error.cure, place) from None
-
-
-def isotropic_bounds(
-    fractions: Array, phases: Sequence[Phase], *, space: bool = False
-) -> tuple[float, float]:
-    """Lower and upper Hashin–Shtrikman bound of Young's modulus in GPa, of `space` or transverse.
-
-    They are its values at the lower and at the upper bounds of the moduli K and G. Fractions have
-    the shape (phases,).
-    """
-    bulk, shear = hashin_shtrikman(fractions, phases, space=space)  # lower and upper each
-    if space:
-        low, high = hill_average(np.stack([bulk, shear, shear], axis=-1))[:, 0]
-    else:
-        low, high = plane_constants(np.stack([2 * bulk, 2 * shear, shear], axis=-1), AXES)[:, 0]
-    return float(low / GPA), float(high / GPA)
 
 
 def key_and_unit(name: str) -> tuple[str, float]:
@@ -247,15 +242,8 @@ def isotropic_label(average: str) -> str:
     return f"{ISOTROPIC}, which that of {average} is not" if is_other else ISOTROPIC
 
 
-def require_isotropic(result: HomogenisedStiffness) -> None:
-    """Refuses E and ν of a cell whose stiffness no isotropic solid has."""
-    if not result.has_isotropic_constants:
-        value, cure = f"{result.modulus / GPA:.4g} GPa", "take the stiffness of `alphacut cell`"
-        raise FailedError(f"E would be {value}: 2 G_T exceeds 3 (C11 + C12)", cure)
-
-
 def require_bounds(young: tuple[float, float], references: References, particles: str) -> None:
-    """Refuses E of spheres outside the Hashin–Shtrikman bounds of the fraction that a case states.
+    """Refuse E of spheres outside the Hashin–Shtrikman bounds of the fraction that a case states.
 
     E is outside by more than `BOUNDS_SLACK` where the radius map holds another fraction, since
     cells denser than any cube are cut off, or because the mean over cells with different spheres
@@ -273,7 +261,7 @@ def require_bounds(young: tuple[float, float], references: References, particles
 
 
 def require_tolerance(error: Mapping[str, float], tolerance: float | None) -> None:
-    """Requires the sum of the declared relative errors of E within a tolerance, if any."""
+    """Require the sum of the declared relative errors of E within a tolerance, if any."""
     total = sum(error.values())
     if tolerance is not None and total > tolerance * (1 + 1e-9):
         what = f"the relative error of E is {total:.2g}; the case allows {tolerance:.2g}"

@@ -19,6 +19,7 @@ from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.result import Nature
 from alphacut.io.provenance import file_digest
 from alphacut.rve.cell.cell import Phase
+from alphacut.rve.fuzzy_cell import loss_corners, phase_loss_cuts
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.files import files_of, needed_memory, read_grid, require_memory
 from alphacut.rve.image.losses import energy_shares, loss_of_young, mean_loss
@@ -33,9 +34,10 @@ from alphacut.rve.image.phases import (
 from alphacut.rve.result.engineering_constants import NAMES, PLANE_STRAIN
 from alphacut.rve.result.loss_factors import CONSTANTS, first_order
 from alphacut.rve.result.moduli import plane_constants
+from alphacut.rve.result.reference_bounds import reference_bounds
 from alphacut.rve.result.result import PhaseEnergies
-from alphacut.stages.cell import AVERAGES, GPA, References, isotropic_bounds
-from alphacut.stages.modulus import LossResult, constant_cuts, loss_corners, phase_loss_cuts
+from alphacut.stages.cell import AVERAGES, GPA, References
+from alphacut.stages.modulus import LossResult, constant_cuts
 from alphacut.stages.store import CutsResult, Numbers, Stage, StageContext, StageResult, Values
 from alphacut.stochastic.segmentation import segment
 
@@ -153,8 +155,9 @@ def compute_cuts(
     if has_both_bounds:
         shares_of_phases = np.array([*fractions.values()])
         phases = [Phase(young.nominal, nu.nominal) for young, nu in cell.pairs]
-        classical = isotropic_bounds(shares_of_phases, phases, space=is_space)
-        references = {"hashin_shtrikman_E_GPa": classical}
+        classical = reference_bounds(phases, fractions=shares_of_phases, space=is_space)
+        lower, upper = classical.young
+        references = {"hashin_shtrikman_E_GPa": (lower / GPA, upper / GPA)}
     along_axes = dict(map(constant_cuts, names, np.moveaxis(constants, 1, 0)))
     result = ImageResult(
         alpha=np.array(alpha),
@@ -224,7 +227,9 @@ def estimated_losses(energies: PhaseEnergies, cuts: Array, average: str) -> Loss
     # what the first order leaves out is of the order of the squared difference of losses
     errors = errors + np.ptp(largest) ** 2 * bounds[:, 0, 1]
     named = dict[str, Array](zip(CONSTANTS, bounds, strict=True))
-    return LossResult.of(named, errors, Nature.ESTIMATED)
+    by_name = dict(zip(CONSTANTS, map(float, errors), strict=True))
+    estimated: LossResult = LossResult.of(named, by_name, Nature.ESTIMATED)
+    return estimated
 
 
 def cut_or_nominal(number: FuzzyNumber, level: AlphaLevel) -> tuple[float, float]:

@@ -19,8 +19,9 @@ from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.fuzzy import FuzzyNumber, Reduced
 from alphacut.fuzzy.propagation import Shares, width_shares
 from alphacut.io.provenance import NESTED
-from alphacut.stages.campaign import OUTPUTS, CellCampaign
+from alphacut.stages.cell import CellProblem
 from alphacut.stages.envelope import EnvelopeTask, PeakResults
+from alphacut.stages.modulus import OUTPUTS, identity, solved
 from alphacut.stages.store import Stage, StageContext, StageResult
 
 ShareTable = dict[str, dict[str, float]]
@@ -28,7 +29,7 @@ ShareTable = dict[str, dict[str, float]]
 
 
 def stage(
-    campaign: CellCampaign | None,
+    campaign: CellProblem | None,
     structure: Structure | None,
     task: EnvelopeTask | None,
     reached: PeakResults,
@@ -51,19 +52,19 @@ def stage(
                 table[f"the peak of {output}"] = dict(zip(shares.names, column, strict=True))
         return StageResult(table)
 
-    of_cell = campaign and [campaign.identity, campaign.inputs, campaign.modulus.alpha]
+    of_cell = campaign and [identity(campaign), campaign.inputs, campaign.modulus.alpha]
     inputs = [of_cell, structure and [structure.model, structure.numbers, task, reached]]
     return Stage("shares", inputs, (*NESTED, "alphacut"), ShareTable, compute)
 
 
-def cell_shares(campaign: CellCampaign) -> Shares:
+def cell_shares(campaign: CellProblem) -> Shares:
     """Shares of the widths of E and ν, (inputs, 2), by the series where it has a formula."""
     modulus = campaign.modulus.model_copy(update={"method": "auto"})
-    propagation, alpha = replace(campaign, modulus=modulus).propagation, modulus.alpha[:1]
+    problem, alpha = replace(campaign, modulus=modulus), modulus.alpha[:1]
 
     def bounds(inputs: Mapping[str, FuzzyNumber]) -> tuple[Array, Array]:
         """Lower and upper bounds of E and ν on the lowest level, shape (2,) each."""
-        cell_bounds = propagation(inputs, Reduced(), alpha=alpha, progress=False)
+        cell_bounds = solved(problem, Reduced(), inputs=inputs, alpha=alpha, progress=False).bounds
         columns = [cell_bounds.column(name) for name in OUTPUTS]
         return cell_bounds.lower[0, columns], cell_bounds.upper[0, columns]
 

@@ -10,7 +10,7 @@ from numbers import Real
 import numpy as np
 
 from alphacut.base.arrays import Array
-from alphacut.base.errors import RefusedError
+from alphacut.base.errors import RefusedError, checked_number
 from alphacut.rve.cell.outline import Outline, area, circle, is_round
 from alphacut.stochastic import RadiusMap, require_map
 
@@ -30,10 +30,12 @@ class Phase:
     Args:
         modulus: Young's modulus in Pa, positive.
         poisson: Poisson's ratio, inside (−1, 0.5).
+        loss: Loss factor tan δ of the whole stiffness, 0 or more; None where it is not asked for.
     """
 
     modulus: float
     poisson: float = 0.3
+    loss: float | None = None
 
     def __post_init__(self) -> None:
         """Refuse constants of no elastic solid; warn of a modulus that is probably not in Pa."""
@@ -51,6 +53,7 @@ class Phase:
             warnings.warn(f"{soft}; a phase takes Pa, 1 GPa is 1e9", stacklevel=3)
         if not -1 < self.poisson < 0.5:
             raise RefusedError("Poisson's ratio", f"{self.poisson:g}", "values inside (-1, 0.5)")
+        require_loss(self.loss)
 
     @property
     def stiffness(self) -> Array:
@@ -80,9 +83,11 @@ class VoigtPhase:
     Args:
         rows: Stiffness in Voigt order (11, 22, 12 with 2 ε12), symmetric positive definite, three
             rows of three, in Pa.
+        loss: Loss factor tan δ of the whole stiffness, 0 or more; None where it is not asked for.
     """
 
     rows: tuple[tuple[float, ...], ...]
+    loss: float | None = None
 
     def __post_init__(self) -> None:
         """Refuse a stiffness that is not symmetric positive definite; make it exactly symmetric."""
@@ -93,6 +98,7 @@ class VoigtPhase:
         if not is_symmetric or np.linalg.eigvalsh(matrix)[0] <= 0:
             allowed = "symmetric positive definite matrices of 3 × 3, in Pa"
             raise RefusedError("stiffness of the phase", matrix.tolist(), allowed)
+        require_loss(self.loss)
         symmetric_rows = ((matrix + matrix.T) / 2).tolist()
         object.__setattr__(self, "rows", tuple(map(tuple, symmetric_rows)))
 
@@ -108,6 +114,12 @@ class VoigtPhase:
 
 
 AnyPhase = Phase | VoigtPhase
+
+
+def require_loss(loss: float | None) -> None:
+    """Refuse a loss factor that is no number of 0 or more."""
+    if loss is not None:
+        checked_number("loss", loss, least=0.0)
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from time import perf_counter
-from typing import ClassVar, TypeVar
+from typing import ClassVar, Self, TypeVar
 
 import numpy as np
 
@@ -34,6 +34,7 @@ from alphacut.rve.cell.cell import (
     require_mesh_size,
     require_solve_arguments,
 )
+from alphacut.rve.cell.model import Resolution
 from alphacut.rve.cell.outline import Outline, circle, is_round
 from alphacut.rve.fenicsx import MPI
 from alphacut.rve.mesh.columns import extrude
@@ -43,7 +44,7 @@ from alphacut.rve.prism.modulus_basis import TOLERANCE, ModulusBasis, modulus_ba
 from alphacut.rve.prism.problem import FoldedMeshError, PrismProblem, SliceStrains
 from alphacut.rve.prism.slices import SliceProblem, is_homogeneous, solve_sample
 from alphacut.rve.result.checks import ROUND_OFF, checks_within_limits, mean, stress_checks
-from alphacut.rve.result.moduli import axial_moduli
+from alphacut.rve.result.moduli import AVERAGES, AXES, axial_moduli
 from alphacut.rve.result.result import HomogenisedStiffness, PhaseEnergies, StressCurve
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.slices.model import SlicesModel
@@ -86,9 +87,37 @@ class PrismModel:
     modulus_range: tuple[float, float] | None = None
     outline: Outline = circle
     name: ClassVar[str] = "prism"
+    convention: ClassVar[str] = AVERAGES[AXES]
+    is_exact: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         require_prisms(self.mesh_size, self.layers)
+
+    @classmethod
+    def with_resolution(cls, resolution: Resolution) -> Self:
+        """The prisms of a resolution; see `CellModel`."""
+        return cls(
+            resolution.mesh_size,
+            resolution.layers,
+            petsc=resolution.petsc,
+            parallel=resolution.parallel,
+            stiffness=resolution.whole_stiffness,
+            estimate=resolution.estimate,
+            outline=resolution.outline,
+        )
+
+    @property
+    def errors_by_reference(self) -> bool:
+        """Whether errors are declared; see `CellModel`."""
+        return self.estimate
+
+    def for_samples(self, moduli: tuple[float, float] | None, *, energies: bool) -> Self:
+        """Prisms without declared errors, whose samples share solutions; see `CellModel`."""
+        return replace(self, estimate=False, modulus_range=moduli)
+
+    def coarser(self) -> Self:
+        """Prisms on triangles twice as large."""
+        return replace(self, mesh_size=min(2 * self.mesh_size, 1.0))
 
     def solve(
         self, radius_map: RadiusMap, matrix: AnyPhase, inclusions: Sequence[AnyPhase]

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from pathlib import Path
 from time import perf_counter
-from typing import ClassVar, cast
+from typing import ClassVar, Self, cast
 
 import numpy as np
 
@@ -31,6 +31,7 @@ from alphacut.rve.prism.model import (
 )
 from alphacut.rve.prism.problem import PrismProblem
 from alphacut.rve.result.checks import checks_within_limits
+from alphacut.rve.result.moduli import AVERAGES, AXES
 from alphacut.rve.result.result import HomogenisedStiffness, PhaseEnergies
 from alphacut.rve.solver.krylov import SolverOptions
 from alphacut.stochastic import ThetaLaw
@@ -50,6 +51,17 @@ class _NamedModel:
 
     petsc: Mapping[str, str]
     name: ClassVar[str] = "prism"
+    convention: ClassVar[str] = AVERAGES[AXES]
+    errors_by_reference: ClassVar[bool] = False
+    is_exact: ClassVar[bool] = False
+
+    def for_samples(self, moduli: tuple[float, float] | None, *, energies: bool) -> Self:
+        """This model; see `CellModel`."""
+        return self
+
+    def coarser(self) -> Self:
+        """This model, which proves nothing that is to be tested."""
+        return self
 
     def problem_of(self, law: object, phases: object) -> tuple[PrismProblem, dict[str, AnyPhase]]:
         """Problem moved to the law, and the materials in the mesh's order, both checked."""

@@ -30,18 +30,24 @@ MAX_FIRST_ORDER = 0.1
 ROUND_OFF = 1e-12
 
 
-def loss_factors(result: HomogenisedStiffness, losses: Array) -> DeclaredConstants:
+def loss_factors(result: HomogenisedStiffness, losses: Array | None = None) -> DeclaredConstants:
     """Effective loss factors of E, G and K, to first order or by complex moduli, with errors.
 
     Complex moduli where a phase has more than `MAX_FIRST_ORDER` and the model takes them (series).
 
     Args:
         result: Of any model, with the energies of its phases, else it is refused.
-        losses: Loss factors of K and G of each phase, shape (phases, 2).
+        losses: Loss factors of K and G of each phase, shape (phases, 2); those that the phases of
+            the cell state if not given, 0 where one states none.
     """
     energies = result.energies
     if energies is None:
-        raise RefusedError("energies", None, "a model with energies=True")
+        allowed = "a model with energies=True, or phases with a loss factor"
+        raise RefusedError("energies", None, allowed)
+    if losses is None:
+        if result.cell is None:
+            raise RefusedError("losses", None, "loss factors of K and G of each phase")
+        losses = np.array([[phase.loss or 0.0] * 2 for phase in result.cell.phases])
     values, errors = first_order(energies, losses, result.constants_of)
     if losses.max() > MAX_FIRST_ORDER and energies.moduli_at is not None:
         assert result.cell is not None

@@ -192,6 +192,17 @@ class HomogenisedStiffness:
         )
 
     @property
+    def is_of_fibres(self) -> bool:
+        """Whether the particles are round fibres, and both phases isotropic."""
+        return self.cell is not None and self.cell.square
+
+    @property
+    def fractions(self) -> Array:
+        """Mean fractions of the phases of the cell under f_Θ, matrix first, shape (2,)."""
+        assert self.cell is not None
+        return np.asarray(self.cell.fractions(self.curve.theta) @ self.curve.weights)
+
+    @property
     def stiffness(self) -> Array | None:
         """Mean stiffness under f_Θ in the order of the curve's, in Pa, or None."""
         curve = self.curve

@@ -25,15 +25,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from time import perf_counter
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from alphacut.base.arrays import Array, Ints
 from alphacut.base.errors import RefusedError
 from alphacut.rve.cell.cell import Cell, Phase, require_points, require_solve_arguments
+from alphacut.rve.cell.model import Resolution
 from alphacut.rve.result.checks import with_checks
-from alphacut.rve.result.moduli import square_voigt
+from alphacut.rve.result.moduli import AVERAGES, AXES, square_voigt
 from alphacut.rve.result.result import HomogenisedStiffness
 from alphacut.rve.series.lattice_sums import ZETA_PERIOD, lattice_images, lattice_sums
 from alphacut.rve.series.means import Material, Series, converged_means, mean_energies
@@ -42,6 +43,11 @@ from alphacut.stochastic import RadiusMap
 MAX_HARMONICS = 160  # per potential and load; reaches r = 0.999
 HIGHEST_SUM = 12 * MAX_HARMONICS + 8  # order of the lattice sums that couple so many
 LOADS = ("hydrostatic", "deviator", "shear")
+MAX_ACCURACY = 0.1
+TOLERANCE_PART = 0.4
+"""Fraction of a tolerance for the series at each θ, and again for the quadrature in θ."""
+COARSER = 100.0
+"""Multiple of the error of a series that tests bounds; a larger one sees less."""
 
 
 @dataclass(frozen=True)
@@ -199,7 +205,8 @@ class SeriesModel:
             of one another.
         accuracy: Relative error allowed, of the series at each θ and, without `points`, of E by the
             rule in θ; from `MIN_ACCURACY` to 0.1.
-        energies: Whether to compute the energies of the phases, for loss factors.
+        energies: Whether to compute the energies of the phases, for loss factors; they are also
+            computed where a phase states a loss factor.
 
     Example:
         >>> from alphacut.rve import Phase
@@ -214,14 +221,35 @@ class SeriesModel:
     accuracy: float = 1e-11
     energies: bool = False
     name: ClassVar[str] = "series"
+    convention: ClassVar[str] = AVERAGES[AXES]
+    errors_by_reference: ClassVar[bool] = False
+    is_exact: ClassVar[bool] = True
     MIN_ACCURACY: ClassVar[float] = 1e-12
+    DEFAULT_TOLERANCE: ClassVar[float | None] = None
     series: ClassVar[Series] = CIRCLES
 
     def __post_init__(self) -> None:
         require_points(self.points)
-        if not self.MIN_ACCURACY <= self.accuracy <= 0.1:
-            allowed = f"values in [{self.MIN_ACCURACY:g}, 0.1]"
+        if not self.MIN_ACCURACY <= self.accuracy <= MAX_ACCURACY:
+            allowed = f"values in [{self.MIN_ACCURACY:g}, {MAX_ACCURACY:g}]"
             raise RefusedError("the accuracy of the series", f"{self.accuracy:g}", allowed)
+
+    @classmethod
+    def with_resolution(cls, resolution: Resolution) -> Self:
+        """The series of a tolerance of E, at each θ and in the rule in θ; see `CellModel`."""
+        tolerance = resolution.tolerance or cls.DEFAULT_TOLERANCE
+        if tolerance is None:
+            return cls(energies=resolution.energies)
+        accuracy = max(TOLERANCE_PART * tolerance, cls.MIN_ACCURACY)
+        return cls(accuracy=accuracy, energies=resolution.energies)
+
+    def for_samples(self, moduli: tuple[float, float] | None, *, energies: bool) -> Self:
+        """This model; see `CellModel`."""
+        return replace(self, energies=energies or self.energies)
+
+    def coarser(self) -> Self:
+        """The series of `COARSER` times the error."""
+        return replace(self, accuracy=min(COARSER * self.accuracy, MAX_ACCURACY))
 
     def solve(
         self, radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase]
@@ -249,7 +277,7 @@ class SeriesModel:
                 errors=mean.errors,
                 cell=cell,
             )
-            if self.energies:
+            if self.energies or matrix.loss is not None or inclusion.loss is not None:
                 result = replace(result, energies=mean_energies(self.series, cell, mean))
             results.append(result)
         return results

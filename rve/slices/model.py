@@ -7,9 +7,9 @@ with radius r(θ). The error of a slice is told by orders and meshes.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
-from typing import ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.polynomial.chebyshev import chebvander
@@ -28,12 +28,13 @@ from alphacut.rve.cell.cell import (
     require_points,
     require_solve_arguments,
 )
+from alphacut.rve.cell.model import Resolution
 from alphacut.rve.cell.outline import Outline, circle, is_round
 from alphacut.rve.fenicsx import MPI, basix, cholesky, fem, mesh_of, ufl
 from alphacut.rve.mesh.curved import PlaneMesh, curved_nodes, plane_mesh, quadrature_degree
 from alphacut.rve.mesh.periodicity import unknowns
 from alphacut.rve.result.checks import with_checks
-from alphacut.rve.result.moduli import axial_moduli, mori_tanaka, square_moduli
+from alphacut.rve.result.moduli import AVERAGES, AXES, axial_moduli, mori_tanaka, square_moduli
 from alphacut.rve.result.result import HomogenisedStiffness, PhaseEnergies, StressCurve
 from alphacut.rve.solver.form import (
     CellForm,
@@ -203,10 +204,30 @@ class SlicesModel:
     points: int = 10
     outline: Outline = circle
     name: ClassVar[str] = "slices"
+    convention: ClassVar[str] = AVERAGES[AXES]
+    errors_by_reference: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         require_mesh_size(self.mesh_size)
         require_points(self.points)
+
+    @classmethod
+    def with_resolution(cls, resolution: Resolution) -> Self:
+        """The slices of a mesh size and an outline; see `CellModel`."""
+        return cls(mesh_size=resolution.mesh_size, outline=resolution.outline)
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether the particle is round, of which mechanics proves signs; see `CellModel`."""
+        return is_round(self.outline)
+
+    def for_samples(self, moduli: tuple[float, float] | None, *, energies: bool) -> Self:
+        """This model; see `CellModel`."""
+        return self
+
+    def coarser(self) -> Self:
+        """Slices on elements twice as large."""
+        return replace(self, mesh_size=min(2 * self.mesh_size, LIMIT))
 
     def solve(
         self, radius_map: RadiusMap, matrix: AnyPhase, inclusions: Sequence[AnyPhase]

@@ -19,6 +19,8 @@ from alphacut.rve.result.moduli import hashin_shtrikman
 from alphacut.rve.result.result import HomogenisedStiffness
 from alphacut.stochastic.particles.particles import SPHERES
 
+HILL = "Hill's isotropic average"
+
 
 def cubic_voigt(bulk: Array, deviator: Array, shear: Array) -> Array:
     """Stiffness in Voigt order, (…, 6, 6), from K, (C11 − C12)/2 and C44, (…,), in their unit."""
@@ -63,7 +65,19 @@ class HomogenisedSpheres(HomogenisedStiffness):
     @property
     def convention(self) -> str:
         """Name of the average that E and ν are of."""
-        return "Hill's isotropic average"
+        return HILL
+
+    @property
+    def is_of_fibres(self) -> bool:
+        """False: the particles are spheres."""
+        return False
+
+    @property
+    def fractions(self) -> Array:
+        """Mean volume fractions of the phases of the cell under f_Θ, matrix first, shape (2,)."""
+        assert self.cell is not None
+        sphere = SPHERES.fractions(self.cell.radius_map(self.curve.theta))
+        return np.asarray(np.stack([1 - sphere, sphere]) @ self.curve.weights)
 
     @property
     def moduli(self) -> Array:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from alphacut.rve import Phase
-from alphacut.rve.spheres.model import SphereSeriesModel
+from alphacut.rve.spheres.model import SpheresModel
 from alphacut.stochastic import HermiteMap
 from tests.calibration.declared import Calibration, free_seed
 
@@ -28,7 +28,7 @@ def test_declared_errors_of_rules_cover_the_true_ones():
         radius_map, (matrix, inclusion) = HermiteMap(a1, slopes[0], a3, slopes[1]), phases(rng)
         accuracy = 10.0 ** rng.uniform(-8, -2)
         rough, fine = (
-            SphereSeriesModel(accuracy=one).solve(radius_map, matrix, [inclusion])[0]
+            SpheresModel(accuracy=one).solve(radius_map, matrix, [inclusion])[0]
             for one in (accuracy, 1e-11)
         )
         declared = rough.moduli * sum(np.asarray(error) for error in rough.errors.values())

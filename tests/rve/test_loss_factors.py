@@ -5,7 +5,7 @@ import pytest
 
 from alphacut.rve import Phase, PrismModel, SeriesModel, SlicesModel
 from alphacut.rve.result.loss_factors import first_order, loss_factors
-from alphacut.rve.spheres.model import SphereSeriesModel
+from alphacut.rve.spheres.model import SpheresModel
 from alphacut.stochastic import HermiteMap
 
 RADIUS = HermiteMap(0.1337, 0.1, 0.8663, 0.1692)
@@ -81,7 +81,7 @@ def test_errors_of_coarse_energies_cover_what_finer_ones_find(rng):
 
 
 def test_losses_of_spheres_are_those_of_differences_of_the_modulus():
-    model, radius = SphereSeriesModel(energies=True), HermiteMap(0.2, 0.1, 0.6, 0.1)
+    model, radius = SpheresModel(energies=True), HermiteMap(0.2, 0.1, 0.6, 0.1)
 
     def result_at(*factors):
         matrix, sphere = (
@@ -100,7 +100,7 @@ def test_losses_of_spheres_are_those_of_differences_of_the_modulus():
 
 def test_few_spheres_lose_what_eshelby_s_lone_sphere_does():
     fraction = np.pi / 6 * 0.1**3
-    result = SphereSeriesModel(energies=True).solve(HermiteMap(0.1, 0, 0.1, 0), MATRIX, [PARTICLE])
+    result = SpheresModel(energies=True).solve(HermiteMap(0.1, 0, 0.1, 0), MATRIX, [PARTICLE])
     energies = result[0].energies.values[:, :, 0]
     (bulk, shear), sphere = MATRIX.bulk_and_shear, PARTICLE.bulk_and_shear[0]
     # K = K_m + c (K_i − K_m)(3 K_m + 4 G_m)/(3 K_i + 4 G_m) to first order in c

@@ -5,7 +5,7 @@ import pytest
 
 from alphacut import rve
 from alphacut.base.errors import RefusedError
-from alphacut.rve.spheres.model import SphereSeriesModel
+from alphacut.rve.spheres.model import SpheresModel
 
 POINTS, ACCURACY = (
     "is 1; allowed: 2 or more",
@@ -14,9 +14,9 @@ POINTS, ACCURACY = (
 WRONG = [
     (rve.SeriesModel, {"points": 1}, POINTS),
     (rve.SeriesModel, {"accuracy": 1e-15}, ACCURACY),
-    (SphereSeriesModel, {"points": 1}, POINTS),
-    (SphereSeriesModel, {"accuracy": 1e-12}, ACCURACY),
-    (SphereSeriesModel, {"accuracy": np.nan}, ACCURACY),
+    (SpheresModel, {"points": 1}, POINTS),
+    (SpheresModel, {"accuracy": 1e-12}, ACCURACY),
+    (SpheresModel, {"accuracy": np.nan}, ACCURACY),
     ("SlicesModel", {"points": 1}, POINTS),
     ("SlicesModel", {"mesh_size": 2}, "the mesh size is 2; allowed"),
     ("PrismModel", {"mesh_size": 0.0}, r"the mesh size is 0; allowed: values in \(0, 1\]"),

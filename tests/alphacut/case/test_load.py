@@ -145,7 +145,7 @@ def fraction_case(particles, fraction):
 )
 def test_a_fraction_is_a_map_that_is_crisp_over_theta(tmp_path, particles, factor, power):
     radius, _ = read(tmp_path, fraction_case(particles, "[0.2, 0.3, 0.4]")).random_cell
-    radii = radius.at({"fraction": 0.3})(np.linspace(-3, 3, 5))
+    radii = radius(np.linspace(-3, 3, 5))
     assert factor * radii**power == pytest.approx(np.full(5, 0.3), rel=1e-14)
 
 

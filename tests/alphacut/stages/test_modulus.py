@@ -9,7 +9,9 @@ from alphacut.case.content import load
 from alphacut.fuzzy.result import Nature
 from alphacut.questions.summary import Parts
 from alphacut.report.results import material
-from alphacut.stages.campaign import PLANS, CellCampaign
+from alphacut.rve.fuzzy_cell import CellSamples, FuzzyCell, require_consistent
+from alphacut.stages.cell import CellProblem
+from alphacut.stages.modulus import solved
 from tests.alphacut.small import CELL, summary_of_run, written
 
 MODELS = {
@@ -26,16 +28,17 @@ def test_cuts_agree_with_a_coarser_model_and_narrower_ones_do_not(tmp_path, mode
     if model == "slices":
         pytest.importorskip("alphacut.rve.fenicsx")
     changes = ("modulus.plan=signed", "cell.inclusion_poisson=0.3", *MODELS[model])
-    campaign = CellCampaign.of(load(written(tmp_path, CELL), changes).content)
-    cuts = campaign.propagation(
-        campaign.inputs, PLANS["signed"], knowledge=campaign.knowledge, progress=False
-    )
-    assert cuts.nature_of("E") is Nature.GUARANTEED
-    campaign.require_consistent(cuts)
+    problem = CellProblem.of(load(written(tmp_path, CELL), changes).content)
+    bounds = solved(problem, progress=False).bounds  # which require it of themselves
+    assert bounds.nature_of("E") is Nature.GUARANTEED
+    cell = FuzzyCell.of(problem.nominal_radius, problem.nominal_phases, problem.inputs)
+    coarse = CellSamples(problem.model().coarser(), cell, average=problem.average, loss_cuts=None)
+    require_consistent(bounds, coarse, error=0.0)
     for factor in (0.98, 1.02):
-        wrong = replace(cuts, lower=factor * cuts.lower, upper=factor * cuts.upper, inner=None)
+        ends = {"lower": factor * bounds.lower, "upper": factor * bounds.upper}
+        wrong = replace(bounds, **ends, inner=None)
         with pytest.raises(FailedError, match=r"the proof is wrong: E of a cell inside a cut"):
-            campaign.require_consistent(wrong)
+            require_consistent(wrong, coarse, error=0.0)
 
 
 def test_only_e_whose_signs_are_proved_is_called_guaranteed(tmp_path):

@@ -6,7 +6,7 @@ import pytest
 from alphacut.rve import Phase
 from alphacut.rve.result.checks import CertificateError
 from alphacut.rve.result.moduli import hashin_shtrikman, mori_tanaka
-from alphacut.rve.spheres.model import SphereSeriesModel
+from alphacut.rve.spheres.model import SpheresModel
 from alphacut.rve.spheres.result import cubic_moduli, cubic_voigt, hill_average, spheres_with_checks
 from alphacut.stochastic import HermiteMap
 
@@ -14,8 +14,8 @@ MATRIX, STIFF, MAP = Phase(20e9), Phase(80e9), HermiteMap(0.1337, 0.1, 0.8663, 0
 
 
 def test_mean_over_theta_is_that_of_a_fine_rule():
-    result = SphereSeriesModel().solve(MAP, MATRIX, [STIFF])[0]
-    fine = SphereSeriesModel(points=60, accuracy=1e-11).solve(MAP, MATRIX, [STIFF])[0]
+    result = SpheresModel().solve(MAP, MATRIX, [STIFF])[0]
+    fine = SpheresModel(points=60, accuracy=1e-11).solve(MAP, MATRIX, [STIFF])[0]
     np.testing.assert_allclose(result.moduli, fine.moduli, rtol=1e-9)
     true = abs(result.moduli / fine.moduli - 1)
     assert (true <= result.modulus_errors + 1e-12).all()
@@ -39,7 +39,7 @@ def test_bounds_meet_the_phases_and_mori_and_tanaka():
     [((0.9, 1.0, 1.0), "Reuss|Hashin"), ((1.08, 1.0, 1.0), "Hashin"), ((1.0, 3.0, 1.0), "Voigt")],
 )
 def test_a_wrong_stiffness_has_no_certificate(factors, words):
-    result = SphereSeriesModel(accuracy=1e-6).solve(MAP, MATRIX, [STIFF])[0]
+    result = SpheresModel(accuracy=1e-6).solve(MAP, MATRIX, [STIFF])[0]
     moduli = cubic_moduli(result.curve.stiffness) * factors
     wrong = replace(result.curve, stiffness=cubic_voigt(*moduli.T))
     with pytest.raises(CertificateError, match=words):

@@ -1,0 +1,35 @@
+"""All engineering constants of a homogenised cell in one place."""
+
+from __future__ import annotations
+
+from alphacut.rve.result.engineering_constants import FREE, NAMES, engineering_constants
+from alphacut.rve.result.result import DeclaredConstants, HomogenisedStiffness
+from alphacut.rve.series.fibre_constants import fibre_constants
+
+
+def constants(result: HomogenisedStiffness) -> DeclaredConstants:
+    """Return the engineering constants of a cell with their declared errors.
+
+    These are E and ν of the result's average; of round fibres in a matrix E_T, E_L, nu_LT, G_T, G_L
+    and K_T, across (T) and along (L) them; of a plane stiffness E_x, E_y, nu_xy and G_xy in plane
+    strain, and with the ending _free without stress along the fibres.
+
+    Example:
+        >>> from alphacut.rve import Phase, SeriesModel
+        >>> from alphacut.stochastic import HermiteMap
+        >>> radius = HermiteMap(0.2, 0.1, 0.6, 0.1)
+        >>> [cell] = SeriesModel().solve(radius, Phase(20e9), [Phase(80e9)])
+        >>> f"{constants(cell).values['E_L'] / 1e9:.3f} GPa"
+        '27.865 GPa'
+    """
+    values = {"E": result.modulus, "nu": result.poisson}
+    errors = {"E": result.estimated_error * result.modulus, "nu": result.poisson_error}
+    if result.is_of_fibres:
+        of_fibres = fibre_constants(result)
+        values |= of_fibres.values
+        errors |= of_fibres.errors
+    for definition, plane in engineering_constants(result).items():
+        names = [f"{name}_free" if definition == FREE else name for name in NAMES]
+        values |= dict(zip(names, map(float, plane.values), strict=True))
+        errors |= dict(zip(names, map(float, plane.errors), strict=True))
+    return DeclaredConstants(values, errors)

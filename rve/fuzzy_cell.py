@@ -1,0 +1,599 @@
+"""The fuzzy stiffness of a cell: its constants and loss factors over α-cuts of fuzzy inputs.
+
+Inputs are parameters of the radius map (a1 … a4, or fraction), Young's moduli and Poisson's ratios
+of the phases (matrix_modulus, inclusion_poisson; of the user's own mesh NAME_modulus), and their
+loss factors (matrix_loss). Loss factors are no coordinates of the samples: those of the cell are
+linear in them to first order, so that each sample gives the bounds over all of their α-cuts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass, replace
+from itertools import product
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from alphacut.base.arrays import Array, on_one_blas_thread
+from alphacut.base.errors import FailedError, require, require_choice
+from alphacut.fuzzy import Crisp, FuzzyNumber, General, Knowledge, propagate
+from alphacut.fuzzy.plans.design import Plan
+from alphacut.fuzzy.result import Bounds, Nature
+from alphacut.fuzzy.sets.boxes import levels
+from alphacut.fuzzy.sets.numbers import Cut, outer_steps
+from alphacut.rve.cell.cell import AnyPhase, Phase
+from alphacut.rve.cell.model import AnyModel
+from alphacut.rve.result.engineering_constants import (
+    FREE,
+    NAMES,
+    PLANE_STRAIN,
+    engineering_constants,
+)
+from alphacut.rve.result.loss_factors import CONSTANTS, MAX_FIRST_ORDER, loss_factors
+from alphacut.rve.result.moduli import AVERAGES
+from alphacut.rve.result.result import HomogenisedStiffness
+from alphacut.rve.series.fibre_constants import fibre_constants
+from alphacut.stochastic import RadiusMap, ThetaLaw
+from alphacut.stochastic.theta.quadrature import between_nodes
+
+if TYPE_CHECKING:
+    import xarray
+
+CURVE_POINTS = 61
+"""Points over θ of a stored stress curve."""
+SUFFIXES = {PLANE_STRAIN: "", FREE: "_free"}
+"""What is added to the name of a constant along x and y, by its definition."""
+FIBRES = ("E_T", "E_L", "nu_LT", "G_T", "G_L")
+"""Constants across (T) and along (L) the fibres; see `fibre_constants`."""
+PLANE = tuple(name + suffix for suffix in SUFFIXES.values() for name in NAMES)
+QUANTITIES = ("E", "nu", "s11", "s12", *FIBRES, *PLANE)
+"""Outputs with α-cuts: moduli and stresses in Pa; s11 and s12 are mean stresses, eq. 15."""
+CUT = ("alpha", "bound")
+
+
+@dataclass(frozen=True, eq=False)
+class LossCuts:
+    """α-cuts of the loss factors of E, G and K.
+
+    Args:
+        cuts: Lower and upper bounds by the names of `CONSTANTS`, shape (levels, 2) each.
+        errors: Their declared absolute errors by name; empty where none are declared.
+    """
+
+    cuts: Mapping[str, Array]
+    errors: Mapping[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class FuzzyStiffness:
+    """Fuzzy homogenised constants of a cell, with their errors and samples.
+
+    Args:
+        bounds: Of the outputs `QUANTITIES` in SI, of those that the model gives, with samples.
+        theta: Values of θ at which the stress curves of the samples are kept, shape (points,).
+        average: Name of the average of the stiffness that E and ν are of.
+        model: Name of the model.
+        error: Declared relative error of E by source.
+        checks: Largest violation of each property that right results have, by name.
+        losses: Loss factors; None where the phases have none.
+    """
+
+    bounds: Bounds
+    theta: Array
+    average: str
+    model: str
+    error: Mapping[str, float]
+    checks: Mapping[str, float]
+    losses: LossCuts | None
+
+    @property
+    def modulus(self) -> FuzzyNumber:
+        """Fuzzy Young's modulus E in Pa; between two levels the wider α-cut holds."""
+        return fuzzy_number(self.bounds.alpha, self.cuts("E"))
+
+    @property
+    def loss_factor(self) -> FuzzyNumber | None:
+        """Fuzzy loss factor of E; None where the phases have none."""
+        if self.losses is None:
+            return None
+        return fuzzy_number(self.bounds.alpha, self.losses.cuts["E"])
+
+    @property
+    def guarantee(self) -> Nature:
+        """What the bounds of E promise; those of all other constants are attained."""
+        return self.bounds.nature_of("E")
+
+    def cuts(self, name: str) -> Array:
+        """Return lower and upper bounds of one of `QUANTITIES` in SI, shape (levels, 2)."""
+        return np.stack(self.bounds.bounds(name), axis=1)
+
+    @property
+    def constants(self) -> tuple[str, ...]:
+        """Names of those `QUANTITIES` that the model gives."""
+        return tuple(name for name in QUANTITIES if name in self.bounds.outputs)
+
+    @property
+    def systems(self) -> int:
+        """Number of linear systems that were solved for the samples."""
+        return int(self._samples("systems").sum())
+
+    def _samples(self, output: str) -> Array:
+        assert self.bounds.samples is not None
+        return self.bounds.samples.values.output(output)
+
+    def __str__(self) -> str:
+        """Return a line for each constant with its lowest and highest α-cut."""
+        first, last = self.bounds.alpha[[0, -1]]
+        lines = [
+            f"fuzzy stiffness by {self.model}: {self.bounds.evaluations} samples,"
+            f" {self.bounds.seconds:.2g} s; E and ν of {self.average}",
+            f"relative error of E: {sum(self.error.values()):.1e}"
+            if self.error
+            else "relative error of E: not declared",
+        ]
+        rows = {name: (self.cuts(name), self.bounds.nature_of(name)) for name in self.constants}
+        for name, cut in {} if self.losses is None else self.losses.cuts.items():
+            rows[f"loss factor of {name}"] = cut, Nature.ATTAINED
+        for name, (cut, nature) in rows.items():
+            texts = (" … ".join(f"{end:.6g}" for end in cut[row]) for row in (0, -1))
+            lowest, highest = texts
+            lines.append(f"{name}: α = {first:g}: {lowest}; α = {last:g}: {highest} ({nature})")
+        return "\n".join(lines)
+
+    __repr__ = __str__
+
+    def to_csv(self, path: str) -> None:
+        """Write a row for each constant and level: bounds in SI, and what they promise."""
+        lines = ["constant,alpha,lower,upper,guarantee"]
+        for name in self.constants:
+            guarantee, cuts = self.bounds.nature_of(name), self.cuts(name)
+            for row, alpha in enumerate(self.bounds.alpha):
+                lower, upper = float(cuts[row, 0]), float(cuts[row, 1])
+                lines.append(f"{name},{alpha:g},{lower!r},{upper!r},{guarantee}")
+        with open(path, "w", encoding="utf-8") as file:
+            file.write("\n".join(lines) + "\n")
+
+    def to_dataset(self) -> xarray.Dataset:
+        """Return a dataset in SI: α-cuts NAME, inputs NAME_at that reach them, and samples.
+
+        Each constant has its values NAME_sample, `point` has the inputs of the samples and
+        `curve11` their stresses σ11 over θ.
+        """
+        import xarray
+
+        bounds = self.bounds
+        assert bounds.samples is not None
+        variables: dict[str, Any] = {}
+        for name in self.constants:
+            units = {"units": "1" if name.startswith("nu") else "Pa"}
+            column = bounds.column(name)
+            points = np.stack([bounds.lower_at[:, column], bounds.upper_at[:, column]], axis=1)
+            variables[name] = (CUT, self.cuts(name), units)
+            variables[f"{name}_at"] = ((*CUT, "parameter"), points)
+            variables[f"{name}_sample"] = ("sample", self._samples(name), units)
+        for name, cut in {} if self.losses is None else self.losses.cuts.items():
+            variables[f"loss_{name}"] = (CUT, cut)
+        variables["point"] = (("sample", "parameter"), bounds.samples.points)
+        variables["curve11"] = (("sample", "theta"), self._samples("curve11"), {"units": "Pa"})
+        axes = {"bound": ["lower", "upper"], "parameter": list(bounds.inputs)}
+        return xarray.Dataset(variables, {"theta": self.theta, "alpha": bounds.alpha, **axes})
+
+
+def fuzzy_number(alpha: Array, cuts: Array) -> FuzzyNumber:
+    """Return the fuzzy number of α-cuts (levels, 2); the mean of both ends on level 1 alone."""
+    if tuple(alpha) == (1.0,):
+        return Crisp(float(cuts.mean()))
+    return outer_steps(alpha, cuts[:, 0], cuts[:, 1])
+
+
+Phases = Sequence[AnyPhase] | Mapping[str, AnyPhase]
+"""Matrix and particle, or the phases of the user's own mesh or level set by name."""
+PHASE_PARAMETERS = ("modulus", "poisson", "loss")
+
+
+def fuzzy_stiffness(
+    model: AnyModel,
+    radius: RadiusMap | ThetaLaw,
+    phases: Phases,
+    inputs: Mapping[str, FuzzyNumber | float],
+    method: Plan | None = None,
+    *,
+    alpha: Sequence[float] | None = None,
+    average: str | None = None,
+    **campaign: Any,
+) -> FuzzyStiffness:
+    """Return the α-cuts of the homogenised constants of a cell with fuzzy inputs.
+
+    Samples that differ in the particle's Young's modulus alone share a mesh. A model whose declared
+    errors take a reference solution declares them at the nominal inputs alone. Where mechanics
+    proves the signs of all inputs' effects on E, and `method` uses them, the bounds of E are
+    guaranteed, and are tested by a coarser model.
+
+    Args:
+        model: A model of the cell, such as `PrismModel()`.
+        radius: Radius map at the nominal inputs; of the user's own mesh the law of θ.
+        phases: Phases at the nominal inputs.
+        inputs: Fuzzy numbers in SI by the names of parameters: fields of the radius map, and of
+            phase NAME ("matrix", "inclusion") NAME_modulus, NAME_poisson and NAME_loss.
+        method: Plan of the samples; `General()` if not given.
+        alpha: Rising levels; 0, ¼, ½, ¾, 1 if not given.
+        average: Average of a plane stiffness that E and ν are of, "axes" (eq. 16) or "isotropic";
+            that of the model's results if not given.
+        campaign: Further arguments of `propagate`: workers, executor, store, identity, progress.
+
+    Raises:
+        RefusedError: An input is no parameter, or a value is not allowed.
+        CampaignError: Samples failed; the others are in the store.
+        FailedError: A coarser model contradicts guaranteed bounds.
+    """
+    cell = FuzzyCell.of(radius, phases, inputs)
+    alpha_levels = tuple(levels(4) if alpha is None else alpha)
+    loss_cuts = cell.loss_cuts(alpha_levels)
+    modulus = cell.inputs.get("inclusion_modulus")
+    sample_model = model.for_samples(
+        None if modulus is None else modulus.support, energies=loss_cuts is not None
+    )
+    function = CellSamples(sample_model, cell, average=average, loss_cuts=loss_cuts)
+    shared = tuple(name for name in cell.inputs if name != "inclusion_modulus")
+    bounds = propagate(
+        function,
+        cell.inputs,
+        method or General(),
+        alpha=alpha_levels,
+        shared=shared or tuple(cell.inputs),
+        knowledge=proved_signs(model, cell),
+        **campaign,
+    )
+    reference = None
+    if model.errors_by_reference:
+        reference = replace(function, model=model).solve([cell.nominal])[0]
+    error = _errors_of_modulus(bounds, reference)
+    losses = None
+    if loss_cuts is not None:
+        losses = _cuts_of_losses(bounds, reference, loss_cuts, has_particle=cell.has_particle)
+    if bounds.nature_of("E") is Nature.GUARANTEED:
+        coarse = replace(function, model=sample_model.coarser())
+        require_consistent(bounds, coarse, error=sum(error.values()))
+    return FuzzyStiffness(
+        bounds=bounds,
+        theta=function.theta,
+        average=model.convention if average is None else AVERAGES[average],
+        model=model.name,
+        error=error,
+        checks=_largest_by_name(bounds, kind="check"),
+        losses=losses,
+    )
+
+
+@dataclass(frozen=True)
+class FuzzyCell:
+    """A cell at nominal values, and the fuzzy numbers of its parameters.
+
+    Args:
+        radius: Radius map, or law of θ, at the nominal values.
+        phases: Phases by name at the nominal values: "matrix" and "inclusion", or those of a mesh.
+        inputs: Fuzzy numbers in SI of the parameters that samples differ in, one at least.
+        losses: Loss factors of the phases, in their order; empty for none.
+        has_particle: Whether the phases are matrix and particle, as most models take them.
+    """
+
+    radius: RadiusMap | ThetaLaw
+    phases: Mapping[str, AnyPhase]
+    inputs: Mapping[str, FuzzyNumber]
+    losses: tuple[FuzzyNumber, ...]
+    has_particle: bool
+
+    @classmethod
+    def of(
+        cls,
+        radius: RadiusMap | ThetaLaw,
+        phases: Phases,
+        inputs: Mapping[str, FuzzyNumber | float],
+    ) -> FuzzyCell:
+        """Return the cell of arguments of `fuzzy_stiffness`; RefusedError of unknown inputs."""
+        has_particle = not isinstance(phases, Mapping)
+        named = _named(phases)
+        numbers = {
+            name: number if isinstance(number, FuzzyNumber) else Crisp(float(number))
+            for name, number in inputs.items()
+        }
+        parameters = _parameters(radius, named)
+        for name in numbers:
+            require_choice("input", name, parameters)
+        # a campaign needs one input at least
+        sampled = {x: number for x, number in numbers.items() if not x.endswith("_loss")}
+        sampled = sampled or {"unchanged": Crisp(1.0)}
+        losses = [
+            numbers.get(f"{name}_loss", Crisp(phase.loss or 0.0)) for name, phase in named.items()
+        ]
+        is_lossy = any(number.support.upper > 0 for number in losses)
+        return cls(radius, named, sampled, tuple(losses) if is_lossy else (), has_particle)
+
+    @property
+    def nominal(self) -> dict[str, float]:
+        """Nominal values of the inputs."""
+        return {name: number.nominal for name, number in self.inputs.items()}
+
+    def loss_cuts(self, alpha: Sequence[float]) -> Array | None:
+        """Return α-cuts of the phases' loss factors, shape (levels, 2, phases); None for none."""
+        if not self.losses:
+            return None
+        return phase_loss_cuts(self.losses, alpha)
+
+    def radius_at(self, values: Mapping[str, float]) -> Any:
+        """Return the radius map, or the law of θ, at values of the inputs."""
+        names = _field_names(self.radius)
+        changes = {name: x for name, x in values.items() if name in names}
+        return replace(cast("Any", self.radius), **changes) if changes else self.radius
+
+    def phases_at(self, values: Mapping[str, float]) -> dict[str, AnyPhase]:
+        """Return the phases by name at values of the inputs."""
+        found = {}
+        for name, phase in self.phases.items():
+            prefix = f"{name}_"
+            changes = {
+                x.removeprefix(prefix): value
+                for x, value in values.items()
+                if x.startswith(prefix) and x.removeprefix(prefix) in _field_names(phase)
+            }
+            found[name] = replace(cast("Any", phase), **changes)
+        return found
+
+    def support(self, name: str) -> Cut:
+        """Return least and greatest value of a phase's parameter, fuzzy or not."""
+        if name in self.inputs:
+            return self.inputs[name].support
+        phase, _, parameter = name.partition("_")
+        value = getattr(self.phases[phase], parameter)
+        return Cut(value, value)
+
+
+def _named(phases: Phases) -> dict[str, AnyPhase]:
+    if isinstance(phases, Mapping):
+        return dict(phases)
+    require(len(phases) == 2, "phases", value=len(phases), allowed="matrix and inclusion")
+    matrix, inclusion = phases
+    return {"matrix": matrix, "inclusion": inclusion}
+
+
+def _field_names(value: object) -> tuple[str, ...]:
+    if not is_dataclass(value):
+        return ()
+    return tuple(field.name for field in fields(value))
+
+
+def _parameters(radius: object, phases: Mapping[str, AnyPhase]) -> tuple[str, ...]:
+    """Return the names that inputs may have."""
+    of_radius = [name for name in _field_names(radius) if isinstance(getattr(radius, name), float)]
+    of_phases = [
+        f"{name}_{parameter}"
+        for name, phase in phases.items()
+        for parameter in PHASE_PARAMETERS
+        if parameter in _field_names(phase)
+    ]
+    return (*of_radius, *of_phases)
+
+
+@dataclass(frozen=True, eq=False)
+class CellSamples:
+    """The function from points of the fuzzy inputs to the outputs of the cell, in SI.
+
+    Args:
+        model: Model of the cell.
+        cell: The cell and its fuzzy inputs.
+        average: As that of `fuzzy_stiffness`.
+        loss_cuts: α-cuts of the phases' loss factors, shape (levels, 2, phases), if any.
+    """
+
+    model: Any
+    cell: FuzzyCell
+    average: str | None
+    loss_cuts: Array | None
+
+    @property
+    def theta(self) -> Array:
+        """Values of θ at which stress curves are kept, shape (CURVE_POINTS,)."""
+        law: Any = getattr(self.cell.radius, "distribution", self.cell.radius)
+        return np.asarray(np.linspace(law.lower, law.upper, CURVE_POINTS))
+
+    def solve(self, points: Sequence[Mapping[str, float]]) -> list[HomogenisedStiffness]:
+        """Return the result at each point; points differ in the particle's modulus alone."""
+        cells = [self.cell.phases_at(point) for point in points]
+        radius = self.cell.radius_at(points[0])
+        if self.cell.has_particle:
+            inclusions = [phases["inclusion"] for phases in cells]
+            results = self.model.solve(radius, cells[0]["matrix"], inclusions)
+        else:
+            results = [self.model.solve(radius, phases)[0] for phases in cells]
+        if self.average is None:
+            return list(results)
+        return [result.with_average(self.average) for result in results]
+
+    @on_one_blas_thread
+    def __call__(self, points: Sequence[Mapping[str, float]]) -> list[dict[str, float | Array]]:
+        """Return the outputs at each point by name, moduli and stresses in Pa.
+
+        Beside `QUANTITIES` these are the number of linear systems, the stress curve "curve11" at
+        `theta`, errors of E by source, checks, and bounds of the loss factors, shape (levels, 3).
+        """
+        return [self._outputs(result) for result in self.solve(points)]
+
+    def _outputs(self, result: HomogenisedStiffness) -> dict[str, float | Array]:
+        require_isotropic(result)
+        curve = result.curve
+        s11, s12 = curve.mean
+        outputs: dict[str, float | Array] = {"E": result.modulus, "nu": result.poisson}
+        outputs |= {"s11": s11, "s12": s12}
+        if result.is_of_fibres:
+            constants = fibre_constants(result).values
+            outputs |= {name: constants[name] for name in FIBRES}
+        outputs |= plane_constants_by_name(result)
+        outputs["systems"] = len(result.iterations)
+        outputs["curve11"] = between_nodes(curve.theta, curve.s11, self.theta)
+        outputs |= {f"error:{name}": result.error.get(name, 0.0) for name in ("space", "theta")}
+        outputs |= {f"check:{name}": value for name, value in result.checks.items()}
+        if self.loss_cuts is not None:
+            bounds, errors = loss_bounds(result, self.loss_cuts)
+            outputs |= {"loss_lower": bounds[:, 0], "loss_upper": bounds[:, 1]}
+            outputs["loss_error"] = np.nan_to_num(errors)
+        return outputs
+
+
+def require_isotropic(result: HomogenisedStiffness) -> None:
+    """Refuse E and ν of a cell whose stiffness no isotropic solid has."""
+    if not result.has_isotropic_constants:
+        value, cure = f"{result.modulus / 1e9:.4g} GPa", "take the stiffness of `alphacut cell`"
+        raise FailedError(f"E would be {value}: 2 G_T exceeds 3 (C11 + C12)", cure)
+
+
+def plane_constants_by_name(result: HomogenisedStiffness) -> dict[str, float]:
+    """Return those of `PLANE` that a result has, moduli in Pa."""
+    return {
+        name + SUFFIXES[definition]: float(value)
+        for definition, constants in engineering_constants(result).items()
+        for name, value in zip(NAMES, constants.values, strict=True)
+    }
+
+
+def proved_signs(model: AnyModel, cell: FuzzyCell) -> Knowledge:
+    """Return the signs of the inputs' effects on E where mechanics proves them, else none.
+
+    If both phases have one crisp Poisson's ratio ν ≥ 0 and one phase is the stiffer for all values,
+    more of it can only stiffen the cell: A = 2 C33 and B = C11 + C12 of fibres rise (the paper's
+    eq. 16), and with them E = 3A/2 − A²/(2B); of spheres the bulk modulus and both averages of the
+    shear modulus. The radius Σ a_i h_i(θ) rises with a1, a2 and a3, since h_i ≥ 0, and falls with
+    a4, since h4 ≤ 0 (the paper's eq. 12).
+    """
+    is_isotropic = all(isinstance(phase, Phase) for phase in cell.phases.values())
+    if not (model.is_exact and cell.has_particle and is_isotropic):
+        return Knowledge()
+    matrix, inclusion = cell.support("matrix_modulus"), cell.support("inclusion_modulus")
+    poisson = cell.support("matrix_poisson")
+    is_same = poisson == cell.support("inclusion_poisson") and poisson.lower == poisson.upper
+    is_stiffer = inclusion.lower >= matrix.upper
+    is_softer = inclusion.upper <= matrix.lower
+    if not is_same or poisson.lower < 0 or not (is_stiffer or is_softer):
+        return Knowledge()
+    effect = 1 if is_stiffer else -1  # of more inclusion on E
+    signs = {"a1": effect, "a2": effect, "a3": effect, "a4": -effect, "fraction": effect}
+    signs |= {"matrix_modulus": 1, "inclusion_modulus": 1}
+    of_inputs = {name: {"E": sign} for name, sign in signs.items() if name in cell.inputs}
+    return Knowledge(signs=of_inputs, source="as mechanics proves of exact cells", tests=2)
+
+
+def require_consistent(bounds: Bounds, coarse: CellSamples, *, error: float) -> None:
+    """Require that a coarser model agrees with guaranteed cuts of E at points inside them.
+
+    The points are the middles of the narrowest and of the widest cut of the inputs.
+
+    Args:
+        bounds: The cuts.
+        coarse: Samples by the coarser model.
+        error: Relative error of E that the cuts declare.
+
+    Raises:
+        FailedError: E at such a point lies outside a cut by more than the errors of both.
+    """
+    cuts = np.stack(bounds.bounds("E"), axis=1)
+    middles_at = bounds.alpha[[-1, 0]]
+    inputs = bounds.inputs.items()
+    points = [{name: float(np.mean(x.cut(alpha))) for name, x in inputs} for alpha in middles_at]
+    for alpha, point in zip(middles_at, points, strict=True):
+        result = coarse.solve([point])[0]
+        value = result.modulus
+        slack = value * (error + sum(result.error.values()))
+        for low, high in cuts[bounds.alpha <= alpha]:
+            if not low - slack <= value <= high + slack:
+                what = f"E of a cell inside a cut is {value / 1e9:.9g} GPa, the cut"
+                what += f" {low / 1e9:.9g} … {high / 1e9:.9g} GPa"
+                raise FailedError(f"the proof is wrong: {what}", "keep the case and report it")
+
+
+def _largest_by_name(bounds: Bounds, *, kind: str) -> dict[str, float]:
+    """Return the largest value over all samples of each output KIND:NAME, by NAME."""
+    assert bounds.samples is not None
+    values = bounds.samples.values
+    return {
+        name.partition(":")[2]: float(values.output(name).max())
+        for name, _ in values.layout
+        if name.startswith(f"{kind}:")
+    }
+
+
+def _errors_of_modulus(bounds: Bounds, reference: HomogenisedStiffness | None) -> dict[str, float]:
+    """Return the relative error of E by source: of the reference, else the largest of samples."""
+    if reference is not None:
+        return dict(reference.error)
+    largest = _largest_by_name(bounds, kind="error")
+    return {name: error for name, error in largest.items() if error}
+
+
+def phase_loss_cuts(losses: Sequence[FuzzyNumber], alpha: Sequence[float]) -> Array:
+    """Return α-cuts of the loss factor of each phase, shape (levels, 2, phases)."""
+    return np.array([np.transpose([loss.cut(level) for loss in losses]) for level in alpha])
+
+
+def loss_corners(cuts: Array, fractions: Array) -> Array:
+    """Return the phases' loss factors where those of E, G and K are extreme, to first order.
+
+    Args:
+        cuts: α-cuts of each phase's loss factor, the same of its K and G, (levels, 2, phases).
+        fractions: ∂ln c/∂ln X of c = E, G, K by X = K, G of each phase, shape (phases, 2, 3).
+
+    Returns:
+        Loss factors of K and G of each phase where that of a constant is least and greatest, shape
+        (levels, 2, 3, phases, 2).
+    """
+    slopes = fractions.sum(axis=1).T  # (constants, phases)
+    lower, upper = cuts[:, 0, None], cuts[:, 1, None]
+    minima = np.where(slopes >= 0, lower, upper)
+    maxima = np.where(slopes >= 0, upper, lower)
+    corners = np.stack([minima, maxima], axis=1)
+    return np.stack([corners, corners], axis=-1)
+
+
+def loss_bounds(result: HomogenisedStiffness, cuts: Array) -> tuple[Array, Array]:
+    """Return bounds of the loss factors of E, G and K, (levels, 2, 3), and their errors, (3,).
+
+    Args:
+        result: Result of a cell, with the energies of its phases.
+        cuts: Those of `phase_loss_cuts`.
+    """
+    assert result.energies is not None
+    fractions, _ = result.energies.energy_fractions(result.constants_of)
+    corners = loss_corners(cuts, fractions)
+    errors = [loss_factors(result, corners[0, 1, k]).errors[x] for k, x in enumerate(CONSTANTS)]
+    if corners.max() <= MAX_FIRST_ORDER:  # level l, end e, constant c, phase p, K or G x
+        return np.einsum("lecpx,pxc->lec", corners, fractions), np.array(errors)
+    bounds = np.empty(corners.shape[:3])
+    for corner in product(*map(range, bounds.shape)):
+        bounds[corner] = loss_factors(result, corners[corner]).values[CONSTANTS[corner[-1]]]
+    return bounds, np.array(errors)
+
+
+def _cuts_of_losses(
+    bounds: Bounds,
+    reference: HomogenisedStiffness | None,
+    phase_cuts: Array,
+    *,
+    has_particle: bool,
+) -> LossCuts:
+    """Return the loss factors' α-cuts: from the least lower bound of all samples to the greatest.
+
+    Errors are those of the reference, else the largest of the samples; none of the user's own mesh.
+    """
+    cuts = {name: np.empty((len(bounds.alpha), 2)) for name in CONSTANTS}
+    for level in range(len(bounds.alpha)):
+        for column, name in enumerate(CONSTANTS):
+            lowest = bounds.bounds(f"loss_lower[{level}][{column}]").lower
+            highest = bounds.bounds(f"loss_upper[{level}][{column}]").upper
+            cuts[name][level] = lowest[level], highest[level]
+    assert bounds.samples is not None
+    if reference is not None:
+        _, errors = loss_bounds(reference, phase_cuts)
+    elif has_particle:
+        errors = bounds.samples.values.output("loss_error").max(axis=0)
+    else:
+        return LossCuts(cuts, {})
+    return LossCuts(cuts, dict(zip(CONSTANTS, map(float, errors), strict=True)))
