@@ -21,14 +21,16 @@ from alphacut.frame.records.history import Accelerogram, History
 from alphacut.frame.records.suite import read_record, read_suite
 from alphacut.frame.structures.lagrangian import LagrangianSystem, pendulum
 from alphacut.frame.structures.loads import Force
+from alphacut.frame.structures.material_damping import damping_from_loss
 from alphacut.frame.structures.matrix import MatrixStructure
 from alphacut.frame.structures.quantities import Output, Parameter
+from alphacut.frame.structures.read_matrix import read_matrix
 from alphacut.frame.structures.storey import StoreyFrame
 
 __all__ = [
     "INTEGRATORS", "METHODS", "Accelerogram", "Auto", "DualProof", "Envelope", "Exact", "Force",
     "GraphFollower", "History", "ImprovedFollower", "LagrangianFlow", "LagrangianSystem",
     "LinearFlow", "MatrixStructure", "Midpoint", "Output", "Parameter", "Proof", "Sampled",
-    "StoreyFrame", "envelope", "identify", "pendulum", "read_modes", "read_record", "read_suite",
-    "require_envelope",
+    "StoreyFrame", "damping_from_loss", "envelope", "identify", "pendulum", "read_matrix",
+    "read_modes", "read_record", "read_suite", "require_envelope",
 ]  # fmt: skip

@@ -1,17 +1,16 @@
-"""Section on a structure from the matrices of a frame program: Matrix Market, NumPy or CSV."""
+"""Section on a structure from the matrices of a frame program."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 from pydantic import Field, PlainValidator, ValidationInfo
 
 from alphacut.base.arrays import Array
-from alphacut.base.errors import RefusedError, printable, require
+from alphacut.base.errors import RefusedError, require
 from alphacut.case.structure import (
     LOSS_STAND_IN,
     RATIO_WORDS,
@@ -23,61 +22,11 @@ from alphacut.case.structure import (
     read_accelerogram,
 )
 from alphacut.case.types import NotEmpty, Section, after, case_file, distinct, text
-from alphacut.frame import Accelerogram, MatrixStructure
-from alphacut.frame.structures.matrix import Monomial, modal_energy_shares
+from alphacut.frame import Accelerogram, MatrixStructure, damping_from_loss, read_matrix
+from alphacut.frame.structures.matrix import Monomial, modal_energy_fractions
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.io.quantity import parse_fuzzy_in_any_unit
-
-ENDINGS = (".mtx", ".npz", ".npy", ".csv")
-ALLOWED = "a file .mtx, .npz, .npy or .csv with one array of finite real numbers"
-
-
-def read_array(path: Path, name: str = "") -> Array:
-    """Reads one array of floats, shape (n,) or (n, m), from a file; a sparse one becomes dense.
-
-    `name` chooses one of several arrays in a .npz file.
-
-    Raises:
-        RefusedError: The file cannot be read, or holds something else.
-    """
-    if path.suffix.lower() not in ENDINGS:
-        raise RefusedError(path.name, f"of type {path.suffix or 'none'}", ALLOWED)
-    try:
-        array = np.asarray(_read_by_ending(path, name))
-    except RefusedError:
-        raise
-    except Exception as error:  # whatever the readers of SciPy and NumPy raise
-        reason = printable(error, 80) or type(error).__name__
-        raise RefusedError(path.name, reason, ALLOWED) from None
-    is_finite = array.dtype.kind in "iuf" and bool(np.isfinite(array).all())
-    fits = is_finite and array.ndim in (1, 2) and array.size > 0
-    require(fits, path.name, "no such array", ALLOWED)
-    return array.astype(float)
-
-
-def _read_by_ending(path: Path, name: str) -> Array:
-    """The array in a .mtx, .csv, .npy or .npz file; `name` chooses one of several in a .npz."""
-    import scipy.io
-    import scipy.sparse
-
-    kind = path.suffix.lower()
-    if kind == ".mtx":
-        array = scipy.io.mmread(path)
-        return np.asarray(array.toarray() if scipy.sparse.issparse(array) else array)
-    if kind == ".csv":
-        return np.loadtxt(path, delimiter=",", ndmin=2, encoding="utf-8-sig")
-    if kind == ".npy":
-        return np.asarray(np.load(path, allow_pickle=False))
-    with np.load(path, allow_pickle=False) as file:
-        names = file.files
-        if {"format", "data", "shape"} <= set(names):
-            return np.asarray(scipy.sparse.load_npz(path).toarray())
-        chosen = [x for x in names if not name or x == name]
-        if len(chosen) != 1:
-            what = f"array {name or 'not named'}"
-            raise RefusedError(path.name, what, f"{path.name}:NAME, one of {', '.join(names)}")
-        return np.asarray(file[chosen[0]])
 
 
 def _term(value: object, info: ValidationInfo) -> tuple[Monomial, Array]:
@@ -85,7 +34,7 @@ def _term(value: object, info: ValidationInfo) -> tuple[Monomial, Array]:
     match value:
         case [str(factor), str(file)]:
             name, _, member = file.partition(":")
-            return Monomial.parse(factor), read_array(case_file(name, info), member)
+            return Monomial.parse(factor), read_matrix(case_file(name, info), name=member)
     raise RefusedError("", value, 'a pair [factor, file], as ["Ec*I", "columns.mtx"]')
 
 
@@ -168,13 +117,16 @@ class MatricesSection(StructureSection):
     def _material_damping_ratios(
         self, damping: MaterialDamping, model: MatrixStructure, loss: FuzzyNumber
     ) -> dict[str, FuzzyNumber]:
-        """Ratio "zeta" of all modes if E is in every term of K; else "zeta1" … by energy shares."""
+        """Ratio "zeta" of all modes if E is in every term of K; else "zeta1" … of each mode."""
         has_modulus = [any(name == "E" for name, _ in f.powers) for f, _ in self.stiffness]
         require(any(has_modulus), "damping_ratio", "material", "a term of the stiffness with E")
         if all(has_modulus):
             return damping_ratios_by_name(damping, loss)
-        shares = modal_energy_shares(model, np.flatnonzero(has_modulus))
-        ratios = tuple(damping.damping_ratio(loss, share) for share in shares)
+        fractions = modal_energy_fractions(model, np.flatnonzero(has_modulus))
+        ratios = tuple(
+            damping_from_loss(loss, joints=damping.joints, energy_fraction=fraction)
+            for fraction in fractions
+        )
         return damping_ratios_by_name(ratios, None)
 
     def _vector_over_unknowns(self, key: str, entries: Mapping[str, float]) -> Array:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -14,11 +13,17 @@ from pydantic import Field, PlainValidator, ValidationInfo
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, require, require_choice
 from alphacut.case.types import Modulus, NotEmpty, OneOrMany, Quantity, Section, case_file, text
-from alphacut.frame import Accelerogram, MatrixStructure, StoreyFrame, read_record
+from alphacut.frame import (
+    Accelerogram,
+    MatrixStructure,
+    StoreyFrame,
+    damping_from_loss,
+    read_record,
+)
 from alphacut.frame.structures.lagrangian import LagrangianSystem, pendulum
 from alphacut.frame.structures.quantities import Output
 from alphacut.frame.structures.storey import SYMBOLS
-from alphacut.fuzzy import Crisp, FuzzyNumber, PiecewiseLinear
+from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.io.files import suggestion
 from alphacut.io.quantity import STANDARD_GRAVITY
 
@@ -59,23 +64,6 @@ class MaterialDamping:
     """Damping ratio by the loss factor of the cell's material, and of the joints, to be added."""
 
     joints: FuzzyNumber = ZERO
-
-    def damping_ratio(self, loss: FuzzyNumber, energy_share: float = 1.0) -> FuzzyNumber:
-        """Damping ratio ζ = sin(½ arctan(w η)) of a mode in free oscillation, plus the joints'.
-
-        η is the loss factor of the material's Young's modulus, w the fraction of the mode's strain
-        energy that is in the material.
-        """
-
-        def ratio(loss: float, joints: float) -> float:
-            return math.sin(math.atan(energy_share * loss) / 2) + joints
-
-        if loss.support.width == 0 and self.joints.support.width == 0:
-            return Crisp(ratio(loss.nominal, self.joints.nominal))
-        alpha = sorted({*loss.cuts.alpha, *self.joints.cuts.alpha})
-        # ζ rises with both numbers, so that the bounds of their α-cuts give its bounds
-        bounds = [map(ratio, loss.cut(level), self.joints.cut(level)) for level in alpha]
-        return PiecewiseLinear(tuple(alpha), *zip(*bounds, strict=True))
 
 
 def _parse_damping_ratios(value: object) -> MaterialDamping | tuple[FuzzyNumber, ...]:
@@ -201,7 +189,7 @@ def damping_ratios_by_name(
     `loss` is the loss factor of the material, for damping by it; None: a stand-in.
     """
     if isinstance(ratios, MaterialDamping):
-        ratios = (ratios.damping_ratio(loss or LOSS_STAND_IN),)
+        ratios = (damping_from_loss(loss or LOSS_STAND_IN, joints=ratios.joints),)
     names = ["zeta"] if len(ratios) == 1 else [f"zeta{mode + 1}" for mode in range(len(ratios))]
     return dict(zip(names, ratios, strict=True))
 

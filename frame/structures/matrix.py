@@ -258,12 +258,12 @@ def value_of(factor: Factor | str | float, p: Mapping[str, Any]) -> Any:
     return factor(p) if callable(factor) else factor
 
 
-def modal_energy_shares(system: MatrixStructure, terms: Sequence[int] | Ints) -> Array:
+def modal_energy_fractions(system: MatrixStructure, terms: Sequence[int] | Ints) -> Array:
     """Fraction of each mode's strain energy in some terms of K = Σ K_i, shape (modes,).
 
     It is Σ φᵀK_i φ / φᵀK φ over the terms K_i of these indices, for the modes φ by rising
-    frequency. The loss factor of a mode is to first order the mean of those of its parts by these
-    shares (Johnson and Kienholz, AIAA Journal 20, 1284, 1982), with modes at nominal values.
+    frequency. The loss factor of a mode is to first order the mean of those of its parts with these
+    weights (Johnson and Kienholz, AIAA Journal 20, 1284, 1982), with modes at nominal values.
     """
     unit: Array = np.eye(system.size)
     every_unknown = {str(k): unit[k] for k in range(system.size)}

@@ -11,7 +11,7 @@ import pytest
 import scipy.io
 
 from alphacut.base.errors import RefusedError
-from alphacut.case.matrices import read_array
+from alphacut.frame import read_matrix
 from alphacut.io.quantity import parse_number
 from alphacut.rve.image.files import read_grid
 
@@ -32,7 +32,7 @@ def test_matrix_market_files_say_symmetric_or_general_and_give_the_same_matrix(t
     stiffness = scipy.sparse.diags([2.0, -1.0, -1.0], [0, 1, -1], shape=(rows, rows))
     scipy.io.mmwrite(tmp_path / "k.mtx", stiffness)
     assert ("symmetric" in (tmp_path / "k.mtx").read_text().split("\n")[0]) == (rows < 100)
-    assert np.array_equal(read_array(tmp_path / "k.mtx"), stiffness.toarray())
+    assert np.array_equal(read_matrix(tmp_path / "k.mtx"), stiffness.toarray())
 
 
 def test_a_thin_volume_saved_as_colour_or_as_pages_is_refused(tmp_path):

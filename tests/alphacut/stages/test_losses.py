@@ -5,10 +5,8 @@ import pytest
 from scipy.linalg import eigvals
 
 from alphacut.case.content import load
-from alphacut.case.structure import MaterialDamping
 from alphacut.frame import MatrixStructure
-from alphacut.frame.structures.matrix import modal_energy_shares
-from alphacut.fuzzy import Crisp, Triangular
+from alphacut.frame.structures.matrix import modal_energy_fractions
 from alphacut.io.files import BadInput
 from tests.alphacut.small import CELL, summary_of_run, written
 
@@ -78,16 +76,6 @@ def test_what_is_wrong_is_said_in_one_line(tmp_path, old, new, key, words):
     assert any(words in str(problem) for problem in found)
 
 
-def test_joints_come_on_top_on_every_level():
-    damping = MaterialDamping(Triangular(0.005, 0.01, 0.02))
-    ratio = damping.damping_ratio(Triangular(0.01, 0.02, 0.04), 0.5)
-    for level in (0.0, 1.0):
-        joints, loss = damping.joints.cut(level), Triangular(0.01, 0.02, 0.04).cut(level)
-        expected = np.sin(np.arctan(np.array(loss) / 2) / 2) + joints
-        assert np.allclose(ratio.cut(level), expected, rtol=1e-12)
-    assert MaterialDamping().damping_ratio(Crisp(0.02)).nominal == pytest.approx(0.01, rel=1e-3)
-
-
 def test_a_lossless_ground_storey_damps_modes_by_their_energy_elsewhere():
     """Against complex modes, whose distance is of third order in the loss factor."""
     upper = np.array([[1.0, -1, 0], [-1, 2, -1], [0, -1, 1]]) * 4e6
@@ -103,7 +91,7 @@ def test_a_lossless_ground_storey_damps_modes_by_their_energy_elsewhere():
         stiffness=[("E", upper), (1.0, ground), ("E", joined), (1.0, ground_of_it)],
         observed={"roof": np.eye(4)[2]},
     )
-    shares, gaps = modal_energy_shares(structure, [0, 2]), []
+    shares, gaps = modal_energy_fractions(structure, [0, 2]), []
     for loss in (0.04, 0.02):
         stiffness = (upper + joined) * (1 + 1j * loss) + ground + ground_of_it
         a, b = np.ix_(range(3), range(3)), stiffness[3:, :3]
