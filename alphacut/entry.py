@@ -10,13 +10,14 @@ import signal
 import sys
 import threading
 import time
+import traceback
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib import import_module
 from types import FrameType
 
-from alphacut.base.errors import RefusedError
+from alphacut.base.errors import FailedError, RefusedError
 from alphacut.commands.options import Command, Parser, require_petsc, split_petsc
 from alphacut.fuzzy.campaign.campaign import CampaignError
 from alphacut.io.files import (
@@ -118,8 +119,12 @@ def main(
             return _end_with_message(error.what, 3)  # its cure is an argument in Python
         except ModuleNotFoundError as error:
             return _end_with_message(missing(error), 1)
-        except (RuntimeError, ValueError, ArithmeticError, OSError, MemoryError, ImportError) as e:
-            return _end_with_message(str(e) or type(e).__name__, 1)
+        except (FailedError, OSError, MemoryError, ImportError) as error:
+            return _end_with_message(str(error) or type(error).__name__, 1)
+        except Exception as error:  # which no part of this program raises on purpose
+            traceback.print_exc()
+            what = f"{type(error).__name__} is an error of this program"
+            return _end_with_message(f"{what}: report the lines above, and the case", 1)
 
 
 @contextmanager
