@@ -6,9 +6,8 @@ hardly more than the remainder is left. Damping only takes energy, so the deviat
 motion, in the norm √(qᵀ K q + vᵀ M v), grows no faster than this defect: no eigenvalue problem is
 solved anew, and nothing rests on a distance between eigenvalues.
 
-Damping by one ratio ζ, D₀ + 2 ζ M √(M⁻¹K), is no polynomial. For any μ > 0 and vector w, in the
-norm of M⁻¹, ‖2 ζ M √(M⁻¹K) w − 2 ζ √μ M w‖ ≤ 2 ζ ‖(K − μ M) w‖ / (√λ + √μ), λ the least eigenvalue
-of K against M. With μ = |λ_k|² the motion is measured with 2 ζ √μ M w in place of the damping.
+Damping by one ratio ζ, 2 ζ (M # K), is no polynomial, but a Taylor model (`geometric_mean`), whose
+remainder is a part of the defect.
 
 A part of a modal model is 2 Re Σ_k C_k(p) w(t; λ_k(p)) with w = exp(λ t) or w = R = ∫ exp(λ (t −
 s)) a(s) ds; its r-th derivative by λ is bounded by t^r exp(g t), or by ∫ τ^r exp(g τ) |a(t − τ)|
@@ -51,8 +50,7 @@ def proved_error(model: ModalModel) -> Array:
     # what is proved are the polynomials that bounds are made of
     modes = replace(model.modes, rate=model.eigenvalue)
     norms = EnergyNorms(structure)
-    by_ratio = _ratio_errors(structure, modes, norms)
-    energy_rate = _energy_rates(structure, modes, norms, by_ratio)
+    energy_rate = _energy_rates(structure, modes, norms)
     start, outputs = _start_errors(structure, modes, norms), modes.outputs(structure)
     deviation = np.zeros(len(model.flow.time))
     output_error = np.zeros((len(model.flow.time), len(model.flow.outputs)))
@@ -63,7 +61,7 @@ def proved_error(model: ModalModel) -> Array:
             output_error += part.waves[0][:, :1] * error
             continue
         deviation += part.push * start[s] + 2 * part.elapsed @ energy_rate[s]
-        share_error = (outputs[s] - part.share).size() + by_ratio[s][:, None] * norms.reading
+        share_error = (outputs[s] - part.share).size()
         left_out = part.left_out[:, None] * part.share.size()
         output_error += 2 * part.waves[0] @ (share_error + left_out)
     return (1 + ROUNDING) * (deviation[:, None] * norms.outputs + output_error)
@@ -89,20 +87,9 @@ class EnergyNorms:
             raise UnprovedError(
                 "the box is so wide that mass and stiffness are not shown to stay positive definite"
             )
-        # lower bound of the frequencies over the box, in rad/s, and the largest damping ratio
-        self.least_frequency = self.omega[0] * np.sqrt((1 - self.kappa) / (1 + self.mu))
-        ratio = structure.ratio
-        self.greatest_ratio = 0.0 if ratio is None else float(ratio.bounds()[1])
-        # what outputs read of a force over its norm √(f* M⁻¹ f), (m,): √(r M rᵀ) of their rows r
-        self.reading = np.sqrt(1 + self.mu) * norm_of(structure.reading.size())
         of_displacement, of_velocity = np.split(structure.rows.size(), 2, axis=1)
-        # accelerations read the force of the damping by a ratio too, 2 ζ ω √(vᵀ M v) at most
-        highest_frequency = self.omega[-1] * np.sqrt((1 + self.kappa) / (1 - self.mu))
-        by_ratio = 2 * self.greatest_ratio * highest_frequency * self.reading
         # error of outputs over a deviation √(qᵀ K q + vᵀ M v) of the motion, (m,)
-        self.outputs = np.hypot(
-            self.of_spring_force(of_displacement), self.of_force(of_velocity) + by_ratio
-        )
+        self.outputs = np.hypot(self.of_spring_force(of_displacement), self.of_force(of_velocity))
 
     def of_displacement(self, x: Array) -> Array:
         """Bound of √(x* K x) for vectors of entries up to x (…, N), shape (…,)."""
@@ -117,30 +104,14 @@ class EnergyNorms:
         return norm_of(f) / np.sqrt(1 - self.mu)
 
 
-def _energy_rates(
-    structure: DampedStructure, modes: DampedModes, norms: EnergyNorms, by_ratio: Array
-) -> Array:
+def _energy_rates(structure: DampedStructure, modes: DampedModes, norms: EnergyNorms) -> Array:
     """Bounds of what the defects of modes add to the deviation over exp(λ t) and time, (S, n)."""
     rate, momentum = modes.rate[:, None], modes.velocity @ structure.mass
     kinematic = rate * modes.shape - modes.velocity
     dynamic = (
         rate * momentum + modes.velocity @ structure.damping + modes.shape @ structure.stiffness
     )
-    if structure.ratio is not None:
-        dynamic = dynamic + modes.ratio_force(structure)
-    force = norms.of_force(dynamic.size()) + by_ratio
-    return np.hypot(norms.of_displacement(kinematic.size()), force)
-
-
-def _ratio_errors(structure: DampedStructure, modes: DampedModes, norms: EnergyNorms) -> Array:
-    """Bounds of the damping forces by a ratio less 2 ζ |λ_k| M w_k, in the norm of M⁻¹, (S, n)."""
-    if structure.ratio is None:
-        return np.zeros(modes.shape.shape[:2])
-    squared = modes.squared_frequency
-    residual = modes.velocity @ structure.stiffness
-    residual = residual - squared[:, None] * (modes.velocity @ structure.mass)
-    sums = norms.least_frequency + np.sqrt(np.maximum(squared.bounds()[0], 0.0))
-    return 2 * norms.greatest_ratio * norms.of_force(residual.size()) / sums
+    return np.hypot(norms.of_displacement(kinematic.size()), norms.of_force(dynamic.size()))
 
 
 def _start_errors(structure: DampedStructure, modes: DampedModes, norms: EnergyNorms) -> Array:

@@ -18,6 +18,7 @@ from alphacut.frame.boxes import Boxes
 from alphacut.frame.calculus.monomials import matmul, product_part
 from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate, solution_series, solve
 from alphacut.frame.calculus.unproved import UnprovedError
+from alphacut.frame.modes.geometric_mean import geometric_mean
 from alphacut.frame.records.history import History
 from alphacut.frame.response.duhamel import absolute_moments
 from alphacut.frame.structures.linear import LinearSystem
@@ -38,14 +39,12 @@ class DampedStructure:
     """
 
     mass: TaylorModel  # M, (N, N)
-    damping: TaylorModel  # D without the damping by a ratio, (N, N)
+    damping: TaylorModel  # D, (N, N)
     stiffness: TaylorModel  # K, (N, N)
-    ratio: TaylorModel | None  # ζ of all modes, which adds 2 ζ M √(M⁻¹K) to D; None without one
     omega: Array  # ω, rising, (N,), in rad/s
     static: TaylorModel  # forces of the sources, (N, S)
     impulse: TaylorModel  # impulses of the sources, (N, S)
-    rows: TaylorModel  # what outputs take of [q, q̇], without the damping by a ratio, (m, 2N)
-    reading: TaylorModel  # what outputs take of forces, as accelerations do, (m, N)
+    rows: TaylorModel  # what outputs take of [q, q̇], (m, 2N)
     # what a unit of each history of forces adds to outputs at once, (m, H); None if nothing
     feeds: TaylorModel | None
 
@@ -71,6 +70,9 @@ class DampedStructure:
         if not squared[0] > np.finfo(float).eps * squared[-1]:
             raise UnprovedError("a mode does not oscillate", "hold the structure by springs")
         M, D, K = (basis.T @ matrix @ basis for matrix in (full.mass, damping, full.stiffness))
+        omega = np.sqrt(squared)
+        if full.ratios and full.ratios[0].size() > 0:  # one ζ of all modes
+            D = D + full.ratios[0] * 2.0 * geometric_mean(M, K, omega)
         static, impulse = full.stiffness @ full.q0[:, None], full.mass @ full.v0[:, None]
         impulses = [impulse if full.impulse is None else impulse + full.impulse]
         if system.ground is not None:
@@ -81,7 +83,7 @@ class DampedStructure:
         statics += [impulse * 0.0 for impulse in impulses[1:]]
         factors = full.row_factors[:, None]
         rows = factors * (full.rows @ np.kron(np.eye(2), basis))
-        reading, feeds = factors * (full.accelerated @ basis), None
+        feeds = None
         if full.accelerated.any():  # q̈ + ι a = M⁻¹ (b f − D q̇ − K q)
             reading = factors * solve(M, M.like((full.accelerated @ basis).T)).T
             rows = rows - concatenate([reading @ K, reading @ D], -1)
@@ -90,26 +92,12 @@ class DampedStructure:
             mass=M,
             damping=D,
             stiffness=K,
-            ratio=full.ratios[0] if full.ratios else None,
-            omega=np.sqrt(squared),
+            omega=omega,
             static=basis.T @ concatenate(statics, -1),
             impulse=basis.T @ concatenate(impulses, -1),
             rows=rows,
-            reading=reading,
             feeds=feeds,
         )
-
-    def damping_series(self) -> TaylorModel:
-        """D with the damping by a ratio, of which the remainder is not known."""
-        if self.ratio is None:
-            return self.damping
-        squared, root = solve(self.mass, self.stiffness), [np.diag(self.omega)[None]]
-        sums = self.omega[:, None] + self.omega
-        for m in range(1, squared.order + 1):  # R R = M⁻¹ K, in degree m (ω_i + ω_j) R_ij + known
-            known = product_part(root, root, m, squared.inputs, matmul, lowest=(1, 1))
-            root.append((squared.part(m) - known) / sums)
-        R = TaylorModel(tuple(root), 0 * sums, squared.inputs, squared.order)
-        return self.damping + self.ratio * 2.0 * (self.mass @ R)
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,36 +115,21 @@ class DampedModes:
         Raises:
             UnprovedError: One does not oscillate, or has the frequency of another one.
         """
-        damping = structure.damping_series()
-        rate, shape = _eigen_series(structure, damping, chosen)
+        rate, shape = _eigen_series(structure, chosen)
         force = shape @ structure.impulse
         if structure.static.size().any():
             force = force - (shape @ structure.static) * _reciprocal(rate[:, None])
         # near a pole (λ² M + λ D + K)⁻¹ is φ φᵀ / (φᵀ (2 λ M + D) φ (λ − λ_k))
-        weighted = (rate * 2.0)[:, None] * (shape @ structure.mass) + shape @ damping
+        weighted = (rate * 2.0)[:, None] * (shape @ structure.mass)
+        weighted = weighted + shape @ structure.damping
         norm = (weighted * shape) @ np.ones((len(structure.omega), 1))
         shape = ((force * _reciprocal(norm)).T[..., None] * shape).polynomial
         return cls(rate, shape, (rate[:, None] * shape).polynomial)
 
-    def ratio_force(self, structure: DampedStructure) -> TaylorModel:
-        """Damping force 2 ζ |λ_k| M w_k of modes by a ratio ζ, shape (S, n, N)."""
-        assert structure.ratio is not None
-        frequency = self.squared_frequency**0.5
-        return structure.ratio * 2.0 * (frequency[:, None] * (self.velocity @ structure.mass))
-
-    @property
-    def squared_frequency(self) -> TaylorModel:
-        """|λ_k|², shape (n,)."""
-        real, imaginary = self.rate.real, self.rate.imag
-        return real * real + imaginary * imaginary
-
     def outputs(self, structure: DampedStructure) -> TaylorModel:
         """Outputs of the states [φ_k, w_k], shape (S, n, m)."""
         n = len(structure.omega)
-        found = self.shape @ structure.rows[:, :n].T + self.velocity @ structure.rows[:, n:].T
-        if structure.ratio is None or not structure.reading.size().any():
-            return found
-        return found - self.ratio_force(structure) @ structure.reading.T
+        return self.shape @ structure.rows[:, :n].T + self.velocity @ structure.rows[:, n:].T
 
 
 def needed_modes(
@@ -186,8 +159,7 @@ def needed_modes(
 def _middle_modes(structure: DampedStructure) -> tuple[Array, Array, Array]:
     """λ (2N,), unit shapes φ as rows and φᵀ (2 λ M + D) φ in the middle; Im λ > 0 first, by |λ|."""
     omega, n = structure.omega, len(structure.omega)
-    ratio = 0.0 if structure.ratio is None else float(structure.ratio.value)
-    D = structure.damping.value + 2 * ratio * np.diag(omega)
+    D = structure.damping.value
     lower = np.hstack([-np.diag(omega**2), -D])
     rate, X = np.linalg.eig(np.vstack([np.eye(n, 2 * n, n), lower]))
     group = np.where(_oscillates(rate), 0, np.where(_oscillates(rate.conj()), 2, 1))
@@ -206,12 +178,10 @@ def norm_of(vectors: Array) -> Array:
     return np.asarray(np.linalg.norm(vectors, axis=-1))
 
 
-def _eigen_series(
-    structure: DampedStructure, D: TaylorModel, chosen: Ints
-) -> tuple[TaylorModel, TaylorModel]:
+def _eigen_series(structure: DampedStructure, chosen: Ints) -> tuple[TaylorModel, TaylorModel]:
     """λ (n,) and φ (n, N) with (λ² M + λ D + K) φ = 0 to the order of M, about the middle."""
     # in degree m, (λ₀² M₀ + λ₀ D₀ + K₀) φ_m + λ_m (2 λ₀ M₀ + D₀) φ₀ is known, and φ₀* φ_m = 0
-    M, K = structure.mass, structure.stiffness
+    M, D, K = structure.mass, structure.damping, structure.stiffness
     rates, shapes, _ = _middle_modes(structure)
     lam, phi = rates[chosen], shapes[chosen]
     if not _oscillates(lam).all():

@@ -9,7 +9,7 @@ import pytest
 from scipy.linalg import sqrtm
 
 from alphacut.frame import Exact, LinearFlow, MatrixStructure, Midpoint, StoreyFrame
-from alphacut.frame.bounds.model_error import EnergyNorms, _ratio_errors, proved_error
+from alphacut.frame.bounds.model_error import EnergyNorms, proved_error
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.calculus.unproved import UnprovedError
@@ -56,6 +56,14 @@ def model(system, inputs, degree=4, **changes) -> ModalModel:
             {"E": (24e9, 26e9), "m2": (14e3, 16e3), "zeta": (0.02, 0.05)},
         ),
         (
+            replace(SHAKEN, damping_ratio=0.03, outputs=("q3", "v1", "a2")),
+            {"E": (24e9, 26e9), "d1": (7e3, 11e3), "m2": (14e3, 16e3)},
+        ),
+        (
+            replace(CHAIN, ratios=(0.1,)),
+            {"m": (1.9, 2.1), "k": (75, 85), "d": (0.0, 0.6)},
+        ),
+        (
             replace(CHAIN, damping=[], ratios=(0.1,)),
             {"m": (1.9, 2.1), "k": (75, 85), "d": (0.0, 0.6)},
         ),
@@ -82,36 +90,20 @@ def test_modes_that_are_left_out_count_as_an_error_of_the_start() -> None:
     assert (missed <= proved_error(few)).all()
 
 
-@pytest.mark.parametrize("factor", [1.02, 0.99])
-def test_what_a_damping_ratio_leaves_out_is_bounded_tightly(factor) -> None:
-    """For the lowest mode the bound is what a wrong frequency does to the damping."""
-    damped = replace(FRAME, damping_ratio=0.07, dampers=())
-    found = model(damped, NARROW, 2)
-    structure, rate = found.structure, found.modes.rate[:1] * factor
-    lowest = structure.mass.like(np.eye(1, 3)[None])
-    modes = DampedModes(rate, lowest, lowest)
-    missed = 2 * 0.07 * (structure.omega[0] - np.abs(rate.value[0]))
-    bound = _ratio_errors(structure, modes, EnergyNorms(structure))[0, 0]
-    assert 1 - 1e-9 <= bound / np.abs(missed) <= 1.8
-
-
 def test_the_damping_force_over_a_mass_is_bounded_closely(rng):
     """Accelerations read the damping force 2 ζ M √(M⁻¹K) v over their mass."""
     frame = StoreyFrame((1e4, 8e3), stiffness=(1e6, 6e5), damping_ratio=0.04, outputs=("a1", "a2"))
     found = model(frame, {"k1": Interval(9e5, 11e5), "m2": Interval(7e3, 9e3)})
     of_frame = EnergyNorms(found.structure).outputs
-    without = EnergyNorms(replace(found.structure, ratio=None)).outputs
-    reached, at_least = np.zeros((2, 2))
+    reached = np.zeros(2)
     for k1, m2 in rng.uniform([9e5, 7e3], [11e5, 9e3], (40, 2)):
         M, K = np.diag([1e4, m2]), np.array([[k1 + 6e5, -6e5], [-6e5, 6e5]])
         by_ratio = 2 * 0.04 * sqrtm(np.linalg.solve(M, K)).real  # times v, over its norm in M
         by_ratio = np.linalg.norm(by_ratio / np.sqrt(np.diag(M)), axis=1)
         by_springs = np.linalg.norm(np.linalg.solve(M, np.linalg.cholesky(K)), axis=1)
         reached = np.maximum(reached, np.hypot(by_ratio, by_springs))
-        at_least = np.maximum(at_least, by_ratio)
     assert (reached <= of_frame).all()
     assert (of_frame < 2 * reached).all()
-    assert (np.sqrt(of_frame**2 - without**2) >= at_least).all()
 
 
 def wrong(polynomials: TaylorModel) -> TaylorModel:
@@ -165,7 +157,7 @@ def test_structures_that_may_gain_energy_are_refused(system, box, message) -> No
 
 
 def test_energy_norms_hold_over_the_box(rng):
-    """√(x* K x), √(f* K⁻¹ f), √(f* M⁻¹ f) of all inputs, and the lowest frequency."""
+    """√(x* K x), √(f* K⁻¹ f) and √(f* M⁻¹ f) of all inputs."""
     inputs = {"k1": Interval(9e5, 11e5), "m2": Interval(7e3, 9e3)}
     frame = StoreyFrame((1e4, 8e3), stiffness=(1e6, 6e5))
     cuts = boxes(inputs, (0,))
@@ -178,8 +170,6 @@ def test_energy_norms_hold_over_the_box(rng):
             np.einsum("si,ij,sj->s", x, A, x) for A in (K, np.linalg.inv(K), np.linalg.inv(M))
         ]
         reached = np.maximum(reached, np.sqrt(squares))
-        lowest = np.sqrt(np.linalg.eigvals(np.linalg.solve(M, K)).real.min())
-        assert norms.least_frequency <= lowest
     bounds = norms.of_displacement(x), norms.of_spring_force(x), norms.of_force(x)
     assert (reached <= bounds).all()
     assert (np.array(bounds) <= 1.3 * reached).all()
@@ -218,18 +208,3 @@ def test_half_of_a_defect_would_not_do(output, given) -> None:
     assert (deviation <= bound + 1e-12).all()
     early = slice(1, 6)
     assert (bound[early] <= 1.2 * deviation[early]).all()
-
-
-def test_a_damping_force_of_a_wrong_frequency_is_in_the_acceleration() -> None:
-    """At once, an acceleration reads all of 2 ζ (ω − |λ|) v: half of the bound would be passed."""
-    frame = StoreyFrame((1.0,), stiffness=(1.0,), outputs=("a1",), damping_ratio=0.1, v0=(1.0,))
-    flow = LinearFlow(frame, ("k1",), 0.2, 0.05, Exact())
-    cuts = boxes({"k1": Interval(1 - 1e-12, 1 + 1e-12)}, (0,))
-    structure = DampedStructure.over_box(frame, cuts, 2)
-    rate, shape, velocity = np.array([0.9j]), np.array([[[-0.5j]]]), np.array([[[0.5 + 0j]]])
-    modes = DampedModes(*(structure.mass.like(x) for x in (rate, shape, velocity)))
-    found = ModalModel.from_modes(flow, cuts, structure, modes)
-    truth = found.flow.values(np.ones((1, 1)))[0, 0, 0]
-    off = np.abs(found.values(np.zeros((1, 1)))[0, 0, 0] - truth)
-    assert off == pytest.approx(2 * 0.1 * 0.1)
-    assert off <= proved_error(found)[0, 0] * (1 + 1e-9) <= 1.2 * off

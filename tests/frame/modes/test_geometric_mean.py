@@ -1,0 +1,106 @@
+"""The geometric mean of mass and stiffness, and the proof of frames that are damped by it."""
+
+import numpy as np
+import pytest
+from scipy.linalg import expm, sqrtm
+
+from alphacut.frame import Proof, StoreyFrame, envelope
+from alphacut.frame.calculus.taylor_model import TaylorModel
+from alphacut.frame.calculus.unproved import UnprovedError
+from alphacut.frame.modes.geometric_mean import geometric_mean, right_side_bound
+from alphacut.fuzzy import Interval
+
+
+def varying(rng, middle, width, order):
+    """A symmetric matrix of two inputs about a diagonal one (n,), that varies by about a width."""
+    scale = np.sqrt(np.outer(middle, middle))
+    slopes = rng.uniform(-width, width, (2, len(middle), len(middle))) * scale
+    parts = np.diag(middle)[None], (slopes + slopes.swapaxes(1, 2)) / 2
+    return TaylorModel(parts, np.zeros(scale.shape), inputs=2, order=order)
+
+
+@pytest.mark.parametrize("order", [1, 2, 4])
+def test_the_geometric_mean_is_enclosed_over_the_box(order, rng):
+    """M √(M⁻¹K) by SciPy at the corners, where polynomials miss most, and inside."""
+    omega = np.sort(rng.uniform(1, 30, 3))
+    mass = varying(rng, np.ones(3), width=0.03, order=order)
+    stiffness = varying(rng, omega**2, width=0.03, order=order)
+    found = geometric_mean(mass, stiffness, omega)
+    corners = np.array([[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]])
+    off = np.zeros((3, 3))
+    for u in np.vstack([corners, rng.uniform(-1, 1, (10, 2))]):
+        M, K = mass.at(u[None])[0], stiffness.at(u[None])[0]
+        exact = M @ sqrtm(np.linalg.solve(M, K)).real
+        off = np.maximum(off, np.abs(found.at(u[None])[0] - exact))
+    assert (off <= found.remainder + 1e-12 * omega[-1]).all()
+
+
+@pytest.mark.parametrize("kind", ["values", "changes"])
+def test_the_right_side_is_bounded_and_so_is_how_fast_it_changes(kind, rng):
+    """Of random matrices whose magnitudes attain their bounds."""
+    change = 1e-3
+    unknown, constant = (0.05, 1.0) if kind == "values" else (1.0, 0.0)
+    signs = rng.choice([-1.0, 1.0], (4, 20_000, 2, 2))
+    defect, P, W, E = signs * rng.uniform(0.5, 1.5, (4, 1, 2, 2))
+    defect, E = constant * defect, unknown * E
+    E[:, 1, 0] = E[:, 0, 1]
+
+    def right_side(E):
+        return defect - E @ P.swapaxes(1, 2) - P @ E - E @ W @ E
+
+    found = right_side(E)
+    if kind == "changes":
+        found = (found - right_side((1 - change) * E)) / change
+    sizes = [np.abs(x[0]) for x in (defect, P, W, E)]
+    bound = right_side_bound(*sizes[:2], inverse_mass=sizes[2], bound=sizes[3])
+    largest = np.abs(found).max(0)
+    assert (largest <= bound * (1 + 1e-9)).all()
+    assert (largest >= 0.8 * bound).all()
+
+
+def test_the_remainder_of_one_unknown_is_that_of_its_square_root(rng):
+    """√(1 + κ u) is missed most at u = −1, where all terms of its series beyond κ u add up."""
+    variation, omega = rng.uniform(0.05, 0.4), rng.uniform(1, 30)
+    parts = np.full((1, 1, 1), omega**2), np.full((1, 1, 1), omega**2 * variation)
+    stiffness = TaylorModel(parts, np.zeros((1, 1)), inputs=1, order=1)
+    found = geometric_mean(stiffness.like(np.eye(1)), stiffness, np.array([omega]))
+    missed = omega * (1 - variation / 2 - np.sqrt(1 - variation))
+    assert missed <= found.remainder[0, 0] <= 1.5 * missed
+
+
+def test_a_box_of_which_no_mean_is_enclosed_is_refused(rng):
+    stiffness = varying(rng, np.array([1.0, 1.1]), width=1.0, order=2)
+    stiffness = stiffness + stiffness.like(np.diag([0.0, 0.0])).loosened(np.full((2, 2), 0.9))
+    with pytest.raises(UnprovedError, match="damping by a ratio is not enclosed"):
+        geometric_mean(stiffness.like(np.eye(2)), stiffness, np.sqrt([1.0, 1.1]))
+
+
+@pytest.mark.parametrize("width", [1e-2, 1e-9])
+def test_dashpots_beside_a_damping_ratio_are_proved(width, rng):
+    """Of a frame of two floors, against the matrix exponential and SciPy's matrix root."""
+    ratio, dashpot = rng.uniform(0.01, 0.05), rng.uniform(1e4, 6e4)
+    k1, k2, M = 6e7, 4e7, np.diag([2e4, 1e4])
+    frame = StoreyFrame(
+        masses=[2e4, 1e4],
+        stiffness=[k1, k2],
+        damping_ratio=ratio,
+        dampers=[dashpot, 1e3],
+        v0=(0.0, 0.5),
+        outputs=("q1", "a2"),
+    )
+    inputs = {"k1": Interval(k1 * (1 - width), k1 * (1 + width))}
+    found = envelope(frame, inputs, Proof(workers=1), duration=1.0, step=0.02, alpha=(0,))
+    assert found.nature == "guaranteed"
+    reached = np.full((2, len(found.time), 2), -np.inf)  # by −output and output
+    for factor in np.linspace(1 - width, 1 + width, 9):
+        K = np.array([[k1 * factor + k2, -k2], [-k2, k2]])
+        D = np.diag([dashpot, 1e3]) + 2 * ratio * M @ sqrtm(np.linalg.solve(M, K)).real
+        of_state = np.linalg.solve(M, np.hstack([-K, -D]))
+        A = np.vstack([np.eye(2, 4, 2), of_state])
+        states = np.array([expm(A * t) @ [0.0, 0.0, 0.0, 0.5] for t in found.time])
+        outputs = np.stack([states[:, 0], states @ of_state[1]], -1)
+        reached = np.maximum(reached, [-outputs, outputs])
+    bound = np.stack([-found.lower[0], found.upper[0]])
+    size = np.abs(reached).max((0, 1))
+    assert (reached <= bound + 1e-10 * size).all()
+    assert (bound - reached <= 2e-3 * size).all()
