@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import gc
 import logging
 import os
 import signal
@@ -179,7 +178,6 @@ def _run_command(arguments: Sequence[str], program: str, names: Mapping[str, str
     named = {name: names[name] for name in words[:1] if name in names}
     with uninterrupted():  # a signal amid imports is not lost to what they run
         parser, by_name = build_parsers(program, named or names)
-    gc.enable()  # which the program puts off until all is imported
     options, unknown = parser.parse_known_args(words)
     if unknown:
         first = next((word for word in unknown if word.startswith("-")), unknown[0])
