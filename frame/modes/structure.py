@@ -2,12 +2,13 @@
 
 Covered is M q̈ + D q̇ + K q = −M ι a(t) + Σ b f(t) with D = a M + b K + 2 M Φ diag(ζ_k ω_k) Φᵀ M,
 whose undamped modes uncouple the motion; what else a structure has is refused with the word why.
+A structure of one unknown has one mode, whatever its damping and the factors of its outputs.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -42,6 +43,8 @@ def classical_structure(system: LinearSystem, parameters: Mapping[str, TaylorMod
         UnprovedError: Its modes are not known to be classical.
     """
     assembly = system.assembly(parameters)
+    if len(assembly.pattern) == 1:
+        assembly = _with_damping_by_mass(_with_unit_rows(assembly))
     _require_classical(assembly)
     q0, v0 = assembly.q0, assembly.v0
     if assembly.static is not None:
@@ -65,6 +68,40 @@ def classical_structure(system: LinearSystem, parameters: Mapping[str, TaylorMod
         rayleigh=stack(list(assembly.rayleigh)),
         ratio=stack(ratios * len(assembly.massive) if len(ratios) == 1 else ratios),
         forced=forced,
+    )
+
+
+def _with_damping_by_mass(assembly: Assembly[TaylorModel]) -> Assembly[TaylorModel]:
+    """The same structure of one unknown whose dashpots are damping by the mass.
+
+    With D = d + a M + b K_springs and K = K_springs − W it is D = (a + (d + b W)/M) M + b K.
+    """
+    a, b = assembly.rayleigh
+    dashpots = assembly.dashpots
+    if assembly.weights is not None:
+        dashpots = dashpots + assembly.weights * b
+    return replace(
+        assembly,
+        springs=assembly.stiffness,
+        weights=None,
+        dashpots=dashpots * 0.0,
+        rayleigh=(a + solve(assembly.mass, dashpots)[0, 0], b),
+    )
+
+
+def _with_unit_rows(assembly: Assembly[TaylorModel]) -> Assembly[TaylorModel]:
+    """The same structure of one unknown, whose outputs' rows depend on no input.
+
+    An output that takes r(u) of the displacement, or of the velocity, is r(u) times a unit of it.
+    """
+    if isinstance(assembly.rows, np.ndarray):
+        return assembly
+    takes_acceleration = (assembly.accelerated[:, 0] != 0).astype(float)
+    coefficients = assembly.rows @ np.ones((2, 1))  # one of the two is zero
+    return replace(
+        assembly,
+        rows=(assembly.rows.size() > 0).astype(float),
+        row_factors=assembly.row_factors * (coefficients[:, 0] + takes_acceleration),
     )
 
 

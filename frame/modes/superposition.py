@@ -71,7 +71,7 @@ def modes_at(
     """Modes of a structure at S values of its inputs `names`, with bounds of their rounding.
 
     The values are `points` (S, inputs) in SI units, and `unit` (S, d) in the unit coordinates of
-    the box of `structure`, from which damping is taken.
+    the box of `structure`, from which damping is taken, but for that of a single mode.
 
     Raises:
         UnprovedError: A mode does not oscillate.
@@ -81,7 +81,10 @@ def modes_at(
     squared, shape = undamped_modes(M, K)
     a, b = structure.rayleigh.at(unit).T[:, :, None]
     ratio, positive = structure.ratio.at(unit), np.maximum(squared, 1e-300)
-    decay = (a + b * squared) / 2 + ratio * np.sqrt(positive)
+    decay = (a + b * squared) / 2
+    if M.shape[-1] == 1:  # where a has the dashpots over the mass, and is no polynomial of inputs
+        decay = matrices.damping.value[..., 0] / M[..., 0] / 2
+    decay = decay + ratio * np.sqrt(positive)
     if not (squared > decay**2).all():
         raise UnprovedError("a mode may not oscillate", "take less damping, and hold the structure")
     n, (q0, v0) = M.shape[-1], np.split(matrices.start.value[..., 0], 2, axis=-1)

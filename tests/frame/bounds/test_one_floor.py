@@ -1,0 +1,72 @@
+"""One floor alone has one mode, whatever its dashpot, weight and outputs: the dual bound holds."""
+
+import numpy as np
+import pytest
+
+from alphacut.frame import Force, History, StoreyFrame, envelope
+from alphacut.frame.methods.dual import DualProof
+from alphacut.fuzzy import Interval
+from alphacut.fuzzy.sets.boxes import quasi_random_points
+
+NOMINAL = {
+    "m1": 2e4,
+    "k1": 6e6,
+    "l1": 3.2,
+    "d1": 4e4,
+    "zeta": 0.02,
+    "rayleigh_mass": 0.05,
+    "rayleigh_stiffness": 2e-3,
+    "q1_0": 0.004,
+    "v1_0": 0.3,
+    "F1": 2e4,
+}
+OUTPUTS = ("q1", "v1", "a1", "base_shear", "overturning_moment")
+
+
+def exact_outputs(p, gravity, time):
+    """Outputs (S, T, m) of M ẍ + D ẋ + K x = F at parameters (S, 1), in closed form."""
+    square = (p["k1"] - p["m1"] * gravity / p["l1"]) / p["m1"]
+    by_springs = p["rayleigh_stiffness"] * p["k1"] / p["m1"]
+    twice_decay = p["d1"] / p["m1"] + p["rayleigh_mass"] + by_springs
+    decay = twice_decay / 2 + p["zeta"] * np.sqrt(square)
+    omega, push = np.sqrt(square - decay**2), p["F1"] / p["m1"]
+    rest = push / square
+    cosine = p["q1_0"] - rest
+    sine = (p["v1_0"] + decay * cosine) / omega
+    wave = np.exp(-decay * time) * np.exp(1j * omega * time) * (cosine - 1j * sine)
+    q, v = rest + wave.real, ((1j * omega - decay) * wave).real
+    a = push - 2 * decay * v - square * q
+    return np.stack([q, v, a, p["k1"] * q, p["l1"] * p["k1"] * q], -1)
+
+
+@pytest.mark.parametrize("gravity", [0.0, 500.0])  # the latter halves the stiffness
+@pytest.mark.parametrize("width", [0.0, 0.03])
+def test_one_floor_with_a_dashpot_and_its_overturning_moment_is_proved(gravity, width, rng):
+    """Also where some of its inputs have no width, and all of them none."""
+    frame = StoreyFrame(
+        [NOMINAL["m1"]],
+        stiffness=[NOMINAL["k1"]],
+        lengths=[NOMINAL["l1"]],
+        dampers=[NOMINAL["d1"]],
+        damping_ratio=NOMINAL["zeta"],
+        rayleigh=(NOMINAL["rayleigh_mass"], NOMINAL["rayleigh_stiffness"]),
+        q0=(NOMINAL["q1_0"],),
+        v0=(NOMINAL["v1_0"],),
+        gravity=gravity,
+        loads=[Force(1, NOMINAL["F1"], History.constant())],
+        outputs=OUTPUTS,
+    )
+    fuzzy = [*NOMINAL]
+    inputs = {x: Interval(NOMINAL[x] * (1 - width), NOMINAL[x] * (1 + width)) for x in fuzzy}
+    found = envelope(frame, inputs, DualProof(), duration=2.0, step=0.02, alpha=(0,))
+    assert found.nature == "guaranteed"
+    unit = 2 * quasi_random_points(len(fuzzy), 2000) - 1
+    unit = np.vstack([unit, np.sign(rng.normal(size=(2000, len(fuzzy))))])
+    points = {x: NOMINAL[x] * (1 + width * unit[:, [k]]) for k, x in enumerate(fuzzy)}
+    values = exact_outputs(points, gravity, found.time)
+    reached = np.stack([-values, values]).max(1)
+    bound = np.stack([-found.lower[0], found.upper[0]])
+    size = np.abs(values).max((0, 1))
+    assert (reached <= bound + 1e-12 * size).all()
+    peak_gap = (bound.max((0, 1)) - reached.max((0, 1))) / size
+    assert (peak_gap <= (0.02 if width else 1e-9)).all()
