@@ -6,15 +6,17 @@ Gmsh's 15-node prisms ("Prism 15") have Basix's order of nodes; physical groups 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
 from alphacut.base.arrays import Array, Ints
-from alphacut.base.errors import RefusedError
+from alphacut.base.errors import RefusedError, require
 from alphacut.rve.mesh import square
 from alphacut.rve.mesh.columns import grid_of
 from alphacut.rve.mesh.periodicity import SAME_PLACE, MeshError, unknowns
@@ -24,6 +26,8 @@ from alphacut.rve.mesh.wedge import prism_rule, vertices_and_midpoints, wedge
 PRISM_15 = 18  # Gmsh's type of the element
 ABAQUS_ORDER = [0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11]
 """Of a prism in Abaqus and VTK: edges of the lower triangle, of the upper, and vertical ones."""
+MESH_FILES = "meshes in Gmsh's format MSH with 15-node prisms"
+COMMENTS, END_OF_COMMENTS = b"$Comments", b"$EndComments"
 FILLED = 1e-6  # of the cell that prisms may leave or take twice
 UPSIDE_DOWN = [3, 4, 5, 0, 1, 2, 12, 13, 8, 14, 10, 11, 6, 7, 9]
 MIRRORED = [0, 2, 1, 3, 5, 4, 7, 6, 8, 9, 11, 10, 13, 12, 14]
@@ -35,12 +39,14 @@ _PLANE_PARTS = (_A, _AB, _CA), (_AB, _B, _BC), (_CA, _BC, _C), (_BC, _CA, _AB)
 
 def read_grid(path: Path | str) -> PrismGrid:
     """Extruded prisms of a Gmsh file, where they are, numbered by level; MeshError if no cell."""
-    with square.model() as gmsh:
+    content = mesh_content(path)
+    with square.model() as gmsh, TemporaryDirectory() as folder:
+        copy = Path(folder, "mesh.msh")
+        copy.write_bytes(content)
         try:
-            gmsh.open(str(path))
+            gmsh.merge(str(copy))
         except Exception as error:  # Gmsh raises nothing else
-            allowed = "files of Gmsh with 15-node prisms"
-            raise RefusedError("mesh.file", path, allowed, str(error)) from None
+            raise RefusedError("mesh.file", path, MESH_FILES, str(error)) from None
         prisms = read_prisms(gmsh)
     _require_square(prisms.points[:, :2], "the cell")
     grid = grid_of(orient(prisms))
@@ -48,6 +54,30 @@ def read_grid(path: Path | str) -> PrismGrid:
     _require_periodic_square(grid)
     _require_joined_columns(grid)
     return grid
+
+
+def mesh_content(path: Path | str) -> bytes:
+    """Return a file in Gmsh's format MSH from its section $MeshFormat on.
+
+    Gmsh takes a file that begins otherwise for a script, whatever its name, and runs the commands
+    in it; it also reads options from files beside the one that it opens. So only what this function
+    returns is handed to it, as the one file in a folder. Sections $Comments before $MeshFormat are
+    left out.
+
+    Raises:
+        RefusedError: The file cannot be read, or begins otherwise.
+    """
+    try:
+        content = Path(path).read_bytes()
+    except OSError as error:
+        raise RefusedError("mesh.file", path, MESH_FILES, error.strerror or str(error)) from None
+    while content.startswith(COMMENTS):
+        _, _, content = content.partition(END_OF_COMMENTS)
+        content = content.lstrip()
+    is_mesh = re.match(rb"\$MeshFormat\s", content) is not None
+    cure = 'write it by gmsh.write("NAME.msh") or `gmsh -save`; a .geo script is no mesh'
+    require(is_mesh, "mesh.file", f"{path}, without $MeshFormat at its start", MESH_FILES, cure)
+    return content
 
 
 def read_prisms(gmsh: Any) -> Prisms:

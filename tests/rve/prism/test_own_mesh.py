@@ -209,6 +209,48 @@ def test_a_periodic_mesh_that_gmsh_scaled_is_refused_with_the_cure(tmp_path, ver
         read_grid(tmp_path / "half.msh")
 
 
+@pytest.mark.parametrize(
+    "content",
+    [
+        "// a script\nPoint(1) = {0, 0, 0};\n",
+        "\n$MeshFormat\n",
+        "$MeshFormatted\n",
+        "",
+        "$Comments\nPoint(1) = {0, 0, 0};\n",
+    ],
+)
+def test_gmsh_is_handed_nothing_but_meshes(tmp_path, monkeypatch, content):
+    """A file that is no mesh is a script to Gmsh, whatever its name: it never gets there."""
+    import gmsh
+
+    for name in ("open", "merge"):
+        monkeypatch.setattr(gmsh, name, lambda *_: pytest.fail("Gmsh was handed a script"))
+    for name in ("cell.msh", "cell.geo", "cell"):
+        path = tmp_path / name
+        path.write_text(content)
+        with pytest.raises(RefusedError, match=r"without \$MeshFormat at its start"):
+            read_grid(path)
+
+
+def test_gmsh_reads_a_copy_with_nothing_beside_it(tmp_path, monkeypatch):
+    """Comments before the mesh are read over; options beside it would be read by Gmsh."""
+    import gmsh
+
+    mesh = (MESHES / "paper-coarse.msh").read_bytes()
+    path = tmp_path / "my cell.msh"
+    path.write_bytes(b"$Comments\nmade by hand\n$EndComments\n" + mesh)
+    (tmp_path / "my cell.msh.opt").write_text("// options\n")
+    handed = []
+    merge = gmsh.merge
+    monkeypatch.setattr(gmsh, "open", lambda *_: pytest.fail("Gmsh opens scripts"))
+    monkeypatch.setattr(
+        gmsh, "merge", lambda x: (handed.append([*Path(x).parent.iterdir()]), merge(x))
+    )
+    grid = read_grid(path)
+    assert [file.name for file in handed[0]] == ["mesh.msh"]
+    assert grid.names == read_grid(MESHES / "paper-coarse.msh").names
+
+
 def test_a_file_that_is_none_is_refused(tmp_path):
     (tmp_path / "no.msh").write_text("nothing")
     for path in (tmp_path / "no.msh", tmp_path / "absent.msh"):
