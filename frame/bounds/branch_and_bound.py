@@ -12,7 +12,6 @@ optima by Newton's method with a trust region, many at a time.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from math import factorial
 
@@ -20,8 +19,9 @@ import numpy as np
 
 from alphacut.base.arrays import Ints
 from alphacut.base.progress_bar import Progress
+from alphacut.base.threads import KernelThreads
 from alphacut.frame import numbers
-from alphacut.frame.bounds.kernel import FACES, examine
+from alphacut.frame.bounds.kernel import FACES, call_examine, examine
 from alphacut.frame.bounds.model_error import Remainder
 from alphacut.frame.calculus.box_quadratic import gain, global_maximum, local_maximum
 from alphacut.frame.calculus.jet import Array
@@ -76,7 +76,7 @@ def enclosed(
         target = optima.value + gap
         return examine_items(model, (lower, upper), remainder, target, frontier, boxes, items)
 
-    with ThreadPoolExecutor(workers) as pool:
+    with KernelThreads(workers, call_examine) as pool:
         while len(frontier) and examined + len(frontier) <= budget * n_problems:
             examined += len(frontier)
             results = pool.map(examined_piece, *zip(*frontier.pieces(PIECE), strict=True))
@@ -149,7 +149,8 @@ def _linear_phases(
         for parts in (remainder.rate, remainder.share)
     )
     slope = np.ascontiguousarray(slopes.imag.swapaxes(1, 2))
-    return in_planes(share), slope, phase, decay, of_rate[:, 2:], of_share
+    of_rate = np.ascontiguousarray(of_rate[:, 2:])
+    return in_planes(share), slope, phase, decay, of_rate, of_share
 
 
 @dataclass(frozen=True, eq=False)

@@ -52,6 +52,13 @@ class Data(NamedTuple):
     grain: Array  # distance of the values that multipliers take, (1,)
 
 
+def data_without_modes() -> Data:
+    """Return `Data` of empty arrays, with which a kernel can be called before there are models."""
+    dimensions = dict.fromkeys(Data._fields, 2)
+    dimensions |= {"table": 4, "points": 1, "expected": 1, "remainder": 1, "grain": 1}
+    return Data(**{name: np.zeros((0,) * count) for name, count in dimensions.items()})
+
+
 def roundings(modes: int, sources: int, inputs: int) -> int:
     """Roundings of a term of the dual function: of its sums over variables, pairs and modes."""
     return 2 * modes * (sources + 2) + 2 * inputs**2 + 4 * inputs + 4 * sources + 32

@@ -273,3 +273,20 @@ def examine(
                     if r[i] > 0 and weight > largest_weight:
                         largest_weight, code[item] = weight, 1 + i
     return code, value, bound
+
+
+def call_examine() -> None:
+    """Call `examine` once without a box; see `KernelThreads`."""
+    no_numbers = np.zeros(0, np.int64)
+    faces = np.zeros((0, 2, 0), np.bool_)
+    phases = tuple(np.zeros((0,) * dimensions) for dimensions in (4, 3, 2, 2, 3, 4))
+    examine(
+        (no_numbers,) * 4,
+        (np.zeros((0, 0)), faces, np.zeros((0,) * 4)),
+        np.zeros((0, 0)),
+        np.zeros(0),
+        phases,
+        (np.zeros((0,) * 5), np.zeros((0,) * 3)),
+        np.zeros(0),
+        False,
+    )

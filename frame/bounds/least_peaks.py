@@ -19,7 +19,7 @@ import numpy as np
 from alphacut.base.arrays import Array, Ints
 from alphacut.base.kernels import compiled
 from alphacut.frame import numbers
-from alphacut.frame.bounds.dual_function import Data, minimise
+from alphacut.frame.bounds.dual_function import Data, data_without_modes, minimise
 from alphacut.frame.bounds.level import LevelModels, OutputBounds
 
 
@@ -103,6 +103,12 @@ def _bound_cell(
             highest, highest_node = least, node
             at[:] = u
     return highest, highest_node
+
+
+def call_bound_cell() -> None:
+    """Call the kernel of `least_peak` once without a mode; see `KernelThreads`."""
+    data, none = data_without_modes(), np.zeros((0, 0))
+    _bound_cell(np.zeros((0, 4), np.int64), (data, data), none, (0, 0, 0), none, np.zeros(0))
 
 
 def _halves(cell: PeakCell, data: Data) -> list[Ints]:

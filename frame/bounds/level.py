@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -227,7 +227,7 @@ class OutputBounds:
 
 def improve_all(
     jobs: Sequence[tuple[OutputBounds, Ints, Effort]],
-    pool: ThreadPoolExecutor,
+    pool: Executor,
     tick: Progress,
     *,
     peaks_alone: bool = False,

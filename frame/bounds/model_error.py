@@ -222,8 +222,10 @@ class Remainder:
         of_exponents = np.array([1, 1, 2, 6])[exponents(d, 3)].prod(1)  # ∂³ u^e at 0, e!
         third = (1 + 1e-9) * (cubic * of_exponents[:, None]).swapaxes(1, 2)
         # bounds of |∂³ output / ∂u_i ∂u_j ∂u_k|, (T, m, d, d, d)
-        self.tensor = third[..., product_places(d, 1, 2)[:, product_places(d, 1, 1)]]
-        self.margin = margin.swapaxes(1, 2)  # rounding of values, and of slopes, (T, m, 1 + d)
+        places = product_places(d, 1, 2)[:, product_places(d, 1, 1)]
+        self.tensor = np.ascontiguousarray(third[..., places])
+        # rounding of values, and of slopes, (T, m, 1 + d)
+        self.margin = np.ascontiguousarray(margin.swapaxes(1, 2))
 
 
 def _rounding_bound(model: ModalModel, rate: Array, load: LoadTables | None) -> Array:

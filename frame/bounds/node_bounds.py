@@ -12,7 +12,15 @@ import numpy as np
 
 from alphacut.base.arrays import Array, Ints
 from alphacut.base.kernels import compiled
-from alphacut.frame.bounds.dual_function import Data, add, dot, loops, minimise, products
+from alphacut.frame.bounds.dual_function import (
+    Data,
+    add,
+    data_without_modes,
+    dot,
+    loops,
+    minimise,
+    products,
+)
 
 GRID = 2.0**24
 """Steps of the model's ascent in unit coordinates, so that rounding does not lead it elsewhere."""
@@ -96,6 +104,24 @@ def bound_nodes(
         out[0, j] = cells.value[:count].max() + constant[0] + constant[1]
         out[1, j] = model_value + constant[0]
         at[j] = u
+
+
+def call_bound_nodes() -> None:
+    """Call `bound_nodes` once without a node; see `KernelThreads`."""
+    none, data = np.zeros((2, 0)), data_without_modes()
+    effort = Effort(
+        cells=0,
+        steps=0,
+        slack_below_peak=0.0,
+        remainder_multiple=0.0,
+        wanted_gap=0.0,
+        incumbent=0.0,
+        patience=0,
+        ascents=0,
+        grace=0,
+        min_progress=0.0,
+    )
+    bound_nodes(np.zeros(0, np.int64), 1.0, effort, none, data, none, np.zeros((0, 0)))
 
 
 @compiled

@@ -11,7 +11,6 @@ from __future__ import annotations
 import logging
 import os
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from heapq import heappop, heappush
@@ -20,6 +19,7 @@ import numpy as np
 
 from alphacut.base.arrays import Array, Ints, Mask
 from alphacut.base.progress_bar import Progress
+from alphacut.base.threads import KernelThreads
 from alphacut.frame import numbers
 from alphacut.frame.bounds.box_proof import Answer, BisectionError, BoxProof, Goal, Hull, refusing
 from alphacut.frame.boxes import Boxes, UnitFlow
@@ -100,7 +100,7 @@ class Queue:
         Raises:
             UnprovedError: The proof refuses too many boxes, or one that bisections would not help.
         """
-        pool = ThreadPoolExecutor(self.workers)
+        pool = KernelThreads(self.workers, self.proof.call_kernels)
         try:
             while batch := self._next():
                 tick = partial(self._tick, progress, batch)

@@ -97,11 +97,11 @@ def convolve(
     inner, longer = (a.shape[-1] if bilinear == matmul else 1), max(len(a), len(b))
     if longer * out[0].size * inner <= SMALL:
         if bilinear == matmul and a.ndim == b.ndim == 3:
-            _add_matrix_products(a, b, at, out)
+            _add_matrix_products(_writable(a), _writable(b), at, out)
             return out
         if bilinear == np.multiply:
             wide = (np.broadcast_to(c, (len(c), *shape)).reshape(len(c), -1) for c in (a, b))
-            _add_products(*wide, at, out.reshape(total, -1))
+            _add_products(*map(_writable, wide), at, out.reshape(total, -1))
             return out
     if len(a) <= len(b):
         for x in np.flatnonzero(a.reshape(len(a), -1).any(1)):
@@ -110,6 +110,11 @@ def convolve(
         for y in np.flatnonzero(b.reshape(len(b), -1).any(1)):
             out[at[:, y]] += bilinear(a, b[y][None])
     return out
+
+
+def _writable(a: Array) -> Array:
+    """Return an array, or a copy where it is read-only: Numba compiles kernels for each kind."""
+    return np.require(a, requirements="W")
 
 
 def product_part(

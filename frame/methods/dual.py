@@ -8,7 +8,7 @@ modes, tables and nodes, and hardly one of inputs.
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
 from typing import ClassVar
@@ -18,17 +18,20 @@ import numpy as np
 from alphacut.base.arrays import Array, Ints, Mask
 from alphacut.base.errors import checked_number
 from alphacut.base.progress_bar import Progress, subprogress
+from alphacut.base.threads import KernelThreads
 from alphacut.frame import numbers
 from alphacut.frame.bounds.box import Box
 from alphacut.frame.bounds.box_proof import Answer, BoxBounds, Goal
-from alphacut.frame.bounds.least_peaks import least_peak
+from alphacut.frame.bounds.least_peaks import call_bound_cell, least_peak
 from alphacut.frame.bounds.level import LevelModels, OutputBounds, improve_all
+from alphacut.frame.bounds.node_bounds import call_bound_nodes
 from alphacut.frame.bounds.pruning import prune_ends, remainder_addition
 from alphacut.frame.bounds.spatial_branch_and_bound import halvings, prove
 from alphacut.frame.boxes import Boxes, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.envelope import Ends, Envelope
+from alphacut.frame.response.duhamel import call_with_load
 from alphacut.frame.structures.linear import frequencies
 
 DRIFT = 1e-6
@@ -112,6 +115,12 @@ class DualProof:
             )
         return float(self.slabs * self.steps)
 
+    def call_kernels(self) -> None:
+        """Call the compiled kernels of `bounds` that take tuples once; see `KernelThreads`."""
+        call_with_load()
+        call_bound_nodes()
+        call_bound_cell()
+
     def bounds(self, flow: LinearFlow, boxes: Boxes, goal: Goal) -> list[Answer]:
         """Return bounds on each level of a box, or the refusal where modes are not enclosed."""
         answers, wider = list[Answer](), np.full(goal.outer.shape[1:], np.inf)
@@ -138,7 +147,7 @@ class DualProof:
             index = int(np.searchsorted(outputs, o)), int(s)
             problems[o, s] = OutputBounds.initial(level, *index, gap[o], goal.incumbent[k, o, s])
             problems[o, s].out[0] = outer[nodes, o, s]
-        with ThreadPoolExecutor(goal.workers) as pool:
+        with KernelThreads(goal.workers, self.call_kernels) as pool:
             # 1. find multipliers with low bounds, and inputs with high values of the models
             tick = subprogress(goal.tick, k / len(goal.needed), (k + 1) / len(goal.needed))
             self._minimise(problems, goal, flow, box, pool, needed[nodes], is_complete, tick)
@@ -196,14 +205,12 @@ class DualProof:
         goal: Goal,
         flow: LinearFlow,
         box: Box,
-        pool: ThreadPoolExecutor,
+        pool: Executor,
         needed: Mask,
         is_complete: bool,
         progress: Progress,
     ) -> None:
         """Minimise the dual functions of bounds `needed` (J, m, 2), each passed over thrice."""
-        first = next(iter(problems.values()))
-        first.improve(np.arange(0), first.effort(1, 1))  # compiles before there are threads
         if not is_complete:
             efforts = int(numbers.PEAK_CELLS), int(numbers.PEAK_STEPS), 1.0
             jobs = [
@@ -258,7 +265,7 @@ class DualProof:
         box: Box,
         level: LevelModels,
         between: Array,
-        pool: ThreadPoolExecutor,
+        pool: Executor,
     ) -> Ends:
         """Lower bound of each output's smallest peak, and the peak of a motion that peaks low."""
         count = len(level.structure.order)

@@ -28,6 +28,7 @@ from alphacut.base.progress_bar import Progress, subprogress
 from alphacut.frame import numbers
 from alphacut.frame.bounds.box_proof import BisectionError, BoxBounds, Goal
 from alphacut.frame.bounds.branch_and_bound import Optima, enclosed, first_optima
+from alphacut.frame.bounds.kernel import call_examine
 from alphacut.frame.bounds.model_error import (
     MAX_PARAMETERS,
     Remainder,
@@ -42,6 +43,7 @@ from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.modes.damped import require_dissipation
 from alphacut.frame.modes.modal_model import ModalModel
+from alphacut.frame.response.duhamel import call_with_load
 from alphacut.frame.response.load_tables import Direct
 from alphacut.frame.response.straying import Response, narrowed_straying
 
@@ -117,6 +119,11 @@ class Proof:
             raise UnprovedError("damping by a ratio of each mode is no polynomial", "take dual")
         require_dissipation(flow.system, boxes)
         return float(numbers.BOXES_OF_INPUT**n_inputs)
+
+    def call_kernels(self) -> None:
+        """Call the compiled kernels of `bounds` that take tuples once; see `KernelThreads`."""
+        call_with_load()
+        call_examine()
 
     def bounds(self, flow: LinearFlow, boxes: Boxes, goal: Goal) -> list[BoxBounds]:
         """Return proved and attained bounds on each level of a part of the box.

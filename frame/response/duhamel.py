@@ -31,7 +31,7 @@ from alphacut.base.arrays import Array, Ints
 from alphacut.base.kernels import compiled, kernel, prange
 from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.records.history import History
+from alphacut.frame.records.history import Accelerogram, History
 
 parallel = kernel(parallel=True)
 PARALLEL_LOOP = Lock()
@@ -51,8 +51,10 @@ ERROR_OF_INTEGRALS = 12.0
 ERROR_OF_PROPAGATOR = 8.0
 """Rounding in u of one product exp(σ h) ρ besides |σ h|: 3 of exp, √5 of the product, 2 of sums."""
 
-Orders = tuple[int, ...]
-"""As many zeros as derivatives are wanted; a tuple's length is known when a kernel is compiled."""
+Orders = Array
+"""An empty array with as many dimensions as orders of derivatives are wanted, that of ρ included.
+Their number is known when a kernel is compiled, as the length of a tuple is, but threads may call a
+kernel with an array for the first time; see `KernelThreads`."""
 
 
 class LinearPieces(NamedTuple):
@@ -100,6 +102,11 @@ def absolute_moments(decay: float, history: History, time: Array) -> Array:
     out: Array = np.empty((5, len(time)))
     _absolute_moments(load, load.offsets[load.offset] + load.time_rounding, decay, out)
     return out
+
+
+def call_with_load() -> None:
+    """Call a kernel once with a load; see `KernelThreads`."""
+    absolute_moments(0.0, Accelerogram(1.0, np.zeros(2)), np.ones(1))
 
 
 @compiled
@@ -187,11 +194,12 @@ def responses_at_nodes(
     require_in_range(sigma, history.step, max(history.step, longest))
     out = np.empty((1 + derivatives, len(times), sigma.shape[-1]), complex)
     error, pieces = np.empty(out.shape[1:]), linear_pieces(history, time)
+    orders = np.zeros((0,) * (1 + derivatives))
     with PARALLEL_LOOP:
         if node is None:
-            _respond_at_nodes(sigma, pieces, (0,) * derivatives, length, out, error)
+            _respond_at_nodes(sigma, pieces, orders, length, out, error)
         else:
-            _respond_at_given(sigma, pieces, (0,) * derivatives, node, out, error)
+            _respond_at_given(sigma, pieces, orders, node, out, error)
     return out, error
 
 
@@ -252,7 +260,7 @@ def _respond(
     out: Array,
     error: Array,
 ) -> None:
-    """Write ρ and derivatives at N nodes to `out` (1 + len(orders), N), ρ's rounding to `error`."""
+    """Write ρ and derivatives at N nodes to `out` (orders.ndim, N), ρ's rounding to `error`."""
     interval, offset, time_rounding = nodes  # `offset`: index among `offsets` (P,), in s
     turns, integrals, roundings = factors  # `_propagators` of the offsets
     h, rate = load.step, abs(sigma.real) + abs(sigma.imag)
@@ -286,9 +294,9 @@ def _respond(
             size = abs(value.real) + abs(value.imag)
             node_rounding += time_rounding[node] * (rate * size + abs(a))  # |dρ/dt| ≤ |σ ρ| + |a|
             out[0, node], error[node] = value, node_rounding
-            if len(orders) > 0:
+            if orders.ndim > 1:
                 out[1, node] = w * (r1 + elapsed * r0) + a * P[1] - slope * P[2]
-            if len(orders) > 1:
+            if orders.ndim > 2:
                 second = r2 + 2 * elapsed * r1 + elapsed * elapsed * r0
                 out[2, node] = w * second + a * P[2] - slope * P[3]
             node += 1
@@ -297,10 +305,10 @@ def _respond(
             elapsed -= since
             w = np.exp(sigma * elapsed)
             fading, since = abs(w), 0.0
-        if len(orders) > 1:
+        if orders.ndim > 2:
             second = r2 + 2 * elapsed * r1 + elapsed * elapsed * r0
             r2 = w * second + a * J2 - slope * J3
-        if len(orders) > 0:
+        if orders.ndim > 1:
             r1 = w * (r1 + elapsed * r0) + a * J1 - slope * J2
         r0 = w * r0
         rounding = fading * rounding + of_product * (abs(r0.real) + abs(r0.imag))

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
+from functools import partial
 from threading import Event
 from typing import Any
 
@@ -13,6 +13,7 @@ import numpy as np
 from alphacut.base.arrays import Array, Ints
 from alphacut.base.errors import FailedError, require
 from alphacut.base.progress_bar import Progress
+from alphacut.base.threads import KernelThreads
 from alphacut.rve.image.bounds import Interval, StiffnessBounds, inverse_below
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.fields.element import Element, element_of
@@ -24,6 +25,7 @@ from alphacut.rve.image.fields.energy import (
     solve_side,
 )
 from alphacut.rve.image.fields.grid import device_array
+from alphacut.rve.image.fields.kernels import call_kernels
 from alphacut.rve.image.phases import ModuliImages
 from alphacut.rve.result.moduli import ISOTROPIC, require_average, square_moduli
 from alphacut.rve.result.result import PhaseEnergies
@@ -121,7 +123,12 @@ class ImageModel:
             return self.solve_side(end, *moduli, guess, raise_if_stopped)
 
         guesses = (None, None) if start is None else (start.lower, start.upper)
-        with ThreadPoolExecutor(2 if self.device == "cpu" else 1) as pool:
+        # pixels and devices are worked on without kernels
+        has_kernels = len(shape) == 3 and self.device == "cpu"
+        with KernelThreads(
+            workers=2 if self.device == "cpu" else 1,
+            call_kernels=partial(call_kernels, self.elements if has_kernels else ()),
+        ) as pool:
             try:
                 lower, upper = pool.map(solve, (0, 1), guesses)
             finally:  # Ctrl-C and errors are not to wait for the other side

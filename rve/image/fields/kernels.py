@@ -13,6 +13,7 @@ along z, along y, modes along x of a row).
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -50,6 +51,17 @@ def modes_by_rows(element: Element, fields: Array, z: int, first: int, last: int
     _fill_modes(*element.products, fields, z, first, last, components)
     parts = isotropic_parts(3, stress=element.stress)
     return np.asarray(parts @ components.reshape(6, -1)).reshape(components.shape)
+
+
+def call_kernels(elements: Iterable[Element]) -> None:
+    """Call all kernels once, on a field of zeros on one voxel; see `KernelThreads`."""
+    coefficient = np.ones((1, 1, 1))
+    for element in elements:
+        fields = np.zeros((1, element.unknowns, 1, 1, 1))
+        mean_modes = np.zeros((len(element.modes), 1))
+        apply_by_rows(element, coefficient, coefficient, fields, mean_modes)
+        modes_by_rows(element, fields, z=0, first=0, last=1)
+    multiply_by_blocks(np.zeros((1, 1, 1), np.float32), np.zeros((1, 1, 1), np.complex64))
 
 
 @fast
