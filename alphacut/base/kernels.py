@@ -12,10 +12,11 @@ import os
 import re
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from functools import cache, partial, update_wrapper
 from hashlib import sha256
 from importlib.metadata import version
+from io import BytesIO
 from pathlib import Path
 from threading import RLock
 from typing import Any
@@ -29,6 +30,7 @@ with_kernels = set[str]()
 """Modules that have kernels; those of helpers come before those that call them."""
 PACKAGE = Path(__file__).parents[1]
 IMPORT = re.compile(r"^\s*from (alphacut[\w.]*) import (?:\(([\w\s,]*)\)|([\w, ]*))", re.MULTILINE)
+DIGEST_BYTES = sha256().digest_size
 _LOCK = RLock()
 prange = range
 """Loop of parallel kernels, in whose module Numba's prange takes its place."""
@@ -94,10 +96,19 @@ def kernel(**options: object) -> Callable[[Callable[..., Any]], Any]:
 
 
 def _shared_index(folder: str, name: str, stamp: str) -> Any:
-    """Numba's index of a kernel's compiled code, but with files that no other process writes."""
+    """Numba's index of a kernel's compiled code, but with files that no other process writes.
+
+    A digest of its content ends each file. A file that it does not fit, as of a copy that was
+    interrupted, is removed and taken as missing: unpickled, it would raise or end the process.
+    """
     from numba.core.caching import IndexDataCacheFile
 
     class Index(IndexDataCacheFile):  # type: ignore[misc]
+        def load(self, key: object) -> object:
+            with suppress(OSError):  # compiled for this process
+                return super().load(key)
+            return None
+
         def save(self, key: object, data: object) -> None:
             with suppress(OSError):  # a full disk, or a cleared folder: compiled for this process
                 super().save(key, data)
@@ -105,7 +116,34 @@ def _shared_index(folder: str, name: str, stamp: str) -> Any:
         def _data_name(self, number: int) -> str:
             return f"{self._index_name}.{uuid4().hex}.nbc"
 
+        def _load_index(self) -> object:
+            _remove_damaged(Path(self._index_path))
+            return super()._load_index()
+
+        def _load_data(self, name: str) -> object:
+            _remove_damaged(Path(self._data_path(name)))
+            return super()._load_data(name)
+
+        @contextmanager
+        def _open_for_write(self, path: str) -> Iterator[BytesIO]:
+            with super()._open_for_write(path) as file:
+                content = BytesIO()
+                yield content
+                file.write(content.getvalue() + sha256(content.getvalue()).digest())
+
     return Index(folder, name, stamp)
+
+
+def _remove_damaged(path: Path) -> None:
+    """Remove a file that does not end with the digest of what stands before, if there is one.
+
+    Raises:
+        OSError: It cannot be read or removed.
+    """
+    with suppress(FileNotFoundError):
+        content = path.read_bytes()
+        if sha256(content[:-DIGEST_BYTES]).digest() != content[-DIGEST_BYTES:]:
+            path.unlink()
 
 
 @cache

@@ -55,10 +55,11 @@ NEW_CONSTANT = {"fuzzy/units.py": "FACTOR = 5.0\n"}
 def results(cache: Path, *calls: tuple[Path, dict[str, str]]) -> list[tuple[float, float]]:
     """Results and cache hits of the caller in checkouts, some of whose files are changed before."""
     for folder, _ in calls:
-        (folder / "alphacut/fuzzy").mkdir(parents=True, exist_ok=True)
+        for package in ("base", "fuzzy"):
+            (folder / "alphacut" / package).mkdir(parents=True, exist_ok=True)
         for name in ("kernels", "user_cache", "arrays"):
             file = Path(inspect.getfile(kernels)).with_name(f"{name}.py")
-            shutil.copy(file, folder / "alphacut/fuzzy")
+            shutil.copy(file, folder / "alphacut/base")
     told = subprocess.run(
         [sys.executable, "-Bc", CALLS],
         env=os.environ | {"ALPHACUT_CACHE": str(cache)},
@@ -82,6 +83,29 @@ def test_a_changed_helper_or_constant_changes_the_result(tmp_path: Path, is_shar
     calls = (one, {}), (one, {}), (one, NEW_HELPER), (one, NEW_CONSTANT), (one, {}), (two, {})
     expected = [(7, 0), (7, 1), (0, 0), (16, 0), (7, is_shared), (7, is_shared)]
     assert results(cache, *calls) == expected
+
+
+@pytest.mark.parametrize("ending", [".nbi", ".nbc"])
+@pytest.mark.parametrize("damage", ["emptied", "halved", "end", "byte"])
+def test_a_damaged_file_of_the_cache_is_removed_and_made_anew(
+    tmp_path: Path, damage: str, ending: str
+) -> None:
+    """Neither this run nor the next one ends with an error; the next finds the code again."""
+    checkout = tmp_path / "checkout"
+    assert results(tmp_path / "cache", (checkout, {}), (checkout, {})) == [(7, 0), (7, 1)]
+    (file,) = tmp_path.glob(f"cache/kernels/alphacut.fuzzy.caller-*/*{ending}")
+    content = file.read_bytes()
+    middle = len(content) // 2
+    flipped = bytes([content[middle] ^ 0xFF])
+    damaged = {
+        "emptied": b"",
+        "halved": content[:middle],
+        "end": content[:-1],
+        "byte": content[:middle] + flipped + content[middle + 1 :],
+    }
+    file.write_bytes(damaged[damage])
+    assert results(tmp_path / "cache", (checkout, {}), (checkout, {})) == [(7, 0), (7, 1)]
+    assert damaged[damage] not in [x.read_bytes() for x in file.parent.iterdir()]
 
 
 def test_code_is_neither_taken_from_other_users_nor_kept_for_ever(tmp_path: Path) -> None:
