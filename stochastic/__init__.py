@@ -9,18 +9,41 @@ from alphacut.stochastic.theta.quadrature import ThetaRule, gauss_rule
 
 if TYPE_CHECKING:
     from alphacut.stochastic.fraction_map import FractionMap
+    from alphacut.stochastic.microstructure import FittedRadiusMap, fit_radius_map
+    from alphacut.stochastic.particles.measured import read_particles
+    from alphacut.stochastic.particles.packings import Packings, pack
+    from alphacut.stochastic.particles.particles import Particles
+    from alphacut.stochastic.particles.radius_laws import LogNormalRadii, MeasuredRadii
 
 __all__ = [
+    "FittedRadiusMap",
     "FractionMap",
     "HermiteMap",
+    "LogNormalRadii",
+    "MeasuredRadii",
+    "Packings",
+    "Particles",
     "RadiusMap",
     "ThetaLaw",
     "ThetaRule",
     "TruncatedNormal",
+    "fit_radius_map",
     "gauss_rule",
+    "pack",
+    "read_particles",
     "require_map",
 ]
-AT_FIRST_USE = {"FractionMap": "fraction_map"}
+AT_FIRST_USE = {
+    "FittedRadiusMap": "microstructure",
+    "FractionMap": "fraction_map",
+    "LogNormalRadii": "particles.radius_laws",
+    "MeasuredRadii": "particles.radius_laws",
+    "Packings": "particles.packings",
+    "Particles": "particles.particles",
+    "fit_radius_map": "microstructure",
+    "pack": "particles.packings",
+    "read_particles": "particles.measured",
+}
 """Module of each exported name that is imported at its first use."""
 
 

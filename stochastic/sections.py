@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import shutil
 import subprocess
-from collections.abc import Callable, Sequence
-from concurrent.futures import Executor
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -15,7 +14,6 @@ import numpy as np
 from alphacut.base.arrays import Array, Ints
 from alphacut.base.errors import FailedError, require
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
-from alphacut.stochastic.particles.packing import Packing
 from alphacut.stochastic.particles.particles import DISCS, Particles
 from alphacut.stochastic.tessellation.apollonius import Apollonius, apollonius, counted_cells
 
@@ -60,31 +58,6 @@ def with_cells(particles: Particles) -> ParticleCells:
     return ParticleCells(particles, counted, diagram.areas[counted], weight, diagram)
 
 
-@dataclass(frozen=True)
-class Simulated:
-    """Independent packings of one kind, of which the bootstrap draws."""
-
-    packing: Packing
-    packings: int = 20
-
-    def sections(
-        self,
-        seed: int,
-        *,
-        executor: Executor | None = None,
-        progress: Callable[[float], None] | None = None,
-    ) -> list[ParticleCells]:
-        """Return all packings with their cells; the k-th depends on `seed` and k only."""
-        seeds = np.random.SeedSequence(seed).spawn(self.packings)
-        map_function = executor.map if executor else map
-        sections: list[ParticleCells] = []
-        for section in map_function(_packing_with_cells, [self.packing] * self.packings, seeds):
-            sections.append(section)
-            if progress:
-                progress(len(sections) / self.packings)
-        return sections
-
-
 def reduced_radii(sections: Sequence[ParticleCells]) -> AreaWeighted:
     """Sample of r_n of all counted cells, weighted by area or volume, grouped for the bootstrap.
 
@@ -107,10 +80,6 @@ def reduced_radii(sections: Sequence[ParticleCells]) -> AreaWeighted:
     allowed, cure = f"values up to {full:.4g}", "mend the overlaps in the data"
     require(largest <= full, "r_n of a cell", value=largest, allowed=allowed, cure=cure)
     return sample
-
-
-def _packing_with_cells(packing: Packing, seed: np.random.SeedSequence) -> ParticleCells:
-    return with_cells(packing.make(np.random.default_rng(seed)))
 
 
 def cell_volumes(spheres: Particles) -> Array:

@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from typing import Annotated
 
 from pydantic import Field
 
 from alphacut.base.errors import require
 from alphacut.case.types import CaseFile, Fraction, Length, Quantity, Section, after, rising
-from alphacut.stochastic.microstructure import MicrostructureStudy
-from alphacut.stochastic.particles.measured import CircleFile, SectionImage
-from alphacut.stochastic.particles.packing import Packing
+from alphacut.stochastic import (
+    LogNormalRadii,
+    MeasuredRadii,
+    Packings,
+    Particles,
+    pack,
+    read_particles,
+)
 from alphacut.stochastic.particles.particles import DISCS, SPHERES
-from alphacut.stochastic.particles.radius_laws import LogNormalRadii, MeasuredRadii
-from alphacut.stochastic.sections import Simulated
+from alphacut.stochastic.particles.radius_laws import RadiusLaw
+
+Progress = Callable[[float], None]
 
 
 class PackingSection(Section):
@@ -33,16 +40,36 @@ class PackingSection(Section):
     file: CaseFile | None = None
     """CSV file of radii or diameters, a column r [mm] or d [mm]"""
 
-    def source(self, spheres: bool) -> Simulated:
-        """The random packings to be computed: of spheres, or else of discs."""
+    @property
+    def radii(self) -> RadiusLaw:
+        """The law of the radii."""
+        ends = self.smallest_radius or 0.0, self.largest_radius or 0.0  # both are there, or a file
+        return MeasuredRadii.read(self.file) if self.file else LogNormalRadii(*ends)
+
+    def require_readable(self, *, spheres: bool) -> None:
+        """Refuses a fraction that does not pack, and radii that are none."""
         shape = SPHERES if spheres else DISCS
         fits, key = self.fraction <= shape.densest, "microstructure.packing.fraction"
         allowed = f"shares up to {shape.densest:g} of {shape.particles} packed at random"
         cure = f"set cell.fraction = {self.fraction:g} in place of [microstructure]"
         require(fits, key, self.fraction, allowed, cure)
-        ends = self.smallest_radius or 0.0, self.largest_radius or 0.0  # both are there, or a file
-        radii = MeasuredRadii.read(self.file) if self.file else LogNormalRadii(*ends)
-        return Simulated(Packing(self.particles, self.fraction, radii, shape=shape), self.packings)
+        _ = self.radii
+
+    def particles_of(
+        self, *, spheres: bool, seed: int, workers: int = 1, progress: Progress | None = None
+    ) -> Packings:
+        """The packings: of spheres, or else of discs."""
+        self.require_readable(spheres=spheres)
+        return pack(
+            self.particles,
+            packings=self.packings,
+            fraction=self.fraction,
+            radii=self.radii,
+            shape=(SPHERES if spheres else DISCS).particles,
+            seed=seed,
+            workers=workers,
+            progress=progress,
+        )
 
     def require_consistent(self) -> None:
         """Refuses a file of radii beside their ends, and one end alone or none without a file."""
@@ -52,26 +79,47 @@ class PackingSection(Section):
         require(fits, key, "beside or without ends", allowed)
 
 
-class Circles(Section):
+class MeasuredSection(Section):
+    """Circles that were measured in a section, or seen in its image."""
+
+    @property
+    def measured(self) -> Particles:
+        """The circles."""
+        raise NotImplementedError
+
+    def require_readable(self, *, spheres: bool) -> None:
+        """Refuses a file that is not read."""
+        _ = self.measured
+
+    def particles_of(
+        self, *, spheres: bool, seed: int, workers: int = 1, progress: Progress | None = None
+    ) -> Sequence[Particles]:
+        """The section."""
+        return [self.measured]
+
+
+class Circles(MeasuredSection):
     """Measured circles from a CSV file with the columns x, y, r."""
 
     file: CaseFile = Field(description="CSV file with the header x [mm], y [mm], r [mm]")
     size: tuple[Length, Length] = Field(description="width and height of the section")
 
-    def source(self, spheres: bool) -> CircleFile:
+    @property
+    def measured(self) -> Particles:
         """The circles of the file."""
-        return CircleFile(self.file, self.size)
+        return read_particles(self.file, size=self.size)
 
 
-class Photograph(Section):
+class Photograph(MeasuredSection):
     """Circles segmented from the image of a section."""
 
     file: CaseFile = Field(description="image file")
     pixel: Length = Field(description="side of a pixel")
 
-    def source(self, spheres: bool) -> SectionImage:
+    @property
+    def measured(self) -> Particles:
         """The circles in the image."""
-        return SectionImage(self.file, self.pixel)
+        return read_particles(self.file, pixel=self.pixel)
 
 
 class MicrostructureSection(Section):
@@ -90,12 +138,13 @@ class MicrostructureSection(Section):
         """The section on the particles; one, once this is built."""
         return [x for x in (self.packing, self.circles, self.image) if x is not None]
 
+    @property
+    def source(self) -> PackingSection | Circles | Photograph:
+        """The section on the particles."""
+        return self.sources[0]
+
     def require_consistent(self) -> None:
         """Refuses several sources of the particles, or none."""
         allowed, count = "one of packing, circles and image", len(self.sources)
         value = f"with {count} of them" if count else None
         require(count == 1, "microstructure", value, allowed)
-
-    def study(self, *, spheres: bool) -> MicrostructureStudy:
-        """The study that computes the radius map from these particles, or from packed spheres."""
-        return MicrostructureStudy(self.sources[0].source(spheres), self.limits, self.seed)

@@ -18,6 +18,7 @@ from alphacut.case.content import Case, Content, load
 from alphacut.case.limits import QuestionSection
 from alphacut.case.loads import RecordsSection
 from alphacut.case.material import RadiusMapSection, ThetaSection
+from alphacut.case.microstructure import MicrostructureSection
 from alphacut.case.motion import EnvelopeSection
 from alphacut.case.structure import Structure
 from alphacut.commands.options import require_petsc
@@ -50,7 +51,7 @@ from alphacut.stages.store import (
     StageStore,
     no_progress,
 )
-from alphacut.stochastic.sections import Simulated
+from alphacut.stochastic import FittedRadiusMap
 
 
 def read_case(options: argparse.Namespace) -> Case:
@@ -143,7 +144,8 @@ class Pipeline:
         section = self.content.microstructure
         if section is None:
             raise RefusedError("microstructure", None, "a section [microstructure]")
-        stage = microstructure.stage(section, self.content.has_spheres, self.figures)
+        draw = _draw_microstructure if self.figures else None
+        stage = microstructure.stage(section, spheres=self.content.has_spheres, draw=draw)
         return self.store.take(stage)
 
     def compute_modulus(self) -> None:
@@ -250,6 +252,14 @@ def response_of(
     return FuzzyResponse(structure, task.fuzzy, alpha, task.duration, step, peaks)
 
 
+def _draw_microstructure(
+    fitted: FittedRadiusMap, folder: Path, section: MicrostructureSection
+) -> None:
+    from alphacut.figures.microstructure import draw  # whose libraries take time to import
+
+    draw(fitted, folder, section)
+
+
 def require_runnable(content: Content) -> image.ImageStudy | None:
     """Reads and builds all that the stages of a case need, so that `check` refuses it too.
 
@@ -257,9 +267,7 @@ def require_runnable(content: Content) -> image.ImageStudy | None:
     """
     stages, study_of_image = content.stages, None
     if "microstructure" in stages and content.microstructure is not None:
-        study = content.microstructure.study(spheres=content.has_spheres)
-        if not isinstance(study.source, Simulated):
-            study.source.read()
+        content.microstructure.source.require_readable(spheres=content.has_spheres)
     if "modulus" in stages:
         study_of_image = _require_material(content)
     if "envelope" in stages:

@@ -30,9 +30,9 @@ from alphacut.rve.result.engineering_constants import PLANE_STRAIN
 from alphacut.stages.cell import UPPER_BOUND, constant_label, isotropic_label
 from alphacut.stages.identify import identify_inputs
 from alphacut.stages.image import ImageResult
+from alphacut.stages.microstructure import fragment
 from alphacut.stages.modulus import ModulusResult
 from alphacut.stages.store import CutsResult
-from alphacut.stochastic.microstructure import fragment
 
 PAGE = "report.html"
 DEVICES = "where an image is solved: cpu (default), or cuda by CuPy"

@@ -11,6 +11,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from alphacut.figures import envelope, material, overview, structure
+from alphacut.figures.style import figure_style, save
 from alphacut.fuzzy import FuzzyNumber, PiecewiseLinear
 from alphacut.fuzzy.campaign.workers import submit
 from alphacut.io.provenance import NESTED, version_of
@@ -19,7 +20,6 @@ from alphacut.questions.summary import Results
 from alphacut.stages.cell import GPA, CellProblem
 from alphacut.stages.identify import IdentifiedResult
 from alphacut.stages.store import Stage, StageContext, StageResult, StageStore
-from alphacut.stochastic.figures.style import figure_style, save
 
 PARTS = 6  # tasks that the figures are divided into, so that no process waits long for another
 Drawing = tuple[str, Callable[[], Figure]]

@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 
 from alphacut.base.arrays import Array
 from alphacut.figures import style
+from alphacut.figures.style import BLUE, GREY, INK, ORANGE, WIDTH
 from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.questions.peaks import ANY
 from alphacut.frame.structures.quantities import Output
@@ -27,7 +28,6 @@ from alphacut.questions.summary import Results
 from alphacut.questions.tolerances import TolerancesAnswer
 from alphacut.stages.envelope import EnvelopeTask
 from alphacut.stages.identify import IdentifiedResult
-from alphacut.stochastic.figures.style import BLUE, GREY, INK, ORANGE, WIDTH
 
 
 def drawings(task: EnvelopeTask, results: Results) -> Iterator[tuple[str, Callable[[], Figure]]]:

@@ -14,11 +14,11 @@ from alphacut.base.arrays import Array
 from alphacut.case.material import RadiusMapSection
 from alphacut.case.structure import Frame
 from alphacut.figures import style
+from alphacut.figures.style import BLUE, GREY, HEIGHT, INK, ORANGE, PURPLE, WIDTH
 from alphacut.stages.cell import GPA
 from alphacut.stages.modulus import ModulusResult
 from alphacut.stages.store import StageResult
 from alphacut.stochastic import HermiteMap
-from alphacut.stochastic.figures.style import BLUE, GREY, HEIGHT, INK, ORANGE, PURPLE, WIDTH
 
 SHOWN_LEVEL = 0.5
 

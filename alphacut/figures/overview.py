@@ -14,14 +14,13 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-u
 
 from alphacut.base.arrays import Array, Ints, Mask
 from alphacut.figures import style
-from alphacut.figures.style import Look
+from alphacut.figures.style import BLUE, INK, ORANGE, PURPLE, Look
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal
 from alphacut.io.quantity import axis_prefix
 from alphacut.questions.summary import Results
 from alphacut.rve.cell.cell import Cell
 from alphacut.rve.mesh.columns import extrude
 from alphacut.rve.mesh.prism_grid import PrismGrid, reference_radius
-from alphacut.stochastic.figures.style import BLUE, INK, ORANGE, PURPLE
 
 MATRIX, PARTICLE = "#f6d9b8", "#b79ad9"
 CUT_MATRIX = "#f0a860"  # of the matrix that is cut open

@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 
 from alphacut.base.arrays import Array
 from alphacut.case.structure import Frame
-from alphacut.figures.style import Look, prefix_axis
+from alphacut.figures.style import BLUE, GREY, INK, ORANGE, Look, prefix_axis
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.methods.graph_follower import Followed, GraphFollower
@@ -18,7 +18,6 @@ from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy import Crisp
 from alphacut.questions.summary import Results
 from alphacut.stages.envelope import EnvelopeTask
-from alphacut.stochastic.figures.style import BLUE, GREY, INK, ORANGE
 
 Point = tuple[float, float]
 ARROW = {"arrowstyle": "-|>", "color": ORANGE}

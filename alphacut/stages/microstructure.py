@@ -2,41 +2,75 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 
 from alphacut.case.microstructure import MicrostructureSection
-from alphacut.fuzzy.campaign.workers import pool
 from alphacut.io.files import Document, write_text
 from alphacut.io.provenance import file_digest
 from alphacut.stages.store import Stage, StageContext, StageResult
-from alphacut.stochastic.microstructure import fragment, study, summary, to_dataset
+from alphacut.stochastic import FittedRadiusMap, fit_radius_map
+
+PACKED = 0.35
+"""Part of the work that packing takes, for the progress."""
 
 
-def stage(section: MicrostructureSection, spheres: bool, figures: bool = True) -> Stage[Document]:
+Draw = Callable[[FittedRadiusMap, Path, MicrostructureSection], None]
+"""Draws the figures of a radius map into a folder."""
+
+
+def stage(
+    section: MicrostructureSection, *, spheres: bool, draw: Draw | None = None
+) -> Stage[Document]:
     """The stage that computes the fuzzy radius map of particles, whatever the number of workers.
 
-    If there is a folder, it gets radius.toml, a section of a case, figures if wanted, and
-    circles.csv of an image.
+    If there is a folder, it gets radius.toml, a section of a case, figures if there is what draws
+    them, and circles.csv of an image.
     """
-    file = section.sources[0].file
+    file = section.source.file
     inputs = [section, spheres, file and file_digest(file)]
 
     def compute(context: StageContext) -> StageResult[Document]:
-        with pool(context.workers) as executor:
-            result = study(section.study(spheres=spheres), executor=executor, progress=context.tick)
-        numbers, folder = summary(result), context.folder
+        options = {"seed": section.seed, "workers": context.workers}
+        particles = section.source.particles_of(
+            spheres=spheres, progress=lambda done: context.tick(PACKED * done), **options
+        )
+        fitted = fit_radius_map(
+            particles,
+            limits=section.limits,
+            progress=lambda done: context.tick(PACKED + (1 - PACKED) * done),
+            **options,
+        )
+        numbers, folder = fitted.numbers(), context.folder
         if folder is not None:
-            import pandas as pd
-
-            from alphacut.stochastic.figures.all import draw
-
-            drawn = draw(result, folder / "figures") if figures else {}
             write_text(folder / "radius.toml", fragment(numbers))
-            if "image_circles" in drawn:
-                discs = result.sections[0].particles
-                rows = np.column_stack([discs.centres, discs.radii])
-                circles = pd.DataFrame(rows, columns=["x [m]", "y [m]", "r [m]"])
-                circles.to_csv(folder / "circles.csv", index=False)
-        return StageResult(numbers, to_dataset(result))
+            if draw is not None:
+                draw(fitted, folder / "figures", section)
+            if section.image is not None:
+                rows = np.column_stack([particles[0].centres, particles[0].radii])
+                columns = {"header": "x [m],y [m],r [m]", "delimiter": ",", "comments": ""}
+                np.savetxt(folder / "circles.csv", rows, fmt="%.17g", **columns)
+        return StageResult(numbers, fitted.to_dataset())
 
     return Stage("microstructure", inputs, ("stochastic",), Document, compute)
+
+
+def fragment(numbers: Mapping[str, Any]) -> str:
+    """The case section [radius] as TOML text, with fractions as comments, from a `summary`."""
+    measure = "volume" if "mean_volume_fraction_of_map" in numbers else "area"
+    stated, map_fraction = numbers["fraction_of_case"], numbers[f"mean_{measure}_fraction_of_map"]
+    words = f"; of the particles: {numbers[f'{measure}_fraction']:.4f}"
+    words += "" if stated is None else f"; of the case: {stated:g}"
+    lines = [
+        f"[radius]  # from {numbers['cells']} cells; the limits keep"
+        f" {numbers['share_kept']:.4%} of their {measure}",
+        f"# {measure} fraction of this map at its nominal values: {map_fraction:.4f}{words}",
+    ]
+    for name, value in numbers["radius"].items():
+        is_fuzzy = isinstance(value, list)
+        ends = ", ".join(f"{x:.10g}" for x in (value if is_fuzzy else [value]))
+        lines.append(f"{name} = [{ends}]" if is_fuzzy else f"{name} = {ends}")
+    return "\n".join(lines) + "\n"

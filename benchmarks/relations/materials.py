@@ -15,11 +15,12 @@ from alphacut.base.arrays import Array
 from alphacut.rve import Ellipse, Phase, SeriesModel, SlicesModel
 from alphacut.rve.image.model import solve_image
 from alphacut.stochastic import HermiteMap
-from alphacut.stochastic.microstructure import MicrostructureStudy, fit_map
+from alphacut.stochastic.microstructure import RadiusLimits, fit_map
 from alphacut.stochastic.particles.packing import Packing
+from alphacut.stochastic.particles.packings import Packings
 from alphacut.stochastic.particles.particles import DISCS, SPHERES, Particles
 from alphacut.stochastic.particles.radius_laws import LogNormalRadii
-from alphacut.stochastic.sections import Simulated, reduced_radii, with_cells
+from alphacut.stochastic.sections import reduced_radii, with_cells
 from benchmarks.relations.relation import ROUNDED, Chance, Kind, Problem, Relation
 from benchmarks.relations.stated import of_values
 
@@ -107,17 +108,17 @@ def drawn_packings(chance: Chance) -> Problem:
     spheres = chance.random() < 0.3
     radii = LogNormalRadii(1e-3, 1e-3 * float(chance.uniform(1.5, 3)))
     fraction = float(chance.uniform(0.1, 0.2 if spheres else 0.4))
-    source = Simulated(Packing(40, fraction, radii, SPHERES if spheres else DISCS), 5)
+    packing = Packing(40, fraction, radii, SPHERES if spheres else DISCS)
     seed = int(chance.integers(1 << 30))
-    particles = [section.particles for section in source.sections(seed)]
-    return {"source": source, "seed": seed, "particles": particles}
+    return {"packing": packing, "seed": seed, "particles": [*Packings.make(packing, 5, seed=seed)]}
 
 
 def stated_of_packings(packings: Problem) -> xr.Dataset:
     """Limits, slopes and shares of the radius map of their cells."""
-    particles, study = packings["particles"], MicrostructureStudy(packings["source"])
+    particles, packing = packings["particles"], packings["packing"]
     sample = reduced_radii([with_cells(x) for x in particles])
-    _, pbox, _, band = fit_map(study, sample)
+    rule = RadiusLimits(packing.shape, packed_fraction=packing.fraction)
+    _, pbox, _, band = fit_map(rule, sample, seed=0)
     numbers = {"a1": pbox.fit.a1, "a3": pbox.fit.a3, "band": band}
     numbers |= {f"a2[{i}]": x for i, x in enumerate(pbox.a2)}
     numbers |= {f"a4[{i}]": x for i, x in enumerate(pbox.a4)}
@@ -131,8 +132,8 @@ def by_processes(start: str) -> Relation:
 
     def changed(packings: Problem, chance: Chance) -> Problem:
         with ProcessPoolExecutor(2, get_context(start)) as pool:
-            sections = packings["source"].sections(packings["seed"], executor=pool)
-        return {"particles": [section.particles for section in sections]}
+            made = Packings.make(packings["packing"], 5, seed=packings["seed"], executor=pool)
+        return {"particles": [*made]}
 
     return Relation(f"{start}ed processes", changed, within=0.0)
 

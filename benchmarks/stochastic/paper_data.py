@@ -19,10 +19,10 @@ import numpy as np
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
 from alphacut.stochastic.fit.hermite_fit import HermiteFit
 from alphacut.stochastic.particles.packing import Packing
+from alphacut.stochastic.particles.packings import Packings
 from alphacut.stochastic.particles.particles import Particles
 from alphacut.stochastic.particles.radius_laws import LogNormalRadii
 from alphacut.stochastic.radius_map import HermiteMap
-from alphacut.stochastic.sections import Simulated
 from alphacut.stochastic.tessellation.apollonius import apollonius
 
 RESULTS = Path(__file__).parents[1] / "results"
@@ -35,7 +35,7 @@ def readings(discs: int, number: int, seed: int) -> Iterator[tuple[str, AreaWeig
     """Readings of the paper's data, and the area-weighted r_n of each."""
     for factor in FACTORS:
         packing = Packing(discs, 0.2, LogNormalRadii(1e-3, 1e-3 * factor))
-        packed = [one.particles for one in Simulated(packing, number).sections(seed)]
+        packed = [*Packings.make(packing, number, seed=seed)]
         yield f"factor {factor}, periodic", sample_of(packed)
         if factor == FACTORS[0]:
             opened = [Particles(one.centres, one.radii, one.size, False) for one in packed]
@@ -61,7 +61,7 @@ def draw(rows: Sequence[tuple[str, AreaWeighted]], folder: Path) -> None:
     """Distribution functions of r_n of every reading, and the paper's fitted map."""
     import matplotlib.pyplot as plt
 
-    from alphacut.stochastic.figures.style import figure_style, save
+    from alphacut.figures.style import figure_style, save
 
     paper = HermiteMap(ENDS[0], 0.1, ENDS[1], 0.1692)  # below eq. 12
     theta, grid = np.linspace(-3, 3, 400), np.linspace(0.05, 1.0, 400)

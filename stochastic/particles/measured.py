@@ -10,7 +10,6 @@ deviation of the noise: the count is exact and half of the radii are within half
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -32,132 +31,141 @@ TILES = 8  # along each side of the image
 ROUNDING = 1e-9  # overlap over the smaller radius that is no overlap
 
 
-@dataclass(frozen=True)
-class CircleFile:
-    """Circles of a CSV file with the columns x, y, r and their units: ``x [mm], y [mm], r [mm]``.
+def read_particles(
+    path: str | Path,
+    *,
+    size: tuple[float, float] | None = None,
+    pixel: float | None = None,
+) -> Particles:
+    r"""Read the circles of a section from a CSV file, or find them in an image of it.
 
     Args:
-        path: The file. A column "d" (diameter) may stand in for r.
+        path: CSV file with the columns ``x [mm], y [mm], r [mm]`` (or d, a diameter), where `size`
+            is given; image of round particles of one brightness in a matrix of another, where
+            `pixel` is.
         size: Width and height of the section, a window with a corner at the origin, in m.
-    """
-
-    path: Path
-    size: tuple[float, float]
-
-    def read(self) -> Particles:
-        """Read the circles, in m from the section's corner, all inside and without overlap."""
-        rows, values = length_columns(self.path, ("x", "y", "r"))
-        centres, radii = values[:, :2], values[:, 2]
-        for row, centre, radius in zip(rows, centres, radii, strict=True):
-            require_radii(f"{self.path.name}, row {row}", radius)
-            if not ((centre >= 0) & (centre <= self.size)).all():
-                value = f"a centre {(1e3 * centre).round(6).tolist()} mm from the corner"
-                width, height = (f"{1e3 * side:g}" for side in self.size)
-                allowed = f"places in the section of {width} × {height} mm"
-                raise RefusedError(f"{self.path.name}, row {row}", value, allowed)
-        discs = Particles(centres, radii, np.array(self.size), periodic=False)
-        first, second = close_pairs(discs, 0.0)
-        overlap = -surface_distance(discs, first, second) / np.minimum(radii[first], radii[second])
-        if overlap.max(initial=0.0) > ROUNDING:
-            worst = int(np.argmax(overlap))
-            upper, lower = sorted(int(rows[k]) for k in (first[worst], second[worst]))
-            value = (
-                f"a circle that overlaps that of row {upper} by {overlap[worst]:.2g} of its radius"
-            )
-            key, allowed = f"{self.path.name}, row {lower}", "circles that do not overlap"
-            raise RefusedError(key, value, allowed, "mend the row")
-        return discs
-
-
-@dataclass(frozen=True)
-class SectionImage:
-    """An image of a section with round particles of one brightness in a matrix of another.
-
-    The particles are the phase whose pieces fill more of their convex hulls.
-
-    Args:
-        path: Image file.
         pixel: Side of a pixel, in m.
 
+    Returns:
+        The circles, in m from the section's corner.
+
     Raises:
-        RefusedError: A value lies outside its range.
+        RefusedError: The file cannot be read, circles leave the section or overlap, or the image
+            hides its particles; or not one of `size` and `pixel` is given.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from tempfile import mkdtemp
+        >>> file = Path(mkdtemp()) / "circles.csv"
+        >>> _ = file.write_text("x [mm],y [mm],r [mm]\n10,10,4\n30,12,5\n")
+        >>> read_particles(file, size=(0.04, 0.04)).radii.tolist()
+        [0.004, 0.005]
     """
+    if size is not None and pixel is None:
+        return _read_circles(Path(path), size)
+    allowed = "the size of the section, or the pixel of an image of it, in m"
+    if pixel is None or size is not None:
+        raise RefusedError("size, pixel", (size, pixel), allowed)
+    checked_number("image.pixel [m]", pixel, least=1e-12, most=1)
+    return circles_in(section_picture(Path(path)), pixel, name=Path(path).name)
 
-    path: Path
-    pixel: float
 
-    def __post_init__(self) -> None:
-        checked_number("image.pixel [m]", self.pixel, least=1e-12, most=1)
+def _read_circles(path: Path, size: tuple[float, float]) -> Particles:
+    """Return the circles of a CSV file, all inside the section and without overlap."""
+    rows, values = length_columns(path, ("x", "y", "r"))
+    centres, radii = values[:, :2], values[:, 2]
+    for row, centre, radius in zip(rows, centres, radii, strict=True):
+        require_radii(f"{path.name}, row {row}", radius)
+        if not ((centre >= 0) & (centre <= size)).all():
+            value = f"a centre {(1e3 * centre).round(6).tolist()} mm from the corner"
+            width, height = (f"{1e3 * side:g}" for side in size)
+            allowed = f"places in the section of {width} × {height} mm"
+            raise RefusedError(f"{path.name}, row {row}", value, allowed)
+    discs = Particles(centres, radii, np.array(size), periodic=False)
+    first, second = close_pairs(discs, 0.0)
+    overlap = -surface_distance(discs, first, second) / np.minimum(radii[first], radii[second])
+    if overlap.max(initial=0.0) > ROUNDING:
+        worst = int(np.argmax(overlap))
+        upper, lower = sorted(int(rows[k]) for k in (first[worst], second[worst]))
+        value = f"a circle that overlaps that of row {upper} by {overlap[worst]:.2g} of its radius"
+        key, allowed = f"{path.name}, row {lower}", "circles that do not overlap"
+        raise RefusedError(key, value, allowed, "mend the row")
+    return discs
 
-    def read(self) -> Particles:
-        """The circles of the image file, y up from the lower edge."""
-        return self.circles(self.picture())
 
-    def picture(self) -> Array:
-        """Return the grey values of the image file, (rows, columns); refuse other files."""
-        from PIL import Image
+def section_picture(path: Path) -> Array:
+    """Return the grey values of the image file, (rows, columns); refuse other files."""
+    from PIL import Image
 
-        try:
-            with Image.open(self.path) as image:
-                is_grey = image.mode in ("1", "L", "I", "F") or image.mode.startswith("I;16")
-                return np.asarray(image if is_grey else image.convert("L"), float)
-        except Exception as error:  # readers of damaged files raise errors of many kinds
-            allowed = f"images that can be read ({error})"
-            raise RefusedError("image.file", self.path, allowed) from None
+    try:
+        with Image.open(path) as image:
+            is_grey = image.mode in ("1", "L", "I", "F") or image.mode.startswith("I;16")
+            return np.asarray(image if is_grey else image.convert("L"), float)
+    except Exception as error:  # readers of damaged files raise errors of many kinds
+        allowed = f"images that can be read ({error})"
+        raise RefusedError("image.file", path, allowed) from None
 
-    def circles(self, picture: Array) -> Particles:
-        """Return the circles, of equal area and centroid, of the particles in a grey image, in m.
 
-        Those that touch its edge are left out. An image whose particles noise or light hide, or of
-        which too many are not round, is refused.
-        """
-        from skimage import measure
+def circles_in(picture: Array, pixel: float, *, name: str) -> Particles:
+    """Return the circles, of equal area and centroid, of the particles in a grey image, in m.
 
-        phase = self._particle_mask(picture)
-        rows, columns = phase.shape
-        circles, not_round_area = [], 0.0
-        for piece in measure.regionprops(_label_particles(phase)):  # type: ignore[no-untyped-call]
-            top, left, bottom, right = piece.bbox
-            if min(top, left) == 0 or bottom == rows or right == columns:
-                continue
-            if piece.area < np.pi * SMALLEST**2 or piece.solidity < ROUND:
-                not_round_area += piece.area
-            else:
-                circles.append((*piece.centroid, piece.equivalent_diameter_area / 2))
-        fraction = not_round_area / max(phase.sum(), 1)
-        value = f"{fraction:.1%} of the particles' area in pieces that are not round, beside"
-        value += f" {len(circles)} that are"
-        is_round = bool(circles) and fraction <= MAX_NOT_ROUND
-        allowed = f"images with round particles, up to {MAX_NOT_ROUND:.0%} of others"
-        cure = "take the image itself as the cell: cell.image"
-        require(is_round, self.path.name, value=value, allowed=allowed, cure=cure)
-        row, column, radius = np.array(circles).T
-        centres = np.stack([column + 0.5, rows - row - 0.5], axis=1)  # y from the lower edge
-        size = np.array([columns, rows]) * self.pixel
-        return Particles(centres * self.pixel, radius * self.pixel, size, periodic=False)
+    The particles are the phase whose pieces fill more of their convex hulls. Those that touch the
+    edge are left out. An image whose particles noise or light hide, or of which too many are not
+    round, is refused.
 
-    def _particle_mask(self, picture: Array) -> Mask:
-        """Mask of the particles' pixels, by Otsu's threshold of the smoothed image."""
-        # the phase whose pieces fill more of their convex hulls is that of the particles
-        from skimage import filters
+    Args:
+        picture: Grey values, shape (rows, columns); y rises from the lower edge.
+        pixel: Side of a pixel, in m.
+        name: Name of the image in messages.
+    """
+    from skimage import measure
 
-        smooth = filters.gaussian(picture, SMOOTHING, preserve_range=True)  # type: ignore[no-untyped-call]
-        bright = smooth > filters.threshold_otsu(smooth)  # type: ignore[no-untyped-call]
-        greys = [smooth[part] for part in (bright, ~bright) if part.any()]
-        contrast = float(np.ptp([np.median(grey) for grey in greys]))
-        noise = float(np.sqrt(np.mean([np.var(grey) for grey in greys])))
-        is_clear = len(greys) == 2 and contrast >= NOISE * noise
-        value = f"one of {len(greys)} greys, apart by {contrast / max(noise, 1e-300):.2g} noises"
-        allowed = f"images of two greys, {NOISE:g} standard deviations apart"
-        cure = "average the image before"
-        require(is_clear, self.path.name, value=value, allowed=allowed, cure=cure)
-        phase: Mask = ~bright if _convexity(~bright) > _convexity(bright) else bright
-        unevenness = _unevenness(smooth, ~phase) / contrast
-        value = f"light that differs by {unevenness:.2g} of the contrast"
-        is_even, allowed = unevenness <= MAX_UNEVENNESS, f"values up to {MAX_UNEVENNESS:g}"
-        cure = "subtract the background, for example by skimage.restoration.rolling_ball"
-        require(is_even, self.path.name, value=value, allowed=allowed, cure=cure)
-        return phase
+    phase = _particle_mask(picture, name)
+    rows, columns = phase.shape
+    circles, not_round_area = [], 0.0
+    for piece in measure.regionprops(_label_particles(phase)):  # type: ignore[no-untyped-call]
+        top, left, bottom, right = piece.bbox
+        if min(top, left) == 0 or bottom == rows or right == columns:
+            continue
+        if piece.area < np.pi * SMALLEST**2 or piece.solidity < ROUND:
+            not_round_area += piece.area
+        else:
+            circles.append((*piece.centroid, piece.equivalent_diameter_area / 2))
+    fraction = not_round_area / max(phase.sum(), 1)
+    value = f"{fraction:.1%} of the particles' area in pieces that are not round, beside"
+    value += f" {len(circles)} that are"
+    is_round = bool(circles) and fraction <= MAX_NOT_ROUND
+    allowed = f"images with round particles, up to {MAX_NOT_ROUND:.0%} of others"
+    cure = "take the image itself as the cell: cell.image"
+    require(is_round, name, value=value, allowed=allowed, cure=cure)
+    row, column, radius = np.array(circles).T
+    centres = np.stack([column + 0.5, rows - row - 0.5], axis=1)  # y from the lower edge
+    size = np.array([columns, rows]) * pixel
+    return Particles(centres * pixel, radius * pixel, size, periodic=False)
+
+
+def _particle_mask(picture: Array, name: str) -> Mask:
+    """Mask of the particles' pixels, by Otsu's threshold of the smoothed image."""
+    # the phase whose pieces fill more of their convex hulls is that of the particles
+    from skimage import filters
+
+    smooth = filters.gaussian(picture, SMOOTHING, preserve_range=True)  # type: ignore[no-untyped-call]
+    bright = smooth > filters.threshold_otsu(smooth)  # type: ignore[no-untyped-call]
+    greys = [smooth[part] for part in (bright, ~bright) if part.any()]
+    contrast = float(np.ptp([np.median(grey) for grey in greys]))
+    noise = float(np.sqrt(np.mean([np.var(grey) for grey in greys])))
+    is_clear = len(greys) == 2 and contrast >= NOISE * noise
+    value = f"one of {len(greys)} greys, apart by {contrast / max(noise, 1e-300):.2g} noises"
+    allowed = f"images of two greys, {NOISE:g} standard deviations apart"
+    cure = "average the image before"
+    require(is_clear, name, value=value, allowed=allowed, cure=cure)
+    phase: Mask = ~bright if _convexity(~bright) > _convexity(bright) else bright
+    unevenness = _unevenness(smooth, ~phase) / contrast
+    value = f"light that differs by {unevenness:.2g} of the contrast"
+    is_even, allowed = unevenness <= MAX_UNEVENNESS, f"values up to {MAX_UNEVENNESS:g}"
+    cure = "subtract the background, for example by skimage.restoration.rolling_ball"
+    require(is_even, name, value=value, allowed=allowed, cure=cure)
+    return phase
 
 
 def _label_particles(phase: Mask) -> NDArray[np.int_]:

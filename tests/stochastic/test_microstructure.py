@@ -1,9 +1,11 @@
 """From particles to the radius map: neighbours, windows, files, images, and the whole study."""
 
 import json
+import re
 import shutil
 import tomllib
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,27 +13,21 @@ from PIL import Image
 from scipy.ndimage import gaussian_filter
 
 from alphacut.base.errors import RefusedError
+from alphacut.stages.microstructure import fragment
 from alphacut.stochastic import microstructure
-from alphacut.stochastic.figures.all import draw
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
-from alphacut.stochastic.microstructure import (
-    MicrostructureStudy,
-    fit_map,
-    fragment,
-    study,
-    summary,
-)
-from alphacut.stochastic.particles.measured import CircleFile, SectionImage
+from alphacut.stochastic.microstructure import RadiusLimits, fit_map, fit_radius_map
+from alphacut.stochastic.particles.measured import circles_in, read_particles
 from alphacut.stochastic.particles.packing import Packing
-from alphacut.stochastic.particles.particles import SPHERES, Particles
+from alphacut.stochastic.particles.packings import pack
+from alphacut.stochastic.particles.particles import DISCS, SPHERES, Particles
 from alphacut.stochastic.particles.radius_laws import LogNormalRadii, MeasuredRadii
-from alphacut.stochastic.sections import Simulated, reduced_radii, with_cells
+from alphacut.stochastic.sections import reduced_radii, with_cells
 from alphacut.stochastic.tessellation.apollonius import apollonius, counted_cells, neighbours
-from benchmarks.stochastic import paper_data
+from benchmarks.stochastic import packing_figures, paper_data
 
 EQUAL, TENFOLD = LogNormalRadii(1e-3, 1e-3), LogNormalRadii(1e-3, 1e-2)
-SOURCE = Simulated(Packing(300, 0.2, TENFOLD), 12)
-SMALL = MicrostructureStudy(SOURCE, limits=(0.15, 0.85), seed=3)
+ROOT = Path(__file__).parents[2]
 needs_voro = pytest.mark.skipif(not shutil.which("voro++"), reason="needs Voro++")
 
 
@@ -80,10 +76,10 @@ def test_whole_cells_are_those_of_the_larger_section_and_weights_remove_their_bi
 GOOD = "x [mm],y [mm],r [mm]\n10,10,4\n30,12,5\n20,30,3\n"
 
 
-def circle_file(tmp_path, text: str, **options) -> CircleFile:
+def circles_of(tmp_path, text: str, size=(0.04, 0.04)) -> Particles:
     path = tmp_path / "circles.csv"
     path.write_text(text, encoding="utf-8", errors="surrogateescape")
-    return CircleFile(path, **(dict(size=(0.04, 0.04)) | options))
+    return read_particles(path, size=size)
 
 
 @pytest.mark.parametrize(
@@ -95,7 +91,7 @@ def circle_file(tmp_path, text: str, **options) -> CircleFile:
     ],
 )
 def test_circles_from_a_file(tmp_path, text):
-    discs = circle_file(tmp_path, text).read()
+    discs = circles_of(tmp_path, text)
     assert discs.centres == pytest.approx(np.array([(0.01, 0.01), (0.03, 0.012), (0.02, 0.03)]))
     assert discs.radii == pytest.approx([4e-3, 5e-3, 3e-3], rel=1e-12)
 
@@ -117,7 +113,7 @@ def test_circles_from_a_file(tmp_path, text):
 )
 def test_rows_without_meaning_are_refused(tmp_path, text, key, allowed):
     with pytest.raises(RefusedError) as refused:
-        circle_file(tmp_path, text).read()
+        circles_of(tmp_path, text)
     assert refused.value.key.endswith(key)
     assert allowed in refused.value.allowed
     assert len(str(refused.value)) < 250
@@ -147,7 +143,7 @@ def test_image_in_circles_out(tmp_path, seed, dark):
     grey, centres, radii = picture(seed, noise=1 / 5, fraction=[0.15, 0.3][seed % 2])
     path, grey = tmp_path / "section.png", np.clip(1 - grey if dark else grey, -0.5, 1.5) + 0.5
     Image.fromarray((127 * grey).astype(np.uint8)).save(path)
-    discs = SectionImage(path, 1.0).read()
+    discs = read_particles(path, pixel=1.0)
     assert len(discs) == len(radii)
     apart = np.hypot(*np.moveaxis(discs.centres[:, None] - centres[None], -1, 0))
     match = np.argmin(apart, axis=0)
@@ -175,24 +171,38 @@ def labyrinth() -> np.ndarray:
         (np.random.default_rng(1).normal(size=(200, 200)), "3 standard deviations"),
         (labyrinth(), "round particles"),
         (under_light(), "values up to 0.2"),
-        ("no image", "images that can be read"),
     ],
 )
-def test_images_that_hide_their_particles_are_refused(tmp_path, image, allowed):
-    section = SectionImage(tmp_path / "image.png", 1.0)
-    section.path.write_text(str(image))
+def test_images_that_hide_their_particles_are_refused(image, allowed):
     with pytest.raises(RefusedError) as refused:
-        section.read() if isinstance(image, str) else section.circles(image)
+        circles_in(image, 1.0, name="image.png")
     assert allowed in refused.value.allowed
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"pixel": 1.0}, "images that can be read"),
+        ({"pixel": 0.0}, "pixel"),
+        ({}, "size, pixel is .*; allowed: the size of the section, or the pixel"),
+        ({"size": (1.0, 1.0), "pixel": 1.0}, "size, pixel is"),
+    ],
+)
+def test_what_is_no_image_is_refused(tmp_path, options, message):
+    path = tmp_path / "image.png"
+    path.write_text("no image")
+    with pytest.raises(RefusedError, match=message):
+        read_particles(path, **options)
 
 
 @pytest.fixture(scope="module")
 def result():
-    return study(SMALL)
+    sections = pack(300, packings=12, fraction=0.2, radii=(1e-3, 1e-2), seed=3)
+    return fit_radius_map(sections, limits=(0.15, 0.85), seed=3)
 
 
 def test_study_of_packings(result):
-    numbers = summary(result)
+    numbers = result.numbers()
     assert json.loads(json.dumps(numbers)) == numbers
     assert numbers["area_fraction"] == pytest.approx(0.2, abs=1e-12)
     assert numbers["area_fraction_of_cells"] == pytest.approx(0.2, abs=1e-12)  # eq. 10
@@ -212,36 +222,36 @@ def test_study_of_measured_circles(tmp_path):
     packing = Packing(600, 0.2, TENFOLD).make(np.random.default_rng(8))
     table = 1e3 * np.column_stack([packing.centres, packing.radii])
     rows = "".join(f"{x!r},{y!r},{r!r}\n" for x, y, r in table.tolist())
-    truth = study(MicrostructureStudy(Simulated(Packing(600, 0.2, TENFOLD), 6)))
+    truth = fit_radius_map(pack(600, packings=6, fraction=0.2, radii=(1e-3, 1e-2)))
     text, size = "x [mm],y [mm],r [mm]\n" + rows, tuple(packing.size)
-    measured = study(MicrostructureStudy(circle_file(tmp_path, text, size=size)))
+    measured = fit_radius_map([circles_of(tmp_path, text, size)])
     assert measured.sample.mean == pytest.approx(truth.sample.mean, abs=0.03)
     for discs, side in ((GOOD, 9.0), ("x [m],y [m],r [m]\n0.3,0.5,0.1\n0.7,0.5,0.1\n", 1.0)):
-        far = replace(measured.study, source=circle_file(tmp_path, discs, size=(side, side)))
+        far = circles_of(tmp_path, discs, (side, side))
         with pytest.raises(RefusedError, match="larger section"):
-            study(far)
+            fit_radius_map([far])
 
 
 def test_cells_as_tight_as_no_square_are_counted_or_refused():
-    dense = study(MicrostructureStudy(Simulated(Packing(300, 0.55, LogNormalRadii(1e-3, 2e-3)), 5)))
+    dense = fit_radius_map(pack(300, packings=5, fraction=0.55, radii=(1e-3, 2e-3)))
     assert dense.limits[1] == 0.99 < dense.sample.values[-1]
-    assert 0 < dense.share_capped < 0.05
+    assert 0 < dense.rule.capped_fraction(dense.sample) < 0.05
     assert dense.share_within > 0.99
     with pytest.raises(RefusedError, match="cells tighter than r_n"):
-        study(MicrostructureStudy(Simulated(Packing(200, 0.75, EQUAL), 5)))
+        fit_radius_map(pack(200, packings=5, fraction=0.75, radii=EQUAL))
 
 
 def test_spheres_that_lose_more_than_15_percent_of_their_cells_are_refused():
-    case = MicrostructureStudy(Simulated(Packing(200, 0.4, TENFOLD, shape=SPHERES), 5))
+    rule = RadiusLimits(SPHERES, packed_fraction=0.4)
     groups = np.arange(100) % 5
     for tight, allowed in ((15, True), (16, False)):
         radii = np.r_[np.linspace(0.4, 0.9, 100 - tight), np.full(tight, 1.05)]
         sample = AreaWeighted.from_values(radii, np.ones(100), groups)
         if allowed:
-            assert case.cap_sample(sample) is sample
+            assert rule.capped(sample) is sample
         else:
             with pytest.raises(RefusedError, match=r"16.* of the volume.*set cell.fraction = 0.4"):
-                case.cap_sample(sample)
+                rule.capped(sample)
 
 
 def test_equal_cells_leave_nothing_to_fit():
@@ -249,29 +259,33 @@ def test_equal_cells_leave_nothing_to_fit():
     section = with_cells(Particles(grid, np.full(36, 0.3), (6, 6)))
     assert reduced_radii([section]).values == pytest.approx(np.full(36, 0.6), rel=1e-14)
     with pytest.raises(RefusedError, match=r"0\.6 in all cells"):
-        fit_map(replace(SMALL, limits=None), reduced_radii([section]))
+        fit_map(RadiusLimits(DISCS), reduced_radii([section]), seed=3)
 
 
-def test_figures_are_drawn(result, tmp_path):
-    files = draw(result, tmp_path)
-    numbers = ("03-04", "05-08", "06-07", "09", "10", "11", "12", "13", "radius")
-    assert [name.split("_")[0] for name in files] == list(numbers)
-    assert all(path.stat().st_size > 2000 for paths in files.values() for path in paths)
+def test_the_papers_figures_are_drawn(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(packing_figures, "N_EQUAL", 400)
+    case = (ROOT / "cases/concrete.toml").read_text(encoding="utf-8")
+    few = case.replace("particles = 2000", "particles = 200").replace("= 20  ", "= 5  ")
+    (tmp_path / "few.toml").write_text(few, encoding="utf-8")
+    packing_figures.main([str(tmp_path / "few.toml"), "--out", str(tmp_path)])
+    files = list(map(Path, capsys.readouterr().out.splitlines()))
+    numbers = ["03-04", "05-08", "06-07", "09", "10", "11", "12"]
+    assert [re.search(r"fig([\d-]+)-", file.name)[1] for file in files[::2]] == numbers
+    assert all(file.stat().st_size > 2000 for file in files)
     assert not list(tmp_path.glob("*partial*"))
 
 
 @needs_voro
-def test_spheres_take_the_same_way_and_keep_their_fraction(tmp_path):
+def test_spheres_take_the_same_way_and_keep_their_fraction():
     law = MeasuredRadii(tuple(np.linspace(1e-3, 2e-3, 20)))
-    spheres = Packing(150, 0.2, law, shape=SPHERES)
-    result = study(MicrostructureStudy(Simulated(spheres, 6), seed=2))
-    numbers = summary(result)
+    spheres = pack(150, packings=6, fraction=0.2, radii=law, shape="spheres", seed=2)
+    result = fit_radius_map(spheres, seed=2)
+    numbers = result.numbers()
     assert numbers["mean_volume_fraction_of_map"] == pytest.approx(0.2, rel=6e-3)
     fraction = pytest.approx(numbers["volume_fraction"], rel=1e-5)
     assert numbers["volume_fraction_of_cells"] == fraction
     for section in result.sections:
         assert section.cells.sum() == pytest.approx(section.particles.measure, rel=1e-5)
-    assert "13_pbox" in draw(result, tmp_path)
 
 
 @pytest.mark.slow

@@ -10,9 +10,10 @@ from scipy import stats
 
 from alphacut.base.errors import FailedError, RefusedError
 from alphacut.stochastic.particles.packing import Packing, random_sequential, relax_random_centres
+from alphacut.stochastic.particles.packings import Packings
 from alphacut.stochastic.particles.particles import DISCS, SPHERES, Particles
 from alphacut.stochastic.particles.radius_laws import LogNormalRadii, MeasuredRadii
-from alphacut.stochastic.sections import Simulated
+from alphacut.stochastic.sections import with_cells
 from alphacut.stochastic.theta.quadrature import gauss_rule
 
 EQUAL, TENFOLD = LogNormalRadii(1e-3, 1e-3), LogNormalRadii(1e-3, 1e-2)
@@ -53,16 +54,18 @@ def test_a_packing_meets_its_specification(law, fraction, shape):
 
 @pytest.mark.parametrize("shape", [DISCS, SPHERES], ids=lambda shape: shape.particles)
 def test_one_seed_gives_one_packing_in_any_process(shape):
-    source = Simulated(Packing(60, 0.2, TENFOLD, shape), 3)
-    alone, more = source.sections(5), Simulated(source.packing, 4).sections(5)
+    packing = Packing(60, 0.2, TENFOLD, shape)
+    alone, more = (Packings.make(packing, count, seed=5) for count in (3, 4))
     for start in ("spawn", "fork"):
         with ProcessPoolExecutor(2, get_context(start)) as pool:
-            shared = source.sections(5, executor=pool)
+            shared = Packings.make(packing, 3, seed=5, executor=pool)
+            cells = list(pool.map(with_cells, alone))
         for a, b, c in zip(alone, shared, more[:3], strict=True):
-            assert (a.particles.centres == b.particles.centres).all()
-            assert (a.cells == b.cells).all()
-            assert (a.particles.centres == c.particles.centres).all()
-    assert not np.isclose(alone[0].particles.centres, alone[1].particles.centres).any()
+            assert (a.centres == b.centres).all()
+            assert (a.centres == c.centres).all()
+        for particles, of_process in zip(alone, cells, strict=True):
+            assert (with_cells(particles).cells == of_process.cells).all()
+    assert not np.isclose(alone[0].centres, alone[1].centres).any()
 
 
 @pytest.mark.parametrize("fraction", [0.9, -0.1, np.nan])

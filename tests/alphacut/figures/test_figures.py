@@ -10,6 +10,7 @@ import pytest
 import xarray
 
 from alphacut.figures import envelope, material, overview
+from alphacut.figures.style import figure_style
 from alphacut.frame import StoreyFrame, propagation
 from alphacut.fuzzy import Triangular
 from alphacut.questions.decision import DecisionAnswer, LimitDecision
@@ -17,7 +18,6 @@ from alphacut.report.page import caption
 from alphacut.rve import Cell, Phase
 from alphacut.stages.store import CutsResult
 from alphacut.stochastic import HermiteMap
-from alphacut.stochastic.figures.style import figure_style
 from tests.alphacut.small import summary_of, two_floors_run
 
 

@@ -1,29 +1,33 @@
-"""All figures of a microstructure: discs and cells, distributions of radii, neighbours and r_n."""
+"""Figures 3 to 12 of the paper: packed discs, their neighbours, cells and reduced radii.
+
+    ./enter python -m benchmarks.stochastic.packing_figures [CASE] [--out FOLDER]
+
+The packings are those of the case, cases/concrete.toml unless named.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import argparse
+from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
-from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import EllipseCollection, LineCollection
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from scipy.spatial import KDTree
 
 from alphacut.base.arrays import Array
-from alphacut.stochastic.figures import style
-from alphacut.stochastic.figures.style import BLUE, GREEN, GREY, INK, LIGHT, ORANGE, PALE
-from alphacut.stochastic.microstructure import Microstructure, to_dataset
-from alphacut.stochastic.particles.measured import SectionImage
+from alphacut.case.content import load
+from alphacut.figures import style
+from alphacut.figures.microstructure import REDUCED, draw_circles, set_view
+from alphacut.figures.style import BLUE, GREEN, GREY, INK, LIGHT, ORANGE, PALE
+from alphacut.stochastic import FittedRadiusMap, LogNormalRadii, Particles, fit_radius_map
 from alphacut.stochastic.particles.packing import Packing
-from alphacut.stochastic.particles.particles import DISCS, Particles
-from alphacut.stochastic.particles.radius_laws import LogNormalRadii
-from alphacut.stochastic.sections import Simulated
+from alphacut.stochastic.particles.packings import Packings
+from alphacut.stochastic.particles.particles import DISCS
 from alphacut.stochastic.tessellation.apollonius import (
     Apollonius,
     apollonius,
@@ -31,56 +35,50 @@ from alphacut.stochastic.tessellation.apollonius import (
     neighbours,
 )
 
-REDUCED = "reduced radius $r_n$ = r/a"  # name of an axis
+RESULTS = Path(__file__).parents[1] / "results"
 CORNER_DISCS = 120  # of a larger section a corner with so many discs is drawn
 N_EQUAL = 4000  # equal discs whose direct neighbours are counted
 EQUAL = "{} equal discs of the same area fraction, not those of the section"
 
 
-def draw(result: Microstructure, folder: Path) -> dict[str, list[Path]]:
-    """Write every figure of a microstructure as SVG and PNG; return the files of each name."""
-    first, source = result.sections[0], result.study.source
-    figures: dict[str, Callable[[], Figure]] = {
-        "11_radii": partial(draw_radii, result),
-        "12_areas": partial(draw_areas, result),
-        "13_pbox": partial(draw_pbox, result),
-        "radius_map": partial(draw_map, result),
-    }
-    if (diagram := first.diagram) is not None:  # statistics of neighbours are of equal discs
-        generator, equal = np.random.default_rng(result.study.seed), _equal_discs(result)
-        figures |= {
-            "03-04_two_point": partial(draw_two_point, equal, generator),
-            "05-08_neighbours": partial(draw_neighbours, diagram.discs),
-            "06-07_neighbour_statistics": partial(draw_neighbour_statistics, equal),
-            "09_correlation": partial(draw_correlation, result, apollonius(equal)),
-            "10_cells": partial(draw_cells, diagram),
-        }
-    if isinstance(source, SectionImage):
-        figures["image_circles"] = partial(draw_overlay, source.picture(), first.particles)
+def draw(packings: Packings, fitted: FittedRadiusMap, folder: Path) -> list[Path]:
+    """Write every figure as SVG and PNG; return the files."""
+    diagram = fitted.sections[0].diagram
+    assert diagram is not None  # of discs
+    generator, equal = np.random.default_rng(fitted.seed), _equal_discs(fitted)
     with style.figure_style():
-        return {name: style.save(draw(), folder / name) for name, draw in sorted(figures.items())}
+        figures = {
+            "03-04-two-point": draw_two_point(equal, generator),
+            "05-08-neighbours": draw_neighbours(diagram.discs),
+            "06-07-neighbour-statistics": draw_neighbour_statistics(equal),
+            "09-correlation": draw_correlation(fitted, apollonius(equal)),
+            "10-cells": draw_cells(diagram),
+            "11-radii": draw_radii(packings),
+            "12-areas": draw_areas(fitted),
+        }
+        files = [style.save(figure, folder / f"fig{name}") for name, figure in figures.items()]
+    return [path for paths in files for path in paths]
 
 
-def _equal_discs(result: Microstructure) -> Particles:
+def _equal_discs(fitted: FittedRadiusMap) -> Particles:
     """Return a packing of equal discs with the sections' area fraction and mean disc area."""
-    discs = [section.particles for section in result.sections]
+    discs = [section.particles for section in fitted.sections]
     radius = float(np.sqrt(np.mean(np.concatenate([packing.radii for packing in discs]) ** 2)))
     fraction = float(np.mean([packing.fraction for packing in discs]))
     packing = Packing(N_EQUAL, min(fraction, DISCS.densest), LogNormalRadii(radius, radius))
-    return packing.make(np.random.default_rng([result.study.seed, N_EQUAL]))
+    return packing.make(np.random.default_rng([fitted.seed, N_EQUAL]))
 
 
-def draw_radii(result: Microstructure) -> Figure:
-    """Draw the distribution function of the radii, and their law if there is one (Fig. 11)."""
+def draw_radii(packings: Packings) -> Figure:
+    """Draw the distribution function of the radii, and their law (Fig. 11)."""
     figure, axes = plt.subplots()
-    particles, source = result.study.shape.particles, result.study.source
-    law = source.packing.radii if isinstance(source, Simulated) else None
-    values = 1e3 * np.concatenate([section.particles.radii for section in result.sections])
-    axes.ecdf(values, color=BLUE, label=f"{len(values)} {particles}")
-    if law is not None and law.smallest < law.largest:
+    law = packings.packing.radii
+    values = 1e3 * np.concatenate([particles.radii for particles in packings])
+    axes.ecdf(values, color=BLUE, label=f"{len(values)} discs")
+    if law.smallest < law.largest:
         grid = np.linspace(law.smallest, law.largest, 400)
         axes.plot(1e3 * grid, law.cdf(grid), color=ORANGE, ls="--", label=law.label)
-    axes.set(xlabel="radius [mm]", ylabel=f"share of {particles}", ylim=(0, 1.02))
+    axes.set(xlabel="radius [mm]", ylabel="share of discs", ylim=(0, 1.02))
     axes.legend()
     return figure
 
@@ -105,10 +103,10 @@ def draw_neighbour_statistics(discs: Particles) -> Figure:
     return figure
 
 
-def draw_correlation(result: Microstructure, equal: Apollonius) -> Figure:
+def draw_correlation(fitted: FittedRadiusMap, equal: Apollonius) -> Figure:
     """Draw r_n of pairs of cells that share a wall, beside those of equal discs (Fig. 9)."""
     figure, panels = plt.subplots(1, 2, figsize=(9.6, 4.4))
-    diagrams = [section.diagram for section in result.sections if section.diagram]
+    diagrams = [section.diagram for section in fitted.sections if section.diagram]
     titles = "the sections", "equal discs"
     for axes, shown, title in zip(panels, (diagrams, [equal]), titles, strict=True):
         all_pairs = [neighbouring_values(diagram, diagram.reduced_radii) for diagram in shown]
@@ -121,11 +119,11 @@ def draw_correlation(result: Microstructure, equal: Apollonius) -> Figure:
     return figure
 
 
-def draw_areas(result: Microstructure) -> Figure:
+def draw_areas(fitted: FittedRadiusMap) -> Figure:
     """Draw the size of each cell over its reduced radius r_n, and its limits (Fig. 12)."""
     figure, axes = plt.subplots()
-    shape, (low, high) = result.study.shape, result.limits
-    for section in result.sections:
+    shape, (low, high) = fitted.shape, fitted.limits
+    for section in fitted.sections:
         radius, measure = section.reduced_radii, 1e3**shape.dimensions * section.cells
         inside = (radius >= low) & (radius <= high)
         for part, size, colour in ((inside, 1.5, GREY), (~inside, 4, BLUE)):
@@ -137,59 +135,9 @@ def draw_areas(result: Microstructure) -> Figure:
     text, top = f"{shape.particles[:-1]} larger\nthan its cell ", axes.get_ylim()[1]
     axes.text(bound, top, text, ha="right", va="top", color=GREY)
     axes.set(xlabel=REDUCED, ylabel=f"{shape.cells} of the cell [{unit}]", xlim=(0, bound + 0.07))
-    share = f"{100 * result.share_within:.2f} % of the {shape.cells}"
+    share = f"{100 * fitted.share_within:.2f} % of the {shape.cells}"
     axes.set_title(f"limits {low:.4g} and {high:.4g} contain {share}")
     return figure
-
-
-def draw_pbox(result: Microstructure) -> Figure:
-    """Draw the distribution of r_n, its bootstrap band and p-box, also less the fit (Fig. 13)."""
-    size, ratios = (6.4, 5.6), (3, 1.4)
-    figure, panels = plt.subplots(2, 1, figsize=size, height_ratios=ratios, sharex=True)
-    axes, residual_axes = panels
-    table = to_dataset(result)
-    radius, cdf = table["r_n"].values, table["cdf"].values
-    low, high = np.maximum(cdf - result.band, 0), np.minimum(cdf + result.band, 1)
-    cells, band_label = len(result.truncated.values), f"band of ± {result.band:.2g}"
-    for panel, base in ((axes, 0 * cdf), (residual_axes, table["fitted"].values)):
-        scale = 1 if panel is axes else 100
-        edges = scale * (low - base), scale * (high - base)
-        panel.fill_between(radius, *edges, fc=PALE, label=band_label)
-        panel.plot(radius, scale * (cdf - base), color=BLUE, label=f"{cells} cells")
-        for name, label in (("pbox_upper", "p-box"), ("pbox_lower", None)):
-            panel.plot(radius, scale * (table[name] - base), color=INK, lw=1, label=label)
-    axes.set(ylabel=f"{result.study.shape.cells}-weighted share", ylim=(0, 1.02))
-    residual_axes.set(xlabel=REDUCED, ylabel="less the fit [%]")
-    axes.legend(loc="upper left")
-    return figure
-
-
-def draw_map(result: Microstructure) -> Figure:
-    """Draw the radius map θ ↦ r_n: quantiles of the sample, fitted cubic, fuzzy bounds (eq. 12)."""
-    figure, axes = plt.subplots()
-    box, law = result.pbox, result.pbox.fit.distribution
-    theta = np.asarray(np.linspace(law.lower, law.upper, 601), float)
-    axes.step(theta, result.truncated.quantile(law.cdf(theta)), color=BLUE, label="sample")
-    fitted = box.fit.map((box.a2[1], box.a4[1]))
-    label, of_box = f"$a_2$ = {fitted.a2:.4f}, $a_4$ = {fitted.a4:.4f}", "fuzzy $a_2$, $a_4$"
-    axes.plot(theta, fitted(theta), color=ORANGE, ls="--", label=label)
-    axes.fill_between(theta, *box.bounds(theta), color=GREY, alpha=0.4, lw=0, label=of_box)
-    axes.set(xlabel="θ, standard deviations", ylabel=REDUCED, ylim=(0, 1))
-    axes.legend()
-    return figure
-
-
-def _circles(axes: Axes, centres: Array, radii: Array, **look: Any) -> None:
-    width = 2e3 * radii
-    position = {"offsets": 1e3 * centres, "offset_transform": axes.transData}
-    axes.add_collection(EllipseCollection(width, width, 0 * width, units="xy", **position, **look))
-
-
-def _view(axes: Axes, low: Array, high: Array) -> None:
-    """Set the axes' limits, given in m, to mm of equal scale, without grid."""
-    axes.set(xlim=1e3 * np.array([low[0], high[0]]), ylim=1e3 * np.array([low[1], high[1]]))
-    axes.set(aspect="equal", xlabel="x [mm]", ylabel="y [mm]")
-    axes.grid(visible=False)
 
 
 def plot_discs(axes: Axes, discs: Particles, colour: str, view: Array) -> None:
@@ -198,8 +146,8 @@ def plot_discs(axes: Axes, discs: Particles, colour: str, view: Array) -> None:
     centres = np.concatenate([discs.centres + shift for shift in shifts])
     radii = np.tile(discs.radii, len(shifts))
     is_seen = ((centres > -radii[:, None]) & (centres < view + radii[:, None])).all(axis=1)
-    _circles(axes, centres[is_seen], radii[is_seen], color=colour, lw=0)
-    _view(axes, 0 * view, view)
+    draw_circles(axes, centres[is_seen], radii[is_seen], color=colour, lw=0)
+    set_view(axes, 0 * view, view)
 
 
 def plot_cells(axes: Axes, diagram: Apollonius, view: Array) -> None:
@@ -294,20 +242,34 @@ def draw_two_point(discs: Particles, generator: np.random.Generator) -> Figure:
     )
     limit = np.full(2, reach + radius)
     for axes, centres, colour in zip(panels, (drawn, near), (LIGHT, colours), strict=True):
-        _circles(axes, np.zeros((1, 2)), np.array([radius]), color=ORANGE)
+        draw_circles(axes, np.zeros((1, 2)), np.array([radius]), color=ORANGE)
         radii = np.full(len(centres), radius)
-        _circles(axes, centres, radii, facecolor=colour, edgecolor=GREY, alpha=0.8)
-        _view(axes, -limit, limit)
+        draw_circles(axes, centres, radii, facecolor=colour, edgecolor=GREY, alpha=0.8)
+        set_view(axes, -limit, limit)
     return figure
 
 
-def draw_overlay(picture: Array, discs: Particles) -> Figure:
-    """Draw the grey image (rows, columns) with the outline of every circle found in it."""
-    width, height = 1e3 * discs.size
-    figure, axes = plt.subplots(figsize=(6.4, 6.4 * float(np.clip(height / width, 0.5, 1.6))))
-    axes.imshow(picture, cmap="gray", extent=(0, width, 0, height), interpolation="none")
-    outline = {"facecolors": "none", "edgecolors": ORANGE, "linewidths": 1.0}
-    _circles(axes, discs.centres, discs.radii, **outline)
-    _view(axes, 0 * discs.size, discs.size)
-    axes.set_title(f"{len(discs)} circles; what has no outline was left out")
-    return figure
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Packs, fits, draws, and prints the files."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("case", nargs="?", default="cases/concrete.toml", help="case file")
+    parser.add_argument("--workers", type=int, default=1, help="processes (1)")
+    parser.add_argument("--out", type=Path, default=RESULTS, help="folder of the figures")
+    options = parser.parse_args(arguments)
+    section = load(options.case).content.microstructure
+    if section is None or section.packing is None:
+        parser.error(f"{options.case} has no [microstructure.packing]")
+    packings = section.packing.particles_of(
+        spheres=False, seed=section.seed, workers=options.workers
+    )
+    fitted = fit_radius_map(
+        packings, limits=section.limits, seed=section.seed, workers=options.workers
+    )
+    for path in draw(packings, fitted, options.out):
+        print(path)
+
+
+if __name__ == "__main__":
+    main()

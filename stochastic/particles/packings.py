@@ -1,0 +1,111 @@
+"""Independent packings of particles: the sections from which a radius map is fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from typing import overload
+
+import numpy as np
+
+from alphacut.base.errors import checked_number, require_choice
+from alphacut.fuzzy.campaign.workers import pool
+from alphacut.stochastic.particles.packing import Packing
+from alphacut.stochastic.particles.particles import DISCS, SPHERES, Particles
+from alphacut.stochastic.particles.radius_laws import LogNormalRadii, RadiusLaw
+
+SHAPES = {shape.particles: shape for shape in (DISCS, SPHERES)}
+
+
+@dataclass(frozen=True, eq=False)
+class Packings(Sequence[Particles]):
+    """Independent periodic packings of one kind, a sequence of `Particles`.
+
+    Args:
+        packing: How each of them is made.
+        seed: The k-th packing depends on this seed and k only.
+        sections: The packings.
+    """
+
+    packing: Packing
+    seed: int
+    sections: tuple[Particles, ...]
+
+    @classmethod
+    def make(
+        cls,
+        packing: Packing,
+        count: int,
+        *,
+        seed: int,
+        executor: Executor | None = None,
+        progress: Callable[[float], None] | None = None,
+    ) -> Packings:
+        """Return `count` packings; an `executor` makes the same ones."""
+        seeds = np.random.SeedSequence(seed).spawn(count)
+        map_function = executor.map if executor else map
+        sections: list[Particles] = []
+        for particles in map_function(_make, [packing] * count, seeds):
+            sections.append(particles)
+            if progress:
+                progress(len(sections) / count)
+        return cls(packing, seed, tuple(sections))
+
+    def __len__(self) -> int:
+        return len(self.sections)
+
+    @overload
+    def __getitem__(self, index: int) -> Particles: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Particles, ...]: ...
+
+    def __getitem__(self, index: int | slice) -> Particles | tuple[Particles, ...]:
+        return self.sections[index]
+
+
+def _make(packing: Packing, seed: np.random.SeedSequence) -> Particles:
+    return packing.make(np.random.default_rng(seed))
+
+
+def pack(
+    particles: int,
+    *,
+    packings: int = 20,
+    fraction: float,
+    radii: tuple[float, float] | RadiusLaw,
+    shape: str = "discs",
+    seed: int = 0,
+    workers: int = 1,
+    progress: Callable[[float], None] | None = None,
+) -> Packings:
+    """Pack discs in squares, or spheres in cubes, at random, periodically and without overlap.
+
+    Args:
+        particles: Number of particles in each packing.
+        packings: Number of independent packings.
+        fraction: Fraction of the area or volume that the particles take.
+        radii: Smallest and largest radius, in m, of a log-normal law (eq. 11); or a law, as
+            `MeasuredRadii.read` has it from a file.
+        shape: "discs" or "spheres".
+        seed: Seed of everything left to chance.
+        workers: Processes that pack; the packings do not depend on their number.
+        progress: Function that takes the completed fraction.
+
+    Raises:
+        RefusedError: A number is out of range, or the fraction above what packs at random.
+        FailedError: The particles still overlap after all steps.
+
+    Example:
+        >>> sections = pack(50, packings=3, fraction=0.2, radii=(1e-3, 4e-3), seed=1)
+        >>> len(sections), len(sections[0]), round(sections[0].fraction, 3)
+        (3, 50, 0.2)
+    """
+    for key, number in {"particles": particles, "packings": packings, "seed": seed}.items():
+        checked_number(key, number, whole=True, positive=key != "seed")
+    require_choice("shape", shape, SHAPES)
+    law = LogNormalRadii(*radii) if isinstance(radii, tuple) else radii
+    packing = Packing(particles, fraction, law, shape=SHAPES[shape])
+    with pool(workers) as executor:
+        return Packings.make(packing, packings, seed=seed, executor=executor, progress=progress)
