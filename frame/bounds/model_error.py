@@ -67,6 +67,22 @@ def proved_error(model: ModalModel) -> Array:
     return (1 + ROUNDING) * (deviation[:, None] * norms.outputs + output_error)
 
 
+def direct_error_in_steps(model: ModalModel) -> Array:
+    """Bound of the error of what forces add to outputs at once, within the step to each node.
+
+    It is the error of the share times the largest |f| in the step, which may be zero at its ends:
+    shape (T, m), in units of the outputs.
+    """
+    structure, error = model.structure, np.zeros((len(model.flow.time), len(model.flow.outputs)))
+    n_sources = structure.static.shape[1]
+    for number, load in enumerate(model.loads):
+        if isinstance(load, Direct):
+            assert structure.feeds is not None
+            share = structure.feeds[:, number + 1 - n_sources] - load.share.real[0] * 2.0
+            error += np.outer(load.history.largest_in_steps(model.flow.time), share.size())
+    return (1 + ROUNDING) * error
+
+
 class EnergyNorms:
     """Bounds of energy norms over the box, by M and K in its middle, the unit matrix and diag(ω²).
 

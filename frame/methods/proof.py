@@ -32,6 +32,7 @@ from alphacut.frame.bounds.kernel import call_examine
 from alphacut.frame.bounds.model_error import (
     MAX_PARAMETERS,
     Remainder,
+    direct_error_in_steps,
     largest_growth,
     motion_parts,
     proved_error,
@@ -196,6 +197,7 @@ def bound_levels(
     Raises:
         BisectionError: The gap is not above twice the model error and rounding.
     """
+    direct = direct_error_in_steps(model)
     model, error = model.in_units(scale), model_error / scale
     rounding = Remainder(model, *model.boxes.unit_ends(0)).margin[..., 0]
     # so that rounding does not lift the gap above what was asked for
@@ -222,7 +224,8 @@ def bound_levels(
         )
         LOG.debug("branch and bound: level %g took %d boxes", model.boxes.alpha[level], used)
         of_levels.append((optima, proved, used))
-    between = (_line_deviation(model) + _error_between_nodes(model, error)) * scale
+    error_between = _error_between_nodes(model, error, direct=direct / scale)
+    between = (_line_deviation(model) + error_between) * scale
     facts = {
         "model_error": float(error.max()),
         "degree": model.degree,
@@ -275,13 +278,22 @@ def _line_deviation(model: ModalModel) -> Array:
     return narrowed_straying(responses, model.flow.time, by_magnitude)
 
 
-def _error_between_nodes(model: ModalModel, error: Array) -> Array:
-    """Bound of what the model's error in the step to a node exceeds its smaller end by, (T, m)."""
-    # it decays no faster than exp(g t): inside it is at most exp(−g h) times what it is at the end
+def _error_between_nodes(model: ModalModel, error: Array, *, direct: Array) -> Array:
+    """Bound of what the model's error in the step to a node exceeds its smaller end by, (T, m).
+
+    Args:
+        model: The model.
+        error: Bound of its error at nodes, shape (T, m).
+        direct: Bound of the part of the error within the step to each node that is in what forces
+            add to outputs at once, shape (T, m); it may be zero at the nodes.
+    """
+    # All but that part decays no faster than exp(g t), g < 0 the least growth rate: within a step
+    # of length h it is at most exp(−g h) times what it is at the end.
     exponent = largest_growth(model.eigenvalue, np.ones(len(model.boxes.names)))
     swell = float(np.exp(np.maximum(-exponent, 0.0).max() * model.flow.step))
     added = np.zeros_like(error)
-    added[1:] = swell * np.maximum(error[1:], error[:-1]) - np.minimum(error[1:], error[:-1])
+    within = swell * np.maximum(error[1:], error[:-1]) + direct[1:]
+    added[1:] = within - np.minimum(error[1:], error[:-1])
     return added
 
 

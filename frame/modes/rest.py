@@ -270,10 +270,14 @@ def coupling_bounds(
 
 def _within_steps(largest: Array, time: Array, force: float, fastest: float, order: int) -> Array:
     """Bounds of |G| and |G′| in the step to each node by those at nodes (2, T); G = σ^order ρ."""
-    # G(t + τ) = exp(σ τ) G(t) + σ^order ∫ exp(σ s) f(t + τ − s) ds, |exp(σ τ)| ≤ 1
-    h, (G, G_slope) = np.diff(time, prepend=time[0]), np.roll(largest, 1, axis=1)
-    G_slope = G_slope + h * G + force * h * fastest ** max(order - 1, 0) * (order + fastest * h / 2)
-    return np.stack([G + force * h * fastest**order, G_slope])
+    # With |exp(σ τ)| ≤ 1, |f| ≤ force and |σ| ≤ fastest in
+    #     G(t + τ) = exp(σ τ) G(t) + σ^n I,   I = ∫ exp(σ s) f(t + τ − s) ds from 0 to τ ≤ h,
+    # |I| ≤ force h and |dI/dσ| ≤ force h²/2; the derivative of σ^n I is n σ^(n − 1) I + σ^n dI/dσ.
+    h = np.diff(time, prepend=time[0])
+    G, G_slope = np.roll(largest, 1, axis=1)
+    of_power = order * fastest ** (order - 1) if order else 0.0
+    of_integral = force * (of_power * h + fastest**order * h**2 / 2)
+    return np.stack([G + force * h * fastest**order, G_slope + h * G + of_integral])
 
 
 def response_slopes(

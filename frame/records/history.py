@@ -91,6 +91,17 @@ class History:
         times = np.asarray(time, float)
         return self.envelope(times) * self.wave(times)
 
+    def largest_in_steps(self, time: Array) -> Array:
+        """Bound of |f| within the step to each of the rising times (T,), 0 at the first, (T,)."""
+        # |g| is largest at an end of the step or at a sample in it, and |sin| at most 1
+        samples = self.start + np.arange(len(self.samples)) * self.step
+        inside = samples[(samples > time[0]) & (samples < time[-1])]
+        times = np.union1d(time, inside)
+        size = np.maximum(np.abs(self.envelope(times)[:-1]), np.abs(self.envelope(times, -1.0)[1:]))
+        largest = np.zeros(len(time))
+        largest[1:] = np.maximum.reduceat(size, np.searchsorted(times, time[:-1]))
+        return largest
+
     def wave(self, time: Array) -> Array:
         """The sine that g is multiplied by; ones where there is none."""
         if not self.frequency:

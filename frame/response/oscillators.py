@@ -159,7 +159,7 @@ class Oscillators:
         if source not in self._deviations:
             self._deviations[source] = line_deviations(
                 *(self.grid.sigma, self.loads.get(source), self.time, self.orders),
-                is_force=source.startswith("force"),
+                is_force=is_fed_through(source, 2),
                 at_nodes=self._table(source),
             )
         modulus, read = self._deviations[source][order]
@@ -177,11 +177,14 @@ def read_response(source: str, sigma: Array, G: Array) -> Array:
     return np.asarray((-1.0 if source == "load" else 1.0) * G.imag / sigma.imag)
 
 
+def is_fed_through(source: str, order: int) -> bool:
+    """Return whether a source adds to a response at once, as a force does to accelerations."""
+    return order == 2 and source.startswith("force")
+
+
 def feedthrough(source: str, loads: Mapping[str, History], order: int, time: Array) -> Array:
     """Direct feedthrough f(t) of a force to accelerations at nodes, shape of `time`, else 0."""
-    if order == 2 and source.startswith("force"):
-        return loads[source].values(time)
-    return np.zeros_like(time)
+    return loads[source].values(time) if is_fed_through(source, order) else np.zeros_like(time)
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,7 +242,9 @@ def response_ranges(
                 direct = np.abs(feedthrough(source, loads, order, time))
                 high = scale * (factor * rho + direct)
                 low = -high
-                deviation = 2 * scale * (factor * rho_in_step + force * direct.any())
+                # a force may be zero at all nodes and not between them
+                direct_in_step = force if is_fed_through(source, order) else 0.0
+                deviation = 2 * scale * (factor * rho_in_step + direct_in_step)
                 if tables and source in loads:
                     table = tables.responses(source, order)
                     powers = [np.abs(tables.grid.sigma) ** (2 * power) for power in POWERS]

@@ -246,7 +246,8 @@ def line_deviations(
         load: The load; None for ρ = exp(σ t).
         time: Nodes, shape (T,), in s.
         orders: Powers of σ; the result has for each bounds in the step to each node, (2, T).
-        is_force: Whether the load itself is added to the imaginary part of order 2.
+        is_force: Whether the load itself is added to the imaginary part of order 2, as a force adds
+            to a relative acceleration at once.
         at_nodes: ρ with two derivatives, its rounding, bounds of its derivatives, where known.
     """
     omega, fast, decay = sigma[0].imag, float(np.abs(sigma).max()), float(-sigma.real.max())
@@ -261,7 +262,9 @@ def line_deviations(
     bounds = tables[2] if tables else moments_of(decay, load, times)
     # for each order the largest over the grid: of A exp(σ τ)'s F = σ^order A and F″; rounding; of
     # H, σ^order ρ off chords: |H|, |H″|, |Im H/ω|, and that with the load before and after
-    added = {order: off_line * (is_force and order == 2) for order in orders}
+    # the load itself strays from lines by `pieces.bend` even where it is on them at all these ends
+    is_added = {order: is_force and order == 2 for order in orders}
+    added = {order: off_line if is_added[order] else 0.0 * off_line for order in orders}
     inside = chords.fraction > 0
     amplitude, rounding, off = (
         {order: np.zeros((count, n)) for order in orders}
@@ -302,7 +305,8 @@ def line_deviations(
         (error,) = rounding[order]
         error = np.maximum(error, chords.with_ends(error) - error)
         bent += 4 * np.maximum(error[:-1], error[1:])
-        total = np.stack([bent, bent / low + added[order].any() * pieces.bend])
+        bend_of_load = pieces.bend if is_added[order] else 0.0 * pieces.bend
+        total = np.stack([bent, bent / low + bend_of_load])
         before, after = (x + missed_read for x in with_load)
         total[0] += np.maximum((size_off + missed)[:-1], (size_off + missed)[1:])
         total[1] += np.maximum(after[:-1], before[1:])

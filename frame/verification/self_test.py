@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from hashlib import sha256
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -34,9 +35,9 @@ MIN_MOTIONS, MAX_MOTIONS = 24, 240
 MOTIONS_OF_LEVEL = 67.0
 """Motions for each level, over the number of unknowns 2n: a tenth of a proof's work. A proof takes
 2·10⁴ multiplications for a bound, of which a level, node and output have two, and a motion 15 (the
-terms of its series) for each node, output, unknown and quarter of a step."""
-QUARTERS = 4
-"""Parts of a step at whose ends motions are compared."""
+terms of its series) for each node, output, unknown and time of a step."""
+TIMES_OF_STEP = 4
+"""Times of a step at which motions are compared: its beginning, and times drawn within it."""
 MAX_NUMBERS = 1_000_000
 """Most numbers of all matrices, 8 MB; structures beyond are left out, the first one never."""
 
@@ -148,6 +149,27 @@ class _Tested(NamedTuple):
     rounding: Array
 
 
+def fractions_of_steps(time: Array, lower: Array, upper: Array) -> Array:
+    """Return fractions of each step at which motions are compared, rising from 0.
+
+    They are drawn, so that no load can be zero at all of them as it can be at nodes and quarter
+    points. The seed depends on nodes and cuts, so that a test that is repeated has the same bits.
+
+    Args:
+        time: Nodes, shape (T,).
+        lower: Lower ends of the inputs on all levels, shape (A, n).
+        upper: Upper ends, the same shape.
+
+    Returns:
+        Fractions in [0, 1), shape (T − 1, TIMES_OF_STEP).
+    """
+    content = b"".join(np.ascontiguousarray(x, float).tobytes() for x in (time, lower, upper))
+    rng = np.random.default_rng(list(sha256(content).digest()))
+    fractions = np.sort(rng.random((len(time) - 1, TIMES_OF_STEP)), axis=1)
+    fractions[:, 0] = 0.0
+    return fractions
+
+
 class Trial:
     """Comparison of exact motions with an envelope that is guaranteed, or has proved outer bounds.
 
@@ -157,8 +179,10 @@ class Trial:
     def __init__(self, envelope: Envelope, lower: Array, upper: Array) -> None:
         self.envelope, self.lower, self.upper = envelope, lower, upper
         time, shape = envelope.time, envelope.lower.shape[1:]
-        inside = time[:-1, None] + np.diff(time)[:, None] * np.arange(QUARTERS) / QUARTERS
-        # nodes and the quarter points between them, (4 (T − 1) + 1,), in s
+        # fractions of each step at which its motions are compared, (T − 1, TIMES_OF_STEP)
+        self.fractions = fractions_of_steps(time, lower, upper)
+        inside = time[:-1, None] + np.diff(time)[:, None] * self.fractions
+        # nodes and the times between them, (TIMES_OF_STEP (T − 1) + 1,), in s
         self.times = np.append(inside.ravel(), time[-1])
         # what is proved between nodes, (T, m)
         self.between = np.full(shape, np.inf) if envelope.between is None else envelope.between
@@ -200,7 +224,9 @@ class Trial:
         envelope = self.envelope
         if envelope.inner is None:
             return
-        at_nodes = _Tested(motion.point, motion.values[::QUARTERS], motion.rounding[::QUARTERS])
+        at_nodes = _Tested(
+            motion.point, motion.values[::TIMES_OF_STEP], motion.rounding[::TIMES_OF_STEP]
+        )
         for sign, at, inner, side in (
             (1.0, envelope.upper_at[level], envelope.inner.upper[level], "upper"),
             (-1.0, envelope.lower_at[level], envelope.inner.lower[level], "lower"),
@@ -215,11 +241,11 @@ class Trial:
 
     def require_line_deviation(self, motion: _Tested) -> None:
         """Refuse a motion that strays farther from straight lines between nodes than is proved."""
-        ends, fraction = motion.values[::QUARTERS], np.arange(QUARTERS)[:, None] / QUARTERS
-        inside = ends[:-1, None] + np.diff(ends, axis=0)[:, None] * fraction
+        ends = motion.values[::TIMES_OF_STEP]
+        inside = ends[:-1, None] + np.diff(ends, axis=0)[:, None] * self.fractions[..., None]
         line = np.concatenate([inside.reshape(-1, ends.shape[1]), ends[-1:]])
         allowed = self.between[1:] + np.maximum(self.slack[1:], self.slack[:-1])
-        allowed = np.append(np.repeat(allowed, QUARTERS, axis=0), allowed[-1:], axis=0)
+        allowed = np.append(np.repeat(allowed, TIMES_OF_STEP, axis=0), allowed[-1:], axis=0)
         excess = np.abs(motion.values - line) - allowed - 2 * motion.rounding
         self._require(excess, line, "farther than `between` from the straight line at", motion)
 
@@ -242,9 +268,9 @@ class Trial:
 
 
 def _within_steps(upper: Array, between: Array) -> Array:
-    """Return upper bounds at nodes and quarter points of steps, (4 (T − 1) + 1, m), from (T, m)."""
+    """Return upper bounds at the times of a `Trial`, (J, m), from those at nodes, (T, m)."""
     inside = np.maximum(upper[1:], upper[:-1]) + between[1:]
-    parts = [upper[:-1], *[inside] * (QUARTERS - 1)]
+    parts = [upper[:-1], *[inside] * (TIMES_OF_STEP - 1)]
     return np.append(np.stack(parts, 1).reshape(-1, upper.shape[1]), upper[-1:], axis=0)
 
 

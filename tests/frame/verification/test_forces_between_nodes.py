@@ -1,0 +1,221 @@
+"""Accelerations under forces that vanish at all nodes, and at every eighth of a step."""
+
+import numpy as np
+import pytest
+from scipy.linalg import eigh
+
+from alphacut.base.errors import FailedError
+from alphacut.frame import Auto, DualProof, Force, History, Proof, StoreyFrame, envelope
+from alphacut.frame.modes.rest import _within_steps
+from alphacut.frame.response.straying import line_deviations
+from alphacut.frame.verification import self_test
+from alphacut.frame.verification.self_test import ContradictionError
+from alphacut.fuzzy import Interval
+
+STEPS = 12
+
+
+def zero_at(step, parts, rng):
+    """A force of unit magnitude that is zero at every `step/parts`, and not between."""
+    samples = np.zeros(STEPS * parts * 2 + 1)
+    samples[1::2] = rng.choice([-1.0, 1.0], len(samples) // 2)
+    return History(step / parts / 2, samples)
+
+
+def acceleration(mass, omega, ratio, force, amplitude, times):
+    """Relative acceleration of an oscillator at rest at t = 0, piecewise exact, shape (T,)."""
+    samples, h = amplitude * force.samples, force.step
+    A = np.array([[0.0, 1.0], [-(omega**2), -2 * ratio * omega]])
+    state, out = np.zeros(2), np.empty(len(times))
+    piece = np.minimum((times / h + 1e-9).astype(int), len(samples) - 2)
+    rate, modes = np.linalg.eig(A)
+    inverse = np.linalg.inv(modes)
+    for k in range(len(samples) - 1):
+        slope = (samples[k + 1] - samples[k]) / h
+
+        def moved(tau, k=k, slope=slope, state=state):
+            """x(τ) of ẋ = A x + e (f_k + slope τ)/m from the state at the beginning."""
+            load = inverse @ np.array([0.0, 1.0 / mass])
+            grown = np.exp(rate * tau)
+            constant = load * (grown - 1) / rate
+            linear = load * (grown - 1 - rate * tau) / rate**2
+            return (
+                modes @ (grown * (inverse @ state) + samples[k] * constant + slope * linear)
+            ).real
+
+        for row in np.flatnonzero(piece == k):
+            tau = times[row] - k * h
+            x = moved(tau)
+            out[row] = A[1] @ x + (samples[k] + slope * tau) / mass
+        state = moved(h)
+    return out
+
+
+@pytest.mark.parametrize("method", [Proof(workers=1), DualProof(workers=1), Auto(workers=1)])
+@pytest.mark.parametrize("parts", [1, 4])
+def test_no_acceleration_leaves_its_bounds_between_nodes(method, parts, rng):
+    step, mass = 0.05, 2.0
+    stiffness = float(mass * rng.uniform(0.5, 6.0) ** 2)
+    history, amplitude = zero_at(step, parts, rng), float(rng.uniform(0.5, 2.0))
+    frame = StoreyFrame(
+        masses=[mass],
+        stiffness=[stiffness],
+        damping_ratio=0.03,
+        outputs=("a1",),
+        loads=[Force(1, amplitude, history)],
+    )
+    inputs = {"m1": Interval(0.9 * mass, 1.1 * mass), "k1": Interval(0.95 * stiffness, stiffness)}
+    motion = {"duration": STEPS * step, "step": step, "alpha": [0.0], "progress": False}
+    bounds = envelope(frame, inputs, method, **motion)
+    assert bounds.nature == "guaranteed"
+    offsets = np.sort(rng.random(20))
+    times = (np.arange(STEPS)[:, None] + offsets).ravel() * step
+    largest = 0.0
+    for m, k in ((x, y) for x in inputs["m1"].support for y in inputs["k1"].support):
+        values = acceleration(m, np.sqrt(k / m), 0.03, history, amplitude, times).reshape(STEPS, -1)
+        upper = np.maximum(bounds.upper[0, 1:, 0], bounds.upper[0, :-1, 0]) + bounds.between[1:, 0]
+        lower = np.minimum(bounds.lower[0, 1:, 0], bounds.lower[0, :-1, 0]) - bounds.between[1:, 0]
+        assert (values <= upper[:, None] + 1e-12).all()
+        assert (values >= lower[:, None] - 1e-12).all()
+        largest = max(largest, np.abs(values).max())
+    assert bounds.between.max() <= 3 * largest
+
+
+def test_the_test_of_an_envelope_sees_forces_that_vanish_at_quarter_points(monkeypatch, rng):
+    """A planted envelope that forgets what lies between nodes contradicts exact motions."""
+    step = 0.05
+    frame = StoreyFrame(
+        masses=[2.0],
+        stiffness=[8.0],
+        damping_ratio=0.03,
+        outputs=("a1",),
+        loads=[Force(1, 1.0, zero_at(step, 4, rng))],
+    )
+    run = Proof.run
+
+    def forgetful(*given):
+        found = run(*given)
+        found.between[:] = 1e-3
+        return found
+
+    monkeypatch.setattr(Proof, "run", forgetful)
+    motion = {"duration": STEPS * step, "step": step, "alpha": [0.0], "progress": False}
+    with pytest.raises(ContradictionError, match="a1 at t"):
+        envelope(frame, {"m1": Interval(1.9, 2.1)}, Proof(workers=1), **motion)
+
+
+def test_times_within_steps_are_the_same_in_each_test_and_others_in_other_cases():
+    time, ends = np.linspace(0, 1, 11), np.array([[1.0, 2.0]])
+    first = self_test.fractions_of_steps(time, ends, ends + 1)
+    assert np.array_equal(first, self_test.fractions_of_steps(time, ends, ends + 1))
+    other = self_test.fractions_of_steps(time, ends, ends + 1.0000001)
+    assert not np.isclose(first[:, 1:], other[:, 1:]).any()
+    assert (first[:, 0] == 0).all()
+    assert (np.diff(first, axis=1) > 0).all()
+    assert first.max() < 1
+
+
+def test_the_bend_of_a_harmonic_force_counts_where_its_pieces_end_on_the_line(rng):
+    for _ in range(40):
+        omega = 10 ** rng.uniform(-1, 2)
+        step, count = rng.uniform(0.01, 0.45) / omega, int(rng.integers(1, 60))
+        force = History.harmonic(omega / 2 / np.pi, rng.uniform(0, 6))
+        time = np.arange(count + 1) * step
+        row = (-0.01 + 1j) * np.array([[0.01 * omega, 0.0101 * omega]])
+        sigma = np.vstack([row, row * 1.0001])
+        bound = line_deviations(sigma, force, time, (2,), is_force=True)[2][1].max()
+        fine = np.linspace(0, time[-1], 40 * count + 1)
+        chord = np.interp(fine, time, force.values(time))
+        assert bound >= np.abs(force.values(fine) - chord).max()
+
+
+@pytest.mark.parametrize("order", [0, 1, 2])
+def test_the_slope_of_a_slow_mode_within_a_step_is_bounded(order, rng):
+    """d/dσ of σ^order ∫ exp(σ s) ds from 0 to h, at σ = iω."""
+    for omega in 10 ** rng.uniform(-3, 1, 10):
+        h = rng.uniform(0.1, 1.0)
+        _, slopes = _within_steps(np.zeros((2, 2)), np.array([0.0, h]), 1.0, omega, order)
+        s = np.linspace(0, h, 4001)
+        waves = np.exp(1j * omega * s)
+        power = (1j * omega) ** order
+        exact = power * np.trapezoid(s * waves, s)
+        if order:
+            exact += order * (1j * omega) ** (order - 1) * np.trapezoid(waves, s)
+        assert slopes[1] >= abs(exact) * (1 - 1e-6)
+
+
+def test_a_harmonic_force_and_an_acceleration_are_proved_with_seven_inputs():
+    """The default method; both have ended with "the proof is wrong"."""
+    omega, step, count, phase = 7.650901231995208, 0.057032196779040006, 8, 1.1385035299674409
+    force = History.harmonic(omega / 2 / np.pi, phase)
+    frame = StoreyFrame(
+        masses=[1.0] * 4,
+        stiffness=[(0.02 * omega) ** 2] * 4,
+        damping_ratio=0.02,
+        outputs=("a4", "q4"),
+        loads=[Force(4, 1.0, force)],
+    )
+    names = ("m1", "m2", "m3", "m4", "k1", "k2", "k3")
+    inputs = {x: Interval(0.98 * frame.parameters[x], 1.02 * frame.parameters[x]) for x in names}
+    try:
+        bounds = envelope(
+            frame, inputs, duration=count * step, step=step, alpha=[0.0], progress=False
+        )
+    except FailedError as error:
+        pytest.fail(str(error))
+    assert bounds.nature == "guaranteed"
+    # the force over the mass bends by (Ω h)²/8 between nodes
+    assert bounds.between[:, 0].max() >= (omega * step) ** 2 / 8 * 0.9
+
+
+@pytest.mark.parametrize("is_small", [True, False], ids=["dual", "auto"])
+def test_modes_known_by_sums_feel_a_force_that_vanishes_at_nodes(is_small):
+    """A mass of 1 kg on 1e6 kg: within a step its acceleration is the force over the mass."""
+    step, amplitude = 0.001, 0.1
+    samples = np.zeros(41)
+    samples[1::2] = 1.0
+    mass, stiffness = np.diag([1e6, 1.0]), np.array([[1e6 + 9, -9.0], [-9.0, 9.0]])
+    _, shapes = eigh(stiffness, mass)  # the start leaves the second mode at rest
+    frame = StoreyFrame(
+        masses=[1e6, 1.0],
+        stiffness=[1e6, 9.0],
+        damping_ratio=0.02,
+        q0=(shapes[:, 0] / shapes[1, 0]).tolist(),
+        v0=[0.0, 0.0] if is_small else [1e-5, 1e-5],
+        outputs=("a2",),
+        loads=[Force(2, amplitude, History(step / 2, samples))],
+    )
+    names = ("F2",) if is_small else ("F2", "q1_0", "q2_0", "v1_0", "v2_0", "m1", "k1")
+    width = 0.05 if is_small else 1e-4
+    inputs = {
+        x: Interval((1 - width) * frame.parameters[x], (1 + width) * frame.parameters[x])
+        for x in names
+    }
+    method = DualProof(workers=1) if is_small else Auto(workers=1)
+    motion = {"duration": 20 * step, "step": step, "alpha": [0.0], "progress": False}
+    bounds = envelope(frame, inputs, method, **motion)
+    assert bounds.nature == "guaranteed"
+    assert amplitude * 0.999 <= bounds.between[:, 0].max() <= 1.2 * amplitude
+
+
+@pytest.mark.parametrize(("start", "gap"), [(0.0, 0.1), (1.0, 0.1), (1e3, 1e-2)])
+def test_what_a_model_errs_of_a_force_that_vanishes_at_nodes_is_counted(start, gap):
+    """Soft springs and masses of ± 35 %: the acceleration between nodes is F/m, up to 1/0.65."""
+    step = 0.1
+    samples = np.zeros(161)
+    samples[1::2] = 1.0
+    frame = StoreyFrame(
+        masses=[1.0],
+        stiffness=[1e-6],
+        damping_ratio=0.02,
+        q0=[start],
+        outputs=("a1",),
+        loads=[Force(1, 1.0, History(step / 8, samples))],
+    )
+    method = Proof(gap=gap, tolerance=gap, workers=1)
+    motion = {"duration": 20 * step, "step": step, "alpha": [0.0], "progress": False}
+    bounds = envelope(frame, {"m1": Interval(0.65, 1.35)}, method, **motion)
+    # the springs' part of the acceleration of the lightest mass falls from k q0/m
+    spring = 1e-6 * start / 0.65
+    reached = 1 / 0.65 - spring
+    assert bounds.upper[0, :2, 0].max() + bounds.between[1, 0] >= reached - 1e-7
