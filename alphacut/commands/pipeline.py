@@ -22,7 +22,7 @@ from alphacut.case.microstructure import MicrostructureSection
 from alphacut.case.motion import EnvelopeSection
 from alphacut.case.structure import Structure
 from alphacut.commands.options import require_petsc
-from alphacut.frame.questions.peaks import Peaks
+from alphacut.frame.analyses.peaks import Peaks
 from alphacut.fuzzy import Crisp, Triangular
 from alphacut.io.files import Document, locked, rank, require_writable, say
 from alphacut.io.results import MANIFEST, ResultsFolder

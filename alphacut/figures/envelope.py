@@ -17,8 +17,8 @@ from matplotlib.figure import Figure
 from alphacut.base.arrays import Array
 from alphacut.figures import style
 from alphacut.figures.style import BLUE, GREY, INK, ORANGE, WIDTH
+from alphacut.frame.analyses.peaks import ANY
 from alphacut.frame.dynamics.nonlinear import make_flow
-from alphacut.frame.questions.peaks import ANY
 from alphacut.frame.structures.quantities import Output
 from alphacut.io.quantity import engineering
 from alphacut.questions.decision import DecisionAnswer, degree_text

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from alphacut.case.limits import DecisionSection
-from alphacut.frame.questions.peaks import ANY, passing
+from alphacut.frame.analyses.peaks import ANY, passing
 from alphacut.fuzzy.result import Nature, rounded
 from alphacut.io.quantity import MINUS, engineering, percent_text
 from alphacut.questions.question import FuzzyResponse, LimitAnswer, LimitsAnswer, Record, Texts

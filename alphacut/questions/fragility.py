@@ -10,9 +10,9 @@ from pydantic import Field
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError
 from alphacut.case.limits import FragilitySection
-from alphacut.frame.questions.fragility import CriticalMeasures, of_any_limit
-from alphacut.frame.questions.incremental import GRID_RATIO, RESOLUTION
-from alphacut.frame.questions.peaks import ANY
+from alphacut.frame.analyses.fragility import CriticalMeasures, of_any_limit
+from alphacut.frame.analyses.incremental import GRID_RATIO, RESOLUTION
+from alphacut.frame.analyses.peaks import ANY
 from alphacut.fuzzy.result import Nature
 from alphacut.io.quantity import STANDARD_GRAVITY, engineering, range_text
 from alphacut.questions.question import FuzzyResponse, LimitAnswer, LimitsAnswer, Record, Texts

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from alphacut.base.arrays import Array
 from alphacut.case.limits import ProbabilitySection
-from alphacut.frame.questions.probability import CONFIDENCE, probabilities
+from alphacut.frame.analyses.probability import CONFIDENCE, probabilities
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.result import Ends, Nature
 from alphacut.io.quantity import MINUS, range_text

@@ -10,7 +10,7 @@ from typing import ClassVar, Generic, NamedTuple, Self, TypeVar
 from alphacut.base.progress_bar import Progress
 from alphacut.case.limits import QuestionSection, Side
 from alphacut.case.structure import Structure
-from alphacut.frame.questions.peaks import ANY, Peaks
+from alphacut.frame.analyses.peaks import ANY, Peaks
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.io.quantity import engineering
 from alphacut.stages.store import Numbers, Values

@@ -6,9 +6,9 @@ import math
 
 from alphacut.base.errors import RefusedError
 from alphacut.case.limits import TolerancesSection
+from alphacut.frame.analyses.tolerances import scale_supports, tolerances
 from alphacut.frame.boxes import boxes
 from alphacut.frame.propagation import require_admissible
-from alphacut.frame.questions.tolerances import scale_supports, tolerances
 from alphacut.fuzzy.result import Nature, rounded
 from alphacut.io.quantity import MINUS, engineering, rounded_ends
 from alphacut.questions.question import Answer, FuzzyResponse, Record, Row, Table

@@ -16,8 +16,8 @@ from alphacut.base.errors import FailedError, require
 from alphacut.base.progress_bar import Progress, subprogress
 from alphacut.case.motion import EnvelopeSection, Study, Tolerance
 from alphacut.case.structure import Structure
+from alphacut.frame.analyses.peaks import PEAK_BOUNDS, Peak, Peaks, peaks, tightest
 from alphacut.frame.bounds.model_error import MAX_PARAMETERS
-from alphacut.frame.questions.peaks import PEAK_BOUNDS, Peak, Peaks, peaks, tightest
 from alphacut.frame.structures.quantities import Output, output_of
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document, say

@@ -19,11 +19,11 @@ from alphacut.case.loads import RecordsSection
 from alphacut.case.motion import EnvelopeSection
 from alphacut.case.structure import Structure
 from alphacut.frame import Accelerogram
+from alphacut.frame.analyses.incremental import IncrementalAnalysis
+from alphacut.frame.analyses.peaks import ANY, PEAK_BOUNDS, Peak, Peaks
+from alphacut.frame.analyses.spectral import spectral_acceleration
 from alphacut.frame.boxes import boxes
 from alphacut.frame.dynamics.nonlinear import make_flow
-from alphacut.frame.questions.incremental import IncrementalAnalysis
-from alphacut.frame.questions.peaks import ANY, PEAK_BOUNDS, Peak, Peaks
-from alphacut.frame.questions.spectral import spectral_acceleration
 from alphacut.frame.records.recording import Recording, arias_fractions
 from alphacut.frame.structures.linear import modal_damping_ratios
 from alphacut.frame.structures.quantities import output_of

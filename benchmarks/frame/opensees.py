@@ -38,9 +38,9 @@ from alphacut.frame import (
     StoreyFrame,
     envelope,
 )
+from alphacut.frame.analyses.peaks import peaks
 from alphacut.frame.dynamics.integrators import INTEGRATORS
 from alphacut.frame.dynamics.nonlinear import make_flow
-from alphacut.frame.questions.peaks import peaks
 from alphacut.fuzzy import Interval
 from benchmarks.frame.plane_frame import MatrixCase
 

@@ -10,8 +10,8 @@ from alphacut.case.content import Content, load
 from alphacut.case.limits import Limit, parse_limit
 from alphacut.figures.envelope import DRAWINGS
 from alphacut.frame import Accelerogram, StoreyFrame, envelope
+from alphacut.frame.analyses.peaks import Peak, peaks
 from alphacut.frame.dynamics.nonlinear import make_flow
-from alphacut.frame.questions.peaks import Peak, peaks
 from alphacut.fuzzy import Interval, Triangular
 from alphacut.fuzzy.result import Nature
 from alphacut.questions.decision import DecisionAnswer

@@ -9,7 +9,7 @@ import pytest
 
 from alphacut.case.content import load
 from alphacut.case.limits import DecisionSection
-from alphacut.frame.questions.peaks import ANY, Peak
+from alphacut.frame.analyses.peaks import ANY, Peak
 from alphacut.fuzzy.result import Nature
 from alphacut.questions.decision import decide
 from alphacut.questions.question import FuzzyResponse

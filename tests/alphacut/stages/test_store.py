@@ -15,7 +15,7 @@ import alphacut
 from alphacut.base.errors import FailedError, RefusedError
 from alphacut.case.content import load
 from alphacut.entry import main
-from alphacut.frame.questions.peaks import Peak
+from alphacut.frame.analyses.peaks import Peak
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import as_json
 from alphacut.io.results import ResultsFolder

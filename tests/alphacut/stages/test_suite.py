@@ -9,7 +9,7 @@ import pytest
 from alphacut.base.errors import RefusedError
 from alphacut.case.content import load
 from alphacut.entry import main
-from alphacut.frame.questions.spectral import spectral_acceleration
+from alphacut.frame.analyses.spectral import spectral_acceleration
 from alphacut.io.files import BadInput
 from alphacut.questions.fragility import FragilityAnswer
 from alphacut.stages.suite import nominal_mode, suite_records

@@ -8,9 +8,9 @@ from scipy.optimize import brentq
 
 from alphacut.base.errors import RefusedError
 from alphacut.frame import Accelerogram, Exact, Force, History, LinearFlow, StoreyFrame, envelope
+from alphacut.frame.analyses.peaks import peaks
 from alphacut.frame.dynamics import yielding
 from alphacut.frame.dynamics.nonlinear import make_flow
-from alphacut.frame.questions.peaks import peaks
 from alphacut.fuzzy import Interval, Nature, Triangular
 
 MASS, STIFFNESS, YIELD_FORCE = 2.0, 50.0, 3.0

@@ -11,8 +11,8 @@ import pytest
 
 from alphacut.base.errors import RefusedError
 from alphacut.frame import Output, StoreyFrame, envelope
+from alphacut.frame.analyses.peaks import peaks
 from alphacut.frame.dynamics.nonlinear import make_flow
-from alphacut.frame.questions.peaks import peaks
 from alphacut.frame.structures.quantities import OF_STOREY_FRAME, of_storey_frame
 from alphacut.fuzzy import Interval, Nature
 

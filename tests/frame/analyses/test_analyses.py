@@ -5,9 +5,9 @@ import pytest
 
 from alphacut.base.errors import RefusedError
 from alphacut.frame import StoreyFrame, envelope
-from alphacut.frame.questions.peaks import ANY, Peak, passing, peaks, tightest
-from alphacut.frame.questions.probability import probabilities
-from alphacut.frame.questions.tolerances import scale_supports, tolerances
+from alphacut.frame.analyses.peaks import ANY, Peak, passing, peaks, tightest
+from alphacut.frame.analyses.probability import probabilities
+from alphacut.frame.analyses.tolerances import scale_supports, tolerances
 from alphacut.fuzzy import Triangular
 from alphacut.fuzzy.result import Nature
 from tests.frame.motions import exact_motions, random_points

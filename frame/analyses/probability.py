@@ -17,10 +17,10 @@ import numpy as np
 from alphacut.base.arrays import Array
 from alphacut.base.errors import require
 from alphacut.base.progress_bar import Progress
+from alphacut.frame.analyses.peaks import ANY, require_limits
 from alphacut.frame.boxes import ALPHA, Boxes, boxes
 from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.envelope import within_steps
-from alphacut.frame.questions.peaks import ANY, require_limits
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.frame.verification.step_error import MARGIN, node_deviation

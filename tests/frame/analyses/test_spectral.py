@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from alphacut.frame import Accelerogram
-from alphacut.frame.questions.spectral import spectral_acceleration
+from alphacut.frame.analyses.spectral import spectral_acceleration
 
 
 @pytest.mark.parametrize("period", [0.05, 0.3, 2.0])

@@ -16,9 +16,9 @@ import numpy as np
 
 from alphacut.base.errors import checked_number
 from alphacut.base.progress_bar import Progress
+from alphacut.frame.analyses.peaks import Peaks, peaks, require_limits
 from alphacut.frame.methods.auto import Auto
 from alphacut.frame.propagation import envelope
-from alphacut.frame.questions.peaks import Peaks, peaks, require_limits
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval

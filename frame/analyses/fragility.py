@@ -16,8 +16,8 @@ import numpy as np
 
 from alphacut.base.arrays import Array, Mask
 from alphacut.base.errors import require
-from alphacut.frame.questions.peaks import Peak
-from alphacut.frame.questions.probability import CONFIDENCE, clopper_pearson
+from alphacut.frame.analyses.peaks import Peak
+from alphacut.frame.analyses.probability import CONFIDENCE, clopper_pearson
 from alphacut.fuzzy.result import Ends
 
 

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from alphacut.frame import Accelerogram, StoreyFrame, envelope
-from alphacut.frame.boxes import boxes
-from alphacut.frame.questions.fragility import CriticalMeasures
-from alphacut.frame.questions.incremental import (
+from alphacut.frame.analyses.fragility import CriticalMeasures
+from alphacut.frame.analyses.incremental import (
     ALL,
     GRID_RATIO,
     RESOLUTION,
     SOME,
     IncrementalAnalysis,
 )
-from alphacut.frame.questions.peaks import peaks
+from alphacut.frame.analyses.peaks import peaks
+from alphacut.frame.boxes import boxes
 from alphacut.fuzzy import Triangular
 
 ALPHA = (0.0, 0.5, 1.0)
