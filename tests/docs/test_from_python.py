@@ -1,0 +1,110 @@
+"""Each block of the page "From Python" runs as it stands, and has the numbers of its case."""
+
+import ast
+import importlib
+import json
+import re
+import runpy
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from alphacut.case.content import load
+from alphacut.frame import envelope
+from alphacut.fuzzy import Interval
+
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs/from_python.md").read_text(encoding="utf-8")
+SCENE = re.compile(r"^## (\d+)\. [^\n]+\n(?:(?!^## ).)*?```python\n(.*?)```", re.M | re.S)
+BLOCKS = {int(number): block for number, block in SCENE.findall(PAGE)}
+PACKAGES = ("alphacut.rve", "alphacut.frame", "alphacut.fuzzy", "alphacut.stochastic")
+OTHERS = ("numpy", "scipy", "matplotlib", "pathlib", "math")
+GOLDEN = json.loads((ROOT / "tests/scenes/golden.json").read_text(encoding="utf-8"))
+
+
+def test_every_scene_has_one_block_and_every_block_a_scene():
+    assert PAGE.count("```python") == len(BLOCKS) == len(re.findall(r"^## \d+\.", PAGE, re.M))
+    assert list(BLOCKS) == sorted(BLOCKS)
+
+
+@pytest.mark.parametrize("scene", BLOCKS)
+def test_a_block_has_at_most_twelve_statements_and_public_imports(scene):
+    nodes = list(ast.walk(ast.parse(BLOCKS[scene])))
+    imports = [node for node in nodes if isinstance(node, ast.Import | ast.ImportFrom)]
+    statements = [node for node in nodes if isinstance(node, ast.stmt)]
+    assert len(statements) - len(imports) <= 12
+    for node in imports:
+        if isinstance(node, ast.ImportFrom) and node.module in PACKAGES:
+            public = set(importlib.import_module(node.module).__all__)
+            assert {alias.name for alias in node.names} <= public
+            continue
+        names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+        names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+        assert all(name.partition(".")[0] in OTHERS for name in names), names
+
+
+def has_the_radius_map_of_the_case(names):
+    """Whether packed particles have the map of cases/concrete.toml."""
+    fitted, case = names["fitted"], GOLDEN["concrete"]["microstructure"]
+    for name in ("a2", "a4"):
+        cut = fitted.inputs[name].support
+        numbers = [cut.lower, fitted.inputs[name].nominal, cut.upper]
+        assert numbers == pytest.approx(case[name], rel=1e-7)
+        assert getattr(fitted.map, name) == pytest.approx(case[name][1], rel=1e-7)
+    assert (fitted.map.a1, fitted.map.a3) == (case["a1"], case["a3"])
+
+
+def moves_as_the_structure_of_the_case(names):
+    """Whether matrices move as those of cases/plane-frame.toml under its first record."""
+    content = load(str(ROOT / "cases/plane-frame.toml")).content
+    ground = content.records.recordings[0].accelerogram(content.records.baseline)
+    model = replace(content.structure.model_with_outputs("outputs", ("roof",)), ground=ground)
+    times = {"duration": 3.0, "step": 0.02, "alpha": (0,)}
+    of_case = envelope(model, {"ks": Interval(0.75, 1.25)}, **times)
+    of_block = envelope(names["frame"], {"springs": Interval(0.75, 1.25)}, **times)
+    size = np.abs(of_case.upper).max()
+    assert size > 0.005
+    assert of_block.lower == pytest.approx(of_case.lower, abs=1e-9 * size)
+    assert of_block.upper == pytest.approx(of_case.upper, abs=1e-9 * size)
+
+
+def teaches_what_the_case_learns(names):
+    """Whether modes narrow the storeys of cases/laboratory-frame.toml as in the case."""
+    learned = names["learned"].answer
+    case = GOLDEN["laboratory-frame"]["update"]
+    by_column = 12 * 200e9 * 9.850884e-12 / 0.3**3  # stiffness of one column, in N/m
+    for storey in (1, 2, 3, 4):
+        ends, columns = learned.inputs[f"k{storey}"], case["inputs"][f"c{storey}"]
+        assert ends.lower[0] == pytest.approx(by_column * columns["lower"][0], rel=1e-3)
+        assert ends.upper[0] == pytest.approx(by_column * columns["upper"][0], rel=1e-3)
+    assert [mode.mode for mode in learned.held_out if mode.inside] == [3, 4]
+
+
+CHECKS = {
+    4: has_the_radius_map_of_the_case,
+    7: moves_as_the_structure_of_the_case,
+    8: teaches_what_the_case_learns,
+}
+"""What the names that a block leaves are compared with, by scene."""
+
+
+@pytest.mark.parametrize("scene", BLOCKS)
+def test_a_block_runs_as_it_stands_and_has_the_numbers_of_its_case(
+    scene, tmp_path, monkeypatch, capsys
+):
+    """In a folder of its own, with links to what a block may read in that of the project."""
+    if "PrismModel" in BLOCKS[scene]:
+        pytest.importorskip("dolfinx")
+    for name in ("cases", "meshes"):
+        (tmp_path / name).symlink_to(ROOT / name)
+    file = tmp_path / f"scene_{scene}.py"
+    file.write_text(BLOCKS[scene], encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    names = runpy.run_path(str(file), run_name="__main__")
+    printed = capsys.readouterr().out
+    assert printed
+    assert "object at 0x" not in printed
+    if scene in CHECKS:
+        CHECKS[scene](names)
