@@ -53,7 +53,7 @@ def read_grid(path: Path, sides: Sequence[float]) -> Array:
     if dimension == 2 and path.is_dir():
         raise RefusedError(path.name, "a folder", "a picture", TAKE_VOXEL)
     try:
-        if path.suffix == ".npy":
+        if path.suffix.lower() == ".npy":
             # mapped: one too large for memory must come as far as the question of how large it is
             values = np.asarray(np.load(path, mmap_mode="r", allow_pickle=False))
         elif dimension == 2:

@@ -49,6 +49,17 @@ def test_hill_s_relations_are_what_a_strain_along_the_fibres_gives(particle):
     assert abs(axial.lateral[2]) > 1e-4 * axial.lateral[0]
 
 
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_poisson_s_ratio_errs_by_what_the_compliance_along_x_errs(sign):
+    """C66 alone is off, and S_xy is not changed by it: ν_xy = −S_xy/S_xx is by S_xx alone."""
+    stiffness = np.linalg.inv([[1.0, -0.3, 0.4], [-0.3, 1.0, 0.0], [0.4, 0.0, 1.0]])
+    errors = np.diag([0.0, 0.0, 1e-3])
+    compliance = np.linalg.inv(stiffness + sign * errors)
+    declared = EngineeringConstants.of_stiffness(stiffness, errors)
+    change = abs(-compliance[0, 1] / compliance[0, 0] - 0.3)
+    assert change <= declared.errors[2] < 1.2 * change
+
+
 def strained_along(cell, phases, fraction):
     """C13, C23, C63 and C33 by fields under ε33 = 1: an eigenstress C13 of the phases."""
     from alphacut.rve.cell.cell import AREA

@@ -14,7 +14,7 @@ from scipy.ndimage import gaussian_filter
 
 from alphacut.base.errors import RefusedError
 from alphacut.stages.microstructure import fragment
-from alphacut.stochastic import microstructure
+from alphacut.stochastic import HermiteMap, microstructure
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
 from alphacut.stochastic.microstructure import RadiusLimits, fit_map, fit_radius_map
 from alphacut.stochastic.particles.measured import circles_in, read_particles
@@ -48,6 +48,29 @@ def test_neighbours_on_the_torus_are_those_of_the_cells(discs):
     assert direct.number.tolist() == walls.tolist()
 
 
+def test_few_data_leave_the_slopes_as_fuzzy_as_their_bootstrap_band(rng):
+    """Samples of 60 r_n of a map: the fuzzy slopes contain the map's own, of which they know."""
+    truth, count = HermiteMap(0.15, 0.3, 0.85, 0.4), 0
+    for seed in range(20):
+        values = truth(truth.distribution.quantile(rng.random(60)))
+        sample = AreaWeighted.from_values(values, np.ones(60), np.arange(60) % 6)
+        _, pbox, *_ = fit_map(RadiusLimits(DISCS, (0.15, 0.85)), sample, seed=seed)
+        count += pbox.a2[0] <= truth.a2 <= pbox.a2[2] and pbox.a4[0] <= truth.a4 <= pbox.a4[2]
+    assert count >= 17  # the band's confidence is 99 %
+
+
+def test_discs_tighter_than_their_cells_count_as_touching_them():
+    """A tenth of the area lies in cells of r_n = 1.05: it is taken at 0.99."""
+    radii = np.r_[np.linspace(0.4, 0.9, 90), np.full(10, 1.05)]
+    sample = AreaWeighted.from_values(radii, np.ones(100), np.arange(100) % 5)
+    rule = RadiusLimits(DISCS)
+    capped = rule.capped(sample)
+    assert capped.values.max() == DISCS.reach == 0.99
+    assert capped.mean == pytest.approx(0.9 * 0.65 + 0.1 * 0.99, rel=1e-12)
+    assert capped.share_within(0.95, 0.99) == pytest.approx(0.1, rel=1e-12)
+    assert RadiusLimits(DISCS, (0.2, 0.9)).capped(sample) is sample
+
+
 def windows(number: int):
     """Windows on a section of 3000 discs, with the true areas of the cells inside."""
     large = Packing(3000, 0.25, TENFOLD).make(np.random.default_rng(4))
@@ -59,7 +82,7 @@ def windows(number: int):
 
 
 def test_whole_cells_are_those_of_the_larger_section_and_weights_remove_their_bias():
-    plain, weighted, truth = [], [], []
+    plain, weighted, truth, estimates, counts = [], [], [], [], []
     for window, areas in windows(25):
         diagram = apollonius(window)
         whole, weight = counted_cells(diagram)
@@ -69,8 +92,11 @@ def test_whole_cells_are_those_of_the_larger_section_and_weights_remove_their_bi
         plain.append(area.mean())
         weighted.append((area @ weight) / weight.sum())
         truth.extend(areas)
+        estimates.append(weight.sum())  # of the number of cells in the window
+        counts.append(len(window))
     assert abs(np.mean(weighted) / np.mean(truth) - 1) < 0.03
     assert np.mean(plain) / np.mean(truth) - 1 < -0.03
+    assert abs(np.mean(estimates) / np.mean(counts) - 1) < 0.05
 
 
 GOOD = "x [mm],y [mm],r [mm]\n10,10,4\n30,12,5\n20,30,3\n"

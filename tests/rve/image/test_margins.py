@@ -9,7 +9,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from alphacut.rve.image.bounds import StiffnessBounds, inverse_below, residual_above
+from alphacut.rve.image.bounds import StiffnessBounds, _hill_mean, inverse_below, residual_above
 from alphacut.rve.image.fields.element import element_of
 from alphacut.rve.image.fields.energy import (
     COEFFICIENT,
@@ -37,6 +37,39 @@ def in_order(terms):
 def tight(bound, error):
     """Whether a bound holds and half of it does not."""
     return error <= bound < 2 * error
+
+
+HILL_SUMS = {  # of a stiffness (Voigt) and of a compliance (Reuss): factors and a divisor
+    0: ((1, 2, 0, 9), (1, 2, 0, 1)),
+    1: ((1, -1, 3, 15), (4, -4, 3, 15)),
+}
+
+
+@pytest.mark.parametrize("modulus", [0, 1], ids=["K", "G"])
+def test_the_sums_of_hill_s_average(modulus, rng):
+    """Against exact sums: K and G of Voigt's average, and those of Reuss's by the compliance."""
+    for _ in range(50):
+        stiffness = random_stiffness(rng)
+        compliance = np.linalg.inv(stiffness)
+        sums = []
+        for matrix, factors in zip((stiffness, compliance), HILL_SUMS[modulus], strict=True):
+            normal, mixed, shear, divisor = factors
+            entries = [[Fraction(float(x)) for x in row] for row in matrix]
+            diagonal = sum(entries[k][k] for k in range(3))
+            off_diagonal = sum(entries[i][j] for i, j in ((0, 1), (0, 2), (1, 2)))
+            of_shears = sum(entries[k][k] for k in range(3, 6))
+            total = normal * diagonal + mixed * off_diagonal + shear * of_shears
+            sums.append(total / divisor)
+        exact = (sums[0] + 1 / sums[1]) / 2
+        low, high = (Fraction(_hill_mean(stiffness, compliance, modulus, s)) for s in (-1, 1))
+        assert low <= exact <= high
+        assert high - low < 2000 * Fraction(UNIT) * exact
+
+
+def random_stiffness(rng):
+    """A positive definite stiffness of space, (6, 6)."""
+    factor = rng.normal(size=(6, 6))
+    return factor @ factor.T + 3 * np.eye(6)
 
 
 def test_the_sum_of_a_piece_of_products():

@@ -69,6 +69,24 @@ def test_every_format_gives_the_same_voxels(tmp_path, kind, rng):
             assert np.array_equal(read_grid(path, CUBE), values), path.name
 
 
+def test_endings_in_capitals_are_those_in_small_letters(tmp_path, rng):
+    values = rng.integers(0, 250, SHAPE).astype("u1")
+    with (tmp_path / "ARRAY.NPY").open("wb") as file:
+        np.save(file, values)
+    stack(tmp_path / "STACK.TIF", values)
+    meta_image(tmp_path / "HEAD.MHD", values)
+    nrrd(tmp_path / "BESIDE.NHDR", values, attached=False)
+    nrrd(tmp_path / "WHOLE.NRRD", values, attached=True)
+    slices(tmp_path / "slices", values)
+    for file in [*(tmp_path / "slices").iterdir()]:
+        file.rename(file.with_suffix(".PNG"))
+    for path in tmp_path.iterdir():
+        if path.suffix != ".raw":
+            assert np.array_equal(read_grid(path, CUBE), values), path.name
+    head, data = files_of(tmp_path / "HEAD.MHD")
+    assert (head.name, data.name) == ("HEAD.MHD", "HEAD.raw")
+
+
 @pytest.mark.parametrize(
     ("name", "write", "message"),
     [

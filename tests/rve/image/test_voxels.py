@@ -1,5 +1,7 @@
 """Proved bounds of voxels: exact cases, symmetries, an independent solver, the kernels, losses."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.linalg import eigh
@@ -8,6 +10,7 @@ from scipy.sparse.linalg import splu
 
 from alphacut.fuzzy import RefusedError
 from alphacut.rve import Phase
+from alphacut.rve.image.bounds import StiffnessBounds
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.fields.element import element_of, isotropic_parts
 from alphacut.rve.image.fields.energy import energies, modes_by_matrices, modes_of
@@ -369,6 +372,22 @@ def test_losses_of_laminates_and_equal_losses_are_exact(rng):
         assert loss[1] - loss[0] < 1e-6
     low, high = mean_loss(np.array([[0.1, 0.5], [0.2, 0.9]]), [0.02, 0.02], [0.02, 0.02])
     assert low <= 0.02 <= high < low + 1e-15
+
+
+def test_shares_of_energy_hold_where_bounds_are_wide():
+    """Along layers of moduli 1 and 4 the soft third has (1/3)/(1/3 + 8/3) of the energy."""
+    phase = np.repeat([[0], [1], [1], [0], [1], [1]], 2, axis=1)
+    moduli = np.array([1.0, 4.0])[phase]
+    images = ModuliImages((moduli, moduli), (0.5 * moduli, 0.5 * moduli))
+    model = ImageModel(solver=TIGHT)
+    solution = model.solve(images)
+    sharp = solution.bounds
+    for lower, upper in ((0.5, 1.0), (1.0, 2.0), (0.7, 1.4)):
+        wide = StiffnessBounds(lower * sharp.lower, upper * sharp.upper)
+        shares = energy_shares(model, replace(solution, bounds=wide), images, phase, 2)
+        for (low, high), share in zip(shares["E_x"], (1 / 9, 8 / 9), strict=True):
+            assert low <= share + 1e-12
+            assert share - 1e-12 <= high
 
 
 def test_first_order_losses_of_an_independent_solver_are_inside(rng):

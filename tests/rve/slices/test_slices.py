@@ -87,14 +87,22 @@ def test_error_of_a_slice_is_declared_at_the_edges(radius, contrast):
 
 
 @pytest.mark.parametrize(
-    ("radius", "matrix", "inclusion"),
+    ("radius", "size", "matrix", "inclusion"),
     [
-        (0.00109, Phase(20e9, 0.44), Phase(5.5e9, 0.2336)),
-        (0.005763695545, Phase(20e9, 0.12270752), Phase(331588660.6, 0.42187752)),
+        (0.00109, 1.0, Phase(20e9, 0.44), Phase(5.5e9, 0.2336)),
+        (0.005763695545, 1.0, Phase(20e9, 0.12270752), Phase(331588660.6, 0.42187752)),
+        (0.006772776620649073, 0.9388783, Phase(20e9, 0.2803043563), Phase(537653428.1, 0.1610344)),
+        (
+            0.007119736168041098,
+            0.9681396,
+            Phase(20e9, 0.3299288408),
+            Phase(1661664514.6, 0.28090141),
+        ),
     ],
 )
-def test_coarse_meshes_hide_no_small_particle_from_both_orders(radius, matrix, inclusion):
-    [solved] = solve_slice(radius, matrix, [inclusion], mesh_size=1.0)
+def test_coarse_meshes_hide_no_small_particle_from_both_orders(radius, size, matrix, inclusion):
+    """The last two are off by 1.05 times what orders 4 and 5 on one mesh tell, or more."""
+    [solved] = solve_slice(radius, matrix, [inclusion], mesh_size=size)
     true = true_errors(solved, radius, matrix, inclusion)[[0, 2]]
     assert (true <= solved.errors[[0, 2]]).all()
 
