@@ -23,7 +23,7 @@ from alphacut.fuzzy.result import Bounds, Nature
 from alphacut.fuzzy.sets.boxes import levels
 from alphacut.fuzzy.sets.numbers import Cut, outer_steps
 from alphacut.rve.cell.cell import AnyPhase, Phase
-from alphacut.rve.cell.model import AnyModel
+from alphacut.rve.result.cell_model import AnyModel
 from alphacut.rve.result.engineering_constants import (
     FREE,
     NAMES,

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from importlib import import_module
 
-from alphacut.rve.cell.model import CellModel
+from alphacut.rve.result.cell_model import CellModel
 
 
 @dataclass(frozen=True)

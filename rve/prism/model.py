@@ -34,7 +34,6 @@ from alphacut.rve.cell.cell import (
     require_mesh_size,
     require_solve_arguments,
 )
-from alphacut.rve.cell.model import Resolution
 from alphacut.rve.cell.outline import Outline, circle, is_round
 from alphacut.rve.fenicsx import MPI
 from alphacut.rve.mesh.columns import extrude
@@ -43,6 +42,7 @@ from alphacut.rve.mesh.square import REFINEMENTS
 from alphacut.rve.prism.modulus_basis import TOLERANCE, ModulusBasis, modulus_basis
 from alphacut.rve.prism.problem import FoldedMeshError, PrismProblem, SliceStrains
 from alphacut.rve.prism.slices import SliceProblem, is_homogeneous, solve_sample
+from alphacut.rve.result.cell_model import Resolution
 from alphacut.rve.result.checks import ROUND_OFF, checks_within_limits, mean, stress_checks
 from alphacut.rve.result.moduli import AVERAGES, AXES, axial_moduli
 from alphacut.rve.result.result import HomogenisedStiffness, PhaseEnergies, StressCurve

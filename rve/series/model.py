@@ -32,7 +32,7 @@ import numpy as np
 from alphacut.base.arrays import Array, Ints
 from alphacut.base.errors import RefusedError
 from alphacut.rve.cell.cell import Cell, Phase, require_points, require_solve_arguments
-from alphacut.rve.cell.model import Resolution
+from alphacut.rve.result.cell_model import Resolution
 from alphacut.rve.result.checks import with_checks
 from alphacut.rve.result.moduli import AVERAGES, AXES, square_voigt
 from alphacut.rve.result.result import HomogenisedStiffness

@@ -28,11 +28,11 @@ from alphacut.rve.cell.cell import (
     require_points,
     require_solve_arguments,
 )
-from alphacut.rve.cell.model import Resolution
 from alphacut.rve.cell.outline import Outline, circle, is_round
 from alphacut.rve.fenicsx import MPI, basix, cholesky, fem, mesh_of, ufl
 from alphacut.rve.mesh.curved import PlaneMesh, curved_nodes, plane_mesh, quadrature_degree
 from alphacut.rve.mesh.periodicity import unknowns
+from alphacut.rve.result.cell_model import Resolution
 from alphacut.rve.result.checks import with_checks
 from alphacut.rve.result.moduli import AVERAGES, AXES, axial_moduli, mori_tanaka, square_moduli
 from alphacut.rve.result.result import HomogenisedStiffness, PhaseEnergies, StressCurve

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 from scipy.stats import beta
-from tests.frame.analyses.test_analyses import one_level
 
 from alphacut.base.errors import RefusedError
 from alphacut.frame.analyses.fragility import CriticalMeasures, of_any_limit
 from alphacut.fuzzy.result import Nature
+from tests.frame.analyses.test_analyses import one_level
 
 LIMIT = 0.02
 

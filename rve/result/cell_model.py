@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, ClassVar, Protocol, Self
+from typing import ClassVar, Protocol, Self
 
 from alphacut.rve.cell.cell import AnyPhase
 from alphacut.rve.cell.outline import Outline, circle
+from alphacut.rve.result.result import HomogenisedStiffness
 from alphacut.stochastic import RadiusMap, ThetaLaw
-
-if TYPE_CHECKING:
-    from alphacut.rve.result.result import HomogenisedStiffness
 
 
 @dataclass(frozen=True)
