@@ -12,6 +12,7 @@ from pydantic import Field, PlainValidator, ValidationInfo
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, require, require_choice
+from alphacut.base.number_text import STANDARD_GRAVITY
 from alphacut.case.types import Modulus, NotEmpty, OneOrMany, Quantity, Section, case_file, text
 from alphacut.frame import (
     Accelerogram,
@@ -25,7 +26,6 @@ from alphacut.frame.structures.quantities import Output
 from alphacut.frame.structures.storey import SYMBOLS
 from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.io.files import suggestion
-from alphacut.io.quantity import STANDARD_GRAVITY
 
 Mass = Annotated[FuzzyNumber, Quantity("kg", above=0, fuzzy=True)]
 Span = Annotated[FuzzyNumber, Quantity("m", above=0, fuzzy=True)]
@@ -104,7 +104,7 @@ class Structure:
     def least_weight(self) -> float:
         """Weight of a frame's floors at their least masses, in N; 0 of other structures."""
         masses = self.frame.group("m") if self.frame else ()
-        return float(STANDARD_GRAVITY) * sum(self.numbers[x].support.lower for x in masses)
+        return STANDARD_GRAVITY * sum(self.numbers[x].support.lower for x in masses)
 
     @property
     def linear(self) -> StoreyFrame | MatrixStructure | None:

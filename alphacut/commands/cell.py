@@ -14,7 +14,7 @@ from alphacut.case.cell import CellContent
 from alphacut.case.material import MeshedCell
 from alphacut.case.parse import parse
 from alphacut.commands.options import Command, add_common, require_petsc, write_answer
-from alphacut.io.files import Document, ranks, text_table
+from alphacut.io.files import Document, ranks
 from alphacut.io.provenance import versions
 from alphacut.rve.cell.cell import STRAIN
 from alphacut.rve.result.engineering_constants import NAMES, engineering_constants

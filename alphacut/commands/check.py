@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 import numpy as np
 
 from alphacut.base.errors import require
+from alphacut.base.number_text import MINUS, STANDARD_GRAVITY, engineering, percent_text, text_table
 from alphacut.case.content import Content
 from alphacut.case.loads import ForceHistory, RecordsSection
 from alphacut.case.motion import EnvelopeSection
@@ -31,8 +32,6 @@ from alphacut.frame.verification.self_test import Trial, stored_motions
 from alphacut.frame.verification.step_error import node_deviation
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal, Triangular
 from alphacut.fuzzy.result import Nature
-from alphacut.io.files import text_table
-from alphacut.io.quantity import MINUS, STANDARD_GRAVITY, engineering, percent_text
 from alphacut.io.results import ResultsFolder
 from alphacut.report.results import AROUND
 from alphacut.rve.cell.cell import VoigtPhase
@@ -44,7 +43,6 @@ from alphacut.stages.suite import SuiteRecord, incremental_analyses, suite_recor
 if TYPE_CHECKING:
     import xarray
 
-GRAVITY = float(STANDARD_GRAVITY)
 USUAL_PERIODS = 1e-3, 60.0  # in s: towers have 10 s at most, machine parts seldom below 1 ms
 KINDS = {Crisp: "crisp", Interval: "interval", Triangular: "triangle", Trapezoidal: "trapezoid"}
 Row = tuple[str, str, str]
@@ -76,7 +74,7 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
             )
     if linear and (record := linear.ground):
         peak = engineering(record.extremes[0], "m/s^2")
-        in_g = f"{record.extremes[0] / GRAVITY:.3g} g"
+        in_g = f"{record.extremes[0] / STANDARD_GRAVITY:.3g} g"
         text += f"record: {len(record.samples)} samples of {record.step:g} s, peak {peak}, {in_g}\n"
         warnings = cut_record_warnings(content, Structure(linear, {}))
         text += "".join(f"{warning}\n" for warning in warnings)
@@ -119,7 +117,7 @@ def records_text(section: RecordsSection, records: Sequence[SuiteRecord]) -> str
     for raw, record in zip(section.recordings, records, strict=True):
         counts = f"{raw.step:g} s", f"{len(raw.samples)}", percent_text(raw.offset_share, 2)
         peaks = raw.peak, record.measures["PGA"], record.measures["Sa(T1)"]
-        sizes = (f"{peak / GRAVITY:.3g} g" for peak in peaks)
+        sizes = (f"{peak / STANDARD_GRAVITY:.3g} g" for peak in peaks)
         file_cells = raw.name, raw.file_format, raw.unit
         rows.append((*file_cells, *counts, *sizes, f"{record.duration:.4g} s"))
     head = ("record", "format", "unit", "step", "samples", "mean/peak", "peak", "PGA used")

@@ -15,12 +15,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from alphacut.base.arrays import Array
+from alphacut.base.number_text import engineering
 from alphacut.figures import style
 from alphacut.figures.style import BLUE, GREY, INK, ORANGE, WIDTH
 from alphacut.frame.analyses.peaks import ANY
 from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.structures.quantities import Output
-from alphacut.io.quantity import engineering
 from alphacut.questions.decision import DecisionAnswer, degree_text
 from alphacut.questions.fragility import FragilityAnswer
 from alphacut.questions.probability import ProbabilityAnswer

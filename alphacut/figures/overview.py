@@ -13,10 +13,10 @@ from matplotlib.patches import FancyBboxPatch
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
 from alphacut.base.arrays import Array, Ints, Mask
+from alphacut.base.number_text import axis_prefix
 from alphacut.figures import style
 from alphacut.figures.style import BLUE, INK, ORANGE, PURPLE, Look
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal
-from alphacut.io.quantity import axis_prefix
 from alphacut.questions.summary import Results
 from alphacut.rve.cell.cell import Cell
 from alphacut.rve.mesh.columns import extrude

@@ -17,7 +17,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from alphacut.base.arrays import Array
-from alphacut.io.quantity import MINUS, axis_prefix
+from alphacut.base.number_text import MINUS, axis_prefix
 
 # Okabe & Ito
 INK, BLUE, ORANGE, GREEN = "#1a1a1a", "#0072b2", "#d55e00", "#009e73"

@@ -8,7 +8,7 @@ import secrets
 import shutil
 import sys
 import tempfile
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, redirect_stdout, suppress
 from difflib import get_close_matches
 from pathlib import Path
@@ -123,14 +123,6 @@ def say(message: str) -> None:
         bar_end = "\r\x1b[K" if sys.stderr.isatty() else ""  # over a progress bar
         with suppress(OSError):
             print(f"{bar_end}alphacut: {printable(message)}", file=sys.stderr, flush=True)
-
-
-def text_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Lines of a table of texts: the first column to the left, the others to the right."""
-    lines = [[*head], *map(list, rows)]
-    first, *further_widths = (max(len(line[k]) for line in lines) for k in range(len(head)))
-    aligned = ([line[0].ljust(first), *map(str.rjust, line[1:], further_widths)] for line in lines)
-    return "".join(f"{'  '.join(line).rstrip()}\n" for line in aligned)
 
 
 def check_destinations(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:

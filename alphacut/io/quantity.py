@@ -7,15 +7,14 @@ decimals.
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Callable, Mapping
 from decimal import Decimal
 from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
 
+from alphacut.base.number_text import MINUS, STANDARD_GRAVITY
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal, Triangular
-from alphacut.fuzzy.result import Nature, rounded
 
 if TYPE_CHECKING:
     import pint
@@ -56,20 +55,15 @@ QUANTITIES = {
     "rad/s": Dimension("angular velocity", "0.1 rad/s", {"rad/s": 0}),
 }
 """Dimensions of quantities by their SI units."""
-STANDARD_GRAVITY = Decimal("9.80665")
-"""In m/s², by the third General Conference on Weights and Measures, 1901."""
 UNITS_HERE = {
     "": {"": Decimal(1), "%": Decimal("0.01")},
-    "m/s^2": {"g": STANDARD_GRAVITY, "gal": Decimal("0.01"), "Gal": Decimal("0.01")},
+    "m/s^2": {"g": Decimal(str(STANDARD_GRAVITY)), "gal": Decimal("0.01"), "Gal": Decimal("0.01")},
 }
 """Units that Pint takes for something else: g is no gram here, and Gal no gallon."""
 REFUSED = r"[%‰]|\b(per ?cent|per ?mille|pp[mb]|pixel|px|point|dot|pt|tons?)\b"
 """Units of print and shares, which Pint takes for numbers or lengths, and tons of several kinds."""
 LEAST, GREATEST = 1e-36, 1e18
 """Magnitudes in SI beyond which a quantity other than 0 is a slip."""
-PREFIXES = {9: "G", 6: "M", 3: "k", 0: "", -3: "m", -6: "µ", -9: "n"}
-MINUS = "\u2212"
-PREFIXED = ("m", "m/s", "m/s^2", "N", "N*m", "N/m", "Pa", "s", "rad", "W", "J")
 NUMBER = r"[-+\u2212]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
 LIST = re.compile(r"\[(.*)\]\s*(.*)", re.DOTALL)
 SPREAD = re.compile(rf"({NUMBER})\s*(.*?)\s*(?:±|\+/-)\s*({NUMBER})\s*(.*)")
@@ -210,56 +204,3 @@ def parse_fuzzy_in_any_unit(value: object) -> FuzzyNumber:
         except ValueError as error:
             reasons.append(str(error))
     raise ValueError(reasons[0])
-
-
-def engineering(value: float, si: str, *, digits: int = 4) -> str:
-    """Text of a value in the SI unit `si`, with a prefix if the unit takes one: ``−3.590 MN``."""
-    rounded_text = f"{value + 0.0:.{digits}g}"  # without the sign of −0
-    rounded_value = float(rounded_text)
-    if si not in PREFIXED or not 1e-12 <= abs(rounded_value) < 1e12:
-        # without an exponent where that is short enough
-        plain = f"{rounded_value:.0f}" if 1e4 <= abs(value) < 1e7 else rounded_text
-        return f"{plain} {si}".strip().replace("-", MINUS)
-    exponent = _exponent(abs(rounded_value))
-    scaled = rounded_value / 10.0**exponent
-    places = max(digits, len(f"{abs(scaled):.0f}"))
-    number = f"{scaled:#.{places}g}".rstrip(".")
-    return f"{number} {PREFIXES[exponent]}{si}".replace("-", MINUS)
-
-
-def _exponent(largest: float) -> int:
-    return min(9, max(-9, 3 * math.floor(math.log10(largest) / 3)))
-
-
-def rounded_ends(low: float, high: float, nature: Nature, digits: int = 4) -> tuple[float, float]:
-    """Both ends of a range, rounded in- or outwards as its nature demands, never past each other.
-
-    Ends that agree, or that would pass each other, are rounded to the nearest number.
-    """
-    lower, upper = rounded(low, "lower", nature, digits), rounded(high, "upper", nature, digits)
-    if high <= low + 1e-9 * abs(low) or lower > upper:
-        return float(f"{low:.{digits}g}"), float(f"{high:.{digits}g}")
-    return lower, upper
-
-
-def range_text(low: float, high: float, nature: Nature, digits: int = 4) -> str:
-    """A range rounded in- or outwards as its nature demands; one number where its ends agree."""
-    ends = rounded_ends(low, high, nature, digits)
-    return " … ".join(dict.fromkeys(number_text(end, digits) for end in ends))
-
-
-def number_text(value: float, digits: int = 4) -> str:
-    """A number with its significant digits, also those that are 0."""
-    return f"{value + 0.0:#.{digits}g}".rstrip(".").replace("-", MINUS)
-
-
-def percent_text(share: float, places: int = 1) -> str:
-    """A share in per cent."""
-    return f"{round(share, places + 2) + 0.0:.{places}%}".replace("-", MINUS)
-
-
-def axis_prefix(largest: float, si: str) -> tuple[float, str]:
-    """Factor and unit for an axis whose values reach `largest`."""
-    if si not in PREFIXED or not math.isfinite(largest) or largest <= 0 or 0.1 <= largest < 1000:
-        return 1.0, si
-    return 10.0 ** -_exponent(largest), f"{PREFIXES[_exponent(largest)]}{si}"

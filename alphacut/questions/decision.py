@@ -8,10 +8,10 @@ from math import floor, log10
 import numpy as np
 from pydantic import Field
 
+from alphacut.base.number_text import MINUS, engineering, percent_text
 from alphacut.case.limits import DecisionSection
 from alphacut.frame.analyses.peaks import ANY, passing
 from alphacut.fuzzy.result import Nature, rounded
-from alphacut.io.quantity import MINUS, engineering, percent_text
 from alphacut.questions.question import FuzzyResponse, LimitAnswer, LimitsAnswer, Record, Texts
 from alphacut.stages.envelope import PeakResult, peak_results
 from alphacut.stages.store import CutsResult

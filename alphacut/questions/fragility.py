@@ -9,12 +9,12 @@ from pydantic import Field
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError
+from alphacut.base.number_text import STANDARD_GRAVITY, engineering, range_text
 from alphacut.case.limits import FragilitySection
 from alphacut.frame.analyses.fragility import CriticalMeasures, of_any_limit
 from alphacut.frame.analyses.incremental import GRID_RATIO, RESOLUTION
 from alphacut.frame.analyses.peaks import ANY
 from alphacut.fuzzy.result import Nature
-from alphacut.io.quantity import STANDARD_GRAVITY, engineering, range_text
 from alphacut.questions.question import FuzzyResponse, LimitAnswer, LimitsAnswer, Record, Texts
 from alphacut.stages.envelope import peaks_of
 from alphacut.stages.store import CutsResult, Values
@@ -75,7 +75,7 @@ class FragilityAnswer(LimitsAnswer[LimitFragility]):
         text = f"median {self.measure} {_range_text(ends, self.unit)}"
         if self.unit != "m/s^2":
             return text
-        low, high = (end / float(STANDARD_GRAVITY) for end in ends)
+        low, high = (end / STANDARD_GRAVITY for end in ends)
         return f"{text} ({_range_text((low, high), 'g')})"
 
     def _ends_text(self, limit: LimitFragility) -> str:

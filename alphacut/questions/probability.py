@@ -8,11 +8,11 @@ import numpy as np
 from pydantic import Field
 
 from alphacut.base.arrays import Array
+from alphacut.base.number_text import MINUS, range_text
 from alphacut.case.limits import ProbabilitySection
 from alphacut.frame.analyses.probability import CONFIDENCE, probabilities
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.result import Ends, Nature
-from alphacut.io.quantity import MINUS, range_text
 from alphacut.questions.question import FuzzyResponse, LimitAnswer, LimitsAnswer, Record, Texts
 from alphacut.stages.store import CutsResult, Values
 

@@ -7,12 +7,12 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar, Generic, NamedTuple, Self, TypeVar
 
+from alphacut.base.number_text import engineering
 from alphacut.base.progress_bar import Progress
 from alphacut.case.limits import QuestionSection, Side
 from alphacut.case.structure import Structure
 from alphacut.frame.analyses.peaks import ANY, Peaks
 from alphacut.fuzzy import FuzzyNumber
-from alphacut.io.quantity import engineering
 from alphacut.stages.store import Numbers, Values
 from alphacut.stages.suite import IncrementalResult, SuiteResult
 

@@ -10,11 +10,11 @@ import numpy as np
 from pydantic import AfterValidator, Field, ValidationError
 
 from alphacut.base.errors import RefusedError, require
+from alphacut.base.number_text import STANDARD_GRAVITY
 from alphacut.case.content import Content
 from alphacut.case.structure import Structure
 from alphacut.frame.structures.linear import frequencies
 from alphacut.io.files import Document, as_json
-from alphacut.io.quantity import STANDARD_GRAVITY
 from alphacut.io.results import COMPLETE, RUN_AGAIN, ResultsFolder, plain_name
 from alphacut.questions.decision import DecisionAnswer, decide
 from alphacut.questions.fragility import FragilityAnswer, fragility
@@ -98,7 +98,7 @@ class Results:
         return FrameResult(
             omega_rad_per_s=omega,
             period_s=float(2 * np.pi / omega[0]),
-            weight_N=sum(structure.frame.masses) * float(STANDARD_GRAVITY),
+            weight_N=sum(structure.frame.masses) * STANDARD_GRAVITY,
             heights_m=heights,
         )
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 
 from alphacut.base.errors import RefusedError
+from alphacut.base.number_text import MINUS, engineering, rounded_ends
 from alphacut.case.limits import TolerancesSection
 from alphacut.frame.analyses.tolerances import scale_supports, tolerances
 from alphacut.frame.boxes import boxes
 from alphacut.frame.propagation import require_admissible
 from alphacut.fuzzy.result import Nature, rounded
-from alphacut.io.quantity import MINUS, engineering, rounded_ends
 from alphacut.questions.question import Answer, FuzzyResponse, Record, Row, Table
 from alphacut.stages.envelope import PEAK_ERROR, PeakResults, peak_results
 from alphacut.stages.store import Numbers

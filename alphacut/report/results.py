@@ -8,10 +8,7 @@ from textwrap import wrap
 
 import numpy as np
 
-from alphacut.frame.structures.quantities import output_of
-from alphacut.fuzzy.result import Nature, rounded
-from alphacut.io.files import text_table
-from alphacut.io.quantity import (
+from alphacut.base.number_text import (
     MINUS,
     STANDARD_GRAVITY,
     axis_prefix,
@@ -20,7 +17,10 @@ from alphacut.io.quantity import (
     percent_text,
     range_text,
     rounded_ends,
+    text_table,
 )
+from alphacut.frame.structures.quantities import output_of
+from alphacut.fuzzy.result import Nature, rounded
 from alphacut.questions.question import Row, Table
 from alphacut.questions.summary import FrameResult, Parts
 from alphacut.questions.tolerances import TolerancesAnswer
@@ -223,7 +223,7 @@ def display_units(
 ) -> Iterator[tuple[str, float]]:
     """Yields the label and the factor from SI of each unit in which a peak is shown."""
     if unit == "m/s^2":
-        yield f"{name}, g", 1 / float(STANDARD_GRAVITY)
+        yield f"{name}, g", 1 / STANDARD_GRAVITY
         return
     factor, prefixed = axis_prefix(max(abs(float(peak.lower[0])), abs(float(peak.upper[0]))), unit)
     yield f"{name}, {prefixed}" if prefixed else name, factor

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
+from alphacut.base.number_text import MINUS, rounded_ends
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document, write_text
-from alphacut.io.quantity import MINUS, rounded_ends
 from alphacut.io.results import ResultsFolder
 from alphacut.questions.question import Table
 from alphacut.questions.summary import Parts

@@ -14,6 +14,7 @@ from pydantic import Field
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, require
+from alphacut.base.number_text import percent_text
 from alphacut.case.limits import FragilitySection
 from alphacut.case.loads import RecordsSection
 from alphacut.case.motion import EnvelopeSection
@@ -28,7 +29,6 @@ from alphacut.frame.records.recording import Recording, arias_fractions
 from alphacut.frame.structures.linear import modal_damping_ratios
 from alphacut.frame.structures.quantities import output_of
 from alphacut.fuzzy.result import Nature
-from alphacut.io.quantity import percent_text
 from alphacut.stages.envelope import EnvelopeTask, PeakResults, outputs_of, peak_results, peaks_of
 from alphacut.stages.store import Numbers, Stage, StageContext, StageResult, Values
 

@@ -10,8 +10,8 @@ from typing import Literal
 import numpy as np
 
 from alphacut.base.arrays import Array
+from alphacut.base.number_text import STANDARD_GRAVITY
 from alphacut.frame.records.history import Accelerogram
-from alphacut.frame.records.units import STANDARD_GRAVITY
 
 Baseline = Literal["none", "mean", "linear"]
 LARGEST_PEAK = 5.0

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 
-STANDARD_GRAVITY = 9.80665
-"""In m/s², by the third General Conference on Weights and Measures, 1901."""
+from alphacut.base.number_text import STANDARD_GRAVITY
+
 METRES = {
     "nm": 1e-9, "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "mm": 1e-3, "cm": 1e-2, "dm": 0.1, "m": 1.0,
     "km": 1e3, "in": 0.0254, "inch": 0.0254, "inches": 0.0254, "ft": 0.3048, "foot": 0.3048,

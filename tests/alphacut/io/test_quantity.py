@@ -4,8 +4,9 @@ import math
 
 import pytest
 
+from alphacut.base.number_text import engineering
 from alphacut.fuzzy import Crisp, Interval, Trapezoidal, Triangular
-from alphacut.io.quantity import QUANTITIES, engineering, parse_fuzzy, parse_number, registry
+from alphacut.io.quantity import QUANTITIES, parse_fuzzy, parse_number, registry
 
 RIGHT = [
     ("80 GPa", "Pa", Crisp(80e9)),

@@ -10,8 +10,8 @@ import pandas as pd
 import pytest
 
 from alphacut.base.errors import RefusedError
+from alphacut.base.number_text import range_text
 from alphacut.fuzzy.result import Nature
-from alphacut.io.quantity import range_text
 from alphacut.io.results import ResultsFolder
 from alphacut.questions.decision import DecisionAnswer, LimitDecision
 from alphacut.questions.summary import FrameResult, Parts, Summary
