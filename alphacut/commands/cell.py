@@ -10,6 +10,7 @@ from typing import TextIO
 import numpy as np
 from numpy.typing import ArrayLike
 
+from alphacut.base.number_text import text_table
 from alphacut.case.cell import CellContent
 from alphacut.case.material import MeshedCell
 from alphacut.case.parse import parse
