@@ -94,23 +94,39 @@ LevelFunction = Callable[[Array, Array, Array], Array]
 """Takes x1, x2 and θ of one shape, gives z of it; z < 0 in the particles."""
 
 
+SIGNS = "numbers that are negative in the particles and positive in the matrix"
+DISTANCE = "return a distance such as np.hypot(x1, x2) - radius; of a mask of particles 0.5 - mask"
+
+
 @dataclass(frozen=True)
 class LevelSet(FixedCell):
     """Particles where z is negative, on a mesh that ignores them, with the law of θ."""
 
     z: LevelFunction
 
-    def is_inside(self, points: Array) -> Mask:
-        """Mask of the points (x1, x2, θ), shape (…, 3), that lie in a particle, shape (…).
+    def values(self, points: Array) -> Array:
+        """Return z at points (x1, x2, θ), shape (…, 3), as an array of shape (…).
 
         Raises:
-            RefusedError: The function does not give a number at each point.
+            RefusedError: The function is a mask, or does not give a number at each point.
         """
-        values = np.asarray(self.z(*np.moveaxis(points, -1, 0)), float)
+        found = np.asarray(self.z(*np.moveaxis(points, -1, 0)))
+        if found.dtype == bool:
+            raise RefusedError("level set", "a mask of True and False", SIGNS, DISTANCE)
+        values = np.asarray(found, float)
         if values.shape != points.shape[:-1] or np.isnan(values).any():
             value = "NaN" if values.shape == points.shape[:-1] else f"of shape {values.shape}"
             raise RefusedError("level set", value, f"numbers of shape {points.shape[:-1]}")
-        return np.asarray(values < 0)
+        return np.asarray(values)
+
+    def require_both_signs(self, lowest: float, highest: float) -> None:
+        """Refuse a function that lies within `lowest` … `highest`, which are of one sign.
+
+        The cell would be of one material.
+        """
+        if not lowest < 0 <= highest:
+            what = f"from {lowest:g} to {highest:g} in the whole cell, without a change of sign"
+            raise RefusedError("level set", what, SIGNS, DISTANCE)
 
 
 def nodes_at_radii(mesh: Triangulation, radii: Array) -> Array:

@@ -159,7 +159,8 @@ class LevelSetModel(_NamedModel):
     The error is of first order in the mesh size, the result too stiff.
 
     Args:
-        z: Takes x1, x2 and θ; negative in the particles.
+        z: Takes x1, x2 and θ; negative in the particles, positive in the matrix, such as a
+            distance. A mask, or a function that has one sign in the whole cell, is refused.
         mesh_size: Edge length of the triangles, in halves of the cell's side, in (0, 1].
         layers: Layers in θ, at least 1.
         petsc: PETSc options without their prefix `rve_`.

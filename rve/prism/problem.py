@@ -182,7 +182,11 @@ class PrismProblem:
         if isinstance(radius_map, LevelSet):
             shapes: Array = wedge(1).tabulate(0, prism_rule()[0])[0].reshape(-1, 15)
             corners = positions[self.grid.cells[self.wedge]]
-            inside = radius_map.is_inside(np.einsum("qn,cnd->cqd", shapes, corners))  # eq. 14
+            values = radius_map.values(np.einsum("qn,cnd->cqd", shapes, corners))
+            lowest = self.comm.allreduce(float(values.min(initial=np.inf)), MPI.MIN)
+            highest = self.comm.allreduce(float(values.max(initial=-np.inf)), MPI.MAX)
+            radius_map.require_both_signs(lowest, highest)
+            inside = values < 0  # eq. 14
             self._phases = np.array([~inside, inside]).reshape(2, *self.areas.shape)
 
     def assemble(self, stiffness: Sequence[Array]) -> PETSc.Mat:
