@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
@@ -61,6 +61,16 @@ class Envelope(Bounds):
             0.0 if between is None else between.max(),
         )
         return lower, upper, error + added
+
+    def without_attained(self) -> Self:
+        """As of `Bounds`; nor is it known which motions of the enclosed set have small peaks."""
+        found, least, searched = super().without_attained(), self.least_peaks, self.searched_peaks
+        return replace(
+            found,
+            attained_error=None,
+            least_peaks=least and Ends(least.lower, np.full_like(least.upper, np.inf)),
+            searched_peaks=searched and searched.without_attained(),
+        )
 
     def to_dataset(self) -> xarray.Dataset:
         """Return the envelope as an xarray dataset with units, ready for NetCDF.

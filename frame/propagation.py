@@ -83,7 +83,7 @@ def envelope(
 
     Returns:
         Bounds at the nodes with their nature, error, deviations between nodes, and the inputs that
-        reach them.
+        reach them; without these where the inputs' cuts are a box around a learned set.
 
     Raises:
         RefusedError: An unknown name or option, a value outside its range, a support that reaches
@@ -118,7 +118,10 @@ def envelope(
             bounds = with_motions_tested(bounds, model)
         if tick:
             tick(1.0)
-    return replace(_on_levels(bounds, levels, rows), seconds=perf_counter() - start)
+    bounds = _on_levels(bounds, levels, rows)
+    if bounds.encloses:
+        bounds = bounds.without_attained()
+    return replace(bounds, seconds=perf_counter() - start)
 
 
 def _build_problem(

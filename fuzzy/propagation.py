@@ -118,6 +118,8 @@ def propagate(
         )
         bounds = _note_failures(method.run(campaign, domain), campaign.failed)
         campaign.report(1.0)
+    if bounds.encloses:
+        bounds = bounds.without_attained()
     return replace(
         bounds,
         units=_units(units or {}, bounds.outputs),

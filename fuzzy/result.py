@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 
@@ -15,7 +15,13 @@ from alphacut.base.nature import Nature as Nature
 from alphacut.base.nature import rounded as rounded
 from alphacut.fuzzy.knowledge.joint import JointClaim
 from alphacut.fuzzy.sets.claimed import ClaimedNumber
-from alphacut.fuzzy.sets.numbers import Stepwise, checked_levels, new_axes, outer_steps
+from alphacut.fuzzy.sets.numbers import (
+    Stepwise,
+    checked_levels,
+    enclosed_set,
+    new_axes,
+    outer_steps,
+)
 
 if TYPE_CHECKING:
     import xarray
@@ -156,6 +162,8 @@ class Bounds:
         """Ends that some inputs are known to reach, less their stated error; NaN where unknown."""
         blank = np.full(self.lower.shape, np.nan)
         inner = self.inner or Ends(blank, blank)
+        if self.encloses and self.inner is None:
+            return inner
         lower = np.where(self._guaranteed, inner.lower, self.lower + self.error)
         return Ends(lower, np.where(self._guaranteed, inner.upper, self.upper - self.error))
 
@@ -166,6 +174,20 @@ class Bounds:
         outer = self.outer or Ends(-wide, wide)
         lower = np.where(self._guaranteed, self.lower, outer.lower)
         return Ends(lower, np.where(self._guaranteed, self.upper, outer.upper))
+
+    @property
+    def encloses(self) -> str:
+        """Name of the set of inputs that the box of their cuts encloses; empty without one."""
+        return enclosed_set(self.inputs.values())
+
+    def without_attained(self) -> Self:
+        """Return the bounds without what is reached in the box of the inputs.
+
+        Of inputs that enclose a set, as the learned set of an identification, the bounds hold for
+        the set, but it is not known whether a point that reaches them belongs to it.
+        """
+        unknown = np.full_like(self.lower_at, np.nan)
+        return replace(self, inner=None, lower_at=unknown, upper_at=unknown)
 
     @property
     def claim(self) -> JointClaim:
@@ -179,13 +201,16 @@ class Bounds:
             RefusedError: The levels do not run from 0 to 1, and the inputs carry no claim of
                 coverage, which the number would have.
         """
-        steps, claim = outer_steps(self.alpha, *self.bounds(output)), self.claim.claim
+        steps, claim = self._steps(output), self.claim.claim
         if claim is not None:
             return ClaimedNumber(steps, claim, float(self.alpha[0]))
         is_complete = (self.alpha[0], self.alpha[-1]) == (0, 1)
         allowed = "levels from 0 to 1: alpha=levels(4)"
         require(is_complete, "alpha", value=self.alpha.tolist(), allowed=allowed)
         return steps
+
+    def _steps(self, output: str) -> Stepwise:
+        return outer_steps(self.alpha, *self.bounds(output), encloses=self.encloses)
 
     def column(self, output: str = "y") -> int:
         """Return the index of an output on the last axis of `lower` and `upper`."""
@@ -209,7 +234,8 @@ class Bounds:
         time = "" if self.time is None else f" over {self.time[0]:g} … {self.time[-1]:g} s"
         budget = f" of at most {self.budget:,}" if self.budget else ""
         cost = f"{self.evaluations:,} evaluations{budget}, {self.seconds:.2g} s"
-        lines = [f"bounds {self.nature}{basis}{time} by the method {self.method}: {cost}"]
+        box = f" {of_enclosing_box(self.encloses)}" if self.encloses else ""
+        lines = [f"bounds {self.nature}{box}{basis}{time} by the method {self.method}: {cost}"]
         for column in range(len(self.outputs))[:count]:
             lines += self._lines(column)
         hidden = len(self.outputs) - count
@@ -237,7 +263,10 @@ class Bounds:
             line = f"{self.named[column]}, α = {_digits(alpha)}: {' … '.join(map(_digits, ends))}"
             if nature is Nature.ATTAINED:
                 line += " or wider"
-            if nature is not Nature.ATTAINED or error > 0:  # that of values, as of a time step
+            is_known = not (nature is Nature.GUARANTEED and self.encloses)  # the gap to attained
+            if nature is Nature.ATTAINED:
+                is_known = error > 0  # that of values, as of a time step
+            if is_known:
                 line += f", {error_name} {_digits(error)}"
             yield line + suffix
 
@@ -270,6 +299,7 @@ class Bounds:
 
         It has lower, upper and error over (alpha, time, output), the inputs `lower_at` and
         `upper_at` that reach them over a further axis parameter, nature and label of each output.
+        The attribute `encloses` is there where it is not empty.
         """
         import xarray
 
@@ -281,8 +311,16 @@ class Bounds:
         natures = [str(self.nature_of(output)) for output in self.outputs]
         variables["nature"] = (("output",), np.array(natures))
         variables["label"] = (("output",), np.array(self.named))
-        facts = {"method": self.method, "evaluations": self.evaluations, "seconds": self.seconds}
+        facts: dict[str, str | float] = {"method": self.method, "evaluations": self.evaluations}
+        facts["seconds"] = self.seconds
+        if self.encloses:
+            facts["encloses"] = self.encloses
         return xarray.Dataset(variables, coordinates, {**facts, "basis": "; ".join(self.basis)})
+
+
+def of_enclosing_box(encloses: str) -> str:
+    """Return the words "of the box around …" for the name of the set that a box encloses."""
+    return f"of the box around {encloses}"
 
 
 def _digits(value: float) -> str:

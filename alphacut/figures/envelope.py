@@ -145,7 +145,7 @@ def draw_decision(answer: DecisionAnswer) -> Figure:
         axes.barh(row, rights - lefts, left=lefts, **look)
         possible, necessary = degree_text(limit.possibility), degree_text(limit.necessity)
         degrees = f"possible to {possible}, necessary to {necessary}"
-        text = f"{limit.verdict_words} ({limit.nature}): {degrees}"
+        text = f"{limit.verdict_words} ({answer.nature_text(limit.nature)}): {degrees}"
         axes.text(0.01, row + 0.4, text, fontsize=8, transform=axes.get_yaxis_transform())
     axes.axvline(1.0, color=ORANGE, lw=1.4, ls="--")
     axes.axvline(0.0, color=GREY, lw=0.4)

@@ -86,11 +86,12 @@ class DecisionAnswer(LimitsAnswer[LimitDecision]):
             proved = limit.text_of(bound, side)
             proved = f"{relation} {proved}" if np.isfinite(bound) else proved
             reached = limit.text_of(inner, side, Nature.ATTAINED)
-            gap = f"{abs((bound - inner) / bound):.1%}" if bound and np.isfinite(bound) else ""
+            has_gap = bound and np.isfinite(bound) and np.isfinite(inner)
+            gap = f"{abs((bound - inner) / bound):.1%}" if has_gap else ""
         return {
             "limit": limit.words,
             "verdict": limit.verdict_and_motion,
-            "nature": limit.nature,
+            "nature": self.nature_text(limit.nature),
             "possibility": degree_text(limit.possibility),
             "necessity": degree_text(limit.necessity),
             "least margin": limit.text_of(float(limit.margin.lower[0]), "lower", limit.nature),
@@ -104,7 +105,7 @@ class DecisionAnswer(LimitsAnswer[LimitDecision]):
         yield {
             "verdict": limit.verdict,
             "from α": limit.from_level,
-            "nature": limit.nature,
+            "nature": self.nature_text(limit.nature),
             "least possibility": limit.possibility[0],
             "greatest possibility": limit.possibility[1],
             "least necessity": limit.necessity[0],
@@ -126,7 +127,7 @@ class DecisionAnswer(LimitsAnswer[LimitDecision]):
                 " Of a mean over records the proved end is the mean of each record's greatest peak;"
                 " what is reached is the mean of one structure."
             )
-        return text
+        return f"{text} {self.words_on_box()}".strip()
 
 
 def decide(section: DecisionSection, response: FuzzyResponse) -> DecisionAnswer:
@@ -155,4 +156,6 @@ def decide(section: DecisionSection, response: FuzzyResponse) -> DecisionAnswer:
         )
         for name, answer in passing(peaks, section.limits_in_si(response.structure)).items()
     }
-    return DecisionAnswer(alpha=np.array(response.alpha), limits=decisions)
+    return DecisionAnswer(
+        encloses=response.encloses, alpha=np.array(response.alpha), limits=decisions
+    )

@@ -65,7 +65,7 @@ class FragilityAnswer(LimitsAnswer[LimitFragility]):
         return {
             "limit": limit.words,
             "median at the lowest α": self._median_text(limit.median[0]) + self._ends_text(limit),
-            "nature": limit.nature,
+            "nature": self.nature_text(limit.nature),
             "dispersion": spread,
             "median at the highest α": self._median_text(limit.median[-1]),
         }
@@ -112,7 +112,7 @@ class FragilityAnswer(LimitsAnswer[LimitFragility]):
                 f"greatest median {measure}": limit.median[k][1],
                 "least dispersion": spread[0],
                 "greatest dispersion": spread[1],
-                "nature": limit.nature,
+                "nature": self.nature_text(limit.nature),
             }
 
     def words(self) -> str:
@@ -143,7 +143,7 @@ class FragilityAnswer(LimitsAnswer[LimitFragility]):
             )
         if any(limit.confidence for limit in self.limits.values()):
             text += " Dashed: pointwise 95 % limits if the records were independent draws."
-        return text
+        return f"{text} {self.words_on_box()}".strip()
 
 
 def _range_text(ends: tuple[float, float], unit: str) -> str:
@@ -199,6 +199,7 @@ def fragility(section: FragilitySection, response: FuzzyResponse) -> FragilityAn
             confidence=ends.confidence_band(grid)._asdict() if section.independent else None,
         )
     return FragilityAnswer(
+        encloses=response.encloses,
         alpha=np.array(response.alpha),
         measure=section.measure,
         unit=UNITS[section.measure],

@@ -55,7 +55,7 @@ class ProbabilityAnswer(LimitsAnswer[LimitProbability]):
         return {
             "limit": limit.event,
             "at the lowest α": limit.bounds_text(0),
-            "nature": limit.nature,
+            "nature": self.nature_text(limit.nature),
             "at the highest α": limit.bounds_text(-1),
             f"{CONFIDENCE:.0%} interval at the lowest α": interval,
             "between nodes": f"{limit.error.max():.2g}".replace("-", MINUS),
@@ -68,7 +68,7 @@ class ProbabilityAnswer(LimitsAnswer[LimitProbability]):
                 "α": float(alpha),
                 "at least": float(limit.lower[k]),
                 "at most": float(limit.upper[k]),
-                "nature": limit.nature,
+                "nature": self.nature_text(limit.nature),
                 f"{CONFIDENCE:.0%} interval from": limit.interval[k][0],
                 f"{CONFIDENCE:.0%} interval to": limit.interval[k][1],
                 "between nodes": float(limit.error[k]),
@@ -77,13 +77,14 @@ class ProbabilityAnswer(LimitsAnswer[LimitProbability]):
     def words(self) -> str:
         """Sentences on how the probability was computed, and on what its interval holds."""
         random = ", ".join(self.random) or "no input"
-        return (
+        text = (
             f"Random: {random}, with {self.samples} independent draws at each fuzzy point."
             " The bounds are those of the fuzzy points tried; other points may have more or less."
             f" With a probability of {CONFIDENCE:.0%} the interval holds the probabilities of all"
             " fuzzy points at once (Clopper and Pearson, Bonferroni over the points). Peaks are"
             f" those at nodes every {self.step:g} s; the last column says what lies between them."
         )
+        return f"{text} {self.words_on_box()}".strip()
 
 
 def probability(section: ProbabilitySection, response: FuzzyResponse) -> ProbabilityAnswer:
@@ -107,6 +108,7 @@ def probability(section: ProbabilitySection, response: FuzzyResponse) -> Probabi
         progress=response.progress,
     )
     return ProbabilityAnswer(
+        encloses=response.encloses,
         fuzzy=tuple(fuzzy),
         random=tuple(random),
         samples=section.samples,

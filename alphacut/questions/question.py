@@ -13,6 +13,8 @@ from alphacut.case.limits import QuestionSection, Side
 from alphacut.case.structure import Structure
 from alphacut.frame.analyses.peaks import ANY, Peaks
 from alphacut.fuzzy import FuzzyNumber
+from alphacut.fuzzy.result import Nature, of_enclosing_box
+from alphacut.fuzzy.sets.numbers import enclosed_set
 from alphacut.stages.store import Numbers, Values
 from alphacut.stages.suite import IncrementalResult, SuiteResult
 
@@ -56,13 +58,31 @@ class FuzzyResponse:
         """Fuzzy inputs by parameter."""
         return self.structure.inputs(self.fuzzy)
 
+    @property
+    def encloses(self) -> str:
+        """Name of the set of inputs that the box of their cuts encloses; empty without one."""
+        return enclosed_set(self.inputs.values())
+
+
+def enclosing_box_words(encloses: str) -> str:
+    """Sentences on bounds of the box around a set, by the set's name."""
+    return (
+        f"All bounds are those {of_enclosing_box(encloses)}. What is guaranteed holds for"
+        f" {encloses} too, but no point of the box is known to belong to it: nothing is known to be"
+        " reached."
+    )
+
 
 class Answer(Numbers):
-    """Answer to a question about limits of outputs, in SI; `key` names its section and results."""
+    """Answer to a question about limits of outputs, in SI; `key` names its section and results.
+
+    `encloses` is that of the inputs, see `FuzzyResponse`.
+    """
 
     key: ClassVar[str]
     title: ClassVar[str]
     caption: ClassVar[str]
+    encloses: str = ""
 
     @abstractmethod
     def table(self) -> Table:
@@ -75,6 +95,14 @@ class Answer(Numbers):
     @abstractmethod
     def words(self) -> str:
         """Sentences on how to read it."""
+
+    def nature_text(self, nature: Nature) -> str:
+        """The nature of a bound, and the box that it is of where this is not the set meant."""
+        return f"{nature} {of_enclosing_box(self.encloses)}" if self.encloses else str(nature)
+
+    def words_on_box(self) -> str:
+        """Sentences on the box around a set of inputs; empty where the box itself is meant."""
+        return enclosing_box_words(self.encloses) if self.encloses else ""
 
 
 class LimitAnswer(Numbers):

@@ -153,6 +153,13 @@ class Parts(Numbers):
         return {name: part for name, part in self if part not in (None, {})}
 
     @property
+    def encloses(self) -> str:
+        """Name of the set of inputs around which the peaks are those of a box; empty without."""
+        results = (*self.envelopes.values(), *([self.records] if self.records else []))
+        peaks = [peak for result in results for peak in result.peak.values()]
+        return next((peak.encloses for peak in peaks if peak.encloses), "")
+
+    @property
     def answers(self) -> list[Answer]:
         """The answers to all questions of the case, in the order of the report."""
         answers = (getattr(self, kind.key) for kind in ANSWERS)

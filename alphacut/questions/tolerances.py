@@ -53,7 +53,10 @@ class TolerancesAnswer(Answer):
         if self.passed is not None:
             clear = "" if self.clear is None else f"no exceedance found up to {self.clear:.4g}, "
             exceeded = f"{clear}exceeded at {self.passed:.4g}"
-        rows: list[Row] = [("scale of all ranges", scale, self.nature, exceeded)]
+        nature = self.nature_text(self.nature)
+        if self.encloses:
+            exceeded = "not known"
+        rows: list[Row] = [("scale of all ranges", scale, nature, exceeded)]
         for name, support in self.supports.items():
             text, relative = "–", ""
             if self.kept is not None:
@@ -62,7 +65,7 @@ class TolerancesAnswer(Answer):
                 relative = f"about {support.nominal:g}"
                 if support.nominal:
                     relative = ", ".join(f"{x / support.nominal - 1:+.2%}" for x in support.kept)
-            rows.append((f"tolerance of {name}", text, self.nature, relative.replace("-", MINUS)))
+            rows.append((f"tolerance of {name}", text, nature, relative.replace("-", MINUS)))
         head = ("quantity", "no limit exceeded", "nature", "limit exceeded, or relative")
         return Table(head, rows)
 
@@ -74,14 +77,16 @@ class TolerancesAnswer(Answer):
             rows.append((name, support.unit, *ends, *support.own, support.nominal))
         titles = ["quantity", "unit", "from", "to", "from in the case", "to in the case"]
         titles += ["most plausible", "nature"]
-        return [dict(zip(titles, (*row, self.nature), strict=True)) for row in rows]
+        nature = self.nature_text(self.nature)
+        return [dict(zip(titles, (*row, nature), strict=True)) for row in rows]
 
     def words(self) -> str:
         """How to read the scale."""
-        return (
+        text = (
             "All supports are scaled together about nominal values; 1 is the case as it stands."
             f" Scales up to {self.most:g} were tried, each with an envelope of its own."
         )
+        return f"{text} {self.words_on_box()}".strip()
 
 
 def require_admissible_scale(section: TolerancesSection, response: FuzzyResponse) -> None:
@@ -112,6 +117,7 @@ def admissible_tolerances(section: TolerancesSection, response: FuzzyResponse) -
     )
     inputs, peaks = response.inputs, peak_results(response.peaks)
     return TolerancesAnswer(
+        encloses=response.encloses,
         limits=limits,
         peaks={name: peaks[name] for name in limits},
         kept=scale.admissible,

@@ -10,10 +10,10 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path, PurePosixPath
 
 from alphacut.base.errors import RefusedError
-from alphacut.fuzzy.result import Nature
+from alphacut.fuzzy.result import Nature, of_enclosing_box
 from alphacut.io.files import Document, say
 from alphacut.io.results import ResultsFolder
-from alphacut.questions.question import Table
+from alphacut.questions.question import Table, enclosing_box_words
 from alphacut.questions.summary import ANSWERS, Summary
 from alphacut.report.results import (
     ANSWER_HEAD,
@@ -80,11 +80,13 @@ def plot(name: str, study: EnvelopeResult, folder: ResultsFolder) -> Document:
     bands = {side: dataset[side] for side in ("lower", "upper", "error")}
     if study.nature is Nature.GUARANTEED:  # which contains it
         bands["error"] = 0.0 * bands["error"]
+    encloses = next((peak.encloses for peak in study.peak.values()), "")
+    box = f", {of_enclosing_box(encloses)}" if encloses else ""
     axes = ("alpha", "output", "time")
     arrays = {x: band.transpose(*axes).values.astype("<f4") for x, band in bands.items()}
     return {
         "name": name,
-        "title": f"{name}: fuzzy {', '.join(study.fuzzy)}",
+        "title": f"{name}: fuzzy {', '.join(study.fuzzy)}{box}",
         "fuzzy": len(study.fuzzy),
         "nature": str(study.nature),
         "alpha": dataset["alpha"].values.tolist(),
@@ -115,6 +117,7 @@ class Page:
         summary, show = self.summary, self._pieces
         refuted = [summary.update.refuted] if isinstance(summary.update, RefutedResult) else []
         shares = [SHARES] if summary.shares else []
+        box = [enclosing_box_words(summary.encloses)] if summary.encloses else []
         answers = [(x, (x.key, f"{x.key}-curves")) for x in summary.answers]
         plots: list[Piece] = [("plot",)] if summary.envelopes else []
         for title, pieces in (
@@ -126,7 +129,7 @@ class Page:
             ("How does the structure move?", [*plots, *show([], self._motion(), folded="peaks")]),
             ("How far does it move under each record?", show([], folded="records")),
             *((x.title, show(names, [x.words()], x.key, f"{x.key}_sets")) for x, names in answers),
-            ("What drives the width?", show([], shares, "shares")),
+            ("What drives the width?", show([], [*shares, *box] if shares else [], "shares")),
             ("Terms", [("glossary", TERMS.items())]),
             ("More", self._more()),
         ):
@@ -187,6 +190,8 @@ class Page:
             yield f"{name}: {study.method}, fuzzy {', '.join(study.fuzzy)}"
         for nature in dict.fromkeys(study.nature for study in studies.values()):
             yield f"{str(nature).capitalize()}: {nature.sentence}"
+        if studies and self.summary.encloses:
+            yield enclosing_box_words(self.summary.encloses)
 
     def _figures(self, *names: str) -> Iterator[Piece]:
         """Yields the figures of these names, without the paper's number, that the run has drawn.

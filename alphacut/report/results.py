@@ -21,7 +21,7 @@ from alphacut.base.number_text import (
 )
 from alphacut.frame.structures.quantities import output_of
 from alphacut.fuzzy.result import Nature, rounded
-from alphacut.questions.question import Row, Table
+from alphacut.questions.question import Row, Table, enclosing_box_words
 from alphacut.questions.summary import FrameResult, Parts
 from alphacut.questions.tolerances import TolerancesAnswer
 from alphacut.stages.cell import UPPER_BOUND
@@ -203,7 +203,7 @@ def peak_cells(peak: PeakResult, factor: float, levels: Sequence[int]) -> Row:
         for k, count in zip(levels, digits, strict=True)
     ]
     error = error_text(factor * float(peak.error.max()), nature)
-    if nature is not Nature.GUARANTEED:
+    if nature is not Nature.GUARANTEED or peak.encloses:
         return (*cuts, error, "", "")
     inner = "lower" if peak.is_least else "upper"
     reached = rounded(factor * float(peak.reached[0]), inner, Nature.ATTAINED)
@@ -249,6 +249,8 @@ def natures(parts: Parts) -> Iterator[str]:
     if groups:
         over = "over time" if suite is None else "over time and records"
         yield f"Peaks are largest magnitudes {over}, {', '.join(groups)}"
+    if parts.encloses:
+        yield enclosing_box_words(parts.encloses)
     if suite is not None:
         yield "A mean is that of one structure's peaks; its bounds are means of the records' bounds"
     for is_guaranteed in (True, False):
@@ -293,6 +295,8 @@ def drivers(parts: Parts) -> Iterator[str]:
         (largest, share), *further = sorted(parts.shares[name].items(), key=lambda x: -x[1])[:count]
         more = "".join(f", {x} by {percent_text(y, 0)}" for x, y in further)
         what = name.replace("the peak", "the reached peak")
+        if name != "E" and parts.encloses:
+            what = f"{name}, as tried in the box around {parts.encloses},"
         yield f"Fixing {largest} narrows {what} by {percent_text(share, 0)}{more}"
 
 

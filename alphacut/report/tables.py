@@ -10,13 +10,13 @@ import numpy as np
 import pandas as pd
 
 from alphacut.base.number_text import MINUS, rounded_ends
-from alphacut.fuzzy.result import Nature
+from alphacut.fuzzy.result import Nature, of_enclosing_box
 from alphacut.io.files import Document, write_text
 from alphacut.io.results import ResultsFolder
 from alphacut.questions.question import Table
 from alphacut.questions.summary import Parts
 from alphacut.report.results import unit_of
-from alphacut.stages.envelope import EnvelopeResult
+from alphacut.stages.envelope import EnvelopeResult, PeakResult
 from alphacut.stages.identify import IdentifiedResult
 from alphacut.stages.image import ImageResult
 from alphacut.stages.modulus import ModulusResult
@@ -109,6 +109,7 @@ def peaks(studies: Mapping[str, EnvelopeResult]) -> pd.DataFrame:
                 "nature": str(peak.nature),
                 "peak reached": peak.reached,
                 "gap, share": [peak.gap(level) for level in range(len(study.alpha))],
+                **_box_column(peak),
             }
         )
         for name, study in studies.items()
@@ -116,21 +117,29 @@ def peaks(studies: Mapping[str, EnvelopeResult]) -> pd.DataFrame:
     )
 
 
+def _box_column(peak: PeakResult) -> dict[str, str]:
+    """A column that says of which box the peaks are, where this is not the set meant."""
+    return {"inputs": of_enclosing_box(peak.encloses)} if peak.encloses else {}
+
+
 def records(result: SuiteResult) -> pd.DataFrame:
     """Measures of each record and its peaks farthest out on the lowest level, then statistics."""
     head = ["record", "PGA [m/s^2]", "Sa(T1) [m/s^2]", "output", "unit"]
-    head += ["farthest peak", "peak reached", "nature"]
+    head += ["farthest peak", "peak reached", "nature", "inputs"]
     rows: list[tuple[object, ...]] = []
     for name, record in result.records.items():
         sizes = record.measures["PGA"], record.measures["Sa(T1)"]
         for output, peak in record.peak.items():
-            peak_cells = peak.far_end[0], peak.reached[0], str(peak.nature)
+            box = of_enclosing_box(peak.encloses) if peak.encloses else None
+            peak_cells = peak.far_end[0], peak.reached[0], str(peak.nature), box
             rows.append((name, *sizes, output, unit_of(result.units, output), *peak_cells))
     for output, statistics in result.statistics.items():
         unit = unit_of(result.units, output)
         for name, proved in statistics.proved.items():  # mean, median …
-            rows.append((f"{name} of all", np.nan, np.nan, output, unit, proved[0], np.nan, np.nan))
-    return pd.DataFrame(rows, columns=head)
+            row = (f"{name} of all", np.nan, np.nan, output, unit, proved[0], np.nan, np.nan, None)
+            rows.append(row)
+    found = pd.DataFrame(rows, columns=head)
+    return found if found["inputs"].any() else found.drop(columns="inputs")
 
 
 def shares(table: Mapping[str, Mapping[str, float]]) -> pd.DataFrame:
@@ -146,8 +155,13 @@ def shares(table: Mapping[str, Mapping[str, float]]) -> pd.DataFrame:
 def over_time(data: xarray.Dataset, output: str, unit: str) -> pd.DataFrame:
     """The bounds of one output over time, with three columns for each level."""
     series, nature = data.sel(output=output), Nature(data.attrs["nature"])
-    titles = {"lower": f"{nature} lower", "upper": f"{nature} upper"}
-    titles["error"] = "gap to attained" if nature is Nature.GUARANTEED else "error"
+    encloses = data.attrs.get("encloses", "")
+    box = f" {of_enclosing_box(encloses)}" if encloses else ""
+    titles = {"lower": f"{nature} lower{box}", "upper": f"{nature} upper{box}"}
+    if nature is not Nature.GUARANTEED:
+        titles["error"] = "error"
+    elif not encloses:
+        titles["error"] = "gap to attained"
     columns = {"time [s]": series["time"].values}
     for level in series["alpha"].values:
         for kind, title in titles.items():

@@ -41,7 +41,7 @@ class PeakResult(Numbers):
     The peak is the largest magnitude, or the greatest ("max q3") or least ("min q3") value, which
     has its own sign here, so that `lower` and `upper` change places. No motion passes `proved`;
     `reached_at` has the inputs of one that reaches the peak on the lowest level, if known. Motions
-    may add `between_nodes` to its bound there within the steps.
+    may add `between_nodes` to its bound there within the steps. `encloses` is that of `Peak`.
     """
 
     lower: Values
@@ -55,6 +55,7 @@ class PeakResult(Numbers):
     between_nodes: float = 0.0
     is_least: bool = False
     reached_at: dict[str, float] = Field(default={})
+    encloses: str = ""
 
     @property
     def far_end(self) -> Array:
@@ -65,12 +66,12 @@ class PeakResult(Numbers):
     def is_widened_by_step(self) -> bool:
         """Whether what motions add between nodes is most of the gap or error, and much."""
         bound, reached = float(self.far_end[0]), float(self.reached[0])
-        is_proved = self.nature is Nature.GUARANTEED
+        is_proved = self.nature is Nature.GUARANTEED and np.isfinite(reached)
         width = abs(bound - reached) if is_proved else float(self.error[0])
         return self.between_nodes > max(width / 2, WIDENING * abs(bound))
 
     def gap(self, level: int) -> float:
-        """Relative gap between that bound and what a motion reaches, on a level."""
+        """Relative gap between that bound and what a motion reaches, on a level; nan if unknown."""
         bound, reached = float(self.far_end[level]), float(self.reached[level])
         return abs((bound - reached) / bound) if bound else 0.0
 
@@ -215,12 +216,13 @@ def outputs_of(peaks: Sequence[str]) -> tuple[str, ...]:
 def loose_peaks(peaks: Peaks, outputs: Sequence[str], gap: float) -> tuple[str, ...]:
     """Names of those peaks that are not guaranteed to within a gap, or not there at all.
 
-    The gap is that between the proved and the reached peak, relative to the proved one.
+    The gap is that between the proved and the reached peak, relative to the proved one. Where the
+    inputs enclose a set, no peak is known to be reached and any guaranteed one is taken.
     """
 
     def is_close(peak: Peak) -> bool:
         is_near = (peak.upper - peak.reached <= gap * np.abs(peak.upper)).all()
-        return peak.nature is Nature.GUARANTEED and bool(is_near)
+        return peak.nature is Nature.GUARANTEED and bool(is_near or peak.encloses)
 
     return tuple(name for name in outputs if name not in peaks or not is_close(peaks[name]))
 
@@ -234,6 +236,7 @@ def peak_results(peaks: Peaks) -> PeakResults:
         is_least = name.startswith("min ")  # which `Peak` has as the greatest value of −q
         bounds = _negative(bounds) if is_least else bounds
         kind = {"nature": peak.nature, "is_least": is_least, "reached_at": peak.reached_at}
+        kind["encloses"] = peak.encloses
         kind["between_nodes"] = peak.between_nodes
         results[name] = PeakResult.model_validate(bounds | kind)
     return results
@@ -250,7 +253,7 @@ def peaks_of(results: PeakResults, alpha: Sequence[float]) -> dict[str, Peak]:
             bounds[bound] = np.where(np.isnan(values), unknown, values)
         is_signed = name.startswith(("max ", "min "))
         kind: dict[str, Any] = {"is_signed": is_signed, "reached_at": peak.reached_at}
-        kind["between_nodes"] = peak.between_nodes
+        kind |= {"between_nodes": peak.between_nodes, "encloses": peak.encloses}
         peaks[name] = Peak(np.array(alpha), **bounds, nature=peak.nature, **kind)
     return peaks
 

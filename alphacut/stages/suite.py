@@ -29,6 +29,7 @@ from alphacut.frame.records.recording import Recording, arias_fractions
 from alphacut.frame.structures.linear import modal_damping_ratios
 from alphacut.frame.structures.quantities import output_of
 from alphacut.fuzzy.result import Nature
+from alphacut.fuzzy.sets.numbers import enclosed_set
 from alphacut.stages.envelope import EnvelopeTask, PeakResults, outputs_of, peak_results, peaks_of
 from alphacut.stages.store import Numbers, Stage, StageContext, StageResult, Values
 
@@ -227,6 +228,7 @@ def with_means(
         columns = [[*map(str, flow.outputs)].index(output) for output in magnitudes]
         tried_means += np.abs(flow.values(points)).max(axis=1)[:, columns] / len(records)
     found = dict(worst)
+    is_box = bool(enclosed_set(structure.inputs(task.fuzzy).values()))
     for name, tried in zip(magnitudes, tried_means.T, strict=True):
         means = {
             bound: np.mean([getattr(x[name], bound) for x in peaks.values()], axis=0)
@@ -239,6 +241,8 @@ def with_means(
         means["reached"] = np.maximum(minima_of_higher_cuts, in_cuts.max(axis=1))
         means["least_upper"] = np.full_like(mean_minima, np.inf)  # nothing bounds one structure's
         reached_at = dict(zip(cuts.names, points[in_cuts[0].argmax()].tolist(), strict=True))
+        if is_box:  # of whose points none is known to belong to the enclosed set
+            means["reached"], reached_at = np.full_like(mean_minima, -np.inf), {}
         found[f"mean {name}"] = replace(worst[name], reached_at=reached_at, **means)
     return found
 
@@ -287,7 +291,9 @@ def suite_result(
     worst = with_means(worst_peaks(peaks), peaks, structure, task, records)
     # of a mean there is no such record
     farthest = {
-        x: max(peaks, key=lambda y: float(peaks[y][x].reached[0])) for x in results[records[0].name]
+        x: max(peaks, key=lambda y: float(peaks[y][x].reached[0]))
+        for x in results[records[0].name]
+        if not worst[x].encloses
     }
     statistics = {}
     for name, peak in results[records[0].name].items():

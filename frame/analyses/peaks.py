@@ -38,7 +38,7 @@ class Peak:
         upper: Greatest peak at the nodes over each cut, as the envelope bounds it.
         error: Distance by which peaks may lie outside `lower` and `upper`: that of the envelope and
             of the steps between nodes; 0 of guaranteed bounds, which contain it.
-        reached: Peak that some motion in the cut is known to reach.
+        reached: Peak that some motion in the cut is known to reach; −∞ where none is known.
         least_lower: Proved lower bound of the least peak over each cut.
         least_upper: Upper bound of it: a peak that some motion in the cut is known not to exceed;
             infinite where none is known.
@@ -48,6 +48,8 @@ class Peak:
         is_signed: Whether it is a largest value, which may be negative, instead of a magnitude.
         reached_at: Inputs in SI, by name, of the motion that reaches the peak on the lowest level;
             empty where none is known.
+        encloses: Name of a set of inputs that the box of their cuts encloses, as "the learned
+            set"; empty where all of the box counts. Then no motion is known to belong to the set.
     """
 
     alpha: Array
@@ -61,6 +63,7 @@ class Peak:
     between_nodes: float = 0.0
     is_signed: bool = False
     reached_at: Mapping[str, float] = field(default_factory=dict)
+    encloses: str = ""
 
     @property
     def greatest_bounds(self) -> Ends:
@@ -117,35 +120,45 @@ def _peak_of(envelope: Envelope, name: str) -> Peak:
         )
     if is_proved:
         lower, upper = np.maximum(lower, least_lower), upper + above
+    reached = np.fmax(reached_at_nodes.upper, smallest).max(1)  # NaN where none is known
+    if envelope.encloses:
+        reached = np.full_like(upper, -np.inf)
     return Peak(
         alpha=np.asarray(envelope.alpha),
         lower=lower,
         upper=upper,
         error=np.zeros_like(upper) if is_proved else np.maximum(above, below),
-        reached=np.fmax(reached_at_nodes.upper, smallest).max(1),  # NaN where none is known
+        reached=reached,
         least_lower=least_lower,
         least_upper=least_upper,
         nature=nature,
         between_nodes=between_nodes,
         is_signed=is_signed,
         reached_at=_inputs_at_peak(envelope, k, name),
+        encloses=envelope.encloses,
     )
 
 
 def _searched_peak(found: Bounds, k: int, between: Array) -> Peak:
     """Return the fuzzy peak of output k by a search; `between` (A,) may be added between nodes."""
     lower, upper = found.lower[:, k], found.upper[:, k]
+    reached, least_upper = upper, lower + between
+    reached_at = dict(zip(found.inputs, found.upper_at[0, k].tolist(), strict=True))
+    if found.encloses:
+        reached, least_upper = np.full_like(upper, -np.inf), np.full_like(lower, np.inf)
+        reached_at = {}
     return Peak(
         alpha=found.alpha,
         lower=lower,
         upper=upper,
         error=found.error[:, k] + between,
-        reached=upper,
+        reached=reached,
         least_lower=np.zeros_like(lower),
-        least_upper=lower + between,
+        least_upper=least_upper,
         nature=found.natures[k],
         between_nodes=float(between[0]),
-        reached_at=dict(zip(found.inputs, found.upper_at[0, k].tolist(), strict=True)),
+        reached_at=reached_at,
+        encloses=found.encloses,
     )
 
 

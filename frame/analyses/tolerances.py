@@ -23,6 +23,7 @@ from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval
 from alphacut.fuzzy.result import Nature
+from alphacut.fuzzy.sets.numbers import enclosed_set
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,7 @@ class Tolerances:
         admissible: Largest scale tried at which exceeding a limit is excluded; None where it is at
             none, not even at scale 0.
         clear: Largest scale tried at which no computed motion exceeds a limit; None where it is at
-            none.
+            none, and of inputs that enclose a set, of which no motion is known.
         passed: Least scale tried at which a computed motion exceeds a limit; infinite without one.
         supports: Supports at the scale `admissible`, by input, in SI units.
         nature: Weakest nature of the envelopes that `admissible` rests on.
@@ -112,13 +113,15 @@ def tolerances(
         return any(found[x].greatest_bounds.lower[0] > limit for x, limit in limits.items())
 
     # the largest scale at which exceeding is excluded, from the largest one known
-    near = precision * most
+    near, is_box = precision * most, bool(enclosed_set(inputs.values()))
     low = next((scale for scale in (most, *tried, 0.0) if is_excluded(scale)), 0.0)
     if low < most and is_excluded(low):
         low = _bisected(is_excluded, low, min(scale for scale in tried if scale > low), near)
     # the same for scales at which a computed motion exceeds a limit
-    passed = min(filter(is_exceeded, tried), default=np.inf)
-    clear = max((scale for scale in tried if scale < passed), default=None)
+    passed, clear = np.inf, None
+    if not is_box:
+        passed = min(filter(is_exceeded, tried), default=np.inf)
+        clear = max((scale for scale in tried if scale < passed), default=None)
     if clear is not None and passed < np.inf:
         clear = _bisected(lambda scale: not is_exceeded(scale), clear, passed, near)
         passed = min(filter(is_exceeded, tried))

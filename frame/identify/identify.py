@@ -29,6 +29,8 @@ from alphacut.fuzzy.result import Ends
 from alphacut.fuzzy.sets.claimed import ClaimedNumber, CoverageClaim, JointRule
 from alphacut.fuzzy.sets.numbers import Cut, outer_steps
 
+LEARNED = "the learned set"
+"""Name of the set of parameters that agree with the modes, which the boxes enclose."""
 ALPHA = (0.05, 0.1, 0.25, 0.5, 0.75, 1.0)
 
 
@@ -227,7 +229,9 @@ class Identified:
     def inputs(self) -> dict[str, FuzzyNumber]:
         """Identified parameters as fuzzy numbers, by name, for an envelope.
 
-        Their cuts are the sides of the boxes; below the lowest level they are the prior's support.
+        Their cuts are the sides of the boxes, which hold structures that do not agree with the
+        modes: results are those of the box around the learned set, and say so. Below the lowest
+        level they are the prior's support.
         Where priors or measurements are claims, so are the numbers, with one joint confidence.
 
         Raises:
@@ -243,7 +247,9 @@ class Identified:
             if not isinstance(priors[name], ClaimedNumber):
                 alpha, decided = np.append(0.0, alpha), 0.0
                 ends = np.column_stack([priors[name].support, ends])
-            numbers[name] = steps = outer_steps(tuple(alpha), tuple(ends[0]), tuple(ends[1]))
+            numbers[name] = steps = outer_steps(
+                tuple(alpha), tuple(ends[0]), tuple(ends[1]), encloses=LEARNED
+            )
             if rule is not None:
                 claim = CoverageClaim(rule.means, self.claim.conditions)
                 numbers[name] = ClaimedNumber(steps, claim, decided, joint=rule)

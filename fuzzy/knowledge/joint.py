@@ -69,7 +69,7 @@ def _join_levels(number: ClaimedNumber, rule: JointRule) -> ClaimedNumber:
     levels = rule.joint_level(np.asarray(cuts.alpha))
     is_last = np.append(np.diff(levels) > 0, True) & (levels <= 1)  # of equal levels the last cut
     lower, upper = (tuple(np.asarray(ends)[is_last]) for ends in (cuts.lower, cuts.upper))
-    joint_cuts = Stepwise(tuple(levels[is_last]), lower, upper)
+    joint_cuts = Stepwise(tuple(levels[is_last]), lower, upper, cuts.encloses)
     decided = float(rule.joint_level(np.asarray(number.decided)))
     return replace(number, number=joint_cuts, decided=decided, joint=rule)
 

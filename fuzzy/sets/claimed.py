@@ -84,6 +84,11 @@ class ClaimedNumber(FuzzyNumber):
         checked_level(self.decided)
 
     @property
+    def encloses(self) -> str:
+        """As of its cuts."""
+        return self.number.encloses
+
+    @property
     def cuts(self) -> Cuts:
         """The α-cuts at all levels; refused where the values do not decide those at low α."""
         self.cut(0.0)

@@ -52,6 +52,15 @@ class FuzzyNumber(ABC):
     def cuts(self) -> Cuts:
         """The α-cuts at the corners of the membership function."""
 
+    @property
+    def encloses(self) -> str:
+        """Name of a set of joint values of several inputs that the box of their cuts encloses.
+
+        Such a set, as "the learned set", may be smaller than the box: what is reached in the box
+        need not be reached in the set. Empty where all of the box counts.
+        """
+        return ""
+
     @cached_property
     def nominal(self) -> float:
         """The nominal value: of membership 1, or the middle of the interval of such values."""
@@ -234,8 +243,11 @@ class PiecewiseLinear(_Nested):
 class Stepwise(_Nested):
     """Fuzzy number from nested cuts, each of which holds from its level up to the next one.
 
-    The arguments are as of `PiecewiseLinear`, but the levels may end below 1.
+    The arguments are as of `PiecewiseLinear`, but the levels may end below 1; `encloses` is that of
+    `FuzzyNumber`.
     """
+
+    encloses: str = ""
 
     @cached_property
     def cuts(self) -> Cuts:
@@ -253,8 +265,17 @@ class Stepwise(_Nested):
         return Cut(self.lower[at], self.upper[at])
 
 
+def enclosed_set(numbers: Iterable[FuzzyNumber]) -> str:
+    """Return the names of the sets that the box of some numbers encloses; empty without one."""
+    return " and ".join(dict.fromkeys(filter(None, (number.encloses for number in numbers))))
+
+
 def outer_steps(
-    alpha: Sequence[float] | Array, lower: Sequence[float] | Array, upper: Sequence[float] | Array
+    alpha: Sequence[float] | Array,
+    lower: Sequence[float] | Array,
+    upper: Sequence[float] | Array,
+    *,
+    encloses: str = "",
 ) -> Stepwise:
     """Return the fuzzy number that has the given nested cuts, and between two levels the wider one.
 
@@ -265,6 +286,7 @@ def outer_steps(
         alpha: Levels, rising, shape (A,).
         lower: Lower ends of the cuts, shape (A,).
         upper: Upper ends of the cuts, shape (A,).
+        encloses: As of `FuzzyNumber`.
     """
     levels = (0.0, *(min(float(level), round(float(level), 12)) for level in alpha[1:]))
-    return Stepwise(levels, tuple(lower), tuple(upper))
+    return Stepwise(levels, tuple(lower), tuple(upper), encloses)

@@ -78,7 +78,7 @@ def parts_of(drawn, structure):
         is_signed = bool(x.side)
         peaks[x.name] = Peak(np.zeros(1), **bounds, nature=Nature.GUARANTEED, is_signed=is_signed)
     section = DecisionSection(limits=tuple(x.text(y) for x in drawn for y in x.limits))
-    answer = decide(section, FuzzyResponse(structure, ("k1",), (0.0,), 1.0, 0.1, peaks))
+    answer = decide(section, FuzzyResponse(structure, ("E",), (0.0,), 1.0, 0.1, peaks))
     numbers = {key: {} for key in ("min", "max", "error")}
     study = EnvelopeResult(
         **numbers, fuzzy=("k1",), alpha=[0.0], peak=peak_results(peaks),

@@ -1,0 +1,77 @@
+"""Answers on learned inputs are those of a box around the learned set, on screen, page and CSV."""
+
+import pandas as pd
+
+from alphacut.entry import main
+from tests.alphacut.small import summary_of
+
+CASE = """
+title = "Two stiffnesses from one frequency"
+stages = ["envelope"]
+[frame]
+masses = ["20 t", "20 t"]
+stiffness = ["[6, 14] MN/m", "[6, 14] MN/m"]
+damping_ratio = "[4, 5, 6] %"
+displacements = ["10 mm", "20 mm"]
+outputs = ["drift1"]
+[identify]
+measured = "modes.csv"
+learn = ["k"]
+frequency_deviation = 0.01
+[envelope]
+fuzzy = ["k", "zeta"]
+alpha = [0.05, 1]
+duration = "1.5 s"
+step = "0.02 s"
+"""
+QUESTIONS = """
+[decision]
+limits = ["drift1 <= 11 mm", "drift1 <= 30 mm"]
+[tolerances]
+limits = ["drift1 <= 30 mm"]
+most = 1
+[probability]
+limits = ["drift1 <= 11 mm"]
+random = ["zeta"]
+samples = 10
+"""
+BOX = "of the box around the learned set"
+
+
+def run_with(folder, text, capfd):
+    """The summary, the console, the page and the CSV files of a run by name."""
+    (folder / "modes.csv").write_text("mode,frequency [Hz]\n1,2.199\n")
+    case = folder / "case.toml"
+    case.write_text(text, encoding="utf-8")
+    assert main(["run", str(case), "--no-figures", "--out", str(folder / "out")]) == 0
+    told = " ".join(capfd.readouterr().out.split())
+    assert main(["report", str(folder / "out"), "--csv", str(folder / "csv")]) == 0
+    (page,) = (folder / "out").glob("*.html")
+    tables = {path.stem: pd.read_csv(path) for path in (folder / "csv").glob("*.csv")}
+    return summary_of(folder / "out"), told, page.read_text(encoding="utf-8"), tables
+
+
+def test_questions_say_of_which_box_they_are_and_claim_nothing_reached_in_it(tmp_path, capfd):
+    summary, told, page, tables = run_with(tmp_path, CASE + QUESTIONS, capfd)
+    low, high, _ = (summary["decision"]["limits"][x] for x in summary["decision"]["limits"])
+    assert low["verdict"] == "undecided"
+    assert low["possibility"] == [0.0, 1.0]
+    assert low["peak"]["reached"] == [None, None]
+    assert low["peak"]["reached_at"] == {}
+    assert high["verdict"] == "not exceeded"
+    assert summary["tolerances"]["passed"] is None
+    assert summary["tolerances"]["clear"] is None
+    assert "can be exceeded" not in told
+    assert f"drift1| ≤ 11.00 mm: undecided (guaranteed {BOX})" in told
+    assert f"not exceeded from α = 0.05 up (guaranteed {BOX})" in told
+    assert "nothing is known to be reached" in told
+    assert "reached" not in told.partition("Peaks are")[0]
+    for name in ("decision", "probability", "tolerances"):
+        assert tables[name]["nature"].str.endswith(BOX).all(), name
+    assert tables["decision"]["peak reached"].isna().all()
+    assert tables["peaks"]["peak reached"].isna().all()
+    assert (tables["peaks"]["inputs"] == BOX).all()
+    over_time = tables["envelope_all-drift1"]
+    assert not any("attained" in title for title in over_time)
+    assert sum(BOX in title for title in over_time) == 4
+    assert page.count(BOX) >= 6
