@@ -9,7 +9,7 @@ from dataclasses import replace
 from inspect import signature
 from pathlib import Path
 from time import perf_counter
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, TypedDict
 
 import numpy as np
 
@@ -27,6 +27,17 @@ from alphacut.fuzzy.plans.design import Plan
 from alphacut.fuzzy.result import Bounds, Nature
 from alphacut.fuzzy.sets.boxes import Domain, fuzzy_inputs, levels
 from alphacut.fuzzy.sets.numbers import Crisp, FuzzyNumber
+
+
+class CampaignOptions(TypedDict, total=False):
+    """Arguments of `propagate` on how samples are evaluated, for functions that pass them on."""
+
+    workers: int
+    executor: Executor | None
+    store: Store | str | Path | None
+    identity: Identity | None
+    progress: Progress | bool | None
+
 
 BUDGET = 10_000  # evaluations of the model that a call may take unless it says more
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
 from itertools import product
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, Unpack, cast
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from alphacut.base.arrays import Array, on_one_blas_thread
 from alphacut.base.errors import FailedError, require, require_choice
 from alphacut.fuzzy import Crisp, FuzzyNumber, General, Knowledge, propagate
 from alphacut.fuzzy.plans.design import Plan
+from alphacut.fuzzy.propagation import CampaignOptions
 from alphacut.fuzzy.result import Bounds, Nature
 from alphacut.fuzzy.sets.boxes import levels
 from alphacut.fuzzy.sets.numbers import Cut, outer_steps
@@ -201,7 +202,7 @@ def fuzzy_stiffness(
     *,
     alpha: Sequence[float] | None = None,
     average: str | None = None,
-    **campaign: Any,
+    **campaign: Unpack[CampaignOptions],
 ) -> FuzzyStiffness:
     """Return the α-cuts of the homogenised constants of a cell with fuzzy inputs.
 
@@ -321,11 +322,12 @@ class FuzzyCell:
             return None
         return phase_loss_cuts(self.losses, alpha)
 
-    def radius_at(self, values: Mapping[str, float]) -> Any:
+    def radius_at(self, values: Mapping[str, float]) -> RadiusMap | ThetaLaw:
         """Return the radius map, or the law of θ, at values of the inputs."""
         names = _field_names(self.radius)
         changes = {name: x for name, x in values.items() if name in names}
-        return replace(cast("Any", self.radius), **changes) if changes else self.radius
+        changed: RadiusMap | ThetaLaw = replace(cast("Any", self.radius), **changes)
+        return changed if changes else self.radius
 
     def phases_at(self, values: Mapping[str, float]) -> dict[str, AnyPhase]:
         """Return the phases by name at values of the inputs."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TextIO
+from typing import TextIO, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -32,6 +32,7 @@ from alphacut.stages.cell import (
     require_bounds,
     require_tolerance,
 )
+from alphacut.stochastic import ThetaLaw
 
 PLANE_INDICES = "126"
 """Of Voigt: 11, 22 and 12."""
@@ -75,7 +76,8 @@ def export(problem: CellProblem, path: Path) -> Document:
     mesh, cell = problem.mesh, problem.cell
     if isinstance(cell, MeshedCell):
         assert mesh.file is not None
-        fields = mesh_fields(MeshModel(mesh.file), problem.nominal_radius, cell.nominal_phases)
+        law = cast("ThetaLaw", problem.nominal_radius)
+        fields = mesh_fields(MeshModel(mesh.file), law, cell.nominal_phases)
     else:
         nominal = problem.nominal
         model = PrismModel(mesh.size, mesh.layers, outline=nominal.outline)

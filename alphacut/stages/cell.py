@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Self
+from typing import Any, Self, cast
 
 from typing_extensions import TypedDict
 
@@ -28,7 +28,7 @@ from alphacut.rve.result.cell_model import AnyModel, Resolution
 from alphacut.rve.result.moduli import AXES
 from alphacut.rve.result.reference_bounds import reference_bounds
 from alphacut.rve.result.result import HomogenisedStiffness
-from alphacut.stochastic import FractionMap, gauss_rule
+from alphacut.stochastic import FractionMap, RadiusMap, ThetaLaw, gauss_rule
 
 GPA = 1e9
 BOUNDS_SLACK = 5e-3
@@ -100,7 +100,7 @@ class CellProblem:
         return fuzzy or next(({x: numbers[x]} for x in names if x in numbers), {})
 
     @property
-    def nominal_radius(self) -> Any:
+    def nominal_radius(self) -> RadiusMap | ThetaLaw:
         """Radius map at the nominal values; of a mesh the law of θ."""
         if isinstance(self.radius, FractionMap):
             return self.radius
@@ -116,7 +116,8 @@ class CellProblem:
         """The cell with one particle at the nominal values of its inputs."""
         assert isinstance(self.cell, RoundCell)
         matrix, inclusion = self.cell.nominal_phases
-        return Cell(matrix, inclusion, self.nominal_radius, self.cell.outline or circle)
+        radius = cast("RadiusMap", self.nominal_radius)
+        return Cell(matrix, inclusion, radius, self.cell.outline or circle)
 
     @property
     def average(self) -> str | None:
@@ -184,7 +185,7 @@ class CellProblem:
         """
         if isinstance(self.cell, MeshedCell):
             return {}
-        radius, stated = self.nominal_radius, self.stated_fraction
+        radius, stated = self.nominal.radius_map, self.stated_fraction
         rule = gauss_rule(radius.distribution, points=NODES)
         is_space = self.cell.particles == "spheres"
         if is_space:

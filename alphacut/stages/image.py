@@ -228,8 +228,7 @@ def estimated_losses(energies: PhaseEnergies, cuts: Array, average: str) -> Loss
     errors = errors + np.ptp(largest) ** 2 * bounds[:, 0, 1]
     named = dict[str, Array](zip(CONSTANTS, bounds, strict=True))
     by_name = dict(zip(CONSTANTS, map(float, errors), strict=True))
-    estimated: LossResult = LossResult.of(named, by_name, Nature.ESTIMATED)
-    return estimated
+    return LossResult.of(named, by_name, Nature.ESTIMATED)
 
 
 def cut_or_nominal(number: FuzzyNumber, level: AlphaLevel) -> tuple[float, float]:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from alphacut.base.arrays import Array
 from alphacut.base.errors import require
 from alphacut.fuzzy import FuzzyNumber, General, Reduced, Signed
 from alphacut.fuzzy.plans.design import Plan
+from alphacut.fuzzy.propagation import CampaignOptions
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document
 from alphacut.io.provenance import file_digest, source_digest, versions
@@ -48,7 +49,9 @@ class LossResult(Numbers):
     nature: Nature
 
     @classmethod
-    def of(cls, cuts: Mapping[str, Array], errors: Mapping[str, float], nature: Nature) -> Any:
+    def of(
+        cls, cuts: Mapping[str, Array], errors: Mapping[str, float], nature: Nature
+    ) -> LossResult:
         """The result of cuts (levels, 2) by the names of `CONSTANTS`, and of their errors."""
         named = {name: CutsResult.of(cuts[name]) for name in CONSTANTS}
         return cls(**named, error=dict(errors), nature=nature)
@@ -131,9 +134,10 @@ def solved(
     plan: Plan | None = None,
     *,
     inputs: Mapping[str, FuzzyNumber] | None = None,
-    **arguments: Any,
+    alpha: Sequence[float] | None = None,
+    **campaign: Unpack[CampaignOptions],
 ) -> FuzzyStiffness:
-    """The fuzzy stiffness of a cell; `arguments` are further ones of `fuzzy_stiffness`."""
+    """The fuzzy stiffness of a cell; `campaign` are further arguments of `fuzzy_stiffness`."""
     losses = dict(zip(problem.cell.loss_names, problem.cell.losses, strict=True))
     return fuzzy_stiffness(
         problem.model(),
@@ -141,8 +145,9 @@ def solved(
         problem.nominal_phases,
         {**(inputs or problem.inputs), **losses},
         plan or PLANS[problem.modulus.plan],
+        alpha=alpha or problem.modulus.alpha,
         average=problem.average,
-        **{"alpha": problem.modulus.alpha, **arguments},
+        **campaign,
     )
 
 
