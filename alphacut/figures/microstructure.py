@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -70,7 +69,7 @@ def draw_map(fitted: FittedRadiusMap) -> Figure:
     return figure
 
 
-def draw_circles(axes: Axes, centres: Array, radii: Array, **look: Any) -> None:
+def draw_circles(axes: Axes, centres: Array, radii: Array, **look: str | float) -> None:
     """Draws circles, of centres (n, 2) and radii (n,) in m, on axes in mm."""
     width = 2e3 * radii
     position = {"offsets": 1e3 * centres, "offset_transform": axes.transData}

@@ -115,7 +115,7 @@ def test_an_exported_cell_taken_as_the_mesh_has_the_same_modulus(tmp_path):
         ("particles =", 'glue = {modulus = "1 GPa", poisson = 0.3}\nparticles =', "phase is 'glue'"),
         ("two-particles", "unlike-sides", "a node of the sides x1 = ±1"),
         ("two-particles", "absent", "mesh.file is"),
-        ("two-particles.msh", "README.md", "files of Gmsh with 15-node prisms"),
+        ("two-particles.msh", "README.md", "without $MeshFormat at its start"),
         ("[modulus]", "[radius]\ntheta = [-2, 3]\n[modulus]", "law of θ is on -2 … 3"),
         ("[modulus]", "[radius]\na1 = 0.2\na2 = 0\na3 = 0.3\na4 = 0\n[modulus]", "radius is a map"),
         ("[modulus]", "[modulus]\ntolerance = 1e-3", "modulus.tolerance"),

@@ -53,6 +53,6 @@ def test_a_packing_that_is_too_dense_names_the_cell_of_that_fraction(shape, dens
         particles=20, fraction=0.83, smallest_radius="1 mm", largest_radius="2 mm"
     )
     with pytest.raises(RefusedError) as refused:
-        section.source(spheres=shape == "spheres")
+        section.require_readable(spheres=shape == "spheres")
     assert f"up to {densest}" in str(refused.value)
     assert "set cell.fraction = 0.83" in str(refused.value)
