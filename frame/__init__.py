@@ -9,7 +9,17 @@ from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import INTEGRATORS, Exact, Midpoint
 from alphacut.frame.dynamics.nonlinear import LagrangianFlow
 from alphacut.frame.envelope import Envelope
-from alphacut.frame.identify import identify, read_modes
+from alphacut.frame.identify import (
+    Identified,
+    LearnedInputs,
+    MeasuredMode,
+    Prediction,
+    Predictions,
+    RefutedError,
+    identify,
+    measured_mode,
+    read_modes,
+)
 from alphacut.frame.methods.auto import Auto
 from alphacut.frame.methods.dual import DualProof
 from alphacut.frame.methods.graph_follower import GraphFollower
@@ -29,8 +39,9 @@ from alphacut.frame.structures.storey import StoreyFrame
 
 __all__ = [
     "INTEGRATORS", "METHODS", "Accelerogram", "Auto", "DualProof", "Envelope", "Exact", "Force",
-    "GraphFollower", "History", "ImprovedFollower", "LagrangianFlow", "LagrangianSystem",
-    "LinearFlow", "MatrixStructure", "Midpoint", "Output", "Parameter", "Proof", "Sampled",
-    "StoreyFrame", "damping_from_loss", "envelope", "identify", "pendulum", "read_matrix",
-    "read_modes", "read_record", "read_suite", "require_envelope",
+    "GraphFollower", "History", "Identified", "ImprovedFollower", "LagrangianFlow",
+    "LagrangianSystem", "LearnedInputs", "LinearFlow", "MatrixStructure", "MeasuredMode",
+    "Midpoint", "Output", "Parameter", "Prediction", "Predictions", "Proof", "RefutedError",
+    "Sampled", "StoreyFrame", "damping_from_loss", "envelope", "identify", "measured_mode",
+    "pendulum", "read_matrix", "read_modes", "read_record", "read_suite", "require_envelope",
 ]  # fmt: skip

@@ -63,7 +63,7 @@ def identify(
             no mode is left to learn from, or one has values without scatter.
 
     Example:
-        >>> from alphacut.frame.identify import measured_mode
+        >>> from alphacut.frame import measured_mode
         >>> from alphacut.fuzzy import Interval
         >>> modes = [measured_mode(1, [0.98, 1.0, 1.01]), measured_mode(2, [2.6, 2.61])]
         >>> frame = StoreyFrame([1.0, 1.0], stiffness=[100.0, 100.0])

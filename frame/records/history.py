@@ -92,7 +92,7 @@ class History:
         return self.envelope(times) * self.wave(times)
 
     def largest_in_steps(self, time: Array) -> Array:
-        """Bound of |f| within the step to each of the rising times (T,), 0 at the first, (T,)."""
+        """Bound of ``|f|`` within the step to each of rising times, shape (T,); 0 at the first."""
         # |g| is largest at an end of the step or at a sample in it, and |sin| at most 1
         samples = self.start + np.arange(len(self.samples)) * self.step
         inside = samples[(samples > time[0]) & (samples < time[-1])]

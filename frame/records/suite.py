@@ -75,7 +75,7 @@ def read_suite(
     """Read a suite of records: all files that the patterns match, each pattern's by their names.
 
     Args:
-        files: A file or a pattern, as "records/*.AT2", or several of them.
+        files: A file or a pattern, as ``records/*.AT2``, or several of them.
         channel: Channel of every file, as of `read_record`.
         step: Time between samples, in s, of files that do not state it.
         unit: Unit of files that state none.

@@ -10,8 +10,7 @@ published: 1 % of a frequency and 2 % of a shape are assumed.
 import numpy as np
 import pytest
 
-from alphacut.frame import StoreyFrame
-from alphacut.frame.identify import identify, measured_mode
+from alphacut.frame import StoreyFrame, identify, measured_mode
 from alphacut.fuzzy import Interval
 
 FLOORS = (3, 6, 9, 12, 15, 18)
