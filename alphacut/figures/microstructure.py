@@ -88,8 +88,8 @@ def draw_overlay(picture: Array, discs: Particles) -> Figure:
     width, height = 1e3 * discs.size
     figure, axes = plt.subplots(figsize=(6.4, 6.4 * float(np.clip(height / width, 0.5, 1.6))))
     axes.imshow(picture, cmap="gray", extent=(0, width, 0, height), interpolation="none")
-    outline = {"facecolors": "none", "edgecolors": ORANGE, "linewidths": 1.0}
-    draw_circles(axes, discs.centres, discs.radii, **outline)
+    look = {"facecolors": "none", "edgecolors": ORANGE}
+    draw_circles(axes, discs.centres, discs.radii, linewidths=1.0, **look)
     set_view(axes, 0 * discs.size, discs.size)
     axes.set_title(f"{len(discs)} circles; what has no outline was left out")
     return figure
