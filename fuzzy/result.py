@@ -265,7 +265,7 @@ class Bounds:
                 line += " or wider"
             is_known = not (nature is Nature.GUARANTEED and self.encloses)  # the gap to attained
             if nature is Nature.ATTAINED:
-                is_known = error > 0  # that of values, as of a time step
+                is_known = bool(error > 0)  # that of values, as of a time step
             if is_known:
                 line += f", {error_name} {_digits(error)}"
             yield line + suffix

@@ -155,8 +155,8 @@ class Parts(Numbers):
     @property
     def encloses(self) -> str:
         """Name of the set of inputs around which the peaks are those of a box; empty without."""
-        results = (*self.envelopes.values(), *([self.records] if self.records else []))
-        peaks = [peak for result in results for peak in result.peak.values()]
+        peaks = [peak for study in self.envelopes.values() for peak in study.peak.values()]
+        peaks += [*self.records.peak.values()] if self.records else []
         return next((peak.encloses for peak in peaks if peak.encloses), "")
 
     @property
