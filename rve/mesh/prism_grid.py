@@ -199,13 +199,25 @@ class PrismGrid:
         if self.fixed is not None:
             return self.fixed
         levels = self.level_thetas(radius_map.distribution)
-        mid_levels, blocks = (levels[1:] + levels[:-1]) / 2, []
-        for theta, count in ((levels, len(self.plane.points)), (mid_levels, self.plane.vertices)):
-            shape = len(theta), *self.plane.points.shape
-            xy = np.broadcast_to(self.plane.points, shape)
-            if self.conforming:
-                xy = nodes_at_radii(self.plane, radius_map(theta))
-            xy = xy[:, :count]
+        thetas, blocks = (levels, (levels[1:] + levels[:-1]) / 2), []
+        for theta, xy in zip(thetas, self.positions_by_level(radius_map), strict=True):
             heights = np.broadcast_to(theta[:, None, None], (*xy.shape[:2], 1))
             blocks.append(np.dstack([xy, heights]).reshape(-1, 3))
         return np.concatenate(blocks)
+
+    def positions_by_level(self, radius_map: RadiusMap) -> tuple[Array, Array]:
+        """(x1, x2) of the nodes of levels, (layers + 1, n, 2), and of mid-levels, (layers, v, 2).
+
+        n is the number of nodes of the plane mesh and v that of its vertices. Not of a mesh that a
+        file gives.
+        """
+        levels = self.level_thetas(radius_map.distribution)
+        mid_levels = (levels[1:] + levels[:-1]) / 2
+        on_mid_levels = self._plane_at(radius_map, mid_levels)[:, : self.plane.vertices]
+        return self._plane_at(radius_map, levels), on_mid_levels
+
+    def _plane_at(self, radius_map: RadiusMap, theta: Array) -> Array:
+        """Positions of the plane mesh at each θ, shape (θ, n, 2)."""
+        if self.conforming:
+            return nodes_at_radii(self.plane, radius_map(theta))
+        return np.broadcast_to(self.plane.points, (len(theta), *self.plane.points.shape))

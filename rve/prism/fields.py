@@ -119,7 +119,7 @@ def _solve_fields(
     """Solve for displacements and stresses under macroscopic strains of shape (loads, 3)."""
     grid = problem.grid
     problem.assemble(stiffness)
-    vectors = solve(problem.solver(options), problem.loads(loads)).vectors
+    vectors = solve(problem.solver(options, problem.matrix), problem.loads(loads)).vectors
     fluctuation = fem.Function(problem.space)
     rank_cells = np.arange(len(problem.wedge), dtype=np.int32)
     nodal_strain = at_points(strain(fluctuation), vertices_and_midpoints())

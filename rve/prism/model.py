@@ -40,8 +40,8 @@ from alphacut.rve.mesh.columns import extrude
 from alphacut.rve.mesh.prism_grid import PrismGrid, reference_radius
 from alphacut.rve.mesh.square import REFINEMENTS
 from alphacut.rve.prism.modulus_basis import TOLERANCE, ModulusBasis, modulus_basis
-from alphacut.rve.prism.problem import FoldedMeshError, PrismProblem, SliceStrains
-from alphacut.rve.prism.slices import SliceProblem, is_homogeneous, solve_sample
+from alphacut.rve.prism.problem import FoldedMeshError, PrismProblem, Solved
+from alphacut.rve.prism.slices import SliceProblem
 from alphacut.rve.result.cell_model import Resolution
 from alphacut.rve.result.checks import ROUND_OFF, checks_within_limits, mean, stress_checks
 from alphacut.rve.result.moduli import AVERAGES, AXES, axial_moduli
@@ -49,7 +49,7 @@ from alphacut.rve.result.result import HomogenisedStiffness, PhaseEnergies, Stre
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.slices.model import SlicesModel
 from alphacut.rve.solver.form import energies_by_phase, total_energy
-from alphacut.rve.solver.krylov import Solutions, SolverOptions, solve
+from alphacut.rve.solver.krylov import SolverOptions, solve
 from alphacut.stochastic import RadiusMap
 
 AnyProblem = TypeVar("AnyProblem", PrismProblem, SliceProblem)
@@ -58,7 +58,6 @@ SERIES_ACCURACY = 1e-9  # relative, of a reference by the series
 SLICES_POINTS = 14  # nodes in θ of a reference by slices
 
 
-Solved = tuple[SliceStrains, tuple[int, ...], float]  # iterations by load, largest residual
 cached_grid = lru_cache(maxsize=2)(extrude)  # prisms for any map with one reference radius
 
 
@@ -133,21 +132,16 @@ class PrismModel:
         require_solve_arguments(radius_map, matrix, inclusions, isotropic=False)
         require_compressible(matrix, *inclusions)
         started = perf_counter()
-        # on one rank and without options, which are PETSc's, slice by slice
-        by_petsc = self.parallel or self.options.overrides or self.options.environment
-        moved = self.problem if by_petsc else partial(self._moved, cached=cached_slices)
-        problem = moved(radius_map)
+        problem = self._moved_slices(radius_map) if self.by_slices else self.problem(radius_map)
         basis = self._basis(problem, matrix, inclusions)  # serves all inclusions
         results = []
         for inclusion in inclusions:
             cell = Cell(matrix, inclusion, radius_map, self.outline)
             loads = self.loads(cell)
             if basis is not None and isinstance(inclusion, Phase):
-                solved = basis.project(inclusion.modulus), basis.iterations, basis.error
-            elif isinstance(problem, SliceProblem):
-                solved = solve_sample(problem, cell.stiffness, loads)
+                solved = basis.project(inclusion.modulus)
             else:
-                solved = solve_loads(problem, cell.stiffness, loads, self.options)
+                solved = solve_sample(problem, cell.stiffness, loads, options=self.options)
             result = prism_result(solved, problem.numbering.size, cell.phases, loads, self.options)
             result = replace(result, cell=cell, seconds=perf_counter() - started)
             if self.estimate:
@@ -167,6 +161,18 @@ class PrismModel:
             RefusedError: A radius does not fit into the cell.
         """
         return self._moved(radius_map, partial(cached_problem, parallel=self.parallel))
+
+    @property
+    def by_slices(self) -> bool:
+        """Whether the form is assembled over slices, on one rank, or over prisms.
+
+        Over slices the stiffness is an operator without entries, which the preconditioner along θ
+        takes and others of PETSc do not.
+        """
+        return self.options.by_levels and not self.parallel
+
+    def _moved_slices(self, radius_map: RadiusMap) -> SliceProblem:
+        return self._moved(radius_map, cached_slices)
 
     def _moved(
         self, radius_map: RadiusMap, cached: Callable[[PrismGrid], AnyProblem]
@@ -210,9 +216,7 @@ class PrismModel:
         self, problem: object, matrix: AnyPhase, inclusions: Sequence[AnyPhase]
     ) -> ModulusBasis | None:
         """Reduced basis for samples that differ only in the modulus of isotropic inclusions."""
-        if not (isinstance(problem, SliceProblem) and isinstance(matrix, Phase)):
-            return None
-        if not self.modulus_range:
+        if not (isinstance(problem, SliceProblem) and self.modulus_range):
             return None
         (low, high), phases = self.modulus_range, [x for x in inclusions if isinstance(x, Phase)]
         are_alike = len(phases) == len(inclusions) and len({x.poisson for x in phases}) == 1
@@ -221,9 +225,14 @@ class PrismModel:
             return None
         if not all(within[0] <= phase.modulus <= within[1] for phase in phases):
             return None
-        cell = Cell(matrix, inclusions[0], problem.map, self.outline)
+        loads = self.loads(Cell(matrix, inclusions[0], problem.map, self.outline))
         basis = modulus_basis(
-            problem, matrix, phases[0].poisson, self.modulus_range, self.loads(cell)
+            problem,
+            matrix,
+            poisson=phases[0].poisson,
+            ends=self.modulus_range,
+            strains=loads,
+            options=self.options,
         )
         return basis if basis.error <= TOLERANCE else None
 
@@ -235,20 +244,31 @@ def require_prisms(mesh_size: float, layers: int) -> None:
         raise RefusedError("the number of layers", layers, "1 or more")
 
 
-def solve_loads(
-    problem: PrismProblem, stiffness: Sequence[Array], strains: Array, options: SolverOptions
+def solve_sample(
+    problem: PrismProblem | SliceProblem,
+    stiffness: Sequence[Array],
+    strains: Array,
+    *,
+    options: SolverOptions,
 ) -> Solved:
-    """As `solve_sample`, by DOLFINx's assembly and a solver of PETSc."""
-    problem.assemble(stiffness)
-    loads = problem.loads(strains)
-    if is_homogeneous(stiffness):  # without fluctuation
-        zeros = [load.duplicate() for load in loads]
-        solutions = Solutions(zeros, iterations=(0,) * len(loads), residual=0.0)
-    else:
-        solutions = solve(problem.solver(options), loads)
-    fluctuations = [problem.elimination.displacements(vector) for vector in solutions.vectors]
-    means = problem.slice_strains(list(zip(strains, fluctuations, strict=True)))
-    return means, solutions.iterations, solutions.residual
+    """Solve eq. 7 for the phases' stiffness in Pa, at the map to which the problem was moved.
+
+    The problem holds what comes before: mesh, constraint and form.
+
+    Args:
+        problem: Over prisms or over slices.
+        stiffness: Of each phase, (3, 3), in Pa.
+        strains: Macroscopic strains ε̄, shape (loads, 3).
+        options: PETSc's, with the default solver's.
+
+    Raises:
+        ConvergenceError: The tolerance of the residual, relative to the load, was not reached.
+    """
+    matrix = problem.assemble(stiffness)  # K of a(u, v) = ∫ f_Θ C ε(u) : ε(v)
+    loads = problem.loads(strains)  # F = −∫ f_Θ C ε̄ : ε(v)
+    solutions = solve(problem.solver(options, matrix), loads)  # K U = F
+    means = problem.slice_strains(strains, solutions.vectors)  # of ε̄ + ε(u), over each slice
+    return Solved(means, solutions.iterations, solutions.residual)
 
 
 def prism_result(
@@ -258,7 +278,7 @@ def prism_result(
 
     `loads` are macroscopic strains, (2 or 3, 3); three give the whole plane stiffness.
     """
-    strains, iterations, residual = solved
+    strains = solved.strains
     stiffness = [phase.stiffness for phase in phases]
     stress, energy = strains.stress(stiffness), total_energy(strains.products, stiffness)
     by_theta = stress @ np.linalg.inv(loads).T if len(loads) == 3 else None
@@ -269,12 +289,12 @@ def prism_result(
         PrismModel.name,
         str(options),
         unknowns,
-        iterations,
+        solved.iterations,
         energies=PhaseEnergies(energies, np.full(energies.shape, np.nan)),
         checks={
             "hill_mandel": float(abs(work.T - energy).max() / abs(energy).max()),
             **stress_checks(stress, loads, strains.fractions, strains.weights, phases),
-            "residual": residual,
+            "residual": solved.residual,
         },
     )
 

@@ -26,7 +26,7 @@ from alphacut.rve.prism.model import (
     cached_problem,
     prism_result,
     require_prisms,
-    solve_loads,
+    solve_sample,
     with_distance,
 )
 from alphacut.rve.prism.problem import PrismProblem
@@ -87,7 +87,7 @@ class _NamedModel:
         started = perf_counter()
         problem, named = self.problem_of(law, phases)
         stiffness = [phase.stiffness for phase in named.values()]
-        solved = solve_loads(problem, stiffness, THREE_LOADS, self.options)
+        solved = solve_sample(problem, stiffness, THREE_LOADS, options=self.options)
         unknowns, materials = problem.numbering.size, list(named.values())
         result = prism_result(solved, unknowns, materials, THREE_LOADS, self.options)
         energies = cast("PhaseEnergies", result.energies)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
+import scipy.sparse as sp
 
 from alphacut.base.arrays import Array, Ints
 from alphacut.base.errors import FailedError, RefusedError
@@ -24,8 +26,9 @@ from alphacut.rve.mesh.wedge import (
 from alphacut.rve.solver.form import CellForm, PointStrains, strain_products
 from alphacut.rve.solver.krylov import SolverOptions, krylov_solver
 from alphacut.rve.solver.numbering import Elimination, LevelNumbering
+from alphacut.rve.solver.theta_preconditioner import ThetaPreconditioner, level_blocks
 from alphacut.stochastic import RadiusMap, ThetaLaw
-from alphacut.stochastic.theta.quadrature import level_rule
+from alphacut.stochastic.theta.quadrature import ThetaRule, level_rule
 
 
 class FoldedMeshError(FailedError):
@@ -51,17 +54,52 @@ class SliceStrains:
     fractions: Array
     products: Array
 
+    @classmethod
+    def zeros(cls, rule: ThetaRule, *, phases: int, fields: int) -> SliceStrains:
+        """Return integrals over no part of the cell, to which `add` adds."""
+        slices, shape = len(rule.nodes), (phases, 3, fields)
+        strain = np.zeros((phases, slices, 3, fields))
+        products = np.zeros((*shape, 3, fields))
+        return cls(rule.nodes, rule.weights, strain, np.zeros((phases, slices)), products)
+
+    def add(self, strain: Array, areas: Array, slices: Ints) -> None:
+        """Add the integrals over some triangles of the slices.
+
+        Args:
+            strain: At the points of the triangles, shape (triangles, points, 3, fields).
+            areas: Weights of the points in each phase, over the area of the cell, shape (phases,
+                triangles, points).
+            slices: Number of each triangle's slice, shape (triangles,).
+        """
+        for phase in range(len(areas)):
+            chosen = np.flatnonzero(areas[phase].any(axis=1))
+            of_phase, of_points, slice_of = areas[phase, chosen], strain[chosen], slices[chosen]
+            entries = np.ones(len(chosen)), (slice_of, np.arange(len(chosen)))
+            member = sp.csr_matrix(entries, (len(self.theta), len(chosen)))
+            sums = member @ np.einsum("tq,tqif->tif", of_phase, of_points).reshape(len(chosen), -1)
+            self.strain[phase] += sums.reshape(self.strain[phase].shape)
+            self.fractions[phase] += member @ of_phase.sum(axis=1)
+            weights = (self.weights[slice_of][:, None] * of_phase).reshape(1, -1)
+            flat = of_points.reshape(-1, *strain.shape[2:])
+            self.products[phase] += strain_products(flat, weights)[0]
+
     def combined(self, coefficients: Array) -> SliceStrains:
         """Those of sums of the fields, coefficients (fields, loads)."""
         products = np.einsum("piajb,ak,bl->pikjl", self.products, coefficients, coefficients)
-        return SliceStrains(
-            self.theta, self.weights, self.strain @ coefficients, self.fractions, products
-        )
+        return replace(self, strain=self.strain @ coefficients, products=products)
 
     def stress(self, stiffness: Sequence[Array]) -> Array:
         """Homogenised (σ11, σ22, σ12), shape (n, 3, fields), in Pa, for the phases' stiffness."""
         stresses = [matrix @ strain for matrix, strain in zip(stiffness, self.strain, strict=True)]
         return np.asarray(sum(stresses))
+
+
+class Solved(NamedTuple):
+    """Mean strains under each load, iterations of each, and the largest relative residual."""
+
+    strains: SliceStrains
+    iterations: tuple[int, ...]
+    residual: float
 
 
 def positive_density(law: ThetaLaw, theta: Array) -> Array:
@@ -200,10 +238,14 @@ class PrismProblem:
         """Reduced forces −⟨Bᵀ C ε̄⟩ of macroscopic strains (loads, 3), for the phases as set."""
         return [self.elimination.forces(self._elastic.load(strain)) for strain in strains]
 
-    def solver(self, options: SolverOptions, matrix: PETSc.Mat | None = None) -> PETSc.KSP:
-        """PETSc solver of the assembled stiffness, or of another reduced symmetric operator."""
-        operator = self.matrix if matrix is None else matrix
-        return krylov_solver(operator, self.numbering, self.map.distribution, options)
+    def solver(self, options: SolverOptions, matrix: PETSc.Mat) -> PETSc.KSP:
+        """PETSc solver of a reduced symmetric operator."""
+        return krylov_solver(matrix, options, lambda: self.preconditioner(matrix))
+
+    def preconditioner(self, matrix: PETSc.Mat) -> ThetaPreconditioner:
+        """Preconditioner along θ of a reduced operator, assembled."""
+        law, blocks = self.map.distribution, level_blocks(matrix, self.numbering)
+        return ThetaPreconditioner(self.numbering, self.comm).set_up(law, blocks)
 
     def assemble_operator(self, form: fem.Form) -> PETSc.Mat:
         """Reduced matrix Pᵀ A P of a bilinear form of the user on `space`."""
@@ -214,27 +256,20 @@ class PrismProblem:
         matrix.assemble()
         return matrix
 
-    def slice_strains(self, fields: Sequence[tuple[Array, Array]]) -> SliceStrains:
-        """Mean strains of slices by phase, area fractions and mean products, summed over ranks.
+    def slice_strains(self, strains: Array, fluctuations: Sequence[PETSc.Vec]) -> SliceStrains:
+        """Return integrals over the slices of fields ε̄ + ε(u), summed over the ranks.
 
-        `fields` are pairs of a macroscopic strain (3,) and a fluctuation (nodes, 2).
+        The fields are n of ε̄, shape (n, 3), and n of u in reduced unknowns.
         """
-        count = len(fields)
-        strain = np.empty((len(self.wedge), SLICES_PER_LAYER, POINTS_PER_SLICE, 3, count))
-        for k, (uniform, u) in enumerate(fields):
-            strain[..., k] = self._strains(u).reshape(strain.shape[:-1]) + uniform
-        areas = self._phases * self.areas / AREA  # (phases, cells, 3, points)
-
-        def over_layers(prisms: Array) -> Array:
-            """Sums, (phases, slices, …), over the prisms of each layer: (phases, cells, 3, …)."""
-            member = np.equal.outer(np.arange(self.grid.layers), self.layer).astype(float)
-            sums = self.comm.allreduce(np.stack([np.tensordot(member, x, 1) for x in prisms]))
-            return np.asarray(sums.reshape(len(areas), -1, *prisms.shape[3:]))
-
-        means = over_layers(np.einsum("pmsq,msqif->pmsif", areas, strain))
-        rule, fractions = self._rule, over_layers(areas.sum(axis=-1))
-        weights = rule.weights.reshape(-1, SLICES_PER_LAYER, 1)[self.layer]
-        point_weights = (weights * areas).reshape(len(areas), -1)
-        products = strain_products(strain.reshape(-1, 3, count), point_weights)
-        products = self.comm.allreduce(products)
-        return SliceStrains(rule.nodes, rule.weights, means, fractions, products)
+        prisms, count, rule = len(self.wedge), len(strains), self._rule
+        values = np.empty((prisms * SLICES_PER_LAYER, POINTS_PER_SLICE, 3, count))
+        for k, (strain, vector) in enumerate(zip(strains, fluctuations, strict=True)):
+            u = self.elimination.displacements(vector)
+            values[..., k] = self._strains(u).reshape(values.shape[:-1]) + strain
+        areas = self._phases * self.areas / AREA  # (phases, prisms, slices, points)
+        slices = self.layer[:, None] * SLICES_PER_LAYER + np.arange(SLICES_PER_LAYER)
+        integrals = SliceStrains.zeros(rule, phases=len(areas), fields=count)
+        integrals.add(values, areas.reshape(len(areas), -1, POINTS_PER_SLICE), slices.ravel())
+        for part in (integrals.strain, integrals.fractions, integrals.products):
+            self.comm.Allreduce(MPI.IN_PLACE, part)
+        return integrals

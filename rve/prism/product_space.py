@@ -91,8 +91,7 @@ class ProductSpace:
 
     def preconditioner(self, matrix: PETSc.Mat) -> ThetaPreconditioner:
         """Preconditioner along θ for `PC.setPythonContext`; the form has the density as factor."""
-        problem = self._problem
-        return ThetaPreconditioner(matrix, problem.numbering, problem.map.distribution)
+        return self._problem.preconditioner(matrix)
 
     def solve(
         self,

@@ -1,79 +1,44 @@
 """The product space by its slices: plane cells at the Gauss points of the layers.
 
-At height ζ of layer k a displacement of the prisms is one of six-node triangles,
+The form has no derivative along θ, so that eq. 7 is a sum over slices s at θ_s,
 
-    u(·, ζ) = (1 − ζ) U_k + ζ U_k+1 + 4 ζ (1 − ζ) J b_k,
+    a(u, v) = Σ_s ∫ w_s C ε(u) : ε(v) dx,    w_s = f_Θ(θ_s) dθ,
 
-with the hats U of the levels, the bubbles b of the mid-levels, and J from linear to quadratic
-triangles, as in `theta_preconditioner`. The form has no derivative along θ, so that eq. 7 is
-
-    K = Σ_s T_sᵀ K_s T_s,    K_s[ic, jd] = Σ_αβ C[cα, dβ] ∫ f_Θ ∂_α N_i ∂_β N_j,
-
-with T_s from hats and bubbles to the nodes of slice s, and the stiffness C of each phase. All K_s
-have one pattern, found once for a mesh; a map moves the nodes alone.
+which DOLFINx assembles on plane triangles. Its mesh is the slices of one layer and moves from layer
+to layer; `LayerConstraint` says what displacements of the prisms are there.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
-import scipy.sparse as sp
 
 from alphacut.base.arrays import Array, Ints
 from alphacut.rve.cell.cell import AREA
-from alphacut.rve.fenicsx import MPI
+from alphacut.rve.fenicsx import MPI, PETSc, basix, fem, mesh_of, ufl
 from alphacut.rve.mesh.prism_grid import PrismGrid
 from alphacut.rve.mesh.wedge import (
     POINTS_PER_SLICE,
     SLICES_PER_LAYER,
-    TRIANGLE_NODES,
     prism_rule,
     slice_weights,
-    wedge,
 )
-from alphacut.rve.prism.problem import SliceStrains, positive_density, require_valid_elements
-from alphacut.rve.solver.form import strain_products
-from alphacut.rve.solver.krylov import DEFAULTS
-from alphacut.rve.solver.level_solver import LevelSolver, Operator, conjugate_gradients, stacked
+from alphacut.rve.prism.problem import (
+    SliceStrains,
+    positive_density,
+    require_valid_elements,
+)
+from alphacut.rve.solver.form import CellForm, PointStrains
+from alphacut.rve.solver.krylov import SolverOptions, krylov_solver
+from alphacut.rve.solver.layers import LayerConstraint, LayerMatrix, layer_interpolation
 from alphacut.rve.solver.numbering import LevelNumbering
-from alphacut.rve.solver.theta_preconditioner import columnwise, theta_mass
+from alphacut.rve.solver.theta_preconditioner import ThetaPreconditioner
 from alphacut.stochastic import RadiusMap
 from alphacut.stochastic.theta.quadrature import level_rule
 
-VOIGT = np.array([[0, 2], [2, 1]])  # index [c, α] of the strain that ∂_α u_c adds to
-RTOL = float(DEFAULTS["ksp_rtol"])
-
-
-def is_homogeneous(stiffness: Sequence[Array]) -> bool:
-    """True where all phases are the same."""
-    return all(np.array_equal(phase, stiffness[0]) for phase in stiffness)
-
-
-def solve_sample(
-    problem: SliceProblem, stiffness: Sequence[Array], strains: Array
-) -> tuple[SliceStrains, tuple[int, ...], float]:
-    """Solve eq. 7 for the phases' stiffness in Pa, at the map to which the problem was moved.
-
-    Returns:
-        Mean strains of the slices under macroscopic strains (loads, 3); iterations of each load;
-        the largest relative residual.
-
-    Raises:
-        ConvergenceError: The tolerance of the residual, relative to the load, was not reached.
-    """
-    entries, loads = problem.entries(stiffness), problem.forces(stiffness, strains)
-    if is_homogeneous(stiffness):  # without fluctuation
-        loads[:] = 0.0
-    operator = problem.operator(entries)
-    problem.factorise(entries)
-    fluctuations, iterations = conjugate_gradients(operator, problem.solver, loads, RTOL)  # K U = F
-    residuals = problem.solver.norms(loads - operator(fluctuations))
-    load_norms = problem.solver.norms(loads)
-    residual = float((residuals / np.where(load_norms > 0, load_norms, 1.0)).max())
-    fields = problem.slice_strains(strains, fluctuations)
-    totals = fields.combined(np.tile(np.eye(len(strains)), (2, 1)))  # ε̄ + ε(u) of each load
-    return totals, iterations, residual
+BASIX_ORDER = [0, 1, 2, 5, 4, 3]
+"""Nodes of `Triangulation.triangles` in Basix's order, whose edge k lies opposite vertex k."""
 
 
 class SliceProblem:
@@ -83,163 +48,121 @@ class SliceProblem:
         grid: Prisms whose nodes follow the interface.
 
     Attributes:
-        numbering: Unknowns.
-        solver: Preconditioner, and the order of the unknowns of a field.
+        numbering: Reduced unknowns, in the order of those of `PrismProblem`.
         map: The radius map.
     """
 
     def __init__(self, grid: PrismGrid) -> None:
         self.grid, self.numbering = grid, LevelNumbering(grid, MPI.COMM_SELF)
-        points = prism_rule()[0]
-        zeta = points[::POINTS_PER_SLICE, 2]
-        self._shapes = np.array([1 - zeta, zeta, 4 * zeta * (1 - zeta)])  # of both hats, the bubble
-        self._prism_slopes = np.array(wedge(1).tabulate(1, points))[1:3].reshape(2, -1, 15)
-        on_base = np.array(wedge(1).tabulate(1, points[:POINTS_PER_SLICE] * [1, 1, 0]))[1:3]
-        slopes = on_base.reshape(2, POINTS_PER_SLICE, 15)[..., TRIANGLE_NODES]
-        self._slopes = slopes.swapaxes(1, 2)  # ∂N_i/∂ξ_β of a six-node triangle, [β, i, point]
-        phase = grid.phase[: len(grid.plane.triangles)]
-        self._phase = [np.flatnonzero(phase == k) for k in range(len(grid.names))]
-        self._unknown = self.numbering.planar[grid.plane.triangles]  # pairs, (triangles, 6)
-        self._find_pattern(phase, self.numbering.level_size // 2)
-        self.solver: LevelSolver = LevelSolver(self.numbering, self._indptr, self._indices)
-
-    def _find_pattern(self, phase: Ints, count: int) -> None:
-        """Pattern of node pairs, and matrices that sum, by phase, what stands in triangles."""
-        unknown, phases = self._unknown, len(self._phase)
-        row, column = unknown[:, :, None], unknown[:, None]
-        is_free = (row >= 0) & (column >= 0)
-        keys, pair = np.unique((row * count + column)[is_free], return_inverse=True)
-        self._indptr = np.searchsorted(keys, np.arange(count + 1) * count)
-        self._indices = keys % count
-        places = pair * phases + np.broadcast_to(phase[:, None, None], is_free.shape)[is_free]
-        # entries [iα, jβ] of a triangle's matrix, (12, 12)
-        entries = np.arange(4 * is_free.size).reshape(-1, 6, 2, 6, 2).swapaxes(2, 3)
-        self._to_pairs = _summation(places, entries[is_free], len(keys) * phases, entries.size)
-        is_free, entries = unknown >= 0, np.arange(2 * unknown.size).reshape(-1, 6, 2)
-        places = (unknown * phases + phase[:, None])[is_free]
-        self._to_nodes = _summation(places, entries[is_free], count * phases, entries.size)
+        self._preconditioner = ThetaPreconditioner(self.numbering, MPI.COMM_SELF)
+        self._options: SolverOptions | None = None  # of this preconditioner
+        # mesh: the slices of a layer, one after another
+        plane, triangles = grid.plane, grid.plane.triangles[:, BASIX_ORDER]
+        nodes = SLICES_PER_LAYER * len(plane.points)
+        first_nodes = np.arange(0, nodes, len(plane.points))
+        cells = (first_nodes[:, None, None] + triangles).reshape(-1, 6)
+        element = basix.ufl.element("P", "triangle", 2, shape=(2,))
+        self.mesh = mesh_of(MPI.COMM_SELF, cells, nodes, element)
+        self._cell: Ints = np.asarray(self.mesh.topology.original_cell_index)
+        self._cell_slice, triangle = np.divmod(self._cell, len(triangles))
+        self._phase = grid.phase[triangle]
+        # form
+        self.space = fem.functionspace(self.mesh, element)
+        self._weight = fem.Function(fem.functionspace(self.mesh, ("DG", 0)))
+        stiffness_space = fem.functionspace(self.mesh, ("DG", 0, (3, 3)))
+        dx = ufl.Measure("dx", self.mesh, metadata={"quadrature_degree": 4})
+        self._form = CellForm(self.space, stiffness_space, dx, self._weight)
+        self._matrix = fem.create_matrix(self._form.bilinear)  # of a layer
+        points = basix.make_quadrature(basix.CellType.triangle, 4)[0]
+        self._strains = PointStrains(self.space, points)
+        # constraint
+        geometry_nodes = self.mesh.geometry.input_global_indices
+        space_nodes: Ints = np.empty(nodes, int)
+        space_nodes[self.space.dofmap.list] = geometry_nodes[self.mesh.geometry.dofmap]
+        heights = prism_rule()[0][::POINTS_PER_SLICE, 2]
+        self._interpolation = layer_interpolation(plane, heights)[geometry_nodes]
+        self._constraint = LayerConstraint(
+            self.numbering, heights, space_nodes, self._matrix.to_scipy()
+        )
 
     def move(self, radius_map: RadiusMap) -> None:
-        """Move the nodes to a map, and integrate over the slices what no stiffness changes.
+        """Move the slices to the interface r(θ) of a map.
 
         Raises:
             FoldedMeshError: An element is inverted.
             RefusedError: The density of θ is not positive at a quadrature point.
         """
         grid, law, self.map = self.grid, radius_map.distribution, radius_map
-        levels = grid.level_thetas(law)
-        self._rule = level_rule(law, levels, points=SLICES_PER_LAYER)
+        self._rule = level_rule(law, grid.level_thetas(law), points=SLICES_PER_LAYER)
         positive_density(law, self._rule.nodes)
-        self._mass = theta_mass(law, levels)
-        self._set_jacobian(grid.positions(radius_map)[:, :2])
-        slices = len(self._areas)
-        self._products = np.empty((slices, self._to_pairs.shape[0]))
-        self._sums = np.empty((slices, self._to_nodes.shape[0]))
-        for s, weight in enumerate(self._rule.weights):  # in turn, which takes less memory
-            x, y = self._inverse[:, :, s, :, None]
-            gradients = x * self._slopes[0] + y * self._slopes[1]  # ∂_α N_i
-            gradients = gradients.transpose(1, 2, 0, 3).reshape(len(self._unknown), 12, -1)
-            weighted = weight * self._areas[s][:, None] * gradients
-            products = weighted @ gradients.swapaxes(-1, -2)  # ∫ f_Θ ∂_α N_i ∂_β N_j: [iα, jβ]
-            self._products[s] = self._to_pairs @ products.ravel()
-            self._sums[s] = self._to_nodes @ weighted.sum(axis=-1).ravel()  # ∫ f_Θ ∂_α N_i
+        levels, mid_levels = grid.positions_by_level(radius_map)
+        by_layer = np.concatenate([levels[:-1], mid_levels, levels[1:]], axis=1)
+        self._positions = [self._interpolation @ positions for positions in by_layer]
+        determinants = np.array([self._strains.determinants() for _ in self._layers()])
+        self._areas = determinants * slice_weights()[0]  # (layers, cells, points)
+        sorted_areas = self._areas[:, np.argsort(self._cell)]
+        by_slice = sorted_areas.reshape(grid.layers, SLICES_PER_LAYER, -1, POINTS_PER_SLICE)
+        of_prisms = by_slice.swapaxes(1, 2).reshape(-1, SLICES_PER_LAYER, POINTS_PER_SLICE)
+        require_valid_elements(grid, of_prisms)
 
-    def _set_jacobian(self, positions: Array) -> None:
-        """Areas of the points, (slices, triangles, 6), and ∂ξ_β/∂x_α, [β, α] of the same shape."""
-        grid = self.grid
-        corners = positions[grid.cells].reshape(grid.layers, -1, 15, 2)
-        jacobian = np.einsum("bqn,ltna->abltq", self._prism_slopes, corners, optimize=True)
-        jacobian = jacobian.reshape(*jacobian.shape[:-1], SLICES_PER_LAYER, POINTS_PER_SLICE)
-        (a, b), (c, d) = jacobian  # ∂x_α/∂ξ_β, (layers, triangles, 3, 6)
-        determinants = a * d - b * c
-        areas = determinants * slice_weights()
-        require_valid_elements(grid, areas.reshape(-1, SLICES_PER_LAYER, POINTS_PER_SLICE))
-        inverse = np.array([[d, -b], [-c, a]]) / determinants
-        shape = len(self._rule.weights), -1, POINTS_PER_SLICE
-        self._areas = areas.swapaxes(1, 2).reshape(shape)
-        self._inverse = inverse.swapaxes(3, 4).reshape(2, 2, *shape)
+    def _layers(self) -> Iterator[int]:
+        """Move mesh and weights w_s to each layer in turn, and yield its number."""
+        for layer, positions in enumerate(self._positions):
+            self.mesh.geometry.x[:, :2] = positions
+            self._weight.x.array[:] = self._rule.weights[self._slices(layer)]
+            yield layer
 
-    def entries(self, stiffness: Sequence[Array]) -> Array:
-        """Entries [c, d] of all K_s, (slices, node pairs, 4), for the stiffness of the phases."""
-        coefficients = np.array(stiffness)[:, VOIGT[:, :, None, None], VOIGT]  # [c, α, d, β]
-        by_products = coefficients.transpose(0, 2, 4, 1, 3).reshape(-1, 4)
-        return self._products.reshape(len(self._areas), -1, len(by_products)) @ by_products
+    def _slices(self, layer: int) -> Ints:
+        """Return the number of each cell's slice among those of all layers."""
+        return np.asarray(layer * SLICES_PER_LAYER + self._cell_slice)
 
-    def forces(self, stiffness: Sequence[Array], strains: Array) -> Array:
-        """−⟨Bᵀ C ε̄⟩ under macroscopic strains (loads, 3), shape (loads, size)."""
-        stress = (strains @ np.array(stiffness))[..., VOIGT]  # σ[phase, load, c, α]
-        sums = self._sums.reshape(len(self._areas), -1, len(stiffness), 2)  # [slice, i, phase, α]
-        return self._to_fields(-np.einsum("pfca,sipa->fsic", stress, sums, optimize=True))
+    def assemble(self, stiffness: Sequence[Array]) -> PETSc.Mat:
+        """Return the reduced stiffness of eq. 7 for the stiffness of the phases, in Pa."""
+        self._form.stiffness.x.array[:] = np.array(stiffness)[self._phase].ravel()
+        layers = []
+        for _ in self._layers():
+            self._matrix.set_value(0.0)
+            fem.assemble_matrix(self._matrix, self._form.bilinear)
+            layers.append(self._constraint.scalar_matrix(self._matrix.data))
+        context, size = LayerMatrix(self._constraint, layers), self.numbering.size
+        return PETSc.Mat().createPython((size, size), context, comm=PETSc.COMM_SELF)
 
-    def operator(self, entries: Array) -> Operator:
-        """The map x ↦ K x of fields (fields, size) for the entries of all K_s."""
-        matrix = stacked(entries, self._indptr, self._indices)
+    def loads(self, strains: Array) -> list[PETSc.Vec]:
+        """Reduced forces −⟨Bᵀ C ε̄⟩ of macroscopic strains (loads, 3), for the phases as set."""
+        forces = np.zeros((len(strains), self.numbering.size))
+        for layer in self._layers():
+            window = self._constraint.windows[layer]
+            for k in range(len(strains)):
+                forces[k, window] += self._constraint.transposed @ self._form.load(strains[k])
+        return [PETSc.Vec().createWithArray(force, comm=PETSc.COMM_SELF) for force in forces]
 
-        def multiply(fields: Array) -> Array:
-            columns = self._to_slices(fields).reshape(len(fields), -1)
-            return self._to_fields(np.array([matrix @ column for column in columns]))
+    def solver(self, options: SolverOptions, matrix: PETSc.Mat) -> PETSc.KSP:
+        """Return PETSc's solver of an assembled stiffness; that of an earlier one is spent."""
+        if options != self._options:
+            self._preconditioner = ThetaPreconditioner(self.numbering, MPI.COMM_SELF)
+            self._options = options
+        blocks = matrix.getPythonContext().level_blocks()
+        law, preconditioner = self.map.distribution, self._preconditioner
+        return krylov_solver(matrix, options, lambda: preconditioner.set_up(law, blocks))
 
-        return multiply
+    def slice_strains(
+        self, strains: Array, fluctuations: Sequence[PETSc.Vec | None]
+    ) -> SliceStrains:
+        """Return integrals over the slices of fields ε̄ + ε(u): n of ε̄, (n, 3), and n of u.
 
-    def factorise(self, entries: Array) -> None:
-        """Factorise the blocks of hats and of bubbles over their masses in `solver`."""
-        by_layer = entries.reshape(self.grid.layers, SLICES_PER_LAYER, -1)
-        lower, upper, bubble = self._shapes**2
-        hats = np.zeros((self.grid.layers + 1, by_layer.shape[-1]))
-        hats[:-1] += lower @ by_layer
-        hats[1:] += upper @ by_layer
-        self.solver.factorise(hats, bubble @ by_layer, self._mass)
-
-    def _to_slices(self, fields: Array) -> Array:
-        """T_s x of all slices s, shape (fields, slices, 2 nodes)."""
-        hats, bubbles = self.numbering.split(fields)
-        lower, upper, bubble = self._shapes[:, :, None]
-        on_slices = lower * hats[:, :-1, None] + upper * hats[:, 1:, None]
-        on_slices += bubble * columnwise(self.solver.injection, bubbles)[:, :, None]
-        return np.asarray(on_slices.reshape(len(fields), -1, hats.shape[-1]))
-
-    def _to_fields(self, on_slices: Array) -> Array:
-        """Σ_s T_sᵀ r_s, shape (fields, size), of values on the nodes of the slices."""
-        fields = np.zeros((len(on_slices), self.numbering.size))
-        hats, bubbles = self.numbering.split(fields)
-        by_layer = on_slices.reshape(*bubbles.shape[:2], SLICES_PER_LAYER, -1)
-        below, above, bubble = np.moveaxis(self._shapes @ by_layer, 2, 0)
-        hats[:, :-1] += below
-        hats[:, 1:] += above
-        bubbles[:] = columnwise(self.solver.injection.T, bubble)
-        return fields
-
-    def slice_strains(self, strains: Array, fields: Array) -> SliceStrains:
-        """Those of macroscopic strains alone, (loads, 3), then of fields alone, (n, size)."""
-        count, slices, phases = len(fields), len(self._areas), len(self._phase)
-        nodal = np.moveaxis(self._to_slices(fields).reshape(count, slices, -1, 2), 0, 2)
-        nodal = np.append(nodal, np.zeros((slices, 1, count, 2)), axis=1)  # number −1: fixed nodes
-        strain = np.empty((len(self._unknown), POINTS_PER_SLICE, 3, len(strains) + count))
-        affine, fluctuation = np.split(strain, [len(strains)], axis=-1)  # views
-        affine[:] = strains.T
-        means, fractions = np.empty((phases, slices, *strain.shape[2:])), np.empty((phases, slices))
-        products = np.zeros((phases, *strain.shape[2:], *strain.shape[2:]))
-        for s, weight in enumerate(self._rule.weights):
-            corners = nodal[s, self._unknown].reshape(len(self._unknown), 6, -1)
-            along_xi, along_eta = self._slopes.swapaxes(1, 2)[:, None] @ corners  # ∂u_c/∂ξ_β
-            x, y = self._inverse[:, :, s, ..., None]
-            gradients = (x * along_xi + y * along_eta).reshape(2, *strain.shape[:2], count, 2)
-            fluctuation[..., 0, :] = gradients[0, ..., 0]
-            fluctuation[..., 1, :] = gradients[1, ..., 1]
-            np.add(gradients[0, ..., 1], gradients[1, ..., 0], out=fluctuation[..., 2, :])
-            for phase, triangles in enumerate(self._phase):
-                areas = self._areas[s, triangles].ravel() / AREA
-                of_phase = strain[triangles].reshape(len(areas), *strain.shape[2:])
-                means[phase, s] = np.tensordot(areas, of_phase, axes=1)
-                fractions[phase, s] = areas.sum()
-                products[phase] += strain_products(of_phase, weight * areas[None])[0]
-        return SliceStrains(self._rule.nodes, self._rule.weights, means, fractions, products)
-
-
-def _summation(places: Ints, entries: Ints, num_places: int, num_entries: int) -> sp.csr_matrix:
-    """Matrix that adds entries, (n, …), to the components of their places, (n,)."""
-    columns = entries.reshape(len(places), -1)
-    components = columns.shape[1]
-    rows = components * places[:, None] + np.arange(components)
-    shape = components * num_places, num_entries
-    return sp.csr_matrix((np.ones(rows.size), (rows.ravel(), columns.ravel())), shape)
+        None is no u.
+        """
+        rule, count = self._rule, len(strains)
+        is_phase = np.equal.outer(np.arange(len(self.grid.names)), self._phase)[..., None]
+        integrals = SliceStrains.zeros(rule, phases=len(is_phase), fields=count)
+        values = np.empty((len(self._cell), POINTS_PER_SLICE, 3, count))
+        for layer in self._layers():
+            window = self._constraint.windows[layer]
+            for k, (strain, vector) in enumerate(zip(strains, fluctuations, strict=True)):
+                values[..., k] = strain
+                if vector is not None:
+                    u = self._constraint.matrix @ vector.array_r[window]
+                    values[..., k] += self._strains(u)
+            areas = is_phase * self._areas[layer] / AREA
+            integrals.add(values, areas, self._slices(layer))
+        return integrals

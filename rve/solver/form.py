@@ -1,7 +1,7 @@
-"""The elasticity form of the cell, for triangles and for prisms of the product space (eq. 1 to 7).
+"""The elasticity form of the cell, written once for all elements (eq. 1 to 7).
 
-div and D act on x alone: on the product space, whose mesh is three-dimensional, the form has no
-derivative along θ.
+DOLFINx assembles it over prisms of the product space, over their slices, and over the triangles of
+a plane cell. div and D act on x alone, so that the form has no derivative along θ.
 """
 
 from __future__ import annotations
@@ -22,6 +22,16 @@ def strain(u: Any) -> Any:
     return ufl.as_vector([gradient[0, 0], gradient[1, 1], gradient[0, 1] + gradient[1, 0]])
 
 
+def virtual_work(stiffness: Any, strain_of_u: Any, v: Any, weight: Any) -> Any:
+    """Return the integrand of eq. 7: the work of the stress C ε in ε(v), times a weight.
+
+    It is Galerkin's projection (eq. 4) of −div σ (eq. 2) in the inner product of eq. 1, whose
+    weight is the density f_Θ, or over a slice at θ_s the weight w_s of its quadrature along θ.
+    """
+    stress = stiffness * strain_of_u  # eq. 6: σ = C ε in Voigt order
+    return weight * ufl.dot(stress, strain(v))
+
+
 class CellForm:
     """Stiffness and loads of a fluctuation, by the stiffness of the material at each point.
 
@@ -29,27 +39,27 @@ class CellForm:
         space: Displacements of two components.
         points: Matrices (3, 3) in cells or at quadrature points.
         dx: Measure of the cells.
-        density: f_Θ of eq. 1 at the points; 1 where there is no θ.
+        weight: f_Θ of eq. 1 at the points, or w_s of a slice; 1 where there is no θ.
 
     Attributes:
         stiffness: Voigt matrix C of the material, in Pa; to be set.
+        bilinear: a(u, v) = ∫ f_Θ C ε(u) : ε(v), compiled.
     """
 
     def __init__(
-        self, space: fem.FunctionSpace, points: fem.FunctionSpace, dx: Any, density: Any = 1.0
+        self, space: fem.FunctionSpace, points: fem.FunctionSpace, dx: Any, weight: Any = 1.0
     ) -> None:
         self.stiffness = fem.Function(points)
         self._uniform = fem.Constant(space.mesh, np.zeros(3))
         u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
-        # eq. 7: Galerkin's projection (eq. 4) of −div σ (eq. 2), weighted by f_Θ (eq. 1)
-        stress, uniform_stress = self.stiffness * strain(u), self.stiffness * self._uniform  # eq. 6
-        self._stiffness = compiled(density * ufl.dot(stress, strain(v)) * dx)
-        self._load = compiled(-density * ufl.dot(uniform_stress, strain(v)) * dx)
+        # eq. 7 with the strain ε̄ + ε(u): a(u, v) = −∫ f_Θ C ε̄ : ε(v) for all v
+        self.bilinear = compiled(virtual_work(self.stiffness, strain(u), v, weight) * dx)
+        self._load = compiled(-virtual_work(self.stiffness, self._uniform, v, weight) * dx)
 
     def assemble(self, matrix: PETSc.Mat) -> None:
         """Set a matrix, whose local-to-global map reduces it, to the stiffness of eq. 7."""
         matrix.zeroEntries()
-        petsc.assemble_matrix(matrix, self._stiffness)
+        petsc.assemble_matrix(matrix, self.bilinear)
         matrix.assemble()
 
     def load(self, uniform: Array) -> Array:

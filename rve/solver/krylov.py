@@ -9,18 +9,17 @@ from __future__ import annotations
 
 import logging
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from itertools import zip_longest
 
 import numpy as np
 
 from alphacut.base.errors import FailedError, RefusedError
 from alphacut.rve.fenicsx import PETSc, option_is_used
 from alphacut.rve.interruption import uninterrupted
-from alphacut.rve.solver.numbering import LevelNumbering
 from alphacut.rve.solver.theta_preconditioner import PREFIX, ThetaPreconditioner
-from alphacut.stochastic import ThetaLaw
 
 DEFAULTS = {
     "ksp_type": "cg",
@@ -75,17 +74,27 @@ class ConvergenceError(FailedError):
 
 @dataclass(frozen=True)
 class Solutions:
-    """One solution and number of iterations a load, and the largest true relative residual."""
+    """Solutions of K x = f.
+
+    Args:
+        vectors: x of each load f.
+        products: K x of each.
+        iterations: Of each.
+        residual: Largest |K x − f| over |f|.
+    """
 
     vectors: list[PETSc.Vec]
+    products: list[PETSc.Vec]
     iterations: tuple[int, ...]
     residual: float
 
 
 def krylov_solver(
-    matrix: PETSc.Mat, numbering: LevelNumbering, law: ThetaLaw, options: SolverOptions
+    matrix: PETSc.Mat, options: SolverOptions, preconditioner: Callable[[], ThetaPreconditioner]
 ) -> PETSc.KSP:
     """PETSc Krylov solver of a reduced stiffness, symmetric positive definite, set up.
+
+    `preconditioner` makes the one along θ; it is called where the options do not name another.
 
     Raises:
         RefusedError: PETSc refuses an option or its value, or does not use it.
@@ -103,22 +112,27 @@ def krylov_solver(
     with in_database(options), uninterrupted(second_ends=True):
         ksp.setFromOptions()
         if options.by_levels:
-            ksp.pc.setPythonContext(ThetaPreconditioner(matrix, numbering, law))
+            ksp.pc.setPythonContext(preconditioner())
         ksp.setUp()
     return ksp
 
 
 @uninterrupted(second_ends=True)
-def solve(ksp: PETSc.KSP, loads: Sequence[PETSc.Vec]) -> Solutions:
-    """Solve for each load.
+def solve(
+    ksp: PETSc.KSP, loads: Sequence[PETSc.Vec], guesses: Sequence[PETSc.Vec] = ()
+) -> Solutions:
+    """Solve for each load, from a guess of each solution or from zero.
 
     Raises:
         ConvergenceError: The tolerance was not reached, or a solution is not finite.
     """
     matrix, _ = ksp.getOperators()
-    vectors, iterations, residuals = [], [], []
-    for load in loads:
-        x, residual = load.duplicate(), load.duplicate()
+    vectors, products, iterations, residuals = [], [], [], []
+    ksp.setInitialGuessNonzero(bool(guesses))
+    for load, guess in zip_longest(loads, guesses):
+        x, product = load.duplicate(), load.duplicate()
+        if guess is not None:
+            guess.copy(x)
         ksp.solve(load, x)  # eq. 7: K U = F
         reason, count = ksp.getConvergedReason(), ksp.getIterationNumber()
         if reason <= 0 or not np.isfinite(x.norm()):
@@ -128,12 +142,13 @@ def solve(ksp: PETSc.KSP, loads: Sequence[PETSc.Vec]) -> Solutions:
                 f"raise -{ksp.getOptionsPrefix()}ksp_max_it or take another solver",
             )
         LOG.debug("%s with %s: %d iterations", ksp.getType(), ksp.pc.getType(), count)
-        matrix.mult(x, residual)
-        residual.axpy(-1, load)
+        matrix.mult(x, product)
+        residual = product - load
         vectors.append(x)
+        products.append(product)
         iterations.append(count)
         residuals.append(residual.norm() / (load.norm() or 1.0))
-    return Solutions(vectors, tuple(iterations), max(residuals))
+    return Solutions(vectors, products, tuple(iterations), max(residuals))
 
 
 @contextmanager

@@ -27,7 +27,7 @@ and the solutions of all levels.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -35,7 +35,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from alphacut.base.arrays import Array, Ints
-from alphacut.rve.fenicsx import PETSc, cholesky
+from alphacut.rve.fenicsx import MPI, PETSc, cholesky
 from alphacut.rve.solver.numbering import LevelNumbering
 from alphacut.stochastic import ThetaLaw
 from alphacut.stochastic.theta.quadrature import level_rule
@@ -112,31 +112,28 @@ def columnwise(matrix: sp.csr_matrix, values: Array) -> Array:
 
 
 class ThetaPreconditioner:
-    """P⁻¹ of a reduced stiffness; a context of PETSc's ``pc_type python``."""
+    """P⁻¹ of reduced stiffnesses of one numbering; a context of PETSc's ``pc_type python``."""
 
-    def __init__(self, matrix: PETSc.Mat, numbering: LevelNumbering, law: ThetaLaw) -> None:
-        self._numbering, self._comm = numbering, matrix.comm.tompi4py()
-        self._mass = theta_mass(law, numbering.grid.level_thetas(law))
+    def __init__(self, numbering: LevelNumbering, comm: MPI.Intracomm) -> None:
+        self._numbering, self._comm = numbering, comm
         self._injection, self._nodal_values = injection(numbering), numbering.nodal_values()
-        levels, mid_levels = self._rank_levels = numbering.levels, numbering.mid_levels
-        masses = [*self._mass.hats[levels], *self._mass.bubbles[mid_levels]]
-        blocks = self._blocks(matrix)
-        self._solvers = [plane_solver(*block) for block in zip(blocks, masses, strict=True)]
+        self._rank_levels = numbering.levels, numbering.mid_levels
+        self._solvers: list[PlaneSolver] = []
 
-    def _blocks(self, matrix: PETSc.Mat) -> Iterator[sp.csr_matrix]:
-        """Diagonal blocks of this rank's levels, then of its mid-levels, in hats and bubbles."""
-        numbering, rows = self._numbering, self._numbering.rows
-        # unknowns of other ranks are those of the mid-level below the first level alone
-        first = max(0, rows.start - numbering.mid_level_size)
-        span = PETSc.IS().createStride(rows.stop - first, first, 1, comm=PETSc.COMM_SELF)
-        starts, columns, values = matrix.createSubMatrices(span)[0].getValuesCSR()
-        stiffness = sp.csr_matrix((values, columns, starts), (rows.stop - first,) * 2)
-        numbers = numbering.split(np.arange(numbering.size))
-        hats, bubbles = (x[k] for x, k in zip(numbers, self._rank_levels, strict=True))
-        T = self._nodal_values[first : rows.stop][:, np.append(hats, bubbles)]
-        products = T.T.tocsr() @ stiffness @ T
-        for start, stop in pairwise(np.cumsum([0, *map(len, hats), *map(len, bubbles)])):
-            yield products[start:stop, start:stop]
+    def set_up(self, law: ThetaLaw, blocks: Iterable[sp.csr_matrix]) -> ThetaPreconditioner:
+        """Factorise the blocks of this rank's levels, then mid-levels; return the preconditioner.
+
+        The blocks, in hats and bubbles and with sorted indices, keep their pattern from one call to
+        the next.
+        """
+        numbering = self._numbering
+        self._mass = theta_mass(law, numbering.grid.level_thetas(law))
+        masses = [*self._mass.hats[numbering.levels], *self._mass.bubbles[numbering.mid_levels]]
+        for number, (block, mass) in enumerate(zip(blocks, masses, strict=True)):
+            if number == len(self._solvers):
+                self._solvers.append(PlaneSolver(block))
+            self._solvers[number].factorise(block.data / mass)
+        return self
 
     def apply(self, _pc: PETSc.PC, residual: PETSc.Vec, result: PETSc.Vec) -> None:
         """Set the result to P⁻¹ residual; called by PETSc."""
@@ -151,9 +148,8 @@ class ThetaPreconditioner:
         solvers, solutions = iter(self._solvers), []
         for load, rows in zip(loads, self._rank_levels, strict=True):
             solution = np.empty_like(load[rows])
-            # the solvers last, of which zip takes no more than there are loads
-            for *arrays, ksp in zip(load[rows], solution, solvers, strict=False):
-                ksp.solve(*(PETSc.Vec().createWithArray(x, comm=PETSc.COMM_SELF) for x in arrays))
+            for k, level in enumerate(rows):
+                next(solvers).solve(load[level], solution[k])
             solutions.append(np.concatenate(self._comm.allgather(solution)))
         hats, bubbles = solutions
         return hats, bubbles
@@ -165,18 +161,54 @@ class ThetaPreconditioner:
         viewer.printfASCII(f"    preconditioner along θ, {count}, each solved by\n")
         rank_viewer = viewer.getSubViewer(PETSc.COMM_SELF)
         if 0 in self._rank_levels[0]:  # on the rank that has it
-            self._solvers[0].view(rank_viewer)
+            self._solvers[0].ksp.view(rank_viewer)
         viewer.restoreSubViewer(rank_viewer)
 
 
-def plane_solver(block: sp.csr_matrix, mass: float) -> PETSc.KSP:
-    """Solver of one level's block over its mass along θ, by default a Cholesky factor."""
-    starts, columns = (x.astype(PETSc.IntType) for x in (block.indptr, block.indices))
-    csr = starts, columns, block.data / mass
-    matrix = PETSc.Mat().createAIJ(block.shape, csr=csr, comm=PETSc.COMM_SELF)
-    ksp = cholesky(matrix, PREFIX + LEVEL)
-    ksp.setUp()
-    return ksp
+class PlaneSolver:
+    """Solver of a level's block over its mass along θ, by default a Cholesky factor.
+
+    The symbolic factor of the pattern, whose indices are sorted, is kept.
+    """
+
+    def __init__(self, pattern: sp.csr_matrix) -> None:
+        starts, columns = (x.astype(PETSc.IntType) for x in (pattern.indptr, pattern.indices))
+        self._values = np.empty(pattern.nnz)  # PETSc's matrix has its values here
+        csr = starts, columns, self._values
+        self._matrix = PETSc.Mat().createAIJWithArrays(pattern.shape, csr, comm=PETSc.COMM_SELF)
+        self.ksp = cholesky(self._matrix, PREFIX + LEVEL)
+
+    def factorise(self, values: Array) -> None:
+        """Factorise the matrix of the pattern with these values, in the order of CSR."""
+        self._values[:] = values
+        self._matrix.assemble()
+        self.ksp.setOperators(self._matrix)
+        self.ksp.setFromOptions()  # so that PETSc knows them as used
+        self.ksp.setUp()
+
+    def solve(self, load: Array, solution: Array) -> None:
+        """Set `solution` to that for `load`."""
+        vectors = (PETSc.Vec().createWithArray(x, comm=PETSc.COMM_SELF) for x in (load, solution))
+        self.ksp.solve(*vectors)
+
+
+def level_blocks(matrix: PETSc.Mat, numbering: LevelNumbering) -> Iterator[sp.csr_matrix]:
+    """Diagonal blocks of this rank's levels, then of its mid-levels, in hats and bubbles, sorted.
+
+    `matrix` is an assembled reduced stiffness.
+    """
+    rows = numbering.rows
+    # unknowns of other ranks are those of the mid-level below the first level alone
+    first = max(0, rows.start - numbering.mid_level_size)
+    span = PETSc.IS().createStride(rows.stop - first, first, 1, comm=PETSc.COMM_SELF)
+    starts, columns, values = matrix.createSubMatrices(span)[0].getValuesCSR()
+    stiffness = sp.csr_matrix((values, columns, starts), (rows.stop - first,) * 2)
+    all_hats, all_bubbles = numbering.split(np.arange(numbering.size))
+    hats, bubbles = all_hats[numbering.levels], all_bubbles[numbering.mid_levels]
+    T = numbering.nodal_values()[first : rows.stop][:, np.append(hats, bubbles)]
+    products = T.T.tocsr() @ stiffness @ T
+    for start, stop in pairwise(np.cumsum([0, *map(len, hats), *map(len, bubbles)])):
+        yield products[start:stop, start:stop].sorted_indices()
 
 
 def injection(numbering: LevelNumbering) -> sp.csr_matrix:

@@ -57,7 +57,6 @@ def test_a_homogeneous_cell_returns_its_material_for_any_map(radius_map):
     assert result.modulus == pytest.approx(20e9, rel=1e-10)
     assert result.poisson == pytest.approx(0.3, rel=1e-10)
     assert np.ptp(result.curve.s11) < 1e-10 * result.curve.s11[0]
-    assert result.iterations == (0, 0)
 
 
 def test_phases_that_differ_in_what_no_load_sees_pass_the_patch_test():
@@ -127,16 +126,18 @@ ORTHOTROPIC = VoigtPhase(((90e9, 20e9, 5e9), (20e9, 50e9, 0.0), (5e9, 0.0, 30e9)
 SMALL = HermiteMap(0.2, 0.1, 0.55, 0.1)
 
 
-def test_slices_give_what_dolfinxs_assembly_and_petsc_give():
+@pytest.mark.parametrize("petsc", [{}, {"ksp_rtol": "1e-12"}])
+def test_the_form_over_slices_gives_what_it_gives_over_prisms(petsc):
     options = {"outline": Ellipse(2.0, 30.0), "mesh_size": 0.5, "layers": 3, "estimate": False}
-    slices = solve(SMALL, ORTHOTROPIC, **options)
-    petsc = solve(SMALL, ORTHOTROPIC, **options, petsc={"ksp_rtol": "1e-12"})
-    assert slices.solver == "theta" != petsc.solver
-    assert slices.unknowns == petsc.unknowns
+    slices = solve(SMALL, ORTHOTROPIC, **options, petsc=petsc)
+    factorised = {"ksp_type": "preonly", "pc_type": "cholesky"}
+    prisms = solve(SMALL, ORTHOTROPIC, **options, petsc=factorised)
+    assert slices.solver.startswith("theta")
+    assert slices.unknowns == prisms.unknowns
     for name in ("stiffness", "theta", "weights"):
-        ours, theirs = getattr(slices.curve, name), getattr(petsc.curve, name)
+        ours, theirs = getattr(slices.curve, name), getattr(prisms.curve, name)
         assert abs(ours - theirs).max() <= 1e-7 * abs(theirs).max()
-    ours, theirs = slices.energies.values, petsc.energies.values
+    ours, theirs = slices.energies.values, prisms.energies.values
     assert abs(ours - theirs).max() <= 1e-9 * abs(theirs).max()
 
 

@@ -45,7 +45,9 @@ def test_a_form_of_the_user_gives_the_matrix_and_the_solutions_of_the_model(cell
     assert gap.norm() < 1e-12 * expected.norm()
     loads = problem.loads(LOADS)
     vectors = cell.solve(matrix, loads).vectors
-    for x, y in zip(vectors, solve(problem.solver(MODEL.options), loads).vectors, strict=True):
+    for x, y in zip(
+        vectors, solve(problem.solver(MODEL.options, expected), loads).vectors, strict=True
+    ):
         assert x.array == pytest.approx(y.array, rel=1e-7, abs=1e-9)
 
 

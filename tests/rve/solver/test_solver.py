@@ -11,7 +11,6 @@ from alphacut.rve.fenicsx import MPI, PETSc, option_is_used
 from alphacut.rve.mesh.columns import extrude
 from alphacut.rve.prism.problem import PrismProblem
 from alphacut.rve.solver.krylov import SolverOptions
-from alphacut.rve.solver.theta_preconditioner import ThetaPreconditioner
 from alphacut.stochastic import HermiteMap
 
 CRISP = HermiteMap(0.5, 0, 0.5, 0)
@@ -32,7 +31,7 @@ def dense(matrix):
 
 
 def test_the_preconditioner_is_exact_where_nothing_changes_with_theta(problem, rng):
-    inverse = ThetaPreconditioner(problem.matrix, problem.numbering, CRISP.distribution)
+    inverse = problem.preconditioner(problem.matrix)
     solution, load = problem.matrix.createVecs()
     # bubbles have linear triangles only: exact on hats, and on linear triangles
     solution.array[:] = rng.standard_normal(len(solution.array))
@@ -47,7 +46,7 @@ def test_the_preconditioner_is_symmetric_and_definite_where_the_radius_changes()
     cone = HermiteMap(0.2, 0.3, 0.8, 0.9)
     one.move(cone)
     one.assemble(PHASES)
-    context = ThetaPreconditioner(one.matrix, one.numbering, cone.distribution)
+    context = one.preconditioner(one.matrix)
     unit, column = one.matrix.createVecs()
     inverse = np.empty((len(unit.array), len(unit.array)))
     for k in range(len(inverse)):
@@ -60,7 +59,7 @@ def test_the_preconditioner_is_symmetric_and_definite_where_the_radius_changes()
 
 
 def test_options_leave_no_trace_in_the_database(problem):
-    problem.solver(SolverOptions({"ksp_rtol": "1e-6", "level_pc_type": "lu"}))
+    problem.solver(SolverOptions({"ksp_rtol": "1e-6", "level_pc_type": "lu"}), problem.matrix)
     assert not [name for name in PETSc.Options().getAll() if name.startswith("rve_")]
 
 
@@ -68,14 +67,14 @@ def test_options_of_the_caller_hold_and_stay(problem):
     database = PETSc.Options()
     database["rve_ksp_rtol"] = "1e-13"
     try:
-        ksp = problem.solver(SolverOptions({"ksp_max_it": "99"}))
+        ksp = problem.solver(SolverOptions({"ksp_max_it": "99"}), problem.matrix)
         assert ksp.getTolerances()[0] == 1e-13
         assert ksp.getTolerances()[3] == 99
         assert database.getString("rve_ksp_rtol") == "1e-13"
         # as PETSC_OPTIONS puts them: named with the result, and not called unused at the end
         database["rve_pc_type"] = "jacobi"
         options = SolverOptions({"ksp_rtol": "1e-9"})
-        assert problem.solver(options).pc.getType() == "jacobi"
+        assert problem.solver(options, problem.matrix).pc.getType() == "jacobi"
         assert str(options) == "-rve_ksp_rtol 1e-9 -rve_pc_type jacobi"
         assert option_is_used("rve_ksp_rtol")
         assert option_is_used("rve_pc_type")
