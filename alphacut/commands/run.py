@@ -23,6 +23,7 @@ from alphacut.fuzzy.result import Nature
 from alphacut.io.files import locked, say, write_text
 from alphacut.io.provenance import FORMAT, command_line, command_to_paste, versions
 from alphacut.io.results import ResultsFolder
+from alphacut.io.typed_json import to_document
 from alphacut.questions.summary import SUMMARY, Parts, Results, Summary
 from alphacut.report import tables
 from alphacut.report.page import comparison_page, render_page
@@ -220,7 +221,7 @@ def identify(options: argparse.Namespace, out: TextIO) -> int:
         raise RefusedError("identify", None, "sections [identify], [frame] and [envelope]")
     alpha, structure = content.envelope.alpha, content.frame.nominal
     learned, _ = identify_inputs(content.identify, structure, alpha)
-    write_answer(options, dict(learned), out, run_text(Parts(update=learned)))
+    write_answer(options, to_document(learned), out, run_text(Parts(update=learned)))
     return 0
 
 

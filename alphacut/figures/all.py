@@ -18,7 +18,6 @@ from alphacut.io.provenance import NESTED, version_of
 from alphacut.questions.fragility import FragilityAnswer
 from alphacut.questions.summary import Results
 from alphacut.stages.cell import GPA, CellProblem
-from alphacut.stages.identify import IdentifiedResult
 from alphacut.stages.store import Stage, StageContext, StageResult, StageStore
 
 PARTS = 6  # tasks that the figures are divided into, so that no process waits long for another
@@ -29,7 +28,7 @@ def drawings(results: Results) -> Iterator[Drawing]:
     """Yields the name of each figure that the results allow, and the function that draws it."""
     yield from _material_figures(results)
     yield from _structure_figures(results)
-    if isinstance(results.learned, IdentifiedResult):
+    if results.learned is not None and not results.learned.is_refuted:
         yield "update-inputs", partial(envelope.identified_inputs, results.learned)
     for key, answer in results.answers.items():
         yield key, partial(envelope.DRAWINGS[key], answer)

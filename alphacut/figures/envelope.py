@@ -18,6 +18,7 @@ from alphacut.base.arrays import Array
 from alphacut.base.number_text import engineering
 from alphacut.figures import style
 from alphacut.figures.style import BLUE, GREY, INK, ORANGE, WIDTH
+from alphacut.frame import LearnedInputs
 from alphacut.frame.analyses.peaks import ANY
 from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.structures.quantities import Output
@@ -27,7 +28,6 @@ from alphacut.questions.probability import ProbabilityAnswer
 from alphacut.questions.summary import Results
 from alphacut.questions.tolerances import TolerancesAnswer
 from alphacut.stages.envelope import EnvelopeTask
-from alphacut.stages.identify import IdentifiedResult
 
 
 def drawings(task: EnvelopeTask, results: Results) -> Iterator[tuple[str, Callable[[], Figure]]]:
@@ -115,7 +115,7 @@ def draw_bars(
     return figure
 
 
-def identified_inputs(result: IdentifiedResult) -> Figure:
+def identified_inputs(result: LearnedInputs) -> Figure:
     """Draws each input's prior interval and its identified cuts, over the prior's middle."""
     alpha, prior = result.alpha, np.array([result.prior[name] for name in result.inputs], float)
     middles = prior.mean(axis=1)[:, None]
@@ -124,7 +124,7 @@ def identified_inputs(result: IdentifiedResult) -> Figure:
     for k, level in enumerate(alpha):
         label = f"after, α = {level:g}" if k in (0, len(alpha) - 1) else None
         look = {"height": 0.5 - 0.3 * level, "alpha": 0.35 + 0.6 * level, "label": label}
-        cuts = np.array([cuts[k] for cuts in result.inputs.values()])
+        cuts = np.array([(ends.lower[k], ends.upper[k]) for ends in result.inputs.values()])
         intervals.append((cuts / middles, {"color": BLUE, **look}))
     return draw_bars(intervals, result.inputs, "value over the middle of what it was before")
 

@@ -7,22 +7,23 @@ from dataclasses import dataclass, field
 from typing import Annotated, Any, Self
 
 import numpy as np
-from pydantic import AfterValidator, Field, ValidationError
+from pydantic import AfterValidator, Field, PlainValidator, ValidationError
 
 from alphacut.base.errors import RefusedError, require
 from alphacut.base.number_text import STANDARD_GRAVITY
 from alphacut.case.content import Content
 from alphacut.case.structure import Structure
+from alphacut.frame import LearnedInputs
 from alphacut.frame.structures.linear import frequencies
 from alphacut.io.files import Document, as_json
 from alphacut.io.results import COMPLETE, RUN_AGAIN, ResultsFolder, plain_name
+from alphacut.io.typed_json import from_document, to_document
 from alphacut.questions.decision import DecisionAnswer, decide
 from alphacut.questions.fragility import FragilityAnswer, fragility
 from alphacut.questions.probability import ProbabilityAnswer, probability
 from alphacut.questions.question import Answer, FuzzyResponse
 from alphacut.questions.tolerances import TolerancesAnswer, admissible_tolerances
 from alphacut.stages.envelope import EnvelopeResult, EnvelopeTask
-from alphacut.stages.identify import LearnedResult
 from alphacut.stages.image import ImageResult
 from alphacut.stages.modulus import ModulusResult
 from alphacut.stages.shares import ShareTable
@@ -32,6 +33,14 @@ from alphacut.stages.suite import SuiteResult
 SUMMARY = "summary.json"
 PlainName = Annotated[str, AfterValidator(plain_name)]
 """A name that leads out of no folder, as it becomes part of the name of a file."""
+
+
+def _learned(value: object) -> LearnedInputs:
+    return value if isinstance(value, LearnedInputs) else from_document(LearnedInputs, value)
+
+
+Learned = Annotated[LearnedInputs, PlainValidator(_learned)]
+"""What measured modes teach, from its document."""
 ANSWERS: dict[type[Answer], Callable[[Any, FuzzyResponse], Answer]] = {
     ProbabilityAnswer: probability,
     DecisionAnswer: decide,
@@ -65,7 +74,7 @@ class Results:
     structure: Structure | None = None
     tasks: tuple[EnvelopeTask, ...] = ()
     envelopes: dict[str, StageResult[EnvelopeResult]] = field(default_factory=dict)
-    learned: LearnedResult | None = None
+    learned: LearnedInputs | None = None
     suite: SuiteResult | None = None
     answers: dict[str, Numbers] = field(default_factory=dict)
     shares: StageResult[ShareTable] | None = None
@@ -124,7 +133,7 @@ class Parts(Numbers):
     damping: dict[str, tuple[float, float, float]] = Field(default={})
     envelopes: dict[PlainName, EnvelopeResult] = Field(default={})
     records: SuiteResult | None = None
-    update: LearnedResult | None = None
+    update: Learned | None = None
     probability: ProbabilityAnswer | None = None
     decision: DecisionAnswer | None = None
     tolerances: TolerancesAnswer | None = None
@@ -150,7 +159,10 @@ class Parts(Numbers):
 
     def parts(self) -> Document:
         """All parts by name but those that the run lacks."""
-        return {name: part for name, part in self if part not in (None, {})}
+        parts = {name: part for name, part in self if part not in (None, {})}
+        if self.update is not None:
+            parts["update"] = to_document(self.update)
+        return parts
 
     @property
     def encloses(self) -> str:

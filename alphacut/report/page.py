@@ -29,7 +29,6 @@ from alphacut.report.results import (
 from alphacut.report.tables import tables
 from alphacut.stages.cell import isotropic_label
 from alphacut.stages.envelope import EnvelopeResult
-from alphacut.stages.identify import RefutedResult
 
 SHARES = (
     "Share of the width, of peaks between those that motions reach, that is lost when an input is"
@@ -115,7 +114,7 @@ class Page:
         A piece is the name of a macro of the template, and what the macro shows.
         """
         summary, show = self.summary, self._pieces
-        refuted = [summary.update.refuted] if isinstance(summary.update, RefutedResult) else []
+        refuted = [summary.update.refuted] if summary.update and summary.update.refuted else []
         shares = [SHARES] if summary.shares else []
         box = [enclosing_box_words(summary.encloses)] if summary.encloses else []
         answers = [(x, (x.key, f"{x.key}-curves")) for x in summary.answers]

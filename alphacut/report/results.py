@@ -16,7 +16,6 @@ from alphacut.base.number_text import (
     number_text,
     percent_text,
     range_text,
-    rounded_ends,
     text_table,
 )
 from alphacut.frame.structures.quantities import output_of
@@ -26,7 +25,6 @@ from alphacut.questions.summary import FrameResult, Parts
 from alphacut.questions.tolerances import TolerancesAnswer
 from alphacut.stages.cell import UPPER_BOUND
 from alphacut.stages.envelope import EnvelopeResult, PeakResult
-from alphacut.stages.identify import IdentifiedResult
 from alphacut.stages.image import ImageResult
 from alphacut.stages.modulus import ModulusResult
 from alphacut.stages.store import CutsResult
@@ -47,10 +45,10 @@ def run_text(parts: Parts) -> str:
     """The results of a run for the console: tables, then sentences, answers and main drivers."""
     shown = [table for table in (material(parts), peak_table(parts)) if table.rows]
     lines = [*natures(parts), *smaller_steps(parts)]
-    if isinstance(parts.update, IdentifiedResult):
-        shown.append(learned(parts.update))
-    elif parts.update is not None:
+    if parts.update is not None and parts.update.is_refuted:
         lines.append(parts.update.refuted)
+    elif parts.update is not None:
+        shown.append(Table(*parts.update.table()))
     for row in answers(parts):
         lines += wrap(f"{row[0]}: {row[1]} ({row[2]})", 80, subsequent_indent="  ")
     lines += drivers(parts)
@@ -132,23 +130,6 @@ def width_text(image: ImageResult) -> str:
         return f"No {' or '.join(unknown)} bound of E: phases may be pores or rigid"
     parts = (f"{source} {width:.3g} GPa" for source, width in image.widths_GPa.items())
     return f"Width of E from {', '.join(parts)}"
-
-
-def learned(result: IdentifiedResult) -> Table:
-    """Table of the inputs before and after measured modes were used, then of predicted modes."""
-    rows: list[Row] = []
-    for name, cuts in result.inputs.items():
-        texts = (_outer_text(ends, result.units[name]) for ends in (result.prior[name], cuts[0]))
-        rows.append((name, *texts, f"{result.narrowed[name]:.0%} of the width"))
-    for mode in result.held_out:
-        predicted = _outer_text(mode.predicted, "Hz")
-        rows.append((f"mode {mode.mode}", f"{mode.measured:.4g} Hz", predicted, mode.verdict))
-    return Table(("input or mode", "before, measured", "learned, predicted", ""), rows)
-
-
-def _outer_text(ends: tuple[float, float], unit: str) -> str:
-    texts = (engineering(x, unit) for x in rounded_ends(*ends, Nature.GUARANTEED))
-    return " … ".join(dict.fromkeys(texts))
 
 
 def peak_table(parts: Parts) -> Table:

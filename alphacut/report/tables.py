@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from alphacut.base.number_text import MINUS, rounded_ends
+from alphacut.frame import LearnedInputs
 from alphacut.fuzzy.result import Nature, of_enclosing_box
 from alphacut.io.files import Document, write_text
 from alphacut.io.results import ResultsFolder
@@ -17,7 +18,6 @@ from alphacut.questions.question import Table
 from alphacut.questions.summary import Parts
 from alphacut.report.results import unit_of
 from alphacut.stages.envelope import EnvelopeResult, PeakResult
-from alphacut.stages.identify import IdentifiedResult
 from alphacut.stages.image import ImageResult
 from alphacut.stages.modulus import ModulusResult
 from alphacut.stages.suite import SuiteResult
@@ -37,12 +37,12 @@ SYMBOLS |= str.maketrans({"…": r"\dots{}", "µ": r"\textmu{}"})
 
 def frames(parts: Parts) -> dict[str, pd.DataFrame]:
     """Numbers of all results as data frames by name: of stages, then of questions."""
-    identified = parts.update if isinstance(parts.update, IdentifiedResult) else None
+    refuted = parts.update is not None and parts.update.is_refuted
     of_stages: tuple[tuple[str, Callable[[Any], pd.DataFrame], object], ...] = (
         ("radius_map", radius_map, parts.microstructure),
         ("modulus", modulus, parts.modulus),
         ("image", modulus, parts.image),
-        ("update", update, identified),
+        ("update", _rows_of_update, None if refuted else parts.update),
         ("peaks", peaks, parts.envelopes),
         ("records", records, parts.records),
         ("shares", shares, parts.shares),
@@ -79,19 +79,8 @@ def modulus(result: ModulusResult | ImageResult) -> pd.DataFrame:
     return pd.DataFrame(columns | {"nature of E": str(result.nature)})
 
 
-def update(result: IdentifiedResult) -> pd.DataFrame:
-    """Inputs before and after measured modes were used, then the modes predicted and measured."""
-    inputs = [
-        (name, result.units[name], *result.prior[name], *cuts[0], result.narrowed[name], "")
-        for name, cuts in result.inputs.items()
-    ]
-    modes = [
-        (f"mode {x.mode}", "Hz", x.measured, x.measured, *x.predicted, np.nan, x.verdict)
-        for x in result.held_out
-    ]
-    head = ["input or mode", "unit", "before or measured, from", "before or measured, to"]
-    head += ["from", "to", "narrowed by", "inside"]
-    return pd.DataFrame([*inputs, *modes], columns=head)
+def _rows_of_update(learned: LearnedInputs) -> pd.DataFrame:
+    return pd.DataFrame(learned.records())
 
 
 def peaks(studies: Mapping[str, EnvelopeResult]) -> pd.DataFrame:

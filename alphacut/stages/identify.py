@@ -8,58 +8,22 @@ from typing import Any
 from alphacut.base.errors import RefusedError, require
 from alphacut.case.motion import Identify
 from alphacut.case.structure import Structure
-from alphacut.frame import identify, read_modes
-from alphacut.frame.identify.identify import Evidence, Identified
-from alphacut.stages.store import CutsResult, Numbers, Values
-
-
-class Prediction(Numbers):
-    """Measured frequency of a mode, and its predicted bounds on the lowest level, in Hz."""
-
-    mode: int
-    measured: float
-    predicted: tuple[float, float]
-    inside: bool
-
-    @property
-    def verdict(self) -> str:
-        """Whether the measured frequency lies inside, in a word."""
-        return "inside" if self.inside else "outside"
-
-
-class IdentifiedResult(Numbers):
-    """Identified inputs: α-cuts in SI, and the share of its width by which each is narrowed."""
-
-    alpha: Values
-    inputs: dict[str, CutsResult]
-    narrowed: dict[str, float]
-    units: dict[str, str]
-    claim: str
-    held_out: tuple[Prediction, ...]
-    prior: dict[str, tuple[float, float]]
-
-
-class RefutedResult(Numbers):
-    """How measurements refute the frame."""
-
-    refuted: str
-
-
-LearnedResult = IdentifiedResult | RefutedResult
+from alphacut.frame import LearnedInputs, identify, read_modes
+from alphacut.frame.identify.identify import Evidence
 
 
 def identify_inputs(
     section: Identify, structure: Structure, alpha: tuple[float, ...]
-) -> tuple[LearnedResult, Structure]:
-    """Numbers of the inputs identified from measured modes, in SI, and the updated structure.
+) -> tuple[LearnedInputs, Structure]:
+    """What measured modes teach about the inputs, and the structure with the learned inputs.
 
-    Where the measurement refutes the frame, the result says so and the structure is as before.
+    Where the measurement refutes the frame, the answer says so and the structure is as before.
     """
     learned = identify(**_arguments(section, structure, alpha))
     if learned.is_refuted:
-        return RefutedResult(refuted=learned.refutation), structure
+        return learned.answer, structure
     numbers = {**structure.numbers, **learned.inputs}
-    return _stored(learned), replace(structure, numbers=numbers)
+    return learned.answer, replace(structure, numbers=numbers)
 
 
 def require_learnable(section: Identify, structure: Structure, alpha: tuple[float, ...]) -> None:
@@ -85,17 +49,3 @@ def _arguments(section: Identify, structure: Structure, alpha: tuple[float, ...]
     inputs = structure.inputs(section.learn, "identify.learn")
     options = {"held_out": section.held_out, "alpha": alpha}
     return {"frame": structure.frame, "inputs": inputs, "modes": modes, **options}
-
-
-def _stored(learned: Identified) -> IdentifiedResult:
-    answer = learned.answer
-    inputs = {name: CutsResult(**ends._asdict()) for name, ends in answer.inputs.items()}
-    return IdentifiedResult(
-        alpha=answer.alpha,
-        inputs=inputs,
-        narrowed=dict(answer.narrowed),
-        units=dict(answer.units),
-        claim=answer.claim,
-        held_out=tuple(Prediction(**vars(mode)) for mode in answer.held_out),
-        prior=dict(answer.prior),
-    )

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from textwrap import fill
 
 import numpy as np
 
 from alphacut.base.arrays import Array
-from alphacut.fuzzy.result import Ends, Nature, rounded
+from alphacut.base.nature import Nature
+from alphacut.base.number_text import Table, engineering, rounded_ends, text_table
+from alphacut.fuzzy.result import Ends
+
+Record = dict[str, str | float | None]
+"""Numbers and texts of a row, in SI, by the titles of their columns."""
 
 
 @dataclass(frozen=True)
@@ -64,23 +69,13 @@ class Predictions:
         verdicts = {mode.mode: f", {mode.verdict}: held out" for mode in self.held_out}
         lines = [f"guaranteed frequencies at α = {self.alpha[0]:g}"]
         for mode, ends in enumerate(zip(self.lower[0], self.upper[0], strict=True), start=1):
-            line = f"mode {mode}: {range_text(ends, 'Hz')}"
+            line = f"mode {mode}: {outer_text(ends, 'Hz')}"
             if mode in self.measured:
                 line += f", measured {self.measured[mode]:.4g} Hz{verdicts.get(mode, '')}"
             lines.append(line)
         return "\n".join(lines)
 
     __repr__ = __str__
-
-
-class LearnedRow(NamedTuple):
-    """A parameter before and after, or a held-out mode measured and predicted, with its unit."""
-
-    name: str
-    unit: str
-    before: tuple[float, float]
-    after: tuple[float, float]
-    remark: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,36 +102,64 @@ class LearnedInputs:
     prior: Mapping[str, tuple[float, float]]
     refuted: str = ""
 
-    def rows(self) -> Iterator[LearnedRow]:
-        """Yield each parameter at the lowest α, then each held-out mode."""
+    @property
+    def is_refuted(self) -> bool:
+        """Whether no parameters in their priors agree with the measured modes."""
+        return bool(self.refuted)
+
+    def table(self) -> Table:
+        """Return texts of each parameter before and after, then of each mode that was held out."""
+        rows: list[tuple[str, ...]] = []
         for name, ends in self.inputs.items():
-            after = float(ends.lower[0]), float(ends.upper[0])
-            remark = f"{self.narrowed[name]:.0%} of the width"
-            yield LearnedRow(name, self.units[name], self.prior[name], after, remark)
+            unit, after = self.units[name], (float(ends.lower[0]), float(ends.upper[0]))
+            texts = outer_text(self.prior[name], unit), outer_text(after, unit)
+            rows.append((name, *texts, f"{self.narrowed[name]:.0%} of the width"))
+        for mode in self.held_out:
+            predicted = outer_text(mode.predicted, "Hz")
+            rows.append((f"mode {mode.mode}", f"{mode.measured:.4g} Hz", predicted, mode.verdict))
+        return Table(("input or mode", "before, measured", "learned, predicted", ""), rows)
+
+    def records(self) -> list[Record]:
+        """Return the numbers of the table, in SI: parameters at the lowest α, then modes."""
+        rows: list[Record] = []
+        for name, ends in self.inputs.items():
+            before, after = self.prior[name], (float(ends.lower[0]), float(ends.upper[0]))
+            rows.append(_record(name, self.units[name], before=before, after=after))
+            rows[-1]["narrowed by"] = self.narrowed[name]
         for mode in self.held_out:
             measured = mode.measured, mode.measured
-            yield LearnedRow(f"mode {mode.mode}", "Hz", measured, mode.predicted, mode.verdict)
+            rows.append(_record(f"mode {mode.mode}", "Hz", before=measured, after=mode.predicted))
+            rows[-1]["inside"] = mode.verdict
+        return rows
+
+    def words(self) -> str:
+        """Return what the boxes claim, or why the frame is refuted."""
+        return self.refuted or f"Guaranteed boxes at α = {self.alpha[0]:g}: {self.claim}"
 
     def __str__(self) -> str:
-        """Return a line for each parameter and each held-out mode, or why the frame is refuted."""
-        if self.refuted:
-            return self.refuted
-        lines = [f"guaranteed boxes at α = {self.alpha[0]:g}"]
-        for row in self.rows():
-            before = range_text(row.before, row.unit)
-            lines.append(f"{row.name}: {before} → {range_text(row.after, row.unit)}, {row.remark}")
-        return "\n".join([*lines, self.claim])
+        """Return the table, then the sentences; of a refuted frame these alone."""
+        return self.refuted or f"{text_table(*self.table())}{fill(self.words(), 100)}"
 
     __repr__ = __str__
 
 
-def range_text(ends: tuple[float, float], unit: str) -> str:
+def _record(
+    name: str, unit: str, *, before: tuple[float, float], after: tuple[float, float]
+) -> Record:
+    """Row of numbers of a parameter or a mode, without how far it is narrowed or inside."""
+    return {
+        "input or mode": name,
+        "unit": unit,
+        "before or measured, from": before[0],
+        "before or measured, to": before[1],
+        "from": after[0],
+        "to": after[1],
+        "narrowed by": None,
+        "inside": "",
+    }
+
+
+def outer_text(ends: tuple[float, float], unit: str) -> str:
     """Return a range with its unit, rounded outwards; one number where its ends agree."""
-    low, high = ends
-    if low == high:
-        return f"{low:.4g} {unit}".strip()
-    texts = [
-        f"{rounded(low, 'lower', Nature.GUARANTEED):.4g}",
-        f"{rounded(high, 'upper', Nature.GUARANTEED):.4g}",
-    ]
-    return f"{' … '.join(dict.fromkeys(texts))} {unit}".strip()
+    texts = (engineering(end, unit) for end in rounded_ends(*ends, Nature.GUARANTEED))
+    return " … ".join(dict.fromkeys(texts))

@@ -1,0 +1,53 @@
+"""What was learned, as a table, as rows of numbers and as a document."""
+
+import csv
+import io
+import json
+
+import numpy as np
+import pytest
+
+from alphacut.frame import LearnedInputs, Prediction
+from alphacut.fuzzy.result import Ends
+from alphacut.io.files import as_json
+from alphacut.io.typed_json import from_document, to_document
+
+LEARNED = LearnedInputs(
+    alpha=np.array([0.05, 1.0]),
+    inputs={"k1": Ends(np.array([1.23456e6, 1.4e6]), np.array([1.65432e6, 1.5e6]))},
+    narrowed={"k1": 0.21},
+    units={"k1": "N/m"},
+    claim="the parameter lies in its cut",
+    held_out=(Prediction(3, 4.3, (4.1111, 4.5222), inside=True),),
+    prior={"k1": (1e6, 3e6)},
+)
+REFUTED = LearnedInputs(np.array([0.05]), {}, {}, {}, "", (), {}, refuted="refuted, since …")
+
+
+def test_ends_are_rounded_outwards_in_the_table():
+    head, rows = LEARNED.table()
+    assert head[:2] == ("input or mode", "before, measured")
+    first, second = rows
+    assert first == ("k1", "1.000 MN/m … 3.000 MN/m", "1.234 MN/m … 1.655 MN/m", "21% of the width")
+    assert second == ("mode 3", "4.3 Hz", "4.111 Hz … 4.523 Hz", "inside")
+    assert "the parameter lies in its cut" in str(LEARNED)
+    assert str(REFUTED) == "refuted, since …"
+
+
+def test_records_have_exact_numbers():
+    parameter, mode = LEARNED.records()
+    assert [parameter[x] for x in ("from", "to", "narrowed by")] == [1.23456e6, 1.65432e6, 0.21]
+    assert [mode[x] for x in ("from", "to", "inside")] == [4.1111, 4.5222, "inside"]
+    assert parameter.keys() == mode.keys()
+    rows = io.StringIO()
+    csv.DictWriter(rows, [*parameter]).writerow(parameter)
+    assert "1234560.0" in rows.getvalue()
+
+
+@pytest.mark.parametrize("answer", [LEARNED, REFUTED])
+def test_a_document_gives_the_same_answer(answer):
+    document = json.loads(as_json(to_document(answer)))
+    again = from_document(LearnedInputs, document)
+    assert as_json(to_document(again)) == as_json(to_document(answer))
+    assert again.is_refuted == answer.is_refuted
+    assert str(again) == str(answer)
