@@ -18,7 +18,9 @@ import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.frame.records.recording import Recording
+from alphacut.frame.records.stated_peak import StatedPeak, peaks_in_text
 from alphacut.frame.records.text_file import TextFile, choose_channel, recording_in_si
+from alphacut.frame.records.units import acceleration_factor
 
 FORTRAN = r"\(\s*(\d*)\s*[A-Za-z](\d+)(?:\.\d+\w*)?\s*\)"
 """Numbers in a line and characters of one, as in (8f10.6)."""
@@ -33,7 +35,8 @@ REALS = re.compile(
 )
 CHANNEL = re.compile(r".*\bSta\s+Chan\s*(\w+)\s*:\s*(.*?)\s*(?:\(|Location|$).*", re.IGNORECASE)
 CODE = re.compile(r"\s*End[- ]of[- ]data for\s+(?:Chan\s*)?(\w*)\b.*", re.IGNORECASE)
-RAW_STEP, PROCESSED_STEP = 34, 62  # entries of the real header
+RAW_STEP, PROCESSED_STEP, PEAK = 34, 62, 64  # entries of the real header
+NULL = -999.0  # of an entry that is not known
 ROUNDED = 1.5
 """Seconds by which the stated duration may be off; files have it rounded or cut to seconds."""
 CSMIP = re.compile(r"\s*(UN)?CORRECTED ACCELEROGRAM\b.*", re.IGNORECASE)
@@ -46,7 +49,10 @@ SERIES = re.compile(
 CSMIP_CHANNEL = re.compile(r".*\bChan(?:nel)?\s*(\w+)\s*:\s*(.*?)\s*(?:\(|from|$).*", re.IGNORECASE)
 V1_TEXT, V1_INTEGERS, V1_REALS = 13, 7, 7  # lines
 V1_COUNTS, V1_DURATION = (33, 28), 3  # entries of the integer header and of the real one
-V1_UNIT = re.compile(r"\b(g/10|g\*10|10\*?g|cm/s(?:ec)?/s(?:ec)?|g)\b", re.IGNORECASE)
+V1_UNIT = re.compile(
+    r"\bUNITS?\b.*?(?<![\w/*])(g/10|g\*10|10\*?g|cm/s(?:ec)?/s(?:ec)?|g)(?![\w/*])", re.IGNORECASE
+)
+"""The unit of accelerations in the line that states units; other lines name units of a sensor."""
 
 
 Channel = tuple[tuple[str, ...], int, Callable[[], Recording]]
@@ -96,26 +102,40 @@ def _read_cosmos(file: TextFile, line: int, reals: int, names: tuple[str, ...]) 
     match = DATA.fullmatch(file.lines[line])
     assert match is not None
     count, unit, width = int(match[1]), match[3].rstrip("."), int(match[5])
-    step = _cosmos_step(file, line, reals, count, float(match[2]))
+    header = _real_header(file, reals)
+    step = _cosmos_step(file, reals, header, count=count, duration=float(match[2]))
     below = file.lines[line + 1].rstrip() if line + 1 < len(file.lines) else ""
     samples = _samples(file, line, count, len(below) // max(width, 1), width)
-    return recording_in_si(file.location(line), "COSMOS V2", unit, step, samples, " ".join(names))
+    stated, to_si = [], acceleration_factor(unit)
+    if header[PEAK - 1] != NULL and to_si is not None:
+        stated.append(StatedPeak(to_si * abs(float(header[PEAK - 1]))))
+    return recording_in_si(
+        file.location(line), "COSMOS V2", unit, step, samples, " ".join(names), stated=stated
+    )
 
 
-def _cosmos_step(file: TextFile, line: int, reals: int, count: int, duration: float) -> float:
-    """Step in s from the real header: the first entry that fits the duration in s."""
-    match = REALS.fullmatch(file.lines[reals]) if reals >= 0 else None
-    allowed = f"a real header whose entry {PROCESSED_STEP} or {RAW_STEP} agrees with the duration"
+HEADER_WORDS = f"a real header whose entry {PROCESSED_STEP} or {RAW_STEP} agrees with the duration"
+
+
+def _real_header(file: TextFile, line: int) -> Array:
+    """Entries of the real header that a line announces, followed by zeros; refuses none."""
+    match = REALS.fullmatch(file.lines[line]) if line >= 0 else None
     if match is None:
-        raise file.refusal(line, "without a real header", allowed)
-    values = file.numbers(reals + 1, reals + 1 + int(match[2]), width=int(match[4]))
-    entries = np.append(values, np.zeros(PROCESSED_STEP))
-    processed, raw = float(entries[PROCESSED_STEP - 1]), float(entries[RAW_STEP - 1])
+        raise file.refusal(max(line, 0), "without a real header", HEADER_WORDS)
+    values = file.numbers(line + 1, line + 1 + int(match[2]), width=int(match[4]))
+    return np.append(values, np.zeros(PEAK))
+
+
+def _cosmos_step(
+    file: TextFile, reals: int, header: Array, *, count: int, duration: float
+) -> float:
+    """Step in s from the real header: the first entry that fits the duration in s."""
+    processed, raw = float(header[PROCESSED_STEP - 1]), float(header[RAW_STEP - 1])
     for step in (processed / 1000, raw, raw / 1000):
         if step > 0 and abs(count * step - duration) <= ROUNDED + 0.01 * duration:
             return step
     value = f"a step of {raw:g} for {count} samples in {duration:g} s"
-    raise file.refusal(reals, value, allowed)
+    raise file.refusal(reals, value, HEADER_WORDS)
 
 
 def _csmip_channels(file: TextFile) -> Iterator[Channel]:
@@ -139,7 +159,10 @@ def _read_csmip(file: TextFile, start: int, end: int, names: tuple[str, ...]) ->
         return _read_unannounced(file, start, end, names)
     unit, step = (match[3] or match[4] or "").rstrip(".,"), float(match[2])
     samples = _samples(file, line, int(match[1]), int(match[5] or 8), int(match[6] or 10))
-    return recording_in_si(file.location(line), "CSMIP", unit, step, samples, " ".join(names))
+    stated = peaks_in_text(file.lines[start:line], unit)
+    return recording_in_si(
+        file.location(line), "CSMIP", unit, step, samples, " ".join(names), stated=stated
+    )
 
 
 def _read_unannounced(file: TextFile, start: int, end: int, names: tuple[str, ...]) -> Recording:
@@ -166,4 +189,7 @@ def _read_unannounced(file: TextFile, start: int, end: int, names: tuple[str, ..
         step = float(steps.mean())
         if np.ptp(steps) > 0.1 * step or not step > 0:
             raise file.refusal(line, "uneven times", "even steps", "resample to even steps")
-    return recording_in_si(file.location(line), "CSMIP V1", unit, step, samples, " ".join(names))
+    stated = peaks_in_text(file.lines[start : start + V1_TEXT], unit)
+    return recording_in_si(
+        file.location(line), "CSMIP V1", unit, step, samples, " ".join(names), stated=stated
+    )

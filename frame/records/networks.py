@@ -13,7 +13,10 @@ from __future__ import annotations
 import re
 from math import ceil
 
+import numpy as np
+
 from alphacut.frame.records.recording import Recording
+from alphacut.frame.records.stated_peak import StatedPeak, peaks_in_text
 from alphacut.frame.records.text_file import ACCELERATION_UNITS, NUMBER, TextFile, recording_in_si
 
 PEER_HEAD_LINES = 12
@@ -37,13 +40,17 @@ DURATION = re.compile(r"\s*([0-9.]+)\s*")
 KNET_FIELDS = {"Sampling Freq(Hz)": FREQUENCY, "Duration Time(s)": DURATION, "Scale Factor": SCALE}
 KNET_LABEL = 18
 """Columns of a label in the head."""
-ESM_LINE = re.compile(r"([A-Z][A-Z0-9_/.]*(?: [A-Z0-9_/.]+)*)\s*:\s*(.*)")
+ESM_LINE = re.compile(r"([A-Z][A-Z0-9_/.^]*(?: [A-Z0-9_/.]+)*)\s*:\s*(.*)")
 INTERVAL, COUNT, KIND = "SAMPLING_INTERVAL_S", "NDATA", "DATA_TYPE"
+ESM_PEAK = "PGA_CM/S^2"
 SMC = re.compile(r"\s*([1-4])\s+(?:(?:UN)?CORRECTED ACCELEROGRAM|VELOCITY|DISPLACEMENT)\s*$")
 SMC_TEXT, SMC_INTEGERS, SMC_REALS = 11, 6, 10
 """Lines of the three heads of an SMC file."""
 VERTICAL_ANGLE, COMMENTS, POINTS, RATE = 13, 16, 17, 2
 """Entries of the integer head, from 1, and the one of the real head with samples in a second."""
+SMC_EXTREMES, SMC_NULL = (30, 32), 1e38
+"""Entries of the real head with the largest and the least sample; numbers above stand for none."""
+GAL = 0.01  # in m/s²
 
 
 def read_peer(file: TextFile) -> Recording:
@@ -62,7 +69,9 @@ def read_peer(file: TextFile) -> Recording:
         file.require_count(samples, count, row)
     component = PEER_COMPONENT.fullmatch(file.lines[1]) if row > 1 else None
     channel = component[1] if component else ""
-    return recording_in_si(file.location(line), "PEER AT2", unit, step, samples, channel)
+    stated = peaks_in_text(file.lines[: row + 1], unit)
+    location = file.location(line)
+    return recording_in_si(location, "PEER AT2", unit, step, samples, channel, stated=stated)
 
 
 def _peer_unit(file: TextFile, last: int) -> tuple[int, str]:
@@ -95,8 +104,16 @@ def read_knet(file: TextFile) -> Recording:
     rate, duration, gal, full_scale = numbers
     counts = file.numbers(end + 1, len(file.lines))
     file.require_count(counts, round(duration * rate), head["Duration Time(s)"][0])
-    location, channel = file.location(end), head.get("Dir.", (0, ""))[1].strip()
-    return recording_in_si(location, "K-NET", "gal", 1 / rate, counts * (gal / full_scale), channel)
+    channel = head.get("Dir.", (0, ""))[1].strip()
+    return recording_in_si(
+        file.location(end),
+        "K-NET",
+        "gal",
+        1 / rate,
+        counts * (gal / full_scale),
+        channel,
+        stated=peaks_in_text(file.lines[:end], "gal"),
+    )
 
 
 def read_esm(file: TextFile) -> Recording:
@@ -119,7 +136,10 @@ def read_esm(file: TextFile) -> Recording:
     file.require_count(samples, count, head[COUNT][1])
     unit, unit_row = head.get("UNITS", ("", head[INTERVAL][1]))
     channel, _ = head.get("STREAM", ("", 0))
-    return recording_in_si(file.location(unit_row), "ESM", unit, step, samples, channel)
+    peak, _ = head.get(ESM_PEAK, ("", 0))
+    stated = peaks_in_text([f"PGA: {peak} cm/s^2"], "cm/s^2")
+    location = file.location(unit_row)
+    return recording_in_si(location, "ESM", unit, step, samples, channel, stated=stated)
 
 
 def read_smc(file: TextFile) -> Recording:
@@ -143,7 +163,18 @@ def read_smc(file: TextFile) -> Recording:
     samples = file.numbers(first, first + ceil(count / 8), width=10)
     file.require_count(samples, count, SMC_TEXT)
     channel = "vertical" if integers[VERTICAL_ANGLE - 1] in (0, 180) else ""
-    return recording_in_si(file.location(reals_line), "SMC", "cm/s^2", 1 / rate, samples, channel)
+    in_text = [*peaks_in_text(file.lines[:SMC_TEXT], "cm/s^2")]
+    extremes = np.abs([reals[k - 1] for k in SMC_EXTREMES if k <= len(reals)])
+    largest = float(extremes[extremes < SMC_NULL].max(initial=0.0))
+    return recording_in_si(
+        file.location(reals_line),
+        "SMC",
+        "cm/s^2",
+        1 / rate,
+        samples,
+        channel,
+        stated=[*in_text, StatedPeak(GAL * largest)],
+    )
 
 
 FORMATS = (

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -11,9 +13,11 @@ from alphacut.base.errors import RefusedError, require
 from alphacut.frame.records.cosmos import is_cosmos, read_cosmos
 from alphacut.frame.records.networks import FORMATS
 from alphacut.frame.records.recording import Recording
+from alphacut.frame.records.stated_peak import StatedPeak
 from alphacut.frame.records.tables import is_table, read_table
 from alphacut.frame.records.text_file import TextFile, choose_channel, read_bytes, recording_in_si
 from alphacut.frame.records.uff import is_universal, read_uff_record
+from alphacut.frame.records.units import acceleration_factor
 
 READ = "PEER AT2, COSMOS, CSMIP, SMC, K-NET, ESM, miniSEED, SAC, UFF 58, CSV"
 MINISEED = re.compile(rb"[0-9 ]{6}[DRQM][ \0]|MS\x03")
@@ -90,4 +94,19 @@ def _read_waveform(path: Path, channel: str, unit: str) -> Recording:
     samples, step = np.asarray(trace.data, float), float(trace.stats.delta)
     file_format = str(trace.stats.get("_format", "waveform"))
     channel = str(trace.stats.channel)
-    return recording_in_si(path.name, file_format, unit, step, samples, channel)
+    return recording_in_si(
+        path.name,
+        file_format,
+        unit,
+        step,
+        samples,
+        channel,
+        stated=_sac_peak(trace.stats.get("sac", {}), unit),
+    )
+
+
+def _sac_peak(head: Mapping[str, Any], unit: str) -> list[StatedPeak]:
+    """The peak that the head of a SAC file states in the unit of its samples; none in others."""
+    extremes = [abs(float(head[key])) for key in ("depmin", "depmax") if key in head]
+    to_si = acceleration_factor(unit)
+    return [StatedPeak(to_si * max(extremes))] if len(extremes) == 2 and to_si else []

@@ -15,13 +15,14 @@ import numpy as np
 from alphacut.base.arrays import Array
 from alphacut.base.errors import require
 from alphacut.frame.records.recording import Recording
+from alphacut.frame.records.stated_peak import peaks_in_text
 from alphacut.frame.records.text_file import (
     ACCELERATION_UNITS,
     TextFile,
     read_bytes,
     recording_in_si,
 )
-from alphacut.frame.records.units import NEWTONS, SECONDS, acceleration_factor
+from alphacut.frame.records.units import NEWTONS, SECONDS, acceleration_factor, other_quantity
 from alphacut.stochastic.particles.csv_columns import NUMBER
 
 TIME = r"\W*(?:time|t)\b\W*([a-zµ]*)\W*[,;\s]\W*"
@@ -31,6 +32,23 @@ FORCE_HEAD = re.compile(TIME + rf"(?:force|load|f)\b{UNIT}", re.IGNORECASE)
 """A head of two columns: units of the times and of the values, each empty where it has none."""
 ALLOWED = "time [s],acceleration [m/s^2], [g] or [gal]"
 ALLOWED_FORCE = "time [s],force [kN], or time [s],force of a course without a unit"
+OTHER_WORDS = {
+    "a displacement": r"disp(?:l\w*)?|deflection|drift|position",
+    "a velocity": r"vel(?:oc\w*)?|speed",
+    "a force": r"forces?|loads?|thrust|(?:base )?shear",
+    "a strain": r"strains?",
+    "a stress": r"stress(?:es)?|pressure",
+    "an angle": r"rotation|angle|tilt",
+    "a number of counts": r"counts?",
+    "a voltage": r"voltage|volts?",
+}
+OTHER_COLUMN = {
+    name: re.compile(rf"(?:\b|_)(?:{words})(?:\b|_)", re.IGNORECASE)
+    for name, words in OTHER_WORDS.items()
+}
+"""Words in the head of a column whose quantity is no acceleration, by what it is called."""
+ACCELERATION_WORD = re.compile(r"(?:\b|_)(?:acc(?:el\w*)?|ag)(?:\b|_)", re.IGNORECASE)
+BRACKETED = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]")
 UNEVEN = 0.05
 """Fraction of a step by which a time may miss its place, as times that are rounded do."""
 
@@ -39,12 +57,16 @@ UNEVEN = 0.05
 class _Table:
     """A table of numbers: its last line of head, empty without one, and cells of each row by line.
 
-    Lines are counted from 0; `start` is the first that is neither empty nor a comment.
+    Lines are counted from 0; `start` is the first that is neither empty nor a comment. `above` are
+    all lines above the numbers, comments among them, and `column_heads` those of them that tell
+    what the columns are: the last one, and those that begin with a time.
     """
 
     head: str
     start: int
     rows: dict[int, list[str]]
+    column_heads: tuple[str, ...]
+    above: tuple[str, ...]
 
     @classmethod
     def of(cls, file: TextFile) -> _Table:
@@ -54,7 +76,24 @@ class _Table:
         first = next(starts, len(file.lines))
         head = [x for k, x in lines.items() if k < first][-1:]
         rows = {k: re.findall(r'[^,;\s"]+', x) for k, x in lines.items() if k >= first}
-        return cls("".join(head), min(lines, default=0), rows)
+        above = tuple(x.lstrip("# \t") for x in file.lines[:first] if x.strip("# \t"))
+        begin_with_time = [x for x in above[:-1] if re.match(TIME, x, re.IGNORECASE)]
+        heads = (*begin_with_time, *above[-1:])
+        return cls("".join(head), min(lines, default=0), rows, heads, above)
+
+    def other_quantity(self) -> str:
+        """The quantity, not an acceleration, that a head of the columns names; empty if none."""
+        for head in self.column_heads:
+            if ACCELERATION_WORD.search(head):
+                continue
+            named = (name for name, pattern in OTHER_COLUMN.items() if pattern.search(head))
+            if name := next(named, ""):
+                return name
+        for head in self.column_heads:
+            for unit in BRACKETED.findall(head):
+                if name := other_quantity(unit):
+                    return name
+        return ""
 
     def numbers(self, file: TextFile, columns: int) -> Array:
         """The numbers, shape (rows, columns); refuses a row of others."""
@@ -84,6 +123,9 @@ def read_table(file: TextFile, step: float | None = None, unit: str = "") -> Rec
     allowed = "a header with units, and rows of numbers below it"
     require(len(table.rows) > 1, file.name, f"{len(table.rows)} rows", allowed)
     columns = len(next(iter(table.rows.values())))
+    if columns < 3 and (quantity := table.other_quantity()):
+        shown = " ".join(table.column_heads)
+        raise file.refusal(table.start, shown, ALLOWED, f"its column is {quantity}")
     match = HEAD.fullmatch(table.head) if columns == 2 else None
     time_unit, head_unit = match.groups() if match else ("", "")
     unit, to_s = head_unit or unit, SECONDS.get(time_unit or "s", 0.0)
@@ -92,17 +134,26 @@ def read_table(file: TextFile, step: float | None = None, unit: str = "") -> Rec
         value = table.head[:80] or f"{columns} columns without a head"
         allowed = f"a unit of {ACCELERATION_UNITS}, and a step" if columns == 1 else ALLOWED
         cure = 'records.unit = "g"' + (', records.step = "0.005 s"' if columns == 1 else "")
-        cure = "keep times and one component" if columns > 2 else f"or say {cure}"
+        cure = f"or say {cure}"
+        if (
+            head_unit and acceleration_factor(head_unit) is None
+        ):  # the case's unit does not stand in
+            cure = f"{head_unit} is no unit of accelerations: mend the head"
+        if columns > 2:
+            cure = "keep times and one component"
         raise file.refusal(table.start, value, allowed, cure)
     numbers, location = table.numbers(file, columns), file.location(table.start)
+    stated = [*peaks_in_text(table.above, unit)]
     if columns == 1:
-        return recording_in_si(location, "one column", unit, step or 0.0, numbers[:, 0])
+        return recording_in_si(
+            location, "one column", unit, step or 0.0, numbers[:, 0], stated=stated
+        )
     step, remarks = _even_step(file, to_s * numbers[:, 0], [*table.rows])
     remarks += ("its times have no unit, taken as s",) * bool(match and not time_unit)
     if table.head and not match:
         remarks += (f"its head, {table.head[:40]}, is not understood: the case's unit is taken",)
     name = "CSV" if match else "two columns"
-    return recording_in_si(location, name, unit, step, numbers[:, 1], "", remarks)
+    return recording_in_si(location, name, unit, step, numbers[:, 1], "", remarks, stated=stated)
 
 
 def _even_step(

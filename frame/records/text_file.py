@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
@@ -14,7 +15,8 @@ import numpy as np
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, require
 from alphacut.frame.records.recording import Recording
-from alphacut.frame.records.units import acceleration_factor
+from alphacut.frame.records.stated_peak import StatedPeak, remarks_on_peak
+from alphacut.frame.records.units import acceleration_factor, other_quantity
 
 NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eEdD][-+]?[0-9]+)?")
 """A number as C, Python or FORTRAN writes it; D stands for E."""
@@ -86,21 +88,41 @@ def recording_in_si(
     samples: Array,
     channel: str = "",
     remarks: tuple[str, ...] = (),
+    *,
+    stated: Iterable[StatedPeak] = (),
 ) -> Recording:
-    """Recording of samples in a unit, their step in s; refuses other units and steps at a place."""
+    """Recording of samples in a unit, their step in s; refuses other units and steps at a place.
+
+    `stated` are the peaks in the file's head: if the samples have another one, the recording
+    bears a remark, or is refused, as `remarks_on_peak` says.
+    """
     to_si = acceleration_factor(unit)
     if to_si is None:
         value = f"in units of {unit}" if unit else "without a unit"
-        raise RefusedError(location, value, f"accelerations in {ACCELERATION_UNITS}")
+        quantity = other_quantity(unit)
+        cure = f"{unit} is the unit of {quantity}" if quantity else ""
+        raise RefusedError(location, value, f"accelerations in {ACCELERATION_UNITS}", cure)
     allowed = f"a step above 0 and below {LONGEST_STEP:g} s"
     require(0 < step < LONGEST_STEP, location, f"a step of {step:g} s", allowed)
-    return Recording(file_format, unit, step, to_si * samples, channel, remarks)
+    in_si = to_si * samples
+    remarks += remarks_on_peak(location, in_si, stated, unit)
+    return Recording(file_format, unit, step, in_si, channel, remarks)
 
 
 def choose_channel(location: str, channel: str, names: Sequence[tuple[str, ...]]) -> int:
-    """Index of the channel that has a name; of the only one where none is asked for."""
-    chosen = [k for k, aliases in enumerate(names) if not channel or channel.lower() in aliases]
-    allowed = "; ".join(dict.fromkeys(" or ".join(aliases) for aliases in names)) or "accelerations"
+    """Index of the channel that has a name; of the only one where none is asked for.
+
+    A name that several channels have is numbered in their order, as "90 deg#1" and "90 deg#2".
+    """
+    counts = Counter(name for aliases in names for name in aliases)
+    numbers = Counter[str]()
+    numbered: list[list[str]] = []  # names of each channel, none of which another one has
+    for aliases in names:
+        numbers.update(aliases)
+        is_own = {name: counts[name] == 1 for name in aliases}
+        numbered.append([x if is_own[x] else f"{x}#{numbers[x]}" for x in aliases])
+    chosen = [k for k, own in enumerate(numbered) if not channel or channel.lower() in own]
+    allowed = "; ".join(dict.fromkeys(" or ".join(own) for own in numbered)) or "accelerations"
     value = f"channel {channel or 'not named'}"
     require(len(chosen) == 1, location, value, f"one of: {allowed}")
     return chosen[0]

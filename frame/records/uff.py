@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from io import BytesIO
@@ -25,6 +26,8 @@ TIME_HISTORY, TIME = 1, 17
 """Function type of a time history, and type of an axis of times, in data set 58."""
 BIG_ENDIAN, DOUBLE, COMPLEX = 2, (4, 6), (5, 6)
 """Codes of byte order and of values."""
+OTHER_QUANTITIES = {8: "a displacement", 9: "a force", 11: "a velocity", 13: "a force"}
+"""Types of data of the ordinate that are no acceleration, whatever unit the file states."""
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 EVEN = 1e-3
 """Fraction of a step by which times may be uneven besides the rounding of their digits."""
@@ -43,19 +46,29 @@ def is_universal(content: bytes) -> bool:
 def read_uff_record(name: str, content: bytes, channel: str = "") -> Recording:
     """Reads a recording of acceleration from a data set 58 of a universal file, text or binary.
 
-    The stated unit says whether it is an acceleration, whatever numeric type the file gives it.
-    `channel` is NODE.DIRECTION of the response, as "7.x"; it may be left out where there is one.
+    The stated unit says whether it is an acceleration; types of data of displacements, velocities
+    and forces contradict it, and others say nothing. `channel` is NODE.DIRECTION of the response,
+    as "7.x"; it may be left out where there is one. Of several data sets of one response it is
+    "7.x#1", "7.x#2" …, or the first line of their heads.
     """
     try:
         parsed = [_parse_series(*rows) for rows in data_sets(content, 58)]
     except (ValueError, IndexError) as error:
         raise RefusedError(name, str(error)[:80], "data sets 58 of a universal file") from None
-    sets = {series.name: series for series in parsed}
-    series = [*sets.values()][choose_channel(name, channel, [(response,) for response in sets])]
+    require(bool(parsed), name, "without a data set 58", "a universal file with time histories")
+    counts = Counter(series.name for series in parsed)
+    names = []  # of each data set; those of one response are told apart by their first lines too
+    for series in parsed:
+        is_repeated = counts[series.name] > 1
+        names.append((series.name, series.title.lower()) if is_repeated else (series.name,))
+    series = parsed[choose_channel(name, channel, names)]
     key = f"{name}, response {series.name}"
     is_history = series.function == TIME_HISTORY or (series.function == 0 and series.axis == TIME)
     allowed = "a time history (1) of an acceleration"
     require(is_history, key, f"of function type {series.function}", allowed)
+    quantity = OTHER_QUANTITIES.get(series.quantity, "")
+    value, allowed = f"of type {series.quantity}, {quantity}", "the response of an accelerometer"
+    require(not quantity, key, value, allowed)
     is_full = len(series.samples) == series.count > 1 and bool(np.isfinite(series.samples).all())
     value = f"{series.count} points, and {len(series.samples)} are there"
     require(is_full, key, value, "two or more finite samples, as many as stated")
@@ -67,10 +80,13 @@ def read_uff_record(name: str, content: bytes, channel: str = "") -> Recording:
 class _Series:
     """A data set 58: NODE.DIRECTION of the response, types of function and axis, and its samples.
 
-    `times` are None where the steps are even, (n,) in s otherwise.
+    `title` is the first line of the head, `quantity` the type of data of the ordinate; `times` are
+    None where the steps are even, (n,) in s otherwise.
     """
 
     name: str
+    title: str
+    quantity: int
     function: int
     axis: int
     unit: str
@@ -129,7 +145,8 @@ def _parse_series(head: list[str], values: bytes | list[str]) -> _Series:
     function, axis, unit = int(head[5][:5]), int(head[7][:10]), head[8][47:67].strip()
     unit = "" if unit.upper() == "NONE" else unit
     name = f"{response}.{axis_name}"
-    return _Series(name, function, axis, unit, count, step, times, samples)
+    title, quantity = " ".join(head[0].split()), int(head[8][:10].strip() or 0)
+    return _Series(name, title, quantity, function, axis, unit, count, step, times, samples)
 
 
 def _even_step(key: str, times: Array) -> float:

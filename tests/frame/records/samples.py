@@ -39,7 +39,7 @@ Sampling Freq(Hz) 200Hz
 Duration Time(s)  2
 Dir.              N-S
 Scale Factor      980.665(gal)/10000000
-Max. Acc. (gal)   632.226
+Max. Acc. (gal)   588.619
 Last Correction   2011/03/11 14:46:21
 Memo.
 """
@@ -91,7 +91,7 @@ def csmip(announced=True, names=("1: 90 Deg", "2: Up"), unit="cm/sec2", raw=Fals
     """Volume 2, or volume 1 if `raw`; not `announced` is an old form of that."""
     blocks = []
     for number, name in enumerate(names, 1):
-        size = {"g": 1.0, "g/10": 10.0}.get(unit, 100 * G) * (1 if number == 1 else 0.5)
+        size = {"g": 1.0, "g/10": 10.0}.get(unit.lower(), 100 * G) * (1 if number == 1 else 0.5)
         integers, reals = [0] * 112, [0.0] * 56
         integers[27], reals[2] = COUNT, STEP * (COUNT - 1)
         title = "UNCORRECTED ACCELEROGRAM DATA" if raw else "CORRECTED ACCELEROGRAM"
@@ -118,6 +118,48 @@ def smc(first="2 CORRECTED ACCELEROGRAM", angle=90, count=COUNT) -> str:
     text = f"{first}\n" + "*\n" * 10 + lines(integers, "10d", 8) + lines(reals, "15.7E", 5)
     values = [f"{x:.4E}".replace("E-0", "E-").replace("E+0", "E+") for x in 100 * G * samples()]
     return text + "| a comment\n|\n" + lines(values, ">10s", 8)
+
+
+PEAK = float(np.abs(samples()).max())
+"""Of the samples, in g."""
+
+
+def cosmos_with_peak(factor: float) -> str:
+    """Volume 2 of one channel whose real header has a peak in entry 64, and another in its text."""
+    text = cosmos(names=("1: 90 deg",))
+    head, mark, body = text.partition("Format= (6F13.6)\n")
+    rows = body.split("\n")
+    row = rows[10]  # entries 61 to 66
+    rows[10] = row[:39] + f"{factor * PEAK * 100 * G:13.6f}" + row[52:]
+    return head + mark + "\n".join(rows)
+
+
+def smc_with_peak(factor: float, entry: int) -> str:
+    """SMC with the largest sample in entry 30, or the least in entry 32 of the real head."""
+    rows = smc().split("\n")
+    row, place = 17 + (entry - 1) // 5, 15 * ((entry - 1) % 5)
+    value = f"{factor * PEAK * 100 * G:15.7E}"
+    rows[row] = rows[row][:place] + value + rows[row][place + 15 :]
+    return "\n".join(rows)
+
+
+WITH_PEAK = {
+    "PEER": lambda f: at2("NPTS=   400, DT=   .0050 SEC").replace("S 0", f"S 0, PGA= {f * PEAK:.4f} g"),
+    "K-NET": lambda f: knet().replace("588.619", f"{f * PEAK * 100 * G:.3f}"),
+    "ESM": lambda f: esm("m/s^2").replace("USER5:", f"PGA_CM/S^2: {f * PEAK * 100 * G:.6f}"),
+    "COSMOS": cosmos_with_peak,
+    "CSMIP V2": lambda f: csmip(names=("1: 90 Deg",)).replace(
+        "text\n", f"PEAK ACCELERATION = {f * PEAK * 100 * G:10.3f} CM/SEC/SEC AT  1.2 SEC\n"
+        "PEAK VELOCITY = 900.1 CM/SEC AT 1.3 SEC\n", 1),
+    "CSMIP V1": lambda f: csmip(False, ("1: 90 Deg",), "g/10", raw=True).replace(
+        "AND g/10", f"AND G/10.   MAX  = {f * PEAK:7.3f} G, AT  0.040 SEC"),
+    "SMC text": lambda f: smc().replace("*\n", f"*   pk acc = {f * PEAK * 100 * G:.3e}\n", 1),
+    "SMC largest": lambda f: smc_with_peak(f, 30),
+    "SMC least": lambda f: smc_with_peak(f, 32),
+    "CSV": lambda f: f"# PGA = {f * PEAK * 1000:.2f} mg\n" + csv_text(),
+    "CSV max": lambda f: f"# max acc [gal]: {f * PEAK * 100 * G:.2f}\n" + csv_text("m/s^2"),
+}  # fmt: skip
+"""A file of each format by the factor of the true peak that its head states."""
 
 
 def csv_text(unit: str = "g", mark: str = ",", start: float = 0.0) -> str:

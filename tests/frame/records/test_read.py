@@ -198,7 +198,6 @@ RECORD = "time [s],acceleration [g]\n0,0\n0.01,0.1\n0.02,-0.2\n"
     ("old", "new", "line"),
     [
         ("[g]", "[kg]", 1),
-        ("[g]", "[%g]", 1),
         ("acc", "up [g],acc", 1),
         ("time", "zeit", 1),
         ("0.01,0.1", "0.01,1_0", 3),
@@ -225,3 +224,73 @@ def test_a_file_that_is_no_record_is_refused(tmp_path, content):
     path.write_bytes(content)
     with pytest.raises(RefusedError):
         read_recording(path)
+
+
+@pytest.mark.parametrize(
+    ("head", "quantity"),
+    [
+        ("time [s],displacement [m]\n", "a displacement"),
+        ("time [s],x [mm]\n", "a displacement"),
+        ("Time, Relative displ.\n", "a displacement"),
+        ("# time [s] velocity [m/s]\n", "a velocity"),
+        ("Time  Velocity\ns m\n", "a velocity"),
+        ("t [s],force [kN]\n", "a force"),
+        ("t [s],acc [N]\n", "a force"),
+        ("t [s],acc (cm/s)\n", "a velocity"),
+        ("t [s],acc [counts]\n", "counts"),
+    ],
+)
+@pytest.mark.parametrize("unit", ["", "g"])
+def test_a_column_of_another_quantity_is_no_acceleration(tmp_path, head, quantity, unit):
+    rows = written.csv_text().partition("\n")[2]
+    path = saved(tmp_path, head + rows)
+    with pytest.raises(RefusedError, match=f"its column is .*{quantity.removeprefix('a ')}"):
+        read_recording(path, unit=unit)
+
+
+def test_a_column_alone_of_another_quantity_is_no_acceleration(tmp_path):
+    path = saved(tmp_path, "velocity [cm/s]\n" + written.lines(written.samples(), "15.7E", 1))
+    with pytest.raises(RefusedError, match="its column is a velocity"):
+        read_recording(path, step=0.005, unit="g")
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("mg", 1e-3), ("%g", 1e-2)])
+def test_small_fractions_of_gravity_are_units(tmp_path, unit, factor):
+    path = saved(tmp_path, written.csv_text().replace("[g]", f"[{unit}]"))
+    expected = factor * written.G * written.samples()
+    assert read_recording(path).samples == pytest.approx(expected, abs=1e-7)
+
+
+def test_a_unit_that_is_not_known_is_not_asked_for_again(tmp_path):
+    path = saved(tmp_path, written.csv_text().replace("[g]", "[furlong]"))
+    for unit in ("", "g"):
+        with pytest.raises(
+            RefusedError, match="furlong is no unit of accelerations: mend the head"
+        ):
+            read_recording(path, unit=unit)
+
+
+@pytest.mark.parametrize("name", [*written.WITH_PEAK])
+def test_the_peak_in_a_head_is_compared_with_the_samples(tmp_path, name):
+    """Heads state the true peak, one of another processing, and one of another unit."""
+    write = written.WITH_PEAK[name]
+    assert not [*read_recording(saved(tmp_path, write(1.0))).doubts()]
+    assert not [*read_recording(saved(tmp_path, write(-1.02))).doubts()]
+    for factor in (1.3, 0.7):
+        (doubt,) = read_recording(saved(tmp_path, write(factor))).doubts()
+        assert "its head states" in doubt
+    for factor in (10.0, -0.1):
+        with pytest.raises(RefusedError, match=r"a peak of 0\.6 g, where its head states"):
+            read_recording(saved(tmp_path, write(factor)))
+
+
+@pytest.mark.parametrize("line", ["", ",  SENSITIVITY =1.250 VDC/G", " RANGE 2 G", " 1.0 G/VOLT"])
+def test_the_unit_of_volume_1_is_that_of_the_line_with_units(tmp_path, line):
+    text = written.csmip(False, ("1: 90 Deg",), "G/10", raw=True)
+    text = text.replace("text\n", f"DAMPING =0.7000{line}\n", 3)
+    record = read_recording(saved(tmp_path, text))
+    assert record.unit == "G/10"
+    assert record.samples == pytest.approx(written.G * written.samples(), abs=1e-4)
+    without = text.replace("UNITS ARE SEC AND G/10", "text")
+    with pytest.raises(RefusedError, match="without a unit"):
+        read_recording(saved(tmp_path, without))

@@ -56,8 +56,28 @@ def test_times_that_are_even_but_for_their_digits_are_even(tmp_path, rate):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [({"unit": "Pa"}, "in units of Pa"), ({"unit": "NONE"}, "without a unit"),
-     ({"function": 4}, "of function type 4"), ({"step": 0.0}, "a step of 0 s")],
+     ({"function": 4}, "of function type 4"), ({"step": 0.0}, "a step of 0 s"),
+     ({"spec": 8}, "of type 8, a displacement"), ({"spec": 11}, "of type 11, a velocity"),
+     ({"spec": 13}, "of type 13, a force"), ({"unit": "cm/s"}, "cm/s is the unit of a velocity")],
 )  # fmt: skip
 def test_what_is_no_acceleration_over_time_is_refused(tmp_path, changes, message):
     with pytest.raises(RefusedError, match=message):
         read_recording(saved(tmp_path, uff58(WAVE, **changes)))
+
+
+def test_data_sets_of_one_response_are_told_apart(tmp_path):
+    runs = [uff58(k * WAVE).replace(b"made up", b"run %d  " % k) for k in (1, 2)]
+    path = saved(tmp_path, b"".join(runs))
+    with pytest.raises(RefusedError, match=r"one of: 7\.x#1 or run 1; 7\.x#2 or run 2"):
+        read_recording(path)
+    with pytest.raises(RefusedError, match=r"channel 7\.x; allowed: one of: 7\.x#1"):
+        read_recording(path, "7.x")
+    for channel, factor in {"7.x#1": 1, "7.X#2": 2, "run 2": 2}.items():
+        samples = read_recording(path, channel).samples
+        assert samples == pytest.approx(factor * WAVE, abs=2e-5)
+
+
+def test_a_universal_file_without_time_histories_is_told_so(tmp_path):
+    geometry = "    -1\n    15\n" + f"{7:10d}{0:10d}{0:10d}{8:10d}\n" + "    -1\n"
+    with pytest.raises(RefusedError, match="without a data set 58"):
+        read_recording(saved(tmp_path, geometry))
