@@ -287,7 +287,11 @@ def fit_radius_map(
         >>> fitted.map.a1, sorted(fitted.inputs)
         (0.13, ['a2', 'a4'])
     """
-    require(len(sections) > 0, "sections", value=None, allowed="one section or more")
+    are_particles = not isinstance(sections, Particles) and all(
+        isinstance(section, Particles) for section in sections
+    )
+    allowed = "a list of one section or more, as `pack` and `read_particles` give them"
+    require(are_particles and len(sections) > 0, "sections", sections, allowed)
     if limits is not None:
         require_numbers("limits", limits)
         is_range = len(limits) == 2 and 0 < limits[0] < limits[1] < 1

@@ -129,6 +129,8 @@ class Evidence:
         alpha: Sequence[float],
     ) -> Self:
         """Return what `identify` learns from; refuse what it refuses."""
+        is_frame, kind = isinstance(frame, StoreyFrame), type(frame).__name__
+        require(is_frame, "frame", value=kind, allowed="a StoreyFrame")
         levels = np.append(0.0, alpha)
         in_range = len(levels) > 1 and levels[-1] <= 1 and bool((np.diff(levels) > 0).all())
         require(in_range, "identify.alpha", value=list(alpha), allowed="rising in (0, 1]")

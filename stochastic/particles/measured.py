@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from alphacut.base.arrays import Array, Mask
-from alphacut.base.errors import RefusedError, checked_number, require
+from alphacut.base.errors import RefusedError, checked_number, require, require_numbers
 from alphacut.stochastic.particles.csv_columns import length_columns
 from alphacut.stochastic.particles.particles import Particles, close_pairs, surface_distance
 from alphacut.stochastic.particles.radius_laws import require_radii
@@ -62,6 +62,9 @@ def read_particles(
         [0.004, 0.005]
     """
     if size is not None and pixel is None:
+        require_numbers("size", size)
+        is_window = len(size) == 2 and min(size) > 0
+        require(is_window, "size", size, allowed="width and height above 0, in m")
         return _read_circles(Path(path), size)
     allowed = "the size of the section, or the pixel of an image of it, in m"
     if pixel is None or size is not None:

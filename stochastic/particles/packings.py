@@ -9,11 +9,11 @@ from typing import overload
 
 import numpy as np
 
-from alphacut.base.errors import checked_number, require_choice
+from alphacut.base.errors import checked_number, require, require_choice, require_numbers
 from alphacut.fuzzy.campaign.workers import pool
 from alphacut.stochastic.particles.packing import Packing
 from alphacut.stochastic.particles.particles import DISCS, SPHERES, Particles
-from alphacut.stochastic.particles.radius_laws import LogNormalRadii, RadiusLaw
+from alphacut.stochastic.particles.radius_laws import LogNormalRadii, MeasuredRadii, RadiusLaw
 
 SHAPES = {shape.particles: shape for shape in (DISCS, SPHERES)}
 
@@ -74,7 +74,7 @@ def pack(
     *,
     packings: int = 20,
     fraction: float,
-    radii: tuple[float, float] | RadiusLaw,
+    radii: Sequence[float] | RadiusLaw,
     shape: str = "discs",
     seed: int = 0,
     workers: int = 1,
@@ -105,7 +105,12 @@ def pack(
     for key, number in {"particles": particles, "packings": packings, "seed": seed}.items():
         checked_number(key, number, whole=True, positive=key != "seed")
     require_choice("shape", shape, SHAPES)
-    law = LogNormalRadii(*radii) if isinstance(radii, tuple) else radii
+    if isinstance(radii, LogNormalRadii | MeasuredRadii):
+        law: RadiusLaw = radii
+    else:
+        require_numbers("radii", radii)
+        require(len(radii) == 2, "radii", radii, allowed="the smallest and the largest, or a law")
+        law = LogNormalRadii(*radii)
     packing = Packing(particles, fraction, law, shape=SHAPES[shape])
     with pool(workers) as executor:
         return Packings.make(packing, packings, seed=seed, executor=executor, progress=progress)

@@ -210,6 +210,7 @@ def test_images_that_hide_their_particles_are_refused(image, allowed):
     [
         ({"pixel": 1.0}, "images that can be read"),
         ({"pixel": 0.0}, "pixel"),
+        ({"size": (1.0, 0.0)}, "size is .*; allowed: width and height above 0"),
         ({}, "size, pixel is .*; allowed: the size of the section, or the pixel"),
         ({"size": (1.0, 1.0), "pixel": 1.0}, "size, pixel is"),
     ],
@@ -225,6 +226,19 @@ def test_what_is_no_image_is_refused(tmp_path, options, message):
 def result():
     sections = pack(300, packings=12, fraction=0.2, radii=(1e-3, 1e-2), seed=3)
     return fit_radius_map(sections, limits=(0.15, 0.85), seed=3)
+
+
+@pytest.mark.parametrize("sections", [[], [1.0], Particles([[1, 1]], [0.1], [2, 2])])
+def test_a_fit_takes_a_list_of_sections(sections):
+    with pytest.raises(RefusedError, match=r"sections is .*a list of one section or more"):
+        fit_radius_map(sections)
+
+
+@pytest.mark.parametrize("limits", [(0.5,), (0.8, 0.2), (0.1, 1.2), "0.1 to 0.8"])
+def test_limits_that_are_no_range_are_refused(limits):
+    section = Packing(20, 0.2, TENFOLD).make(np.random.default_rng(1))
+    with pytest.raises(RefusedError, match="limits is"):
+        fit_radius_map([section], limits=limits)
 
 
 def test_study_of_packings(result):

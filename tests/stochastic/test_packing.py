@@ -10,7 +10,7 @@ from scipy import stats
 
 from alphacut.base.errors import FailedError, RefusedError
 from alphacut.stochastic.particles.packing import Packing, random_sequential, relax_random_centres
-from alphacut.stochastic.particles.packings import Packings
+from alphacut.stochastic.particles.packings import Packings, pack
 from alphacut.stochastic.particles.particles import DISCS, SPHERES, Particles
 from alphacut.stochastic.particles.radius_laws import LogNormalRadii, MeasuredRadii
 from alphacut.stochastic.sections import with_cells
@@ -66,6 +66,30 @@ def test_one_seed_gives_one_packing_in_any_process(shape):
         for particles, of_process in zip(alone, cells, strict=True):
             assert (with_cells(particles).cells == of_process.cells).all()
     assert not np.isclose(alone[0].centres, alone[1].centres).any()
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"particles": 0}, "particles is 0"),
+        ({"packings": 2.5}, "packings is 2.5"),
+        ({"seed": -1}, "seed is -1"),
+        ({"shape": "cubes"}, "shape is cubes; allowed: discs, spheres"),
+        ({"radii": [1e-3]}, "radii is .*the smallest and the largest"),
+        ({"radii": "1 mm"}, "radii is .*a list of numbers"),
+        ({"radii": (2e-3, 1e-3)}, "largest_radius"),
+        ({"fraction": 0.9}, "fraction"),
+    ],
+)
+def test_arguments_without_meaning_are_refused(changes, message):
+    arguments = {"particles": 10, "fraction": 0.2, "radii": (1e-3, 2e-3), **changes}
+    with pytest.raises(RefusedError, match=message):
+        pack(**arguments)
+
+
+def test_a_list_of_two_radii_is_their_range():
+    (packing,) = pack(20, packings=1, fraction=0.2, radii=[1e-3, 2e-3])
+    assert 1e-3 <= packing.radii.min() <= packing.radii.max() <= 2e-3
 
 
 @pytest.mark.parametrize("fraction", [0.9, -0.1, np.nan])

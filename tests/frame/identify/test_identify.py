@@ -187,6 +187,7 @@ LEVELS = r"rising in \(0, 1\]"
         (modes_like([2.0, 2.1], {1: [1.0]}), r"amplitudes is \[1\]; allowed: 2 of each"),
         (lambda: MeasuredMode(1, Interval(-2, -1)), r"positive values in Hz"),
         (lambda: replace(FIRST, shape={1: FIRST}, reference=1), r"reference is 1; .* beside"),
+        (lambda: identify("frame", PRIOR, [FIRST]), r"frame is str; allowed: a StoreyFrame"),
         (identified_from(), r"one or more, rising"),
         (held_out_of(FIRST, held_out=[1]), r"held_out is 1; allowed: some of modes \[1\], not all"),
         (held_out_of(FIRST, held_out=[2]), r"held_out is 2; allowed: some of modes"),
