@@ -70,7 +70,7 @@ test-wheels:
 	$(IN) $(WHEELS)/pip install --quiet --requirement build/wheels/requirements.txt pyvista
 	$(IN) $(WHEELS)/pip list
 	$(IN) env PATH=$(CURDIR)/$(WHEELS):/usr/bin:/bin python -m pytest -m "not slow" --timeout 400 $(PYTEST) \
-		tests/rve tests/alphacut/export tests/alphacut/report tests/scenes tests/environment/test_versions.py
+		tests/rve tests/alphacut/report tests/scenes tests/environment/test_versions.py
 
 findings:
 	@set -e; for finding in findings/*.sh; do echo "$$finding"; $(IN) bash "$$finding"; done

@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from alphacut.rve import Ellipse, Phase, PrismModel, SlicesModel, VoigtPhase, cell_fields
+from alphacut.rve import Ellipse, Phase, PrismModel, SlicesModel, VoigtPhase
 from alphacut.stochastic import HermiteMap
 
 radius, resin = HermiteMap(0.25, 0.1, 0.6, 0.1), Phase(4e9, 0.35)
@@ -91,7 +91,7 @@ assert lying[0, 0] > 1.05 * lying[1, 1]
 # ## Pictures
 
 # %%
-drawn = cell_fields(prism, radius, resin, fibre)
+drawn = prism.fields(radius, resin, [fibre])
 
 
 def picture(folder: Path) -> None:

@@ -24,7 +24,7 @@ import numpy as np
 import ufl
 from dolfinx import fem
 
-from alphacut.rve import LOADS, Phase, PrismModel, ProductSpace, cell_fields, effective_modulus
+from alphacut.rve import LOADS, Phase, PrismModel, ProductSpace, effective_modulus
 from alphacut.stochastic import HermiteMap
 
 # %% [markdown]
@@ -125,7 +125,7 @@ assert abs(result.modulus / modulus - 1) < 1e-9
 # cut open along a side of the cone.
 
 # %%
-drawn = cell_fields(PrismModel(), radius, matrix, fibre)
+drawn = PrismModel().fields(radius, matrix, [fibre])
 
 
 def picture(folder: Path) -> None:

@@ -18,7 +18,7 @@ from alphacut.rve.result.result import HomogenisedStiffness, StressCurve, effect
 if TYPE_CHECKING:
     from alphacut.rve.engineering import constants
     from alphacut.rve.fuzzy_cell import FuzzyStiffness, fuzzy_stiffness
-    from alphacut.rve.prism.fields import cell_fields
+    from alphacut.rve.prism.cell_fields import CellFields
     from alphacut.rve.prism.model import PrismModel
     from alphacut.rve.prism.own_mesh import LevelSetModel, MeshModel
     from alphacut.rve.prism.product_space import ProductSpace
@@ -29,12 +29,13 @@ if TYPE_CHECKING:
     from alphacut.rve.spheres.model import SpheresModel
 
 __all__ = [
-    "LOADS", "STRAIN", "Cell", "Ellipse", "FuzzyStiffness", "HomogenisedStiffness",
+    "LOADS", "STRAIN", "Cell", "CellFields", "Ellipse", "FuzzyStiffness", "HomogenisedStiffness",
     "LevelSetModel", "MeshModel", "Phase", "PrismModel", "ProductSpace", "ReferenceBounds",
-    "SeriesModel", "SlicesModel", "SpheresModel", "StressCurve", "VoigtPhase", "cell_fields",
+    "SeriesModel", "SlicesModel", "SpheresModel", "StressCurve", "VoigtPhase",
     "constants", "effective_modulus", "fuzzy_stiffness", "loss_factors", "reference_bounds",
 ]  # fmt: skip
 AT_FIRST_USE = {
+    "CellFields": "prism.cell_fields",
     "FuzzyStiffness": "fuzzy_cell",
     "LevelSetModel": "prism.own_mesh",
     "MeshModel": "prism.own_mesh",
@@ -44,7 +45,6 @@ AT_FIRST_USE = {
     "SeriesModel": "series.model",
     "SlicesModel": "slices.model",
     "SpheresModel": "spheres.model",
-    "cell_fields": "prism.fields",
     "constants": "engineering",
     "fuzzy_stiffness": "fuzzy_cell",
     "loss_factors": "result.loss_factors",

@@ -15,7 +15,7 @@ from alphacut.case.cell import CellContent
 from alphacut.case.material import MeshedCell
 from alphacut.case.parse import parse
 from alphacut.commands.options import Command, add_common, require_petsc, write_answer
-from alphacut.io.files import Document, ranks
+from alphacut.io.files import Document, ranks, say, whole_file
 from alphacut.io.provenance import versions
 from alphacut.rve.cell.cell import STRAIN
 from alphacut.rve.result.engineering_constants import NAMES, engineering_constants
@@ -68,8 +68,6 @@ def run(options: argparse.Namespace, out: TextIO) -> int:
 
 def export(problem: CellProblem, path: Path) -> Document:
     """Writes the mesh with displacements and stresses; returns the file and its number of nodes."""
-    from alphacut.export.cell_files import write_cell
-    from alphacut.rve.prism.fields import cell_fields, mesh_fields
     from alphacut.rve.prism.model import PrismModel
     from alphacut.rve.prism.own_mesh import MeshModel
 
@@ -77,12 +75,16 @@ def export(problem: CellProblem, path: Path) -> Document:
     if isinstance(cell, MeshedCell):
         assert mesh.file is not None
         law = cast("ThetaLaw", problem.nominal_radius)
-        fields = mesh_fields(MeshModel(mesh.file), law, cell.nominal_phases)
+        fields = MeshModel(mesh.file).fields(law, cell.nominal_phases)
     else:
         nominal = problem.nominal
         model = PrismModel(mesh.size, mesh.layers, outline=nominal.outline)
-        fields = cell_fields(model, nominal.radius_map, nominal.matrix, nominal.inclusion)
-    return {"file": str(path), "nodes": write_cell(fields, path)}
+        fields = model.fields(nominal.radius_map, nominal.matrix, [nominal.inclusion])
+    if path.suffix == ".inp":
+        say(f"{path} holds mesh and phases; displacements and stresses go to .msh, .vtu or .xdmf")
+    with whole_file(path) as partial:
+        nodes = fields.write(partial)
+    return {"file": str(path), "nodes": nodes}
 
 
 def document_of(result: HomogenisedStiffness) -> Document:

@@ -1,146 +1,129 @@
-"""Displacements and stresses at the nodes of the product space, for ParaView and other programs."""
+"""Displacements and stresses at the nodes of the product space, from solutions on it."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from itertools import permutations
 
 import numpy as np
 
 from alphacut.base.arrays import Array, Ints
-from alphacut.rve.cell.cell import THREE_LOADS, AnyPhase, Cell
-from alphacut.rve.fenicsx import at_points, fem
+from alphacut.base.errors import require
+from alphacut.rve.fenicsx import at_points, fem, ufl
+from alphacut.rve.mesh.prism_grid import NAMES, LevelSet
 from alphacut.rve.mesh.wedge import vertices_and_midpoints
-from alphacut.rve.prism.model import PrismModel
-from alphacut.rve.prism.own_mesh import MeshModel
+from alphacut.rve.prism.cell_fields import CellFields
 from alphacut.rve.prism.problem import PrismProblem
 from alphacut.rve.solver.form import strain
 from alphacut.rve.solver.krylov import SolverOptions, solve
-from alphacut.stochastic import RadiusMap, ThetaLaw
 
-NODES = 15
-VERTICES = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [0, 1, 1]])
-EDGES = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 4), (2, 5), (3, 4), (3, 5), (4, 5)]
-SIDES = np.array(
-    [[0, 1, 3, 4, 6, 8, 10, 12], [0, 2, 3, 5, 7, 8, 11, 13], [1, 2, 4, 5, 9, 10, 11, 14]]
-)
-"""Corners of Basix's prism, ends of its edges, and of each side the corners and middle nodes."""
+NODES = 15  # of a prism
 
 
-@dataclass(frozen=True)
-class CellFields:
-    """Total fields under each load; nodes on the interface stand twice, once for each phase.
-
-    Args:
-        points: (x1, x2, θ), shape (n, 3).
-        cells: Nodes of the prisms in Basix's order, shape (m, 15).
-        phase: Index of the phase of each prism in `names`, shape (m,).
-        displacement: In halves of the cell's side, shape (n, 2, loads).
-        stress: (σ11, σ22, σ12), means over the prisms of one phase that meet in a node, shape
-            (n, 3, loads), in Pa.
-        names: Names of the phases.
-        node: Node of the mesh that each point is, shape (n,).
-    """
-
-    points: Array
-    cells: Ints
-    phase: Ints
-    displacement: Array
-    stress: Array
-    names: tuple[str, ...]
-    node: Ints
-
-    def in_tetrahedra(self) -> CellFields:
-        """The same with each prism as three quadratic tetrahedra in VTK's order, (3 m, 10).
-
-        Centres of the prisms' sides, where diagonals have their middle nodes, come last among the
-        points, with values interpolated as in the prism and −1 as their `node`.
-        """
-        columns = np.argsort(self.node[self.cells[:, :3]], axis=1)  # same diagonals from both sides
-        prism_sides = self.cells[:, SIDES].reshape(-1, 8)
-        corners = np.sort(prism_sides[:, :4], axis=1)
-        _, first, number = np.unique(corners, axis=0, return_index=True, return_inverse=True)
-        nodes = np.column_stack([self.cells, len(self.points) + number.reshape(-1, 3)])
-        cells = np.empty((len(nodes), 3, 10), int)
-        for order in permutations(range(3)):
-            chosen = (columns == order).all(axis=1)
-            cells[chosen] = nodes[chosen][:, _tetrahedra_nodes(order)]
-        sides = prism_sides[first]
-        points, displacement, stress = (
-            np.concatenate([x, x[sides[:, 4:]].sum(axis=1) / 2 - x[sides[:, :4]].sum(axis=1) / 4])
-            for x in (self.points, self.displacement, self.stress)
-        )
-        phase, names = np.repeat(self.phase, 3), self.names
-        node = np.concatenate([self.node, np.full(len(sides), -1)])
-        return CellFields(points, cells.reshape(-1, 10), phase, displacement, stress, names, node)
-
-
-def _tetrahedra_nodes(columns: tuple[int, ...]) -> Ints:
-    """Nodes, shape (3, 10), of a prism's tetrahedra; its diagonals rise along `columns`."""
-    lower, upper = list(columns), [3 + column for column in columns]
-    middles = {frozenset(edge): 6 + k for k, edge in enumerate(EDGES)}
-    for k, (a, b, c, d, *_) in enumerate(SIDES):
-        middles |= dict.fromkeys([frozenset((a, d)), frozenset((b, c))], 15 + k)
-    tetrahedra = []
-    for k in range(3):
-        corners = lower[: k + 1] + upper[k:]
-        if np.linalg.det(VERTICES[corners[1:]] - VERTICES[corners[0]]) < 0:
-            corners[:2] = corners[1], corners[0]
-        ends = [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)]
-        tetrahedra.append(corners + [middles[frozenset((corners[i], corners[j]))] for i, j in ends])
-    return np.array(tetrahedra)
-
-
-def cell_fields(
-    model: PrismModel, radius_map: RadiusMap, matrix: AnyPhase, inclusion: AnyPhase
-) -> CellFields:
-    """Fields of one cell, on one rank, by a mesh that follows the interface.
-
-    Raises:
-        FoldedMeshError: The map bends more than the layers can follow.
-    """
-    cell = Cell(matrix, inclusion, radius_map, model.outline)
-    return _solve_fields(
-        model.problem(radius_map), cell.stiffness, model.loads(cell), model.options
-    )
-
-
-def mesh_fields(model: MeshModel, law: ThetaLaw, phases: Mapping[str, AnyPhase]) -> CellFields:
-    """Displacements and stresses at the nodes of a mesh from a file, under three unit strains."""
-    problem, named = model.problem_of(law, phases)
-    stiffness = [phase.stiffness for phase in named.values()]
-    return _solve_fields(problem, stiffness, THREE_LOADS, model.options)
-
-
-def _solve_fields(
+def solved_fields(
     problem: PrismProblem, stiffness: Sequence[Array], loads: Array, options: SolverOptions
 ) -> CellFields:
-    """Solve for displacements and stresses under macroscopic strains of shape (loads, 3)."""
-    grid = problem.grid
+    """Solve a cell and return its fields under macroscopic strains.
+
+    Args:
+        problem: The cell, moved to its map; on one rank.
+        stiffness: Stiffness of each phase, (3, 3) each, in Pa.
+        loads: Macroscopic strains (ε11, ε22, 2 ε12), shape (loads, 3).
+        options: The linear solver.
+    """
     problem.assemble(stiffness)
     vectors = solve(problem.solver(options, problem.matrix), problem.loads(loads)).vectors
     fluctuation = fem.Function(problem.space)
-    rank_cells = np.arange(len(problem.wedge), dtype=np.int32)
-    nodal_strain = at_points(strain(fluctuation), vertices_and_midpoints())
+    fluctuations, prism_strains = [], []
+    for vector, load in zip(vectors, loads, strict=True):
+        values = problem.elimination.displacements(vector)
+        fluctuation.x.array[:] = values.ravel()
+        fluctuations.append(values)
+        prism_strains.append(_at_nodes_of_prisms(problem, strain(fluctuation)) + load)
+    phase = phase_at_nodes(problem)
+    stress = np.stack(stiffness)[phase] @ np.stack(prism_strains, axis=-1)
+    return nodal_fields(problem, np.stack(fluctuations, axis=-1), loads, stress, phase)
+
+
+def fields_of_solution(
+    problem: PrismProblem, u: fem.Function, stress: Mapping[str, ufl.core.expr.Expr], load: Array
+) -> CellFields:
+    """Return the fields of a solution of the user.
+
+    Args:
+        problem: The cell that it was solved on, on one rank.
+        u: Fluctuation of the displacements.
+        stress: (σ11, σ22, σ12) of each phase by its name, expressions of three components, in Pa.
+        load: Macroscopic strain (ε11, ε22, 2 ε12), shape (3,).
+
+    Raises:
+        RefusedError: A phase has no stress, or an expression has not three components.
+    """
+    names = problem.grid.names
+    require(set(stress) == set(names), "stress of phases", [*stress], ", ".join(names))
+    for name, expression in stress.items():
+        shape = expression.ufl_shape
+        require(shape == (3,), f"shape of the stress of {name}", shape, "(3,): σ11, σ22, σ12")
+    phase = phase_at_nodes(problem)
+    of_phases = np.stack([_at_nodes_of_prisms(problem, stress[name]) for name in names])
+    prism, node = np.indices(phase.shape)
+    values = of_phases[phase, prism, node][..., None]
+    fluctuation = u.x.array.reshape(-1, 2, 1)
+    return nodal_fields(problem, fluctuation, np.array([load], float), values, phase)
+
+
+def phase_at_nodes(problem: PrismProblem) -> Ints:
+    """Return the index of the phase at each node of this rank's prisms, shape (m, 15).
+
+    It is that of the prism, or follows from the sign of the function of a level set there (eq. 14).
+    """
+    grid = problem.grid
+    if isinstance(problem.map, LevelSet):
+        positions = grid.positions(problem.map)[grid.cells[problem.wedge]]
+        return np.asarray(problem.map.values(positions) < 0, int)
+    return np.broadcast_to(grid.phase[problem.wedge, None], (len(problem.wedge), NODES))
+
+
+def _at_nodes_of_prisms(problem: PrismProblem, expression: ufl.core.expr.Expr) -> Array:
+    """Return an expression of three components at the nodes of each prism, shape (m, 15, 3)."""
+    cells = np.arange(len(problem.wedge), dtype=np.int32)
+    values = at_points(expression, vertices_and_midpoints()).eval(problem.mesh, cells)
+    return np.asarray(values).reshape(len(cells), NODES, 3)
+
+
+def nodal_fields(
+    problem: PrismProblem, fluctuation: Array, loads: Array, stress: Array, phase: Ints
+) -> CellFields:
+    """Return total displacements, and stresses as means over the prisms that meet in a node.
+
+    Args:
+        problem: The cell, on one rank.
+        fluctuation: Displacements at DOLFINx's nodes without the macroscopic strain's, in halves of
+            the cell's side, shape (nodes, 2, loads).
+        loads: Macroscopic strains (ε11, ε22, 2 ε12), shape (loads, 3).
+        stress: At the nodes of each prism, shape (m, 15, 3, loads), in Pa.
+        phase: Index of the phase there, shape (m, 15).
+    """
+    grid = problem.grid
     positions = grid.positions(problem.map)
-    displacement = np.empty((grid.nodes, 2, len(vectors)))
-    prism_strains = np.empty((len(grid.cells), NODES, 3, len(vectors)))
-    for k, vector in enumerate(vectors):
-        u, uniform = problem.elimination.displacements(vector), np.asarray(loads[k], float)
-        tensor = np.array([[uniform[0], uniform[2] / 2], [uniform[2] / 2, uniform[1]]])
-        displacement[problem.node, :, k] = u + positions[problem.node, :2] @ tensor
-        fluctuation.x.array[:] = u.ravel()
-        strains = nodal_strain.eval(problem.mesh, rank_cells).reshape(len(rank_cells), NODES, 3)
-        prism_strains[problem.wedge, ..., k] = strains + uniform
-    stress = np.stack(stiffness)[grid.phase][:, None] @ prism_strains
+    eps11, eps22, gamma12 = np.moveaxis(loads, -1, 0)
+    tensors = np.array([[eps11, gamma12 / 2], [gamma12 / 2, eps22]])  # (2, 2, loads)
+    uniform = np.einsum("nj,ijl->nil", positions[problem.node, :2], tensors)
+    displacement = np.empty((grid.nodes, *uniform.shape[1:]))
+    displacement[problem.node] = fluctuation + uniform
     # one point for each node and phase, since stresses jump at the interface
-    point_keys = grid.cells + grid.phase[:, None] * grid.nodes
+    point_keys = grid.cells[problem.wedge] + phase * grid.nodes
     points, cells = np.unique(point_keys, return_inverse=True)
     cells = cells.reshape(point_keys.shape)
-    mean_stress = np.zeros((len(points), 3, len(vectors)))
+    mean_stress = np.zeros((len(points), *stress.shape[2:]))
     np.add.at(mean_stress, cells, stress)
     mean_stress /= np.bincount(cells.ravel())[:, None, None]
-    nodes = points % grid.nodes
-    fields = displacement[nodes], mean_stress
-    return CellFields(positions[nodes], cells, grid.phase, *fields, grid.names, nodes)
+    node = points % grid.nodes
+    return CellFields(
+        points=positions[node],
+        cells=cells,
+        phase=np.rint(phase.mean(axis=1)).astype(int),  # of a cut prism that of most of its nodes
+        displacement=displacement[node],
+        stress=mean_stress,
+        names=NAMES if isinstance(problem.map, LevelSet) else grid.names,
+        node=node,
+    )

@@ -22,7 +22,7 @@ from typing import ClassVar, Self, TypeVar
 import numpy as np
 
 from alphacut.base.arrays import Array
-from alphacut.base.errors import RefusedError
+from alphacut.base.errors import RefusedError, require
 from alphacut.rve.cell.cell import (
     LOADS,
     STRAIN,
@@ -39,6 +39,8 @@ from alphacut.rve.fenicsx import MPI
 from alphacut.rve.mesh.columns import extrude
 from alphacut.rve.mesh.prism_grid import PrismGrid, reference_radius
 from alphacut.rve.mesh.square import REFINEMENTS
+from alphacut.rve.prism.cell_fields import CellFields
+from alphacut.rve.prism.fields import solved_fields
 from alphacut.rve.prism.modulus_basis import TOLERANCE, ModulusBasis, modulus_basis
 from alphacut.rve.prism.problem import FoldedMeshError, PrismProblem, Solved
 from alphacut.rve.prism.slices import SliceProblem
@@ -152,6 +154,20 @@ class PrismModel:
             results.append(replace(result, checks=checks))
             started = perf_counter()
         return results
+
+    def fields(
+        self, radius_map: RadiusMap, matrix: AnyPhase, inclusions: Sequence[AnyPhase]
+    ) -> CellFields:
+        """Displacements and stresses at the nodes, of one inclusion; the cell is solved for them.
+
+        Raises:
+            As `solve`, and RefusedError of several inclusions.
+        """
+        require_solve_arguments(radius_map, matrix, inclusions, isotropic=False)
+        require(len(inclusions) == 1, "inclusions", len(inclusions), "one, for fields")
+        cell = Cell(matrix, inclusions[0], radius_map, self.outline)
+        problem = self.problem(radius_map)
+        return solved_fields(problem, cell.stiffness, self.loads(cell), self.options)
 
     def problem(self, radius_map: RadiusMap) -> PrismProblem:
         """DOLFINx's mesh and form for a map; cached, so that the next map moves the same mesh.

@@ -21,6 +21,8 @@ from alphacut.rve.fenicsx import MPI
 from alphacut.rve.mesh.columns import from_first_rank
 from alphacut.rve.mesh.file import read_grid, refined
 from alphacut.rve.mesh.prism_grid import NAMES, FixedCell, LevelFunction, LevelSet, PrismGrid
+from alphacut.rve.prism.cell_fields import CellFields
+from alphacut.rve.prism.fields import solved_fields
 from alphacut.rve.prism.model import (
     cached_grid,
     cached_problem,
@@ -100,6 +102,15 @@ class _NamedModel:
                 energies=PhaseEnergies(energies.values[order], energies.errors[order]),
             )
         ]
+
+    def fields(self, law: ThetaLaw, phases: Mapping[str, AnyPhase]) -> CellFields:
+        """Displacements and stresses at the nodes under three unit strains, solved for them.
+
+        Arguments and errors are those of `solve`.
+        """
+        problem, named = self.problem_of(law, phases)
+        stiffness = [phase.stiffness for phase in named.values()]
+        return solved_fields(problem, stiffness, THREE_LOADS, self.options)
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,8 @@ import numpy as np
 
 from alphacut.base.errors import RefusedError
 from alphacut.rve.fenicsx import PETSc, compiled, fem, ufl
+from alphacut.rve.prism.cell_fields import CellFields
+from alphacut.rve.prism.fields import fields_of_solution
 from alphacut.rve.prism.model import PrismModel
 from alphacut.rve.prism.own_mesh import MeshModel, mesh_law
 from alphacut.rve.prism.problem import PrismProblem
@@ -88,6 +90,21 @@ class ProductSpace:
     def assign(self, function: fem.Function, vector: PETSc.Vec) -> None:
         """Set a function of `space` to the displacements of reduced unknowns."""
         function.x.array[:] = self._problem.elimination.displacements(vector).ravel()
+
+    def fields(
+        self, u: fem.Function, stress: Mapping[str, ufl.core.expr.Expr], strain: Sequence[float]
+    ) -> CellFields:
+        """Displacements and stresses at the nodes of a solution, to be drawn or written.
+
+        Args:
+            u: The fluctuation of the displacements, a function of `space`.
+            stress: (σ11, σ22, σ12) of each phase by its name, as UFL vectors, in Pa.
+            strain: The macroscopic strain (ε11, ε22, 2 ε12).
+
+        Raises:
+            RefusedError: A phase has no stress, or one that has not three components.
+        """
+        return fields_of_solution(self._problem, u, stress, np.asarray(strain, float))
 
     def preconditioner(self, matrix: PETSc.Mat) -> ThetaPreconditioner:
         """Preconditioner along θ for `PC.setPythonContext`; the form has the density as factor."""

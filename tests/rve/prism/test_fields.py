@@ -6,7 +6,6 @@ import pytest
 pytest.importorskip("alphacut.rve.fenicsx")
 
 from alphacut.rve.cell.cell import LOADS, Phase
-from alphacut.rve.prism.fields import cell_fields
 from alphacut.rve.prism.model import PrismModel
 from alphacut.rve.series.model import square_stiffness
 from alphacut.stochastic import HermiteMap
@@ -16,7 +15,7 @@ CONE, MATRIX, PARTICLE = HermiteMap(0.5, 0, 0.6, 0), Phase(20e9), Phase(80e9, 0.
 
 def test_the_particles_mean_stress_and_strain_are_those_of_the_series():
     """c (C_i − C_m) ε_i = (C − C_m) ε, with C by the series."""
-    fields = cell_fields(PrismModel(0.1, 2), HermiteMap(0.5, 0, 0.5, 0), MATRIX, PARTICLE)
+    fields = PrismModel(0.1, 2).fields(HermiteMap(0.5, 0, 0.5, 0), MATRIX, [PARTICLE])
     inner, weight = fields.phase == 1, np.zeros(len(fields.points))
     corners = fields.points[fields.cells[:, :3], :2]
     area = abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 2
@@ -38,7 +37,7 @@ def test_the_particles_mean_stress_and_strain_are_those_of_the_series():
 
 
 def test_nodes_of_the_interface_stand_once_for_each_phase():
-    fields = cell_fields(PrismModel(0.4, 2), CONE, MATRIX, PARTICLE)
+    fields = PrismModel(0.4, 2).fields(CONE, MATRIX, [PARTICLE])
     touched = [set(fields.cells[fields.phase == k].ravel()) for k in (0, 1)]
     assert not touched[0] & touched[1]
     assert len(touched[0] | touched[1]) == len(fields.points)

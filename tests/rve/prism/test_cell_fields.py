@@ -12,11 +12,10 @@ import pytest
 pytest.importorskip("alphacut.rve.fenicsx")
 
 from alphacut.base.errors import RefusedError
-from alphacut.export.cell_files import FORMATS, write_cell
 from alphacut.rve import Phase, PrismModel
 from alphacut.rve.mesh import square
 from alphacut.rve.mesh.file import ABAQUS_ORDER
-from alphacut.rve.prism.fields import cell_fields
+from alphacut.rve.prism.cell_fields import FORMATS
 from alphacut.stochastic import HermiteMap
 from tests.rve.mesh.test_prisms import volumes
 
@@ -26,13 +25,13 @@ VOLUME = 24.0  # 2 × 2 × 6
 
 @cache
 def fields():
-    return cell_fields(PrismModel(0.5, 3), MAP, SOFT, HARD)
+    return PrismModel(0.5, 3).fields(MAP, SOFT, [HARD])
 
 
 @pytest.fixture
 def written(tmp_path, request):
     path = tmp_path / f"cell{request.param}"
-    write_cell(fields(), path)
+    fields().write(path)
     return path
 
 
@@ -70,7 +69,7 @@ def test_gmsh_reads_its_jacobians_groups_and_fields(written):
 def test_vtk_and_meshio_read_positive_volumes(ending, tmp_path):
     meshio, pyvista = pytest.importorskip("meshio"), pytest.importorskip("pyvista")
     path = tmp_path / f"cell.{ending}"
-    assert write_cell(fields(), path) > len(fields().points)
+    assert fields().write(path) > len(fields().points)
     mesh = meshio.read(path)
     grid = pyvista.UnstructuredGrid({24: mesh.cells_dict["tetra10"]}, mesh.points)
     if ending == "vtu":
@@ -115,7 +114,7 @@ def test_meshio_reads_abaqus(tmp_path):
     from meshio._mesh import topological_dimension
 
     path = tmp_path / "cell.inp"
-    assert write_cell(fields(), path) == fields().node.max() + 1
+    assert fields().write(path) == fields().node.max() + 1
     topological_dimension.setdefault("wedge15", 3)  # which meshio 5.3 forgets
     mesh = meshio.read(path)
     assert [block.type for block in mesh.cells] == ["wedge15", "wedge15"]
@@ -129,4 +128,4 @@ def test_meshio_reads_abaqus(tmp_path):
 
 def test_other_endings_are_refused(tmp_path):
     with pytest.raises(RefusedError, match=re.escape(", ".join(FORMATS))):
-        write_cell(fields(), tmp_path / "cell.stl")
+        fields().write(tmp_path / "cell.stl")
