@@ -82,7 +82,22 @@ def teaches_what_the_case_learns(names):
     assert [mode.mode for mode in learned.held_out if mode.inside] == [3, 4]
 
 
+def has_the_modulus_of_the_paper(names):
+    """Whether the campaign has E of cases/paper.toml at its lowest and highest level."""
+    cuts, case = names["stiffness"].cuts("E") / 1e9, GOLDEN["paper"]["modulus"]["E_GPa"]
+    for row, level in ((0, 0), (-1, -1)):
+        ends = case["lower"][level], case["upper"][level]
+        assert cuts[row] == pytest.approx(ends, rel=1e-7)
+
+
+def has_the_modulus_of_the_sample(names):
+    """Whether prisms have E of the paper's nominal cell; see tests/scenes/test_materials.py."""
+    assert names["sample"].modulus == pytest.approx(24.773342084495e9, rel=1e-6)
+
+
 CHECKS = {
+    1: has_the_modulus_of_the_paper,
+    2: has_the_modulus_of_the_sample,
     4: has_the_radius_map_of_the_case,
     7: moves_as_the_structure_of_the_case,
     8: teaches_what_the_case_learns,
