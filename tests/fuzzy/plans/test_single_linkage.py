@@ -141,7 +141,7 @@ def test_the_nature_of_bounds_covers_a_cone_on_a_plateau(rng):
 def test_what_never_changes_is_attained_without_a_search():
     result = propagate(lambda x, y: {"u": x + y, "v": 0 * x}, SQUARE, alpha=[0], vectorised=True)
     assert result.natures == (Nature.ESTIMATED, Nature.ATTAINED)
-    assert result.evaluations < 100
+    assert result.evaluations < 150
     assert any(note.startswith("v does not change") for note in result.notes)
 
 
@@ -163,7 +163,8 @@ def test_a_bound_at_a_kink_or_a_jump_is_attained(function):
 
 @pytest.mark.parametrize(
     ("count", "evaluations", "points"),
-    [(1, 15 + 1 + 2 + 4 * 2 + 1, 17), (4, 20 * 4 + 1 + 2 * 2 * 4 + 4 * 2**4 + 1, 24)],
+    # nominal point, walk, two staircases that begin at corners, and the other corners of four cuts
+    [(1, 1 + 21 + 2 * 41 + 3 * 2, 100), (4, 1 + 81 + 2 * 81 + 4 * 2**4 - 2, 60)],
 )
 def test_corners_bound_a_monotone_function_at_little_cost(count, evaluations, points):
     inputs = {f"x{i}": Triangular(0.0, 0.3, 1.0) for i in range(count)}
