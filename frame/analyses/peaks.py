@@ -39,7 +39,7 @@ class Peak:
         error: Distance by which peaks may lie outside `lower` and `upper`: that of the envelope and
             of the steps between nodes; 0 of guaranteed bounds, which contain it.
         reached: Peak that some motion in the cut is known to reach; −∞ where none is known.
-        least_lower: Proved lower bound of the least peak over each cut.
+        least_lower: Lower bound of the least peak over each cut, proved where the bounds are.
         least_upper: Upper bound of it: a peak that some motion in the cut is known not to exceed;
             infinite where none is known.
         nature: Nature of the bounds.
@@ -120,6 +120,9 @@ def _peak_of(envelope: Envelope, name: str) -> Peak:
         )
     if is_proved:
         lower, upper = np.maximum(lower, least_lower), upper + above
+    elif nature is Nature.ESTIMATED:
+        # a peak is no smaller than at the nodes, whatever is added between them
+        least_lower = np.maximum(least_lower, lower - below)
     reached = np.fmax(reached_at_nodes.upper, smallest).max(1)  # NaN where none is known
     if envelope.encloses:
         reached = np.full_like(upper, -np.inf)

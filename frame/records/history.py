@@ -7,7 +7,7 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from alphacut.base.arrays import Array
+from alphacut.base.arrays import Array, Mask
 from alphacut.base.errors import RefusedError, checked_number, require
 
 
@@ -101,6 +101,17 @@ class History:
         largest = np.zeros(len(time))
         largest[1:] = np.maximum.reduceat(size, np.searchsorted(times, time[:-1]))
         return largest
+
+    def jumps_in_steps(self, time: Array) -> Mask:
+        """Whether f may jump within the step to each of the rising times, or at its end, (T,)."""
+        ends = [(self.start, self.samples[0])]
+        if not self.is_held:
+            ends.append((self.start + (len(self.samples) - 1) * self.step, self.samples[-1]))
+        jumps = np.zeros(len(time) + 1, bool)
+        # a node next to a jump has the value after it
+        jumps[[np.searchsorted(time, at - 1e-9 * self.step) for at, value in ends if value]] = True
+        jumps[0] = False
+        return jumps[:-1]
 
     def wave(self, time: Array) -> Array:
         """The sine that g is multiplied by; ones where there is none."""

@@ -328,6 +328,21 @@ def load_deviation(load: History, time: Array) -> Array:
     return np.where(bound > 1e-12 * load.extremes[0], bound, 0.0)
 
 
+def load_excess(load: History, time: Array) -> Array:
+    """Bound of how far a load lies beyond both its values at the ends of the step to each node.
+
+    It is zero where the load jumps from the one to the other: shape (T,), 0 at the first node.
+    """
+    pieces = _pieces(load, time, 0.0)
+    first = np.searchsorted(pieces.time, time[:-1])
+    high = np.maximum(pieces.first, pieces.last) + pieces.bend
+    low = np.minimum(pieces.first, pieces.last) - pieces.bend
+    value = load.values(time)
+    above = np.maximum.reduceat(high, first) - np.maximum(value[1:], value[:-1])
+    below = np.minimum(value[1:], value[:-1]) - np.minimum.reduceat(low, first)
+    return np.append(0.0, np.maximum(np.maximum(above, below), 0.0))
+
+
 def _of_line(sigma: Array, first: Array, slope: Array) -> Array:
     """a/σ + b/σ² of P pieces, with its first two derivatives by σ, (3, P, S)."""
     inverse = [1 / sigma, 1 / sigma**2, 1 / sigma**3, 1 / sigma**4]

@@ -4,16 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
-from alphacut.base.arrays import Array
+from alphacut.base.arrays import Array, Mask
 from alphacut.base.errors import FailedError
 from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.dynamics.flow import Flow, StepError
 from alphacut.frame.dynamics.nonlinear import LagrangianFlow
 from alphacut.frame.envelope import Envelope
+from alphacut.frame.records.history import History
+from alphacut.frame.response.straying import load_deviation, load_excess
 from alphacut.frame.structures.lagrangian import LagrangianSystem
+from alphacut.frame.structures.linear import evaluate
+from alphacut.frame.structures.loads import distinct_histories
 from alphacut.fuzzy.result import Nature
 
 OPTIMA = 64
@@ -120,20 +125,71 @@ def node_deviation(flow: Flow, points: Array) -> Array:
     Row j is that of the step that ends at node j, 0 for the first node. It is `MARGIN` times the
     largest of the step and its neighbours, and of `FLOOR` times that of any step, of trajectories
     at parameters (S, d) in SI units.
+
+    In a step in which a force jumps, so does an acceleration. It is far from the straight line
+    then, but hardly beyond its values at both ends: there the distance beyond these is taken.
     """
     finer, parts = flow.finer()
     fraction = (np.arange(1, parts) / parts)[:, None]
     deviation = np.zeros((len(flow.time) - 1, len(flow.outputs)))
+    has_jump = np.zeros(deviation.shape, bool)
     for chunk in np.array_split(points, -(-len(points) // CHUNK)):
         fine = finer.values(chunk)
         ends = fine[:, ::parts]
         inner = fine[:, :-1].reshape(len(fine), -1, parts, fine.shape[-1])[:, :, 1:]
         chord = ends[:, :-1, None] * (1 - fraction) + ends[:, 1:, None] * fraction
-        deviation = np.maximum(deviation, np.abs(inner - chord).max((0, 2)))
-    # where these trajectories are straight, others may bend
-    candidates = [np.roll(deviation, k, 0) for k in (-1, 0, 1)]
-    candidates.append(np.broadcast_to(FLOOR * deviation.max(0), deviation.shape))
+        off_chord = np.abs(inner - chord).max((0, 2))
+        above = inner.max(2) - np.maximum(ends[:, :-1], ends[:, 1:])
+        below = np.minimum(ends[:, :-1], ends[:, 1:]) - inner.min(2)
+        beyond_ends = np.maximum(np.maximum(above, below).max(0), 0.0)
+        fed = _fed_through(flow, chunk)
+        has_jump |= (fed.jumps[:, :, None] & (fed.amplitude > 0)).any(0)
+        off = np.where(has_jump, beyond_ends, off_chord)
+        deviation = np.maximum(deviation, off + _fed_between(fed, finer.time, parts))
+    # Where these trajectories are straight, others may bend, but a jump is in the same step of all.
+    smooth = np.where(has_jump, 0.0, deviation)
+    padded = np.pad(smooth, ((1, 1), (0, 0)))
+    candidates = [padded[:-2], deviation, padded[2:]]
+    candidates.append(np.broadcast_to(FLOOR * smooth.max(0), deviation.shape))
     return np.concatenate([np.zeros((1, deviation.shape[1])), MARGIN * np.max(candidates, 0)])
+
+
+class _FedThrough(NamedTuple):
+    """What H histories of forces add to m accelerations at once."""
+
+    histories: list[History]
+    amplitude: Array  # largest magnitude that a unit of each adds, (H, 1, m)
+    jumps: Mask  # whether each jumps in a step, or at its end, (H, T − 1)
+
+
+def _fed_through(flow: Flow, points: Array) -> _FedThrough:
+    """Return what forces add to outputs at once, at any of the parameters (S, d)."""
+    histories = list[History]()
+    amplitude = np.zeros((0, 1, len(flow.outputs)))
+    if not isinstance(flow.system, LagrangianSystem):
+        matrices, _ = evaluate(flow.system, flow.names, points, derivatives=False)
+        if matrices.feeds is not None:
+            histories = distinct_histories(flow.system.loads)
+            amplitude = np.abs(matrices.feeds.value).max(0).T[:, None]
+    jumps = np.zeros((len(histories), len(flow.time) - 1), bool)
+    for row, history in zip(jumps, histories, strict=True):
+        row[:] = history.jumps_in_steps(flow.time)[1:]
+    return _FedThrough(histories, amplitude, jumps)
+
+
+def _fed_between(fed: _FedThrough, time: Array, parts: int) -> Array:
+    """Return what forces add to outputs between finer nodes, (steps, m), `parts` to a step.
+
+    A force may be zero at all of these and not between them.
+    """
+    steps = (len(time) - 1) // parts
+    added = np.zeros((steps, fed.amplitude.shape[-1]))
+    for history, amplitude, jumps in zip(*fed, strict=True):
+        off_chord, beyond_ends = (
+            f(history, time)[1:].reshape(steps, parts).max(1) for f in (load_deviation, load_excess)
+        )
+        added += np.where(jumps, beyond_ends, off_chord)[:, None] * amplitude
+    return added
 
 
 def reference_motions(

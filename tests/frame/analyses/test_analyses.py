@@ -1,5 +1,7 @@
 """Questions to a motion: peaks, passing of limits, tolerances, probabilities."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -103,6 +105,25 @@ def test_attained_bounds_exclude_nothing_and_say_so():
     near = passing(of, {"q1": 0.9 * of["q1"].reached[1]})["q1"]
     assert near.possibility == (1.0, 1.0)
     assert near.necessity == (0.0, 1.0)
+
+
+def test_what_lies_between_nodes_lowers_no_peak():
+    """Of estimated bounds: a coarse step widens them above, and all structures still exceed."""
+    found = envelope(FRAME, INPUTS, duration=5, step=0.02, alpha=(0, 1))
+    largest = np.abs(found.upper).max((0, 1))
+    coarse = replace(
+        found,
+        nature=Nature.ESTIMATED,
+        inner=None,
+        outer=None,
+        least_peaks=None,
+        error=np.full_like(found.error, 1e-3 * largest.min()),
+        between=np.tile(largest, (len(found.time), 1)),
+    )
+    peak = peaks(coarse)["q1"]
+    assert peak.error[0] >= largest[0]
+    limit = 0.98 * peak.lower[0]
+    assert passing({"q1": peak}, {"q1": limit})["q1"].outcome == "exceeded"
 
 
 def test_levels_below_the_lowest_are_left_open():

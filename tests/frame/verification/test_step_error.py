@@ -3,11 +3,14 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.linalg import expm
 
 from alphacut.base.errors import FailedError, RefusedError
 from alphacut.frame import (
     Accelerogram,
     Exact,
+    Force,
+    History,
     ImprovedFollower,
     LagrangianFlow,
     LagrangianSystem,
@@ -144,3 +147,90 @@ def test_modes_that_turn_several_times_within_a_step_are_seen() -> None:
             off = abs(inner - inner[0] * (1 - fraction) - inner[-1] * fraction).max(0)
             assert (off <= found[j + 1]).all(), seed
         assert found.max() < 4 * abs(fine).max()
+
+
+def top_accelerations(masses, stiffness, dampers, samples, factors, times):
+    """Accelerations of the top floor by SciPy's matrix exponential, shape (factors, T).
+
+    Springs and dashpots are those of storeys; `factors` multiply all springs. The force on the top
+    floor is linear between equally spaced samples, begins at t = 0 and ends with the last one; all
+    samples are at some of the equally spaced times.
+    """
+
+    def chain(values):
+        upper = np.append(values[1:], 0.0)
+        return np.diag(values + upper) - np.diag(values[1:], 1) - np.diag(values[1:], -1)
+
+    n, dt = len(masses), times[1]
+    spacing = round(0.1 / dt)
+    n_loaded = spacing * (len(samples) - 1)
+    at_times = np.interp(np.arange(n_loaded + 1) / spacing, np.arange(len(samples)), samples)
+    begin, end = np.zeros((2, len(times)))  # of the force in the interval after each time
+    begin[:n_loaded] = at_times[:-1]
+    end[:n_loaded] = at_times[1:]
+    motions = []
+    for factor in factors:
+        inverse_mass = np.diag(1 / masses)
+        A = np.zeros((2 * n + 2, 2 * n + 2))  # of q, v, the force and its slope
+        A[:n, n : 2 * n] = np.eye(n)
+        A[n : 2 * n, :n] = -inverse_mass @ chain(factor * stiffness)
+        A[n : 2 * n, n : 2 * n] = -inverse_mass @ chain(dampers)
+        A[2 * n - 1, 2 * n] = 1 / masses[-1]
+        A[2 * n, 2 * n + 1] = 1.0
+        step_map = expm(A * dt)
+        state, values = np.zeros(2 * n), []
+        for f, f_end in zip(begin, end, strict=True):
+            full = np.append(state, [f, (f_end - f) / dt])
+            values.append(A[2 * n - 1] @ full)
+            state = (step_map @ full)[: 2 * n]
+        motions.append(values)
+    return np.array(motions)
+
+
+def test_a_force_that_ends_at_a_node_widens_no_step_but_its_own(rng):
+    """An acceleration jumps with the force, by far more than motions stray in any step."""
+    masses, stiffness = np.array([6e4, 5e4]), np.array([6e7, 3e7])
+    dampers, step, parts, steps = np.array([4e5, 2e5]), 0.02, 20, 100
+    gust = History(0.1, rng.uniform(1.0, 1.6, 1 + 4 * (steps // 20)))
+    frame = StoreyFrame(
+        masses,
+        stiffness=stiffness,
+        dampers=dampers,
+        damper_placement="storey",
+        outputs=("a2",),
+        loads=[Force(2, 1.2e4, gust)],
+    )
+    names, factors = ("k1", "k2"), np.linspace(0.95, 1.05, 5)
+    flow = LinearFlow(frame, names, steps * step, step, Exact())
+    found = node_deviation(flow, factors[[0, 2, -1], None] * stiffness)[1:, 0]
+    times = np.arange(parts * steps + 1) * (step / parts)
+    samples = 1.2e4 * gust.samples
+    exact = top_accelerations(masses, stiffness, dampers, samples, factors, times)
+    nodes, x = exact[:, ::parts, None], np.arange(parts) / parts
+    inner = exact[:, :-1].reshape(len(factors), steps, parts)
+    off_chord = np.abs(inner - (1 - x) * nodes[:, :-1] - x * nodes[:, 1:]).max((0, 2))
+    above = inner.max(2) - np.maximum(nodes[:, :-1, 0], nodes[:, 1:, 0])
+    below = np.minimum(nodes[:, :-1, 0], nodes[:, 1:, 0]) - inner.min(2)
+    beyond_ends = np.maximum(above, below).max(0)
+    end = round(gust.step * (len(gust.samples) - 1) / step)  # node at which the force ends
+    has_jump = np.arange(1, steps + 1) == end
+    assert has_jump.any()
+    assert (off_chord <= found)[~has_jump].all()
+    assert (beyond_ends <= found).all()
+    assert found[has_jump] < 0.5 * off_chord[has_jump]
+    assert np.median((found / off_chord)[~has_jump]) <= 3.0
+
+
+@pytest.mark.parametrize("parts", [1, 4, 12])
+def test_a_force_between_the_nodes_of_finer_steps_is_counted(parts):
+    """It is zero at all times at which trajectories are looked at; F/m between them."""
+    step, steps, mass = 0.05, 8, 2.0
+    samples = np.zeros(2 * parts * steps + 1)
+    samples[1::2] = 1.0
+    force = Force(1, 3.0, History(step / parts / 2, samples))
+    frame = StoreyFrame([mass], stiffness=[8.0], outputs=("a1", "q1"), loads=[force])
+    flow = LinearFlow(frame, ("m1",), steps * step, step, Exact())
+    found = node_deviation(flow, np.array([[mass], [1.1 * mass]]))
+    assert (found[1:, 0] >= 3.0 / mass).all()
+    assert (found[1:, 0] <= 2 * 3.0 / mass).all()
+    assert found[:, 1].max() < 0.2 * 3.0 / mass * step**2
