@@ -25,6 +25,7 @@ from alphacut.case.types import NotEmpty, Section, after, case_file, distinct, t
 from alphacut.frame import Accelerogram, MatrixStructure, damping_from_loss, read_matrix
 from alphacut.frame.structures.matrix import Monomial, modal_energy_fractions
 from alphacut.frame.structures.quantities import Output
+from alphacut.frame.structures.read_matrix import MAX_ROWS
 from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.io.quantity import parse_fuzzy_in_any_unit
 
@@ -34,7 +35,10 @@ def _term(value: object, info: ValidationInfo) -> tuple[Monomial, Array]:
     match value:
         case [str(factor), str(file)]:
             name, _, member = file.partition(":")
-            return Monomial.parse(factor), read_matrix(case_file(name, info), name=member)
+            unknowns = info.data.get("unknowns", ())  # missing where they are refused themselves
+            rows = len(unknowns) or MAX_ROWS
+            path = case_file(name, info)
+            return Monomial.parse(factor), read_matrix(path, name=member, max_rows=rows)
     raise RefusedError("", value, 'a pair [factor, file], as ["Ec*I", "columns.mtx"]')
 
 

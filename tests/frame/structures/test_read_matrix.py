@@ -1,10 +1,13 @@
 """Matrices from files of every kind that is read, and files that are refused."""
 
+from zipfile import ZipFile
+
 import numpy as np
 import pytest
 import scipy.io
 import scipy.sparse
 
+from alphacut.base import memory
 from alphacut.base.errors import RefusedError
 from alphacut.frame import read_matrix
 
@@ -39,8 +42,8 @@ def test_one_of_several_arrays_is_named(tmp_path):
         ("k.txt", "1 2\n", "of type .txt"),
         ("k.csv", "1,2\n3\n", "a file .mtx"),
         ("k.csv", "1,nan\n", "no such array"),
-        ("k.mtx", "no matrix\n", "a file .mtx"),
-        ("k.npy", "no array", "a file .mtx"),
+        ("k.mtx", "no matrix\n", "k.mtx is no matrix; allowed: %%MatrixMarket"),
+        ("k.npy", "no array", "an array of real numbers as numpy.save"),
     ],
 )
 def test_what_is_no_matrix_is_refused(tmp_path, name, content, words):
@@ -49,3 +52,153 @@ def test_what_is_no_matrix_is_refused(tmp_path, name, content, words):
         read_matrix(tmp_path / name)
     with pytest.raises(RefusedError, match=f"missing{tmp_path.joinpath(name).suffix}"):
         read_matrix(tmp_path / f"missing{tmp_path.joinpath(name).suffix}")
+
+
+def refuse_calls(*_, **__):
+    raise AssertionError("a library was handed a file that is not checked")
+
+
+@pytest.fixture(autouse=True)
+def _no_library_reads(monkeypatch):
+    monkeypatch.setattr(scipy.io, "mmread", refuse_calls)
+    monkeypatch.setattr(scipy.sparse, "load_npz", refuse_calls)
+    monkeypatch.setattr(np, "load", refuse_calls)
+
+
+def random_sparse(rng, *, is_square):
+    rows = int(rng.integers(1, 12))
+    columns = rows if is_square else int(rng.integers(1, 12))
+    values = rng.normal(size=(rows, columns)) * (rng.uniform(size=(rows, columns)) < 0.3)
+    return scipy.sparse.coo_matrix(values)
+
+
+@pytest.mark.parametrize("symmetry", ["general", "symmetric", "skew-symmetric"])
+@pytest.mark.parametrize("field", ["real", "integer", "pattern"])
+@pytest.mark.parametrize("is_dense", [False, True])
+def test_files_of_scipy_give_the_matrices_that_it_reads(
+    tmp_path, monkeypatch, rng, symmetry, field, is_dense
+):
+    if is_dense and field == "pattern":
+        return
+    matrix = random_sparse(rng, is_square=symmetry != "general")
+    if field == "integer":
+        matrix = scipy.sparse.coo_matrix(np.rint(5 * matrix.toarray()).astype(int))
+    if symmetry != "general":
+        sign = 1 if symmetry == "symmetric" else -1
+        matrix = scipy.sparse.coo_matrix(matrix + sign * matrix.T)
+    path = tmp_path / "k.mtx"
+    written = matrix.toarray() if is_dense else matrix
+    scipy.io.mmwrite(path, written, field=field, symmetry=symmetry, comment="one\ntwo")
+    monkeypatch.undo()
+    expected = scipy.io.mmread(path)
+    if scipy.sparse.issparse(expected):
+        expected = expected.toarray()
+    if field == "pattern" and symmetry == "skew-symmetric":
+        expected = np.sign(expected)
+    assert np.array_equal(read_matrix(path), expected)
+
+
+@pytest.mark.parametrize("form", ["csr", "csc", "coo", "bsr", "dia"])
+def test_sparse_matrices_of_every_form_are_read(tmp_path, rng, form):
+    matrix = random_sparse(rng, is_square=False).asformat(form)
+    for is_compressed in (False, True):
+        scipy.sparse.save_npz(tmp_path / "k.npz", matrix, compressed=is_compressed)
+        assert np.array_equal(read_matrix(tmp_path / "k.npz"), matrix.toarray())
+
+
+HEAD = "%%MatrixMarket matrix coordinate real general\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (HEAD + "2 2 1\n3 1 5.0\n", "index 3 of rows, counted from 1; allowed: .* from 1 to 2"),
+        (HEAD + "2 2 1\n1 0 5.0\n", "index 0 of columns"),
+        (HEAD + "2 2 1\n1 1.5 5.0\n", "index 1.5 of columns"),
+        (HEAD + "2 2 1\n1 -1 5.0\n", "index -1 of columns"),
+        (HEAD + "2 2 1\n1 1 5.0x\n", "with '1 1 5.0x'"),
+        (HEAD + "2 2 1\n1 1 nan\n", "with '1 1 nan'"),
+        (HEAD + "2 2 1\n1 1 1e\n", "could not convert string to float"),
+        (HEAD + "2 2 2\n1 1 5.0\n", "3 numbers for 2 entries"),
+        (HEAD + "2 2 -1\n1 1 5.0\n", "sizes .* whole numbers"),
+        (HEAD + "900000000 900000000 1\n1 1 5.0\n", "900000000 × 900000000; allowed: up to 5000"),
+        (HEAD + "2 2 99999999999999\n1 1 5.0\n", "3 numbers for 99999999999999 entries"),
+        (HEAD.replace("real", "complex") + "1 1 1\n1 1 1 0\n", "coordinate complex"),
+        (HEAD, "sizes"),
+    ],
+)  # fmt: skip
+def test_texts_that_contradict_themselves_are_refused(tmp_path, text, words):
+    path = tmp_path / "k.mtx"
+    path.write_text(text)
+    with pytest.raises(RefusedError, match=words):
+        read_matrix(path)
+
+
+@pytest.mark.parametrize(
+    ("key", "values", "words"),
+    [
+        ("indices", [0, 3, 1, 2, 0], "index 4 of columns"),
+        ("indices", [0, -1, 1, 2, 0], "index 0 of columns"),
+        ("indices", [0, 1], "pointers that do not rise"),
+        ("indptr", [0, 2, 1, 5], "pointers that do not rise"),
+        ("indptr", [0, 2, 4, 900000000], "pointers that do not rise"),
+        ("indptr", [0, 1, 2, 3, 5], "index 4 of rows"),
+        ("shape", [900000000, 900000000], "up to 5000"),
+        ("shape", [3, 3, 3], "of shape"),
+        ("format", b"lil", "of form lil"),
+    ],
+)  # fmt: skip
+def test_sparse_arrays_that_contradict_one_another_are_refused(tmp_path, key, values, words):
+    arrays = {
+        "format": b"csr",
+        "shape": [3, 3],
+        "data": np.ones(5),
+        "indices": [0, 1, 1, 2, 0],
+        "indptr": [0, 2, 4, 5],
+    }
+    np.savez(tmp_path / "k.npz", **arrays)
+    assert read_matrix(tmp_path / "k.npz").sum() == 5
+    np.savez(tmp_path / "k.npz", **(arrays | {key: values}))
+    with pytest.raises(RefusedError, match=words):
+        read_matrix(tmp_path / "k.npz")
+
+
+@pytest.mark.parametrize("ending", ["npy", "npz"])
+@pytest.mark.parametrize("shape", ["(9, 9)", "(3, 2)", "(30000, 30000)", "(-3, -3)", "(3,)*99"])
+def test_a_head_that_promises_other_numbers_than_follow_is_refused(tmp_path, ending, shape):
+    np.save(tmp_path / "k.npy", np.ones((3, 3)))
+    content = (tmp_path / "k.npy").read_bytes()
+    start, end = content.index(b"(3, 3)"), content.index(b"\n")
+    head = content[:start] + shape.encode() + b", }"
+    content = head.ljust(end) + content[end:]
+    if ending == "npy":
+        (tmp_path / "k.npy").write_bytes(content)
+    else:
+        with ZipFile(tmp_path / "k.npz", "w") as archive:
+            archive.writestr("k.npy", content)
+    with pytest.raises(RefusedError, match=r"of shape|bytes, where its head states|unreadable"):
+        read_matrix(tmp_path / f"k.{ending}")
+
+
+def test_objects_are_no_matrix_and_no_pickle_is_read(tmp_path):
+    np.save(tmp_path / "k.npy", np.array([None, 1.0], object), allow_pickle=True)
+    np.savez(tmp_path / "k.npz", k=np.array([None, 1.0], object))
+    for name in ("k.npy", "k.npz"):
+        with pytest.raises(RefusedError, match="object of shape"):
+            read_matrix(tmp_path / name)
+
+
+def test_a_matrix_larger_than_the_unknowns_is_refused(tmp_path):
+    for name, write in WRITE.items():
+        write(tmp_path / name)
+        assert read_matrix(tmp_path / name, max_rows=3).shape == (3, 3)
+        with pytest.raises(RefusedError, match="3 × 3; allowed: up to 2 rows"):
+            read_matrix(tmp_path / name, max_rows=2)
+
+
+def test_an_archive_that_unpacks_to_more_than_memory_is_refused(tmp_path, monkeypatch):
+    np.savez_compressed(tmp_path / "k.npz", k=np.zeros((200, 200)))
+    assert read_matrix(tmp_path / "k.npz").shape == (200, 200)
+    monkeypatch.setattr(memory, "free_memory", lambda: 1e5)
+    with pytest.raises(RefusedError, match=r"takes 0\.00064 GB"):
+        read_matrix(tmp_path / "k.npz")
