@@ -12,6 +12,17 @@ PACKAGES = ("stochastic", "rve", "fuzzy", "frame", "alphacut")
 FOLDERS = (*PACKAGES, "tests", "benchmarks", "docs", "demos")
 
 
+def folder_of_package(name: str) -> Path:
+    """Folder of a package: beside alphacut, or within it, as in the source archive."""
+    return ROOT / name if (ROOT / name).is_dir() else ROOT / "alphacut" / name
+
+
+def top_folder(file: Path) -> str:
+    """Name of the package or of the folder at the top that a file belongs to."""
+    first, *further = file.relative_to(ROOT).parts
+    return further[0] if first == "alphacut" and further[0] in PACKAGES else first
+
+
 @cache
 def trees() -> dict[Path, ast.Module]:
     """Syntax trees of all Python files of the project."""
@@ -21,7 +32,7 @@ def trees() -> dict[Path, ast.Module]:
 
 def files_in(*folders: str) -> list[Path]:
     """Python files in folders of the project, by their names at the top."""
-    return [file for file in trees() if file.relative_to(ROOT).parts[0] in folders]
+    return [file for file in trees() if top_folder(file) in folders]
 
 
 def kinds_of_lines(text: str) -> Counter[str]:

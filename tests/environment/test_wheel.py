@@ -118,9 +118,13 @@ def test_the_wheel_owns_one_name_and_holds_every_file(wheel):
 def test_the_archive_holds_what_tests_need(archive):
     with tarfile.open(archive) as content:
         files = {name.partition("/")[2] for name in content.getnames()}
-    for folder in ("tests", "benchmarks", "cases", "docs", "meshes", *NESTED):
+    for folder in ("tests", "benchmarks", "cases", "demos", "docs", "findings", "meshes"):
         here = {path.relative_to(ROOT).as_posix() for path in (ROOT / folder).rglob("*")}
         assert {file for file in here if "__pycache__" not in file} <= files
+    for folder in NESTED:  # once, where they are imported from
+        here = {path.relative_to(ROOT).as_posix() for path in (ROOT / folder).rglob("*.py")}
+        assert {f"alphacut/{file}" for file in here} <= files
+        assert not here & files
     for name in ("enter", "Makefile", ".ci/run", "README.md", "CONTRIBUTING.md", "CHANGELOG.md"):
         assert name in files
 
