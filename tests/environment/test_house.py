@@ -9,7 +9,7 @@ import os
 
 from tests.environment.house import PACKAGES, files_in, trees
 
-ANY = 17  # public functions with Any, for FEniCSx, Gmsh and keywords of Matplotlib
+ANY = 18  # public functions with Any, for FEniCSx, Gmsh and keywords of Matplotlib
 
 
 def uses_any(node: ast.expr | None) -> bool:
