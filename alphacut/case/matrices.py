@@ -24,7 +24,7 @@ from alphacut.case.structure import (
 from alphacut.case.types import NotEmpty, Section, after, case_file, distinct, text
 from alphacut.frame import Accelerogram, MatrixStructure, damping_from_loss, read_matrix
 from alphacut.frame.structures.matrix import Monomial, modal_energy_fractions
-from alphacut.frame.structures.quantities import Output
+from alphacut.frame.structures.quantities import Output, require_names
 from alphacut.frame.structures.read_matrix import MAX_ROWS
 from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.io.quantity import parse_fuzzy_in_any_unit
@@ -146,8 +146,11 @@ class MatricesSection(StructureSection):
         return np.array(pattern)
 
     def require_consistent(self) -> None:
-        """Refuses a structure without outputs, and a record without a direction."""
+        """Refuses names out of alphabet, no outputs, and a record without a direction."""
         require(bool(self.outputs), "matrices.outputs", None, "one output or more")
+        require_names("matrices.parameters", self.parameters)
+        outputs = [Output(name, output.unit) for name, output in self.outputs.items()]
+        require_names("matrices.outputs", outputs)
         if self.accelerogram is not None or self.direction:
             self.require_pattern()
         _ = self.nominal  # refuses matrices that do not fit together

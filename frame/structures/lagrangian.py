@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from alphacut.base.errors import RefusedError, checked_number, require
-from alphacut.frame.structures.quantities import Output, Parameter
+from alphacut.frame.structures.quantities import Output, Parameter, require_names
 
 if TYPE_CHECKING:
     from sympy import Expr, Matrix
@@ -36,9 +36,9 @@ class LagrangianSystem:
         force: Generalised forces F(q, v, p), n of them; None for none.
 
     Raises:
-        RefusedError: L is not quadratic in v, a coordinate has no inertia, or a function asks for
-            what is not there or gives a list of another length. Functions that are not smooth are
-            refused by a motion.
+        RefusedError: A name or unit is out of alphabet, L is not quadratic in v, a coordinate has
+            no inertia, or a function asks for what is not there or gives a list of another length.
+            Functions that are not smooth are refused by a motion.
 
     Example:
         >>> oscillator = LagrangianSystem(
@@ -66,6 +66,7 @@ class LagrangianSystem:
             mapping = getattr(self, name)
             has_entries = isinstance(mapping, Mapping) and bool(mapping)
             require(has_entries, name, value=mapping, allowed="values by name, one at least")
+            require_names(f"name in {name}", mapping)
         for name, value in self.parameters.items():
             checked_number(f"parameter {name}", value)
         eq = self.symbols

@@ -22,7 +22,7 @@ from alphacut.frame.calculus.jet import Jet, variables
 from alphacut.frame.records.history import Accelerogram
 from alphacut.frame.structures.linear import Assembly, Number, evaluate, stack, undamped_modes
 from alphacut.frame.structures.loads import Factor, Force, require_loads
-from alphacut.frame.structures.quantities import RATIO, Output, Parameter
+from alphacut.frame.structures.quantities import RATIO, Output, Parameter, require_names
 
 KINDS = ("mass", "damping", "stiffness")
 Terms = Sequence[tuple[Factor | str | float, Array]]
@@ -56,9 +56,10 @@ class MatrixStructure:
         loads: Forces on unknowns that have mass.
 
     Raises:
-        RefusedError: A shape is wrong, a number not finite, a factor names no parameter, an array
-            is not symmetric, the mass of unknowns that have mass is not positive definite, one
-            without mass has a damper, a force or no stiffness, or a ratio is outside [0, 1).
+        RefusedError: A name or unit is out of alphabet, a shape is wrong, a number not finite, a
+            factor names no parameter, an array is not symmetric, the mass of unknowns that have
+            mass is not positive definite, one without mass has a damper, a force or no stiffness,
+            or a ratio is outside [0, 1).
 
     Example:
         >>> import numpy as np
@@ -87,6 +88,8 @@ class MatrixStructure:
             checked_number(f"parameter {name}", value)
         for kind in ("mass", "stiffness", "observed"):
             require(bool(getattr(self, kind)), kind, value=None, allowed="one entry at least")
+        require_names("name of a parameter", self.parameters)
+        require_names("name of an output", self.observed)
         require_loads(self.ground, self.loads)
         object.__setattr__(self, "loads", tuple(self.loads))
         for kind in KINDS:

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
+
+from alphacut.base.errors import require
 
 OUTPUTS = {  # unit and words, by names without the floor
     "q": ("m", "displacement of floor"),
@@ -19,6 +22,11 @@ OUTPUTS = {  # unit and words, by names without the floor
     "overturning_moment": ("N*m", ""),
     **{"base_shear": ("N", ""), "force": ("N", ""), "phi": ("rad", "")},
 }
+NAME = re.compile(r"[^\W\d]\w{0,63}")
+"""A name that texts of limits and peaks ("max roof"), files and tables can have."""
+NAME_WORDS = "names of a letter, then letters, digits or _, up to 64"
+UNIT = re.compile(r"[\w%°*/^·. ()+-]{0,32}")
+UNIT_WORDS = "units of letters, digits and % ° * / ^ · . ( ) + -, up to 32, as N*m"
 POSITIVE = "positive"
 NOT_NEGATIVE = "0 or greater"
 UP_TO_ONE = "0 to 1"
@@ -63,6 +71,21 @@ class Output(str):
         kind, floor = self._parts
         _, words = OUTPUTS.get(kind, ("", ""))
         return f"{words} {floor} ({self})" if words and floor else self.replace("_", " ")
+
+
+def require_names(key: str, names: Iterable[str]) -> None:
+    """Refuse names of parameters or outputs, and units of the latter, that are out of alphabet.
+
+    Raises:
+        RefusedError: A name has a blank or a control character, say, or the unit of an `Output`
+            has a letter that no unit has.
+    """
+    for name in names:
+        is_name = isinstance(name, str) and NAME.fullmatch(name) is not None
+        require(is_name, key, value=repr(str(name)), allowed=NAME_WORDS)
+        if isinstance(name, Output):
+            is_unit = UNIT.fullmatch(name.unit) is not None
+            require(is_unit, f"unit of {name}", value=repr(name.unit), allowed=UNIT_WORDS)
 
 
 def output_of(peak: str) -> str:

@@ -89,6 +89,16 @@ def test_matrices_and_the_storey_frame_move_alike(folder):
         ('direction = "x"', 'direction = "y"', "matrices.direction"),
         ('"1.x", "2.x"]\nmass', '"1.x", "2.x", "3.x"]\nmass', "of shape"),
         ('m = "20 t"', 'm = "20 parsec fuzz"', "a quantity"),
+        (
+            "roof =",
+            '"roof drift" =',
+            "matrices.outputs is 'roof drift'; allowed: names of a letter",
+        ),
+        ("roof =", '"roof\\u001b[31m" =', "matrices.outputs is 'roof\\x1b[31m'"),
+        ("roof =", '"2nd" =', "matrices.outputs is '2nd'"),
+        ("roof =", '"" =', "matrices.outputs is ''"),
+        ('m = "20 t"', 'm = "20 t"\n"k 3" = 1', "matrices.parameters is 'k 3'"),
+        ('unit = "N"', 'unit = "N\\u001b[2J"', "unit of shear is 'N\\x1b[2J'"),
         ('{ row = { "2.x" = 1.0 } }', "{ }", "matrices.outputs.roof.row is missing"),
     ],
 )

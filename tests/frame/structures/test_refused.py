@@ -17,6 +17,7 @@ from alphacut.frame import (
     LagrangianSystem,
     LinearFlow,
     MatrixStructure,
+    Output,
     StoreyFrame,
     pendulum,
 )
@@ -68,6 +69,13 @@ MATRICES = MatrixStructure({"m": 1.0, "k": 2.0}, [("m", EYE)], [("k", EYE)], {"q
         ({"ratios": [0.1, 0.2, 0.3]}, "ratios is .*; allowed: one number or parameter"),
         ({"ratios": [1.0]}, "ratios is .*, 0 or greater"),
         ({"parameters": {"m": "1 kg", "k": 2.0}}, "parameter m is '1 kg'"),
+        ({"parameters": {"m": 1.0, "k": 2.0, "k 3": 1.0}}, "name of a parameter is 'k 3'"),
+        ({"observed": {"roof drift": EYE[0]}}, "name of an output is 'roof drift'; allowed: names"),
+        ({"observed": {"=q": EYE[0]}}, "name of an output is '=q'"),
+        (
+            {"observed": {Output("q", "m\x1b[2J"): EYE[0]}},
+            "unit of q is 'm.x1b.2J'; allowed: units",
+        ),
     ],
 )
 def test_a_structure_from_matrices_refuses(changes, message):
