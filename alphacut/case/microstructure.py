@@ -55,7 +55,7 @@ class PackingSection(Section):
         require(fits, key, self.fraction, allowed, cure)
         _ = self.radii
 
-    def particles_of(
+    def pack(
         self, *, spheres: bool, seed: int, workers: int = 1, progress: Progress | None = None
     ) -> Packings:
         """The packings: of spheres, or else of discs."""
@@ -79,47 +79,18 @@ class PackingSection(Section):
         require(fits, key, "beside or without ends", allowed)
 
 
-class MeasuredSection(Section):
-    """Circles that were measured in a section, or seen in its image."""
-
-    @property
-    def measured(self) -> Particles:
-        """The circles."""
-        raise NotImplementedError
-
-    def require_readable(self, *, spheres: bool) -> None:
-        """Refuses a file that is not read."""
-        _ = self.measured
-
-    def particles_of(
-        self, *, spheres: bool, seed: int, workers: int = 1, progress: Progress | None = None
-    ) -> Sequence[Particles]:
-        """The section."""
-        return [self.measured]
-
-
-class Circles(MeasuredSection):
+class Circles(Section):
     """Measured circles from a CSV file with the columns x, y, r."""
 
     file: CaseFile = Field(description="CSV file with the header x [mm], y [mm], r [mm]")
     size: tuple[Length, Length] = Field(description="width and height of the section")
 
-    @property
-    def measured(self) -> Particles:
-        """The circles of the file."""
-        return read_particles(self.file, size=self.size)
 
-
-class Photograph(MeasuredSection):
+class Photograph(Section):
     """Circles segmented from the image of a section."""
 
     file: CaseFile = Field(description="image file")
     pixel: Length = Field(description="side of a pixel")
-
-    @property
-    def measured(self) -> Particles:
-        """The circles in the image."""
-        return read_particles(self.file, pixel=self.pixel)
 
 
 class MicrostructureSection(Section):
@@ -139,9 +110,29 @@ class MicrostructureSection(Section):
         return [x for x in (self.packing, self.circles, self.image) if x is not None]
 
     @property
-    def source(self) -> PackingSection | Circles | Photograph:
-        """The section on the particles."""
-        return self.sources[0]
+    def measured(self) -> Particles | None:
+        """The circles that were measured or seen; None of packings."""
+        if self.circles is not None:
+            return read_particles(self.circles.file, size=self.circles.size)
+        if self.image is not None:
+            return read_particles(self.image.file, pixel=self.image.pixel)
+        return None
+
+    def particles(self, *, spheres: bool, workers: int, progress: Progress) -> Sequence[Particles]:
+        """The packings, or the one section that was measured."""
+        if self.packing is None:
+            measured = self.measured
+            assert measured is not None  # one of the three is there
+            return [measured]
+        return self.packing.pack(
+            spheres=spheres, seed=self.seed, workers=workers, progress=progress
+        )
+
+    def require_readable(self, *, spheres: bool) -> None:
+        """Refuses a fraction that does not pack, and a file that is not read."""
+        if self.packing is not None:
+            self.packing.require_readable(spheres=spheres)
+        _ = self.measured
 
     def require_consistent(self) -> None:
         """Refuses several sources of the particles, or none."""

@@ -267,7 +267,7 @@ def require_runnable(content: Content) -> image.ImageStudy | None:
     """
     stages, study_of_image = content.stages, None
     if "microstructure" in stages and content.microstructure is not None:
-        content.microstructure.source.require_readable(spheres=content.has_spheres)
+        content.microstructure.require_readable(spheres=content.has_spheres)
     if "modulus" in stages:
         study_of_image = _require_material(content)
     if "envelope" in stages:

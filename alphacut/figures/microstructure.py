@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -69,7 +70,9 @@ def draw_map(fitted: FittedRadiusMap) -> Figure:
     return figure
 
 
-def draw_circles(axes: Axes, centres: Array, radii: Array, **look: str | float) -> None:
+def draw_circles(
+    axes: Axes, centres: Array, radii: Array, **look: str | float | Sequence[str]
+) -> None:
     """Draws circles, of centres (n, 2) and radii (n,) in m, on axes in mm."""
     width = 2e3 * radii
     position = {"offsets": 1e3 * centres, "offset_transform": axes.transData}

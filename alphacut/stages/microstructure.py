@@ -30,19 +30,21 @@ def stage(
     If there is a folder, it gets radius.toml, a section of a case, figures if there is what draws
     them, and circles.csv of an image.
     """
-    file = section.source.file
+    file = section.sources[0].file
     inputs = [section, spheres, file and file_digest(file)]
 
     def compute(context: StageContext) -> StageResult[Document]:
-        options = {"seed": section.seed, "workers": context.workers}
-        particles = section.source.particles_of(
-            spheres=spheres, progress=lambda done: context.tick(PACKED * done), **options
+        particles = section.particles(
+            spheres=spheres,
+            workers=context.workers,
+            progress=lambda done: context.tick(PACKED * done),
         )
         fitted = fit_radius_map(
             particles,
             limits=section.limits,
+            seed=section.seed,
+            workers=context.workers,
             progress=lambda done: context.tick(PACKED + (1 - PACKED) * done),
-            **options,
         )
         numbers, folder = fitted.numbers(), context.folder
         if folder is not None:

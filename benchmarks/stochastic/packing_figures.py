@@ -261,9 +261,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     section = load(options.case).content.microstructure
     if section is None or section.packing is None:
         parser.error(f"{options.case} has no [microstructure.packing]")
-    packings = section.packing.particles_of(
-        spheres=False, seed=section.seed, workers=options.workers
-    )
+    packings = section.packing.pack(spheres=False, seed=section.seed, workers=options.workers)
     fitted = fit_radius_map(
         packings, limits=section.limits, seed=section.seed, workers=options.workers
     )
