@@ -235,6 +235,9 @@ class Frame(StructureSection):
     """drift at which they yield, in place of yield_force"""
     hardening: OneOrMany[Hardening] | None = None
     """stiffness of each storey after yielding over the initial one, 0 unless given"""
+    gravity: Annotated[float, Quantity("m/s^2", minimum=0)] = 0.0
+    """acceleration of gravity, "1 g", of weights that press on displaced storeys (P-Delta): they
+    reduce the stiffness of a storey by the weight above over its height; left out unless given"""
     damping_ratio: DampingRatios = Field(default=(), description=RATIO_WORDS)
     dampers: OneOrMany[Damping] = Field(default=(ZERO,), description="viscous damper of each floor")
     damper_placement: Literal["ground", "storey"] | None = None
@@ -287,6 +290,7 @@ class Frame(StructureSection):
                 rayleigh=(self.rayleigh_mass.nominal, self.rayleigh_stiffness.nominal),
                 rayleigh_of=self.rayleigh_of,
                 ground=self.accelerogram,
+                gravity=self.gravity,
                 damping_ratio=nominal_ratios[0] if len(ratios) == 1 else nominal_ratios or None,
             )
         except RefusedError as error:

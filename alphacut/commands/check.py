@@ -44,6 +44,8 @@ if TYPE_CHECKING:
     import xarray
 
 USUAL_PERIODS = 1e-3, 60.0  # in s: towers have 10 s at most, machine parts seldom below 1 ms
+NEGLIGIBLE_WEIGHT = 0.1
+"""Stability coefficient of a storey up to which EN 1998-1, 4.4.2.2, neglects P-Delta."""
 KINDS = {Crisp: "crisp", Interval: "interval", Triangular: "triangle", Trapezoidal: "trapezoid"}
 Row = tuple[str, str, str]
 
@@ -72,6 +74,8 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
             text += (
                 "this is an unusual period: are units right, mass and stiffness not exchanged?\n"
             )
+    if content.structure is not None:
+        text += "".join(f"warning: {line}\n" for line in missing_gravity(content.structure))
     if linear and (record := linear.ground):
         peak = engineering(record.extremes[0], "m/s^2")
         in_g = f"{record.extremes[0] / STANDARD_GRAVITY:.3g} g"
@@ -91,6 +95,18 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
             text += f"fragility: about {motions:,.0f} motions, {seconds:.0f} s by one process\n"
     write_answer(options, document, out, f"{text}{options.case}: no problems\n")
     return 0
+
+
+def missing_gravity(structure: Structure) -> Iterator[str]:
+    """Yields a sentence for each storey of a frame on which the case leaves out a large weight."""
+    frame = structure.frame
+    if frame is None or frame.gravity or not len(frame.lengths):
+        return
+    ends = {name: tuple(number.support) for name, number in structure.numbers.items()}
+    for z, coefficient in enumerate(frame.stability_coefficients(ends), start=1):
+        if coefficient > NEGLIGIBLE_WEIGHT:
+            what = f"weight over stiffness and height of storey {z} is up to {coefficient:.2g}"
+            yield f'{what}: say frame.gravity = "1 g", so that drifts grow by it (P-Delta)'
 
 
 def long_steps(linear: LinearSystem, section: EnvelopeSection) -> Iterator[str]:

@@ -11,12 +11,13 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import checked_number, require, require_choice, require_numbers
+from alphacut.base.number_text import STANDARD_GRAVITY
 from alphacut.frame.calculus.jet import Jet
 from alphacut.frame.records.history import Accelerogram
 from alphacut.frame.structures.linear import Assembly, Number, stack
@@ -32,6 +33,18 @@ SYMBOLS = {
 SINGLE = {"modulus": "E", "damping_ratio": "zeta", "rayleigh": "rayleigh_mass"}
 MOMENT = "overturning_moment"
 SPRING_KEYS = "lengths, modulus and second_moment, or stiffness (with lengths for gravity)"
+
+
+class _Storeys(NamedTuple):
+    """Storeys somewhere in a box, from below: arrays of shape (n,).
+
+    Args:
+        stiffness: k_z in N/m.
+        mass_over_height: Mass of all floors above over the height l_z, in kg/m.
+    """
+
+    stiffness: Array
+    mass_over_height: Array
 
 
 @dataclass(frozen=True)
@@ -251,7 +264,12 @@ class StoreyFrame:
 
     def softening(self, p: Mapping[str, Number]) -> Number:
         """P_z / l_z of storeys, shape (…, n), in N/m, P_z the weight of all floors above."""
-        above = self._of_floors("m{}", p).contract(self.gravity * np.tri(self.floors))
+        return self._masses_over_heights(p) * self.gravity
+
+    def _masses_over_heights(self, p: Mapping[str, Number]) -> Number:
+        """Mass of all floors above each storey over its height, shape (…, n), in kg/m."""
+        # row i of the lower triangle adds the mass of floor i to storeys 1 … i
+        above = self._of_floors("m{}", p).contract(np.tri(self.floors))
         return above * self.heights(p) ** -1
 
     def heights(self, p: Mapping[str, Number]) -> Number:
@@ -317,24 +335,47 @@ class StoreyFrame:
         require(0 < z <= self.floors, "output", value=name, allowed=allowed)
         return kind, z - 1
 
+    def stability_coefficients(self, ends: Mapping[str, tuple[float, float]]) -> Array:
+        """Return the largest P_z / (k_z l_z) of each storey in a box, P_z the weight above.
+
+        Below 0.1 second-order effects may be neglected (EN 1998-1, 4.4.2.2, where the storey is
+        elastic); from 1 on the storey buckles.
+
+        Args:
+            ends: Lower and upper end of parameters in SI units, by name; others are nominal.
+
+        Returns:
+            Shape (n,), with the frame's own gravity, or standard gravity if it has none.
+        """
+        worst = self._worst_storeys(ends)
+        return (self.gravity or STANDARD_GRAVITY) * worst.mass_over_height / worst.stiffness
+
     def require_standing(self, ends: Mapping[str, tuple[float, float]]) -> None:
         """Refuse weights that buckle a storey somewhere in a box of parameters, by SI ends."""
         if not self.gravity:
             return
-        # k − P / l of all storeys must be positive. k l / P is least where stiffness is low and
-        # mass high; with k of columns it falls with heights.
+        # k − P / l of all storeys must be positive
+        worst = self._worst_storeys(ends)
+        softening = self.gravity * worst.mass_over_height
+        for z, (k, soft) in enumerate(zip(worst.stiffness, softening, strict=True), start=1):
+            allowed = f"more than weight over height, {soft:.5g} N/m"
+            cure = "else it buckles: take stiffer storeys, lighter floors or narrower supports"
+            key = f"stiffness of storey {z} under P-Delta"
+            require(k > soft, key, value=f"{k:.5g} N/m", allowed=allowed, cure=cure)
+
+    def _worst_storeys(self, ends: Mapping[str, tuple[float, float]]) -> _Storeys:
+        """The storeys where k l / P is least in a box: stiffness low, mass high.
+
+        The k of columns falls with the cube of the height, so that k l is least where it is high;
+        the k of springs does not depend on it.
+        """
         worst_when_high = "m" if self.stiffness else "ml"
         worst = {name: ends.get(name, (x, x)) for name, x in self.parameters.items()}
         p = {
             name: Jet.constant(np.array([high if name[0] in worst_when_high else low]), 0)
             for name, (low, high) in worst.items()
         }
-        stiffness, softening = self.springs(p).value[0], self.softening(p).value[0]
-        for z, (k, soft) in enumerate(zip(stiffness, softening, strict=True), start=1):
-            allowed = f"more than weight over height, {soft:.5g} N/m"
-            cure = "else it buckles: take stiffer storeys, lighter floors or narrower supports"
-            key = f"stiffness of storey {z} under P-Delta"
-            require(k > soft, key, value=f"{k:.5g} N/m", allowed=allowed, cure=cure)
+        return _Storeys(self.springs(p).value[0], self._masses_over_heights(p).value[0])
 
     def _of_floors(self, pattern: str, p: Mapping[str, Number]) -> Number:
         """Parameters of all floors, shape (…, n)."""

@@ -1,0 +1,69 @@
+"""P-Delta in a case: `frame.gravity` softens storeys, and `check` warns where it is left out."""
+
+import pytest
+
+from alphacut.case.content import load
+from alphacut.entry import main
+from alphacut.frame.structures.linear import frequencies
+from alphacut.io.files import BadInput
+
+# weight over height of the storeys: 294.2 and 98.07 kN/m
+CASE = """
+title = "A soft storey"
+stages = ["envelope"]
+[frame]
+masses = ["60 t", "30 t"]
+lengths = "3 m"
+stiffness = ["[1.96, 2.1] MN/m", "5 MN/m"]
+damping_ratio = "5 %"
+displacements = "10 mm"
+GRAVITY
+[envelope]
+fuzzy = ["k1"]
+alpha = [0, 1]
+duration = "1 s"
+step = "0.02 s"
+"""
+
+
+def written(folder, gravity):
+    path = folder / "case.toml"
+    path.write_text(CASE.replace("GRAVITY", gravity), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("text", "gravity"), [("1 g", 9.80665), ("9.81 m/s^2", 9.81), ("0 m/s^2", 0.0)]
+)
+def test_gravity_softens_storeys(tmp_path, text, gravity):
+    """Frequencies are the roots of ω⁴ m₁ m₂ − ω² (m₁ s₂ + m₂ (s₁ + s₂)) + s₁ s₂ = 0."""
+    frame = load(written(tmp_path, f'gravity = "{text}"')).content.structure.frame
+    m1, m2, k2 = 60e3, 30e3, 5e6
+    s1 = frame.parameters["k1"] - (m1 + m2) * gravity / 3
+    s2 = k2 - m2 * gravity / 3
+    half = (m1 * s2 + m2 * (s1 + s2)) / 2
+    square = (half - (half**2 - m1 * m2 * s1 * s2) ** 0.5) / (m1 * m2)
+    assert frequencies(frame)[0] == pytest.approx(square**0.5, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('gravity = "-9.81 m/s^2"', "frame.gravity is -9.81 m/s.2; allowed"),
+        ("gravity = 9.81", "frame.gravity is 9.81"),
+        ('gravity = "10 g"', "stiffness of storey 1 under P-Delta"),
+    ],
+)
+def test_a_gravity_that_makes_no_frame_is_refused(tmp_path, text, message):
+    with pytest.raises(BadInput, match=message):
+        load(written(tmp_path, text))
+
+
+def test_check_warns_of_a_weight_that_the_case_leaves_out(tmp_path, capfd):
+    """Storey 1 has 294.2 / 1,960 = 0.15 at its softest, storey 2 has 98.07 / 5,000 = 0.02."""
+    assert main(["check", str(written(tmp_path, ""))]) == 0
+    said = capfd.readouterr().out
+    assert "stiffness and height of storey 1 is up to 0.15: say frame.gravity" in said
+    assert "storey 2" not in said
+    assert main(["check", str(written(tmp_path, 'gravity = "1 g"'))]) == 0
+    assert "warning" not in capfd.readouterr().out
