@@ -112,18 +112,21 @@ def test_values_off_chords_lie_in_their_ranges(load, spread, fall, rng):
     assert (high >= ((kappa * G).real + more).max(1) - 1e-15).all()
 
 
+@pytest.mark.parametrize("samples_in_step", [1, PARTS])
 @pytest.mark.parametrize("order", [0, 1, 2])
-def test_resonance_between_two_points_of_a_grid_is_in_the_bound(order, rng):
+def test_resonance_between_two_points_of_a_grid_is_in_the_bound(order, samples_in_step, rng):
     """A mode strays most at a frequency between the grid's two, in which it hardly resonates.
 
-    The load has many samples within a step, so that the bound consists of what the response is off
-    the chord of the step there, and of what that may be between the frequencies.
+    Where the load has many samples within a step, the bound consists of what the response is off
+    the chord of the step there, and of what that may be between the frequencies. Where it has none,
+    it is made of the size of the response at the beginning of the step.
     """
-    middle = rng.uniform(15, 20)
-    step = (TIME[1] - TIME[0]) / PARTS
+    middle = rng.uniform(28, 32)
+    step = (TIME[1] - TIME[0]) / samples_in_step
     samples = np.sin(middle * np.arange(0.0, TIME[-1] + step, step))
     load = History(step, samples)
-    width = rng.uniform(0.15, 0.25)
+    # at the end the response at the grid's frequencies has beaten down to almost nothing
+    width = rng.uniform(0.9, 1.05) * 2 * np.pi / (TIME[-1] * middle)
     sigma = grid_over((middle * (1 - width), middle * (1 + width)), (0.0, 0.0), (2, 1)).sigma
     response = Response(sigma, load, order, 1 / (1j * sigma.imag[None]), np.zeros((2, 1)))
     bound = response.line_deviation(TIME)[1:, 0]
@@ -160,3 +163,49 @@ def test_values_off_chords_between_two_points_of_a_grid_are_in_their_range(rng):
         off = (kappa * off_the_chord(at)).real
         assert (low[:, 0] <= off + 1e-12).all()
         assert (off - 1e-12 <= high[:, 0]).all()
+
+
+def samples_that_vanish_on_a_grid(functionals, at_middle):
+    """Samples of a load for which complex numbers linear in them vanish, (count, N), and one not.
+
+    Of all such samples those for which the number `at_middle` (N,) is largest.
+    """
+    rows = np.concatenate([functionals.real, functionals.imag])
+    null_space = np.linalg.svd(rows)[2][len(rows) :]
+    found = null_space.T @ (null_space @ at_middle.real)
+    return found / np.abs(found).max()
+
+
+def test_what_a_response_is_between_points_at_which_it_and_its_curvature_vanish(rng):
+    """Nothing is read at the two frequencies of the grid: its fourth derivative alone bounds it."""
+    omega, width, parts, step = rng.uniform(15, 25), rng.uniform(0.05, 0.15), 4, TIME[1] - TIME[0]
+    ends = omega * np.array([1 - width, 1 + width])
+    sigma = grid_over(tuple(ends), (0.0, 0.0), (2, 1)).sigma
+    points = 1j * np.array([*sigma[0].imag, omega])
+    nodes = np.linspace(TIME[0], TIME[-1], parts * (len(TIME) - 1) + 1)
+    kinds = {"off the chord": [], "free in the step": []}
+    for sample in np.eye(len(TIME)):
+        load = History(step, sample)
+        rho, _ = responses_at_nodes(points, load, nodes, 2)  # with two derivatives, (3, T, 3)
+        middle = rho[:, -3] - (rho[:, -5] + rho[:, -1]) / 2
+        kinds["off the chord"].append(middle)
+        # A = ρ + a/σ + b/σ² at the beginning of the last step, with its second derivative
+        a, b = sample[-2], (sample[-1] - sample[-2]) / step
+        value = rho[0, -5] + a / points + b / points**2
+        second = rho[2, -5] + 2 * a / points**3 + 6 * b / points**4
+        kinds["free in the step"].append(np.stack([value, value, second]))
+    for kind, columns in kinds.items():
+        values = np.stack(columns, -1)  # (value, slope, curvature; points; samples)
+        on_grid = np.concatenate([values[0, :2], values[2, :2]])
+        load = History(step, samples_that_vanish_on_a_grid(on_grid, values[0, 2]))
+        kappa = np.full((1, *sigma.shape), np.exp(-1j * np.angle(values[0, 2] @ load.samples)))
+        response = Response(sigma, load, 0, kappa, np.zeros((2, 1)))
+        fine = np.linspace(TIME[-2], TIME[-1], 41)
+        rho = responses_at_nodes(points[2:], load, np.append(TIME[:-2], fine), 0)[0][0, -41:, 0]
+        off = (kappa[0, 0, 0] * (rho - np.linspace(rho[0], rho[-1], 41))).real
+        assert np.abs(off).max() > 1e-6 * np.abs(rho).max()
+        if kind == "off the chord":
+            low, high = response.off_chords(nodes, parts)
+            assert low[-3, 0] <= off[20] <= high[-3, 0]
+        else:
+            assert np.abs(off).max() <= response.line_deviation(TIME)[-1, 0]
