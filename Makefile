@@ -6,7 +6,7 @@
 # make relations   contradictions of problems said otherwise and of cases run otherwise (RELATIONS="--seed 7")
 # make test-wheels    tests of rve, export, report and scenes with the newest wheels of PyPI that pyproject.toml allows
 # make findings    what packages of the field do that one would not guess, run anew (needs the network)
-# make docs, make lint, make pictures    documentation, style and types, the README's picture
+# make docs, make lint    documentation, style and types
 # The environment is made on first use; make clean-env removes it.
 CASE ?= cases/paper.toml
 WORKERS ?= 2
@@ -16,7 +16,7 @@ IN = ./enter
 help:
 	@sed -n 's/^# //p' Makefile
 
-.PHONY: help run test quick test-slow coverage lint charts bench-solver bench-scaling stability relations findings test-wheels docs pictures clean clean-env
+.PHONY: help run test quick test-slow coverage lint charts bench-solver bench-scaling stability relations findings test-wheels docs clean clean-env
 
 run:
 	$(IN) python -m alphacut run $(CASE) --out $(OUT) --workers $(WORKERS) $(if $(FRESH),--fresh)
@@ -53,6 +53,9 @@ charts:
 	$(IN) python -m benchmarks.frame.envelopes
 	$(IN) python -m benchmarks.frame.envelopes --wide 3
 	$(IN) python -m benchmarks.costs
+	$(IN) python cases/make_composite.py
+	$(IN) python cases/make_tomogram.py --picture
+	$(IN) python -m benchmarks.pictures
 
 stability:
 	$(IN) python -m benchmarks.rve.stability
@@ -77,10 +80,6 @@ findings:
 
 docs:
 	$(IN) sphinx-build -q docs build/docs
-
-pictures: run
-	mkdir -p docs/pictures
-	cp results/paper/figures/fig33-envelope-E-m-30s-q3.png docs/pictures/envelope.png
 
 clean:
 	rm -rf results build

@@ -3,7 +3,7 @@
     ./enter python -m benchmarks.costs
 
 Processor time of a first computation with code compiled, and the exponent p in seconds ~ size^p by
-least squares of the logarithms. For workers it is the clock that counts. Storeys have five inputs,
+least squares of the logarithms, of three points or more. For workers it is the clock that counts. Storeys have five inputs,
 inputs eight storeys, records three inputs, workers eleven records.
 """
 
@@ -31,6 +31,8 @@ from benchmarks.synthetic_record import SyntheticRecord, write_suite
 RESULTS = Path(__file__).parent / "results"
 MESH_SIZES = (0.15, 0.11, 0.08, 0.055, 0.04)  # 34,000 to 385,000 unknowns
 STOREYS, INPUTS, RECORDS, WORKERS = (3, 6, 12, 24), (2, 4, 8, 12, 17), (1, 4, 11, 44), (1, 2)
+MIN_POINTS = 3
+"""Fewest points that an exponent is fitted to."""
 SUITE = """
 title = "Two storeys under records"
 stages = ["envelope"]
@@ -110,10 +112,14 @@ def draw(rows: Sequence[Row]) -> None:
     for axes, kind in zip(panels, kinds, strict=True):
         line = [row for row in rows if row["size of"] == kind]
         size, seconds = (np.array([row[key] for row in line], float) for key in ("size", "seconds"))
-        power = float(np.polyfit(np.log(size), np.log(seconds), 1)[0])
-        print(f"{kind}: seconds ~ size^{power:.2f}")
+        if len(size) >= MIN_POINTS:
+            power = float(np.polyfit(np.log(size), np.log(seconds), 1)[0])
+            words = f"seconds ~ size^{power:.2f}"
+        else:
+            words = f"{seconds[-1] / seconds[0]:.2f} of the time of {size[0]:g}"
+        print(f"{kind}: {words}")
         axes.loglog(size, seconds, "o-")
-        axes.set(xlabel=kind, title=f"seconds ~ size^{power:.2f}")
+        axes.set(xlabel=kind, title=words)
         axes.set_xticks(size, [f"{x:,.0f}" for x in size], rotation=30)
         axes.set_yticks(seconds, [f"{x:.2g}" for x in seconds])
         axes.minorticks_off()

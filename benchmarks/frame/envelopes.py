@@ -96,13 +96,19 @@ def measured(duration: float, step: float, wide: float) -> Iterator[dict[str, An
         }
 
 
+def line_of(method: str) -> str:
+    """Return the name of the line that a method belongs to: its class, and the order if it is 1."""
+    name = method.partition("(")[0]
+    return f"{name}, order 1" if "order=1" in method else name
+
+
 def draw(rows: list[dict[str, Any]], path: Path) -> None:
     """Error over evaluations and over time."""
     figure, axes = plt.subplots(1, 2, figsize=(13, 5), sharey=True, layout="constrained")
-    names = list(dict.fromkeys(row["method"].partition("(")[0] for row in rows))
+    names = list(dict.fromkeys(line_of(row["method"]) for row in rows))
     for axis, key in zip(axes, ("evaluations", "seconds"), strict=True):
         for place, name in enumerate(names):
-            own = [row for row in rows if row["method"].startswith(f"{name}(")]
+            own = [row for row in rows if line_of(row["method"]) == name]
             points = [(row[key], max(row["error_m"], 1e-7)) for row in own]
             axis.loglog(*zip(*points, strict=True), "o-", color=f"C{place}", label=name)
         axis.set_xlabel(key)
@@ -124,8 +130,9 @@ def main() -> None:
     for row in measured(options.duration, options.step, options.wide):
         rows.append(row)
         print(*(f"{key} {value}" for key, value in row.items()), flush=True)
-    write(rows, RESULTS / "frame_envelopes.csv")
-    draw(rows, RESULTS / "frame_envelopes.svg")
+    stem = "frame_envelopes" if options.wide == 1 else f"frame_envelopes_wide_{options.wide:g}"
+    write(rows, RESULTS / f"{stem}.csv")
+    draw(rows, RESULTS / f"{stem}.svg")
 
 
 if __name__ == "__main__":
