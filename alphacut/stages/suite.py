@@ -57,7 +57,7 @@ class SuiteRecord:
     """A record of the suite as it moves the structure, corrected and scaled.
 
     `duration` is that of the motion in s, `cut_share` the share of the Arias intensity after its
-    end; `measures` are "PGA" and "Sa(T1)" in m/s², and "scale", 1.
+    end; `measures` are "PGA" and "Sa(T1)" (`spectral_acceleration`) in m/s², and "scale", 1.
     """
 
     name: str
