@@ -17,7 +17,6 @@ from alphacut.base.errors import require
 from alphacut.base.number_text import MINUS, STANDARD_GRAVITY, engineering, percent_text, text_table
 from alphacut.case.content import Content
 from alphacut.case.loads import ForceHistory, RecordsSection
-from alphacut.case.motion import EnvelopeSection
 from alphacut.case.parse import quantity_of
 from alphacut.case.structure import MaterialDamping, Structure
 from alphacut.case.types import Section
@@ -26,7 +25,7 @@ from alphacut.commands.pipeline import cut_record_warnings, read_case, require_r
 from alphacut.frame import Exact, History, LinearFlow, MatrixStructure, StoreyFrame
 from alphacut.frame.boxes import AT_REST
 from alphacut.frame.envelope import Ends, Envelope, within_steps
-from alphacut.frame.structures.linear import LinearSystem, frequencies
+from alphacut.frame.structures.linear import LinearSystem, NominalModes, nominal_modes
 from alphacut.frame.structures.matrix import Monomial
 from alphacut.frame.verification.self_test import Trial, stored_motions
 from alphacut.frame.verification.step_error import node_deviation
@@ -38,7 +37,13 @@ from alphacut.rve.cell.cell import VoigtPhase
 from alphacut.stages.cell import GPA, CellProblem
 from alphacut.stages.envelope import WIDENING, tasks
 from alphacut.stages.image import image_study
-from alphacut.stages.suite import SuiteRecord, incremental_analyses, suite_records
+from alphacut.stages.suite import (
+    NominalMode,
+    SuiteRecord,
+    incremental_analyses,
+    nominal_mode,
+    suite_records,
+)
 
 if TYPE_CHECKING:
     import xarray
@@ -46,6 +51,8 @@ if TYPE_CHECKING:
 USUAL_PERIODS = 1e-3, 60.0  # in s: towers have 10 s at most, machine parts seldom below 1 ms
 NEGLIGIBLE_WEIGHT = 0.1
 """Stability coefficient of a storey up to which EN 1998-1, 4.4.2.2, neglects P-Delta."""
+LEAST_MODES, MAX_MODES = 3, 8
+"""Modes that are shown, if the structure has as many."""
 KINDS = {Crisp: "crisp", Interval: "interval", Triangular: "triangle", Trapezoidal: "trapezoid"}
 Row = tuple[str, str, str]
 
@@ -55,11 +62,13 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
     content = read_case(options).content
     study_of_image = require_runnable(content)
     rows, linear = list(rows_of("", content)), nominal_structure(content)
-    period = 2 * pi / float(frequencies(linear)[0]) if linear else None
+    modes = nominal_modes(linear) if linear else None
+    period = 2 * pi / float(modes.frequencies[0]) if modes else None
     document = {
         "case": options.case,
         "stages": list(content.stages),
         "period_s": period,
+        "modes": modes_document(modes) if modes else None,
         "inputs": [dict(zip(("key", "value", "kind"), row, strict=True)) for row in rows],
     }
     text = text_table(("key", "value", "kind"), rows)
@@ -68,12 +77,13 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
         shares = study.fractions.items()
         text += f"image: {study.extent}\n"
         text += f"phases: {', '.join(f'{name} {share:.2%}' for name, share in shares)}\n"
-    if period:
+    if modes and period:
         text += f"first natural period: {period:.4g} s, at the most plausible values\n"
         if not USUAL_PERIODS[0] <= period <= USUAL_PERIODS[1]:
             text += (
                 "this is an unusual period: are units right, mass and stiffness not exchanged?\n"
             )
+        text += modes_text(modes)
     if content.structure is not None:
         text += "".join(f"warning: {line}\n" for line in missing_gravity(content.structure))
     if linear and (record := linear.ground):
@@ -83,10 +93,17 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
         warnings = cut_record_warnings(content, Structure(linear, {}))
         text += "".join(f"{warning}\n" for warning in warnings)
     if linear and content.envelope is not None and content.records is None:
-        text += "".join(f"{line}\n" for line in long_steps(linear, content.envelope))
+        times = content.envelope.duration, content.envelope.step
+        text += "".join(f"warning: {line}\n" for line in long_steps(linear, *times))
     if content.records is not None and content.envelope is not None and linear:
         records = suite_records(content.records, content.envelope, Structure(linear, {}))
-        text += records_text(content.records, records)
+        text += records_text(content.records, records, nominal_mode(Structure(linear, {})))
+        strongest = max(records, key=lambda record: record.measures["Sa(T1)"])
+        if isinstance(linear, StoreyFrame) and linear.hardening:
+            step = content.envelope.step
+            duration = step * round(strongest.duration / step)
+            moved = replace(linear, ground=strongest.ground)
+            text += "".join(f"warning: {line}\n" for line in long_steps(moved, duration, step))
         question, structure = content.incremental_question, content.structure
         if question is not None and structure is not None:
             (task,) = tasks(content.envelope, ())
@@ -95,6 +112,33 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
             text += f"fragility: about {motions:,.0f} motions, {seconds:.0f} s by one process\n"
     write_answer(options, document, out, f"{text}{options.case}: no problems\n")
     return 0
+
+
+def modes_document(modes: NominalModes) -> dict[str, object]:
+    """Periods in s, damping ratios, effective masses in kg and the moved mass, for JSON."""
+    return {
+        "periods_s": (2 * pi / np.maximum(modes.frequencies, 1e-300)).tolist(),
+        "damping_ratios": modes.damping_ratios.tolist(),
+        "effective_masses_kg": modes.effective_masses.tolist(),
+        "moved_mass_kg": modes.moved_mass,
+    }
+
+
+def modes_text(modes: NominalModes) -> str:
+    """Table of the first modes, up to 90 % of the mass but at most `MAX_MODES`; then the weight."""
+    moved = modes.moved_mass
+    shares = modes.effective_masses / moved if moved else np.zeros_like(modes.effective_masses)
+    needed = int(np.searchsorted(np.cumsum(shares), 0.9)) + 1
+    rows = []
+    for k in range(min(max(needed, LEAST_MODES), MAX_MODES, len(shares))):
+        period = engineering(2 * pi / max(float(modes.frequencies[k]), 1e-300), "")
+        mass = percent_text(float(shares[k])) if moved else "–"
+        rows.append((f"{k + 1}", f"{period} s", percent_text(modes.damping_ratios[k], 2), mass))
+    text = text_table(("mode", "period", "damping ratio", "effective mass"), rows)
+    if moved:
+        weight = engineering(moved * STANDARD_GRAVITY, "N")
+        text += f"total weight: {weight}, of {moved:,.6g} kg that move with the ground\n"
+    return text
 
 
 def missing_gravity(structure: Structure) -> Iterator[str]:
@@ -109,25 +153,37 @@ def missing_gravity(structure: Structure) -> Iterator[str]:
             yield f'{what}: say frame.gravity = "1 g", so that drifts grow by it (P-Delta)'
 
 
-def long_steps(linear: LinearSystem, section: EnvelopeSection) -> Iterator[str]:
-    """Yields a sentence for each output whose peak may rise much between the nodes of [envelope].
+def long_steps(linear: LinearSystem, duration: float, step: float) -> Iterator[str]:
+    """Yields a sentence for each output whose peak may rise much between nodes a step apart.
 
-    Both are those of the motion at the most plausible values.
+    Both are those of the motion at the most plausible values. Of columns that yield all peaks but
+    those of accelerations are found between nodes as well; these are judged by the motion of the
+    initial stiffness.
     """
+    yields = isinstance(linear, StoreyFrame) and bool(linear.hardening)
     if isinstance(linear, StoreyFrame) and linear.hardening:
-        return  # whose peaks are found between nodes as well
-    flow = LinearFlow(linear, (), section.duration, section.step, Exact(), by_modes=False)
+        read_at_nodes = tuple(x for x in linear.outputs if linear.quantity(x)[0] == "a")
+        if not read_at_nodes:
+            return
+        elastic = {"yield_force": (), "yield_drift": (), "hardening": (), "rayleigh_of": "initial"}
+        linear = replace(linear, outputs=read_at_nodes, **elastic)
+    flow = LinearFlow(linear, (), duration, step, Exact(), by_modes=False)
     nominal = np.zeros((1, 0))
     size, between = np.abs(flow.values(nominal)[0]).T, node_deviation(flow, nominal).T
     peaks = np.maximum(size.max(1), AT_REST * flow.reach())  # at rest rounding alone moves
     widening = within_steps(size, between).max(1) / peaks - 1
     for name, share in zip(linear.outputs, widening, strict=True):
         if share > WIDENING:
-            what = f"the step of {section.step:g} s widens its bound by about {share:.1%}"
-            yield f"{name}: {what} between nodes, one of {section.step / 2:g} s by {share / 4:.1%}"
+            if yields:
+                what = f"the step of {step:g} s is too coarse: its peak may be missed"
+                most = "altogether" if share >= 1 else f"by about {share:.1%}"
+                yield f"{name}: {what} {most} between nodes"
+            else:
+                what = f"the step of {step:g} s widens its bound by about {share:.1%}"
+                yield f"{name}: {what} between nodes, one of {step / 2:g} s by {share / 4:.1%}"
 
 
-def records_text(section: RecordsSection, records: Sequence[SuiteRecord]) -> str:
+def records_text(section: RecordsSection, records: Sequence[SuiteRecord], mode: NominalMode) -> str:
     """Table of a suite's records, as their files hold them and as they are used; then warnings."""
     rows = []
     for raw, record in zip(section.recordings, records, strict=True):
@@ -138,6 +194,10 @@ def records_text(section: RecordsSection, records: Sequence[SuiteRecord]) -> str
         rows.append((*file_cells, *counts, *sizes, f"{record.duration:.4g} s"))
     head = ("record", "format", "unit", "step", "samples", "mean/peak", "peak", "PGA used")
     text = text_table((*head, "Sa(T1) used", "motion"), rows)
+    text += (
+        f"Sa(T1): pseudo-acceleration ω² max |u| at T1 = {mode.period:.4g} s with the structure's"
+    )
+    text += f" own damping ratio, {percent_text(mode.ratio)}\n"
     return text + "".join(f"warning: {x}\n" for record in records for x in record.warnings)
 
 

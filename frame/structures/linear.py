@@ -326,8 +326,35 @@ def frequencies(system: LinearSystem) -> Array:
 
 def modal_damping_ratios(system: LinearSystem) -> tuple[Array, Array]:
     """Undamped ω in rad/s and ratios φᵀDφ/(2ω) of all modes at nominal values, shape (n,) each."""
+    modes = nominal_modes(system)
+    return modes.frequencies, modes.damping_ratios
+
+
+@dataclass(frozen=True, eq=False)
+class NominalModes:
+    """Undamped modes φ of a structure at its nominal parameters, by rising frequency.
+
+    Args:
+        frequencies: Angular frequencies ω in rad/s, shape (n,).
+        damping_ratios: φᵀ D φ / (2 ω), with φᵀ M φ = 1, shape (n,).
+        effective_masses: (φᵀ M ι)² in kg, shape (n,): the mass of an oscillator with the mode's
+            base shear. They add up to `moved_mass`.
+        moved_mass: ιᵀ M ι in kg, the mass that moves with the ground in its direction.
+    """
+
+    frequencies: Array
+    damping_ratios: Array
+    effective_masses: Array
+    moved_mass: float
+
+
+def nominal_modes(system: LinearSystem) -> NominalModes:
+    """Return the undamped modes at the nominal parameters."""
     matrices, _ = evaluate(system, (), np.zeros((1, 0)), derivatives=False)
     M, D, K = (x.value[0] for x in (matrices.mass, matrices.damping, matrices.stiffness))
     squared, shapes = undamped_modes(M, K)
     omega = np.sqrt(np.maximum(squared, 0.0))
-    return omega, np.einsum("ik,ij,jk->k", shapes, D, shapes) / np.maximum(2 * omega, 1e-300)
+    ratios = np.einsum("ik,ij,jk->k", shapes, D, shapes) / np.maximum(2 * omega, 1e-300)
+    influence = matrices.rigid[:, 0]
+    participation = shapes.T @ M @ influence
+    return NominalModes(omega, ratios, participation**2, float(influence @ M @ influence))

@@ -1,0 +1,69 @@
+"""What `check` says of the motion beforehand: modes, weight, and steps that miss accelerations."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+from alphacut.entry import main
+
+CASE = """
+title = "Two equal storeys"
+stages = ["envelope"]
+[frame]
+masses = ["50 t", "50 t"]
+lengths = "3 m"
+stiffness = ["[39, 41] MN/m", "40 MN/m"]
+YIELD
+damping_ratio = "4 %"
+GROUND
+outputs = ["drift1", "a2"]
+[envelope]
+fuzzy = ["k1"]
+alpha = [0]
+duration = "4 s"
+step = "0.01 s"
+"""
+TIME = 0.01 * np.arange(400)
+RECORD = np.sin(14 * TIME) + np.sin(9 * TIME)
+YIELD = 'yield_force = "100 kN"\nhardening = "5 %"'
+
+
+def said(folder, capfd, *, step="0.01 s", yields="", suite=False):
+    rows = "".join(f"{t:.2f},{a:.6f}\n" for t, a in zip(TIME, RECORD, strict=True))
+    (folder / "record.csv").write_text("time [s],acceleration [m/s^2]\n" + rows)
+    ground = "" if suite else 'accelerogram = "record.csv"'
+    text = CASE.replace("GROUND", ground).replace("YIELD", yields).replace('"0.01 s"', f'"{step}"')
+    text += '[records]\nfiles = "record.csv"\n' if suite else ""
+    (folder / "case.toml").write_text(text, encoding="utf-8")
+    assert main(["check", str(folder / "case.toml"), f"--json={folder}/check.json"]) == 0
+    return capfd.readouterr().out
+
+
+def test_modes_and_weight_are_those_of_two_equal_storeys(tmp_path, capfd):
+    """ω² = k/m (3 ∓ √5) / 2; effective masses are (5 ± 2 √5) / 10 of both floors."""
+    text = said(tmp_path, capfd)
+    periods = 2 * np.pi / np.sqrt(800 * (3 - np.array([1, -1]) * np.sqrt(5)) / 2)
+    shares = (5 + 2 * np.sqrt(5) * np.array([1, -1])) / 10
+    for number, period, share in zip((1, 2), periods, shares, strict=True):
+        row = rf"^{number} +{period:.4g} s +4.00% +{100 * share:.1f}%$"
+        assert re.search(row, text, re.MULTILINE), text
+    assert "total weight: 980.7 kN, of 100,000 kg" in text
+    modes = json.loads((tmp_path / "check.json").read_text())["modes"]
+    assert modes["periods_s"] == pytest.approx(periods.tolist(), rel=1e-9)
+    assert modes["effective_masses_kg"] == pytest.approx((1e5 * shares).tolist(), rel=1e-9)
+
+
+@pytest.mark.parametrize("suite", [False, True], ids=["record", "suite"])
+def test_a_step_that_misses_accelerations_of_yielding_columns_is_warned_of(tmp_path, capfd, suite):
+    coarse = said(tmp_path, capfd, step="0.2 s", yields=YIELD, suite=suite)
+    assert "warning: a2: the step of 0.2 s is too coarse: its peak may be missed" in coarse
+    assert "drift1: the step" not in coarse  # its peaks are found between nodes
+    fine = said(tmp_path, capfd, step="0.002 s", yields=YIELD, suite=suite)
+    assert "too coarse" not in fine
+
+
+def test_spectral_acceleration_is_said_to_be_pseudo_acceleration_with_own_damping(tmp_path, capfd):
+    text = said(tmp_path, capfd, suite=True)
+    assert re.search(r"Sa\(T1\): pseudo-acceleration .* T1 = 0.3594 s .* ratio, 4.0%", text), text
