@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from io import BytesIO
 from pathlib import Path
+from typing import Any, Literal
 from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile
 
 import numpy as np
@@ -20,6 +21,7 @@ from alphacut.base.memory import require_free_memory
 
 Numbers = NDArray[np.generic]
 ALLOWED = "an array of real numbers as numpy.save writes it"
+formats: Any = np.lib.format  # NumPy does not say the types of its functions
 LONGEST_HEAD = 1 << 16
 """Bytes; heads of arrays of numbers have 128 or 192."""
 MAX_MEMBERS = 1000
@@ -46,16 +48,15 @@ class ArrayHead:
     def __init__(self, name: str, start: bytes, *, size: int, kinds: str) -> None:
         stream = BytesIO(start[:LONGEST_HEAD])
         try:
-            version = np.lib.format.read_magic(stream)
-            read = {
-                (1, 0): np.lib.format.read_array_header_1_0,
-                (2, 0): np.lib.format.read_array_header_2_0,
-            }[version]
-            self.shape, is_fortran, self.dtype = read(stream)
+            version = formats.read_magic(stream)
+            read = {(1, 0): formats.read_array_header_1_0, (2, 0): formats.read_array_header_2_0}
+            shape, is_fortran, dtype = read[version](stream)
         except Exception as error:  # readers of damaged heads raise errors of many kinds
             reason = str(error).partition("\n")[0] or type(error).__name__
             raise RefusedError(name, f"unreadable ({reason})", ALLOWED) from None
-        self.order = "F" if is_fortran else "C"
+        self.shape: tuple[int, ...] = shape
+        self.dtype: np.dtype[Any] = dtype
+        self.order: Literal["C", "F"] = "F" if is_fortran else "C"
         self.offset = stream.tell()
         is_known = self.dtype.kind in kinds and self.dtype.itemsize <= LONGEST_HEAD
         require(is_known, name, f"{self.dtype} of shape {self.shape}", ALLOWED)
@@ -77,8 +78,7 @@ def read_npy(path: Path, *, kinds: str = "buif") -> Numbers:
     head = ArrayHead(path.name, start, size=path.stat().st_size, kinds=kinds)
     if math.prod(head.shape) == 0:
         return np.empty(head.shape, head.dtype)
-    order = "F" if head.order == "F" else "C"
-    return np.memmap(path, head.dtype, "r", head.offset, head.shape, order)
+    return np.memmap(path, head.dtype, "r", head.offset, head.shape, head.order)
 
 
 class ArrayArchive:
@@ -126,5 +126,4 @@ class ArrayArchive:
         except Exception as error:  # as above
             raise RefusedError(place, f"unreadable ({error})", "an undamaged archive") from None
         head = ArrayHead(place, content, size=len(content), kinds=kinds)
-        order = "F" if head.order == "F" else "C"
-        return np.ndarray(head.shape, head.dtype, content, head.offset, order=order)
+        return np.ndarray(head.shape, head.dtype, content, head.offset, order=head.order)

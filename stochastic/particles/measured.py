@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from alphacut.base.arrays import Array, Mask
 from alphacut.base.errors import RefusedError, checked_number, require, require_numbers
+from alphacut.base.pictures import opened_picture
 from alphacut.stochastic.particles.csv_columns import length_columns
 from alphacut.stochastic.particles.particles import Particles, close_pairs, surface_distance
 from alphacut.stochastic.particles.radius_laws import require_radii
@@ -98,12 +99,12 @@ def _read_circles(path: Path, size: tuple[float, float]) -> Particles:
 
 def section_picture(path: Path) -> Array:
     """Return the grey values of the image file, (rows, columns); refuse other files."""
-    from PIL import Image
-
     try:
-        with Image.open(path) as image:
+        with opened_picture(path) as image:
             is_grey = image.mode in ("1", "L", "I", "F") or image.mode.startswith("I;16")
             return np.asarray(image if is_grey else image.convert("L"), float)
+    except RefusedError:
+        raise
     except Exception as error:  # readers of damaged files raise errors of many kinds
         allowed = f"images that can be read ({error})"
         raise RefusedError("image.file", path, allowed) from None

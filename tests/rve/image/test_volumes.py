@@ -1,5 +1,9 @@
 """Volumes from files: the same voxels along (z, y, x) from every format, or one line."""
 
+import gzip
+import itertools
+import zlib
+
 import numpy as np
 import pytest
 from PIL import Image
@@ -45,6 +49,14 @@ def nrrd(path, values, *, attached):
         return
     values.tofile(path.with_suffix(".raw"))
     path.write_text(f"{head}data file: {path.stem}.raw\n")
+
+
+def nrrd_with(path, line, values=None):
+    """NRRD of zeros, or of values along (z, y, x), with one more line in its head."""
+    values = np.zeros(SHAPE, "u1") if values is None else values
+    sizes = " ".join(map(str, values.shape[::-1]))
+    head = NRRD.format("uchar", "raw").replace("7 5 12", sizes)
+    path.write_bytes(f"{head}{line}\n\n".encode() + values.tobytes())
 
 
 @pytest.mark.parametrize("kind", ["u1", "u2", "f4"])
@@ -101,11 +113,24 @@ def test_endings_in_capitals_are_those_in_small_letters(tmp_path, rng):
         ("nan.npy", lambda p: np.save(p, np.full((2, 5, 6), np.nan)), "not finite"),
         ("raw.raw", lambda p: p.write_bytes(b"0" * 100), ".mhd head"),
         ("a.mhd", lambda p: meta_image(p, np.zeros((11, 5, 7), "u1")), "385 bytes"),
-        ("b.mhd", lambda p: meta_image(p, np.zeros(SHAPE, "u1"), head="CompressedData = True\n"), "compressed"),
+        ("b.mhd", lambda p: meta_image(p, np.zeros(SHAPE, "u1"), head="CompressedData = True\n"), "gzip or zlib"),
         ("c.mhd", lambda p: meta_image(p, np.zeros(SHAPE, "u1"), head="ElementSpacing = 1 1 2\n"), "voxels of 1 × 1 × 2"),
         ("d.mhd", lambda p: p.write_text(HEAD + "ElementType = MET_LONG_LONG\nElementDataFile = x\n"), "type"),
         ("e.mhd", lambda p: p.write_text(HEAD + "ElementType = MET_UCHAR\nElementDataFile = x\n"), "beside the head"),
-        ("f.nhdr", lambda p: p.write_text(NRRD.format("uchar", "gzip") + "data file: x\n"), "compressed"),
+        ("f.nhdr", lambda p: p.write_text(NRRD.format("uchar", "hex") + "data file: f.nhdr\n"), "raw or gzip"),
+        ("f.nrrd", lambda p: nrrd_with(p, "spacings: 1 0 1"), "greater than 0"),
+        ("f.nrrd", lambda p: nrrd_with(p, "spacings: 1 -1 1"), "greater than 0"),
+        ("f.nrrd", lambda p: nrrd_with(p, "spacings: 1 inf 1"), "finite"),
+        ("f.nrrd", lambda p: nrrd_with(p, "spacings: 1 1 1.1"), "1 × 1 × 1.1 along"),
+        ("f.nrrd", lambda p: nrrd_with(p, "spacings: 1 nan 1.1"), "1 × nan × 1.1 along"),
+        ("f.nrrd", lambda p: nrrd_with(p, "space directions: (1,1,0) (1,-1,0) (0,0,1)"), "along x, y and z"),
+        ("f.nrrd", lambda p: nrrd_with(p, "space directions: (1,0,0) (1,0,0) (0,0,1)"), "along x, y and z"),
+        ("f.nrrd", lambda p: nrrd_with(p, "space directions: (0,0,3) (0,1,0) (1,0,0)"), "1 × 1 × 3 along"),
+        ("s.mhd", lambda p: meta_image(p, np.zeros(SHAPE, "u1"), head="ElementSize = 1 1 3\n"), "1 × 1 × 3 along"),
+        ("t.mhd", lambda p: meta_image(p, np.zeros(SHAPE, "u1"), head="HeaderSize = 1\n"), "allowed: 1 + 420"),
+        ("u.mhd", lambda p: meta_image(p, np.zeros(SHAPE, "u1"), head="HeaderSize = -2\n"), "−1 of raw data"),
+        ("v.mhd", lambda p: meta_image(p, np.zeros(SHAPE, "u1"), head="ElementNumberOfChannels = 3\n"), "one"),
+        ("w.mhd", lambda p: p.write_text((HEAD + "ElementType = MET_UCHAR\nElementDataFile = LOCAL\n").replace("7 5 12", "-7 -5 12")), "sizes -7 -5 12"),
         ("empty", lambda p: p.mkdir(), "0 pictures"),
         ("noise.tif", lambda p: p.write_bytes(b"II*\0nonsense"), "0 series"),
     ],
@@ -136,3 +161,109 @@ def test_slices_that_are_not_alike_and_bent_voxels_are_told(tmp_path):
 def test_a_grid_too_large_is_told_what_fits(shape, what):
     with pytest.raises(RefusedError, match=rf"{what}.*crop a piece of \d+ × "):
         require_memory(shape)
+
+
+@pytest.mark.parametrize("word", ["True", "true", "T", "1", "t"])
+def test_every_word_for_big_endian_is_read_so(tmp_path, rng, word):
+    values = rng.integers(0, 60000, SHAPE).astype("u2")
+    for key in ("BinaryDataByteOrderMSB", "ElementByteOrderMSB"):
+        meta_image(tmp_path / "a.mhd", values, order=">")
+        text = (tmp_path / "a.mhd").read_text()
+        text = text.replace("BinaryDataByteOrderMSB = True", f"{key} = {word}")
+        (tmp_path / "a.mhd").write_text(text)
+        assert np.array_equal(read_grid(tmp_path / "a.mhd", CUBE), values)
+
+
+def test_compressed_volumes_and_those_at_the_end_of_a_file_are_read(tmp_path, rng):
+    values = rng.integers(0, 250, SHAPE).astype("u1")
+    meta_image(tmp_path / "end.mhd", values, head="HeaderSize = -1\n")
+    (tmp_path / "end.raw").write_bytes(b"a head of another program" + values.tobytes())
+    assert np.array_equal(read_grid(tmp_path / "end.mhd", CUBE), values)
+    for skip in ("byte skip: -1", "byteskip: 17", "byte skip: 17"):
+        head = NRRD.format("uchar", "raw") + f"{skip}\ndata file: skip.raw\n"
+        (tmp_path / "skip.nhdr").write_text(head)
+        (tmp_path / "skip.raw").write_bytes(bytes(17) + values.tobytes())
+        assert np.array_equal(read_grid(tmp_path / "skip.nhdr", CUBE), values)
+    meta_image(tmp_path / "zlib.mhd", values, head="CompressedData = True\n")
+    (tmp_path / "zlib.raw").write_bytes(zlib.compress(values.tobytes()))
+    assert np.array_equal(read_grid(tmp_path / "zlib.mhd", CUBE), values)
+    head = NRRD.format("uchar", "gzip").encode() + b"\n"
+    (tmp_path / "gzip.nrrd").write_bytes(head + gzip.compress(values.tobytes()))
+    assert np.array_equal(read_grid(tmp_path / "gzip.nrrd", CUBE), values)
+    for packed in (gzip.compress(bytes(10**7)), gzip.compress(b"few")):
+        (tmp_path / "gzip.nrrd").write_bytes(head + packed)
+        with pytest.raises(RefusedError, match="bytes unpacked; allowed: 420 for"):
+            read_grid(tmp_path / "gzip.nrrd", CUBE)
+
+
+@pytest.mark.parametrize("order", list(itertools.permutations(range(3))))
+def test_axes_in_any_order_and_direction_are_those_of_the_world(tmp_path, rng, order):
+    """The file's axes run along ± x, y, z in some order; the values come back along z, y, x."""
+    world = rng.integers(0, 250, (4, 5, 6)).astype("u1")  # along z, y, x
+    signs = rng.choice([-1, 1], 3)
+    along_file = world.transpose([2 - axis for axis in order[::-1]])
+    flips = tuple(slice(None, None, int(signs[axis])) for axis in order[::-1])
+    stored = np.ascontiguousarray(along_file[flips])
+    sides = (2.0, 1.5, 1.0)  # of a voxel along z, y, x
+    rows = [np.eye(3, dtype=int)[axis] * signs[axis] for axis in order]
+    vectors = [row * sides[2 - axis] for row, axis in zip(rows, order, strict=True)]
+    directions = " ".join(f"({x:g},{y:g},{z:g})" for x, y, z in vectors)
+    nrrd_with(tmp_path / "a.nrrd", f"space directions: {directions}", stored)
+    assert np.array_equal(read_grid(tmp_path / "a.nrrd", sides), world)
+    spacing = " ".join(f"{sides[2 - axis]:g}" for axis in order)
+    matrix = " ".join(f"{x}" for row in rows for x in row)
+    head = f"TransformMatrix = {matrix}\nElementSpacing = {spacing}\n"
+    meta_image(tmp_path / "a.mhd", stored, head=head)
+    text = (tmp_path / "a.mhd").read_text()
+    sizes = " ".join(map(str, stored.shape[::-1]))
+    (tmp_path / "a.mhd").write_text(text.replace("7 5 12", sizes))
+    assert np.array_equal(read_grid(tmp_path / "a.mhd", sides=(2.0, 1.5, 1.0)), world)
+
+
+SPACED = {
+    "ImageJ": ("a.tif", {"imagej": True, "resolution": (1.0, 1.0), "metadata": {"axes": "ZYX", "spacing": 5.0, "unit": "um"}}),
+    "ImageJ in pixels": ("a.tif", {"imagej": True, "metadata": {"axes": "ZYX", "spacing": 5.0}}),
+    "ImageJ along x": ("a.tif", {"imagej": True, "resolution": (5.0, 1.0), "metadata": {"axes": "ZYX"}}),
+    "TIFF": ("a.tif", {"resolution": (1.0, 5.0)}),
+    "OME": ("a.ome.tif", {"metadata": {"axes": "ZYX", "PhysicalSizeX": 1.0, "PhysicalSizeY": 1.0, "PhysicalSizeZ": 5.0}}),
+    "OME in units": ("a.ome.tif", {"metadata": {"axes": "ZYX", "PhysicalSizeX": 1.0, "PhysicalSizeY": 1.0,
+                     "PhysicalSizeZ": 0.005, "PhysicalSizeZUnit": "mm"}}),
+}  # fmt: skip
+RIGHT = {"ImageJ along x": (5, 5, 1), "TIFF": (1, 1, 5)}
+"""Sides of a voxel along z, y, x; else (5, 1, 1)."""
+
+
+@pytest.mark.parametrize("name", SPACED)
+def test_spacing_in_heads_of_tiff_is_that_of_the_case(tmp_path, rng, name):
+    values = rng.integers(0, 250, SHAPE).astype("u1")
+    file, options = SPACED[name]
+    stack(tmp_path / file, values, **options)
+    right = RIGHT.get(name, (5, 1, 1))
+    assert np.array_equal(read_grid(tmp_path / file, right), values)
+    with pytest.raises(RefusedError, match=r"voxels of .* along x, y, z"):
+        read_grid(tmp_path / file, CUBE)
+
+
+@pytest.mark.parametrize("kind", ["u1", "u2"])
+def test_white_as_zero_means_the_same_in_a_stack_a_folder_and_a_picture(tmp_path, rng, kind):
+    values = rng.integers(0, 250, SHAPE).astype(kind)
+    shown = np.iinfo(kind).max - values
+    stack(tmp_path / "stack.tif", values, photometric="miniswhite")
+    (tmp_path / "folder").mkdir()
+    for k, page in enumerate(values):
+        stack(tmp_path / f"folder/page{k}.tif", page, photometric="miniswhite")
+    assert np.array_equal(read_grid(tmp_path / "stack.tif", CUBE), shown)
+    assert np.array_equal(read_grid(tmp_path / "folder", CUBE), shown)
+    assert np.array_equal(read_grid(tmp_path / "folder/page0.tif", (1, 1)), shown[0, ::-1])
+
+
+def test_a_stack_that_promises_more_than_its_file_holds_is_refused(tmp_path):
+    stack(tmp_path / "a.tif", np.zeros((3, 40, 50), "u1"), photometric="minisblack")
+    content = (tmp_path / "a.tif").read_bytes()
+    with tifffile.TiffFile(tmp_path / "a.tif") as file:
+        places = [page.tags["ImageLength"].valueoffset for page in file.pages]
+    for place in places:
+        content = content[:place] + (4000).to_bytes(4, "little") + content[place + 4 :]
+    (tmp_path / "a.tif").write_bytes(content)
+    with pytest.raises(RefusedError, match=r"3 × 4000 × 50; allowed: what \d+ bytes can hold"):
+        read_grid(tmp_path / "a.tif", CUBE)

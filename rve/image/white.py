@@ -1,0 +1,37 @@
+"""One meaning for pictures whose stored zeros are white (TIFF's PhotometricInterpretation 0)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from alphacut.base.arrays import Array
+from alphacut.base.errors import RefusedError, require
+
+WHITE_IS_ZERO = 0
+
+
+def as_shown(name: str, values: Array, photometric: object) -> Array:
+    """Return the stored values of a picture or a stack such that bright is large.
+
+    Readers differ: Pillow inverts such pictures of 8 bits and no others, tifffile none.
+
+    Args:
+        name: Name of the file.
+        values: Values as stored, any shape.
+        photometric: The file's PhotometricInterpretation.
+
+    Raises:
+        RefusedError: White is zero in a mask of two values, whose phases programs exchange, or
+            beside numbers whose largest is not known.
+    """
+    if photometric != WHITE_IS_ZERO:
+        return values
+    if len(np.unique(values)) == 2:
+        bright_fraction = np.mean(values == values.max())
+        what = f"two-valued with white as zero, bright on {bright_fraction:.4g}"
+        cure = "save it as .npy or PNG, and look at the fractions that check prints"
+        raise RefusedError(name, what, "masks that all programs read alike", cure)
+    is_known = values.dtype.kind == "u"
+    cure = "save it with black as zero, or as .npy"
+    require(is_known, name, f"{values.dtype} with white as zero", "unsigned integers", cure)
+    return np.asarray(np.iinfo(values.dtype).max - values)
