@@ -1,10 +1,14 @@
-"""What is known of modes by sums alone: forms of inverse matrices over the whole box."""
+"""What is known of modes by sums alone, and what couples those of a block, over the whole box."""
+
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from alphacut.frame.calculus.taylor_model import TaylorModel
-from alphacut.frame.modes.rest import inverse_form
+from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate
+from alphacut.frame.modes.blocks import Block
+from alphacut.frame.modes.intervening import BlockShares
+from alphacut.frame.modes.rest import coupling_bounds, inverse_form
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])
@@ -25,3 +29,59 @@ def test_remainder_of_an_inverse_form_is_that_of_a_geometric_series(order, rng):
         assert (off <= found.remainder + 1e-12 * np.abs(middle)).all()
     of_series = np.abs(middle) * variation ** (order + 1) / (1 - variation)
     np.testing.assert_allclose(found.remainder, of_series, rtol=1e-9)
+
+
+def test_coupling_within_a_block_attains_its_bounds_at_nodes_and_between(rng):
+    """Of two alike oscillators, of which one is moved and the other read, in closed form.
+
+    With L = λ + ε off the diagonal, N = 1 + ν u and cos(√λ t) as response, the coupling adds
+    a (cos(√(λ + ε) t) − cos(√(λ − ε) t))/2. Nodes are a period apart, where late motions are at
+    their extremes, so that they stray from lines by twice as much within the steps.
+    """
+    omega, variation = rng.uniform(5, 20), rng.uniform(0.35, 0.5)
+    squared = omega**2
+    time = (2 * np.pi * np.arange(30) + np.pi / 2) / omega
+    off = 0.05 * omega / time[-1]  # ε, whose phase ε t/(2 ω) stays small
+
+    def polynomial(*coefficients):
+        parts = tuple(np.full((1, 1), x) for x in coefficients)
+        return TaylorModel(parts, np.zeros(1), inputs=1, order=10)
+
+    mass = polynomial(1.0, variation)
+    read = polynomial(1.0, variation / 2)  # a, so that a²/N is about 1
+    nothing, zero = mass * 0.0, polynomial(0.0)
+    constant = zero.like(np.ones(1))
+
+    def matrix(rows):
+        return concatenate([concatenate(row, -1)[None] for row in rows], -2)
+
+    rate = matrix([[constant * squared, constant * off], [constant * off, constant * squared]])
+    norm = matrix([[mass, nothing], [nothing, mass]])
+    block = Block(np.arange(2), rate, rate, rate, norm)
+    of_block = BlockShares(
+        block,
+        read=matrix([[nothing], [read]]),
+        source_forces=matrix([[mass], [nothing]]),
+        participation=matrix([[constant], [nothing]]),
+    )
+    structure = SimpleNamespace(
+        order=np.zeros(1, int),
+        factor=constant,
+        rayleigh=zero.like(np.zeros(2)),
+        ratio=zero.like(np.zeros(2)),
+    )
+    found = SimpleNamespace(low=np.full(2, squared - off), high=np.full(2, squared + off))
+    added, straying, _ = coupling_bounds(structure, of_block, found, ({}, time, ("start",)))
+    largest_read = 1 + variation / 2
+
+    def coupled(t):
+        fast, slow = np.cos(np.sqrt(squared + off) * t), np.cos(np.sqrt(squared - off) * t)
+        return largest_read * (fast - slow) / 2
+
+    at_nodes = np.abs(coupled(time))
+    assert (at_nodes <= added[:, 0] + 1e-12).all()
+    assert (at_nodes[-10:] >= 0.9 * added[-10:, 0]).all()
+    middles = (time[1:] + time[:-1]) / 2
+    between = np.abs(coupled(middles) - (coupled(time[1:]) + coupled(time[:-1])) / 2)
+    assert (between <= straying[1:, 0] + 1e-12).all()
+    assert (between[-10:] >= 0.8 * straying[-10:, 0]).all()
