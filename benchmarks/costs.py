@@ -3,8 +3,8 @@
     ./enter python -m benchmarks.costs
 
 Processor time of a first computation with code compiled, and the exponent p in seconds ~ size^p by
-least squares of the logarithms, of three points or more. For workers it is the clock that counts. Storeys have five inputs,
-inputs eight storeys, records three inputs, workers eleven records.
+least squares of the logarithms, of three points or more. For workers it is the clock that counts.
+Storeys have five inputs, inputs eight storeys, records three inputs, workers eleven records.
 """
 
 from __future__ import annotations
