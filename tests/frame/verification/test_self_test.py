@@ -126,6 +126,50 @@ def test_a_deviation_between_nodes_a_quarter_too_small_is_refused(rng):
         self_test.with_motions_tested(faulty, system)
 
 
+def between_too_small(found, exact):
+    """Bounds at nodes that are the exact motion's, and 3/4 of what it exceeds both ends by."""
+    nodes = exact.outputs(found.time)[0]
+    highest = np.maximum(nodes[1:], nodes[:-1])
+    for fraction in np.arange(1, 40) / 40:
+        inside = exact.outputs(found.time[:-1] + np.diff(found.time) * fraction)[0]
+        highest = np.maximum(highest, inside)
+    over = np.zeros_like(nodes)
+    over[1:] = highest - np.maximum(nodes[1:], nodes[:-1])
+    size = np.abs(nodes).max()
+    lower = np.full_like(found.lower, -3 * size)
+    return replace(
+        found, lower=lower, upper=nodes[None], inner=None, outer=None, between=0.75 * over
+    )
+
+
+def smaller_by_rounding(found, _):
+    faulty = copy(found)
+    vars(faulty)["proved"] = Ends(found.proved.lower, (1 - 1e-8) * found.proved.upper)
+    return faulty
+
+
+@pytest.mark.parametrize(
+    ("change", "check", "words"),
+    [
+        (between_too_small, "require_inside", "above the proved upper"),
+        (smaller_by_rounding, "require_inside", "above the proved upper"),
+        (lambda found, _: attained_off(found, -1e-8), "require_attained", "the attained upper"),
+    ],
+)
+def test_a_fault_far_below_all_tolerances_is_seen_by_its_check(change, check, words, rng):
+    """A hundred millionth of a value, or a part of what motions do within steps."""
+    system = replace(frame(), ground=Accelerogram(0.03, rng.normal(size=40)))
+    found = motion(system, {"k1": Crisp(4e6)}, method=DualProof(), alpha=(1.0,))
+    point = np.array([[4e6]])
+    (exact,) = self_test.structures_at(system, found, point)
+    faulty, others = change(found, exact), {"require_inside", "require_attained"}
+    with pytest.MonkeyPatch.context() as patch:
+        for other in (others | {"require_line_deviation"}) - {check}:
+            patch.setattr(Trial, other, lambda *_: None)
+        with pytest.raises(ContradictionError, match=words):
+            Trial(faulty, point, point).require_agreement(point, [exact])
+
+
 def test_inputs_without_width_are_tested_at_their_one_point():
     found = motion(frame(), {"k1": Crisp(4e6)}, method=DualProof())
     assert found.facts["motions_tested"] == 1
