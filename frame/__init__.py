@@ -5,6 +5,16 @@ Example:
     (['exact', 'midpoint'], 6)
 """
 
+from alphacut.frame.analyses.decision import Decision, decide
+from alphacut.frame.analyses.fragility import Fragility, fragility
+from alphacut.frame.analyses.incremental import ScaledPeaks, incremental
+from alphacut.frame.analyses.limits import Limit
+from alphacut.frame.analyses.peaks import Peak, peaks
+from alphacut.frame.analyses.probability import Probability, probability
+from alphacut.frame.analyses.sensitivity import Sensitivity, sensitivity
+from alphacut.frame.analyses.spectral import spectral_acceleration
+from alphacut.frame.analyses.suites import SuitePeaks, over_records
+from alphacut.frame.analyses.tolerances import Tolerances, tolerances
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import INTEGRATORS, Exact, Midpoint
 from alphacut.frame.dynamics.nonlinear import LagrangianFlow
@@ -38,10 +48,13 @@ from alphacut.frame.structures.read_matrix import read_matrix
 from alphacut.frame.structures.storey import StoreyFrame
 
 __all__ = [
-    "INTEGRATORS", "METHODS", "Accelerogram", "Auto", "DualProof", "Envelope", "Exact", "Force",
-    "GraphFollower", "History", "Identified", "ImprovedFollower", "LagrangianFlow",
-    "LagrangianSystem", "LearnedInputs", "LinearFlow", "MatrixStructure", "MeasuredMode",
-    "Midpoint", "Output", "Parameter", "Prediction", "Predictions", "Proof", "RefutedError",
-    "Sampled", "StoreyFrame", "damping_from_loss", "envelope", "identify", "measured_mode",
-    "pendulum", "read_matrix", "read_modes", "read_record", "read_suite", "require_envelope",
+    "INTEGRATORS", "METHODS", "Accelerogram", "Auto", "Decision", "DualProof", "Envelope",
+    "Exact", "Force", "Fragility", "GraphFollower", "History", "Identified", "ImprovedFollower",
+    "LagrangianFlow", "LagrangianSystem", "LearnedInputs", "Limit", "LinearFlow",
+    "MatrixStructure", "MeasuredMode", "Midpoint", "Output", "Parameter", "Peak", "Prediction",
+    "Predictions", "Probability", "Proof", "RefutedError", "Sampled", "ScaledPeaks",
+    "Sensitivity", "StoreyFrame", "SuitePeaks", "Tolerances", "damping_from_loss", "decide",
+    "envelope", "fragility", "identify", "incremental", "measured_mode", "over_records",
+    "peaks", "pendulum", "probability", "read_matrix", "read_modes", "read_record",
+    "read_suite", "require_envelope", "sensitivity", "spectral_acceleration", "tolerances",
 ]  # fmt: skip

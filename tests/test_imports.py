@@ -161,11 +161,11 @@ def test_packages_and_the_program_import_nothing_heavy():
     assert not HEAVY & modules_after(f"import {', '.join(packages)}, alphacut.entry")
 
 
-def test_a_case_is_read_without_figures_and_questions():
+def test_a_case_is_read_without_figures_and_stages():
     program = "from alphacut.case.content import load; load('cases/building.toml')"
     modules = modules_after(program)
     assert "alphacut.case.content" in modules
-    wrong = ("matplotlib", "alphacut.figures", "alphacut.questions")
+    wrong = ("matplotlib", "alphacut.figures", "alphacut.stages")
     assert not {name for name in modules if name.startswith(wrong)}
 
 

@@ -8,28 +8,32 @@ or "min q3 >= -60 mm" of one side, "mean drift1 <= 30 mm" of the mean over the r
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar, Literal, Self, cast
 
-import numpy as np
 from pydantic import PlainValidator
 
 from alphacut.base.errors import RefusedError, require
 from alphacut.case.structure import Structure
 from alphacut.case.types import NotEmpty, Quantity, Section
+from alphacut.frame import Limit
+from alphacut.frame.analyses.fragility import require_fragile, yields
+from alphacut.frame.analyses.limits import Side, limits_by_name
 from alphacut.frame.structures.quantities import OUTPUTS, Output
 from alphacut.io import quantity
 
-Side = Literal["", "max", "min", "mean"]
 BASE_SHEAR = "base_shear"
 
 
 @dataclass(frozen=True)
-class Limit:
-    """Largest magnitude allowed of an output, or its greatest or least value.
+class CaseLimit:
+    """Largest magnitude allowed of an output, or its greatest or least value, as a case states it.
 
     `side` is "max" or "min" of the output itself, "" of its magnitude, "mean" of that over records;
-    the value is in SI or, if relative, a fraction of the storey's height or of the weight.
+    the value is in SI or, if relative, a fraction of the storey's height or of the weight. `event`
+    is the text of a limit of all storeys of which this one is a part.
     """
 
     side: Side
@@ -37,16 +41,23 @@ class Limit:
     value: float
     is_relative: bool
     text: str
+    event: str = ""
 
     @property
     def peak(self) -> str:
-        """Name of the peak as `Peaks` has it, such as "max q3"."""
+        """Name of the limited peak, such as "max q3"."""
         return f"{self.side} {self.output}".strip()
 
-    @property
-    def sign(self) -> int:
-        """−1 of a least value, whose peak is that of the output's negative; else 1."""
-        return -1 if self.side == "min" else 1
+    def limit(self, structure: Structure, key: str) -> Limit:
+        """The limit in the SI unit of its output."""
+        return Limit(
+            self.output,
+            self.value_in_si(structure, key),
+            largest={"max": True, "min": False}.get(self.side),
+            mean=self.side == "mean",
+            stated=re.split("[<>]=", self.text)[1].strip(),
+            event=self.event,
+        )
 
     def value_in_si(self, structure: Structure, key: str) -> float:
         """The limit in the SI unit of its output; a fraction is of the least height or weight."""
@@ -61,17 +72,20 @@ class Limit:
             raise RefusedError(key, self.text, "a drift of a storey whose length frame.lengths has")
         return self.value * height.support.lower
 
-    def by_storey(self, structure: Structure) -> tuple[Limit, ...]:
+    def by_storey(self, structure: Structure) -> tuple[CaseLimit, ...]:
         """The limits of all floors or storeys of a frame that "drift" means; else itself."""
         _, words = OUTPUTS.get(self.output, ("", ""))
         if structure.frame is None or not words:
             return (self,)
         names = [f"{self.output}{z}" for z in range(1, structure.frame.floors + 1)]
         word = rf"\b{self.output}\b"  # the "a" of "max a" alone
-        return tuple(replace(self, output=x, text=re.sub(word, x, self.text)) for x in names)
+        texts = (re.sub(word, x, self.text) for x in names)
+        event = self.text if len(names) > 1 else ""
+        of_storeys = zip(names, texts, strict=True)
+        return tuple(replace(self, output=x, text=y, event=event) for x, y in of_storeys)
 
 
-def parse_limit(value: object) -> Limit:
+def parse_limit(value: object) -> CaseLimit:
     """Limit that a text such as "drift1 <= 40 mm" states; of a magnitude it is positive."""
     match = re.fullmatch(r"(?:(max|min|mean) )?(\w+)\s*(<=|>=)\s*(.+)", str(value).strip())
     allowed = "'drift1 <= 40 mm', 'drift <= 1/200', 'max q3 <= 80 mm' or 'min q3 >= -60 mm'"
@@ -92,10 +106,10 @@ def parse_limit(value: object) -> Limit:
     except ValueError as error:
         raise RefusedError("", value, allowed, str(error)) from None
     require(number > 0 or side in ("max", "min"), "", value, allowed)
-    return Limit(cast("Side", side or ""), name, number, is_relative, str(value))
+    return CaseLimit(cast("Side", side or ""), name, number, is_relative, str(value))
 
 
-AnyLimit = Annotated[Limit, PlainValidator(parse_limit)]
+AnyLimit = Annotated[CaseLimit, PlainValidator(parse_limit)]
 Limits = Annotated[tuple[AnyLimit, ...], NotEmpty]
 
 
@@ -115,38 +129,33 @@ class QuestionSection(Section):
     weight"""
 
     def with_storeys(self, structure: Structure) -> Self:
-        """The section with a limit of every storey as one of each; see `Limit.by_storey`."""
+        """The section with a limit of every storey as one of each; see `CaseLimit.by_storey`."""
         limits = (x for limit in self.limits for x in limit.by_storey(structure))
         return self.model_copy(update={"limits": tuple(limits)})
 
-    @property
-    def limits_by_name(self) -> dict[str, Limit]:
-        """Limits by name: the peak, such as "max q3", or the text where a peak has several."""
-        peaks = [limit.peak for limit in self.limits]
-        return {x.peak if peaks.count(x.peak) == 1 else x.text: x for x in self.limits}
-
-    def limits_in_si(self, structure: Structure) -> dict[str, float]:
-        """Value of each peak's limit in the SI unit of its output, by `limits_by_name`.
-
-        The peak of a least value is that of the output's negative, and so is its limit.
-        """
-        key, limits = f"{self.key}.limits", self.limits_by_name
-        # 0.0 − 0.0 is no negative zero
-        values = {name: 0.0 + x.sign * x.value_in_si(structure, key) for name, x in limits.items()}
-        outputs = tuple(dict.fromkeys(limit.output for limit in self.limits))
-        structure.require_quantities(key, outputs)
-        texts = ", ".join(limit.text for limit in self.limits)
-        require(len(values) == len(self.limits), key, texts, "each limit once")
-        return values
+    def limits_of(self, structure: Structure) -> tuple[Limit, ...]:
+        """The limits in the SI units of their outputs; RefusedError where they do not fit."""
+        key = f"{self.key}.limits"
+        limits = tuple(limit.limit(structure, key) for limit in self.limits)
+        structure.require_quantities(key, [*dict.fromkeys(x.output for x in self.limits)])
+        with _naming(key):
+            limits_by_name(limits, (), magnitudes=self.needs_magnitudes)
+        return limits
 
     def require_answerable(self, structure: Structure) -> None:
         """Refuses outputs that the structure lacks, and limits that this question cannot take."""
-        self.limits_in_si(structure)
-        if self.needs_magnitudes:
-            is_one_each = all(name == x.output for name, x in self.limits_by_name.items())
-            texts = ", ".join(limit.text for limit in self.limits)
-            allowed = "one limit of the magnitude for each output"
-            require(is_one_each, f"{self.key}.limits", texts, allowed)
+        self.limits_of(structure)
+
+
+@contextmanager
+def _naming(key: str) -> Iterator[None]:
+    """Gives refused limits the key of the case."""
+    try:
+        yield
+    except RefusedError as error:
+        is_limits = error.key == "limits" or error.key.startswith("limit of")
+        name = key if is_limits else error.key
+        raise RefusedError(name, error.value, error.allowed, error.cure) from None
 
 
 class DecisionSection(QuestionSection):
@@ -202,17 +211,7 @@ class FragilitySection(QuestionSection):
     def require_answerable(self, structure: Structure) -> None:
         """Refuses structures with forces or a start beside the record, and unfit limits."""
         super().require_answerable(structure)
-        linear = structure.linear
-        is_free = linear is not None and not linear.loads
-        is_at_rest = not any(np.any(getattr(linear, start, 0)) for start in ("q0", "v0"))
-        allowed = "linear structures and frames that yield, at rest and without forces"
-        require(is_free and is_at_rest, "fragility", "of another motion", allowed)
-        yields = bool(getattr(linear, "hardening", ()))
-        is_used = yields or not self.has_key("most")
+        with _naming("fragility.limits"):
+            require_fragile(structure.model, self.limits_of(structure))
+        is_used = yields(structure.model) or not self.has_key("most")
         require(is_used, "fragility.most", self.most, "beside columns that yield")
-        for limit in self.limits:
-            fits = limit.sign * limit.value > 0 and limit.side != "mean"
-            allowed = "limits of each record that the structure at rest keeps"
-            if yields:
-                fits, allowed = limit.side == "", "limits of magnitudes, of columns that yield"
-            require(fits, "fragility.limits", limit.text, allowed)

@@ -10,7 +10,6 @@ from typing import Annotated, Any, Literal, cast
 
 from pydantic import Field, PlainValidator, ValidationInfo
 
-from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, require, require_choice
 from alphacut.base.number_text import STANDARD_GRAVITY
 from alphacut.case.types import Modulus, NotEmpty, OneOrMany, Quantity, Section, case_file, text
@@ -22,7 +21,7 @@ from alphacut.frame import (
     read_record,
 )
 from alphacut.frame.structures.lagrangian import LagrangianSystem, pendulum
-from alphacut.frame.structures.quantities import Output
+from alphacut.frame.structures.observed import unit_of_output, with_outputs
 from alphacut.frame.structures.storey import SYMBOLS
 from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.io.files import suggestion
@@ -118,8 +117,7 @@ class Structure:
 
     def unit(self, output: str) -> str:
         """SI unit of an output."""
-        units = {str(name): Output(name).unit for name in self.outputs}
-        return units.get(output) or Output(output).unit
+        return unit_of_output(self.model, output)
 
     def input_unit(self, name: str) -> str:
         """SI unit of a parameter; empty where it has none, or none is known."""
@@ -161,15 +159,7 @@ class Structure:
     ) -> StoreyFrame | MatrixStructure | LagrangianSystem:
         """The model reduced to some outputs; one that is not linear always computes all of them."""
         self.require_quantities(key, outputs)
-        if isinstance(self.model, StoreyFrame):
-            return replace(self.model, outputs=outputs)
-        if isinstance(self.model, LagrangianSystem):
-            return self.model
-        observed: dict[str, Array] = {
-            x: self.model.observed[x] for x in self.outputs if x in outputs
-        }
-        factors = {x: f for x, f in self.model.row_factors.items() if x in outputs}
-        return replace(self.model, observed=observed, row_factors=factors)
+        return with_outputs(self.model, outputs)
 
 
 def read_accelerogram(value: object, info: ValidationInfo) -> Accelerogram:

@@ -23,6 +23,8 @@ from alphacut.case.types import Section
 from alphacut.commands.options import Command, add_common, add_quiet, write_answer
 from alphacut.commands.pipeline import cut_record_warnings, read_case, require_runnable
 from alphacut.frame import Exact, History, LinearFlow, MatrixStructure, StoreyFrame
+from alphacut.frame.analyses.peaks import WIDENING
+from alphacut.frame.analyses.suites import NominalMode, ScaledRecord, nominal_mode
 from alphacut.frame.boxes import AT_REST
 from alphacut.frame.envelope import Ends, Envelope, within_steps
 from alphacut.frame.structures.linear import LinearSystem, NominalModes, nominal_modes
@@ -35,15 +37,9 @@ from alphacut.io.results import ResultsFolder
 from alphacut.report.results import AROUND
 from alphacut.rve.cell.cell import VoigtPhase
 from alphacut.stages.cell import GPA, CellProblem
-from alphacut.stages.envelope import WIDENING, tasks
+from alphacut.stages.envelope import tasks
 from alphacut.stages.image import image_study
-from alphacut.stages.suite import (
-    NominalMode,
-    SuiteRecord,
-    incremental_analyses,
-    nominal_mode,
-    suite_records,
-)
+from alphacut.stages.suite import analyses_of, suite_records
 
 if TYPE_CHECKING:
     import xarray
@@ -97,7 +93,7 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
         text += "".join(f"warning: {line}\n" for line in long_steps(linear, *times))
     if content.records is not None and content.envelope is not None and linear:
         records = suite_records(content.records, content.envelope, Structure(linear, {}))
-        text += records_text(content.records, records, nominal_mode(Structure(linear, {})))
+        text += records_text(content.records, records, nominal_mode(linear))
         strongest = max(records, key=lambda record: record.measures["Sa(T1)"])
         if isinstance(linear, StoreyFrame) and linear.hardening:
             step = content.envelope.step
@@ -107,7 +103,7 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
         question, structure = content.incremental_question, content.structure
         if question is not None and structure is not None:
             (task,) = tasks(content.envelope, ())
-            analyses = incremental_analyses(question, structure, task, records)
+            analyses = analyses_of(question, structure, task, records)
             motions, seconds = np.sum([x.foresee() for x in analyses.values()], axis=0)
             text += f"fragility: about {motions:,.0f} motions, {seconds:.0f} s by one process\n"
     write_answer(options, document, out, f"{text}{options.case}: no problems\n")
@@ -183,7 +179,9 @@ def long_steps(linear: LinearSystem, duration: float, step: float) -> Iterator[s
                 yield f"{name}: {what} between nodes, one of {step / 2:g} s by {share / 4:.1%}"
 
 
-def records_text(section: RecordsSection, records: Sequence[SuiteRecord], mode: NominalMode) -> str:
+def records_text(
+    section: RecordsSection, records: Sequence[ScaledRecord], mode: NominalMode
+) -> str:
     """Table of a suite's records, as their files hold them and as they are used; then warnings."""
     rows = []
     for raw, record in zip(section.recordings, records, strict=True):

@@ -15,22 +15,20 @@ from alphacut import frame
 from alphacut.base.errors import RefusedError, require
 from alphacut.base.progress_bar import progress_reporter
 from alphacut.case.content import Case, Content, load
-from alphacut.case.limits import QuestionSection
 from alphacut.case.loads import RecordsSection
 from alphacut.case.material import RadiusMapSection, ThetaSection
 from alphacut.case.microstructure import MicrostructureSection
 from alphacut.case.motion import EnvelopeSection
 from alphacut.case.structure import Structure
 from alphacut.commands.options import require_petsc
-from alphacut.frame.analyses.peaks import Peaks
+from alphacut.frame.analyses.incremental import Increments
+from alphacut.frame.analyses.peaks import Peak, Peaks
 from alphacut.fuzzy import Crisp, Triangular
 from alphacut.io.files import Document, locked, rank, require_writable, say
 from alphacut.io.results import MANIFEST, ResultsFolder
-from alphacut.questions.question import Answer, FuzzyResponse
-from alphacut.questions.summary import ANSWERS, Results
-from alphacut.questions.tolerances import require_admissible_scale
 from alphacut.rve.image.fields.grid import device_array
 from alphacut.stages import (
+    answers,
     cell,
     envelope,
     identify,
@@ -40,17 +38,18 @@ from alphacut.stages import (
     shares,
     suite,
 )
+from alphacut.stages.answers import ANSWERS, Response
 from alphacut.stages.cell import CellProblem
-from alphacut.stages.envelope import EnvelopeTask, PeakResults, peaks_of
+from alphacut.stages.envelope import EnvelopeTask
 from alphacut.stages.modulus import fuzzy_loss, fuzzy_modulus, require_levels
 from alphacut.stages.store import (
     RunProgress,
     Stage,
-    StageContext,
     StageResult,
     StageStore,
     no_progress,
 )
+from alphacut.stages.summary import Results
 from alphacut.stochastic import FittedRadiusMap
 
 
@@ -180,11 +179,10 @@ class Pipeline:
         else:
             self._compute_envelopes(structure, section)
             peaks = self._limited_peaks(replace(task, limited=content.limited_outputs), structure)
-            response = response_of(structure, task, peaks)
+            response = Response(structure, task, peaks)
         for kind in ANSWERS:
             if (question := content.questions.get(kind.key)) is not None:
-                compute, inputs = partial(answer_of, kind, question, response), [question, response]
-                stage = Stage(kind.key, inputs, ("fuzzy", "frame", "alphacut"), kind, compute)
+                stage = answers.stage(kind, question, response)
                 results.answers[kind.key] = self.store.take(stage).numbers
 
     def _compute_envelopes(self, structure: Structure, section: EnvelopeSection) -> None:
@@ -202,7 +200,7 @@ class Pipeline:
 
     def _suite_response(
         self, section: RecordsSection, structure: Structure, task: EnvelopeTask
-    ) -> FuzzyResponse:
+    ) -> Response:
         """Computes peaks under each record of a suite into the results; returns the response."""
         records = suite.suite_records(section, task.section, structure)
         for warning in (warning for record in records for warning in record.warnings):
@@ -213,43 +211,28 @@ class Pipeline:
         stages = [suite.stage(structure, task, record) for record in longest_first]
         outcomes = self.store.take_all(stages, self.executor)
         by_record = {record.name: outcomes[f"record_{record.name}"].numbers for record in records}
-        result = self.results.suite = suite.suite_result(by_record, records, structure, task)
-        response = response_of(structure, task, peaks_of(result.peak, task.section.alpha))
-        increments = dict[str, suite.IncrementalResult]()
+        found = suite.suite_peaks(structure, task, records, by_record)
+        self.results.suite, increments = found, dict[str, Increments]()
         if (question := self.content.incremental_question) is not None:
-            analyses = suite.incremental_analyses(question, structure, task, longest_first)
-            further = [suite.incremental_stage(question, *item) for item in analyses.items()]
-            found = self.store.take_all(further, self.executor)
-            increments = {x.name: found[f"incremental_{x.name}"].numbers for x in records}
-        return replace(response, suite=result, increments=increments)
+            analyses = suite.analyses_of(question, structure, task, longest_first)
+            further = [
+                suite.incremental_stage(question, structure, *item) for item in analyses.items()
+            ]
+            scaled = self.store.take_all(further, self.executor)
+            increments = {x.name: scaled[f"incremental_{x.name}"].numbers for x in records}
+        return Response(structure, task, found.peak, found, increments)
 
     def _limited_peaks(self, task: EnvelopeTask, structure: Structure) -> Peaks | None:
         """Peaks for questions: of the study with [envelope]'s motion, else computed alone."""
-        alpha = task.section.alpha
         for study in self.results.tasks:
             if study.has_motion_of(task.section):
-                return peaks_of(self.results.envelopes[study.name].numbers.peak, alpha)
+                return self.results.envelopes[study.name].numbers.peak
         if not task.limited:
             return None
         inputs = [structure.model, structure.numbers, task]
         compute = partial(task.compute_peaks, structure)
-        stage = Stage("peaks", inputs, ("fuzzy", "frame"), PeakResults, compute)
-        return peaks_of(self.store.take(stage).numbers, alpha)
-
-
-def answer_of(
-    kind: type[Answer], section: QuestionSection, response: FuzzyResponse, context: StageContext
-) -> StageResult[Answer]:
-    """The answer of a kind to the question of a section about a response."""
-    return StageResult(ANSWERS[kind](section, replace(response, progress=context.tick)))
-
-
-def response_of(
-    structure: Structure, task: EnvelopeTask, peaks: Peaks | None = None
-) -> FuzzyResponse:
-    """The fuzzy response of [envelope], about which questions are asked."""
-    alpha, step = task.section.alpha, task.section.step
-    return FuzzyResponse(structure, task.fuzzy, alpha, task.duration, step, peaks)
+        stage = Stage("peaks", inputs, ("fuzzy", "frame"), dict[str, Peak], compute)
+        return self.store.take(stage).numbers
 
 
 def _draw_microstructure(
@@ -301,12 +284,12 @@ def _require_motion(content: Content) -> None:
         identify.require_learnable(content.identify, structure, alpha)
     if content.records is not None:
         records = suite.suite_records(content.records, content.envelope, structure)
-        structure = suite.with_record(structure, records[0])  # which stands for all
+        structure = suite.moved_by(structure, records[0])  # which stands for all
     for task in envelope.tasks(content.envelope, content.study):
         frame.require_envelope(**task.arguments(structure))
     if content.tolerances is not None:
         (own_task,) = envelope.tasks(content.envelope, ())  # of [envelope], as questions are
-        require_admissible_scale(content.tolerances, response_of(structure, own_task))
+        answers.require_tolerances(content.tolerances, Response(structure, own_task))
 
 
 def _with_stand_ins(content: Content, structure: Structure) -> Structure:

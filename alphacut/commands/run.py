@@ -24,7 +24,6 @@ from alphacut.io.files import locked, say, write_text
 from alphacut.io.provenance import FORMAT, command_line, command_to_paste, versions
 from alphacut.io.results import ResultsFolder
 from alphacut.io.typed_json import to_document
-from alphacut.questions.summary import SUMMARY, Parts, Results, Summary
 from alphacut.report import tables
 from alphacut.report.page import comparison_page, render_page
 from alphacut.report.results import comparison, cut_text, run_text, width_text
@@ -35,6 +34,7 @@ from alphacut.stages.image import ImageResult
 from alphacut.stages.microstructure import fragment
 from alphacut.stages.modulus import ModulusResult
 from alphacut.stages.store import CutsResult
+from alphacut.stages.summary import SUMMARY, Parts, Results, Summary
 
 PAGE = "report.html"
 DEVICES = "where an image is solved: cpu (default), or cuda by CuPy"
@@ -172,7 +172,7 @@ def modulus(options: argparse.Namespace, out: TextIO) -> int:
         text += f"{UPPER_BOUND}\n" if part.particles == "mesh" else ""
         text += f"{part.samples} samples, {part.solves} linear systems, "
         text += f"{part.seconds:.1f} s, {part.method}\n"
-    write_answer(options, dict(part), out, text)
+    write_answer(options, to_document(part), out, text)
     return 0
 
 

@@ -12,13 +12,13 @@ from matplotlib.figure import Figure
 
 from alphacut.figures import envelope, material, overview, structure
 from alphacut.figures.style import figure_style, save
+from alphacut.frame import Fragility
 from alphacut.fuzzy import FuzzyNumber, PiecewiseLinear
 from alphacut.fuzzy.campaign.workers import submit
 from alphacut.io.provenance import NESTED, version_of
-from alphacut.questions.fragility import FragilityAnswer
-from alphacut.questions.summary import Results
 from alphacut.stages.cell import GPA, CellProblem
 from alphacut.stages.store import Stage, StageContext, StageResult, StageStore
+from alphacut.stages.summary import Results
 
 PARTS = 6  # tasks that the figures are divided into, so that no process waits long for another
 Drawing = tuple[str, Callable[[], Figure]]
@@ -32,7 +32,7 @@ def drawings(results: Results) -> Iterator[Drawing]:
         yield "update-inputs", partial(envelope.identified_inputs, results.learned)
     for key, answer in results.answers.items():
         yield key, partial(envelope.DRAWINGS[key], answer)
-        if isinstance(answer, FragilityAnswer) and answer.increments:
+        if isinstance(answer, Fragility) and answer.increments:
             yield "fragility-curves", partial(envelope.draw_incremental, answer)
     for task in results.tasks:
         yield from envelope.drawings(task, results)

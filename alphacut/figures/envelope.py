@@ -18,16 +18,14 @@ from alphacut.base.arrays import Array
 from alphacut.base.number_text import engineering
 from alphacut.figures import style
 from alphacut.figures.style import BLUE, GREY, INK, ORANGE, WIDTH
-from alphacut.frame import LearnedInputs
-from alphacut.frame.analyses.peaks import ANY
+from alphacut.frame import Decision, Fragility, LearnedInputs, Probability, Tolerances
+from alphacut.frame.analyses.decision import degree_text
+from alphacut.frame.analyses.fragility import LimitFragility
 from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.structures.quantities import Output
-from alphacut.questions.decision import DecisionAnswer, degree_text
-from alphacut.questions.fragility import FragilityAnswer
-from alphacut.questions.probability import ProbabilityAnswer
-from alphacut.questions.summary import Results
-from alphacut.questions.tolerances import TolerancesAnswer
+from alphacut.fuzzy.result import Ends
 from alphacut.stages.envelope import EnvelopeTask
+from alphacut.stages.summary import Results
 
 
 def drawings(task: EnvelopeTask, results: Results) -> Iterator[tuple[str, Callable[[], Figure]]]:
@@ -129,7 +127,7 @@ def identified_inputs(result: LearnedInputs) -> Figure:
     return draw_bars(intervals, result.inputs, "value over the middle of what it was before")
 
 
-def draw_decision(answer: DecisionAnswer) -> Figure:
+def draw_decision(answer: Decision) -> Figure:
     """Draws bars from the smallest to the largest peak over its limit, of each limit and level."""
     limits = [limit for limit in answer.limits.values() if limit.peak is not None]
     figure, axes = plt.subplots(figsize=(WIDTH, 1.2 + 0.7 * len(limits)))
@@ -155,41 +153,38 @@ def draw_decision(answer: DecisionAnswer) -> Figure:
     return figure
 
 
-def draw_probability_bands(
-    x: Array, bands: Sequence[Array], alpha: Array, title: str, *, in_steps: bool = False
-) -> tuple[Figure, Axes]:
-    """Draws lower and upper bounds of a probability over x, two arrays (levels, x)."""
-    figure, axes = plt.subplots()
+def draw_bands(axes: Axes, x: Array, bands: Ends, alpha: Array, *, in_steps: bool = False) -> None:
+    """Draws lower and upper bounds (levels, x) of a probability over x; the highest as lines."""
     band: style.Look = {"step": "post"} if in_steps else {}
     line: style.Look = {"drawstyle": "steps-post"} if in_steps else {}
-    for low, high, shade in zip(*bands, style.colours(alpha), strict=True):
+    levels = zip(bands.lower[:-1], bands.upper[:-1], style.colours(alpha)[:-1], strict=True)
+    for low, high, shade in levels:
         axes.fill_between(x, low, high, color=shade, lw=0, **band)
-    for end in (bands[0][-1], bands[1][-1]):  # the highest band may have no width
+    for end in (bands.lower[-1], bands.upper[-1]):  # which agree where its band has no width
         axes.plot(x, end, color=INK, lw=1, **line)
-    axes.set(ylim=(0, 1.02), title=title.replace("^2", "²"))
-    style.alpha_legend(axes, alpha)
-    return figure, axes
+    axes.set_ylim(0, 1.02)
 
 
-def draw_probability(answer: ProbabilityAnswer) -> Figure:
+def draw_probability(answer: Probability) -> Figure:
     """Draws the bounds of the exceedance probability of the last event over its limit, by level."""
-    event = [*answer.limits.values()][-1]
-    limits, *bands = (event.curve[x] for x in ("limit", "lower", "upper"))
-    limit_text = "1" if event.output == ANY else engineering(event.limit, event.unit)
+    event = [*answer.events.values()][-1]
+    limits, limit_text = event.curve.limit, "1" if event.is_event else event.value_words
     is_near = event.limit <= 2 * limits[-1]
-    title = f"limit {limit_text} ({'dashed' if is_near else 'far off'})"
-    figure, axes = draw_probability_bands(limits, bands, answer.alpha, title)
+    figure, axes = plt.subplots()
+    draw_bands(axes, limits, Ends(event.curve.lower, event.curve.upper), answer.alpha)
+    style.alpha_legend(axes, answer.alpha)
+    axes.set_title(f"limit {limit_text} ({'dashed' if is_near else 'far off'})".replace("^2", "²"))
     if is_near:
         axes.axvline(event.limit, color=ORANGE, lw=1.2, ls="--")
     axes.set_ylabel("probability of exceeding it")
     label = f"limit of |{event.output}|"
-    if event.output == ANY:
+    if event.is_event:
         label = "all limits, over those of the case"
     style.prefix_axis(axes, label, event.unit, across=True)
     return figure
 
 
-def draw_tolerances(answer: TolerancesAnswer) -> Figure:
+def draw_tolerances(answer: Tolerances) -> Figure:
     """Draws the supports of the inputs over nominal values: in the case, and with no exceedance."""
     supports = answer.supports.values()
     nominal = np.array([[x.nominal or 1.0] for x in supports])
@@ -204,22 +199,36 @@ def draw_tolerances(answer: TolerancesAnswer) -> Figure:
     return figure
 
 
-def draw_fragility(answer: FragilityAnswer) -> Figure:
-    """Draws the bounds of the share of records that exceed the last limit over their measure."""
-    limit = [*answer.limits.values()][-1]
-    measures, bands = limit.measure, (limit.band.lower, limit.band.upper)
-    figure, axes = draw_probability_bands(measures, bands, answer.alpha, limit.words, in_steps=True)
-    if limit.confidence is not None:
-        for end in (limit.confidence.lower, limit.confidence.upper):
-            axes.plot(measures, end[0], color=BLUE, lw=0.9, ls="--")
-    axes.set_ylabel("share of records that exceed it")
-    style.prefix_axis(axes, answer.measure, answer.unit, across=True)
+def draw_fragility(answer: Fragility) -> Figure:
+    """Draws the bounds of the share of records that exceed each limit over their measure.
+
+    A limit of all storeys is drawn as the event that any storey exceeds it.
+    """
+    shown = [part for part in answer.limits.values() if not part.event_name]
+    size = WIDTH, 0.9 + 2.3 * len(shown)
+    figure, panels = plt.subplots(len(shown), squeeze=False, figsize=size)
+    for axes, part in zip(panels[:, 0], shown, strict=True):
+        draw_fragility_of(axes, answer, part)
+    style.alpha_legend(panels[0, 0], answer.alpha)
     return figure
 
 
-def draw_incremental(answer: FragilityAnswer) -> Figure:
+def draw_fragility_of(axes: Axes, answer: Fragility, part: LimitFragility) -> None:
+    """Draws the bands of one limit or event, and the lognormal fit on the highest level."""
+    draw_bands(axes, part.measure, part.band, answer.alpha, in_steps=True)
+    for curve in part.lognormal_fit(-1):
+        axes.plot(part.measure, curve, color=ORANGE, lw=1.2, ls=":")
+    if part.confidence is not None:
+        for end in part.confidence:
+            axes.plot(part.measure, end[0], color=BLUE, lw=0.9, ls="--")
+    axes.set_title(part.words.replace("^2", "²"))
+    axes.set_ylabel("share of records")
+    style.prefix_axis(axes, answer.measure, answer.unit, across=True)
+
+
+def draw_incremental(answer: Fragility) -> Figure:
     """Draws least and greatest peak found over the measure, of each limit, record and level."""
-    limits = {name: limit for name, limit in answer.limits.items() if name != ANY}
+    limits = {name: limit for name, limit in answer.limits.items() if not limit.is_event}
     size = WIDTH, 0.6 + 1.9 * len(limits)
     figure, panels = plt.subplots(len(limits), sharex=True, squeeze=False, figsize=size)
     for axes, (name, limit) in zip(panels[:, 0], limits.items(), strict=True):

@@ -17,10 +17,10 @@ from alphacut.base.number_text import axis_prefix
 from alphacut.figures import style
 from alphacut.figures.style import BLUE, INK, ORANGE, PURPLE, Look
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal
-from alphacut.questions.summary import Results
 from alphacut.rve.cell.cell import Cell
 from alphacut.rve.mesh.columns import extrude
 from alphacut.rve.mesh.prism_grid import PrismGrid, reference_radius
+from alphacut.stages.summary import Results
 
 MATRIX, PARTICLE = "#f6d9b8", "#b79ad9"
 CUT_MATRIX = "#f0a860"  # of the matrix that is cut open

@@ -16,8 +16,8 @@ from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.methods.graph_follower import Followed, GraphFollower
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy import Crisp
-from alphacut.questions.summary import Results
 from alphacut.stages.envelope import EnvelopeTask
+from alphacut.stages.summary import Results
 
 Point = tuple[float, float]
 ARROW = {"arrowstyle": "-|>", "color": ORANGE}

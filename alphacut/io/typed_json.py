@@ -2,7 +2,8 @@
 
 A document is what `json` reads and writes. Fields stand by their names; enumerations by their
 value; arrays, tuples and lists as lists; named tuples and mappings as objects. Numbers that are not
-finite are null in JSON, and nan when they are read.
+finite are null in JSON, and nan when they are read. Fields that a dataclass makes itself are
+written and not read.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from typing import (
     get_args,
     get_origin,
     get_type_hints,
+    is_typeddict,
 )
 
 import numpy as np
@@ -100,7 +102,7 @@ def _read(kind: Any, document: Any, path: str) -> Any:
             return np.nan
         is_number = isinstance(document, int | float) and not isinstance(document, bool)
         return float(_required(is_number, document, path))
-    if is_dataclass(kind) or hasattr(kind, "_field_defaults"):
+    if is_dataclass(kind) or hasattr(kind, "_field_defaults") or is_typeddict(kind):
         return _read_fields(kind, document, path)
     if issubclass(kind, Enum):
         return _checked(kind, document, path)
@@ -135,6 +137,7 @@ def _read_fields(kind: Any, document: Any, path: str) -> Any:
     """Return a dataclass or a named tuple from the values of its fields by name."""
     _required(isinstance(document, dict), document, path)
     hints, required = _field_types(kind)
+    document = {key: entry for key, entry in document.items() if key not in _derived(kind)}
     for key in document:
         _required(key in hints, key, _below(path, key))
     for name in required:
@@ -147,11 +150,20 @@ def _read_fields(kind: Any, document: Any, path: str) -> Any:
 def _field_types(kind: Any) -> tuple[dict[str, Any], tuple[str, ...]]:
     """Return the types of the fields of a dataclass or named tuple, and those without default."""
     hints = get_type_hints(kind, include_extras=True)
+    if is_typeddict(kind):
+        return hints, tuple(kind.__required_keys__)
     if not is_dataclass(kind):
         return hints, tuple(x for x in kind._fields if x not in kind._field_defaults)
     own = [x for x in fields(kind) if x.init]
     required = [x.name for x in own if x.default is MISSING and x.default_factory is MISSING]
     return {x.name: hints[x.name] for x in own}, tuple(required)
+
+
+@cache
+def _derived(kind: Any) -> frozenset[str]:
+    """Return the names of the fields of a dataclass that follow from others."""
+    own = fields(kind) if is_dataclass(kind) else ()
+    return frozenset(x.name for x in own if not x.init)
 
 
 def _required(condition: bool, document: Any, path: str) -> Any:

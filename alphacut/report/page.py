@@ -10,11 +10,12 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path, PurePosixPath
 
 from alphacut.base.errors import RefusedError
+from alphacut.base.number_text import Table
+from alphacut.frame import Sensitivity
+from alphacut.frame.analyses.answer import enclosing_box_words
 from alphacut.fuzzy.result import Nature, of_enclosing_box
 from alphacut.io.files import Document, say
 from alphacut.io.results import ResultsFolder
-from alphacut.questions.question import Table, enclosing_box_words
-from alphacut.questions.summary import ANSWERS, Summary
 from alphacut.report.results import (
     ANSWER_HEAD,
     MEANING,
@@ -29,15 +30,12 @@ from alphacut.report.results import (
 from alphacut.report.tables import tables
 from alphacut.stages.cell import isotropic_label
 from alphacut.stages.envelope import EnvelopeResult
+from alphacut.stages.summary import Summary
 
-SHARES = (
-    "Share of the width, of peaks between those that motions reach, that is lost when an input is"
-    " fixed at its nominal value."
-)
 Piece = tuple[object, ...]
 """Name of a macro of ``report.html``, and what it shows."""
 _TABLES = tomllib.loads(Path(__file__).with_name("captions.toml").read_text(encoding="utf-8"))
-FIGURES: dict[str, str] = _TABLES["figures"] | {kind.key: kind.caption for kind in ANSWERS}
+FIGURES: dict[str, str] = _TABLES["figures"]
 TERMS = _TABLES["terms"] | {str(nature).capitalize(): nature.sentence for nature in Nature}
 """Terms of the page with their meaning."""
 
@@ -115,7 +113,7 @@ class Page:
         """
         summary, show = self.summary, self._pieces
         refuted = [summary.update.refuted] if summary.update and summary.update.refuted else []
-        shares = [SHARES] if summary.shares else []
+        shares = [Sensitivity(summary.shares).words()] if summary.shares else []
         box = [enclosing_box_words(summary.encloses)] if summary.encloses else []
         answers = [(x, (x.key, f"{x.key}-curves")) for x in summary.answers]
         plots: list[Piece] = [("plot",)] if summary.envelopes else []
@@ -127,7 +125,10 @@ class Page:
             ("What do the measured modes teach?", show(["update-inputs"], refuted, "update")),
             ("How does the structure move?", [*plots, *show([], self._motion(), folded="peaks")]),
             ("How far does it move under each record?", show([], folded="records")),
-            *((x.title, show(names, [x.words()], x.key, f"{x.key}_sets")) for x, names in answers),
+            *(
+                (x.title, show(names, [x.all_words()], x.key, f"{x.key}_sets"))
+                for x, names in answers
+            ),
             ("What drives the width?", show([], [*shares, *box] if shares else [], "shares")),
             ("Terms", [("glossary", TERMS.items())]),
             ("More", self._more()),

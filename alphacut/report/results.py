@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from textwrap import wrap
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from alphacut.base.number_text import (
     MINUS,
     STANDARD_GRAVITY,
+    Table,
     axis_prefix,
     engineering,
     number_text,
@@ -18,18 +19,18 @@ from alphacut.base.number_text import (
     range_text,
     text_table,
 )
+from alphacut.frame import Peak, SuitePeaks, Tolerances
+from alphacut.frame.analyses.answer import enclosing_box_words
 from alphacut.frame.structures.quantities import output_of
 from alphacut.fuzzy.result import Nature, rounded
-from alphacut.questions.question import Row, Table, enclosing_box_words
-from alphacut.questions.summary import FrameResult, Parts
-from alphacut.questions.tolerances import TolerancesAnswer
 from alphacut.stages.cell import UPPER_BOUND
-from alphacut.stages.envelope import EnvelopeResult, PeakResult
+from alphacut.stages.envelope import EnvelopeResult
 from alphacut.stages.image import ImageResult
 from alphacut.stages.modulus import ModulusResult
 from alphacut.stages.store import CutsResult
-from alphacut.stages.suite import SuiteResult
+from alphacut.stages.summary import FrameResult, Parts
 
+Row = tuple[str, ...]
 MEANING = "Least … largest value if every input stays in its range; α = 1: most plausible"
 """First line of all results, for readers who do not know α-cuts; "nominal" is α = 1."""
 TOLERANCE_TABLE = "table on the page and in tolerances.csv"
@@ -139,7 +140,7 @@ def peak_table(parts: Parts) -> Table:
     of a peak has a row of its own. Of a suite the peaks are the largest over the records, then the
     means.
     """
-    studies: dict[str, EnvelopeResult | SuiteResult] = {**parts.envelopes}
+    studies: dict[str, EnvelopeResult | SuitePeaks] = {**parts.envelopes}
     if parts.records is not None:
         studies["records"] = parts.records
     if not studies:
@@ -154,10 +155,12 @@ def peak_table(parts: Parts) -> Table:
     for name, study in studies.items():
         suffix = f" ({name})" if len(studies) > 1 else ""
         drawn = study.drawn if isinstance(study, EnvelopeResult) else ()
-        farthest = study.farthest_record if isinstance(study, SuiteResult) else {}
+        farthest = study.farthest_record if isinstance(study, SuitePeaks) else {}
         for peak_name in (name for name in study.peak if name in (drawn or study.peak)):
             peak, record = study.peak[peak_name], farthest.get(peak_name, "")
-            units = display_units(peak_name, unit_of(study.units, peak_name), peak, parts.structure)
+            units = display_units(
+                peak_name, study.units[output_of(peak_name)], peak, parts.structure
+            )
             for label, factor in units:
                 cells = peak_cells(peak, factor, levels)
                 for limit, verdict in limits.get(peak_name, [(math.nan, "")]):
@@ -172,7 +175,7 @@ def peak_table(parts: Parts) -> Table:
     return without_empty_columns(head, rows)
 
 
-def peak_cells(peak: PeakResult, factor: float, levels: Sequence[int]) -> Row:
+def peak_cells(peak: Peak, factor: float, levels: Sequence[int]) -> Row:
     """Texts of a peak times a factor: its cut on some levels, its error, what is reached, the gap.
 
     Levels are indices, the highest first; a middle one has three digits.
@@ -188,7 +191,7 @@ def peak_cells(peak: PeakResult, factor: float, levels: Sequence[int]) -> Row:
         return (*cuts, error, "", "")
     inner = "lower" if peak.is_least else "upper"
     reached = rounded(factor * float(peak.reached[0]), inner, Nature.ATTAINED)
-    return (*cuts, error, number_text(reached), f"{peak.gap(0):.1%}")
+    return (*cuts, error, number_text(reached), f"{peak.gaps[0]:.1%}")
 
 
 def limits_by_peak(parts: Parts) -> dict[str, list[tuple[float, str]]]:
@@ -200,7 +203,7 @@ def limits_by_peak(parts: Parts) -> dict[str, list[tuple[float, str]]]:
 
 
 def display_units(
-    name: str, unit: str, peak: PeakResult, frame: FrameResult | None
+    name: str, unit: str, peak: Peak, frame: FrameResult | None
 ) -> Iterator[tuple[str, float]]:
     """Yields the label and the factor from SI of each unit in which a peak is shown."""
     if unit == "m/s^2":
@@ -252,7 +255,7 @@ def smaller_steps(parts: Parts) -> Iterator[str]:
                 if peak.nature is Nature.GUARANTEED:
                     what = "at least" if peak.is_least else "at most"
                     value = float(peak.far_end[0]) + (saved if peak.is_least else -saved)
-                text = engineering(value, unit_of(study.units, name))
+                text = engineering(value, study.units[output_of(name)])
                 yield f"{name}: a step of {study.step / 2:g} s would give {what} about {text}"
 
 
@@ -261,7 +264,7 @@ def answers(parts: Parts) -> list[Row]:
     rows: list[Row] = []
     for answer in parts.answers:
         answer_rows = answer.table().rows
-        if isinstance(answer, TolerancesAnswer):
+        if isinstance(answer, Tolerances):
             scale, *inputs = answer_rows
             answer_rows = [scale, ("ranges", f"of {len(inputs)} inputs", TOLERANCE_TABLE)]
         rows += [(f"{answer.key}: {row[0]}", *row[1:3]) for row in answer_rows]
@@ -307,20 +310,15 @@ def _compared_entries(parts: Parts) -> Iterator[tuple[str, str, float | str]]:
     for study_name, study in parts.envelopes.items():
         for output, peak in study.peak.items():
             name = output if study_name == "all" else f"{output} ({study_name})"
-            unit = unit_of(study.units, output)
+            unit = study.units[output_of(output)]
             yield f"greatest peak of {name}", unit, float(peak.far_end[0])
             yield f"width of the peak of {name}", unit, float(peak.upper[0] - peak.lower[0])
     if (suite := parts.records) is not None:
         for output, statistics in suite.statistics.items():
-            for name, ends in statistics.proved.items():  # mean, median …
-                unit = unit_of(suite.units, output)
+            for name, ends in statistics.items():  # mean, median …
+                unit = suite.units[output_of(output)]
                 yield f"{name} of the records' peaks of {output}", unit, float(ends[0])
     for limit in () if parts.decision is None else parts.decision.limits.values():
         yield limit.words, "", limit.verdict_words
     if parts.tolerances is not None and parts.tolerances.kept is not None:
         yield "scale of tolerances", "", parts.tolerances.kept
-
-
-def unit_of(units: Mapping[str, str], peak: str) -> str:
-    """SI unit of a peak such as "max q3", from those of the outputs."""
-    return units[peak.rpartition(" ")[2]]

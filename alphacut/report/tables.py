@@ -9,18 +9,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from alphacut.base.number_text import MINUS, rounded_ends
-from alphacut.frame import LearnedInputs
+from alphacut.base.number_text import MINUS, Table, rounded_ends
+from alphacut.frame import LearnedInputs, Sensitivity
+from alphacut.frame.analyses.answer import Answer
+from alphacut.frame.structures.quantities import output_of
 from alphacut.fuzzy.result import Nature, of_enclosing_box
 from alphacut.io.files import Document, write_text
 from alphacut.io.results import ResultsFolder
-from alphacut.questions.question import Table
-from alphacut.questions.summary import Parts
-from alphacut.report.results import unit_of
-from alphacut.stages.envelope import EnvelopeResult, PeakResult
+from alphacut.stages.envelope import EnvelopeResult
 from alphacut.stages.image import ImageResult
 from alphacut.stages.modulus import ModulusResult
-from alphacut.stages.suite import SuiteResult
+from alphacut.stages.summary import Parts
 
 if TYPE_CHECKING:
     import xarray
@@ -42,15 +41,15 @@ def frames(parts: Parts) -> dict[str, pd.DataFrame]:
         ("radius_map", radius_map, parts.microstructure),
         ("modulus", modulus, parts.modulus),
         ("image", modulus, parts.image),
-        ("update", _rows_of_update, None if refuted else parts.update),
+        ("update", rows_of, None if refuted else parts.update),
         ("peaks", peaks, parts.envelopes),
-        ("records", records, parts.records),
-        ("shares", shares, parts.shares),
+        ("records", rows_of, parts.records),
+        ("shares", rows_of, Sensitivity(parts.shares) if parts.shares else None),
     )
     found = {name: frame_of(part) for name, frame_of, part in of_stages if part}
     if parts.fragility is not None and parts.fragility.increments:
         found["fragility_sets"] = pd.DataFrame(parts.fragility.crossings())
-    return found | {answer.key: pd.DataFrame(answer.records()) for answer in parts.answers}
+    return found | {answer.key: rows_of(answer) for answer in parts.answers}
 
 
 def tables(parts: Parts) -> dict[str, Table]:
@@ -79,8 +78,9 @@ def modulus(result: ModulusResult | ImageResult) -> pd.DataFrame:
     return pd.DataFrame(columns | {"nature of E": str(result.nature)})
 
 
-def _rows_of_update(learned: LearnedInputs) -> pd.DataFrame:
-    return pd.DataFrame(learned.records())
+def rows_of(answer: Answer | LearnedInputs) -> pd.DataFrame:
+    """The rows of numbers of an answer."""
+    return pd.DataFrame(answer.records())
 
 
 def peaks(studies: Mapping[str, EnvelopeResult]) -> pd.DataFrame:
@@ -90,55 +90,20 @@ def peaks(studies: Mapping[str, EnvelopeResult]) -> pd.DataFrame:
             {
                 "study": name,
                 "output": output,
-                "unit": unit_of(study.units, output),
+                "unit": study.units[output_of(output)],
                 "α": study.alpha,
                 "least peak": peak.lower,
                 "greatest peak": peak.upper,
                 "error": peak.error,
                 "nature": str(peak.nature),
-                "peak reached": peak.reached,
-                "gap, share": [peak.gap(level) for level in range(len(study.alpha))],
-                **_box_column(peak),
+                "peak reached": np.where(np.isfinite(peak.reached), peak.reached, np.nan),
+                "gap, share": peak.gaps,
+                **({"inputs": of_enclosing_box(peak.encloses)} if peak.encloses else {}),
             }
         )
         for name, study in studies.items()
         for output, peak in study.peak.items()
     )
-
-
-def _box_column(peak: PeakResult) -> dict[str, str]:
-    """A column that says of which box the peaks are, where this is not the set meant."""
-    return {"inputs": of_enclosing_box(peak.encloses)} if peak.encloses else {}
-
-
-def records(result: SuiteResult) -> pd.DataFrame:
-    """Measures of each record and its peaks farthest out on the lowest level, then statistics."""
-    head = ["record", "PGA [m/s^2]", "Sa(T1) [m/s^2]", "output", "unit"]
-    head += ["farthest peak", "peak reached", "nature", "inputs"]
-    rows: list[tuple[object, ...]] = []
-    for name, record in result.records.items():
-        sizes = record.measures["PGA"], record.measures["Sa(T1)"]
-        for output, peak in record.peak.items():
-            box = of_enclosing_box(peak.encloses) if peak.encloses else None
-            peak_cells = peak.far_end[0], peak.reached[0], str(peak.nature), box
-            rows.append((name, *sizes, output, unit_of(result.units, output), *peak_cells))
-    for output, statistics in result.statistics.items():
-        unit = unit_of(result.units, output)
-        for name, proved in statistics.proved.items():  # mean, median …
-            row = (f"{name} of all", np.nan, np.nan, output, unit, proved[0], np.nan, np.nan, None)
-            rows.append(row)
-    found = pd.DataFrame(rows, columns=head)
-    return found if found["inputs"].any() else found.drop(columns="inputs")
-
-
-def shares(table: Mapping[str, Mapping[str, float]]) -> pd.DataFrame:
-    """Each input's share in the width of each result at the lowest level, the largest first."""
-    rows = [
-        (result, name, share)
-        for result, values in table.items()
-        for name, share in sorted(values.items(), key=lambda pair: -pair[1])
-    ]
-    return pd.DataFrame(rows, columns=["width of", "input", "share"])
 
 
 def over_time(data: xarray.Dataset, output: str, unit: str) -> pd.DataFrame:
@@ -173,8 +138,8 @@ def shown(frame: pd.DataFrame) -> Table:
 
 
 def _text(value: object) -> str:
-    if isinstance(value, str):
-        return value
+    if value is None or isinstance(value, str):
+        return value or ""
     number = float(value)  # type: ignore[arg-type]
     return "" if np.isnan(number) else f"{number + 0.0:.{DIGITS}g}".replace("-", MINUS)
 

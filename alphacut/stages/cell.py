@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Self, cast
-
-from typing_extensions import TypedDict
+from typing import Any, Self, TypedDict, cast
 
 from alphacut.base.errors import FailedError, RefusedError
 from alphacut.case.cell import CellContent

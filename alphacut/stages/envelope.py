@@ -8,7 +8,6 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from pydantic import Field
 
 from alphacut import frame
 from alphacut.base.arrays import Array
@@ -16,12 +15,19 @@ from alphacut.base.errors import FailedError, require
 from alphacut.base.progress_bar import Progress, subprogress
 from alphacut.case.motion import EnvelopeSection, Study, Tolerance
 from alphacut.case.structure import Structure
-from alphacut.frame.analyses.peaks import PEAK_BOUNDS, Peak, Peaks, peaks, tightest
+from alphacut.frame.analyses.peaks import (
+    PEAK_ERROR,
+    Peak,
+    close_peaks,
+    loose_peaks,
+    peaks,
+    tightest,
+)
 from alphacut.frame.bounds.model_error import MAX_PARAMETERS
 from alphacut.frame.structures.quantities import Output, output_of
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document, say
-from alphacut.stages.store import Numbers, Stage, StageContext, StageResult, Values
+from alphacut.stages.store import Stage, StageContext, StageResult
 
 if TYPE_CHECKING:
     import xarray
@@ -29,58 +35,10 @@ if TYPE_CHECKING:
 DEFAULT_TOLERANCE = Tolerance(1e-3, "")
 """Tolerance where none is named: a fraction of each peak."""
 FOLLOWERS = ("graph-follower", "improved-graph-follower")
-WIDENING = 0.01
-"""Fraction of a peak from which on it is said that a smaller step would narrow its bound."""
-PEAK_ERROR = 5e-3
-"""Error of the peaks of limited outputs that is aimed at, as a share of each."""
 
 
-class PeakResult(Numbers):
-    """Bounds of the peak of an output on each level, in SI, as `Peak` has them; nan if unknown.
-
-    The peak is the largest magnitude, or the greatest ("max q3") or least ("min q3") value, which
-    has its own sign here, so that `lower` and `upper` change places. No motion passes `proved`;
-    `reached_at` has the inputs of one that reaches the peak on the lowest level, if known. Motions
-    may add `between_nodes` to its bound there within the steps. `encloses` is that of `Peak`.
-    """
-
-    lower: Values
-    upper: Values
-    error: Values
-    reached: Values
-    least_lower: Values
-    least_upper: Values
-    proved: Values
-    nature: Nature
-    between_nodes: float = 0.0
-    is_least: bool = False
-    reached_at: dict[str, float] = Field(default={})
-    encloses: str = ""
-
-    @property
-    def far_end(self) -> Array:
-        """Bound on each level of the peaks farthest out: the upper one, or that of least values."""
-        return self.lower if self.is_least else self.upper
-
-    @property
-    def is_widened_by_step(self) -> bool:
-        """Whether what motions add between nodes is most of the gap or error, and much."""
-        bound, reached = float(self.far_end[0]), float(self.reached[0])
-        is_proved = self.nature is Nature.GUARANTEED and np.isfinite(reached)
-        width = abs(bound - reached) if is_proved else float(self.error[0])
-        return self.between_nodes > max(width / 2, WIDENING * abs(bound))
-
-    def gap(self, level: int) -> float:
-        """Relative gap between that bound and what a motion reaches, on a level; nan if unknown."""
-        bound, reached = float(self.far_end[level]), float(self.reached[level])
-        return abs((bound - reached) / bound) if bound else 0.0
-
-
-PeakResults = dict[str, PeakResult]
-"""Peaks by their names, such as q3 and max q3."""
-
-
-class EnvelopeResult(Numbers):
+@dataclass(frozen=True, eq=False, kw_only=True)
+class EnvelopeResult:
     """An envelope in SI: extremes and errors by output at the lowest level, peaks, and cost.
 
     `drawn` are the outputs that are drawn, all if empty.
@@ -90,8 +48,8 @@ class EnvelopeResult(Numbers):
     min: dict[str, float]
     max: dict[str, float]
     error: dict[str, float]
-    alpha: Values
-    peak: PeakResults
+    alpha: Array
+    peak: dict[str, Peak]
     seconds: float
     method: str
     nature: Nature
@@ -159,7 +117,7 @@ class EnvelopeTask:
             max=by_output(lowest["upper"].max("time")),
             error=by_output(lowest["error"].max("time")),
             alpha=data["alpha"].values,
-            peak=peak_results(peak_bounds),
+            peak=peak_bounds,
             seconds=float(data.attrs["seconds"]),
             method=str(data.attrs["method"]),
             nature=Nature(data.attrs["nature"]),
@@ -170,10 +128,10 @@ class EnvelopeTask:
         return StageResult(numbers, data)
 
     def compute_peaks(
-        self, structure: Structure, context: StageContext, nodes: int = 1
-    ) -> StageResult[PeakResults]:
-        """Computes the peaks of the limited outputs alone, with some nodes in each step."""
-        return StageResult(peak_results(self.close_peaks(structure, context.tick, nodes)))
+        self, structure: Structure, context: StageContext
+    ) -> StageResult[dict[str, Peak]]:
+        """Computes the peaks of the limited outputs alone."""
+        return StageResult(self.close_peaks(structure, context.tick))
 
     def arguments(self, structure: Structure) -> Document:
         """Arguments of `frame.envelope` and `frame.require_envelope`, by name, from the case."""
@@ -187,17 +145,11 @@ class EnvelopeTask:
             arguments["tolerance"] = tolerance * (section.gain if method in FOLLOWERS else 1.0)
         return arguments
 
-    def close_peaks(self, structure: Structure, progress: Progress, nodes: int = 1) -> Peaks:
-        """Peaks of the limited outputs by the method that bounds peaks most closely.
-
-        There are `nodes` nodes in each step of [envelope].
-        """
-        model = structure.model_with_outputs("limits", outputs_of(self.limited))
-        magnitudes = all(name == output_of(name) for name in self.limited)
-        method = frame.Auto(PEAK_ERROR, peaks=True, magnitudes=magnitudes)
-        motion = self._motion(structure) | {"step": self.section.step / nodes}
-        result = frame.envelope(model, method=method, relative=True, progress=progress, **motion)
-        return peaks(result, self.limited)
+    def close_peaks(self, structure: Structure, progress: Progress) -> dict[str, Peak]:
+        """Peaks of the limited outputs by the method that bounds peaks most closely."""
+        structure.require_quantities("limits", outputs_of(self.limited))
+        motion = self._motion(structure)
+        return close_peaks(structure.model, names=self.limited, progress=progress, **motion)
 
     def _motion(self, structure: Structure) -> dict[str, Any]:
         return {
@@ -211,58 +163,6 @@ class EnvelopeTask:
 def outputs_of(peaks: Sequence[str]) -> tuple[str, ...]:
     """Outputs of some peaks, each once."""
     return tuple(dict.fromkeys(map(output_of, peaks)))
-
-
-def loose_peaks(peaks: Peaks, outputs: Sequence[str], gap: float) -> tuple[str, ...]:
-    """Names of those peaks that are not guaranteed to within a gap, or not there at all.
-
-    The gap is that between the proved and the reached peak, relative to the proved one. Where the
-    inputs enclose a set, no peak is known to be reached and any guaranteed one is taken.
-    """
-
-    def is_close(peak: Peak) -> bool:
-        is_near = (peak.upper - peak.reached <= gap * np.abs(peak.upper)).all()
-        return peak.nature is Nature.GUARANTEED and bool(is_near or peak.encloses)
-
-    return tuple(name for name in outputs if name not in peaks or not is_close(peaks[name]))
-
-
-def peak_results(peaks: Peaks) -> PeakResults:
-    """Peaks as results by name; a least value has its own sign."""
-    results: PeakResults = {}
-    for name, peak in peaks.items():
-        bounds = {bound: getattr(peak, bound) for bound in PEAK_BOUNDS}
-        bounds["proved"] = peak.greatest_bounds.upper
-        is_least = name.startswith("min ")  # which `Peak` has as the greatest value of −q
-        bounds = _negative(bounds) if is_least else bounds
-        kind = {"nature": peak.nature, "is_least": is_least, "reached_at": peak.reached_at}
-        kind["encloses"] = peak.encloses
-        kind["between_nodes"] = peak.between_nodes
-        results[name] = PeakResult.model_validate(bounds | kind)
-    return results
-
-
-def peaks_of(results: PeakResults, alpha: Sequence[float]) -> dict[str, Peak]:
-    """Peaks from their results on levels `alpha`."""
-    peaks = {}
-    for name, peak in results.items():
-        bounds = {bound: getattr(peak, bound) for bound in PEAK_BOUNDS}
-        bounds = _negative(bounds) if peak.is_least else bounds
-        for bound, values in bounds.items():
-            unknown = np.inf if bound in ("upper", "least_upper") else -np.inf
-            bounds[bound] = np.where(np.isnan(values), unknown, values)
-        is_signed = name.startswith(("max ", "min "))
-        kind: dict[str, Any] = {"is_signed": is_signed, "reached_at": peak.reached_at}
-        kind |= {"between_nodes": peak.between_nodes, "encloses": peak.encloses}
-        peaks[name] = Peak(np.array(alpha), **bounds, nature=peak.nature, **kind)
-    return peaks
-
-
-def _negative(bounds: Mapping[str, Array]) -> dict[str, Array]:
-    """Bounds of the negative of a peak, whose error is the same."""
-    negative = {name: 0.0 - values for name, values in bounds.items()}
-    ends = {"lower": negative["upper"], "upper": negative["lower"]}
-    return negative | ends | {"error": bounds["error"]}
 
 
 def tasks(

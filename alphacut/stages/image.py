@@ -38,7 +38,7 @@ from alphacut.rve.result.reference_bounds import reference_bounds
 from alphacut.rve.result.result import PhaseEnergies
 from alphacut.stages.cell import AVERAGES, GPA, References
 from alphacut.stages.modulus import LossResult, constant_cuts
-from alphacut.stages.store import CutsResult, Numbers, Stage, StageContext, StageResult, Values
+from alphacut.stages.store import CutsResult, Stage, StageContext, StageResult
 from alphacut.stochastic.segmentation import segment
 
 if TYPE_CHECKING:
@@ -63,7 +63,8 @@ PhaseRanges = Callable[[AlphaLevel], tuple[Ints, Ints]]
 """Least and greatest phase of each pixel at a level."""
 
 
-class ImageResult(Numbers):
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ImageResult:
     """Proved bounds of an image or volume, moduli in GPa.
 
     On the highest level `lower_GPa` and `upper_GPa` bound the stiffness in the sense of Loewner,
@@ -73,10 +74,10 @@ class ImageResult(Numbers):
     widths of E by cause. Bounds that pores or rigid phases leave unknown are null.
     """
 
-    alpha: Values
+    alpha: Array
     E_GPa: CutsResult
-    lower_GPa: Values
-    upper_GPa: Values
+    lower_GPa: Array
+    upper_GPa: Array
     nu: dict[str, float | None]
     shear_GPa: dict[str, float | None]
     average: str

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Unpack
 
@@ -26,7 +27,7 @@ from alphacut.rve.fuzzy_cell import (
 from alphacut.rve.result.engineering_constants import NAMES
 from alphacut.rve.result.loss_factors import CONSTANTS
 from alphacut.stages.cell import GPA, CellProblem, References, key_and_unit
-from alphacut.stages.store import CutsResult, Numbers, Stage, StageContext, StageResult, Values
+from alphacut.stages.store import CutsResult, Stage, StageContext, StageResult
 
 if TYPE_CHECKING:
     import xarray
@@ -39,7 +40,8 @@ PLANS: dict[str, Plan] = {
 }
 
 
-class LossResult(Numbers):
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LossResult:
     """α-cuts of the loss factors of E, G and K; their errors by name, where they are declared."""
 
     E: CutsResult
@@ -57,14 +59,15 @@ class LossResult(Numbers):
         return cls(**named, error=dict(errors), nature=nature)
 
 
-class ModulusResult(Numbers):
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ModulusResult:
     """α-cuts of a cell, moduli in GPa; nature and relative errors of E, references and cost.
 
     `fibres` has the constants of cylinders by name, as E_T_GPa; `plane` those along x and y by
     definition and name. Errors by source and checks are the largest of all samples.
     """
 
-    alpha: Values
+    alpha: Array
     E_GPa: CutsResult
     nu_cuts: CutsResult
     fibres: dict[str, CutsResult]

@@ -12,18 +12,10 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Annotated, Generic, TypeVar
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    PlainSerializer,
-    PlainValidator,
-    TypeAdapter,
-    ValidationError,
-)
 
 from alphacut.base.arrays import Array, on_one_blas_thread
 from alphacut.base.errors import FailedError, RefusedError, require
@@ -31,6 +23,7 @@ from alphacut.base.progress_bar import Progress, subprogress
 from alphacut.io.files import as_json, rank, say, write_text
 from alphacut.io.provenance import build_provenance, fingerprint
 from alphacut.io.results import Listed, ResultsFolder
+from alphacut.io.typed_json import from_document, to_document
 
 if TYPE_CHECKING:
     import xarray
@@ -43,26 +36,12 @@ SECONDS |= {"probability": 5.0, "tolerances": 30.0, "figures": 6.0}
 """Rough seconds of a stage by the first word of its name, else 1, for its part of the progress."""
 
 
-class Numbers(BaseModel):
-    """Numbers and texts of a result by name, as JSON holds them; null where one is not finite."""
-
-    model_config = ConfigDict(frozen=True, arbitrary_types_allowed=True, extra="forbid")
-
-
-def _finite(values: object) -> Array:
-    array = np.asarray(values, float)
-    return np.where(np.isfinite(array), array, np.nan)
-
-
-Values = Annotated[Array, PlainValidator(_finite), PlainSerializer(np.ndarray.tolist)]
-"""Numbers of any shape; those that are not finite, as unknown bounds, are nan."""
-
-
-class CutsResult(Numbers):
+@dataclass(frozen=True, eq=False)
+class CutsResult:
     """α-cuts of a quantity: its lower and its upper bound on each level, rising."""
 
-    lower: Values
-    upper: Values
+    lower: Array
+    upper: Array
 
     @classmethod
     def of(cls, bounds: ArrayLike) -> CutsResult:
@@ -233,12 +212,12 @@ class StageStore:
         try:
             contents = {file: folder.content(file) for file in files}
             document = json.loads(contents[name])["result"]
-            numbers = TypeAdapter(stage.kind).validate_python(document)
+            numbers = from_document(stage.kind, document)
         except RefusedError as error:
             problem = f"{Path(error.key).name} is {error.value or 'missing'}"
             say(f"warning: {problem}; {stage.name} is computed anew")
             return None
-        except ValidationError:  # of a front door that named numbers otherwise
+        except ValueError:  # of a front door that named numbers otherwise
             return None
         self.up_to_date.append(stage.name)
         LOG.info("stage %s is taken from its files", stage.name)
@@ -275,7 +254,10 @@ class StageStore:
         name, key = f"{stage.name}.json", stage.key
         if rank() != 0:
             return replace(computed, fingerprint=key)
-        document = {**build_provenance(self.case_text, key), "result": computed.numbers}
+        document = {
+            **build_provenance(self.case_text, key),
+            "result": to_document(computed.numbers),
+        }
         write_text(files / name, as_json(document, indent=1))
         if computed.data is not None:
             computed.data.to_netcdf(files / f"{stage.name}.nc")

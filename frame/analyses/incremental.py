@@ -11,19 +11,26 @@ refute it at the last such scale. Sets of nested cuts are nested, as they are of
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
 
 from alphacut.base.arrays import Array
+from alphacut.base.errors import checked_number, require
+from alphacut.base.number_text import Table, range_text
 from alphacut.base.progress_bar import Progress
-from alphacut.frame.boxes import Boxes
+from alphacut.frame.analyses.answer import Answer, Record
+from alphacut.frame.analyses.suites import scaled_records
+from alphacut.frame.boxes import ALPHA, Boxes, boxes
 from alphacut.frame.dynamics.yielding import YieldingFlow
 from alphacut.frame.methods.sampled import SKIPPED, spread_points
 from alphacut.frame.records.history import Accelerogram
+from alphacut.frame.structures.observed import unit_of_output
 from alphacut.frame.structures.storey import StoreyFrame
+from alphacut.fuzzy import FuzzyNumber
+from alphacut.fuzzy.result import Nature
 
 GRID_RATIO = 1.1
 """Ratio of neighbouring scales of the grid: what happens within a step of it may be missed."""
@@ -53,6 +60,7 @@ class IncrementalAnalysis:
         duration: Length of the motions, in s.
         step: Step at which outputs are read, in s.
         greatest_scale: Scale up to which it goes.
+        events: Indices of the limits of each event that any of several is exceeded.
     """
 
     model: StoreyFrame
@@ -61,13 +69,14 @@ class IncrementalAnalysis:
     duration: float
     step: float
     greatest_scale: float = 1.0
+    events: Sequence[Sequence[int]] = ()
     moved: dict[float, tuple[Array, Array]] = field(init=False, default_factory=dict)
 
     def run(self, progress: Progress | None = None) -> tuple[Array, Array]:
         """Return scales (X,), rising, and the demands found there, shape (2, A, E, X).
 
         These are the greatest and the least one of the structures of each cut that were moved,
-        infinite where they collapse. The last of E events is that any of the limits is exceeded.
+        infinite where they collapse. The E demands are those of the limits, then of the events.
         At the first scale all structures moved are elastic and keep every limit.
         """
         structures, searched = self._spread_structures(), set[tuple[float, int, int, int]]()
@@ -109,12 +118,25 @@ class IncrementalAnalysis:
                 self._search(scale, side, level, event)
             searched |= todo
 
+    @property
+    def n_demands(self) -> int:
+        """Number of limits and events."""
+        return len(self.limits) + len(self.events)
+
     def foresee(self) -> tuple[float, float]:
         """Return about how many motions a run takes, and how many seconds."""
         structures, start = self._spread_structures(), time.perf_counter()
-        searched = SEARCHES * len(self.cuts.names) * (len(self.limits) + 1)
+        searched = SEARCHES * len(self.cuts.names) * self.n_demands
         rounds = (1 + searched) * len(self._grid(structures))  # of all structures
         return rounds * len(structures), rounds * (time.perf_counter() - start)
+
+    def peaks_at(self, scales: Array) -> Array:
+        """Return peaks over limits of spread structures, shape (L, 2, A, X), at scales (X,)."""
+        structures = self._spread_structures()
+        for scale in map(float, scales):
+            self._move(scale, structures)
+        found = np.stack([self._extremes(float(scale))[0] for scale in scales], axis=-1)
+        return np.moveaxis(found, 2, 0)
 
     def elastic_scales(self, points: Array) -> Array:
         """Return the scales at which structures (S, d) would reach limits if they were elastic.
@@ -158,13 +180,14 @@ class IncrementalAnalysis:
 
     def _move(self, scale: float, points: Array) -> None:
         """Move those of the structures (…, d) that were not moved at this scale yet."""
-        d, n_events = len(self.cuts.names), len(self.limits) + 1
+        d, n_events = len(self.cuts.names), self.n_demands
         moved, demands = self.moved.get(scale, (np.empty((0, d)), np.empty((0, n_events))))
         known_rows = {row.tobytes() for row in moved}
         points = np.unique(points.reshape(-1, d), axis=0)
         if len(points := points[[row.tobytes() not in known_rows for row in points]]):
             new = self._peaks_over_limits(scale, points, self.limits)
-            new = np.column_stack([new, new.max(axis=1)])
+            of_events = [new[:, [*event]].max(axis=1) for event in self.events]
+            new = np.column_stack([new, *of_events])
             self.moved[scale] = np.vstack([moved, points]), np.vstack([demands, new])
 
     def _extremes(self, scale: float) -> tuple[Array, Array]:
@@ -189,3 +212,108 @@ class IncrementalAnalysis:
             demands, points = self._extremes(scale)
             if np.isclose(demands[side, level, event], before, rtol=RESOLUTION / 10):
                 size /= 2
+
+
+@dataclass(frozen=True, eq=False)
+class Increments:
+    """Demands of a frame that yields over a measure of one record.
+
+    Args:
+        measure: Values of the measure at which structures were moved, rising, shape (X,); at the
+            first one all structures moved are elastic and keep every limit.
+        demands: Greatest and least peak over limit of the structures moved, by the limit's name,
+            shape (2, A, X); nan where they collapse.
+    """
+
+    measure: Array
+    demands: dict[str, Array]
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class ScaledPeaks(Answer):
+    """Greatest and least peaks found over the scales of each record of a suite.
+
+    Args:
+        alpha: Levels, shape (A,).
+        scales: Scales of the records, shape (X,).
+        peaks: Greatest and least peak of the structures moved by record and output, in SI, shape
+            (2, A, X); infinite where they collapse.
+        units: SI units of the outputs.
+    """
+
+    key = "incremental"
+    title = "How do peaks grow with the scale of a record?"
+    alpha: Array
+    scales: Array
+    peaks: dict[str, dict[str, Array]]
+    units: dict[str, str]
+
+    def table(self) -> Table:
+        """Return the peaks at the largest scale, on the lowest level."""
+        head = ("record", f"peaks at scale {self.scales[-1]:g}", "nature")
+        rows: list[tuple[str, ...]] = []
+        for record, by_output in self.peaks.items():
+            texts = []
+            for output, (high, low) in by_output.items():
+                ends = range_text(float(low[0, -1]), float(high[0, -1]), Nature.ATTAINED)
+                texts.append(f"{output} {ends} {self.units[output]}".strip())
+            rows.append((record, "; ".join(texts), Nature.ATTAINED))
+        return Table(head, rows)
+
+    def records(self) -> list[Record]:
+        """Return a row for each record, output, level and scale."""
+        rows: list[Record] = []
+        for record, by_output in self.peaks.items():
+            for output, (high, low) in by_output.items():
+                for level, column in np.ndindex(low.shape):
+                    rows.append({"record": record, "output": output, "unit": self.units[output]})
+                    rows[-1] |= {"α": self.alpha[level], "scale": self.scales[column]}
+                    rows[-1] |= {"least peak": low[level, column]}
+                    rows[-1] |= {"greatest peak": high[level, column]}
+        return rows
+
+    def words(self) -> str:
+        """Return what the peaks are of."""
+        return (
+            "Peaks of the structures that were moved; others of the cut may have smaller or greater"
+            " ones. A collapse has an infinite peak."
+        )
+
+
+def incremental(
+    model: StoreyFrame,
+    inputs: Mapping[str, FuzzyNumber],
+    suite: Sequence[Accelerogram],
+    scales: Sequence[float],
+    *,
+    duration: float,
+    step: float,
+    alpha: Sequence[float] = ALPHA,
+) -> ScaledPeaks:
+    """Return the peaks of a frame that yields at scales of each record of a suite.
+
+    Args:
+        model: A frame whose columns yield. Of others peaks are proportional to the scale.
+        inputs: Fuzzy parameters by name, in SI units.
+        suite: Records, as of `read_suite`; each takes the place of the frame's own.
+        scales: Factors of the records, positive.
+        duration: Longest motion, in s; a motion ends five natural periods after its record.
+        step: Step at which outputs are read, in s.
+        alpha: Levels.
+
+    Raises:
+        RefusedError: The columns do not yield, or a scale is not positive.
+    """
+    yields = isinstance(model, StoreyFrame) and bool(model.hardening)
+    require(yields, "incremental", value="of another structure", allowed="columns that yield")
+    tried = np.unique(np.array([checked_number("scale", x, positive=True) for x in scales]))
+    records = scaled_records(model, suite, duration=duration, step=step)
+    outputs, peaks = [*map(str, model.outputs)], dict[str, dict[str, Array]]()
+    cuts = boxes(inputs, alpha)
+    for record in records:
+        frame = replace(model, ground=record.ground)
+        limits = [(output, 1.0) for output in outputs]
+        analysis = IncrementalAnalysis(frame, cuts, limits, record.duration, step)
+        peaks[record.name] = dict(zip(outputs, analysis.peaks_at(tried), strict=True))
+    units = {output: unit_of_output(model, output) for output in outputs}
+    return ScaledPeaks(alpha=np.array(cuts.alpha), scales=tried, peaks=peaks, units=units)

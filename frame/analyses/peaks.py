@@ -2,50 +2,64 @@
 
 At the nodes no motion peaks higher than its envelope, and each has at least the magnitude that its
 band is away from zero; what the steps between nodes may add counts as error.
-
-Exceeding a limit is possible to the degree of the highest α-cut that holds such a motion. It is
-necessary to one less the degree to which not exceeding it is possible (Dubois and Prade,
-Possibility Theory, chapter 1). A greatest peak below the limit excludes the motion on its level and
-above, and one that is reached above it proves the possibility.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
-from alphacut.base.arrays import Array, Mask
-from alphacut.base.errors import checked_number, require, require_choice
+from alphacut.base.arrays import Array
+from alphacut.base.progress_bar import Progress
+from alphacut.frame.boxes import ALPHA
 from alphacut.frame.dynamics.yielding import AT_NODES
 from alphacut.frame.envelope import Envelope, within_steps
+from alphacut.frame.methods.auto import Auto
+from alphacut.frame.propagation import envelope
+from alphacut.frame.structures.lagrangian import LagrangianSystem
+from alphacut.frame.structures.matrix import MatrixStructure
+from alphacut.frame.structures.observed import with_outputs
 from alphacut.frame.structures.quantities import output_of
+from alphacut.frame.structures.storey import StoreyFrame
+from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.result import Bounds, Ends, Nature
 
-ANY = "any of them"  # name of the event that any of several limits is exceeded
-PEAK_BOUNDS = ("lower", "upper", "error", "reached", "least_lower", "least_upper")  # of a `Peak`
+PEAK_ERROR = 5e-3
+"""Error of the peaks of limited outputs that is aimed at, as a fraction of each."""
+WIDENING = 0.01
+"""Fraction of a peak from which on it is said that a smaller step would narrow its bound."""
+UNBOUNDED = {"lower": -np.inf, "upper": np.inf, "reached": -np.inf}
+UNBOUNDED |= {"least_lower": -np.inf, "least_upper": np.inf}
+"""What an unknown bound of a peak is, if the peak is no least value."""
 
 
 @dataclass(frozen=True, eq=False)
 class Peak:
-    """Bounds of the largest magnitude of an output over time, or of its largest value.
+    """Bounds of the largest magnitude of an output over time, or of its largest or least value.
+
+    A least value ("min q3") has its own sign: farther out is lower, and its peak over a cut that
+    is farthest out is bounded by `lower`.
 
     Args:
         alpha: Levels, rising, shape (A,).
-        lower: Least peak at the nodes over each cut, as the envelope bounds it, shape (A,).
-        upper: Greatest peak at the nodes over each cut, as the envelope bounds it.
+        lower: Lower end of the peaks at the nodes over each cut, as the envelope bounds it, shape
+            (A,). A bound that is not known is nan when it is given, and infinite afterwards.
+        upper: Upper end of them, shape (A,).
         error: Distance by which peaks may lie outside `lower` and `upper`: that of the envelope and
             of the steps between nodes; 0 of guaranteed bounds, which contain it.
-        reached: Peak that some motion in the cut is known to reach; −∞ where none is known.
-        least_lower: Lower bound of the least peak over each cut, proved where the bounds are.
-        least_upper: Upper bound of it: a peak that some motion in the cut is known not to exceed;
-            infinite where none is known.
-        nature: Nature of the bounds.
-        between_nodes: Part of the greatest bound on the lowest level that motions may add within
-            the steps between nodes; it falls with the square of the step.
-        is_signed: Whether it is a largest value, which may be negative, instead of a magnitude.
+        reached: Peak that some motion in the cut is known to reach, the farthest out; −∞ (of a
+            least value ∞) where none is known.
+        least_lower: Bound of the peaks of all motions in the cut, proved where the bounds are: none
+            is nearer to zero, or of values less far out.
+        least_upper: A peak that some motion in the cut is known not to exceed; infinite where none
+            is known.
+        nature: Guarantee of the bounds.
+        between_nodes: Part of the bound farthest out on the lowest level that motions may add
+            within the steps between nodes; it falls with the square of the step.
+        side: "" of a magnitude, "max" of the largest value and "min" of the least one.
         reached_at: Inputs in SI, by name, of the motion that reaches the peak on the lowest level;
             empty where none is known.
         encloses: Name of a set of inputs that the box of their cuts encloses, as "the learned
@@ -61,73 +75,130 @@ class Peak:
     least_upper: Array
     nature: Nature
     between_nodes: float = 0.0
-    is_signed: bool = False
+    side: Literal["", "max", "min"] = ""
     reached_at: Mapping[str, float] = field(default_factory=dict)
     encloses: str = ""
+    proved: Array = field(init=False)
+    """No motion's peak lies farther out, shape (A,); infinite where nothing is known."""
+
+    def __post_init__(self) -> None:
+        """Take unknown bounds as infinite, on the side on which they say nothing."""
+        sign, swapped = (-1, ENDS_OF_LEAST) if self.is_least else (1, {})
+        for name, unknown in UNBOUNDED.items():
+            values = np.asarray(getattr(self, swapped.get(name, name)), float)
+            known = np.where(np.isnan(values), sign * unknown, values)
+            object.__setattr__(self, swapped.get(name, name), known)
+        object.__setattr__(self, "proved", 0.0 + sign * self.greatest_bounds.upper)
+
+    @property
+    def is_least(self) -> bool:
+        """Whether it is the least value of an output."""
+        return self.side == "min"
+
+    @property
+    def outwards(self) -> Peak:
+        """The peak; of a least value that of −q, which is its largest value."""
+        return mirrored(self) if self.is_least else self
+
+    @property
+    def far_end(self) -> Array:
+        """Bound on each level of the peaks farthest out: the upper one, or that of least values."""
+        return self.lower if self.is_least else self.upper
 
     @property
     def greatest_bounds(self) -> Ends:
-        """A lower and an upper bound of the greatest peak in each cut, shape (A,) each."""
+        """A lower and an upper bound of the greatest peak, of `outwards`, shape (A,) each."""
+        if self.is_least:
+            return self.outwards.greatest_bounds
         # where bounds are only attained other motions may peak higher
         beyond = np.inf if self.nature is Nature.ATTAINED else self.error
         return Ends(self.reached, self.upper + beyond)
 
     @property
     def least_bounds(self) -> Ends:
-        """A lower and an upper bound of the least peak in each cut, shape (A,) each."""
-        smallest = -np.inf if self.is_signed else 0.0  # of any peak
+        """A lower and an upper bound of the least peak, of `outwards`, shape (A,) each."""
+        if self.is_least:
+            return self.outwards.least_bounds
+        smallest = -np.inf if self.side else 0.0  # of any peak
         beyond = np.inf if self.nature is Nature.ATTAINED else self.error
         lower_bound = np.maximum(np.maximum(self.lower - beyond, smallest), self.least_lower)
         # each cut contains the narrowest one, whose greatest peak bounds the least one
         return Ends(lower_bound, np.minimum(self.greatest_bounds.upper[-1:], self.least_upper))
 
+    @property
+    def is_widened_by_step(self) -> bool:
+        """Whether what motions add between nodes is most of the gap or error, and much."""
+        bound, reached = float(self.far_end[0]), float(self.reached[0])
+        is_proved = self.nature is Nature.GUARANTEED and np.isfinite(reached)
+        width = abs(bound - reached) if is_proved else float(self.error[0])
+        return self.between_nodes > max(width / 2, WIDENING * abs(bound))
+
+    @property
+    def gaps(self) -> Array:
+        """Gap between the bound farthest out and what is reached, over the bound, shape (A,).
+
+        It is nan where nothing is known to be reached.
+        """
+        reached = np.where(np.isfinite(self.reached), self.reached, np.nan)
+        difference, size = np.abs(self.far_end - reached), np.abs(self.far_end)
+        ratio = np.divide(difference, size, out=np.zeros_like(size), where=size > 0)
+        return np.asarray(ratio)
+
+
+ENDS_OF_LEAST = {"lower": "upper", "upper": "lower"}
+"""Ends that change places where the sign of a peak does."""
+
+
+def mirrored(peak: Peak) -> Peak:
+    """Return a peak with the signs of its values changed, as that of −q."""
+    ends = {name: 0.0 - getattr(peak, ENDS_OF_LEAST.get(name, name)) for name in UNBOUNDED}
+    return replace(peak, side="max" if peak.is_least else "min", **ends)
+
 
 Peaks = Mapping[str, Peak]
-"""Peaks by name: "q3" of a magnitude, "max q3" of a value, "min q3" of the largest value of −q3."""
+"""Peaks by name: "q3" of a magnitude, "max q3" and "min q3" of the largest and the least value."""
 
 
-def peaks(envelope: Envelope, names: Sequence[str] = ()) -> dict[str, Peak]:
-    """Return the fuzzy peaks of an envelope by name: intervals of the peak by level.
+def peaks(of: Envelope, names: Sequence[str] = ()) -> dict[str, Peak]:
+    """Return the fuzzy peaks of an envelope `of` outputs by name: intervals of the peak by level.
 
     `names` are outputs, for the peaks of their magnitudes, or "max q3", "min q3"; all outputs if
     empty.
     """
-    return {name: _peak_of(envelope, name) for name in names or map(str, envelope.outputs)}
+    return {name: _peak_of(of, name) for name in names or map(str, of.outputs)}
 
 
-def _peak_of(envelope: Envelope, name: str) -> Peak:
-    k = [*map(str, envelope.outputs)].index(output_of(name))
-    nature = envelope.natures[k] if envelope.natures else envelope.nature
+def _peak_of(band: Envelope, name: str) -> Peak:
+    k = [*map(str, band.outputs)].index(output_of(name))
+    nature = band.natures[k] if band.natures else band.nature
     is_proved, is_signed = nature is Nature.GUARANTEED, name != output_of(name)
     smallest = -np.inf if is_signed else 0.0  # of any peak
-    error = 0.0 if is_proved else envelope.error[..., k]  # which proved bounds contain
-    ends = [(x.lower[..., k], x.upper[..., k]) for x in (envelope, envelope.attained)]
+    error = 0.0 if is_proved else band.error[..., k]  # which proved bounds contain
+    ends = [(x.lower[..., k], x.upper[..., k]) for x in (band, band.attained)]
     ends_at_nodes, reached_at_nodes = (_oriented(*end, name) for end in ends)  # (A, T) each
     upper, lower = ends_at_nodes.upper.max(1), ends_at_nodes.lower.max(1)
-    between = None if envelope.between is None else envelope.between[:, k]
+    between = None if band.between is None else band.between[:, k]
     bound_at_nodes = ends_at_nodes.upper + error
     bound = within_steps(bound_at_nodes, between).max(1)
     above = bound - upper
     below = lower - np.maximum(ends_at_nodes.lower - error, smallest).max(1)
     least_lower, least_upper = np.full_like(upper, smallest), np.full_like(upper, np.inf)
-    if envelope.least_peaks is not None and not is_signed:
-        least_lower, least_upper = (end[:, k] for end in envelope.least_peaks)
+    if band.least_peaks is not None and not is_signed:
+        least_lower, least_upper = (end[:, k] for end in band.least_peaks)
     between_nodes = float(bound[0] - bound_at_nodes[0].max())
-    if envelope.searched_peaks is not None and not is_signed:
+    if band.searched_peaks is not None and not is_signed:
         is_at_nodes = name.rstrip("0123456789") in AT_NODES
-        return _searched_peak(
-            envelope.searched_peaks, k, is_at_nodes * (bound - bound_at_nodes.max(1))
-        )
+        return _searched_peak(band.searched_peaks, k, is_at_nodes * (bound - bound_at_nodes.max(1)))
     if is_proved:
         lower, upper = np.maximum(lower, least_lower), upper + above
     elif nature is Nature.ESTIMATED:
         # a peak is no smaller than at the nodes, whatever is added between them
         least_lower = np.maximum(least_lower, lower - below)
     reached = np.fmax(reached_at_nodes.upper, smallest).max(1)  # NaN where none is known
-    if envelope.encloses:
+    if band.encloses:
         reached = np.full_like(upper, -np.inf)
-    return Peak(
-        alpha=np.asarray(envelope.alpha),
+    peak = Peak(
+        alpha=np.asarray(band.alpha),
         lower=lower,
         upper=upper,
         error=np.zeros_like(upper) if is_proved else np.maximum(above, below),
@@ -136,10 +207,11 @@ def _peak_of(envelope: Envelope, name: str) -> Peak:
         least_upper=least_upper,
         nature=nature,
         between_nodes=between_nodes,
-        is_signed=is_signed,
-        reached_at=_inputs_at_peak(envelope, k, name),
-        encloses=envelope.encloses,
+        side="max" if is_signed else "",
+        reached_at=_inputs_at_peak(band, k, name),
+        encloses=band.encloses,
     )
+    return mirrored(peak) if name.startswith("min ") else peak
 
 
 def _searched_peak(found: Bounds, k: int, between: Array) -> Peak:
@@ -165,10 +237,10 @@ def _searched_peak(found: Bounds, k: int, between: Array) -> Peak:
     )
 
 
-def _inputs_at_peak(envelope: Envelope, k: int, name: str) -> dict[str, float]:
+def _inputs_at_peak(band: Envelope, k: int, name: str) -> dict[str, float]:
     """Return inputs of the motion that reaches a peak of output k on the lowest level, if known."""
-    low, high = envelope.attained
-    by_side = {"max": (high, envelope.upper_at), "min": (-low, envelope.lower_at)}
+    low, high = band.attained
+    by_side = {"max": (high, band.upper_at), "min": (-low, band.lower_at)}
     ends = [by_side[name[:3]]] if name != output_of(name) else [*by_side.values()]
     values = np.array([end[0, :, k] for end, _ in ends])  # (ends, T)
     points = np.array([at[0, :, k] for _, at in ends])  # (ends, T, n)
@@ -176,7 +248,7 @@ def _inputs_at_peak(envelope: Envelope, k: int, name: str) -> dict[str, float]:
     if not np.isfinite(values).any():
         return {}
     farthest = np.unravel_index(values.argmax(), values.shape)
-    return dict(zip(envelope.inputs, map(float, points[farthest]), strict=True))
+    return dict(zip(band.inputs, map(float, points[farthest]), strict=True))
 
 
 def _oriented(low: Array, high: Array, name: str) -> Ends:
@@ -194,8 +266,11 @@ def tightest(first: Peaks, second: Peaks) -> dict[str, Peak]:
     Guaranteed bounds are intersected and attained ones united; else the bounds of the stronger
     nature or of the smaller error are taken. Peaks that either analysis reaches are kept.
     """
-    shared = {name: _tighter(first[name], second[name]) for name in first if name in second}
-    return {**first, **second, **shared}
+    found = {**first, **second}
+    for name in first.keys() & second.keys():
+        both = _tighter(first[name].outwards, second[name].outwards)
+        found[name] = mirrored(both) if first[name].is_least else both
+    return found
 
 
 def _tighter(first: Peak, second: Peak) -> Peak:
@@ -213,97 +288,37 @@ def _tighter(first: Peak, second: Peak) -> Peak:
     return replace(better, reached_at=farther.reached_at, **ends)
 
 
-def require_limits(limits: Mapping[str, float], outputs: Sequence[str]) -> None:
-    """Refuse no limits, unknown outputs, and limits of magnitudes ("q3", no "max q3") up to 0."""
-    require(bool(limits), "limits", value=None, allowed="one limit or more, as {'q3': 0.1}")
-    for name, limit in limits.items():
-        require_choice("limits", name, outputs)
-        is_magnitude = not name.startswith(("max ", "min "))
-        checked_number(f"limit of {name}", float(limit), positive=is_magnitude)
+def close_peaks(
+    model: StoreyFrame | MatrixStructure | LagrangianSystem,
+    inputs: Mapping[str, FuzzyNumber],
+    names: Sequence[str],
+    *,
+    duration: float,
+    step: float,
+    alpha: Sequence[float] = ALPHA,
+    progress: Progress | bool | None = None,
+) -> dict[str, Peak]:
+    """Return peaks by the method that bounds peaks most closely, to within `PEAK_ERROR` if it can.
+
+    `names` are those of peaks, such as "q3" and "max q3"; the others are as of `envelope`.
+    """
+    outputs = tuple(dict.fromkeys(map(output_of, names)))
+    magnitudes = all(name == output_of(name) for name in names)
+    method = Auto(PEAK_ERROR, peaks=True, magnitudes=magnitudes)
+    times: dict[str, Any] = {"duration": duration, "step": step, "alpha": alpha}
+    observed = with_outputs(model, outputs)
+    return peaks(envelope(observed, inputs, method, progress=progress, **times), names)
 
 
-@dataclass(frozen=True, eq=False)
-class Passing:
-    """Degrees to which exceeding a limit at some time is possible and necessary.
+def loose_peaks(peaks: Peaks, names: Sequence[str], gap: float) -> tuple[str, ...]:
+    """Return the names of those peaks that are not guaranteed to within a gap, or not there at all.
 
-    Args:
-        possibility: Lower and upper bound, from 0 to 1.
-        necessity: Lower and upper bound, from 0 to 1.
-        margin: Limit less greatest and less least peak on each level, shape (A, 2), in SI units;
-            −inf where nothing excludes a greater peak. Of any limit: as fractions of the limits.
-        lowest: Lowest level computed; below it nothing is known.
-        nature: Nature of the bounds that both degrees rest on.
-        is_reached: Whether a motion in some cut is known to exceed it, if only at level 0.
+    The gap is that between the bound farthest out and the reached peak, over the bound. Where the
+    inputs enclose a set, no peak is known to be reached and any guaranteed one is taken.
     """
 
-    possibility: tuple[float, float]
-    necessity: tuple[float, float]
-    margin: Array
-    lowest: float
-    nature: Nature
-    is_reached: bool
+    def is_close(peak: Peak) -> bool:
+        is_near = np.abs(peak.far_end - peak.reached) <= gap * np.abs(peak.far_end)
+        return peak.nature is Nature.GUARANTEED and bool(is_near.all() or peak.encloses)
 
-    @property
-    def outcome(self) -> str:
-        """(Not) exceeded, on and above the lowest level; can be exceeded; or undecided."""
-        if self.possibility[1] <= self.lowest:
-            return "not exceeded"
-        if self.necessity[0] >= 1 - self.lowest:
-            return "exceeded"
-        return "can be exceeded" if self.is_reached else "undecided"
-
-
-def passing(peaks: Peaks, limits: Mapping[str, float]) -> dict[str, Passing]:
-    """Return possibility and necessity that each fuzzy peak exceeds its limit, in SI, by name.
-
-    If there are several limits one more answer, `ANY`, is on the event that any is exceeded.
-
-    Raises:
-        RefusedError: There is no limit, one is not positive, or it names no peak.
-    """
-    require_limits(limits, [*peaks])
-    answers = {name: _passing_of(peaks[name], float(limit)) for name, limit in limits.items()}
-    if len(answers) > 1:
-        answers[ANY] = _passing_of_any(answers, limits)
-    return answers
-
-
-def _passing_of(peak: Peak, limit: float) -> Passing:
-    greatest, least, alpha = peak.greatest_bounds, peak.least_bounds, peak.alpha
-    reaches, is_excluded = greatest.lower > limit, greatest.upper <= limit
-    possibility = alpha[reaches].max(initial=0.0), _excluded(alpha, is_excluded)
-    is_kept = np.broadcast_to(least.upper <= limit, alpha.shape)  # by some motion
-    keeping = alpha[is_kept].max(initial=0.0), _excluded(alpha, least.lower > limit)
-    return Passing(
-        possibility=(float(possibility[0]), possibility[1]),
-        # one less the possibility of keeping the limit (Dubois, Prade 1988)
-        necessity=(1 - keeping[1], 1 - float(keeping[0])),
-        margin=limit - np.stack([greatest.upper, least.lower], axis=1),
-        lowest=float(alpha[0]),
-        nature=peak.nature,
-        is_reached=bool(reaches.any()),
-    )
-
-
-def _passing_of_any(answers: Mapping[str, Passing], limits: Mapping[str, float]) -> Passing:
-    passings = list(answers.values())
-    least, greatest = (max(x.possibility[k] for x in passings) for k in (0, 1))
-    relative_margins = [  # of a limit of 0 they are the sign
-        x.margin / abs(limits[name]) if limits[name] else np.sign(x.margin)
-        for name, x in answers.items()
-    ]
-    return Passing(
-        possibility=(least, greatest),
-        # below 1 all motions of the highest cut keep all limits
-        necessity=(max(x.necessity[0] for x in passings), 0.0 if greatest < 1 else 1.0),
-        margin=np.min(relative_margins, axis=0),
-        lowest=passings[0].lowest,
-        nature=Nature.weakest(x.nature for x in passings),
-        is_reached=any(x.is_reached for x in passings),
-    )
-
-
-def _excluded(alpha: Array, excluded: Mask) -> float:
-    """Return the lowest level from which on the mask (A,) holds on all levels, 1 without one."""
-    first = np.flatnonzero(~excluded).max(initial=-1) + 1
-    return float(alpha[first]) if first < len(alpha) else 1.0
+    return tuple(name for name in names if name not in peaks or not is_close(peaks[name]))

@@ -287,6 +287,7 @@ class Identified:
         """What was learned, as data for tables and files."""
         if self.is_refuted:
             return LearnedInputs(self.alpha, {}, {}, {}, "", (), {}, refuted=self.refutation)
+        cuts = {name: widest_cut(number) for name, number in self.evidence.prior.items()}
         return LearnedInputs(
             alpha=self.alpha,
             inputs={
@@ -297,7 +298,7 @@ class Identified:
             units={name: of_storey_frame(name).unit for name in self.names},
             claim=str(self.claim),
             held_out=self.predictions().held_out,
-            prior={name: widest_cut(number) for name, number in self.evidence.prior.items()},
+            prior={name: (cut.lower, cut.upper) for name, cut in cuts.items()},
         )
 
     def __str__(self) -> str:

@@ -11,12 +11,12 @@ import xarray
 
 from alphacut.figures import envelope, material, overview
 from alphacut.figures.style import figure_style
-from alphacut.frame import StoreyFrame, propagation
+from alphacut.frame import Decision, Peak, StoreyFrame, propagation
+from alphacut.frame.analyses.decision import LimitDecision
 from alphacut.fuzzy import Triangular
-from alphacut.questions.decision import DecisionAnswer, LimitDecision
+from alphacut.fuzzy.result import Ends, Nature
 from alphacut.report.page import caption
 from alphacut.rve import Cell, Phase
-from alphacut.stages.store import CutsResult
 from alphacut.stochastic import HermiteMap
 from tests.alphacut.small import summary_of, two_floors_run
 
@@ -113,12 +113,11 @@ def test_a_mesh_and_six_cuts_are_those_of_the_case():
 def test_a_limit_of_zero_leaves_room_for_the_bars_of_others():
     limits = {}
     for size in (0.0, 0.02):
-        limit = LimitDecision(
-            side="", output="q1", unit="m", limit=size, possibility=(0, 0), necessity=(0, 0),
-            margin=CutsResult.of([[size - 0.02, size - 0.01]]), verdict="not exceeded",
-            from_level=0, nature="estimated", peak=None,
+        bounds = [np.array([x]) for x in (0.01, 0.02, 0.0, 0.02, 0.0, 0.02)]
+        limits[f"{size}"] = LimitDecision(
+            output="q1", unit="m", limit=size, possibility=(0, 0), necessity=(0, 0),
+            margin=Ends(np.array([size - 0.02]), np.array([size - 0.01])), verdict="not exceeded",
+            from_level=0, nature=Nature.ESTIMATED, peak=Peak(np.zeros(1), *bounds, Nature.ESTIMATED),
         )  # fmt: skip
-        limits[f"{size}"] = limit.model_copy(update={"peak": object()})  # drawn are those with one
-    answer = DecisionAnswer(alpha=[0.0], limits={}).model_copy(update={"limits": limits})
-    (axes,) = envelope.draw_decision(answer).axes
+    (axes,) = envelope.draw_decision(Decision(np.zeros(1), limits)).axes
     assert max(abs(end) for end in axes.get_xlim()) < 3

@@ -4,6 +4,7 @@ import csv
 import json
 import re
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -11,15 +12,15 @@ import pytest
 
 from alphacut.base.errors import RefusedError
 from alphacut.base.number_text import range_text
-from alphacut.fuzzy.result import Nature
+from alphacut.frame import Decision, Peak
+from alphacut.frame.analyses.decision import LimitDecision
+from alphacut.fuzzy.result import Ends, Nature
 from alphacut.io.results import ResultsFolder
-from alphacut.questions.decision import DecisionAnswer, LimitDecision
-from alphacut.questions.summary import FrameResult, Parts, Summary
 from alphacut.report.page import render_page
 from alphacut.report.results import answers, drivers, peak_table, run_text
 from alphacut.report.tables import shown, write_tables
-from alphacut.stages.envelope import EnvelopeResult, PeakResult
-from alphacut.stages.store import CutsResult
+from alphacut.stages.envelope import EnvelopeResult
+from alphacut.stages.summary import FrameResult, Parts, Summary
 from tests.alphacut.small import summary_of
 
 
@@ -72,19 +73,20 @@ def peaks_of(**ends):
     """Parts of a summary with the peaks of some outputs at α = 0, 0.5 and 1."""
     units = {"drift1": "m", "a3": "m/s^2", "base_shear": "N", "q1": "m"}
     peaks = {
-        name: PeakResult(
-            **{"lower": low, "upper": up, "error": [0.0002], "nature": "estimated"},
-            **dict.fromkeys(("reached", "least_lower", "least_upper", "proved"), [np.nan] * 3),
+        name: Peak(
+            **{"alpha": np.array([0, 0.5, 1]), "lower": np.array(low), "upper": np.array(up)},
+            **dict.fromkeys(("reached", "least_lower", "least_upper"), np.full(3, np.nan)),
+            error=np.array([0.0002]), nature=Nature.ESTIMATED,
         )
         for name, (low, up) in ends.items()
-    }
+    }  # fmt: skip
     numbers = {key: {} for key in ("min", "max", "error")}
     study = EnvelopeResult(
-        **numbers, fuzzy=("E",), alpha=[0, 0.5, 1], peak=peaks, seconds=1.0,
+        **numbers, fuzzy=("E",), alpha=np.array([0, 0.5, 1]), peak=peaks, seconds=1.0,
         method="proof", nature=Nature.ESTIMATED, motions_tested=0, units=units,
     )  # fmt: skip
     frame = FrameResult(
-        omega_rad_per_s=[1.0], period_s=6.28, weight_N=1e6, heights_m={"drift1": 4.0}
+        omega_rad_per_s=np.ones(1), period_s=6.28, weight_N=1e6, heights_m={"drift1": 4.0}
     )
     return Parts(envelopes={"all": study}, structure=frame)
 
@@ -97,11 +99,11 @@ def test_peaks_are_stated_in_the_units_that_engineers_compare():
     }
     limit = LimitDecision(
         side="", output="drift1", unit="m", limit=0.02, possibility=(0, 0), necessity=(0, 0),
-        margin=CutsResult.of([[0.0, 0.0]]), verdict="not exceeded", from_level=0, nature="estimated",
+        margin=Ends(np.zeros(1), np.zeros(1)), verdict="not exceeded", from_level=0, nature=Nature.ESTIMATED,
         peak=None,
     )  # fmt: skip
-    decision = DecisionAnswer(alpha=[0, 0.5, 1], limits={"drift1": limit})
-    head, rows = peak_table(peaks_of(**ends).model_copy(update={"decision": decision}))
+    decision = Decision(alpha=np.array([0, 0.5, 1]), limits={"drift1": limit})
+    head, rows = peak_table(replace(peaks_of(**ends), decision=decision))
     assert head == ("peak of", "nominal", "α = 0.5", "α = 0", "± error", "limit", "exceeded")
     assert rows[0][:5] == ("drift1, mm", "11.00", "10.5 … 11.5", "10.37 … 12.01", "0.2")
     assert rows[0][5:] == ("20", "no")

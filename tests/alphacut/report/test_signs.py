@@ -9,15 +9,14 @@ import pytest
 
 from alphacut.case.content import load
 from alphacut.case.limits import DecisionSection
-from alphacut.frame.analyses.peaks import ANY, Peak
+from alphacut.frame import Peak, decide
+from alphacut.frame.analyses.limits import ANY
 from alphacut.fuzzy.result import Nature
-from alphacut.questions.decision import decide
-from alphacut.questions.question import FuzzyResponse
-from alphacut.questions.summary import Parts
 from alphacut.report.page import render_template
 from alphacut.report.results import peak_table, run_text
 from alphacut.report.tables import frames, latex, tables, write_csv
-from alphacut.stages.envelope import EnvelopeResult, peak_results
+from alphacut.stages.envelope import EnvelopeResult
+from alphacut.stages.summary import Parts
 from tests.alphacut.small import FRAME
 
 LIMITS, LIMITS_OF_PEAK = 2000, 8
@@ -69,19 +68,20 @@ class Drawn:
 
 
 def parts_of(drawn, structure):
-    """Envelope and decision of the drawn bounds, which `Peak` has for −q where side is min."""
+    """Envelope and decision of the drawn bounds."""
     peaks = {}
     for x in drawn:
         ends = {"lower": x.proved[0], "upper": x.proved[1], "error": 0.0, "reached": x.farthest}
         ends |= {"least_lower": x.proved[0], "least_upper": x.nearest}
-        bounds = {end: np.array([x.outwards * value]) for end, value in ends.items()}
-        is_signed = bool(x.side)
-        peaks[x.name] = Peak(np.zeros(1), **bounds, nature=Nature.GUARANTEED, is_signed=is_signed)
+        if x.side == "min":
+            ends |= {"lower": x.proved[1], "upper": x.proved[0]}
+        bounds = {end: np.array([value]) for end, value in ends.items()}
+        peaks[x.name] = Peak(np.zeros(1), **bounds, nature=Nature.GUARANTEED, side=x.side)
     section = DecisionSection(limits=tuple(x.text(y) for x in drawn for y in x.limits))
-    answer = decide(section, FuzzyResponse(structure, ("E",), (0.0,), 1.0, 0.1, peaks))
+    answer = decide(peaks, section.limits_of(structure), units=OUTPUTS)
     numbers = {key: {} for key in ("min", "max", "error")}
     study = EnvelopeResult(
-        **numbers, fuzzy=("k1",), alpha=[0.0], peak=peak_results(peaks),
+        **numbers, fuzzy=("k1",), alpha=np.zeros(1), peak=peaks,
         seconds=1.0, method="proof", nature=Nature.GUARANTEED, motions_tested=0,
         units=OUTPUTS,
     )  # fmt: skip

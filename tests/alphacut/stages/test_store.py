@@ -9,19 +9,19 @@ from types import FunctionType
 import numpy as np
 import pytest
 import xarray
-from pydantic import TypeAdapter
 
 import alphacut
 from alphacut.base.errors import FailedError, RefusedError
 from alphacut.case.content import load
 from alphacut.entry import main
-from alphacut.frame.analyses.peaks import Peak
+from alphacut.frame.analyses.peaks import Peak, mirrored
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import as_json
 from alphacut.io.results import ResultsFolder
-from alphacut.questions.summary import Summary
+from alphacut.io.typed_json import from_document, to_document
 from alphacut.stages import envelope
 from alphacut.stages.store import RunProgress, Stage, StageResult, StageStore
+from alphacut.stages.summary import Summary
 from tests.alphacut.small import CELL, written
 
 ROOT = Path(alphacut.__file__).resolve().parents[1]
@@ -109,7 +109,7 @@ def test_a_borrowed_folder_is_not_believed(tmp_path):
     summary = Summary.read(results)
     summary.require_run_of(results)
     with pytest.raises(RefusedError, match="of another run"):
-        summary.model_copy(update={"fingerprints": {"modulus": "other"}}).require_run_of(results)
+        replace(summary, fingerprints={"modulus": "other"}).require_run_of(results)
     for text in ("", "[" * 100_000, '{"case": 1}'):
         (folder / "summary.json").write_text(text)
         with pytest.raises(RefusedError, match="is changed"):
@@ -120,12 +120,17 @@ def test_peaks_pass_through_json_with_their_infinite_bounds():
     """An unknown bound never excludes a peak: of "max q1" the least one may be −∞."""
     first = [np.array([x]) for x in (1.0, 3.0, 0.0, 2.0, 0.5, 1.5)]
     second = [np.array([x]) for x in (2.0, np.inf, 0.0, -np.inf, -np.inf, np.inf)]
+    largest = Peak(np.zeros(1), *second, Nature.ATTAINED, side="max")
     peaks = {
         "q1": Peak(np.zeros(1), *first, Nature.GUARANTEED),
-        "max q1": Peak(np.zeros(1), *second, Nature.ATTAINED, is_signed=True),
-        "min q1": Peak(np.zeros(1), *second, Nature.ATTAINED, is_signed=True),  # of −q1
+        "max q1": largest,
+        "min q1": mirrored(largest),
     }
-    kind, text = TypeAdapter(envelope.PeakResults), as_json(envelope.peak_results(peaks))
-    again = envelope.peaks_of(kind.validate_json(text), [0.0])
-    for name in peaks:
-        assert {**vars(again[name])} == {**vars(peaks[name])}, name
+    document = json.loads(as_json(to_document(peaks)))
+    again = from_document(dict[str, Peak], document)
+    for name, peak in peaks.items():
+        assert {**vars(again[name])} == {**vars(peak)}, name
+    # of a least value unknown bounds lie on the other side
+    assert (again["min q1"].lower[0], again["min q1"].upper[0]) == (-np.inf, -2.0)
+    assert again["min q1"].reached[0] == np.inf
+    assert again["min q1"].outwards.greatest_bounds == again["max q1"].greatest_bounds

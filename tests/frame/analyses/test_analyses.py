@@ -6,10 +6,20 @@ import numpy as np
 import pytest
 
 from alphacut.base.errors import RefusedError
-from alphacut.frame import StoreyFrame, envelope
-from alphacut.frame.analyses.peaks import ANY, Peak, passing, peaks, tightest
-from alphacut.frame.analyses.probability import probabilities
-from alphacut.frame.analyses.tolerances import scale_supports, tolerances
+from alphacut.frame import (
+    Limit,
+    Peak,
+    StoreyFrame,
+    decide,
+    envelope,
+    peaks,
+    probability,
+    tolerances,
+)
+from alphacut.frame.analyses.limits import ANY
+from alphacut.frame.analyses.peaks import loose_peaks, tightest
+from alphacut.frame.analyses.probability import shaped_like
+from alphacut.frame.analyses.tolerances import scale_supports
 from alphacut.fuzzy import Triangular
 from alphacut.fuzzy.result import Nature
 from tests.frame.motions import exact_motions, random_points
@@ -22,6 +32,14 @@ ALPHA = (0.0, 0.25, 0.5, 0.75, 1.0)
 ONE = StoreyFrame(  # q = v0 / ω sin ωt with ω² = 24 E I / (l³ m): it peaks at v0 √(l³ m / (24 E I))
     (1e3,), (3.0,), 25e9, 1e-6, (0.0,), "storey", (0.0,), (0.3,), outputs=("q1",)
 )
+
+
+def decided(found, limits):
+    """Decisions on limits of peaks by name, such as "q1" and "max q2"."""
+    sides = {"max": True, "min": False}
+    words = {name: name.rpartition(" ") for name in limits}
+    of = [Limit(words[x][2], limit, sides.get(words[x][0])) for x, limit in limits.items()]
+    return decide(found, of).limits
 
 
 def motions(rng, frame, inputs, count, *, level=0.0, duration=5, step=0.02):
@@ -57,52 +75,52 @@ def test_the_limit_that_a_level_just_reaches_is_possible_to_that_level():
     alpha = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
     of = peaks(envelope(ONE, inputs, duration=6, step=0.01, alpha=alpha))
     assert of["q1"].nature is Nature.GUARANTEED
-    middle = passing(of, {"q1": amplitude(1050)})["q1"]  # reached at the mass of level 0.5
+    middle = decided(of, {"q1": amplitude(1050)})["q1"]  # reached at the mass of level 0.5
     assert middle.possibility == (0.4, 0.6)
     assert middle.necessity == (0.0, 0.0)
-    assert passing(of, {"q1": amplitude(1101)})["q1"].outcome == "not exceeded"
-    surely = passing(of, {"q1": amplitude(899)})["q1"]
+    assert decided(of, {"q1": amplitude(1101)})["q1"].verdict == "not exceeded"
+    surely = decided(of, {"q1": amplitude(899)})["q1"]
     assert surely.possibility == (1.0, 1.0)
-    assert surely.outcome != "undecided"  # the least peak is a bound, not attained
+    assert surely.verdict != "undecided"  # the least peak is a bound, not attained
 
 
 def test_any_of_several_limits_is_as_possible_as_the_most_possible(proved):
     q1, drift2 = (0.999 * proved[name].upper for name in ("q1", "drift2"))
     limits = {"q1": q1[1], "drift2": drift2[3], "base_shear": 1e9}
-    answers = passing(proved, limits)
+    answers = decided(proved, limits)
     assert answers["base_shear"].possibility == (0.0, 0.0)
     assert answers[ANY].possibility == answers["drift2"].possibility
     assert answers[ANY].possibility[0] >= answers["q1"].possibility[0]
-    far_below = passing(proved, {name: 0.9 * peak.lower[0] for name, peak in proved.items()})
-    assert {answer.outcome for answer in far_below.values()} == {"exceeded"}
+    far_below = decided(proved, {name: 0.9 * peak.lower[0] for name, peak in proved.items()})
+    assert {answer.verdict for answer in far_below.values()} == {"exceeded"}
     assert far_below[ANY].necessity == (1.0, 1.0)
 
 
 def exact(peak):
     """Bounds of a peak that every motion has."""
     row = np.array([peak])
-    return Peak(np.zeros(1), row, row, 0 * row, row, row, row, Nature.GUARANTEED, is_signed=True)
+    return Peak(np.zeros(1), row, row, 0 * row, row, row, row, Nature.GUARANTEED, side="max")
 
 
 def test_the_margin_of_any_limit_is_the_least_share_and_a_limit_of_0_has_all_or_none():
     """Peaks of 0.5, −0.2 and 0.9 below limits of 2, 0 and 1: 75 % is left, all, and 10 %."""
     found = {name: exact(peak) for name, peak in (("q1", 0.5), ("max q2", -0.2), ("q3", 0.9))}
     limits = {"q1": 2.0, "max q2": 0.0, "q3": 1.0}
-    assert passing(found, limits)[ANY].margin == pytest.approx(np.full((1, 2), 0.1))
-    assert passing(found, {"q1": 2.0, "max q2": 0.0})[ANY].margin == pytest.approx(0.75)
+    assert decided(found, limits)[ANY].margin.lower == pytest.approx(0.1)
+    assert decided(found, {"q1": 2.0, "max q2": 0.0})[ANY].margin.lower == pytest.approx(0.75)
     above = {"q1": 2.0, "max q2": -0.3}
-    assert passing(found, above)[ANY].margin == pytest.approx(-1 / 3)
+    assert decided(found, above)[ANY].margin.lower == pytest.approx(-1 / 3)
     passed = {name: exact(peak) for name, peak in (("q1", 0.9), ("max q2", 0.2), ("q3", 1.3))}
-    assert passing(passed, limits | {"q3": 9.0})[ANY].margin == pytest.approx(-1.0)
+    assert decided(passed, limits | {"q3": 9.0})[ANY].margin.lower == pytest.approx(-1.0)
 
 
 def test_attained_bounds_exclude_nothing_and_say_so():
     given = {"duration": 5, "step": 0.02, "alpha": (0, 1), "method": "quasi-monte-carlo"}
     of = peaks(envelope(FRAME, INPUTS, **given))
     assert {peak.nature for peak in of.values()} == {Nature.ATTAINED}
-    far = passing(of, {"q1": 10 * of["q1"].upper[0]})["q1"]
-    assert (far.possibility, far.nature, far.outcome) == ((0, 1), Nature.ATTAINED, "undecided")
-    near = passing(of, {"q1": 0.9 * of["q1"].reached[1]})["q1"]
+    far = decided(of, {"q1": 10 * of["q1"].upper[0]})["q1"]
+    assert (far.possibility, far.nature, far.verdict) == ((0, 1), Nature.ATTAINED, "undecided")
+    near = decided(of, {"q1": 0.9 * of["q1"].reached[1]})["q1"]
     assert near.possibility == (1.0, 1.0)
     assert near.necessity == (0.0, 1.0)
 
@@ -123,37 +141,37 @@ def test_what_lies_between_nodes_lowers_no_peak():
     peak = peaks(coarse)["q1"]
     assert peak.error[0] >= largest[0]
     limit = 0.98 * peak.lower[0]
-    assert passing({"q1": peak}, {"q1": limit})["q1"].outcome == "exceeded"
+    assert decided({"q1": peak}, {"q1": limit})["q1"].verdict == "exceeded"
 
 
 def test_levels_below_the_lowest_are_left_open():
     motion = envelope(FRAME, INPUTS, duration=5, step=0.02, alpha=(0.5, 1))
-    answer = passing(peaks(motion), {"q1": 1.0})["q1"]
+    answer = decided(motion, {"q1": 1.0})["q1"]
     assert answer.possibility == (0.0, 0.5)
-    assert (answer.outcome, answer.lowest) == ("not exceeded", 0.5)
+    assert (answer.verdict, answer.from_level) == ("not exceeded", 0.5)
 
 
 def test_the_scale_of_tolerances_is_kept_and_a_greater_one_passed(rng):
     inputs = {"m1": Triangular(900, 1000, 1100)}
     limit = amplitude(1000 + 1.4 * 100)
     answer = tolerances(
-        ONE, inputs, {"q1": limit}, duration=6, step=0.01, most=3, precision=0.003, error=2e-4
+        ONE, inputs, Limit("q1", limit), duration=6, step=0.01, most=3, precision=0.003, error=2e-4
     )
     assert answer.nature is Nature.GUARANTEED
-    assert answer.admissible <= answer.clear < answer.passed
-    assert answer.admissible <= 1.4 <= answer.passed
-    assert answer.passed - answer.admissible <= 0.03
-    reach = 100 * answer.admissible
-    assert answer.supports["m1"] == pytest.approx((1000 - reach, 1000 + reach))
-    scaled = scale_supports(inputs, answer.admissible)
+    assert answer.kept <= answer.clear < answer.passed
+    assert answer.kept <= 1.4 <= answer.passed
+    assert answer.passed - answer.kept <= 0.03
+    reach = 100 * answer.kept
+    assert answer.supports["m1"].kept == pytest.approx((1000 - reach, 1000 + reach))
+    scaled = scale_supports(inputs, answer.kept)
     assert motions(rng, ONE, scaled, 500, duration=6, step=0.01).max() <= limit
 
 
-@pytest.mark.parametrize(("limit", "kept", "passed"), [(1e-3, None, 0.0), (9.0, 2.0, np.inf)])
+@pytest.mark.parametrize(("limit", "kept", "passed"), [(1e-3, None, 0.0), (9.0, 2.0, None)])
 def test_tolerances_at_their_ends(limit, kept, passed):
     inputs = {"m1": Triangular(900, 1000, 1100)}
-    answer = tolerances(ONE, inputs, {"q1": limit}, duration=2, step=0.01)
-    assert (answer.admissible, answer.passed) == (kept, passed)
+    answer = tolerances(ONE, inputs, Limit("q1", limit), duration=2, step=0.01)
+    assert (answer.kept, answer.passed) == (kept, passed)
 
 
 def speed(rng, count):
@@ -162,9 +180,9 @@ def speed(rng, count):
 
 def probable(frame=FRAME, inputs=INPUTS, limits=None, **changes):
     settings = {"duration": 4, "step": 0.05, "alpha": (0, 0.5, 1)}
-    settings |= {"rng": np.random.default_rng(0), "samples": 400, **changes}
-    limits = limits or {"drift2": 0.16, "q1": 0.14}
-    return probabilities(frame, inputs, {"v2_0": speed}, limits, **settings)
+    settings |= {"samples": 400, **changes}
+    limits = [Limit(*pair) for pair in (limits or {"drift2": 0.16, "q1": 0.14}).items()]
+    return probability(frame, inputs, limits, {"v2_0": speed}, **settings).events
 
 
 def test_probabilities_are_nested_and_agree_with_independent_draws(rng):
@@ -175,13 +193,15 @@ def test_probabilities_are_nested_and_agree_with_independent_draws(rng):
     assert one.lower[-1] == one.upper[-1]
     assert (answers[ANY].upper >= one.upper).all()
     curve = answers["q1"].curve  # falls from 1 to 0
-    assert (np.diff(curve, axis=-1) <= 0).all()
-    assert (*curve[:, 0, 0], curve[1, 0, -1]) == (1, 1, 0)
+    for end in (curve.lower, curve.upper):
+        assert (np.diff(end, axis=-1) <= 0).all()
+        assert end[0, 0] == 1
+    assert curve.upper[0, -1] == 0
     draws = rng.normal(0.4, 0.1, 4000)
     points = np.column_stack([np.full(4000, 25e9), np.full(4000, 7e3), draws])
     size = np.abs(exact_motions(FRAME, points, ("E", "m2", "v2_0"), 4, 0.05)).max(1)
     share = (size[:, 1] > 0.16).mean()
-    low, high = one.interval[:, -1]
+    low, high = (end[-1] for end in one.interval)
     assert low < share < high
     assert low < one.lower[-1] <= one.upper[-1] < high
 
@@ -191,25 +211,25 @@ def test_the_interval_is_that_of_clopper_and_pearson_at_the_level_of_bonferroni(
     inputs = {"E": Triangular(24e9, 25e9, 26e9)}
     answers = probable(inputs=inputs, limits={"drift2": 1e3, "q1": 1e-9}, samples=50)
     miss = 0.05 / (2 * (66 + 66 + 1))
-    np.testing.assert_allclose(answers["drift2"].interval[1], 1 - miss ** (1 / 50))
-    assert (answers["drift2"].interval[0] == 0).all()
-    np.testing.assert_allclose(answers["q1"].interval[0], miss ** (1 / 50))
-    assert (answers["q1"].interval[1] == 1).all()
+    np.testing.assert_allclose(answers["drift2"].interval.upper, 1 - miss ** (1 / 50))
+    assert (answers["drift2"].interval.lower == 0).all()
+    np.testing.assert_allclose(answers["q1"].interval.lower, miss ** (1 / 50))
+    assert (answers["q1"].interval.upper == 1).all()
 
 
 @pytest.mark.parametrize(
     ("limits", "random", "key"),
     [
-        ({"q9": 1.0}, {}, "limits"),
+        ({"q9": 1.0}, {}, "output"),
         ({"q1": 0.0}, {}, "limit of q1"),
         ({"q1": 1.0}, {"E": speed}, "random"),
         ({"q1": 1.0}, {"v2_0": lambda rng, n: rng.random(3)}, "values of v2_0"),
     ],
 )
 def test_wrong_questions_are_refused(limits, random, key):
-    given = {"duration": 1, "step": 0.1, "rng": np.random.default_rng(0)}
+    asked = [Limit(*pair) for pair in limits.items()]
     with pytest.raises(RefusedError) as refused:
-        probabilities(FRAME, INPUTS, random, limits, **given)
+        probability(FRAME, INPUTS, asked, random, duration=1, step=0.1)
     assert refused.value.key == key
 
 
@@ -230,3 +250,21 @@ def test_the_tighter_proved_and_the_larger_reached_value_is_taken(order):
     mixed = tightest(*(first, weaker)[::order])["q1"]
     assert (mixed.lower[0], mixed.upper[0], mixed.reached[0]) == (1.0, 3.0, 2.4)
     assert mixed.nature is Nature.GUARANTEED
+
+
+def test_peaks_are_wide_where_the_gap_is_or_nothing_is_proved():
+    one = np.ones(2)
+
+    def peak(upper, nature=Nature.GUARANTEED):
+        return Peak(np.array([0.0, 1.0]), one, upper, 0 * one, one, one, one, nature)
+
+    bounds = {"q1": peak(one), "q2": peak(np.array([1.1, 1.0])), "q3": peak(one, Nature.ESTIMATED)}
+    assert loose_peaks(bounds, ("q1", "q2", "q3", "max q1"), 0.05) == ("q2", "q3", "max q1")
+    assert loose_peaks(bounds, ("q1", "q2"), 0.1) == ()
+
+
+def test_random_inputs_have_the_shape_of_their_membership(rng):
+    draws = shaped_like(Triangular(0, 1, 3))(rng, 20_000)
+    six_deviations = 6 / np.sqrt(20_000)
+    assert abs(draws.mean() - 4 / 3) < np.sqrt(7 / 18) * six_deviations
+    assert abs((draws < 1).mean() - 1 / 3) < np.sqrt(2 / 9) * six_deviations

@@ -5,8 +5,9 @@ import pytest
 from scipy.stats import beta
 
 from alphacut.base.errors import RefusedError
-from alphacut.frame.analyses.fragility import CriticalMeasures, of_any_limit
-from alphacut.fuzzy.result import Nature
+from alphacut.frame.analyses.fragility import CriticalMeasures, any_exceeded
+from alphacut.frame.analyses.probability import clopper_pearson
+from alphacut.fuzzy.result import Ends, Nature
 from tests.frame.analyses.test_analyses import one_level
 
 LIMIT = 0.02
@@ -23,21 +24,28 @@ def suite(count=12, seed=4):
     return middle, [peaks(0.8 * x, 1.25 * x, 1.2 * x) for x in middle]
 
 
+def fractions(critical, measure):
+    """Bounds of the fraction of the records under which a structure exceeds the limit."""
+    return Ends(*(count / critical.low.shape[1] for count in critical.counts(measure)))
+
+
 def test_every_structure_of_the_cut_lies_in_the_band():
     middle, each = suite()
     measures = np.full(len(middle), 2.0)
     critical = CriticalMeasures.from_peaks(each, measures, LIMIT)
-    assert critical.low[:, 0] == pytest.approx(2 * LIMIT / (1.25 * middle))
-    assert critical.high[:, 0] == pytest.approx(2 * LIMIT / (0.8 * middle))
+    assert critical.low[0] == pytest.approx(2 * LIMIT / (1.25 * middle))
+    assert critical.high[0] == pytest.approx(2 * LIMIT / (0.8 * middle))
     measure = np.linspace(0.5, 12, 200)
-    band = critical.band(measure)
+    band = fractions(critical, measure)
     rng = np.random.default_rng(7)
     for _ in range(200):
         exact = 2 * LIMIT / (middle * rng.uniform(0.8, 1.25, len(middle)))
         share = (exact[:, None] < measure).mean(0)
         assert (band.lower[0] <= share).all()
         assert (share <= band.upper[0]).all()
-        assert critical.median.lower[0] <= np.exp(np.log(exact).mean()) <= critical.median.upper[0]
+        assert critical.median.lower[0] <= np.median(exact) <= critical.median.upper[0]
+        fitted = critical.lognormal_median
+        assert fitted.lower[0] <= np.exp(np.log(exact).mean()) <= fitted.upper[0]
         spread = np.log(exact).std(ddof=1)
         assert critical.dispersion.lower[0] <= spread <= critical.dispersion.upper[0]
 
@@ -46,7 +54,8 @@ def test_confidence_limits_are_those_of_clopper_and_pearson():
     middle, each = suite()
     critical = CriticalMeasures.from_peaks(each, np.ones(len(middle)), LIMIT)
     measure = np.linspace(0.5, 6, 23)
-    band, limits = critical.band(measure), critical.confidence_band(measure)
+    band = fractions(critical, measure)
+    limits = clopper_pearson(*critical.counts(measure), 12, 0.025)
     for k in range(len(measure)):
         least, most = (round(12 * end[0, k]) for end in band)
         lower = beta.ppf(0.025, least, 13 - least) if least else 0.0
@@ -59,7 +68,7 @@ def test_any_of_the_limits_is_the_least():
     _, each = suite()
     one = CriticalMeasures.from_peaks(each, np.ones(12), LIMIT)
     two = CriticalMeasures.from_peaks(each, np.linspace(0.5, 2, 12), LIMIT)
-    either = of_any_limit([one, two])
+    either = any_exceeded([one, two])
     assert either.low == pytest.approx(np.minimum(one.low, two.low))
     assert (either.high >= either.low_reached).all()
 
@@ -67,7 +76,7 @@ def test_any_of_the_limits_is_the_least():
 def test_a_structure_that_may_stay_at_rest_has_no_upper_end():
     critical = CriticalMeasures.from_peaks([peaks(0.0, 0.01, 0.01)] * 2, [1.0, 1.0], LIMIT)
     assert np.isinf(critical.high).all()
-    assert critical.band(np.array([5.0])).lower[0, 0] == 0.0
+    assert fractions(critical, np.array([5.0])).lower[0, 0] == 0.0
     assert np.isinf(critical.dispersion.upper[0])
     with pytest.raises(RefusedError, match="two records"):
         _ = CriticalMeasures.from_peaks([peaks(0.01, 0.02, 0.015)], [1.0], LIMIT).dispersion

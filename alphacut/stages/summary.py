@@ -2,58 +2,47 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+import json
+from dataclasses import dataclass, field, fields, replace
 from typing import Annotated, Any, Self
 
 import numpy as np
-from pydantic import AfterValidator, Field, PlainValidator, ValidationError
 
+from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, require
 from alphacut.base.number_text import STANDARD_GRAVITY
 from alphacut.case.content import Content
 from alphacut.case.structure import Structure
-from alphacut.frame import LearnedInputs
+from alphacut.frame import (
+    Decision,
+    Fragility,
+    LearnedInputs,
+    Probability,
+    SuitePeaks,
+    Tolerances,
+)
+from alphacut.frame.analyses.answer import Answer
 from alphacut.frame.structures.linear import frequencies
 from alphacut.io.files import Document, as_json
 from alphacut.io.results import COMPLETE, RUN_AGAIN, ResultsFolder, plain_name
 from alphacut.io.typed_json import from_document, to_document
-from alphacut.questions.decision import DecisionAnswer, decide
-from alphacut.questions.fragility import FragilityAnswer, fragility
-from alphacut.questions.probability import ProbabilityAnswer, probability
-from alphacut.questions.question import Answer, FuzzyResponse
-from alphacut.questions.tolerances import TolerancesAnswer, admissible_tolerances
+from alphacut.stages.answers import ANSWERS
 from alphacut.stages.envelope import EnvelopeResult, EnvelopeTask
 from alphacut.stages.image import ImageResult
 from alphacut.stages.modulus import ModulusResult
 from alphacut.stages.shares import ShareTable
-from alphacut.stages.store import Numbers, StageResult, Values
-from alphacut.stages.suite import SuiteResult
+from alphacut.stages.store import StageResult
 
 SUMMARY = "summary.json"
-PlainName = Annotated[str, AfterValidator(plain_name)]
+PlainName = Annotated[str, plain_name]
 """A name that leads out of no folder, as it becomes part of the name of a file."""
 
 
-def _learned(value: object) -> LearnedInputs:
-    return value if isinstance(value, LearnedInputs) else from_document(LearnedInputs, value)
-
-
-Learned = Annotated[LearnedInputs, PlainValidator(_learned)]
-"""What measured modes teach, from its document."""
-ANSWERS: dict[type[Answer], Callable[[Any, FuzzyResponse], Answer]] = {
-    ProbabilityAnswer: probability,
-    DecisionAnswer: decide,
-    TolerancesAnswer: admissible_tolerances,
-    FragilityAnswer: fragility,
-}
-"""Kinds of answers in the order of the report, each with its function of section and response."""
-
-
-class FrameResult(Numbers):
+@dataclass(frozen=True, eq=False, kw_only=True)
+class FrameResult:
     """A frame at its nominal inputs, with the height of the storey of each drift."""
 
-    omega_rad_per_s: Values
+    omega_rad_per_s: Array
     period_s: float
     weight_N: float
     heights_m: dict[str, float]
@@ -75,8 +64,8 @@ class Results:
     tasks: tuple[EnvelopeTask, ...] = ()
     envelopes: dict[str, StageResult[EnvelopeResult]] = field(default_factory=dict)
     learned: LearnedInputs | None = None
-    suite: SuiteResult | None = None
-    answers: dict[str, Numbers] = field(default_factory=dict)
+    suite: SuitePeaks | None = None
+    answers: dict[str, Answer] = field(default_factory=dict)
     shares: StageResult[ShareTable] | None = None
 
     @property
@@ -123,25 +112,26 @@ class Results:
         }
 
 
-class Parts(Numbers):
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Parts:
     """Numbers of all results of a run; None or empty where the case has no such stage."""
 
     microstructure: dict[str, Any] | None = None
     modulus: ModulusResult | None = None
     image: ImageResult | None = None
     structure: FrameResult | None = None
-    damping: dict[str, tuple[float, float, float]] = Field(default={})
-    envelopes: dict[PlainName, EnvelopeResult] = Field(default={})
-    records: SuiteResult | None = None
-    update: Learned | None = None
-    probability: ProbabilityAnswer | None = None
-    decision: DecisionAnswer | None = None
-    tolerances: TolerancesAnswer | None = None
-    fragility: FragilityAnswer | None = None
-    shares: ShareTable = Field(default={})
+    damping: dict[str, tuple[float, float, float]] = field(default_factory=dict)
+    envelopes: dict[PlainName, EnvelopeResult] = field(default_factory=dict)
+    records: SuitePeaks | None = None
+    update: LearnedInputs | None = None
+    probability: Probability | None = None
+    decision: Decision | None = None
+    tolerances: Tolerances | None = None
+    fragility: Fragility | None = None
+    shares: ShareTable = field(default_factory=dict)
 
     @classmethod
-    def of(cls, results: Results, **further: object) -> Self:
+    def of(cls, results: Results, **further: Any) -> Self:
         """The numbers of results, and further fields of this class."""
         drawn = {task.name: tuple(task.figures) for task in results.tasks}
         parts: dict[str, Any] = {
@@ -149,20 +139,19 @@ class Parts(Numbers):
             "structure": results.frame_result,
             "damping": results.damping,
             "envelopes": {
-                name: result.numbers.model_copy(update={"drawn": drawn[name]})
+                name: replace(result.numbers, drawn=drawn[name])
                 for name, result in results.envelopes.items()
             },
             "records": results.suite,
             "update": results.learned,
         }
-        return cls.model_validate({**parts, **results.answers, **further})
+        return cls(**{**parts, **results.answers, **further})
 
     def parts(self) -> Document:
-        """All parts by name but those that the run lacks."""
-        parts = {name: part for name, part in self if part not in (None, {})}
-        if self.update is not None:
-            parts["update"] = to_document(self.update)
-        return parts
+        """All parts by name but those that the run lacks, as a JSON document."""
+        values = {x.name: getattr(self, x.name) for x in fields(self)}
+        is_there = {name: value is not None and value != {} for name, value in values.items()}
+        return {name: to_document(x) for name, x in values.items() if is_there[name]}
 
     @property
     def encloses(self) -> str:
@@ -178,6 +167,7 @@ class Parts(Numbers):
         return [answer for answer in answers if answer is not None]
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Summary(Parts):
     """Numbers of a run with their origin; `changes` are those of the command line."""
 
@@ -191,7 +181,7 @@ class Summary(Parts):
     changes: tuple[str, ...] = ()
     figures: tuple[PlainName, ...] = ()
     seconds: float
-    fingerprints: dict[PlainName, str]
+    fingerprints: dict[PlainName, str] = field(default_factory=dict)
 
     def to_json(self) -> str:
         """The summary as a JSON object."""
@@ -201,9 +191,9 @@ class Summary(Parts):
     def read(cls, folder: ResultsFolder) -> Self:
         """The summary in a folder of results; RefusedError where it is missing or damaged."""
         try:
-            return cls.model_validate_json(folder.content(SUMMARY))
-        except ValidationError as error:
-            keys = ".".join(map(str, error.errors()[0]["loc"])) or "no JSON object"
+            return from_document(cls, json.loads(folder.content(SUMMARY)))
+        except (ValueError, RecursionError) as error:
+            keys = str(error).partition(":")[0] or "no JSON object"
             what = f"damaged ({SUMMARY}: {keys})"
             raise RefusedError(str(folder.path), what, COMPLETE, RUN_AGAIN) from None
 

@@ -1,0 +1,152 @@
+"""Stages of the questions of a case: read a section, call the analysis, return its answer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+from alphacut.base.errors import RefusedError
+from alphacut.base.progress_bar import Progress
+from alphacut.case.limits import (
+    DecisionSection,
+    FragilitySection,
+    ProbabilitySection,
+    QuestionSection,
+    TolerancesSection,
+)
+from alphacut.case.structure import Structure
+from alphacut.frame import (
+    Decision,
+    Fragility,
+    Probability,
+    SuitePeaks,
+    Tolerances,
+    decide,
+    probability,
+    tolerances,
+)
+from alphacut.frame.analyses.answer import Answer
+from alphacut.frame.analyses.fragility import fragility_of
+from alphacut.frame.analyses.incremental import Increments
+from alphacut.frame.analyses.limits import limits_by_name
+from alphacut.frame.analyses.peaks import Peaks
+from alphacut.frame.analyses.tolerances import require_admissible_scale
+from alphacut.fuzzy import FuzzyNumber
+from alphacut.stages.envelope import EnvelopeTask
+from alphacut.stages.store import Stage, StageContext, StageResult
+
+
+@dataclass(frozen=True)
+class Response:
+    """What questions are asked about: a structure, its motion of section [envelope], and peaks.
+
+    `peaks` are those of the outputs, None where no question reads them. `suite` has the peaks under
+    each record, if there is a suite, and `increments` those over its scales, of a frame that
+    yields.
+    """
+
+    structure: Structure
+    task: EnvelopeTask
+    peaks: Peaks | None = None
+    suite: SuitePeaks | None = None
+    increments: Mapping[str, Increments] = field(default_factory=dict)
+
+    @property
+    def inputs(self) -> dict[str, FuzzyNumber]:
+        """Fuzzy inputs by parameter."""
+        return self.structure.inputs(self.task.fuzzy)
+
+    @property
+    def times(self) -> dict[str, Any]:
+        """Length of the motion and distance of its nodes, by the names of arguments."""
+        return {"duration": self.task.duration, "step": self.task.section.step}
+
+
+def decision(section: DecisionSection, response: Response, _: Progress) -> Decision:
+    """The answer to [decision]."""
+    structure, found = response.structure, response.suite or response.peaks
+    assert found is not None
+    limits = section.limits_of(structure)
+    return decide(
+        found,
+        limits,
+        units={limit.output: structure.unit(limit.output) for limit in limits},
+        input_units={name: structure.input_unit(name) for name in response.inputs},
+    )
+
+
+def probability_of(section: ProbabilitySection, response: Response, tick: Progress) -> Probability:
+    """The answer to [probability]."""
+    structure = response.structure
+    random = structure.inputs(section.random, "probability.random")
+    return probability(
+        structure.model,
+        {name: number for name, number in response.inputs.items() if name not in random},
+        section.limits_of(structure),
+        random,
+        **response.times,
+        alpha=response.task.section.alpha,
+        samples=section.samples,
+        progress=tick,
+    )
+
+
+def tolerances_of(section: TolerancesSection, response: Response, tick: Progress) -> Tolerances:
+    """The answer to [tolerances]."""
+    is_known = response.task.section.alpha[0] == 0
+    return tolerances(
+        response.structure.model,
+        response.inputs,
+        section.limits_of(response.structure),
+        **response.times,
+        most=section.most,
+        at_one=response.peaks if is_known else None,
+        progress=tick,
+    )
+
+
+def fragility_answer(section: FragilitySection, response: Response, _: Progress) -> Fragility:
+    """The answer to [fragility]."""
+    linear = response.structure.linear
+    if response.suite is None or linear is None:
+        raise RefusedError("fragility", "without records", "a section [records]")
+    return fragility_of(
+        linear,
+        limits_by_name(section.limits_of(response.structure), ()),
+        intensity=section.measure,
+        independent=section.independent,
+        alpha=response.task.section.alpha,
+        suite=response.suite,
+        increments=response.increments,
+    )
+
+
+ANSWERS: dict[type[Answer], Callable[[Any, Response, Progress], Answer]] = {
+    Probability: probability_of,
+    Decision: decision,
+    Tolerances: tolerances_of,
+    Fragility: fragility_answer,
+}
+"""Kinds of answers in the order of the report, each with its function of section and response."""
+
+
+def stage(kind: type[Answer], section: QuestionSection, response: Response) -> Stage[Answer]:
+    """The stage of the answer of a kind to the question of a section."""
+    compute, inputs = partial(_computed, kind, section, response), [section, response]
+    return Stage(kind.key, inputs, ("fuzzy", "frame", "alphacut"), kind, compute)
+
+
+def _computed(
+    kind: type[Answer], section: QuestionSection, response: Response, context: StageContext
+) -> StageResult[Answer]:
+    return StageResult(ANSWERS[kind](section, response, context.tick))
+
+
+def require_tolerances(section: TolerancesSection, response: Response) -> None:
+    """Refuses a largest scale of the supports at which an input is inadmissible."""
+    try:
+        require_admissible_scale(response.structure.model, response.inputs, section.most)
+    except RefusedError as error:
+        raise RefusedError("tolerances.most", error.value, error.allowed, error.cure) from None
