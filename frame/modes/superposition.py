@@ -30,9 +30,6 @@ from alphacut.frame.response.duhamel import absolute_moments, responses_at_nodes
 from alphacut.frame.response.oscillators import read_response
 from alphacut.frame.structures.linear import LinearSystem, evaluate, histories, undamped_modes
 
-ENTRY_ROUNDINGS = 8
-"""Roundings of an entry of M, K and of output rows, as a stiffness 12 c E I / l³ takes."""
-
 
 @dataclass(frozen=True, eq=False)
 class Modal:
@@ -48,6 +45,7 @@ class Modal:
     mass_error: Array  # |F|, (S, n, n)
     rows: Array  # rows of all outputs on the state, (S, m, 2 n)
     structure: Classical  # the structure over the box
+    entry_roundings: int  # of an entry of M, K and of output rows; see `LinearSystem`
 
     @property
     def sigma_slope(self) -> Array:
@@ -62,7 +60,7 @@ class Modal:
         # accelerations are read of structures whose unknowns all have mass
         row = np.where(order == 2, self.structure.rows[output, :n], row)
         size = np.einsum("si,sik->sk", np.abs(row), np.abs(shape))
-        return np.einsum("si,sik->sk", row, shape), gamma(n + ENTRY_ROUNDINGS) * size
+        return np.einsum("si,sik->sk", row, shape), gamma(n + self.entry_roundings) * size
 
 
 def modes_at(
@@ -94,11 +92,13 @@ def modes_at(
     if system.ground is not None:
         patterns["load"] = np.broadcast_to(matrices.rigid[:, 0], squared.shape)
     share, share_error, product = {}, {}, "sik,sij,sj->sk"
+    entry_roundings = system.entry_roundings
     for name, x in patterns.items():
         share[name] = np.einsum(product, shape, M, x, optimize=True)
         size = np.einsum(product, *(np.abs(part) for part in (shape, M, x)), optimize=True)
-        share_error[name] = gamma(2 * n + 2 * ENTRY_ROUNDINGS) * size
-    of_stiffness, of_mass = _residual(shape, K, squared), _residual(shape, M, np.ones_like(squared))
+        share_error[name] = gamma(2 * n + 2 * entry_roundings) * size
+    of_stiffness = _residual(shape, K, squared, entry_roundings=entry_roundings)
+    of_mass = _residual(shape, M, np.ones_like(squared), entry_roundings=entry_roundings)
     of_stiffness += of_mass * squared[:, None]
     of_stiffness += gamma(8) * squared[:, None] * np.eye(n)  # of σ from λ
     return Modal(
@@ -112,15 +112,16 @@ def modes_at(
         mass_error=of_mass,
         rows=rows.value,
         structure=structure,
+        entry_roundings=entry_roundings,
     )
 
 
-def _residual(shape: Array, matrix: Array, diagonal: Array) -> Array:
+def _residual(shape: Array, matrix: Array, diagonal: Array, *, entry_roundings: int) -> Array:
     """Bound of |Xᵀ A X − diag| for the exact A, with the rounding of its product, (S, n, n)."""
     n, across = shape.shape[-1], shape.swapaxes(-1, -2)
     residual = across @ matrix @ shape - diagonal[:, None] * np.eye(n)
     size = np.abs(across) @ np.abs(matrix) @ np.abs(shape)
-    return np.asarray(np.abs(residual) + gamma(2 * n + ENTRY_ROUNDINGS) * size)
+    return np.asarray(np.abs(residual) + gamma(2 * n + entry_roundings) * size)
 
 
 @dataclass(frozen=True, eq=False)

@@ -126,6 +126,10 @@ class LinearSystem(Protocol):
     def ratios(self) -> Collection[str | float]:
         """Damping ratios, numbers or names of parameters: none, one, or one a mode."""
 
+    @property
+    def entry_roundings(self) -> int:
+        """Most roundings of an entry of M, K and of the outputs' rows as they are computed."""
+
     def assembly(self, p: Mapping[str, Number]) -> Assembly[Number]:
         """The structure with its parameters as jets or as Taylor models."""
 

@@ -116,6 +116,11 @@ class MatrixStructure:
         """Number of unknowns n."""
         return len(self.mass[0][1])
 
+    @property
+    def entry_roundings(self) -> int:
+        """Roundings of a factor, such as E I / l³, and of the sum of all terms of a matrix."""
+        return 8 + max(len(self.mass), len(self.stiffness))
+
     @cached_property
     def massive(self) -> Ints:
         """Unknowns that have mass, rising."""
