@@ -153,7 +153,7 @@ def compute_cuts(
     top, constants = cuts[-1], np.array([cut.constants for cut in cuts])  # (levels, constants, 2)
     fractions, names = study.fractions, CONSTANT_NAMES[cell.dimension]
     is_space, references = cell.dimension == 3, References()
-    if has_both_bounds:
+    if has_both_bounds and all(cell.is_solid):
         shares_of_phases = np.array([*fractions.values()])
         phases = [Phase(young.nominal, nu.nominal) for young, nu in cell.pairs]
         classical = reference_bounds(phases, fractions=shares_of_phases, space=is_space)

@@ -26,7 +26,8 @@ REUSS = np.array([_NORMAL, ((6 * _UNIT - 2) * _NORMAL + _SHEAR) / 15])
 class StiffnessBounds:
     """Lower ≤ C ≤ upper as quadratic forms of the mean strain, in Voigt order, in Pa.
 
-    Of pores the lower one is 0, of rigid phases the upper one has an infinite diagonal.
+    Of pores that percolate the lower one is 0, of rigid phases the upper one has an infinite
+    diagonal.
 
     Of the plane, (3, 3), with 2 ε12, or of space, (6, 6), with shears 23, 13, 12 and 2 ε. Moduli
     that are such forms are bounded by those of the ends, and with them whatever rises in each of
@@ -44,7 +45,7 @@ class StiffnessBounds:
 
     @property
     def has_lower(self) -> bool:
-        """Whether the cell is known to resist."""
+        """Whether the cell is known to resist: not where pores percolate."""
         return bool(self.lower.any())
 
     @property

@@ -56,6 +56,7 @@ def energy_shares(
             factor = np.where(phase == k, 1 + change, 1.0)
             moduli = factor * images.bulk[0], factor * images.shear[0]
             stresses = model.solve_side(0, *moduli, solution.lower)
+            assert stresses is not None  # phases that have losses are no pores
             below = inverse_below(stresses.energy.upper)
             bounds = concave_constants(StiffnessBounds(below, below), model.average)
             changed_lower[change] = {name: low for name, (low, _) in bounds.items()}

@@ -21,10 +21,9 @@ from alphacut.rve.image.fields.energy import (
     SideSolution,
     coefficients,
     energies,
-    on_host,
     solve_side,
 )
-from alphacut.rve.image.fields.grid import device_array
+from alphacut.rve.image.fields.grid import device_array, on_host
 from alphacut.rve.image.fields.kernels import call_kernels
 from alphacut.rve.image.phases import ModuliImages
 from alphacut.rve.result.moduli import ISOTROPIC, require_average, square_moduli
@@ -116,7 +115,7 @@ class ImageModel:
                 raise
 
         def solve(end: int, guess: SideSolution | None) -> SideSolution | None:
-            """Fields of least energy with the least (end 0) or greatest (end 1) moduli."""
+            """Fields of least energy with the least (end 0) or greatest (end 1) moduli, if any."""
             moduli = images.moduli_of_fields(end)
             if moduli is None:
                 return None
@@ -145,8 +144,11 @@ class ImageModel:
         shear: Array,
         start: SideSolution | None,
         watch: Callable[[], None] | None = None,
-    ) -> SideSolution:
-        """Stresses (end 0), which bound the compliance, or displacements (1) of least energy."""
+    ) -> SideSolution | None:
+        """Stresses (end 0), which bound the compliance, or displacements (1) of least energy.
+
+        None where pores percolate, so that no stress is found that vanishes in them.
+        """
         to_device = device_array(self.device)
         return solve_side(
             self.elements[end],
@@ -228,7 +230,7 @@ def usual_division(images: ModuliImages) -> int:
 class ImageSolution:
     """Bounds of the stiffness, and displacements (upper) and stresses (lower) that prove them.
 
-    None for displacements where a phase is rigid, for stresses where one is a pore.
+    None for displacements where a phase is rigid, for stresses where pores percolate.
     """
 
     bounds: StiffnessBounds

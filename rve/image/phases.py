@@ -109,16 +109,19 @@ class ModuliImages:
     def moduli_of_fields(self, end: int) -> tuple[Array, Array] | None:
         """Bulk and shear moduli for stresses (end 0) or displacements (1); None if none bounds.
 
-        Pores leave no stress to bound from below, rigid phases no displacement from above. The
-        other bound holds with a pore a little too stiff, and a rigid phase too soft, since stiffer
-        phases make a stiffer cell.
+        Rigid phases leave no displacement to bound from above. The lower bound holds with a rigid
+        phase too soft, the upper one with a pore a little too stiff, since stiffer phases make a
+        stiffer cell. For stresses pores keep the modulus 0.
         """
         moduli = self.bulk[end], self.shear[end]
-        if any(np.any(np.isinf(x) if end else x == 0) for x in moduli):
+        if end and any(np.isinf(x).any() for x in moduli):
             return None
-        finite = [x[(x > 0) & np.isfinite(x)] for x in moduli]
-        ends = [(PORE_RATIO * x.min(), RIGID_RATIO * x.max()) for x in finite]
-        return np.clip(moduli[0], *ends[0]), np.clip(moduli[1], *ends[1])
+        clipped = []
+        for values in moduli:
+            finite = values[(values > 0) & np.isfinite(values)]
+            least = PORE_RATIO * finite.min() if end else 0.0
+            clipped.append(np.clip(values, least, RIGID_RATIO * finite.max()))
+        return clipped[0], clipped[1]
 
     def equals(self, images: ModuliImages) -> bool:
         """True if both are the same moduli everywhere."""

@@ -76,6 +76,7 @@ class Element:
     The axes of a grid are (y, x) or (z, y, x); lengths are in widths along x.
 
     Args:
+        sides: Sides of a cell along the axes.
         unknowns: Number of values of the field in every cell of the periodic grid.
         local: For each of the cell's local unknowns its number among these, and the neighbour that
             owns it, so many cells further along each axis of the grid.
@@ -93,6 +94,7 @@ class Element:
             each group of terms that are alike in both; factors of the terms.
     """
 
+    sides: tuple[float, ...]
     unknowns: int
     local: tuple[tuple[int, tuple[int, ...]], ...]
     modes: Array
@@ -194,6 +196,7 @@ def element_of(sides: tuple[float, ...], *, stress: bool) -> Element:
     ends = np.array([0, *starts, len(terms)])
     groups = np.stack([ends[:-1], ends[1:]], axis=1)
     return Element(
+        sides=sides,
         unknowns=len(potentials) * len(unknowns),
         local=tuple(local),
         modes=np.ascontiguousarray(modes[is_kept]),

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,8 +18,17 @@ import numpy as np
 from alphacut.base.arrays import Array
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient, System
 from alphacut.rve.image.fields.element import Element, isotropic_parts
-from alphacut.rve.image.fields.grid import SLAB_CELLS, Fields, Operator, gather, namespace, slabs
+from alphacut.rve.image.fields.grid import (
+    SLAB_CELLS,
+    Fields,
+    Operator,
+    gather,
+    namespace,
+    on_host,
+    slabs,
+)
 from alphacut.rve.image.fields.kernels import ROUNDINGS, modes_by_rows
+from alphacut.rve.image.fields.pores import PoreNodes, PorePotentials
 from alphacut.rve.image.fields.preconditioner import FourierPreconditioner, Reference
 
 UNIT = 2.0**-53  # rounding unit
@@ -66,7 +75,11 @@ class Energies:
 
 
 def energies(
-    element: Element, fields: Fields, mean_modes: Array, weights: Sequence[Weighted]
+    element: Element,
+    fields: Fields,
+    mean_modes: Array,
+    weights: Sequence[Weighted],
+    field_errors: Fields | None = None,
 ) -> Energies:
     """Mean energy products of all pairs of fields, with a bound of their rounding errors.
 
@@ -76,12 +89,13 @@ def energies(
         mean_modes: Modes of the uniform field to add to each, shape (modes, fields).
         weights: Pairs of rows of modes and their coefficient in each cell, of the grid's shape,
             not negative, with a rounding error of up to `COEFFICIENT` units.
+        field_errors: Bounds of what `fields` are off from those that are meant; None: nothing.
     """
     xp, count, cells = namespace(fields), fields.shape[0], math.prod(fields.shape[2:])
     piece = PIECE if cells <= SMALL else LONG_PIECE
     sums: list[list[Array]] = [[] for _ in weights]
     by_modes = np.zeros((len(weights), count, count))
-    for slab, modes, amplification, local in modes_of(element, fields, mean_modes):
+    for slab, modes, amplification, local in modes_of(element, fields, mean_modes, field_errors):
         for k, (rows, weight) in enumerate(weights):
             factor = xp.reshape(weight[slab], (-1,))
             weighted = modes[rows] * factor
@@ -98,11 +112,6 @@ def energies(
     by_modes += 2 * UNIT * cells * size[:, :, None] * size[:, None, :]  # `UNIT` · |modes| each
     relative_rounding = SAFETY * (piece + COEFFICIENT + 5) * UNIT
     return Energies(value, by_modes / cells, relative_rounding)
-
-
-def on_host(array: Fields) -> Array:
-    """The array as NumPy's, wherever it is."""
-    return np.asarray(array.get() if hasattr(array, "get") else array)
 
 
 def _piecewise_products(modes: Fields, weighted: Fields, piece: int) -> Array:
@@ -125,14 +134,18 @@ Modes = Iterator[tuple[Any, Fields, Fields, Fields]]
 """Slab; modes (modes, fields, cells of the slab); A and b: errors ≤ A @ b + `UNIT` · |modes|."""
 
 
-def modes_of(element: Element, fields: Fields, mean_modes: Array) -> Modes:
+def modes_of(
+    element: Element, fields: Fields, mean_modes: Array, field_errors: Fields | None = None
+) -> Modes:
     """Yield modes by slabs with bounds of their rounding: of voxels of NumPy by kernels."""
     if isinstance(fields, np.ndarray) and element.dimension == 3:
-        return _modes_by_rows(element, fields, mean_modes)
-    return modes_by_matrices(element, fields, mean_modes)
+        return _modes_by_rows(element, fields, mean_modes, field_errors)
+    return modes_by_matrices(element, fields, mean_modes, field_errors)
 
 
-def modes_by_matrices(element: Element, fields: Fields, mean_modes: Array) -> Modes:
+def modes_by_matrices(
+    element: Element, fields: Fields, mean_modes: Array, field_errors: Fields | None = None
+) -> Modes:
     """As `modes_of`, with the element's matrix, in any library: what kernels are judged by."""
     xp = namespace(fields)
     matrix, magnitude = xp.asarray(element.modes), xp.asarray(element.magnitude)
@@ -142,12 +155,18 @@ def modes_by_matrices(element: Element, fields: Fields, mean_modes: Array) -> Mo
         local, error = (xp.reshape(x, (*x.shape[:2], -1)) for x in pair)
         # the sums of the product, in which zeros add no error, and the entries of the matrix
         error += (terms + ENTRY) * UNIT * xp.abs(local)
+        if field_errors is not None:
+            error += xp.reshape(
+                _with_linear(element, gather(element, field_errors, slab)), error.shape
+            )
         modes = xp.tensordot(matrix, local, axes=1)
         modes += xp.asarray(mean_modes)[:, :, None]
         yield slab, modes, magnitude, error
 
 
-def _modes_by_rows(element: Element, fields: Array, mean_modes: Array) -> Modes:
+def _modes_by_rows(
+    element: Element, fields: Array, mean_modes: Array, field_errors: Array | None
+) -> Modes:
     """As `modes_of`, in pieces of a layer, so that few modes are in memory."""
     count, (nz, ny, nx) = len(fields), fields.shape[2:]
     n_rows, width = max(1, SLAB_CELLS // (count * nx)), 1 + element.reach
@@ -155,7 +174,11 @@ def _modes_by_rows(element: Element, fields: Array, mean_modes: Array) -> Modes:
     by_unknown = [element.magnitude[:, unknown == u].sum(axis=1) for u in range(element.unknowns)]
     amplification = ROUNDINGS * UNIT * np.stack(by_unknown, axis=1)
     for z in range(nz):
-        greatest = np.abs(fields[:, :, np.arange(z, z + width) % nz]).max(axis=2)
+        layers = np.arange(z, z + width) % nz
+        sizes = np.abs(fields[:, :, layers])
+        if field_errors is not None:  # as a part of what modes are rounded by
+            sizes += field_errors[:, :, layers] / (ROUNDINGS * UNIT)
+        greatest = sizes.max(axis=2)
         for axis in (2, 3):  # of the values of an unknown at a voxel
             greatest = np.max([np.roll(greatest, -k, axis) for k in range(width)], axis=0)
         for first in range(0, ny, n_rows):
@@ -174,6 +197,15 @@ def _subtract_linear(element: Element, raw: Fields) -> tuple[Fields, Fields]:
             local[k] -= raw[other]
             error[k] += UNIT * abs(local[k])
     return local, error
+
+
+def _with_linear(element: Element, errors: Fields) -> Fields:
+    """Errors of local unknowns less a linear function: of all numbers that enter, summed."""
+    total = errors.copy()
+    for k, subtracted in enumerate(element.subtracted):
+        for other in subtracted:
+            total[k] += errors[other]
+    return total
 
 
 def solved_loads(dimension: int) -> Array:
@@ -209,23 +241,34 @@ def solve_side(
     solver: ConjugateGradient,
     division: int = 1,
     start: Fields | None = None,
-) -> SideSolution:
-    """Fields of least energy under the unit loads.
+) -> SideSolution | None:
+    """Fields of least energy under the unit loads; None where pores leave no stress.
+
+    Stresses vanish in pores, whose bulk or shear modulus is 0; see `pores`.
 
     Args:
         element: Of displacements, whose energy bounds the stiffness from above, or of stresses,
             whose energy bounds the compliance.
         bulk: Bulk modulus of each cell (of the plane: K + G/3), any unit.
-        shear: Shear modulus, same shape and unit.
+        shear: Shear modulus, same shape and unit; of displacements both are positive.
         solver: Stopping rule.
         division: Parts along each side into which every cell is divided: the same image, a larger
             space of fields.
         start: Fields to start from, on the divided cells.
     """
     xp = namespace(bulk)
-    trace, deviator = coefficients(element, bulk, shear)
     for axis in range(element.dimension if division > 1 else 0):
-        trace, deviator = (xp.repeat(x, division, axis=axis) for x in (trace, deviator))
+        bulk, shear = (xp.repeat(x, division, axis=axis) for x in (bulk, shear))
+    is_pore = (bulk == 0) | (shear == 0)
+    potentials = None
+    if element.stress and bool(is_pore.any()):
+        nodes = PoreNodes.of_mask(on_host(is_pore).astype(bool), element.reach)
+        if nodes is None:
+            return None
+        potentials = PorePotentials.of_nodes(element, nodes)
+        # stiff there for the preconditioner, as there is no stress that could have an energy
+        bulk, shear = (xp.where(is_pore, x.max(), x) for x in (bulk, shear))
+    trace, deviator = coefficients(element, bulk, shear)
     loads = solved_loads(element.dimension)
     modes = element.mean_modes(loads)
     constant = Reference.of_grid(element, trace, deviator)
@@ -240,14 +283,43 @@ def solve_side(
         guess = None if start is None else xp.tensordot(xp.asarray(loads[part]), start, axes=1)
         load = operator.load(modes[:, part])
         system = System(operator.apply, preconditioner.apply, load, scale[part], least, guess)
-        fields[part], number = solver.solve(system)
+        if potentials is None:
+            fields[part], number = solver.solve(system)
+        else:
+            fields[part], number = _solve_beside_pores(solver, system, potentials, loads[part])
         iterations.append(number)
     to_unit_loads = xp.asarray(np.linalg.inv(loads))
     for slab in slabs(fields):  # in place
         fields[:, :, slab] = xp.tensordot(to_unit_loads, fields[:, :, slab], axes=1)
+    field_errors = None
+    if potentials is not None:
+        field_errors = potentials.impose(fields)
+        trace, deviator = (xp.where(is_pore, 0.0, x) for x in (trace, deviator))
     weights = list(zip(element.parts, (trace, deviator), strict=True))
-    energy = energies(element, fields, element.mean_modes(np.eye(len(loads))), weights)
+    unit_modes = element.mean_modes(np.eye(len(loads)))
+    energy = energies(element, fields, unit_modes, weights, field_errors)
     return SideSolution(fields, energy, max(iterations))
+
+
+def _solve_beside_pores(
+    solver: ConjugateGradient, system: System, potentials: PorePotentials, loads: Array
+) -> tuple[Fields, int]:
+    """Solve for fields whose stress under `loads` (rows, in Voigt order) vanishes in pores.
+
+    With Q the projection on their differences, the system is Q A Q, and Q M Q its preconditioner,
+    M being that of A. The energy of the differences is that of A, so that the ratio `least` holds.
+    """
+    particular = potentials.particular_fields(loads, system.load)
+    start = None if system.start is None else potentials.project(system.start - particular)
+    projected = replace(
+        system,
+        operator=lambda x: potentials.project(system.operator(x)),
+        preconditioner=lambda r: potentials.project(system.preconditioner(r)),
+        load=potentials.project(system.load - system.operator(particular)),
+        start=start,
+    )
+    differences, iterations = solver.solve(projected)
+    return particular + differences, iterations
 
 
 def minimum_energy(element: Element, trace: Fields, deviator: Fields, modes: Array) -> Array:

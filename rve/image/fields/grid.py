@@ -37,6 +37,11 @@ def namespace(array: Fields) -> ModuleType:
     return library
 
 
+def on_host(array: Fields) -> Array:
+    """The array as NumPy's, wherever it is."""
+    return np.asarray(array.get() if hasattr(array, "get") else array)
+
+
 def device_array(device: str) -> Callable[[Array], Fields]:
     """Function that takes NumPy's arrays to a device, "cpu" or "cuda".
 

@@ -191,3 +191,18 @@ def test_the_constants_of_one_stiffness(average):
                 off = abs(exact - (Fraction(low) + Fraction(high)) / 2)
                 used[k] = max(used[k], off / ((Fraction(high) - Fraction(low)) / 2))
     assert (used[:2] > 0.5).all() if average != AXES else used[0] > 0.5
+
+
+@pytest.mark.parametrize("sides", [(0.8, 1.0), (0.8, 1.2, 1.0)])
+def test_what_fields_are_off_by_is_in_the_rounding_of_their_energies(sides, rng):
+    element = element_of(sides, stress=True)
+    shape = (2, element.unknowns, *(3, 4, 5)[: len(sides)])
+    fields, off = rng.normal(size=shape), 1e-6 * rng.normal(size=shape)
+    means = element.mean_modes(rng.normal(size=(2, len(element.of_voigt.T))))
+    weights = [(rows, rng.uniform(0.5, 2.0, shape[2:])) for rows in element.parts]
+    found = energies(element, fields, means, weights, abs(off))
+    exact, without = (energies(element, x, means, weights) for x in (fields + off, fields))
+    error = abs(exact.value - without.value)
+    assert (error <= found.rounding).all()
+    assert (error > 1e3 * without.rounding).any()
+    assert (found.rounding < 1e3 * error.max()).all()

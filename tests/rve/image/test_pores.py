@@ -1,0 +1,195 @@
+"""Lower bounds of cells with pores: stresses that vanish in them, against bounds by hand and limits."""
+
+from fractions import Fraction
+from itertools import product
+
+import numpy as np
+import pytest
+from scipy.linalg import eigh
+
+from alphacut.rve.image.fields.element import element_of, stress_derivatives
+from alphacut.rve.image.fields.energy import modes_of
+from alphacut.rve.image.fields.pores import PoreNodes, PorePotentials
+from alphacut.rve.image.model import ImageModel, solve_image
+from alphacut.rve.image.phases import ModuliImages
+
+E, NU = 1.0, 0.25
+K, G = E / 3 / (1 - 2 * NU), E / 2 / (1 + NU)
+
+
+def with_pores(is_pore, ratio=0.0, **settings):
+    """Bounds of E = 1 with pores of a fraction of its moduli."""
+    bulk = K if is_pore.ndim == 3 else K + G / 3
+    moduli = (np.where(is_pore, ratio * x, x) for x in (bulk, G))
+    return solve_image(*moduli, **settings).bounds
+
+
+def cube(n=8):
+    """A cube of side 1/2 as a pore in a unit cell of n³ voxels."""
+    inside = np.zeros((n,) * 3, bool)
+    inside[(slice(n // 4, n - n // 4),) * 3] = True
+    return inside
+
+
+@pytest.mark.parametrize("shift", [(0, 0, 0), (3, 5, 0)])
+@pytest.mark.parametrize("sides", [(1.0, 1.0, 1.0), (1.3, 0.7, 1.0)])
+def test_columns_beside_a_cube_carry_three_quarters(shift, sides):
+    """Uniaxial stress in the columns that meet no pore: E_x, E_y, E_z ≥ 3/4 E, whatever the sides."""
+    bounds = with_pores(np.roll(cube(), shift, (0, 1, 2)), sides=sides)
+    low, high = bounds.constants()[:3].T
+    assert (low >= 0.75).all()
+    assert (high < 0.84).all()
+    if len(set(sides)) == 1:  # .7689 is what 1e-6 and 1e-8 in the pore tend to
+        assert low == pytest.approx([0.76887] * 3, abs=2e-5)
+
+
+def test_columns_beside_a_square_carry_half():
+    square = np.zeros((8, 8), bool)
+    square[2:6, 2:6] = True
+    (low, high), *_ = with_pores(square).constants()
+    assert 0.5 * E / (1 - NU**2) <= low < high
+
+
+def test_the_bulk_modulus_of_a_spherical_pore_is_that_of_vanishing_moduli():
+    squares = (np.indices((14,) * 3) - 6.5) ** 2
+    sphere = squares.sum(0) < (14 * (0.157 * 3 / 4 / np.pi) ** (1 / 3)) ** 2
+    assert sphere.mean() == pytest.approx(0.157, abs=1e-3)
+    low, high = with_pores(sphere).bulk
+    assert 0.417 < low < 0.4174 < high
+
+
+def closed_pores(rng, shape):
+    """Single cells and pairs of them, far enough apart to be pores of their own."""
+    is_pore = np.zeros(shape, bool)
+    for corner in product(*(range(0, n - 3, 5) for n in shape)):
+        is_pore[corner] = True
+        beside = list(corner)
+        beside[rng.integers(len(shape))] += 1
+        is_pore[tuple(beside)] = rng.random() < 0.5
+    return np.roll(is_pore, rng.integers(0, 8, len(shape)), range(len(shape)))
+
+
+@pytest.mark.parametrize("shape", [(15, 20), (5, 10, 10)])
+def test_pores_tend_to_phases_of_vanishing_moduli(shape, rng):
+    is_pore = closed_pores(rng, shape)
+    pores, soft = with_pores(is_pore), with_pores(is_pore, ratio=1e-7)
+    assert eigh(pores.lower, pores.upper, eigvals_only=True)[-1] <= 1
+    assert eigh(pores.lower, soft.upper, eigvals_only=True)[-1] <= 1
+    ratio = eigh(pores.lower, soft.lower, eigvals_only=True)
+    assert ratio[0] > 0.998  # of the potentials without stress, polynomials of second degree alone
+
+
+def test_pores_carry_forces_from_one_to_the_next_in_the_plane():
+    """Half a wall between two pores is as soft as the other one allows: not as if it were held."""
+    is_pore = np.zeros((16, 16), bool)
+    is_pore[2:7, 2:14] = is_pore[10:14, 4:9] = True
+    pores, soft = with_pores(is_pore), with_pores(is_pore, ratio=1e-8)
+    assert eigh(pores.lower, soft.lower, eigvals_only=True)[0] > 1 - 1e-4
+
+
+@pytest.mark.parametrize("sides", [(1.0, 1.0), (0.7, 1.0), (1.0, 1.0, 1.0), (1.3, 0.7, 1.0)])
+def test_the_stress_in_pores_is_zero_but_for_the_declared_rounding(sides, rng):
+    n = len(sides)
+    is_pore = closed_pores(rng, (10, 15)[:n] if n == 2 else (5, 10, 10))
+    element = element_of(sides, stress=True)
+    potentials = PorePotentials.of_nodes(element, PoreNodes.of_mask(is_pore, element.reach))
+    count = len(element.of_voigt.T)
+    fields = rng.normal(size=(count, element.unknowns, *is_pore.shape))
+    errors = potentials.impose(fields)
+    n_wrong = 0
+    for cell in np.argwhere(is_pore)[:4]:
+        for load, (found, bound) in enumerate(exact_stress(element, fields, errors, cell)):
+            stress = [x + (component == load) for component, x in enumerate(found)]
+            assert all(abs(x) <= y for x, y in zip(stress, bound, strict=True))
+            n_wrong += any(stress)
+    assert (n_wrong > 0) or set(sides) == {1.0}  # rounding there is
+    assert errors.max() < 1e-12 * abs(fields).max()
+    mean_modes = element.mean_modes(np.eye(count))
+    for slab, modes, *_ in modes_of(element, fields, mean_modes):
+        inside = is_pore[slab].ravel()
+        assert abs(modes[..., inside]).max(initial=0.0) < 1e-11
+
+
+def exact_stress(element, fields, errors, cell):
+    """Mean stress in a cell without rounding, by load, and what errors of the fields add to it."""
+    # integrals over a cell of the derivatives of order 0, 1, 2 of its functions of one coordinate
+    functions = {
+        2: [
+            [Fraction(1, 2), -1, 0],
+            [Fraction(1, 12), 0, -1],
+            [Fraction(1, 2), 1, 0],
+            [Fraction(-1, 12), 0, 1],
+        ],
+        3: [[Fraction(1, 3), -1, 2], [Fraction(4, 3), 0, -4], [Fraction(1, 3), 1, 2]],
+    }[element.dimension]
+    n, derivatives = element.dimension, stress_derivatives(element.dimension)
+    potentials = sorted({potential for terms in derivatives for _, potential, _ in terms})
+    numbers = list(product(range(len(functions)), repeat=n))
+    for field, error in zip(fields, errors, strict=True):
+        stress, bound = [], []
+        for terms in derivatives:
+            total = added = Fraction(0)
+            for factor, potential, orders in terms:
+                for k, number in enumerate(numbers):
+                    unknown, offset = element.local[potentials.index(potential) * len(numbers) + k]
+                    weight = Fraction(factor)
+                    for f, order, side in zip(number, orders[::-1], element.sides, strict=True):
+                        weight *= functions[f][order] / Fraction(side) ** order
+                    at = (unknown, *(cell + offset) % field.shape[1:])
+                    total += weight * Fraction(field[at])
+                    added += abs(weight) * Fraction(error[at])
+            stress.append(total)
+            bound.append(added)
+        yield stress, bound
+
+
+def column(shape=(4, 7, 7)):
+    """A hole along the first axis."""
+    is_pore = np.zeros(shape, bool)
+    is_pore[:, 3] = True
+    return is_pore
+
+
+@pytest.mark.parametrize(
+    "is_pore",
+    [
+        column(),
+        column((7, 9))[:, ::-1].T.copy(),
+        np.roll(np.pad(np.ones((2, 2, 2), bool), (0, 1)), 2, 0),  # a voxel from its image
+        np.indices((8, 8)).sum(0) % 8 < 2,  # a band along a diagonal
+    ],
+    ids=["column", "row", "thin wall", "diagonal"],
+)
+def test_pores_that_meet_their_own_image_leave_no_lower_bound(is_pore):
+    bounds = with_pores(is_pore)
+    assert not bounds.has_lower
+    assert bounds.constants()[0, 0] == 0
+
+
+def test_a_pore_that_is_connected_through_the_sides_alone_is_closed():
+    """A ring about the corner of the cell is one pore, wherever the cell begins."""
+    is_pore = np.zeros((12, 12), bool)
+    is_pore[3:9, 3:9] = True
+    is_pore[5:7, 5:7] = False
+    whole, parted = with_pores(is_pore), with_pores(np.roll(is_pore, (6, 6), (0, 1)))
+    assert parted.lower == pytest.approx(whole.lower, rel=1e-4, abs=1e-6)
+    assert whole.has_lower
+
+
+def test_cuts_of_pores_of_a_fuzzy_extent_are_nested_and_consistent():
+    """Of a threshold that leaves the rim of a pore open, and a fuzzy modulus."""
+    extent = np.maximum.reduce(abs(np.indices((16, 16)) - 7.5))
+    images = []
+    for rim, spread in ((1.0, 0.1), (0.0, 0.0)):
+        surely_solid, maybe_solid = extent > 3 + rim, extent > 3
+        moduli = [
+            tuple(np.where(solid, x * scale, 0.0) for solid, scale in ends)
+            for x in (K + G / 3, G)
+            for ends in [((surely_solid, 1 - spread), (maybe_solid, 1 + spread))]
+        ]
+        images.append(ModuliImages(*moduli))
+    model = ImageModel()
+    cuts = model.cuts(images, (images[-1], model.solve(images[-1])))
+    wide, narrow = (cut.modulus for cut in cuts)
+    assert 0 < wide[0] < narrow[0] < narrow[1] < wide[1]
+    model.require_consistent(images, cuts)
