@@ -34,4 +34,5 @@ def as_shown(name: str, values: Array, photometric: object) -> Array:
     is_known = values.dtype.kind == "u"
     cure = "save it with black as zero, or as .npy"
     require(is_known, name, f"{values.dtype} with white as zero", "unsigned integers", cure)
-    return np.asarray(np.iinfo(values.dtype).max - values)
+    largest = (1 << 8 * values.dtype.itemsize) - 1
+    return np.asarray(largest - values)

@@ -10,8 +10,6 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
-from typing import Any
 
 import numpy as np
 
@@ -19,6 +17,7 @@ from alphacut.base.arrays import Array, Ints
 from alphacut.base.errors import RefusedError, require
 from alphacut.rve.mesh import square
 from alphacut.rve.mesh.columns import grid_of
+from alphacut.rve.mesh.msh import DamagedMeshError, MshFile, element_name, parse_msh
 from alphacut.rve.mesh.periodicity import SAME_PLACE, MeshError, unknowns
 from alphacut.rve.mesh.prism_grid import PrismGrid, Prisms
 from alphacut.rve.mesh.wedge import prism_rule, vertices_and_midpoints, wedge
@@ -39,15 +38,11 @@ _PLANE_PARTS = (_A, _AB, _CA), (_AB, _B, _BC), (_CA, _BC, _C), (_BC, _CA, _AB)
 
 def read_grid(path: Path | str) -> PrismGrid:
     """Extruded prisms of a Gmsh file, where they are, numbered by level; MeshError if no cell."""
-    content = mesh_content(path)
-    with square.model() as gmsh, TemporaryDirectory() as folder:
-        copy = Path(folder, "mesh.msh")
-        copy.write_bytes(content)
-        try:
-            gmsh.merge(str(copy))
-        except Exception as error:  # Gmsh raises nothing else
-            raise RefusedError("mesh.file", path, MESH_FILES, str(error)) from None
-        prisms = read_prisms(gmsh)
+    try:
+        mesh = parse_msh(mesh_content(path))
+    except DamagedMeshError as error:
+        raise RefusedError("mesh.file", f"{path}, {error}", MESH_FILES) from None
+    prisms = read_prisms(mesh)
     _require_square(prisms.points[:, :2], "the cell")
     grid = grid_of(orient(prisms))
     _require_filled(grid)
@@ -59,10 +54,8 @@ def read_grid(path: Path | str) -> PrismGrid:
 def mesh_content(path: Path | str) -> bytes:
     """Return a file in Gmsh's format MSH from its section $MeshFormat on.
 
-    Gmsh takes a file that begins otherwise for a script, whatever its name, and runs the commands
-    in it; it also reads options from files beside the one that it opens. So only what this function
-    returns is handed to it, as the one file in a folder. Sections $Comments before $MeshFormat are
-    left out.
+    A file that begins otherwise may be a script of Gmsh, whose commands Gmsh would run; here Gmsh
+    reads no file at all. Sections $Comments before $MeshFormat are left out.
 
     Raises:
         RefusedError: The file cannot be read, or begins otherwise.
@@ -80,52 +73,48 @@ def mesh_content(path: Path | str) -> bytes:
     return content
 
 
-def read_prisms(gmsh: Any) -> Prisms:
-    """All prisms of Gmsh's current model, each physical group of volumes a phase.
+def read_prisms(mesh: MshFile) -> Prisms:
+    """All prisms of a file, each physical group of volumes a phase, by rising number of the group.
 
     Raises:
         MeshError: A volume is in no physical group or in two, or has other elements.
     """
-    if parts := gmsh.model.getNumberOfPartitions():
+    if mesh.partitions:
         cure = "write the mesh before it is divided among processes"
-        raise MeshError(f"the mesh is partitioned into {parts} parts", cure)
-    tags, xyz, _ = gmsh.model.mesh.getNodes()
-    number_of_tag = np.zeros(int(tags.max(initial=0)) + 1, np.int64)
-    number_of_tag[tags] = np.arange(len(tags))
+        raise MeshError(f"the mesh is partitioned into {mesh.partitions} parts", cure)
     names: list[str] = []
     cells: list[Ints] = []
     phases: list[Ints] = []
     grouped: set[int] = set()
-    for _, group in gmsh.model.getPhysicalGroups(3):
-        name = gmsh.model.getPhysicalName(3, group) or f"group {group}"
-        volumes = gmsh.model.getEntitiesForPhysicalGroup(3, group).tolist()
+    for group in sorted(mesh.groups):
+        name = mesh.names.get(group) or f"group {group}"
+        volumes = sorted(mesh.groups[group])
         if grouped & set(volumes):
             raise MeshError(f"prisms of the physical group {name!r} are in another one too")
         grouped |= set(volumes)
         for volume in volumes:
-            cells.append(_cells_of(gmsh, volume, name))
+            cells.append(_cells_of(mesh, volume, name))
             phases.append(np.full(len(cells[-1]), len(names)))
         names.append(name)
-    ungrouped = [tag for _, tag in gmsh.model.getEntities(3) if tag not in grouped]
+    ungrouped = sorted(mesh.volumes - grouped)
     if ungrouped or not names:
         what = f"volume {ungrouped[0]}" if ungrouped else "the mesh"
         raise MeshError(f"{what} has no physical group that names its phase")
     # nodes of curves and surfaces alone belong to no prism
-    used, compact = np.unique(number_of_tag[np.concatenate(cells)], return_inverse=True)
-    points: Array = np.asarray(xyz, float).reshape(-1, 3)[used]
-    return Prisms(points, compact.reshape(-1, 15), np.concatenate(phases), tuple(names))
+    used, compact = np.unique(np.concatenate(cells), return_inverse=True)
+    return Prisms(mesh.points[used], compact.reshape(-1, 15), np.concatenate(phases), tuple(names))
 
 
-def _cells_of(gmsh: Any, volume: int, name: str) -> Ints:
-    """Node tags of the prisms of a volume, shape (m, 15), in Basix's order."""
-    kinds, _, nodes = gmsh.model.mesh.getElements(3, volume)
-    if list(kinds) != [PRISM_15]:
-        found = ", ".join(gmsh.model.mesh.getElementProperties(kind)[0] for kind in kinds)
+def _cells_of(mesh: MshFile, volume: int, name: str) -> Ints:
+    """Indices of the nodes of the prisms of a volume, shape (m, 15), in Basix's order."""
+    kinds = [kind for entity, kind in mesh.elements if entity == volume]
+    if kinds != [PRISM_15]:
+        found = ", ".join(element_name(kind) for kind in kinds)
         raise MeshError(
             f"the physical group {name!r} holds {found or 'no elements'}",
             "mesh with Prism 15: extrude with recombine, Mesh.SecondOrderIncomplete = 1, order 2",
         )
-    return np.asarray(nodes[0].astype(np.int64)).reshape(-1, 15)
+    return mesh.elements[volume, PRISM_15]
 
 
 def refined(grid: PrismGrid) -> PrismGrid:
@@ -221,8 +210,7 @@ def _require_square(xy: Array, what: str) -> None:
     box = np.array([xy.min(axis=0), xy.max(axis=0)])
     if abs(box - [[-1, -1], [1, 1]]).max() > SAME_PLACE:
         shown = " × ".join(f"{low:.6g} … {high:.6g}" for low, high in box.T)
-        # reading MSH 4.1, Gmsh puts periodic nodes where they were before it scaled the others
-        cure = "a periodic mesh that Gmsh scaled: write it with Mesh.MshFileVersion = 2.2"
+        cure = "scale and move the mesh so that the cell spans −1 … 1"
         raise MeshError(f"{what} spans {shown}, not −1 … 1 × −1 … 1", cure)
 
 

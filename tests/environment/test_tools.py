@@ -83,10 +83,11 @@ with square.model() as gmsh:
     assert done.stdout.split() == ["1.0", "1e-08"]
 
 
-def test_complete_quadratic_prisms_of_gmsh_are_refused_with_its_own_option():
+def test_complete_quadratic_prisms_of_gmsh_are_refused_with_its_own_option(tmp_path):
     pytest.importorskip("alphacut.rve.fenicsx")
     from alphacut.rve.mesh import square
     from alphacut.rve.mesh.file import read_prisms
+    from alphacut.rve.mesh.msh import parse_msh
     from alphacut.rve.mesh.periodicity import MeshError
 
     with square.model() as gmsh:
@@ -97,8 +98,9 @@ def test_complete_quadratic_prisms_of_gmsh_are_refused_with_its_own_option():
         gmsh.option.setNumber("Mesh.ElementOrder", 2)
         gmsh.option.setNumber("Mesh.MeshSizeMin", 1)
         gmsh.model.mesh.generate(3)
-        with pytest.raises(MeshError, match=r"Prism 18.*SecondOrderIncomplete = 1"):
-            read_prisms(gmsh)
+        gmsh.write(str(tmp_path / "cell.msh"))
+    with pytest.raises(MeshError, match=r"Prism 18.*SecondOrderIncomplete = 1"):
+        read_prisms(parse_msh((tmp_path / "cell.msh").read_bytes()))
 
 
 def test_a_matrix_refuses_a_place_outside_of_its_pattern():

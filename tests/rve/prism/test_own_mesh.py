@@ -16,7 +16,16 @@ from alphacut.rve import MeshModel, Phase, PrismModel
 from alphacut.rve.cell.outline import Ellipse, circle
 from alphacut.rve.mesh import square
 from alphacut.rve.mesh.columns import extrude
-from alphacut.rve.mesh.file import MIRRORED, UPSIDE_DOWN, orient, read_grid, refined, write
+from alphacut.rve.mesh.file import (
+    MIRRORED,
+    UPSIDE_DOWN,
+    orient,
+    read_grid,
+    read_prisms,
+    refined,
+    write,
+)
+from alphacut.rve.mesh.msh import parse_msh
 from alphacut.rve.mesh.periodicity import MeshError
 from alphacut.rve.mesh.prism_grid import Prisms
 from alphacut.stochastic import HermiteMap, TruncatedNormal
@@ -196,16 +205,14 @@ def test_prisms_that_are_no_cell_are_refused(tmp_path, change, message):
         read_grid(tmp_path / "bad.msh")
 
 
-@pytest.mark.parametrize(("version", "right"), [(2.2, "0.5"), (4.1, "1.5")])
-def test_a_periodic_mesh_that_gmsh_scaled_is_refused_with_the_cure(tmp_path, version, right):
+@pytest.mark.parametrize("version", [2.2, 4.1])
+def test_a_periodic_mesh_that_gmsh_scaled_is_refused_with_the_cure(tmp_path, version):
     with square.model() as gmsh:
         gmsh.open(str(MESHES / "two-particles.msh"))
         gmsh.option.setNumber("Mesh.MshFileVersion", version)
         gmsh.option.setNumber("Mesh.ScalingFactor", 0.5)
         gmsh.write(str(tmp_path / "half.msh"))
-    with pytest.raises(
-        MeshError, match=rf"spans -0.5 … {right} ×.* write it with Mesh.MshFileVersion = 2.2"
-    ):
+    with pytest.raises(MeshError, match=r"spans -0\.5 … 0\.5 ×.* scale and move the mesh"):
         read_grid(tmp_path / "half.msh")
 
 
@@ -232,23 +239,87 @@ def test_gmsh_is_handed_nothing_but_meshes(tmp_path, monkeypatch, content):
             read_grid(path)
 
 
-def test_gmsh_reads_a_copy_with_nothing_beside_it(tmp_path, monkeypatch):
-    """Comments before the mesh are read over; options beside it would be read by Gmsh."""
+def test_gmsh_reads_no_file(tmp_path, monkeypatch):
+    """Comments before the mesh are read over; a script and options beside it stay unread."""
     import gmsh
 
     mesh = (MESHES / "paper-coarse.msh").read_bytes()
     path = tmp_path / "my cell.msh"
     path.write_bytes(b"$Comments\nmade by hand\n$EndComments\n" + mesh)
     (tmp_path / "my cell.msh.opt").write_text("// options\n")
-    handed = []
-    merge = gmsh.merge
-    monkeypatch.setattr(gmsh, "open", lambda *_: pytest.fail("Gmsh opens scripts"))
-    monkeypatch.setattr(
-        gmsh, "merge", lambda x: (handed.append([*Path(x).parent.iterdir()]), merge(x))
-    )
+    for name in ("open", "merge"):
+        monkeypatch.setattr(gmsh, name, lambda *_: pytest.fail("Gmsh was handed a file"))
     grid = read_grid(path)
-    assert [file.name for file in handed[0]] == ["mesh.msh"]
     assert grid.names == read_grid(MESHES / "paper-coarse.msh").names
+
+
+@pytest.mark.parametrize("name", ["paper-coarse.msh", "ring.msh"])
+@pytest.mark.parametrize(("version", "is_binary"), [(2.2, 0), (2.2, 1), (4.1, 0), (4.1, 1)])
+def test_each_version_of_msh_is_read_as_gmsh_reads_it(tmp_path, name, version, is_binary):
+    with square.model() as gmsh:
+        gmsh.merge(str(MESHES / name))
+        gmsh.option.setNumber("Mesh.MshFileVersion", version)
+        gmsh.option.setNumber("Mesh.Binary", is_binary)
+        gmsh.write(str(tmp_path / "cell.msh"))
+        tags, points, _ = gmsh.model.mesh.getNodes()
+        [group] = [t for d, t in gmsh.model.getPhysicalGroups(3)][:1]
+        volumes = gmsh.model.getEntitiesForPhysicalGroup(3, group)
+        _, _, nodes = gmsh.model.mesh.getElements(3, volumes[0])
+        label = gmsh.model.getPhysicalName(3, group)
+    place = dict(zip(tags.tolist(), points.reshape(-1, 3), strict=True))
+    expected = np.array([place[tag] for tag in nodes[0].tolist()]).reshape(-1, 15, 3)
+    prisms = read_prisms(parse_msh((tmp_path / "cell.msh").read_bytes()))
+    first = prisms.cells[prisms.phase == prisms.names.index(label)][: len(expected)]
+    assert prisms.points[first] == pytest.approx(expected, abs=1e-14)
+    assert len(read_grid(tmp_path / "cell.msh").cells) == len(prisms.cells)
+
+
+TEXT = """$MeshFormat
+4.1 0 8
+$EndMeshFormat
+$Entities
+0 0 0 1
+1 0 0 0 1 1 1 1 1 0
+$EndEntities
+$Nodes
+1 1 1 1
+3 1 0 1
+1
+0 0 0
+$EndNodes
+$Elements
+1 1 1 1
+3 1 15 1
+1 1
+$EndElements
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("4.1 0 8", "4 0 8", "of version 4 .*write it as MSH 4.1 or 2.2"),
+        ("4.1 0 8", "4.1 0 4", "numbers of 4 bytes"),
+        ("4.1 0 8", "text", "without a format"),
+        ("1 1 1 1\n3 1 0 1", "1 1 1 1\n3 1 0 999999999", "promised and fewer there"),
+        ("1 1 1 1\n3 1 0 1", "1 1 1 1\n3 1 0 -1", "below 0"),
+        ("1 1 1 1\n3 1 0 1", "1 2 1 1\n3 1 0 1", "2 nodes promised and 1 there"),
+        ("1 1 1 1\n3 1 15 1", "99 1 1 1\n3 1 15 1", "promised and fewer there"),
+        ("3 1 15 1", "3 1 77 1", "of the unknown type 77"),
+        ("1 1\n$EndE", "1 9\n$EndE", "whose node is not there"),
+        ("1 1\n$EndE", "1 1.5\n$EndE", "no whole number"),
+        ("0 0 0\n$End", "0 0 nan\n$End", "whose place is no number"),
+        ("0 0 0\n$End", "0 0 0x\n$End", "could not convert"),
+        ("$EndElements", "", "cut off inside .Elements"),
+        ("$Nodes", "$Knots", "cut off inside .Knots"),
+    ],
+)  # fmt: skip
+def test_a_mesh_that_contradicts_itself_is_refused(tmp_path, old, new, message):
+    assert parse_msh(TEXT.encode()).groups == {1: [1]}
+    assert old in TEXT
+    (tmp_path / "cell.msh").write_text(TEXT.replace(old, new, 1))
+    with pytest.raises(RefusedError, match=message):
+        read_grid(tmp_path / "cell.msh")
 
 
 def test_a_file_that_is_none_is_refused(tmp_path):
