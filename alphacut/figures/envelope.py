@@ -227,21 +227,33 @@ def draw_fragility_of(axes: Axes, answer: Fragility, part: LimitFragility) -> No
 
 
 def draw_incremental(answer: Fragility) -> Figure:
-    """Draws least and greatest peak found over the measure, of each limit, record and level."""
-    limits = {name: limit for name, limit in answer.limits.items() if not limit.is_event}
-    size = WIDTH, 0.6 + 1.9 * len(limits)
-    figure, panels = plt.subplots(len(limits), sharex=True, squeeze=False, figsize=size)
-    for axes, (name, limit) in zip(panels[:, 0], limits.items(), strict=True):
-        for increment in answer.increments.values():
-            measure, (high, low) = increment.measure, limit.limit * increment.demands[name]
+    """Draws least and greatest peak found over the measure, of each peak, record and level.
+
+    A peak is drawn once with all its limits. In SVG its curves show their record's name on hover.
+    """
+    demands = answer.limits_by_demand
+    size = WIDTH, 0.6 + 1.9 * len(demands)
+    figure, panels = plt.subplots(len(demands), sharex=True, squeeze=False, figsize=size)
+    for axes, (peak, names) in zip(panels[:, 0], demands.items(), strict=True):
+        for record, increment in answer.increments.items():
+            measure, (high, low) = increment.measure, answer.demand_curve(names[0], record)
             for level, shade in enumerate(style.colours(answer.alpha)):
                 band: style.Look = {"color": shade, "lw": 0, "alpha": 0.7}
-                axes.fill_between(measure, low[level], high[level], **band)
-            axes.plot(measure, high[-1], color=INK, lw=0.7)
-        axes.axhline(limit.limit, color=ORANGE, lw=1.2, ls="--")
-        axes.set_xlim(0.0, max(x.measure[-1] for x in limits.values()))
-        axes.set_ylim(0.0, 3 * limit.limit)
-        style.prefix_axis(axes, f"peak of {limit.output}", limit.unit)
+                filled = axes.fill_between(measure, low[level], high[level], **band)
+                filled.set_gid(f"{style.HOVER}{record}")
+            (line,) = axes.plot(measure, high[-1], color=INK, lw=0.7)
+            line.set_gid(f"{style.HOVER}{record}")
+        limits = [answer.limits[name] for name in names]
+        for limit in limits:
+            axes.axhline(limit.limit, color=ORANGE, lw=1.2, ls="--")
+            axes.annotate(
+                limit.value_words, (1.0, limit.limit), xycoords=("axes fraction", "data"),
+                ha="right", va="bottom", fontsize=8, color=ORANGE,
+            )  # fmt: skip
+        largest, smallest = (pick(x.limit for x in limits) for pick in (max, min))
+        axes.set_xlim(0.0, max(answer.limits[name].measure[-1] for name in names))
+        axes.set_ylim(0.0, max(3 * smallest, 1.5 * largest))
+        style.prefix_axis(axes, f"peak of {peak}", limits[0].unit)
     style.prefix_axis(axes, answer.measure, answer.unit, across=True)
     panels[0, 0].set_title(f"{len(answer.increments)} records; limits dashed")
     style.alpha_legend(panels[0, 0], answer.alpha)

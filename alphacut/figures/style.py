@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -48,6 +49,10 @@ SETTINGS: dict[str, Any] = {
 }
 
 
+HOVER = "hover:"
+"""Beginning of an artist's `gid`; the rest is what SVG shows where a pointer rests on it."""
+
+
 @contextmanager
 def figure_style() -> Iterator[None]:
     """Context manager that sets this style."""
@@ -67,6 +72,10 @@ def save(figure: Figure, stem: Path) -> list[Path]:
     for kind in ("svg", "png"):
         partial, file = (stem.with_name(f"{stem.name}{x}.{kind}") for x in (".partial", ""))
         figure.savefig(partial, metadata={"Date": None} if kind == "svg" else None)
+        if kind == "svg":
+            drawn = partial.read_text(encoding="utf-8")
+            titled = re.sub(rf'<g id="{HOVER}([^"]*)">', r"<g><title>\1</title>", drawn)
+            partial.write_text(titled, encoding="utf-8")
         files.append(partial.replace(file))
     plt.close(figure)
     return files

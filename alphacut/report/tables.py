@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
+from alphacut.base.csv_text import csv_cell
 from alphacut.base.number_text import MINUS, Table, rounded_ends
 from alphacut.frame import LearnedInputs, Sensitivity
 from alphacut.frame.analyses.answer import Answer
@@ -49,6 +50,7 @@ def frames(parts: Parts) -> dict[str, pd.DataFrame]:
     found = {name: frame_of(part) for name, frame_of, part in of_stages if part}
     if parts.fragility is not None and parts.fragility.increments:
         found["fragility_sets"] = pd.DataFrame(parts.fragility.crossings())
+        found["fragility_curves"] = pd.DataFrame(parts.fragility.curves())
     return found | {answer.key: rows_of(answer) for answer in parts.answers}
 
 
@@ -157,9 +159,15 @@ def write_tables(parts: Parts, results: ResultsFolder, folder: Path) -> list[Pat
 def write_csv(found: Mapping[str, pd.DataFrame], folder: Path) -> list[Path]:
     """Writes data frames as CSV files, exact so that a bound stays one; returns the files."""
     for name, frame in found.items():
-        text = frame.to_csv(index=False, lineterminator="\n").replace(MINUS, "-")
+        texts = frame.select_dtypes("object")
+        text = frame.assign(**texts.map(_csv_cell)).to_csv(index=False, lineterminator="\n")
         write_text(folder / f"{name}.csv", text, follow_links=False)
     return [folder / f"{name}.csv" for name in found]
+
+
+def _csv_cell(value: object) -> object:
+    """A text with plain signs that no spreadsheet takes for a formula; another value as it is."""
+    return csv_cell(value.replace(MINUS, "-")) if isinstance(value, str) else value
 
 
 def write_markup(named: Mapping[str, Table], folder: Path) -> list[Path]:

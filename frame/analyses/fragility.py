@@ -20,7 +20,7 @@ from alphacut.base.arrays import Array, Mask
 from alphacut.base.errors import require, require_choice
 from alphacut.base.number_text import STANDARD_GRAVITY, engineering, range_text
 from alphacut.base.progress_bar import Progress, subprogress
-from alphacut.frame.analyses.answer import Record
+from alphacut.frame.analyses.answer import Record, known
 from alphacut.frame.analyses.incremental import (
     GRID_RATIO,
     RESOLUTION,
@@ -321,6 +321,42 @@ class Fragility(LimitsAnswer[LimitFragility]):
                         rows[-1][f"{title}{unit}"] = None if np.isinf(crossing) else crossing
                     for title, demands in sets.items():
                         rows[-1][f"{title}{unit}"] = _set_text(increment.measure, demands)
+        return rows
+
+    @property
+    def limits_by_demand(self) -> dict[str, list[str]]:
+        """Names of the limits of each peak of a frame that yields, by the name of the peak."""
+        found: dict[str, list[str]] = {}
+        for name, part in self.limits.items():
+            if not part.is_event:
+                found.setdefault(part.peak_name, []).append(name)
+        return found
+
+    def demand_curve(self, name: str, record: str) -> Array:
+        """Return the greatest and the least peak found under a record, over its `measure`.
+
+        Args:
+            name: Name of a limit of the peak.
+            record: Name of the record.
+
+        Returns:
+            In the SI unit of the limit, shape (2, A, X); nan where structures collapse.
+        """
+        return self.limits[name].limit * self.increments[record].demands[name]
+
+    def curves(self) -> list[Record]:
+        """Return a row for each peak, record, level and measure of a frame that yields."""
+        measure, rows = f"{self.measure} [{self.unit}]" if self.unit else "scale", list[Record]()
+        for peak, (first, *_) in self.limits_by_demand.items():
+            unit = self.limits[first].unit
+            for record, increment in self.increments.items():
+                greatest, least = self.demand_curve(first, record)
+                for level, alpha in enumerate(self.alpha):
+                    ends = zip(increment.measure, least[level], greatest[level], strict=True)
+                    for value, low, high in ends:
+                        row: Record = {"peak": peak, "unit": unit, "record": record}
+                        row |= {"α": float(alpha), measure: float(value)}
+                        rows.append(row | {"least": known(low), "greatest": known(high)})
         return rows
 
     def numbers_of(self, part: LimitFragility) -> Iterator[Record]:

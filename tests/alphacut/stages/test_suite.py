@@ -9,6 +9,8 @@ import pytest
 from alphacut.base.errors import RefusedError
 from alphacut.case.content import load
 from alphacut.entry import main
+from alphacut.figures.envelope import draw_incremental
+from alphacut.figures.style import save
 from alphacut.frame import Fragility, spectral_acceleration
 from alphacut.frame.analyses.suites import nominal_mode
 from alphacut.io.files import BadInput
@@ -226,3 +228,27 @@ def test_a_limit_that_no_measure_tried_exceeds_is_said_to_be_so(tmp_path):
     assert "first crossing beyond all measures tried" in words
     assert "inf " not in words
     assert "fragility.most tries more" in answer.words()
+
+
+def test_curves_of_a_demand_have_their_record_and_are_drawn_once_with_all_limits(tmp_path):
+    """The structure is elastic at the first measure: peaks are its drift under the record there."""
+    text = CASE.replace("masses", 'yield_force = ["40 kN ± 9 %"]\nmasses')
+    text = text.replace('"k1"', '"fy1"').replace(
+        '["drift1 <= 10 mm"]', '["drift1 <= 10 mm", "drift1 <= 25 mm"]'
+    )
+    answer = from_document(Fragility, summary_of_run(written(tmp_path, text))["fragility"])
+    curves = pd.DataFrame(answer.curves())
+    assert set(curves["record"]) == {"one", "two"}
+    assert (curves["unit"] == "m").all()
+    assert set(curves["peak"]) == {"drift1"}
+    for record in records_of(tmp_path)[0]:
+        first = curves[(curves["record"] == record.name) & (curves["α"] == 1.0)].iloc[0]
+        period = 2 * np.pi * np.sqrt(20e3 / 8e6)
+        scale = first["PGA [m/s^2]"] / record.measures["PGA"]
+        drift = scale * spectral_acceleration(record.ground, period, 0.05) / (8e6 / 20e3)
+        assert first["greatest"] == pytest.approx(drift, rel=0.01)
+    figure = draw_incremental(answer)
+    assert len(figure.axes) == 1
+    assert [text.get_text() for text in figure.axes[0].texts] == ["10 mm", "25 mm"]
+    drawn = save(figure, tmp_path / "curves")[0].read_text(encoding="utf-8")
+    assert drawn.count("<title>one</title>") == drawn.count("<title>two</title>") == 3
