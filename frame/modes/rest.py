@@ -185,8 +185,10 @@ def _amplitude_bounds(
 
 def _root(A: TaylorModel, B: TaylorModel) -> TaylorModel:
     """Bound (A t + B/t)/2 of √(A B), shape (sources, m), for A (m,) and B (sources,)."""
-    of_A, of_B = (np.maximum(x.bounds()[1], 1e-300) for x in (A, B))
-    t = np.sqrt(of_B[:, None] / of_A)
+    _, of_A = A.bounds()
+    _, of_B = B.bounds()
+    # t is the least bound's; any other positive number is allowed, where a sum may be zero
+    t: Array = np.sqrt(np.maximum(of_B, 1e-300)[:, None] / np.maximum(of_A, 1e-300))
     return A[None] * (t / 2) + B[:, None] * (0.5 / t)
 
 
