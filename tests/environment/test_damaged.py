@@ -1,0 +1,62 @@
+"""Damaged files of every format neither end a process nor take much memory or time."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from alphacut.base.errors import RefusedError
+from tests.environment import damaged
+from tests.environment.damaged import HEAD, Format, outcome_of
+
+
+@pytest.mark.slow
+def test_damaged_files_of_every_format_are_read_or_refused(rng):
+    """A few of each; `python -m tests.environment.damaged` damages a hundred of each."""
+    pytest.importorskip("tifffile")
+    command = [sys.executable, "-m", "tests.environment.damaged", "--count", "3"]
+    command += ["--seed", str(rng.integers(1 << 31))]
+    run = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stdout + run.stderr
+    assert run.stdout.startswith(HEAD)
+    assert len(run.stdout.splitlines()) > 50
+
+
+def refuse(_):
+    raise RefusedError("file", "damaged", "sound files")
+
+
+@pytest.mark.parametrize(
+    ("read", "failure"),
+    [
+        (refuse, ""),
+        (lambda path: path.read_bytes(), ""),
+        (lambda _: os.kill(os.getpid(), signal.SIGKILL), "signal 9"),
+        (lambda _: os.kill(os.getpid(), signal.SIGALRM), "more than 20 s"),
+        (lambda _: [][1], "exit status 4"),
+        (lambda _: bytes(1 << 40), " MB"),
+    ],
+)
+def test_each_end_of_a_process_is_told(tmp_path, rng, read, failure):
+    """Readers that fail in each way, in the processes of their own alone."""
+
+    def read_damaged(path):
+        return None if os.getpid() == parent else read(path)
+
+    parent = os.getpid()
+    write = damaged.bytes_to("file.txt", lambda: b"1 2 3")
+
+    outcome = outcome_of(Format("made up", write, read_damaged), 3, rng, Path(tmp_path, "a"))
+    assert len(outcome.failures) == (3 if failure else 0)
+    assert all(failure in words for words in outcome.failures)
+
+
+def test_a_process_that_takes_much_memory_is_told(tmp_path, rng, monkeypatch):
+    monkeypatch.setattr(damaged, "MOST_MEGABYTES", 1.0)
+    write = damaged.bytes_to("file.txt", lambda: b"1 2 3")
+    outcome = outcome_of(Format("made up", write, Path.exists), 2, rng, Path(tmp_path, "a"))
+    assert len(outcome.failures) == 2
+    assert all(" MB" in words for words in outcome.failures)
