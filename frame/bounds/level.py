@@ -25,9 +25,10 @@ from alphacut.frame.response.oscillators import (
     ModalResponses,
     Oscillators,
     grid_over,
+    is_fed_through,
     read_response,
 )
-from alphacut.frame.response.straying import Response, narrowed_straying
+from alphacut.frame.response.straying import Response, load_deviation, narrowed_straying
 
 POINTS = (8, 80), (3, 12)
 """Least and most points of a mode's table along ω and along q = g/ω."""
@@ -133,11 +134,38 @@ class LevelModels:
             deviations = self.tables[order].line_deviation
             for mode, deviation in zip(self.models.oscillators, deviations, strict=True):
                 by_magnitude[:, o] += mode.share.size()[:, o] @ deviation
+        # what forces add at once: by magnitude that of oscillators is in their tables
+        time = self.excitation[1]
+        direct = [*self._feedthroughs()]
         responses = [x for mode in self.models.oscillators for x in self._responses(mode)]
-        return narrowed_straying(responses, self.excitation[1], by_magnitude, unresolved)
+        for source, response in direct:
+            index = self.excitation[2].index(source)
+            of_others = response.coefficient.real[:, 0, 0]
+            spread = response.spread[0]
+            for mode in self.models.oscillators:
+                share = mode.share[index]
+                is_acceleration = self.structure.order == 2
+                of_others = of_others - share.value * is_acceleration
+                spread = spread + share.spread() * is_acceleration
+            assert response.load is not None
+            deviation = load_deviation(response.load, time)
+            by_magnitude += np.outer(deviation, np.abs(of_others) + spread)
+        responses += [response for _, response in direct]
+        return narrowed_straying(responses, time, by_magnitude, unresolved)
+
+    def _feedthroughs(self) -> Iterator[tuple[str, Response]]:
+        """What each force adds to accelerations at once, M⁻¹ b f of all modes, by its source."""
+        structure = self.structure
+        rows = structure.rows * (structure.order == 2)[:, None]
+        for source in self.excitation[2]:
+            if is_fed_through(source, 2) and rows.any():
+                fed = (structure.forced[source][None] @ rows.T)[0] * structure.factor
+                spread = np.stack([fed.spread(), 0 * fed.spread()])
+                kappa = fed.value[:, None, None] + 0j
+                yield source, Response(None, self.excitation[0][source], 2, kappa, spread)
 
     def _responses(self, mode: Oscillator) -> Iterator[Response]:
-        """What a mode adds to outputs by each source, and what forces do to accelerations."""
+        """What a mode adds to outputs by each source, without what forces add at once."""
         (loads, _, sources), orders = self.excitation, self.structure.order
         points = int(numbers.DEVIATION_POINTS), 3
         sigma = grid_over(mode.omega_range, mode.quotient_range, points).sigma
@@ -150,9 +178,6 @@ class LevelModels:
                 kappa = share[:, None, None] * (real + 1j * imag)
                 kappa_off = np.outer([np.abs(x).max() for x in (real, imag)], off)
                 yield Response(sigma, loads.get(source), order, kappa, kappa_off)
-                if order == 2 and source.startswith("force"):
-                    kappa, kappa_off = share[:, None, None] + 0j, np.stack([off, 0 * off])
-                    yield Response(None, loads[source], order, kappa, kappa_off)
 
 
 @dataclass(eq=False)

@@ -56,7 +56,8 @@ class TruncatedModes:
     amplitude: TaylorModel  # bound of √(A B), (sources, m)
     middle: Array  # middle of the responses that the share is multiplied by, (sources, m, T)
     half: Array  # half their range, that the amplitude is multiplied by
-    # bound of the motion's distance from straight lines between nodes, (T, m)
+    # bound of the motion's distance from straight lines between nodes, without what forces add to
+    # accelerations at once, (T, m)
     line_deviation: Array
 
     @property

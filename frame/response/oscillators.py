@@ -165,6 +165,14 @@ class Oscillators:
         modulus, read = self._deviations[source][order]
         return modulus * (1 + self.grid.quotient[-1]) if source == "start" else read
 
+    def deviation_without_feedthrough(self, source: str, order: int) -> Array:
+        """Bounds of how far responses stray from lines, without what forces add at once, (T,)."""
+        deviation = self._line_deviation(source, order)
+        if not is_fed_through(source, order):
+            return deviation
+        modulus, _ = self._deviations[source][order]
+        return np.asarray(modulus / self.grid.omega[0])  # |Im G/ω| ≤ |G|/ω
+
 
 def read_response(source: str, sigma: Array, G: Array) -> Array:
     """Response e of oscillators to a source by G = σ^order ρ(σ; t), without feedthrough.
@@ -193,7 +201,8 @@ class Ranges:
 
     low: Array  # lower bounds
     high: Array  # upper bounds
-    # bounds of how far λ^κ e strays from a straight line in the step to a node
+    # bounds of how far λ^κ e, without what a force adds at once, strays from a straight line in the
+    # step to a node
     line_deviation: Array
 
 
@@ -233,25 +242,23 @@ def response_ranges(
         scale = largest ** (2 * np.array(POWERS)[:, None])
         for s, source in enumerate(sources):
             rho = size.get(source, np.exp(-decay * time))
-            rho_in_step, force = np.append(rho[:1], rho[:-1]), 0.0
+            rho_in_step = np.append(rho[:1], rho[:-1])
             if source in loads:
-                force = loads[source].extremes[0]
-                rho_in_step = np.maximum(rho_in_step + step * force, rho)
+                rho_in_step = np.maximum(rho_in_step + step * loads[source].extremes[0], rho)
             for order, ranges in found.items():
                 factor = largest**order * (1 + quotient[1] if source == "start" else 1 / slowest)
                 direct = np.abs(feedthrough(source, loads, order, time))
                 high = scale * (factor * rho + direct)
                 low = -high
-                # a force may be zero at all nodes and not between them
-                direct_in_step = force if is_fed_through(source, order) else 0.0
-                deviation = 2 * scale * (factor * rho_in_step + direct_in_step)
+                deviation = 2 * scale * factor * rho_in_step
                 if tables and source in loads:
                     table = tables.responses(source, order)
                     powers = [np.abs(tables.grid.sigma) ** (2 * power) for power in POWERS]
                     cells = [_bounds_over_cells(table.value, table.error, x) for x in powers]
                     least, greatest = np.swapaxes(cells, 0, 1)
                     low, high = np.maximum(low, least), np.minimum(high, greatest)
-                    deviation = np.minimum(deviation, scale * table.line_deviation)
+                    by_table = tables.deviation_without_feedthrough(source, order)
+                    deviation = np.minimum(deviation, scale * by_table)
                 np.minimum(ranges.low[:, s], low, out=ranges.low[:, s])
                 np.maximum(ranges.high[:, s], high, out=ranges.high[:, s])
                 np.maximum(ranges.line_deviation[:, s], deviation, out=ranges.line_deviation[:, s])
