@@ -134,29 +134,31 @@ class LevelModels:
             deviations = self.tables[order].line_deviation
             for mode, deviation in zip(self.models.oscillators, deviations, strict=True):
                 by_magnitude[:, o] += mode.share.size()[:, o] @ deviation
-        # what forces add at once: by magnitude that of oscillators is in their tables
-        time = self.excitation[1]
-        direct = [*self._feedthroughs()]
-        responses = [x for mode in self.models.oscillators for x in self._responses(mode)]
-        for source, response in direct:
-            index = self.excitation[2].index(source)
-            of_others = response.coefficient.real[:, 0, 0]
-            spread = response.spread[0]
-            for mode in self.models.oscillators:
-                share = mode.share[index]
-                is_acceleration = self.structure.order == 2
-                of_others = of_others - share.value * is_acceleration
-                spread = spread + share.spread() * is_acceleration
+        # The tables of oscillators contain what forces add at once through these; what they add
+        # through all other modes is the difference to M⁻¹ b f.
+        time, fed = self.excitation[1], dict(self._feedthroughs())
+        for source, response in fed.items():
             assert response.load is not None
-            deviation = load_deviation(response.load, time)
-            by_magnitude += np.outer(deviation, np.abs(of_others) + spread)
-        responses += [response for _, response in direct]
-        return narrowed_straying(responses, time, by_magnitude, unresolved)
+            of_others = self._fed_through_others(source, response)
+            by_magnitude += np.outer(load_deviation(response.load, time), of_others)
+        responses = [x for mode in self.models.oscillators for x in self._responses(mode)]
+        return narrowed_straying([*responses, *fed.values()], time, by_magnitude, unresolved)
+
+    def _fed_through_others(self, source: str, fed: Response) -> Array:
+        """Bound of what a unit of a force adds at once by modes that are no oscillators, (m,)."""
+        index, is_acceleration = self.excitation[2].index(source), self.structure.order == 2
+        value: Array = fed.coefficient.real[:, 0, 0]
+        spread: Array = fed.spread[0]
+        for mode in self.models.oscillators:
+            share = mode.share[index]
+            value = value - np.where(is_acceleration, share.value, 0.0)
+            spread = spread + np.where(is_acceleration, share.spread(), 0.0)
+        return np.asarray(np.abs(value) + spread)
 
     def _feedthroughs(self) -> Iterator[tuple[str, Response]]:
         """What each force adds to accelerations at once, M⁻¹ b f of all modes, by its source."""
         structure = self.structure
-        rows = structure.rows * (structure.order == 2)[:, None]
+        rows = np.where((structure.order == 2)[:, None], structure.rows, 0.0)
         for source in self.excitation[2]:
             if is_fed_through(source, 2) and rows.any():
                 fed = (structure.forced[source][None] @ rows.T)[0] * structure.factor

@@ -131,8 +131,8 @@ def node_deviation(flow: Flow, points: Array) -> Array:
     """
     finer, parts = flow.finer()
     fraction = (np.arange(1, parts) / parts)[:, None]
-    deviation = np.zeros((len(flow.time) - 1, len(flow.outputs)))
-    has_jump = np.zeros(deviation.shape, bool)
+    deviation: Array = np.zeros((len(flow.time) - 1, len(flow.outputs)))
+    has_jump: Mask = np.zeros(deviation.shape, bool)
     for chunk in np.array_split(points, -(-len(points) // CHUNK)):
         fine = finer.values(chunk)
         ends = fine[:, ::parts]

@@ -187,11 +187,14 @@ def top_accelerations(masses, stiffness, dampers, samples, factors, times):
     return np.array(motions)
 
 
-def test_a_force_that_ends_at_a_node_widens_no_step_but_its_own(rng):
+@pytest.mark.parametrize("count", [16, 21], ids=["inner node", "last node"])
+def test_a_force_that_ends_at_a_node_widens_no_step_but_its_own(count, rng):
     """An acceleration jumps with the force, by far more than motions stray in any step."""
     masses, stiffness = np.array([6e4, 5e4]), np.array([6e7, 3e7])
     dampers, step, parts, steps = np.array([4e5, 2e5]), 0.02, 20, 100
-    gust = History(0.1, rng.uniform(1.0, 1.6, 1 + 4 * (steps // 20)))
+    samples = rng.uniform(1.0, 1.6, count)
+    samples[-1] = 3.0  # the force rises until it ends, so that motions exceed both nodes there
+    gust = History(0.1, samples)
     frame = StoreyFrame(
         masses,
         stiffness=stiffness,
@@ -204,20 +207,20 @@ def test_a_force_that_ends_at_a_node_widens_no_step_but_its_own(rng):
     flow = LinearFlow(frame, names, steps * step, step, Exact())
     found = node_deviation(flow, factors[[0, 2, -1], None] * stiffness)[1:, 0]
     times = np.arange(parts * steps + 1) * (step / parts)
-    samples = 1.2e4 * gust.samples
-    exact = top_accelerations(masses, stiffness, dampers, samples, factors, times)
+    exact = top_accelerations(masses, stiffness, dampers, 1.2e4 * samples, factors, times)
     nodes, x = exact[:, ::parts, None], np.arange(parts) / parts
     inner = exact[:, :-1].reshape(len(factors), steps, parts)
     off_chord = np.abs(inner - (1 - x) * nodes[:, :-1] - x * nodes[:, 1:]).max((0, 2))
     above = inner.max(2) - np.maximum(nodes[:, :-1, 0], nodes[:, 1:, 0])
     below = np.minimum(nodes[:, :-1, 0], nodes[:, 1:, 0]) - inner.min(2)
     beyond_ends = np.maximum(above, below).max(0)
-    end = round(gust.step * (len(gust.samples) - 1) / step)  # node at which the force ends
+    end = round(gust.step * (len(samples) - 1) / step)  # node at which the force ends
     has_jump = np.arange(1, steps + 1) == end
     assert has_jump.any()
     assert (off_chord <= found)[~has_jump].all()
     assert (beyond_ends <= found).all()
     assert found[has_jump] < 0.5 * off_chord[has_jump]
+    assert found[end - 2] < 0.5 * found[end - 1]
     assert np.median((found / off_chord)[~has_jump]) <= 3.0
 
 
