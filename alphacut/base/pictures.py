@@ -20,10 +20,15 @@ if TYPE_CHECKING:
 
 FORMATS = ("BMP", "GIF", "JPEG", "JPEG2000", "PNG", "PPM", "TIFF", "WEBP")
 """Formats of pixels, by Pillow's names."""
-MAX_PIXELS_PER_BYTE = {"PNG": 8 * DEFLATE_RATIO, "BMP": 128, "PPM": 8}
-"""Pixels that a byte of the file can stand for: of PNG one bit each and deflated, of BMP a run of
-255 in two bytes, of PPM one bit each. What a byte of the other formats can stand for is not bounded
-so well, and the memory that is free alone limits them."""
+LZW_RATIO = 2731
+"""Bytes that a byte of LZW can stand for: a string of 4096 bytes takes twelve bits."""
+MAX_BYTES_PER_BYTE = {
+    "PNG": DEFLATE_RATIO, "BMP": 128, "PPM": 1, "GIF": LZW_RATIO, "raw": 1, "packbits": 64,
+    "tiff_lzw": LZW_RATIO, "tiff_adobe_deflate": DEFLATE_RATIO, "tiff_deflate": DEFLATE_RATIO,
+}  # fmt: skip
+"""Bytes of pixels that a byte of the file can stand for, by format, or compression of TIFF."""
+MAX_PIXELS = 6e7
+"""Pixels of a picture in the other formats, of which a few bytes can stand for any number."""
 BYTES_PER_PIXEL = 16
 """Memory of a pixel while it is read: Pillow's four bytes, a copy of them, and a float."""
 
@@ -43,8 +48,12 @@ def opened_picture(path: Path) -> Iterator[Image]:
     with Image.open(path, formats=FORMATS) as picture:
         pixels, size = picture.width * picture.height, path.stat().st_size
         what = f"{picture.width} × {picture.height} pixels"
-        per_byte = MAX_PIXELS_PER_BYTE.get(picture.format or "", pixels)
+        coding = str(
+            picture.info.get("compression") if picture.format == "TIFF" else picture.format
+        )
+        ratio = MAX_BYTES_PER_BYTE.get(coding)
+        most = MAX_PIXELS if ratio is None else 8.0 * ratio * size  # a pixel has a bit at least
         value = f"{what} in a file of {size} bytes"
-        require(pixels <= per_byte * size, path.name, value, f"up to {per_byte * size} pixels")
+        require(pixels <= most, path.name, value, f"up to {most:.3g} pixels")
         require_free_memory(path.name, float(BYTES_PER_PIXEL * pixels), what)
         yield picture

@@ -20,18 +20,24 @@ from alphacut.base.errors import RefusedError, require
 from alphacut.base.pictures import opened_picture
 from alphacut.rve.image.raw import HEADS, data_of_head, read_head
 from alphacut.rve.image.stack import read_stack
-from alphacut.rve.image.white import WHITE_IS_ZERO, as_shown
+from alphacut.rve.image.white import PHOTOMETRIC, WHITE_IS_ZERO, as_shown, tags_of
 
 PLANE_MODES = ("1", "L", "I;16", "I;16B", "I;16L", "I", "F")
-PHOTOMETRIC = 262  # tag of TIFF
 SAMPLE_FORMAT, SIGNED = 339, 2
 PROGRAM_BYTES = 1.7e8
 """Memory of the program and its libraries."""
 BYTES_PER_ELEMENT = {2: 1450, 3: 1600}
 """Memory of an element in the cuts' solutions with their first guess, by dimension; within 1.25 of
 peaks at 128² … 512² pixels of two elements a side, 512² and 1024² of one, 64³ … 128³ voxels."""
+COLOUR_MODES = ("RGB", "RGBA", "P", "LA")
+"""Pillow's modes that may hold grey values as equal colours."""
 TAKE_VOXEL = "a volume takes cell.voxel in place of cell.pixel"
 TAKE_PIXEL = "a picture takes cell.pixel in place of cell.voxel"
+_HDF5 = 'np.save("v.npy", h5py.File("v.h5")["data"])'
+_NIFTI = 'np.save("v.npy", nibabel.load("v.nii").get_fdata().T)'
+_VTI = 'm = pyvista.read("v.vti"); np.save("v.npy", m.active_scalars.reshape(m.dimensions[::-1]))'
+SAVE_AS_NPY = {".nii": _NIFTI, ".h5": _HDF5, ".hdf5": _HDF5, ".vti": _VTI}
+"""A line of Python that writes a volume of another format as .npy, by its ending."""
 SLICES = (".tif", ".tiff", ".png", ".bmp")
 
 
@@ -99,6 +105,7 @@ def _read_volume(path: Path, sides: Sequence[float]) -> Array:
         return head.read()
     allowed = "a TIFF stack, a folder of slices, .npy, .mhd or .nhdr"
     cure = "write raw data beside a .mhd head with DimSize, ElementType and ElementDataFile"
+    cure = SAVE_AS_NPY.get(path.suffixes[0].lower() if path.suffixes else "", cure)
     if path.suffix.lower() in (*SLICES, ".jpg", ".jpeg"):
         cure = TAKE_PIXEL
     raise RefusedError(path.name, f"a file of kind {path.suffix or 'unknown'}", allowed, cure)
@@ -109,11 +116,7 @@ def _read_slices(folder: Path, is_square: bool) -> Array:
     files = files_of(folder)
     allowed = "a folder of slices, PNG, TIFF or BMP"
     require(len(files) > 1, folder.name, f"{len(files)} pictures", allowed)
-    by_number = {}
-    for file in files:
-        digits = re.findall(r"\d+", file.stem)
-        require(bool(digits), file.name, "no number", "a number in the name of each slice")
-        by_number[int(digits[-1])] = file
+    by_number = dict(zip(_numbers_in_names(files), files, strict=True))
     lowest, count = min(by_number), len(files)
     missing = [k for k in range(lowest, lowest + count) if k not in by_number]
     what = f"{count} pictures, none with number {min(missing, default=lowest)}"
@@ -130,11 +133,32 @@ def _read_slices(folder: Path, is_square: bool) -> Array:
     return values
 
 
+def _numbers_in_names(files: Sequence[Path]) -> list[int]:
+    """Return the number of each slice: of the numbers in its name the one that changes.
+
+    Where the names differ in more than one number, or in words, it is the last of them.
+
+    Raises:
+        RefusedError: A name has no number.
+    """
+    numbers = [re.findall(r"\d+", file.stem) for file in files]
+    for file, found in zip(files, numbers, strict=True):
+        require(bool(found), file.name, "no number", "a number in the name of each slice")
+    words = {re.sub(r"\d+", "#", file.stem) for file in files}
+    place = -1
+    if len(words) == 1:
+        columns = list(zip(*numbers, strict=True))
+        changing = [k for k, column in enumerate(columns) if len(set(map(int, column))) > 1]
+        place = changing[-1] if changing else -1
+    return [int(found[place]) for found in numbers]
+
+
 def _read_picture(path: Path, is_square: bool) -> Array:
     """Read the pixels of an image file with one page of grey values, top row first."""
     with opened_picture(path) as picture:
         mode, frames = picture.mode, getattr(picture, "n_frames", 1)
-        if mode not in PLANE_MODES or frames > 1:
+        is_grey = mode in PLANE_MODES or (mode in COLOUR_MODES and frames == 1)
+        if not is_grey or frames > 1:
             what = f"of mode {mode} with {frames} pages"
             cure = "save the one meant as grey values; a volume takes cell.voxel"
             raise RefusedError(path.name, what, "one page of grey values", cure)
@@ -143,8 +167,10 @@ def _read_picture(path: Path, is_square: bool) -> Array:
             what = f"of pixels {dpi_x:g} by {dpi_y:g} per inch"
             raise RefusedError(path.name, what, "square ones", "give cell.pixel = [width, height]")
         require_memory((picture.height, picture.width))
+        if mode in COLOUR_MODES:
+            return _grey_of_colours(path.name, np.asarray(picture.convert("RGBA")))
         values = np.asarray(picture)
-        tags = getattr(picture, "tag_v2", {})
+        tags = tags_of(picture)
         is_signed = tags.get(SAMPLE_FORMAT, (1,)) == (SIGNED,)
         is_wrapped = not is_signed and mode == "I" and values.min() < 0  # of unsigned 32 bits
         if is_wrapped or (is_signed and mode == "L"):
@@ -154,6 +180,24 @@ def _read_picture(path: Path, is_square: bool) -> Array:
         if mode == "L" and photometric == WHITE_IS_ZERO:
             values = np.uint8(255) - values  # as stored: Pillow has inverted them
         return as_shown(path.name, values, photometric)
+
+
+def _grey_of_colours(name: str, values: Array) -> Array:
+    """Return the grey values of an opaque picture whose red, green and blue are equal.
+
+    Args:
+        name: Name of the file.
+        values: Red, green, blue and opacity, shape (rows, columns, 4), 255 where opaque.
+
+    Raises:
+        RefusedError: It has colours, or is transparent somewhere.
+    """
+    red = values[..., 0]
+    is_grey = (values[..., 1] == red).all() and (values[..., 2] == red).all()
+    cure = "save it as grey values"
+    require(is_grey, name, "in colours", "one page of grey values", cure)
+    require((values[..., 3] == 255).all(), name, "transparent in places", "opaque pixels", cure)
+    return np.ascontiguousarray(red)
 
 
 def needed_memory(shape: tuple[int, ...], division: int = 1) -> float:

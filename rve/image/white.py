@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, require
 
-WHITE_IS_ZERO = 0
+PHOTOMETRIC, WHITE_IS_ZERO = 262, 0
+"""Number of the tag of TIFF, and the value with which a stored zero is white."""
+
+
+def tags_of(picture: object) -> Mapping[int, Any]:
+    """Return the tags of a page of TIFF that Pillow has opened, by their numbers; {} of others."""
+    tags: Mapping[int, Any] = getattr(picture, "tag_v2", {})
+    return tags
 
 
 def as_shown(name: str, values: Array, photometric: object) -> Array:

@@ -5,7 +5,7 @@ import zlib
 import numpy as np
 import pytest
 
-from alphacut.base import memory
+from alphacut.base import memory, pictures
 from alphacut.base.errors import RefusedError
 from alphacut.base.pictures import opened_picture
 from alphacut.rve.image.files import read_grid
@@ -59,3 +59,13 @@ def test_a_page_of_postscript_is_no_picture_and_starts_no_program(tmp_path, monk
     (tmp_path / "a.png").write_text(page)
     with pytest.raises(RefusedError, match="cannot identify image file"):
         read(tmp_path / "a.png")
+
+
+@pytest.mark.parametrize("name", ["a.gif", "a.jpg", "a.webp", "a.tif"])
+def test_every_format_has_a_most_of_pixels(tmp_path, monkeypatch, name):
+    Image.fromarray(np.zeros((40, 50), np.uint8)).save(tmp_path / name)
+    assert section_picture(tmp_path / name).shape == (40, 50)
+    monkeypatch.setattr(pictures, "MAX_PIXELS", 1999)
+    monkeypatch.setattr(pictures, "MAX_BYTES_PER_BYTE", dict.fromkeys(("GIF", "raw"), 1e-3))
+    with pytest.raises(RefusedError, match="50 × 40 pixels in a file of"):
+        section_picture(tmp_path / name)

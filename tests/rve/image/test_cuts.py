@@ -141,7 +141,7 @@ def test_a_mask_whose_white_is_zero_is_refused_with_its_fraction(tmp_path):
 
 
 BROKEN = {
-    "colour.png": np.zeros((4, 4, 3), np.uint8),
+    "colour.png": np.arange(48, dtype=np.uint8).reshape(4, 4, 3),
     "nan.npy": np.array([[1.0, np.nan], [0.0, 1.0]]),
     "line.npy": np.arange(5.0),
     "text.png": b"no image",

@@ -102,7 +102,7 @@ def test_endings_in_capitals_are_those_in_small_letters(tmp_path, rng):
 @pytest.mark.parametrize(
     ("name", "write", "message"),
     [
-        ("colour.tif", lambda p: stack(p, np.zeros((4, 5, 6, 3), np.uint8), photometric="rgb"), "axes"),
+        ("colour.tif", lambda p: stack(p, np.arange(360, dtype="u2").reshape(4, 5, 6, 3), photometric="rgb"), "in colours"),
         ("channels.tif", lambda p: stack(p, np.zeros((3, 5, 6), np.uint8), imagej=True), "axes CYX"),
         ("times.tif", lambda p: stack(p, np.zeros((2, 4, 5, 6), np.uint8), imagej=True), "axes"),
         ("plane.tif", lambda p: stack(p, np.zeros((5, 6), np.uint8)), "axes YX"),
@@ -112,6 +112,10 @@ def test_endings_in_capitals_are_those_in_small_letters(tmp_path, rng):
         ("thin.npy", lambda p: np.save(p, np.zeros((1, 5, 6))), "2 × 2 × 2 or more"),
         ("nan.npy", lambda p: np.save(p, np.full((2, 5, 6), np.nan)), "not finite"),
         ("raw.raw", lambda p: p.write_bytes(b"0" * 100), ".mhd head"),
+        ("v.nii", lambda p: p.write_bytes(b"0" * 100), "nibabel.load("),
+        ("v.nii.gz", lambda p: p.write_bytes(b"0" * 100), "nibabel.load("),
+        ("v.HDF5", lambda p: p.write_bytes(b"0" * 100), "h5py.File("),
+        ("v.vti", lambda p: p.write_bytes(b"0" * 100), "pyvista.read("),
         ("a.mhd", lambda p: meta_image(p, np.zeros((11, 5, 7), "u1")), "385 bytes"),
         ("b.mhd", lambda p: meta_image(p, np.zeros(SHAPE, "u1"), head="CompressedData = True\n"), "gzip or zlib"),
         ("c.mhd", lambda p: meta_image(p, np.zeros(SHAPE, "u1"), head="ElementSpacing = 1 1 2\n"), "voxels of 1 × 1 × 2"),
@@ -267,3 +271,45 @@ def test_a_stack_that_promises_more_than_its_file_holds_is_refused(tmp_path):
     (tmp_path / "a.tif").write_bytes(content)
     with pytest.raises(RefusedError, match=r"3 × 4000 × 50; allowed: what \d+ bytes can hold"):
         read_grid(tmp_path / "a.tif", CUBE)
+
+
+def test_pages_of_pillow_are_a_stack_whatever_their_compression(tmp_path, rng):
+    for kind in ("u1", "u2"):
+        values = rng.integers(0, 250, SHAPE).astype(kind)
+        pages = [Image.fromarray(page) for page in values]
+        for compression in ("tiff_lzw", "tiff_deflate", "raw"):
+            path = tmp_path / f"{kind}-{compression}.tif"
+            pages[0].save(path, save_all=True, append_images=pages[1:], compression=compression)
+            assert np.array_equal(read_grid(path, CUBE), values)
+        with tifffile.TiffWriter(tmp_path / "pages.tif") as file:
+            for page in values:
+                file.write(page, contiguous=False)
+        assert np.array_equal(read_grid(tmp_path / "pages.tif", CUBE), values)
+        with tifffile.TiffWriter(tmp_path / "unlike.tif") as file:
+            for page in (values[0], values[1, 1:]):
+                file.write(page, contiguous=False)
+        with pytest.raises(RefusedError, match="2 series"):
+            read_grid(tmp_path / "unlike.tif", CUBE)
+
+
+def test_colours_that_are_equal_are_grey_values(tmp_path, rng):
+    values = rng.integers(0, 250, SHAPE).astype("u1")
+    stack(tmp_path / "rgb.tif", np.repeat(values[..., None], 3, axis=3), photometric="rgb")
+    assert np.array_equal(read_grid(tmp_path / "rgb.tif", CUBE), values)
+    grey = Image.fromarray(values[0])
+    for mode in ("RGB", "RGBA", "LA", "P"):
+        grey.convert(mode).save(tmp_path / f"{mode}.png")
+        assert np.array_equal(read_grid(tmp_path / f"{mode}.png", (1, 1)), values[0, ::-1])
+    clear = grey.convert("RGBA")
+    clear.putpixel((0, 0), (7, 7, 7, 100))
+    clear.save(tmp_path / "clear.png")
+    with pytest.raises(RefusedError, match="transparent in places"):
+        read_grid(tmp_path / "clear.png", (1, 1))
+
+
+@pytest.mark.parametrize("name", ["rec_{:04d}_8bit", "scan_{:03d}_5um", "2024-01-02_s{}_x3", "{}"])
+def test_the_number_that_changes_in_names_is_that_of_the_slice(tmp_path, rng, name):
+    values = rng.integers(0, 250, SHAPE).astype("u1")
+    for k, page in enumerate(values):
+        Image.fromarray(page).save(tmp_path / f"{name.format(k)}.png")
+    assert np.array_equal(read_grid(tmp_path, CUBE), values)
