@@ -163,7 +163,7 @@ class LevelModels:
             if is_fed_through(source, 2) and rows.any():
                 fed = (structure.forced[source][None] @ rows.T)[0] * structure.factor
                 spread = np.stack([fed.spread(), 0 * fed.spread()])
-                kappa = fed.value[:, None, None] + 0j
+                kappa = fed.value[:, None, None]
                 yield source, Response(None, self.excitation[0][source], 2, kappa, spread)
 
     def _responses(self, mode: Oscillator) -> Iterator[Response]:
