@@ -22,6 +22,25 @@ class Table(NamedTuple):
     rows: list[tuple[str, ...]]
 
 
+class ShownUnit(NamedTuple):
+    """Unit in which a quantity is shown.
+
+    Args:
+        label: The unit, as "mm"; empty for none.
+        factor: Number in this unit of one SI unit.
+    """
+
+    label: str
+    factor: float
+
+    def text(self, value: float, *, digits: int = 4) -> str:
+        """Text of a value in SI: ``40.00 mm``."""
+        scaled = value * self.factor + 0.0  # without the sign of −0
+        places = max(digits, len(f"{abs(scaled):.0f}"))
+        number = f"{scaled:#.{places}g}".rstrip(".")
+        return f"{number} {self.label}".strip().replace("-", MINUS)
+
+
 def engineering(value: float, si: str, *, digits: int = 4) -> str:
     """Text of a value in the SI unit `si`, with a prefix if the unit takes one: ``−3.590 MN``."""
     rounded_text = f"{value + 0.0:.{digits}g}"  # without the sign of −0

@@ -15,7 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from alphacut.base.arrays import Array
-from alphacut.base.number_text import engineering
+from alphacut.base.number_text import ShownUnit
 from alphacut.figures import style
 from alphacut.figures.style import BLUE, GREY, INK, ORANGE, WIDTH
 from alphacut.frame import Decision, Fragility, LearnedInputs, Probability, Tolerances
@@ -25,20 +25,26 @@ from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.result import Ends
 from alphacut.stages.envelope import EnvelopeTask
-from alphacut.stages.summary import Results
+from alphacut.stages.summary import Parts, Results
 
 
 def drawings(task: EnvelopeTask, results: Results) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Yields the name of each figure of a study, one an output, and the function that draws it."""
     dataset, structure = results.envelopes[task.name].arrays, results.structure
     assert structure is not None
+    units = Parts.of(results).shown_units
     for name in task.figures or map(str, dataset["output"].values):
         output = Output(name, structure.unit(name))
         number = f"fig{task.figures[output]}-" if output in task.figures else ""
-        yield f"{number}envelope-{task.name}-{output}", partial(envelope, dataset, output, task)
+        yield (
+            f"{number}envelope-{task.name}-{output}",
+            partial(envelope, dataset, output, task, units[name]),
+        )
 
 
-def envelope(dataset: xarray.Dataset, output: Output, task: EnvelopeTask) -> Figure:
+def envelope(
+    dataset: xarray.Dataset, output: Output, task: EnvelopeTask, unit: ShownUnit
+) -> Figure:
     """Draws the bands between lower and upper envelope of an output, by level, and their errors."""
     figure, axes = plt.subplots()
     shown = dataset.sel(output=str(output))
@@ -50,28 +56,31 @@ def envelope(dataset: xarray.Dataset, output: Output, task: EnvelopeTask) -> Fig
         axes.plot(time, shown.isel(alpha=-1)[side], color=INK, lw=0.8)
         axes.plot(time, shown.isel(alpha=0)[side], color=INK, lw=0.3)
     nature = str(dataset.attrs["nature"])
-    error = draw_error_band(axes, time, shown.isel(alpha=0), nature, output.unit)
-    time_axes(axes, time, output)
+    error = draw_error_band(axes, time, shown.isel(alpha=0), nature, unit)
+    time_axes(axes, time, output, unit)
     title = f"{output.words}; fuzzy: {', '.join(task.fuzzy)}; {nature}{error}".replace("^2", "²")
     axes.set_title(fill(re.sub(r"(?<=\d) ", "\u00a0", title), 80))  # keeps units by numbers
     style.alpha_legend(axes, alpha)
     return figure
 
 
-def draw_error_band(axes: Axes, time: Array, lowest: xarray.Dataset, nature: str, unit: str) -> str:
+def draw_error_band(
+    axes: Axes, time: Array, lowest: xarray.Dataset, nature: str, unit: ShownUnit
+) -> str:
     """Draws the declared error around a band; returns it as text, empty where none is estimated."""
     if "error" not in lowest or nature != "estimated":
         return ""
     error = lowest["error"]
     for end in (lowest["lower"] - error, lowest["upper"] + error):
         axes.plot(time, end, color=GREY, lw=0.7, ls="--")
-    return f", ± {engineering(float(error.max()), unit, digits=2)} (dashed)"
+    return f", ± {unit.text(float(error.max()), digits=2)} (dashed)"
 
 
-def time_axes(axes: Axes, time: Array, output: Output) -> None:
-    """Axes of an output over time."""
+def time_axes(axes: Axes, time: Array, output: Output, unit: ShownUnit) -> None:
+    """Axes of an output over time, in the unit in which it is shown."""
     axes.set(xlim=(time[0], time[-1]), xlabel="time t (s)")
-    style.prefix_axis(axes, output.words.removesuffix(f" ({output})"), output.unit)
+    words = output.words.removesuffix(f" ({output})")
+    style.prefix_axis(axes, words, output.unit, shown=unit)
 
 
 def mapping(results: Results) -> Figure:
@@ -93,7 +102,8 @@ def mapping(results: Results) -> Figure:
     shown = dataset.sel(output=output).isel(time=slice(0, len(flow.time)))
     for side in ("lower", "upper"):
         axes.plot(flow.time, shown[side], color=INK, lw=1.3)
-    time_axes(axes, flow.time, Output(output, structure.unit(output)))
+    unit = Parts.of(results).shown_units[output]
+    time_axes(axes, flow.time, Output(output, structure.unit(output)), unit)
     level = f"α = {float(dataset['alpha']):g}"
     axes.set_title(f"{output} at {level}: {len(points)} random motions (blue) and their envelope")
     return figure
@@ -180,7 +190,7 @@ def draw_probability(answer: Probability) -> Figure:
     label = f"limit of |{event.output}|"
     if event.is_event:
         label = "all limits, over those of the case"
-    style.prefix_axis(axes, label, event.unit, across=True)
+    style.prefix_axis(axes, label, event.unit, across=True, shown=event.stated_unit)
     return figure
 
 
@@ -253,7 +263,8 @@ def draw_incremental(answer: Fragility) -> Figure:
         largest, smallest = (pick(x.limit for x in limits) for pick in (max, min))
         axes.set_xlim(0.0, max(answer.limits[name].measure[-1] for name in names))
         axes.set_ylim(0.0, max(3 * smallest, 1.5 * largest))
-        style.prefix_axis(axes, f"peak of {peak}", limits[0].unit)
+        unit = limits[0].stated_unit
+        style.prefix_axis(axes, f"peak of {peak}", limits[0].unit, shown=unit)
     style.prefix_axis(axes, answer.measure, answer.unit, across=True)
     panels[0, 0].set_title(f"{len(answer.increments)} records; limits dashed")
     style.alpha_legend(panels[0, 0], answer.alpha)

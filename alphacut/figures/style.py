@@ -18,7 +18,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from alphacut.base.arrays import Array
-from alphacut.base.number_text import MINUS, axis_prefix
+from alphacut.base.number_text import MINUS, ShownUnit, axis_prefix
 
 # Okabe & Ito
 INK, BLUE, ORANGE, GREEN = "#1a1a1a", "#0072b2", "#d55e00", "#009e73"
@@ -99,13 +99,17 @@ def alpha_legend(axes: Axes, alpha: Array) -> None:
     axes.legend(handles=[*patches, top], title="α-cut", title_fontsize=8, **beside)
 
 
-def prefix_axis(axes: Axes, label: str, si: str, *, across: bool = False) -> None:
+def prefix_axis(
+    axes: Axes, label: str, si: str, *, across: bool = False, shown: ShownUnit | None = None
+) -> None:
     """Labels the vertical axis, or the horizontal one if `across`, in a unit with a prefix.
 
-    The data stay in SI: the labels of ticks are scaled.
+    The data stay in SI: the labels of ticks are scaled. Where `shown` is given, it is the unit.
     """
     axis = axes.xaxis if across else axes.yaxis
     factor, unit = axis_prefix(max(map(abs, axis.get_view_interval())), si)
+    if shown is not None:
+        unit, factor = shown
     axis.set_label_text(f"{label} ({unit})".replace("^2", "²") if unit else label)
     if factor != 1.0:
         axis.set_major_formatter(lambda value, _: f"{value * factor:.10g}".replace("-", MINUS))

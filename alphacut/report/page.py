@@ -6,11 +6,11 @@ import base64
 import math
 import re
 import tomllib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path, PurePosixPath
 
 from alphacut.base.errors import RefusedError
-from alphacut.base.number_text import Table
+from alphacut.base.number_text import ShownUnit, Table
 from alphacut.frame import Sensitivity
 from alphacut.frame.analyses.answer import enclosing_box_words
 from alphacut.fuzzy.result import Nature, of_enclosing_box
@@ -49,7 +49,10 @@ def render_page(folder: ResultsFolder) -> str:
         name=summary.case,
         about=" ".join(summary.about.split()),
         sections=Page(summary, folder).sections(),
-        envelopes=[plot(name, study, folder) for name, study in summary.envelopes.items()],
+        envelopes=[
+            plot(name, study, folder, summary.shown_units)
+            for name, study in summary.envelopes.items()
+        ],
     )
 
 
@@ -69,7 +72,9 @@ def render_template(**parts: object) -> str:
     return templates.get_template("report.html").render(parts)
 
 
-def plot(name: str, study: EnvelopeResult, folder: ResultsFolder) -> Document:
+def plot(
+    name: str, study: EnvelopeResult, folder: ResultsFolder, units: Mapping[str, ShownUnit]
+) -> Document:
     """Data of a study for the interactive plot: values over time as base64 of 32-bit floats."""
     dataset = folder.dataset(f"envelope_{name}.nc")
     time = dataset["time"].values
@@ -88,7 +93,8 @@ def plot(name: str, study: EnvelopeResult, folder: ResultsFolder) -> Document:
         "nature": str(study.nature),
         "alpha": dataset["alpha"].values.tolist(),
         "outputs": outputs,
-        "units": [study.units[output] for output in outputs],
+        "units": [units[output].label for output in outputs],
+        "factors": [units[output].factor for output in outputs],
         "step": float(time[1] - time[0]),
         **{
             side: [[base64.b64encode(row.tobytes()).decode() for row in level] for level in array]

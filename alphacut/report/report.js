@@ -71,15 +71,9 @@
     for (let k = last; k >= first; k -= 1) points.push(`${x(k * entry.step).toFixed(1)},${y(lower[k]).toFixed(1)}`);
     return `M${points.join("L")}Z`;
   }
-  function prefixed(unit) {
-    // A prefix where plain numbers would be long, as in the tables.
-    const largest = Math.max(Math.abs(view.bottom), Math.abs(view.top));
-    if (!["m", "m/s", "N", "Pa", "rad"].includes(unit) || !(largest > 0) || (largest >= 0.01 && largest < 1000)) return [1, unit];
-    const power = Math.min(3, Math.max(-3, Math.floor(Math.log10(largest) / 3)));
-    return [1000 ** -power, ["n", "\u00b5", "m", "", "k", "M", "G"][power + 3] + unit];
-  }
   function axes(entry) {
-    const [factor, unit] = prefixed(entry.units[entry.outputs.indexOf(output.value)]);
+    const index = entry.outputs.indexOf(output.value);
+    const [factor, unit] = [entry.factors[index], entry.units[index]];
     for (const t of ticks(view.left, view.right)) {
       element("line", { x1: x(t), x2: x(t), y1: margin.top, y2: height - margin.bottom, stroke: "#e6e6e6" }, svg);
       element("text", { x: x(t), y: height - margin.bottom + 18, "text-anchor": "middle" }, svg).textContent = String(t);
@@ -169,7 +163,7 @@
     const k = Math.round(time(at.x) / entry.step);
     if (k < 0 || k >= entry.lower[0][index].length) return;
     const [low, high] = ["lower", "upper"].map((side) => cut(entry, side, index, +slider.value)[k]);
-    readout.textContent = `t = ${(k * entry.step).toFixed(2)} s: ${[low, high].map((x) => x.toPrecision(4).replace(/-/g, "\u2212")).join(" … ")} ${entry.units[index]} at α = ${(+slider.value).toFixed(2)}`;
+    readout.textContent = `t = ${(k * entry.step).toFixed(2)} s: ${[low, high].map((x) => (x * entry.factors[index]).toPrecision(4).replace(/-/g, "\u2212")).join(" … ")} ${entry.units[index]} at α = ${(+slider.value).toFixed(2)}`;
   });
   svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
   fillOutputs();

@@ -10,9 +10,8 @@ import numpy as np
 
 from alphacut.base.number_text import (
     MINUS,
-    STANDARD_GRAVITY,
+    ShownUnit,
     Table,
-    axis_prefix,
     engineering,
     number_text,
     percent_text,
@@ -39,6 +38,7 @@ EXCEEDED = {"exceeded": "yes", "not exceeded": "no", "can be exceeded": "can be"
 """Verdicts on a limit as they stand in a column, where they are shorter there."""
 AROUND = "lie in the wider bounds that are proved"
 """Where tested motions lie beside an envelope that is not guaranteed itself."""
+NO_UNIT = ShownUnit("", 1.0)
 COMPARED = ("at the lowest α", "first", "second", "second over first")
 
 
@@ -152,15 +152,16 @@ def peak_table(parts: Parts) -> Table:
         levels.insert(1, int(np.argmin(np.abs(alpha - 0.5))))
     levels = list(dict.fromkeys(levels))
     limits, rows = limits_by_peak(parts), list[Row]()
+    shown_units = parts.shown_units
     for name, study in studies.items():
         suffix = f" ({name})" if len(studies) > 1 else ""
         drawn = study.drawn if isinstance(study, EnvelopeResult) else ()
         farthest = study.farthest_record if isinstance(study, SuitePeaks) else {}
         for peak_name in (name for name in study.peak if name in (drawn or study.peak)):
             peak, record = study.peak[peak_name], farthest.get(peak_name, "")
-            units = display_units(
-                peak_name, study.units[output_of(peak_name)], peak, parts.structure
-            )
+            unit = shown_units[output_of(peak_name)]
+            is_force = study.units[output_of(peak_name)] == "N"
+            units = display_units(peak_name, unit, parts.structure, is_force=is_force)
             for label, factor in units:
                 cells = peak_cells(peak, factor, levels)
                 for limit, verdict in limits.get(peak_name, [(math.nan, "")]):
@@ -203,18 +204,14 @@ def limits_by_peak(parts: Parts) -> dict[str, list[tuple[float, str]]]:
 
 
 def display_units(
-    name: str, unit: str, peak: Peak, frame: FrameResult | None
+    name: str, unit: ShownUnit, frame: FrameResult | None, *, is_force: bool
 ) -> Iterator[tuple[str, float]]:
     """Yields the label and the factor from SI of each unit in which a peak is shown."""
-    if unit == "m/s^2":
-        yield f"{name}, g", 1 / STANDARD_GRAVITY
-        return
-    factor, prefixed = axis_prefix(max(abs(float(peak.lower[0])), abs(float(peak.upper[0]))), unit)
-    yield f"{name}, {prefixed}" if prefixed else name, factor
+    yield f"{name}, {unit.label}" if unit.label else name, unit.factor
     height = None if frame is None else frame.heights_m.get(output_of(name))
     if height is not None:
         yield "  % of storey", 100 / height
-    if frame is not None and unit == "N":
+    if frame is not None and is_force:
         yield "  % of weight", 100 / frame.weight_N
 
 
@@ -255,7 +252,7 @@ def smaller_steps(parts: Parts) -> Iterator[str]:
                 if peak.nature is Nature.GUARANTEED:
                     what = "at least" if peak.is_least else "at most"
                     value = float(peak.far_end[0]) + (saved if peak.is_least else -saved)
-                text = engineering(value, study.units[output_of(name)])
+                text = parts.shown_units[output_of(name)].text(value)
                 yield f"{name}: a step of {study.step / 2:g} s would give {what} about {text}"
 
 
@@ -296,29 +293,31 @@ def comparison(first: Parts, second: Parts) -> Table:
             rows.append((what, str(entry), str(second_entry), ""))
         else:
             ratio = f"{second_entry / entry:.3f}" if entry else ""
-            rows.append((what, engineering(entry, unit), engineering(second_entry, unit), ratio))
+            rows.append((what, unit.text(entry), unit.text(second_entry), ratio))
     return Table(COMPARED, rows)
 
 
-def _compared_entries(parts: Parts) -> Iterator[tuple[str, str, float | str]]:
+def _compared_entries(parts: Parts) -> Iterator[tuple[str, ShownUnit, float | str]]:
     """Yields what is compared of a run on the lowest level: its name, its unit, number or text."""
+    shown_units = parts.shown_units
     for result in (parts.modulus, parts.image):
         if result is not None:
             low, high = (1e9 * float(end[0]) for end in result.E_GPa.ends)
             entries = {"greatest E": high, "width of E": high - low}
-            yield from ((what, "Pa", x) for what, x in entries.items() if math.isfinite(x))
+            shown = ShownUnit("GPa", 1e-9)
+            yield from ((what, shown, x) for what, x in entries.items() if math.isfinite(x))
     for study_name, study in parts.envelopes.items():
         for output, peak in study.peak.items():
             name = output if study_name == "all" else f"{output} ({study_name})"
-            unit = study.units[output_of(output)]
+            unit = shown_units[output_of(output)]
             yield f"greatest peak of {name}", unit, float(peak.far_end[0])
             yield f"width of the peak of {name}", unit, float(peak.upper[0] - peak.lower[0])
     if (suite := parts.records) is not None:
         for output, statistics in suite.statistics.items():
             for name, ends in statistics.items():  # mean, median …
-                unit = suite.units[output_of(output)]
+                unit = shown_units[output_of(output)]
                 yield f"{name} of the records' peaks of {output}", unit, float(ends[0])
     for limit in () if parts.decision is None else parts.decision.limits.values():
-        yield limit.words, "", limit.verdict_words
+        yield limit.words, NO_UNIT, limit.verdict_words
     if parts.tolerances is not None and parts.tolerances.kept is not None:
-        yield "scale of tolerances", "", parts.tolerances.kept
+        yield "scale of tolerances", NO_UNIT, parts.tolerances.kept

@@ -10,7 +10,7 @@ import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, require
-from alphacut.base.number_text import STANDARD_GRAVITY
+from alphacut.base.number_text import STANDARD_GRAVITY, ShownUnit, axis_prefix
 from alphacut.case.content import Content
 from alphacut.case.structure import Structure
 from alphacut.frame import (
@@ -23,6 +23,7 @@ from alphacut.frame import (
 )
 from alphacut.frame.analyses.answer import Answer
 from alphacut.frame.structures.linear import frequencies
+from alphacut.frame.structures.quantities import output_of
 from alphacut.io.files import Document, as_json
 from alphacut.io.results import COMPLETE, RUN_AGAIN, ResultsFolder, plain_name
 from alphacut.io.typed_json import from_document, to_document
@@ -159,6 +160,37 @@ class Parts:
         peaks = [peak for study in self.envelopes.values() for peak in study.peak.values()]
         peaks += [*self.records.peak.values()] if self.records else []
         return next((peak.encloses for peak in peaks if peak.encloses), "")
+
+    @property
+    def shown_units(self) -> dict[str, ShownUnit]:
+        """The unit in which each output is shown, wherever it is.
+
+        It is that of its first limit with a unit; else g of accelerations, and of others the SI
+        unit with a prefix that fits the largest peak.
+        """
+        largest, found = dict[str, float](), dict[str, ShownUnit]()
+        units = dict[str, str]()
+        studies: list[EnvelopeResult | SuitePeaks] = [*self.envelopes.values()]
+        studies += [self.records] if self.records else []
+        for study in studies:
+            units |= study.units
+            for name, peak in study.peak.items():
+                size = max(abs(float(peak.lower[0])), abs(float(peak.upper[0])))
+                largest[output_of(name)] = max(largest.get(output_of(name), 0.0), size)
+        for envelope in self.envelopes.values():
+            for output in envelope.min:
+                size = max(abs(envelope.min[output]), abs(envelope.max[output]))
+                largest.setdefault(output, float(size))
+        for output, unit in units.items():
+            label, factor = "g", 1 / STANDARD_GRAVITY
+            if unit != "m/s^2":
+                factor, label = axis_prefix(largest.get(output, 0.0), unit)
+            found[output] = ShownUnit(label, factor)
+        for answer in (self.probability, self.fragility, self.decision):
+            for part in () if answer is None else reversed(answer.parts.values()):
+                if part.stated_unit is not None and part.output in units:
+                    found[part.output] = part.stated_unit
+        return found
 
     @property
     def answers(self) -> list[Answer]:

@@ -89,7 +89,8 @@ class LimitDecision(About):
         if not np.isfinite(value):
             return "not known"
         if not self.is_event:
-            return engineering(rounded(value, side, nature), self.unit)
+            factor = 1.0 if self.stated_unit is None else self.stated_unit.factor
+            return self.text_of_value(rounded(factor * value, side, nature) / factor)
         digits = 4 + floor(log10(abs(value))) if value else 1  # a tenth of a per cent is the last
         return percent_text(rounded(value, side, nature, max(digits, 1)))
 

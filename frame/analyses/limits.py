@@ -10,7 +10,7 @@ from typing import Any, Generic, Literal, TypeVar
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import checked_number, require, require_choice
-from alphacut.base.number_text import MINUS, Table, engineering
+from alphacut.base.number_text import MINUS, ShownUnit, Table, engineering
 from alphacut.frame.analyses.answer import Answer, Record
 from alphacut.frame.structures.quantities import Output
 
@@ -169,6 +169,20 @@ class About:
         stated = re.sub(r"-(?=[\d.])", MINUS, self.stated)
         is_fraction = stated.endswith("%") or re.fullmatch(r"1\s*/\s*\d+", stated)
         return f"{stated} ({in_si})" if is_fraction and self.unit else stated
+
+    @property
+    def stated_unit(self) -> ShownUnit | None:
+        """The unit in which the limit was given; None of a fraction, and of a plain number."""
+        stated = self.stated.replace(MINUS, "-")
+        match = re.fullmatch(r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*([^\d\s%/].*)", stated)
+        if match is None or not self.limit or not float(match[1]):
+            return None
+        return ShownUnit(match[2], float(match[1]) / self.limit)
+
+    def text_of_value(self, value: float) -> str:
+        """Text of a value of the output in SI, in the unit of the limit if that has one."""
+        unit = self.stated_unit
+        return engineering(value, self.unit) if unit is None else unit.text(value)
 
     @property
     def event(self) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import xarray
 
+from alphacut.base.number_text import ShownUnit
 from alphacut.figures import envelope, material, overview
 from alphacut.figures.style import figure_style
 from alphacut.frame import Decision, Peak, StoreyFrame, propagation
@@ -74,10 +75,10 @@ def test_the_error_is_drawn_outside_bounds_that_it_may_pass(nature, lines):
     lowest = xarray.Dataset({name: ("time", values) for name, values in ends.items()})
     with figure_style():
         _, axes = plt.subplots()
-        words = envelope.draw_error_band(axes, time, lowest, nature, "m")
+        words = envelope.draw_error_band(axes, time, lowest, nature, ShownUnit("m", 1.0))
         ends = sorted(float(line.get_ydata()[0]) for line in axes.lines)
     assert ends == [-1.25, 1.25][:lines]
-    assert ("± 250 mm" in words) == bool(lines)
+    assert ("± 0.25 m" in words) == bool(lines)
 
 
 def test_numbers_and_bounds_are_drawn_with_their_own_ends():
