@@ -355,11 +355,15 @@ class ImageCell(Section):
         return 3 if self.voxel else 2
 
     @property
+    def lengths(self) -> tuple[float, ...]:
+        """Sides of a pixel along (y, x) or of a voxel along (z, y, x), in m."""
+        lengths: tuple[float, ...] = self.voxel or self.pixel or ()
+        return (lengths * self.dimension if len(lengths) == 1 else lengths)[::-1]
+
+    @property
     def sides(self) -> tuple[float, ...]:
-        """Sides of a pixel along (y, x) or of a voxel along (z, y, x), over that along x."""
-        sides: tuple[float, ...] = self.voxel or self.pixel or ()
-        sides = sides * self.dimension if len(sides) == 1 else sides
-        return tuple(side / sides[0] for side in reversed(sides))
+        """The same over the side along x."""
+        return tuple(length / self.lengths[-1] for length in self.lengths)
 
 
 def _cell_kind(table: Mapping[str, object]) -> str:

@@ -8,9 +8,12 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 import xarray
+from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
 from alphacut.base.arrays import Array
+from alphacut.base.number_text import axis_prefix
 from alphacut.case.material import RadiusMapSection
 from alphacut.case.structure import Frame
 from alphacut.figures import style
@@ -146,21 +149,53 @@ def membership(dataset: xarray.Dataset) -> Figure:
 
 
 def image(dataset: xarray.Dataset) -> Figure:
-    """Segmented phases as greys, of a volume on three planes in its middle, and the α-cuts of E."""
-    phase = dataset["phase"]
-    planes = [phase.isel({axis: phase.sizes[axis] // 2}) for axis in phase.dims[::-1]]
-    pictures = [phase] if phase.ndim == 2 else planes
-    ratios = [*[1.0] * len(pictures), 1.4 if len(pictures) == 1 else 2.0]
-    figure, axes = plt.subplots(1, len(ratios), figsize=(WIDTH, 3.4), width_ratios=ratios)
-    sides = dict(zip(phase.dims, dataset.attrs.get("sides", ()), strict=False))
-    for picture, values in zip(axes, pictures, strict=False):
-        up, right = values.dims
-        picture.imshow(values.values, origin="lower", cmap="Greys_r", vmin=0, vmax=phase.max())
-        picture.set_aspect(sides.get(up, 1) / sides.get(right, 1))
-        picture.set(xticks=[], yticks=[], xlabel=right, ylabel=up)
-    axes[0].set_title("phases as segmented")
+    """Phases of an image, or of a volume on three planes in its middle, and the α-cuts of E.
+
+    Pixels and voxels whose phase the fuzzy threshold leaves open on the lowest level are orange.
+    """
+    phase, is_open = dataset["phase"], dataset["is_open"]
+    lengths = dict(zip(phase.dims, dataset.attrs["lengths"], strict=True))
+    factor, unit = axis_prefix(max(phase.sizes[axis] * lengths[axis] for axis in phase.dims), "m")
+    # by the axis across each picture, None of an image
+    planes = [*phase.dims[::-1]] if phase.ndim == 3 else [None]
+    mosaic = [[*map(str, planes)], ["E"] * 3] if phase.ndim == 3 else [["None", "E"]]
+    size = (WIDTH, 5.6) if phase.ndim == 3 else (WIDTH, 3.8)
+    figure, axes = plt.subplot_mosaic(mosaic, figsize=size)
+    for across in planes:
+        place = {} if across is None else {across: phase.sizes[across] // 2}
+        picture, (up, right) = axes[str(across)], phase.isel(place).dims
+        ends = [factor * lengths[axis] * phase.sizes[axis] for axis in (right, up)]
+        look: style.Look = {"origin": "lower", "extent": (0, ends[0], 0, ends[1])}
+        greys = ListedColormap(_phase_greys(dataset))
+        shown = phase.isel(place).values
+        picture.imshow(shown, cmap=greys, vmin=-0.5, vmax=greys.N - 0.5, **look)
+        mask = np.ma.masked_equal(is_open.isel(place).values, 0)
+        picture.imshow(mask, cmap=ListedColormap([ORANGE]), **look)
+        picture.set(xlabel=f"{right} ({unit})", ylabel=f"{up} ({unit})")
+        picture.grid(visible=False)
+        if across is not None:
+            picture.set_title(f"{across} = {factor * lengths[across] * place[across]:.4g} {unit}")
+    patches = [
+        Patch(facecolor=grey, edgecolor=INK, lw=0.5, label=name)
+        for grey, name in zip(_phase_greys(dataset), _phase_names(dataset), strict=True)
+    ]
+    if is_open.values.any():
+        level, kind = dataset["alpha"].values[0], "voxels" if phase.ndim == 3 else "pixels"
+        label = f"open at α = {level:g}: {float(is_open.mean()):.2%} of the {kind}"
+        patches.append(Patch(facecolor=ORANGE, label=label))
+    figure.legend(handles=patches, loc="outside lower left", ncols=len(patches))
     lower, upper = dataset["E"].transpose("bound", "alpha").values / GPA
-    style.shaded_cuts(axes[-1], dataset["alpha"].values, lower, upper)
+    style.shaded_cuts(axes["E"], dataset["alpha"].values, lower, upper)
     where = ", plane strain" if phase.ndim == 2 else ""
-    style.membership_axes(axes[-1], f"Young's modulus E{where} (GPa)")
+    style.membership_axes(axes["E"], f"Young's modulus E{where} (GPa)")
     return figure
+
+
+def _phase_names(dataset: xarray.Dataset) -> list[str]:
+    """Names of the phases, dark first; a file holds one name as a text."""
+    return [*np.atleast_1d(dataset.attrs["phases"])]
+
+
+def _phase_greys(dataset: xarray.Dataset) -> list[tuple[float, float, float]]:
+    """Grey of each phase, from dark to light, apart from the white of the paper."""
+    return [(x, x, x) for x in np.linspace(0.3, 0.88, len(_phase_names(dataset)))]

@@ -178,7 +178,7 @@ def compute_cuts(
         loss=estimates,
         proved_losses={name: CutsResult.of(cut) for name, cut in proved.items()},
     )
-    return StageResult(result, _dataset(alpha, cuts, phase, proved, cell.sides))
+    return StageResult(result, _dataset(study, alpha, cuts, proved))
 
 
 def _require_isotropic(widest: ImageCut) -> None:
@@ -192,15 +192,19 @@ def _require_isotropic(widest: ImageCut) -> None:
 
 
 def _dataset(
+    study: ImageStudy,
     alpha: tuple[float, ...],
     cuts: Sequence[ImageCut],
-    phase: Ints,
     losses: Mapping[str, Array],
-    sides: tuple[float, ...],
 ) -> xarray.Dataset:
-    """Dataset of the bounds on each level, in SI, and of the phase of each pixel or voxel."""
+    """Dataset of the bounds on each level, in SI, and of the phase of each pixel or voxel.
+
+    `phase` is the one at the nominal threshold, `is_open` says whether the threshold leaves it open
+    on the lowest level.
+    """
     import xarray
 
+    phase, (first, last) = study.phase_ranges(None)[0], study.phase_ranges(alpha[0])
     young, constants = np.array([x.modulus for x in cuts]), np.array([x.constants for x in cuts])
     stiffness = np.array([[cut.bounds.lower, cut.bounds.upper] for cut in cuts])
     names = CONSTANT_NAMES[phase.ndim]
@@ -210,10 +214,16 @@ def _dataset(
         **{name: (("alpha", "bound"), constants[:, k]) for k, name in enumerate(names)},
         **{f"loss_{name}": (("alpha", "bound"), cut) for name, cut in losses.items()},
         "phase": (("z", "y", "x")[-phase.ndim :], phase.astype(np.float32)),
+        "is_open": (("z", "y", "x")[-phase.ndim :], (first != last).astype(np.uint8)),
     }
     axes = {"alpha": list(alpha), "bound": [*SIDES]}
     axes |= dict.fromkeys(("row", "column"), AXES[phase.ndim])
-    return xarray.Dataset(variables, axes, {"nature": str(NATURE), "sides": sides})
+    attributes = {
+        "nature": str(NATURE),
+        "lengths": study.cell.lengths,
+        "phases": [*study.fractions],
+    }
+    return xarray.Dataset(variables, axes, attributes)
 
 
 def estimated_losses(energies: PhaseEnergies, cuts: Array, average: str) -> LossResult:

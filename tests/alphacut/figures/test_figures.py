@@ -48,11 +48,47 @@ def test_every_figure_has_both_forms_and_a_caption(two_floors):
     assert caption("fig28-envelope-E-5s-q1", paper=True) == "Fig. 28: Envelope of q1, study E-5s"
 
 
+def image_dataset(young, shape=(4, 6)):
+    """Result of an image or volume of two phases, of which one cell is open."""
+    axes = ("z", "y", "x")[-len(shape) :]
+    phase, is_open = np.zeros(shape), np.zeros(shape, np.uint8)
+    phase[..., 3:] = 1
+    is_open[tuple(n // 2 for n in shape)] = 1
+    variables = {"E": (("alpha", "bound"), young), "phase": (axes, phase)}
+    variables["is_open"] = (axes, is_open)
+    attributes = {"lengths": (2e-6, 3e-6, 1e-6)[-len(shape) :], "phases": ["dark", "bright"]}
+    return xarray.Dataset(variables, {"alpha": [0.0, 1.0], "bound": ["lower", "upper"]}, attributes)
+
+
+@pytest.mark.parametrize("shape", [(4, 6), (2, 4, 6)])
+def test_an_image_has_scales_a_legend_and_its_open_pixels(shape):
+    young = 1e9 * np.array([[20.0, 30.0], [24.0, 26.0]])
+    with figure_style():
+        figure = material.image(image_dataset(young, shape))
+        figure.draw_without_rendering()
+        *pictures, cuts = figure.axes
+        labels = [(x.get_xlabel(), x.get_ylabel(), x.get_title(loc="left")) for x in pictures]
+        extents = [(x.get_xlim(), x.get_ylim()) for x in pictures]
+        legend = [text.get_text() for text in figure.legends[0].get_texts()]
+        overlays = [picture.images[1].get_array() for picture in pictures]
+        plt.close(figure)
+    across_z = ("x (µm)", "y (µm)", "" if len(shape) == 2 else "z = 2 µm")
+    if len(shape) == 2:
+        assert labels == [across_z]
+    else:
+        across_x, across_y = ("y (µm)", "z (µm)", "x = 3 µm"), ("x (µm)", "z (µm)", "y = 6 µm")
+        assert labels == [across_x, across_y, across_z]
+    assert extents[-1] == ((0, 6), (0, 12))
+    share = {2: "4.17% of the pixels", 3: "2.08% of the voxels"}[len(shape)]
+    assert legend == ["dark", "bright", f"open at α = 0: {share}"]
+    assert [overlay.count() for overlay in overlays] == [1] * len(pictures)
+    assert cuts.get_xlabel().startswith("Young's modulus E")
+
+
 @pytest.mark.parametrize("width", [1e-6, 1e-4, 1e-2, 1.0])
 def test_numbers_of_a_narrow_axis_stand_apart_and_whole(width):
     young = 29.8821e9 * np.array([[1 - width / 2, 1 + width / 2], [1.0, 1.0]])
-    variables = {"E": (("alpha", "bound"), young), "phase": (("y", "x"), np.eye(4))}
-    data = xarray.Dataset(variables, {"alpha": [0.0, 1.0], "bound": ["lower", "upper"]})
+    data = image_dataset(young)
     with figure_style():
         figure = material.image(data)
         figure.draw_without_rendering()
