@@ -2,7 +2,7 @@
 
 Grey values are the share of a voxel's blurred neighbourhood that spheres cover, with noise from a
 seed that non-local means take away again: python cases/make_tomogram.py. With --picture the volume
-is drawn, its corner cut open: docs/pictures/tomogram.png
+is drawn, spheres alone in its nearest corner: docs/pictures/tomogram.png
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ SIZE, SPHERES, SEED = 48, 12, 7
 SMALLEST, LARGEST = 0.13, 0.2  # radii over the side, uniform between them
 GREY = (70, 190)  # of matrix and spheres
 BLUR, NOISE = 1.0, 12.0  # voxels, grey levels
+VOXEL, OPEN = 5e-3, (126, 134)  # side in mm and support of the threshold, as in the case
 
 
 def spheres(rng: np.random.Generator) -> list[tuple[np.ndarray, float]]:
@@ -45,19 +46,39 @@ def volume(rng: np.random.Generator) -> np.ndarray:
 
 
 def picture(grey: np.ndarray, file: Path) -> None:
-    """Draw the grey values on the faces, the nearest eighth taken out, and the spheres there."""
+    """Draw the grey values of the voxels, of the nearest eighth those of spheres alone.
+
+    Voxels whose phase the threshold of the case leaves open are orange.
+    """
     import pyvista
 
-    grid = pyvista.ImageData(dimensions=[n + 1 for n in grey.shape[::-1]])
-    grid.cell_data["grey"] = grey.ravel()  # x varies fastest
-    plotter = pyvista.Plotter(off_screen=True, window_size=(900, 760))
-    half = SIZE / 2
-    opened = grid.clip_box((half, SIZE, 0, half, half, SIZE))
-    plotter.add_mesh(opened, scalars="grey", cmap="gray", clim=(40, 210), show_scalar_bar=False)
-    smooth = grid.cell_data_to_point_data().contour([sum(GREY) / 2])
-    inside = smooth.clip_box((half, SIZE, 0, half, half, SIZE), invert=False)
-    plotter.add_mesh(inside, color="tab:orange", smooth_shading=True)
-    plotter.camera_position = [(3.1 * SIZE, -2.1 * SIZE, 2.3 * SIZE), (half, half, half), (0, 0, 1)]
+    grid = pyvista.ImageData(dimensions=[n + 1 for n in grey.shape[::-1]], spacing=(VOXEL,) * 3)
+    grid.cell_data["grey value"] = grey.ravel()  # x varies fastest
+    z, y, x = np.indices(grey.shape)
+    is_nearest = (x >= SIZE // 2) & (y < SIZE // 2) & (z >= SIZE // 2)
+    is_open = (grey >= OPEN[0]) & (grey < OPEN[1])
+    is_shown = (~is_nearest | (grey >= OPEN[1])) & ~is_open
+    plotter = pyvista.Plotter(off_screen=True, window_size=(1100, 900))
+    plotter.set_background("white")
+    place = {"vertical": True, "position_x": 0.88, "position_y": 0.3, "height": 0.45}
+    bar = {**place, "color": "black", "fmt": "%.0f"}
+    shown, opened = (grid.extract_cells(np.flatnonzero(x)) for x in (is_shown, is_open))
+    plotter.add_mesh(shown, scalars="grey value", cmap="gray", clim=(40, 210), scalar_bar_args=bar)
+    plotter.add_mesh(opened, color="tab:orange")
+    words = f"orange: open, grey values {OPEN[0]} to {OPEN[1]}, {is_open.mean():.2%} of the voxels"
+    plotter.add_text(words, position=(60, 830), font_size=12, color="black")
+    plotter.show_bounds(
+        **{f"{axis}title": f"{axis} (mm)" for axis in "xyz"},
+        **{f"n_{axis}labels": 4 for axis in "xyz"},
+        use_3d_text=False,
+        fmt="%.2f",
+        font_size=16,
+        color="black",
+        location="outer",
+    )
+    side = SIZE * VOXEL
+    middle = (side / 2, side / 2, side / 2)
+    plotter.camera_position = [(2.7 * side, -1.9 * side, 2.1 * side), middle, (0, 0, 1)]
     plotter.screenshot(file)
 
 

@@ -166,6 +166,7 @@ def image(dataset: xarray.Dataset) -> Figure:
         picture, (up, right) = axes[str(across)], phase.isel(place).dims
         ends = [factor * lengths[axis] * phase.sizes[axis] for axis in (right, up)]
         look: style.Look = {"origin": "lower", "extent": (0, ends[0], 0, ends[1])}
+        look["interpolation"] = "nearest"
         greys = ListedColormap(_phase_greys(dataset))
         shown = phase.isel(place).values
         picture.imshow(shown, cmap=greys, vmin=-0.5, vmax=greys.N - 0.5, **look)
@@ -198,4 +199,4 @@ def _phase_names(dataset: xarray.Dataset) -> list[str]:
 
 def _phase_greys(dataset: xarray.Dataset) -> list[tuple[float, float, float]]:
     """Grey of each phase, from dark to light, apart from the white of the paper."""
-    return [(x, x, x) for x in np.linspace(0.3, 0.88, len(_phase_names(dataset)))]
+    return [(x, x, x) for x in np.linspace(0.45, 0.95, len(_phase_names(dataset)))]
