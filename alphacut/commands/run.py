@@ -26,7 +26,7 @@ from alphacut.io.results import ResultsFolder
 from alphacut.io.typed_json import to_document
 from alphacut.report import tables
 from alphacut.report.page import comparison_page, render_page
-from alphacut.report.results import comparison, cut_text, run_text, width_text
+from alphacut.report.results import comparison, cut_text, guaranteed_of, run_text, width_text
 from alphacut.rve.result.engineering_constants import PLANE_STRAIN
 from alphacut.stages.cell import UPPER_BOUND, constant_label, isotropic_label
 from alphacut.stages.identify import identify_inputs
@@ -167,7 +167,7 @@ def modulus(options: argparse.Namespace, out: TextIO) -> int:
     if isinstance(part, ImageResult):
         measured = "area" if len(part.lower_GPa) == 3 else "volume"
         text += "".join(f"{x}: {y:.1%} of the {measured}\n" for x, y in part.fractions.items())
-        text += f"{width_text(part)}\n"
+        text += f"{guaranteed_of(part)}\n{width_text(part)}\n"
     else:
         text += f"{UPPER_BOUND}\n" if part.particles == "mesh" else ""
         text += f"{part.samples} samples, {part.solves} linear systems, "

@@ -21,6 +21,7 @@ from alphacut.report.results import (
     MEANING,
     answers,
     drivers,
+    guaranteed_of,
     material,
     natures,
     peak_table,
@@ -176,10 +177,8 @@ class Page:
     def _image(self) -> Iterator[str]:
         if (part := self.summary.image) is not None:
             shares = ", ".join(f"{x} {share:.1%}" for x, share in part.fractions.items())
-            is_plane = len(part.lower_GPa) == 3
-            where = "image as it was segmented, in plane strain" if is_plane else "volume"
-            yield f"The bounds are those of the {where}."
-            measured = "area" if is_plane else "volume"
+            yield f"{guaranteed_of(part)}."
+            measured = "area" if len(part.lower_GPa) == 3 else "volume"
             yield f"Of the {measured}: {shares}. {width_text(part)}."
 
     def _references(self) -> Iterator[str]:

@@ -45,7 +45,8 @@ COMPARED = ("at the lowest α", "first", "second", "second over first")
 def run_text(parts: Parts) -> str:
     """The results of a run for the console: tables, then sentences, answers and main drivers."""
     shown = [table for table in (material(parts), peak_table(parts)) if table.rows]
-    lines = [*natures(parts), *smaller_steps(parts)]
+    lines = [guaranteed_of(parts.image)] if parts.image is not None else []
+    lines += [*natures(parts), *smaller_steps(parts)]
     if parts.update is not None and parts.update.is_refuted:
         lines.append(parts.update.refuted)
     elif parts.update is not None:
@@ -123,12 +124,27 @@ def without_empty_columns(head: Row, rows: list[Row]) -> Table:
     return Table(tuple(head[k] for k in columns), filled_rows)
 
 
+def guaranteed_of(image: ImageResult) -> str:
+    """What the bounds of an image or volume are guaranteed of, in a sentence."""
+    is_plane = len(image.lower_GPa) == 3
+    what = "image as segmented" if is_plane else "volume"
+    where = ", in plane strain" if is_plane else ""
+    return f"The bounds are guaranteed of the {what}, repeated periodically{where}"
+
+
 def width_text(image: ImageResult) -> str:
-    """Width of E at the lowest level by what it comes from, or which bound it has not."""
-    low, high = image.E_GPa.ends
-    if not (low[0] > 0 and np.isfinite(high[0])):
-        unknown = ["lower"] * (low[0] <= 0) + ["upper"] * np.isinf(high[0])
-        return f"No {' or '.join(unknown)} bound of E: phases may be pores or rigid"
+    """Width of E at the lowest level by what it comes from, or which bound is missing, and why."""
+    has_lower, has_upper = image.lower_GPa.any(), np.isfinite(image.upper_GPa).all()
+    missing = []
+    if not has_lower:
+        why = "stresses are sought that vanish in closed pores, and these meet their own image"
+        missing.append(f"lower bound of E: {why}")
+    if not has_upper:
+        # the plane's E = G (3 − G/K) falls where G, which has no bound, exceeds 3/2 K
+        which = "lower or upper" if has_lower and image.E_GPa.ends[0][0] <= 0 else "upper"
+        missing.append(f"{which} bound of E: a phase may be rigid")
+    if missing:
+        return f"This program gives no {', and no '.join(missing)}"
     parts = (f"{source} {width:.3g} GPa" for source, width in image.widths_GPa.items())
     return f"Width of E from {', '.join(parts)}"
 
