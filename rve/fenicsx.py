@@ -15,6 +15,7 @@ from typing import Any
 
 import cffi
 import numpy as np
+import scipy.sparse as sp
 
 from alphacut.base.arrays import Array, Ints
 from alphacut.base.errors import RefusedError
@@ -122,6 +123,15 @@ def option_is_used(name: str) -> bool:
     library: Any = interface.dlopen(PETSc.__file__)
     library.PetscOptionsUsed(interface.NULL, name.encode(), used)
     return any(byte != b"\0" for byte in used)
+
+
+def aij(matrix: sp.csr_matrix) -> PETSc.Mat:
+    """PETSc matrix on the values of a SciPy one with sorted indices, of this rank alone."""
+    starts, columns = (np.asarray(x, PETSc.IntType) for x in (matrix.indptr, matrix.indices))
+    csr = starts, columns, matrix.data
+    result = PETSc.Mat().createAIJWithArrays(matrix.shape, csr, comm=PETSc.COMM_SELF)
+    result.assemble()
+    return result
 
 
 def cholesky(matrix: PETSc.Mat, prefix: str) -> PETSc.KSP:

@@ -172,6 +172,7 @@ def modulus(options: argparse.Namespace, out: TextIO) -> int:
         text += f"{UPPER_BOUND}\n" if part.particles == "mesh" else ""
         text += f"{part.samples} samples, {part.solves} linear systems, "
         text += f"{part.seconds:.1f} s, {part.method}\n"
+        text += f"{part.solver}\n" if part.solver else ""
     write_answer(options, to_document(part), out, text)
     return 0
 

@@ -47,6 +47,8 @@ def run_text(parts: Parts) -> str:
     shown = [table for table in (material(parts), peak_table(parts)) if table.rows]
     lines = [guaranteed_of(parts.image)] if parts.image is not None else []
     lines += [*natures(parts), *smaller_steps(parts)]
+    if parts.modulus is not None and parts.modulus.solver:
+        lines.append(f"Cells: {parts.modulus.solver}")
     if parts.update is not None and parts.update.is_refuted:
         lines.append(parts.update.refuted)
     elif parts.update is not None:

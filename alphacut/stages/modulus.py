@@ -64,7 +64,8 @@ class ModulusResult:
     """α-cuts of a cell, moduli in GPa; nature and relative errors of E, references and cost.
 
     `fibres` has the constants of cylinders by name, as E_T_GPa; `plane` those along x and y by
-    definition and name. Errors by source and checks are the largest of all samples.
+    definition and name. `solver` says how finite elements are assembled and solved, "" without
+    them. Errors by source and checks are the largest of all samples.
     """
 
     alpha: Array
@@ -73,6 +74,7 @@ class ModulusResult:
     fibres: dict[str, CutsResult]
     plane: dict[str, dict[str, CutsResult]]
     method: str
+    solver: str
     plan: str
     samples: int
     solves: int
@@ -118,6 +120,7 @@ def modulus_result(problem: CellProblem, stiffness: FuzzyStiffness) -> ModulusRe
         fibres=cuts_of(stiffness, {name: name for name in FIBRES}),
         plane={definition: cuts for definition, cuts in plane.items() if cuts},
         method=problem.modulus.method,
+        solver=getattr(problem.model(), "solver_text", ""),
         plan=bounds.method,
         samples=bounds.evaluations,
         solves=stiffness.systems,

@@ -187,6 +187,11 @@ class PrismModel:
         """
         return self.options.by_levels and not self.parallel
 
+    @property
+    def solver_text(self) -> str:
+        """How the cell is assembled and solved."""
+        return self.options.described("slices" if self.by_slices else "prisms")
+
     def _moved_slices(self, radius_map: RadiusMap) -> SliceProblem:
         return self._moved(radius_map, cached_slices)
 

@@ -74,6 +74,11 @@ class _NamedModel:
         """The linear solver with what overrides it."""
         return SolverOptions(self.petsc)
 
+    @property
+    def solver_text(self) -> str:
+        """How the cell is assembled and solved."""
+        return self.options.described("prisms")
+
     def solve(self, law: ThetaLaw, phases: Mapping[str, AnyPhase]) -> list[HomogenisedStiffness]:
         """Homogenised stiffness, one result in a list; energies in the order of `phases`.
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-import scipy.sparse as sp
 
 from alphacut.base.arrays import Array, Ints
 from alphacut.base.errors import FailedError, RefusedError
@@ -71,17 +70,16 @@ class SliceStrains:
                 triangles, points).
             slices: Number of each triangle's slice, shape (triangles,).
         """
-        for phase in range(len(areas)):
-            chosen = np.flatnonzero(areas[phase].any(axis=1))
-            of_phase, of_points, slice_of = areas[phase, chosen], strain[chosen], slices[chosen]
-            entries = np.ones(len(chosen)), (slice_of, np.arange(len(chosen)))
-            member = sp.csr_matrix(entries, (len(self.theta), len(chosen)))
-            sums = member @ np.einsum("tq,tqif->tif", of_phase, of_points).reshape(len(chosen), -1)
-            self.strain[phase] += sums.reshape(self.strain[phase].shape)
-            self.fractions[phase] += member @ of_phase.sum(axis=1)
-            weights = (self.weights[slice_of][:, None] * of_phase).reshape(1, -1)
-            flat = of_points.reshape(-1, *strain.shape[2:])
-            self.products[phase] += strain_products(flat, weights)[0]
+        fields = strain.shape[-1]
+        for number in np.unique(slices):
+            for phase in range(len(areas)):
+                chosen = (slices == number) & areas[phase].any(axis=1)
+                weights = areas[phase, chosen].ravel()
+                points = strain[chosen].reshape(len(weights), 3, fields)
+                self.strain[phase, number] += np.tensordot(weights, points, axes=1)
+                self.fractions[phase, number] += weights.sum()
+                of_theta = (self.weights[number] * weights)[None]
+                self.products[phase] += strain_products(points, of_theta)[0]
 
     def combined(self, coefficients: Array) -> SliceStrains:
         """Those of sums of the fields, coefficients (fields, loads)."""

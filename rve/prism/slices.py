@@ -119,22 +119,24 @@ class SliceProblem:
     def assemble(self, stiffness: Sequence[Array]) -> PETSc.Mat:
         """Return the reduced stiffness of eq. 7 for the stiffness of the phases, in Pa."""
         self._form.stiffness.x.array[:] = np.array(stiffness)[self._phase].ravel()
-        layers = []
-        for _ in self._layers():
+        values = self._constraint.empty_values()
+        for layer in self._layers():
             self._matrix.set_value(0.0)
             fem.assemble_matrix(self._matrix, self._form.bilinear)
-            layers.append(self._constraint.scalar_matrix(self._matrix.data))
-        context, size = LayerMatrix(self._constraint, layers), self.numbering.size
+            self._constraint.set_layer(values[layer], self._matrix.data)
+        context, size = LayerMatrix(self._constraint, values), self.numbering.size
         return PETSc.Mat().createPython((size, size), context, comm=PETSc.COMM_SELF)
 
     def loads(self, strains: Array) -> list[PETSc.Vec]:
         """Reduced forces −⟨Bᵀ C ε̄⟩ of macroscopic strains (loads, 3), for the phases as set."""
-        forces = np.zeros((len(strains), self.numbering.size))
-        for layer in self._layers():
-            window = self._constraint.windows[layer]
-            for k in range(len(strains)):
-                forces[k, window] += self._constraint.transposed @ self._form.load(strains[k])
-        return [PETSc.Vec().createWithArray(force, comm=PETSc.COMM_SELF) for force in forces]
+        by_layer = [[self._form.load(strain) for strain in strains] for _ in self._layers()]
+        Q, loads = self._constraint.matrix, []
+        for forces in np.array(by_layer).swapaxes(0, 1):
+            on_slices, load = Q.createVecLeft(), Q.createVecRight()
+            on_slices.array[:] = forces.ravel()
+            Q.multTranspose(on_slices, load)
+            loads.append(load)
+        return loads
 
     def solver(self, options: SolverOptions, matrix: PETSc.Mat) -> PETSc.KSP:
         """Return PETSc's solver of an assembled stiffness; that of an earlier one is spent."""
@@ -152,17 +154,21 @@ class SliceProblem:
 
         None is no u.
         """
-        rule, count = self._rule, len(strains)
+        rule, count, Q = self._rule, len(strains), self._constraint.matrix
+        on_slices = np.zeros((count, self.grid.layers, Q.size[0] // self.grid.layers))
+        for k, vector in enumerate(fluctuations):
+            if vector is not None:
+                u = Q.createVecLeft()
+                Q.mult(vector, u)
+                on_slices[k] = u.array.reshape(on_slices.shape[1:])
         is_phase = np.equal.outer(np.arange(len(self.grid.names)), self._phase)[..., None]
         integrals = SliceStrains.zeros(rule, phases=len(is_phase), fields=count)
         values = np.empty((len(self._cell), POINTS_PER_SLICE, 3, count))
         for layer in self._layers():
-            window = self._constraint.windows[layer]
-            for k, (strain, vector) in enumerate(zip(strains, fluctuations, strict=True)):
-                values[..., k] = strain
+            for k, vector in enumerate(fluctuations):
+                values[..., k] = strains[k]
                 if vector is not None:
-                    u = self._constraint.matrix @ vector.array_r[window]
-                    values[..., k] += self._strains(u)
+                    values[..., k] += self._strains(on_slices[k, layer])
             areas = is_phase * self._areas[layer] / AREA
             integrals.add(values, areas, self._slices(layer))
         return integrals

@@ -59,6 +59,11 @@ class SolverOptions:
         """True for the preconditioner that solves level by level."""
         return self.all["pc_type"] == "python"
 
+    def described(self, elements: str) -> str:
+        """Return in words how the form is assembled, over which elements, and how it is solved."""
+        krylov = self.all["ksp_type"]
+        return f"one UFL form over {elements} by DOLFINx, solved by PETSc's {krylov} with {self}"
+
     def __str__(self) -> str:
         changes = {**self.environment, **self.overrides}.items()
         words = [f"-{PREFIX}{name} {value}".strip() for name, value in changes]

@@ -8,8 +8,8 @@ triangles,
 
 where V_k are the values of U_k at vertices and J injects linear into quadratic triangles. With
 periodicity and the fixed corner this is u = Q x on the slices of a layer, for the unknowns x of its
-two levels and its mid-level. Q is the same for all layers, and the reduced stiffness is
-K = Σ_k Q_kᵀ A_k Q_k, where A_k is what DOLFINx assembles over the slices of layer k.
+two levels and its mid-level, and the reduced stiffness is K = Qᵀ diag(A_k) Q, where A_k is what
+DOLFINx assembles over the slices of layer k.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from alphacut.base.arrays import Array, Ints
-from alphacut.rve.fenicsx import PETSc
+from alphacut.rve.fenicsx import PETSc, aij
 from alphacut.rve.mesh.prism_grid import Triangulation
 from alphacut.rve.solver.numbering import LevelNumbering
 from alphacut.rve.solver.theta_preconditioner import interpolated_vertices
@@ -36,44 +36,48 @@ class BlockSum:
 
     Args:
         sums: Matrix from the entries of A to those of Bᵀ A B, both in the order of CSR.
-        indptr, indices: Pattern of Bᵀ A B in CSR.
+        block: Bᵀ A B, whose entries are set anew for each A.
     """
 
     sums: sp.csr_matrix
-    indptr: Ints
-    indices: Ints
+    block: sp.csr_matrix
 
     def scaled(self, factors: Array) -> sp.csr_matrix:
         """Return `sums` of entries of A that are multiplied by factors, one for each."""
         return self.sums @ sp.diags(factors)
 
+    def filled(self, entries: Array) -> sp.csr_matrix:
+        """Return `block` with these entries; the next call changes it."""
+        self.block.data = entries
+        return self.block
+
 
 class LayerConstraint:
-    """The constraint u = Q x of the slices of any layer by the unknowns of its levels.
+    """The constraint u = Q x of all slices, layer after layer, by the unknowns of the levels.
 
     Args:
         numbering: Reduced unknowns, all on this rank.
         heights: ζ of the slices, inside (0, 1), shape (slices,).
-        node: Number of each node of DOLFINx's space: slice after slice, in each as in the plane
-            mesh; shape (nodes,).
+        node: Number of each node of DOLFINx's space on the slices of a layer: slice after slice, in
+            each as in the plane mesh; shape (nodes,).
         pattern: Pattern of DOLFINx's matrix in that space, in blocks of 2 × 2.
 
     Attributes:
-        windows: Unknowns of each layer, those of its levels and mid-level.
-        matrix: Q, shape (2 nodes, unknowns of a layer).
-        transposed: Qᵀ.
+        matrix: Q, shape (layers · 2 nodes, unknowns).
     """
 
     def __init__(
         self, numbering: LevelNumbering, heights: Array, node: Ints, pattern: sp.bsr_matrix
     ) -> None:
-        plane = numbering.grid.plane
-        pairs = layer_interpolation(plane, heights)[node] @ _periodicity(numbering)
-        self.matrix = sp.kron(pairs, sp.eye(2), "csr")
-        self.transposed = self.matrix.T.tocsr()
-        width, layers = self.matrix.shape[1], range(numbering.grid.layers)
-        self.windows = [slice(k * numbering.stride, k * numbering.stride + width) for k in layers]
+        plane, layers = numbering.grid.plane, numbering.grid.layers
+        of_layer = layer_interpolation(plane, heights)[node] @ _periodicity(numbering)
+        Q = sp.kron(of_layer, sp.eye(2), "coo")
+        layer = np.arange(layers)[:, None]
+        places = (Q.row + layer * Q.shape[0]).ravel(), (Q.col + layer * numbering.stride).ravel()
+        shape = layers * Q.shape[0], numbering.size
+        self.matrix = aij(sp.csr_matrix((np.tile(Q.data, layers), places), shape))
         self._pattern = _scalar_pattern(pattern)
+        self._all_layers = sp.kron(sp.eye(layers), sp.csr_matrix(self._pattern, dtype=float), "csr")
         # The preconditioner's blocks are Bᵀ A B with B from hats, then from bubbles, to the slices:
         # (1 − ζ), ζ at a node, and 4 ζ (1 − ζ) / 2 from both ends of the edge of a midpoint.
         on_slice, plane_node = np.divmod(node, len(plane.points))
@@ -86,39 +90,53 @@ class LayerConstraint:
         self._lower, self._upper = hats.scaled(lower**2), hats.scaled(upper**2)
         self._bubble = bubbles.scaled((2 * lower * upper) ** 2)
 
-    def scalar_matrix(self, values: Array) -> sp.csr_matrix:
-        """Return A_k from the values of DOLFINx's matrix, in the order of its blocks; copied."""
-        pattern = self._pattern
-        return sp.csr_matrix((values[pattern.data], pattern.indices, pattern.indptr), pattern.shape)
+    def empty_values(self) -> Array:
+        """Return an array for the values of A_k in CSR, shape (layers, entries)."""
+        layers = self._all_layers.shape[0] // self._pattern.shape[0]
+        return np.empty((layers, self._pattern.nnz))
 
-    def level_blocks(self, layers: list[sp.csr_matrix]) -> Iterator[sp.csr_matrix]:
+    def set_layer(self, values: Array, blocks: Array) -> None:
+        """Set the values of a layer, (entries,), to those of DOLFINx's blocks."""
+        np.take(blocks, self._pattern.data, out=values, mode="clip")  # "raise" copies
+
+    def block_diagonal(self, values: Array) -> PETSc.Mat:
+        """Return diag(A_k) on the values of all layers, shape (layers, entries)."""
+        pattern = self._all_layers
+        return aij(sp.csr_matrix((values.ravel(), pattern.indices, pattern.indptr), pattern.shape))
+
+    def level_blocks(self, values: Array) -> Iterator[sp.csr_matrix]:
         """Yield the blocks of the hats of all levels, then of the bubbles of all mid-levels."""
-        values = [layer.data for layer in layers]
         below = [*(self._lower @ x for x in values), 0.0]  # of the layer above each level
         above = [0.0, *(self._upper @ x for x in values)]
         for from_above, from_below in zip(below, above, strict=True):
-            yield _csr(from_above + from_below, self._hats)
+            yield self._hats.filled(from_above + from_below)
         for x in values:
-            yield _csr(self._bubble @ x, self._bubbles)
+            yield self._bubbles.filled(self._bubble @ x)
 
 
 class LayerMatrix:
-    """K = Σ_k Q_kᵀ A_k Q_k; a context of PETSc's ``python`` matrix."""
+    """K = Qᵀ diag(A_k) Q; a context of PETSc's ``python`` matrix.
 
-    def __init__(self, constraint: LayerConstraint, layers: list[sp.csr_matrix]) -> None:
-        self._constraint, self._layers = constraint, layers
+    Args:
+        constraint: Q and the pattern of A_k.
+        values: Those of A_k, shape (layers, entries).
+    """
+
+    def __init__(self, constraint: LayerConstraint, values: Array) -> None:
+        self._constraint, self._values = constraint, values
+        self._layers = constraint.block_diagonal(values)
+        self._displacements, self._forces = self._layers.createVecs()
 
     def mult(self, _matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Set y to K x; called by PETSc."""
-        constraint, unknowns, result = self._constraint, x.array_r, np.zeros(x.local_size)
-        for window, stiffness in zip(constraint.windows, self._layers, strict=True):
-            displacements = constraint.matrix @ unknowns[window]
-            result[window] += constraint.transposed @ (stiffness @ displacements)
-        y.array[:] = result
+        Q = self._constraint.matrix
+        Q.mult(x, self._displacements)
+        self._layers.mult(self._displacements, self._forces)
+        Q.multTranspose(self._forces, y)
 
     def level_blocks(self) -> Iterator[sp.csr_matrix]:
         """Yield the blocks of the hats of all levels, then of the bubbles of all mid-levels."""
-        return self._constraint.level_blocks(self._layers)
+        return self._constraint.level_blocks(self._values)
 
 
 def layer_interpolation(plane: Triangulation, heights: Array) -> sp.csr_matrix:
@@ -164,7 +182,7 @@ def _block_sum(pattern: sp.bsr_matrix, parents: Ints) -> BlockSum:
     blocks = np.ones((len(keys), 2, 2)), keys % size, indptr
     scalar = _scalar_pattern(sp.bsr_matrix(blocks, (2 * size, 2 * size)))
     by_component = sp.kron(sums, sp.eye(4), "csr")[scalar.data]
-    return BlockSum(by_component[:, _scalar_pattern(pattern).data], scalar.indptr, scalar.indices)
+    return BlockSum(by_component[:, _scalar_pattern(pattern).data], scalar)
 
 
 def _scalar_pattern(pattern: sp.bsr_matrix) -> sp.csr_matrix:
@@ -172,7 +190,3 @@ def _scalar_pattern(pattern: sp.bsr_matrix) -> sp.csr_matrix:
     places = np.arange(pattern.data.size).reshape(-1, 2, 2)
     blocks = sp.bsr_matrix((places, pattern.indices, pattern.indptr), pattern.shape)
     return blocks.tocsr()
-
-
-def _csr(values: Array, pattern: BlockSum) -> sp.csr_matrix:
-    return sp.csr_matrix((values, pattern.indices, pattern.indptr))

@@ -35,7 +35,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from alphacut.base.arrays import Array, Ints
-from alphacut.rve.fenicsx import MPI, PETSc, cholesky
+from alphacut.rve.fenicsx import MPI, PETSc, aij, cholesky
 from alphacut.rve.solver.numbering import LevelNumbering
 from alphacut.stochastic import ThetaLaw
 from alphacut.stochastic.theta.quadrature import level_rule
@@ -137,7 +137,7 @@ class ThetaPreconditioner:
 
     def apply(self, _pc: PETSc.PC, residual: PETSc.Vec, result: PETSc.Vec) -> None:
         """Set the result to P⁻¹ residual; called by PETSc."""
-        forces = np.concatenate(self._comm.allgather(residual.array_r))
+        forces = self._gathered(residual.array_r)
         fields = self._numbering.split(self._nodal_values.T @ forces)
         fields = precondition(self._mass, self._injection, fields, self._solve)
         values = self._nodal_values @ np.concatenate([x.ravel() for x in fields])
@@ -149,10 +149,16 @@ class ThetaPreconditioner:
         for load, rows in zip(loads, self._rank_levels, strict=True):
             solution = np.empty_like(load[rows])
             for k, level in enumerate(rows):
-                next(solvers).solve(load[level], solution[k])
-            solutions.append(np.concatenate(self._comm.allgather(solution)))
+                solution[k] = next(solvers).solve(load[level])
+            solutions.append(self._gathered(solution))
         hats, bubbles = solutions
         return hats, bubbles
+
+    def _gathered(self, part: Array) -> Array:
+        """Return the parts of all ranks, one after another along the first axis."""
+        if self._comm.size == 1:
+            return part
+        return np.concatenate(self._comm.allgather(part))
 
     def view(self, _pc: PETSc.PC, viewer: PETSc.Viewer) -> None:
         """Print the number of levels and the first one's solver, for ``-rve_ksp_view``."""
@@ -172,10 +178,10 @@ class PlaneSolver:
     """
 
     def __init__(self, pattern: sp.csr_matrix) -> None:
-        starts, columns = (x.astype(PETSc.IntType) for x in (pattern.indptr, pattern.indices))
-        self._values = np.empty(pattern.nnz)  # PETSc's matrix has its values here
-        csr = starts, columns, self._values
-        self._matrix = PETSc.Mat().createAIJWithArrays(pattern.shape, csr, comm=PETSc.COMM_SELF)
+        self._values = np.ones(pattern.nnz)  # PETSc's matrix has its values here
+        csr = self._values, pattern.indices, pattern.indptr
+        self._matrix = aij(sp.csr_matrix(csr, pattern.shape))
+        self._solution, self._load = self._matrix.createVecs()
         self.ksp = cholesky(self._matrix, PREFIX + LEVEL)
 
     def factorise(self, values: Array) -> None:
@@ -186,10 +192,11 @@ class PlaneSolver:
         self.ksp.setFromOptions()  # so that PETSc knows them as used
         self.ksp.setUp()
 
-    def solve(self, load: Array, solution: Array) -> None:
-        """Set `solution` to that for `load`."""
-        vectors = (PETSc.Vec().createWithArray(x, comm=PETSc.COMM_SELF) for x in (load, solution))
-        self.ksp.solve(*vectors)
+    def solve(self, load: Array) -> Array:
+        """Return the solution for a load, as a view that the next call overwrites."""
+        self._load.array[:] = load
+        self.ksp.solve(self._load, self._solution)
+        return np.asarray(self._solution.array_r)
 
 
 def level_blocks(matrix: PETSc.Mat, numbering: LevelNumbering) -> Iterator[sp.csr_matrix]:
