@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -53,8 +54,8 @@ def _read_by_marks(path: Path, channel: str, step: float | None, unit: str) -> R
     content = read_bytes(path)
     if is_universal(content):
         return read_uff_record(path.name, content, channel)
-    if _is_waveform(content):
-        return _read_waveform(path, channel, unit)
+    if _waveform_format(content):
+        return _read_waveform(path, content, channel, unit)
     file = TextFile.from_bytes(path.name, content)
     if is_cosmos(file):
         return read_cosmos(file, channel)
@@ -67,24 +68,28 @@ def _read_by_marks(path: Path, channel: str, step: float | None, unit: str) -> R
     raise RefusedError(path.name, "of no format that is read", READ, cure)
 
 
-def _is_waveform(content: bytes) -> bool:
+def _waveform_format(content: bytes) -> str:
+    """ObsPy's name of the format of a content that is SAC or miniSEED; empty of others."""
     for order in ("<i4", ">i4") if len(content) > SAC_HEAD else ():
         head = np.frombuffer(content[:SAC_HEAD], order)
         version, count = int(head[SAC_VERSION]), int(head[SAC_COUNT])
         if version in (6, 7) and 0 < 4 * count <= len(content) - SAC_HEAD:
-            return True
-    return MINISEED.match(content) is not None
+            return "SAC"
+    return "MSEED" if MINISEED.match(content) else ""
 
 
-def _read_waveform(path: Path, channel: str, unit: str) -> Recording:
+def _read_waveform(path: Path, content: bytes, channel: str, unit: str) -> Recording:
     """Recording of a file of miniSEED or SAC, which have no unit: the case says it."""
     try:
         import obspy
     except ImportError:
         cure = "pip install 'alphacut[obspy]'"
         raise RefusedError(path.name, "miniSEED or SAC", "with obspy", cure) from None
+    file_format = _waveform_format(content)
     try:
-        traces = list(obspy.read(str(path)))
+        # ObsPy is told the format, since it loads pickles, which are programs, to find one; and it is
+        # handed the content, since of names it unpacks archives and follows patterns
+        traces = list(obspy.read(BytesIO(content), format=file_format))
     except Exception as error:  # readers of damaged files raise errors of many kinds
         reason = " ".join(str(error).split())[:80] or type(error).__name__
         raise RefusedError(path.name, reason, "miniSEED or SAC that obspy reads") from None
@@ -92,7 +97,6 @@ def _read_waveform(path: Path, channel: str, unit: str) -> Recording:
     trace = traces[choose_channel(f"{path.name} without gaps", channel, names)]
     require(bool(unit), path.name, "without a unit", 'records.unit = "m/s^2"')
     samples, step = np.asarray(trace.data, float), float(trace.stats.delta)
-    file_format = str(trace.stats.get("_format", "waveform"))
     channel = str(trace.stats.channel)
     return recording_in_si(
         path.name,

@@ -11,6 +11,7 @@ of its own, which must neither end by a signal, nor raise what is no refusal, no
 from __future__ import annotations
 
 import argparse
+import importlib.util
 import os
 import re
 import resource
@@ -186,7 +187,7 @@ def bytes_to(name: str, content: Callable[[], bytes]) -> Callable[[Path], Path]:
     return write
 
 
-def _saved_by(name: str, save: Callable[[Path], object]) -> Callable[[Path], Path]:
+def saved_by(name: str, save: Callable[[Path], object]) -> Callable[[Path], Path]:
     """A writer by a function of the path."""
 
     def write(folder: Path) -> Path:
@@ -217,6 +218,13 @@ def _records() -> list[Format]:
     for order in ("<", ">"):
         write = bytes_to("record.uff", lambda order=order: samples.uff58(wave, order=order))
         found.append(Format(f"UFF 58b {order}", write, read_recording))
+    if importlib.util.find_spec("obspy"):
+        import obspy
+
+        trace = obspy.Trace(wave.astype("float32"), {"delta": samples.STEP, "channel": "HNE"})
+        for name in ("MSEED", "SAC"):
+            saved = saved_by("record", lambda path, name=name: trace.write(str(path), format=name))
+            found.append(Format(name, saved, lambda path: read_recording(path, unit="m/s^2")))
     return found
 
 
@@ -248,7 +256,7 @@ def _matrices() -> list[Format]:
         savers[f"{form}.npz"] = lambda p, form=form: scipy.sparse.save_npz(
             p, sparse.asformat(form), compressed=False
         )
-    return [Format(name, _saved_by(name, save), read_matrix) for name, save in savers.items()]
+    return [Format(name, saved_by(name, save), read_matrix) for name, save in savers.items()]
 
 
 def _pictures() -> list[Format]:
@@ -267,7 +275,7 @@ def _pictures() -> list[Format]:
     names |= {"packbits.tif": {"compression": "packbits"}, "a.webp": {}, "a.jp2": {}}
     found = []
     for name, options in names.items():
-        write = _saved_by(name, lambda path, options=options: picture.save(path, **options))
+        write = saved_by(name, lambda path, options=options: picture.save(path, **options))
         found.append(Format(f"section {name}", write, section_picture))
         if name not in COLOURED:
             found.append(Format(f"picture {name}", write, lambda path: read_grid(path, (1, 1))))
@@ -318,7 +326,7 @@ def _volumes() -> list[Format]:
     def read(path: Path) -> object:
         return read_grid(path, (1, 1, 1))
 
-    found = [Format(f"volume {x}", _saved_by(x, save), read) for x, save in savers.items()]
+    found = [Format(f"volume {x}", saved_by(x, save), read) for x, save in savers.items()]
     return [*found, Format("volume of slices", folder_of_slices, read)]
 
 
@@ -368,7 +376,7 @@ def _meshes() -> list[Format]:
 
     return [
         Format(f"MSH {version} {'binary' if binary else 'text'}",
-               _saved_by("a.msh", lambda p, v=version, b=binary: write(p, v, b)), read)
+               saved_by("a.msh", lambda p, v=version, b=binary: write(p, v, b)), read)
         for version in (2.2, 4.1)
         for binary in (0, 1)
     ]  # fmt: skip

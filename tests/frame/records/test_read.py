@@ -1,5 +1,8 @@
 """Records as downloaded: the same samples from each format and head, or one line with the place."""
 
+import sys
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -134,8 +137,29 @@ def test_waveforms_are_read_by_obspy_or_refused_with_its_name(tmp_path):
     for content in (b"000001D " + bytes(504), bytes(head) + bytes(1600)):
         path = tmp_path / "record.bin"
         path.write_bytes(content)
-        with pytest.raises(RefusedError, match="miniSEED or SAC"):
+        with pytest.raises(RefusedError, match="miniSEED or SAC|without a unit"):
             read_recording(path)
+
+
+@pytest.mark.parametrize(("start", "expected"), [(b"000001D ", "MSEED"), (b"", "SAC")])
+def test_obspy_is_told_the_format_so_that_it_loads_no_pickle(
+    tmp_path, monkeypatch, start, expected
+):
+    """ObsPy loads a file that names its module in its first bytes as a pickle, unless it is told."""
+    head = bytearray(632)
+    head[304:308], head[316:320] = (6).to_bytes(4, "little"), (400).to_bytes(4, "little")
+    content = start + bytes(504) if start else bytes(head) + bytes(1600)
+    asked = []
+
+    def read(source, *, format):  # ObsPy's own name of the argument
+        asked.append((source.read(), format))
+        raise ValueError("nothing there")
+
+    monkeypatch.setitem(sys.modules, "obspy", SimpleNamespace(read=read))
+    (tmp_path / "record").write_bytes(content)
+    with pytest.raises(RefusedError, match="nothing there"):
+        read_recording(tmp_path / "record", unit="g")
+    assert asked == [(content, expected)]
 
 
 @pytest.mark.parametrize("file_format", ["MSEED", "SAC"])
@@ -150,6 +174,12 @@ def test_waveforms_give_the_same_samples(tmp_path, file_format):
     assert record.samples == pytest.approx(written.G * written.samples(), abs=1e-5)
     with pytest.raises(RefusedError, match="without a unit"):
         read_recording(path)
+    if file_format == "SAC":  # its head has the largest and the least sample, in its unit
+        content = bytearray(path.read_bytes())
+        content[4:12] = np.array([-0.01, 0.01], "<f4").tobytes()
+        path.write_bytes(content)
+        with pytest.raises(RefusedError, match="where its head states"):
+            read_recording(path, unit="cm/s^2")
 
 
 def test_cosmos_with_numbers_that_touch(tmp_path):
