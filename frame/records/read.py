@@ -87,7 +87,7 @@ def _read_waveform(path: Path, content: bytes, channel: str, unit: str) -> Recor
         raise RefusedError(path.name, "miniSEED or SAC", "with obspy", cure) from None
     file_format = _waveform_format(content)
     try:
-        # ObsPy is told the format, since it loads pickles, which are programs, to find one; and it is
+        # ObsPy is told the format, since to find one it loads pickles, which are programs; it is
         # handed the content, since of names it unpacks archives and follows patterns
         traces = list(obspy.read(BytesIO(content), format=file_format))
     except Exception as error:  # readers of damaged files raise errors of many kinds

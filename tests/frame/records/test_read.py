@@ -137,7 +137,7 @@ def test_waveforms_are_read_by_obspy_or_refused_with_its_name(tmp_path):
     for content in (b"000001D " + bytes(504), bytes(head) + bytes(1600)):
         path = tmp_path / "record.bin"
         path.write_bytes(content)
-        with pytest.raises(RefusedError, match="miniSEED or SAC|without a unit"):
+        with pytest.raises(RefusedError, match=r"miniSEED or SAC|without a unit"):
             read_recording(path)
 
 
