@@ -142,7 +142,7 @@ def missing_gravity(structure: Structure) -> Iterator[str]:
     frame = structure.frame
     if frame is None or frame.gravity or not len(frame.lengths):
         return
-    ends = {name: tuple(number.support) for name, number in structure.numbers.items()}
+    ends = {name: number.support for name, number in structure.numbers.items()}
     for z, coefficient in enumerate(frame.stability_coefficients(ends), start=1):
         if coefficient > NEGLIGIBLE_WEIGHT:
             what = f"weight over stiffness and height of storey {z} is up to {coefficient:.2g}"
@@ -161,8 +161,14 @@ def long_steps(linear: LinearSystem, duration: float, step: float) -> Iterator[s
         read_at_nodes = tuple(x for x in linear.outputs if linear.quantity(x)[0] == "a")
         if not read_at_nodes:
             return
-        elastic = {"yield_force": (), "yield_drift": (), "hardening": (), "rayleigh_of": "initial"}
-        linear = replace(linear, outputs=read_at_nodes, **elastic)
+        linear = replace(
+            linear,
+            outputs=read_at_nodes,
+            yield_force=(),
+            yield_drift=(),
+            hardening=(),
+            rayleigh_of="initial",
+        )
     flow = LinearFlow(linear, (), duration, step, Exact(), by_modes=False)
     nominal = np.zeros((1, 0))
     size, between = np.abs(flow.values(nominal)[0]).T, node_deviation(flow, nominal).T

@@ -49,6 +49,7 @@ def run_text(parts: Parts) -> str:
     lines += [*natures(parts), *smaller_steps(parts)]
     if parts.modulus is not None and parts.modulus.solver:
         lines.append(f"Cells: {parts.modulus.solver}")
+    lines = [row for line in lines for row in wrap(line, 80, subsequent_indent="  ")]
     if parts.update is not None and parts.update.is_refuted:
         lines.append(parts.update.refuted)
     elif parts.update is not None:

@@ -143,7 +143,7 @@ def node_deviation(flow: Flow, points: Array) -> Array:
         below = np.minimum(ends[:, :-1], ends[:, 1:]) - inner.min(2)
         beyond_ends = np.maximum(np.maximum(above, below).max(0), 0.0)
         fed = _fed_through(flow, chunk)
-        has_jump |= (fed.jumps[:, :, None] & (fed.amplitude > 0)).any(0)
+        has_jump = has_jump | (fed.jumps[:, :, None] & (fed.amplitude > 0)).any(0)
         off = np.where(has_jump, beyond_ends, off_chord)
         deviation = np.maximum(deviation, off + _fed_between(fed, finer.time, parts))
     # Where these trajectories are straight, others may bend, but a jump is in the same step of all.

@@ -111,8 +111,8 @@ class Automatic:
                 notes.append(f"a bound of {_listed(kinked)} lies at a kink or a jump")
         if ended:
             notes.append("the budget ended the search: a larger one may find more")
-        found_all = [linkage is not None and linkage.is_estimate(output) for output in outputs]
-        found_all &= ~is_rough
+        has_estimate = [linkage is not None and linkage.is_estimate(output) for output in outputs]
+        found_all = np.array(has_estimate, bool) & ~is_rough
         bounds = bounds_of_samples(domain, campaign.samples, self.name)
         return replace(_with_errors(bounds, monotone | found_all, domain), notes=tuple(notes))
 
