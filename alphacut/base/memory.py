@@ -6,9 +6,12 @@ import os
 from contextlib import suppress
 from math import inf
 from pathlib import Path
+from stat import S_ISDIR, S_ISREG
 
 from alphacut.base.errors import RefusedError
 
+BYTES_OF_TEXT = 30
+"""Memory of a byte of text while its numbers are told apart: two digits and a blank take 64."""
 AVAILABLE = "MemAvailable:"
 """Line of /proc/meminfo with the kibibytes that processes can take without swapping."""
 
@@ -54,3 +57,20 @@ def require_free_memory(name: str, needed: float, what: str) -> None:
     if needed > free:
         value = f"{what}, which takes {needed / 1e9:.3g} GB"
         raise RefusedError(name, value, f"what fits {free / 1e9:.3g} GB of free memory")
+
+
+def require_text(path: Path) -> None:
+    """Refuse a file of text that does not fit the free memory, and what is no regular file.
+
+    Pipes and devices have no end, and reading them would wait for ever.
+
+    Raises:
+        RefusedError: As said.
+        OSError: The file is not there.
+    """
+    status = path.stat()
+    is_regular = S_ISREG(status.st_mode) or S_ISDIR(status.st_mode)  # reading a folder says so
+    if not is_regular:
+        raise RefusedError(str(path), "a pipe or a device", "a regular file")
+    what = f"a text of {status.st_size} bytes"
+    require_free_memory(path.name, float(BYTES_OF_TEXT * status.st_size), what)

@@ -14,6 +14,7 @@ import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, require
+from alphacut.base.memory import require_text
 from alphacut.frame.records.recording import Recording
 from alphacut.frame.records.stated_peak import StatedPeak, remarks_on_peak
 from alphacut.frame.records.units import acceleration_factor, other_quantity
@@ -139,6 +140,7 @@ def decoded(content: bytes) -> str:
 def read_bytes(path: Path) -> bytes:
     """The content of a file; refuses one that cannot be read."""
     try:
+        require_text(path)
         return path.read_bytes()
     except OSError as error:
         reason = str(error.strerror or "unreadable").lower().removeprefix("is ")

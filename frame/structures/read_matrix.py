@@ -14,15 +14,13 @@ import numpy as np
 from alphacut.base.array_files import ArrayArchive, Numbers, read_npy
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, printable, require
-from alphacut.base.memory import require_free_memory
+from alphacut.base.memory import require_free_memory, require_text
 from alphacut.frame.structures.matrix_market import dense_of_entries, matrix_market, require_size
 
 ENDINGS = (".mtx", ".npz", ".npy", ".csv")
 ALLOWED = "a file .mtx, .npz, .npy or .csv with one array of finite real numbers"
 MAX_ROWS = 5000
 """Rows of the largest matrix where nothing else is said: it is dense here, and takes 200 MB."""
-BYTES_OF_TEXT = 30
-"""Memory of a byte of text while its numbers are told apart: two digits and a blank take 64."""
 SPARSE = {"format", "shape", "data"}
 """Arrays in every file of `scipy.sparse.save_npz`."""
 
@@ -71,8 +69,7 @@ def _read_by_ending(path: Path, name: str, *, max_rows: int) -> Numbers:
         return read_npy(path)
     if kind == ".npz":
         return _read_archive(ArrayArchive(path), name, max_rows=max_rows)
-    size = path.stat().st_size
-    require_free_memory(path.name, BYTES_OF_TEXT * size, f"a text of {size} bytes")
+    require_text(path)
     if kind == ".mtx":
         return matrix_market(path.name, path.read_bytes(), max_rows=max_rows)
     text = path.read_text(encoding="utf-8-sig")

@@ -15,6 +15,7 @@ import numpy as np
 
 from alphacut.base.arrays import Array, Ints
 from alphacut.base.errors import RefusedError, require
+from alphacut.base.memory import require_text
 from alphacut.rve.mesh import square
 from alphacut.rve.mesh.columns import grid_of
 from alphacut.rve.mesh.msh import DamagedMeshError, MshFile, element_name, parse_msh
@@ -61,6 +62,7 @@ def mesh_content(path: Path | str) -> bytes:
         RefusedError: The file cannot be read, or begins otherwise.
     """
     try:
+        require_text(Path(path))
         content = Path(path).read_bytes()
     except OSError as error:
         raise RefusedError("mesh.file", path, MESH_FILES, error.strerror or str(error)) from None

@@ -12,6 +12,7 @@ import numpy as np
 
 from alphacut.base.arrays import Array, Ints
 from alphacut.base.errors import RefusedError
+from alphacut.base.memory import require_text
 
 METRES = {"m": 1.0, "dm": 0.1, "cm": 1e-2, "mm": 1e-3, "µm": 1e-6, "μm": 1e-6, "um": 1e-6}
 METRES |= {"micron": 1e-6, "nm": 1e-9, "in": 0.0254, "inch": 0.0254, "ft": 0.3048}
@@ -62,6 +63,7 @@ def fields(path: Path) -> list[tuple[int, list[str]]]:
 def text_of(path: Path) -> str:
     """Return the text of a file in UTF-8; refuse what is none."""
     try:
+        require_text(path)
         return path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         reason = str(getattr(error, "strerror", None) or "no text").lower().removeprefix("is ")

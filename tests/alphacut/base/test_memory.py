@@ -1,11 +1,17 @@
 """The memory that a process may still take."""
 
+import os
 import resource
 
 import pytest
 
+from alphacut.base import memory
 from alphacut.base.errors import RefusedError
 from alphacut.base.memory import free_memory, require_free_memory
+from alphacut.frame import read_matrix
+from alphacut.frame.identify.uff_modes import uff_mode_rows
+from alphacut.frame.records.read import read_recording
+from alphacut.stochastic import read_particles
 
 
 def test_a_limit_of_the_process_is_one_of_its_memory(monkeypatch):
@@ -16,3 +22,27 @@ def test_a_limit_of_the_process_is_one_of_its_memory(monkeypatch):
     assert free_memory() == 0
     with pytest.raises(RefusedError, match="an array, which takes 2e-09 GB"):
         require_free_memory("k.npy", 2.0, "an array")
+
+
+READERS = {
+    "matrix.mtx": read_matrix,
+    "matrix.csv": read_matrix,
+    "record.csv": read_recording,
+    "modes.uff": lambda path: uff_mode_rows(path, {}),
+    "circles.csv": lambda path: read_particles(path, size=(0.1, 0.1)),
+}
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_texts_larger_than_memory_and_pipes_are_refused_before_they_are_read(
+    tmp_path, monkeypatch, name
+):
+    path = tmp_path / name
+    path.write_text("1,2\n" * 100)
+    monkeypatch.setattr(memory, "free_memory", lambda: 1e4)
+    with pytest.raises(RefusedError, match=r"a text of 400 bytes, which takes 1\.2e-05 GB"):
+        READERS[name](path)
+    path.unlink()
+    os.mkfifo(path)
+    with pytest.raises(RefusedError, match="a pipe or a device"):
+        READERS[name](path)
