@@ -14,6 +14,7 @@ import pytest
 from alphacut.case.content import load
 from alphacut.frame import envelope
 from alphacut.fuzzy import Interval
+from tests.alphacut.small import summary_of_run
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs/from_python.md").read_text(encoding="utf-8")
@@ -95,10 +96,56 @@ def has_the_modulus_of_the_sample(names):
     assert names["sample"].modulus == pytest.approx(24.773342084495e9, rel=1e-6)
 
 
+BUILDING = """
+title = "A building under records"
+stages = ["envelope"]
+shares = false
+[frame]
+masses = ["50 t", "50 t", "50 t"]
+stiffness = ["90 MN/m ± 6 %", "80 MN/m ± 6 %", "70 MN/m ± 6 %"]
+lengths = ["3.5 m", "3 m", "3 m"]
+damping_ratio = "4 %"
+outputs = ["drift1", "a3"]
+GROUND
+[envelope]
+fuzzy = ["k"]
+alpha = [0, 1]
+duration = "10 s"
+step = "0.02 s"
+"""
+
+
+def answers_as_the_cases_of_a_building(names):
+    """Whether a building has the answers of two cases: under one record, and under a suite."""
+    text = BUILDING + '[decision]\nlimits = ["drift1 <= 8 mm"]\n'
+    text += '[tolerances]\nlimits = ["drift1 <= 8 mm"]\n'
+    samples = [
+        f"{0.02 * k:.2f},{x!r}" for k, x in enumerate(names["frame"].ground.samples.tolist())
+    ]
+    Path("ground.csv").write_text("\n".join(["time [s],a [m/s^2]", *samples]), encoding="utf-8")
+    case = Path("building.toml")
+    case.write_text(text.replace("GROUND", 'accelerogram = "ground.csv"'), encoding="utf-8")
+    summary = summary_of_run(case, "--fresh")
+    limit, found = summary["decision"]["limits"]["drift1"], names["decision"].limits["drift1"]
+    assert (limit["verdict"], limit["nature"]) == (found.verdict, "guaranteed")
+    upper = limit["peak"]["upper"][0]
+    assert found.peak.upper[0] == pytest.approx(upper, rel=0.01)
+    assert names["scale"].kept == pytest.approx(summary["tolerances"]["kept"], rel=0.03)
+    text = BUILDING + '[fragility]\nlimits = ["drift1 <= 8 mm"]\n'
+    records = '[records]\nbaseline = "mean"\nfiles = "cases/suite/record-200[1-3].AT2"\n'
+    case.write_text(text.replace("GROUND", records), encoding="utf-8")
+    of_case = summary_of_run(case, "--fresh")["fragility"]["limits"]["drift1"]
+    of_block = names["under_suite"].limits["drift1"]
+    assert of_block.critical.low[0] == pytest.approx(of_case["critical"]["low"][0], rel=1e-3)
+    assert of_block.critical.high[0] == pytest.approx(of_case["critical"]["high"][0], rel=1e-3)
+    assert of_block.median.lower[0] == pytest.approx(of_case["median"]["lower"][0], rel=1e-3)
+
+
 CHECKS = {
     1: has_the_modulus_of_the_paper,
     2: has_the_modulus_of_the_sample,
     4: has_the_radius_map_of_the_case,
+    6: answers_as_the_cases_of_a_building,
     7: moves_as_the_structure_of_the_case,
     8: teaches_what_the_case_learns,
 }

@@ -12,7 +12,7 @@ import xarray
 from alphacut.base.number_text import ShownUnit
 from alphacut.figures import envelope, material, overview
 from alphacut.figures.style import figure_style
-from alphacut.frame import Decision, Peak, StoreyFrame, propagation
+from alphacut.frame import Accelerogram, Decision, Limit, Peak, StoreyFrame, fragility, propagation
 from alphacut.frame.analyses.decision import LimitDecision
 from alphacut.fuzzy import Triangular
 from alphacut.fuzzy.result import Ends, Nature
@@ -158,3 +158,20 @@ def test_a_limit_of_zero_leaves_room_for_the_bars_of_others():
         )  # fmt: skip
     (axes,) = envelope.draw_decision(Decision(np.zeros(1), limits)).axes
     assert max(abs(end) for end in axes.get_xlim()) < 3
+
+
+def test_every_limit_of_a_fragility_is_drawn_with_its_fit_and_the_highest_level_as_a_line(rng):
+    suite = [Accelerogram(0.02, rng.normal(size=40), name=f"r{x}") for x in range(3)]
+    frame = StoreyFrame([2e4], stiffness=[8e6], damping_ratio=0.05)
+    limits = [Limit("drift1", 0.01), Limit("q1", 0.02), Limit("a1", 4.0)]
+    times = {"duration": 1.0, "step": 0.02, "alpha": (0, 1), "intensity": "PGA"}
+    answer = fragility(frame, {"k1": Triangular(7.5e6, 8e6, 8.5e6)}, suite, limits, **times)
+    with figure_style():
+        panels = envelope.draw_fragility(answer).axes
+    titles = [axes.get_title(loc="left") for axes in panels]
+    assert titles == ["|drift1| ≤ 10.00 mm", "|q1| ≤ 20.00 mm", "|a1| ≤ 4.000 m/s²"]
+    for axes in panels:
+        assert len(axes.collections) == 1  # the band of the lowest level alone
+        styles = [line.get_linestyle() for line in axes.lines]
+        assert styles.count("-") == 2
+        assert styles.count(":") in (1, 2)

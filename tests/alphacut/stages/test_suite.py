@@ -252,3 +252,12 @@ def test_curves_of_a_demand_have_their_record_and_are_drawn_once_with_all_limits
     assert [text.get_text() for text in figure.axes[0].texts] == ["10 mm", "25 mm"]
     drawn = save(figure, tmp_path / "curves")[0].read_text(encoding="utf-8")
     assert drawn.count("<title>one</title>") == drawn.count("<title>two</title>") == 3
+
+
+def test_a_run_without_shares_and_questions_has_a_page(tmp_path):
+    text = CASE.partition("[fragility]")[0].replace("stages", "shares = false\nstages")
+    summary = summary_of_run(written(tmp_path, text))
+    assert "fingerprints" not in summary
+    assert main(["report", str(tmp_path / "out"), "--quiet"]) == 0
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "One storey under two records" in page

@@ -5,8 +5,10 @@ import pytest
 from scipy.stats import beta
 
 from alphacut.base.errors import RefusedError
+from alphacut.frame import Accelerogram, Limit, StoreyFrame, fragility
 from alphacut.frame.analyses.fragility import CriticalMeasures, any_exceeded
 from alphacut.frame.analyses.probability import clopper_pearson
+from alphacut.fuzzy import Triangular
 from alphacut.fuzzy.result import Ends, Nature
 from tests.frame.analyses.test_analyses import one_level
 
@@ -80,3 +82,46 @@ def test_a_structure_that_may_stay_at_rest_has_no_upper_end():
     assert np.isinf(critical.dispersion.upper[0])
     with pytest.raises(RefusedError, match="two records"):
         _ = CriticalMeasures.from_peaks([peaks(0.01, 0.02, 0.015)], [1.0], LIMIT).dispersion
+
+
+@pytest.fixture(scope="module")
+def two_storeys():
+    """Fragility of a frame with two limits of all storeys, under five records."""
+    rng = np.random.default_rng(3)
+    suite = [Accelerogram(0.02, x * rng.normal(size=60), name=f"r{x}") for x in (1, 2, 3, 5, 9)]
+    frame = StoreyFrame([2e4, 2e4], stiffness=[8e6, 6e6], damping_ratio=0.05)
+    limits = [
+        Limit(f"drift{storey}", value, stated=text, event=f"drift <= {text}")
+        for text, value in (("0.5 %", 0.015), ("1 %", 0.03))
+        for storey in (1, 2)
+    ]
+    inputs = {"k1": Triangular(7.7e6, 8e6, 8.3e6)}
+    times = {"duration": 3.0, "step": 0.02, "alpha": (0, 1)}
+    return fragility(frame, inputs, suite, limits, intensity="PGA", **times)
+
+
+def test_a_limit_of_all_storeys_is_one_event_and_there_is_none_of_all_limits(two_storeys):
+    limits = two_storeys.limits
+    names = ["drift1 <= 0.5 %", "drift2 <= 0.5 %", "drift1 <= 1 %", "drift2 <= 1 %"]
+    assert [*limits] == [*names, "drift <= 0.5 %", "drift <= 1 %"]
+    for text in ("0.5 %", "1 %"):
+        event = limits[f"drift <= {text}"]
+        of_storeys = [limits[f"drift{storey} <= {text}"].critical for storey in (1, 2)]
+        assert event.critical.low == pytest.approx(np.minimum(*(x.low for x in of_storeys)))
+        assert event.critical.high == pytest.approx(np.minimum(*(x.high for x in of_storeys)))
+        assert event.words == f"drift ≤ {text}, of any"
+    assert limits["drift1 <= 1 %"].words == "|drift1| ≤ 1 % (30.00 mm)"
+
+
+def test_the_median_is_that_of_the_sample_and_the_fit_has_the_geometric_mean(two_storeys):
+    for part in two_storeys.limits.values():
+        for end, of_sample, of_fit in zip(
+            (part.critical.low, part.critical.high), part.median, part.lognormal_median, strict=True
+        ):
+            assert of_sample == pytest.approx(np.sort(end, axis=1)[:, 2])
+            assert of_fit == pytest.approx(end.prod(axis=1) ** 0.2)
+        curves = part.lognormal_fit(-1)
+        half = [np.interp(0.5, curve, part.measure) for curve in curves]
+        ends = [part.lognormal_median.lower[-1], part.lognormal_median.upper[-1]]
+        assert [half[0], half[-1]] == pytest.approx(ends, rel=0.02)
+    assert "lognormal" in str(two_storeys)
