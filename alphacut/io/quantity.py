@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from alphacut.base.number_text import MINUS, STANDARD_GRAVITY
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal, Triangular
+from alphacut.io.quantity_cures import number_cure, unit_cure
 
 if TYPE_CHECKING:
     import pint
@@ -57,7 +58,13 @@ QUANTITIES = {
 """Dimensions of quantities by their SI units."""
 UNITS_HERE = {
     "": {"": Decimal(1), "%": Decimal("0.01")},
-    "m/s^2": {"g": Decimal(str(STANDARD_GRAVITY)), "gal": Decimal("0.01"), "Gal": Decimal("0.01")},
+    "m/s^2": {
+        "g": Decimal(str(STANDARD_GRAVITY)),
+        "mg": Decimal(str(STANDARD_GRAVITY)) / 1000,
+        "%g": Decimal(str(STANDARD_GRAVITY)) / 100,
+        "gal": Decimal("0.01"),
+        "Gal": Decimal("0.01"),
+    },
 }
 """Units that Pint takes for something else: g is no gram here, and Gal no gallon."""
 REFUSED = r"[%‰]|\b(per ?cent|per ?mille|pp[mb]|pixel|px|point|dot|pt|tons?)\b"
@@ -69,6 +76,8 @@ LIST = re.compile(r"\[(.*)\]\s*(.*)", re.DOTALL)
 SPREAD = re.compile(rf"({NUMBER})\s*(.*?)\s*(?:±|\+/-)\s*({NUMBER})\s*(.*)")
 SINGLE = re.compile(rf"({NUMBER})\s*(.*)")
 SHAPES: tuple[Callable[..., FuzzyNumber], ...] = (Crisp, Interval, Triangular, Trapezoidal)
+MAX_EXPONENT = 100
+"""Power of ten of a number beyond which it is not multiplied by its unit, but refused."""
 MAX_CHARACTERS = 1000
 """Characters of a quantity; no longer text is read."""
 
@@ -91,15 +100,39 @@ def factor(unit: str, si: str) -> Decimal:
     if not unit:
         raise ValueError(f"the unit is missing, such as {QUANTITIES[si].example}")
     if not si or re.search(REFUSED, unit):
-        raise ValueError(f'the unit "{unit}" is wrong')
-    spelt = re.sub(r"([A-Za-z])([234])(?!\w)", r"\1^\2", unit)
+        raise ValueError(_with_cure(f'the unit "{unit}" is wrong', unit, si))
     try:
-        one_unit = registry().Quantity(Decimal(1), registry().parse_units(spelt))
-        return Decimal(one_unit.to(_pint_target(one_unit, si)).magnitude)
+        return _factor_by_pint(unit, si)
     except Exception:  # Pint's parser raises whatever Python's does
         kind = next((x.name for x in QUANTITIES.values() if unit in x.powers), "")
         measured = f"is a unit of {kind}, and" if kind else "is"
-        raise ValueError(f'the unit "{unit}" {measured} no unit of {QUANTITIES[si].name}') from None
+        what = f'the unit "{unit}" {measured} no unit of {QUANTITIES[si].name}'
+        raise ValueError(_with_cure(what, unit, si)) from None
+
+
+def _factor_by_pint(unit: str, si: str) -> Decimal:
+    """Value of one unit in the SI unit `si` by Pint, whose parser raises whatever Python's does."""
+    spelt = re.sub(r"([A-Za-z])([234])(?!\w)", r"\1^\2", unit)
+    one_unit = registry().Quantity(Decimal(1), registry().parse_units(spelt))
+    return Decimal(one_unit.to(_pint_target(one_unit, si)).magnitude)
+
+
+def _with_cure(what: str, unit: str, si: str) -> str:
+    """What is wrong with a unit, followed by what to write in its place."""
+
+    def fits(spelling: str) -> bool:
+        """Whether Pint, or this module, has this unit for the dimension."""
+        if not spelling or spelling == unit or re.search(REFUSED, spelling):
+            return False
+        if spelling in UNITS_HERE.get(si, {}) or spelling in QUANTITIES[si].powers:
+            return True
+        try:
+            return bool(si) and bool(_factor_by_pint(spelling, si))
+        except Exception:  # whatever Pint's parser raises
+            return False
+
+    units = ", ".join(QUANTITIES[si].powers) or "none, or %"
+    return f"{what}; {unit_cure(unit, si, fits) or f'units are {units}'}"
 
 
 def _pint_target(one_unit: pint.Quantity, si: str) -> str:
@@ -126,11 +159,26 @@ def _pint_target(one_unit: pint.Quantity, si: str) -> str:
 
 def _parse_decimal(text: str, si: str) -> Decimal:
     """The number in the SI unit `si` that a quantity such as "80 GPa" states, or ValueError."""
-    match = SINGLE.fullmatch(text.strip())
+    text = text.strip()
+    match = SINGLE.fullmatch(text)
+    cure = number_cure(text)
     if match is None or match[2].startswith((",", "_")):
-        raise ValueError(f'"{text.strip()}" does not begin with a number such as 1.5')
-    number = Decimal(match[1].replace(MINUS, "-"))  # a typographic minus is one
-    return number * factor(match[2].strip(), si)
+        example = "does not begin with a number such as 1.5"
+        raise ValueError(f'"{text}" {example}' + (f"; {cure}" if cure else ""))
+    if cure and re.match(r"[^A-Za-z°%‰µμ(/[]", match[2]):
+        raise ValueError(f'"{text}" is no number with a unit; {cure}')
+    _, _, exponent = match[1].lower().partition("e")
+    number = Decimal(0)
+    is_moderate = len(exponent) < 6
+    if is_moderate:
+        number = Decimal(match[1].replace(MINUS, "-"))  # a typographic minus is one
+        is_moderate = number == 0 or abs(number.adjusted()) <= MAX_EXPONENT
+    if not is_moderate:
+        raise ValueError(f"magnitudes go from {LEAST:g} to {GREATEST:g} in SI, or are 0")
+    try:
+        return number * factor(match[2].strip(), si)
+    except ValueError as error:
+        raise ValueError(f"{cure}; {error}" if cure else str(error)) from None
 
 
 def _parse_spread(match: re.Match[str], si: str) -> tuple[Decimal, Decimal]:

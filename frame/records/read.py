@@ -62,9 +62,9 @@ def _read_by_marks(path: Path, channel: str, step: float | None, unit: str) -> R
     for mark, n_lines, read in FORMATS:
         if any(map(mark.match, file.lines[:n_lines])):
             return read(file)
-    if is_table(file):
-        return read_table(file, step, unit)
-    cure = 'one column is read with records.step = "0.005 s", records.unit = "g"'
+    if is_table(file, is_described=bool(channel or (step and unit))):
+        return read_table(file, step, unit, channel)
+    cure = 'numbers alone are read with records.step = "0.005 s", records.unit = "g"'
     raise RefusedError(path.name, "of no format that is read", READ, cure)
 
 

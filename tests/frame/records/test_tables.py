@@ -1,0 +1,151 @@
+"""Tables of numbers as people bring them: read, or one line that names cause and cure."""
+
+import numpy as np
+import pytest
+
+from alphacut.base.errors import RefusedError
+from alphacut.frame.records.read import read_recording
+from alphacut.frame.records.tables import read_force_history
+
+G = 9.80665
+STEP = 1 / 256
+N_SAMPLES = 403
+VALUES = np.array([round(x, 5) for x in 0.3 * np.sin(0.11 * np.arange(N_SAMPLES))])
+
+
+def saved(folder, rows, head=""):
+    path = folder / "r.csv"
+    path.write_text("\n".join([head] * bool(head) + list(rows)) + "\n", encoding="utf-8")
+    return path
+
+
+def refused(path, *layout):
+    with pytest.raises(RefusedError) as caught:
+        read_recording(path, *layout)
+    assert len(str(caught.value).splitlines()) == 1
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("per_line", [2, 5, 8])
+def test_bare_numbers_several_a_line_are_read_by_step_and_unit(tmp_path, per_line):
+    starts = range(0, N_SAMPLES, per_line)
+    rows = [" ".join(f"{x:14.7E}" for x in VALUES[k : k + per_line]) for k in starts]
+    path = saved(tmp_path, rows)
+    record = read_recording(path, step=0.02, unit="g")
+    assert record.step == 0.02
+    assert record.samples == pytest.approx(G * VALUES, abs=1e-6)
+    assert "records.step" in refused(path) or "records.unit" in refused(path)
+    titled = saved(tmp_path, rows, "El Centro, 1940, NS")
+    if per_line > 2:
+        assert len(read_recording(titled, step=0.02, unit="g").samples) == N_SAMPLES
+
+
+def components(fmt="{:.6f} {:.5f} {:.5f} {:.5f}"):
+    waves = (VALUES, 0.8 * VALUES[::-1], 0.2 * np.cos(0.07 * np.arange(N_SAMPLES)))
+    return [fmt.format(k * STEP, *(wave[k] for wave in waves)) for k in range(N_SAMPLES)]
+
+
+@pytest.mark.parametrize("head", ["", "t [s] NS [g] EW [g] V [g]", "time [s],NS [g],EW [g],V [g]"])
+def test_a_column_of_times_and_three_components_is_chosen(tmp_path, head):
+    path = saved(tmp_path, components(), head)
+    for channel, expected in {"2": VALUES, "3": 0.8 * VALUES[::-1]}.items():
+        record = read_recording(path, channel, unit="" if head else "g")
+        assert record.step == pytest.approx(STEP, rel=1e-6)
+        assert record.samples == pytest.approx(G * expected, abs=1e-4)
+    if head:
+        assert read_recording(path, "ew").samples == pytest.approx(G * 0.8 * VALUES[::-1], abs=1e-4)
+        assert "one of: 2 or ns; 3 or ew; 4 or v" in refused(path)
+    else:
+        assert "one of: 2; 3; 4" in refused(path, "", None, "g")
+        assert 'say records.unit = "g"' in refused(path, "2")
+    assert "channel 9" in refused(path, "9", None, "g")
+
+
+def test_components_without_times_are_no_series_of_numbers(tmp_path):
+    path = saved(tmp_path, [row.partition(" ")[2] for row in components()])
+    message = refused(path, "", 0.01, "g")
+    assert "3 columns, each smoother than the rows" in message
+    assert "r.csv#1" in message
+    record = read_recording(path, "1", 0.01, "g")
+    assert record.samples == pytest.approx(G * VALUES, abs=1e-4)
+
+
+def test_a_column_of_another_quantity_is_refused(tmp_path):
+    path = saved(tmp_path, components(), "time [s],acc [g],velocity [m/s],disp [m]")
+    assert read_recording(path, "acc").samples == pytest.approx(G * VALUES, abs=1e-4)
+    assert "its column is a velocity" in refused(path, "velocity")
+    assert "its column is a displacement" in refused(path, "4")
+
+
+@pytest.mark.parametrize("digits", [".3f", ".2e"])
+def test_times_that_lost_digits_are_read_by_the_step_that_the_line_names(tmp_path, digits):
+    rows = [f"{k * STEP:{digits}},{x:.5f}" for k, x in enumerate(VALUES[:30])]
+    path = saved(tmp_path, rows, "time [s],acceleration [g]")
+    message = refused(path)
+    assert "digits were lost" in message
+    assert 'records.step = "0.00390625 s"' in message
+    record = read_recording(path, step=STEP)
+    assert record.step == STEP
+    assert record.samples == pytest.approx(G * VALUES[:30], abs=1e-4)
+    assert any("rounded to" in remark for remark in record.remarks)
+    assert "digits were lost" in refused(path, "", 2 * STEP)  # a step that does not fit the times
+
+
+def test_forces_whose_times_lost_digits_name_the_step(tmp_path):
+    rows = [f"{k * STEP:.3f},{k % 7}" for k in range(30)]
+    with pytest.raises(RefusedError, match=r"digits were lost: .*0\.00390625 s"):
+        read_force_history(saved(tmp_path, rows, "time [s],force [kN]"))
+
+
+@pytest.mark.parametrize("mark", [";", "\t", " ", " ; "])
+def test_decimal_commas_between_other_marks_are_read(tmp_path, mark):
+    rows = [f"{k * STEP:.8f}{mark}{x:.5f}".replace(".", ",") for k, x in enumerate(VALUES)]
+    record = read_recording(saved(tmp_path, rows, "time [s];acceleration [m/s^2]"))
+    assert record.step == pytest.approx(STEP, rel=1e-6)
+    assert record.samples == pytest.approx(VALUES)
+    quoted = [f'"{k * STEP:.8f}","{x:.5f}"'.replace(".", ",") for k, x in enumerate(VALUES)]
+    quoted = [row.replace('",,"', '","') for row in quoted]
+    assert read_recording(saved(tmp_path, quoted, "time [s],a [m/s^2]")).samples == pytest.approx(
+        VALUES
+    )
+
+
+def test_one_column_of_decimal_commas_is_one_column(tmp_path):
+    path = saved(tmp_path, [f"{x:.5f}".replace(".", ",") for x in VALUES])
+    assert read_recording(path, step=0.01, unit="g").samples == pytest.approx(G * VALUES)
+    counted = saved(tmp_path, [f"{k},{k % 9}" for k in range(N_SAMPLES)])  # two columns
+    assert len(read_recording(counted, unit="g").samples) == N_SAMPLES
+
+
+@pytest.mark.parametrize(
+    ("row", "cure"),
+    [
+        ("00:00:00.010,0.1", "seconds in place of clock times"),
+        ("2020-01-01,0.1", "in place of dates"),
+        ("0.01,1,234.5", "separators of thousands"),
+        ("0.01,nan", "values are missing"),
+        ("0.01,", "cells are empty"),
+        ("0.01,0.1,5", "decimal points"),
+    ],
+)
+def test_rows_of_no_numbers_tell_their_cure(tmp_path, row, cure):
+    rows = ["0.00,0.5", row.replace("0.01,0.1,5", "0.01,0,15"), "0.02,0.3", "0.03,0.4"]
+    assert cure in refused(saved(tmp_path, rows, "time [s],acceleration [g]"))
+
+
+@pytest.mark.parametrize(
+    ("times", "cure"),
+    [
+        ((0, 1, 2, 2, 3, 4), "a time stands twice"),
+        ((0, 1, 2, 5, 6, 7), "samples are missing there"),
+        ((0, 1, 2, 3, 0, 1, 2, 3), "times must rise"),
+    ],
+)
+def test_uneven_times_tell_their_cure(tmp_path, times, cure):
+    rows = [f"{0.01 * k:.2f},{0.1 * k * k % 1:.3f}" for k in times]
+    assert cure in refused(saved(tmp_path, rows, "time [s],acceleration [g]"))
+
+
+def test_times_in_a_unit_of_something_else_are_told_which_there_are(tmp_path):
+    path = saved(tmp_path, ["0,1", "1,2", "2,1"], "time [samples],acceleration [g]")
+    assert "samples is no unit of times" in refused(path)
