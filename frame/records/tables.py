@@ -320,7 +320,9 @@ def _even_step(
     """Return the step in s of times that must rise evenly, and remarks on what is unusual.
 
     Args:
-        to_s: Unit of the times in the first column, in s.
+        file: The file, for messages.
+        table: Its table, whose first column has the times.
+        to_s: Unit of the times, in s.
         stated_step: Step that the case states, in s; it is taken if the times are too coarsely
             rounded to tell the step, and agree with it.
         from_zero: Refuses times that begin elsewhere than at 0.

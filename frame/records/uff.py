@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -29,13 +30,16 @@ BIG_ENDIAN, DOUBLE, COMPLEX = 2, (4, 6), (5, 6)
 OTHER_QUANTITIES = {8: "a displacement", 9: "a force", 11: "a velocity", 13: "a force"}
 """Types of data of the ordinate that are no acceleration, whatever unit the file states."""
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
+WITHOUT_LETTER = re.compile(r"(\d*\.\d+|\d+\.)([-+]\d{3})(?![\d.])")
+"""A number whose exponent has three digits; FORTRAN leaves its letter out."""
 EVEN = 1e-3
 """Fraction of a step by which times may be uneven besides the rounding of their digits."""
 
 
 def floats(line: str) -> list[float]:
-    """Return the numbers of a line, as FORTRAN or C write them."""
-    return [float(number.upper().replace("D", "E")) for number in NUMBER.findall(line)]
+    """Return the numbers of a line, as FORTRAN or C write them; 8.82898-001 is .882898."""
+    with_letter = WITHOUT_LETTER.sub(r"\1e\2", line)
+    return [float(number.upper().replace("D", "E")) for number in NUMBER.findall(with_letter)]
 
 
 def is_universal(content: bytes) -> bool:
@@ -100,6 +104,9 @@ def data_sets(content: bytes, number: int) -> Iterator[tuple[list[str], bytes | 
     """Yields the head of each data set of a number, and its values: lines, or bytes of a 58b.
 
     The head of a data set in bytes ends with their byte order, < or >.
+
+    Raises:
+        ValueError: A data set of the number ends inside its head.
     """
     file = BytesIO(content)
     while line := file.readline():
@@ -118,6 +125,11 @@ def data_sets(content: bytes, number: int) -> Iterator[tuple[list[str], bytes | 
         inside = takewhile(lambda x: x.strip() != b"-1", iter(file.readline, b""))
         rows = [decoded(row).rstrip("\r\n") for row in inside]
         if first.strip() == str(number).encode():
+            if len(rows) < HEAD_LINES[number]:
+                following = file.readline().strip()
+                is_id_line = following not in (b"-1", b"")
+                reason = "an ID line is −1: write NONE there" if is_id_line else "it is cut off"
+                raise ValueError(f"data set {number} with {len(rows)} lines of a head; {reason}")
             yield rows[: HEAD_LINES[number]], rows[HEAD_LINES[number] :]
 
 
@@ -126,7 +138,7 @@ def _parse_series(head: list[str], values: bytes | list[str]) -> _Series:
     response, direction = int(head[5][41:51]), abs(int(head[5][51:55]))
     axis_name = DIRECTIONS[direction - 1] if 1 <= direction <= 6 else str(direction)
     kind, count, is_even = (int(head[6][start : start + 10]) for start in (0, 10, 20))
-    step = float(head[6][43:56])
+    [step] = floats(head[6][43:56])
     parts = 2 if kind in COMPLEX else 1
     columns = parts if is_even else parts + 1
     if isinstance(values, bytes):

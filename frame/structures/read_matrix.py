@@ -6,6 +6,7 @@ the unknowns and the memory that is free, indices against the shape, text agains
 
 from __future__ import annotations
 
+import re
 from io import StringIO
 from pathlib import Path
 
@@ -19,8 +20,27 @@ from alphacut.frame.structures.matrix_market import dense_of_entries, matrix_mar
 
 ENDINGS = (".mtx", ".npz", ".npy", ".csv")
 ALLOWED = "a file .mtx, .npz, .npy or .csv with one array of finite real numbers"
+OTHER_ENDINGS = {
+    (".txt", ".dat", ".tsv", ".out", ".asc"): "rename a file of numbers alone to NAME.csv",
+    (".mat",): "write it by numpy.save of an array of scipy.io.loadmat",
+    (".xlsx", ".xls", ".ods"): "save the sheet as CSV, numbers alone",
+    (".mm",): "rename a file of Matrix Market to NAME.mtx",
+    (".pkl", ".pickle"): "write it by numpy.save",
+}
+"""What to do with files of other types."""
 MAX_ROWS = 5000
 """Rows of the largest matrix where nothing else is said: it is dense here, and takes 200 MB."""
+NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf)", re.IGNORECASE)
+CURES_OF_CELLS = {
+    r"[\[\]()]": "write numbers without brackets",
+    r"\d,\d+[ \t]+[-+\d]": "write decimal points, or semicolons beside decimal commas",
+    r"^\s*%%": "a file of Matrix Market is NAME.mtx",
+    r",\s*(,|$)|;\s*(;|$)": "cells are empty: write 0, and nothing behind the last number",
+    r"\d\.?[dD][-+]?\d": "write 1e3 in place of 1D3",
+    r"\d\s*[-+]?\s*\d*\.?\d*[ij]\b": "a matrix is real: damping has a matrix of its own",
+    r"\d\s*(?:[kMG]?N|kg|t)\b": "matrices are in SI units: write numbers alone",
+}
+"""Cure of a row of a CSV file by a pattern in it; the first that fits."""
 SPARSE = {"format", "shape", "data"}
 """Arrays in every file of `scipy.sparse.save_npz`."""
 
@@ -30,7 +50,7 @@ def read_matrix(path: str | Path, *, name: str = "", max_rows: int = MAX_ROWS) -
 
     Args:
         path: File of Matrix Market (.mtx), of `scipy.sparse.save_npz` or `numpy.savez` (.npz), of
-            `numpy.save` (.npy), or of numbers between commas (.csv).
+            `numpy.save` (.npy), or of numbers between commas, semicolons or blanks (.csv).
         name: Name of the array in a .npz file of several.
         max_rows: Largest number of rows and of columns, as the number of unknowns.
 
@@ -46,7 +66,8 @@ def read_matrix(path: str | Path, *, name: str = "", max_rows: int = MAX_ROWS) -
     """
     file = Path(path)
     if file.suffix.lower() not in ENDINGS:
-        raise RefusedError(file.name, f"of type {file.suffix or 'none'}", ALLOWED)
+        cures = (cure for kinds, cure in OTHER_ENDINGS.items() if file.suffix.lower() in kinds)
+        raise RefusedError(file.name, f"of type {file.suffix or 'none'}", ALLOWED, next(cures, ""))
     try:
         array = _read_by_ending(file, name, max_rows=max_rows)
     except RefusedError:
@@ -54,11 +75,18 @@ def read_matrix(path: str | Path, *, name: str = "", max_rows: int = MAX_ROWS) -
     except Exception as error:  # whatever the readers of files, texts and archives raise
         reason = printable(error, 80) or type(error).__name__
         raise RefusedError(file.name, reason, ALLOWED) from None
-    is_real = array.dtype.kind in "uif" and array.ndim in (1, 2) and array.size > 0
-    require(is_real, file.name, value="no such array", allowed=ALLOWED)
+    is_real, shape = array.dtype.kind in "uif", " × ".join(map(str, array.shape))
+    require(is_real, file.name, value=f"an array of {array.dtype.name}", allowed=ALLOWED)
+    is_matrix = array.ndim in (1, 2) and array.size > 0
+    require(is_matrix, file.name, value=f"an array of {shape or 'no'} numbers", allowed=ALLOWED)
     require_size(file.name, array.shape, max_rows)
     require_free_memory(file.name, 8.0 * array.size, f"{array.size} numbers")
-    require(np.isfinite(array).all(), file.name, value="no such array", allowed=ALLOWED)
+    if not np.isfinite(array).all():
+        place = np.argwhere(~np.isfinite(array))[0] + 1
+        what = f"{array[tuple(place - 1)]} at " + ", ".join(
+            f"{axis} {k}" for axis, k in zip(("row", "column"), place, strict=False)
+        )
+        raise RefusedError(file.name, what, ALLOWED)
     return np.array(array, float)
 
 
@@ -72,8 +100,46 @@ def _read_by_ending(path: Path, name: str, *, max_rows: int) -> Numbers:
     require_text(path)
     if kind == ".mtx":
         return matrix_market(path.name, path.read_bytes(), max_rows=max_rows)
-    text = path.read_text(encoding="utf-8-sig")
-    return np.loadtxt(StringIO(text), delimiter=",", ndmin=2)
+    return _read_csv(path.name, path.read_text(encoding="utf-8-sig"))
+
+
+def _read_csv(name: str, text: str) -> Array:
+    """Return the numbers of a text, shape (rows, columns).
+
+    Commas part them, or semicolons, beside which commas are decimal ones, or blanks and tabs.
+
+    Raises:
+        RefusedError: A row has another text, or another count of numbers than the first.
+    """
+    require(bool(text.strip()), name, "", ALLOWED)
+    delimiter: str | None = ","
+    if ";" in text:
+        delimiter, text = ";", text.replace(",", ".")
+    elif "," not in text:
+        delimiter = None
+    try:
+        return np.loadtxt(StringIO(text), delimiter=delimiter, ndmin=2)
+    except ValueError:
+        raise _wrong_row(name, text, delimiter) from None
+
+
+def _wrong_row(name: str, text: str, delimiter: str | None) -> RefusedError:
+    """Error about the first row of a text that is not of as many numbers as the first row is."""
+    lines = {k: x for k, x in enumerate(text.splitlines(), 1) if x.partition("#")[0].strip()}
+    count = 0
+    for number, line in lines.items():
+        cells = [cell.strip() for cell in line.partition("#")[0].split(delimiter)]
+        others = [cell for cell in cells if not NUMBER.fullmatch(cell)]
+        count = count or len(cells)
+        if not others and len(cells) == count:
+            continue
+        cure = f"the first row has {count}"
+        if others:
+            fitting = (cure for pattern, cure in CURES_OF_CELLS.items() if re.search(pattern, line))
+            cure = next(fitting, "a matrix has no head and no names of rows")
+        key, allowed = f"{name}, line {number}", "rows of as many numbers, as 1.5,0,2e6"
+        return RefusedError(key, line.strip()[:60], allowed, cure)
+    return RefusedError(name, "no matrix", ALLOWED)
 
 
 def _read_archive(archive: ArrayArchive, name: str, *, max_rows: int) -> Numbers:

@@ -27,6 +27,8 @@ PRISM_15 = 18  # Gmsh's type of the element
 ABAQUS_ORDER = [0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11]
 """Of a prism in Abaqus and VTK: edges of the lower triangle, of the upper, and vertical ones."""
 MESH_FILES = "meshes in Gmsh's format MSH with 15-node prisms"
+PRISM_15_BY_GMSH = "extrude with recombine, Mesh.SecondOrderIncomplete = 1, order 2"
+EXTRUDE = f"make prisms of the triangles along θ: {PRISM_15_BY_GMSH}, a physical group a phase"
 COMMENTS, END_OF_COMMENTS = b"$Comments", b"$EndComments"
 FILLED = 1e-6  # of the cell that prisms may leave or take twice
 UPSIDE_DOWN = [3, 4, 5, 0, 1, 2, 12, 13, 8, 14, 10, 11, 6, 7, 9]
@@ -84,6 +86,8 @@ def read_prisms(mesh: MshFile) -> Prisms:
     if mesh.partitions:
         cure = "write the mesh before it is divided among processes"
         raise MeshError(f"the mesh is partitioned into {mesh.partitions} parts", cure)
+    if not mesh.volumes and not mesh.elements:
+        raise MeshError("the mesh is plane: it has no volumes, and prisms are wanted", EXTRUDE)
     names: list[str] = []
     cells: list[Ints] = []
     phases: list[Ints] = []
@@ -101,7 +105,8 @@ def read_prisms(mesh: MshFile) -> Prisms:
     ungrouped = sorted(mesh.volumes - grouped)
     if ungrouped or not names:
         what = f"volume {ungrouped[0]}" if ungrouped else "the mesh"
-        raise MeshError(f"{what} has no physical group that names its phase")
+        cure = 'name each phase: gmsh.model.addPhysicalGroup(3, volumes, name="matrix")'
+        raise MeshError(f"{what} has no physical group that names its phase", cure)
     # nodes of curves and surfaces alone belong to no prism
     used, compact = np.unique(np.concatenate(cells), return_inverse=True)
     return Prisms(mesh.points[used], compact.reshape(-1, 15), np.concatenate(phases), tuple(names))
@@ -114,7 +119,7 @@ def _cells_of(mesh: MshFile, volume: int, name: str) -> Ints:
         found = ", ".join(element_name(kind) for kind in kinds)
         raise MeshError(
             f"the physical group {name!r} holds {found or 'no elements'}",
-            "mesh with Prism 15: extrude with recombine, Mesh.SecondOrderIncomplete = 1, order 2",
+            f"mesh with Prism 15: {PRISM_15_BY_GMSH}",
         )
     return mesh.elements[volume, PRISM_15]
 
@@ -212,7 +217,11 @@ def _require_square(xy: Array, what: str) -> None:
     box = np.array([xy.min(axis=0), xy.max(axis=0)])
     if abs(box - [[-1, -1], [1, 1]]).max() > SAME_PLACE:
         shown = " × ".join(f"{low:.6g} … {high:.6g}" for low, high in box.T)
-        cure = "scale and move the mesh so that the cell spans −1 … 1"
+        size, other = box[1] - box[0]
+        cure = "the cell is a square; a rectangle has no place here"
+        if abs(size - other) <= SAME_PLACE * size:
+            x, y = box.mean(axis=0)
+            cure = f"scale and move the mesh: 2 (x − {x:g}) / {size:g}, 2 (y − {y:g}) / {size:g}"
         raise MeshError(f"{what} spans {shown}, not −1 … 1 × −1 … 1", cure)
 
 

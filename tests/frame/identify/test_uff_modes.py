@@ -1,5 +1,7 @@
 """Modes of universal files, written by the columns of the format."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -56,3 +58,16 @@ def test_modes_that_are_not_there_are_refused(tmp_path):
     ):
         with pytest.raises(RefusedError, match=words):
             modes_of(tmp_path, *sets, floors=floors)
+
+
+def test_an_id_line_of_minus_one_and_exponents_without_their_letter(tmp_path):
+    mode = uff55(1, [*SHAPE, 9.0])
+    bare = re.sub(r"(\d\.\d+)E([-+])(\d\d)(?!\d)", r"\1\g<2>0\3", mode)
+    assert bare != mode
+    (row,) = modes_of(tmp_path, bare)
+    assert row.frequencies == pytest.approx([1.5])
+    assert [row.amplitudes[k][0] for k in (1, 2, 3)] == pytest.approx(SHAPE)
+    lines = mode.splitlines(keepends=True)
+    lines[2] = "    -1\n"
+    with pytest.raises(RefusedError, match="an ID line is −1: write NONE there"):
+        modes_of(tmp_path, "".join(lines))

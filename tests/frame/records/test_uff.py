@@ -1,10 +1,13 @@
 """Universal files, written by the columns of the format."""
 
+import re
+
 import numpy as np
 import pytest
 
 from alphacut.base.errors import RefusedError
 from alphacut.frame.records.read import read_recording
+from alphacut.frame.records.uff import floats
 from tests.frame.records.samples import uff58
 
 
@@ -81,3 +84,24 @@ def test_a_universal_file_without_time_histories_is_told_so(tmp_path):
     geometry = "    -1\n    15\n" + f"{7:10d}{0:10d}{0:10d}{8:10d}\n" + "    -1\n"
     with pytest.raises(RefusedError, match="without a data set 58"):
         read_recording(saved(tmp_path, geometry))
+
+
+def test_exponents_without_their_letter_are_read_as_fortran_does(tmp_path):
+    content = uff58(WAVE)
+    bare = re.sub(rb"(\d\.\d+)[eE]([-+])(\d\d)(?!\d)", rb"\1\g<2>0\3", content)
+    assert bare != content
+    record = read_recording(saved(tmp_path, bare))
+    assert record.step == pytest.approx(0.005)
+    assert record.samples == pytest.approx(WAVE, abs=1e-5)
+    assert floats("  8.82898-001 -1.00000+000 2 .5+001") == [0.882898, -1.0, 2.0, 5.0]
+    assert floats("1.5 -100 12.5-33.5") == [1.5, -100.0, 12.5, -33.5]
+
+
+def test_a_data_set_that_ends_in_its_head_is_told_why(tmp_path):
+    content = uff58(WAVE)
+    start, _, rest = content.partition(b"made up")
+    _, _, below = rest.partition(b"\n")
+    with pytest.raises(RefusedError, match=r"an ID line is −1: write NONE there"):
+        read_recording(saved(tmp_path, start + b"    -1\n" + below))
+    with pytest.raises(RefusedError, match="it is cut off"):
+        read_recording(saved(tmp_path, start + b"NONE\n"))

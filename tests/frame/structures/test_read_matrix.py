@@ -40,8 +40,8 @@ def test_one_of_several_arrays_is_named(tmp_path):
     ("name", "content", "words"),
     [
         ("k.txt", "1 2\n", "of type .txt"),
-        ("k.csv", "1,2\n3\n", "a file .mtx"),
-        ("k.csv", "1,nan\n", "no such array"),
+        ("k.csv", "1,2\n3\n", "the first row has 2"),
+        ("k.csv", "1,nan\n", "nan at row 1, column 2"),
         ("k.mtx", "no matrix\n", "k.mtx is no matrix; allowed: %%MatrixMarket"),
         ("k.npy", "no array", "an array of real numbers as numpy.save"),
     ],
