@@ -99,6 +99,7 @@ class Automatic:
                     linkage.run(walk.samples)
                     wavy = [x for x in linkage.outputs if linkage.passes_over_waves(x)]
                     is_rough = is_rough | np.isin(outputs, wavy)
+                    linkage.search()  # further, where a look beside the optima found others
             except SpentError:
                 ended = True
         if linkage is not None and linkage.outputs:

@@ -241,6 +241,14 @@ class SingleLinkage:
                 self._sample_up_to(cut, MIN_SAMPLES, 0)
             return
         self._add_samples(self.cuts[0], first)
+        self.search()
+
+    def search(self) -> None:
+        """Go on until every bound meets the stopping rule, as after optima found elsewhere.
+
+        Raises:
+            SpentError: The budget ended the search.
+        """
         rounds = 0
         while visits := [(cut, bounds) for cut in self.cuts if (bounds := self._open_bounds(cut))]:
             rounds += 1
@@ -263,7 +271,7 @@ class SingleLinkage:
         return any(state.optima and not state.is_smooth for state in states)
 
     def passes_over_waves(self, output: str) -> bool:
-        """Return whether descents to the best optima of the widest cut pass over jumps or waves.
+        """Return whether descents to the best optima of some cut pass over jumps or waves.
 
         An estimated output is evaluated along each input, to both sides of the best optimum of each
         bound. Where it improves again, away from the optimum, a descent should find a smooth
@@ -274,8 +282,7 @@ class SingleLinkage:
         Raises:
             SpentError: The budget does not carry the evaluations.
         """
-        cut = self.cuts[0]
-        for bound, side in product(self.bounds, (-1.0, 1.0)):
+        for cut, bound, side in product(self.cuts, self.bounds, (-1.0, 1.0)):
             if bound.output != output or not self.is_estimate(output):
                 continue
             best = cut.unit(self.states[cut.level, bound].best.point[None])[0]

@@ -112,3 +112,29 @@ def test_a_smooth_turn_near_a_corner_is_estimated_by_the_search():
     bounds = propagate(lambda x, y: (x - 0.02) ** 2 + y, inputs, alpha=[0], vectorised=True)
     assert bounds.nature is Nature.ESTIMATED
     assert bounds.bounds() == pytest.approx((0, 0.98**2 + 1), abs=1e-5)
+
+
+def test_an_optimum_beside_a_corner_of_any_cut_is_found():
+    """At α = ½ it is 0.00283625, on a face (a grid of 2001² points), and the corner 0.00283044."""
+    turn = np.array([[0.26501223, 1.26789829], [-0.45505702, -0.15450735], [-0.168391, 0.0107871]])
+    factors = np.array(
+        [
+            [1.81000705, 1.63243209, -0.17344578, -0.75248719],
+            [-2.0237598, -0.7308207, 0.07120307, -0.75695097],
+            [0.11074471, -0.78280492, 1.81982962, 0.2670886],
+        ]
+    )
+
+    def product_of_polynomials(x, y):
+        values = [
+            sum(c * z**k for k, c in enumerate(row, start=1))
+            for row, z in zip(factors, turn @ np.stack([x, y]), strict=True)
+        ]
+        return 0.6651144635338473 * np.prod(values, axis=0)
+
+    inputs = {
+        "x": Triangular(-0.730531622336565, 0.19181929493080407, 0.9940924338640771),
+        "y": Interval(-0.7798962386097238, 0.7603214826878335),
+    }
+    bounds = propagate(product_of_polynomials, inputs, alpha=[0, 0.5], vectorised=True)
+    assert bounds.upper[1, 0] == pytest.approx(0.00283625, abs=1e-7)
