@@ -158,9 +158,10 @@ def image(dataset: xarray.Dataset) -> Figure:
     factor, unit = axis_prefix(max(phase.sizes[axis] * lengths[axis] for axis in phase.dims), "m")
     # by the axis across each picture, None of an image
     planes = [*phase.dims[::-1]] if phase.ndim == 3 else [None]
-    mosaic = [[*map(str, planes)], ["E"] * 3] if phase.ndim == 3 else [["None", "E"]]
+    mosaic: Any = [[*map(str, planes)], ["E"] * 3] if phase.ndim == 3 else [["None", "E"]]
     size = (WIDTH, 5.6) if phase.ndim == 3 else (WIDTH, 3.8)
-    figure, axes = plt.subplot_mosaic(mosaic, figsize=size)
+    figure = plt.figure(figsize=size)
+    axes = figure.subplot_mosaic(mosaic)
     for across in planes:
         place = {} if across is None else {across: phase.sizes[across] // 2}
         picture, (up, right) = axes[str(across)], phase.isel(place).dims
@@ -170,7 +171,7 @@ def image(dataset: xarray.Dataset) -> Figure:
         greys = ListedColormap(_phase_greys(dataset))
         shown = phase.isel(place).values
         picture.imshow(shown, cmap=greys, vmin=-0.5, vmax=greys.N - 0.5, **look)
-        mask = np.ma.masked_equal(is_open.isel(place).values, 0)
+        mask = np.where(is_open.isel(place).values, 1.0, np.nan)
         picture.imshow(mask, cmap=ListedColormap([ORANGE]), **look)
         picture.set(xlabel=f"{right} ({unit})", ylabel=f"{up} ({unit})")
         picture.grid(visible=False)
