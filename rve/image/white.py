@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
@@ -14,9 +13,9 @@ PHOTOMETRIC, WHITE_IS_ZERO = 262, 0
 """Number of the tag of TIFF, and the value with which a stored zero is white."""
 
 
-def tags_of(picture: object) -> Mapping[int, Any]:
+def tags_of(picture: object) -> Mapping[int, object]:
     """Return the tags of a page of TIFF that Pillow has opened, by their numbers; {} of others."""
-    tags: Mapping[int, Any] = getattr(picture, "tag_v2", {})
+    tags: Mapping[int, object] = getattr(picture, "tag_v2", {})
     return tags
 
 
