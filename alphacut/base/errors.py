@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Collection, Iterable
 from math import inf, isfinite, nan
 from numbers import Integral, Real
@@ -118,6 +119,39 @@ def checked_number(
     shown = printable(value) if isinstance(value, Integral) else repr(value)
     require(is_allowed, key, value=shown, allowed=allowed)
     return number
+
+
+def is_number(value: object, *, whole: bool = False) -> bool:
+    """True for a real number, or a whole one, of Python or NumPy; not for True and False."""
+    kind = Integral if whole else Real
+    return isinstance(value, kind) and type(value).__name__ not in ("bool", "bool_")
+
+
+def array_of_call(key: str, function: object, *points: np.ndarray, allowed: str) -> np.ndarray:
+    """Return what a function of the caller's gives at arrays of points, of their shape, as floats.
+
+    Args:
+        key: Name of the function, for the message.
+        function: What the caller gave as one.
+        points: Its arguments, arrays of one shape.
+        allowed: What the function takes and gives, in words.
+
+    Raises:
+        RefusedError: It is no function, raises an error, or gives an array of another shape.
+    """
+    if not callable(function):
+        raise RefusedError(key, repr(function), allowed)
+    try:
+        values = np.asarray(function(*points), float)
+    except Exception as error:  # whatever the caller's function raises
+        value = f"a function that raises {type(error).__name__}: {error}"
+        is_of_one_number = re.search("length-1 arrays|truth value|0-dimensional", str(error))
+        cure = "write it by NumPy's functions, as np.hypot and np.where" if is_of_one_number else ""
+        raise RefusedError(key, value, allowed, cure) from None
+    if values.shape != points[0].shape:
+        value = f"a function that gives shape {values.shape} at points of shape {points[0].shape}"
+        raise RefusedError(key, value, allowed, "of one number for all make np.full_like of it")
+    return values
 
 
 def require_numbers(name: str, values: object) -> None:

@@ -10,7 +10,7 @@ from numbers import Real
 import numpy as np
 
 from alphacut.base.arrays import Array
-from alphacut.base.errors import RefusedError, checked_number
+from alphacut.base.errors import RefusedError, checked_number, is_number
 from alphacut.rve.cell.outline import Outline, area, circle, is_round
 from alphacut.stochastic import RadiusMap, require_map
 
@@ -172,15 +172,16 @@ MAX_POISSON = 0.45
 
 def require_mesh_size(size: float) -> None:
     """Refuse an edge length outside (0, 1], in halves of the cell's side."""
-    if not 0 < size <= 1:
+    if not (is_number(size) and 0 < size <= 1):
         allowed = "values in (0, 1], in halves of the cell's side"
-        raise RefusedError("the mesh size", f"{size:g}", allowed)
+        shown = f"{size:g}" if is_number(size) else repr(size)
+        raise RefusedError("the mesh size", shown, allowed)
 
 
 def require_points(points: int | None) -> None:
     """Refuse a quadrature rule in θ of fewer than two points; None means the model's choice."""
-    if points is not None and points < 2:
-        raise RefusedError("number of points of the rule in θ", points, "2 or more")
+    if points is not None and not (is_number(points, whole=True) and points >= 2):
+        raise RefusedError("number of points of the rule in θ", repr(points), "2 or more")
 
 
 def continuous_radii(radius_map: RadiusMap) -> Array:

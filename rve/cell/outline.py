@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.base.arrays import Array
-from alphacut.base.errors import RefusedError
+from alphacut.base.errors import RefusedError, array_of_call
 
 Outline = Callable[[Array], Array]
 """Takes angles φ of any shape, gives s(φ) > 0 of the same; smooth, of period 2π."""
@@ -47,6 +47,12 @@ class Ellipse:
         return np.asarray(
             1 / np.sqrt(np.cos(turned) ** 2 / self.aspect + np.sin(turned) ** 2 * self.aspect)
         )
+
+
+def require_outline(outline: object) -> None:
+    """Refuse what is no function of an array of angles that gives as many distances."""
+    allowed = "a function of an array of angles that gives as many distances over r, or Ellipse"
+    array_of_call("outline", outline, _ANGLES, allowed=allowed)
 
 
 def is_round(outline: Outline) -> bool:

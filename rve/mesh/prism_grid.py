@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from alphacut.base.arrays import Array, Ints, Mask
-from alphacut.base.errors import RefusedError
+from alphacut.base.errors import RefusedError, array_of_call
 from alphacut.rve.cell.outline import Outline, circle, reach, require_fit
 from alphacut.stochastic import RadiusMap, ThetaLaw, require_map
 
@@ -110,13 +110,20 @@ class LevelSet(FixedCell):
         Raises:
             RefusedError: The function is a mask, or does not give a number at each point.
         """
-        found = np.asarray(self.z(*np.moveaxis(points, -1, 0)))
-        if found.dtype == bool:
+        kinds: list[bool] = []
+
+        def noted(*coordinates: Array) -> Array:
+            found = np.asarray(self.z(*coordinates))
+            kinds.append(found.dtype == bool)
+            return found
+
+        z = noted if callable(self.z) else self.z
+        allowed = "a function of three arrays x1, x2 and θ that gives a number at each point"
+        values = array_of_call("level set", z, *np.moveaxis(points, -1, 0), allowed=allowed)
+        if any(kinds):
             raise RefusedError("level set", "a mask of True and False", SIGNS, DISTANCE)
-        values = np.asarray(found, float)
-        if values.shape != points.shape[:-1] or np.isnan(values).any():
-            value = "NaN" if values.shape == points.shape[:-1] else f"of shape {values.shape}"
-            raise RefusedError("level set", value, f"numbers of shape {points.shape[:-1]}")
+        if np.isnan(values).any():
+            raise RefusedError("level set", "NaN", allowed)
         return np.asarray(values)
 
     def require_both_signs(self, lowest: float, highest: float) -> None:

@@ -22,7 +22,7 @@ from typing import ClassVar, Self, TypeVar
 import numpy as np
 
 from alphacut.base.arrays import Array
-from alphacut.base.errors import RefusedError, require
+from alphacut.base.errors import RefusedError, is_number, require, require_numbers
 from alphacut.rve.cell.cell import (
     LOADS,
     STRAIN,
@@ -34,7 +34,7 @@ from alphacut.rve.cell.cell import (
     require_mesh_size,
     require_solve_arguments,
 )
-from alphacut.rve.cell.outline import Outline, circle, is_round
+from alphacut.rve.cell.outline import Outline, circle, is_round, require_outline
 from alphacut.rve.fenicsx import MPI
 from alphacut.rve.mesh.columns import extrude
 from alphacut.rve.mesh.prism_grid import PrismGrid, reference_radius
@@ -51,7 +51,7 @@ from alphacut.rve.result.result import HomogenisedStiffness, PhaseEnergies, Stre
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.slices.model import SlicesModel
 from alphacut.rve.solver.form import energies_by_phase, total_energy
-from alphacut.rve.solver.krylov import SolverOptions, solve
+from alphacut.rve.solver.krylov import SolverOptions, require_petsc, solve
 from alphacut.stochastic import RadiusMap
 
 AnyProblem = TypeVar("AnyProblem", PrismProblem, SliceProblem)
@@ -93,6 +93,12 @@ class PrismModel:
 
     def __post_init__(self) -> None:
         require_prisms(self.mesh_size, self.layers)
+        require_petsc(self.petsc)
+        require_outline(self.outline)
+        if self.modulus_range is not None:
+            require_numbers("modulus_range", self.modulus_range)
+            is_range = len(self.modulus_range) == 2
+            require(is_range, "modulus_range", self.modulus_range, "least and greatest, in Pa")
 
     @classmethod
     def with_resolution(cls, resolution: Resolution) -> Self:
@@ -261,8 +267,9 @@ class PrismModel:
 def require_prisms(mesh_size: float, layers: int) -> None:
     """Refuse a mesh size or a number of layers that is not allowed."""
     require_mesh_size(mesh_size)
-    if layers < 1:
-        raise RefusedError("the number of layers", layers, "1 or more")
+    if not (is_number(layers, whole=True) and layers >= 1):
+        allowed = "1 or more" if is_number(layers, whole=True) else "a whole number, 1 or more"
+        raise RefusedError("the number of layers", repr(layers), allowed)
 
 
 def solve_sample(

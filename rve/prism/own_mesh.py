@@ -13,8 +13,6 @@ from pathlib import Path
 from time import perf_counter
 from typing import ClassVar, Self, cast
 
-import numpy as np
-
 from alphacut.base.errors import RefusedError
 from alphacut.rve.cell.cell import THREE_LOADS, AnyPhase, Phase, VoigtPhase, require_compressible
 from alphacut.rve.fenicsx import MPI
@@ -35,8 +33,9 @@ from alphacut.rve.prism.problem import PrismProblem
 from alphacut.rve.result.checks import checks_within_limits
 from alphacut.rve.result.moduli import AVERAGES, AXES
 from alphacut.rve.result.result import HomogenisedStiffness, PhaseEnergies
-from alphacut.rve.solver.krylov import SolverOptions
+from alphacut.rve.solver.krylov import SolverOptions, require_petsc
 from alphacut.stochastic import ThetaLaw
+from alphacut.stochastic.theta.law import require_law
 
 ROUGH_MESH = 0.1
 """Relative violation of a bound that a user's mesh may have, whose error nobody knows."""
@@ -146,6 +145,9 @@ class MeshModel(_NamedModel):
         [coarse] = replace(self, refine=False).solve(law, phases)
         return [with_distance(result, coarse, REFINEMENT_SAFETY) for result in results]
 
+    def __post_init__(self) -> None:
+        require_petsc(self.petsc)
+
     def problem_of(self, law: object, phases: object) -> tuple[PrismProblem, dict[str, AnyPhase]]:
         """Problem on the mesh, moved to the law, with law and materials checked."""
         problem = self.cached_problem()
@@ -154,9 +156,9 @@ class MeshModel(_NamedModel):
 
     def cached_problem(self) -> PrismProblem:
         """Problem on the mesh, cached as long as the file does not change."""
+        if not isinstance(self.file, str | Path) or not Path(self.file).is_file():
+            raise RefusedError("mesh.file", self.file, "path of a file of Gmsh")
         path = Path(self.file)
-        if not path.is_file():
-            raise RefusedError("mesh.file", path, "a file of Gmsh")
         return _mesh_problem(str(path), path.stat().st_mtime_ns, self.parallel, self.refine)
 
 
@@ -191,11 +193,11 @@ class LevelSetModel(_NamedModel):
 
     def __post_init__(self) -> None:
         require_prisms(self.mesh_size, self.layers)
+        require_petsc(self.petsc)
 
     def problem_of(self, law: object, phases: object) -> tuple[PrismProblem, dict[str, AnyPhase]]:
         """Problem on a cached mesh."""
-        if not hasattr(law, "pdf"):
-            raise RefusedError("law of θ", type(law).__name__, "a law, as TruncatedNormal(-3, 3)")
+        require_law(law)
         named = in_order_of(NAMES, phases)
         size, layers, parallel = self.mesh_size, self.layers, self.parallel
         grid = cached_grid(size=size, radius=0.0, layers=layers, parallel=parallel)
@@ -225,10 +227,11 @@ def mesh_law(grid: PrismGrid, law: object) -> FixedCell:
     assert grid.fixed is not None
     theta = grid.fixed[:, 2]
     low, high = theta.min(), theta.max()
-    lower, upper = getattr(law, "lower", np.nan), getattr(law, "upper", np.nan)
+    require_law(law)
+    lower, upper = cast("ThetaLaw", law).lower, cast("ThetaLaw", law).upper
     tolerance = SAME_LEVEL * (high - low)
     is_same = abs(lower - low) <= tolerance and abs(upper - high) <= tolerance
-    if not is_same or not hasattr(law, "pdf"):
+    if not is_same:
         value = f"on {lower:g} … {upper:g}"
         allowed = f"laws on {low:g} … {high:g}, the lowest and the highest level of the mesh"
         raise RefusedError("law of θ", value, allowed)

@@ -30,7 +30,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from alphacut.base.arrays import Array, Ints
-from alphacut.base.errors import RefusedError
+from alphacut.base.errors import RefusedError, is_number
 from alphacut.rve.cell.cell import Cell, Phase, require_points, require_solve_arguments
 from alphacut.rve.result.cell_model import Resolution
 from alphacut.rve.result.checks import with_checks
@@ -230,9 +230,10 @@ class SeriesModel:
 
     def __post_init__(self) -> None:
         require_points(self.points)
-        if not self.MIN_ACCURACY <= self.accuracy <= MAX_ACCURACY:
+        accuracy = self.accuracy
+        if not (is_number(accuracy) and self.MIN_ACCURACY <= accuracy <= MAX_ACCURACY):
             allowed = f"values in [{self.MIN_ACCURACY:g}, {MAX_ACCURACY:g}]"
-            raise RefusedError("the accuracy of the series", f"{self.accuracy:g}", allowed)
+            raise RefusedError("the accuracy of the series", repr(accuracy), allowed)
 
     @classmethod
     def with_resolution(cls, resolution: Resolution) -> Self:

@@ -28,7 +28,7 @@ from alphacut.rve.cell.cell import (
     require_points,
     require_solve_arguments,
 )
-from alphacut.rve.cell.outline import Outline, circle, is_round
+from alphacut.rve.cell.outline import Outline, circle, is_round, require_outline
 from alphacut.rve.fenicsx import MPI, basix, cholesky, fem, mesh_of, ufl
 from alphacut.rve.mesh.curved import PlaneMesh, curved_nodes, plane_mesh, quadrature_degree
 from alphacut.rve.mesh.periodicity import unknowns
@@ -210,6 +210,7 @@ class SlicesModel:
     def __post_init__(self) -> None:
         require_mesh_size(self.mesh_size)
         require_points(self.points)
+        require_outline(self.outline)
 
     @classmethod
     def with_resolution(cls, resolution: Resolution) -> Self:

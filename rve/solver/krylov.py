@@ -70,6 +70,20 @@ class SolverOptions:
         return " ".join(["theta", *words] if self.by_levels else words)
 
 
+def require_petsc(petsc: object) -> None:
+    """Refuse what is no table of options of PETSc by their names without dash and prefix."""
+    allowed = 'a dict of options without dash and prefix, as {"ksp_type": "gmres"}'
+    if not isinstance(petsc, Mapping):
+        cure = ""
+        if words := re.findall(r"-(\S+)\s+([^-\s]\S*)", petsc if isinstance(petsc, str) else ""):
+            cure = f"write {dict(words)}".replace("'", '"')
+        raise RefusedError("petsc", repr(petsc), allowed, cure)
+    for name in petsc:
+        bare = str(name).lstrip("-").removeprefix(PREFIX)
+        if name != bare:
+            raise RefusedError("petsc", repr(name), allowed, f'write "{bare}"')
+
+
 LOG = logging.getLogger(__name__)
 
 
@@ -176,6 +190,8 @@ def in_database(options: SolverOptions) -> Iterator[None]:
     except PETSc.Error as failure:
         reason = str(failure).splitlines()[-1].strip()
         if options.overrides:
+            if "norm type" in reason:
+                reason += f"; say -{PREFIX}ksp_norm_type preconditioned, or none, beside it"
             raise RefusedError("PETSc", str(options), "what PETSc takes", reason) from failure
         raise ConvergenceError(f"PETSc cannot set up {options}: {reason}") from failure
     finally:

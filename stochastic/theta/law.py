@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from alphacut.base.arrays import Array
-from alphacut.base.errors import require
+from alphacut.base.errors import is_number, require
 
 MIN_WIDTH = 1e-4  # of a support over its greater end, so that rounding is small beside it
 
@@ -38,6 +38,18 @@ class ThetaLaw(Protocol):
 
     def quantile(self, probability: ArrayLike) -> Array:
         """Return θ with P(Θ ≤ θ) = probability in [0, 1], any shape."""
+
+
+def require_law(law: object) -> None:
+    """Refuse what is no `ThetaLaw`, as a name or a frozen law of SciPy."""
+    ends = getattr(law, "lower", None), getattr(law, "upper", None)
+    is_law = all(map(is_number, ends)) and callable(getattr(law, "pdf", None))
+    cure = "give the law itself, as TruncatedNormal(-3, 3)"
+    if hasattr(law, "ppf"):
+        cure = "for scipy.stats.norm give TruncatedNormal(-3, 3); else a class with these members"
+    shown = type(law).__name__ if not isinstance(law, str) else repr(law)
+    allowed = "a law with lower, upper, pdf, cdf and quantile"
+    require(is_law, "law of θ", value=shown, allowed=allowed, cure=cure)
 
 
 def require_support(lower: float, upper: float, unit: float = 0.0) -> None:
