@@ -13,6 +13,7 @@ import numpy as np
 import xarray
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from alphacut.base.arrays import Array
 from alphacut.base.number_text import ShownUnit
@@ -26,6 +27,9 @@ from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.result import Ends
 from alphacut.stages.envelope import EnvelopeTask
 from alphacut.stages.summary import Parts, Results
+
+FIT: style.Look = {"color": ORANGE, "lw": 1.2, "ls": ":"}
+"""Line of a lognormal fit."""
 
 
 def drawings(task: EnvelopeTask, results: Results) -> Iterator[tuple[str, Callable[[], Figure]]]:
@@ -219,7 +223,8 @@ def draw_fragility(answer: Fragility) -> Figure:
     figure, panels = plt.subplots(len(shown), squeeze=False, figsize=size)
     for axes, part in zip(panels[:, 0], shown, strict=True):
         draw_fragility_of(axes, answer, part)
-    style.alpha_legend(panels[0, 0], answer.alpha)
+    fit = Line2D([], [], **FIT, label=f"lognormal fit\nat α = {answer.alpha[-1]:g}")
+    style.alpha_legend(panels[0, 0], answer.alpha, [fit])
     return figure
 
 
@@ -227,7 +232,7 @@ def draw_fragility_of(axes: Axes, answer: Fragility, part: LimitFragility) -> No
     """Draws the bands of one limit or event, and the lognormal fit on the highest level."""
     draw_bands(axes, part.measure, part.band, answer.alpha, in_steps=True)
     for curve in part.lognormal_fit(-1):
-        axes.plot(part.measure, curve, color=ORANGE, lw=1.2, ls=":")
+        axes.plot(part.measure, curve, **FIT)
     if part.confidence is not None:
         for end in part.confidence:
             axes.plot(part.measure, end[0], color=BLUE, lw=0.9, ls="--")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -90,13 +90,13 @@ def colours(alpha: Array) -> list[Colour]:
     return [colormaps["YlGnBu"](0.25 + 0.65 * float(level)) for level in alpha]
 
 
-def alpha_legend(axes: Axes, alpha: Array) -> None:
-    """Adds a legend of the colours of α-levels, beside the axes where no data are."""
+def alpha_legend(axes: Axes, alpha: Array, further: Sequence[Line2D] = ()) -> None:
+    """Adds a legend of the colours of α-levels and of further lines, beside the axes."""
     shades = zip(alpha[:-1], colours(alpha), strict=False)
     patches = [Patch(facecolor=shade, label=f"α = {level:g}") for level, shade in shades]
     top = Line2D([], [], color=INK, lw=1, label=f"α = {alpha[-1]:g}")
     beside: Look = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0)}
-    axes.legend(handles=[*patches, top], title="α-cut", title_fontsize=8, **beside)
+    axes.legend(handles=[*patches, top, *further], title="α-cut", title_fontsize=8, **beside)
 
 
 def prefix_axis(

@@ -619,8 +619,8 @@ def fragility_of(
 
 
 def event_words(event: str) -> str:
-    """Return the name of an event in words: "drift ≤ 1 %, of any storey"."""
-    return f"{event.replace('<=', '≤').replace('>=', '≥')}, of any"
+    """Return the limit of all storeys or floors in words: "drift ≤ 1 % everywhere"."""
+    return f"{event.replace('<=', '≤').replace('>=', '≥')} everywhere"
 
 
 def _grid(ends: CriticalMeasures, tried: Sequence[Tried]) -> Array:

@@ -109,7 +109,7 @@ def test_a_limit_of_all_storeys_is_one_event_and_there_is_none_of_all_limits(two
         of_storeys = [limits[f"drift{storey} <= {text}"].critical for storey in (1, 2)]
         assert event.critical.low == pytest.approx(np.minimum(*(x.low for x in of_storeys)))
         assert event.critical.high == pytest.approx(np.minimum(*(x.high for x in of_storeys)))
-        assert event.words == f"drift ≤ {text}, of any"
+        assert event.words == f"drift ≤ {text} everywhere"
     assert limits["drift1 <= 1 %"].words == "|drift1| ≤ 1 % (30.00 mm)"
 
 
