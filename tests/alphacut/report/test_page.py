@@ -141,7 +141,7 @@ def test_ends_of_a_range_are_never_printed_past_each_other(low, high, nature, te
 
 def test_the_first_tables_have_a_row_for_every_result(two_floors):
     summary = Summary.read(ResultsFolder.read(two_floors))
-    assert [row[0] for row in peak_table(summary)[1]] == ["q2, m", "drift1, m", "  % of storey"]
+    assert [row[0] for row in peak_table(summary)[1]] == ["q2, mm", "drift1, m", "  % of storey"]
     shares = summary.shares["the peak of q2"]
     assert set(shares) == {"E", "m1"}
     assert 0.5 < sum(shares.values()) < 1.5
