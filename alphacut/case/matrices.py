@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Annotated
 
 import numpy as np
-from pydantic import Field, PlainValidator, ValidationInfo
+from pydantic import BeforeValidator, Field, PlainValidator, ValidationInfo
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, require
@@ -49,6 +49,13 @@ def _parameter(value: object, _: ValidationInfo) -> FuzzyNumber:
         raise RefusedError("", value, 'a quantity, as "30 GPa ± 5 %" or 1.2', str(error)) from None
 
 
+def _one_direction(value: object) -> object:
+    allowed = 'a direction of the unknowns, as "x", or a table by unknown'
+    cure = 'of a list make a table: {"5.x" = 1, "5.y" = 0.3} has the ground move along both'
+    require(isinstance(value, str | dict), "", value, allowed, cure)
+    return value
+
+
 Term = Annotated[tuple[Monomial, Array], PlainValidator(_term)]
 Parameters = dict[str, Annotated[FuzzyNumber, text(_parameter)]]
 
@@ -76,7 +83,7 @@ class MatricesSection(StructureSection):
     """pairs [factor, file] of K"""
     damping: tuple[Term, ...] = Field(default=(), description="pairs [factor, file] of D")
     damping_ratio: DampingRatios = Field(default=(), description=RATIO_WORDS)
-    direction: str | dict[str, float] = ""
+    direction: Annotated[str | dict[str, float], BeforeValidator(_one_direction)] = ""
     """direction of the ground: it moves all unknowns NODE.DIRECTION; or how it moves each, by
     unknown"""
     accelerogram: Annotated[Accelerogram, text(read_accelerogram)] | None = None

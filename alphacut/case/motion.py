@@ -90,7 +90,13 @@ class EnvelopeSection(Section):
         is_multiple = round(steps) >= 1 and abs(round(steps) - steps) <= 1e-9 * steps  # round-off
         if not is_multiple or steps > MOST_STEPS:
             allowed = f"whole multiples of envelope.step, up to {MOST_STEPS:,} steps"
-            raise RefusedError(key, f"{duration:g} s", allowed)
+            count = max(round(steps), 1)
+            cure = f'write envelope.step = "{duration / count:.9g} s"'
+            if count > MOST_STEPS:
+                cure = f'write envelope.step = "{duration / MOST_STEPS:.3g} s" or more'
+            elif " of " not in key:  # the duration of a record is the record's
+                cure += f' or {key} = "{count * self.step:.9g} s"'
+            raise RefusedError(key, f"{duration:g} s", allowed, cure)
 
 
 class Identify(Section):

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import itertools
 import math
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Self, TypeVar
+from typing import Annotated, Self, TypeVar, cast
 
 from pydantic import (
     AfterValidator,
@@ -22,7 +23,7 @@ from pydantic import (
 from pydantic.annotated_handlers import GetCoreSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
-from alphacut.base.errors import RefusedError, require
+from alphacut.base.errors import RefusedError, is_number, require
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.io import quantity
 from alphacut.io.quantity import QUANTITIES
@@ -96,15 +97,24 @@ class Quantity:
             )
         except ValueError as error:
             fits, cure = False, "; ".join(filter(None, (str(error), cure)))
-        require(fits, "", value, self.allowed, cure=cure)
+        require(fits, "", value, self.allowed, cure=cure or self._percent_cure(value))
         return number
+
+    def _percent_cure(self, value: object) -> str:
+        """What to write for a ratio too large by itself, that would fit as per cent."""
+        if self.si or self.is_integer or not is_number(value):
+            return ""
+        share = float(cast("float", value)) / 100
+        fits = self.above < share < self.below and self.minimum <= share <= self.maximum
+        return f'write "{value} %" or {share:g}' if fits and share > 0 else ""
 
     def _parsed(self, value: object) -> FuzzyNumber | float | int:
         if self.is_integer and isinstance(value, int) and not isinstance(value, bool):
             return value
         bare = not self.si and isinstance(value, str) and "%" not in value and "[" not in value
         if bare or self.is_integer:
-            raise ValueError("write a number without quotes and without a unit")
+            reason = "write a number without quotes and without a unit"
+            raise ValueError(reason if self.is_integer else f'{reason}, or "5 %" for 0.05')
         parse = quantity.parse_fuzzy if self.fuzzy else quantity.parse_number
         return parse(value, self.si)
 
@@ -144,16 +154,22 @@ def rising(values: tuple[float, ...]) -> tuple[float, ...]:
 def case_file(value: object, info: ValidationInfo) -> Path:
     """Path of a file that the case names, relative to the folder of the case."""
     folder: Path = (info.context or {}).get("folder", Path())
-    if not isinstance(value, str) or not (folder / value).is_file():
-        raise RefusedError("", value, f"a file, from the folder {folder.absolute()}")
+    reason = ""
+    try:
+        is_file = isinstance(value, str) and (folder / value).is_file()
+    except OSError as error:  # of a name that is too long, or a folder that may not be entered
+        is_file, reason = False, (error.strerror or str(error)).lower()
+    if not isinstance(value, str) or not is_file:
+        raise RefusedError("", value, f"a file, from the folder {folder.absolute()}", reason)
     return folder / value
 
 
 def case_path(value: object, info: ValidationInfo) -> Path:
     """As `case_file`, of a file or a folder."""
     folder: Path = (info.context or {}).get("folder", Path())
-    if isinstance(value, str) and value and (folder / value).is_dir():
-        return folder / value
+    with suppress(OSError):  # which `case_file` says
+        if isinstance(value, str) and value and (folder / value).is_dir():
+            return folder / value
     return case_file(value, info)
 
 

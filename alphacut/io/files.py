@@ -65,13 +65,15 @@ def whole_file(path: Path | str, *, follow_links: bool = True) -> Iterator[Path]
     path = Path(os.path.realpath(path)) if follow_links else path
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(f".{path.stem}.{secrets.token_hex(4)}.part{path.suffix}")
-    os.close(os.open(partial, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))  # through no link
     try:
+        os.close(os.open(partial, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))  # through no link
         yield partial
         os.replace(partial, path)
     except (OSError, RuntimeError):
         if shutil.disk_usage(path.parent).free < MIN_FREE_BYTES:
-            raise FailedError(f"the disk of {path.parent} is full", "free some space") from None
+            is_temporary = path.is_relative_to(tempfile.gettempdir())
+            cure = "free some space" + (", or set TMPDIR to another folder" * is_temporary)
+            raise FailedError(f"the disk of {path.parent} is full", cure) from None
         raise
     finally:
         partial.unlink(missing_ok=True)

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 from alphacut.base.arrays import Array, on_one_blas_thread
 from alphacut.base.errors import FailedError, RefusedError, require
 from alphacut.base.progress_bar import Progress, subprogress
-from alphacut.io.files import as_json, rank, say, write_text
+from alphacut.io.files import as_json, rank, say, whole_file, write_text
 from alphacut.io.provenance import build_provenance, fingerprint
 from alphacut.io.results import Listed, ResultsFolder
 from alphacut.io.typed_json import from_document, to_document
@@ -260,7 +260,8 @@ class StageStore:
         }
         write_text(files / name, as_json(document, indent=1))
         if computed.data is not None:
-            computed.data.to_netcdf(files / f"{stage.name}.nc")
+            with whole_file(files / f"{stage.name}.nc") as partial:
+                computed.data.to_netcdf(partial)
         before = self.folder.files[name].source if name in self.folder.files else ""
         self.folder.put_files(key, files, before)
         return replace(computed, files=self.folder.made_from(key), fingerprint=key)

@@ -68,8 +68,13 @@ class YieldingFlow(Flow):
         super().__post_init__()
         require(bool(self.system.hardening), "frame", value="elastic", allowed="columns that yield")
         for history in histories(self.system).values():
-            value, allowed = "harmonic, on columns that yield", "loads linear between samples"
-            require(not history.frequency, "load", value=value, allowed=allowed)
+            require(
+                not history.frequency,
+                "load",
+                value="harmonic, on columns that yield",
+                allowed="loads linear between samples",
+                cure='sample it: a case has force.history = "sine.csv", with time [s],force [kN]',
+            )
 
     @property
     def exact(self) -> bool:

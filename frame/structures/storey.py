@@ -182,10 +182,17 @@ class StoreyFrame:
             require(not beside, beside, value="there", allowed=f"{allowed} what makes it")
             needed = ["lengths"] if self.gravity else []
         for name in needed:
-            require(name in given, name, value=None, allowed=SPRING_KEYS)
+            example = {"lengths": "[3.0]", "modulus": "200e9", "second_moment": "1e-6"}[name]
+            cure = f"give {name}, as {example} in SI"
+            cure += "" if len(self.stiffness) else ", or stiffness, as [30e6]"
+            require(name in given, name, value=None, allowed=SPRING_KEYS, cure=cure)
         has_force, has_drift = bool(len(self.yield_force)), bool(len(self.yield_drift))
         require(
-            not has_force & has_drift, "yield_force", value="there", allowed="it or yield_drift"
+            not has_force & has_drift,
+            "yield_force",
+            value="beside yield_drift",
+            allowed="one of them",
+            cure="leave out yield_drift: it is yield_force over stiffness",
         )
         if len(self.hardening):
             allowed = "one of them beside hardening"

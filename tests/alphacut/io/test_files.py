@@ -1,11 +1,14 @@
 """Whole files: what stands there is replaced only where it is a file."""
 
 import os
+import shutil
+import tempfile
 import threading
+from types import SimpleNamespace
 
 import pytest
 
-from alphacut.base.errors import RefusedError
+from alphacut.base.errors import FailedError, RefusedError
 from alphacut.io.files import locked, whole_file, write_text
 
 
@@ -44,3 +47,20 @@ def test_a_second_run_into_the_same_folder_is_refused_while_the_first_writes(tmp
         locked("--out", place).__enter__()
     with locked("--out", place):
         assert not list(place.iterdir())
+
+
+def failing(path, error):
+    with whole_file(path):
+        raise error
+
+
+def test_a_full_disk_is_named_whatever_the_writer_says(tmp_path, monkeypatch):
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: SimpleNamespace(free=0))
+    full = r"the disk of .* is full; free some space"
+    for error in (RuntimeError("NetCDF: HDF error"), OSError(28, "No space left on device")):
+        with pytest.raises(FailedError, match=full):
+            failing(tmp_path / "a.nc", error)
+    monkeypatch.setattr(tempfile, "gettempdir", lambda: str(tmp_path))
+    with pytest.raises(FailedError, match="or set TMPDIR to another folder"):
+        failing(tmp_path / "stage" / "a.nc", RuntimeError("NetCDF: HDF error"))
+    assert not list((tmp_path / "stage").iterdir())
