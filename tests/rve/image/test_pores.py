@@ -76,7 +76,7 @@ def test_pores_tend_to_phases_of_vanishing_moduli(shape, rng):
     assert eigh(pores.lower, pores.upper, eigvals_only=True)[-1] <= 1
     assert eigh(pores.lower, soft.upper, eigvals_only=True)[-1] <= 1
     ratio = eigh(pores.lower, soft.lower, eigvals_only=True)
-    assert ratio[0] > 0.998  # of the potentials without stress, polynomials of second degree alone
+    assert ratio[0] > 0.997  # of the potentials without stress, polynomials of second degree alone
 
 
 def test_pores_carry_forces_from_one_to_the_next_in_the_plane():
