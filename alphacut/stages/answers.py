@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any
+from typing import Any, TypedDict
 
 from alphacut.base.errors import RefusedError
 from alphacut.base.progress_bar import Progress
@@ -38,6 +38,13 @@ from alphacut.stages.envelope import EnvelopeTask
 from alphacut.stages.store import Stage, StageContext, StageResult
 
 
+class Times(TypedDict):
+    """Length of a motion and distance of its nodes, in s."""
+
+    duration: float
+    step: float
+
+
 @dataclass(frozen=True)
 class Response:
     """What questions are asked about: a structure, its motion of section [envelope], and peaks.
@@ -59,7 +66,7 @@ class Response:
         return self.structure.inputs(self.task.fuzzy)
 
     @property
-    def times(self) -> dict[str, Any]:
+    def times(self) -> Times:
         """Length of the motion and distance of its nodes, by the names of arguments."""
         return {"duration": self.task.duration, "step": self.task.section.step}
 

@@ -132,7 +132,7 @@ class Parts:
     shares: ShareTable = field(default_factory=dict)
 
     @classmethod
-    def of(cls, results: Results, **further: Any) -> Self:
+    def of(cls, results: Results, **further: object) -> Self:
         """The numbers of results, and further fields of this class."""
         drawn = {task.name: tuple(task.figures) for task in results.tasks}
         parts: dict[str, Any] = {

@@ -108,7 +108,7 @@ class Decision(LimitsAnswer[LimitDecision]):
     limits: dict[str, LimitDecision]
 
     @property
-    def parts(self) -> Mapping[str, LimitDecision]:
+    def parts(self) -> dict[str, LimitDecision]:
         """The decisions by the names of their limits."""
         return self.limits
 

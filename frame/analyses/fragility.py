@@ -273,7 +273,7 @@ class Fragility(LimitsAnswer[LimitFragility]):
     increments: dict[str, Increments] = field(default_factory=dict)
 
     @property
-    def parts(self) -> Mapping[str, LimitFragility]:
+    def parts(self) -> dict[str, LimitFragility]:
         """The fragilities by the names of limits and events."""
         return self.limits
 
@@ -592,7 +592,7 @@ def fragility_of(
         n_records, miss = ends.low.shape[1], (1 - CONFIDENCE) / 2
         about: dict[str, Any] = {"output": event_words(name), "is_event": True}
         if name in limits:
-            about = facts_of(limits[name], unit_of_output(model, limits[name].output))
+            about = {**facts_of(limits[name], unit_of_output(model, limits[name].output))}
             about["event_name"] = event_by_limit.get(name, "")
         parts[name] = LimitFragility(
             **about,

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 from abc import abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Generic, Literal, TypeVar
+from typing import Generic, Literal, TypedDict, TypeVar
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import checked_number, require, require_choice
@@ -191,10 +191,25 @@ class About:
         return words.translate({ord("≤"): ">", ord("≥"): "<"})
 
 
-def facts_of(limit: Limit, unit: str) -> dict[str, Any]:
+class LimitFacts(TypedDict):
+    """Fields of `About` that a limit gives."""
+
+    side: Side
+    output: str
+    unit: str
+    limit: float
+    stated: str
+
+
+def facts_of(limit: Limit, unit: str) -> LimitFacts:
     """Return the fields of `About` that a limit of an output in a unit gives."""
-    facts = {"side": limit.side, "output": limit.output, "unit": unit}
-    return facts | {"limit": limit.number, "stated": limit.stated}
+    return {
+        "side": limit.side,
+        "output": limit.output,
+        "unit": unit,
+        "limit": limit.number,
+        "stated": limit.stated,
+    }
 
 
 P = TypeVar("P", bound=About)
@@ -207,7 +222,7 @@ class LimitsAnswer(Answer, Generic[P]):
 
     @property
     @abstractmethod
-    def parts(self) -> Mapping[str, P]:
+    def parts(self) -> dict[str, P]:
         """The parts by the names of their limits."""
 
     @abstractmethod

@@ -103,7 +103,7 @@ class Probability(LimitsAnswer[LimitProbability]):
     step: float
 
     @property
-    def parts(self) -> Mapping[str, LimitProbability]:
+    def parts(self) -> dict[str, LimitProbability]:
         """The probabilities by the names of their limits."""
         return self.events
 
