@@ -28,7 +28,12 @@ from alphacut.frame.response.oscillators import (
     is_fed_through,
     read_response,
 )
-from alphacut.frame.response.straying import Response, load_deviation, narrowed_straying
+from alphacut.frame.response.straying import (
+    Response,
+    load_deviation,
+    narrowed_at_jumps,
+    narrowed_straying,
+)
 
 POINTS = (8, 80), (3, 12)
 """Least and most points of a mode's table along ω and along q = g/ω."""
@@ -125,7 +130,10 @@ class LevelModels:
         return cls(structure, models, grids, tables, excitation)
 
     def line_deviation(self) -> Array:
-        """Bound of how far outputs stray from straight lines in the step to each node, (T, m)."""
+        """Bound of how far outputs lie beyond both their values in the step to each node, (T, m).
+
+        Where no force jumps, it bounds how far they stray from a straight line there.
+        """
         unresolved = self.models.line_deviation + sum(
             x.line_deviation for x in self.models.truncated
         )
@@ -142,7 +150,11 @@ class LevelModels:
             of_others = self._fed_through_others(source, response)
             by_magnitude += np.outer(load_deviation(response.load, time), of_others)
         responses = [x for mode in self.models.oscillators for x in self._responses(mode)]
-        return narrowed_straying([*responses, *fed.values()], time, by_magnitude, unresolved)
+        responses += fed.values()
+        straying = narrowed_straying(responses, time, by_magnitude, unresolved)
+        if unresolved.any():  # whose change within a step is not known
+            return straying
+        return narrowed_at_jumps(responses, time, straying)
 
     def _fed_through_others(self, source: str, fed: Response) -> Array:
         """Bound of what a unit of a force adds at once by modes that are no oscillators, (m,)."""

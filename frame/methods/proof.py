@@ -46,7 +46,7 @@ from alphacut.frame.modes.damped import require_dissipation
 from alphacut.frame.modes.modal_model import ModalModel
 from alphacut.frame.response.duhamel import call_with_load
 from alphacut.frame.response.load_tables import Direct
-from alphacut.frame.response.straying import Response, narrowed_straying
+from alphacut.frame.response.straying import Response, narrowed_at_jumps, narrowed_straying
 
 LOG = logging.getLogger(__name__)
 
@@ -252,7 +252,10 @@ def bound_levels(
 
 
 def _line_deviation(model: ModalModel) -> Array:
-    """Bound of how far outputs stray from straight lines in the step to each node, (T, m)."""
+    """Bound of how far outputs lie beyond both their values in the step to each node, (T, m).
+
+    Where no force jumps, it bounds how far they stray from a straight line there.
+    """
     reach, rate = np.ones(len(model.boxes.names)), model.eigenvalue
     growth, spread = largest_growth(rate, reach), rate.imag.spread()
     decay = -growth, rate.real.spread() - rate.value.real  # least and greatest of each mode
@@ -275,7 +278,8 @@ def _line_deviation(model: ModalModel) -> Array:
             kappa = np.multiply.outer(2 * part.share.value[k], np.ones(shape))
             responses.append(Response(sigma, load, 0, kappa, spreads[k]))
     by_magnitude = np.sum([x.line_deviation(model.flow.time) for x in responses], axis=0)
-    return narrowed_straying(responses, model.flow.time, by_magnitude)
+    straying = narrowed_straying(responses, model.flow.time, by_magnitude)
+    return narrowed_at_jumps(responses, model.flow.time, straying)
 
 
 def _error_between_nodes(model: ModalModel, error: Array, *, direct: Array) -> Array:

@@ -10,6 +10,9 @@ import numpy as np
 from alphacut.base.arrays import Array, Mask
 from alphacut.base.errors import RefusedError, checked_number, require
 
+SAME_TIME = 1e-9
+"""Distance of a time and a sample, as a fraction of the step of samples, that is rounding alone."""
+
 
 @dataclass(frozen=True, eq=False)
 class History:
@@ -102,6 +105,14 @@ class History:
         largest[1:] = np.maximum.reduceat(size, np.searchsorted(times, time[:-1]))
         return largest
 
+    def before(self, time: Array) -> Array:
+        """Values of f at times, before what jumps there, the same shape."""
+        return self.envelope(time, -1.0) * self.wave(time)
+
+    def jumps_at(self, time: Array) -> Mask:
+        """Whether f jumps at each of the times, (T,)."""
+        return np.asarray(self.envelope(time, -1.0) != self.envelope(time))
+
     def jumps_in_steps(self, time: Array) -> Mask:
         """Whether f may jump within the step to each of the rising times, or at its end, (T,)."""
         ends = [(self.start, self.samples[0])]
@@ -109,7 +120,9 @@ class History:
             ends.append((self.start + (len(self.samples) - 1) * self.step, self.samples[-1]))
         jumps = np.zeros(len(time) + 1, bool)
         # a node next to a jump has the value after it
-        jumps[[np.searchsorted(time, at - 1e-9 * self.step) for at, value in ends if value]] = True
+        jumps[
+            [np.searchsorted(time, at - SAME_TIME * self.step) for at, value in ends if value]
+        ] = True
         jumps[0] = False
         return jumps[:-1]
 
@@ -122,7 +135,7 @@ class History:
     def envelope(self, time: Array, side: float = 1.0) -> Array:
         """Values of g at times, same shape: after jumps (`side` 1) or before them (−1)."""
         n, position = len(self.samples), (time - self.start) / self.step
-        is_sample = np.abs(position - np.round(position)) < 1e-9
+        is_sample = np.abs(position - np.round(position)) < SAME_TIME
         position = np.where(is_sample, np.round(position), position)
         inside: Array = np.interp(position, np.arange(n), self.samples)
         after = np.greater_equal if side > 0 else np.greater

@@ -23,7 +23,7 @@ import numpy as np
 
 from alphacut.base.arrays import Array, Ints
 from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF
-from alphacut.frame.records.history import History
+from alphacut.frame.records.history import SAME_TIME, History
 from alphacut.frame.response.duhamel import absolute_moments, responses_at_nodes
 
 PHASE = 0.5
@@ -78,17 +78,57 @@ class Response(NamedTuple):
         size = np.hypot(real, np.abs(kappa.imag).max((1, 2)) + imag)
         imag = np.abs(kappa.imag * omega).max((1, 2)) + omega.max() * imag
         by_parts = np.outer(modulus, real) + np.outer(of_imaginary, imag)
-        return np.minimum(np.outer(modulus, size), by_parts)
+        return np.asarray(np.minimum(np.outer(modulus, size), by_parts))
+
+    def line_deviation_before(self, first: float, last: float) -> Array:
+        """Bound of how far it strays from a line in a step before what jumps at its end, (m,)."""
+        if self.sigma is not None:
+            return np.asarray(self.line_deviation(np.array([first, last]))[1])
+        assert self.load is not None
+        # shortly before the end the load is within `missed` of its value before the jump, and so
+        # is the line from the beginning
+        sliver = 4 * SAME_TIME * self.load.step
+        missed = 2 * sliver * self.load.extremes[1]
+        deviation = load_deviation(self.load, np.array([first, last - sliver]))[1] + missed
+        real = np.abs(self.coefficient.real).max((1, 2)) + self.spread[0]
+        return np.asarray(deviation * real)
 
     def off_chords(self, nodes: Array, parts: int) -> tuple[Array, Array]:
         """Its range at nodes less the chords of steps of so many parts, (nodes, m) each."""
         chords = Chords.through(np.arange(0, len(nodes), parts), nodes)
-        kappa = self.coefficient.reshape(len(self.coefficient), -1)
         if self.sigma is None:
             assert self.load is not None
-            off = chords.deviations(self.load.values(nodes)[:, None])
-            value, margin = off * kappa[:, 0].real, np.abs(off) * self.spread[0]
-            return value - margin, value + margin
+            return self._range_of_load(chords.deviations(self.load.values(nodes)[:, None]))
+        fourth = np.append(np.repeat(self._fourth_off_chords(nodes[::parts]), parts), 0.0)
+        return self._range_off(chords, nodes, fourth=fourth)
+
+    def change(self, first: float, last: float) -> tuple[Array, Array]:
+        """Its range at `last`, before what jumps there, less its value at `first`, (m,) each."""
+        nodes = np.array([first, last])
+        if self.sigma is None:
+            assert self.load is not None
+            change = self.load.before(nodes[1:]) - self.load.values(nodes[:1])
+            low, high = self._range_of_load(change[:, None])
+            return low[0], high[0]
+        decay, fast = float(-self.sigma.real.max()), float(np.abs(self.sigma).max())
+        fourth = fourth_derivative(self.order, fast, moments_of(decay, self.load, nodes))
+        to_first = Chords(np.zeros(2, int), np.zeros(2, int), np.zeros(2))
+        low, high = self._range_off(to_first, nodes, fourth=np.append(0.0, fourth.sum()))
+        return low[1], high[1]
+
+    def _range_of_load(self, value: Array) -> tuple[Array, Array]:
+        """The range of Re κ f for values (N, 1) of the load itself, (N, m) each."""
+        middle = value * self.coefficient[:, 0, 0].real
+        margin = np.abs(value) * self.spread[0]
+        return middle - margin, middle + margin
+
+    def _range_off(self, chords: Chords, nodes: Array, *, fourth: Array) -> tuple[Array, Array]:
+        """The range of Re κ G, G = σ^order ρ off chords at nodes (N,), (N, m) each.
+
+        `fourth` (N,) bounds the fourth derivative of G by σ.
+        """
+        assert self.sigma is not None
+        kappa = self.coefficient.reshape(len(self.coefficient), -1)
         sigma = self.sigma.ravel()
         low, high = np.full((2, len(nodes), len(kappa)), np.inf)
         # largest over the grid: of the parts of G = σ^order ρ off the chord, |G″|, rounding
@@ -104,9 +144,8 @@ class Response(NamedTuple):
                 high[:, o] = np.minimum(high[:, o], -value.max(-1))
         # between the points of the grid G strays from what is bilinear by `missed`, κ G by what κ
         # changes in a cell besides, at most what it does along its sides: it is monotone along both
-        between, fourth = _between_points(self.sigma), self._fourth_off_chords(nodes[::parts])
-        missed = between * (second + between * np.append(np.repeat(fourth, parts), 0.0))
-        missed += 2 * chords.with_ends(rounding)
+        between = _between_points(self.sigma)
+        missed = between * (second + between * fourth) + 2 * chords.with_ends(rounding)
         axes = (np.diff(self.coefficient, axis=axis) for axis in (1, 2))
         change = sum(np.abs(x).max((1, 2), initial=0.0) for x in axes)
         margin = np.outer(missed, np.abs(kappa).max(1)) + np.outer(np.hypot(real, imag), change)
@@ -178,6 +217,32 @@ def narrowed_straying(
     off, straying = _off_and_straying(responses, time, parts)
     narrowed = np.vstack([np.zeros(off.shape[1]), off + straying])
     return np.fmin(bound, narrowed + unresolved)
+
+
+def narrowed_at_jumps(responses: Sequence[Response], time: Array, bound: Array) -> Array:
+    """Return a bound of how far Σ responses lies beyond its values at the nodes of steps, (T, m).
+
+    It is the `bound` of how far it strays from straight lines, except in steps at whose end a load
+    jumps that is added itself. With y₁⁻ the value before the jump, a motion strays within the step
+    by some r from the line between y₀ and y₁⁻, and so lies beyond y₀ and y₁ by |y₁⁻ − y₀| + r at
+    most; the line from y₀ to y₁ is as far from it as the jump is large.
+    """
+    loads = [x.load for x in responses if x.sigma is None and x.load is not None]
+    jumps = (
+        np.any([x.jumps_at(time) for x in loads], axis=0) if loads else np.zeros(len(time), bool)
+    )
+    narrowed = bound.copy()
+    for node in np.flatnonzero(jumps[1:]) + 1:
+        first, last = float(time[node - 1]), float(time[node])
+        low, high, size, straying = np.zeros((4, bound.shape[1]))
+        for response in responses:
+            least, greatest = response.change(first, last)
+            low, high = low + least, high + greatest
+            size += np.maximum(np.abs(least), np.abs(greatest))
+            straying += response.line_deviation_before(first, last)
+        change = np.maximum(-low, high) + len(responses) * UNIT_ROUNDOFF * size
+        narrowed[node] = np.fmin(bound[node], change + straying)
+    return narrowed
 
 
 def _off_and_straying(

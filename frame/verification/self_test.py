@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from alphacut.base.arrays import Array
+from alphacut.base.arrays import Array, Mask
 from alphacut.base.errors import FailedError
 from alphacut.frame.boxes import Boxes, boxes
 from alphacut.frame.envelope import Envelope
@@ -142,11 +142,24 @@ def _distinct(points: Array) -> Array:
 
 
 class _Tested(NamedTuple):
-    """An exact motion: inputs (n,), outputs at `Trial.times` (J, m), and their round-off."""
+    """An exact motion at inputs (n,)."""
 
     point: Array
-    values: Array
-    rounding: Array
+    values: Array  # outputs at `Trial.times`, (J, m)
+    rounding: Array  # their round-off
+    jumps: Mask  # whether a force jumps at the end of each step, (T − 1,)
+
+
+def jumps_at_ends(courses: Sequence[Course], time: Array) -> Mask:
+    """Return whether one of the forces jumps at the end of each step between nodes, (T − 1,)."""
+    jumps = np.zeros(len(time), bool)
+    for course in courses:
+        ends = [course.start]
+        if not course.is_held:
+            ends.append(course.start + (len(course.samples) - 1) * course.step)
+        for end in ends:
+            jumps |= np.abs(time - end) <= 1e-9 * course.step
+    return jumps[1:]
 
 
 def fractions_of_steps(time: Array, lower: Array, upper: Array) -> Array:
@@ -200,7 +213,8 @@ class Trial:
         """
         for k, motion in enumerate(motions):
             point = points[k]
-            tested = _Tested(point, *motion.outputs(self.times))
+            jumps = jumps_at_ends(motion.courses, self.envelope.time)
+            tested = _Tested(point, *motion.outputs(self.times), jumps)
             near = 4 * np.finfo(float).eps * np.abs(point)  # as inputs are rounded
             inside = (self.lower <= point + near) & (point - near <= self.upper)
             for level in map(int, np.flatnonzero(inside.all(1))):
@@ -225,7 +239,10 @@ class Trial:
         if envelope.inner is None:
             return
         at_nodes = _Tested(
-            motion.point, motion.values[::TIMES_OF_STEP], motion.rounding[::TIMES_OF_STEP]
+            motion.point,
+            motion.values[::TIMES_OF_STEP],
+            motion.rounding[::TIMES_OF_STEP],
+            motion.jumps,
         )
         for sign, at, inner, side in (
             (1.0, envelope.upper_at[level], envelope.inner.upper[level], "upper"),
@@ -240,13 +257,23 @@ class Trial:
             self._require(excess, inner, words, at_nodes)
 
     def require_line_deviation(self, motion: _Tested) -> None:
-        """Refuse a motion that strays farther from straight lines between nodes than is proved."""
+        """Refuse a motion that strays farther from straight lines between nodes than is proved.
+
+        In a step at whose end a force jumps it must not lie farther beyond its values at both ends.
+        """
         ends = motion.values[::TIMES_OF_STEP]
         inside = ends[:-1, None] + np.diff(ends, axis=0)[:, None] * self.fractions[..., None]
         line = np.concatenate([inside.reshape(-1, ends.shape[1]), ends[-1:]])
         allowed = self.between[1:] + np.maximum(self.slack[1:], self.slack[:-1])
         allowed = np.append(np.repeat(allowed, TIMES_OF_STEP, axis=0), allowed[-1:], axis=0)
-        excess = np.abs(motion.values - line) - allowed - 2 * motion.rounding
+        is_jump = np.append(np.repeat(motion.jumps, TIMES_OF_STEP), False)[:, None]
+        low, high = (
+            np.append(np.repeat(f(ends[1:], ends[:-1]), TIMES_OF_STEP, axis=0), ends[-1:], axis=0)
+            for f in (np.minimum, np.maximum)
+        )
+        above = motion.values - np.where(is_jump, high, line)
+        below = np.where(is_jump, low, line) - motion.values
+        excess = np.maximum(above, below) - allowed - 2 * motion.rounding
         self._require(excess, line, "farther than `between` from the straight line at", motion)
 
     def _require(self, excess: Array, bound: Array, words: str, motion: _Tested) -> None:

@@ -143,3 +143,33 @@ def ratios_of_a_random_frame(method, rng):
 def test_bounds_hold_at_all_times_and_are_close_between_nodes(method, rng):
     ratios = np.concatenate([ratios_of_a_random_frame(method, rng) for _ in range(FRAMES)])
     assert np.median(ratios) <= 3.0
+
+
+@pytest.mark.parametrize("count", [11, 16], ids=["inner node", "last node"])
+@pytest.mark.parametrize("method", [Proof(workers=1), DualProof(workers=1)], ids=["proof", "dual"])
+def test_the_jump_of_a_force_at_a_node_widens_no_bound(method, count, rng):
+    """With it the acceleration jumps, by far more than motions lie beyond their nodes."""
+    step, steps = 0.02, 75
+    samples = rng.uniform(1.0, 1.6, count)
+    samples[-1] = 3.0  # the force rises until it ends, so that motions exceed both nodes there
+    frame = StoreyFrame(
+        [6e4, 5e4],
+        stiffness=[6e7, 3e7],
+        damping_ratio=0.02,
+        outputs=("a1", "a2"),
+        loads=[Force(2, 1.2e4, History(0.1, samples))],
+    )
+    inputs = {"k2": Interval(2.97e7, 3.03e7), "F2": Interval(1.19e4, 1.21e4)}
+    motion = {"duration": steps * step, "step": step, "alpha": [0.0], "progress": False}
+    bounds = envelope(frame, inputs, method, **motion)
+    end = round(0.1 * (count - 1) / step)
+    fractions = np.append(np.arange(20) / 20, 1 - 1e-9)
+    times = (end - 1 + fractions) * step
+    for point in random_points(inputs, MOTIONS, rng):
+        at_all = np.append(times, end * step)
+        values = exact_accelerations(frame, dict(zip(inputs, point, strict=True)), at_all)
+        for sign, at_nodes in ((1.0, bounds.upper[0]), (-1.0, -bounds.lower[0])):
+            bound = np.maximum(at_nodes[end - 1], at_nodes[end]) + bounds.between[end]
+            assert (sign * values <= bound + 1e-9).all()
+    jump = 1.2e4 * samples[-1] / 5e4
+    assert bounds.between[end, 1] <= 0.5 * jump
