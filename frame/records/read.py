@@ -12,6 +12,7 @@ import numpy as np
 
 from alphacut.base.errors import RefusedError, require
 from alphacut.frame.records.cosmos import is_cosmos, read_cosmos
+from alphacut.frame.records.geonet import is_geonet, read_geonet
 from alphacut.frame.records.networks import FORMATS
 from alphacut.frame.records.recording import Recording
 from alphacut.frame.records.stated_peak import StatedPeak
@@ -20,7 +21,7 @@ from alphacut.frame.records.text_file import TextFile, choose_channel, read_byte
 from alphacut.frame.records.uff import is_universal, read_uff_record
 from alphacut.frame.records.units import acceleration_factor
 
-READ = "PEER AT2, COSMOS, CSMIP, SMC, K-NET, ESM, miniSEED, SAC, UFF 58, CSV"
+READ = "PEER AT2, COSMOS, CSMIP, GeoNet V2A, SMC, K-NET, ESM, miniSEED, SAC, UFF 58, CSV"
 MINISEED = re.compile(rb"[0-9 ]{6}[DRQM][ \0]|MS\x03")
 SAC_HEAD, SAC_VERSION, SAC_COUNT = 632, 76, 79
 """Bytes of the head of a SAC file; words in it with its version (6 or 7) and number of samples."""
@@ -57,6 +58,8 @@ def _read_by_marks(path: Path, channel: str, step: float | None, unit: str) -> R
     if _waveform_format(content):
         return _read_waveform(path, content, channel, unit)
     file = TextFile.from_bytes(path.name, content)
+    if is_geonet(file):
+        return read_geonet(file, channel)
     if is_cosmos(file):
         return read_cosmos(file, channel)
     for mark, n_lines, read in FORMATS:

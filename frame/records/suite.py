@@ -34,8 +34,8 @@ def read_record(
 ) -> Accelerogram:
     """Read a record of the ground's acceleration from a file as networks publish them.
 
-    Read are PEER AT2, COSMOS, CSMIP, SMC, K-NET, ESM, miniSEED, SAC, UFF 58 and tables (CSV); the
-    marks in a file say which it is.
+    Read are PEER AT2, COSMOS, CSMIP, GeoNet V2A, SMC, K-NET, ESM, miniSEED, SAC, UFF 58 and tables
+    (CSV); the marks in a file say which it is.
 
     Args:
         path: The file.

@@ -1,0 +1,75 @@
+"""Corrected files of GeoNet, written by the columns of the format."""
+
+import numpy as np
+import pytest
+
+from alphacut.base.errors import RefusedError
+from alphacut.frame.records.read import read_recording
+
+N_SAMPLES, STEP = 403, 0.02
+WAVES = [k * 250 * np.sin(0.05 * np.arange(N_SAMPLES) + k) for k in (1, 2, 3)]
+
+
+def block(values, width_format="8.1f"):
+    rows = [values[k : k + 10] for k in range(0, len(values), 10)]
+    return "".join("".join(format(x, width_format) for x in row) + "\n" for row in rows)
+
+
+def component(name, wave, *, first="Corrected accelerogram 20161113 GNS Science", peak=None):
+    text = [first, *["text"] * 11, f"Component {name}  Longitudinal", *["peak"] * 3]
+    integers = [7] * 40
+    integers[33:36] = [len(wave)] * 3
+    reals = [1.5] * 60
+    reals[25], reals[35] = STEP, np.abs(wave).max() if peak is None else peak
+    head = "\n".join(text) + "\n" + block(integers, "8d") + block(reals, "8.3f")
+    return head + block(wave) + block(9 * wave) + block(5 * wave)
+
+
+def saved(folder, *components):
+    path = folder / "20161113.V2A"
+    path.write_text("".join(components), encoding="ascii")
+    return path
+
+
+def test_each_component_is_read_by_number_and_orientation(tmp_path):
+    names = ("S90E", "N00E", "Up")
+    path = saved(tmp_path, *map(component, names, WAVES))
+    for number, (name, wave) in enumerate(zip(names, WAVES, strict=True), 1):
+        for channel in (str(number), name):
+            record = read_recording(path, channel)
+            assert record.step == STEP
+            assert record.samples == pytest.approx(1e-3 * wave, abs=6e-5)  # one digit of mm/s²
+    assert any("vertical" in doubt for doubt in record.doubts())
+    with pytest.raises(RefusedError, match="one of: 1 or s90e; 2 or n00e; 3 or up"):
+        read_recording(path)
+
+
+def test_components_of_one_orientation_are_numbered(tmp_path):
+    path = saved(tmp_path, component("S90E", WAVES[0]), component("S90E", WAVES[1]))
+    record = read_recording(path, "S90E#2")
+    assert record.samples == pytest.approx(1e-3 * WAVES[1], abs=6e-5)
+    with pytest.raises(RefusedError, match="s90e#1; 2 or s90e#2"):
+        read_recording(path, "S90E")
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda text: text.replace("Corrected", "Uncorrected", 1), "take the corrected file"),
+        (lambda text: text[:-9000], "samples, and .* follow"),
+        (lambda text: text.replace("     403", "       0"), "counts of"),
+        (lambda text: text.replace("   0.020", "  99.000"), "a step of 99 s"),
+    ],
+)
+def test_a_damaged_file_is_one_line(tmp_path, change, words):
+    text = component("S90E", WAVES[0])
+    damaged = change(text)
+    assert damaged != text
+    with pytest.raises(RefusedError, match=words):
+        read_recording(saved(tmp_path, damaged))
+
+
+def test_another_peak_than_the_head_states_is_no_record_without_a_word(tmp_path):
+    path = saved(tmp_path, component("S90E", WAVES[0], peak=25.0))
+    with pytest.raises(RefusedError, match="peak"):
+        read_recording(path)
