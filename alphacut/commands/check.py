@@ -27,6 +27,7 @@ from alphacut.frame.analyses.peaks import WIDENING
 from alphacut.frame.analyses.suites import NominalMode, ScaledRecord, nominal_mode
 from alphacut.frame.boxes import AT_REST
 from alphacut.frame.envelope import Ends, Envelope, within_steps
+from alphacut.frame.methods.sampled import PeakSearch
 from alphacut.frame.structures.linear import LinearSystem, NominalModes, nominal_modes
 from alphacut.frame.structures.matrix import Monomial
 from alphacut.frame.verification.self_test import Trial, stored_motions
@@ -106,6 +107,8 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
             analyses = analyses_of(question, structure, task, records)
             motions, seconds = np.sum([x.foresee() for x in analyses.values()], axis=0)
             text += f"fragility: about {motions:,.0f} motions, {seconds:.0f} s by one process\n"
+            text += f"before that the peaks under {len(records)} records, whose searches of up to"
+            text += f" {PeakSearch.budget:,} motions each are not foreseen\n"
     write_answer(options, document, out, f"{text}{options.case}: no problems\n")
     return 0
 

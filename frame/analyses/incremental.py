@@ -124,11 +124,21 @@ class IncrementalAnalysis:
         return len(self.limits) + len(self.events)
 
     def foresee(self) -> tuple[float, float]:
-        """Return about how many motions a run takes, and how many seconds."""
-        structures, start = self._spread_structures(), time.perf_counter()
+        """Return about how many motions a run takes, and how many seconds.
+
+        Motions are timed in the middle and at the end of the scales, as they take longer the more
+        often columns yield.
+        """
+        structures = self._spread_structures()
+        grid = self._grid(structures)
         searched = SEARCHES * len(self.cuts.names) * self.n_demands
-        rounds = (1 + searched) * len(self._grid(structures))  # of all structures
-        return rounds * len(structures), rounds * (time.perf_counter() - start)
+        rounds = (1 + searched) * len(grid)  # of all structures
+        timed = replace(self)  # which keeps these motions to itself
+        timed._move(grid[0], structures)  # compiles, and may be the first motion of the process
+        start = time.perf_counter()
+        for scale in (grid[len(grid) // 2], grid[-1]):
+            timed._move(scale, structures)
+        return rounds * len(structures), rounds * (time.perf_counter() - start) / 2
 
     def peaks_at(self, scales: Array) -> Array:
         """Return peaks over limits of spread structures, shape (L, 2, A, X), at scales (X,)."""

@@ -118,3 +118,20 @@ def test_a_search_finds_what_no_structure_of_the_grid_shows(seed, side):
         last = scales[demands[ALL, 0, 0] <= 1].max()
         peaks = analysis._peaks_over_limits(last / 1.02, structures, analysis.limits)
         assert peaks.min() > 1.03
+
+
+def test_motions_of_a_run_are_foreseen_within_a_factor_of_two(rng):
+    """By motions that are timed at scales of the run, and are none of the run's own."""
+    ground = Accelerogram(0.05, rng.normal(size=60))
+    frame = StoreyFrame([1.0], stiffness=[200.0], yield_force=[1.0], ground=ground)
+    inputs = {"fy1": Triangular(0.95, 1.0, 1.05), "k1": Triangular(190.0, 200.0, 210.0)}
+    cuts, motion = boxes(inputs, (0.0, 1.0)), (4.0, 0.05)
+    analysis = IncrementalAnalysis(frame, cuts, [("drift1", 0.01)], *motion)
+    scale = float(analysis.elastic_scales(cuts.nominal[None])[0, 1:].max())
+    analysis = replace(analysis, greatest_scale=2 * scale)
+    foreseen, seconds = analysis.foresee()
+    assert seconds > 0
+    assert not analysis.moved
+    analysis.run()
+    made = sum(len(points) for points, _ in analysis.moved.values())
+    assert made / 2 <= foreseen <= 2 * made
