@@ -134,6 +134,17 @@ def aij(matrix: sp.csr_matrix) -> PETSc.Mat:
     return result
 
 
+def columns(values: Array) -> PETSc.Mat:
+    """PETSc matrix whose columns are the rows of an array, (n, size).
+
+    It has its values in the array if that is contiguous, else in a copy.
+    """
+    values = np.ascontiguousarray(values)
+    result = PETSc.Mat().createDense(values.T.shape, array=values.T, comm=PETSc.COMM_SELF)
+    result.assemble()
+    return result
+
+
 def cholesky(matrix: PETSc.Mat, prefix: str) -> PETSc.KSP:
     """Cholesky solver of a matrix by CHOLMOD, or MUMPS without it; PETSc options override that."""
     matrix.setOption(PETSc.Mat.Option.SPD, True)

@@ -294,7 +294,8 @@ def solve_sample(
     """
     matrix = problem.assemble(stiffness)  # K of a(u, v) = ∫ f_Θ C ε(u) : ε(v)
     loads = problem.loads(strains)  # F = −∫ f_Θ C ε̄ : ε(v)
-    solutions = solve(problem.solver(options, matrix), loads)  # K U = F
+    solver = problem.solver(options, matrix, loads=len(loads))
+    solutions = solve(solver, loads)  # K U = F
     means = problem.slice_strains(strains, solutions.vectors)  # of ε̄ + ε(u), over each slice
     return Solved(means, solutions.iterations, solutions.residual)
 

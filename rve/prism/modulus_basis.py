@@ -18,7 +18,7 @@ from alphacut.base.arrays import Array
 from alphacut.rve.cell.cell import AREA, AnyPhase, Phase
 from alphacut.rve.fenicsx import PETSc
 from alphacut.rve.prism.problem import SliceStrains, Solved
-from alphacut.rve.prism.slices import SliceProblem
+from alphacut.rve.prism.slices import SliceProblem, repeated
 from alphacut.rve.solver.krylov import SolverOptions, solve
 
 TOLERANCE = 2e-10  # of the energy that is left out; E is off by half of it at most
@@ -90,10 +90,10 @@ def modulus_basis(
     for stiffness in phases:
         matrices.append(problem.assemble(stiffness))
         loads.append(problem.loads(strains))
-    ksp = problem.solver(options, matrices[0])  # its factors serve both
+    ksp = problem.solver(options, matrices[0], loads=len(strains))  # its factors serve both
     ksp.setTolerances(rtol=_LOOSER * ksp.getTolerances()[0])
     first = solve(ksp, loads[0])
-    ksp.setOperators(matrices[1])
+    ksp.setOperators(repeated(matrices[1], len(strains)))
     second = solve(ksp, loads[1], guesses=first.vectors)
 
     solutions = first.vectors + second.vectors
@@ -115,7 +115,7 @@ def modulus_basis(
     for end, modulus in enumerate(ends):
         projected = basis.coefficients(modulus).T @ basis.at(modulus, images)
         residuals = basis.at(modulus, forces) - projected
-        energies[end] = [_energy(ksp.pc, residual) for residual in residuals]
+        energies[end] = _energies(ksp.pc, residuals)
     affine_energies = AREA * np.einsum("li,ij,lj->l", strains, matrix.stiffness, strains)
     return replace(basis, error=float((energies / affine_energies).max()))
 
@@ -134,9 +134,9 @@ def _arrays(vectors: Sequence[Any]) -> Array:
     return np.array([_arrays(vector) for vector in vectors])
 
 
-def _energy(preconditioner: PETSc.PC, residual: Array) -> float:
-    """Return rᵀ P⁻¹ r, about the energy of the error."""
-    r = PETSc.Vec().createWithArray(residual, comm=PETSc.COMM_SELF)
-    correction = r.duplicate()
-    preconditioner.apply(r, correction)
-    return float(r.dot(correction))
+def _energies(preconditioner: PETSc.PC, residuals: Array) -> Array:
+    """Return rᵀ P⁻¹ r of residuals (loads, size), about the energies of the errors, (loads,)."""
+    r = PETSc.Vec().createWithArray(residuals.ravel(), comm=PETSc.COMM_SELF)
+    corrections = r.duplicate()
+    preconditioner.apply(r, corrections)
+    return np.asarray((residuals * corrections.array_r.reshape(residuals.shape)).sum(axis=1))

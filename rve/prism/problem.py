@@ -236,8 +236,8 @@ class PrismProblem:
         """Reduced forces −⟨Bᵀ C ε̄⟩ of macroscopic strains (loads, 3), for the phases as set."""
         return [self.elimination.forces(self._elastic.load(strain)) for strain in strains]
 
-    def solver(self, options: SolverOptions, matrix: PETSc.Mat) -> PETSc.KSP:
-        """PETSc solver of a reduced symmetric operator."""
+    def solver(self, options: SolverOptions, matrix: PETSc.Mat, *, loads: int = 1) -> PETSc.KSP:
+        """PETSc solver of a reduced symmetric operator, for any number of loads in turn."""
         return krylov_solver(matrix, options, lambda: self.preconditioner(matrix))
 
     def preconditioner(self, matrix: PETSc.Mat) -> ThetaPreconditioner:

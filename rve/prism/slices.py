@@ -138,14 +138,22 @@ class SliceProblem:
             loads.append(load)
         return loads
 
-    def solver(self, options: SolverOptions, matrix: PETSc.Mat) -> PETSc.KSP:
-        """Return PETSc's solver of an assembled stiffness; that of an earlier one is spent."""
+    def solver(self, options: SolverOptions, matrix: PETSc.Mat, *, loads: int) -> PETSc.KSP:
+        """Return PETSc's solver of an assembled stiffness for some loads at once.
+
+        That of an earlier stiffness is spent. The solver's tolerance is that of each load: where
+        all have norm 1, |r_j| ≤ |r| ≤ rtol / √n · √n for the residual r of n loads together.
+        """
         if options != self._options:
             self._preconditioner = ThetaPreconditioner(self.numbering, MPI.COMM_SELF)
             self._options = options
         blocks = matrix.getPythonContext().level_blocks()
         law, preconditioner = self.map.distribution, self._preconditioner
-        return krylov_solver(matrix, options, lambda: preconditioner.set_up(law, blocks))
+        ksp = krylov_solver(
+            repeated(matrix, loads), options, lambda: preconditioner.set_up(law, blocks)
+        )
+        ksp.setTolerances(rtol=ksp.getTolerances()[0] / loads**0.5)
+        return ksp
 
     def slice_strains(
         self, strains: Array, fluctuations: Sequence[PETSc.Vec | None]
@@ -172,3 +180,9 @@ class SliceProblem:
             areas = is_phase * self._areas[layer] / AREA
             integrals.add(values, areas, self._slices(layer))
         return integrals
+
+
+def repeated(matrix: PETSc.Mat, times: int) -> PETSc.Mat:
+    """Return a stiffness as operator on several fields, one after another in a vector."""
+    size = times * matrix.size[0]
+    return PETSc.Mat().createPython((size, size), matrix.getPythonContext(), comm=PETSc.COMM_SELF)

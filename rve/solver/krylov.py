@@ -12,7 +12,6 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from itertools import zip_longest
 
 import numpy as np
 
@@ -142,17 +141,24 @@ def solve(
 ) -> Solutions:
     """Solve for each load, from a guess of each solution or from zero.
 
+    Where the solver's vectors are n times as long as a load, n loads are solved at once: divided by
+    their norms, they stand one after another in a vector.
+
     Raises:
         ConvergenceError: The tolerance was not reached, or a solution is not finite.
     """
     matrix, _ = ksp.getOperators()
+    together = matrix.size[0] // loads[0].size
     vectors, products, iterations, residuals = [], [], [], []
     ksp.setInitialGuessNonzero(bool(guesses))
-    for load, guess in zip_longest(loads, guesses):
-        x, product = load.duplicate(), load.duplicate()
-        if guess is not None:
-            guess.copy(x)
-        ksp.solve(load, x)  # eq. 7: K U = F
+    for first in range(0, len(loads), together):
+        group = slice(first, first + together)
+        norms = [load.norm() or 1.0 for load in loads[group]]
+        b, x = matrix.createVecLeft(), matrix.createVecRight()
+        _join(loads[group], norms, into=b)
+        if guesses:
+            _join(guesses[group], norms, into=x)
+        ksp.solve(b, x)  # eq. 7: K U = F
         reason, count = ksp.getConvergedReason(), ksp.getIterationNumber()
         if reason <= 0 or not np.isfinite(x.norm()):
             raise ConvergenceError(
@@ -161,13 +167,30 @@ def solve(
                 f"raise -{ksp.getOptionsPrefix()}ksp_max_it or take another solver",
             )
         LOG.debug("%s with %s: %d iterations", ksp.getType(), ksp.pc.getType(), count)
+        product = b.duplicate()
         matrix.mult(x, product)
-        residual = product - load
-        vectors.append(x)
-        products.append(product)
-        iterations.append(count)
-        residuals.append(residual.norm() / (load.norm() or 1.0))
+        vectors += _split(x, loads[group], norms)
+        products += _split(product, loads[group], norms)
+        iterations += together * [count]
+        residuals.append((product - b).norm())  # at least that of each load, whose norm is 1
     return Solutions(vectors, products, tuple(iterations), max(residuals))
+
+
+def _join(vectors: Sequence[PETSc.Vec], norms: Sequence[float], *, into: PETSc.Vec) -> None:
+    """Set a vector to vectors over norms, one after another."""
+    parts = [vector.array_r / norm for vector, norm in zip(vectors, norms, strict=True)]
+    into.array[:] = np.concatenate(parts)
+
+
+def _split(
+    joined: PETSc.Vec, loads: Sequence[PETSc.Vec], norms: Sequence[float]
+) -> list[PETSc.Vec]:
+    """Return the vectors that `_join` has joined, each in the layout of its load."""
+    vectors = [load.duplicate() for load in loads]
+    parts = np.split(joined.array_r, len(vectors))
+    for vector, part, norm in zip(vectors, parts, norms, strict=True):
+        vector.array[:] = part * norm
+    return vectors
 
 
 @contextmanager

@@ -21,7 +21,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from alphacut.base.arrays import Array, Ints
-from alphacut.rve.fenicsx import PETSc, aij
+from alphacut.rve.fenicsx import PETSc, aij, columns
 from alphacut.rve.mesh.prism_grid import Triangulation
 from alphacut.rve.solver.numbering import LevelNumbering
 from alphacut.rve.solver.theta_preconditioner import interpolated_vertices
@@ -64,6 +64,7 @@ class LayerConstraint:
 
     Attributes:
         matrix: Q, shape (layers · 2 nodes, unknowns).
+        transposed: Qᵀ.
     """
 
     def __init__(
@@ -75,7 +76,8 @@ class LayerConstraint:
         layer = np.arange(layers)[:, None]
         places = (Q.row + layer * Q.shape[0]).ravel(), (Q.col + layer * numbering.stride).ravel()
         shape = layers * Q.shape[0], numbering.size
-        self.matrix = aij(sp.csr_matrix((np.tile(Q.data, layers), places), shape))
+        all_layers = sp.csr_matrix((np.tile(Q.data, layers), places), shape)
+        self.matrix, self.transposed = aij(all_layers), aij(all_layers.T.tocsr())
         self._pattern = _scalar_pattern(pattern)
         self._all_layers = sp.kron(sp.eye(layers), sp.csr_matrix(self._pattern, dtype=float), "csr")
         # The preconditioner's blocks are Bᵀ A B with B from hats, then from bubbles, to the slices:
@@ -125,14 +127,17 @@ class LayerMatrix:
     def __init__(self, constraint: LayerConstraint, values: Array) -> None:
         self._constraint, self._values = constraint, values
         self._layers = constraint.block_diagonal(values)
-        self._displacements, self._forces = self._layers.createVecs()
 
     def mult(self, _matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Set y to K x; called by PETSc."""
-        Q = self._constraint.matrix
-        Q.mult(x, self._displacements)
-        self._layers.mult(self._displacements, self._forces)
-        Q.multTranspose(self._forces, y)
+        """Set y to K x; called by PETSc. Several x may stand one after another in a vector.
+
+        They are read and multiplied together, which takes little longer than one.
+        """
+        Q, transposed = self._constraint.matrix, self._constraint.transposed
+        fields = columns(x.array_r.reshape(-1, Q.size[1]))
+        forces = self._layers.matMult(Q.matMult(fields))
+        products = transposed.matMult(forces)  # named, since its array does not keep it alive
+        y.array[:] = products.getDenseArray().T.ravel()
 
     def level_blocks(self) -> Iterator[sp.csr_matrix]:
         """Yield the blocks of the hats of all levels, then of the bubbles of all mid-levels."""

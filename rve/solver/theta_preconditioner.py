@@ -35,7 +35,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from alphacut.base.arrays import Array, Ints
-from alphacut.rve.fenicsx import MPI, PETSc, aij, cholesky
+from alphacut.rve.fenicsx import MPI, PETSc, aij, cholesky, columns
 from alphacut.rve.solver.numbering import LevelNumbering
 from alphacut.stochastic import ThetaLaw
 from alphacut.stochastic.theta.quadrature import level_rule
@@ -136,29 +136,33 @@ class ThetaPreconditioner:
         return self
 
     def apply(self, _pc: PETSc.PC, residual: PETSc.Vec, result: PETSc.Vec) -> None:
-        """Set the result to P⁻¹ residual; called by PETSc."""
-        forces = self._gathered(residual.array_r)
-        fields = self._numbering.split(self._nodal_values.T @ forces)
+        """Set the result to P⁻¹ residual; called by PETSc.
+
+        On one rank several residuals may stand one after another in a vector.
+        """
+        forces = self._gathered(residual.array_r).reshape(-1, self._numbering.size)
+        fields = self._numbering.split((self._nodal_values.T @ forces.T).T)
         fields = precondition(self._mass, self._injection, fields, self._solve)
-        values = self._nodal_values @ np.concatenate([x.ravel() for x in fields])
-        result.array[:] = values[self._numbering.rows.start : self._numbering.rows.stop]
+        flat = np.concatenate([x.reshape(len(forces), -1) for x in fields], axis=1)
+        values = self._nodal_values @ flat.T
+        result.array[:] = values[self._numbering.rows.start : self._numbering.rows.stop].T.ravel()
 
     def _solve(self, *loads: Array) -> Fields:
         """Solutions of all levels and of all mid-levels, of which each rank solves its own."""
         solvers, solutions = iter(self._solvers), []
         for load, rows in zip(loads, self._rank_levels, strict=True):
-            solution = np.empty_like(load[rows])
+            solution = np.empty((len(load), len(rows), load.shape[-1]))
             for k, level in enumerate(rows):
-                solution[k] = next(solvers).solve(load[level])
-            solutions.append(self._gathered(solution))
+                solution[:, k] = next(solvers).solve(load[:, level])
+            solutions.append(self._gathered(solution, axis=1))
         hats, bubbles = solutions
         return hats, bubbles
 
-    def _gathered(self, part: Array) -> Array:
-        """Return the parts of all ranks, one after another along the first axis."""
+    def _gathered(self, part: Array, *, axis: int = 0) -> Array:
+        """Return the parts of all ranks, one after another along an axis."""
         if self._comm.size == 1:
             return part
-        return np.concatenate(self._comm.allgather(part))
+        return np.concatenate(self._comm.allgather(part), axis=axis)
 
     def view(self, _pc: PETSc.PC, viewer: PETSc.Viewer) -> None:
         """Print the number of levels and the first one's solver, for ``-rve_ksp_view``."""
@@ -181,7 +185,6 @@ class PlaneSolver:
         self._values = np.ones(pattern.nnz)  # PETSc's matrix has its values here
         csr = self._values, pattern.indices, pattern.indptr
         self._matrix = aij(sp.csr_matrix(csr, pattern.shape))
-        self._solution, self._load = self._matrix.createVecs()
         self.ksp = cholesky(self._matrix, PREFIX + LEVEL)
 
     def factorise(self, values: Array) -> None:
@@ -192,11 +195,11 @@ class PlaneSolver:
         self.ksp.setFromOptions()  # so that PETSc knows them as used
         self.ksp.setUp()
 
-    def solve(self, load: Array) -> Array:
-        """Return the solution for a load, as a view that the next call overwrites."""
-        self._load.array[:] = load
-        self.ksp.solve(self._load, self._solution)
-        return np.asarray(self._solution.array_r)
+    def solve(self, loads: Array) -> Array:
+        """Return the solutions for some loads, shape (loads, size)."""
+        solutions = np.empty(loads.shape)
+        self.ksp.matSolve(columns(loads), columns(solutions))
+        return solutions
 
 
 def level_blocks(matrix: PETSc.Mat, numbering: LevelNumbering) -> Iterator[sp.csr_matrix]:
