@@ -53,6 +53,7 @@ WORKS = {  # name: command in a checkout; one that runs a case gets a new folder
     "campaign": CAMPAIGN,  # of the paper, 225 samples
     "paper": (*RUN, "cases/paper.toml", "--workers=2"),
     "sample": SOLVE,
+    "sample-option": (*SOLVE, "-rve_ksp_rtol", "1e-8"),  # which repeats the default
     "building": (*RUN, "cases/building.toml", "--workers=2"),
     "records-44": (*RUN, f"{SUITES}/storeys.toml", "--workers=2"),
     "records-12": (  # of 60 s
@@ -67,11 +68,9 @@ WORKS = {  # name: command in a checkout; one that runs a case gets a new folder
     },
     **{f"product-{size}": (*SOLVE, f"--set=mesh.size={size}") for size in (0.15, 0.08, 0.04)},
 }
-LARGEST = {"campaign": 0.5, "paper": 0.5, "sample": 0.65, "building": 0.4}
+LARGEST = {"campaign": 0.5, "paper": 0.5, "sample": 0.45, "sample-option": 0.45, "building": 0.4}
 LARGEST |= {"records-44": 0.45, "records-12": 0.45}
-LARGEST |= {
-    name: 0.6 if name.startswith("check") else 0.85 for name in WORKS if name not in LARGEST
-}
+LARGEST |= {name: 0.6 if name.startswith("check") else 0.5 for name in WORKS if name not in LARGEST}
 """Ratio of processor times that each work is to stay below."""
 
 

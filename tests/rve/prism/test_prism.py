@@ -223,6 +223,29 @@ def test_what_petsc_does_not_take_or_reach_is_an_error(petsc, error, message):
         solve(mesh_size=0.4, layers=3, petsc=petsc)
 
 
+def test_options_reach_the_blocks_at_every_sample_and_leave_the_next_model_alone():
+    particles, petsc = [Phase(80e9), Phase(82e9)], {"level_pc_type": "jacobi"}
+    plain = PrismModel(0.5, 3, estimate=False)
+    changed = PrismModel(0.5, 3, estimate=False, petsc=petsc)
+    before = plain.solve(PAPER, MATRIX, particles)
+    for one, other in zip(before, changed.solve(PAPER, MATRIX, particles), strict=True):
+        assert other.modulus == pytest.approx(one.modulus, rel=1e-8)
+        assert max(other.iterations) > 5 * max(one.iterations)
+        assert other.solver == "theta -rve_level_pc_type jacobi"
+    for one, other in zip(before, plain.solve(PAPER, MATRIX, particles), strict=True):
+        assert (other.modulus, other.iterations) == (one.modulus, one.iterations)
+
+
+def test_a_solver_that_needs_entries_gets_the_form_over_prisms():
+    factorised = {"ksp_type": "preonly", "pc_type": "lu"}
+    assert PrismModel().solver_text.startswith(
+        "one UFL form over slices by DOLFINx, solved by PETSc's cg"
+    )
+    assert "over slices" in PrismModel(petsc={"ksp_rtol": "1e-8"}).solver_text
+    assert "over prisms" in PrismModel(petsc=factorised).solver_text
+    assert "over prisms" in PrismModel(parallel=True).solver_text
+
+
 def test_nearly_incompressible_phases_are_referred_to_the_series():
     with pytest.raises(RefusedError, match=r"Poisson's ratio is 0.46; .* take the series"):
         solve(particle=Phase(80e9, 0.46))
