@@ -6,8 +6,12 @@ import re
 from collections.abc import Callable, Collection, Iterable
 from math import inf, isfinite, nan
 from numbers import Integral, Real
+from os import PathLike
+from pathlib import Path
 
 import numpy as np
+
+from alphacut.base.arrays import Array
 
 MAX_LENGTH = 300
 """Characters of a message; beyond it value and allowed values are cut, and never the cure."""
@@ -121,13 +125,20 @@ def checked_number(
     return number
 
 
+def path_of(key: str, value: object) -> Path:
+    """Return the path of a file that a caller names by a text or a path; refuses others."""
+    is_path = isinstance(value, str | PathLike) and not isinstance(value, bytes)
+    require(is_path, key, repr(value), 'the path of a file, as "NAME"')
+    return Path(value)  # type: ignore[arg-type]
+
+
 def is_number(value: object, *, whole: bool = False) -> bool:
     """True for a real number, or a whole one, of Python or NumPy; not for True and False."""
     kind = Integral if whole else Real
     return isinstance(value, kind) and type(value).__name__ not in ("bool", "bool_")
 
 
-def array_of_call(key: str, function: object, *points: np.ndarray, allowed: str) -> np.ndarray:
+def array_of_call(key: str, function: object, *points: Array, allowed: str) -> Array:
     """Return what a function of the caller's gives at arrays of points, of their shape, as floats.
 
     Args:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from alphacut.base.errors import checked_number, require
+from alphacut.base.errors import checked_number, path_of, require
 from alphacut.frame.identify.mode_rows import mode_rows
 from alphacut.frame.identify.modes import MeasuredMode, measured_mode
 from alphacut.frame.identify.uff_modes import ENDINGS, uff_mode_rows
@@ -49,7 +49,7 @@ def read_modes(
     for key, deviation in deviations.items():
         if deviation is not None:
             checked_number(key, deviation, positive=True)
-    file = Path(path)
+    file = path_of("path", path)
     is_universal = file.suffix.lower() in ENDINGS
     allowed = "the floors of its unknowns" if is_universal else "left out beside a CSV file"
     require(bool(floors) == is_universal, "floors", floors or None, allowed)

@@ -53,6 +53,7 @@ def read_recording(
 
 def _read_by_marks(path: Path, channel: str, step: float | None, unit: str) -> Recording:
     content = read_bytes(path)
+    require(bool(content.strip()), path.name, "empty", "a file with a record", "load it anew")
     if is_universal(content):
         return read_uff_record(path.name, content, channel)
     if _waveform_format(content):

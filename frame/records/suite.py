@@ -5,13 +5,14 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from glob import glob
 from math import isclose
 from pathlib import Path
 from typing import get_args
 
-from alphacut.base.errors import RefusedError, checked_number, require, require_choice
+from alphacut.base.errors import RefusedError, checked_number, path_of, require, require_choice
 from alphacut.frame.records.history import Accelerogram
 from alphacut.frame.records.read import read_recording
 from alphacut.frame.records.recording import Baseline, Recording
@@ -59,8 +60,8 @@ def read_record(
         >>> ground.name, len(ground.samples), ground.step
         ('record-2001', 501, 0.02)
     """
-    _require_arguments(step, unit, baseline=baseline)
-    (recording,) = read_recordings([Path(path)], channel=channel, step=step, unit=unit)
+    _require_arguments(channel, step, unit=unit, baseline=baseline)
+    (recording,) = read_recordings([path_of("path", path)], channel=channel, step=step, unit=unit)
     return recording.accelerogram(baseline)
 
 
@@ -90,11 +91,16 @@ def read_suite(
         >>> len(suite), suite[0].name
         (11, 'record-2001')
     """
-    _require_arguments(step, unit, baseline=baseline)
+    _require_arguments(channel, step, unit=unit, baseline=baseline)
     paths: list[Path] = []
-    for pattern in [files] if isinstance(files, str | Path) else files:
-        is_file = Path(pattern).is_file()
-        paths += [Path(pattern)] if is_file else map(Path, sorted(glob(str(pattern))))
+    patterns: Sequence[object] = [files]
+    if isinstance(files, Sequence) and not isinstance(files, str):
+        patterns = files
+    for pattern in patterns:
+        path, is_file = path_of("files", pattern), False
+        with suppress(OSError):  # of a name that is too long
+            is_file = path.is_file()
+        paths += [path] if is_file else map(Path, sorted(glob(str(pattern))))
     recordings = read_recordings(paths, channel=channel, step=step, unit=unit, shown=files)
     require_distinct("files", recordings)
     return tuple(recording.accelerogram(baseline) for recording in recordings)
@@ -147,11 +153,12 @@ def require_distinct(key: str, recordings: Sequence[Recording]) -> None:
     require(not repeated, key, repeated, allowed="each file once, by its name")
 
 
-def _require_arguments(step: float | None, unit: str, *, baseline: str) -> None:
+def _require_arguments(channel: str, step: float | None, *, unit: str, baseline: str) -> None:
+    require(isinstance(channel, str), "channel", repr(channel), 'a name in quotes, as "2"')
     if step is not None:
         checked_number("step", step, positive=True)
-    is_known = not unit or acceleration_factor(unit) is not None
-    require(is_known, "unit", unit, allowed=f"a unit of {ACCELERATION_UNITS}")
+    is_known = isinstance(unit, str) and (not unit or acceleration_factor(unit) is not None)
+    require(is_known, "unit", repr(unit), allowed=f"a unit of {ACCELERATION_UNITS}")
     require_choice("baseline", baseline, get_args(Baseline))
 
 

@@ -64,9 +64,13 @@ CURES_OF_ROWS = {
     r"\d\.\d{3},\d|\d,\d{3}\.\d": "write numbers without separators of thousands",
     r"(?i)nan|null|n/?a\b|inf|-{2}|#": "values are missing: fill the gap, or cut the record there",
     r",\s*,|;\s*;|,\s*$|;\s*$": "cells are empty: fill the gap, or cut the record there",
+    r"^\s*[,;]": "cells are empty: fill the gap, or cut the record there",
+    r"[A-Za-z]{2}": "text stands among the numbers: cut it off",
     r"\d,\d": "write decimal points if these are decimal commas",
 }
 """Cure of a row that is not of numbers, by a pattern in its text; the first that fits."""
+COUNTED = re.compile(r"\W*(?:samples?|points?|index|number|no|nr|count|n|i)\b", re.IGNORECASE)
+"""A head whose first column counts samples."""
 UNEVEN = 0.05
 """Fraction of a step by which a time may miss its place, as times that are rounded do."""
 ROUNDED = 1 + 1e-6
@@ -234,6 +238,10 @@ def read_table(
             head_unit and acceleration_factor(head_unit) is None
         ):  # the case's unit does not stand in
             cure = f"{head_unit} is no unit of accelerations: mend the head"
+        if re.search(r"[,;\s]\W*(?:time|t)\b", table.head, re.IGNORECASE):
+            cure = "times stand in the first column"
+        elif COUNTED.match(table.head):
+            cure = 'leave the count of samples out, and say records.step = "0.005 s"'
         if to_s == 0:
             cure = f"{time_unit} is no unit of times: {', '.join(SECONDS)}"
         raise file.refusal(table.start, value, allowed, cure)

@@ -13,7 +13,7 @@ from typing import Self
 import numpy as np
 
 from alphacut.base.arrays import Array
-from alphacut.base.errors import RefusedError, require
+from alphacut.base.errors import RefusedError, printable, require
 from alphacut.base.memory import require_text
 from alphacut.frame.records.recording import Recording
 from alphacut.frame.records.stated_peak import StatedPeak, remarks_on_peak
@@ -104,7 +104,8 @@ def recording_in_si(
         cure = f"{unit} is the unit of {quantity}" if quantity else ""
         raise RefusedError(location, value, f"accelerations in {ACCELERATION_UNITS}", cure)
     allowed = f"a step above 0 and below {LONGEST_STEP:g} s"
-    require(0 < step < LONGEST_STEP, location, f"a step of {step:g} s", allowed)
+    cure = "times in ms have the head time [ms]" if step >= LONGEST_STEP else ""
+    require(0 < step < LONGEST_STEP, location, f"a step of {step:g} s", allowed, cure)
     in_si = to_si * samples
     remarks += remarks_on_peak(location, in_si, stated, unit)
     return Recording(file_format, unit, step, in_si, channel, remarks)
@@ -144,4 +145,4 @@ def read_bytes(path: Path) -> bytes:
         return path.read_bytes()
     except OSError as error:
         reason = str(error.strerror or "unreadable").lower().removeprefix("is ")
-        raise RefusedError(str(path), reason, "a file with a record") from None
+        raise RefusedError(printable(path, 80), reason, "a file with a record") from None

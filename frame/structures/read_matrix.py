@@ -14,7 +14,7 @@ import numpy as np
 
 from alphacut.base.array_files import ArrayArchive, Numbers, read_npy
 from alphacut.base.arrays import Array
-from alphacut.base.errors import RefusedError, printable, require
+from alphacut.base.errors import RefusedError, path_of, printable, require
 from alphacut.base.memory import require_free_memory, require_text
 from alphacut.frame.structures.matrix_market import dense_of_entries, matrix_market, require_size
 
@@ -64,7 +64,7 @@ def read_matrix(path: str | Path, *, name: str = "", max_rows: int = MAX_ROWS) -
         >>> read_matrix("cases/plane-frame/stiffness1.mtx").shape
         (18, 18)
     """
-    file = Path(path)
+    file = path_of("path", path)
     if file.suffix.lower() not in ENDINGS:
         cures = (cure for kinds, cure in OTHER_ENDINGS.items() if file.suffix.lower() in kinds)
         raise RefusedError(file.name, f"of type {file.suffix or 'none'}", ALLOWED, next(cures, ""))
@@ -73,8 +73,8 @@ def read_matrix(path: str | Path, *, name: str = "", max_rows: int = MAX_ROWS) -
     except RefusedError:
         raise
     except Exception as error:  # whatever the readers of files, texts and archives raise
-        reason = printable(error, 80) or type(error).__name__
-        raise RefusedError(file.name, reason, ALLOWED) from None
+        reason = getattr(error, "strerror", None) or printable(error, 80) or type(error).__name__
+        raise RefusedError(printable(file.name, 80), reason, ALLOWED) from None
     is_real, shape = array.dtype.kind in "uif", " × ".join(map(str, array.shape))
     require(is_real, file.name, value=f"an array of {array.dtype.name}", allowed=ALLOWED)
     is_matrix = array.ndim in (1, 2) and array.size > 0

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from alphacut.base.errors import RefusedError
-from alphacut.frame import Accelerogram, read_record, read_suite
+from alphacut.frame import Accelerogram, read_matrix, read_modes, read_record, read_suite
 
 
 def write_column(path, samples):
@@ -56,6 +56,10 @@ def test_what_is_unusual_is_a_remark(tmp_path):
         ("a.txt", {"step": float("nan")}, "step is nan"),
         ("a.txt", {"baseline": "median"}, "baseline is median; allowed: none, mean, linear"),
         ("a.txt", {"unit": "furlongs"}, "furlongs"),
+        ("a.txt", {"unit": 9.81}, "unit is 9.81; allowed: a unit of g"),
+        ("a.txt", {"channel": 2}, 'channel is 2; allowed: a name in quotes, as "2"'),
+        ("a.txt", {"step": "0.01"}, "step is '0.01'; allowed: finite numbers"),
+        (300 * "a", {}, "files is .*0 match"),
         ("missing.txt", {}, "0 match"),
     ],
 )
@@ -65,3 +69,16 @@ def test_other_files_and_arguments_are_refused(tmp_path, files, options, message
     paths = f"{tmp_path}/{files}" if is_one else [f"{tmp_path}/{name}" for name in files]
     with pytest.raises(RefusedError, match=message):
         read_suite(paths, **{"step": 0.02, "unit": "g"} | options)
+
+
+@pytest.mark.parametrize("read", [read_record, read_suite, read_modes, read_matrix])
+@pytest.mark.parametrize("path", [None, 3, b"a.csv"])
+def test_what_is_no_path_is_refused_before_it_is_opened(read, path):
+    with pytest.raises(RefusedError, match="allowed: the path of a file"):
+        read(path)
+
+
+@pytest.mark.parametrize("read", [read_record, read_matrix])
+def test_a_name_that_is_too_long_is_said_to_be(read):
+    with pytest.raises(RefusedError, match=r"(?i)aaa… is file name too long"):
+        read(300 * "a" + ".csv")

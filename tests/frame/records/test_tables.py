@@ -126,6 +126,8 @@ def test_one_column_of_decimal_commas_is_one_column(tmp_path):
         ("0.01,nan", "values are missing"),
         ("0.01,", "cells are empty"),
         ("0.01,0.1,5", "decimal points"),
+        (",0.1", "cells are empty"),
+        ("max,0.3", "text stands among the numbers"),
     ],
 )
 def test_rows_of_no_numbers_tell_their_cure(tmp_path, row, cure):
@@ -149,3 +151,17 @@ def test_uneven_times_tell_their_cure(tmp_path, times, cure):
 def test_times_in_a_unit_of_something_else_are_told_which_there_are(tmp_path):
     path = saved(tmp_path, ["0,1", "1,2", "2,1"], "time [samples],acceleration [g]")
     assert "samples is no unit of times" in refused(path)
+
+
+@pytest.mark.parametrize(
+    ("head", "step", "cure"),
+    [
+        ("acceleration [g],time [s]", 0.01, "times stand in the first column"),
+        ("sample,acceleration [g]", 1, "leave the count of samples out"),
+        ("time [s],acceleration [g]", 10, r"times in ms have the head time \[ms\]"),
+    ],
+)
+def test_columns_that_are_no_times_in_seconds_tell_their_cure(tmp_path, head, step, cure):
+    rows = [f"{step * k:.9g},{0.1 * k * k % 1:.3f}" for k in range(9)]
+    with pytest.raises(RefusedError, match=cure):
+        read_recording(saved(tmp_path, rows, head))
