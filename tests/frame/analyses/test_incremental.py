@@ -5,7 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from alphacut.frame import Accelerogram, StoreyFrame, envelope
+from alphacut.base.errors import RefusedError
+from alphacut.frame import (
+    Accelerogram,
+    Limit,
+    StoreyFrame,
+    decide,
+    envelope,
+    incremental,
+    over_records,
+)
 from alphacut.frame.analyses.fragility import CriticalMeasures, Tried, counts_between
 from alphacut.frame.analyses.incremental import (
     ALL,
@@ -135,3 +144,45 @@ def test_motions_of_a_run_are_foreseen_within_a_factor_of_two(rng):
     analysis.run()
     made = sum(len(points) for points, _ in analysis.moved.values())
     assert made / 2 <= foreseen <= 2 * made
+
+
+def test_peaks_over_scales_are_proportional_until_a_column_yields(rng, tmp_path):
+    suite = [Accelerogram(0.05, rng.normal(size=40), name=name) for name in ("one", "two")]
+    frame = StoreyFrame([1.0], stiffness=[200.0], yield_force=[1.0], outputs=("drift1", "a1"))
+    inputs, motion = {"k1": Triangular(180.0, 200.0, 220.0)}, {"duration": 3.0, "step": 0.05}
+    first = [1e-4, 2e-4, 50.0]
+    answer = incremental(frame, inputs, suite, first, **motion, alpha=(0, 1))
+    for by_output in answer.peaks.values():
+        high, low = by_output["drift1"]
+        assert high[:, 1] == pytest.approx(2 * high[:, 0])
+        assert (low <= high * (1 + 1e-12)).all()
+        assert low[1] == pytest.approx(high[1])  # of the nominal structure alone
+        assert high[0, 0] > high[1, 0]
+        # what yields has no more acceleration than fy / m and the damping give
+        assert by_output["a1"][0][0, 2] < 0.1 * by_output["a1"][0][0, 0] * 50.0 / 1e-4
+    rows = answer.records()
+    assert len(rows) == 2 * 2 * 2 * 3
+    answer.to_csv(tmp_path / "peaks.csv")
+    assert len((tmp_path / "peaks.csv").read_text(encoding="utf-8").splitlines()) == 1 + len(rows)
+    assert answer.to_dataset()["greatest peak"].shape == (len(rows),)
+    assert "drift1" in str(answer)
+    linear = StoreyFrame([1.0], stiffness=[200.0])
+    with pytest.raises(RefusedError, match="columns that yield"):
+        incremental(linear, inputs, suite, first, **motion)
+
+
+def test_the_worst_and_the_mean_over_records_are_those_of_each(rng):
+    suite = [Accelerogram(0.05, x * rng.normal(size=40), name=f"r{x}") for x in (1, 2, 4)]
+    frame = StoreyFrame([1.0], stiffness=[200.0], damping_ratio=0.05, outputs=("drift1",))
+    motion = {"duration": 3.0, "step": 0.05, "alpha": (0, 1)}
+    inputs = {"k1": Triangular(190.0, 200.0, 210.0)}
+    answer = over_records(frame, inputs, suite, **motion, measure="PGA", scale=3.0)
+    each = [record.peak["drift1"] for record in answer.by_record.values()]
+    assert [x.measures["PGA"] for x in answer.by_record.values()] == pytest.approx([3.0] * 3)
+    worst, mean = answer.peak["drift1"], answer.peak["mean drift1"]
+    assert worst.proved == pytest.approx(np.max([x.proved for x in each], axis=0))
+    assert mean.proved == pytest.approx(np.mean([x.proved for x in each], axis=0))
+    farthest = answer.by_record[answer.farthest_record["drift1"]]
+    assert farthest.peak["drift1"].reached[0] == worst.reached[0]
+    verdict = decide(answer, Limit("drift1", 0.9 * float(mean.reached[0]), mean=True))
+    assert verdict.limits["mean drift1"].verdict in ("can be exceeded", "exceeded")
