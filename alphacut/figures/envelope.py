@@ -22,6 +22,7 @@ from alphacut.figures.style import BLUE, GREY, INK, ORANGE, WIDTH
 from alphacut.frame import Decision, Fragility, LearnedInputs, Probability, Tolerances
 from alphacut.frame.analyses.decision import degree_text
 from alphacut.frame.analyses.fragility import LimitFragility
+from alphacut.frame.analyses.peaks import Peak
 from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.result import Ends
@@ -36,20 +37,30 @@ def drawings(task: EnvelopeTask, results: Results) -> Iterator[tuple[str, Callab
     """Yields the name of each figure of a study, one an output, and the function that draws it."""
     dataset, structure = results.envelopes[task.name].arrays, results.structure
     assert structure is not None
-    units = Parts.of(results).shown_units
+    parts = Parts.of(results)
+    peaks = parts.envelopes[task.name].peak
     for name in task.figures or map(str, dataset["output"].values):
         output = Output(name, structure.unit(name))
         number = f"fig{task.figures[output]}-" if output in task.figures else ""
         yield (
             f"{number}envelope-{task.name}-{output}",
-            partial(envelope, dataset, output, task, units[name]),
+            partial(envelope, dataset, output, task, parts.shown_units[name], peak=peaks.get(name)),
         )
 
 
 def envelope(
-    dataset: xarray.Dataset, output: Output, task: EnvelopeTask, unit: ShownUnit
+    dataset: xarray.Dataset,
+    output: Output,
+    task: EnvelopeTask,
+    unit: ShownUnit,
+    *,
+    peak: Peak | None = None,
 ) -> Figure:
-    """Draws the bands between lower and upper envelope of an output, by level, and their errors."""
+    """Draws the bands between lower and upper envelope of an output, by level, and their errors.
+
+    The title states the error of the output's `peak`, as the table of peaks does, where it is
+    given.
+    """
     figure, axes = plt.subplots()
     shown = dataset.sel(output=str(output))
     alpha, time = dataset["alpha"].values, dataset["time"].values
@@ -61,6 +72,8 @@ def envelope(
         axes.plot(time, shown.isel(alpha=0)[side], color=INK, lw=0.3)
     nature = str(dataset.attrs["nature"])
     error = draw_error_band(axes, time, shown.isel(alpha=0), nature, unit)
+    if error and peak is not None:  # which contains what lies between nodes
+        error = f", peak ± {unit.text(float(peak.error.max()), digits=2)} (at nodes dashed)"
     time_axes(axes, time, output, unit)
     title = f"{output.words}; fuzzy: {', '.join(task.fuzzy)}; {nature}{error}".replace("^2", "²")
     axes.set_title(fill(re.sub(r"(?<=\d) ", "\u00a0", title), 80))  # keeps units by numbers

@@ -3,6 +3,7 @@
 import itertools
 import os
 import shutil
+from types import SimpleNamespace
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -14,6 +15,7 @@ from alphacut.figures import envelope, material, overview
 from alphacut.figures.style import figure_style
 from alphacut.frame import Accelerogram, Decision, Limit, Peak, StoreyFrame, fragility, propagation
 from alphacut.frame.analyses.decision import LimitDecision
+from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy import Triangular
 from alphacut.fuzzy.result import Ends, Nature
 from alphacut.report.page import caption
@@ -115,6 +117,22 @@ def test_the_error_is_drawn_outside_bounds_that_it_may_pass(nature, lines):
         ends = sorted(float(line.get_ydata()[0]) for line in axes.lines)
     assert ends == [-1.25, 1.25][:lines]
     assert ("± 0.25 m" in words) == bool(lines)
+
+
+def test_the_title_states_the_error_of_the_peak_with_what_lies_between_nodes():
+    """As the table of peaks does; the error at nodes is smaller."""
+    band = ("alpha", "time")
+    ends = {"lower": -np.ones((2, 11)), "upper": np.ones((2, 11)), "error": 0.1 * np.ones((2, 11))}
+    dataset = xarray.Dataset(
+        {name: (band, values) for name, values in ends.items()},
+        coords={"alpha": [0.0, 1.0], "time": np.linspace(0, 1, 11)},
+        attrs={"nature": "estimated"},
+    ).expand_dims(output=["q1"])
+    task, peak = SimpleNamespace(fuzzy=("k",)), SimpleNamespace(error=np.array([0.5, 0.4]))
+    unit = ShownUnit("mm", 1e3)
+    with figure_style():
+        figure = envelope.envelope(dataset, Output("q1", "m"), task, unit, peak=peak)
+    assert "peak ± 500 mm (at nodes dashed)" in " ".join(figure.axes[0].get_title("left").split())
 
 
 def test_numbers_and_bounds_are_drawn_with_their_own_ends():
