@@ -18,6 +18,12 @@ from alphacut.rve.result.result import HomogenisedStiffness, StressCurve, effect
 if TYPE_CHECKING:
     from alphacut.rve.engineering import constants
     from alphacut.rve.fuzzy_cell import FuzzyStiffness, fuzzy_stiffness
+    from alphacut.rve.image.study import (
+        FuzzyImageStiffness,
+        GreyImage,
+        fuzzy_image_stiffness,
+        read_image,
+    )
     from alphacut.rve.prism.cell_fields import CellFields
     from alphacut.rve.prism.model import PrismModel
     from alphacut.rve.prism.own_mesh import LevelSetModel, MeshModel
@@ -29,14 +35,17 @@ if TYPE_CHECKING:
     from alphacut.rve.spheres.model import SpheresModel
 
 __all__ = [
-    "LOADS", "STRAIN", "Cell", "CellFields", "Ellipse", "FuzzyStiffness", "HomogenisedStiffness",
-    "LevelSetModel", "MeshModel", "Phase", "PrismModel", "ProductSpace", "ReferenceBounds",
-    "SeriesModel", "SlicesModel", "SpheresModel", "StressCurve", "VoigtPhase",
-    "constants", "effective_modulus", "fuzzy_stiffness", "loss_factors", "reference_bounds",
+    "LOADS", "STRAIN", "Cell", "CellFields", "Ellipse", "FuzzyImageStiffness", "FuzzyStiffness",
+    "GreyImage", "HomogenisedStiffness", "LevelSetModel", "MeshModel", "Phase", "PrismModel",
+    "ProductSpace", "ReferenceBounds", "SeriesModel", "SlicesModel", "SpheresModel", "StressCurve",
+    "VoigtPhase", "constants", "effective_modulus", "fuzzy_image_stiffness", "fuzzy_stiffness",
+    "loss_factors", "read_image", "reference_bounds",
 ]  # fmt: skip
 AT_FIRST_USE = {
     "CellFields": "prism.cell_fields",
+    "FuzzyImageStiffness": "image.study",
     "FuzzyStiffness": "fuzzy_cell",
+    "GreyImage": "image.study",
     "LevelSetModel": "prism.own_mesh",
     "MeshModel": "prism.own_mesh",
     "PrismModel": "prism.model",
@@ -46,8 +55,10 @@ AT_FIRST_USE = {
     "SlicesModel": "slices.model",
     "SpheresModel": "spheres.model",
     "constants": "engineering",
+    "fuzzy_image_stiffness": "image.study",
     "fuzzy_stiffness": "fuzzy_cell",
     "loss_factors": "result.loss_factors",
+    "read_image": "image.study",
     "reference_bounds": "result.reference_bounds",
 }
 """Module of each exported name that is imported at its first use: some need DOLFINx."""

@@ -39,7 +39,7 @@ from alphacut.report.results import AROUND
 from alphacut.rve.cell.cell import VoigtPhase
 from alphacut.stages.cell import GPA, CellProblem
 from alphacut.stages.envelope import tasks
-from alphacut.stages.image import image_study
+from alphacut.stages.image import study_of
 from alphacut.stages.suite import analyses_of, suite_records
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
     }
     text = text_table(("key", "value", "kind"), rows)
     if content.image_cell is not None:
-        study = study_of_image or image_study(content.image_cell)
+        study = study_of_image or study_of(content.image_cell)
         shares = study.fractions.items()
         text += f"image: {study.extent}\n"
         text += f"phases: {', '.join(f'{name} {share:.2%}' for name, share in shares)}\n"

@@ -27,6 +27,7 @@ from alphacut.fuzzy import Crisp, Triangular
 from alphacut.io.files import Document, locked, rank, require_writable, say
 from alphacut.io.results import MANIFEST, ResultsFolder
 from alphacut.rve.image.fields.grid import device_array
+from alphacut.rve.image.study import ImageStudy
 from alphacut.stages import (
     answers,
     cell,
@@ -243,7 +244,7 @@ def _draw_microstructure(
     draw(fitted, folder, section)
 
 
-def require_runnable(content: Content) -> image.ImageStudy | None:
+def require_runnable(content: Content) -> ImageStudy | None:
     """Reads and builds all that the stages of a case need, so that `check` refuses it too.
 
     Returns the study of the image that stage modulus takes, if it takes one.
@@ -258,14 +259,14 @@ def require_runnable(content: Content) -> image.ImageStudy | None:
     return study_of_image
 
 
-def _require_material(content: Content) -> image.ImageStudy | None:
+def _require_material(content: Content) -> ImageStudy | None:
     if "envelope" in content.stages and not content.has_stated_modulus:
         require_levels(content.modulus.alpha, "modulus.alpha")
     if content.image_cell is not None:
         fits = all(content.image_cell.is_solid) or "envelope" not in content.stages
         cure = "give a pore a small modulus, a rigid phase a large one, or take stage modulus alone"
         require(fits, "cell.modulus", "0 or rigid", "both bounds of E, for a frame", cure)
-        return image.image_study(content.image_cell)
+        return image.study_of(content.image_cell)
     if "microstructure" not in content.stages:
         problem = CellProblem.of(content)
         problem.require_mesh()

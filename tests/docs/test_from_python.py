@@ -141,11 +141,20 @@ def answers_as_the_cases_of_a_building(names):
     assert of_block.median.lower[0] == pytest.approx(of_case["median"]["lower"][0], rel=1e-3)
 
 
+def has_the_bounds_of_the_tomogram(names):
+    """Whether E is that of cases/tomogram.toml on both levels."""
+    cuts, case = names["stiffness"].young / 1e9, GOLDEN["tomogram"]["image"]["cuts"]["E_GPa"]
+    for row, level in ((0, 0), (-1, -1)):
+        ends = case["lower"][level], case["upper"][level]
+        assert cuts[row] == pytest.approx(ends, rel=1e-5)
+
+
 CHECKS = {
     1: has_the_modulus_of_the_paper,
     2: has_the_modulus_of_the_sample,
     4: has_the_radius_map_of_the_case,
     6: answers_as_the_cases_of_a_building,
+    5: has_the_bounds_of_the_tomogram,
     7: moves_as_the_structure_of_the_case,
     8: teaches_what_the_case_learns,
 }

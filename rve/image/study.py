@@ -1,0 +1,521 @@
+"""The fuzzy stiffness of an image or a volume: proved bounds on each α-level, by what widens them.
+
+The image is the periodic cell. Each pixel or voxel is of one of the phases that its grey value and
+the thresholds allow; each phase has fuzzy moduli and loss factors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from alphacut.base.array_files import read_npy
+from alphacut.base.arrays import Array, Ints, Mask
+from alphacut.base.errors import FailedError, require, require_choice
+from alphacut.base.progress_bar import Progress, progress_reporter, subprogress
+from alphacut.fuzzy import Crisp, FuzzyNumber
+from alphacut.fuzzy.result import Nature, rounded
+from alphacut.rve.cell.cell import Phase
+from alphacut.rve.fuzzy_cell import LossCuts, fuzzy_number, loss_corners, phase_loss_cuts
+from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
+from alphacut.rve.image.files import needed_memory, read_grid, require_memory
+from alphacut.rve.image.losses import energy_shares, loss_of_young, mean_loss
+from alphacut.rve.image.model import ImageCut, ImageModel, phase_energies, usual_division
+from alphacut.rve.image.phases import (
+    RIGID,
+    ModuliImages,
+    ModuliInterval,
+    moduli_images,
+    require_phases,
+    threshold_ranges,
+)
+from alphacut.rve.result.engineering_constants import NAMES
+from alphacut.rve.result.loss_factors import CONSTANTS, first_order
+from alphacut.rve.result.moduli import ISOTROPIC, plane_constants
+from alphacut.rve.result.reference_bounds import ReferenceBounds, reference_bounds
+from alphacut.rve.result.result import PhaseEnergies
+from alphacut.stochastic.segmentation import segment
+
+if TYPE_CHECKING:
+    import xarray
+
+ACCURACY = 1e-5
+"""Relative energy that the solver may leave."""
+GUARANTEE = Nature.GUARANTEED
+"""What all bounds promise: they are proved of the image as segmented, repeated periodically."""
+AXES = {2: ["11", "22", "12"], 3: ["11", "22", "33", "23", "13", "12"]}
+CONSTANT_NAMES = {
+    2: NAMES,
+    3: ("E_x", "E_y", "E_z", "nu_yz", "nu_xz", "nu_xy", "G_yz", "G_xz", "G_xy"),
+}
+"""Constants along the axes of an image in plane strain, and of a volume."""
+SIDES = "lower", "upper"
+VOLUMES = (".mhd", ".mha", ".nhdr", ".nrrd")
+AlphaLevel = float | None
+"""α-level, or None for the nominal values alone."""
+PhaseRanges = Callable[[AlphaLevel], tuple[Ints, Ints]]
+"""Function to the least and greatest phase of each pixel at a level."""
+
+
+@dataclass(frozen=True, eq=False)
+class GreyImage:
+    """Grey values or labels of pixels or voxels.
+
+    Args:
+        values: Shape (y, x) with y pointing up, or (z, y, x).
+        lengths: Sides of a pixel or voxel in the order of the axes of `values`, in m.
+    """
+
+    values: Array
+    lengths: tuple[float, ...]
+
+    @property
+    def sides(self) -> tuple[float, ...]:
+        """The sides over that along x."""
+        return tuple(length / self.lengths[-1] for length in self.lengths)
+
+
+def read_image(path: Path | str, *, spacing: float | Sequence[float]) -> GreyImage:
+    """Read an image, or a volume.
+
+    Args:
+        path: Picture (PNG, TIFF), or an array in .npy; of a volume a TIFF stack, a folder of
+            slices, .npy, .mhd or .nhdr.
+        spacing: Side of a pixel or voxel in m; or its sides, along (x, y) of a picture or along
+            (x, y, z) of a volume. A TIFF file is a volume where there are three.
+
+    Raises:
+        RefusedError: The file is none of these, too large for memory, or states other sides.
+    """
+    file = Path(path)
+    lengths = (float(spacing),) if isinstance(spacing, float | int) else tuple(spacing)
+    dimension = len(lengths) if len(lengths) > 1 else _dimension_of(file)
+    require(len(lengths) in (1, dimension), "spacing", spacing, f"one length, or {dimension}")
+    require(min(lengths) > 0, "spacing", spacing, "positive lengths in m")
+    in_order = (lengths * dimension if len(lengths) == 1 else lengths)[::-1]
+    sides = [length / in_order[-1] for length in in_order]
+    return GreyImage(read_grid(file, sides), in_order)
+
+
+def _dimension_of(file: Path) -> int:
+    if file.suffix.lower() == ".npy":
+        return int(np.ndim(read_npy(file, kinds="buifc")))
+    return 3 if file.is_dir() or file.suffix.lower() in VOLUMES else 2
+
+
+@dataclass(frozen=True)
+class ImagePhase:
+    """A phase of an image.
+
+    Args:
+        modulus: Young's modulus in Pa; 0 of a pore, `RIGID` or more of a rigid phase.
+        poisson: Poisson's ratio.
+        loss: Loss factor tan δ of the stiffness; None where it is not asked for.
+    """
+
+    modulus: FuzzyNumber
+    poisson: FuzzyNumber
+    loss: FuzzyNumber | None = None
+
+    @classmethod
+    def of(cls, values: Mapping[str, FuzzyNumber | float]) -> ImagePhase:
+        """Return the phase of a mapping with modulus, poisson and, if asked for, loss."""
+        for name in values:
+            require_choice("key of a phase", name, ("modulus", "poisson", "loss"))
+        numbers = {
+            name: x if isinstance(x, FuzzyNumber) else Crisp(float(x)) for name, x in values.items()
+        }
+        for name in ("modulus", "poisson"):
+            require(name in numbers, f"{name} of a phase", None, "a number, or a fuzzy number")
+        return cls(**numbers)
+
+    @property
+    def is_solid(self) -> bool:
+        """Whether the phase is neither a pore nor rigid, throughout its support."""
+        return self.modulus.support.lower > 0 and self.modulus.support.upper < RIGID
+
+
+@dataclass(frozen=True, eq=False)
+class ImageStudy:
+    """An image ready to be solved.
+
+    Args:
+        image: Its values.
+        phases: Its phases, dark first.
+        names: Their names.
+        phase_ranges: The phases that each pixel may be of, at a level.
+        fuzzy_threshold: Whether these depend on the level.
+    """
+
+    image: GreyImage
+    phases: tuple[ImagePhase, ...]
+    names: tuple[str, ...]
+    phase_ranges: PhaseRanges
+    fuzzy_threshold: bool
+
+    @property
+    def dimension(self) -> int:
+        """2 of an image, 3 of a volume."""
+        return len(self.image.lengths)
+
+    @property
+    def extent(self) -> str:
+        """Number of pixels or voxels along each axis, and memory of their solution, in words."""
+        nominal = self.images(None, None)
+        shape = nominal.bulk[0].shape
+        sizes = " × ".join(map(str, shape))
+        gigabytes = needed_memory(shape, usual_division(nominal)) / 1e9
+        axes = "pixels (y, x)" if len(shape) == 2 else "voxels (z, y, x)"
+        return f"{sizes} {axes}, about {gigabytes:.1f} GB of memory"
+
+    def images(self, threshold: AlphaLevel, phases: AlphaLevel) -> ModuliImages:
+        """Return least and greatest moduli of each pixel, at levels of threshold and phases."""
+        moduli = [
+            ModuliInterval.of_young(
+                cut_or_nominal(phase.modulus, phases),
+                cut_or_nominal(phase.poisson, phases),
+                self.dimension,
+            )
+            for phase in self.phases
+        ]
+        return moduli_images(*self.phase_ranges(threshold), moduli)
+
+    @property
+    def fractions(self) -> dict[str, float]:
+        """Fraction of each phase at the nominal values by the phase's name, dark first."""
+        phase = self.phase_ranges(None)[0]
+        counts = np.bincount(phase.ravel(), minlength=len(self.phases))
+        return dict(zip(self.names, map(float, counts / phase.size), strict=True))
+
+
+def cut_or_nominal(number: FuzzyNumber, level: AlphaLevel) -> tuple[float, float]:
+    """Return the cut of a number at a level, or its nominal value twice."""
+    return (number.nominal, number.nominal) if level is None else number.cut(level)
+
+
+def image_study(
+    image: GreyImage,
+    phases: Sequence[ImagePhase],
+    *,
+    thresholds: Sequence[FuzzyNumber] = (),
+    labels: Sequence[float] = (),
+) -> ImageStudy:
+    """Return the study of an image whose phases labels or thresholds of its greys tell apart.
+
+    Args:
+        image: The image.
+        phases: Its phases, dark first.
+        thresholds: Grey value from which on a pixel is of the next phase, one fewer than phases.
+        labels: Value of each phase in a labelled image, in place of thresholds.
+
+    Raises:
+        RefusedError: A threshold or a label does not fit the image, or its sides are too unlike.
+    """
+    ImageModel(image.sides)  # refuses sides too unlike
+    count, has_one = len(labels) or len(thresholds) + 1, bool(labels) != bool(thresholds)
+    require(has_one, "cell.threshold", "neither or both", "one of thresholds and labels")
+    require(len(phases) == count, "phases", len(phases), f"{count}, one for each")
+    grey = image.values
+    if labels:
+        phase = np.full(grey.shape, -1)
+        for number, label in enumerate(labels):
+            phase[grey == label] = number
+        values = {float(x) for x in np.unique(grey)}
+        wrong = ", ".join(f"{x:g}" for x in sorted(values ^ set(labels))[:5])
+        allowed = "every value of the image, and no other"
+        require(not wrong, "cell.labels", value=wrong, allowed=allowed)
+        names = tuple(f"label {label:g}" for label in labels)
+        return ImageStudy(image, tuple(phases), names, lambda level: (phase, phase), False)
+    require_phases(grey, tuple(number.cut(0.0) for number in thresholds))
+    is_fuzzy = any(number.support.width > 0 for number in thresholds)
+    segmentation = None  # of a volume, whose noise is not judged
+    if grey.ndim == 2:
+        segmentation = segment(grey, [number.nominal for number in thresholds])
+        segmentation.require_certain()
+
+    def phase_ranges(level: AlphaLevel) -> tuple[Ints, Ints]:
+        """Return least and greatest phase of each pixel at a level."""
+        # noise and light leave phases open, unless a fuzzy threshold says all that is not known
+        if segmentation is not None and level is not None and not is_fuzzy:
+            return segmentation.ranges()
+        return threshold_ranges(grey, [cut_or_nominal(number, level) for number in thresholds])
+
+    greys = [f"{number.nominal:g}" for number in thresholds]
+    between = [f"grey {low} … {high}" for low, high in pairwise(greys)]
+    names = (f"grey below {greys[0]}", *between, f"grey above {greys[-1]}")
+    is_open = segmentation is not None and segmentation.open_fraction > 0
+    return ImageStudy(image, tuple(phases), names, phase_ranges, is_fuzzy or is_open)
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class FuzzyImageStiffness:
+    """Proved bounds of the stiffness of an image or volume, repeated periodically, on α-levels.
+
+    Moduli are in Pa. Bounds that pores or rigid phases leave unknown are 0 or infinite.
+
+    Args:
+        alpha: Levels, shape (A,).
+        cuts: Bounds at each of them.
+        average: Average that E and ν of the plane are of; of a volume it is Hill's.
+        widths: Width of E at the lowest level by what it comes from, in Pa, the largest first.
+        fractions: Fraction of each phase by its name.
+        proved_losses: Loss factors at nominal moduli, to first order, by the name of the constant,
+            shape (A, 2) each; empty where phases have none.
+        losses: Estimates of those of E, G and K of an image beside them.
+        references: Classical bounds of isotropic composites; None beside pores or rigid phases.
+        division: Elements along each side of a pixel or voxel.
+        seconds: Wall time.
+        phase: Phase of each pixel or voxel at the nominal threshold.
+        is_open: Whether the threshold leaves it open on the lowest level.
+        lengths: As those of `GreyImage`.
+    """
+
+    alpha: Array
+    cuts: Sequence[ImageCut]
+    average: str
+    widths: Mapping[str, float]
+    fractions: Mapping[str, float]
+    proved_losses: Mapping[str, Array]
+    losses: LossCuts | None
+    references: ReferenceBounds | None
+    division: int
+    seconds: float
+    phase: Ints
+    is_open: Mask
+    lengths: tuple[float, ...]
+
+    @property
+    def modulus(self) -> FuzzyNumber:
+        """Fuzzy Young's modulus of the average in Pa; between two levels the wider α-cut holds."""
+        return fuzzy_number(self.alpha, self.young)
+
+    @property
+    def loss_factor(self) -> FuzzyNumber | None:
+        """Fuzzy loss factor of E, proved to first order; None where phases have none."""
+        if not self.proved_losses:
+            return None
+        return fuzzy_number(self.alpha, self.proved_losses["E"])
+
+    @property
+    def young(self) -> Array:
+        """Bounds of Young's modulus of the average, shape (A, 2), in Pa."""
+        return np.array([cut.modulus for cut in self.cuts])
+
+    @property
+    def constants(self) -> dict[str, Array]:
+        """Bounds of the constants along the axes by name, shape (A, 2) each, moduli in Pa."""
+        values = np.moveaxis(np.array([cut.constants for cut in self.cuts]), 1, 0)
+        return dict(zip(CONSTANT_NAMES[len(self.lengths)], values, strict=True))
+
+    def widths_by_cause(self) -> str:
+        """Return the width of E at the lowest level by what it comes from, in words."""
+        if not self.widths:
+            return "no width of E: one of its bounds is not known beside pores or rigid phases"
+        texts = (f"{cause} {width / 1e9:.3g} GPa" for cause, width in self.widths.items())
+        return f"width of E from {', '.join(texts)}"
+
+    def __str__(self) -> str:
+        """Return the guarantee, a line for each constant, and the fractions."""
+        kind = "image" if len(self.lengths) == 2 else "volume"
+        first, last = self.alpha[[0, -1]]
+        lines = [f"bounds {GUARANTEE} of the {kind}, repeated periodically; {self.seconds:.2g} s"]
+        for name, bounds in {"E": self.young, **self.constants}.items():
+            lowest, highest = (_range_text(bounds[row]) for row in (0, -1))
+            lines.append(f"{name}: α = {first:g}: {lowest}; α = {last:g}: {highest}")
+        shares = ", ".join(f"{name} {share:.1%}" for name, share in self.fractions.items())
+        return "\n".join([*lines, f"phases: {shares}"])
+
+    __repr__ = __str__
+
+    def to_csv(self, path: str) -> None:
+        """Write a row for each constant and level: bounds in SI."""
+        lines = ["constant,alpha,lower,upper,guarantee"]
+        for name, bounds in {"E": self.young, **self.constants}.items():
+            for row, alpha in enumerate(self.alpha):
+                lower, upper = float(bounds[row, 0]), float(bounds[row, 1])
+                lines.append(f"{name},{alpha:g},{lower!r},{upper!r},{GUARANTEE}")
+        Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+    def to_dataset(self) -> xarray.Dataset:
+        """Return a dataset of the bounds on each level, in SI, and of the phase of each pixel.
+
+        `phase` is the one at the nominal threshold, `is_open` says whether the threshold leaves it
+        open on the lowest level.
+        """
+        import xarray
+
+        stiffness = np.array([[cut.bounds.lower, cut.bounds.upper] for cut in self.cuts])
+        grid = ("z", "y", "x")[-self.phase.ndim :]
+        cut = ("alpha", "bound")
+        variables: dict[str, Any] = {
+            "E": (cut, self.young, {"units": "Pa"}),
+            "stiffness": ((*cut, "row", "column"), stiffness, {"units": "Pa"}),
+            **{name: (cut, bounds) for name, bounds in self.constants.items()},
+            **{f"loss_{name}": (cut, bounds) for name, bounds in self.proved_losses.items()},
+            "phase": (grid, self.phase.astype(np.float32)),
+            "is_open": (grid, self.is_open.astype(np.uint8)),
+        }
+        axes = {"alpha": self.alpha, "bound": [*SIDES]}
+        axes |= dict.fromkeys(("row", "column"), AXES[self.phase.ndim])
+        attributes = {
+            "nature": str(GUARANTEE),
+            "lengths": self.lengths,
+            "phases": [*self.fractions],
+        }
+        return xarray.Dataset(variables, axes, attributes)
+
+
+def _range_text(ends: Array) -> str:
+    """Return a range of two ends, rounded outwards to six digits."""
+    lower = rounded(float(ends[0]), "lower", GUARANTEE, 6)
+    upper = rounded(float(ends[1]), "upper", GUARANTEE, 6)
+    return f"{lower:.6g} … {upper:.6g}"
+
+
+def fuzzy_image_stiffness(
+    image: GreyImage,
+    phases: Sequence[Mapping[str, FuzzyNumber | float]],
+    *,
+    thresholds: Sequence[FuzzyNumber | float] = (),
+    labels: Sequence[float] = (),
+    alpha: Sequence[float] = (0.0, 0.5, 1.0),
+    average: str = ISOTROPIC,
+    device: str = "cpu",
+    progress: Progress | bool | None = None,
+) -> FuzzyImageStiffness:
+    """Return proved bounds of the stiffness of an image or volume on α-levels.
+
+    Args:
+        image: The periodic cell; see `read_image`.
+        phases: Of each phase, dark first, its modulus (Pa), poisson and, if asked for, loss.
+        thresholds: Grey value from which on a pixel is of the next phase, one fewer than phases.
+        labels: Value of each phase in a labelled image, in place of thresholds.
+        alpha: Rising levels.
+        average: Average of a plane stiffness that E and ν are of, "isotropic" or "axes".
+        device: "cpu", or "cuda" by CuPy.
+        progress: Called with the completed fraction; a bar on a terminal if not given.
+
+    Raises:
+        RefusedError: A value is not allowed, or the image does not fit into memory.
+        FailedError: The bounds do not tell that E is positive, or contradict each other.
+    """
+    numbers = [x if isinstance(x, FuzzyNumber) else Crisp(float(x)) for x in thresholds]
+    listed = [ImagePhase.of(values) for values in phases]
+    study = image_study(image, listed, thresholds=numbers, labels=labels)
+    with progress_reporter(progress) as tick:
+        return solve_study(
+            study, alpha=alpha, average=average, device=device, tick=tick or (lambda done: None)
+        )
+
+
+def solve_study(
+    study: ImageStudy, *, alpha: Sequence[float], average: str, device: str, tick: Progress
+) -> FuzzyImageStiffness:
+    """Return the bounds of a study on α-levels, and what widens them; see above."""
+    start, phases = perf_counter(), study.phases
+    nominal = study.images(None, None)  # at nominal thresholds and moduli
+    division = usual_division(nominal)
+    require_memory(nominal.bulk[0].shape, division)
+    solver = ConjugateGradient(ACCURACY)
+    model = ImageModel(study.image.sides, division, solver, average, device)
+    crisp = model.solve(nominal)
+    n_solutions = len(alpha) + 5  # with the nominal one, two tests, and the widths of two sources
+    tick(1 / n_solutions)
+    images = [study.images(level, level) for level in alpha]
+    of_cuts = subprogress(tick, 1 / n_solutions, (len(alpha) + 1) / n_solutions)
+    cuts = model.cuts(images, (nominal, crisp), of_cuts)
+    model.require_consistent(images, cuts)
+    _require_positive(cuts[0])
+    tick((len(alpha) + 3) / n_solutions)
+
+    def width(threshold: AlphaLevel, of_phases: AlphaLevel) -> float:
+        """Return the width of E in Pa at levels of the threshold and of the phases."""
+        (cut,) = model.cuts([study.images(threshold, of_phases)], (nominal, crisp))
+        return float(cut.modulus[1] - cut.modulus[0])
+
+    widths = dict[str, float]()
+    has_both_bounds = bool(np.isfinite(cuts[0].bounds.width))
+    if has_both_bounds:
+        base, lowest = width(None, None), alpha[0]
+        widths["discretisation"] = base
+        if study.fuzzy_threshold:
+            widths["threshold"] = max(0.0, width(lowest, None) - base)
+        if any(x.support.width > 0 for phase in phases for x in (phase.modulus, phase.poisson)):
+            widths["phases"] = max(0.0, width(None, lowest) - base)
+    proved, estimates = dict[str, Array](), None
+    nominal_phase = study.phase_ranges(None)[0]
+    losses = [phase.loss for phase in phases if phase.loss is not None]
+    if losses:
+        require(len(losses) == len(phases), "loss", f"of {len(losses)} phases", "each, 0 for none")
+        phase_cuts = phase_loss_cuts(losses, alpha)
+        shares = energy_shares(model, crisp, nominal, nominal_phase, len(phases))
+        proved = {
+            name: np.array([mean_loss(parts, *cut) for cut in phase_cuts])
+            for name, parts in shares.items()
+        }
+        young = loss_of_young(crisp.bounds, proved["K"], proved["G"], average)
+        proved = {"E": young, **proved}
+        if study.dimension == 2:
+            energies = phase_energies(model, crisp, nominal, nominal_phase, len(phases))
+            estimates = _estimated_losses(energies, phase_cuts, average)
+    references = None
+    if has_both_bounds and all(phase.is_solid for phase in phases):
+        isotropic = [Phase(phase.modulus.nominal, phase.poisson.nominal) for phase in phases]
+        of_phases = [*study.fractions.values()]
+        is_space = study.dimension == 3
+        references = reference_bounds(isotropic, fractions=of_phases, space=is_space)
+    first, last = study.phase_ranges(alpha[0])
+    return FuzzyImageStiffness(
+        alpha=np.array(alpha, float),
+        cuts=cuts,
+        average=average,
+        widths={cause: widths[cause] for cause in sorted(widths, key=lambda x: -widths[x])},
+        fractions=study.fractions,
+        proved_losses=proved,
+        losses=estimates,
+        references=references,
+        division=model.division,
+        seconds=perf_counter() - start,
+        phase=nominal_phase,
+        is_open=first != last,
+        lengths=study.image.lengths,
+    )
+
+
+def _require_positive(widest: ImageCut) -> None:
+    """Refuse bounds that do not tell that E is positive, where there are two."""
+    low, high = (end / 1e9 for end in widest.modulus)
+    if low <= 0 and np.isfinite(widest.bounds.width):  # pores and rigid phases have no better
+        ends = [(float(x), float(y)) for x, y in widest.constants / 1e9]
+        along = zip("xyz"[: widest.bounds.dimension], ends, strict=False)
+        along_axes = ", ".join(f"E_{name} {x:.4g} … {y:.4g} GPa" for name, (x, y) in along)
+        what = f"the bounds of E, {low:.4g} … {high:.4g} GPa, do not tell that it is positive"
+        raise FailedError(what, f"take a finer image, or {along_axes}")
+
+
+def _estimated_losses(energies: PhaseEnergies, cuts: Array, average: str) -> LossCuts:
+    """Return loss factors of E, G and K of an image at nominal moduli.
+
+    Args:
+        energies: Parts of the phases in the strain energy.
+        cuts: Loss factors of the phases, shape (levels, 2, phases).
+        average: Average that E and ν are of.
+    """
+    constants_of = partial(plane_constants, average=average)
+    fractions, _ = energies.energy_fractions(constants_of)
+    corners = loss_corners(cuts, fractions)
+    # level l, end e, constant c, phase p, K or G x
+    bounds = np.einsum("lecpx,pxc->cle", corners, fractions)
+    largest = corners[0, 1, 0]
+    _, errors = first_order(energies, largest, constants_of)
+    # what the first order leaves out is of the order of the squared difference of losses
+    errors = errors + np.ptp(largest) ** 2 * bounds[:, 0, 1]
+    by_name = dict(zip(CONSTANTS, map(float, errors), strict=True))
+    return LossCuts(dict(zip(CONSTANTS, bounds, strict=True)), by_name)
