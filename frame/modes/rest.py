@@ -262,12 +262,14 @@ def coupling_bounds(
             half = np.ptp(response.value, axis=(1, 2)) / 2 + response.error
             bounds = np.outer(slope, by_slope[s, o]), 2 * np.outer(half, size[s, o])
             added[:, o] += np.minimum(*bounds)
-            # of the block, or at most twice what its coupling adds within the step
+            # The coupling is the block's motion less its oscillators'. Either strays from a line by
+            # `straying` at most, so that the coupling does by twice that; or by twice its largest
+            # value within the step.
             force = loads[source].extremes[0] if source in loads else 0.0
             G, G_slope = _within_steps(response.largest, time, force, fastest, order)
             slope = response_slopes(source, G, G_slope, low_omega, most)
             straying = np.outer(response.line_deviation, size[s, o])
-            deviation[:, o] += np.minimum(straying, 2 * np.outer(slope, by_slope[s, o]))
+            deviation[:, o] += 2 * np.minimum(straying, np.outer(slope, by_slope[s, o]))
     return added, deviation, ends
 
 
