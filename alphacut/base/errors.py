@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Sequence
 from math import inf, isfinite, nan
 from numbers import Integral, Real
 from os import PathLike
@@ -173,6 +173,14 @@ def require_numbers(name: str, values: object) -> None:
         return  # without a loop: matrices have many entries
     for value in np.ravel(values).tolist() if isinstance(values, np.ndarray) else values:  # type: ignore[attr-defined]
         checked_number(name, value)
+
+
+def require_sequence(key: str, values: object, allowed: str) -> None:
+    """Refuse what is no list, tuple or array of one dimension or more, as a number or a text."""
+    is_list = isinstance(values, Sequence) and not isinstance(values, str)
+    is_array = isinstance(values, np.ndarray) and values.ndim > 0
+    cure = "put a single value into brackets"
+    require(is_list or is_array, key, value=type(values).__name__, allowed=allowed, cure=cure)
 
 
 def require_choice(key: str, value: object, names: Iterable[str]) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from alphacut.base.arrays import Array
-from alphacut.base.errors import require
+from alphacut.base.errors import require, require_sequence
 from alphacut.frame.records.history import Accelerogram, History
 
 Factor = Callable[[Mapping[str, Any]], Any]
@@ -41,6 +41,7 @@ def require_loads(ground: object, forces: Sequence[object]) -> None:
     """Refuse a base excitation that is no `Accelerogram`, and forces that are no `Force`."""
     is_record = isinstance(ground, Accelerogram | None)
     require(is_record, "ground", value=type(ground).__name__, allowed="an Accelerogram, or None")
-    are_forces = all(isinstance(x, Force) and isinstance(x.history, History | None) for x in forces)
     allowed = "a sequence of Force, each with a History or None"
+    require_sequence("loads", forces, allowed)
+    are_forces = all(isinstance(x, Force) and isinstance(x.history, History | None) for x in forces)
     require(are_forces, "loads", value=type(forces).__name__, allowed=allowed)

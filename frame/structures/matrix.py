@@ -17,6 +17,7 @@ from alphacut.base.errors import (
     require,
     require_choice,
     require_numbers,
+    require_sequence,
 )
 from alphacut.frame.calculus.jet import Jet, variables
 from alphacut.frame.records.history import Accelerogram
@@ -84,10 +85,17 @@ class MatrixStructure:
 
     def __post_init__(self) -> None:
         """Store terms and loads as tuples; refuse values that are not allowed."""
+        for kind in ("parameters", "observed"):
+            value = getattr(self, kind)
+            is_table = isinstance(value, Mapping)
+            require(is_table, kind, value=type(value).__name__, allowed="a dict by name")
+        for kind in KINDS[:3]:
+            require_sequence(kind, getattr(self, kind), "a list of pairs (factor, array)")
+        require_sequence("ratios", self.ratios, "a list of damping ratios")
         for name, value in self.parameters.items():
             checked_number(f"parameter {name}", value)
         for kind in ("mass", "stiffness", "observed"):
-            require(bool(getattr(self, kind)), kind, value=None, allowed="one entry at least")
+            require(len(getattr(self, kind)) > 0, kind, value=None, allowed="one entry at least")
         require_names("name of a parameter", self.parameters)
         require_names("name of an output", self.observed)
         require_loads(self.ground, self.loads)

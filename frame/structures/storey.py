@@ -16,7 +16,13 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from alphacut.base.arrays import Array
-from alphacut.base.errors import checked_number, require, require_choice, require_numbers
+from alphacut.base.errors import (
+    checked_number,
+    require,
+    require_choice,
+    require_numbers,
+    require_sequence,
+)
 from alphacut.base.number_text import STANDARD_GRAVITY
 from alphacut.frame.calculus.jet import Jet
 from alphacut.frame.records.history import Accelerogram
@@ -154,6 +160,9 @@ class StoreyFrame:
         self.require_standing({})
 
     def _require_values(self) -> None:
+        for name in ("masses", "stiffness", "lengths", "yield_force", "yield_drift"):
+            if getattr(self, name) is not None and not isinstance(getattr(self, name), str):
+                require_sequence(name, getattr(self, name), "one value a floor, from below")
         n = len(self.masses)
         require(n > 0, "masses", value=None, allowed="one value a floor, from below")
         checked_number("gravity", self.gravity, least=0)

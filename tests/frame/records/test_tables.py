@@ -110,6 +110,13 @@ def test_decimal_commas_between_other_marks_are_read(tmp_path, mark):
     )
 
 
+def test_decimal_commas_are_told_by_the_marks_where_whole_seconds_rise(tmp_path):
+    rows = [f"{1.5 * k:.1f};{x:.5f}".replace(".", ",") for k, x in enumerate(VALUES[:50])]
+    record = read_recording(saved(tmp_path, rows, "time [s];acceleration [m/s^2]"))
+    assert record.step == 1.5
+    assert record.samples == pytest.approx(VALUES[:50])
+
+
 def test_one_column_of_decimal_commas_is_one_column(tmp_path):
     path = saved(tmp_path, [f"{x:.5f}".replace(".", ",") for x in VALUES])
     assert read_recording(path, step=0.01, unit="g").samples == pytest.approx(G * VALUES)

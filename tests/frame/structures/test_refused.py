@@ -27,6 +27,12 @@ COLUMNS = StoreyFrame((2e4, 1e4), (3.0, 2.5), 25e9, 1e-4)
 SPRINGS = StoreyFrame((2e4, 1e4), (3.0, 2.5), stiffness=(1e6, 1e6))
 
 
+def matrices(**changes):
+    unit = {"parameters": {"a": 1.0}, "observed": {"q": np.array([0.0, 1.0])}}
+    unit |= {"mass": [("a", np.eye(2))], "stiffness": [("a", np.eye(2))]}
+    return MatrixStructure(**unit | changes)
+
+
 @pytest.mark.parametrize(
     ("frame", "changes", "message"),
     [
@@ -135,6 +141,13 @@ def test_a_lagrangian_system_refuses(changes, message):
         (lambda: replace(COLUMNS, loads=[Force(4, 1.0, None)]), "floor is 4"),
         (lambda: replace(COLUMNS, loads=[Force(1, np.nan, None)]), "amplitude"),
         (lambda: replace(COLUMNS, loads=[History.constant()]), "loads is list"),
+        (lambda: replace(COLUMNS, loads=Force(1, 1.0, None)), "loads is Force; .* brackets"),
+        (lambda: StoreyFrame(masses=30e3, stiffness=[1e6]), "masses is float; .* brackets"),
+        (lambda: StoreyFrame(masses=[30e3], stiffness=1e6), "stiffness is float; .* brackets"),
+        (lambda: matrices(mass=np.eye(2)), "term of mass is ndarray"),
+        (lambda: matrices(parameters=["a"]), "parameters is list; allowed: a dict by name"),
+        (lambda: matrices(observed=[0, 1]), "observed is list; allowed: a dict by name"),
+        (lambda: matrices(ratios=0.05), "ratios is float; allowed: a list .* brackets"),
         (lambda: History(0.1, np.ones(1)), "history is 1 samples"),
         (lambda: History.harmonic(-1.0), "frequency"),
         (lambda: History.constant(-1.0), "start"),
