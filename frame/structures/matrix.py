@@ -282,7 +282,7 @@ def modal_energy_fractions(system: MatrixStructure, terms: Sequence[int] | Ints)
     weights (Johnson and Kienholz, AIAA Journal 20, 1284, 1982), with modes at nominal values.
     """
     unit: Array = np.eye(system.size)
-    every_unknown = {str(k): unit[k] for k in range(system.size)}
+    every_unknown = {f"u{k}": unit[k] for k in range(system.size)}
     observed = replace(system, observed=every_unknown, row_factors={}, ratios=())
     matrices, rows = evaluate(observed, (), np.zeros((1, 0)), derivatives=False)
     modes = undamped_modes(matrices.mass.value[0], matrices.stiffness.value[0])[1]

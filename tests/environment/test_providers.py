@@ -21,7 +21,6 @@ DIRECT = {name: f"python3-{name}" for name in SAME.split()} | {
     "petsc4py": "python3-petsc4py-real",
     "pydantic_core": "python3-pydantic",  # which depends on it
     "tifffile": "python3-skimage",  # which depends on it
-    "typing_extensions": "python3-typing-extensions",
     "ufl": "python3-dolfinx",
     "vtkmodules": "python3-pyvista",  # which depends on VTK
 }
