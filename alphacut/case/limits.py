@@ -200,8 +200,8 @@ class FragilitySection(QuestionSection):
     reads_peaks = True
 
     measure: Literal["Sa(T1)", "PGA", "scale"] = "Sa(T1)"
-    """measure of a record; Sa(T1) is the pseudo-acceleration ω² max |u| at the nominal structure's
-    first period, with its own damping ratio (not 5 %)"""
+    """measure of a record; Sa(T1) is the pseudo-acceleration `ω² max |u|` at the nominal
+    structure's first period, with its own damping ratio (not 5 %)"""
     independent: bool = False
     """whether records count as independent draws: 95 % limits"""
     most: Annotated[float, Quantity(above=0, maximum=100)] = 2.0

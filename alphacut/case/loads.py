@@ -200,7 +200,7 @@ class RecordsSection(Section):
     baseline: Baseline = Field(default="none", description="mean or straight line to subtract")
     scale: Annotated[Scale, text(_parse_scale)] = Scale()
     """factor, "PGA = 0.3 g" or "Sa(T1) = 0.5 g", of every record; Sa(T1) is the pseudo-acceleration
-    ω² max |u| at the nominal structure's first period, with its own damping ratio (not 5 %)"""
+    `ω² max |u|` at the nominal structure's first period, with its own damping ratio (not 5 %)"""
 
     @property
     def recordings(self) -> tuple[Recording, ...]:

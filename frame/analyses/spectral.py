@@ -16,7 +16,7 @@ POINTS_PER_PERIOD = 40
 
 
 def spectral_acceleration(ground: Accelerogram, period: float, ratio: float) -> float:
-    """Pseudo-acceleration ω² max |u| of an oscillator at rest at the start, in m/s².
+    """Pseudo-acceleration `ω² max |u|` of an oscillator at rest at the start, in m/s².
 
     `period` T is undamped, in s; the damping `ratio` ζ is below 1. The free motion after the
     record's end is included for one period.
