@@ -222,8 +222,9 @@ class Summary(Parts):
     @classmethod
     def read(cls, folder: ResultsFolder) -> Self:
         """The summary in a folder of results; RefusedError where it is missing or damaged."""
+        content = folder.content(SUMMARY)
         try:
-            return from_document(cls, json.loads(folder.content(SUMMARY)))
+            return from_document(cls, json.loads(content))
         except (ValueError, RecursionError) as error:
             keys = str(error).partition(":")[0] or "no JSON object"
             what = f"damaged ({SUMMARY}: {keys})"
