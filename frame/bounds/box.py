@@ -187,6 +187,6 @@ def over_box(system: LinearSystem, names: Sequence[str], low: Array, high: Array
 
 def sources(system: LinearSystem, structure: Classical) -> tuple[str, ...]:
     """Names of what moves the structure: loads, velocity, start."""
-    moved = np.asarray(structure.start.size().any(-1))
+    moved = np.asarray(structure.start.magnitude().any(-1))
     at_start = [name for name, k in (("velocity", 1), ("start", 0)) if moved[k]]
     return (*histories(system), *at_start)

@@ -106,9 +106,9 @@ class LevelModels:
     tables: dict[int, ResponseTable]  # responses of its oscillators, by order of derivative
     excitation: Excitation  # the loads, nodes, and sources
 
-    def within(self, low: Array, high: Array) -> LevelModels:
+    def on_subbox(self, low: Array, high: Array) -> LevelModels:
         """Models over the part low ≤ u ≤ high of the box, with the same response tables."""
-        return replace(self, models=self.models.within(low, high))
+        return replace(self, models=self.models.on_subbox(low, high))
 
     @classmethod
     def from_structure(
@@ -141,7 +141,7 @@ class LevelModels:
         for o, order in enumerate(map(int, self.structure.order)):
             deviations = self.tables[order].line_deviation
             for mode, deviation in zip(self.models.oscillators, deviations, strict=True):
-                by_magnitude[:, o] += mode.share.size()[:, o] @ deviation
+                by_magnitude[:, o] += mode.share.magnitude()[:, o] @ deviation
         # The tables of oscillators contain what forces add at once through these; what they add
         # through all other modes is the difference to M⁻¹ b f.
         time, fed = self.excitation[1], dict(self._feedthroughs())
@@ -164,7 +164,7 @@ class LevelModels:
         for mode in self.models.oscillators:
             share = mode.share[index]
             value = value - np.where(is_acceleration, share.value, 0.0)
-            spread = spread + np.where(is_acceleration, share.spread(), 0.0)
+            spread = spread + np.where(is_acceleration, share.deviation(), 0.0)
         return np.asarray(np.abs(value) + spread)
 
     def _feedthroughs(self) -> Iterator[tuple[str, Response]]:
@@ -174,7 +174,7 @@ class LevelModels:
         for source in self.excitation[2]:
             if is_fed_through(source, 2) and rows.any():
                 fed = (structure.forced[source][None] @ rows.T)[0] * structure.factor
-                spread = np.stack([fed.spread(), 0 * fed.spread()])
+                spread = np.stack([fed.deviation(), 0 * fed.deviation()])
                 kappa = fed.value[:, None, None]
                 yield source, Response(None, self.excitation[0][source], 2, kappa, spread)
 
@@ -184,7 +184,7 @@ class LevelModels:
         points = int(numbers.DEVIATION_POINTS), 3
         sigma = grid_over(mode.omega_range, mode.quotient_range, points).sigma
         for source, value, spread in zip(
-            sources, mode.share.value, mode.share.spread(), strict=True
+            sources, mode.share.value, mode.share.deviation(), strict=True
         ):
             real, imag = (read_response(source, sigma, np.full_like(sigma, x)) for x in (1, -1j))
             for order in map(int, set(orders)):
@@ -292,7 +292,7 @@ def _data(level: LevelModels, o: int, side: float) -> tuple[Data, Array]:
     modes, order = level.models.oscillators, int(level.structure.order[o])
     models = [(mode.omega[None], mode.decay[None], mode.share[:, o]) for mode in modes]
     variables = concatenate([x for of_mode in models for x in of_mode], -1)
-    spread = np.maximum(variables.spread(), 1e-9 * np.abs(variables.value))
+    spread = np.maximum(variables.deviation(), 1e-9 * np.abs(variables.value))
     radius = np.maximum(spread, LEAST_SPREAD)  # by which variables are scaled, shape (Z,)
     linear, quadratic, cubic, remainder = _scaled(variables, radius)
     expected = numbers.EXPECTED_CUBIC * np.asarray(np.abs(cubic).sum(1))
@@ -340,7 +340,7 @@ def _truncation_terms(level: LevelModels, o: int, side: float) -> tuple[list[Arr
     constant: Array = np.zeros((2, len(level.excitation[1])))
     constant[1] = level.models.added[:, o]
     for mode, error in zip(modes, table.error, strict=True):
-        constant[1] += mode.share.size()[:, o] @ error
+        constant[1] += mode.share.magnitude()[:, o] @ error
     d, sources = level.structure.rayleigh.inputs, modes[0].share.shape[0]
     if not level.models.truncated:
         return [np.zeros((0, x)) for x in (1, d, d * (d + 1) // 2)], constant
@@ -364,6 +364,9 @@ def _scaled(x: TaylorModel, radius: Array) -> tuple[Array, ...]:
     """Linear, quadratic and cubic coefficients of models (Z,), and remainders, over `radius`."""
     pairs = monomials(x.inputs, 2)
     by_rows = np.lexsort((pairs[:, 1], pairs[:, 0]))  # i ≤ j, as the kernel has them
-    remainder = np.asarray(x.remainder + gamma(8) * x.size())
-    parts = ((part / radius).T for part in (x.part(1), x.part(2)[by_rows], x.part(3)))
+    remainder = np.asarray(x.remainder + gamma(8) * x.magnitude())
+    parts = (
+        (part / radius).T
+        for part in (x.homogeneous_part(1), x.homogeneous_part(2)[by_rows], x.homogeneous_part(3))
+    )
     return (*(np.ascontiguousarray(part) for part in parts), remainder / radius)

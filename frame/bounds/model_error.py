@@ -57,12 +57,12 @@ def proved_error(model: ModalModel) -> Array:
     for s, part in enumerate(motion_parts(model, largest_growth(model.eigenvalue, reach))):
         if isinstance(part.load, Direct):
             assert structure.feeds is not None
-            error = (structure.feeds[:, s - len(start)] - part.share.real[0] * 2.0).size()
+            error = (structure.feeds[:, s - len(start)] - part.share.real[0] * 2.0).magnitude()
             output_error += part.waves[0][:, :1] * error
             continue
         deviation += part.push * start[s] + 2 * part.elapsed @ energy_rate[s]
-        share_error = (outputs[s] - part.share).size()
-        left_out = part.left_out[:, None] * part.share.size()
+        share_error = (outputs[s] - part.share).magnitude()
+        left_out = part.left_out[:, None] * part.share.magnitude()
         output_error += 2 * part.waves[0] @ (share_error + left_out)
     return (1 + ROUNDING) * (deviation[:, None] * norms.outputs + output_error)
 
@@ -79,7 +79,7 @@ def direct_error_in_steps(model: ModalModel) -> Array:
         if isinstance(load, Direct):
             assert structure.feeds is not None
             share = structure.feeds[:, number + 1 - n_sources] - load.share.real[0] * 2.0
-            error += np.outer(load.history.largest_in_steps(model.flow.time), share.size())
+            error += np.outer(load.history.largest_in_steps(model.flow.time), share.magnitude())
     return (1 + ROUNDING) * error
 
 
@@ -95,15 +95,15 @@ class EnergyNorms:
 
     def __init__(self, structure: DampedStructure) -> None:
         mass, stiffness, self.omega = structure.mass, structure.stiffness, structure.omega
-        mass_off = (mass - np.eye(len(mass.value))).size()
-        stiffness_off = (stiffness - np.diag(self.omega**2)).size()
+        mass_off = (mass - np.eye(len(mass.value))).magnitude()
+        stiffness_off = (stiffness - np.diag(self.omega**2)).magnitude()
         stiffness_off = stiffness_off / (self.omega[:, None] * self.omega)
         self.mu, self.kappa = (float(np.linalg.norm(x, 2)) for x in (mass_off, stiffness_off))
         if not max(self.mu, self.kappa) < 1:
             raise UnprovedError(
                 "the box is so wide that mass and stiffness are not shown to stay positive definite"
             )
-        of_displacement, of_velocity = np.split(structure.rows.size(), 2, axis=1)
+        of_displacement, of_velocity = np.split(structure.rows.magnitude(), 2, axis=1)
         # error of outputs over a deviation √(qᵀ K q + vᵀ M v) of the motion, (m,)
         self.outputs = np.hypot(self.of_spring_force(of_displacement), self.of_force(of_velocity))
 
@@ -127,7 +127,9 @@ def _energy_rates(structure: DampedStructure, modes: DampedModes, norms: EnergyN
     dynamic = (
         rate * momentum + modes.velocity @ structure.damping + modes.shape @ structure.stiffness
     )
-    return np.hypot(norms.of_displacement(kinematic.size()), norms.of_force(dynamic.size()))
+    return np.hypot(
+        norms.of_displacement(kinematic.magnitude()), norms.of_force(dynamic.magnitude())
+    )
 
 
 def _start_errors(structure: DampedStructure, modes: DampedModes, norms: EnergyNorms) -> Array:
@@ -136,7 +138,7 @@ def _start_errors(structure: DampedStructure, modes: DampedModes, norms: EnergyN
     q, v = ((twice @ x.real)[:, 0] for x in (modes.shape, modes.velocity))
     spring = q @ structure.stiffness - structure.static.T
     momentum = v @ structure.mass - structure.impulse.T
-    return np.hypot(norms.of_spring_force(spring.size()), norms.of_force(momentum.size()))
+    return np.hypot(norms.of_spring_force(spring.magnitude()), norms.of_force(momentum.magnitude()))
 
 
 def majorant_parts(polynomials: TaylorModel, reach: Array) -> list[Array]:
@@ -145,13 +147,13 @@ def majorant_parts(polynomials: TaylorModel, reach: Array) -> list[Array]:
     At v = 0 its derivatives bound those of the polynomials, shape V, over the box |u_i| ≤ reach_i.
     """
     sizes = replace(polynomials, parts=tuple(np.abs(part) for part in polynomials.parts))
-    around = sizes.within(reach - 1, reach + 1)
-    return [around.part(degree) for degree in range(4)]
+    around = sizes.on_subbox(reach - 1, reach + 1)
+    return [around.homogeneous_part(degree) for degree in range(4)]
 
 
 def largest_growth(eigenvalue: TaylorModel, reach: Array) -> Array:
     """Upper bounds of the growth rates Re λ_k over the box |u_i| ≤ reach_i, shape (n,), in 1/s."""
-    return eigenvalue.real.within(-reach, reach).bounds()[1]
+    return eigenvalue.real.on_subbox(-reach, reach).bounds()[1]
 
 
 @dataclass(frozen=True, eq=False)

@@ -45,7 +45,7 @@ def prune_ends(
                 end = 1 - 2 * fraction if prune_upper else 2 * fraction - 1
                 piece_low, piece_high = low.copy(), high.copy()
                 (piece_low if prune_upper else piece_high)[i] = end
-                piece = level.within(piece_low, piece_high)
+                piece = level.on_subbox(piece_low, piece_high)
                 inside = OutputBounds.initial(
                     piece, *bounds.index, bounds.wanted_gap, bounds.reached
                 )

@@ -90,31 +90,31 @@ class TaylorModel:
         """Joins Taylor models along a new last axis of V."""
         return concatenate([x[..., None] for x in models], -1)
 
-    def part(self, degree: int) -> Array:
+    def homogeneous_part(self, degree: int) -> Array:
         """Coefficients of one degree, shape (monomials, *V)."""
         if degree < len(self.parts):
             return self.parts[degree]
         return np.zeros((count(self.inputs, degree), *self.shape), self.parts[0].dtype)
 
-    def sizes(self) -> list[Array]:
+    def part_magnitudes(self) -> list[Array]:
         """Bounds of the parts over the box, each of shape V."""
         of_sums = len(self.parts) + 4
         return [np.abs(part).sum(0) * (1 + gamma(len(part) + of_sums)) for part in self.parts]
 
-    def size(self) -> Array:
+    def magnitude(self) -> Array:
         """Bound of |f| over the box, shape V."""
-        return np.asarray(sum(self.sizes()) + self.remainder)
+        return np.asarray(sum(self.part_magnitudes()) + self.remainder)
 
-    def spread(self) -> Array:
+    def deviation(self) -> Array:
         """Bound of |f − value|, shape V."""
-        return np.asarray(sum(self.sizes()[1:]) + self.remainder)
+        return np.asarray(sum(self.part_magnitudes()[1:]) + self.remainder)
 
     def bounds(self) -> tuple[Array, Array]:
         """Lower and upper bounds over the box, each of shape V."""
-        reach = self.spread() * (1 + gamma(2)) + UNIT_ROUNDOFF * np.abs(self.value)
+        reach = self.deviation() * (1 + gamma(2)) + UNIT_ROUNDOFF * np.abs(self.value)
         return self.value - reach, self.value + reach
 
-    def loosened(self, more: ArrayLike) -> TaylorModel:
+    def widened(self, more: ArrayLike) -> TaylorModel:
         """Functions that may be off by `more`, shape V."""
         return replace(self, remainder=self.remainder + np.asarray(more))
 
@@ -159,7 +159,7 @@ class TaylorModel:
             tables.append(np.hstack(derivatives))
         return tables
 
-    def present(self) -> Ints:
+    def active_inputs(self) -> Ints:
         """Inputs that the functions depend on."""
         found = np.zeros(self.inputs, bool)
         for degree, part in enumerate(self.parts[1:], 1):
@@ -167,7 +167,7 @@ class TaylorModel:
             found[monomials(self.inputs, degree)[some]] = True
         return np.flatnonzero(found)
 
-    def on(self, inputs: Ints) -> TaylorModel:
+    def restricted_to(self, inputs: Ints) -> TaylorModel:
         """The model as functions of the inputs at `inputs` (d,) alone; it depends on no others."""
         d = len(inputs)
         lists = (inputs[monomials(d, degree)] for degree in range(len(self.parts)))
@@ -175,7 +175,7 @@ class TaylorModel:
         parts = tuple(part[at] for part, at in zip(self.parts, rows, strict=True))
         return TaylorModel(parts, self.remainder, d, self.order)
 
-    def among(self, inputs: Ints, d: int) -> TaylorModel:
+    def embedded(self, inputs: Ints, d: int) -> TaylorModel:
         """The same functions as functions of d inputs, of which theirs are at `inputs`, rising.
 
         Functions of d inputs stay as they are.
@@ -204,12 +204,12 @@ class TaylorModel:
         """The polynomials alone, functions that have no remainder."""
         return replace(self, remainder=np.zeros(self.shape))
 
-    def cut(self, order: int) -> TaylorModel:
+    def truncated(self, order: int) -> TaylorModel:
         """The same, whose products are kept to `order`; sizes of higher parts go into the rest."""
-        remainder = np.asarray(self.remainder + sum(self.sizes()[order + 1 :]))
+        remainder = np.asarray(self.remainder + sum(self.part_magnitudes()[order + 1 :]))
         return TaylorModel(self.parts[: order + 1], remainder, self.inputs, order)
 
-    def within(self, low: Array, high: Array) -> TaylorModel:
+    def on_subbox(self, low: Array, high: Array) -> TaylorModel:
         """The model over the part low ≤ u ≤ high, (d,) each, in unit coordinates of the part."""
         middle, half = (low + high) / 2, (high - low) / 2
         shifted = [np.zeros_like(part) for part in self.parts]  # of p(middle + v)
@@ -224,7 +224,9 @@ class TaylorModel:
             scale = half[monomials(self.inputs, degree)].prod(-1)
             parts.append(scale.reshape(-1, *[1] * self.remainder.ndim) * part)
         # sums of d terms, once for each derivative, of |middle| + half ≤ 1
-        rounding = gamma((len(self.parts) + 1) * (self.inputs + 4)) * np.sum(self.sizes(), 0)
+        rounding = gamma((len(self.parts) + 1) * (self.inputs + 4)) * np.sum(
+            self.part_magnitudes(), 0
+        )
         return TaylorModel(tuple(parts), self.remainder + rounding, self.inputs, self.order)
 
     def reshaped(self, *shape: int) -> TaylorModel:
@@ -241,7 +243,10 @@ class TaylorModel:
         """Sum entry by entry, with its rounding in the remainder."""
         b = other if isinstance(other, TaylorModel) else self.like(_numbers(other))
         degrees, n = range(max(len(self.parts), len(b.parts))), max(len(self.shape), len(b.shape))
-        parts = tuple(_padded(self.part(k), n) + _padded(b.part(k), n) for k in degrees)
+        parts = tuple(
+            _padded(self.homogeneous_part(k), n) + _padded(b.homogeneous_part(k), n)
+            for k in degrees
+        )
         remainder, order = self.remainder + b.remainder, max(self.order, b.order)
         return TaylorModel(parts, remainder, self.inputs, order).with_rounding(1)
 
@@ -290,7 +295,7 @@ class TaylorModel:
         Raises:
             UnprovedError: A function is not known to be positive.
         """
-        middle, spread, N = self.value, self.spread(), self.order
+        middle, spread, N = self.value, self.deviation(), self.order
         least = middle - spread
         if not (least > 0).all():
             raise UnprovedError(
@@ -305,11 +310,11 @@ class TaylorModel:
             term = term * step
             scale = factor * middle ** (exponent - k)
             out = out + term * scale
-            rounding = rounding + gamma(4 * k + 4) * np.abs(scale) * term.size()
+            rounding = rounding + gamma(4 * k + 4) * np.abs(scale) * term.magnitude()
         next_factor, power = abs(factor * (exponent - N) / (N + 1)), exponent - N - 1
         largest_power = np.maximum(least**power, (middle + spread) ** power)
         truncation = next_factor * largest_power * spread ** (N + 1) * (1 + gamma(8 * N + 8))
-        return out.loosened(rounding + truncation)
+        return out.widened(rounding + truncation)
 
     def contract(self, arrays: Array) -> TaylorModel:
         """Sum of functions shape (…, e) times arrays of numbers (e, …)."""
@@ -318,8 +323,8 @@ class TaylorModel:
 
     def with_rounding(self, count: int) -> TaylorModel:
         """The same after `count` roundings of coefficients and rest, whose sums did not cancel."""
-        return self.loosened(
-            gamma(count) * np.sum(self.sizes(), 0) + gamma(count + 3) * self.remainder
+        return self.widened(
+            gamma(count) * np.sum(self.part_magnitudes(), 0) + gamma(count + 3) * self.remainder
         )
 
     def _linear(
@@ -327,7 +332,9 @@ class TaylorModel:
     ) -> TaylorModel:
         """Product with numbers, each entry a sum of `terms`, with its rounding in the remainder."""
         remainder = np.asarray(bilinear(self.remainder, np.abs(factor))) * (1 + gamma(terms + 2))
-        rounding = gamma(terms + COMPLEX) * bilinear(np.sum(self.sizes(), 0), np.abs(factor))
+        rounding = gamma(terms + COMPLEX) * bilinear(
+            np.sum(self.part_magnitudes(), 0), np.abs(factor)
+        )
         parts = tuple(np.asarray(bilinear(part, factor)) for part in self.parts)
         return TaylorModel(parts, remainder + rounding, self.inputs, self.order)
 
@@ -335,17 +342,17 @@ class TaylorModel:
 def concatenate(models: Sequence[TaylorModel], axis: int) -> TaylorModel:
     """Joins Taylor models along a negative `axis` of V."""
     degrees = range(max(len(x.parts) for x in models))
-    parts = tuple(np.concatenate([x.part(k) for x in models], axis) for k in degrees)
+    parts = tuple(np.concatenate([x.homogeneous_part(k) for x in models], axis) for k in degrees)
     remainder = np.concatenate([x.remainder for x in models], axis)
     return TaylorModel(parts, remainder, models[0].inputs, max(x.order for x in models))
 
 
-def all_within(models: Sequence[TaylorModel], low: Array, high: Array) -> list[TaylorModel]:
+def all_on_subbox(models: Sequence[TaylorModel], low: Array, high: Array) -> list[TaylorModel]:
     """Each model over the part low ≤ u ≤ high, in the part's unit coordinates, as by `within`.
 
     All are restricted together, as one array of functions.
     """
-    restricted = concatenate([x.reshaped(-1) for x in models], -1).within(low, high)
+    restricted = concatenate([x.reshaped(-1) for x in models], -1).on_subbox(low, high)
     end, found = 0, list[TaylorModel]()
     for x in models:
         begin, end = end, end + x.remainder.size
@@ -362,7 +369,7 @@ def inverse_bound(matrix: TaylorModel) -> Array | None:
     C, n = np.linalg.inv(matrix.value), len(matrix.value)
     in_middle = np.abs(np.eye(n) - C @ matrix.value)
     in_middle += gamma(n + 1) * (np.abs(C) @ np.abs(matrix.value))
-    ratio = np.abs(C) @ matrix.spread() + in_middle  # bounds |I − C A|
+    ratio = np.abs(C) @ matrix.deviation() + in_middle  # bounds |I − C A|
     # with (I − |I − C A|)⁻¹ ≥ 0 the spectral radius of a matrix of positive entries is below 1
     inverse = np.linalg.inv(np.eye(n) - ratio) * (1 + gamma(8 * n * n))
     if not ((inverse >= 0).all() and np.abs(np.linalg.eigvals(ratio)).max(initial=0.0) < 1):
@@ -374,10 +381,10 @@ def solution_series(matrix: TaylorModel, right: TaylorModel) -> TaylorModel:
     """Polynomials Y, degree by degree, of A Y ≈ B for A (n, n) and B (n, m); without remainders."""
     d, order = matrix.inputs, max(matrix.order, right.order) if matrix.inputs else 0
     middle_inverse = np.linalg.inv(matrix.value)
-    parts = [middle_inverse @ right.part(0)]
+    parts = [middle_inverse @ right.homogeneous_part(0)]
     for degree in range(1, order + 1):
         lower_degrees = product_part(matrix.parts, parts, degree, d, matmul)
-        parts.append(middle_inverse @ (right.part(degree) - lower_degrees))
+        parts.append(middle_inverse @ (right.homogeneous_part(degree) - lower_degrees))
     return TaylorModel(tuple(parts), np.zeros(right.shape), d, order)
 
 
@@ -392,7 +399,7 @@ def solve(matrix: TaylorModel, right: TaylorModel) -> TaylorModel:
     found, bound = solution_series(matrix, right), inverse_bound(matrix)
     if bound is None:
         raise UnprovedError("a matrix may be singular in the box", "take narrower inputs")
-    return found.loosened(bound @ (matrix @ found - right).size())
+    return found.widened(bound @ (matrix @ found - right).magnitude())
 
 
 def _numbers(value: ArrayLike) -> Array:
@@ -419,7 +426,7 @@ def _product(
 ) -> TaylorModel:
     """Product a b by `bilinear` (elementwise or matrix), kept to the higher order of both."""
     d, order, ndim = a.inputs, max(a.order, b.order), max(a.remainder.ndim, b.remainder.ndim)
-    a_sizes, b_sizes = a.sizes(), b.sizes()
+    a_sizes, b_sizes = a.part_magnitudes(), b.part_magnitudes()
     remainder = bilinear(a.remainder, np.asarray(sum(b_sizes)) + b.remainder)
     remainder = remainder + bilinear(np.asarray(sum(a_sizes)), b.remainder)
     degrees = range(min(order, len(a_sizes) + len(b_sizes) - 2) + 1)

@@ -257,8 +257,8 @@ def _line_deviation(model: ModalModel) -> Array:
     Where no force jumps, it bounds how far they stray from a straight line there.
     """
     reach, rate = np.ones(len(model.boxes.names)), model.eigenvalue
-    growth, spread = largest_growth(rate, reach), rate.imag.spread()
-    decay = -growth, rate.real.spread() - rate.value.real  # least and greatest of each mode
+    growth, spread = largest_growth(rate, reach), rate.imag.deviation()
+    decay = -growth, rate.real.deviation() - rate.value.real  # least and greatest of each mode
     omega = np.abs(rate.value.imag) - spread, np.abs(rate.value.imag) + spread
     if (omega[0] <= 0).any():
         raise UnprovedError("a mode may not oscillate", "take less damping")
@@ -270,7 +270,7 @@ def _line_deviation(model: ModalModel) -> Array:
     responses = list[Response]()
     for part in motion_parts(model, growth):
         load = None if part.load is None else part.load.history
-        spreads = 2 * np.stack([part.share.real.spread(), part.share.imag.spread()], 1)
+        spreads = 2 * np.stack([part.share.real.deviation(), part.share.imag.deviation()], 1)
         # of a load itself by the first mode's share
         of_modes = [None] if isinstance(part.load, Direct) else grids
         for k, sigma in enumerate(of_modes):

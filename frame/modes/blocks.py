@@ -64,14 +64,16 @@ class Block:
         rate, norm = (np.diag(x.remainder) / np.diag(x.value) for x in (self.rate, self.norm))
         return float(max(rate.max(), norm.max()))
 
-    def cut(self, order: int) -> Block:
+    def truncated(self, order: int) -> Block:
         """Block with its Taylor models cut to a lower order."""
-        parts = (x.cut(order) for x in (self.rate, self.shape, self.mass_shape, self.norm))
+        parts = (x.truncated(order) for x in (self.rate, self.shape, self.mass_shape, self.norm))
         return Block(self.modes, *parts)
 
-    def among(self, used: Ints, inputs: int) -> Block:
+    def embedded(self, used: Ints, inputs: int) -> Block:
         """The same as functions of all inputs, of which those at `used` are its own."""
-        parts = (x.among(used, inputs) for x in (self.rate, self.shape, self.mass_shape, self.norm))
+        parts = (
+            x.embedded(used, inputs) for x in (self.rate, self.shape, self.mass_shape, self.norm)
+        )
         return Block(self.modes, *parts)
 
 
@@ -243,7 +245,7 @@ def enclosed_block(
     x = _polynomial([rotation.T @ part for part in series[1]], mass.inputs)
     systems = []
     for j in range(p):
-        shifted = stiffness.cut(2) - mass.cut(2) * L[j, j].cut(2)
+        shifted = stiffness.truncated(2) - mass.truncated(2) * L[j, j].truncated(2)
         systems.append(Comparison.over_box(shifted[o[:, None], o]))
         if not systems[-1].regular:
             return None
@@ -254,12 +256,12 @@ def enclosed_block(
         return None
     diagonal = L[np.arange(p), np.arange(p)]
     equations = SubspaceEquations(
-        residual=(x @ stiffness - L @ Mx).size(),
-        shape=x.size(),
-        mass_shape=Mx.size(),
-        mass=mass.size(),
-        coupling=L.size() * (1.0 - np.eye(p)),
-        difference=(diagonal[:, None] - diagonal[None, :]).size(),
+        residual=(x @ stiffness - L @ Mx).magnitude(),
+        shape=x.magnitude(),
+        mass_shape=Mx.magnitude(),
+        mass=mass.magnitude(),
+        coupling=L.magnitude() * (1.0 - np.eye(p)),
+        difference=(diagonal[:, None] - diagonal[None, :]).magnitude(),
     )
     Y, E = np.zeros_like(equations.residual), np.zeros_like(equations.coupling)
     for _ in range(ROUNDS):
@@ -277,8 +279,8 @@ def enclosed_block(
         return None
     norm_error = Y @ equations.mass_shape.T
     M = equations.mass
-    norm = norm.loosened(norm_error + norm_error.T + Y @ M @ Y.T)
-    return Block(block, L.loosened(E), x.loosened(Y), Mx.loosened(Y @ M), norm)
+    norm = norm.widened(norm_error + norm_error.T + Y @ M @ Y.T)
+    return Block(block, L.widened(E), x.widened(Y), Mx.widened(Y @ M), norm)
 
 
 def _polynomial(parts: list[Array], inputs: int) -> TaylorModel:
@@ -292,8 +294,8 @@ def eigenvalue_drop(matrix: TaylorModel, scale: Array, sign: float) -> float:
     """
     if not len(scale):
         return 0.0
-    weight, low = sign * np.outer(scale, scale), matrix.cut(2)
-    linear, quadratic = low.part(1) * weight, low.part(2) * weight
+    weight, low = sign * np.outer(scale, scale), matrix.truncated(2)
+    linear, quadratic = low.homogeneous_part(1) * weight, low.homogeneous_part(2) * weight
     lists = monomials(matrix.inputs, 2)
     norm_1 = min(_norm_of_sizes(linear), _linear_norm(linear))
     norm_2 = min(_norm_of_sizes(quadratic), _norm_of_terms(quadratic, lists[:, 0] == lists[:, 1]))
@@ -354,7 +356,7 @@ class Comparison:
         for sign, rows in ((1.0, middle > 0), (-1.0, middle <= 0)):
             o = np.flatnonzero(rows)
             drops.append(eigenvalue_drop(matrix[o[:, None], o], distance[o] ** -0.5, sign))
-        return cls(distance, matrix.spread(), inverse_bound(matrix), 1 - max(drops))
+        return cls(distance, matrix.deviation(), inverse_bound(matrix), 1 - max(drops))
 
     @property
     def regular(self) -> bool:

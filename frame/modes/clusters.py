@@ -117,7 +117,7 @@ def centred_matrices(mass: TaylorModel, stiffness: TaylorModel) -> tuple[Centred
     Raises:
         UnprovedError: The structure can move rigidly, or is unstable, in the middle.
     """
-    massive = np.asarray(mass.size().any(1))
+    massive = np.asarray(mass.magnitude().any(1))
     M, K, n = mass.value, stiffness.value, len(massive)
     a, b = np.flatnonzero(massive), np.flatnonzero(~massive)
     massless_values, massless_vectors = np.linalg.eigh(K[np.ix_(b, b)])
@@ -129,9 +129,9 @@ def centred_matrices(mass: TaylorModel, stiffness: TaylorModel) -> tuple[Centred
     basis[a, : len(a)] = shapes
     basis[b, : len(a)] = follow @ shapes
     basis[b, len(a) :] = massless_vectors * np.sqrt(squared[-1] / massless_values)
-    used = np.union1d(mass.present(), stiffness.present())
+    used = np.union1d(mass.active_inputs(), stiffness.active_inputs())
     used = used if len(used) else np.arange(1)
-    heavy, stiff = (basis.T @ matrix.on(used) @ basis for matrix in (mass, stiffness))
+    heavy, stiff = (basis.T @ matrix.restricted_to(used) @ basis for matrix in (mass, stiffness))
     weight = (np.arange(n) < len(a)).astype(float)
     diagonals = _diagonal(heavy, weight), _diagonal(stiff, np.diag(stiff.value))
     return CentredMatrices(*diagonals, basis, len(a)), used
@@ -152,7 +152,9 @@ def _require_stiff(values: Array, like: Array) -> None:
 
 def _couplings(centre: CentredMatrices, some: Ints) -> Array:
     """First-order change of K − λ M between modes, λ the mean of both, shape (d, p, p)."""
-    stiff, heavy = (x.part(1)[:, some[:, None], some] for x in (centre.stiffness, centre.mass))
+    stiff, heavy = (
+        x.homogeneous_part(1)[:, some[:, None], some] for x in (centre.stiffness, centre.mass)
+    )
     mean = (centre.squared[some, None] + centre.squared[some]) / 2
     return np.asarray(stiff - mean * heavy)
 

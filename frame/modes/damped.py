@@ -62,7 +62,7 @@ class DampedStructure:
         full = system.assembly(parameters)
         damping = full.dashpots
         for factor, matrix in zip(full.rayleigh, (full.mass, full.springs), strict=True):
-            damping = damping + factor * matrix if factor.size() > 0 else damping
+            damping = damping + factor * matrix if factor.magnitude() > 0 else damping
         try:
             squared, basis = eigh(full.stiffness.value, full.mass.value)
         except np.linalg.LinAlgError:
@@ -71,7 +71,7 @@ class DampedStructure:
             raise UnprovedError("a mode does not oscillate", "hold the structure by springs")
         M, D, K = (basis.T @ matrix @ basis for matrix in (full.mass, damping, full.stiffness))
         omega = np.sqrt(squared)
-        if full.ratios and full.ratios[0].size() > 0:  # one ζ of all modes
+        if full.ratios and full.ratios[0].magnitude() > 0:  # one ζ of all modes
             D = D + full.ratios[0] * 2.0 * geometric_mean(M, K, omega)
         static, impulse = full.stiffness @ full.q0[:, None], full.mass @ full.v0[:, None]
         impulses = [impulse if full.impulse is None else impulse + full.impulse]
@@ -117,7 +117,7 @@ class DampedModes:
         """
         rate, shape = _eigen_series(structure, chosen)
         force = shape @ structure.impulse
-        if structure.static.size().any():
+        if structure.static.magnitude().any():
             force = force - (shape @ structure.static) * _reciprocal(rate[:, None])
         # near a pole (λ² M + λ D + K)⁻¹ is φ φᵀ / (φᵀ (2 λ M + D) φ (λ − λ_k))
         weighted = (rate * 2.0)[:, None] * (shape @ structure.mass)

@@ -45,8 +45,8 @@ def geometric_mean(mass: TaylorModel, stiffness: TaylorModel, omega: Array) -> T
     inverse_mass, sums = solve(mass, mass.like(np.eye(len(omega)))), omega[:, None] + omega
     series = _series(inverse_mass, stiffness, omega)
     product = series @ inverse_mass
-    defect = (stiffness - product @ series).size()
-    coupling, inverse_size = (product - np.diag(omega)).size(), inverse_mass.size()
+    defect = (stiffness - product @ series).magnitude()
+    coupling, inverse_size = (product - np.diag(omega)).magnitude(), inverse_mass.magnitude()
     bound = np.zeros_like(defect)
     for _ in range(ROUNDS):
         found = right_side_bound(defect, coupling, inverse_mass=inverse_size, bound=bound) / sums
@@ -54,7 +54,7 @@ def geometric_mean(mass: TaylorModel, stiffness: TaylorModel, omega: Array) -> T
         if not (found < sums).all():
             break
         if (SLACK * found <= bound).all():
-            return series.loosened(bound)
+            return series.widened(bound)
         bound = WIDENING * np.maximum(found, bound)
     what = "the box is so wide that the damping by a ratio is not enclosed"
     raise UnprovedError(what, "take narrower inputs")
@@ -79,6 +79,6 @@ def _series(inverse_mass: TaylorModel, stiffness: TaylorModel, omega: Array) -> 
     for m in range(1, stiffness.order + 1):
         # in degree m, (ω_i + ω_j) X_ij and what lower degrees of X give are K
         XW.append(product_part(X, W, m, d, matmul))
-        X.append((stiffness.part(m) - product_part(XW, X, m, d, matmul)) / sums)
+        X.append((stiffness.homogeneous_part(m) - product_part(XW, X, m, d, matmul)) / sums)
         XW[m] = XW[m] + X[m]
     return TaylorModel(tuple(X), np.zeros(sums.shape), d, stiffness.order)

@@ -86,12 +86,12 @@ class BlockShares:
         degree, d = DEGREES[0], block.norm.inputs
         while degree < DEGREES[1] and comb(2 * d + degree + 1, degree + 1) <= MAX_PAIRS:
             degree += 1
-        block = block.cut(min(degree, block.norm.order))
-        if len(excited.present()):
-            block = block.cut(excited.order).among(used, excited.inputs)
+        block = block.truncated(min(degree, block.norm.order))
+        if len(excited.active_inputs()):
+            block = block.truncated(excited.order).embedded(used, excited.inputs)
         else:
-            excited = block.norm.like(excited.value).loosened(excited.remainder)
-        read = (block.shape @ rows.value.T).loosened(block.shape.size() @ rows.remainder.T)
+            excited = block.norm.like(excited.value).widened(excited.remainder)
+        read = (block.shape @ rows.value.T).widened(block.shape.magnitude() @ rows.remainder.T)
         source_forces = block.mass_shape @ excited.T
         return cls(block, read, source_forces, solve(block.norm, source_forces))
 
@@ -121,7 +121,9 @@ def oscillators(structure: Classical, of_block: BlockShares, found: Subspaces) -
         UnprovedError: They have different damping ratios.
     """
     modes, d, order = of_block.block.modes, structure.start.inputs, structure.start.order
-    share, rate = (x.cut(order).among(found.used, d) for x in (of_block.share, of_block.block.rate))
+    share, rate = (
+        x.truncated(order).embedded(found.used, d) for x in (of_block.share, of_block.block.rate)
+    )
     ratio = structure.ratio[modes]
     if any((part[:, 1:] != part[:, :-1]).any() for part in ratio.parts):
         raise UnprovedError(

@@ -8,7 +8,7 @@ import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.frame.calculus.rounding import gamma
-from alphacut.frame.calculus.taylor_model import TaylorModel, all_within
+from alphacut.frame.calculus.taylor_model import TaylorModel, all_on_subbox
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.blocks import CentredMatrices
 from alphacut.frame.modes.clusters import centred_matrices, enclose_subspaces
@@ -46,11 +46,11 @@ class MotionModels:
     # (T, m)
     line_deviation: Array
 
-    def within(self, low: Array, high: Array) -> MotionModels:
+    def on_subbox(self, low: Array, high: Array) -> MotionModels:
         """The models over the part low ≤ u ≤ high of the box, in unit coordinates of the part."""
         models = [x for mode in self.oscillators for x in mode.models]
         models += [x for rest in self.truncated for x in (rest.share, rest.amplitude)]
-        restricted = iter(all_within(models, low, high))  # in the same order
+        restricted = iter(all_on_subbox(models, low, high))  # in the same order
         return replace(
             self,
             oscillators=[x.on_part([next(restricted) for _ in x.models]) for x in self.oscillators],
@@ -114,7 +114,7 @@ def inverse(basis: Array, like: TaylorModel) -> TaylorModel:
     found, n = np.linalg.inv(basis), len(basis)
     left = np.abs(np.eye(n) - basis @ found) + gamma(n + 1) * (np.abs(basis) @ np.abs(found))
     # B⁻¹ − C = C (I − B C) + …, of which the terms beyond the first are far below a tenth
-    return like.like(found).loosened(1.1 * np.abs(found) @ left)
+    return like.like(found).widened(1.1 * np.abs(found) @ left)
 
 
 def modes_wanted(

@@ -63,7 +63,7 @@ class TruncatedModes:
     @property
     def width(self) -> Array:
         """Bound of the half width at the node where it is greatest, shape (m,)."""
-        return np.asarray((self.amplitude.size()[..., None] * self.half).max(-1).sum(0))
+        return np.asarray((self.amplitude.magnitude()[..., None] * self.half).max(-1).sum(0))
 
 
 Sums = list[tuple[TaylorModel, TaylorModel]]
@@ -112,13 +112,13 @@ def truncated_modes(
 def _sums_over_modes(found: Subspaces, read: TaylorModel, excited: TaylorModel, order: int) -> Sums:
     """Sums over all modes, of outputs `read` (m, n) and sources `excited` (sources, n)."""
     centre, mass, stiffness = found.centre, found.centre.mass, found.centre.stiffness
-    if len(excited.present()):
+    if len(excited.active_inputs()):
         order, d = excited.order, excited.inputs
-        mass, stiffness = (x.among(found.used, d) for x in (mass, stiffness))
+        mass, stiffness = (x.embedded(found.used, d) for x in (mass, stiffness))
     else:
-        excited = mass.like(excited.value).loosened(excited.remainder)
-    mass, stiffness = mass.cut(order), stiffness.cut(order)
-    rows = stiffness.like(read.value).loosened(read.remainder)
+        excited = mass.like(excited.value).widened(excited.remainder)
+    mass, stiffness = mass.truncated(order), stiffness.truncated(order)
+    rows = stiffness.like(read.value).widened(read.remainder)
     massive, light = slice(0, centre.modes), slice(centre.modes, None)
     least_mass, least_stiffness = (1 - variation for variation in found.variation)
     forces = excited @ mass
@@ -129,7 +129,7 @@ def _sums_over_modes(found: Subspaces, read: TaylorModel, excited: TaylorModel, 
         light_rows = rows[:, light]
         massless = inverse_form(stiffness[light, light], light_rows, light_rows, least_stiffness)
         of_stiffness = of_stiffness - _diagonal(massless)
-        of_mass = of_mass.loosened(np.where(light_rows.size().any(1), UNKNOWN, 0.0))
+        of_mass = of_mass.widened(np.where(light_rows.magnitude().any(1), UNKNOWN, 0.0))
     by_stiffness = inverse_form(stiffness, forces, forces, least_stiffness)
     return [
         (excited @ rows.T, inverse_form(stiffness, forces, rows, least_stiffness)),
@@ -148,10 +148,10 @@ def inverse_form(
     (r, n) are rows, and A(u) ≥ least · A(0) over the box, as quadratic forms.
     """
     x, y = (solution_series(matrix, rows.T).T for rows in (left, right))
-    e, f = (left - x @ matrix).size(), (right - y @ matrix).size()
+    e, f = (left - x @ matrix).magnitude(), (right - y @ matrix).magnitude()
     # |e A⁻¹ fᵀ| ≤ |e| |f| / least in the norm of A(0)⁻¹
     norms = (np.sqrt((size**2 / np.diag(matrix.value)).sum(1)) for size in (e, f))
-    return (x @ right.T).loosened(e @ y.size().T + np.outer(*norms) / least)
+    return (x @ right.T).widened(e @ y.magnitude().T + np.outer(*norms) / least)
 
 
 def sums_over_block(of_block: BlockShares) -> Sums:
@@ -177,7 +177,7 @@ def _amplitude_bounds(
     """C and the bound of √(A B) for each power 0, ½, 1 of λ, with the outputs' factors."""
     d, order = structure.start.inputs, structure.start.order
     (C0, C1), (A0, A1), (B0, B1) = (
-        [x.cut(order).among(found.used, d) for x in pair] for pair in sums
+        [x.truncated(order).embedded(found.used, d) for x in pair] for pair in sums
     )
     pairs = ((C0, A0, B0), (C0 * 0.0, A1, B0), (C1, A1, B1))
     factor = structure.factor
@@ -204,7 +204,7 @@ def _with_best_powers(
     )
     middle, half = (low + high) / 2, (high - low) / 2
     middle[1], half[1] = 0.0, np.abs(middle[1]) + half[1]  # Σ a β is not known with √λ
-    amplitudes = np.stack([amplitude.size() for _, amplitude in bounds])
+    amplitudes = np.stack([amplitude.magnitude() for _, amplitude in bounds])
     best = (amplitudes * half.max(-1)).argmin(0)
     share, amplitude = bounds[0][0] * 0.0, bounds[0][1] * 0.0
     for k, pair in enumerate(bounds):
@@ -232,12 +232,12 @@ def coupling_bounds(
     loads, time, sources = excitation
     block, modes = shares.block, shares.block.modes
     # bounds of the coupling over sup |de/dλ|, and of |a N^-½| |N^½ β|, (sources, m) each
-    off = block.rate.size() * (1.0 - np.eye(len(modes)))
-    norm = 1 + float(np.linalg.norm(block.norm.spread(), 2))
-    read = np.sqrt(shares.of_outputs.size()) * structure.factor.size()
+    off = block.rate.magnitude() * (1.0 - np.eye(len(modes)))
+    norm = 1 + float(np.linalg.norm(block.norm.deviation(), 2))
+    read = np.sqrt(shares.of_outputs.magnitude()) * structure.factor.magnitude()
     of_columns = np.sqrt(norm) * np.linalg.norm(off, axis=1)
-    by_slope = (shares.participation.size().T @ of_columns)[:, None] * read
-    size = norm * np.sqrt(shares.of_sources.size())[:, None] * read  # of |a| |β|, too
+    by_slope = (shares.participation.magnitude().T @ of_columns)[:, None] * read
+    size = norm * np.sqrt(shares.of_sources.magnitude())[:, None] * read  # of |a| |β|, too
     j = np.arange(len(off))
     low, high = block.rate[j, j].bounds()  # the λ lie in Gershgorin's discs about L_jj
     lambda_low = max(float((low - off.sum(1)).min()), float(found.low[modes[0]]))

@@ -100,7 +100,7 @@ def _with_unit_rows(assembly: Assembly[TaylorModel]) -> Assembly[TaylorModel]:
     coefficients = assembly.rows @ np.ones((2, 1))  # one of the two is zero
     return replace(
         assembly,
-        rows=(assembly.rows.size() > 0).astype(float),
+        rows=(assembly.rows.magnitude() > 0).astype(float),
         row_factors=assembly.row_factors * (coefficients[:, 0] + takes_acceleration),
     )
 
@@ -112,11 +112,11 @@ def _accelerations(assembly: Assembly[TaylorModel], forces: TaylorModel) -> Tayl
 
 
 def _require_classical(assembly: Assembly[TaylorModel]) -> None:
-    if assembly.dashpots.size().any():
+    if assembly.dashpots.magnitude().any():
         raise UnprovedError(
             "dashpots couple the modes", "give damping ratios or Rayleigh's factors in their place"
         )
-    if assembly.weights is not None and assembly.rayleigh[1].size() > 0:
+    if assembly.weights is not None and assembly.rayleigh[1].magnitude() > 0:
         raise UnprovedError(
             "Rayleigh's damping by the springs without the weights couples the modes",
             "give a damping ratio, or leave gravity out",

@@ -78,7 +78,7 @@ class LoadTables:
     @cached_property
     def tables(self) -> list[LoadTable]:
         """One of each mode."""
-        pairs = zip(self.rate.value, self.rate.spread(), strict=True)
+        pairs = zip(self.rate.value, self.rate.deviation(), strict=True)
         return [LoadTable(self.history, self.time, complex(x), float(y)) for x, y in pairs]
 
     @property

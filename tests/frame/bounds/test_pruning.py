@@ -35,7 +35,7 @@ def test_models_over_a_part_bound_motions_there(box, rng):
     ends = np.sort(rng.uniform(-1, 1, (2, 7)), axis=0)
     values, unit = motions(box, *ends, rng)
     level = box.level()
-    part, own = level.within(*ends), 2 * (unit - ends[0]) / (ends[1] - ends[0]) - 1
+    part, own = level.on_subbox(*ends), 2 * (unit - ends[0]) / (ends[1] - ends[0]) - 1
     for whole, narrow, grid in zip(
         level.models.oscillators, part.models.oscillators, part.grids, strict=True
     ):

@@ -94,7 +94,7 @@ def test_half_of_a_remainder_of_eigenpairs_would_not_do():
 def test_half_of_the_range_of_eigenvalues_would_not_do():
     own, _, _, _, structure = frame(1, 0.1)
     p = {name: TaylorModel.constant(x, 1) for name, x in own.parameters.items()}
-    loose = {name: p[name].loosened(0.1 * own.parameters[name]) for name in ("k1", "m1")}
+    loose = {name: p[name].widened(0.1 * own.parameters[name]) for name in ("k1", "m1")}
     for one in (structure, classical_structure(own, p | loose)):
         found = modes(one)
         assert found.low[0] == pytest.approx(3e7 / 2e4 * 0.9 / 1.1)
@@ -116,9 +116,9 @@ def masses_on_springs(stiffness):
 def test_half_of_what_springs_and_start_are_loosened_by_would_not_do():
     """Two of three masses on springs have the same frequency."""
     centre, time, parts = np.array([1.0, 1.0, 3.0]), np.arange(0, 44.01, 0.25), 4
-    p = TaylorModel.variables(centre, 1e-3 * centre).loosened(0.03 * centre)
+    p = TaylorModel.variables(centre, 1e-3 * centre).widened(0.03 * centre)
     springs = classical_structure(masses_on_springs(centre), {x: p[i] for i, x in enumerate("abc")})
-    both = springs.start.loosened(np.array([[0.0] * 3, [0.1, 0.1, 0.0]]))
+    both = springs.start.widened(np.array([[0.0] * 3, [0.1, 0.1, 0.0]]))
     level = LevelModels.from_structure(replace(springs, start=both), ({}, time, ("velocity",)))
     bounds = [OutputBounds.initial(level, 0, s, 1e-6) for s in (0, 1)]
     for of_side in bounds:

@@ -66,7 +66,7 @@ def test_no_function_leaves_its_taylor_model(rng):
         run, c, order = random_program(rng), float(rng.normal()), int(rng.integers(2, 6))
         centre, radius = rng.uniform(-1, 1, 3), 10 ** rng.uniform(-8, -0.7) * np.ones(3)
         loose = radius * rng.choice([0.0, 0.1])  # what inputs leave out, at one end of it
-        inputs = TaylorModel.variables(centre, radius, order).loosened(loose)
+        inputs = TaylorModel.variables(centre, radius, order).widened(loose)
         try:
             model = run([inputs[i] for i in range(3)], c)
         except UnprovedError:  # of b² + 1 with a remainder above 1
@@ -74,9 +74,9 @@ def test_no_function_leaves_its_taylor_model(rng):
         low, high = np.sort(rng.uniform(-1, 1, (2, 3)), axis=0)
         lower_bound, upper_bound = model.bounds()
         rows = [*zip(centre, radius, loose, strict=True)]
-        cut, part = model.cut(order - 1), model.within(low, high)
+        cut, part = model.truncated(order - 1), model.on_subbox(low, high)
         bare, factor = TaylorModel(model.parts, np.zeros(()), 3, order), float(rng.normal())
-        scaled, inside = bare * factor, bare.within(low, high)
+        scaled, inside = bare * factor, bare.on_subbox(low, high)
         with mp.workdps(40):
             for u in (*rng.uniform(-1, 1, (3, 3)), np.sign(rng.normal(size=3))):
                 v = [mp.mpf(float(x)) for x in u]
@@ -161,12 +161,12 @@ def test_half_of_a_remainder_of_series_would_not_do():
 
     own, other = line(0.2, 0.01), line(-0.2, 0.01)
     fourth, narrow = own * own * own * own, TaylorModel.variables(np.ones(1), np.full(1, 0.1))
-    narrow = narrow.loosened(0.01)
+    narrow = narrow.widened(0.01)
     square = narrow * narrow
     for made, u, exact in (
         (solve(other, own), 1.0, 1.21 / 0.79),
         (fourth, 1.0, 1.21**4),
-        (fourth.cut(2), 1.0, 1.21**4),
+        (fourth.truncated(2), 1.0, 1.21**4),
         (fourth @ np.array([[-2.0]]), 1.0, -2 * 1.21**4),
         (np.array([[-2.0]]) @ fourth, 1.0, -2 * 1.21**4),
         (-fourth, 1.0, -(1.21**4)),

@@ -70,7 +70,7 @@ def test_the_remainder_of_one_unknown_is_that_of_its_square_root(rng):
 
 def test_a_box_of_which_no_mean_is_enclosed_is_refused(rng):
     stiffness = varying(rng, np.array([1.0, 1.1]), width=1.0, order=2)
-    stiffness = stiffness + stiffness.like(np.diag([0.0, 0.0])).loosened(np.full((2, 2), 0.9))
+    stiffness = stiffness + stiffness.like(np.diag([0.0, 0.0])).widened(np.full((2, 2), 0.9))
     with pytest.raises(UnprovedError, match="damping by a ratio is not enclosed"):
         geometric_mean(stiffness.like(np.eye(2)), stiffness, np.sqrt([1.0, 1.1]))
 
