@@ -25,9 +25,9 @@ from alphacut.frame.methods.graph_follower import GraphFollower
 from alphacut.frame.methods.improved_follower import ImprovedFollower
 from alphacut.frame.methods.proof import Proof
 from alphacut.frame.methods.sampled import Sampled
-from alphacut.frame.structures.lagrangian import LagrangianSystem
-from alphacut.frame.structures.linear import LinearSystem, evaluate, require_modal_order
-from alphacut.frame.structures.storey import StoreyFrame
+from alphacut.frame.structures.linear import evaluate, has_matrices, require_modal_order
+from alphacut.frame.structures.model import StructureModel
+from alphacut.frame.structures.storey import yields
 from alphacut.frame.verification.self_test import with_motions_tested
 from alphacut.frame.verification.step_error import step_error, with_node_deviation, with_step_error
 from alphacut.fuzzy import FuzzyNumber
@@ -50,7 +50,7 @@ REMOVED_METHODS = {"search": "take auto, or improved-graph-follower with the int
 
 @on_one_blas_thread
 def envelope(
-    model: LinearSystem | LagrangianSystem,
+    model: StructureModel,
     inputs: Mapping[str, FuzzyNumber | float],
     method: Method | str | None = None,
     *,
@@ -114,7 +114,7 @@ def envelope(
         if proof:
             bounds = _with_proof(bounds, flow, proof, subprogress(tick, 0.5, 1.0))
         bounds = with_node_deviation(bounds, flow)
-        if not isinstance(model, LagrangianSystem) and np.isfinite(bounds.proved.upper).all():
+        if has_matrices(model) and np.isfinite(bounds.proved.upper).all():
             bounds = with_motions_tested(bounds, model)
         if tick:
             tick(1.0)
@@ -125,7 +125,7 @@ def envelope(
 
 
 def _build_problem(
-    model: LinearSystem | LagrangianSystem,
+    model: StructureModel,
     inputs: Mapping[str, FuzzyNumber | float],
     method: Method | str | None,
     duration: float,
@@ -135,11 +135,11 @@ def _build_problem(
     **options: Any,
 ) -> tuple[Method, UnitFlow, Array, Ints]:
     """Return the method, the motion over distinct cuts, the levels, and the cut of each level."""
-    is_system = isinstance(model, LagrangianSystem) or hasattr(model, "assembly")
     allowed = "a StoreyFrame, a MatrixStructure or a LagrangianSystem"
-    require(is_system, "model", value=type(model).__name__, allowed=allowed)
+    is_structure = isinstance(model, StructureModel)
+    require(is_structure, "model", value=type(model).__name__, allowed=allowed)
     if method is None:
-        method = "improved-graph-follower" if isinstance(model, LagrangianSystem) else "auto"
+        method = "auto" if has_matrices(model) else "improved-graph-follower"
     if isinstance(method, str):
         cure = REMOVED_METHODS.get(method, "")
         require(method in METHODS, "method", value=method, allowed=", ".join(METHODS), cure=cure)
@@ -153,14 +153,13 @@ def _build_problem(
         allowed = "none beside a method that is no name"
         require(not options, "options", value=[*options], allowed=allowed)
         chosen = method
-    has_kinks = bool(getattr(model, "hardening", ()))
     needs_derivatives = isinstance(chosen, Proof | DualProof | GraphFollower | ImprovedFollower)
     allowed = "auto or quasi-monte-carlo where columns yield"
-    is_possible = not (has_kinks and needs_derivatives)
+    is_possible = not (yields(model) and needs_derivatives)
     require(is_possible, "method", value=chosen.name, allowed=allowed)
     if integrator is None:
-        is_exact = has_kinks or isinstance(chosen, Auto | Proof | DualProof)
-        integrator = "exact" if is_exact and not isinstance(model, LagrangianSystem) else "midpoint"
+        is_exact = yields(model) or isinstance(chosen, Auto | Proof | DualProof)
+        integrator = "exact" if is_exact and has_matrices(model) else "midpoint"
     cuts = boxes(inputs, alpha)
     flow = make_flow(model, cuts.names, duration, step, integrator)
     require_admissible(model, cuts)
@@ -169,7 +168,7 @@ def _build_problem(
 
 
 def require_envelope(
-    model: LinearSystem | LagrangianSystem,
+    model: StructureModel,
     inputs: Mapping[str, FuzzyNumber | float],
     method: Method | str | None = None,
     **arguments: Any,
@@ -207,7 +206,7 @@ def _with_proof(followed: Envelope, over: UnitFlow, proof: Proof, tick: Progress
     return replace(followed, outer=proved.proved, between=proved.between, error=error, facts=facts)
 
 
-def require_admissible(system: LinearSystem | LagrangianSystem, cuts: Boxes) -> None:
+def require_admissible(system: StructureModel, cuts: Boxes) -> None:
     """Refuse supports with values that are not allowed for their parameters.
 
     Raises:
@@ -223,11 +222,10 @@ def require_admissible(system: LinearSystem | LagrangianSystem, cuts: Boxes) -> 
         is_right = is_same_unit or nominal == 0 or not any(sizes)
         allowed = f"values of the size of {nominal:g}, the structure's own"
         require(is_right, key, value=shown, allowed=allowed, cure="give both in SI units")
-    if isinstance(system, LagrangianSystem):
+    if not has_matrices(system):
         return
-    if isinstance(system, StoreyFrame):
-        ends = zip(cuts.lower[0].tolist(), cuts.upper[0].tolist(), strict=True)
-        system.require_standing(dict(zip(cuts.names, ends, strict=True)))
+    ends = zip(cuts.lower[0].tolist(), cuts.upper[0].tolist(), strict=True)
+    system.require_standing(dict(zip(cuts.names, ends, strict=True)))
     is_moved = system.ground is not None and np.any(system.ground.samples)
     for point in cuts.probes:
         at = ", ".join(f"{name} = {x:g}" for name, x in zip(cuts.names, point, strict=True))

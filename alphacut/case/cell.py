@@ -25,8 +25,12 @@ from alphacut.stochastic import FractionMap
 Stage = Literal["microstructure", "modulus", "envelope"]
 
 
-class CellContent(Section):
-    """The sections of the cell, built; those of other stages as they stand in the file."""
+class CellContent(Section, defer_build=True):
+    """The sections of the cell, built; microstructure as it stands in the file.
+
+    Validators of this class and of those derived from it are built at first use, since a case is
+    read by the class that `with_structures` derives.
+    """
 
     title: str = Field(description="one line, for figures and the report")
     about: str = Field(default="", description="a paragraph: what the case shows")
@@ -39,18 +43,6 @@ class CellContent(Section):
     cell: Cell | None = None
     mesh: Mesh = Mesh()
     modulus: ModulusSection = ModulusSection()
-    frame: object = None
-    pendulum: object = None
-    matrices: object = None
-    records: object = None
-    force: object = ()
-    study: object = ()
-    envelope: object = None
-    identify: object = None
-    probability: object = None
-    decision: object = None
-    tolerances: object = None
-    fragility: object = None
 
     @property
     def image_cell(self) -> ImageCell | None:
@@ -142,3 +134,20 @@ class CellContent(Section):
         method = self.modulus.method
         methods = (method,) if self.cell is None else self.cell.methods
         require(method in methods, "modulus.method", method, f"{', '.join(methods)} for this cell")
+
+
+class CellCase(CellContent):
+    """A case of which the cell alone is built; other sections are kept as they stand in the file.
+
+    The structure's section is among them, see `with_structures`.
+    """
+
+    records: object = None
+    force: object = ()
+    study: object = ()
+    envelope: object = None
+    identify: object = None
+    probability: object = None
+    decision: object = None
+    tolerances: object = None
+    fragility: object = None

@@ -17,22 +17,20 @@ from alphacut.case.limits import (
     TolerancesSection,
 )
 from alphacut.case.loads import ForceSection, RecordsSection, with_forces
-from alphacut.case.matrices import MatricesSection
 from alphacut.case.microstructure import MicrostructureSection
 from alphacut.case.motion import EnvelopeSection, Identify, Study
 from alphacut.case.parse import ParsedCase, parse
-from alphacut.case.structure import Frame, MaterialDamping, Pendulum, Structure
+from alphacut.case.structure import MaterialDamping, Structure, StructureSection
+from alphacut.case.structures import STRUCTURES, with_structures
 from alphacut.case.types import require_alone
+from alphacut.frame.structures.storey import yields
 from alphacut.fuzzy import FuzzyNumber
 
 
 class Content(CellContent):
-    """A case."""
+    """A case, with one section of `alphacut.case.structures.STRUCTURES` for its structure."""
 
     microstructure: MicrostructureSection | None = None
-    frame: Frame | None = None
-    pendulum: Pendulum | None = None
-    matrices: MatricesSection | None = None
     records: RecordsSection | None = None
     force: tuple[ForceSection, ...] = ()
     study: tuple[Study, ...] = ()
@@ -54,7 +52,7 @@ class Content(CellContent):
     def incremental_question(self) -> FragilitySection | None:
         """The question of fragility, with one limit of each storey, if columns yield; else None."""
         question, structure = self.fragility, self.structure
-        if question is None or structure is None or not getattr(structure.linear, "hardening", ()):
+        if question is None or structure is None or not yields(structure.model):
             return None
         return question.with_storeys(structure)
 
@@ -77,19 +75,25 @@ class Content(CellContent):
     @property
     def has_stated_modulus(self) -> bool:
         """True if the structure needs no modulus of a stage."""
-        frame = self.frame
-        return frame is None or frame.modulus is not None or frame.stiffness is not None
+        section = self.structure_section
+        return section is None or not section.needs_modulus
 
     @property
-    def structure_section(self) -> Frame | Pendulum | MatricesSection | None:
+    def structure_sections(self) -> dict[str, StructureSection]:
+        """The sections of structures in the case, of which there may be one, by their names."""
+        sections = {name: getattr(self, name, None) for name in STRUCTURES}
+        return {name: section for name, section in sections.items() if section is not None}
+
+    @property
+    def structure_section(self) -> StructureSection | None:
         """The section of the structure, if the case has one."""
-        return self.frame or self.pendulum or self.matrices
+        return next(iter(self.structure_sections.values()), None)
 
     @cached_property
     def structure(self) -> Structure | None:
         """The structure, with stand-ins for what is yet to be computed; built once."""
         section = self.structure_section
-        return None if section is None else self._with_forces(section.nominal)
+        return None if section is None else with_forces(section.nominal, self.force, section.places)
 
     def structure_of(
         self, modulus: FuzzyNumber | None = None, loss: FuzzyNumber | None = None
@@ -99,13 +103,10 @@ class Content(CellContent):
         `modulus` is Young's in Pa, the structure's own by default; `loss` the loss factor of its
         material, where the case takes damping from there.
         """
-        if self.structure_section is None:
+        section = self.structure_section
+        if section is None:
             raise RefusedError("envelope", None, "a structure and a section [envelope]")
-        return self._with_forces(self.structure_section.structure(modulus, loss))
-
-    def _with_forces(self, structure: Structure) -> Structure:
-        unknowns = () if self.matrices is None else self.matrices.unknowns
-        return with_forces(structure, self.force, unknowns)
+        return with_forces(section.structure(modulus, loss), self.force, section.places)
 
     @property
     def has_material_damping(self) -> bool:
@@ -118,7 +119,7 @@ class Content(CellContent):
         super().require_consistent()
         if self.has_material_damping:
             has_losses = "modulus" in self.stages and bool(self.cell and self.cell.losses)
-            key = f"{'frame' if self.frame else 'matrices'}.damping_ratio"
+            key = f"{next(iter(self.structure_sections))}.damping_ratio"
             allowed = "stage modulus and loss factors in [cell], or a number"
             require(has_losses, key, "material", allowed)
         self._require_excitation()
@@ -126,24 +127,23 @@ class Content(CellContent):
 
     def _require_excitation(self) -> None:
         """Refuses a structure at rest without loads, and what a suite of records cannot answer."""
-        ground = getattr(self.structure_section, "accelerogram", None)
+        section = self.structure_section
+        ground = None if section is None else section.nominal.model.ground
         is_loaded = self.records is not None or ground is not None or bool(self.force)
-        starts = (*self.frame.displacements, *self.frame.velocities) if self.frame else ()
-        starts_at_rest = (self.frame or self.matrices) and not any(any(x.support) for x in starts)
+        is_moved = is_loaded or section is None or section.moves_by_itself
         allowed = "a start, an accelerogram, a section [records] or [[force]]"
         cure = "nothing moves the frame"
-        is_moved = is_loaded or not starts_at_rest
         require(is_moved, "frame.displacements", None, allowed, cure=cure)
         if self.records is None:
             is_absent, allowed = self.fragility is None, "beside [records]"
             require(is_absent, "fragility", "without records", allowed)
-            for key, section in self.questions.items():
-                means = ", ".join(limit.text for limit in section.limits if limit.side == "mean")
+            for key, question in self.questions.items():
+                means = ", ".join(limit.text for limit in question.limits if limit.side == "mean")
                 require(not means, f"{key}.limits", means, "a mean over records beside [records]")
             return
         require_alone("records", ground is not None, "an accelerogram")
-        if self.matrices is not None:
-            self.matrices.require_pattern()
+        if section is not None:
+            section.require_pattern()
         for key in ("probability", "tolerances", "identify", "study"):
             allowed = "[decision] and [fragility], of one motion for each record"
             require(not getattr(self, key), key, "beside [records]", allowed)
@@ -152,11 +152,13 @@ class Content(CellContent):
         envelope, structure = self.envelope, self.structure
         if envelope is None or "envelope" not in self.stages:
             return
-        sections = [x for x in (self.frame, self.pendulum, self.matrices) if x is not None]
+        sections = self.structure_sections
         if structure is None or len(sections) > 1:
             value = None if structure is None else f"beside {len(sections) - 1} more"
-            raise RefusedError("frame", value, "one of [frame], [matrices] and [pendulum]")
-        if getattr(structure.linear, "hardening", ()):
+            *names, last = (f"[{name}]" for name in sorted(STRUCTURES))
+            allowed = f"one of {', '.join(names)} and {last}"
+            raise RefusedError("frame", value, allowed)
+        if yields(structure.model):
             allowed = "auto or quasi-monte-carlo where columns yield"
             is_possible = envelope.method in ("auto", "quasi-monte-carlo")
             require(is_possible, "envelope.method", envelope.method, allowed)
@@ -168,7 +170,7 @@ class Content(CellContent):
             self._require_study(f"study[{number}]", study, envelope, structure)
         has_modulus = self.has_stated_modulus or "modulus" in self.stages
         require(has_modulus, "frame.modulus", None, "a modulus, or stage modulus")
-        is_framed = self.identify is None or self.frame is not None
+        is_framed = self.identify is None or structure.model.floors > 0
         require(is_framed, "identify", "without a frame", "beside [frame]")
         names = [study.name for study in self.study]
         for number, name in enumerate(names, start=1):
@@ -205,4 +207,4 @@ def load(path: Path | str, changes: Sequence[str] = ()) -> Case:
 
     BadInput has every problem of the case.
     """
-    return parse(Content, path, changes)
+    return parse(with_structures(Content, built=True), path, changes)

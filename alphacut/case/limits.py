@@ -16,12 +16,14 @@ from typing import Annotated, ClassVar, Literal, Self, cast
 from pydantic import PlainValidator
 
 from alphacut.base.errors import RefusedError, require
+from alphacut.base.number_text import STANDARD_GRAVITY
 from alphacut.case.structure import Structure
 from alphacut.case.types import NotEmpty, Quantity, Section
 from alphacut.frame import Limit
-from alphacut.frame.analyses.fragility import require_fragile, yields
+from alphacut.frame.analyses.fragility import require_fragile
 from alphacut.frame.analyses.limits import Side, limits_by_name
 from alphacut.frame.structures.quantities import OUTPUTS, Output
+from alphacut.frame.structures.storey import yields
 from alphacut.io import quantity
 
 BASE_SHEAR = "base_shear"
@@ -65,8 +67,10 @@ class CaseLimit:
             return self.value
         if self.output == BASE_SHEAR:
             allowed = "a share of the weight beside [frame], or a force, as 90 kN"
-            require(structure.frame is not None, key, self.text, allowed)
-            return self.value * structure.least_weight
+            masses = structure.floor_masses
+            require(bool(masses), key, self.text, allowed)
+            least = sum(mass.support.lower for mass in masses)
+            return self.value * (STANDARD_GRAVITY * least)
         height = structure.heights.get(self.output)
         if height is None:
             raise RefusedError(key, self.text, "a drift of a storey whose length frame.lengths has")
@@ -75,9 +79,9 @@ class CaseLimit:
     def by_storey(self, structure: Structure) -> tuple[CaseLimit, ...]:
         """The limits of all floors or storeys of a frame that "drift" means; else itself."""
         _, words = OUTPUTS.get(self.output, ("", ""))
-        if structure.frame is None or not words:
+        if not structure.model.floors or not words:
             return (self,)
-        names = [f"{self.output}{z}" for z in range(1, structure.frame.floors + 1)]
+        names = [f"{self.output}{z}" for z in range(1, structure.model.floors + 1)]
         word = rf"\b{self.output}\b"  # the "a" of "max a" alone
         texts = (re.sub(word, x, self.text) for x in names)
         event = self.text if len(names) > 1 else ""

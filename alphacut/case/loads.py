@@ -7,18 +7,18 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, NamedTuple
 
-import numpy as np
 from pydantic import Field, ValidationInfo
 
 from alphacut.base.errors import RefusedError, require, require_choice
 from alphacut.case.structure import Structure
 from alphacut.case.types import NotEmpty, OneOrMany, Section, Time, case_file, text
-from alphacut.frame import Force, History, StoreyFrame
+from alphacut.frame import History
 from alphacut.frame.records.recording import Baseline, Recording
 from alphacut.frame.records.suite import MAX_RECORDS, read_recordings, require_distinct
 from alphacut.frame.records.tables import read_force_history
 from alphacut.frame.records.text_file import ACCELERATION_UNITS
 from alphacut.frame.records.units import acceleration_factor
+from alphacut.frame.structures.model import PlacedForce
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.io import quantity
 
@@ -102,42 +102,35 @@ class ForceSection(Section):
 
 
 def with_forces(
-    structure: Structure, sections: Sequence[ForceSection], unknowns: Sequence[str]
+    structure: Structure, sections: Sequence[ForceSection], places: Sequence[str]
 ) -> Structure:
-    """The structure with the forces of a case, whose amplitudes become its parameters.
+    """Return the structure with the forces of a case, whose amplitudes become its parameters.
 
-    `unknowns` names the degrees of freedom of a structure from matrices; a frame has floors.
+    Args:
+        structure: The structure without them.
+        sections: The forces by their time histories.
+        places: Names of the degrees of freedom in their order; none if it takes no forces.
+
+    Raises:
+        RefusedError: The structure takes no forces, or a force acts on no degree of freedom.
     """
     if not sections:
         return structure
-    model = structure.linear
-    if model is None:
-        raise RefusedError("force", "on a pendulum", "beside [frame] or [matrices]")
-    forces = [
-        (unknown, *amplitude, section.history.history)
-        for section in sections
-        for unknown, amplitude in section.amplitude.items()
-    ]
-    if isinstance(model, StoreyFrame):
-        unknowns = [str(floor) for floor in range(1, model.floors + 1)]
-    for unknown, *_ in forces:
-        require_choice("force.amplitude", unknown, unknowns)
-    if isinstance(model, StoreyFrame):
-        loads = [Force(int(floor), x.nominal, course) for floor, x, _, course in forces]
-        model = replace(model, loads=loads)
-        names = model.force_names
-    else:
-        names = tuple(f"F{number}" for number in range(1, len(forces) + 1))
-        nominal = {name: x.nominal for name, (_, x, *_) in zip(names, forces, strict=True)}
-        loads = [
-            Force(np.array([float(x == unknown) for x in unknowns]), name, course)
-            for name, (unknown, _, _, course) in zip(names, forces, strict=True)
-        ]
-        model = replace(model, loads=loads, parameters={**model.parameters, **nominal})
-    amplitudes = {name: x for name, (_, x, *_) in zip(names, forces, strict=True)}
-    units = {name: unit for name, (_, _, unit, _) in zip(names, forces, strict=True)}
-    numbers = {**structure.numbers, **amplitudes}
-    return replace(structure, model=model, numbers=numbers, force_units=units)
+    require(bool(places), "force", "on a pendulum", "beside [frame] or [matrices]")
+    forces: list[PlacedForce] = []
+    amplitudes: list[FuzzyNumber] = []
+    units: list[str] = []
+    for section in sections:
+        for place, (amplitude, unit) in section.amplitude.items():
+            require_choice("force.amplitude", place, places)
+            index, history = places.index(place), section.history.history
+            forces.append(PlacedForce(index, amplitude.nominal, history))
+            amplitudes.append(amplitude)
+            units.append(unit)
+    model, names = structure.model.with_forces(forces)
+    numbers = {**structure.numbers, **dict(zip(names, amplitudes, strict=True))}
+    force_units = dict(zip(names, units, strict=True))
+    return replace(structure, model=model, numbers=numbers, force_units=force_units)
 
 
 @dataclass(frozen=True)

@@ -90,6 +90,11 @@ class MatricesSection(StructureSection):
     """file of the ground's acceleration; motion is relative to it"""
     outputs: dict[str, ObservedRow] = Field(description="observed quantities by name")
 
+    @property
+    def places(self) -> tuple[str, ...]:
+        """Names of the unknowns, on which forces act."""
+        return self.unknowns
+
     def structure(
         self, modulus: FuzzyNumber | None = None, loss: FuzzyNumber | None = None
     ) -> Structure:

@@ -3,25 +3,18 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Annotated, Any, Literal, cast
 
 from pydantic import Field, PlainValidator, ValidationInfo
 
-from alphacut.base.errors import RefusedError, require, require_choice
-from alphacut.base.number_text import STANDARD_GRAVITY
+from alphacut.base.errors import RefusedError, require
 from alphacut.case.types import Modulus, NotEmpty, OneOrMany, Quantity, Section, case_file, text
-from alphacut.frame import (
-    Accelerogram,
-    MatrixStructure,
-    StoreyFrame,
-    damping_from_loss,
-    read_record,
-)
-from alphacut.frame.structures.lagrangian import LagrangianSystem, pendulum
-from alphacut.frame.structures.observed import unit_of_output, with_outputs
+from alphacut.frame import Accelerogram, StoreyFrame, damping_from_loss, pendulum, read_record
+from alphacut.frame.structures.linear import LinearSystem, has_matrices
+from alphacut.frame.structures.model import StructureModel
 from alphacut.frame.structures.storey import SYMBOLS
 from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.io.files import suggestion
@@ -56,6 +49,8 @@ STAND_IN = Crisp(2e10)
 """Young's modulus in Pa of a frame whose own is yet to be computed."""
 LOSS_STAND_IN = Crisp(0.02)
 """Loss factor of a material whose own is yet to be computed."""
+NEGLIGIBLE_WEIGHT = 0.1
+"""Stability coefficient of a storey up to which EN 1998-1, 4.4.2.2, neglects P-Delta."""
 
 
 @dataclass(frozen=True)
@@ -82,33 +77,28 @@ DampingRatios = Annotated[
 
 @dataclass(frozen=True)
 class Structure:
-    """A storey frame, a structure from matrices or a pendulum: the model at its nominal values.
+    """A structure of a case: the model at its nominal values, and its fuzzy parameters.
 
     `numbers` has every parameter, crisp or fuzzy, in SI; `heights` those of the storeys by
     drift and residual drift; `force_units` the SI units of the forces' amplitudes, empty of
     factors.
     """
 
-    model: StoreyFrame | MatrixStructure | LagrangianSystem
+    model: StructureModel
     numbers: Mapping[str, FuzzyNumber]
     heights: Mapping[str, FuzzyNumber] = field(default_factory=dict)
     force_units: Mapping[str, str] = field(default_factory=dict)
 
     @property
-    def frame(self) -> StoreyFrame | None:
-        """The model if it is a storey frame, else None."""
-        return self.model if isinstance(self.model, StoreyFrame) else None
+    def floor_masses(self) -> tuple[FuzzyNumber, ...]:
+        """Masses of a frame's floors in kg; none of other structures."""
+        names = self.model.group("m") if self.model.floors else ()
+        return tuple(self.numbers[name] for name in names)
 
     @property
-    def least_weight(self) -> float:
-        """Weight of a frame's floors at their least masses, in N; 0 of other structures."""
-        masses = self.frame.group("m") if self.frame else ()
-        return STANDARD_GRAVITY * sum(self.numbers[x].support.lower for x in masses)
-
-    @property
-    def linear(self) -> StoreyFrame | MatrixStructure | None:
-        """The model if it is linear, else None."""
-        return None if isinstance(self.model, LagrangianSystem) else self.model
+    def linear(self) -> LinearSystem | None:
+        """The model if it is linear, at least until columns yield; else None."""
+        return self.model if has_matrices(self.model) else None
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -117,7 +107,7 @@ class Structure:
 
     def unit(self, output: str) -> str:
         """SI unit of an output."""
-        return unit_of_output(self.model, output)
+        return self.model.unit_of(output)
 
     def input_unit(self, name: str) -> str:
         """SI unit of a parameter; empty where it has none, or none is known."""
@@ -127,7 +117,7 @@ class Structure:
         """Fuzzy parameters of a name, "m" of all masses of a frame; RefusedError where none is."""
         allowed, cure = "inputs that are fuzzy", f"{name} is one number"
         try:
-            members = self.frame.group(name) if self.frame else (name,)
+            members = self.model.group(name)
             fuzzy = tuple(member for member in members if self.numbers[member].support.width > 0)
         except (ValueError, KeyError):
             fuzzy, allowed = (), ", ".join(self.numbers)
@@ -146,20 +136,15 @@ class Structure:
     def require_quantities(self, key: str, names: Sequence[str]) -> None:
         """Refuses outputs that the model cannot have, though it need not observe them."""
         for name in names:
-            if self.frame is None:
-                require_choice(key, name, self.outputs)
-                continue
             try:
-                self.frame.quantity(name)
+                self.model.require_quantity(name)
             except RefusedError as error:
                 raise RefusedError(key, error.value, error.allowed) from None
 
-    def model_with_outputs(
-        self, key: str, outputs: tuple[str, ...]
-    ) -> StoreyFrame | MatrixStructure | LagrangianSystem:
+    def model_with_outputs(self, key: str, outputs: tuple[str, ...]) -> StructureModel:
         """The model reduced to some outputs; one that is not linear always computes all of them."""
         self.require_quantities(key, outputs)
-        return with_outputs(self.model, outputs)
+        return self.model.with_outputs(outputs)
 
 
 def read_accelerogram(value: object, info: ValidationInfo) -> Accelerogram:
@@ -201,6 +186,29 @@ class StructureSection(Section):
     def nominal(self) -> Structure:
         """The structure with stand-ins for what is yet to be computed; built once."""
         return self.structure()
+
+    @property
+    def needs_modulus(self) -> bool:
+        """Whether the structure needs a modulus that a stage computes."""
+        return False
+
+    @property
+    def moves_by_itself(self) -> bool:
+        """Whether the structure starts displaced or moving, so that it needs no loads."""
+        linear = self.nominal.linear
+        return linear is None or not linear.is_at_rest
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """Names of the degrees of freedom that forces act on: floors, or unknowns of matrices."""
+        return tuple(str(floor + 1) for floor in range(self.nominal.model.floors))
+
+    def require_pattern(self) -> None:
+        """Refuse a structure that records of the ground do not move."""
+
+    def warnings(self, structure: Structure) -> Iterator[str]:
+        """Yield a sentence for each effect that the section leaves out, and that is not small."""
+        yield from ()
 
 
 class Frame(StructureSection):
@@ -251,6 +259,27 @@ class Frame(StructureSection):
     def floors(self) -> int:
         """Number of floors."""
         return len(self.masses)
+
+    @property
+    def needs_modulus(self) -> bool:
+        """Whether neither a modulus nor stiffnesses are stated."""
+        return self.modulus is None and self.stiffness is None
+
+    @property
+    def moves_by_itself(self) -> bool:
+        """Whether some floor may be displaced or move at the start."""
+        return any(any(start.support) for start in (*self.displacements, *self.velocities))
+
+    def warnings(self, structure: Structure) -> Iterator[str]:
+        """Yield a sentence for each storey on which a large weight is left out (P-Delta)."""
+        if self.gravity or self.lengths is None:
+            return
+        frame = cast("StoreyFrame", structure.model)
+        ends = {name: number.support for name, number in structure.numbers.items()}
+        for z, coefficient in enumerate(frame.stability_coefficients(ends), start=1):
+            if coefficient > NEGLIGIBLE_WEIGHT:
+                what = f"weight over stiffness and height of storey {z} is up to {coefficient:.2g}"
+                yield f'{what}: say frame.gravity = "1 g", so that drifts grow by it (P-Delta)'
 
     def per_floor(self, values: tuple[FuzzyNumber, ...] | None) -> tuple[FuzzyNumber, ...]:
         """One value for each floor; a single one holds for all of them."""

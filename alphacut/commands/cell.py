@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from alphacut.base.number_text import text_table
-from alphacut.case.cell import CellContent
+from alphacut.case.cell import CellCase
 from alphacut.case.material import MeshedCell
 from alphacut.case.parse import parse
+from alphacut.case.structures import with_structures
 from alphacut.commands.options import Command, add_common, require_petsc, write_answer
 from alphacut.io.files import Document, ranks, say, whole_file
 from alphacut.io.provenance import versions
@@ -50,7 +51,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, out: TextIO) -> int:
     """Solves the cell at the nominal values, checks and writes its result; exit status 0."""
-    content = parse(CellContent, options.case, options.set).content
+    kind = with_structures(CellCase, built=False)
+    content = parse(kind, options.case, options.set).content
     require_petsc(options.petsc, content)
     problem = CellProblem.of(content, options.petsc)
     problem.require_mesh()

@@ -22,7 +22,7 @@ from alphacut.case.structure import MaterialDamping, Structure
 from alphacut.case.types import Section
 from alphacut.commands.options import Command, add_common, add_quiet, write_answer
 from alphacut.commands.pipeline import cut_record_warnings, read_case, require_runnable
-from alphacut.frame import Exact, History, LinearFlow, MatrixStructure, StoreyFrame
+from alphacut.frame import Exact, History, LinearFlow
 from alphacut.frame.analyses.peaks import WIDENING
 from alphacut.frame.analyses.suites import NominalMode, ScaledRecord, nominal_mode
 from alphacut.frame.boxes import AT_REST
@@ -30,6 +30,7 @@ from alphacut.frame.envelope import Ends, Envelope, within_steps
 from alphacut.frame.methods.sampled import PeakSearch
 from alphacut.frame.structures.linear import LinearSystem, NominalModes, nominal_modes
 from alphacut.frame.structures.matrix import Monomial
+from alphacut.frame.structures.storey import yields
 from alphacut.frame.verification.self_test import Trial, stored_motions
 from alphacut.frame.verification.step_error import node_deviation
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal, Triangular
@@ -46,8 +47,6 @@ if TYPE_CHECKING:
     import xarray
 
 USUAL_PERIODS = 1e-3, 60.0  # in s: towers have 10 s at most, machine parts seldom below 1 ms
-NEGLIGIBLE_WEIGHT = 0.1
-"""Stability coefficient of a storey up to which EN 1998-1, 4.4.2.2, neglects P-Delta."""
 LEAST_MODES, MAX_MODES = 3, 8
 """Modes that are shown, if the structure has as many."""
 KINDS = {Crisp: "crisp", Interval: "interval", Triangular: "triangle", Trapezoidal: "trapezoid"}
@@ -81,8 +80,9 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
                 "this is an unusual period: are units right, mass and stiffness not exchanged?\n"
             )
         text += modes_text(modes)
-    if content.structure is not None:
-        text += "".join(f"warning: {line}\n" for line in missing_gravity(content.structure))
+    section, structure = content.structure_section, content.structure
+    if section is not None and structure is not None:
+        text += "".join(f"warning: {line}\n" for line in section.warnings(structure))
     if linear and (record := linear.ground):
         peak = engineering(record.extremes[0], "m/s^2")
         in_g = f"{record.extremes[0] / STANDARD_GRAVITY:.3g} g"
@@ -96,10 +96,10 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
         records = suite_records(content.records, content.envelope, Structure(linear, {}))
         text += records_text(content.records, records, nominal_mode(linear))
         strongest = max(records, key=lambda record: record.measures["Sa(T1)"])
-        if isinstance(linear, StoreyFrame) and linear.hardening:
+        if yields(linear):
             step = content.envelope.step
             duration = step * round(strongest.duration / step)
-            moved = replace(linear, ground=strongest.ground)
+            moved = linear.moved_by(strongest.ground)
             text += "".join(f"warning: {line}\n" for line in long_steps(moved, duration, step))
         question, structure = content.incremental_question, content.structure
         if question is not None and structure is not None:
@@ -140,18 +140,6 @@ def modes_text(modes: NominalModes) -> str:
     return text
 
 
-def missing_gravity(structure: Structure) -> Iterator[str]:
-    """Yields a sentence for each storey of a frame on which the case leaves out a large weight."""
-    frame = structure.frame
-    if frame is None or frame.gravity or not len(frame.lengths):
-        return
-    ends = {name: number.support for name, number in structure.numbers.items()}
-    for z, coefficient in enumerate(frame.stability_coefficients(ends), start=1):
-        if coefficient > NEGLIGIBLE_WEIGHT:
-            what = f"weight over stiffness and height of storey {z} is up to {coefficient:.2g}"
-            yield f'{what}: say frame.gravity = "1 g", so that drifts grow by it (P-Delta)'
-
-
 def long_steps(linear: LinearSystem, duration: float, step: float) -> Iterator[str]:
     """Yields a sentence for each output whose peak may rise much between nodes a step apart.
 
@@ -159,19 +147,12 @@ def long_steps(linear: LinearSystem, duration: float, step: float) -> Iterator[s
     those of accelerations are found between nodes as well; these are judged by the motion of the
     initial stiffness.
     """
-    yields = isinstance(linear, StoreyFrame) and bool(linear.hardening)
-    if isinstance(linear, StoreyFrame) and linear.hardening:
-        read_at_nodes = tuple(x for x in linear.outputs if linear.quantity(x)[0] == "a")
+    has_events = yields(linear)
+    if has_events:
+        read_at_nodes = [name for name in linear.outputs if linear.unit_of(name) == "m/s^2"]
         if not read_at_nodes:
             return
-        linear = replace(
-            linear,
-            outputs=read_at_nodes,
-            yield_force=(),
-            yield_drift=(),
-            hardening=(),
-            rayleigh_of="initial",
-        )
+        linear = linear.elastic().with_outputs(read_at_nodes)
     flow = LinearFlow(linear, (), duration, step, Exact(), by_modes=False)
     nominal = np.zeros((1, 0))
     size, between = np.abs(flow.values(nominal)[0]).T, node_deviation(flow, nominal).T
@@ -179,7 +160,7 @@ def long_steps(linear: LinearSystem, duration: float, step: float) -> Iterator[s
     widening = within_steps(size, between).max(1) / peaks - 1
     for name, share in zip(linear.outputs, widening, strict=True):
         if share > WIDENING:
-            if yields:
+            if has_events:
                 what = f"the step of {step:g} s is too coarse: its peak may be missed"
                 most = "altogether" if share >= 1 else f"by about {share:.1%}"
                 yield f"{name}: {what} {most} between nodes"
@@ -208,7 +189,7 @@ def records_text(
     return text + "".join(f"warning: {x}\n" for record in records for x in record.warnings)
 
 
-def nominal_structure(content: Content) -> StoreyFrame | MatrixStructure | None:
+def nominal_structure(content: Content) -> LinearSystem | None:
     """The linear structure of the case at the nominal values; None where there is none.
 
     A modulus to be computed is taken from the series; None also where that does not fit the cell.

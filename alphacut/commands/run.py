@@ -218,9 +218,10 @@ def cuts_text(title: str, cuts: Mapping[str, CutsResult], alpha: Array, nature: 
 def identify(options: argparse.Namespace, out: TextIO) -> int:
     """Identifies inputs from measured modes; exit status 0 even if these refute the frame."""
     content = read_case(options).content
-    if content.identify is None or content.frame is None or content.envelope is None:
+    section = content.structure_section
+    if content.identify is None or section is None or content.envelope is None:
         raise RefusedError("identify", None, "sections [identify], [frame] and [envelope]")
-    alpha, structure = content.envelope.alpha, content.frame.nominal
+    alpha, structure = content.envelope.alpha, section.nominal
     learned, _ = identify_inputs(content.identify, structure, alpha)
     write_answer(options, to_document(learned), out, run_text(Parts(update=learned)))
     return 0

@@ -53,7 +53,8 @@ def _material_figures(results: Results) -> Iterator[Drawing]:
     if modulus is not None:
         yield "fig16-stress-curves", partial(material.stress_curves, modulus.arrays)
         yield "fig17-mean-stress", partial(material.mean_stress, modulus.arrays)
-        yield "fig18-modulus", partial(material.fuzzy_modulus, modulus, content.frame)
+        stated = getattr(content.structure_section, "modulus", None)
+        yield "fig18-modulus", partial(material.fuzzy_modulus, modulus, stated)
     if modulus is not None and results.is_paper:
         yield "fig19-membership", partial(material.membership, modulus.arrays)
         inclusion = getattr(content.cell, "inclusion_modulus", None)
@@ -73,9 +74,9 @@ def _structure_figures(results: Results) -> Iterator[Drawing]:
     if results.is_paper:
         yield "fig02-stages", partial(overview.stages, results)
     yield "fig20-mapping", partial(envelope.mapping, results)
-    if (section := results.content.frame) is not None:
-        yield "fig26-frame", partial(structure.draw_frame, section)
-        yield "fig27-chain", partial(structure.draw_chain, section)
+    if results.structure.model.floors:
+        yield "fig26-frame", partial(structure.draw_frame, results.structure)
+        yield "fig27-chain", partial(structure.draw_chain, results.structure)
     task = max(results.tasks, key=lambda task: len(task.fuzzy))
     if task.section.method == "graph-follower":
         steps = partial(structure.graph_follower_steps, results, task)

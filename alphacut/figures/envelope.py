@@ -109,8 +109,7 @@ def mapping(results: Results) -> Figure:
     output = names[-1] if "q" in names[-1] else names[0]  # the last one if it is a displacement
     inputs, step = structure.inputs(task.fuzzy), task.section.step
     end = round(min(5.0, task.duration) / step) * step
-    scheme = task.section.integrator or ("exact" if structure.frame else "midpoint")
-    flow = make_flow(structure.model, tuple(inputs), end, step, scheme)
+    flow = make_flow(structure.model, tuple(inputs), end, step, task.section.integrator)
     lower, upper = np.array([x.cut(float(dataset["alpha"])) for x in inputs.values()]).T
     points = np.random.default_rng(0).uniform(lower, upper, (40, len(inputs)))
     curves = flow.values(points)[:, :, list(flow.outputs).index(output)]

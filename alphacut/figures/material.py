@@ -15,9 +15,9 @@ from matplotlib.patches import Patch
 from alphacut.base.arrays import Array
 from alphacut.base.number_text import axis_prefix
 from alphacut.case.material import RadiusMapSection
-from alphacut.case.structure import Frame
 from alphacut.figures import style
 from alphacut.figures.style import BLUE, GREY, HEIGHT, INK, ORANGE, PURPLE, WIDTH
+from alphacut.fuzzy import FuzzyNumber
 from alphacut.stages.cell import GPA
 from alphacut.stages.modulus import ModulusResult
 from alphacut.stages.store import StageResult
@@ -113,15 +113,15 @@ def mean_stress(dataset: xarray.Dataset) -> Figure:
     return figure
 
 
-def fuzzy_modulus(result: StageResult[ModulusResult], frame: Frame | None) -> Figure:
+def fuzzy_modulus(result: StageResult[ModulusResult], stated: FuzzyNumber | None) -> Figure:
     """Fig. 18: fuzzy Young's modulus, with the one that the case states, and Poisson's ratio ν."""
     size = (WIDTH, 1.75 * HEIGHT)
     figure, (axes, below) = plt.subplots(2, 1, figsize=size, height_ratios=(3, 2))
     dataset, average = result.arrays, result.numbers.average
     alpha, modulus_GPa = dataset["alpha"].values, dataset["E"].values / GPA
     style.shaded_cuts(axes, alpha, *modulus_GPa.T)
-    if frame is not None and frame.modulus is not None:
-        cuts = np.array([frame.modulus.cut(level) for level in (0.0, 1.0)]) / GPA
+    if stated is not None:
+        cuts = np.array([stated.cut(level) for level in (0.0, 1.0)]) / GPA
         line: style.Look = {"color": BLUE, "lw": 1.2, "ls": "--", "label": "quoted in the case"}
         axes.plot(style.outline(*cuts.T), [0, 1, 1, 0], **line)
         axes.plot([], [], color=INK, marker="o", ms=3.5, lw=1.2, label="computed here")

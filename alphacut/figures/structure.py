@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from alphacut.base.arrays import Array
-from alphacut.case.structure import Frame
+from alphacut.case.structure import Structure
 from alphacut.figures.style import BLUE, GREY, INK, ORANGE, Look, prefix_axis
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.dynamics.nonlinear import make_flow
@@ -24,21 +24,21 @@ ARROW = {"arrowstyle": "-|>", "color": ORANGE}
 PITCH = 1.6  # distance of the masses of the chain in Fig. 27; a mass is 1 wide
 
 
-def draw_frame(section: Frame) -> Figure:
+def draw_frame(structure: Structure) -> Figure:
     """Fig. 26: floors with mass m and displacement q, columns with length l or stiffness k."""
-    default_lengths = (Crisp(3.0),)  # not to scale where only stiffnesses are given
-    per_floor = section.per_floor(section.lengths or default_lengths)
-    lengths = [length.nominal for length in per_floor]
+    masses, numbers = structure.floor_masses, structure.numbers
+    # not to scale where only stiffnesses are given
+    heights = [structure.heights.get(f"drift{z + 1}", Crisp(3.0)) for z in range(len(masses))]
+    lengths = [height.nominal for height in heights]
     height, level = sum(lengths), 0.0  # of the frame, and of the floor below, in m
     span = 0.45 * max(height, 6.0) if len(lengths) < 5 else 0.3 * height
     inches = min(9.0, 1.4 + 0.5 * height, 2.31 * height / span)
     figure, axes = plt.subplots(figsize=(1.9 * inches * span / height, inches))
     draw_ground(axes, (-0.1 * span, 1.1 * span), (-0.03 * span, 0))
-    masses, stiffness = section.per_floor(section.masses), section.per_floor(section.stiffness)
     for floor, (length, mass) in enumerate(zip(lengths, masses, strict=True), start=1):
         words = f"$l_{{{floor}}}$ = {length:.2f} m"
-        if stiffness:
-            words = f"$k_{{{floor}}}$ = {stiffness[floor - 1].nominal / 1e6:.4g} MN/m"
+        if (stiffness := numbers.get(f"k{floor}")) is not None:
+            words = f"$k_{{{floor}}}$ = {stiffness.nominal / 1e6:.4g} MN/m"
         for x in (0.0, span):
             axes.plot([x, x], [level, level + length], color=INK, lw=1.4)
         axes.annotate(words, (-0.06 * span, level + length / 2), ha="right", fontsize=8)
@@ -53,10 +53,12 @@ def draw_frame(section: Frame) -> Figure:
     return figure
 
 
-def draw_chain(section: Frame) -> Figure:
+def draw_chain(structure: Structure) -> Figure:
     """Fig. 27: the frame as a chain of masses and springs, with its dampers if it has any."""
-    floors, has_dampers = section.floors, any(x.support.upper > 0 for x in section.dampers)
-    placement = section.damper_placement if has_dampers else None
+    floors = structure.model.floors
+    dampers = [structure.numbers[f"d{floor}"] for floor in range(1, floors + 1)]
+    has_dampers = any(damper.support.upper > 0 for damper in dampers)
+    placement = getattr(structure.model, "damper_placement", None) if has_dampers else None
     foot = -0.9 if placement == "ground" else -0.5
     right, width = PITCH * floors + 0.2, min(12.0, 2.2 + 1.5 * floors)  # of the axes, in inches
     height = 2.15 * width / (PITCH * floors + 0.5) + 0.1
@@ -192,7 +194,7 @@ def followed_run(results: Results, task: EnvelopeTask) -> tuple[Followed, int]:
     assert structure is not None
     cuts, tolerance = boxes(structure.inputs(task.fuzzy), (0.0,)), task.tolerance(structure)
     steps = max(1, min(round(DURATION / step), round(task.duration / step)))
-    motion = make_flow(structure.model, cuts.names, steps * step, step)
+    motion = make_flow(structure.model, cuts.names, steps * step, step, "midpoint")
     flow = UnitFlow(motion, cuts, not tolerance.unit)
     column = max(0, len([name for name in flow.outputs if name.startswith("q")]) - 1)
     for refinement in (1.0, 1e-2, 1e-4, 1e-8):  # until a new graph is computed, to have one to show

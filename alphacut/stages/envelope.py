@@ -207,7 +207,6 @@ def require_tolerance(
         if has_unit and error > allowed.value * (1 + 1e-9):
             what = f"the error of {name} is {error:.2g}; the case allows {allowed.value:.2g}"
             cure = "method auto, or a smaller envelope.step, reaches it"
-            is_general = isinstance(structure.model, frame.LagrangianSystem)
-            if not is_general and task.section.method not in FOLLOWERS:
+            if structure.linear is not None and task.section.method not in FOLLOWERS:
                 raise FailedError(what, cure)
             say(f"warning: {what}; {cure}")

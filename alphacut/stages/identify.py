@@ -34,7 +34,6 @@ def require_learnable(section: Identify, structure: Structure, alpha: tuple[floa
 def _arguments(section: Identify, structure: Structure, alpha: tuple[float, ...]) -> dict[str, Any]:
     """Arguments of `identify` for a section; RefusedError where it makes none."""
     require(alpha[0] > 0, "envelope.alpha", value=list(alpha), allowed="levels above 0")
-    assert structure.frame is not None
     try:
         modes = read_modes(
             section.measured,
@@ -48,4 +47,4 @@ def _arguments(section: Identify, structure: Structure, alpha: tuple[float, ...]
         raise RefusedError(key, error.value, error.allowed, error.cure) from None
     inputs = structure.inputs(section.learn, "identify.learn")
     options = {"held_out": section.held_out, "alpha": alpha}
-    return {"frame": structure.frame, "inputs": inputs, "modes": modes, **options}
+    return {"frame": structure.model, "inputs": inputs, "modes": modes, **options}

@@ -37,9 +37,10 @@ def stage(
             shares = cell_shares(campaign)
             for k, name in enumerate(("E", "ν")):
                 table[name] = dict(zip(shares.names, map(float, shares.share[:, k]), strict=True))
-        if structure is not None and task is not None and structure.frame and len(task.fuzzy) > 1:
+        has_floors = structure is not None and structure.model.floors > 0
+        if structure is not None and task is not None and has_floors and len(task.fuzzy) > 1:
             table |= sensitivity(
-                structure.frame,
+                structure.model,
                 structure.inputs(task.fuzzy),
                 duration=task.duration,
                 step=task.section.step,

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import cast
 
 from alphacut.case.limits import FragilitySection
 from alphacut.case.loads import RecordsSection
@@ -16,13 +15,13 @@ from alphacut.frame.analyses.fragility import incremental_analyses, increments_o
 from alphacut.frame.analyses.incremental import IncrementalAnalysis, Increments
 from alphacut.frame.analyses.limits import limits_by_name
 from alphacut.frame.analyses.suites import (
-    Moved,
     ScaledRecord,
     record_peaks,
     scaled_records,
     summarised,
-    with_record,
 )
+from alphacut.frame.structures.linear import LinearSystem
+from alphacut.frame.structures.storey import yields
 from alphacut.stages.envelope import EnvelopeTask
 from alphacut.stages.store import Stage, StageContext, StageResult
 
@@ -44,9 +43,15 @@ def suite_records(
     return records
 
 
+def linear_model(structure: Structure) -> LinearSystem:
+    """The model of a structure that records may move; scaled records are refused of others."""
+    assert structure.linear is not None
+    return structure.linear
+
+
 def moved_by(structure: Structure, record: ScaledRecord) -> Structure:
     """The structure moved by a record."""
-    return replace(structure, model=with_record(cast("Moved", structure.model), record))
+    return replace(structure, model=linear_model(structure).moved_by(record.ground))
 
 
 def stage(structure: Structure, task: EnvelopeTask, record: ScaledRecord) -> Stage[dict[str, Peak]]:
@@ -61,7 +66,7 @@ def _peaks(
     structure: Structure, task: EnvelopeTask, record: ScaledRecord, context: StageContext
 ) -> StageResult[dict[str, Peak]]:
     peaks = record_peaks(
-        cast("Moved", structure.model),
+        linear_model(structure),
         structure.inputs(task.fuzzy),
         record,
         task.limited,
@@ -80,7 +85,7 @@ def suite_peaks(
 ) -> SuitePeaks:
     """Worst, mean and statistics over the records, from the peaks under each by its name."""
     return summarised(
-        cast("Moved", structure.model),
+        linear_model(structure),
         structure.inputs(task.fuzzy),
         records,
         peaks,
@@ -96,9 +101,10 @@ def analyses_of(
     records: Sequence[ScaledRecord],
 ) -> dict[str, IncrementalAnalysis]:
     """Analyses of a frame that yields by the record's name, over the measure of the section."""
-    assert structure.frame is not None
+    frame = structure.model
+    assert yields(frame)
     return incremental_analyses(
-        structure.frame,
+        frame,
         structure.inputs(task.fuzzy),
         records,
         limits_by_name(section.limits_of(structure), ()),

@@ -90,14 +90,14 @@ class Results:
     def frame_result(self) -> FrameResult | None:
         """Frequencies, first period, weight and heights of a frame; None of another structure."""
         structure = self.structure
-        if structure is None or structure.frame is None:
+        if structure is None or structure.linear is None or not structure.floor_masses:
             return None
-        omega, drifts = frequencies(structure.frame), set(structure.outputs)
+        omega, drifts = frequencies(structure.linear), set(structure.outputs)
         heights = {x: height.nominal for x, height in structure.heights.items() if x in drifts}
         return FrameResult(
             omega_rad_per_s=omega,
             period_s=float(2 * np.pi / omega[0]),
-            weight_N=sum(structure.frame.masses) * STANDARD_GRAVITY,
+            weight_N=sum(mass.nominal for mass in structure.floor_masses) * STANDARD_GRAVITY,
             heights_m=heights,
         )
 

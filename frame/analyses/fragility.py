@@ -38,7 +38,6 @@ from alphacut.frame.analyses.peaks import Peak
 from alphacut.frame.analyses.probability import CONFIDENCE, clopper_pearson
 from alphacut.frame.analyses.suites import (
     MEASURES,
-    Moved,
     ScaledRecord,
     SuitePeaks,
     nominal_mode,
@@ -47,8 +46,9 @@ from alphacut.frame.analyses.suites import (
 )
 from alphacut.frame.boxes import ALPHA, boxes
 from alphacut.frame.records.history import Accelerogram
-from alphacut.frame.structures.observed import unit_of_output
-from alphacut.frame.structures.storey import StoreyFrame
+from alphacut.frame.structures.linear import LinearSystem, has_matrices
+from alphacut.frame.structures.model import StructureModel
+from alphacut.frame.structures.storey import StoreyFrame, yields
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.result import Ends, Nature
 
@@ -428,7 +428,7 @@ def _set_text(measures: Array, demands: Array) -> str:
 
 
 def fragility(
-    model: Moved,
+    model: LinearSystem,
     inputs: Mapping[str, FuzzyNumber],
     suite: Sequence[Accelerogram],
     limits: Limit | Sequence[Limit],
@@ -465,7 +465,7 @@ def fragility(
     named = limits_by_name(limits, ())
     require_fragile(model, [*named.values()])
     require_choice("intensity", intensity, MEASURES)
-    if not (isinstance(model, StoreyFrame) and yields(model)):
+    if not yields(model):
         names = [*dict.fromkeys(limit.peak for limit in named.values())]
         peaks = over_records(
             model, inputs, suite, duration=duration, step=step, alpha=alpha, names=names,
@@ -489,17 +489,11 @@ def fragility(
     )  # fmt: skip
 
 
-def yields(model: object) -> bool:
-    """Return whether a structure is a frame whose columns yield."""
-    return isinstance(model, StoreyFrame) and bool(model.hardening)
-
-
-def require_fragile(model: object, limits: Sequence[Limit]) -> None:
+def require_fragile(model: StructureModel, limits: Sequence[Limit]) -> None:
     """Refuse structures with forces or a start beside the record, and limits that do not fit."""
-    is_free = isinstance(model, Moved) and not model.loads
-    is_at_rest = not any(np.any(getattr(model, start, 0)) for start in ("q0", "v0"))
+    moves_by_record = has_matrices(model) and not model.loads and model.is_at_rest
     allowed = "linear structures and frames that yield, at rest and without forces"
-    require(is_free and is_at_rest, "fragility", value="of another motion", allowed=allowed)
+    require(moves_by_record, "fragility", value="of another motion", allowed=allowed)
     for limit in limits:
         fits = limit.outwards > 0 and not limit.mean
         allowed = "limits of each record that the structure at rest keeps"
@@ -553,7 +547,7 @@ def increments_of(
 
 
 def fragility_of(
-    model: Moved,
+    model: LinearSystem,
     limits: Mapping[str, Limit],
     *,
     intensity: str,
@@ -592,7 +586,7 @@ def fragility_of(
         n_records, miss = ends.low.shape[1], (1 - CONFIDENCE) / 2
         about: dict[str, Any] = {"output": event_words(name), "is_event": True}
         if name in limits:
-            about = {**facts_of(limits[name], unit_of_output(model, limits[name].output))}
+            about = {**facts_of(limits[name], model.unit_of(limits[name].output))}
             about["event_name"] = event_by_limit.get(name, "")
         parts[name] = LimitFragility(
             **about,

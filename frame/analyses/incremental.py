@@ -27,8 +27,7 @@ from alphacut.frame.boxes import ALPHA, Boxes, boxes
 from alphacut.frame.dynamics.yielding import YieldingFlow
 from alphacut.frame.methods.sampled import SKIPPED, spread_points
 from alphacut.frame.records.history import Accelerogram
-from alphacut.frame.structures.observed import unit_of_output
-from alphacut.frame.structures.storey import StoreyFrame
+from alphacut.frame.structures.storey import StoreyFrame, yields
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.result import Nature
 
@@ -314,8 +313,8 @@ def incremental(
     Raises:
         RefusedError: The columns do not yield, or a scale is not positive.
     """
-    yields = isinstance(model, StoreyFrame) and bool(model.hardening)
-    require(yields, "incremental", value="of another structure", allowed="columns that yield")
+    value, allowed = "of another structure", "columns that yield"
+    require(yields(model), "incremental", value=value, allowed=allowed)
     tried = np.unique(np.array([checked_number("scale", x, positive=True) for x in scales]))
     records = scaled_records(model, suite, duration=duration, step=step)
     outputs, peaks = [*map(str, model.outputs)], dict[str, dict[str, Array]]()
@@ -325,5 +324,5 @@ def incremental(
         limits = [(output, 1.0) for output in outputs]
         analysis = IncrementalAnalysis(frame, cuts, limits, record.duration, step)
         peaks[record.name] = dict(zip(outputs, analysis.peaks_at(tried), strict=True))
-    units = {output: unit_of_output(model, output) for output in outputs}
+    units = {output: model.unit_of(output) for output in outputs}
     return ScaledPeaks(alpha=np.array(cuts.alpha), scales=tried, peaks=peaks, units=units)

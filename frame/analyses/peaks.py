@@ -19,11 +19,8 @@ from alphacut.frame.dynamics.yielding import AT_NODES
 from alphacut.frame.envelope import Envelope, within_steps
 from alphacut.frame.methods.auto import Auto
 from alphacut.frame.propagation import envelope
-from alphacut.frame.structures.lagrangian import LagrangianSystem
-from alphacut.frame.structures.matrix import MatrixStructure
-from alphacut.frame.structures.observed import with_outputs
+from alphacut.frame.structures.model import StructureModel
 from alphacut.frame.structures.quantities import output_of
-from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.result import Bounds, Ends, Nature
 
@@ -289,7 +286,7 @@ def _tighter(first: Peak, second: Peak) -> Peak:
 
 
 def close_peaks(
-    model: StoreyFrame | MatrixStructure | LagrangianSystem,
+    model: StructureModel,
     inputs: Mapping[str, FuzzyNumber],
     names: Sequence[str],
     *,
@@ -306,7 +303,7 @@ def close_peaks(
     magnitudes = all(name == output_of(name) for name in names)
     method = Auto(PEAK_ERROR, peaks=True, magnitudes=magnitudes)
     times: dict[str, Any] = {"duration": duration, "step": step, "alpha": alpha}
-    observed = with_outputs(model, outputs)
+    observed = model.with_outputs(outputs)
     return peaks(envelope(observed, inputs, method, progress=progress, **times), names)
 
 

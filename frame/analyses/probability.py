@@ -31,10 +31,7 @@ from alphacut.frame.analyses.limits import (
 from alphacut.frame.boxes import ALPHA, Boxes, boxes
 from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.envelope import within_steps
-from alphacut.frame.structures.lagrangian import LagrangianSystem
-from alphacut.frame.structures.matrix import MatrixStructure
-from alphacut.frame.structures.observed import unit_of_output, with_outputs
-from alphacut.frame.structures.storey import StoreyFrame
+from alphacut.frame.structures.model import StructureModel
 from alphacut.frame.verification.step_error import MARGIN, node_deviation
 from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.fuzzy.result import Ends, Nature
@@ -150,7 +147,7 @@ class Probability(LimitsAnswer[LimitProbability]):
 
 
 def probability(
-    model: StoreyFrame | MatrixStructure | LagrangianSystem,
+    model: StructureModel,
     inputs: Mapping[str, FuzzyNumber],
     limits: Limit | Sequence[Limit],
     random: Mapping[str, FuzzyNumber | Sampler] | Sequence[str] = (),
@@ -189,7 +186,8 @@ def probability(
         random = {name: inputs[name] for name in random}
         inputs = {name: number for name, number in inputs.items() if name not in random}
     named = limits_by_name(limits, (), magnitudes=True)
-    model, sizes = with_outputs(model, tuple(named)), np.array([x.number for x in named.values()])
+    model = model.with_outputs(tuple(named))
+    sizes = np.array([x.number for x in named.values()])
     shared, allowed = ", ".join(sorted(set(inputs) & set(random))), "inputs that are not fuzzy too"
     require(not shared, "random", value=shared, allowed=allowed)
     rng, drawn = np.random.default_rng(seed), list[Array]()
@@ -203,8 +201,7 @@ def probability(
     draws = np.column_stack(drawn) if drawn else np.zeros((1, 0))
     crisp = {name: Crisp(x) for name, x in model.parameters.items() if name not in random}
     cuts = boxes(inputs or dict([*crisp.items()][:1]), alpha)  # which has one point
-    scheme = "midpoint" if isinstance(model, LagrangianSystem) else "exact"
-    flow = make_flow(model, (*cuts.names, *random), duration, step, scheme)
+    flow = make_flow(model, (*cuts.names, *random), duration, step)
     points_of_levels = [_points_of_cut(cuts, level) for level in range(len(cuts.alpha))]
     points = np.concatenate(points_of_levels)
     # errors between nodes and of time steps, from a few of the motions
@@ -227,7 +224,7 @@ def probability(
     has_random, events = bool(random), dict[str, LimitProbability]()
     for (name, limit), ratio in zip(named.items(), by_limit, strict=True):
         bounds = _bounds_of_event(ratio, level, limit.number, has_random=has_random)
-        unit = unit_of_output(model, limit.output)
+        unit = model.unit_of(limit.output)
         events[name] = LimitProbability(**facts_of(limit, unit), **bounds)
     if len(named) > 1:
         bounds = _bounds_of_event(by_limit.max(0), level, 1.0, has_random=has_random)

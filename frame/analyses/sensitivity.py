@@ -17,9 +17,7 @@ from alphacut.base.number_text import Table, percent_text
 from alphacut.frame.analyses.answer import Answer, Record
 from alphacut.frame.dynamics.flow import Flow
 from alphacut.frame.dynamics.nonlinear import make_flow
-from alphacut.frame.structures.lagrangian import LagrangianSystem
-from alphacut.frame.structures.matrix import MatrixStructure
-from alphacut.frame.structures.storey import StoreyFrame
+from alphacut.frame.structures.model import StructureModel
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.propagation import width_shares
 from alphacut.fuzzy.result import Nature
@@ -63,7 +61,7 @@ class Sensitivity(Answer):
 
 
 def sensitivity(
-    model: StoreyFrame | MatrixStructure | LagrangianSystem,
+    model: StructureModel,
     inputs: Mapping[str, FuzzyNumber],
     *,
     duration: float,
@@ -86,8 +84,7 @@ def sensitivity(
             where its search begins. It begins at the nominal values if not given.
     """
     outputs, known = [*map(str, model.outputs)], reached_at or {}
-    scheme = "midpoint" if isinstance(model, LagrangianSystem) else "exact"
-    flow = make_flow(model, tuple(inputs), duration, step, scheme)
+    flow = make_flow(model, tuple(inputs), duration, step)
     greatest = np.array(
         [[known.get(x, {}).get(y, number.nominal) for y, number in inputs.items()] for x in outputs]
     )

@@ -21,12 +21,9 @@ from alphacut.frame.boxes import ALPHA, boxes
 from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.records.history import Accelerogram
 from alphacut.frame.records.recording import arias_fractions
-from alphacut.frame.structures.lagrangian import LagrangianSystem
-from alphacut.frame.structures.linear import modal_damping_ratios
-from alphacut.frame.structures.matrix import MatrixStructure
-from alphacut.frame.structures.observed import unit_of_output, with_outputs
+from alphacut.frame.structures.linear import LinearSystem, has_matrices, modal_damping_ratios
+from alphacut.frame.structures.model import StructureModel
 from alphacut.frame.structures.quantities import output_of
-from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.result import Nature
 
@@ -42,8 +39,6 @@ QUANTILES = {"median": 0.5, "84 %": 0.84}
 """Of a suite's peaks; 84 % is one standard deviation of a normal law above the mean."""
 MEASURES = {"PGA": "m/s^2", "Sa(T1)": "m/s^2", "scale": ""}
 """SI units of the intensity measures of a record, by their names."""
-Moved = StoreyFrame | MatrixStructure
-"""A structure that a record of the ground moves."""
 
 
 class NominalMode(NamedTuple):
@@ -53,9 +48,9 @@ class NominalMode(NamedTuple):
     ratio: float
 
 
-def nominal_mode(model: Moved | LagrangianSystem) -> NominalMode:
+def nominal_mode(model: StructureModel) -> NominalMode:
     """Return the first mode of a linear structure; RefusedError of another one."""
-    if isinstance(model, LagrangianSystem):
+    if not has_matrices(model):
         what = "with a system that is not linear"
         raise RefusedError("records", what, "linear structures")
     omega, ratios = modal_damping_ratios(model)
@@ -104,7 +99,7 @@ class ScaledRecord:
 
 
 def scaled_records(
-    model: Moved | LagrangianSystem,
+    model: StructureModel,
     suite: Sequence[Accelerogram],
     *,
     duration: float,
@@ -156,7 +151,7 @@ def scaled_records(
 
 
 def record_peaks(
-    model: Moved,
+    model: LinearSystem,
     inputs: Mapping[str, FuzzyNumber],
     record: ScaledRecord,
     names: Sequence[str],
@@ -167,12 +162,7 @@ def record_peaks(
 ) -> dict[str, Peak]:
     """Return the peaks of a structure under a record, by the names of the peaks."""
     times: dict[str, Any] = {"duration": record.duration, "step": step / NODES, "alpha": alpha}
-    return close_peaks(with_record(model, record), inputs, names, **times, progress=progress)
-
-
-def with_record(model: Moved, record: ScaledRecord) -> Moved:
-    """Return the structure moved by a record in place of its own."""
-    return replace(model, ground=record.ground)
+    return close_peaks(model.moved_by(record.ground), inputs, names, **times, progress=progress)
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -250,7 +240,7 @@ class SuitePeaks(Answer):
 
 
 def over_records(
-    model: Moved,
+    model: LinearSystem,
     inputs: Mapping[str, FuzzyNumber],
     suite: Sequence[Accelerogram],
     *,
@@ -292,7 +282,7 @@ def over_records(
 
 
 def summarised(
-    model: Moved,
+    model: LinearSystem,
     inputs: Mapping[str, FuzzyNumber],
     records: Sequence[ScaledRecord],
     peaks: Mapping[str, Mapping[str, Peak]],
@@ -322,7 +312,7 @@ def summarised(
         alpha=np.array(alpha, float),
         by_record={x.name: replace(x.facts, peak=dict(peaks[x.name])) for x in records},
         statistics=statistics,
-        units={output_of(name): unit_of_output(model, output_of(name)) for name in worst},
+        units={output_of(name): model.unit_of(output_of(name)) for name in worst},
         peak={**worst, **means},
         farthest_record=farthest,
     )
@@ -346,7 +336,7 @@ def worst_peaks(peaks: Mapping[str, Peaks]) -> dict[str, Peak]:
 
 
 def mean_peaks(
-    model: Moved,
+    model: LinearSystem,
     inputs: Mapping[str, FuzzyNumber],
     records: Sequence[ScaledRecord],
     peaks: Mapping[str, Peaks],
@@ -369,7 +359,7 @@ def mean_peaks(
     is_in_cut = inside.all(axis=-1)  # (levels, points)
     tried_means: Array = np.zeros((len(points_tried), len(magnitudes)))
     for record in records:
-        moved = with_outputs(with_record(model, record), magnitudes)
+        moved = model.moved_by(record.ground).with_outputs(magnitudes)
         flow = make_flow(moved, cuts.names, record.duration, step / NODES, "exact")
         columns = [[*map(str, flow.outputs)].index(output) for output in magnitudes]
         tried_means += np.abs(flow.values(points_tried)).max(axis=1)[:, columns] / len(records)

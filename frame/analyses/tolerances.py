@@ -23,10 +23,7 @@ from alphacut.frame.analyses.peaks import PEAK_ERROR, Peak, Peaks, peaks
 from alphacut.frame.boxes import boxes
 from alphacut.frame.methods.auto import Auto
 from alphacut.frame.propagation import envelope, require_admissible
-from alphacut.frame.structures.lagrangian import LagrangianSystem
-from alphacut.frame.structures.matrix import MatrixStructure
-from alphacut.frame.structures.observed import with_outputs
-from alphacut.frame.structures.storey import StoreyFrame
+from alphacut.frame.structures.model import StructureModel
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval
 from alphacut.fuzzy.result import Nature, rounded
 from alphacut.fuzzy.sets.numbers import enclosed_set
@@ -130,7 +127,7 @@ def scale_supports(inputs: Mapping[str, FuzzyNumber], scale: float) -> dict[str,
 
 
 def require_admissible_scale(
-    model: StoreyFrame | MatrixStructure | LagrangianSystem,
+    model: StructureModel,
     inputs: Mapping[str, FuzzyNumber],
     most: float,
 ) -> None:
@@ -143,7 +140,7 @@ def require_admissible_scale(
 
 
 def tolerances(
-    model: StoreyFrame | MatrixStructure | LagrangianSystem,
+    model: StructureModel,
     inputs: Mapping[str, FuzzyNumber],
     limits: Limit | Sequence[Limit],
     *,
@@ -177,7 +174,7 @@ def tolerances(
     checked_number("precision", precision, positive=True, most=1)
     named = limits_by_name(limits, (), magnitudes=True)
     sizes = {name: limit.number for name, limit in named.items()}
-    model = with_outputs(model, tuple(sizes))
+    model = model.with_outputs(tuple(sizes))
     require_admissible_scale(model, inputs, most)
     tried = {1.0: at_one} if at_one is not None and most >= 1 else {}  # peaks by scale
 

@@ -20,7 +20,6 @@ from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.integrators import Exact, Integrator, Midpoint, StepMap, state_matrix
 from alphacut.frame.dynamics.modal_trajectory import classical_trajectory, modal_trajectory
 from alphacut.frame.records.history import History
-from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import (
     LinearSystem,
     Matrices,
@@ -29,6 +28,7 @@ from alphacut.frame.structures.linear import (
     histories,
 )
 from alphacut.frame.structures.loads import distinct_histories
+from alphacut.frame.structures.model import Dynamics, StructureModel
 
 MAX_STEPS = 10_000_000
 """Most steps of a motion: bounds of one output at two levels are 320 MB of them."""
@@ -76,7 +76,7 @@ class Flow(ABC):
         RefusedError: A name is unknown, or the duration is no multiple of the step.
     """
 
-    system: LinearSystem | LagrangianSystem
+    system: StructureModel
     names: tuple[str, ...]
     duration: float
     step: float
@@ -189,7 +189,8 @@ class LinearFlow(Flow):
         """Refuse, besides, columns that yield, whose motion is not linear."""
         super().__post_init__()
         value, allowed = "of columns that yield", "make_flow, which takes them"
-        require(not getattr(self.system, "hardening", ()), "flow", value=value, allowed=allowed)
+        is_linear = self.system.dynamics is Dynamics.LINEAR
+        require(is_linear, "flow", value=value, allowed=allowed)
 
     @property
     def exact(self) -> bool:

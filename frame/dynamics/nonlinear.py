@@ -12,7 +12,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -26,8 +26,9 @@ from alphacut.frame.dynamics.flow import Flow, LinearFlow, StepError
 from alphacut.frame.dynamics.integrators import INTEGRATORS, Integrator
 from alphacut.frame.dynamics.yielding import YieldingFlow
 from alphacut.frame.structures.lagrangian import LagrangianSystem
-from alphacut.frame.structures.linear import LinearSystem
-from alphacut.frame.structures.storey import StoreyFrame
+from alphacut.frame.structures.linear import has_matrices
+from alphacut.frame.structures.model import StructureModel
+from alphacut.frame.structures.storey import yields
 
 Expressions = tuple[list[Any], list[Any], list[Any]]
 """Components, and the symbols they depend on: those to differentiate by, and others."""
@@ -36,31 +37,37 @@ MAX_ITERATIONS = 30
 
 
 def make_flow(
-    model: LinearSystem | LagrangianSystem,
+    model: StructureModel,
     names: Sequence[str],
     duration: float,
     step: float,
-    integrator: str | Integrator = "midpoint",
+    integrator: str | Integrator | None = None,
 ) -> Flow:
-    """Create the flow of a linear structure or another ("exact" alone where columns yield).
+    """Return the flow of a structure, as its dynamics ask for.
 
-    A Lagrangian system has "midpoint" steps alone.
-
-    `names` are the uncertain parameters; duration and step are in s.
+    Args:
+        model: The structure.
+        names: Uncertain parameters.
+        duration: Length of the simulation, in s.
+        step: Length of a step, in s.
+        integrator: Time stepping or its name. If not given it is exact where the structure has an
+            exact solution, else the midpoint scheme.
 
     Raises:
-        RefusedError: The structure has no such parameter or integrator.
+        RefusedError: The structure has no such parameter, or is not integrated so.
     """
-    if isinstance(model, LagrangianSystem):
-        require_choice("integrator", integrator, ["midpoint"])
-        return LagrangianFlow(model, tuple(names), duration, step)
-    if isinstance(model, StoreyFrame) and model.hardening:
-        require_choice("integrator", getattr(integrator, "name", integrator), ["exact"])
+    name = integrator.name if isinstance(integrator, Integrator) else integrator
+    if yields(model):
+        require_choice("integrator", name or "exact", ["exact"])
         return YieldingFlow(model, tuple(names), duration, step)
-    if isinstance(integrator, str):
-        require_choice("integrator", integrator, INTEGRATORS)
-        integrator = INTEGRATORS[integrator]
-    return LinearFlow(model, tuple(names), duration, step, integrator)
+    if has_matrices(model):
+        scheme = integrator or "exact"
+        if isinstance(scheme, str):
+            require_choice("integrator", scheme, INTEGRATORS)
+            scheme = INTEGRATORS[scheme]
+        return LinearFlow(model, tuple(names), duration, step, scheme)
+    require_choice("integrator", name or "midpoint", ["midpoint"])
+    return LagrangianFlow(cast("LagrangianSystem", model), tuple(names), duration, step)
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,6 +21,7 @@ from alphacut.base.errors import FailedError, require
 from alphacut.frame.identify.enclosure import enclosure
 from alphacut.frame.identify.learned import LearnedInputs, Predictions
 from alphacut.frame.identify.modes import Chain, MeasuredMode, ModeCut, eigenvalue_ranges
+from alphacut.frame.structures.model import StructureModel
 from alphacut.frame.structures.quantities import of_storey_frame
 from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.fuzzy import Crisp, FuzzyNumber
@@ -129,8 +130,8 @@ class Evidence:
         alpha: Sequence[float],
     ) -> Self:
         """Return what `identify` learns from; refuse what it refuses."""
-        is_frame, kind = isinstance(frame, StoreyFrame), type(frame).__name__
-        require(is_frame, "frame", value=kind, allowed="a StoreyFrame")
+        is_frame = isinstance(frame, StructureModel) and frame.floors > 0
+        require(is_frame, "frame", value=type(frame).__name__, allowed="a StoreyFrame")
         levels = np.append(0.0, alpha)
         in_range = len(levels) > 1 and levels[-1] <= 1 and bool((np.diff(levels) > 0).all())
         require(in_range, "identify.alpha", value=list(alpha), allowed="rising in (0, 1]")

@@ -22,8 +22,6 @@ from alphacut.frame.modes.geometric_mean import geometric_mean
 from alphacut.frame.records.history import History
 from alphacut.frame.response.duhamel import absolute_moments
 from alphacut.frame.structures.linear import LinearSystem
-from alphacut.frame.structures.matrix import MatrixStructure
-from alphacut.frame.structures.storey import StoreyFrame
 
 EQUAL = 1e-6
 """Relative distance of two eigenvalues below which they count as equal."""
@@ -256,31 +254,12 @@ def _reciprocal(x: TaylorModel) -> TaylorModel:
 def require_dissipation(system: LinearSystem, boxes: Boxes) -> None:
     """Refuse structures that are not known to lose energy everywhere in the box.
 
-    It follows from how a structure is written, not from samples of it.
-
     Raises:
-        UnprovedError: Unknowns have no mass, a parameter leaves its range, or a term of the damping
-            may feed energy into the structure.
+        UnprovedError: A parameter leaves its range, or see `LinearSystem.require_dissipation`.
     """
-    if not isinstance(system, StoreyFrame | MatrixStructure):
-        raise UnprovedError(f"nothing is known about the parameters of a {type(system).__name__}")
     lowest = {**system.parameters, **dict(zip(boxes.names, boxes.lower[0].tolist(), strict=True))}
     for name, low, high in zip(boxes.names, boxes.lower[0], boxes.upper[0], strict=True):
         if not (parameter := system.parameter(name)).admits(low, high):
             what = f"{name} reaches from {low:g} to {high:g}"
             raise UnprovedError(f"{what}, and is known to be {parameter.range or 'finite'}")
-    if isinstance(system, StoreyFrame):
-        return  # whose ranges have no negative damping
-    if len(system.massless):
-        raise UnprovedError("unknowns without mass are condensed", "take the method dual")
-    for kind in ("mass", "damping", "stiffness"):
-        if any(callable(factor) for factor, _ in getattr(system, kind)):
-            raise UnprovedError(f"{kind} has a factor that is a function")
-    for factor, array in system.damping:
-        eigenvalues = np.linalg.eigvalsh(array)
-        least = lowest[factor] if isinstance(factor, str) else float(factor)  # type: ignore[arg-type]
-        if least < 0 or eigenvalues[0] < -1e-14 * np.abs(eigenvalues).max():
-            raise UnprovedError(
-                "a term of the damping has a negative factor or an indefinite array: it may feed"
-                " energy into the structure"
-            )
+    system.require_dissipation(lowest)

@@ -8,7 +8,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from alphacut.base.errors import RefusedError, checked_number, require
-from alphacut.frame.structures.quantities import Output, Parameter, require_names
+from alphacut.frame.structures.model import Dynamics, StructureModel
+from alphacut.frame.structures.quantities import Output, require_names
 
 if TYPE_CHECKING:
     from sympy import Expr, Matrix
@@ -20,7 +21,7 @@ SMOOTH = "arithmetic and the smooth functions of SymPy"
 
 
 @dataclass(frozen=True, eq=False)
-class LagrangianSystem:
+class LagrangianSystem(StructureModel):
     """A system with n coordinates, given by plain Python functions of (q, v, p).
 
     The functions are called with symbols. They may use arithmetic, whole and fractional powers, and
@@ -97,9 +98,10 @@ class LagrangianSystem:
         """Names of the observed quantities, with their units."""
         return tuple(map(Output, self.observed))
 
-    def parameter(self, name: str) -> Parameter:
-        """A parameter, whose unit and range are not known."""
-        return Parameter(name)
+    @property
+    def dynamics(self) -> Dynamics:
+        """Nonlinear and smooth, by what SymPy can differentiate."""
+        return Dynamics.SMOOTH
 
     @cached_property
     def symbols(self) -> Equations:

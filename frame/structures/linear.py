@@ -8,9 +8,9 @@ parameter sets of jets, and nothing for Taylor models.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Generic, Protocol, TypeVar
+from typing import Any, Generic, Self, TypeGuard, TypeVar, cast
 
 import numpy as np
 
@@ -18,9 +18,10 @@ from alphacut.base.arrays import Array, Ints, Mask
 from alphacut.base.errors import RefusedError, require
 from alphacut.frame.calculus.jet import Jet, concatenate, inverse, variables
 from alphacut.frame.calculus.taylor_model import TaylorModel
+from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.records.history import Accelerogram, History
 from alphacut.frame.structures.loads import Force, distinct_histories
-from alphacut.frame.structures.quantities import Parameter
+from alphacut.frame.structures.model import Dynamics, StructureModel
 
 Number = TypeVar("Number", Jet, TaylorModel)
 
@@ -100,38 +101,65 @@ def stack(values: Sequence[Number]) -> Number:
     return type(values[0]).stack(values)
 
 
-class LinearSystem(Protocol):
-    """A linear structure whose matrices are smooth functions of named parameters."""
+class LinearSystem(StructureModel):
+    """Base of structures whose matrices are smooth functions of named parameters.
+
+    A kind of linear structure gives `parameters`, `outputs`, `assembly` and `entry_roundings`, and
+    `ground`, `loads` and `ratios` where it has them. Until columns yield it is linear as well.
+    """
 
     @property
-    def parameters(self) -> Mapping[str, float]:
-        """All parameters with their nominal values, in SI units."""
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """Names of the observed quantities."""
-
-    @property
-    def ground(self) -> Accelerogram | None:
-        """Base excitation, if any; the displacements are then relative to the ground."""
-
-    @property
-    def loads(self) -> Sequence[Force]:
-        """Forces on it."""
-
-    def parameter(self, name: str) -> Parameter:
-        """A parameter with the unit and the range that are known of it."""
+    def dynamics(self) -> Dynamics:
+        """Linear, unless columns yield."""
+        return Dynamics.LINEAR
 
     @property
     def ratios(self) -> Collection[str | float]:
         """Damping ratios, numbers or names of parameters: none, one, or one a mode."""
+        return ()
 
     @property
     def entry_roundings(self) -> int:
-        """Most roundings of an entry of M, K and of the outputs' rows as they are computed."""
+        """Largest number of roundings in the computation of an entry of M, K and output rows."""
+        raise NotImplementedError
 
     def assembly(self, p: Mapping[str, Number]) -> Assembly[Number]:
-        """The structure with its parameters as jets or as Taylor models."""
+        """Return the structure with its parameters as jets or as Taylor models."""
+        raise NotImplementedError
+
+    @property
+    def is_at_rest(self) -> bool:
+        """Whether nothing is displaced or moves at the start, at the nominal parameters."""
+        matrices, _ = evaluate(self, (), np.zeros((1, 0)), derivatives=False)
+        return not (matrices.q0.value.any() or matrices.v0.value.any())
+
+    def elastic(self) -> LinearSystem:
+        """Return the structure with its initial stiffness, whose columns do not yield."""
+        return self
+
+    def moved_by(self, ground: Accelerogram) -> Self:
+        """Return the structure with another base excitation."""
+        moved: Any = replace(cast("Any", self), ground=ground)
+        return cast("Self", moved)
+
+    def require_dissipation(self, lowest: Mapping[str, float]) -> None:
+        """Refuse a structure that is not known to lose energy everywhere in a box of parameters.
+
+        It follows from how the structure is written, not from samples of it.
+
+        Args:
+            lowest: Least value of each parameter in the box; all are within their ranges.
+
+        Raises:
+            UnprovedError: Unknowns have no mass, or a term of the damping may feed energy into the
+                structure.
+        """
+        raise UnprovedError(f"nothing is known about the parameters of a {type(self).__name__}")
+
+
+def has_matrices(model: object) -> TypeGuard[LinearSystem]:
+    """Return whether an object is a structure that is linear, at least until columns yield."""
+    return isinstance(model, StructureModel) and model.dynamics is not Dynamics.SMOOTH
 
 
 def histories(system: LinearSystem) -> dict[str, History]:

@@ -20,9 +20,18 @@ from alphacut.base.errors import (
     require_sequence,
 )
 from alphacut.frame.calculus.jet import Jet, variables
+from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.records.history import Accelerogram
-from alphacut.frame.structures.linear import Assembly, Number, evaluate, stack, undamped_modes
+from alphacut.frame.structures.linear import (
+    Assembly,
+    LinearSystem,
+    Number,
+    evaluate,
+    stack,
+    undamped_modes,
+)
 from alphacut.frame.structures.loads import Factor, Force, require_loads
+from alphacut.frame.structures.model import PlacedForce
 from alphacut.frame.structures.quantities import RATIO, Output, Parameter, require_names
 
 KINDS = ("mass", "damping", "stiffness")
@@ -30,7 +39,7 @@ Terms = Sequence[tuple[Factor | str | float, Array]]
 
 
 @dataclass(frozen=True, eq=False)
-class MatrixStructure:
+class MatrixStructure(LinearSystem):
     """M(p) q̈ + D(p) q̇ + K(p) q = −M(p) ι a(t) with M(p) = Σ_i f_i(p) M_i, likewise D and K.
 
     A factor is a number, the name of a parameter, or a function of all parameters in plain
@@ -165,8 +174,45 @@ class MatrixStructure:
         return tuple(map(Output, self.observed))
 
     def parameter(self, name: str) -> Parameter:
-        """A parameter, whose range is known where it is a damping ratio."""
+        """Return a parameter, whose range is known where it is a damping ratio."""
         return Parameter(name, range=RATIO if name in self.ratios else "")
+
+    def with_outputs(self, names: Sequence[str]) -> Self:
+        """Return the structure, observed at some of its outputs alone."""
+        super().with_outputs(names)
+        observed = {name: row for name, row in self.observed.items() if name in names}
+        factors = {name: factor for name, factor in self.row_factors.items() if name in names}
+        return replace(self, observed=observed, row_factors=factors)
+
+    def with_forces(self, forces: Sequence[PlacedForce]) -> tuple[Self, tuple[str, ...]]:
+        """Return the structure under forces, with the amplitudes "F1", "F2" … in their order."""
+        names = tuple(f"F{number}" for number in range(1, len(forces) + 1))
+        unit_vectors: Array = np.eye(self.size)
+        loads: list[Force] = []
+        parameters = dict(self.parameters)
+        for name, force in zip(names, forces, strict=True):
+            loads.append(Force(unit_vectors[force.place], name, force.history))
+            parameters[name] = force.amplitude
+        return replace(self, loads=loads, parameters=parameters), names
+
+    def require_dissipation(self, lowest: Mapping[str, float]) -> None:
+        """Refuse functions as factors, and damping that is not known to be dissipative.
+
+        D = Σ_i f_i D_i loses energy if all factors f_i and all arrays D_i are nonnegative.
+        """
+        if len(self.massless):
+            raise UnprovedError("unknowns without mass are condensed", "take the method dual")
+        for kind in KINDS:
+            if any(callable(factor) for factor, _ in getattr(self, kind)):
+                raise UnprovedError(f"{kind} has a factor that is a function")
+        for factor, array in self.damping:
+            eigenvalues = np.linalg.eigvalsh(array)
+            is_definite = eigenvalues[0] >= -1e-14 * np.abs(eigenvalues).max()
+            if value_of(factor, lowest) < 0 or not is_definite:
+                raise UnprovedError(
+                    "a term of the damping has a negative factor or an indefinite array: it may"
+                    " feed energy into the structure"
+                )
 
     def _term(self, kind: str, term: Any) -> tuple[Factor | str | float, Array]:
         """A term of a matrix: its factor, and its dense or sparse array made exactly symmetric."""

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, Self, TypeGuard
 
 import numpy as np
 
@@ -26,8 +26,9 @@ from alphacut.base.errors import (
 from alphacut.base.number_text import STANDARD_GRAVITY
 from alphacut.frame.calculus.jet import Jet
 from alphacut.frame.records.history import Accelerogram
-from alphacut.frame.structures.linear import Assembly, Number, stack
+from alphacut.frame.structures.linear import Assembly, LinearSystem, Number, stack
 from alphacut.frame.structures.loads import Force, require_loads
+from alphacut.frame.structures.model import Dynamics, PlacedForce, StructureModel
 from alphacut.frame.structures.quantities import Output, Parameter, of_storey_frame
 
 # names of the parameters that each list holds, by floor or storey, and of values that may be single
@@ -54,7 +55,7 @@ class _Storeys(NamedTuple):
 
 
 @dataclass(frozen=True)
-class StoreyFrame:
+class StoreyFrame(LinearSystem):
     """Chain of n floors with k_z = 12 c_z E I / l_z³ for c_z clamped columns (2 by default).
 
     Parameters that can be uncertain: "E", "I" or "I1" …, "m1" … "mn", "l1" …, "c1" … (columns of a
@@ -249,9 +250,35 @@ class StoreyFrame:
             names.append(f"{name}_{n_before + 1}" if n_before else name)
         return tuple(names)
 
+    @property
+    def dynamics(self) -> Dynamics:
+        """Linear, unless columns yield."""
+        return Dynamics.YIELDING if self.hardening else Dynamics.LINEAR
+
     def parameter(self, name: str) -> Parameter:
-        """A parameter with its unit and range."""
+        """Return a parameter with its unit and range."""
         return of_storey_frame(name)
+
+    def require_quantity(self, name: str) -> None:
+        """Refuse an output that the frame cannot have."""
+        self.quantity(name)
+
+    def with_outputs(self, names: Sequence[str]) -> Self:
+        """Return the frame, observed at any quantities that it can have."""
+        return replace(self, outputs=tuple(names))
+
+    def with_forces(self, forces: Sequence[PlacedForce]) -> tuple[Self, tuple[str, ...]]:
+        """Return the frame under forces on its floors, with the amplitudes `force_names`."""
+        loads = [Force(force.place + 1, force.amplitude, force.history) for force in forces]
+        frame = replace(self, loads=loads)
+        return frame, frame.force_names
+
+    def elastic(self) -> Self:
+        """Return the frame with its initial stiffness, whose columns do not yield."""
+        return replace(self, yield_force=(), yield_drift=(), hardening=(), rayleigh_of="initial")
+
+    def require_dissipation(self, lowest: Mapping[str, float]) -> None:
+        """Refuse nothing: the ranges of a frame's parameters have no negative damping."""
 
     def group(self, name: str) -> tuple[str, ...]:
         """The parameters that a short name stands for: "m" for m1 … mn; else itself."""
@@ -401,6 +428,11 @@ class StoreyFrame:
     def _of_floors(self, pattern: str, p: Mapping[str, Number]) -> Number:
         """Parameters of all floors, shape (…, n)."""
         return stack([p[pattern.format(z + 1)] for z in range(self.floors)])
+
+
+def yields(model: object) -> TypeGuard[StoreyFrame]:
+    """Return whether an object is a frame whose columns yield."""
+    return isinstance(model, StructureModel) and model.dynamics is Dynamics.YIELDING
 
 
 def chain_matrix(links: Array) -> Array:

@@ -17,7 +17,7 @@ from alphacut.frame.envelope import Envelope
 from alphacut.frame.records.history import History
 from alphacut.frame.response.straying import load_deviation, load_excess
 from alphacut.frame.structures.lagrangian import LagrangianSystem
-from alphacut.frame.structures.linear import evaluate
+from alphacut.frame.structures.linear import evaluate, has_matrices
 from alphacut.frame.structures.loads import distinct_histories
 from alphacut.fuzzy.result import Nature
 
@@ -166,7 +166,7 @@ def _fed_through(flow: Flow, points: Array) -> _FedThrough:
     """Return what forces add to outputs at once, at any of the parameters (S, d)."""
     histories = list[History]()
     amplitude = np.zeros((0, 1, len(flow.outputs)))
-    if not isinstance(flow.system, LagrangianSystem):
+    if has_matrices(flow.system):
         matrices, _ = evaluate(flow.system, flow.names, points, derivatives=False)
         if matrices.feeds is not None:
             histories = distinct_histories(flow.system.loads)

@@ -37,7 +37,7 @@ def written(folder, gravity):
 )
 def test_gravity_softens_storeys(tmp_path, text, gravity):
     """Frequencies are the roots of ω⁴ m₁ m₂ − ω² (m₁ s₂ + m₂ (s₁ + s₂)) + s₁ s₂ = 0."""
-    frame = load(written(tmp_path, f'gravity = "{text}"')).content.structure.frame
+    frame = load(written(tmp_path, f'gravity = "{text}"')).content.structure.model
     m1, m2, k2 = 60e3, 30e3, 5e6
     s1 = frame.parameters["k1"] - (m1 + m2) * gravity / 3
     s2 = k2 - m2 * gravity / 3

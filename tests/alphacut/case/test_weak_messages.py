@@ -2,8 +2,7 @@
 
 import pytest
 
-from alphacut.case.content import Content
-from alphacut.case.parse import parse
+from alphacut.case.content import load
 from alphacut.io.files import BadInput
 
 CASE = """
@@ -66,7 +65,7 @@ YIELDS = 'yield_force = ["50 kN", "50 kN"]\noutputs'
 def test_one_line_names_the_key_and_the_cure(tmp_path, old, new, words):
     (tmp_path / "t.toml").write_text(CASE.replace(old, new, 1), encoding="utf-8")
     with pytest.raises(BadInput) as caught:
-        parse(Content, tmp_path / "t.toml")
+        load(tmp_path / "t.toml")
     (line,) = str(caught.value).splitlines()
     for word in words:
         assert word in line
