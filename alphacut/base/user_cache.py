@@ -9,11 +9,13 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from hashlib import sha256
 from pathlib import Path
-from uuid import uuid4
 from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
+
+from alphacut.base.errors import FailedError
+from alphacut.base.kept_files import whole_file
 
 Arrays = Sequence[NDArray[np.generic]]
 UNUSED_DAYS = 14
@@ -61,10 +63,9 @@ def cached_arrays(name: str, content: bytes, make: Callable[[], Arrays]) -> Arra
         if np.array_equal(stored_key, key):
             os.utime(file)  # for `remove_unused`
             return arrays
-    new_arrays, partial = make(), folder / f"{uuid4().hex}.partial"
-    with suppress(OSError):  # a full disk, or a folder that was cleared: nothing is kept
-        with partial.open("wb") as stream:
-            np.savez(stream, key, *new_arrays)
-        partial.replace(file)
+    new_arrays = make()
+    with suppress(OSError, FailedError):  # a full disk, or a folder that was cleared: none is kept
+        with whole_file(file) as partial:
+            np.savez(partial, key, *new_arrays)
         remove_unused(folder)
     return new_arrays

@@ -10,13 +10,14 @@ from typing import TextIO, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
+from alphacut.base.kept_files import whole_file
 from alphacut.base.number_text import text_table
 from alphacut.case.cell import CellCase
 from alphacut.case.material import MeshedCell
 from alphacut.case.parse import parse
 from alphacut.case.structures import with_structures
 from alphacut.commands.options import Command, add_common, require_petsc, write_answer
-from alphacut.io.files import Document, ranks, say, whole_file
+from alphacut.io.files import Document, ranks, say
 from alphacut.io.provenance import versions
 from alphacut.rve.cell.cell import STRAIN
 from alphacut.rve.result.engineering_constants import NAMES, engineering_constants

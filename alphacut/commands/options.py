@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from typing import NoReturn, TextIO
 
 from alphacut.base.errors import RefusedError, require
+from alphacut.base.kept_files import write_text
 from alphacut.case.cell import CellContent
-from alphacut.io.files import as_json, suggestion, write_text
+from alphacut.io.files import as_json, suggestion
 
 PETSC_PREFIX = "-rve_"
 

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from alphacut import frame
 from alphacut.base.errors import RefusedError, require
+from alphacut.base.kept_files import locked
 from alphacut.base.progress_bar import progress_reporter
 from alphacut.case.content import Case, Content, load
 from alphacut.case.loads import RecordsSection
@@ -24,7 +25,7 @@ from alphacut.commands.options import require_petsc
 from alphacut.frame.analyses.incremental import Increments
 from alphacut.frame.analyses.peaks import Peak, Peaks
 from alphacut.fuzzy import Crisp, Triangular
-from alphacut.io.files import Document, locked, rank, require_writable, say
+from alphacut.io.files import Document, rank, require_writable, say
 from alphacut.io.results import MANIFEST, ResultsFolder
 from alphacut.rve.image.fields.grid import device_array
 from alphacut.rve.image.study import ImageStudy

@@ -15,12 +15,13 @@ import pandas as pd
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, require
+from alphacut.base.kept_files import locked, write_text
 from alphacut.base.number_text import text_table
 from alphacut.commands.options import Command, add_common, add_quiet, add_run, write_answer
 from alphacut.commands.pipeline import Pipeline, open_results, read_case
 from alphacut.fuzzy.campaign.workers import pool
 from alphacut.fuzzy.result import Nature
-from alphacut.io.files import locked, say, write_text
+from alphacut.io.files import say
 from alphacut.io.provenance import FORMAT, command_line, command_to_paste, versions
 from alphacut.io.results import ResultsFolder
 from alphacut.io.typed_json import to_document

@@ -1,11 +1,9 @@
-"""Output: places that are checked, whole files, one JSON object on standard output; messages."""
+"""Output: places that are checked, one JSON object on standard output; messages."""
 
 from __future__ import annotations
 
 import argparse
 import os
-import secrets
-import shutil
 import sys
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping
@@ -17,10 +15,9 @@ from typing import Any, TextIO
 import numpy as np
 from pydantic_core import to_json
 
-from alphacut.base.errors import FailedError, RefusedError, printable, require
+from alphacut.base.errors import RefusedError, printable, require
+from alphacut.base.kept_files import is_special
 
-MIN_FREE_BYTES = 1 << 20
-"""Bytes that a disk has at least where it is not full."""
 RANKS = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "MPI_LOCALRANKID")
 SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS")
 OUTPUTS = ("out", "json", "export", "csv", "tables")
@@ -42,47 +39,6 @@ def rank() -> int:
 def ranks() -> int:
     """The number of MPI ranks as mpirun tells it; 1 where there is none."""
     return next((int(os.environ[name]) for name in SIZES if name in os.environ), 1)
-
-
-def is_special(path: Path) -> bool:
-    """True if this is a device, a pipe or a socket, that nothing may replace."""
-    return path.exists() and not (path.is_file() or path.is_dir())
-
-
-@contextmanager
-def whole_file(path: Path | str, *, follow_links: bool = True) -> Iterator[Path]:
-    """Yields a temporary path beside `path`; the file written there replaces `path` in the end.
-
-    If the block fails, `path` stays as it was. A device or a pipe is written to instead. A link
-    stays and its target is replaced, or the link itself without `follow_links`.
-    """
-    path = Path(path)
-    if is_special(path) and follow_links:
-        with tempfile.TemporaryDirectory() as folder:
-            yield (partial := Path(folder) / path.name)
-            path.write_bytes(partial.read_bytes())
-        return
-    path = Path(os.path.realpath(path)) if follow_links else path
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(f".{path.stem}.{secrets.token_hex(4)}.part{path.suffix}")
-    try:
-        os.close(os.open(partial, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))  # through no link
-        yield partial
-        os.replace(partial, path)
-    except (OSError, RuntimeError):
-        if shutil.disk_usage(path.parent).free < MIN_FREE_BYTES:
-            is_temporary = path.is_relative_to(tempfile.gettempdir())
-            cure = "free some space" + (", or set TMPDIR to another folder" * is_temporary)
-            raise FailedError(f"the disk of {path.parent} is full", cure) from None
-        raise
-    finally:
-        partial.unlink(missing_ok=True)
-
-
-def write_text(path: Path | str, text: str, *, follow_links: bool = True) -> None:
-    """Writes a text file, whole or not at all."""
-    with whole_file(path, follow_links=follow_links) as partial:
-        partial.write_text(text, encoding="utf-8")
 
 
 def as_json(document: Mapping[str, object], *, indent: int | None = None) -> str:
@@ -149,32 +105,6 @@ def require_writable(option: str, value: str, *, folder: bool) -> None:
         fits, reason = False, f"nothing can be written in {existing}: {error.strerror or error}"
     allowed, fits = f"the name of {kind} where you may write", fits or is_special(path)
     require(fits, option, value or "empty", allowed, cure=reason.lower())
-
-
-@contextmanager
-def locked(option: str, folder: Path) -> Iterator[None]:
-    """Makes a folder, and locks it during the block against other runs, if the file system can.
-
-    Raises:
-        RefusedError: Another run is writing into it.
-    """
-    folder.mkdir(parents=True, exist_ok=True)
-    try:
-        import fcntl
-    except ImportError:  # Windows
-        yield
-        return
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        with suppress(OSError):
-            try:
-                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                cure = "another run is writing into it"
-                raise RefusedError(option, str(folder), "a folder of its own", cure) from None
-        yield
-    finally:
-        os.close(handle)
 
 
 class BadInput(Exception):  # noqa: N818 - it names the input, not the program, as the culprit

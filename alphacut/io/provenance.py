@@ -19,6 +19,7 @@ from types import FunctionType
 import numpy as np
 from pydantic import BaseModel
 
+from alphacut.base.kept_files import digest_of
 from alphacut.io.files import INSIDE
 
 FORMAT = 4
@@ -73,17 +74,6 @@ def fingerprint(inputs: object, packages: Sequence[str]) -> str:
     """Digest of everything that a result depends on: inputs, source, library versions."""
     content = [inputs, source_digest(tuple(packages)), versions(), FORMAT]
     return digest_of(json.dumps(content, sort_keys=True, default=_canonical).encode())
-
-
-def digest_of(content: bytes) -> str:
-    """SHA-256 of a content in hexadecimal digits."""
-    return hashlib.sha256(content).hexdigest()
-
-
-def file_digest(path: Path) -> str:
-    """SHA-256 of the content of a file, which may be larger than the memory."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _canonical(value: object) -> object:

@@ -11,17 +11,16 @@ from __future__ import annotations
 import json
 import os
 import re
-import stat
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Self
 
-from pydantic import AfterValidator, TypeAdapter, ValidationError
-
 from alphacut.base.errors import RefusedError, require
-from alphacut.io.files import as_json, whole_file
-from alphacut.io.provenance import FORMAT, command_to_paste, digest_of
+from alphacut.base.kept_files import digest_of, is_regular, read_regular, whole_file
+from alphacut.io.files import as_json
+from alphacut.io.provenance import FORMAT, command_to_paste
+from alphacut.io.typed_json import from_document
 
 if TYPE_CHECKING:
     import xarray
@@ -29,9 +28,6 @@ if TYPE_CHECKING:
 MANIFEST = "manifest.json"
 PLAIN = re.compile(r"(figures/)?(?!.*\.\.)[\w+-][\w.+-]{0,100}")
 """Names of files in a folder of results or its folder of figures, which lead to no other."""
-READ_ONLY = os.O_RDONLY | sum(
-    getattr(os, flag, 0) for flag in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY")
-)
 RUN = command_to_paste("run", "CASE.toml")
 COMPLETE = "whole results of a run"
 """Allowed state of a folder of results."""
@@ -40,10 +36,18 @@ RUN_AGAIN = f"make it anew by {RUN}"
 
 
 def plain_name(name: str) -> str:
-    """The name of a file in a folder of results or its folder of figures; ValueError of others."""
+    """Return the name of a file in a folder of results or its folder of figures.
+
+    Raises:
+        ValueError: The name leads elsewhere.
+    """
     if PLAIN.fullmatch(name) is None:
         raise ValueError("no plain name")
     return name
+
+
+PlainName = Annotated[str, plain_name]
+"""Type of such names in documents that `from_document` reads."""
 
 
 class Listed(NamedTuple):
@@ -53,9 +57,6 @@ class Listed(NamedTuple):
     """SHA-256; "" of a store of samples, whose rows have checksums"""
     source: str
     """"" of a text of the run itself"""
-
-
-FILES = TypeAdapter(dict[Annotated[str, AfterValidator(plain_name)], Listed])
 
 
 @dataclass
@@ -71,9 +72,10 @@ class ResultsFolder:
 
     @classmethod
     def read(cls, path: Path) -> Self:
-        """The folder with what manifest.json lists; nothing where that is missing or damaged.
+        """Return the folder with what manifest.json lists; nothing where it is missing or damaged.
 
-        RefusedError of a list of another format or program, and of one that is no regular file.
+        Raises:
+            RefusedError: The list is of another format or program, or is no regular file.
         """
         file = path / MANIFEST
         if not os.path.lexists(file):
@@ -90,12 +92,14 @@ class ResultsFolder:
         value, allowed = f"of format {version}", f"files of format {FORMAT}"
         cure = "name another folder" if version is None else RUN_AGAIN
         require(version == FORMAT, str(file), value, allowed, cure=cure)
+        files = document.get("files")
         try:
-            files = FILES.validate_python(document.get("files"))
-        except ValidationError:
+            pairs = from_document(dict[PlainName, tuple[str, str]], files)
+        except ValueError:
             return cls(path, is_damaged=True)
-        is_whole = document.get("checksum") == digest_of(json.dumps(files).encode())
-        return cls(path, files) if is_whole else cls(path, is_damaged=True)
+        if document.get("checksum") != digest_of(json.dumps(files).encode()):
+            return cls(path, is_damaged=True)
+        return cls(path, {name: Listed(*pair) for name, pair in pairs.items()})
 
     def require_own_files(self, option: str) -> None:
         """Refuses a folder of other files, in which no run has written its list."""
@@ -140,14 +144,14 @@ class ResultsFolder:
         cure = "move it away, or name another folder"
         try:
             self._require_real_parents(name)
-            mode = os.lstat(file).st_mode
+            is_file = is_regular(file)
         except FileNotFoundError:
             return
         except NotADirectoryError as error:
             raise RefusedError(str(file), str(error), allowed, cure) from None
-        is_listed, is_regular = self.is_damaged or name in self.files, stat.S_ISREG(mode)
-        kind = "a file that no manifest lists" if is_regular else "no regular file"
-        is_free = is_listed and (is_regular or stat.S_ISLNK(mode))
+        is_listed = self.is_damaged or name in self.files
+        is_free = is_listed and (is_file or file.is_symlink())
+        kind = "a file that no manifest lists" if is_file else "no regular file"
         require(is_free, str(file), kind, allowed, cure=cure)
 
     def put_files(self, source: str, folder: Path, before: str = "") -> None:
@@ -204,8 +208,7 @@ class ResultsFolder:
         file = self.path / name
         try:
             self._require_real_parents(name)
-            is_link = stat.S_ISLNK(os.lstat(file).st_mode)
-            if is_link or digest in ("", digest_of(read_regular(file))):
+            if file.is_symlink() or digest in ("", digest_of(read_regular(file))):
                 file.unlink()
         except OSError:
             return
@@ -213,14 +216,7 @@ class ResultsFolder:
     def _require_real_parents(self, name: str) -> None:
         """Raises NotADirectoryError if a folder between this one and a file is a link."""
         for parent in PurePosixPath(name).parents[:-1]:
-            if not stat.S_ISDIR(os.lstat(self.path / parent).st_mode):
+            folder = self.path / parent
+            os.lstat(folder)  # FileNotFoundError where there is nothing
+            if folder.is_symlink() or not folder.is_dir():
                 raise NotADirectoryError(f"{parent} is no folder")
-
-
-def read_regular(file: Path) -> bytes:
-    """The content of a regular file; OSError of a link, a device, a pipe or a folder."""
-    if stat.S_ISREG(os.lstat(file).st_mode):  # before it is opened, and then what was opened
-        with open(os.open(file, READ_ONLY), "rb") as stream:
-            if stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
-                return stream.read()
-    raise OSError("no regular file")

@@ -10,12 +10,13 @@ import numpy as np
 import pandas as pd
 
 from alphacut.base.csv_text import csv_cell
+from alphacut.base.kept_files import write_text
 from alphacut.base.number_text import MINUS, Table, rounded_ends
 from alphacut.frame import LearnedInputs, Sensitivity
 from alphacut.frame.analyses.answer import Answer
 from alphacut.frame.structures.quantities import output_of
 from alphacut.fuzzy.result import Nature, of_enclosing_box
-from alphacut.io.files import Document, write_text
+from alphacut.io.files import Document
 from alphacut.io.results import ResultsFolder
 from alphacut.stages.envelope import EnvelopeResult
 from alphacut.stages.image import ImageResult

@@ -8,9 +8,9 @@ from functools import partial
 import numpy as np
 
 from alphacut.base.arrays import Array
+from alphacut.base.kept_files import file_digest
 from alphacut.case.material import ImageCell
 from alphacut.fuzzy.result import Nature
-from alphacut.io.provenance import file_digest
 from alphacut.rve.image.files import files_of, read_grid
 from alphacut.rve.image.study import (
     GUARANTEE,

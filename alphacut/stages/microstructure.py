@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from alphacut.base.kept_files import file_digest, write_text
 from alphacut.case.microstructure import MicrostructureSection
-from alphacut.io.files import Document, write_text
-from alphacut.io.provenance import file_digest
+from alphacut.io.files import Document
 from alphacut.stages.store import Stage, StageContext, StageResult
 from alphacut.stochastic import FittedRadiusMap, fit_radius_map
 

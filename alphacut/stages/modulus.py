@@ -11,12 +11,13 @@ import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import require
+from alphacut.base.kept_files import file_digest
 from alphacut.fuzzy import FuzzyNumber, General, Reduced, Signed
 from alphacut.fuzzy.plans.design import Plan
 from alphacut.fuzzy.propagation import CampaignOptions
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document
-from alphacut.io.provenance import file_digest, source_digest, versions
+from alphacut.io.provenance import source_digest, versions
 from alphacut.rve.fuzzy_cell import (
     FIBRES,
     SUFFIXES,

@@ -19,8 +19,9 @@ from numpy.typing import ArrayLike
 
 from alphacut.base.arrays import Array, on_one_blas_thread
 from alphacut.base.errors import FailedError, RefusedError, require
+from alphacut.base.kept_files import whole_file, write_text
 from alphacut.base.progress_bar import Progress, subprogress
-from alphacut.io.files import as_json, rank, say, whole_file, write_text
+from alphacut.io.files import as_json, rank, say
 from alphacut.io.provenance import build_provenance, fingerprint
 from alphacut.io.results import Listed, ResultsFolder
 from alphacut.io.typed_json import from_document, to_document

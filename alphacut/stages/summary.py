@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, field, fields, replace
-from typing import Annotated, Any, Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from alphacut.frame.analyses.answer import Answer
 from alphacut.frame.structures.linear import frequencies
 from alphacut.frame.structures.quantities import output_of
 from alphacut.io.files import Document, as_json
-from alphacut.io.results import COMPLETE, RUN_AGAIN, ResultsFolder, plain_name
+from alphacut.io.results import COMPLETE, RUN_AGAIN, PlainName, ResultsFolder
 from alphacut.io.typed_json import from_document, to_document
 from alphacut.stages.answers import ANSWERS
 from alphacut.stages.envelope import EnvelopeResult, EnvelopeTask
@@ -35,8 +35,6 @@ from alphacut.stages.shares import ShareTable
 from alphacut.stages.store import StageResult
 
 SUMMARY = "summary.json"
-PlainName = Annotated[str, plain_name]
-"""A name that leads out of no folder, as it becomes part of the name of a file."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

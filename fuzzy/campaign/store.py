@@ -13,7 +13,6 @@ from __future__ import annotations
 import json
 import os
 import sqlite3
-import stat
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -25,6 +24,7 @@ import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import FailedError, require
+from alphacut.base.kept_files import is_regular, read_regular
 from alphacut.fuzzy.campaign.call import Layout, Sample, named_point
 
 Identity = Mapping[str, object]
@@ -189,12 +189,11 @@ def _is_store(path: Path) -> bool:
     """Return True for a store, an empty file, or where there is nothing; none of them a link."""
     for end in ("", "-journal", "-wal", "-shm"):
         with suppress(FileNotFoundError):
-            if not stat.S_ISREG(os.lstat(path.with_name(f"{path.name}{end}")).st_mode):
+            if not is_regular(path.with_name(f"{path.name}{end}")):
                 return False
-    if not os.path.lexists(path):
+    if not path.exists():
         return True
-    with path.open("rb") as file:
-        head = file.read(_HEAD)
+    head = read_regular(path, _HEAD)
     if not head.startswith(b"SQLite format 3\0"):
         return not head
     return int.from_bytes(head[_HEAD - 4 :], "big") == _APPLICATION

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import pytest
 
 from alphacut.base.errors import FailedError, RefusedError
-from alphacut.io.files import locked, whole_file, write_text
+from alphacut.base.kept_files import locked, whole_file, write_text
 
 
 def test_a_link_stays_and_its_target_is_replaced(tmp_path):

@@ -1,0 +1,135 @@
+"""Files that are kept, of samples and of results: written whole, named by digests, by one writer.
+
+Nothing is read or replaced through a link, and no device, pipe or folder is taken for a file.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import secrets
+import shutil
+import stat
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from alphacut.base.errors import FailedError, RefusedError
+
+MIN_FREE_BYTES = 1 << 20
+"""Bytes that a disk has at least where it is not full."""
+
+
+def digest_of(content: bytes) -> str:
+    """Return the SHA-256 of a content in hexadecimal digits."""
+    return hashlib.sha256(content).hexdigest()
+
+
+def file_digest(path: Path) -> str:
+    """Return the SHA-256 of a file, which may be larger than the memory."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def is_regular(path: Path) -> bool:
+    """Return whether a path names a regular file itself, and no link to one.
+
+    Raises:
+        OSError: There is nothing of this name.
+    """
+    return stat.S_ISREG(os.lstat(path).st_mode)
+
+
+def is_special(path: Path) -> bool:
+    """Return whether a path leads to a device, a pipe or a socket, which nothing may replace."""
+    return path.exists() and not (path.is_file() or path.is_dir())
+
+
+def read_regular(path: Path, size: int = -1) -> bytes:
+    """Return the content of a regular file, or its first `size` bytes.
+
+    Raises:
+        OSError: There is no such file, or it is a link, a device, a pipe or a folder.
+    """
+    # A pipe without a writer would block the opening, so the path is looked at before; what was
+    # opened is looked at again, because the path may name something else by then.
+    if is_regular(path):
+        flags = os.O_RDONLY
+        for flag in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY"):
+            flags |= getattr(os, flag, 0)
+        with open(os.open(path, flags), "rb") as stream:
+            if stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
+                return stream.read(size)
+    raise OSError("no regular file")
+
+
+@contextmanager
+def whole_file(path: Path | str, *, follow_links: bool = True) -> Iterator[Path]:
+    """Yield a temporary path beside `path`; the file written there replaces `path` in the end.
+
+    If the block fails, `path` stays as it was. A device or a pipe is written to instead. A link
+    stays and its target is replaced, or the link itself without `follow_links`.
+
+    Raises:
+        FailedError: The disk is full.
+    """
+    path = Path(path)
+    if is_special(path) and follow_links:
+        with tempfile.TemporaryDirectory() as folder:
+            partial = Path(folder) / path.name
+            yield partial
+            path.write_bytes(partial.read_bytes())
+        return
+    path = Path(os.path.realpath(path)) if follow_links else path
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_name(f".{path.stem}.{secrets.token_hex(4)}.part{path.suffix}")
+    try:
+        os.close(os.open(partial, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))  # through no link
+        yield partial
+        os.replace(partial, path)
+    except (OSError, RuntimeError):
+        if shutil.disk_usage(path.parent).free < MIN_FREE_BYTES:
+            cure = "free some space"
+            if path.is_relative_to(tempfile.gettempdir()):
+                cure += ", or set TMPDIR to another folder"
+            raise FailedError(f"the disk of {path.parent} is full", cure) from None
+        raise
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def write_text(path: Path | str, text: str, *, follow_links: bool = True) -> None:
+    """Write a text file, whole or not at all; see `whole_file`."""
+    with whole_file(path, follow_links=follow_links) as partial:
+        partial.write_text(text, encoding="utf-8")
+
+
+@contextmanager
+def locked(option: str, folder: Path) -> Iterator[None]:
+    """Make a folder, and lock it during the block against other runs, if the file system can.
+
+    Args:
+        option: Option that names the folder, for the message.
+        folder: The folder.
+
+    Raises:
+        RefusedError: Another run is writing into it.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        import fcntl
+    except ImportError:  # Windows
+        yield
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        with suppress(OSError):
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                cure = "another run is writing into it"
+                raise RefusedError(option, str(folder), "a folder of its own", cure) from None
+        yield
+    finally:
+        os.close(handle)
