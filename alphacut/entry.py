@@ -18,7 +18,7 @@ from types import FrameType
 
 from alphacut.base.errors import FailedError, RefusedError
 from alphacut.commands.options import Command, Parser, require_petsc, split_petsc
-from alphacut.fuzzy.campaign.campaign import CampaignError
+from alphacut.fuzzy.campaign.call import CampaignError
 from alphacut.io.files import (
     BadInput,
     check_destinations,

@@ -23,7 +23,7 @@ from alphacut.fuzzy.propagation import CampaignOptions
 from alphacut.fuzzy.result import Bounds, Nature
 from alphacut.fuzzy.sets.boxes import levels
 from alphacut.fuzzy.sets.numbers import Cut, outer_steps
-from alphacut.rve.cell.cell import AnyPhase, Phase
+from alphacut.rve.cell.cell import AnyPhase, Phase, Phases
 from alphacut.rve.result.cell_model import AnyModel
 from alphacut.rve.result.engineering_constants import (
     FREE,
@@ -188,8 +188,6 @@ def fuzzy_number(alpha: Array, cuts: Array) -> FuzzyNumber:
     return outer_steps(alpha, cuts[:, 0], cuts[:, 1])
 
 
-Phases = Sequence[AnyPhase] | Mapping[str, AnyPhase]
-"""Matrix and particle, or the phases of the user's own mesh or level set by name."""
 PHASE_PARAMETERS = ("modulus", "poisson", "loss")
 
 

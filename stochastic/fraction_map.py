@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from alphacut.base.arrays import Array
-from alphacut.stochastic.particles.particles import DISCS, Shape
+from alphacut.stochastic.particles.shapes import DISCS, Shape
 from alphacut.stochastic.theta.law import ThetaLaw, TruncatedNormal
 
 

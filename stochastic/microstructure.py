@@ -24,7 +24,8 @@ from alphacut.fuzzy.campaign.workers import pool
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
 from alphacut.stochastic.fit.hermite_fit import HermiteFit, PBox, SlopeBand, least_pbox, slope_band
 from alphacut.stochastic.particles.packings import Packings
-from alphacut.stochastic.particles.particles import DISCS, SPHERES, Particles, Shape
+from alphacut.stochastic.particles.particles import Particles
+from alphacut.stochastic.particles.shapes import DISCS, SPHERES, Shape
 from alphacut.stochastic.radius_map import HermiteMap
 from alphacut.stochastic.sections import ParticleCells, reduced_radii, with_cells
 from alphacut.stochastic.tessellation.apollonius import neighbouring_values, neighbours

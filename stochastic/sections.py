@@ -14,7 +14,8 @@ import numpy as np
 from alphacut.base.arrays import Array, Ints
 from alphacut.base.errors import FailedError, require
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
-from alphacut.stochastic.particles.particles import DISCS, Particles
+from alphacut.stochastic.particles.particles import Particles
+from alphacut.stochastic.particles.shapes import DISCS
 from alphacut.stochastic.tessellation.apollonius import Apollonius, apollonius, counted_cells
 
 PATCHES = 5  # a single section is cut into 5 × 5 patches, which the bootstrap draws

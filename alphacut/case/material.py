@@ -32,7 +32,7 @@ from alphacut.rve.cell.outline import Ellipse, circle, reach
 from alphacut.rve.image.phases import RIGID
 from alphacut.rve.models import MODELS, fitting_models
 from alphacut.stochastic import FractionMap, HermiteMap, TruncatedNormal
-from alphacut.stochastic.particles.particles import DISCS, SPHERES, Shape
+from alphacut.stochastic.particles.shapes import DISCS, SPHERES, Shape
 
 Radius = Annotated[FuzzyNumber, Quantity(above=0, below=1, fuzzy=True)]
 

@@ -17,8 +17,8 @@ from alphacut.stochastic import (
     pack,
     read_particles,
 )
-from alphacut.stochastic.particles.particles import DISCS, SPHERES
 from alphacut.stochastic.particles.radius_laws import RadiusLaw
+from alphacut.stochastic.particles.shapes import DISCS, SPHERES
 
 Progress = Callable[[float], None]
 

@@ -18,9 +18,8 @@ from alphacut.case.material import (
 )
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.io.files import missing
-from alphacut.rve.cell.cell import Cell, Phase
+from alphacut.rve.cell.cell import Cell, Phase, Phases
 from alphacut.rve.cell.outline import circle
-from alphacut.rve.fuzzy_cell import Phases
 from alphacut.rve.models import fitting_models
 from alphacut.rve.result.cell_model import AnyModel, Resolution
 from alphacut.rve.result.moduli import AXES

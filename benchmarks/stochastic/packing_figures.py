@@ -27,7 +27,7 @@ from alphacut.figures.style import BLUE, GREEN, GREY, INK, LIGHT, ORANGE, PALE
 from alphacut.stochastic import FittedRadiusMap, LogNormalRadii, Particles, fit_radius_map
 from alphacut.stochastic.particles.packing import Packing
 from alphacut.stochastic.particles.packings import Packings
-from alphacut.stochastic.particles.particles import DISCS
+from alphacut.stochastic.particles.shapes import DISCS
 from alphacut.stochastic.tessellation.apollonius import (
     Apollonius,
     apollonius,

@@ -66,6 +66,35 @@ class SpentError(FailedError):
     """The next evaluations would pass the budget; none of them is run."""
 
 
+class CampaignError(FailedError):
+    """Some samples of a campaign failed.
+
+    Args:
+        failures: Inputs of each failed sample by name, and the text of its error.
+        total: Number of samples of the campaign.
+        cure: What the user can do.
+    """
+
+    max_quoted = 3  # failed samples in the message
+    max_letters = 300  # letters of each of their errors
+
+    def __init__(self, failures: list[tuple[dict[str, float], str]], total: int, cure: str) -> None:
+        self.failures = failures
+        self.total = total
+        quoted = []
+        for point, error in failures[: self.max_quoted]:
+            first_line = error.strip().partition("\n")[0]
+            if len(first_line) > self.max_letters:
+                first_line = f"{first_line[: self.max_letters]} …"
+            values = ", ".join(f"{name} = {value:.6g}" for name, value in point.items())
+            quoted.append(f"at {values}: {first_line}")
+        if len(failures) > self.max_quoted:
+            quoted.append(f"and {len(failures) - self.max_quoted} more")
+        successes = "the others are done: " if len(failures) < total else ""
+        what = f"{len(failures)} of {total} samples failed, {successes}"
+        super().__init__(what + "; ".join(quoted), cure)
+
+
 class Sample(NamedTuple):
     """Outputs at one point."""
 

@@ -11,9 +11,10 @@ from time import perf_counter
 import numpy as np
 
 from alphacut.base.arrays import Array
-from alphacut.base.errors import FailedError, checked_number
+from alphacut.base.errors import checked_number
 from alphacut.fuzzy.campaign.call import (
     Call,
+    CampaignError,
     Failure,
     Layout,
     Outcome,
@@ -30,29 +31,9 @@ from alphacut.fuzzy.sets.boxes import Domain, quasi_random_points
 
 LOG = logging.getLogger(__name__)
 
-_MAX_QUOTED = 3  # failed samples that a message quotes
-_MAX_LETTERS = 300  # letters of an error that a message quotes
 _MIN_PAUSE = 0.05  # seconds between two transactions at least
 _MIN_PAUSE_RATIO = 10  # a transaction that took t is not followed by another within 10 t
 _FIRST_POINTS = 16  # points that are tried, where samples may fail, to learn the outputs' names
-
-
-class CampaignError(FailedError):
-    """Some samples of `total` failed: `failures` has the inputs of each and its error."""
-
-    def __init__(self, failures: list[tuple[dict[str, float], str]], total: int, cure: str) -> None:
-        self.failures, self.total = failures, total
-        lines = []
-        for point, error in failures[:_MAX_QUOTED]:
-            first_line = error.strip().partition("\n")[0]
-            is_long = len(first_line) > _MAX_LETTERS
-            brief = f"{first_line[:_MAX_LETTERS]} …" if is_long else first_line
-            values = ", ".join(f"{name} = {value:.6g}" for name, value in point.items())
-            lines.append(f"at {values}: {brief}")
-        more = f"; and {len(failures) - _MAX_QUOTED} more" if len(failures) > _MAX_QUOTED else ""
-        successes = "the others are done: " if len(failures) < total else ""
-        what = f"{len(failures)} of {total} samples failed, {successes}"
-        super().__init__(what + "; ".join(lines) + more, cure)
 
 
 @dataclass

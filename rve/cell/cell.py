@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Real
 
@@ -114,6 +114,8 @@ class VoigtPhase:
 
 
 AnyPhase = Phase | VoigtPhase
+Phases = Sequence[AnyPhase] | Mapping[str, AnyPhase]
+"""Matrix and particle, or the phases of a mesh or level set of the user's own by name."""
 
 
 def require_loss(loss: float | None) -> None:

@@ -17,7 +17,7 @@ from alphacut.rve.cell.cell import Phase
 from alphacut.rve.result.checks import ROUND_OFF, bulk_check, checks_within_limits, order_checks
 from alphacut.rve.result.moduli import hashin_shtrikman
 from alphacut.rve.result.result import HomogenisedStiffness
-from alphacut.stochastic.particles.particles import SPHERES
+from alphacut.stochastic.particles.shapes import SPHERES
 
 HILL = "Hill's isotropic average"
 

@@ -17,15 +17,14 @@ from scipy.spatial import KDTree
 from alphacut.base.arrays import Array, Ints, Mask
 from alphacut.base.errors import FailedError, checked_number, require
 from alphacut.stochastic.particles.particles import (
-    DISCS,
     Particles,
-    Shape,
     close_pairs,
     nearest_image,
     points_in_balls,
     size_classes,
 )
 from alphacut.stochastic.particles.radius_laws import RadiusLaw
+from alphacut.stochastic.particles.shapes import DISCS, Shape
 
 MAX_PROPOSALS = 1000  # for a particle, before random sequential addition ends without a packing
 MAX_NUMBER = 100_000  # particles to which their number is raised where the largest needs more room

@@ -12,8 +12,9 @@ import numpy as np
 from alphacut.base.errors import checked_number, require, require_choice, require_numbers
 from alphacut.fuzzy.campaign.workers import pool
 from alphacut.stochastic.particles.packing import Packing
-from alphacut.stochastic.particles.particles import DISCS, SPHERES, Particles
+from alphacut.stochastic.particles.particles import Particles
 from alphacut.stochastic.particles.radius_laws import LogNormalRadii, MeasuredRadii, RadiusLaw
+from alphacut.stochastic.particles.shapes import DISCS, SPHERES
 
 SHAPES = {shape.particles: shape for shape in (DISCS, SPHERES)}
 

@@ -20,8 +20,9 @@ from alphacut.stochastic.microstructure import RadiusLimits, fit_map, fit_radius
 from alphacut.stochastic.particles.measured import circles_in, read_particles
 from alphacut.stochastic.particles.packing import Packing
 from alphacut.stochastic.particles.packings import pack
-from alphacut.stochastic.particles.particles import DISCS, SPHERES, Particles
+from alphacut.stochastic.particles.particles import Particles
 from alphacut.stochastic.particles.radius_laws import LogNormalRadii, MeasuredRadii
+from alphacut.stochastic.particles.shapes import DISCS, SPHERES
 from alphacut.stochastic.sections import reduced_radii, with_cells
 from alphacut.stochastic.tessellation.apollonius import apollonius, counted_cells, neighbours
 from benchmarks.stochastic import packing_figures, paper_data

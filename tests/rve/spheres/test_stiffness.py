@@ -9,7 +9,7 @@ from alphacut.rve.result.moduli import hashin_shtrikman
 from alphacut.rve.series.means import SeriesError
 from alphacut.rve.spheres.lattice_sums import harmonics, lattice_sums
 from alphacut.rve.spheres.model import SPHERES, cubic_stiffness
-from alphacut.stochastic.particles import particles
+from alphacut.stochastic.particles import shapes
 from tests.rve.series.test_series import random_cells
 
 MATRIX = Phase(20e9)
@@ -33,7 +33,7 @@ def test_dilute_limit_of_eshelby(inclusion):
     radius = 5e-3
     (km, gm), (ki, gi) = MATRIX.bulk_and_shear, inclusion.bulk_and_shear
     zeta = gm / 6 * (9 * km + 8 * gm) / (km + 2 * gm)
-    exact = particles.SPHERES.fractions(radius) * np.array(
+    exact = shapes.SPHERES.fractions(radius) * np.array(
         [
             (ki - km) * (km + 4 / 3 * gm) / (ki + 4 / 3 * gm),
             *[(gi - gm) * (gm + zeta) / (gi + zeta)] * 2,
@@ -45,7 +45,7 @@ def test_dilute_limit_of_eshelby(inclusion):
 @pytest.mark.parametrize("radius", [0.3, 0.8, 0.92])
 def test_equal_shear_moduli_give_hills_bulk_modulus(radius):
     """Hill (1963): K = ⟨1/(K + 4μ/3)⟩⁻¹ − 4μ/3 for any arrangement; μ stays."""
-    shear, bulks, share = 8e9, (12e9, 300e9), particles.SPHERES.fractions(radius)
+    shear, bulks, share = 8e9, (12e9, 300e9), shapes.SPHERES.fractions(radius)
     exact = 1 / ((1 - share) / (bulks[0] + 4 / 3 * shear) + share / (bulks[1] + 4 / 3 * shear))
     found = moduli(radius, *(material(bulk, shear) for bulk in bulks), tolerance=1e-11)
     np.testing.assert_allclose(found, [exact - 4 / 3 * shear, shear, shear], rtol=1e-10)
@@ -100,7 +100,7 @@ def test_rigid_spheres_near_contact_follow_lubrication():
 def test_hashin_shtrikman_and_the_traces_enclose():
     for radius, matrix, inclusion in random_cells(40, 3, highest=0.95):
         bulk, deviator, shear = moduli(radius, matrix, inclusion, tolerance=1e-5)
-        share = particles.SPHERES.fractions(radius)
+        share = shapes.SPHERES.fractions(radius)
         shares = np.array([1 - share, share])
         limits = hashin_shtrikman(shares, [matrix, inclusion], space=True)
         assert limits[0, 0] * (1 - 1e-9) <= bulk <= limits[0, 1] * (1 + 1e-9)

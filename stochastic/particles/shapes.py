@@ -1,0 +1,54 @@
+"""Kinds of particles, discs and spheres: how much of its cell a particle of a radius fills."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from alphacut.base.arrays import Array
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Particles of one kind in their cells, of two or three dimensions.
+
+    Args:
+        particles: discs or spheres.
+        cells: Measure of a cell: area or volume.
+        dimensions: 2 or 3.
+        factor: Share of a cell of side 2 that a particle of radius 1 takes.
+        reach: Greatest r_n that a map may have: the particle almost touches its cell's sides.
+        sequential: Share of the box up to which random sequential addition is quick.
+        densest: Share of the box that packed particles may take, below random close packing.
+    """
+
+    particles: str
+    cells: str
+    dimensions: int
+    factor: float
+    reach: float
+    sequential: float
+    densest: float
+
+    @property
+    def largest(self) -> float:
+        """r_n of a particle that fills its cell."""
+        return float(self.factor ** (-1 / self.dimensions))
+
+    def fractions(self, radii: ArrayLike) -> Array:
+        """Return the area or volume fraction of a cell that particles of reduced radii fill."""
+        return np.asarray(self.factor * np.asarray(radii, float) ** self.dimensions)
+
+    def reduced_radius(self, fraction: float) -> float:
+        """Reduced radius of a particle that takes a share of its cell."""
+        return float((fraction / self.factor) ** (1 / self.dimensions))
+
+    def measure(self, radii: ArrayLike) -> Array:
+        """Area in m² or volume in m³ of particles, of radii in m of any shape."""
+        return self.fractions(radii) * 2.0**self.dimensions
+
+
+DISCS = Shape("discs", "area", 2, np.pi / 4, 0.99, 0.45, 0.82)
+SPHERES = Shape("spheres", "volume", 3, np.pi / 6, 0.97, 0.25, 0.58)
