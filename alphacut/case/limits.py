@@ -104,7 +104,8 @@ def parse_limit(value: object) -> CaseLimit:
         if ratio is not None and is_relative:
             number = 1 / int(ratio[1])
         elif unit == "SI":  # the output's is not known here
-            number = float(quantity.parse_fuzzy_in_any_unit(text).nominal)
+            fuzzy, _ = quantity.parse_fuzzy_in_any_unit(text)
+            number = float(fuzzy.nominal)
         else:
             number = quantity.parse_number(text, unit)
     except ValueError as error:

@@ -67,13 +67,11 @@ def _parse_history(value: object, info: ValidationInfo) -> ForceHistory:
 
 def _parse_amplitude(value: object, _: ValidationInfo) -> tuple[FuzzyNumber, str]:
     """Parse an amplitude: its value in SI, and its SI unit ("N", "N*s" or "" of a factor)."""
-    for unit in ("N", "N*s", ""):
-        try:
-            return quantity.parse_fuzzy(value, unit), unit
-        except ValueError:
-            continue
-    allowed = 'a force, an impulse or a number, as "8 kN ± 10 %", "0.3 kN s", "1 ± 10 %"'
-    raise RefusedError("", value, allowed)
+    try:
+        return quantity.parse_fuzzy_in_any_unit(value, ("N", "N*s", ""))
+    except ValueError as error:
+        allowed = 'a force, an impulse or a number, as "8 kN ± 10 %", "0.3 kN s", "1 ± 10 %"'
+        raise RefusedError("", value, allowed, str(error)) from None
 
 
 Amplitude = Annotated[tuple[FuzzyNumber, str], text(_parse_amplitude)]

@@ -44,9 +44,10 @@ def _term(value: object, info: ValidationInfo) -> tuple[Monomial, Array]:
 
 def _parameter(value: object, _: ValidationInfo) -> FuzzyNumber:
     try:
-        return parse_fuzzy_in_any_unit(value)
+        number, _ = parse_fuzzy_in_any_unit(value)
     except ValueError as error:
         raise RefusedError("", value, 'a quantity, as "30 GPa ± 5 %" or 1.2', str(error)) from None
+    return number
 
 
 def _one_direction(value: object) -> object:

@@ -36,15 +36,15 @@ class Tolerance:
 
 
 def _parse_tolerance(value: object, info: ValidationInfo) -> Tolerance:
-    for unit in ("m", "N", ""):
-        try:
-            number = quantity.parse_number(value, unit)
-        except ValueError:
-            continue
-        if 0 < number < (1 if unit == "" else float("inf")):
-            return Tolerance(number, unit)
     allowed = 'a length, a force or a fraction of each peak, as "0.2 mm", "0.05 N", "0.1 %"'
-    raise RefusedError("", value, allowed)
+    try:
+        tolerance, unit = quantity.parse_fuzzy_in_any_unit(value, ("m", "N", ""))
+    except ValueError as error:
+        raise RefusedError("", value, allowed, str(error)) from None
+    lower, upper = tolerance.support
+    is_allowed = lower == upper > 0 and (unit != "" or upper < 1)
+    require(is_allowed, "", value, allowed)
+    return Tolerance(upper, unit)
 
 
 def _file_name(value: str) -> str:

@@ -35,6 +35,7 @@ from alphacut.frame.verification.self_test import Trial, stored_motions
 from alphacut.frame.verification.step_error import node_deviation
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal, Triangular
 from alphacut.fuzzy.result import Nature
+from alphacut.io.quantity import QUANTITIES
 from alphacut.io.results import ResultsFolder
 from alphacut.report.results import AROUND
 from alphacut.rve.cell.cell import VoigtPhase
@@ -46,9 +47,11 @@ from alphacut.stages.suite import analyses_of, suite_records
 if TYPE_CHECKING:
     import xarray
 
-USUAL_PERIODS = 1e-3, 60.0  # in s: towers have 10 s at most, machine parts seldom below 1 ms
+USUAL_PERIODS = 1e-3, 30.0  # in s: towers have 10 s at most, machine parts seldom below 1 ms
 LEAST_MODES, MAX_MODES = 3, 8
 """Modes that are shown, if the structure has as many."""
+UNUSUAL = ", unusual"
+"""Mark of the kind of a quantity that structures and their materials seldom have."""
 KINDS = {Crisp: "crisp", Interval: "interval", Triangular: "triangle", Trapezoidal: "trapezoid"}
 Row = tuple[str, str, str]
 
@@ -68,6 +71,9 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
         "inputs": [dict(zip(("key", "value", "kind"), row, strict=True)) for row in rows],
     }
     text = text_table(("key", "value", "kind"), rows)
+    for key, value, kind in rows:
+        if kind.endswith(UNUSUAL):
+            text += f"warning: {key} is {value}, which is unusual: is its unit right?\n"
     if content.image_cell is not None:
         study = study_of_image or study_of(content.image_cell)
         shares = study.fractions.items()
@@ -227,9 +233,11 @@ def rows_of(prefix: str, section: Section) -> Iterator[Row]:
                     words = _numbers(entry, unit.si if unit else "")
                     words += " in SI" * (key == "parameters")  # of matrices, in any unit
                     kind = KINDS.get(type(entry), "fuzzy") if section.has_key(key) else "default"
-                    yield row_key, words, kind
+                    mark = _mark_of_size(entry, unit.si) if unit else ""
+                    yield row_key, words, kind + mark
                 case (FuzzyNumber() as force, str(si)):
-                    yield row_key, _numbers(force, si), KINDS.get(type(force), "fuzzy")
+                    kind = KINDS.get(type(force), "fuzzy") + _mark_of_size(force, si)
+                    yield row_key, _numbers(force, si), kind
                 case ForceHistory(History(frequency=omega)) if omega:
                     hertz, period = (engineering(x, "") for x in (omega / (2 * pi), 2 * pi / omega))
                     yield row_key, f"{hertz} Hz, period {period} s", "harmonic"
@@ -244,6 +252,14 @@ def rows_of(prefix: str, section: Section) -> Iterator[Row]:
                     yield row_key, stiffness.replace("-", MINUS), "GPa, plane strain"
                 case float() if unit and unit.si and is_shown:
                     yield row_key, engineering(entry, unit.si), "number"
+
+
+def _mark_of_size(number: FuzzyNumber, si: str) -> str:
+    """Return `UNUSUAL` if a quantity, in the SI unit `si`, is 0 nowhere and of an unusual size."""
+    smallest, largest = QUANTITIES[si].usual
+    sizes = [abs(end) for end in number.support]
+    is_usual = min(sizes) == 0 or (smallest <= min(sizes) and max(sizes) <= largest)
+    return "" if is_usual else UNUSUAL
 
 
 def _numbers(number: FuzzyNumber, unit: str) -> str:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from difflib import get_close_matches
 
 NUMBER_CURES = {
     r"^[-+]?\d{1,3}(?:[,'’_\s]\d{3})+(?!\d)": "write thousands without a separator, as 25000",
@@ -29,10 +30,26 @@ UNIT_CURES = {
     r"['’′]": "write ft for feet",
 }
 """Cure by a pattern in a unit that is not understood."""
+CONFUSED_PREFIXES = {
+    "mN": "a millinewton; did you mean MN? else write newtons, as 0.09 N",
+    "mPa": "a millipascal; did you mean MPa? else write pascals, as 0.3 Pa",
+    "mJ": "a millijoule; did you mean MJ? else write joules, as 0.02 J",
+    "Mm": "a million metres; did you mean mm? else write km",
+    "Ms": "a million seconds; did you mean ms? else write seconds",
+    "mt": "a thousandth of a tonne; did you mean t? else write kg",
+    "Grad": "a thousand million radians; did you mean deg?",
+    "Mt": "a million tonnes; did you mean t? else write kg, as 1e9 kg",
+}
+"""Units that are right by their letters, but almost always a slip of m (milli) and M (mega)."""
+SYMBOLS = (
+    *("Pa", "kPa", "MPa", "GPa", "N", "kN", "MN", "GN", "m", "mm", "cm", "km", "s", "ms", "min"),
+    *("h", "kg", "t", "Hz", "kHz", "g", "gal", "rad", "deg", "rpm", "ft", "in", "lb", "lbf", "kip"),
+    *("ksi", "psi", "J", "kJ", "MJ", "W", "kgf", "turn"),
+)
+"""Common units as Pint spells them."""
 SPELLINGS = {
     "cps": "Hz",
-    "hertz": "Hz",
-    "sek": "s",
+    "msec": "ms",
     "gr": "g",
     "knm": "kN m",
     "kns": "kN s",
@@ -51,49 +68,72 @@ SPELLINGS = {
     "mpa": "MPa",
     "kg": "kg",
 }
-"""Pint's spelling of units by their small letters, where small letters alone do not give it."""
-USUAL = (
-    *("Pa", "kPa", "MPa", "GPa", "N", "kN", "MN", "GN", "m", "mm", "cm", "km", "s", "ms", "min"),
-    *("h", "kg", "t", "Hz", "kHz", "g", "gal", "rad", "deg", "rpm", "ft", "in", "lb", "lbf", "kip"),
-    *("ksi", "psi", "J", "kJ", "MJ", "W", "kgf", "turn"),
-)
-"""Units as Pint spells them; a unit with other capitals is told these."""
+"""Spelling of units by their small letters, where the letters of `SYMBOLS` do not give it."""
+PREFIX_NAMES = {
+    "": "", "nano": "n", "micro": "µ", "milli": "m", "centi": "c", "kilo": "k", "mega": "M",
+    "giga": "G",
+}  # fmt: skip
+UNIT_NAMES = {
+    "metre": "m", "meter": "m", "newton": "N", "pascal": "Pa", "gram": "g", "gramme": "g",
+    "second": "s", "sec": "s", "sek": "s", "hertz": "Hz", "joule": "J", "tonne": "t",
+    "radian": "rad", "degree": "deg", "minute": "min", "hour": "h",
+}  # fmt: skip
 
 
 def number_cure(text: str) -> str:
     """Return what to write in place of a quantity without a plain number; empty if unknown."""
-    cures = (cure for pattern, cure in NUMBER_CURES.items() if re.search(pattern, text))
-    return next(cures, "")
+    for pattern, cure in NUMBER_CURES.items():
+        if re.search(pattern, text):
+            return cure
+    return ""
 
 
-def unit_cure(unit: str, si: str, fits: Callable[[str], bool]) -> str:
+def unit_cure(unit: str, si: str, *, fits: Callable[[str], bool], known: Iterable[str]) -> str:
     """Return what to write in place of a unit that is none of a dimension; empty if unknown.
 
     Args:
         unit: The unit as it was written.
         si: SI unit of the dimension.
-        fits: Whether a unit is one of the dimension.
+        fits: Function that tells whether a spelling is a unit of the dimension.
+        known: Common units of the dimension.
     """
     for pattern, cure in UNIT_CURES.items():
         if re.fullmatch(pattern, unit.strip()):
             return cure
-    if spelt := next(filter(fits, _spellings(unit)), ""):
-        return f"did you mean {spelt}?"
+    for spelling in _spellings(unit):
+        if spelling != unit and fits(spelling):
+            return f"did you mean {spelling}?"
     if si == "kg" and re.fullmatch(r"[kMG]?N|kip|lbf", unit):
         return "a weight over 9.80665 m/s^2 is a mass"
+    if similar := get_close_matches(unit, [*known], n=1):
+        return f"did you mean {similar[0]}?"
     return ""
 
 
 def _spellings(unit: str) -> Iterator[str]:
-    """Yield other spellings of a unit: usual capitals, without brackets, forces for masses."""
-    by_small_letters = {name.lower(): name for name in USUAL} | SPELLINGS
-    bare = re.sub(r"[\[\](){}]", "", unit).strip()
+    """Yield other spellings of a unit, the most likely one first.
+
+    They are the unit without brackets; with the usual symbol in place of each word, whatever its
+    capitals; with blanks between the symbols; and with forces in place of masses.
+    """
+    bare = re.sub(r"[\[\](){}]", "", unit).strip(" .")
     yield bare
+    with_symbols = re.sub(r"[A-Za-zµ]+", lambda match: _usual_symbol(match[0]), bare)
+    yield with_symbols
+    yield re.sub(r"(?<=[A-Za-z])\s*[-.·]\s*(?=[A-Za-z])", " ", with_symbols)
+    yield re.sub(r"\b(kg|lb)\b", r"\1f", with_symbols)
 
-    def usual(match: re.Match[str]) -> str:
-        return by_small_letters.get(match[0].lower(), match[0])
 
-    spelt = re.sub(r"[A-Za-z]+", usual, bare)
-    yield spelt
-    yield re.sub(r"(?<=[A-Za-z])\s*[-.·]\s*(?=[A-Za-z])", " ", spelt)
-    yield re.sub(r"\b(kg|lb)\b", r"\1f", spelt)
+def _usual_symbol(word: str) -> str:
+    """Return the symbol of a unit by its name or its letters, as kN of "KN" or "kilonewtons"."""
+    small = word.lower()
+    symbols = {symbol.lower(): symbol for symbol in SYMBOLS} | SPELLINGS
+    for prefix, prefix_symbol in PREFIX_NAMES.items():
+        for name, symbol in UNIT_NAMES.items():
+            symbols[prefix + name] = prefix_symbol + symbol
+    singular = small if small in symbols else small.removesuffix("s")
+    if singular in symbols:
+        return symbols[singular]
+    close = get_close_matches(small, symbols, n=1, cutoff=0.75)
+    is_close = len(small) > 2 and bool(close) and close[0][0] == small[0]
+    return symbols[close[0]] if is_close else word

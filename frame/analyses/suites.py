@@ -29,6 +29,8 @@ from alphacut.fuzzy.result import Nature
 
 FREE_PERIODS = 5
 """Natural periods of free motion after a record: by then 5 % damping leaves a fifth."""
+MAX_PERIOD = 1000.0
+"""Longest first natural period, in s; towers have 10 s, and a longer one is a mistake in a unit."""
 MAX_CORNERS = 64
 """Corners of each cut whose means over records are computed; more take time, none is a bound."""
 NODES = 2
@@ -122,6 +124,10 @@ def scaled_records(
     """
     require_choice("measure", measure, ["", "PGA", "Sa(T1)"])
     mode, scaled = nominal_mode(model), list[ScaledRecord]()
+    what = f"a first natural period of {mode.period:.4g} s"
+    cure = "are the units of mass and stiffness right, as t and MN/m?"
+    allowed = f"periods up to {MAX_PERIOD:g} s"
+    require(mode.period <= MAX_PERIOD, "structure", what, allowed, cure)
     for number, record in enumerate(suite, start=1):
         name = record.name or f"record {number}"
         response = spectral_acceleration(record, mode.period, min(mode.ratio, 0.999))

@@ -17,7 +17,13 @@ import numpy as np
 
 from alphacut.frame.records.recording import Recording
 from alphacut.frame.records.stated_peak import StatedPeak, peaks_in_text
-from alphacut.frame.records.text_file import ACCELERATION_UNITS, NUMBER, TextFile, recording_in_si
+from alphacut.frame.records.text_file import (
+    ACCELERATION_UNITS,
+    NUMBER,
+    TextFile,
+    recording_in_si,
+    require_step,
+)
 
 PEER_HEAD_LINES = 12
 """Lines in which a head ends; most have four."""
@@ -26,6 +32,7 @@ PEER_STEP = re.compile(
     rf"(?:NPTS\s*=?\s*([0-9]+)\s*[,;]?\s*)?\bDT\s*=?\s*{REAL}\s*(?:S|SEC|SECONDS?)?\s*[,;.]?\s*",
     re.I,
 )
+PEER_STEP_WORD = re.compile(r"\b(?:DT|NPTS)\b", re.I)
 PEER_STEP_FIRST = re.compile(rf"([0-9]+)[\s,]+{REAL}[\s,]+NPTS\s*,?\s*DT\s*[,;.]?\s*", re.I)
 PEER_MARK = re.compile(
     rf".*(?:\bNPTS\b|\bDT\s*=?\s*{REAL}|\bPEER\b.*\b(?:DATABASE|RECORD)\b)", re.I
@@ -53,17 +60,24 @@ SMC_EXTREMES, SMC_NULL = (30, 32), 1e38
 GAL = 0.01  # in m/s²
 
 
-def read_peer(file: TextFile) -> Recording:
-    """Recording of a file of type AT2."""
+def read_peer(file: TextFile, unit: str = "") -> Recording:
+    """Return the recording in a file of type AT2; `unit` is for a head that states none."""
     head = enumerate(file.lines[:PEER_HEAD_LINES])
     found = ((k, PEER_STEP_FIRST.search(x) or PEER_STEP.search(x)) for k, x in head)
     row, match = next(((k, match) for k, match in found if match), (0, None))
-    if match is None:
-        raise file.refusal(min(3, len(file.lines) - 1), "without NPTS and DT", PEER_HEAD)
+    head_lines = file.lines[:PEER_HEAD_LINES]
+    step_line = next((k for k, x in enumerate(head_lines) if PEER_STEP_WORD.search(x)), row)
+    if match is None or re.search(r"\bDT\s*=?\s*\d*,\d", file.lines[step_line], re.I):
+        cure = "write the step as a number above 0 with a decimal point: DT= .0050 SEC"
+        raise file.refusal(step_line, file.lines[step_line].strip(), PEER_HEAD, cure)
     count, step = int(match[1] or 0), float(re.sub("[dD]", "e", match[2]))
-    line, unit = _peer_unit(file, row)
-    if re.search(r"\b(velocity|displacement)\b", file.lines[line], re.I):
-        raise file.refusal(line, f"in units of {unit}", f"accelerations in {ACCELERATION_UNITS}")
+    require_step(file.location(row), step, "DT is in seconds: write 20 ms as DT= .0200 SEC")
+    line, own_unit = _peer_unit(file, row)
+    unit = own_unit or unit
+    if word := re.search(r"\b(velocity|displacement)\b", file.lines[line], re.I):
+        allowed = f"accelerations in {ACCELERATION_UNITS}"
+        cure = f"this is a {word[1].lower()}: take the file .AT2 of the acceleration"
+        raise file.refusal(line, f"in units of {unit}", allowed, cure)
     samples = file.numbers(row + 1, len(file.lines), count=count)
     if count:
         file.require_count(samples, count, row)
@@ -83,7 +97,7 @@ def _peer_unit(file: TextFile, last: int) -> tuple[int, str]:
     return last, ""
 
 
-def read_knet(file: TextFile) -> Recording:
+def read_knet(file: TextFile, unit: str = "") -> Recording:
     """Recording of a K-NET or KiK-net file: a head of 17 lines, then counts, eight to a line.
 
     One count is the scale factor ``7845(gal)/8223790``. Counts keep the sensor's offset, so that
@@ -116,7 +130,7 @@ def read_knet(file: TextFile) -> Recording:
     )
 
 
-def read_esm(file: TextFile) -> Recording:
+def read_esm(file: TextFile, unit: str = "") -> Recording:
     """Recording of a file of ESM or ITACA: a head of lines ``KEY: value``, then a sample a line."""
     head = dict[str, tuple[str, int]]()  # value and line, from 0, of each key
     for row, line in enumerate(file.lines):
@@ -134,7 +148,7 @@ def read_esm(file: TextFile) -> Recording:
     step, count = float(head[INTERVAL][0]), int(float(head[COUNT][0]))
     samples = file.numbers(1 + max(row for _, row in head.values()), len(file.lines))
     file.require_count(samples, count, head[COUNT][1])
-    unit, unit_row = head.get("UNITS", ("", head[INTERVAL][1]))
+    unit, unit_row = head.get("UNITS", (unit, head[INTERVAL][1]))
     channel, _ = head.get("STREAM", ("", 0))
     peak, _ = head.get(ESM_PEAK, ("", 0))
     stated = peaks_in_text([f"PGA: {peak} cm/s^2"], "cm/s^2")
@@ -142,7 +156,7 @@ def read_esm(file: TextFile) -> Recording:
     return recording_in_si(location, "ESM", unit, step, samples, channel, stated=stated)
 
 
-def read_smc(file: TextFile) -> Recording:
+def read_smc(file: TextFile, unit: str = "") -> Recording:
     """Recording of an SMC file of the USGS, in cm/s²: three heads, comments, 8 samples a line."""
     match = SMC.match(file.lines[0])
     assert match is not None

@@ -65,7 +65,7 @@ def _read_by_marks(path: Path, channel: str, step: float | None, unit: str) -> R
         return read_cosmos(file, channel)
     for mark, n_lines, read in FORMATS:
         if any(map(mark.match, file.lines[:n_lines])):
-            return read(file)
+            return read(file, unit)
     if is_table(file, is_described=bool(channel or (step and unit))):
         return read_table(file, step, unit, channel)
     cure = 'numbers alone are read with records.step = "0.005 s", records.unit = "g"'

@@ -20,10 +20,12 @@ from alphacut.frame.records.recording import Recording
 from alphacut.frame.records.stated_peak import peaks_in_text
 from alphacut.frame.records.text_file import (
     ACCELERATION_UNITS,
+    MAX_STEP,
     TextFile,
     choose_channel,
     read_bytes,
     recording_in_si,
+    require_step,
 )
 from alphacut.frame.records.units import NEWTONS, SECONDS, acceleration_factor, other_quantity
 from alphacut.stochastic.particles.csv_columns import NUMBER
@@ -35,6 +37,10 @@ FORCE_HEAD = re.compile(TIME + rf"(?:force|load|f)\b{UNIT}", re.IGNORECASE)
 """A head of two columns: units of the times and of the values, each empty where it has none."""
 ALLOWED = "time [s],acceleration [m/s^2], [g] or [gal]"
 ALLOWED_FORCE = "time [s],force [kN], or time [s],force of a course without a unit"
+TAKE = "take the record of the acceleration, or mend the head"
+DECIMAL_COMMAS_BETWEEN_COMMAS = (
+    "these seem to be decimal commas: write decimal points, or semicolons between the columns"
+)
 OTHER_WORDS = {
     "a displacement": r"disp(?:l\w*)?|deflection|drift|position",
     "a velocity": r"vel(?:oc\w*)?|speed",
@@ -123,7 +129,7 @@ class _Table:
         for head in self.column_heads:
             for unit in BRACKETED.findall(head):
                 if name := other_quantity(unit):
-                    return name
+                    return f"{name} by its unit {unit}"
         return ""
 
     def numbers(self, file: TextFile, columns: int) -> Array:
@@ -220,11 +226,18 @@ def read_table(
     allowed = "a header with units, and rows of numbers below it"
     require(len(table.rows) > 1, file.name, f"{len(table.rows)} rows", allowed)
     columns = len(next(iter(table.rows.values())))
+    in_head = len(re.split("[,;\t]", table.head))
+    has_commas = all("," in file.lines[line] for line in table.rows)
+    if has_commas and 1 < in_head < columns <= 2 * in_head and re.match(TIME, table.head, re.I):
+        value = f"{columns} numbers in a row below {in_head} heads"
+        first_row = next(iter(table.rows))
+        cure = DECIMAL_COMMAS_BETWEEN_COMMAS
+        raise file.refusal(first_row, value, "a number in a row for each head", cure)
     if channel or columns > 2:
         return _read_column(file, table, step, unit, channel=channel)
     if quantity := table.other_quantity():
         shown = " ".join(table.column_heads)
-        raise file.refusal(table.start, shown, ALLOWED, f"its column is {quantity}")
+        raise file.refusal(table.start, shown, ALLOWED, f"its column is {quantity}: {TAKE}")
     match = HEAD.fullmatch(table.head) if columns == 2 else None
     time_unit, head_unit = match.groups() if match else ("", "")
     unit, to_s = head_unit or unit, SECONDS.get(time_unit or "s", 0.0)
@@ -251,12 +264,16 @@ def read_table(
         samples, name = table.series(file), "one column" if columns == 1 else "bare numbers"
         return recording_in_si(location, name, unit, step or 0.0, samples, stated=stated)
     numbers = table.numbers(file, columns)
-    step, remarks = _even_step(file, table, to_s=to_s, stated_step=step)
-    remarks += ("its times have no unit, taken as s",) * bool(match and not time_unit)
+    step, remarks = _step_and_remarks(file, table, to_s=to_s, stated_step=step)
+    if match and not time_unit:
+        remarks.append("its times have no unit, taken as s")
     if table.head and not match:
-        remarks += (f"its head, {table.head[:40]}, is not understood: the case's unit is taken",)
+        what = f"its head, {table.head[:40]}, is not understood"
+        remarks.append(f"{what}: the case's unit is taken")
     name = "CSV" if match else "two columns"
-    return recording_in_si(location, name, unit, step, numbers[:, 1], "", remarks, stated=stated)
+    return recording_in_si(
+        location, name, unit, step, numbers[:, 1], "", (*remarks,), stated=stated
+    )
 
 
 def _has_times(table: _Table) -> bool:
@@ -290,7 +307,9 @@ def _read_column(
     unit, name = in_head[1] if in_head else unit, " ".join(names[column - components[0]])
     for quantity, pattern in OTHER_COLUMN.items():
         if pattern.search(bare[column]) and not ACCELERATION_WORD.search(bare[column]):
-            raise file.refusal(table.start, heads[column], ALLOWED, f"its column is {quantity}")
+            raise file.refusal(
+                table.start, heads[column], ALLOWED, f"its column is {quantity}: {TAKE}"
+            )
     if not unit or (not has_times and step is None):
         cure = 'say records.unit = "g"' + ("" if has_times else ', records.step = "0.005 s"')
         raise file.refusal(table.start, table.head[:80] or "columns alone", ALLOWED, cure)
@@ -301,9 +320,10 @@ def _read_column(
     to_s = SECONDS.get(time_unit[1], 0.0) if time_unit else 1.0
     if to_s == 0:
         raise file.refusal(table.start, heads[0], f"times in {', '.join(SECONDS)}")
-    step, remarks = _even_step(file, table, to_s=to_s, stated_step=step)
-    remarks += ("its times have no unit, taken as s",) * (time_unit is None)
-    return recording_in_si(location, "columns", unit, step, numbers[:, column], name, remarks)
+    step, remarks = _step_and_remarks(file, table, to_s=to_s, stated_step=step)
+    if time_unit is None:
+        remarks.append("its times have no unit, taken as s")
+    return recording_in_si(location, "columns", unit, step, numbers[:, column], name, (*remarks,))
 
 
 def _column_heads(head: str, columns: int) -> list[str]:
@@ -317,49 +337,76 @@ def _column_heads(head: str, columns: int) -> list[str]:
     return [""] * columns
 
 
+def _step_and_remarks(
+    file: TextFile, table: _Table, *, to_s: float, stated_step: float | None
+) -> tuple[float, list[str]]:
+    """Return the step in s of a record's times, and remarks; arguments as of `_even_step`."""
+    step, first, remarks = _even_step(file, table, to_s=to_s, stated_step=stated_step)
+    is_count = step == 1 and first in (0, 1)
+    if is_count and stated_step is not None:
+        return stated_step, ["its times count the samples: the stated step is taken"]
+    cure = "times in ms have the head time [ms]" if step >= MAX_STEP else ""
+    if is_count:
+        cure = 'times that count the samples do not tell their step: say records.step = "0.005 s"'
+    elif to_s != 1:
+        cure = "the head states another unit of times than s: if they are in s, write time [s]"
+    require_step(file.location(table.start), step, cure)
+    if abs(first) > UNEVEN * step:
+        remarks.append(f"its times begin at {first:g} s, taken as 0")
+    return step, remarks
+
+
 def _even_step(
     file: TextFile,
     table: _Table,
     *,
     to_s: float,
     stated_step: float | None = None,
-    from_zero: bool = False,
-) -> tuple[float, tuple[str, ...]]:
-    """Return the step in s of times that must rise evenly, and remarks on what is unusual.
+    or_step: str = ', or say records.step = "{:.9g} s"',
+) -> tuple[float, float, list[str]]:
+    """Return the step of a table's times, the first time, and what is unusual about them.
+
+    The times stand in the first column and must rise in even steps. A step that the case states is
+    taken if the times do not tell it: all are equal, they count the samples, or they are rounded so
+    coarsely that even steps look uneven. In the last case it must agree with them.
 
     Args:
         file: The file, for messages.
-        table: Its table, whose first column has the times.
+        table: Its table, of two rows or more.
         to_s: Unit of the times, in s.
-        stated_step: Step that the case states, in s; it is taken if the times are too coarsely
-            rounded to tell the step, and agree with it.
-        from_zero: Refuses times that begin elsewhere than at 0.
+        stated_step: Step that the case states, in s.
+        or_step: What a cure says of the key that states the step; empty where there is none.
+
+    Returns:
+        The step and the first time, in s, and clauses for remarks.
+
+    Raises:
+        RefusedError: The times tell no even step, or one that records do not have.
     """
     lines = [*table.rows]
     time = to_s * np.array([float(cells[0]) for cells in table.rows.values()])
-    first = 0.0 if from_zero else time[0]
-    even = np.linspace(first, time[-1], len(time))
-    step = float(even[1] - even[0]) if len(time) > 1 else 0.0
-    deviation = np.abs(time - even)
-    remarks: tuple[str, ...] = ()
-    if not (step > 0 and deviation.max() <= UNEVEN * step):
+    first, last, n_steps = float(time[0]), float(time[-1]), len(time) - 1
+    even: Array = np.asarray(np.linspace(first, last, len(time)), float)
+    step = float(even[1] - even[0])
+    if (time == first).all():
+        if stated_step is None:
+            cure = f"write times of even steps{or_step.format(0.005)}"
+            raise file.refusal(lines[0], f"time {first:g} s, as all times", "times that rise", cure)
+        return stated_step, 0.0, ["its times are all equal: the stated step is taken"]
+    if not (step > 0 and np.abs(time - even).max() <= UNEVEN * step):
         last_digit = to_s * table.resolution()
         if not _are_rounded(time, even, last_digit):
-            raise _uneven(file, lines, time, from_zero=from_zero)
-        duration, n_steps = time[-1] - first, len(time) - 1
-        off = abs((stated_step or 0.0) * n_steps - duration)
-        if stated_step is None or off > ROUNDED * last_digit:
+            raise _uneven(file, lines, time)
+        duration = last - first
+        difference = abs((stated_step or 0.0) * n_steps - duration)
+        if stated_step is None or difference > ROUNDED * last_digit:
             likely = _likely_step(n_steps, duration, last_digit)
-            cure = f'digits were lost: say records.step = "{likely:.9g} s"'
-            if from_zero:
-                cure = f"digits were lost: write times of steps of {likely:.9g} s in full"
+            cure = f"digits were lost: write times of steps of {likely:.9g} s in full"
+            cure += or_step.format(likely)
             value = f"times to {last_digit:g} s in steps of about {step:.4g} s"
             raise file.refusal(lines[0], value, "even steps", cure)
-        remarks = (f"its times are rounded to {last_digit:g} s: the stated step is taken",)
-        step = stated_step
-    is_shifted = abs(first) > UNEVEN * step
-    remarks += (f"its times begin at {first:g} s, taken as 0",) * is_shifted
-    return step, remarks
+        return stated_step, first, [f"its times are rounded to {last_digit:g} s: the stated step"]
+    return step, first, []
 
 
 def _are_rounded(time: Array, even: Array, last_digit: float) -> bool:
@@ -391,25 +438,37 @@ def _likely_step(n_steps: int, duration: float, last_digit: float) -> float:
     return duration / n_steps
 
 
-def _uneven(file: TextFile, lines: Sequence[int], time: Array, *, from_zero: bool) -> RefusedError:
-    """Error about times in s, shape (n,), whose steps differ: the first odd one, and its cure."""
-    first = 0.0 if from_zero else time[0]
-    deviation = np.abs(time - np.linspace(first, time[-1], len(time)))
-    steps = np.diff(time, prepend=first)  # the first is 0
-    usual = np.median(steps[steps > 0]) if (steps > 0).any() else 0.0
+def _uneven(file: TextFile, lines: Sequence[int], time: Array) -> RefusedError:
+    """Return the error about times whose steps differ: the first odd one, and its cure.
+
+    Args:
+        file: The file.
+        lines: Line of each time, counted from 0.
+        time: The times, in s, shape (n,).
+    """
+    steps = np.diff(time)
+    rising = steps[steps > 0]
+    usual = float(np.median(rising)) if rising.size else 0.0
     is_odd = np.abs(steps - usual) > 2 * UNEVEN * usual
-    is_odd[0] = abs(steps[0]) > UNEVEN * usual
-    wrong = int(is_odd.argmax() if is_odd.any() else deviation.argmax())
-    value = f"time {time[wrong]:g} s" + (f" after {time[wrong - 1]:g} s" if wrong else "")
+    distances = np.abs(time - np.linspace(time[0], time[-1], len(time)))
+    wrong = 1 + int(is_odd.argmax()) if is_odd.any() else int(distances.argmax())
+    if (steps < 0).any():
+        wrong = 1 + int((steps < 0).argmax())
+    value = f"time {time[wrong]:g} s after {time[wrong - 1]:g} s"
     cure = "resample to even steps"
-    if wrong and time[wrong] == time[wrong - 1]:
+    in_order = np.diff(np.sort(time))
+    if time[wrong] < time[wrong - 1]:
+        pair = f"line {lines[wrong - 1] + 1} and line {lines[wrong] + 1}"
+        cure = f"times must rise, and fall between {pair}: sort the rows"
+        if (steps < 0).all():
+            cure = "times must rise, and these fall: turn the order of the rows round"
+        elif (in_order < UNEVEN * usual).any():
+            cure = f"times must rise, and fall between {pair}: of two records in one file keep one"
+    elif time[wrong] == time[wrong - 1]:
         cure = "a time stands twice: leave one out, or resample to even steps"
-    elif wrong and time[wrong] < time[wrong - 1]:
-        cure = "times must rise: sort the rows; of two records in one file keep one"
-    elif wrong and steps[wrong] > 1.5 * usual and is_odd.sum() == 1:
+    elif steps[wrong - 1] > 1.5 * usual and is_odd.sum() == 1:
         cure = "samples are missing there: fill the gap, or resample to even steps"
-    allowed = "even steps from 0 s" if from_zero else "even steps"
-    return file.refusal(lines[wrong], value, allowed, cure)
+    return file.refusal(lines[wrong], value, "even steps", cure)
 
 
 def read_force_history(path: Path) -> tuple[float, Array, bool]:
@@ -429,7 +488,10 @@ def read_force_history(path: Path) -> tuple[float, Array, bool]:
         cure = f"units are {', '.join(NEWTONS)}"
         raise file.refusal(table.start, table.head[:80], ALLOWED_FORCE, cure)
     numbers = table.numbers(file, 2)
-    step, _ = _even_step(file, table, to_s=to_s, from_zero=True)
+    step, first, _ = _even_step(file, table, to_s=to_s, or_step="")
+    if abs(first) > UNEVEN * step:
+        [line, *_] = table.rows
+        raise file.refusal(line, f"time {first:g} s", "even steps from 0 s")
     samples = np.asarray(to_si * numbers[:, 1])
     if not samples.any():
         raise file.refusal(table.start, "zeros throughout", "a force that moves something")

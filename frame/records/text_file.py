@@ -24,8 +24,8 @@ NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eEdD][-+]?[0-9]+)?")
 LONGEST_LINE = 10_000
 """Letters of a line; formats have about 80, and searches of a line take their square."""
 ACCELERATION_UNITS = "g, gal, cm/s^2 or m/s^2"
-LONGEST_STEP = 10.0
-"""In s; a longer one is a slip."""
+MIN_STEP, MAX_STEP = 4e-5, 0.5
+"""Steps of records in s that are believed: instruments sample 10 to 20,000 times a second."""
 
 
 @dataclass(frozen=True)
@@ -101,14 +101,25 @@ def recording_in_si(
     if to_si is None:
         value = f"in units of {unit}" if unit else "without a unit"
         quantity = other_quantity(unit)
-        cure = f"{unit} is the unit of {quantity}" if quantity else ""
+        cure = 'where the file has no unit, say records.unit = "g"'
+        if quantity:
+            cure = f"{unit} is the unit of {quantity}: take the record of the acceleration"
+        elif unit:
+            cure = "mend the unit in the head"
         raise RefusedError(location, value, f"accelerations in {ACCELERATION_UNITS}", cure)
-    allowed = f"a step above 0 and below {LONGEST_STEP:g} s"
-    cure = "times in ms have the head time [ms]" if step >= LONGEST_STEP else ""
-    require(0 < step < LONGEST_STEP, location, f"a step of {step:g} s", allowed, cure)
+    require_step(location, step)
     in_si = to_si * samples
     remarks += remarks_on_peak(location, in_si, stated, unit)
     return Recording(file_format, unit, step, in_si, channel, remarks)
+
+
+def require_step(location: str, step: float, cure: str = "") -> None:
+    """Refuse a step, in s, that no record of an earthquake has; `cure` is for the message."""
+    allowed = f"steps from {MIN_STEP:g} s to below {MAX_STEP:g} s"
+    is_usual = MIN_STEP <= step < MAX_STEP
+    require(
+        is_usual, location, f"a step of {step:g} s", allowed, cure or "mend the step in the head"
+    )
 
 
 def choose_channel(location: str, channel: str, names: Sequence[tuple[str, ...]]) -> int:

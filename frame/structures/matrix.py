@@ -158,7 +158,9 @@ class MatrixStructure(LinearSystem):
         a, b = self.massive, self.massless
         is_definite = len(a) > 0 and np.linalg.eigvalsh(mass[np.ix_(a, a)]).min() > 0
         allowed = "a positive definite matrix of the unknowns that have mass"
-        require(is_definite, "mass", value="not positive definite", allowed=allowed)
+        cure = "turn its sign: this seems to be −M" if np.trace(mass) < 0 else ""
+        require(is_definite, "mass", value="not positive definite", allowed=allowed, cure=cure)
+        self._require_stable(stiffness)
         if not len(b):
             return
         least = np.linalg.eigvalsh(stiffness[np.ix_(b, b)]).min() / np.abs(stiffness).max()
@@ -167,6 +169,24 @@ class MatrixStructure(LinearSystem):
         damped = [int(k) for k in b if any(array[k].any() for _, array in self.damping)]
         what, allowed = f"of unknowns {damped[:5]} without mass", "dampers between those with mass"
         require(not damped, "damping", value=what, allowed=allowed)
+
+    def _require_stable(self, stiffness: Array) -> None:
+        """Refuse a stiffness with a negative eigenvalue to which a term of negative sign adds.
+
+        Args:
+            stiffness: Sum of all terms at the nominal parameters, shape (n, n).
+
+        Raises:
+            RefusedError: The structure is unstable because of such a term, whose place it names.
+        """
+        traces = np.trace(self.nominal_terms("stiffness"), axis1=1, axis2=2)
+        negative = np.flatnonzero(traces < 0)
+        if not len(negative):
+            return
+        is_stable = np.linalg.eigvalsh(stiffness).min() >= -1e-9 * np.abs(stiffness).max()
+        what = f"unstable, with a negative diagonal in term {negative[0] + 1}"
+        cure = "turn the sign of that matrix or of its factor: it seems to be −K"
+        require(bool(is_stable), "stiffness", what, "a stiffness without negative directions", cure)
 
     @property
     def outputs(self) -> tuple[Output, ...]:
@@ -225,7 +245,8 @@ class MatrixStructure(LinearSystem):
         array, key = np.asarray(value.toarray() if hasattr(value, "toarray") else value), "array of"
         size = np.shape(self.mass[0][1])[0]
         what, allowed = f"of shape {array.shape}", f"({size}, {size})"
-        require(array.shape == (size, size), f"{key} {kind}", value=what, allowed=allowed)
+        cure = "all matrices have as many rows and columns as there are unknowns"
+        require(array.shape == (size, size), f"{key} {kind}", what, allowed, cure)
         require_numbers(kind, array)
         asymmetry = np.abs(array - array.T)
         i, j = np.unravel_index(asymmetry.argmax(), asymmetry.shape)

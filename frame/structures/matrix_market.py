@@ -43,7 +43,8 @@ def matrix_market(name: str, content: bytes, *, max_rows: int) -> Array:
     match = HEAD.fullmatch(lines[0]) if lines else None
     if match is None:
         first = lines[0][:60].decode("latin-1") if lines else "empty"
-        raise RefusedError(name, first, ALLOWED)
+        cure = "mend or write the first line, as %%MatrixMarket matrix coordinate real symmetric"
+        raise RefusedError(name, first, ALLOWED, cure)
     layout, kind, symmetry = (word.decode().lower() for word in match.groups())
     body = [line for line in lines[1:] if not line.lstrip().startswith(b"%")]
     text = b"\n".join(body)
@@ -56,7 +57,10 @@ def matrix_market(name: str, content: bytes, *, max_rows: int) -> Array:
     is_sparse = layout == "coordinate"
     n_sizes = 3 if is_sparse else 2
     are_sizes = len(sizes) == n_sizes and bool(((sizes >= 0) & (sizes == np.floor(sizes))).all())
-    require(are_sizes, name, f"sizes {sizes.tolist()}", f"{n_sizes} whole numbers")
+    cure = "the line of sizes is as 18 18 42 for 18 rows, 18 columns and 42 entries"
+    if not is_sparse:
+        cure = "the line of sizes of an array is as 18 18 for 18 rows and 18 columns"
+    require(are_sizes, name, f"sizes {sizes.tolist()}", f"{n_sizes} whole numbers", cure)
     require_size(name, (int(min(sizes[0], 1e18)), int(min(sizes[1], 1e18))), max_rows)
     shape = int(sizes[0]), int(sizes[1])
     mirrored = MIRRORED[symmetry]
@@ -66,8 +70,10 @@ def matrix_market(name: str, content: bytes, *, max_rows: int) -> Array:
         require(kind != "pattern", name, "an array of a pattern", ALLOWED)
         return _dense(name, entries, shape, symmetry=symmetry)
     columns = 2 if kind == "pattern" else 3
-    value = f"{len(entries)} numbers for {sizes[2]:.0f} entries"
-    require(len(entries) == columns * sizes[2], name, value, f"{columns} numbers an entry")
+    value = f"of {len(entries) / columns:g} entries, where its line of sizes states {sizes[2]:.0f}"
+    cure = "mend the last number of the line of sizes, or load the file anew"
+    is_complete = len(entries) == columns * sizes[2]
+    require(is_complete, name, value, f"entries of {columns} numbers, as many as stated", cure)
     table = entries.reshape(-1, columns)
     values = table[:, 2] if columns == 3 else np.ones(len(table))
     rows, cols = table[:, 0] - 1, table[:, 1] - 1
@@ -112,7 +118,10 @@ def dense_of_entries(
         if not is_inside.all():
             wrong = indices[int(np.argmin(is_inside))]
             value = f"index {wrong + 1:g} of {'rows' if axis == 0 else 'columns'}, counted from 1"
-            raise RefusedError(name, value, f"whole numbers from 1 to {shape[axis]}")
+            cure = f"the file states {shape[0]} × {shape[1]}: mend the line of sizes, or the index"
+            if wrong == -1:
+                cure = "indices that count from 0 need 1 added to each"
+            raise RefusedError(name, value, f"whole numbers from 1 to {shape[axis]}", cure)
     matrix = np.zeros(shape)
     np.add.at(matrix, (rows.astype(int), columns.astype(int)), values)
     return matrix

@@ -7,6 +7,7 @@ the unknowns and the memory that is free, indices against the shape, text agains
 from __future__ import annotations
 
 import re
+from collections import Counter
 from io import StringIO
 from pathlib import Path
 
@@ -78,7 +79,9 @@ def read_matrix(path: str | Path, *, name: str = "", max_rows: int = MAX_ROWS) -
     is_real, shape = array.dtype.kind in "uif", " × ".join(map(str, array.shape))
     require(is_real, file.name, value=f"an array of {array.dtype.name}", allowed=ALLOWED)
     is_matrix = array.ndim in (1, 2) and array.size > 0
-    require(is_matrix, file.name, value=f"an array of {shape or 'no'} numbers", allowed=ALLOWED)
+    what = f"an array of {shape or 'no'} numbers"
+    cure = "save two dimensions, as array[0] of three" if array.ndim > 2 else ""
+    require(is_matrix, file.name, what, ALLOWED, cure)
     require_size(file.name, array.shape, max_rows)
     require_free_memory(file.name, 8.0 * array.size, f"{array.size} numbers")
     if not np.isfinite(array).all():
@@ -86,7 +89,7 @@ def read_matrix(path: str | Path, *, name: str = "", max_rows: int = MAX_ROWS) -
         what = f"{array[tuple(place - 1)]} at " + ", ".join(
             f"{axis} {k}" for axis, k in zip(("row", "column"), place, strict=False)
         )
-        raise RefusedError(file.name, what, ALLOWED)
+        raise RefusedError(file.name, what, ALLOWED, "write finite numbers there")
     return np.array(array, float)
 
 
@@ -126,14 +129,18 @@ def _read_csv(name: str, text: str) -> Array:
 def _wrong_row(name: str, text: str, delimiter: str | None) -> RefusedError:
     """Error about the first row of a text that is not of as many numbers as the first row is."""
     lines = {k: x for k, x in enumerate(text.splitlines(), 1) if x.partition("#")[0].strip()}
-    count = 0
+    counts = [len(line.partition("#")[0].split(delimiter)) for line in lines.values()]
+    count, n_rows = Counter(counts).most_common(1)[0]
+    if n_rows == 1:  # all rows differ
+        count = counts[0]
     for number, line in lines.items():
         cells = [cell.strip() for cell in line.partition("#")[0].split(delimiter)]
         others = [cell for cell in cells if not NUMBER.fullmatch(cell)]
-        count = count or len(cells)
         if not others and len(cells) == count:
             continue
-        cure = f"the first row has {count}"
+        cure = f"it has {len(cells)} numbers, and {n_rows} of {len(lines)} rows have {count}"
+        if delimiter == "," and "." not in text:
+            cure += "; if commas are decimal ones, part the numbers by semicolons"
         if others:
             fitting = (cure for pattern, cure in CURES_OF_CELLS.items() if re.search(pattern, line))
             cure = next(fitting, "a matrix has no head and no names of rows")

@@ -18,7 +18,7 @@ from alphacut.base.errors import RefusedError, require
 from alphacut.base.memory import require_text
 from alphacut.rve.mesh import square
 from alphacut.rve.mesh.columns import grid_of
-from alphacut.rve.mesh.msh import DamagedMeshError, MshFile, element_name, parse_msh
+from alphacut.rve.mesh.msh import REWRITE, DamagedMeshError, MshFile, element_name, parse_msh
 from alphacut.rve.mesh.periodicity import SAME_PLACE, MeshError, unknowns
 from alphacut.rve.mesh.prism_grid import PrismGrid, Prisms
 from alphacut.rve.mesh.wedge import prism_rule, vertices_and_midpoints, wedge
@@ -44,8 +44,10 @@ def read_grid(path: Path | str) -> PrismGrid:
     try:
         mesh = parse_msh(mesh_content(path))
     except DamagedMeshError as error:
-        raise RefusedError("mesh.file", f"{path}, {error}", MESH_FILES) from None
+        cure = "" if REWRITE in str(error) else "copy the file anew, or write it anew by Gmsh"
+        raise RefusedError("mesh.file", f"{path}, {error}", MESH_FILES, cure) from None
     prisms = read_prisms(mesh)
+    _require_theta_last(prisms.points)
     _require_square(prisms.points[:, :2], "the cell")
     grid = grid_of(orient(prisms))
     _require_filled(grid)
@@ -212,13 +214,30 @@ def _require_joined_columns(grid: PrismGrid) -> None:
         )
 
 
+def _require_theta_last(points: Array) -> None:
+    """Refuse points, shape (n, 3), of a cell whose third coordinate is not the one along θ.
+
+    The cell spans −1 … 1 in two coordinates. If it does so in the third one and in only one of the
+    others, θ was taken along the remaining one.
+    """
+    ends = np.array([points.min(axis=0), points.max(axis=0)])
+    is_side = (np.abs(ends - [[-1], [1]]) <= SAME_PLACE).all(axis=0)
+    if is_side[2] and is_side.sum() == 2:
+        axis = int(np.argmin(is_side))
+        low, high = ends[:, axis]
+        raise MeshError(
+            f"the cell spans {low:.6g} … {high:.6g} along x{axis + 1} and −1 … 1 along x3",
+            f"turn the axes: exchange x{axis + 1} and x3, so that θ is the third coordinate",
+        )
+
+
 def _require_square(xy: Array, what: str) -> None:
     """Refuse points (n, 2) whose box is not the cell's."""
     box = np.array([xy.min(axis=0), xy.max(axis=0)])
     if abs(box - [[-1, -1], [1, 1]]).max() > SAME_PLACE:
         shown = " × ".join(f"{low:.6g} … {high:.6g}" for low, high in box.T)
         size, other = box[1] - box[0]
-        cure = "the cell is a square; a rectangle has no place here"
+        cure = "the cell is a square, not a rectangle: mesh the square −1 … 1 × −1 … 1 anew"
         if abs(size - other) <= SAME_PLACE * size:
             x, y = box.mean(axis=0)
             cure = f"scale and move the mesh: 2 (x − {x:g}) / {size:g}, 2 (y − {y:g}) / {size:g}"

@@ -75,14 +75,18 @@ def parse_msh(content: bytes) -> MshFile:
     sections = _sections(content)
     match = FORMAT.match(sections.get(b"MeshFormat", b""))
     if match is None:
-        raise DamagedMeshError("without a format in $MeshFormat")
+        raise DamagedMeshError('without the line "4.1 0 8" or "2.2 0 8" below $MeshFormat')
     version, is_binary, size = match[1].decode("latin-1"), match[2] == b"1", int(match[3])
     if version not in VERSIONS or size != 8:
         raise DamagedMeshError(f"of version {version} with numbers of {size} bytes; {REWRITE}")
     order = "<"
     if is_binary:
         one = sections[b"MeshFormat"][match.end() : match.end() + 4]
+        if one not in (b"\x01\0\0\0", b"\0\0\0\x01"):
+            raise DamagedMeshError("in text, where the line below $MeshFormat says bytes (1)")
         order = "<" if one == b"\x01\0\0\0" else ">"
+    elif b"\0" in content:
+        raise DamagedMeshError("in bytes, where the line below $MeshFormat says text (0)")
 
     def numbers(name: bytes) -> _Numbers:
         if name not in sections:

@@ -77,6 +77,8 @@ def test_check_prints_what_was_read(tmp_path, capfd):
     assert "unusual" not in out
     soft = "--set=frame.modulus=[22, 24, 26] kPa"
     assert "unusual period" in spoken(capfd, "check", written(tmp_path), soft)[1]
+    tiny = spoken(capfd, "check", written(tmp_path), "--set=frame.modulus=[22, 24, 26] Pa")[1]
+    assert "warning: frame.modulus is 22.00 Pa" in tiny
     assert "22.00 GPa … 24.00 GPa … 26.00 GPa  triangle" in out
     assert out.endswith("no problems\n")
     read = {

@@ -6,7 +6,13 @@ import pytest
 
 from alphacut.base.number_text import engineering
 from alphacut.fuzzy import Crisp, Interval, Trapezoidal, Triangular
-from alphacut.io.quantity import QUANTITIES, parse_fuzzy, parse_number, registry
+from alphacut.io.quantity import (
+    QUANTITIES,
+    parse_fuzzy,
+    parse_fuzzy_in_any_unit,
+    parse_number,
+    registry,
+)
 
 RIGHT = [
     ("80 GPa", "Pa", Crisp(80e9)),
@@ -58,8 +64,8 @@ WRONG = [
     (["10 t"], "kg", "as if of a matrix"),
     ("[] m", "m", "does not begin with a number"),
     (True, "m", "no quantity"),
-    ("5 %", "m", "wrong"),
-    ("3 px", "m", "wrong"),
+    ("5 %", "m", "no unit of length"),
+    ("3 px", "m", "no unit of length"),
     ("9" * 2000, "", "too long"),
     ("2 s", "Hz", "no unit of frequency"),
     ("2 rad", "Hz", "no unit of frequency"),
@@ -87,6 +93,20 @@ WRONG = [
             ("80 kg/cm2", "Pa", "kgf/cm2"),
             ("80 [GPa]", "Pa", "GPa"),
             ("45 Deg", "rad", "deg"),
+            ("[0.8, 1, 1.2] kn", "N", "kN"),
+            ("40 Millimetres", "m", "mm"),
+            ("3 KiloNewtons", "N", "kN"),
+            ("5 Sec", "s", "s"),
+            ("20 Tonnes", "kg", "t"),
+            ("24.7 GP", "Pa", "GPa"),
+            ("30 MPascal", "Pa", "MPa"),
+            ("1 herz", "Hz", "Hz"),
+            ("12 Kips", "N", "kip"),
+            ("9.81 m s-2", "m/s^2", r"m/s\^2"),
+            ("90 mN/m ± 6 %", "N/m", "MN"),
+            ("300 mPa", "Pa", "MPa"),
+            ("5 Mm", "m", "mm"),
+            ("20 Mt", "kg", "t"),
         )
     ],
     ("20 ton", "kg", "write t"),
@@ -109,7 +129,7 @@ WRONG = [
     ("5...6 m", "m", "a range as"),
     ("[5; 6] m", "m", r"\[5, 6\] m"),
     ("[5 6] m", "m", "units are m, cm"),
-    ("80 Giga Pa", "Pa", "units are Pa, kPa"),
+    ("80 Giga Pa", "Pa", r"did you mean GPa\?"),
     ("[5, 6 m", "m", "close the bracket"),
     ("~5 m", "m", "a value, or a range"),
     ("GPa 80", "Pa", "the number first"),
@@ -126,6 +146,21 @@ WRONG = [
 def test_what_is_no_quantity_is_refused(text, unit, words):
     with pytest.raises(ValueError, match=words):
         parse_fuzzy(text, unit)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("40 Millimetres", r"did you mean mm\?"),
+        ("40 kn", r"did you mean kN\?"),
+        ("60 tons", "write t"),
+        ("3,5 m", "a decimal point"),
+        ("12 parsec fuzz", "none of a quantity such as"),
+    ],
+)
+def test_a_quantity_of_any_dimension_names_the_unit_that_was_meant(text, words):
+    with pytest.raises(ValueError, match=words):
+        parse_fuzzy_in_any_unit(text)
 
 
 def test_one_number_is_one():

@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from alphacut.frame import Accelerogram
+from alphacut.base.errors import RefusedError
+from alphacut.frame import Accelerogram, StoreyFrame
 from alphacut.frame.analyses.spectral import spectral_acceleration
+from alphacut.frame.analyses.suites import scaled_records
 
 
 @pytest.mark.parametrize("period", [0.05, 0.3, 2.0])
@@ -22,3 +24,10 @@ def test_peaks_are_those_of_a_dense_integration(period):
     motion = solve_ivp(rate, (0, times[-1]), [0, 0], t_eval=times, rtol=1e-9, max_step=step)
     exact = omega**2 * abs(motion.y[0]).max()
     assert spectral_acceleration(ground, period, ratio) == pytest.approx(exact, rel=4e-3)
+
+
+def test_a_period_that_no_structure_has_is_refused_before_it_takes_minutes():
+    frame = StoreyFrame((50e3,), stiffness=(0.09,), dampers=(0.0,), damper_placement="storey")
+    record = Accelerogram(0.02, np.ones(40))
+    with pytest.raises(RefusedError, match=r"first natural period .* as t and MN/m"):
+        scaled_records(frame, [record], duration=20.0, step=0.02)

@@ -111,9 +111,9 @@ def test_decimal_commas_between_other_marks_are_read(tmp_path, mark):
 
 
 def test_decimal_commas_are_told_by_the_marks_where_whole_seconds_rise(tmp_path):
-    rows = [f"{1.5 * k:.1f};{x:.5f}".replace(".", ",") for k, x in enumerate(VALUES[:50])]
+    rows = [f"{0.4 * k:.1f};{x:.5f}".replace(".", ",") for k, x in enumerate(VALUES[:50])]
     record = read_recording(saved(tmp_path, rows, "time [s];acceleration [m/s^2]"))
-    assert record.step == 1.5
+    assert record.step == pytest.approx(0.4, rel=1e-12)
     assert record.samples == pytest.approx(VALUES[:50])
 
 
@@ -121,7 +121,10 @@ def test_one_column_of_decimal_commas_is_one_column(tmp_path):
     path = saved(tmp_path, [f"{x:.5f}".replace(".", ",") for x in VALUES])
     assert read_recording(path, step=0.01, unit="g").samples == pytest.approx(G * VALUES)
     counted = saved(tmp_path, [f"{k},{k % 9}" for k in range(N_SAMPLES)])  # two columns
-    assert len(read_recording(counted, unit="g").samples) == N_SAMPLES
+    assert "say records.step" in refused(counted, "", None, "g")
+    record = read_recording(counted, step=0.01, unit="g")
+    assert record.step == 0.01
+    assert len(record.samples) == N_SAMPLES
 
 
 @pytest.mark.parametrize(
@@ -147,12 +150,52 @@ def test_rows_of_no_numbers_tell_their_cure(tmp_path, row, cure):
     [
         ((0, 1, 2, 2, 3, 4), "a time stands twice"),
         ((0, 1, 2, 5, 6, 7), "samples are missing there"),
-        ((0, 1, 2, 3, 0, 1, 2, 3), "times must rise"),
+        ((0, 1, 2, 3, 0, 1, 2, 3), "of two records in one file keep one"),
+        ((0, 1, 2, 4, 3, 5, 6), "fall between line 5 and line 6: sort the rows"),
+        ((6, 5, 4, 3, 2, 1, 0), "turn the order of the rows round"),
+        ((0, 1, 2, 3, 5, 7, 9), "resample to even steps"),
+        ((0, 0, 0, 0, 0), 'records.step = "0.005 s"'),
     ],
 )
 def test_uneven_times_tell_their_cure(tmp_path, times, cure):
     rows = [f"{0.01 * k:.2f},{0.1 * k * k % 1:.3f}" for k in times]
     assert cure in refused(saved(tmp_path, rows, "time [s],acceleration [g]"))
+
+
+@pytest.mark.parametrize(
+    ("head", "step", "cure"),
+    [
+        ("time [s],acceleration [g]", 1, "say records.step"),
+        ("time [min],acceleration [g]", 0.01, r"write time [s]"),
+        ("time [ms],acceleration [g]", 0.02, r"write time [s]"),
+        ("time [s],acceleration [g]", 5, r"have the head time [ms]"),
+    ],
+)
+def test_times_whose_step_no_record_has_tell_their_cure(tmp_path, head, step, cure):
+    rows = [f"{step * k:g},{0.1 * k * k % 1:.3f}" for k in range(20)]
+    assert cure in refused(saved(tmp_path, rows, head))
+
+
+@pytest.mark.parametrize("times", [[0] * 9, range(9), range(1, 10)])
+def test_times_without_a_step_give_way_to_the_stated_one(tmp_path, times):
+    rows = [f"{time},{0.1 * k * k % 1:.3f}" for k, time in enumerate(times)]
+    record = read_recording(saved(tmp_path, rows, "time [s],acceleration [g]"), step=0.01)
+    assert record.step == 0.01
+    assert any("the stated step is taken" in remark for remark in record.remarks)
+
+
+@pytest.mark.parametrize("is_whole", [True, False])
+def test_decimal_commas_between_commas_are_told_apart_by_the_head(tmp_path, is_whole):
+    rows = [f"{0.01 * k:.2f},{k if is_whole else 0.1 * k:g}" for k in range(1, 30)]
+    path = saved(tmp_path, [row.replace(".", ",") for row in rows], "time [s],acceleration [g]")
+    assert "these seem to be decimal commas" in refused(path)
+
+
+def test_no_warning_of_numpy_is_raised_by_times_that_begin_late(tmp_path, recwarn):
+    rows = [f"{1 + 0.01 * k:.2f},{0.1 * k * k % 1:.3f}" for k in range(20)]
+    record = read_recording(saved(tmp_path, rows, "time [s],acceleration [g]"))
+    assert record.remarks == ("its times begin at 1 s, taken as 0",)
+    assert not recwarn.list
 
 
 def test_times_in_a_unit_of_something_else_are_told_which_there_are(tmp_path):

@@ -28,7 +28,9 @@ def test_commas_semicolons_and_blanks_part_numbers(tmp_path, mark):
     [
         ("q1,q2\n1,2\n3,4\n", "line 1 is q1,q2; .* no head"),
         ("q1,1,2\nq2,3,4\n", "line 1 is q1,1,2; .* no head and no names"),
-        ("1,2\n3\n", "line 2 is 3; .* the first row has 2"),
+        ("1,2\n3\n", "line 2 is 3; .* it has 1 numbers, and 1 of 2 rows have 2"),
+        ("1\n2,3\n4,5\n", "line 1 is 1; .* it has 1 numbers, and 2 of 3 rows have 2"),
+        ("1,5,2\n3,5,4,5\n6,5,7,5\n", "if commas are decimal ones, part the numbers by semic"),
         ("1,2,\n3,4,\n", "cells are empty"),
         ("1,,2\n3,4,5\n", "cells are empty"),
         ("1,5 2,5\n3,5 4,5\n", "write decimal points"),

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.sparse import coo_array
 
+from alphacut.base.errors import RefusedError
 from alphacut.frame import Accelerogram, Exact, LinearFlow, MatrixStructure, StoreyFrame, envelope
 from alphacut.frame.records.history import History
 from alphacut.frame.structures.linear import frequencies
@@ -70,3 +71,21 @@ def test_factors_read_from_text_are_proved_as_names_and_numbers_are():
     fuzzy = {"k": Interval(600, 620)}
     result = envelope(structure, fuzzy, duration=1.0, step=0.01, alpha=[0], progress=False)
     assert result.nature == "guaranteed"
+
+
+def signed_structure(*, mass, stiffness):
+    chain = np.array([[2.0, -1.0], [-1.0, 1.0]])
+    return MatrixStructure(
+        {"k": 1.0},
+        mass=[(1.0, mass * np.eye(2))],
+        stiffness=[("k", chain), (1.0, stiffness * chain)],
+        observed={"q2": np.array([0.0, 1.0])},
+    )
+
+
+def test_a_matrix_of_the_other_sign_is_told_to_turn_it():
+    with pytest.raises(RefusedError, match=r"mass is not positive definite; .* seems to be −M"):
+        signed_structure(mass=-1.0, stiffness=0.0)
+    with pytest.raises(RefusedError, match=r"negative diagonal in term 2; .* it seems to be −K"):
+        signed_structure(mass=1.0, stiffness=-3.0)
+    assert signed_structure(mass=1.0, stiffness=-0.5).size == 2  # a weight takes some stiffness

@@ -40,7 +40,7 @@ def test_one_of_several_arrays_is_named(tmp_path):
     ("name", "content", "words"),
     [
         ("k.txt", "1 2\n", "of type .txt"),
-        ("k.csv", "1,2\n3\n", "the first row has 2"),
+        ("k.csv", "1,2\n3\n", "1 of 2 rows have 2"),
         ("k.csv", "1,nan\n", "nan at row 1, column 2"),
         ("k.mtx", "no matrix\n", "k.mtx is no matrix; allowed: %%MatrixMarket"),
         ("k.npy", "no array", "an array of real numbers as numpy.save"),
@@ -113,16 +113,19 @@ HEAD = "%%MatrixMarket matrix coordinate real general\n"
     ("text", "words"),
     [
         (HEAD + "2 2 1\n3 1 5.0\n", "index 3 of rows, counted from 1; allowed: .* from 1 to 2"),
-        (HEAD + "2 2 1\n1 0 5.0\n", "index 0 of columns"),
+        (HEAD + "2 2 1\n3 1 5.0\n", "the file states 2 × 2: mend the line of sizes, or the index"),
+        (HEAD + "2 2 1\n1 0 5.0\n", "index 0 of columns, .* count from 0 need 1 added"),
+        (HEAD + "2 2\n1 1 5.0\n", "as 18 18 42 for 18 rows, 18 columns and 42 entries"),
+        (HEAD.replace("general", "symetric") + "1 1 1\n1 1 5.0\n", "mend or write the first line"),
         (HEAD + "2 2 1\n1 1.5 5.0\n", "index 1.5 of columns"),
         (HEAD + "2 2 1\n1 -1 5.0\n", "index -1 of columns"),
         (HEAD + "2 2 1\n1 1 5.0x\n", "with '1 1 5.0x'"),
         (HEAD + "2 2 1\n1 1 nan\n", "with '1 1 nan'"),
         (HEAD + "2 2 1\n1 1 1e\n", "could not convert string to float"),
-        (HEAD + "2 2 2\n1 1 5.0\n", "3 numbers for 2 entries"),
+        (HEAD + "2 2 2\n1 1 5.0\n", "of 1 entries, where its line of sizes states 2; .* mend the last number"),
         (HEAD + "2 2 -1\n1 1 5.0\n", "sizes .* whole numbers"),
         (HEAD + "900000000 900000000 1\n1 1 5.0\n", "900000000 × 900000000; allowed: up to 5000"),
-        (HEAD + "2 2 99999999999999\n1 1 5.0\n", "3 numbers for 99999999999999 entries"),
+        (HEAD + "2 2 99999999999999\n1 1 5.0\n", "of 1 entries, where its line of sizes states 99999999999999"),
         (HEAD.replace("real", "complex") + "1 1 1\n1 1 1 0\n", "coordinate complex"),
         (HEAD, "sizes"),
     ],
@@ -186,6 +189,21 @@ def test_objects_are_no_matrix_and_no_pickle_is_read(tmp_path):
     for name in ("k.npy", "k.npz"):
         with pytest.raises(RefusedError, match="object of shape"):
             read_matrix(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ("array", "cure"),
+    [
+        (MATRIX[np.newaxis], r"save two dimensions, as array\[0\]"),
+        (MATRIX + 1j, "save its real part"),
+        (MATRIX.astype(object), "save numbers"),
+        (np.where(MATRIX == 0, np.nan, MATRIX), "write finite numbers there"),
+    ],
+)
+def test_arrays_that_are_no_matrix_tell_their_cure(tmp_path, array, cure):
+    np.save(tmp_path / "k.npy", array, allow_pickle=True)
+    with pytest.raises(RefusedError, match=cure):
+        read_matrix(tmp_path / "k.npy")
 
 
 def test_a_matrix_larger_than_the_unknowns_is_refused(tmp_path):

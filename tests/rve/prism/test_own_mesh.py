@@ -159,6 +159,11 @@ def stretched(points, cells, phase):
     return points * [1.1, 1, 1], cells, phase
 
 
+def laid_down(points, cells, phase):
+    theta = 2.5 * (points[:, 2] - points[:, 2].min()) / np.ptp(points[:, 2])
+    return np.column_stack([theta, points[:, 1], points[:, 0]]), cells, phase
+
+
 def with_a_hole(points, cells, phase):
     per_layer = len(phase) // 2
     kept = np.arange(len(phase)) % per_layer != np.flatnonzero(phase)[0]
@@ -188,7 +193,8 @@ def begun_late(points, cells, phase):
     ("change", "message"),
     [
         (lifted, "does not stand on one level"),
-        (stretched, "the cell spans -1.1 … 1.1"),
+        (stretched, "the cell spans -1.1 … 1.1 .* mesh the square"),
+        (laid_down, r"spans 0 … 2.5 along x1 .* exchange x1 and x3, so that θ is the third"),
         (with_a_hole, r"the prisms fill 9\d\.\d+% .* give holes a phase of their own"),
         (twice_the_particle, r"the prisms fill 112\.\d+% .* occ.fragment"),
         (cut_out, "has a prism on one side alone: a slit; .* Coherence"),
@@ -300,7 +306,11 @@ $EndElements
     [
         ("4.1 0 8", "4 0 8", "of version 4 .*write it as MSH 4.1 or 2.2"),
         ("4.1 0 8", "4.1 0 4", "numbers of 4 bytes"),
-        ("4.1 0 8", "text", "without a format"),
+        ("4.1 0 8", "text", 'without the line "4.1 0 8" .*write it anew'),
+        ("4.1 0 8\n", "", 'without the line "4.1 0 8"'),
+        ("4.1 0 8", "4.1 1 8", r"in text, where .* says bytes \(1\)"),
+        ("0 0 0\n$End", "0 0 \0\n$End", r"in bytes, where .* says text \(0\)"),
+        ("$EndNodes", "", "cut off inside .Nodes.*copy the file anew"),
         ("1 1 1 1\n3 1 0 1", "1 1 1 1\n3 1 0 999999999", "promised and fewer there"),
         ("1 1 1 1\n3 1 0 1", "1 1 1 1\n3 1 0 -1", "below 0"),
         ("1 1 1 1\n3 1 0 1", "1 2 1 1\n3 1 0 1", "2 nodes promised and 1 there"),
