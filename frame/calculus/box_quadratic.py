@@ -9,14 +9,25 @@ import numpy as np
 from alphacut.base.kernels import compiled
 from alphacut.frame.calculus.jet import Array
 
-FACES_UP_TO = 6
-"""Number of parameters up to which all faces of the box are enumerated."""
 SHIFT = 1e-13
-"""Share of |H| by which a block is made more concave before it is solved, so that it is regular."""
+"""Fraction of max|H| by which Hessians are made more concave before they are solved.
+
+It is far above the unit roundoff, so that no Hessian stays singular, and far below what changes a
+maximum visibly.
+"""
 
 
 def gain(g: Array, H: Array, x: Array) -> Array:
-    """Values of g·x + x·H·x/2, shape (N, …), for g (N, d), H (N, d, d) and x (N, …, d)."""
+    """Return the values of N quadratics g·x + x·H·x/2 at points.
+
+    Args:
+        g: Gradients at x = 0, shape (N, d).
+        H: Symmetric Hessians, shape (N, d, d).
+        x: One point for each quadratic, shape (N, d), or several, shape (N, points, d).
+
+    Returns:
+        Shape (N,) or (N, points).
+    """
     if x.ndim == 2:
         mean_slope = g + 0.5 * np.matmul(H, x[..., None])[..., 0]
     else:
@@ -27,34 +38,44 @@ def gain(g: Array, H: Array, x: Array) -> Array:
 def local_maximum(
     g: Array, H: Array, lower: Array, upper: Array, start: Array | None = None, *, rounds: int = 6
 ) -> Array:
-    """Points (N, d) near local maxima of g·x + x·H·x/2 over boxes, uphill from `start` (or 0).
+    """Return points near local maxima of N quadratics g·x + x·H·x/2 over N boxes.
 
-    Each round ascends along one axis after the other, then by two Newton steps.
+    Each round maximises along one axis after the other and then makes two projected Newton steps.
+    No step goes downhill. The points need not be exact maxima.
 
     Args:
-        g: Gradients, shape (N, d).
+        g: Gradients at x = 0, shape (N, d).
         H: Symmetric Hessians, shape (N, d, d).
         lower: Lower ends of the boxes, shape (N, d).
-        upper: Upper ends.
-        start: Where to start, inside the boxes.
-        rounds: Most rounds; one that gains next to nothing is a problem's last.
+        upper: Upper ends of the boxes, shape (N, d).
+        start: Where the ascents begin, inside the boxes, shape (N, d); x = 0 if None.
+        rounds: Largest number of rounds. An ascent ends earlier where a round gains next to
+            nothing.
+
+    Returns:
+        Shape (N, d), a new array.
     """
-    x = np.zeros(g.shape) if start is None else np.array(start, float, order="C")
-    quadratics_and_boxes = (np.ascontiguousarray(array, float) for array in (g, H, lower, upper))
-    _ascend(*quadratics_and_boxes, x, rounds)
+    if start is None:
+        start = np.zeros(g.shape)
+    x = np.array(start, float, order="C")
+    gradients, hessians = np.ascontiguousarray(g, float), np.ascontiguousarray(H, float)
+    lower_ends, upper_ends = np.ascontiguousarray(lower, float), np.ascontiguousarray(upper, float)
+    _ascend(gradients, hessians, lower_ends, upper_ends, x, rounds)
     return x
 
 
 @compiled
 def _ascend(g: Array, H: Array, lower: Array, upper: Array, x: Array, rounds: int) -> None:
-    """Ascend to local maxima of all problems, in place, x (N, d) in the boxes."""
+    """Move the points x, shape (N, d), uphill in place, as `local_maximum` says."""
     for n in range(len(g)):
         value = _value(g[n], H[n], x[n])
         for _ in range(rounds):
             before = value
             for i in range(x.shape[1]):
                 low, high, curvature = lower[n, i], upper[n, i], H[n, i, i]
-                slope = _slope(g[n], H[n], x[n], i) - curvature * x[n, i]  # at x_i = 0
+                # along x_i the quadratic is slope x_i + curvature x_i²/2, and `rise` is its value
+                # at the upper end less that at the lower end
+                slope = _slope(g[n], H[n], x[n], i) - curvature * x[n, i]
                 rise = slope * (high - low) + 0.5 * curvature * (high**2 - low**2)
                 x[n, i] = high if rise > 0 else low
                 if curvature < 0:
@@ -67,6 +88,7 @@ def _ascend(g: Array, H: Array, lower: Array, upper: Array, x: Array, rounds: in
 
 @compiled
 def _slope(g: Array, H: Array, x: Array, i: int) -> float:
+    """Return the derivative by x_i of a quadratic, (g + H x)_i."""
     slope = g[i]
     for j in range(len(x)):
         slope += H[i, j] * x[j]
@@ -75,6 +97,7 @@ def _slope(g: Array, H: Array, x: Array, i: int) -> float:
 
 @compiled
 def _value(g: Array, H: Array, x: Array) -> float:
+    """Return g·x + x·H·x/2 = Σ_i x_i (g_i + (g + H x)_i)/2."""
     value = 0.0
     for i in range(len(x)):
         value += 0.5 * x[i] * (g[i] + _slope(g, H, x, i))
@@ -83,13 +106,22 @@ def _value(g: Array, H: Array, x: Array) -> float:
 
 @compiled
 def _newton_step(g: Array, H: Array, lower: Array, upper: Array, x: Array) -> float:
-    """Value after a projected Newton step of length 1, ½ or ¼ on the free axes, if it gains."""
-    d, best, start, free, step = len(x), _value(g, H, x), x.copy(), H.copy(), np.empty((len(x), 1))
+    """Make a projected Newton step, and return the value of the quadratic afterwards.
+
+    Axes at whose end of the box the quadratic rises outwards are held. The step is tried in its
+    full length, in half and in a quarter, each clipped to the box; x moves, in place, to the best
+    of these points that gains.
+    """
+    d, best, start = len(x), _value(g, H, x), x.copy()
+    free, step = H.copy(), np.empty((len(x), 1))
     for i in range(d):
         slope = _slope(g, H, x, i)
         step[i, 0] = -slope
         if (x[i] <= lower[i] and slope <= 0) or (x[i] >= upper[i] and slope >= 0):
-            free[i], free[:, i], step[i, 0] = 0.0, 0.0, 0.0
+            # the equation of a held axis becomes −step_i = 0
+            free[i] = 0.0
+            free[:, i] = 0.0
+            step[i, 0] = 0.0
             free[i, i] = -1.0
     shift = SHIFT * (np.abs(free).max() + 1e-100)  # as in `_regular`
     for k in range(d):
@@ -99,13 +131,19 @@ def _newton_step(g: Array, H: Array, lower: Array, upper: Array, x: Array) -> fl
         trial = np.minimum(np.maximum(start + length * step[:, 0], lower), upper)
         value = _value(g, H, trial)
         if value > best:
-            best, x[:] = value, trial
+            best = value
+            x[:] = trial
     return float(best)
 
 
 @compiled
 def solve_in_place(matrix: Array, b: Array) -> None:
-    """Overwrite b (n, m) with the solutions x of A x = b by elimination with row exchanges."""
+    """Overwrite b with the solutions of A x = b by Gaussian elimination with partial pivoting.
+
+    Args:
+        matrix: A, not singular, shape (n, n); it is not changed.
+        b: Right-hand sides as columns, shape (n, m).
+    """
     n, m, A = len(matrix), b.shape[1], matrix.copy()
     for k in range(n):
         pivot = k
@@ -130,45 +168,73 @@ def solve_in_place(matrix: Array, b: Array) -> None:
 
 
 def global_maximum(g: Array, H: Array, lower: Array, upper: Array) -> Array:
-    """Points (N, d) of boxes where g·x + x·H·x/2 is largest, among all faces' stationary points.
+    """Return the points of N boxes where the quadratics g·x + x·H·x/2 are largest.
 
-    With more than `FACES_UP_TO` parameters there are too many faces: then the better of the local
-    maxima from 0 and from the corner that the gradient points to.
+    A maximum over a box is a stationary point on the interior of one of its 3^d faces. Up to six
+    parameters all faces are searched. With more, which are too many faces, the better of two local
+    maxima is taken, uphill from 0 and from the corner that the gradient points to.
+
+    Args:
+        g: Gradients at x = 0, shape (N, d).
+        H: Symmetric Hessians, shape (N, d, d).
+        lower: Lower ends of the boxes, which hold x = 0, shape (N, d).
+        upper: Upper ends of the boxes, shape (N, d).
+
+    Returns:
+        Shape (N, d). Where no point has a positive value it is x = 0.
     """
-    d = g.shape[1]
-    if d > FACES_UP_TO:
-        starts = [np.zeros_like(g), np.where(g > 0, upper, lower)]
-        optima = np.stack([local_maximum(g, H, lower, upper, start) for start in starts], 1)
-        return np.asarray(optima[np.arange(len(g)), gain(g, H, optima).argmax(1)])
+    d, problems = g.shape[1], np.arange(len(g))
+    if d > 6:
+        corners = np.where(g > 0, upper, lower)
+        from_zero = local_maximum(g, H, lower, upper, np.zeros_like(g))
+        from_corner = local_maximum(g, H, lower, upper, corners)
+        optima = np.stack([from_zero, from_corner], 1)
+        return np.asarray(optima[problems, gain(g, H, optima).argmax(1)])
     best, best_gain = np.zeros_like(g, order="C"), np.zeros(len(g))
     for size in range(d + 1):
         for free in combinations(range(d), size):
             points = _face_points(g, H, lower, upper, free)
             values = gain(g, H, points)
-            highest = np.arange(len(g)), values.argmax(1)
-            better = values[highest] > best_gain
-            best[better], best_gain[better] = points[highest][better], values[highest][better]
+            highest = values.argmax(1)
+            highest_values = values[problems, highest]
+            is_better = highest_values > best_gain
+            best[is_better] = points[problems, highest][is_better]
+            best_gain[is_better] = highest_values[is_better]
     return best
 
 
 def _face_points(g: Array, H: Array, lower: Array, upper: Array, free: tuple[int, ...]) -> Array:
-    """Stationary points (N, 2^(d − free), d) on faces with these free axes, clipped to them."""
+    """Return the stationary point of each quadratic on each face with the same free axes.
+
+    Args:
+        g: Gradients at x = 0, shape (N, d).
+        H: Symmetric Hessians, shape (N, d, d).
+        lower: Lower ends of the boxes, shape (N, d).
+        upper: Upper ends of the boxes, shape (N, d).
+        free: Axes along which these faces extend; along the others they lie at an end of the box.
+
+    Returns:
+        The points, clipped to their faces, shape (N, 2^(d − len(free)), d).
+    """
     d = g.shape[1]
     fixed = [i for i in range(d) if i not in free]
-    is_upper = np.array([*product((False, True), repeat=len(fixed))], bool)  # (corners, fixed)
+    is_upper = np.array(list(product((False, True), repeat=len(fixed))), bool)  # (faces, fixed)
     points = np.zeros((len(g), len(is_upper), d))
     points[:, :, fixed] = np.where(is_upper, upper[:, None, fixed], lower[:, None, fixed])
     if free:
         f = list(free)
-        block = _regular(H[:, f][:, :, f])
+        hessian = _regular(H[:, f][:, :, f])
         slope = g[:, None, f] + np.einsum("nij,ncj->nci", H[:, f], points)
-        stationary = -np.linalg.solve(block, slope.swapaxes(1, 2)).swapaxes(1, 2)
+        stationary = -np.linalg.solve(hessian, slope.swapaxes(1, 2)).swapaxes(1, 2)
         points[:, :, f] = np.clip(stationary, lower[:, None, f], upper[:, None, f])
     return points
 
 
 def _regular(H: Array) -> Array:
-    """Symmetric matrices (N, k, k) a little more concave, and by rounding not singular."""
-    # also where H is zero: then a slope of any size leads out of the box, and is clipped to it
-    size = np.abs(H).max((1, 2), keepdims=True) + 1e-100
-    return np.asarray(H - SHIFT * size * np.eye(H.shape[-1]))
+    """Return symmetric matrices, shape (N, k, k), shifted by `SHIFT` so that none is singular.
+
+    The shift makes the quadratics more concave. A matrix of zeros is shifted as well: then a slope
+    of any size leads out of the box, and the point is clipped to it.
+    """
+    magnitude = np.abs(H).max((1, 2), keepdims=True) + 1e-100
+    return np.asarray(H - SHIFT * magnitude * np.eye(H.shape[-1]))

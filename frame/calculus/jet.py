@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,16 +19,25 @@ Array = NDArray[Any]
 
 @dataclass(frozen=True, eq=False)
 class Jet:
-    """Value of shape V with derivatives along d parameters; broadcasts over V."""
+    """An array of shape V with its first and second derivatives by d parameters.
 
-    terms: Array  # value, first and second derivatives (by i ≤ j), (1 + d + d (d + 1) / 2, *V)
-    directions: int  # number of parameters d
+    Operators act on jets as NumPy's act on arrays of shape V, and broadcast over V.
 
-    __array_ufunc__ = None  # an array on the left leaves the operation to the jet
+    Args:
+        terms: Values, then the d first derivatives, then the second derivatives by the parameters
+            i and j for i ≤ j, shape (1 + d + d (d + 1)/2, *V).
+        directions: Number d of parameters.
+    """
+
+    # NumPy's arrays as left operands leave the operation to this class
+    __array_ufunc__ = None
+
+    terms: Array
+    directions: int
 
     @classmethod
     def constant(cls, value: ArrayLike, directions: int) -> Jet:
-        """A jet without dependence on any of `directions` parameters."""
+        """Return a constant, of shape V, whose derivatives by `directions` parameters are zero."""
         array, d = np.asarray(value, float), directions
         terms = np.zeros((1 + d + d * (d + 1) // 2, *array.shape))
         terms[0] = array
@@ -36,17 +45,23 @@ class Jet:
 
     @classmethod
     def of(cls, value: Array, first: Array, second: Array) -> Jet:
-        """The jet of a value V, first derivatives (d, *V) and second ones (d, d, *V), symmetric."""
-        i, j, _ = _pairs(len(first))
-        return cls(np.concatenate([value[None], first, second[i, j]]), len(first))
+        """Return a jet from its derivatives.
+
+        Args:
+            value: Shape V.
+            first: First derivatives, shape (d, *V).
+            second: Second derivatives, symmetric in the first two axes, shape (d, d, *V).
+        """
+        pairs = _pairs(len(first))
+        return cls(np.concatenate([value[None], first, second[pairs.i, pairs.j]]), len(first))
 
     def like(self, value: ArrayLike) -> Jet:
-        """A constant with as many derivatives as this jet."""
+        """Return a constant with as many derivatives as this jet."""
         return Jet.constant(value, self.directions)
 
     @property
     def value(self) -> Array:
-        """Value, shape V."""
+        """Values, shape V."""
         return self.terms[0, ...]
 
     @property
@@ -57,7 +72,7 @@ class Jet:
     @property
     def second(self) -> Array:
         """Second derivatives, shape (d, d, *V), symmetric in the first two axes."""
-        return self.terms[1 + self.directions :][_pairs(self.directions)[2]]
+        return self.terms[1 + self.directions :][_pairs(self.directions).place]
 
     def __getitem__(self, index: Any) -> Jet:
         key = index if isinstance(index, tuple) else (index,)
@@ -65,21 +80,28 @@ class Jet:
 
     @staticmethod
     def stack(jets: Sequence[Jet]) -> Jet:
-        """Joins jets along a new last axis of V."""
+        """Return jets of equal shape V, joined along a new last axis of V."""
         return Jet(np.stack([x.terms for x in jets], -1), jets[0].directions)
 
     def contract(self, arrays: Array) -> Jet:
-        """Sum of jets shape (…, e) times arrays of numbers (e, …)."""
+        """Return Σ_k x[…, k] arrays[k] of a jet x, for V = (…, e) and numbers of shape (e, …)."""
         return Jet(np.tensordot(self.terms, arrays, 1), self.directions)
 
     def map(self, linear: Callable[[Array], Array]) -> Jet:
-        """Linear map of value and derivatives, as a function of arrays with one more axis first."""
+        """Return a linear map of the values and of each derivative.
+
+        `linear` takes and returns arrays with one more axis in front of V.
+        """
         return Jet(linear(self.terms), self.directions)
 
     def rescaled(self, units: Array) -> Jet:
-        """The same with derivatives by the parameters measured in `units`, shape (d,)."""
-        i, j, _ = _pairs(self.directions)
-        factors = np.concatenate([[1.0], units, units[i] * units[j]])
+        """Return the jet by other parameters, of which each is the old one over its unit.
+
+        Args:
+            units: Unit of each new parameter, shape (d,): d/d(p/u) = u d/dp.
+        """
+        pairs = _pairs(self.directions)
+        factors = np.concatenate([[1.0], units, units[pairs.i] * units[pairs.j]])
         return self.map(lambda x: x * factors.reshape(-1, *[1] * (x.ndim - 1)))
 
     def __neg__(self) -> Jet:
@@ -92,7 +114,9 @@ class Jet:
     __radd__ = __add__
 
     def __sub__(self, other: Jet | ArrayLike) -> Jet:
-        return self + (-other if isinstance(other, Jet) else -np.asarray(other, float))
+        if isinstance(other, Jet):
+            return self + -other
+        return self + -np.asarray(other, float)
 
     def __rsub__(self, other: Jet | ArrayLike) -> Jet:
         return -self + other
@@ -114,77 +138,112 @@ class Jet:
         return Jet(other @ self.terms, self.directions)
 
     def __truediv__(self, other: Jet | ArrayLike) -> Jet:
-        return self * (other**-1 if isinstance(other, Jet) else 1 / np.asarray(other, float))
+        if isinstance(other, Jet):
+            return self * other**-1
+        return self * (1 / np.asarray(other, float))
 
     def __rtruediv__(self, other: ArrayLike) -> Jet:
         return self**-1 * other
 
     def __pow__(self, exponent: float) -> Jet:
-        """Real power, with derivatives by the chain rule."""
+        """Return a real power, with derivatives by the chain rule."""
         if exponent == 2:
             return self * self
         x, k, d = self.value, exponent, self.directions
-        i, j, _ = _pairs(d)
+        pairs = _pairs(d)
+        # (x^k)_i = k x^(k−1) x_i and (x^k)_ij = k x^(k−1) x_ij + k (k − 1) x^(k−2) x_i x_j
         terms = k * x ** (k - 1) * self.terms
         terms[0] = x**k
-        terms[1 + d :] += k * (k - 1) * x ** (k - 2) * self.first[i] * self.first[j]
+        products = self.first[pairs.i] * self.first[pairs.j]
+        terms[1 + d :] += k * (k - 1) * x ** (k - 2) * products
         return Jet(terms, d)
 
 
+class _Pairs(NamedTuple):
+    """Pairs i ≤ j of d parameters, in the order of a jet's second derivatives.
+
+    `i` and `j` have shape (d (d + 1)/2,); `place` says where the pair (i, j) or (j, i) stands among
+    them, shape (d, d).
+    """
+
+    i: Array
+    j: Array
+    place: Array
+
+
 @cache
-def _pairs(d: int) -> tuple[Array, Array, Array]:
-    """Pairs i ≤ j of d parameters, as indices i and j, and the place of each pair, (d, d)."""
+def _pairs(d: int) -> _Pairs:
+    """Return the pairs of d parameters."""
     i, j = np.triu_indices(d)
     place = np.zeros((d, d), int)
-    place[i, j] = place[j, i] = np.arange(len(i))
-    return i, j, place
+    place[i, j] = np.arange(len(i))
+    place[j, i] = np.arange(len(i))
+    return _Pairs(i, j, place)
 
 
 def _padded(a: Jet, ndim: int) -> Jet:
-    """`a` with V extended on the left by axes of length 1 up to `ndim` axes."""
+    """Return a jet whose V has at least `ndim` axes, new ones of length 1 on the left."""
     missing = ndim - (a.terms.ndim - 1)
-    return a if missing <= 0 else a[(None,) * missing]
+    if missing <= 0:
+        return a
+    return a[(None,) * missing]
 
 
 def _matched(a: Jet, other: Jet | ArrayLike) -> tuple[Jet, Jet]:
-    b = other if isinstance(other, Jet) else a.like(other)
+    """Return both operands as jets whose V have equally many axes."""
+    b = other
+    if not isinstance(b, Jet):
+        b = a.like(b)
     return _padded(a, b.terms.ndim - 1), _padded(b, a.terms.ndim - 1)
 
 
 def _product(a: Jet, b: Jet, bilinear: Callable[[Array, Array], Array]) -> Jet:
-    """Product of two jets by `np.multiply` or `np.matmul`, with derivatives by Leibniz' rule."""
-    d, terms = a.directions, np.asarray(bilinear(a.terms, b.value))
+    """Return the product of two jets by `np.multiply` or `np.matmul`.
+
+    Its derivatives follow Leibniz' rule: (a b)_ij = a_ij b + a_i b_j + a_j b_i + a b_ij.
+    """
+    d = a.directions
+    terms = np.asarray(bilinear(a.terms, b.value))
     if d:  # operations on empty arrays take time, too
-        i, j, _ = _pairs(d)
+        pairs = _pairs(d)
         terms[1:] += bilinear(a.value, b.terms[1:])
-        terms[1 + d :] += bilinear(a.first[i], b.first[j])
-        terms[1 + d :] += bilinear(a.first[j], b.first[i])
+        terms[1 + d :] += bilinear(a.first[pairs.i], b.first[pairs.j])
+        terms[1 + d :] += bilinear(a.first[pairs.j], b.first[pairs.i])
     return Jet(terms, d)
 
 
 def variables(points: Array, names: Sequence[str], selected: Sequence[str]) -> dict[str, Jet]:
-    """Jets of the independent variables by name, each of shape (S,), with slope 1 by itself.
+    """Return the variables themselves as jets, for differentiation of functions of them.
 
-    `points` (S, len(names)) are their values, `selected` the names to differentiate by, in the
-    order of the derivatives.
+    Args:
+        points: Values of all variables at S points, shape (S, variables).
+        names: Names of the variables, in the order of the columns of `points`.
+        selected: Names of those to differentiate by; their order is that of the derivatives.
+
+    Returns:
+        A jet of shape (S,) for each name. Its derivative by itself is 1 if it is selected.
     """
     jets = Jet.constant(points, len(selected))
     for k, name in enumerate(selected):
         jets.first[k, :, names.index(name)] = 1.0
-    return {name: jets[:, i] for i, name in enumerate(names)}
+    return {name: jets[:, column] for column, name in enumerate(names)}
 
 
 def inverse(a: Jet) -> Jet:
-    """Inverse of square matrices, shape (..., n, n), by one factorisation."""
+    """Return the inverses X of square matrices A, V = (..., n, n), with their derivatives.
+
+    They are X_i = −X A_i X and X_ij = −X A_ij X − X A_i X_j − X A_j X_i.
+    """
     x, d = np.linalg.inv(a.value), a.directions
-    i, j, _ = _pairs(d)
-    scaled = x @ a.terms[1:]  # A⁻¹ A_k, then A⁻¹ A_ij
+    pairs = _pairs(d)
+    scaled = x @ a.terms[1:]  # X A_i, then X A_ij
     terms = np.concatenate([x[None], -scaled @ x])
     first = terms[1 : 1 + d]
-    terms[1 + d :] -= scaled[i] @ first[j] + scaled[j] @ first[i]
+    mixed_products = scaled[pairs.i] @ first[pairs.j] + scaled[pairs.j] @ first[pairs.i]
+    terms[1 + d :] -= mixed_products
     return Jet(terms, d)
 
 
-def concatenate(parts: Sequence[Jet], axis: int) -> Jet:
-    """Joins jets along a negative `axis` of V."""
-    return Jet(np.concatenate([x.terms for x in parts], axis), parts[0].directions)
+def concatenate(jets: Sequence[Jet], axis: int) -> Jet:
+    """Return jets joined along an axis of V, counted from the last one (negative)."""
+    return Jet(np.concatenate([jet.terms for jet in jets], axis), jets[0].directions)

@@ -1,8 +1,9 @@
-"""Monomials of d variables: their places among all of one degree, and products of polynomials.
+"""Monomials of d variables and products of homogeneous polynomials.
 
-A monomial u_i u_j … of degree m is a rising list of m variables; its place among all of that
-degree is Σ_k C(i_k + k, k + 1), k = 0 … m − 1 (the combinatorial number system). A homogeneous
-polynomial is an array whose first axis runs over the monomials.
+A monomial u_i u_j … of degree m is written as the rising list (i, j, …) of the m indices of its
+variables. All monomials of one degree are ordered by the combinatorial number system: the place of
+(i_0, …, i_(m−1)) is Σ_k binomial(i_k + k, k + 1). A homogeneous polynomial is an array of
+coefficients whose first axis runs over the monomials in this order.
 """
 
 from __future__ import annotations
@@ -17,91 +18,130 @@ import numpy as np
 from alphacut.base.arrays import Array, Ints
 from alphacut.base.kernels import compiled
 
-SMALL = 300_000
-"""Multiplications by one coefficient up to which a loop over all pairs is faster than products of
-arrays, one for each coefficient."""
-
 
 def count(d: int, degree: int) -> int:
-    """Number of monomials of one degree."""
-    return comb(d + degree - 1, degree) if d else int(degree == 0)
+    """Return the number of monomials of one degree in d variables."""
+    if d == 0:
+        return int(degree == 0)
+    return comb(d + degree - 1, degree)
 
 
 @cache
 def monomials(d: int, degree: int) -> Ints:
-    """All rising lists of `degree` out of d variables by place, shape (monomials, degree)."""
+    """Return all monomials of one degree, in order, as rising lists: shape (monomials, degree)."""
     lists = list(combinations_with_replacement(range(d), degree))
     rows = np.array(lists, np.int64).reshape(len(lists), degree)
     return rows[np.argsort(places(rows, d))]
 
 
 @cache
-def _binomials(d: int, degree: int) -> Ints:
-    """C(i + k, k + 1) for variables i and k, shape (d, degree)."""
-    return np.array([[comb(i + k, k + 1) for k in range(degree)] for i in range(d)], np.int64)
+def _place_terms(d: int, degree: int) -> Ints:
+    """Return binomial(i + k, k + 1) for variables i and k = 0 … degree − 1, shape (d, degree)."""
+    terms = np.zeros((d, degree), np.int64)
+    for i in range(d):
+        for k in range(degree):
+            terms[i, k] = comb(i + k, k + 1)
+    return terms
 
 
 def places(lists: Ints, d: int) -> Ints:
-    """Places of rising lists (N, m), shape (N,)."""
+    """Return the places of monomials among all of their degree.
+
+    Args:
+        lists: Rising lists of variables, one in each row, shape (N, degree).
+        d: Number of variables.
+
+    Returns:
+        Shape (N,).
+    """
     degree = lists.shape[1]
     if degree == 0:
         return np.zeros(len(lists), np.int64)
-    return np.asarray(_binomials(d, degree)[lists, np.arange(degree)].sum(1))
+    return np.asarray(_place_terms(d, degree)[lists, np.arange(degree)].sum(1))
 
 
 @cache
 def product_places(d: int, m: int, q: int) -> Ints:
-    """Places of the products of all monomials of degree m with all of degree q, shape (M, Q)."""
+    """Return the places of the products of each monomial of degree m with each of degree q.
+
+    The shape is (monomials of degree m, monomials of degree q).
+    """
     a, b = monomials(d, m), monomials(d, q)
-    pairs = np.concatenate([np.repeat(a, len(b), axis=0), np.tile(b, (len(a), 1))], axis=1)
-    return places(np.sort(pairs, axis=1), d).reshape(len(a), len(b))
+    first_factors, second_factors = np.repeat(a, len(b), axis=0), np.tile(b, (len(a), 1))
+    products = np.sort(np.concatenate([first_factors, second_factors], axis=1), axis=1)
+    return places(products, d).reshape(len(a), len(b))
 
 
 @cache
 def exponents(d: int, degree: int) -> Ints:
-    """How often each variable stands in each monomial, shape (monomials, d)."""
+    """Return the exponent of each variable in each monomial, shape (monomials, d)."""
     lists = monomials(d, degree)
     return np.asarray((lists[:, :, None] == np.arange(d)).sum(1))
 
 
 @cache
 def _last_factors(d: int, degree: int) -> tuple[Ints, Ints]:
-    """The last variable of each monomial, and the place of the product of the others."""
+    """Return the last variable of each monomial, and the place of the product of all others."""
     lists = monomials(d, degree)
     return lists[:, -1], places(lists[:, :-1], d)
 
 
 def monomial_values(u: Array, degree: int) -> Array:
-    """Values of all monomials up to a degree at points u (S, d), by degree, shape (S, terms)."""
-    d, points = u.shape[1], np.ascontiguousarray(u.T)
+    """Return the values of all monomials of degrees 0 … `degree` at points.
+
+    Args:
+        u: Points, shape (S, d).
+        degree: Highest degree.
+
+    Returns:
+        Shape (S, terms): the constant 1, then the monomials of degree 1, and so on.
+    """
+    d, coordinates = u.shape[1], np.ascontiguousarray(u.T)
     values: Array = np.ones((comb(d + degree, degree), len(u)))
-    lower, begin = 0, 1
+    first_of_lower_degree, begin = 0, 1
     for m in range(1, degree + 1):
         variable, other_factors = _last_factors(d, m)
         end = begin + len(variable)
-        values[begin:end] = values[lower + other_factors] * points[variable]
-        lower, begin = begin, end
+        lower = values[first_of_lower_degree + other_factors]
+        values[begin:end] = lower * coordinates[variable]
+        first_of_lower_degree, begin = begin, end
     return values.T
 
 
 def convolve(
     a: Array, b: Array, degrees: tuple[int, int], d: int, bilinear: Callable[[Array, Array], Array]
 ) -> Array:
-    """Product of homogeneous polynomials in d variables by a bilinear product of coefficients.
+    """Return the product of two homogeneous polynomials in d variables.
 
-    a and b, of `degrees`, have shapes (monomials, …); `bilinear` broadcasts over their first axes.
+    Args:
+        a: Coefficients of the first one, shape (monomials, *coefficient).
+        b: Coefficients of the second one.
+        degrees: Degrees of both.
+        d: Number of variables.
+        bilinear: Product of coefficients, `np.multiply` or `matmul`, which broadcasts over the
+            first axes.
+
+    Returns:
+        Coefficients of the product, whose degree is the sum of both.
     """
-    at, total = product_places(d, *degrees), count(d, sum(degrees))
+    # multiplications up to which, as measured, compiled loops over all pairs of monomials are
+    # faster than one product of arrays for each coefficient of the shorter factor
+    few_multiplications = 300_000
+
+    at = product_places(d, *degrees)
     shape = bilinear(a[0], b[0]).shape
-    out = np.zeros((total, *shape), np.result_type(a, b))
-    inner, longer = (a.shape[-1] if bilinear == matmul else 1), max(len(a), len(b))
-    if longer * out[0].size * inner <= SMALL:
+    out = np.zeros((count(d, sum(degrees)), *shape), np.result_type(a, b))
+    inner = 1
+    if bilinear == matmul:
+        inner = a.shape[-1]
+    if max(len(a), len(b)) * out[0].size * inner <= few_multiplications:
         if bilinear == matmul and a.ndim == b.ndim == 3:
             _add_matrix_products(_writable(a), _writable(b), at, out)
             return out
         if bilinear == np.multiply:
-            wide = (np.broadcast_to(c, (len(c), *shape)).reshape(len(c), -1) for c in (a, b))
-            _add_products(*map(_writable, wide), at, out.reshape(total, -1))
+            a_flat = np.broadcast_to(a, (len(a), *shape)).reshape(len(a), -1)
+            b_flat = np.broadcast_to(b, (len(b), *shape)).reshape(len(b), -1)
+            _add_products(_writable(a_flat), _writable(b_flat), at, out.reshape(len(out), -1))
             return out
     if len(a) <= len(b):
         for x in np.flatnonzero(a.reshape(len(a), -1).any(1)):
@@ -113,7 +153,7 @@ def convolve(
 
 
 def _writable(a: Array) -> Array:
-    """Return an array, or a copy where it is read-only: Numba compiles kernels for each kind."""
+    """Return an array, or a copy if it is read-only, of which Numba would compile a new kernel."""
     return np.require(a, requirements="W")
 
 
@@ -125,21 +165,31 @@ def product_part(
     bilinear: Callable[[Array, Array], Array],
     lowest: tuple[int, int] = (0, 0),
 ) -> Array:
-    """Part of one degree of the product of two polynomials in d variables, as by `convolve`.
+    """Return the homogeneous part of one degree of the product of two polynomials.
 
-    a and b are their parts by degree; missing ones count as zero, as those below `lowest` do.
+    Args:
+        a: Homogeneous parts of the first polynomial by degree, from 0; missing ones are zero.
+        b: Those of the second one.
+        degree: Degree of the part.
+        d: Number of variables.
+        bilinear: Product of coefficients, as for `convolve`.
+        lowest: Degrees of a and of b below which parts are taken as zero.
     """
-    total = np.zeros(
-        (count(d, degree), *bilinear(a[0][0], b[0][0]).shape), np.result_type(a[0], b[0])
-    )
-    for k in range(max(lowest[1], degree - len(a) + 1), min(degree - lowest[0], len(b) - 1) + 1):
+    shape = bilinear(a[0][0], b[0][0]).shape
+    total = np.zeros((count(d, degree), *shape), np.result_type(a[0], b[0]))
+    first = max(lowest[1], degree - len(a) + 1)
+    last = min(degree - lowest[0], len(b) - 1)
+    for k in range(first, last + 1):
         total += convolve(a[degree - k], b[k], (degree - k, k), d, bilinear)
     return total
 
 
 @compiled
 def _add_products(a: Array, b: Array, at: Ints, out: Array) -> None:
-    """Add a[x] b[y], entry by entry, (v,), to out[at[x, y]] for all pairs of monomials x, y."""
+    """Add the elementwise products a[x] b[y] to out[at[x, y]] for all pairs of monomials x, y.
+
+    a, b and out have shapes (monomials, v), `at` has shape (monomials of a, monomials of b).
+    """
     for x in range(len(a)):
         if not a[x].any():
             continue
@@ -151,7 +201,10 @@ def _add_products(a: Array, b: Array, at: Ints, out: Array) -> None:
 
 @compiled
 def _add_matrix_products(a: Array, b: Array, at: Ints, out: Array) -> None:
-    """Add a[x] @ b[y], (p, q) by (q, r), to out[at[x, y]] for all pairs of monomials x, y."""
+    """Add the matrix products a[x] @ b[y] to out[at[x, y]] for all pairs of monomials x, y.
+
+    a, b and out have shapes (monomials, p, q), (monomials, q, r) and (monomials, p, r).
+    """
     for x in range(len(a)):
         if not a[x].any():
             continue
@@ -165,15 +218,30 @@ def _add_matrix_products(a: Array, b: Array, at: Ints, out: Array) -> None:
 
 
 def matmul(a: Array, b: Array) -> Array:
-    """Products of matrices, as `numpy.matmul`; as one where the right factor is one alone."""
+    """Return products of matrices, as `numpy.matmul` does for stacks of them.
+
+    If the right stack has one matrix alone, one product of tall matrices takes the place of many
+    small ones.
+    """
     if b.ndim == 3 and len(b) == 1 and a.ndim > 2:
         return np.asarray(np.tensordot(a, b[0], 1))
     return np.asarray(np.matmul(a, b))
 
 
 def derivative(part: Array, degree: int, direction: Array) -> Array:
-    """Derivative of a homogeneous polynomial along a direction (d,), of one degree less."""
+    """Return the derivative Σ_i direction_i ∂p/∂u_i of a homogeneous polynomial p.
+
+    Args:
+        part: Coefficients of p, shape (monomials, *coefficient).
+        degree: Degree of p, at least 1.
+        direction: Shape (d,).
+
+    Returns:
+        Coefficients of the derivative, whose degree is one less.
+    """
     d = len(direction)
-    at, often = product_places(d, 1, degree - 1), exponents(d, degree - 1).T + 1
-    weight = direction[:, None] * often
-    return np.asarray(np.einsum("ib,ib...->b...", weight, part[at]))
+    # a monomial b of the derivative by u_i comes from u_i b alone, times the exponent of u_i there
+    with_variable = product_places(d, 1, degree - 1)
+    exponent_before = exponents(d, degree - 1).T + 1
+    weight = direction[:, None] * exponent_before
+    return np.asarray(np.einsum("ib,ib...->b...", weight, part[with_variable]))

@@ -6,8 +6,17 @@ import numpy as np
 
 UNIT_ROUNDOFF = float(np.finfo(float).eps) / 2
 """u, the largest relative error of one rounded operation."""
+COMPLEX_ROUNDINGS = 2
+"""Roundings that a product of complex numbers has beyond those of a real one.
+
+Its relative error is at most √2 γ_2 ≤ γ_3 (Higham 2002, lemma 3.5).
+"""
 
 
 def gamma(count: int) -> float:
-    """γ_n = n u / (1 − n u), bound of the relative error of n roundings, in any order of a sum."""
+    """Return γ_n = n u / (1 − n u) for n = `count`, which must be far below 1/u.
+
+    It bounds the relative error of n rounded operations in turn, and of a sum of n + 1 numbers of
+    one sign in any order.
+    """
     return count * UNIT_ROUNDOFF / (1 - count * UNIT_ROUNDOFF)

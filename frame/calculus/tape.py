@@ -18,10 +18,12 @@ if TYPE_CHECKING:
     from sympy import Expr, Symbol
 
 Tape = tuple[Ints, Ints, Array]
-"""Operations (L, 3), places of the results (m,), and the places themselves.
+"""Operations of shape (L, 3), places of the m results of shape (m,), and an array of places.
 
-An operation has a number and the places of two operands. Places hold arguments, the result of each
-operation, and numbers, these counted from the end: the first is at −1.
+An operation is its index in `OPERATIONS` and the places of two operands; the second one repeats the
+first one where there is one operand alone. The array of places holds the arguments, then the
+results of all operations, then the numbers of the expression, which are counted from the end: the
+first number stands at −1.
 """
 BINARY = ("add", "multiply", "power")
 UNARY = ("reciprocal", "sqrt", "sin", "cos", "tan", "exp", "log")
@@ -29,46 +31,67 @@ OPERATIONS = (*BINARY, *UNARY)
 
 
 def tape(components: Sequence[Expr], active: Sequence[Symbol], constants: Sequence[Symbol]) -> Tape:
-    """The tape of expressions (m,) of arguments: the active ones, then constants.
+    """Return the tape of m expressions.
+
+    Args:
+        components: The expressions.
+        active: Arguments that have the first places.
+        constants: Arguments that follow.
 
     Raises:
         RefusedError: An expression has a function that is not among `OPERATIONS`.
     """
-    writer = _Writer([*active, *constants])
+    writer = _Writer(list(active) + list(constants))
     results = np.array([writer.place(e) for e in components], np.int64)
-    code = np.array([*writer.code], np.int64).reshape(-1, 3)
-    places = np.zeros(writer.arguments + len(code) + len(writer.numbers))
-    places[writer.arguments + len(code) :] = [*writer.numbers][::-1]
-    return code, results, places
+    operations = np.array(list(writer.operations), np.int64).reshape(-1, 3)
+    first_number = writer.arguments + len(operations)
+    places = np.zeros(first_number + len(writer.numbers))
+    places[first_number:] = list(writer.numbers)[::-1]
+    return operations, results, places
 
 
 def with_derivatives(
     components: Sequence[Expr], active: Sequence[Symbol], constants: Sequence[Symbol]
 ) -> Tape:
-    """The same, with first derivatives (m, a) by the active ones and second ones (m, a, a)."""
+    """Return the tape of m expressions and of their derivatives by the a active arguments.
+
+    The results are the expressions, the first derivatives in the order of an array (m, a), and the
+    second ones in that of an array (m, a, a). Arguments are as for `tape`.
+    """
     first = [e.diff(x) for e in components for x in active]
     second = [e.diff(x) for e in first for x in active]
     return tape([*components, *first, *second], active, constants)
 
 
 class _Writer:
-    """Writes a tape: the place of every expression, one for those that are equal."""
+    """Writes a tape, on which equal expressions have one place.
+
+    Args:
+        arguments: Symbols, which have the first places.
+
+    Attributes:
+        places: Place of each expression met so far.
+        numbers: Index of each number among the numbers; its place is −1 − index.
+        operations: Place of the result of each operation, in the order of evaluation.
+    """
 
     def __init__(self, arguments: Sequence[Symbol]) -> None:
-        self.places: dict[object, int] = {x: k for k, x in enumerate(arguments)}
+        self.places: dict[object, int] = {x: place for place, x in enumerate(arguments)}
         self.numbers: dict[float, int] = {}
-        self.code: dict[tuple[int, int, int], int] = {}  # operations in order, and their places
+        self.operations: dict[tuple[int, int, int], int] = {}
         self.arguments = len(arguments)
 
     def place(self, e: Expr) -> int:
-        """Place of an expression."""
+        """Return the place of an expression, after writing what computes it where it is new."""
         if e not in self.places:
-            number = e.is_number and self.numbers.setdefault(float(e), len(self.numbers))
-            self.places[e] = -1 - number if e.is_number else self._write(e)
+            if e.is_number:
+                self.places[e] = -1 - self.numbers.setdefault(float(e), len(self.numbers))
+            else:
+                self.places[e] = self._write(e)
         return self.places[e]
 
     def _write(self, e: Expr) -> int:
-        """Place of a compound expression, after the operations that compute it are written."""
+        """Write the operations that compute a compound expression, and return its place."""
         name = type(e).__name__
         if name in ("Add", "Mul"):
             operands = map(self.place, e.args)
@@ -79,18 +102,26 @@ class _Writer:
         return self._apply(name, self.place(e.args[0]))
 
     def _power(self, base: Expr, exponent: Expr) -> int:
-        """Place of base ** exponent, written as products or roots where these are exact."""
+        """Write base ** exponent, and return its place.
+
+        Small integer powers become products and half powers become roots, which are exact to a few
+        roundings and faster than a general power.
+        """
         if exponent.is_Integer and abs(int(exponent)) <= 4:
-            x = self.place(base)
-            power = reduce(lambda a, b: self._apply("Mul", a, b), [x] * abs(int(exponent)))
-            return power if exponent > 0 else self._apply("reciprocal", power)
-        if exponent.is_number and abs(float(exponent)) == 0.5:
-            root = self._apply("sqrt", self.place(base))
-            return root if exponent > 0 else self._apply("reciprocal", root)
-        return self._apply("power", self.place(base), self.place(exponent))
+            factors = [self.place(base)] * abs(int(exponent))
+            power = reduce(lambda a, b: self._apply("Mul", a, b), factors)
+        elif exponent.is_number and abs(float(exponent)) == 0.5:
+            power = self._apply("sqrt", self.place(base))
+        else:
+            return self._apply("power", self.place(base), self.place(exponent))
+        if exponent > 0:
+            return power
+        return self._apply("reciprocal", power)
 
     def _apply(self, name: str, x: int, y: int | None = None) -> int:
-        """Place of the result of an operation on places x and y, written unless it is there."""
+        """Write an operation on the places x and y unless it is there; return its place."""
         instruction = {"Add": "add", "Mul": "multiply"}.get(name, name)
-        row = (OPERATIONS.index(instruction), x, x if y is None else y)
-        return self.code.setdefault(row, self.arguments + len(self.code))
+        if y is None:
+            y = x
+        operation = (OPERATIONS.index(instruction), x, y)
+        return self.operations.setdefault(operation, self.arguments + len(self.operations))

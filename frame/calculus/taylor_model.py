@@ -2,10 +2,12 @@
 
 A Taylor model stands for functions f(u) of inputs u in [−1, 1]^d: |f(u) − p(u)| ≤ remainder for all
 u of the box, p a polynomial (Makino, Berz 2003). Sums, products, powers and solutions of linear
-systems of Taylor models are Taylor models. What a product has above the order kept is bounded by
-the sums of magnitudes of its factors' coefficients, a power's by the derivative of the next order.
-So is the rounding of the coefficients, by γ_n of the operations that make them (Higham 2002,
-section 3.1).
+systems of Taylor models are Taylor models.
+
+Three errors go into the remainder. Terms of a product above the order kept are bounded by the sums
+of the magnitudes of the coefficients of its factors. The Taylor series of a power is bounded by
+Lagrange's remainder, with the derivative of the next order. The rounding of n operations is bounded
+by γ_n = n u / (1 − n u), u the unit roundoff (Higham 2002, section 3.1).
 """
 
 from __future__ import annotations
@@ -32,112 +34,138 @@ from alphacut.frame.calculus.monomials import (
     places,
     product_part,
 )
-from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF, gamma
+from alphacut.frame.calculus.rounding import COMPLEX_ROUNDINGS, UNIT_ROUNDOFF, gamma
 from alphacut.frame.calculus.unproved import UnprovedError
 
 ORDER = 3
 """Order of a Taylor model unless another is given."""
-COMPLEX = 2
-"""Roundings of a product of complex numbers beyond one: √2 γ_2 ≤ γ_3 (Higham 2002, lemma 3.5)."""
 
 
 @dataclass(frozen=True, eq=False)
 class TaylorModel:
-    """Functions of the unit box, an array of shape V of them."""
+    """Taylor models of an array of functions, of shape V, on the unit box [−1, 1]^d.
 
-    __array_ufunc__ = None  # an array on the left leaves the operation to the model
+    Operators act on the array as NumPy's act on arrays of numbers. Each result bounds the results
+    of exact arithmetic on all functions that its operands stand for.
 
-    # coefficients of degree 0, 1, …, (monomials, *V), real or complex; missing ones are zero
+    Args:
+        parts: Homogeneous parts of the polynomials by degree 0, 1, …: coefficients of shape
+            (monomials of that degree, *V), real or complex, in the order of
+            `monomials.monomials`. Parts of higher degrees are zero.
+        remainder: Bound of |f(u) − p(u)| over the box, with the rounding of the coefficients,
+            shape V, not negative.
+        inputs: Number d of inputs.
+        order: Degree above which products move their terms into the remainder.
+    """
+
+    # NumPy's arrays as left operands leave the operation to this class
+    __array_ufunc__ = None
+
     parts: tuple[Array, ...]
-    remainder: Array  # bound of what they leave out and of their rounding, V, never negative
-    inputs: int  # number of inputs d
-    order: int = ORDER  # degree to which products are kept
+    remainder: Array
+    inputs: int
+    order: int = ORDER
 
     @classmethod
     def constant(cls, value: ArrayLike, inputs: int, order: int = ORDER) -> TaylorModel:
-        """Functions without dependence on the inputs, values of shape V."""
+        """Return constant functions, with the values `value` of shape V."""
         array = _numbers(value)
         return cls((array[None],), np.zeros(array.shape), inputs, order)
 
     @classmethod
     def variables(cls, centre: Array, radius: Array, order: int = ORDER) -> TaylorModel:
-        """The inputs themselves, centre + radius u, shape (d,), with the rounding of both."""
-        parts = np.asarray(centre, float)[None], np.diag(np.asarray(radius, float))
-        return cls(parts, gamma(2) * (np.abs(centre) + radius), len(centre), order)
+        """Return the functions centre_i + radius_i u_i, from arrays of shape (d,); V is (d,).
+
+        The remainder covers the rounding of the product and of the sum.
+        """
+        constant_part = np.asarray(centre, float)[None]
+        linear_part = np.diag(np.asarray(radius, float))
+        rounding = gamma(2) * (np.abs(centre) + radius)
+        return cls((constant_part, linear_part), rounding, len(centre), order)
 
     def like(self, value: ArrayLike) -> TaylorModel:
-        """A constant of the same inputs and order."""
+        """Return constant functions of the same inputs and to the same order."""
         return TaylorModel.constant(value, self.inputs, self.order)
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Shape V."""
+        """Shape V of the array of functions."""
         return self.remainder.shape
 
     @property
     def value(self) -> Array:
-        """Values of the polynomials in the middle of the box, shape V."""
+        """Values of the polynomials at the midpoint u = 0 of the box, shape V."""
         return np.asarray(self.parts[0][0])
 
     @property
     def T(self) -> TaylorModel:  # noqa: N802
-        """Transposed matrices, shape (m, n) for (n, m)."""
+        """The matrices with their last two axes swapped."""
         parts = tuple(part.swapaxes(-1, -2) for part in self.parts)
         return replace(self, parts=parts, remainder=self.remainder.swapaxes(-1, -2))
 
     @staticmethod
     def stack(models: Sequence[TaylorModel]) -> TaylorModel:
-        """Joins Taylor models along a new last axis of V."""
+        """Return Taylor models of equal shape V, joined along a new last axis of V."""
         return concatenate([x[..., None] for x in models], -1)
 
     def homogeneous_part(self, degree: int) -> Array:
-        """Coefficients of one degree, shape (monomials, *V)."""
+        """Return the coefficients of one degree, shape (monomials, *V); zeros if none are kept."""
         if degree < len(self.parts):
             return self.parts[degree]
         return np.zeros((count(self.inputs, degree), *self.shape), self.parts[0].dtype)
 
     def part_magnitudes(self) -> list[Array]:
-        """Bounds of the parts over the box, each of shape V."""
-        of_sums = len(self.parts) + 4
-        return [np.abs(part).sum(0) * (1 + gamma(len(part) + of_sums)) for part in self.parts]
+        """Return a bound over the box of the magnitude of each homogeneous part, each of shape V.
+
+        Since |u_i| ≤ 1, the sum of the magnitudes of its coefficients bounds a part. The factor
+        covers the rounding of that sum, of the sum of all bounds and of the few products that
+        callers form with it.
+        """
+        roundings_of_callers = len(self.parts) + 4
+        return [
+            np.abs(part).sum(0) * (1 + gamma(len(part) + roundings_of_callers))
+            for part in self.parts
+        ]
 
     def magnitude(self) -> Array:
-        """Bound of |f| over the box, shape V."""
+        """Return a bound of |f| over the box, shape V."""
         return np.asarray(sum(self.part_magnitudes()) + self.remainder)
 
     def deviation(self) -> Array:
-        """Bound of |f − value|, shape V."""
+        """Return a bound over the box of |f − p(0)|, where p(0) is `value`, shape V."""
         return np.asarray(sum(self.part_magnitudes()[1:]) + self.remainder)
 
     def bounds(self) -> tuple[Array, Array]:
-        """Lower and upper bounds over the box, each of shape V."""
-        reach = self.deviation() * (1 + gamma(2)) + UNIT_ROUNDOFF * np.abs(self.value)
-        return self.value - reach, self.value + reach
+        """Return a lower and an upper bound of real functions over the box, each of shape V."""
+        # the sum value ± radius is rounded: its error is at most u (|value| + radius)
+        radius = self.deviation() * (1 + gamma(2)) + UNIT_ROUNDOFF * np.abs(self.value)
+        return self.value - radius, self.value + radius
 
     def widened(self, more: ArrayLike) -> TaylorModel:
-        """Functions that may be off by `more`, shape V."""
+        """Return the model with `more`, of shape V, added to the remainder."""
         return replace(self, remainder=self.remainder + np.asarray(more))
 
     @cached_property
     def coefficients(self) -> Array:
-        """Coefficients of all monomials by degree, as they stand in `monomial_values`."""
+        """Coefficients of all degrees, shape (terms, *V), ordered as in `monomial_values`."""
         return np.concatenate(self.parts)
 
     @property
     def exponents(self) -> Ints:
-        """Exponents of these monomials, shape (terms, d)."""
+        """Exponents of the monomials of `coefficients`, shape (terms, d)."""
         return np.concatenate([exponents(self.inputs, k) for k in range(len(self.parts))])
 
     def at(self, u: Array) -> Array:
-        """The polynomials' values at points u (S, d), shape (S, *V)."""
+        """Return the values of the polynomials at points u, shape (S, d): shape (S, *V)."""
         powers = monomial_values(u, len(self.parts) - 1)
         flat = self.coefficients.reshape(powers.shape[1], -1)
         return _real_times(powers, flat).reshape(len(u), *self.shape)
 
     def jets(self, u: Array) -> Array:
-        """Values, gradients and Hessians' upper triangles of K functions at points u (S, d).
+        """Return values, gradients and Hessians of K polynomials, V = (K,), at points u (S, d).
 
-        Shape (S, q, K) with q = 1 + d + d (d + 1)/2.
+        The shape is (S, q, K) with q = 1 + d + d (d + 1)/2. Along the second axis stand the value,
+        the d first derivatives, and the second derivatives by u_i and u_j for i ≤ j.
         """
         powers = monomial_values(u, len(self.parts) - 1)
         tables = [_real_times(powers[:, : len(x)], x) for x in self._derivative_tables]
@@ -145,92 +173,119 @@ class TaylorModel:
 
     @cached_property
     def _derivative_tables(self) -> list[Array]:
-        """Coefficients of all values, first and second derivatives, shapes (terms, functions)."""
-        axes = np.eye(self.inputs)
-        by_axes: dict[tuple[int, ...], Sequence[Array]] = {(): self.parts}
+        """Coefficients of the K polynomials and of their first and second derivatives.
+
+        Three arrays of shape (terms, K · derivatives of that order).
+        """
+        directions = np.eye(self.inputs)
+        # homogeneous parts of the derivative by each list of inputs, such as (0, 0) or (0, 2)
+        derivatives_by: dict[tuple[int, ...], Sequence[Array]] = {(): self.parts}
         tables = [self.coefficients]
         for order in (1, 2):
-            derivatives = []
-            for chosen in combinations_with_replacement(range(self.inputs), order):
-                lower = enumerate(by_axes[chosen[:-1]][1:], 1)
-                parts = [derivative(part, degree, axes[chosen[-1]]) for degree, part in lower]
-                by_axes[chosen] = parts or [0 * self.parts[0]]
-                derivatives.append(np.concatenate(by_axes[chosen]))
-            tables.append(np.hstack(derivatives))
+            of_this_order = []
+            for inputs in combinations_with_replacement(range(self.inputs), order):
+                parts_before = derivatives_by[inputs[:-1]]
+                direction = directions[inputs[-1]]
+                parts = [
+                    derivative(part, degree, direction)
+                    for degree, part in enumerate(parts_before[1:], 1)
+                ]
+                derivatives_by[inputs] = parts or [0 * self.parts[0]]
+                of_this_order.append(np.concatenate(derivatives_by[inputs]))
+            tables.append(np.hstack(of_this_order))
         return tables
 
     def active_inputs(self) -> Ints:
-        """Inputs that the functions depend on."""
-        found = np.zeros(self.inputs, bool)
+        """Return the indices of the inputs that the polynomials depend on, rising."""
+        is_active = np.zeros(self.inputs, bool)
         for degree, part in enumerate(self.parts[1:], 1):
-            some = part.reshape(len(part), -1).any(1)
-            found[monomials(self.inputs, degree)[some]] = True
-        return np.flatnonzero(found)
+            has_coefficient = part.reshape(len(part), -1).any(1)
+            is_active[monomials(self.inputs, degree)[has_coefficient]] = True
+        return np.flatnonzero(is_active)
 
     def restricted_to(self, inputs: Ints) -> TaylorModel:
-        """The model as functions of the inputs at `inputs` (d,) alone; it depends on no others."""
-        d = len(inputs)
-        lists = (inputs[monomials(d, degree)] for degree in range(len(self.parts)))
-        rows = [places(chosen, self.inputs) for chosen in lists]
-        parts = tuple(part[at] for part, at in zip(self.parts, rows, strict=True))
-        return TaylorModel(parts, self.remainder, d, self.order)
+        """Return the same functions as functions of fewer inputs.
+
+        Args:
+            inputs: Indices of the inputs that are kept, rising, shape (fewer,). The functions must
+                not depend on any other input.
+        """
+        fewer = len(inputs)
+        parts = []
+        for degree, part in enumerate(self.parts):
+            kept = places(inputs[monomials(fewer, degree)], self.inputs)
+            parts.append(part[kept])
+        return TaylorModel(tuple(parts), self.remainder, fewer, self.order)
 
     def embedded(self, inputs: Ints, d: int) -> TaylorModel:
-        """The same functions as functions of d inputs, of which theirs are at `inputs`, rising.
+        """Return the same functions as functions of d inputs, the reverse of `restricted_to`.
 
-        Functions of d inputs stay as they are.
+        Args:
+            inputs: Index of each present input among the d inputs, rising, shape (self.inputs,).
+            d: Number of inputs of the result. If it is the present number, the model is returned
+                as it is.
         """
         if self.inputs == d:
             return self
         parts = []
         for degree, part in enumerate(self.parts):
-            full = np.zeros((count(d, degree), *self.shape))
-            full[places(inputs[monomials(self.inputs, degree)], d)] = part
-            parts.append(full)
+            wider_part = np.zeros((count(d, degree), *self.shape))
+            wider_part[places(inputs[monomials(self.inputs, degree)], d)] = part
+            parts.append(wider_part)
         return TaylorModel(tuple(parts), self.remainder, d, self.order)
 
     @property
     def real(self) -> TaylorModel:
-        """Real parts."""
+        """Real parts of the functions."""
         return replace(self, parts=tuple(part.real for part in self.parts))
 
     @property
     def imag(self) -> TaylorModel:
-        """Imaginary parts."""
+        """Imaginary parts of the functions."""
         return replace(self, parts=tuple(part.imag for part in self.parts))
 
     @property
     def polynomial(self) -> TaylorModel:
-        """The polynomials alone, functions that have no remainder."""
+        """The polynomials alone, with a remainder of zero."""
         return replace(self, remainder=np.zeros(self.shape))
 
     def truncated(self, order: int) -> TaylorModel:
-        """The same, whose products are kept to `order`; sizes of higher parts go into the rest."""
+        """Return the model to a lower order; bounds of the higher parts go into the remainder."""
         remainder = np.asarray(self.remainder + sum(self.part_magnitudes()[order + 1 :]))
         return TaylorModel(self.parts[: order + 1], remainder, self.inputs, order)
 
     def on_subbox(self, low: Array, high: Array) -> TaylorModel:
-        """The model over the part low ≤ u ≤ high, (d,) each, in unit coordinates of the part."""
-        middle, half = (low + high) / 2, (high - low) / 2
-        shifted = [np.zeros_like(part) for part in self.parts]  # of p(middle + v)
+        """Return the model on the sub-box low ≤ u ≤ high, as a model on the unit box.
+
+        The new inputs w in [−1, 1]^d are those of u = (low + high)/2 + w (high − low)/2.
+
+        Args:
+            low: Lower ends of the sub-box, shape (d,), not below −1.
+            high: Upper ends, not above 1.
+        """
+        midpoint, radius = (low + high) / 2, (high - low) / 2
+        # Taylor's formula: p(midpoint + v) = Σ_k (midpoint·∇)^k p(v) / k!, of which the k-th term
+        # turns a part of degree m into one of degree m − k
+        shifted = [np.zeros_like(part) for part in self.parts]
         for degree, part in enumerate(self.parts):
-            term = part  # (middle·∇)^k p / k!
+            term = part
             for k in range(degree + 1):
                 shifted[degree - k] = shifted[degree - k] + term
                 if k < degree:
-                    term = derivative(term, degree - k, middle) / (k + 1)
+                    term = derivative(term, degree - k, midpoint) / (k + 1)
+        # v_i = radius_i w_i
         parts = []
         for degree, part in enumerate(shifted):
-            scale = half[monomials(self.inputs, degree)].prod(-1)
+            scale = radius[monomials(self.inputs, degree)].prod(-1)
             parts.append(scale.reshape(-1, *[1] * self.remainder.ndim) * part)
-        # sums of d terms, once for each derivative, of |middle| + half ≤ 1
-        rounding = gamma((len(self.parts) + 1) * (self.inputs + 4)) * np.sum(
-            self.part_magnitudes(), 0
-        )
+        # each derivative is a sum of d terms; |midpoint| + radius ≤ 1, so that no term of the
+        # shifted polynomial exceeds the bound of the part that it came from
+        roundings = (len(self.parts) + 1) * (self.inputs + 4)
+        rounding = gamma(roundings) * np.sum(self.part_magnitudes(), 0)
         return TaylorModel(tuple(parts), self.remainder + rounding, self.inputs, self.order)
 
     def reshaped(self, *shape: int) -> TaylorModel:
-        """The same functions in another shape V."""
+        """Return the same functions with another shape V."""
         parts = tuple(part.reshape(len(part), *shape) for part in self.parts)
         return replace(self, parts=parts, remainder=self.remainder.reshape(shape))
 
@@ -240,15 +295,17 @@ class TaylorModel:
         return replace(self, parts=parts, remainder=self.remainder[key])
 
     def __add__(self, other: TaylorModel | ArrayLike) -> TaylorModel:
-        """Sum entry by entry, with its rounding in the remainder."""
-        b = other if isinstance(other, TaylorModel) else self.like(_numbers(other))
-        degrees, n = range(max(len(self.parts), len(b.parts))), max(len(self.shape), len(b.shape))
-        parts = tuple(
-            _padded(self.homogeneous_part(k), n) + _padded(b.homogeneous_part(k), n)
-            for k in degrees
-        )
-        remainder, order = self.remainder + b.remainder, max(self.order, b.order)
-        return TaylorModel(parts, remainder, self.inputs, order).with_rounding(1)
+        """Return the sum, which broadcasts as sums of arrays do, with its rounding."""
+        b = self._as_model(other)
+        ndim = max(len(self.shape), len(b.shape))
+        parts = []
+        for degree in range(max(len(self.parts), len(b.parts))):
+            first = _padded(self.homogeneous_part(degree), ndim)
+            second = _padded(b.homogeneous_part(degree), ndim)
+            parts.append(first + second)
+        remainder = self.remainder + b.remainder
+        order = max(self.order, b.order)
+        return TaylorModel(tuple(parts), remainder, self.inputs, order).with_rounding(1)
 
     __radd__ = __add__
 
@@ -256,19 +313,20 @@ class TaylorModel:
         return replace(self, parts=tuple(-part for part in self.parts))
 
     def __sub__(self, other: TaylorModel | ArrayLike) -> TaylorModel:
-        return self + -(other if isinstance(other, TaylorModel) else _numbers(other))
+        return self + -self._as_model(other)
 
     def __rsub__(self, other: ArrayLike) -> TaylorModel:
         return -self + other
 
     def __mul__(self, other: TaylorModel | ArrayLike) -> TaylorModel:
-        """Product entry by entry; a constant scales the parts and the remainder."""
+        """Return the elementwise product; numbers scale both the polynomials and the remainder."""
         if isinstance(other, TaylorModel):
             return _product(self, other, np.multiply)
         factor = _numbers(other)
         parts = tuple(_padded(part, factor.ndim) * factor for part in self.parts)
         remainder = self.remainder * np.abs(factor)
-        return TaylorModel(parts, remainder, self.inputs, self.order).with_rounding(1 + COMPLEX)
+        scaled = TaylorModel(parts, remainder, self.inputs, self.order)
+        return scaled.with_rounding(1 + COMPLEX_ROUNDINGS)
 
     __rmul__ = __mul__
 
@@ -282,164 +340,251 @@ class TaylorModel:
         return self._linear(lambda x, y: np.matmul(y, x), factor, factor.shape[-1])
 
     def __truediv__(self, other: TaylorModel | ArrayLike) -> TaylorModel:
-        return self * (other**-1.0 if isinstance(other, TaylorModel) else 1.0 / _numbers(other))
+        if isinstance(other, TaylorModel):
+            return self * other**-1.0
+        return self * (1.0 / _numbers(other))
 
     def __rtruediv__(self, other: ArrayLike) -> TaylorModel:
         return self**-1.0 * other
 
     def __pow__(self, exponent: float) -> TaylorModel:
-        """Real power of positive functions f, by the Taylor series in f − value to the order kept.
+        """Return a real power of positive functions f.
 
-        The remainder has the rounding of the series and Lagrange's bound of what it leaves out.
+        With the value c of f at the midpoint and t = f − c, the model is the Taylor series
+
+            f^a = Σ_k binomial(a, k) c^(a − k) t^k,    k = 0 … N, N the order.
+
+        The remainder bounds its rounding, and by Lagrange's form what follows:
+        |binomial(a, N + 1)| max(ξ^(a − N − 1)) max|t|^(N + 1), ξ between the bounds of f. A power
+        of ξ is monotonic, so that its maximum lies at one of these two bounds.
 
         Raises:
-            UnprovedError: A function is not known to be positive.
+            UnprovedError: A function is not known to be positive on the box.
         """
-        middle, spread, N = self.value, self.deviation(), self.order
-        least = middle - spread
-        if not (least > 0).all():
+        centre, deviation, N = self.value, self.deviation(), self.order
+        lower_bound = centre - deviation
+        if not (lower_bound > 0).all():
             raise UnprovedError(
                 "a quantity that must be positive is not known to be so over the box",
                 "take narrower inputs",
             )
-        step, factor = self - middle, 1.0
-        out, term = self.like(middle**exponent), self.like(np.ones_like(middle))
-        rounding = gamma(4) * middle**exponent
+        step, binomial = self - centre, 1.0
+        series, step_power = self.like(centre**exponent), self.like(np.ones_like(centre))
+        rounding = gamma(4) * centre**exponent
         for k in range(1, N + 1):
-            factor = factor * (exponent - k + 1) / k
-            term = term * step
-            scale = factor * middle ** (exponent - k)
-            out = out + term * scale
-            rounding = rounding + gamma(4 * k + 4) * np.abs(scale) * term.magnitude()
-        next_factor, power = abs(factor * (exponent - N) / (N + 1)), exponent - N - 1
-        largest_power = np.maximum(least**power, (middle + spread) ** power)
-        truncation = next_factor * largest_power * spread ** (N + 1) * (1 + gamma(8 * N + 8))
-        return out.widened(rounding + truncation)
+            binomial = binomial * (exponent - k + 1) / k
+            step_power = step_power * step
+            coefficient = binomial * centre ** (exponent - k)
+            series = series + step_power * coefficient
+            rounding = rounding + gamma(4 * k + 4) * np.abs(coefficient) * step_power.magnitude()
+        next_binomial = abs(binomial * (exponent - N) / (N + 1))
+        last_exponent = exponent - N - 1
+        last_power = np.maximum(lower_bound**last_exponent, (centre + deviation) ** last_exponent)
+        truncation = next_binomial * last_power * deviation ** (N + 1) * (1 + gamma(8 * N + 8))
+        return series.widened(rounding + truncation)
 
     def contract(self, arrays: Array) -> TaylorModel:
-        """Sum of functions shape (…, e) times arrays of numbers (e, …)."""
+        """Return Σ_k f[…, k] arrays[k], for V = (…, e) and numbers of shape (e, …)."""
         factor = _numbers(arrays)
         return self._linear(lambda x, y: np.asarray(np.tensordot(x, y, 1)), factor, len(factor))
 
     def with_rounding(self, count: int) -> TaylorModel:
-        """The same after `count` roundings of coefficients and rest, whose sums did not cancel."""
-        return self.widened(
-            gamma(count) * np.sum(self.part_magnitudes(), 0) + gamma(count + 3) * self.remainder
-        )
+        """Return the model with the error of `count` roundings of all coefficients added.
+
+        The coefficients and the remainder are those after rounding. They must be sums without
+        cancellation, so that each rounding error is a fraction of the result.
+        """
+        of_coefficients = gamma(count) * np.sum(self.part_magnitudes(), 0)
+        return self.widened(of_coefficients + gamma(count + 3) * self.remainder)
+
+    def _as_model(self, other: TaylorModel | ArrayLike) -> TaylorModel:
+        """Return a Taylor model as it is, and numbers as constant functions."""
+        if isinstance(other, TaylorModel):
+            return other
+        return self.like(_numbers(other))
 
     def _linear(
         self, bilinear: Callable[[Array, Array], Array], factor: Array, terms: int
     ) -> TaylorModel:
-        """Product with numbers, each entry a sum of `terms`, with its rounding in the remainder."""
-        remainder = np.asarray(bilinear(self.remainder, np.abs(factor))) * (1 + gamma(terms + 2))
-        rounding = gamma(terms + COMPLEX) * bilinear(
-            np.sum(self.part_magnitudes(), 0), np.abs(factor)
-        )
+        """Return a bilinear product with numbers, with its rounding in the remainder.
+
+        Args:
+            bilinear: Product of an array of functions' coefficients with `factor`. It must accept
+                one more axis in front of the first array.
+            factor: The numbers.
+            terms: Number of products that each entry of the result is the sum of.
+        """
+        magnitude = np.abs(factor)
+        remainder = np.asarray(bilinear(self.remainder, magnitude)) * (1 + gamma(terms + 2))
+        # |fl(x·y) − x·y| ≤ γ_n |x|·|y| for sums of n products (Higham 2002, section 3.1)
+        products = bilinear(np.sum(self.part_magnitudes(), 0), magnitude)
+        rounding = gamma(terms + COMPLEX_ROUNDINGS) * products
         parts = tuple(np.asarray(bilinear(part, factor)) for part in self.parts)
         return TaylorModel(parts, remainder + rounding, self.inputs, self.order)
 
 
 def concatenate(models: Sequence[TaylorModel], axis: int) -> TaylorModel:
-    """Joins Taylor models along a negative `axis` of V."""
-    degrees = range(max(len(x.parts) for x in models))
-    parts = tuple(np.concatenate([x.homogeneous_part(k) for x in models], axis) for k in degrees)
-    remainder = np.concatenate([x.remainder for x in models], axis)
-    return TaylorModel(parts, remainder, models[0].inputs, max(x.order for x in models))
+    """Return Taylor models of the same inputs, joined along an axis of V.
+
+    Args:
+        models: At least one; their order becomes the highest one of all.
+        axis: Negative, counted from the last axis of V.
+    """
+    parts = []
+    for degree in range(max(len(model.parts) for model in models)):
+        of_degree = [model.homogeneous_part(degree) for model in models]
+        parts.append(np.concatenate(of_degree, axis))
+    remainder = np.concatenate([model.remainder for model in models], axis)
+    order = max(model.order for model in models)
+    return TaylorModel(tuple(parts), remainder, models[0].inputs, order)
 
 
 def all_on_subbox(models: Sequence[TaylorModel], low: Array, high: Array) -> list[TaylorModel]:
-    """Each model over the part low ≤ u ≤ high, in the part's unit coordinates, as by `within`.
+    """Return each model on the sub-box low ≤ u ≤ high, as `TaylorModel.on_subbox` does.
 
-    All are restricted together, as one array of functions.
+    All models are moved at once as one array of functions, which is faster than one by one.
     """
-    restricted = concatenate([x.reshaped(-1) for x in models], -1).on_subbox(low, high)
-    end, found = 0, list[TaylorModel]()
-    for x in models:
-        begin, end = end, end + x.remainder.size
-        found.append(replace(restricted[begin:end].reshaped(*x.shape), order=x.order))
-    return found
+    joined = concatenate([model.reshaped(-1) for model in models], axis=-1).on_subbox(low, high)
+    moved, first = list[TaylorModel](), 0
+    for model in models:
+        last = first + model.remainder.size
+        moved.append(replace(joined[first:last].reshaped(*model.shape), order=model.order))
+        first = last
+    return moved
 
 
 def inverse_bound(matrix: TaylorModel) -> Array | None:
-    """Bound of |A⁻¹| over the box, entry by entry, by Neumann's series, shape (n, n).
+    """Return a bound, entry by entry, of |A⁻¹| for all matrices A of a Taylor model.
 
-    It is None where the series diverges, or may. Of a matrix that is diagonal in the middle it is
-    the inverse of Ostrowski's comparison matrix (1937).
+    With an approximate inverse C of the matrix at the midpoint, A⁻¹ = (I − (I − C A))⁻¹ C. If the
+    spectral radius of R ≥ |I − C A| is below 1, Neumann's series converges and
+    |A⁻¹| ≤ (I − R)⁻¹ |C|. Of a matrix that is diagonal at the midpoint, this bound is the inverse
+    of Ostrowski's comparison matrix (1937).
+
+    Args:
+        matrix: Square matrices, V = (n, n).
+
+    Returns:
+        The bound, shape (n, n), or None where the series is not known to converge: then A may be
+        singular.
     """
-    C, n = np.linalg.inv(matrix.value), len(matrix.value)
-    in_middle = np.abs(np.eye(n) - C @ matrix.value)
-    in_middle += gamma(n + 1) * (np.abs(C) @ np.abs(matrix.value))
-    ratio = np.abs(C) @ matrix.deviation() + in_middle  # bounds |I − C A|
-    # with (I − |I − C A|)⁻¹ ≥ 0 the spectral radius of a matrix of positive entries is below 1
-    inverse = np.linalg.inv(np.eye(n) - ratio) * (1 + gamma(8 * n * n))
-    if not ((inverse >= 0).all() and np.abs(np.linalg.eigvals(ratio)).max(initial=0.0) < 1):
+    n = len(matrix.value)
+    C = np.linalg.inv(matrix.value)
+    # |I − C A(0)|, which is not zero by rounding alone: n products and a difference
+    defect = np.abs(np.eye(n) - C @ matrix.value)
+    defect += gamma(n + 1) * (np.abs(C) @ np.abs(matrix.value))
+    R = np.abs(C) @ matrix.deviation() + defect
+    inverse = np.linalg.inv(np.eye(n) - R) * (1 + gamma(8 * n * n))
+    # R ≥ 0 has a spectral radius below 1 if and only if (I − R)⁻¹ exists and is ≥ 0 (M-matrices)
+    if not ((inverse >= 0).all() and np.abs(np.linalg.eigvals(R)).max(initial=0.0) < 1):
         return None
     return np.asarray(inverse @ np.abs(C))
 
 
 def solution_series(matrix: TaylorModel, right: TaylorModel) -> TaylorModel:
-    """Polynomials Y, degree by degree, of A Y ≈ B for A (n, n) and B (n, m); without remainders."""
-    d, order = matrix.inputs, max(matrix.order, right.order) if matrix.inputs else 0
-    middle_inverse = np.linalg.inv(matrix.value)
-    parts = [middle_inverse @ right.homogeneous_part(0)]
+    """Return polynomials Y that solve A Y = B degree by degree, without a bound of their error.
+
+    The part of degree m of A Y = B gives Y_m = A_0⁻¹ (B_m − Σ_{k < m} A_{m−k} Y_k).
+
+    Args:
+        matrix: A, V = (n, n), whose matrix A_0 at the midpoint is not singular.
+        right: B, V = (n, m).
+
+    Returns:
+        Y, V = (n, m), with a remainder of zero. Where there are no inputs, it is constant.
+    """
+    order = 0
+    if matrix.inputs:
+        order = max(matrix.order, right.order)
+    midpoint_inverse = np.linalg.inv(matrix.value)
+    parts = [midpoint_inverse @ right.homogeneous_part(0)]
     for degree in range(1, order + 1):
-        lower_degrees = product_part(matrix.parts, parts, degree, d, matmul)
-        parts.append(middle_inverse @ (right.homogeneous_part(degree) - lower_degrees))
-    return TaylorModel(tuple(parts), np.zeros(right.shape), d, order)
+        lower_degrees = product_part(matrix.parts, parts, degree, matrix.inputs, matmul)
+        parts.append(midpoint_inverse @ (right.homogeneous_part(degree) - lower_degrees))
+    return TaylorModel(tuple(parts), np.zeros(right.shape), matrix.inputs, order)
 
 
 def solve(matrix: TaylorModel, right: TaylorModel) -> TaylorModel:
-    """Taylor model of the solution Y of A Y = B, for A (n, n) and B (n, m).
+    """Return a Taylor model of the solutions Y of A Y = B.
+
+    The error of the polynomials Y' of `solution_series` is |Y' − Y| ≤ |A⁻¹| |A Y' − B|, whose
+    factors are bounded over the box. Both sides of the system are first multiplied by the inverse
+    of A at the midpoint, which makes these bounds tight.
+
+    Args:
+        matrix: A, V = (n, n).
+        right: B, V = (n, m).
 
     Raises:
-        UnprovedError: A may be singular.
+        UnprovedError: A may be singular somewhere in the box.
     """
-    middle_inverse: Any = np.linalg.inv(matrix.value)
-    matrix, right = middle_inverse @ matrix, middle_inverse @ right
-    found, bound = solution_series(matrix, right), inverse_bound(matrix)
+    midpoint_inverse: Any = np.linalg.inv(matrix.value)
+    matrix, right = midpoint_inverse @ matrix, midpoint_inverse @ right
+    solution = solution_series(matrix, right)
+    bound = inverse_bound(matrix)
     if bound is None:
         raise UnprovedError("a matrix may be singular in the box", "take narrower inputs")
-    return found.widened(bound @ (matrix @ found - right).magnitude())
+    return solution.widened(bound @ (matrix @ solution - right).magnitude())
 
 
 def _numbers(value: ArrayLike) -> Array:
+    """Return numbers as an array of floats or of complex numbers."""
     array = np.asarray(value)
-    return array if np.iscomplexobj(array) else np.asarray(array, float)
+    if np.iscomplexobj(array):
+        return array
+    return np.asarray(array, float)
 
 
 def _real_times(real: Array, coefficients: Array) -> Array:
-    """Product real @ coefficients (terms, K), in which `real` is not made complex."""
+    """Return real @ coefficients, (S, terms) by (terms, K), for real or complex coefficients.
+
+    NumPy would first convert `real` to complex numbers; here the real and the imaginary parts are
+    2 K real columns.
+    """
     if not np.iscomplexobj(coefficients):
         return np.asarray(real @ coefficients)
-    of_both_parts = np.ascontiguousarray(coefficients).view(float)
-    return np.asarray((real @ of_both_parts).view(complex))
+    real_columns = np.ascontiguousarray(coefficients).view(float)
+    return np.asarray((real @ real_columns).view(complex))
 
 
 def _padded(part: Array, ndim: int) -> Array:
-    """A part with V extended on the left by axes of length 1 up to `ndim` axes."""
-    missing = ndim - (part.ndim - 1)
-    return part.reshape(len(part), *[1] * max(missing, 0), *part.shape[1:])
+    """Return a part (monomials, *V) whose V has at least `ndim` axes, new ones on the left."""
+    missing = max(ndim - (part.ndim - 1), 0)
+    return part.reshape(len(part), *[1] * missing, *part.shape[1:])
 
 
 def _product(
     a: TaylorModel, b: TaylorModel, bilinear: Callable[[Array, Array], Array]
 ) -> TaylorModel:
-    """Product a b by `bilinear` (elementwise or matrix), kept to the higher order of both."""
-    d, order, ndim = a.inputs, max(a.order, b.order), max(a.remainder.ndim, b.remainder.ndim)
-    a_sizes, b_sizes = a.part_magnitudes(), b.part_magnitudes()
-    remainder = bilinear(a.remainder, np.asarray(sum(b_sizes)) + b.remainder)
-    remainder = remainder + bilinear(np.asarray(sum(a_sizes)), b.remainder)
-    degrees = range(min(order, len(a_sizes) + len(b_sizes) - 2) + 1)
-    kind = np.result_type(a.parts[0], b.parts[0])
-    parts = [np.zeros((count(d, k), *remainder.shape), kind) for k in degrees]
-    inner = a.shape[-1] if bilinear == matmul else 1
+    """Return the product a b, with the terms above the higher order of both in the remainder.
+
+    Args:
+        a: Left factor.
+        b: Right factor, of the same inputs.
+        bilinear: `np.multiply` for elementwise products or `monomials.matmul` for matrices.
+    """
+    order = max(a.order, b.order)
+    ndim = max(a.remainder.ndim, b.remainder.ndim)
+    a_magnitudes, b_magnitudes = a.part_magnitudes(), b.part_magnitudes()
+    # |f g − p q| ≤ |f − p| |g| + |p| |g − q|
+    remainder = bilinear(a.remainder, np.asarray(sum(b_magnitudes)) + b.remainder)
+    remainder = remainder + bilinear(np.asarray(sum(a_magnitudes)), b.remainder)
+    degrees = range(min(order, len(a_magnitudes) + len(b_magnitudes) - 2) + 1)
+    dtype = np.result_type(a.parts[0], b.parts[0])
+    parts = [np.zeros((count(a.inputs, k), *remainder.shape), dtype) for k in degrees]
+    inner = 1  # products in each entry of `bilinear`
+    if bilinear == matmul:
+        inner = a.shape[-1]
     for i, x in enumerate(a.parts):
         for j, y in enumerate(b.parts):
-            omitted = 1.0  # fraction of the parts' product that the polynomial leaves out
+            omitted_fraction = 1.0  # of the product of two parts, by the polynomial
             if i + j <= order:
-                parts[i + j] += convolve(_padded(x, ndim), _padded(y, ndim), (i, j), d, bilinear)
-                # rounding of sums over all ways to split a monomial into factors of degree i and j
-                omitted = gamma(inner * comb(i + j, i) + i + j + 1 + COMPLEX)
-            remainder = remainder + omitted * bilinear(a_sizes[i], b_sizes[j])
+                x_padded, y_padded = _padded(x, ndim), _padded(y, ndim)
+                parts[i + j] += convolve(x_padded, y_padded, (i, j), a.inputs, bilinear)
+                # a monomial of degree i + j splits in at most binomial(i + j, i) ways into factors
+                # of degree i and j, whose products are summed, and i + j + 1 such parts are added
+                roundings = inner * comb(i + j, i) + i + j + 1 + COMPLEX_ROUNDINGS
+                omitted_fraction = gamma(roundings)
+            remainder = remainder + omitted_fraction * bilinear(a_magnitudes[i], b_magnitudes[j])
     remainder = remainder * (1 + gamma(inner + (order + 1) ** 2))
-    return TaylorModel(tuple(parts), np.asarray(remainder), d, order)
+    return TaylorModel(tuple(parts), np.asarray(remainder), a.inputs, order)

@@ -1,4 +1,4 @@
-"""The error of a proof that is not found."""
+"""The error that says that a proof was not found."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ class UnprovedError(FailedError):
     Args:
         what: The property.
         cure: What the caller can change.
-        along: Input, by its place among those of the box, whose bisection is most likely to help;
-            None where none stands out.
+        along: Index of the input whose bisection is most likely to help, or None where none stands
+            out.
     """
 
     def __init__(self, what: str, cure: str = "", along: int | None = None) -> None:
