@@ -20,6 +20,7 @@ help:
 
 run:
 	$(IN) python -m alphacut run $(CASE) --out $(OUT) --workers $(WORKERS) $(if $(FRESH),--fresh)
+	$(if $(filter paper%,$(notdir $(CASE))),$(IN) python cases/paper_figures.py $(CASE) --out $(OUT) --workers $(WORKERS))
 
 test:
 	$(IN) python -m pytest -m "not slow" -n $(WORKERS) --dist worksteal --timeout 400 $(PYTEST)

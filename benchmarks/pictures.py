@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[1]
 OF_RUNS = {
     "docs/pictures/envelope.png": ("paper", "fig33-envelope-E-m-30s-q3.png"),
     "docs/pictures/prism-mesh.png": ("paper", "fig15-prism-mesh.png"),
-    "docs/pictures/modulus.png": ("paper-3d", "fig18-modulus.png"),
+    "docs/pictures/modulus.png": ("paper-3d", "modulus.png"),
 }
 """Case and figure of each picture that a run of a case draws."""
 COMMANDS = {
@@ -32,10 +32,11 @@ COMMANDS = {
 
 
 def main() -> None:
-    """Run the cases of `OF_RUNS` and copy their pictures."""
+    """Run the cases of `OF_RUNS`, draw the figures of the paper alone, and copy their pictures."""
     for case in dict.fromkeys(case for case, _ in OF_RUNS.values()):
         words = ["run", f"cases/{case}.toml", f"--out=results/{case}", "--workers=2"]
         subprocess.run([sys.executable, "-m", "alphacut", *words], cwd=ROOT, check=True)
+    subprocess.run([sys.executable, "cases/paper_figures.py"], cwd=ROOT, check=True)
     for picture, (case, figure) in OF_RUNS.items():
         shutil.copyfile(ROOT / "results" / case / "figures" / figure, ROOT / picture)
 

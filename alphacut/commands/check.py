@@ -37,7 +37,7 @@ from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal, Triangular
 from alphacut.fuzzy.result import Nature
 from alphacut.io.quantity import QUANTITIES
 from alphacut.io.results import ResultsFolder
-from alphacut.report.results import AROUND
+from alphacut.report.results import agreement
 from alphacut.rve.cell.cell import VoigtPhase
 from alphacut.stages.cell import GPA, CellProblem
 from alphacut.stages.envelope import tasks
@@ -296,7 +296,7 @@ def verify(options: argparse.Namespace, out: TextIO) -> int:
             trial.require_agreement(points, motions)
             n_motions = len(points)
             is_guaranteed = data.attrs["nature"] == Nature.GUARANTEED
-            verdict = f"{n_motions} exact motions {'agree with it' if is_guaranteed else AROUND}"
+            verdict = f"{n_motions} exact motions {agreement(is_guaranteed)}"
         nature = str(data.attrs["nature"])
         document[name] = {"nature": nature, "motions_tested": n_motions}
         text += f"{name}: {verdict} ({nature})\n"

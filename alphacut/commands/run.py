@@ -7,66 +7,70 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TextIO
 
 import pandas as pd
 
-from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, require
 from alphacut.base.kept_files import locked, write_text
 from alphacut.base.number_text import text_table
 from alphacut.commands.options import Command, add_common, add_quiet, add_run, write_answer
 from alphacut.commands.pipeline import Pipeline, open_results, read_case
 from alphacut.fuzzy.campaign.workers import pool
-from alphacut.fuzzy.result import Nature
 from alphacut.io.files import say
 from alphacut.io.provenance import FORMAT, command_line, command_to_paste, versions
 from alphacut.io.results import ResultsFolder
 from alphacut.io.typed_json import to_document
 from alphacut.report import tables
 from alphacut.report.page import comparison_page, render_page
-from alphacut.report.results import comparison, cut_text, guaranteed_of, run_text, width_text
+from alphacut.report.results import (
+    comparison,
+    fractions_text,
+    guaranteed_of,
+    material,
+    run_text,
+    width_text,
+)
 from alphacut.rve.result.engineering_constants import PLANE_STRAIN
-from alphacut.stages.cell import UPPER_BOUND, constant_label, isotropic_label
+from alphacut.stages.cell import UPPER_BOUND, isotropic_label
 from alphacut.stages.identify import identify_inputs
 from alphacut.stages.image import ImageResult
 from alphacut.stages.microstructure import fragment
 from alphacut.stages.modulus import ModulusResult
-from alphacut.stages.store import CutsResult
 from alphacut.stages.summary import SUMMARY, Parts, Results, Summary
 
 PAGE = "report.html"
-DEVICES = "where an image is solved: cpu (default), or cuda by CuPy"
-ONLY = "Plane strain alone: the other definition is for one particle of two isotropic phases"
 
 
 def add_modulus(parser: argparse.ArgumentParser, default_place: str = "nothing is kept") -> None:
-    """Adds the options of a command that computes stage modulus."""
+    """Add the options of a command that computes stage modulus."""
     add_run(parser, default_place)
-    parser.add_argument("--device", choices=("cpu", "cuda"), default="cpu", help=DEVICES)
+    about = "where an image is solved: cpu (default), or cuda by CuPy"
+    parser.add_argument("--device", choices=("cpu", "cuda"), default="cpu", help=about)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Adds the options of a run."""
+    """Add the options of a run."""
     add_modulus(parser, "results/NAME")
     parser.add_argument("--fresh", action="store_true", help="compute everything anew")
     parser.add_argument("--no-figures", action="store_true", help="numbers only")
 
 
 def run(options: argparse.Namespace, out: TextIO) -> int:
-    """Computes all stages of a case, draws figures and shows tables; returns exit status 0."""
+    """Compute all stages of a case, draw figures, and show tables; return exit status 0."""
     folder = options.out or f"results/{Path(options.case).stem}"
-    start, names, figures = time.perf_counter(), list[str](), not options.no_figures
+    start, names = time.perf_counter(), list[str]()
+    has_figures = not options.no_figures
     with open_results(options, folder) as (case, store):
-        if figures:  # before processes are forked, which then need not import it
-            from alphacut.figures.all import draw_figures  # which takes time to import
         with pool(store.workers) as executor:
-            first = Results(case.content)
-            results = Pipeline(first, store, options.petsc, figures, executor, options.device).run()
-            if figures:
-                names = draw_figures(results, store, executor)
+            results = Pipeline(
+                Results(case.content), store, options.petsc, has_figures, executor, options.device
+            ).run()
+        if has_figures:
+            from alphacut.figures.all import draw_figures  # whose libraries take time to import
+
+            names = draw_figures(results, store)
         summary = Summary.of(
             results,
             format_version=FORMAT,
@@ -92,7 +96,7 @@ def run(options: argparse.Namespace, out: TextIO) -> int:
 
 
 def add_page(parser: argparse.ArgumentParser) -> None:
-    """Adds the options of a report."""
+    """Add the options of a report."""
     parser.add_argument(
         "folder", metavar="FOLDER", nargs="+", help="results of a run; of two to compare them"
     )
@@ -105,13 +109,14 @@ def add_page(parser: argparse.ArgumentParser) -> None:
 
 
 def report(options: argparse.Namespace, out: TextIO) -> int:
-    """Writes the page of a run and the tables requested, or compares two; returns exit status 0."""
+    """Write the page of a run and the tables requested, or compare two; return exit status 0."""
     if len(options.folder) > 1:
         return compare(options, out)
     folder = ResultsFolder.read(Path(options.folder[0]))
     page = render_page(folder)
     path = Path(options.out) if options.out else folder.path / PAGE
     if path.name == PAGE and path.parent.resolve() == folder.path.resolve():
+        # A page within the folder is listed among its files, which a run must not write meanwhile.
         with locked("FOLDER", folder.path):
             ResultsFolder.read(folder.path).put_text(PAGE, page)
     else:
@@ -127,7 +132,7 @@ def report(options: argparse.Namespace, out: TextIO) -> int:
 
 
 def compare(options: argparse.Namespace, out: TextIO) -> int:
-    """Shows two runs side by side, and writes the files requested; returns exit status 0."""
+    """Show two runs side by side, and write the files requested; return exit status 0."""
     folders = options.folder
     require(len(folders) == 2, "FOLDER", f"{len(folders)} folders", "one or two")
     first, second = (Summary.read(ResultsFolder.read(Path(name))) for name in folders)
@@ -148,7 +153,7 @@ def compare(options: argparse.Namespace, out: TextIO) -> int:
 
 
 def microstructure(options: argparse.Namespace, out: TextIO) -> int:
-    """Computes the radius map of particles, and prints its section [radius]; exit status 0."""
+    """Compute the radius map of particles, and print its section [radius]; return exit status 0."""
     with open_results(options) as (case, store):
         numbers = Pipeline(Results(case.content), store).compute_microstructure().numbers
     text = fragment(numbers)
@@ -157,67 +162,35 @@ def microstructure(options: argparse.Namespace, out: TextIO) -> int:
 
 
 def modulus(options: argparse.Namespace, out: TextIO) -> int:
-    """Computes the fuzzy modulus of the cell, and prints its tables; returns exit status 0."""
+    """Compute the fuzzy modulus of the cell or image, print its tables; return exit status 0."""
     with open_results(options) as (case, store):
         results = Results(case.content)
         Pipeline(results, store, options.petsc, device=options.device).compute_modulus()
-    result = results.modulus or results.image
-    assert result is not None
-    part: ModulusResult | ImageResult = result.numbers
-    text = text_table(*tables.shown(tables.modulus(part))) + constants_text(part)
-    if isinstance(part, ImageResult):
-        measured = "area" if len(part.lower_GPa) == 3 else "volume"
-        text += "".join(f"{x}: {y:.1%} of the {measured}\n" for x, y in part.fractions.items())
-        text += f"{guaranteed_of(part)}\n{width_text(part)}\n"
+    if results.image is not None:
+        image = results.image.numbers
+        part: ModulusResult | ImageResult = image
+        constants = material(Parts(image=image), every_constant=True)
+        lines = [fractions_text(image), guaranteed_of(image), width_text(image)]
     else:
-        text += f"{UPPER_BOUND}\n" if part.particles == "mesh" else ""
-        text += f"{part.samples} samples, {part.solves} linear systems, "
-        text += f"{part.seconds:.1f} s, {part.method}\n"
-        text += f"{part.solver}\n" if part.solver else ""
-    write_answer(options, to_document(part), out, text)
+        assert results.modulus is not None
+        part = cell = results.modulus.numbers
+        constants = material(Parts(modulus=cell), every_constant=True)
+        cost = f"{cell.samples} samples, {cell.solves} linear systems, {cell.seconds:.1f} s"
+        lines = [UPPER_BOUND] if cell.particles == "mesh" else []
+        lines += [f"{cost}, {cell.method}"] + ([cell.solver] if cell.solver else [])
+        if [*cell.plane] == [PLANE_STRAIN]:
+            why = "the other definition is for one particle of two isotropic phases"
+            lines.insert(0, f"Plane strain alone: {why}")
+    if bounds := part.references.get("hashin_shtrikman_E_GPa"):
+        lower, upper = bounds
+        lines.insert(0, f"{isotropic_label(part.average)}: {lower:.4f} … {upper:.4f} GPa")
+    text = text_table(*tables.shown(tables.modulus(part))) + text_table(*constants)
+    write_answer(options, to_document(part), out, text + "".join(f"{line}\n" for line in lines))
     return 0
 
 
-def constants_text(part: ModulusResult | ImageResult) -> str:
-    """Constants of fibres, along x and y by definition, loss factors, and bounds of isotropic E."""
-    groups, nature, proved_losses = part.plane, Nature.GUARANTEED, dict[str, CutsResult]()
-    if isinstance(part, ImageResult):
-        proved_losses = part.proved_losses
-    else:  # of a cell at most E is proved
-        groups, nature = {"of fibres": part.fibres, **groups}, Nature.ATTAINED
-    text = "".join(cuts_text(name, cuts, part.alpha, nature) for name, cuts in groups.items())
-    if [*part.plane] == [PLANE_STRAIN]:
-        text += f"{ONLY}\n"
-    text += cuts_text("tan δ, to first order in it", proved_losses, part.alpha, nature)
-    if (loss := part.loss) is not None:
-        rows, levels = [], end_levels(part.alpha)
-        for name, cuts in (("E", loss.E), ("G", loss.G), ("K", loss.K)):
-            texts = (cut_text(cuts, level, Nature.ATTAINED) for level in levels.values())
-            error = f"{loss.error[name]:.1e}" if loss.error else "not declared"
-            rows.append((f"loss factor of {name}", *texts, error))
-        text += text_table(("tan δ = 2 ζ", *levels, "± error"), rows)
-    if bounds := part.references.get("hashin_shtrikman_E_GPa"):
-        text += f"{isotropic_label(part.average)}: {bounds[0]:.4f} … {bounds[1]:.4f} GPa\n"
-    return text
-
-
-def end_levels(alpha: Array) -> dict[str, int]:
-    """Indices of the lowest and the highest level by their titles."""
-    return {f"α = {alpha[level]:g}": level for level in (0, len(alpha) - 1)}
-
-
-def cuts_text(title: str, cuts: Mapping[str, CutsResult], alpha: Array, nature: Nature) -> str:
-    """Table of the lowest and highest cut of each constant; empty where there are none."""
-    levels = end_levels(alpha)
-    rows = [
-        (constant_label(x), *(cut_text(ends, level, nature) for level in levels.values()))
-        for x, ends in cuts.items()
-    ]
-    return text_table((title, *levels), rows) if rows else ""
-
-
 def identify(options: argparse.Namespace, out: TextIO) -> int:
-    """Identifies inputs from measured modes; exit status 0 even if these refute the frame."""
+    """Identify inputs from measured modes; return exit status 0 even if these refute the frame."""
     content = read_case(options).content
     section = content.structure_section
     if content.identify is None or section is None or content.envelope is None:

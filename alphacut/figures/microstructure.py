@@ -25,7 +25,7 @@ REDUCED = "reduced radius $r_n$ = r/a"
 def draw(fitted: FittedRadiusMap, folder: Path, section: MicrostructureSection) -> None:
     """Writes the figures of a radius map as SVG and PNG."""
     with style.figure_style():
-        style.save(draw_pbox(fitted), folder / "13_pbox")
+        style.save(draw_pbox(fitted), folder / "pbox")
         style.save(draw_map(fitted), folder / "radius_map")
         if section.image is not None:
             picture = section_picture(section.image.file)

@@ -1,4 +1,7 @@
-"""The report of a run as one HTML page that needs nothing else: no network, no other file."""
+"""The report of a run as one HTML page that needs nothing else: no network, no other file.
+
+What stands on the page, and in which order, is said by the template report.html.
+"""
 
 from __future__ import annotations
 
@@ -6,8 +9,11 @@ import base64
 import math
 import re
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path, PurePosixPath
+from typing import NamedTuple
+
+import xarray
 
 from alphacut.base.errors import RefusedError
 from alphacut.base.number_text import ShownUnit, Table
@@ -16,78 +22,99 @@ from alphacut.frame.analyses.answer import enclosing_box_words
 from alphacut.fuzzy.result import Nature, of_enclosing_box
 from alphacut.io.files import Document, say
 from alphacut.io.results import ResultsFolder
-from alphacut.report.results import (
-    ANSWER_HEAD,
-    MEANING,
-    answers,
-    drivers,
-    guaranteed_of,
-    material,
-    natures,
-    peak_table,
-    smaller_steps,
-    width_text,
-)
+from alphacut.report import results
 from alphacut.report.tables import tables
 from alphacut.stages.cell import isotropic_label
 from alphacut.stages.envelope import EnvelopeResult
 from alphacut.stages.summary import Summary
 
-Piece = tuple[object, ...]
-"""Name of a macro of ``report.html``, and what it shows."""
-_TABLES = tomllib.loads(Path(__file__).with_name("captions.toml").read_text(encoding="utf-8"))
-FIGURES: dict[str, str] = _TABLES["figures"]
-TERMS = _TABLES["terms"] | {str(nature).capitalize(): nature.sentence for nature in Nature}
-"""Terms of the page with their meaning."""
+
+class Picture(NamedTuple):
+    """Caption of a figure, and its PNG file in base64."""
+
+    caption: str
+    content: str
 
 
 def render_page(folder: ResultsFolder) -> str:
-    """The page for the results in a folder, or RefusedError where they are not of one run."""
+    """Return the page for the results in a folder.
+
+    Raises:
+        RefusedError: Files are missing, damaged, or of different runs.
+    """
     summary = Summary.read(folder)
     summary.require_run_of(folder)
+    words, periods = named_words(), ""
+    if (frame := summary.structure) is not None:
+        periods = ", ".join(f"{2 * math.pi / x:.3g}" for x in frame.omega_rad_per_s[:4])
     return render_template(
+        "report.html",
         title=summary.title,
         name=summary.case,
         about=" ".join(summary.about.split()),
-        sections=Page(summary, folder).sections(),
+        run=summary,
+        meaning=results.MEANING,
+        key_tables=results.key_tables(summary),
+        key_sentences=results.key_sentences(summary),
+        tables=tables(summary),
+        figures=Figures(summary, folder, words["figures"]),
+        periods=periods,
+        sensitivity=Sensitivity(summary.shares),
+        terms=words["terms"] | {str(x).capitalize(): x.sentence for x in Nature},
+        versions=Table(("program", "version"), [*summary.versions.items()]),
+        guaranteed_of=results.guaranteed_of,
+        fractions_text=results.fractions_text,
+        width_text=results.width_text,
+        isotropic_label=isotropic_label,
+        enclosing_box_words=enclosing_box_words,
         envelopes=[
-            plot(name, study, folder, summary.shown_units)
+            plot(name, study, folder.dataset(f"envelope_{name}.nc"), summary.shown_units)
             for name, study in summary.envelopes.items()
         ],
     )
 
 
-def comparison_page(first: Summary, second: Summary, table: Table) -> str:
-    """The page for two summaries with the table of both side by side."""
+def comparison_page(first: Summary, second: Summary, comparison: Table) -> str:
+    """Return the page of two runs with the table of both side by side."""
     title, name = f"{first.title} and {second.title}", f"{first.case} and {second.case}"
-    sections = [("Side by side", [("table", *table)])]
-    return render_template(title=title, name=name, about="", sections=sections, envelopes=[])
+    return render_template(
+        "comparison.html", title=title, name=name, about="", comparison=comparison
+    )
 
 
-def render_template(**parts: object) -> str:
-    """The template of the page with its parts; all texts of it are escaped."""
+def render_template(template: str, **content: object) -> str:
+    """Return a template of this folder filled with content, all texts of which are escaped."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     loader = FileSystemLoader(Path(__file__).parent)
-    templates = Environment(autoescape=True, loader=loader, undefined=StrictUndefined)
-    return templates.get_template("report.html").render(parts)
+    templates = Environment(
+        autoescape=True,
+        loader=loader,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return templates.get_template(template).render(content)
+
+
+def named_words() -> dict[str, dict[str, str]]:
+    """Return the captions of figures by their names, and the meanings of terms."""
+    return tomllib.loads(Path(__file__).with_name("captions.toml").read_text(encoding="utf-8"))
 
 
 def plot(
-    name: str, study: EnvelopeResult, folder: ResultsFolder, units: Mapping[str, ShownUnit]
+    name: str, study: EnvelopeResult, dataset: xarray.Dataset, units: Mapping[str, ShownUnit]
 ) -> Document:
-    """Data of a study for the interactive plot: values over time as base64 of 32-bit floats."""
-    dataset = folder.dataset(f"envelope_{name}.nc")
+    """Return the data of a study for the interactive plot of report.js.
+
+    Values over time are 32-bit floats in base64, by side, level and output. A guaranteed envelope
+    contains its error, so that none is drawn beside it.
+    """
     time = dataset["time"].values
     outputs = [str(output) for output in dataset["output"].values]
-    bands = {side: dataset[side] for side in ("lower", "upper", "error")}
-    if study.nature is Nature.GUARANTEED:  # which contains it
-        bands["error"] = 0.0 * bands["error"]
     encloses = next((peak.encloses for peak in study.peak.values()), "")
     box = f", {of_enclosing_box(encloses)}" if encloses else ""
-    axes = ("alpha", "output", "time")
-    arrays = {x: band.transpose(*axes).values.astype("<f4") for x, band in bands.items()}
-    return {
+    document: Document = {
         "name": name,
         "title": f"{name}: fuzzy {', '.join(study.fuzzy)}{box}",
         "fuzzy": len(study.fuzzy),
@@ -97,143 +124,62 @@ def plot(
         "units": [units[output].label for output in outputs],
         "factors": [units[output].factor for output in outputs],
         "step": float(time[1] - time[0]),
-        **{
-            side: [[base64.b64encode(row.tobytes()).decode() for row in level] for level in array]
-            for side, array in arrays.items()
-        },
     }
+    for side in ("lower", "upper", "error"):
+        values = dataset[side].transpose("alpha", "output", "time").values.astype("<f4")
+        if side == "error" and study.nature is Nature.GUARANTEED:
+            values = 0 * values
+        document[side] = [
+            [base64.b64encode(series.tobytes()).decode() for series in level] for level in values
+        ]
+    return document
 
 
-class Page:
-    """The sections of one run, from its summary and its results."""
+class Figures:
+    """Figures of a run that no section of its page has shown yet.
 
-    def __init__(self, summary: Summary, folder: ResultsFolder) -> None:
-        self.summary, self.folder, self.tables = summary, folder, tables(summary)
-        self.paper = any("fig" in name for name in summary.figures)
+    Only PNG files are taken: an SVG file in the folder could hold a script of somebody else.
+
+    Args:
+        summary: The run, whose figures these are.
+        folder: Folder of its results.
+        captions: Captions by the names of figures.
+    """
+
+    def __init__(
+        self, summary: Summary, folder: ResultsFolder, captions: Mapping[str, str]
+    ) -> None:
         pictures = [name for name in summary.figures if name.endswith(".png")]
-        self.unshown = {PurePosixPath(x).stem: x for x in pictures}  # that no section has shown yet
+        self.paths = {PurePosixPath(path).stem: path for path in pictures}
+        self.folder = folder
+        self.captions = captions
 
-    def sections(self) -> Iterator[tuple[str, list[Piece]]]:
-        """Yields title and pieces of each section that the results allow, in reading order.
+    def take(self, name: str) -> Picture | None:
+        """Return a figure by its name; None where the run has none, or its file is damaged."""
+        path = self.paths.pop(name, None)
+        if path is None:
+            return None
+        try:
+            content = self.folder.content(path)
+        except RefusedError as error:
+            say(f"warning: a figure is left out: {error}")
+            return None
+        return Picture(caption(name, self.captions), base64.b64encode(content).decode())
 
-        A piece is the name of a macro of the template, and what the macro shows.
-        """
-        summary, show = self.summary, self._pieces
-        refuted = [summary.update.refuted] if summary.update and summary.update.refuted else []
-        shares = [Sensitivity(summary.shares).words()] if summary.shares else []
-        box = [enclosing_box_words(summary.encloses)] if summary.encloses else []
-        answers = [(x, (x.key, f"{x.key}-curves")) for x in summary.answers]
-        plots: list[Piece] = [("plot",)] if summary.envelopes else []
-        for title, pieces in (
-            ("Key results", self._key_pieces()),
-            ("Microstructure", show(["pbox", "p-box"], self._particles(), folded="radius_map")),
-            ("How stiff is the material?", show(["modulus"], self._references(), folded="modulus")),
-            ("How stiff is the image?", show(["image"], self._image(), folded="image")),
-            ("What do the measured modes teach?", show(["update-inputs"], refuted, "update")),
-            ("How does the structure move?", [*plots, *show([], self._motion(), folded="peaks")]),
-            ("How far does it move under each record?", show([], folded="records")),
-            *(
-                (x.title, show(names, [x.all_words()], x.key, f"{x.key}_sets"))
-                for x, names in answers
-            ),
-            ("What drives the width?", show([], [*shares, *box] if shares else [], "shares")),
-            ("Terms", [("glossary", TERMS.items())]),
-            ("More", self._more()),
-        ):
-            if shown := [*pieces]:
-                yield title, shown
-
-    def _pieces(
-        self, figures: Iterable[str], texts: Iterable[str] = (), table: str = "", folded: str = ""
-    ) -> Iterator[Piece]:
-        """Yields figures, texts, a table and a folded one, by their names; none that is missing."""
-        yield from self._figures(*figures)
-        yield from (("text", text) for text in texts)
-        if table in self.tables:
-            yield ("table", *self.tables[table])
-        if folded in self.tables:
-            yield "folded", "As a table", [("table", *self.tables[folded])]
-
-    def _key_pieces(self) -> Iterator[Piece]:
-        summary = self.summary
-        yield "text", f"{MEANING}."
-        for table in (material(summary), peak_table(summary), (ANSWER_HEAD, answers(summary))):
-            yield ("table", *table)
-        lines = (*natures(summary), *smaller_steps(summary), *drivers(summary))
-        yield from self._pieces([], lines)
-
-    def _particles(self) -> Iterator[str]:
-        if (part := self.summary.microstructure) is None:
-            return
-        count, kind = part.get("discs", part.get("spheres")), part["particles"]
-        cells = "volume" if kind == "spheres" else "area"
-        stated, mapped = part["fraction_of_case"], part[f"mean_{cells}_fraction_of_map"]
-        measured = part[f"{cells}_fraction"]
-        beside = "" if stated is None else f"; the case says {stated:.4g}"
-        yield f"{count:,} {kind} in {part['packings']} sections or cubes."
-        beside += f"; the {kind} themselves {measured:.4f}"
-        yield f"Of the {cells} of the cells the map's particles take {mapped:.4f}{beside}."
-
-    def _image(self) -> Iterator[str]:
-        if (part := self.summary.image) is not None:
-            shares = ", ".join(f"{x} {share:.1%}" for x, share in part.fractions.items())
-            yield f"{guaranteed_of(part)}."
-            measured = "area" if len(part.lower_GPa) == 3 else "volume"
-            yield f"Of the {measured}: {shares}. {width_text(part)}."
-
-    def _references(self) -> Iterator[str]:
-        part = self.summary.modulus
-        if part is not None and (bounds := part.references.get("hashin_shtrikman_E_GPa")):
-            yield f"{isotropic_label(part.average)}: {bounds[0]:.5g} … {bounds[1]:.5g} GPa."
-
-    def _motion(self) -> Iterator[str]:
-        studies, frame = self.summary.envelopes, self.summary.structure
-        if studies and frame is not None:
-            periods = ", ".join(f"{2 * math.pi / omega:.3g}" for omega in frame.omega_rad_per_s[:4])
-            yield f"Natural periods of linear elastic motion: {periods} s."
-        for name, study in studies.items():
-            yield f"{name}: {study.method}, fuzzy {', '.join(study.fuzzy)}"
-        for nature in dict.fromkeys(study.nature for study in studies.values()):
-            yield f"{str(nature).capitalize()}: {nature.sentence}"
-        if studies and self.summary.encloses:
-            yield enclosing_box_words(self.summary.encloses)
-
-    def _figures(self, *names: str) -> Iterator[Piece]:
-        """Yields the figures of these names, without the paper's number, that the run has drawn.
-
-        No SVG is taken from the folder: it could hold a script of somebody else.
-        """
-        for name in names:
-            stem = next((x for x in self.unshown if x == name or x.endswith(f"-{name}")), None)
-            if stem is None:
-                continue
-            try:
-                content = self.folder.content(self.unshown.pop(stem))
-            except RefusedError as error:
-                say(f"warning: a figure is left out: {error}")
-                continue
-            yield "figure", caption(stem, paper=self.paper), base64.b64encode(content).decode()
-
-    def _more(self) -> Iterator[Piece]:
-        summary = self.summary
-        yield "folded", "All other figures", [*self._figures(*self.unshown)]
-        yield "folded", f"Case {summary.case}", [("code", summary.case_text)]
-        changes = [("code", change) for change in summary.changes]
-        yield "folded", "Changed on the command line", changes
-        origin = f"Made by {summary.command} in {summary.seconds:.0f} s."
-        versions = ("table", ("program", "version"), [*summary.versions.items()])
-        yield "folded", "Versions", [("text", origin), versions]
+    def others(self) -> Iterator[Picture | None]:
+        """Yield the figures that are left."""
+        for name in list(self.paths):
+            yield self.take(name)
 
 
-def caption(stem: str, *, paper: bool) -> str:
-    """Caption of a figure such as "fig16-stress-curves"; with the paper's number if `paper`."""
-    parts = re.fullmatch(r"(?:fig)?(\d+(?:-\d+)?)[-_](.+)", stem)
-    number, name = (parts[1], parts[2]) if parts else ("", stem)
-    if match := re.fullmatch(r"envelope-(.+)-([^-]+)", name):
+def caption(name: str, captions: Mapping[str, str]) -> str:
+    """Return the caption of a figure, which begins with its number in the paper if it has one."""
+    number, rest = "", name
+    if match := re.fullmatch(r"fig(\d+)-(.+)", name):
+        number, rest = f"Fig. {match[1]}: ", match[2]
+    if match := re.fullmatch(r"envelope-(.+)-([^-]+)", rest):
         study, output = match.groups()
         text = f"Envelope of {output}" + ("" if study == "all" else f", study {study}")
     else:
-        text = FIGURES.get(name.replace("_", "-"), name.replace("-", " "))
-    numbers = [str(int(figure)) for figure in number.split("-") if paper and number]
-    prefix = f"{'Figs.' if len(numbers) > 1 else 'Fig.'} {' to '.join(numbers)}: "
-    return prefix + text if numbers else text
+        text = captions.get(rest.replace("_", "-"), rest.replace("-", " "))
+    return number + text

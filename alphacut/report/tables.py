@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -27,70 +27,77 @@ if TYPE_CHECKING:
     import xarray
 
 DIGITS = 6
-RANGES = (("E from [GPa]", "E to [GPa]", "nature of E"), ("least peak", "greatest peak", "nature"))
-"""Columns of lower and upper ends that are rounded as the nature in a third one demands."""
-SIGNS = {"−": "-", "≤": r"\leq", "≥": r"\geq", "±": r"\pm", "²": "^2", "α": r"\alpha"}
-SIGNS |= {"ν": r"\nu", "ζ": r"\zeta"}
-SYMBOLS = str.maketrans({x: f"${sign}$" for x, sign in SIGNS.items()})
-SYMBOLS |= str.maketrans({"…": r"\dots{}", "µ": r"\textmu{}"})
-"""What LaTeX's fonts do not have."""
+"""Significant digits of numbers that are shown; files have all."""
 
 
 def frames(parts: Parts) -> dict[str, pd.DataFrame]:
-    """Numbers of all results as data frames by name: of stages, then of questions."""
-    refuted = parts.update is not None and parts.update.is_refuted
-    of_stages: tuple[tuple[str, Callable[[Any], pd.DataFrame], object], ...] = (
-        ("radius_map", radius_map, parts.microstructure),
-        ("modulus", modulus, parts.modulus),
-        ("image", modulus, parts.image),
-        ("update", rows_of, None if refuted else parts.update),
-        ("peaks", peaks, parts.envelopes),
-        ("records", rows_of, parts.records),
-        ("shares", rows_of, Sensitivity(parts.shares) if parts.shares else None),
-    )
-    found = {name: frame_of(part) for name, frame_of, part in of_stages if part}
+    """Return the numbers of all results as data frames by name: stages first, then answers."""
+    found: dict[str, pd.DataFrame] = {}
+    if parts.microstructure:
+        found["radius_map"] = radius_map(parts.microstructure)
+    if parts.modulus:
+        found["modulus"] = modulus(parts.modulus)
+    if parts.image:
+        found["image"] = modulus(parts.image)
+    if parts.update is not None and not parts.update.is_refuted:
+        found["update"] = rows_of(parts.update)
+    if parts.envelopes:
+        found["peaks"] = peaks(parts.envelopes)
+    if parts.records:
+        found["records"] = rows_of(parts.records)
+    if parts.shares:
+        found["shares"] = rows_of(Sensitivity(parts.shares))
     if parts.fragility is not None and parts.fragility.increments:
         found["fragility_sets"] = pd.DataFrame(parts.fragility.crossings())
         found["fragility_curves"] = pd.DataFrame(parts.fragility.curves())
-    return found | {answer.key: rows_of(answer) for answer in parts.answers}
+    for answer in parts.answers:
+        found[answer.key] = rows_of(answer)
+    return found
 
 
 def tables(parts: Parts) -> dict[str, Table]:
-    """Tables of texts of all results: numbers rounded as their nature allows, answers in words."""
+    """Return tables of texts of all results: numbers rounded as their guarantee allows.
+
+    Answers are given in their own words.
+    """
     texts = {name: shown(frame) for name, frame in frames(parts).items()}
     return texts | {answer.key: answer.table() for answer in parts.answers}
 
 
 def radius_map(numbers: Document) -> pd.DataFrame:
-    """The parameters a1 … a4 of the radius map: minimum, nominal value and maximum."""
-    corners = {name: np.atleast_1d(numbers[name]) for name in ("a1", "a2", "a3", "a4")}  # 3 or 1
-    rows = [(name, x[0], x[len(x) // 2], x[-1]) for name, x in corners.items()]
+    """Return the minimum, nominal value and maximum of the parameters a1 … a4 of a radius map."""
+    rows = []
+    for name in ("a1", "a2", "a3", "a4"):
+        corners = np.atleast_1d(numbers[name])  # of a triangular number, or one value
+        rows.append((name, corners[0], corners[len(corners) // 2], corners[-1]))
     head = ["parameter of the radius map", "minimum", "nominal", "maximum"]
     return pd.DataFrame(rows, columns=head)
 
 
 def modulus(result: ModulusResult | ImageResult) -> pd.DataFrame:
-    """The α-cuts of E, and of a cell those of ν and the error of E."""
-    young = result.E_GPa
-    lower, upper = young.ends
+    """Return the α-cuts of E, and of a cell those of ν and the error of E, a row for each level."""
+    lower, upper = result.E_GPa.ends
     columns = {"α": result.alpha, "E from [GPa]": lower, "E to [GPa]": upper}
     if isinstance(result, ModulusResult):
-        error = sum(result.error.values())
-        columns |= {"ν from": result.nu_cuts.lower, "ν to": result.nu_cuts.upper}
-        columns["± E [GPa]"] = error * young.upper if error else np.full(len(young.upper), np.nan)
+        columns["ν from"] = result.nu_cuts.lower
+        columns["ν to"] = result.nu_cuts.upper
+        # Errors are fractions of E by their causes; without a cause they are not known.
+        error = sum(result.error.values()) or np.nan
+        columns["± E [GPa]"] = error * result.E_GPa.upper
     return pd.DataFrame(columns | {"nature of E": str(result.nature)})
 
 
 def rows_of(answer: Answer | LearnedInputs) -> pd.DataFrame:
-    """The rows of numbers of an answer."""
+    """Return the rows of numbers of an answer."""
     return pd.DataFrame(answer.records())
 
 
 def peaks(studies: Mapping[str, EnvelopeResult]) -> pd.DataFrame:
-    """The peaks of all studies, a row for each output and level."""
-    return pd.concat(
-        pd.DataFrame(
-            {
+    """Return the peaks of all studies, a row for each output and level."""
+    found = []
+    for name, study in studies.items():
+        for output, peak in study.peak.items():
+            columns = {
                 "study": name,
                 "output": output,
                 "unit": study.units[output_of(output)],
@@ -101,16 +108,18 @@ def peaks(studies: Mapping[str, EnvelopeResult]) -> pd.DataFrame:
                 "nature": str(peak.nature),
                 "peak reached": np.where(np.isfinite(peak.reached), peak.reached, np.nan),
                 "gap, share": peak.gaps,
-                **({"inputs": of_enclosing_box(peak.encloses)} if peak.encloses else {}),
             }
-        )
-        for name, study in studies.items()
-        for output, peak in study.peak.items()
-    )
+            if peak.encloses:
+                columns["inputs"] = of_enclosing_box(peak.encloses)
+            found.append(pd.DataFrame(columns))
+    return pd.concat(found)
 
 
 def over_time(data: xarray.Dataset, output: str, unit: str) -> pd.DataFrame:
-    """The bounds of one output over time, with three columns for each level."""
+    """Return the bounds of one output over time, with three columns for each level.
+
+    The third one is the error; of guaranteed bounds, which contain it, the gap to attained values.
+    """
     series, nature = data.sel(output=output), Nature(data.attrs["nature"])
     encloses = data.attrs.get("encloses", "")
     box = f" {of_enclosing_box(encloses)}" if encloses else ""
@@ -121,21 +130,30 @@ def over_time(data: xarray.Dataset, output: str, unit: str) -> pd.DataFrame:
         titles["error"] = "gap to attained"
     columns = {"time [s]": series["time"].values}
     for level in series["alpha"].values:
-        for kind, title in titles.items():
-            if kind in series:
-                name = f"{title} at alpha {level:g} [{unit}]"
-                columns[name] = series[kind].sel(alpha=level).values
+        for variable, title in titles.items():
+            if variable in series:
+                values = series[variable].sel(alpha=level).values
+                columns[f"{title} at alpha {level:g} [{unit}]"] = values
     return pd.DataFrame(columns)
 
 
 def shown(frame: pd.DataFrame) -> Table:
-    """A data frame as texts, without columns that are empty."""
+    """Return a data frame as a table of texts, without columns that are empty.
+
+    Lower and upper ends are rounded out- or inwards, as their guarantee demands.
+    """
     filled = frame.dropna(axis=1, how="all")
-    for low, high, nature in RANGES:
-        if low in filled:
-            columns = (filled[x] for x in (low, high, nature))
-            ends = [rounded_ends(x, y, Nature(z), DIGITS) for x, y, z in zip(*columns, strict=True)]
-            filled = filled.assign(**dict(zip((low, high), zip(*ends, strict=True), strict=True)))
+    for low, high, guarantee in (
+        ("E from [GPa]", "E to [GPa]", "nature of E"),
+        ("least peak", "greatest peak", "nature"),
+    ):
+        if low not in filled:
+            continue
+        ends = [
+            rounded_ends(lower, upper, Nature(nature), DIGITS)
+            for lower, upper, nature in filled[[low, high, guarantee]].itertuples(index=False)
+        ]
+        filled = filled.assign(**{low: [x[0] for x in ends], high: [x[1] for x in ends]})
     rows = [tuple(map(_text, row)) for row in filled.itertuples(index=False)]
     return Table(tuple(map(str, filled)), rows)
 
@@ -148,7 +166,7 @@ def _text(value: object) -> str:
 
 
 def write_tables(parts: Parts, results: ResultsFolder, folder: Path) -> list[Path]:
-    """Writes the results of a run as CSV files into a folder; returns the files."""
+    """Write the results of a run into a folder as CSV files; return the files."""
     found = frames(parts)
     for name, study in parts.envelopes.items():
         data = results.dataset(f"envelope_{name}.nc")
@@ -158,29 +176,51 @@ def write_tables(parts: Parts, results: ResultsFolder, folder: Path) -> list[Pat
 
 
 def write_csv(found: Mapping[str, pd.DataFrame], folder: Path) -> list[Path]:
-    """Writes data frames as CSV files, exact so that a bound stays one; returns the files."""
+    """Write data frames as CSV files, with all digits so that a bound stays one; return the files.
+
+    Texts have plain minus signs, and no spreadsheet takes one for a formula.
+    """
     for name, frame in found.items():
-        texts = frame.select_dtypes("object")
-        text = frame.assign(**texts.map(_csv_cell)).to_csv(index=False, lineterminator="\n")
-        write_text(folder / f"{name}.csv", text, follow_links=False)
+        texts = frame.select_dtypes("object").map(_csv_cell)
+        content = frame.assign(**texts).to_csv(index=False, lineterminator="\n")
+        write_text(folder / f"{name}.csv", content, follow_links=False)
     return [folder / f"{name}.csv" for name in found]
 
 
 def _csv_cell(value: object) -> object:
-    """A text with plain signs that no spreadsheet takes for a formula; another value as it is."""
     return csv_cell(value.replace(MINUS, "-")) if isinstance(value, str) else value
 
 
 def write_markup(named: Mapping[str, Table], folder: Path) -> list[Path]:
-    """Writes each table as a file of LaTeX; returns the files."""
-    texts = {folder / f"{name}.tex": latex(table) for name, table in named.items() if table.rows}
-    for path, text in texts.items():
-        write_text(path, text, follow_links=False)
-    return [*texts]
+    """Write each table that has rows as a LaTeX file; return the files."""
+    written = []
+    for name, table in named.items():
+        if table.rows:
+            written.append(folder / f"{name}.tex")
+            write_text(written[-1], latex(table), follow_links=False)
+    return written
 
 
 def latex(table: Table) -> str:
-    """A tabular environment, with rules of the package booktabs."""
+    """Return a table as a tabular environment with the rules of the package booktabs.
+
+    Signs that the fonts of LaTeX do not have become commands.
+    """
     frame, columns = pd.DataFrame(table.rows, columns=table.head), "l" + "r" * (len(table.head) - 1)
     text: str = frame.to_latex(index=False, escape=True, column_format=columns)
-    return text.translate(SYMBOLS)
+    commands: dict[str, str | int | None] = {
+        "…": r"\dots{}",
+        "µ": r"\textmu{}",
+        "−": "$-$",
+        "²": "$^2$",
+    }
+    for sign, name in {
+        "≤": "leq",
+        "≥": "geq",
+        "±": "pm",
+        "α": "alpha",
+        "ν": "nu",
+        "ζ": "zeta",
+    }.items():
+        commands[sign] = rf"$\{name}$"
+    return text.translate(str.maketrans(commands))

@@ -217,7 +217,7 @@ def test_what_a_run_stored_is_verified_and_a_narrower_envelope_contradicted(
     assert proved(written(tmp_path), folder) == 0
     files = sorted(folder.iterdir())
     assert main(["verify", str(folder)]) == 0
-    assert "exact motions agree with it (guaranteed)" in capfd.readouterr().out
+    assert "exact motions agree with what is guaranteed (guaranteed)" in capfd.readouterr().out
     stored = check.envelope_of
     monkeypatch.setattr(check, "envelope_of", lambda data: narrower(stored(data)))
     assert main(["verify", str(folder)]) == 1

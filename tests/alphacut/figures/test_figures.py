@@ -11,16 +11,14 @@ import pytest
 import xarray
 
 from alphacut.base.number_text import ShownUnit
-from alphacut.figures import envelope, material, overview
+from alphacut.figures import answers, envelope, material
 from alphacut.figures.style import figure_style
 from alphacut.frame import Accelerogram, Decision, Limit, Peak, StoreyFrame, fragility, propagation
 from alphacut.frame.analyses.decision import LimitDecision
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy import Triangular
 from alphacut.fuzzy.result import Ends, Nature
-from alphacut.report.page import caption
-from alphacut.rve import Cell, Phase
-from alphacut.stochastic import HermiteMap
+from alphacut.report.page import caption, named_words
 from tests.alphacut.small import summary_of, two_floors_run
 
 
@@ -44,10 +42,10 @@ def test_every_figure_has_both_forms_and_a_caption(two_floors):
     assert {"decision", "probability", "tolerances"} <= stems
     assert set(names) == {f"figures/{stem}.{kind}" for stem in stems for kind in ("svg", "png")}
     assert all((two_floors / name).stat().st_size > 1000 for name in names)
-    assert all(caption(x, paper=False)[0].isupper() and caption(x, paper=False) != x for x in stems)
-    words = "Figs. 21 to 25: The Graph Follower, step by step"
-    assert caption("fig21-25-graph-follower", paper=True) == words
-    assert caption("fig28-envelope-E-5s-q1", paper=True) == "Fig. 28: Envelope of q1, study E-5s"
+    named = named_words()["figures"]
+    assert all(stem in named or stem.startswith("envelope-all-") for stem in stems)
+    assert caption("decision", named) == "Fuzzy peak of each limited output over its limit"
+    assert caption("fig28-envelope-E-5s-q1", named) == "Fig. 28: Envelope of q1, study E-5s"
 
 
 def image_dataset(young, shape=(4, 6)):
@@ -110,13 +108,17 @@ def test_numbers_of_a_narrow_axis_stand_apart_and_whole(width):
 def test_the_error_is_drawn_outside_bounds_that_it_may_pass(nature, lines):
     time, one = np.linspace(0, 1, 11), np.ones(11)
     ends = {"lower": -one, "upper": one, "error": 0.25 * one}
-    lowest = xarray.Dataset({name: ("time", values) for name, values in ends.items()})
+    dataset = xarray.Dataset(
+        {name: (("alpha", "time"), np.array([values, values])) for name, values in ends.items()},
+        coords={"alpha": [0.0, 1.0], "time": time},
+        attrs={"nature": nature},
+    ).expand_dims(output=["q1"])
+    task, unit = SimpleNamespace(fuzzy=("k",)), ShownUnit("m", 1.0)
     with figure_style():
-        _, axes = plt.subplots()
-        words = envelope.draw_error_band(axes, time, lowest, nature, ShownUnit("m", 1.0))
-        ends = sorted(float(line.get_ydata()[0]) for line in axes.lines)
-    assert ends == [-1.25, 1.25][:lines]
-    assert ("± 0.25 m" in words) == bool(lines)
+        (axes,) = envelope.envelope(dataset, Output("q1", "m"), task, unit).axes
+    dashed = [line for line in axes.lines if line.get_linestyle() == "--"]
+    assert sorted(float(line.get_ydata()[0]) for line in dashed) == [-1.25, 1.25][:lines]
+    assert ("± 0.25 m" in " ".join(axes.get_title("left").split())) == bool(lines)
 
 
 def test_the_title_states_the_error_of_the_peak_with_what_lies_between_nodes():
@@ -149,22 +151,6 @@ def test_numbers_and_bounds_are_drawn_with_their_own_ends():
     assert ends[0].ymax == pytest.approx(motion.upper[0].max())
 
 
-def test_a_mesh_and_six_cuts_are_those_of_the_case():
-    cell = Cell(Phase(20e9), Phase(80e9), HermiteMap(0.2, 0.1, 0.6, 0.1))
-    with figure_style():
-        plane, density, prisms = overview.domains(cell, 0.5, 3).axes
-        (opened,) = overview.draw_mesh(cell, 0.5, 3).axes[0].collections
-        cuts = overview.alpha_cuts(Triangular(75e9, 80e9, 85e9))
-    assert "3 layers" in density.get_title(loc="left")
-    assert len(prisms.collections) == 4
-    assert len(opened.get_facecolor()) > 100
-    _, count = overview.edges_of(np.array([[0, 1, 2], [2, 1, 3]]))
-    assert count.tolist() == [1, 1, 2, 1, 1]  # the third edge is inside: no face of it is drawn
-    assert plane.get_title(loc="left") == "physical domain, θ = -1"
-    bars = [line.get_xdata() for line in cuts.axes[0].lines[1:]]
-    assert np.array(bars) / 1e9 == pytest.approx(np.array([[75 + k, 85 - k] for k in range(6)]))
-
-
 def test_a_limit_of_zero_leaves_room_for_the_bars_of_others():
     limits = {}
     for size in (0.0, 0.02):
@@ -174,7 +160,7 @@ def test_a_limit_of_zero_leaves_room_for_the_bars_of_others():
             margin=Ends(np.array([size - 0.02]), np.array([size - 0.01])), verdict="not exceeded",
             from_level=0, nature=Nature.ESTIMATED, peak=Peak(np.zeros(1), *bounds, Nature.ESTIMATED),
         )  # fmt: skip
-    (axes,) = envelope.draw_decision(Decision(np.zeros(1), limits)).axes
+    (axes,) = answers.draw_decision(Decision(np.zeros(1), limits)).axes
     assert max(abs(end) for end in axes.get_xlim()) < 3
 
 
@@ -185,7 +171,7 @@ def test_every_limit_of_a_fragility_is_drawn_with_its_fit_and_the_highest_level_
     times = {"duration": 1.0, "step": 0.02, "alpha": (0, 1), "intensity": "PGA"}
     answer = fragility(frame, {"k1": Triangular(7.5e6, 8e6, 8.5e6)}, suite, limits, **times)
     with figure_style():
-        panels = envelope.draw_fragility(answer).axes
+        panels = answers.draw_fragility(answer).axes
     titles = [axes.get_title(loc="left") for axes in panels]
     assert titles == ["|drift1| ≤ 10.00 mm", "|q1| ≤ 20.00 mm", "|a1| ≤ 4.000 m/s²"]
     for axes in panels:

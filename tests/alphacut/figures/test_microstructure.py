@@ -29,7 +29,7 @@ def test_a_fit_to_packings_is_drawn(tmp_path):
     packing |= {"smallest_radius": "1 mm", "largest_radius": "4 mm"}
     sections = pack(60, packings=5, fraction=0.2, radii=(1e-3, 4e-3))
     draw(fit_radius_map(sections), tmp_path, section_of(packing=packing))
-    names = {"13_pbox.png", "13_pbox.svg", "radius_map.png", "radius_map.svg"}
+    names = {"pbox.png", "pbox.svg", "radius_map.png", "radius_map.svg"}
     assert {file.name for file in tmp_path.iterdir()} == names
     assert all(file.stat().st_size > 2000 for file in tmp_path.iterdir())
 

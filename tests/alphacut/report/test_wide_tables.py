@@ -7,6 +7,7 @@ import subprocess
 
 import pytest
 
+from alphacut.base.number_text import Table
 from alphacut.report.page import render_template
 
 HEAD = ("output", *(f"α = {k / 20:g}: mean over records" for k in range(21)))
@@ -25,9 +26,8 @@ document.getElementById("measured").textContent = JSON.stringify({
 
 def measured(folder, *, printed):
     """Places of a wide table in px, as chromium lays the page out on paper or on a screen."""
-    text = render_template(
-        title="t", name="n", about="", envelopes=[], sections=[("S", [("table", HEAD, [ROW] * 3)])]
-    )
+    table = Table(HEAD, [ROW] * 3)
+    text = render_template("comparison.html", title="t", name="n", about="", comparison=table)
     if printed:  # the rules of the paper, in a window as wide as the paper
         text = text.replace("@media print", "@media all")
     (folder / "page.html").write_text(text.replace("</body>", MEASURED), encoding="utf-8")

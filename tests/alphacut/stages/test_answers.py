@@ -8,7 +8,7 @@ import pytest
 from alphacut.base.errors import RefusedError
 from alphacut.case.content import Content, load
 from alphacut.case.limits import CaseLimit, parse_limit
-from alphacut.figures.envelope import DRAWINGS
+from alphacut.figures.answers import DRAWINGS
 from alphacut.frame import Accelerogram, Decision, StoreyFrame, envelope, peaks
 from alphacut.frame.analyses.limits import limits_by_name
 from alphacut.frame.dynamics.nonlinear import make_flow

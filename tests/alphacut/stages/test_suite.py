@@ -9,7 +9,7 @@ import pytest
 from alphacut.base.errors import RefusedError
 from alphacut.case.content import load
 from alphacut.entry import main
-from alphacut.figures.envelope import draw_incremental
+from alphacut.figures.answers import draw_incremental
 from alphacut.figures.style import save
 from alphacut.frame import Fragility, spectral_acceleration
 from alphacut.frame.analyses.suites import nominal_mode

@@ -1,0 +1,240 @@
+"""Identified inputs, and the answers to questions: decision, probability, tolerances, fragility."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from alphacut.base.arrays import Array
+from alphacut.figures import style
+from alphacut.figures.style import BLUE, GREY, INK, ORANGE, WIDTH, Look
+from alphacut.frame import Decision, Fragility, LearnedInputs, Probability, Tolerances
+from alphacut.frame.analyses.decision import LimitDecision, degree_text
+from alphacut.frame.analyses.fragility import LimitFragility
+from alphacut.fuzzy.result import Ends
+
+LIMIT: Look = {"color": ORANGE, "lw": 1.3, "ls": "--"}
+"""Line of a limit."""
+FIT: Look = {"color": ORANGE, "lw": 1.2, "ls": ":"}
+"""Line of a lognormal fit."""
+
+
+def draw_bars(bars: Sequence[tuple[Array, Look]], names: Iterable[str], label: str) -> Figure:
+    """Draw intervals of inputs as bars, one row for each input, the first one on top.
+
+    Args:
+        bars: Series of intervals, shape (inputs, 2) each, with the look of its bars. Later series
+            are drawn over earlier ones.
+        names: Names of the inputs.
+        label: Label of the horizontal axis.
+    """
+    rows = np.arange(len(bars[0][0]), dtype=float)[::-1]
+    figure, axes = plt.subplots(figsize=(WIDTH, 0.9 + 0.36 * len(rows)))
+    for intervals, look in bars:
+        lower = intervals[:, 0]
+        upper = intervals[:, 1]
+        axes.barh(rows, upper - lower, left=lower, lw=0, **look)
+    axes.set_yticks(rows, list(names))
+    axes.set_xlabel(label)
+    axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    return figure
+
+
+def identified_inputs(result: LearnedInputs) -> Figure:
+    """Draw each input's interval before the measurement and its α-cuts after it.
+
+    All are divided by the middle of the interval before, so that inputs share one axis.
+    """
+    alpha = result.alpha
+    prior = np.array([result.prior[name] for name in result.inputs], float)  # (inputs, 2)
+    middle = prior.mean(axis=1, keepdims=True)
+    before: Look = {"height": 0.7, "color": GREY, "alpha": 0.45, "label": "before"}
+    bars = [(prior / middle, before)]
+    for k, level in enumerate(alpha):
+        look: Look = {"height": 0.5 - 0.3 * level, "color": BLUE, "alpha": 0.35 + 0.6 * level}
+        if k in (0, len(alpha) - 1):
+            look["label"] = f"after, α = {level:g}"
+        cuts = np.array([(ends.lower[k], ends.upper[k]) for ends in result.inputs.values()])
+        bars.append((cuts / middle, look))
+    return draw_bars(bars, result.inputs, "value over the middle of what it was before")
+
+
+def draw_tolerances(answer: Tolerances) -> Figure:
+    """Draw the supports of the inputs in the case, and those within which no limit is exceeded.
+
+    All are divided by the nominal value of the input.
+    """
+    supports = answer.supports.values()
+    nominal = np.array([[x.nominal or 1.0] for x in supports])
+    stated: Look = {"color": GREY, "height": 0.7, "label": "in the case"}
+    admissible: Look = {"color": BLUE, "height": 0.35, "label": "no limit exceeded"}
+    bars = [
+        (np.array([x.own for x in supports]) / nominal, stated),
+        (np.array([x.kept for x in supports]) / nominal, admissible),
+    ]
+    figure = draw_bars(bars, answer.supports, "value over the nominal one")
+    figure.axes[0].axvline(1.0, color=INK, lw=0.8)
+    return figure
+
+
+def draw_decision(answer: Decision) -> Figure:
+    """Draw, of each limit, bars from the smallest to the largest peak over it on each level."""
+    limits = [limit for limit in answer.limits.values() if limit.peak is not None]
+    figure, axes = plt.subplots(figsize=(WIDTH, 1.2 + 0.7 * len(limits)))
+    rows = np.arange(len(limits))[::-1]  # the first limit on top
+    for row, limit in zip(rows, limits, strict=True):
+        ratios = peak_over_limit(limit)
+        look: Look = {"height": 0.66 - 0.4 * answer.alpha, "color": style.colours(answer.alpha)}
+        axes.barh(row, ratios.upper - ratios.lower, left=ratios.lower, lw=0, **look)
+        degrees = (
+            f"possible to {degree_text(limit.possibility)},"
+            f" necessary to {degree_text(limit.necessity)}"
+        )
+        text = f"{limit.verdict_words} ({answer.nature_text(limit.nature)}): {degrees}"
+        axes.text(0.01, row + 0.4, text, fontsize=8, transform=axes.get_yaxis_transform())
+    axes.axvline(1.0, **LIMIT)
+    axes.axvline(0.0, color=GREY, lw=0.4)
+    axes.set_ylim(-0.5, len(limits) - 0.2)
+    axes.set_yticks(rows, [limit.words for limit in limits], color=INK)
+    axes.set_xlabel("peak over its limit (dashed); the darker the higher α")
+    return figure
+
+
+def peak_over_limit(limit: LimitDecision) -> Ends:
+    """Return the smallest and the largest peak over the limit on each level, shape (A,) each.
+
+    Of a limit of zero the peaks are 1 less the margin over the largest margin, so that their bars
+    have about the length of those of other limits.
+    """
+    size = abs(limit.limit)
+    if size == 0.0:
+        margins = np.concatenate([limit.margin.lower, limit.margin.upper])
+        size = float(np.abs(margins[np.isfinite(margins)]).max(initial=1e-300))
+    # The margin is the limit less the peak, so the largest margin belongs to the smallest peak.
+    lower = np.asarray(1 - limit.margin.upper / size)
+    upper = np.asarray(1 - limit.margin.lower / size)
+    return Ends(lower, upper)
+
+
+def draw_bands(axes: Axes, x: Array, bands: Ends, alpha: Array, *, in_steps: bool = False) -> None:
+    """Draw lower and upper bounds of a probability over x, on each α-level.
+
+    Args:
+        axes: Axes that are drawn on.
+        x: Rising values, shape (X,).
+        bands: Bounds, shape (A, X) each. Those of the highest level are drawn as lines.
+        alpha: Rising levels, shape (A,).
+        in_steps: The probability changes at the values x alone, from each one on.
+    """
+    band: Look = {"lw": 0}
+    line: Look = {"color": INK, "lw": 1}
+    if in_steps:
+        band["step"] = "post"
+        line["drawstyle"] = "steps-post"
+    levels = zip(bands.lower[:-1], bands.upper[:-1], style.colours(alpha)[:-1], strict=True)
+    for low, high, shade in levels:
+        axes.fill_between(x, low, high, color=shade, **band)
+    for end in (bands.lower[-1], bands.upper[-1]):
+        axes.plot(x, end, **line)
+    axes.set_ylim(0, 1.02)
+
+
+def draw_probability(answer: Probability) -> Figure:
+    """Draw the bounds of the exceedance probability of the last event over its limit, by level."""
+    event = [*answer.events.values()][-1]
+    limits = event.curve.limit
+    is_near = event.limit <= 2 * limits[-1]
+    figure, axes = plt.subplots()
+    draw_bands(axes, limits, Ends(event.curve.lower, event.curve.upper), answer.alpha)
+    style.alpha_legend(axes, answer.alpha)
+    limit_text, label = event.value_words, f"limit of |{event.output}|"
+    if event.is_event:
+        limit_text, label = "1", "all limits, over those of the case"
+    axes.set_title(f"limit {limit_text} ({'dashed' if is_near else 'far off'})".replace("^2", "²"))
+    if is_near:
+        axes.axvline(event.limit, **LIMIT)
+    axes.set_ylabel("probability of exceeding it")
+    style.prefix_axis(axes, label, event.unit, across=True, shown=event.stated_unit)
+    return figure
+
+
+def draw_fragility(answer: Fragility) -> Figure:
+    """Draw bounds of the fraction of records that exceed each limit over the intensity measure.
+
+    A limit of all storeys is drawn as the event that any storey exceeds it.
+    """
+    shown = [part for part in answer.limits.values() if not part.event_name]
+    size = WIDTH, 0.9 + 2.3 * len(shown)
+    figure, panels = plt.subplots(len(shown), squeeze=False, figsize=size)
+    for axes, part in zip(panels[:, 0], shown, strict=True):
+        draw_fragility_of(axes, answer, part)
+    fit = Line2D([], [], **FIT, label=f"lognormal fit\nat α = {answer.alpha[-1]:g}")
+    style.alpha_legend(panels[0, 0], answer.alpha, [fit])
+    return figure
+
+
+def draw_fragility_of(axes: Axes, answer: Fragility, part: LimitFragility) -> None:
+    """Draw the bands of one limit or event, and the lognormal fit on the highest level."""
+    draw_bands(axes, part.measure, part.band, answer.alpha, in_steps=True)
+    for curve in part.lognormal_fit(-1):
+        axes.plot(part.measure, curve, **FIT)
+    if part.confidence is not None:
+        for end in part.confidence:
+            axes.plot(part.measure, end[0], color=BLUE, lw=0.9, ls="--")
+    axes.set_title(part.words.replace("^2", "²"))
+    axes.set_ylabel("fraction of records")
+    style.prefix_axis(axes, answer.measure, answer.unit, across=True)
+
+
+def draw_incremental(answer: Fragility) -> Figure:
+    """Draw the smallest and the largest peak found over the intensity measure of each record.
+
+    Each peak has a panel with all its limits, and each record a band for each level. In SVG the
+    curves show the name of their record where a pointer rests on them.
+    """
+    demands = answer.limits_by_demand
+    size = WIDTH, 0.6 + 1.9 * len(demands)
+    figure, panels = plt.subplots(len(demands), sharex=True, squeeze=False, figsize=size)
+    for axes, (peak, names) in zip(panels[:, 0], demands.items(), strict=True):
+        draw_demands(axes, answer, names)
+        limits = [answer.limits[name] for name in names]
+        for limit in limits:
+            axes.axhline(limit.limit, **LIMIT)
+            place: Look = {"xycoords": ("axes fraction", "data"), "ha": "right", "va": "bottom"}
+            axes.annotate(limit.value_words, (1, limit.limit), fontsize=8, color=ORANGE, **place)
+        values = [limit.limit for limit in limits]
+        axes.set_xlim(0.0, max(limit.measure[-1] for limit in limits))
+        axes.set_ylim(0.0, max(3 * min(values), 1.5 * max(values)))
+        shown = limits[0].stated_unit
+        style.prefix_axis(axes, f"peak of {peak}", limits[0].unit, shown=shown)
+    style.prefix_axis(axes, answer.measure, answer.unit, across=True)
+    panels[0, 0].set_title(f"{len(answer.increments)} records; limits dashed")
+    style.alpha_legend(panels[0, 0], answer.alpha)
+    return figure
+
+
+def draw_demands(axes: Axes, answer: Fragility, names: Sequence[str]) -> None:
+    """Draw the peaks found under each record, of the peak that the limits `names` share."""
+    for record, increment in answer.increments.items():
+        high, low = answer.demand_curve(names[0], record)
+        for level, shade in enumerate(style.colours(answer.alpha)):
+            band: Look = {"color": shade, "lw": 0, "alpha": 0.7}
+            filled = axes.fill_between(increment.measure, low[level], high[level], **band)
+            filled.set_gid(f"{style.HOVER}{record}")
+        (line,) = axes.plot(increment.measure, high[-1], color=INK, lw=0.7)
+        line.set_gid(f"{style.HOVER}{record}")
+
+
+DRAWINGS: dict[str, Callable[[Any], Figure]] = {
+    "probability": draw_probability,
+    "decision": draw_decision,
+    "tolerances": draw_tolerances,
+    "fragility": draw_fragility,
+}
+"""Function that draws the answer to each question, by the question's key."""

@@ -1,0 +1,65 @@
+"""Figures that the paper alone needs, drawn by cases/paper_figures.py beside those of a run."""
+
+import importlib.util
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from alphacut.entry import main
+from alphacut.figures.style import figure_style
+from alphacut.fuzzy import Triangular
+from alphacut.io.results import ResultsFolder
+from alphacut.rve import Cell, Phase
+from alphacut.stochastic import HermiteMap
+from tests.alphacut.small import CELL, FRAME, written
+
+PROGRAM = Path(__file__).parents[2] / "cases/paper_figures.py"
+BOTH = (
+    CELL.replace('["modulus"]', '["modulus", "envelope"]')
+    + "[frame]"
+    + FRAME.partition("[frame]")[2].replace('modulus = "[22, 24, 26] GPa"\n', "")
+)
+
+
+@pytest.fixture(scope="module")
+def paper():
+    spec = importlib.util.spec_from_file_location("paper_figures", PROGRAM)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_a_mesh_and_six_cuts_are_those_of_the_case(paper):
+    cell = Cell(Phase(20e9), Phase(80e9), HermiteMap(0.2, 0.1, 0.6, 0.1))
+    with figure_style():
+        plane, density, prisms = paper.domains(cell, 0.5, 3).axes
+        (opened,) = paper.draw_mesh(cell, 0.5, 3).axes[0].collections
+        cuts = paper.alpha_cuts(Triangular(75e9, 80e9, 85e9))
+    assert "3 layers" in density.get_title(loc="left")
+    assert len(prisms.collections) == 4
+    assert len(opened.get_facecolor()) > 100
+    _, count = paper.edges_of(np.array([[0, 1, 2], [2, 1, 3]]))
+    assert count.tolist() == [1, 1, 2, 1, 1]  # the third edge is inside: no face of it is drawn
+    assert plane.get_title(loc="left") == "physical domain, θ = -1"
+    bars = [line.get_xdata() for line in cuts.axes[0].lines[1:]]
+    assert np.array(bars) / 1e9 == pytest.approx(np.array([[75 + k, 85 - k] for k in range(6)]))
+
+
+def test_figures_of_the_paper_stand_beside_those_of_the_run_and_are_drawn_once(
+    tmp_path, capfd, paper
+):
+    case, out = written(tmp_path, BOTH), tmp_path / "out"
+    assert main(["run", str(case), "--quiet", "--out", str(out)]) == 0
+    run = set(ResultsFolder.read(out).files)
+    capfd.readouterr()
+    paper.main([str(case), "--out", str(out)])
+    drawn = capfd.readouterr().out.splitlines()
+    numbers = {Path(name).name.partition("-")[0] for name in drawn}
+    assert numbers == {f"fig{x}" for x in ("02", 13, 14, 16, 17, 19, 20, 21, 26, 27, 36, 37)}
+    assert all(Path(name).stat().st_size > 2000 for name in drawn)
+    files = set(ResultsFolder.read(out).files)
+    assert files - run == {f"figures/{Path(x).name}" for x in drawn} | {"paper_figures.json"}
+    before = {name: Path(name).stat().st_mtime_ns for name in drawn}
+    paper.main([str(case), "--out", str(out)])
+    assert {name: Path(name).stat().st_mtime_ns for name in drawn} == before
