@@ -597,7 +597,7 @@ def graph_follower_steps(results: Results, task: EnvelopeTask) -> Figure:
         panels[panel].axvline(time[marked], **NODE)
     panels[4].fill_between(time, *envelope, color=BLUE, alpha=0.2, lw=0)
     for number, (axes, title) in enumerate(zip(panels, TITLES, strict=True), start=1):
-        label = f"Fig. {20 + number}" if results.is_paper else number
+        label = f"Fig. {20 + number}" if task.figures else number
         axes.set_title(f"{label}: {title}", fontsize=9)
     panels[4].set_xlabel("time t (s)")
     output = flow.outputs[column]

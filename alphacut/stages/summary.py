@@ -68,11 +68,6 @@ class Results:
     shares: StageResult[ShareTable] | None = None
 
     @property
-    def is_paper(self) -> bool:
-        """True if figures bear the paper's numbers."""
-        return any(task.figures for task in self.tasks)
-
-    @property
     def single(self) -> dict[str, StageResult[object]]:
         """Results of the stages that have one, by name."""
         names = ("microstructure", "modulus", "image", "shares")
