@@ -22,6 +22,7 @@ from alphacut.frame import (
     Tolerances,
 )
 from alphacut.frame.analyses.answer import Answer
+from alphacut.frame.analyses.limits import LimitResult
 from alphacut.frame.structures.linear import frequencies
 from alphacut.frame.structures.quantities import output_of
 from alphacut.io.files import Document, as_json
@@ -179,10 +180,15 @@ class Parts:
             if unit != "m/s^2":
                 factor, label = axis_prefix(largest.get(output, 0.0), unit)
             found[output] = ShownUnit(label, factor)
-        for answer in (self.probability, self.fragility, self.decision):
-            for part in () if answer is None else reversed(answer.parts.values()):
-                if part.stated_unit is not None and part.output in units:
-                    found[part.output] = part.stated_unit
+        limited: list[LimitResult] = []
+        if self.probability is not None:
+            limited += reversed(self.probability.events.values())
+        for answer in (self.fragility, self.decision):
+            if answer is not None:
+                limited += reversed(answer.limits.values())
+        for part in limited:
+            if part.stated_unit is not None and part.output in units:
+                found[part.output] = part.stated_unit
         return found
 
     @property

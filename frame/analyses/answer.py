@@ -1,8 +1,9 @@
-"""What all answers of an analysis share: a table of texts, rows of numbers, sentences and files."""
+"""Base class of the results of all analyses: tables of texts, rows of numbers, sentences, files."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
@@ -20,18 +21,20 @@ if TYPE_CHECKING:
     import xarray
 
 Record = dict[str, str | float | None]
-"""Numbers and texts of a row, in SI, by the titles of their columns; None where there is none."""
+"""A row of numbers in SI units and of texts, by the titles of the columns; None where unknown."""
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Answer(ABC):
-    """Answer of an analysis: data that print themselves.
+    """Result of an analysis, which can be printed, tabulated and written to files.
 
-    `key` names its section of a case and its results, `title` is the question in words.
+    The class attributes are `key`, the name of the section of a case file that asks for the
+    analysis, and `title`, the question that it answers.
 
     Args:
-        encloses: Name of a set of inputs that the box of their cuts encloses, as "the learned
-            set"; empty where all of the box counts. No point of the box is known to belong to it.
+        encloses: Name of the set of inputs, such as "the learned set", that the box of the α-cuts
+            encloses; empty if all of the box counts. If it is given, no point of the box is known
+            to belong to the set.
     """
 
     key: ClassVar[str]
@@ -40,57 +43,56 @@ class Answer(ABC):
 
     @abstractmethod
     def table(self) -> Table:
-        """Return rows of texts: what, answer and guarantee are the first three columns."""
+        """Return a table of texts; its first columns are the subject, the result, its guarantee."""
 
     @abstractmethod
     def records(self) -> list[Record]:
-        """Return rows of numbers in SI, of the same columns each."""
+        """Return rows of numbers in SI units; all rows have the same columns."""
 
     @abstractmethod
     def words(self) -> str:
-        """Return sentences on how to read the answer."""
+        """Return sentences that explain how to read the result."""
 
     def nature_text(self, nature: Nature) -> str:
-        """Return the guarantee of a bound, and of which box where that is not the set meant."""
+        """Return the guarantee of a bound as text, with the enclosing box if there is one."""
         return f"{nature} {of_enclosing_box(self.encloses)}" if self.encloses else str(nature)
 
-    def __str__(self) -> str:
-        """Return the table, then the sentences."""
-        return f"{self.title}\n{text_table(*self.table())}{fill(self.all_words(), 100)}\n"
-
     def all_words(self) -> str:
-        """Return the sentences, and those on the box around a set of inputs if there is one."""
-        box = [enclosing_box_words(self.encloses)] if self.encloses else []
-        return " ".join([self.words(), *box])
+        """Return the sentences of `words`, and those on the enclosing box if there is one."""
+        box = f" {enclosing_box_words(self.encloses)}" if self.encloses else ""
+        return self.words() + box
+
+    def __str__(self) -> str:
+        """Return the question, the table and the sentences."""
+        return f"{self.title}\n{text_table(*self.table())}{fill(self.all_words(), 100)}\n"
 
     __repr__ = __str__
 
     def to_csv(self, path: str | Path) -> None:
-        """Write the rows of numbers as a CSV file, exact and in SI."""
+        """Write the rows of numbers to a CSV file, with all digits and in SI units."""
         rows = self.records()
         cells = [["" if x is None else str(x) for x in row.values()] for row in rows]
         Path(path).write_text(csv_text([*rows[0]], cells), encoding="utf-8")
 
     def to_dataset(self) -> xarray.Dataset:
-        """Return the rows of numbers as an xarray dataset: a variable a column, over `row`.
+        """Return the rows of numbers as an xarray dataset.
 
-        Numbers that are not known are nan.
+        Each column is a variable over the dimension `row`. Unknown numbers are NaN.
         """
         import xarray
 
         rows = self.records()
-        columns = {title: [row[title] for row in rows] for title in rows[0]}
-        variables = {
-            title: ("row", [str(x) for x in column])
-            if any(isinstance(x, str) for x in column)
-            else ("row", np.array(column, float))
-            for title, column in columns.items()
-        }
+        variables = {}
+        for title in rows[0]:
+            column = [row[title] for row in rows]
+            is_text = any(isinstance(value, str) for value in column)
+            values = [str(value) for value in column] if is_text else np.array(column, float)
+            variables[title] = ("row", values)
         return xarray.Dataset(variables, attrs={"title": self.title, "notes": self.all_words()})
 
 
 def enclosing_box_words(encloses: str) -> str:
-    """Return sentences on bounds of the box around a set, by the set's name."""
+    """Return sentences on bounds that belong to the box around a set with a name."""
     return (
         f"All bounds are those {of_enclosing_box(encloses)}. What is guaranteed holds for"
         f" {encloses} too, but no point of the box is known to belong to it: nothing is known to be"
@@ -98,6 +100,11 @@ def enclosing_box_words(encloses: str) -> str:
     )
 
 
+def table_of(rows: Sequence[Mapping[str, str]]) -> Table:
+    """Return a table whose rows are given by the titles of the columns, the same in each row."""
+    return Table(tuple(rows[0]), [tuple(row.values()) for row in rows])
+
+
 def known(value: float) -> float | None:
-    """Return a number for a row; None of one that is not finite, as an unknown bound."""
+    """Return a finite number as it is, and None for one that is infinite or NaN."""
     return float(value) if isfinite(value) else None

@@ -1,32 +1,25 @@
 """Decision: how possible and how necessary it is that limits are exceeded, and the margins left.
 
-Exceeding a limit is possible to the degree of the highest α-cut that holds such a motion. It is
-necessary to one less the degree to which not exceeding it is possible (Dubois and Prade,
-Possibility Theory, chapter 1). A greatest peak below the limit excludes the motion on its level and
-above, and one that is reached above it proves the possibility.
+It is possible that a limit is exceeded to the degree α of the highest α-cut that contains a
+response beyond the limit. It is necessary to the degree 1 - π, where π is the degree to which it is
+possible that the limit is not exceeded (Dubois and Prade, Possibility Theory, 1988, chapter 1). A
+guaranteed bound of the peaks that lies below the limit excludes the exceedance on its level and on
+all higher ones; an attained peak above the limit proves that an exceedance is possible.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import floor, log10
-from typing import Any
 
 import numpy as np
 
 from alphacut.base.arrays import Array, Mask
 from alphacut.base.errors import require_choice
-from alphacut.base.number_text import MINUS, engineering, percent_text
-from alphacut.frame.analyses.answer import Record, known
-from alphacut.frame.analyses.limits import (
-    ANY,
-    About,
-    Limit,
-    LimitsAnswer,
-    facts_of,
-    limits_by_name,
-)
+from alphacut.base.number_text import MINUS, Table, engineering, percent_text
+from alphacut.frame.analyses.answer import Answer, Record, known, table_of
+from alphacut.frame.analyses.limits import ANY, Limit, LimitResult, limit_fields, limits_by_name
 from alphacut.frame.analyses.peaks import Peak, Peaks, peaks
 from alphacut.frame.analyses.suites import SuitePeaks
 from alphacut.frame.envelope import Envelope
@@ -35,22 +28,22 @@ from alphacut.fuzzy.result import Ends, Nature, rounded
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class LimitDecision(About):
-    """Degrees to which it is possible and necessary that a limit is exceeded, and what is left.
+class LimitDecision(LimitResult):
+    """Degrees to which it is possible and necessary that a limit is exceeded, and the margins.
 
     Args:
-        possibility: Lower and upper bound of the degree, from 0 to 1.
-        necessity: Lower and upper bound, from 0 to 1.
-        margin: What the greatest (`lower`) and the least peak leave of the limit on each level,
-            shape (A,), in SI units; −∞ where nothing excludes a greater peak. Of several limits
-            fractions of them.
-        verdict: "not exceeded" by any motion, "exceeded" by all, "can be exceeded" by one that is
-            known, or "undecided"; on and above the level `from_level`.
-        from_level: Lowest level computed; below it nothing is known.
-        nature: Guarantee of the bounds that both degrees rest on.
-        peak: The limited peak; None of several limits.
-        record: Record of a suite under which the peak is reached; empty without one.
-        input_units: SI units of the inputs at which it is reached, where they are known.
+        possibility: Lower and upper bound of the degree of possibility, between 0 and 1.
+        necessity: Lower and upper bound of the degree of necessity, between 0 and 1.
+        margin: Limit minus largest peak (`lower`) and limit minus smallest peak (`upper`) on each
+            level, shape (levels,) each, in SI units; -∞ where no larger peak is excluded. For the
+            event of several limits the margins are fractions of the limits.
+        verdict: "not exceeded" by any response, "exceeded" by all responses, "can be exceeded" by a
+            known response, or "undecided". It holds for the cuts on `from_level` and above.
+        from_level: Lowest level that was computed.
+        nature: Guarantee of the bounds on which both degrees rest.
+        peak: The limited peak; None for the event of several limits.
+        record: Record of a suite under which the peak is attained; empty if there is none.
+        input_units: SI units of the inputs at which the peak is attained, as far as known.
     """
 
     possibility: tuple[float, float]
@@ -65,41 +58,51 @@ class LimitDecision(About):
 
     @property
     def verdict_words(self) -> str:
-        """The verdict, with the level from which on it holds if that is not 0."""
-        holds_from = bool(self.from_level) and self.verdict in ("exceeded", "not exceeded")
-        return f"{self.verdict} from α = {self.from_level:g} up" if holds_from else self.verdict
+        """The verdict, with the lowest level for which it holds unless this is 0."""
+        is_about_all = self.verdict in ("exceeded", "not exceeded")
+        if is_about_all and self.from_level > 0:
+            return f"{self.verdict} from α = {self.from_level:g} up"
+        return self.verdict
 
     @property
     def verdict_and_motion(self) -> str:
-        """The verdict; where only some motions exceed the limit, with the inputs of one."""
+        """The verdict; if only some responses exceed the limit, with the inputs of one of them."""
         inputs = {} if self.peak is None else self.peak.reached_at
         if self.verdict != "can be exceeded" or not inputs:
             return self.verdict_words
-        units = self.input_units
-        texts = [f"{x} = {engineering(value, units.get(x, ''))}" for x, value in inputs.items()]
-        texts += [f"record {self.record}"] if self.record else []
+        texts = []
+        for name, value in inputs.items():
+            texts.append(f"{name} = {engineering(value, self.input_units.get(name, ''))}")
+        if self.record:
+            texts.append(f"record {self.record}")
         return f"{self.verdict}, as at {', '.join(texts)}"
 
     def text_of(self, value: float, side: str, nature: Nature = Nature.GUARANTEED) -> str:
-        """Return the text of a bound of a peak or a margin, rounded to its side.
+        """Return the text of a bound of a peak or of a margin, rounded so that it stays a bound.
 
-        The side is "lower" or "upper"; the bound may be infinite. Of several limits it is a
-        fraction of them.
+        Args:
+            value: Bound in SI units, or as a fraction of the limits for an event; may be infinite.
+            side: "lower" or "upper", for a lower or an upper bound.
+            nature: Guarantee of the bound.
         """
         if not np.isfinite(value):
             return "not known"
         if not self.is_event:
             factor = 1.0 if self.stated_unit is None else self.stated_unit.factor
             return self.text_of_value(rounded(factor * value, side, nature) / factor)
-        digits = 4 + floor(log10(abs(value))) if value else 1  # a tenth of a per cent is the last
+        # Percentages have one decimal place: the third one of the fraction.
+        digits = 4 + floor(log10(abs(value))) if value else 1
         return percent_text(rounded(value, side, nature, max(digits, 1)))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Decision(LimitsAnswer[LimitDecision]):
-    """Possibility and necessity that limits are exceeded, on levels `alpha` (A,), by their names.
+class Decision(Answer):
+    """Possibility and necessity that limits are exceeded.
 
-    Of several limits `ANY` is the event that any of them is exceeded.
+    Args:
+        alpha: Levels, shape (levels,).
+        limits: Decision on each limit by its name. If there are several limits, the last one, with
+            the name `ANY`, is on the event that any of them is exceeded.
     """
 
     key = "decision"
@@ -107,22 +110,22 @@ class Decision(LimitsAnswer[LimitDecision]):
     alpha: Array
     limits: dict[str, LimitDecision]
 
-    @property
-    def parts(self) -> dict[str, LimitDecision]:
-        """The decisions by the names of their limits."""
-        return self.limits
+    def table(self) -> Table:
+        """Return a row for each limit; margin, bound, attained peak and gap are of the lowest α."""
+        return table_of([self._texts(part) for part in self.limits.values()])
 
-    def texts_of(self, part: LimitDecision) -> dict[str, str]:
-        """Return verdict, degrees, and on the lowest level margin, bound, reached peak and gap."""
-        bound_text, reached_text, gap = "", "", ""
-        if (peak := part.peak) is not None:
-            bound, reached = float(peak.proved[0]), float(peak.reached[0])
-            side, relation = ("lower", "≥") if peak.is_least else ("upper", "≤")
-            bound_text = part.text_of(bound, side)
-            bound_text = f"{relation} {bound_text}" if np.isfinite(bound) else bound_text
-            reached_text = part.text_of(reached, side, Nature.ATTAINED)
-            has_gap = bound and np.isfinite(bound) and np.isfinite(reached)
-            gap = f"{abs((bound - reached) / bound):.1%}" if has_gap else ""
+    def _texts(self, part: LimitDecision) -> dict[str, str]:
+        """Return the texts of a row of the table by the titles of the columns."""
+        bound_text = attained_text = gap = ""
+        if part.peak is not None:
+            bound = float(part.peak.proved[0])
+            attained = float(part.peak.reached[0])
+            bound_text = part.text_of(bound, part.peak.bound_side)
+            if np.isfinite(bound):
+                bound_text = f"{'≥' if part.peak.is_least else '≤'} {bound_text}"
+            attained_text = part.text_of(attained, part.peak.bound_side, Nature.ATTAINED)
+            if bound and np.isfinite(bound) and np.isfinite(attained):
+                gap = f"{abs((bound - attained) / bound):.1%}"
         return {
             "limit": part.words,
             "verdict": part.verdict_and_motion,
@@ -131,33 +134,37 @@ class Decision(LimitsAnswer[LimitDecision]):
             "necessity": degree_text(part.necessity),
             "least margin": part.text_of(float(part.margin.lower[0]), "lower", part.nature),
             "bound of peak": bound_text,
-            "peak reached": reached_text,
+            "peak reached": attained_text,
             "gap": gap,
         }
 
-    def numbers_of(self, part: LimitDecision) -> Iterator[Record]:
-        """Yield one record; margin and peaks are those of the lowest level."""
-        yield {
-            "verdict": part.verdict,
-            "from α": part.from_level,
-            "nature": self.nature_text(part.nature),
-            "least possibility": part.possibility[0],
-            "greatest possibility": part.possibility[1],
-            "least necessity": part.necessity[0],
-            "greatest necessity": part.necessity[1],
-            "least margin": known(part.margin.lower[0]),
-            "bound of peak": None if part.peak is None else known(part.peak.proved[0]),
-            "peak reached": None if part.peak is None else known(part.peak.reached[0]),
-        }
+    def records(self) -> list[Record]:
+        """Return a row for each limit; margin and peaks are those of the lowest level."""
+        return [
+            {
+                **part.columns(name),
+                "verdict": part.verdict,
+                "from α": part.from_level,
+                "nature": self.nature_text(part.nature),
+                "least possibility": part.possibility[0],
+                "greatest possibility": part.possibility[1],
+                "least necessity": part.necessity[0],
+                "greatest necessity": part.necessity[1],
+                "least margin": known(part.margin.lower[0]),
+                "bound of peak": None if part.peak is None else known(part.peak.proved[0]),
+                "peak reached": None if part.peak is None else known(part.peak.reached[0]),
+            }
+            for name, part in self.limits.items()
+        ]
 
     def words(self) -> str:
-        """Return sentences on how to read the verdicts."""
+        """Return sentences that explain the verdicts."""
         text = (
             "A limit is not exceeded where no motion exceeds it, exceeded where every motion does,"
             " and can be exceeded where a motion is known that does."
             " Attained bounds show what is possible and exclude nothing."
         )
-        if any(limit.side == "mean" for limit in self.limits.values()):
+        if any(part.side == "mean" for part in self.limits.values()):
             text += (
                 " Of a mean over records the proved end is the mean of each record's greatest peak;"
                 " what is reached is the mean of one structure."
@@ -165,9 +172,9 @@ class Decision(LimitsAnswer[LimitDecision]):
         return text
 
 
-def degree_text(ends: tuple[float, float]) -> str:
-    """Return the bounds of a degree, or one number where they agree."""
-    return " … ".join(dict.fromkeys(f"{end:.4g}" for end in ends)).replace("-", MINUS)
+def degree_text(bounds: tuple[float, float]) -> str:
+    """Return both bounds of a degree as text, or one number if they agree."""
+    return " … ".join(dict.fromkeys(f"{bound:.4g}" for bound in bounds)).replace("-", MINUS)
 
 
 def decide(
@@ -177,16 +184,16 @@ def decide(
     units: Mapping[str, str] | None = None,
     input_units: Mapping[str, str] | None = None,
 ) -> Decision:
-    """Return possibility, necessity and margins of exceeding each limit.
+    """Return the possibility and the necessity of exceeding limits, and the margins.
 
     Args:
         response: An envelope, the peaks over a suite of records, or peaks by name.
         limits: Limits of outputs, in SI units.
-        units: SI units of outputs, where `response` does not hold them.
-        input_units: SI units of the inputs, for the text that names a motion.
+        units: SI units of the outputs that `response` does not hold.
+        input_units: SI units of the inputs, for the text that names a response beyond a limit.
 
     Raises:
-        RefusedError: There is no limit, one is not positive, or it names no output or peak.
+        RefusedError: There is no limit, a limit is not positive, or it names no output or peak.
 
     Example:
         >>> from alphacut.frame import Limit, StoreyFrame, decide, envelope
@@ -196,94 +203,146 @@ def decide(
         >>> decide(band, [Limit("q1", 0.15)]).limits["q1"].verdict
         'not exceeded'
     """
-    known_units, found, farthest = dict(units or {}), dict[str, Peak](), dict[str, str]()
+    output_units = dict(units or {})
+    farthest_record: Mapping[str, str] = {}
     if isinstance(response, Envelope):
         outputs = [*map(str, response.outputs)]
         named = limits_by_name(limits, outputs)
-        known_units |= dict(zip(outputs, response.units or map(_unit, outputs), strict=True))
-        found = peaks(response, [*dict.fromkeys(limit.peak for limit in named.values())])
+        known_units = response.units or [Output(output).unit for output in outputs]
+        output_units |= dict(zip(outputs, known_units, strict=True))
+        limited = dict.fromkeys(limit.peak for limit in named.values())
+        found: Peaks = peaks(response, [*limited])
     else:
-        if isinstance(response, SuitePeaks):
-            known_units, farthest = known_units | response.units, response.farthest_record
-            response = response.peak
-        found = dict(response)
         named = limits_by_name(limits, ())
-    for limit in named.values():
-        require_choice("limits", limit.peak, found)
-    decisions: dict[str, LimitDecision] = {}
+        if isinstance(response, SuitePeaks):
+            output_units |= response.units
+            farthest_record = response.farthest_record
+            response = response.peak
+        found = response
+
+    decisions = {}
     for name, limit in named.items():
-        unit = known_units.get(limit.output) or _unit(limit.output)
-        decisions[name] = LimitDecision(
-            **facts_of(limit, unit),
-            **_passing(found[limit.peak], limit.outwards),
-            peak=found[limit.peak],
-            record=farthest.get(limit.peak, ""),
-            input_units=dict(input_units or {}),
+        require_choice("limits", limit.peak, found)
+        decisions[name] = _decide_limit(
+            limit,
+            found[limit.peak],
+            unit=output_units.get(limit.output) or Output(limit.output).unit,
+            record=farthest_record.get(limit.peak, ""),
+            input_units=input_units or {},
         )
     if len(decisions) > 1:
-        decisions[ANY] = _passing_of_any([*decisions.values()])
+        decisions[ANY] = _decide_any([*decisions.values()])
     first = next(iter(found.values()))
     return Decision(first.alpha, decisions, encloses=first.encloses)
 
 
-def _unit(output: str) -> str:
-    return Output(output).unit
+def _decide_limit(
+    limit: Limit, peak: Peak, *, unit: str, record: str, input_units: Mapping[str, str]
+) -> LimitDecision:
+    """Return the decision on one limit from the bounds of the limited peak.
+
+    Args:
+        limit: The limit, in SI units.
+        peak: Bounds of the peak on all levels.
+        unit: SI unit of the output.
+        record: Record under which the peak is attained; empty if there is none.
+        input_units: SI units of the inputs.
+    """
+    alpha, largest_allowed = peak.alpha, limit.outwards
+    max_peak, min_peak = peak.max_peak_bounds, peak.min_peak_bounds
+
+    # A response of a cut exceeds the limit if the largest peak does.
+    is_exceeded = max_peak.lower > largest_allowed
+    possibility = (
+        float(alpha[is_exceeded].max(initial=0.0)),
+        _lowest_excluding_level(alpha, max_peak.upper <= largest_allowed),
+    )
+    # A response of a cut keeps the limit if the smallest peak does.
+    is_kept = min_peak.upper <= largest_allowed
+    possibility_of_keeping = (
+        float(alpha[is_kept].max(initial=0.0)),
+        _lowest_excluding_level(alpha, min_peak.lower > largest_allowed),
+    )
+    necessity = (1 - possibility_of_keeping[1], 1 - possibility_of_keeping[0])
+    lowest_level = float(alpha[0])
+    return LimitDecision(
+        **limit_fields(limit, unit),
+        possibility=possibility,
+        necessity=necessity,
+        margin=Ends(largest_allowed - max_peak.upper, largest_allowed - min_peak.lower),
+        verdict=_verdict(possibility, necessity, lowest_level, is_exceeded=bool(is_exceeded.any())),
+        from_level=lowest_level,
+        nature=peak.nature,
+        peak=peak,
+        record=record,
+        input_units=dict(input_units),
+    )
 
 
-def _passing(peak: Peak, limit: float) -> dict[str, Any]:
-    """Return degrees, margin, verdict, level and nature of a peak and a limit, both outwards."""
-    greatest, least, alpha = peak.greatest_bounds, peak.least_bounds, peak.alpha
-    reaches, is_excluded = greatest.lower > limit, greatest.upper <= limit
-    possibility = float(alpha[reaches].max(initial=0.0)), _excluded(alpha, is_excluded)
-    is_kept = np.broadcast_to(least.upper <= limit, alpha.shape)  # by some motion
-    keeping = float(alpha[is_kept].max(initial=0.0)), _excluded(alpha, least.lower > limit)
-    # one less the possibility of keeping the limit (Dubois, Prade 1988)
-    necessity = 1 - keeping[1], 1 - keeping[0]
-    lowest = float(alpha[0])
-    return {
-        "possibility": possibility,
-        "necessity": necessity,
-        "margin": Ends(limit - greatest.upper, limit - least.lower),
-        "verdict": _verdict(possibility, necessity, lowest, is_reached=bool(reaches.any())),
-        "from_level": lowest,
-        "nature": peak.nature,
-    }
+def _decide_any(single: Sequence[LimitDecision]) -> LimitDecision:
+    """Return the decision on the event that any of several limits is exceeded.
 
-
-def _passing_of_any(single: Sequence[LimitDecision]) -> LimitDecision:
-    """Return the decision on the event that any of several limits is exceeded."""
-    possibility = tuple(max(x.possibility[k] for x in single) for k in (0, 1))
-    # below 1 all motions of the highest cut keep all limits
-    necessity = max(x.necessity[0] for x in single), 0.0 if possibility[1] < 1 else 1.0
-    margins = [  # of a limit of 0 they are the sign
-        np.stack(x.margin) / abs(x.limit) if x.limit else np.sign(x.margin) for x in single
+    Args:
+        single: Decisions on the limits one by one, on the same levels.
+    """
+    # The event is as possible as the most possible of its parts. It is at least as necessary as
+    # each part. Its necessity is 0 if it is not fully possible: then some response of the highest
+    # cut keeps all limits.
+    possibility = (
+        max(part.possibility[0] for part in single),
+        max(part.possibility[1] for part in single),
+    )
+    necessity = (
+        max(part.necessity[0] for part in single),
+        0.0 if possibility[1] < 1 else 1.0,
+    )
+    # Margins as fractions of the limits; for a limit of 0 only their signs have a meaning.
+    margins = [
+        np.stack(part.margin) / abs(part.limit) if part.limit else np.sign(part.margin)
+        for part in single
     ]
-    lowest = single[0].from_level
-    is_reached = any(x.verdict in ("exceeded", "can be exceeded") for x in single)
+    lowest_level = single[0].from_level
+    is_exceeded = any(part.verdict in ("exceeded", "can be exceeded") for part in single)
     return LimitDecision(
         output=ANY,
         is_event=True,
-        possibility=(possibility[0], possibility[1]),
+        possibility=possibility,
         necessity=necessity,
         margin=Ends(*np.min(margins, axis=0)),
-        verdict=_verdict(possibility, necessity, lowest, is_reached=is_reached),
-        from_level=lowest,
-        nature=Nature.weakest(x.nature for x in single),
+        verdict=_verdict(possibility, necessity, lowest_level, is_exceeded=is_exceeded),
+        from_level=lowest_level,
+        nature=Nature.weakest(part.nature for part in single),
     )
 
 
 def _verdict(
-    possibility: Sequence[float], necessity: Sequence[float], lowest: float, *, is_reached: bool
+    possibility: tuple[float, float],
+    necessity: tuple[float, float],
+    lowest_level: float,
+    *,
+    is_exceeded: bool,
 ) -> str:
-    """Return what is known from the lowest level on; `is_reached`: a motion exceeds the limit."""
-    if possibility[1] <= lowest:
+    """Return the verdict on the cuts from the lowest computed level on.
+
+    Args:
+        possibility: Bounds of the degree to which exceeding the limit is possible.
+        necessity: Bounds of the degree to which it is necessary.
+        lowest_level: Lowest level α that was computed.
+        is_exceeded: Whether some response of a cut is known to exceed the limit.
+    """
+    if possibility[1] <= lowest_level:
         return "not exceeded"
-    if necessity[0] >= 1 - lowest:
+    if necessity[0] >= 1 - lowest_level:
         return "exceeded"
-    return "can be exceeded" if is_reached else "undecided"
+    return "can be exceeded" if is_exceeded else "undecided"
 
 
-def _excluded(alpha: Array, excluded: Mask) -> float:
-    """Return the lowest level from which on the mask (A,) holds on all levels, 1 without one."""
-    first = np.flatnonzero(~excluded).max(initial=-1) + 1
+def _lowest_excluding_level(alpha: Array, is_excluded: Mask) -> float:
+    """Return the lowest level from which on a mask holds on all levels, or 1 if there is none.
+
+    Args:
+        alpha: Rising levels, shape (levels,).
+        is_excluded: The mask, shape (levels,).
+    """
+    first = np.flatnonzero(~is_excluded).max(initial=-1) + 1
     return float(alpha[first]) if first < len(alpha) else 1.0

@@ -1,39 +1,35 @@
-"""Fragility under a suite of records: of linear structures from proved peaks, of others by motions.
+"""Fragility: under which fraction of a suite of records a limit is exceeded, over their intensity.
 
-A linear structure that starts at rest and is moved by its record alone scales with it. So the
-measure of a record at which a limit L is reached is c(p) = m L / peak(p), m the record's measure as
-it is and p the inputs. Over an α-cut it ranges between m L over the greatest and m L over the least
-peak, both of which are bounded from outside (proved) and from inside (reached). α is a level of
-possibility, no probability, and is never multiplied with one. Of a frame that yields c(p) is a set.
+Let m be the intensity measure of a record as it is. The response of a linear structure that starts
+at rest and is moved by the record alone is proportional to the record. A structure with the inputs
+p therefore reaches the limit L at the critical measure c(p) = m L / peak(p). Over an α-cut of the
+inputs, c lies between m L over the largest peak and m L over the smallest peak of the cut, and both
+peaks have guaranteed bounds and attained values. The peak of a frame that yields is not
+proportional to the record; the limit is then exceeded on a set of measures, which is found by
+incremental dynamic analysis (`incremental`). α is a level of possibility, not a probability, and is
+never multiplied by one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from math import erf, log, sqrt
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
 from alphacut.base.arrays import Array, Mask
 from alphacut.base.errors import require, require_choice
-from alphacut.base.number_text import STANDARD_GRAVITY, engineering, range_text
+from alphacut.base.number_text import STANDARD_GRAVITY, Table, engineering, range_text
 from alphacut.base.progress_bar import Progress, subprogress
-from alphacut.frame.analyses.answer import Record, known
+from alphacut.frame.analyses.answer import Answer, Record, known, table_of
 from alphacut.frame.analyses.incremental import (
     GRID_RATIO,
     RESOLUTION,
     IncrementalAnalysis,
     Increments,
+    curve_rows,
 )
-from alphacut.frame.analyses.limits import (
-    About,
-    Limit,
-    LimitsAnswer,
-    facts_of,
-    limits_by_name,
-)
+from alphacut.frame.analyses.limits import Limit, LimitResult, limit_fields, limits_by_name
 from alphacut.frame.analyses.peaks import Peak
 from alphacut.frame.analyses.probability import CONFIDENCE, clopper_pearson
 from alphacut.frame.analyses.suites import (
@@ -52,22 +48,46 @@ from alphacut.frame.structures.storey import StoreyFrame, yields
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.result import Ends, Nature
 
-POINTS = 60
-"""Measures at which bands are drawn and tabulated."""
-TITLES = {"first crossing": "low_reached", "last non-exceedance": "high_reached"}
-"""Fields of `CriticalMeasures` of frames that yield by their titles."""
+
+@dataclass(frozen=True)
+class TriedMeasures:
+    """Intensity measures of one record that were tried, and what the structures moved showed.
+
+    Args:
+        measure: The measures, rising, shape (measures,).
+        exceeded: Whether some structure of the cut, and whether all structures that were found,
+            exceed the limit; shape (2, levels, measures).
+    """
+
+    measure: Array
+    exceeded: Mask
+
+    @classmethod
+    def from_increments(cls, increments: Increments, name: str) -> TriedMeasures:
+        """Return what the demands of the limit or event with a name show.
+
+        A demand is the peak over the limit. The demand of a collapse is NaN, which exceeds every
+        limit.
+        """
+        return cls(increments.measure, ~(increments.demands[name] <= 1))
 
 
 @dataclass(frozen=True, eq=False)
 class CriticalMeasures:
-    """Measures of R records at which a limit is reached, as intervals on A levels.
+    """Intensity measures of records at which a limit is reached, as intervals on each level.
+
+    All arrays have the shape (levels, records). A measure that is not known may be given as NaN,
+    which becomes infinite.
 
     Args:
-        low: No structure of the cut exceeds the limit below it, shape (A, R).
-        low_reached: A structure of the cut is known to exceed it above, shape (A, R).
-        high_reached: A structure of the cut is known not to exceed it up to here, shape (A, R).
-        high: Every structure of the cut exceeds it above; infinite where no peak is known to be
-            larger than zero, shape (A, R).
+        low: No structure of the cut exceeds the limit below this measure.
+        low_reached: A structure of the cut is known to exceed the limit above this measure.
+        high_reached: A structure of the cut is known not to exceed the limit up to this measure.
+        high: Every structure of the cut exceeds the limit above this measure; infinite if the
+            smallest peak may be zero.
+
+    Raises:
+        RefusedError: A measure is not positive, or an attained value lies outside its bounds.
     """
 
     low: Array
@@ -76,114 +96,147 @@ class CriticalMeasures:
     high: Array
 
     def __post_init__(self) -> None:
-        """Refuse measures that are not positive, or reached outside their bounds.
-
-        A measure that is not known (nan) lies above all measures.
-        """
-        for name in ("low", "low_reached", "high_reached", "high"):
-            values = getattr(self, name)
-            object.__setattr__(self, name, np.where(np.isnan(values), np.inf, values))
-        is_valid, rounding = bool((self.low > 0).all()), 1 + 1e-9
-        for reached in (self.low_reached, self.high_reached):
-            is_inside = (self.low <= reached * rounding) & (reached <= self.high * rounding)
-            is_valid &= bool(is_inside.all())
+        for end in fields(self):
+            values = getattr(self, end.name)
+            object.__setattr__(self, end.name, np.where(np.isnan(values), np.inf, values))
+        reached = np.stack([self.low_reached, self.high_reached])
+        reached_with_rounding = reached * (1 + 1e-9)
+        is_rising = (self.low <= reached_with_rounding) & (reached <= self.high * (1 + 1e-9))
+        is_valid = bool((self.low > 0).all() and is_rising.all())
         require(is_valid, "critical measures", value="not rising", allowed="rising ends")
 
     @classmethod
     def from_peaks(
         cls, peaks: Sequence[Peak], measures: Sequence[float], limit: float
     ) -> CriticalMeasures:
-        """Return the critical measures of R records at a limit, in its SI unit and outwards.
+        """Return the critical measures c = m L / peak of a linear structure.
 
-        `peaks` of the limited output, on A levels, and `measures` are of each record as it is.
+        Args:
+            peaks: Bounds of the limited peak under each record.
+            measures: Intensity measure m of each record, unscaled.
+            limit: Limit L in SI units, of the peaks of `Peak.outwards`.
         """
-        ends = [(*x.greatest_bounds[::-1], *x.least_bounds[::-1]) for x in peaks]
-        falling = np.stack([np.stack(np.broadcast_arrays(*x)) for x in ends], axis=-1)  # (4, A, R)
-        with np.errstate(divide="ignore"):
-            measure_ends = np.asarray(measures) * limit / np.maximum(falling, 0.0)
-        low, low_reached, high_reached, high = measure_ends
-        low_reached = np.minimum(low_reached, high)  # no greatest peak is below the least one
-        # the structure that reaches the greatest peak known is one of the cut
-        return cls(low, low_reached, np.maximum(high_reached, low_reached), high)
+        max_peaks = [peak.max_peak_bounds for peak in peaks]
+        min_peaks = [peak.min_peak_bounds for peak in peaks]
+
+        def critical(peak_bounds: list[Array]) -> Array:
+            positive_peaks = np.maximum(np.stack(peak_bounds, axis=-1), 0.0)  # (levels, records)
+            with np.errstate(divide="ignore"):
+                return np.asarray(np.asarray(measures) * limit / positive_peaks)
+
+        high = critical([bounds.lower for bounds in min_peaks])
+        # The largest peak of a cut is no smaller than its smallest peak.
+        low_reached = np.minimum(critical([bounds.lower for bounds in max_peaks]), high)
+        # The structure with the largest attained peak keeps the limit below its critical measure.
+        high_reached = critical([bounds.upper for bounds in min_peaks])
+        return cls(
+            low=critical([bounds.upper for bounds in max_peaks]),
+            low_reached=low_reached,
+            high_reached=np.maximum(high_reached, low_reached),
+            high=high,
+        )
 
     @classmethod
-    def from_demands(cls, records: Sequence[Tried]) -> CriticalMeasures:
-        """Return the critical measures of R records by the measures tried.
+    def from_demands(cls, records: Sequence[TriedMeasures]) -> CriticalMeasures:
+        """Return the critical measures of a frame that yields, from the measures that were tried.
 
-        At the first measure all structures keep the limit. The first crossing lies between `low`
-        and `low_reached`, the last non-exceedance between `high_reached` and `high`; those that lie
-        beyond the largest measure are infinite.
+        The first crossing lies between `low` and `low_reached`, the last non-exceedance between
+        `high_reached` and `high`. Those beyond the largest measure are infinite.
+
+        Args:
+            records: Measures of each record. No structure exceeds the limit at the first one.
         """
-        ends = []
+        of_records = []
         for record in records:
-            tried, (by_some, by_all) = record.measure, record.exceeded
-            or_infinite, last = np.append(tried, np.inf), len(tried) - 1
-            crossing = np.where(by_some.any(1), by_some.argmax(1), len(tried))
-            after = len(tried) - (~by_all)[:, ::-1].argmax(1)
-            high_reached = np.where(after > last, np.inf, tried[after - 1])
-            bounds = [tried[crossing - 1], or_infinite[crossing]]
-            ends.append([*bounds, high_reached, or_infinite[after]])
-        low, low_reached, high_reached, high = np.moveaxis(np.array(ends), 0, -1)
+            by_some, by_all = record.exceeded
+            count = len(record.measure)
+            measure_or_infinite = np.append(record.measure, np.inf)
+            # Index of the first measure at which some structure exceeds the limit, and of the first
+            # one of the last measures at which all structures do; `count` if there is none.
+            crossing = np.where(by_some.any(axis=1), by_some.argmax(axis=1), count)
+            after_last = count - (~by_all)[:, ::-1].argmax(axis=1)
+            ends = (
+                record.measure[crossing - 1],
+                measure_or_infinite[crossing],
+                np.where(after_last == count, np.inf, record.measure[after_last - 1]),
+                measure_or_infinite[after_last],
+            )
+            of_records.append(ends)
+        low, low_reached, high_reached, high = np.moveaxis(np.array(of_records), 0, -1)
         return cls(low, low_reached, high_reached, high)
 
+    @classmethod
+    def of_any(cls, limits: Sequence[CriticalMeasures]) -> CriticalMeasures:
+        """Return the critical measures of the event that any of several limits is exceeded."""
+        low = np.min([limit.low for limit in limits], axis=0)
+        reached = np.min([limit.low_reached for limit in limits], axis=0)
+        high = np.min([limit.high for limit in limits], axis=0)
+        # Different limits may attain their high measures by different structures, so that no larger
+        # measure is known to be attained.
+        return cls(low, reached, reached, np.maximum(high, reached))
+
     def counts(self, measure: Array) -> Ends:
-        """Return numbers (A, X) of records that exceed for all structures of a cut and for some."""
-        grid = np.asarray(measure)
-        return Ends(*((x[:, :, None] < grid).sum(axis=1) for x in (self.high, self.low)))
+        """Return the number of records under which all, and under which some structures exceed.
+
+        Args:
+            measure: Intensity measures, shape (measures,).
+
+        Returns:
+            Lower and upper bound of the number of records under which a structure of the cut
+            exceeds the limit, shape (levels, measures) each.
+        """
+        for_all = self.high[:, :, np.newaxis] < measure
+        for_some = self.low[:, :, np.newaxis] < measure
+        return Ends(for_all.sum(axis=1), for_some.sum(axis=1))
 
     @property
     def median(self) -> Ends:
-        """Bounds of the median of the records' critical measures, shape (A,) each.
+        """Bounds of the sample median of the critical measures of a structure, (levels,) each.
 
-        The median of the sample rises with each of its values.
+        The median rises with each value of the sample.
         """
         return Ends(np.median(self.low, axis=1), np.median(self.high, axis=1))
 
     @property
     def lognormal_median(self) -> Ends:
-        """Bounds of the median of the lognormal fit, exp of the mean logarithm, shape (A,) each."""
-        return Ends(*(np.exp(np.log(end).mean(axis=1)) for end in (self.low, self.high)))
+        """Bounds of the median of the lognormal fit, exp of the mean logarithm, (levels,) each."""
+        low, high = np.log(self.low), np.log(self.high)
+        return Ends(np.exp(low.mean(axis=1)), np.exp(high.mean(axis=1)))
 
     @property
     def dispersion(self) -> Ends:
-        """Bounds of the standard deviation of the logarithms, shape (A,) each.
+        """Bounds of the standard deviation of the logarithms of the measures, (levels,) each.
 
         Raises:
-            RefusedError: There is one record.
+            RefusedError: There is only one record.
         """
-        # it is within ‖h‖ / √(R − 1) of that of the middles of the intervals, h their half widths:
-        # subtracting the mean does not lengthen a vector
         n_records = self.low.shape[1]
         require(n_records > 1, "records", value=n_records, allowed="two records or more")
         low, high = np.log(self.low), np.log(self.high)
-        finite = np.isfinite(high).all(axis=1, keepdims=True)
-        middle = np.where(finite, (low + high) / 2, low)
-        reach = np.linalg.norm((high - low) / 2, axis=1) / np.sqrt(n_records - 1)
-        deviation, is_finite = middle.std(axis=1, ddof=1), finite[:, 0]
-        return Ends(np.where(is_finite, np.maximum(deviation - reach, 0), 0.0), deviation + reach)
+        # Let x be the logarithms, z the midpoints of their intervals and r the radii. The standard
+        # deviation is the norm of x minus its mean over √(n - 1). Subtracting the mean is a
+        # projection, which lengthens no vector, so that the standard deviations of x and z differ
+        # by at most |x - z| / √(n - 1) ≤ |r| / √(n - 1). Without a finite end nothing is known.
+        with np.errstate(invalid="ignore"):
+            deviation = ((low + high) / 2).std(axis=1, ddof=1)
+        distance = np.linalg.norm((high - low) / 2, axis=1) / np.sqrt(n_records - 1)
+        is_known = np.isfinite(distance)
+        lower = np.where(is_known, np.maximum(deviation - distance, 0.0), 0.0)
+        return Ends(lower, np.where(is_known, deviation + distance, np.inf))
 
 
-@dataclass(frozen=True, eq=False)
-class Tried:
-    """Measures (X,) of a record at which structures were moved, rising, and what they showed.
+def counts_between(records: Sequence[TriedMeasures], measure: Array) -> Ends:
+    """Return the number of records under which all, and under which some structures exceed.
 
-    `exceeded` says whether some structure, and all structures found, exceed the limit, shape
-    (2, A, X).
-    """
+    Between two measures that were tried, all structures are counted as exceeding the limit if they
+    do so at both, and some structure if one does so at either.
 
-    measure: Array
-    exceeded: Mask
+    Args:
+        records: Measures of each record that were tried.
+        measure: Measures at which the records are counted, shape (measures,).
 
-    @classmethod
-    def of(cls, increments: Increments, name: str) -> Tried:
-        """Return what the demands of a limit show; a collapse (nan) exceeds every limit."""
-        return cls(increments.measure, ~(increments.demands[name] <= 1))
-
-
-def counts_between(records: Sequence[Tried], measure: Array) -> Ends:
-    """Return numbers (A, X) of records that exceed for all structures found and for some.
-
-    Between two measures tried all do if all do at both, and some do if some do at either.
+    Returns:
+        Both numbers, shape (levels, measures) each.
     """
     shape = (records[0].exceeded.shape[1], len(measure))
     count_all, count_some = np.zeros(shape), np.zeros(shape)
@@ -197,29 +250,22 @@ def counts_between(records: Sequence[Tried], measure: Array) -> Ends:
     return Ends(count_all, count_some)
 
 
-def any_exceeded(limits: Sequence[CriticalMeasures]) -> CriticalMeasures:
-    """Return the critical measures of the event that any of several limits is exceeded."""
-    # high measures of single limits may belong to different structures: none is known to be reached
-    ends = ("low", "low_reached", "high")
-    low, reached, high = (np.min([getattr(x, end) for x in limits], axis=0) for end in ends)
-    return CriticalMeasures(low, reached, reached, np.maximum(high, reached))
-
-
 @dataclass(frozen=True, eq=False, kw_only=True)
-class LimitFragility(About):
-    """Critical measures of the records for a limit, and the fraction of records by measure.
+class LimitFragility(LimitResult):
+    """Fraction of the records under which one limit is exceeded, over their intensity measure.
 
     Args:
         nature: Guarantee of the critical measures.
         critical: Measures of each record at which the limit is reached.
-        measure: Measures at which the fraction is given, rising, shape (X,).
-        band: Bounds of the fraction of the records under which a structure exceeds the limit; they
-            hold for every structure within the α-cut, shape (A, X) each.
-        median: Bounds of the median of the sample of critical measures, shape (A,) each.
-        lognormal_median: Bounds of the median of the lognormal fit, their geometric mean.
-        dispersion: Bounds of the standard deviation of their logarithms; None of one record.
-        confidence: 95 % limits of the fraction if records are independent draws (Clopper, Pearson
-            1934), shape (A, X) each; None where they need not be.
+        measure: Measures at which the fraction is given, rising, shape (measures,).
+        band: Lower and upper bound of the fraction of the records under which a structure exceeds
+            the limit, shape (levels, measures) each. They hold for each structure of the α-cut.
+        median: Bounds of the sample median of the critical measures, shape (levels,) each.
+        lognormal_median: Bounds of the median of the lognormal fit, shape (levels,) each.
+        dispersion: Bounds of the standard deviation of the logarithms of the critical measures,
+            shape (levels,) each; None for a single record.
+        confidence: Limits of the fraction with a confidence of 95 % if the records are independent
+            draws (Clopper and Pearson 1934), shape (levels, measures) each; None if they are not.
     """
 
     nature: Nature
@@ -232,34 +278,39 @@ class LimitFragility(About):
     confidence: Ends | None
 
     def lognormal_fit(self, level: int) -> list[Array]:
-        """Return the lognormal distributions (X,) that fit the ends of the critical measures.
+        """Return the lognormal distribution functions fitted to both ends of the critical measures.
 
-        There is one where the ends agree; none of one record or of measures without an end.
+        Args:
+            level: Index of the level.
+
+        Returns:
+            Values at `measure`, shape (measures,), for the lower ends and for the upper ends; once
+            if the ends agree. Ends that are infinite or all equal have no fit.
         """
-        curves: dict[bytes, Array] = {}
-        for end in (self.critical.low[level], self.critical.high[level]):
+        from scipy.special import ndtr
+
+        low, high = self.critical.low[level], self.critical.high[level]
+        curves = []
+        for end in [low] if np.array_equal(low, high) else [low, high]:
             logarithms = np.log(end)
-            if len(end) < 2 or not np.isfinite(logarithms).all() or np.ptp(logarithms) == 0:
-                continue
-            middle, deviation = float(logarithms.mean()), float(logarithms.std(ddof=1))
-            reduced = [(log(x) - middle) / (deviation * sqrt(2)) for x in self.measure]
-            curve = np.array([(1 + erf(x)) / 2 for x in reduced])
-            curves[curve.tobytes()] = curve
-        return [*curves.values()]
+            if np.isfinite(end).all() and np.ptp(logarithms) > 0:
+                deviation = logarithms.std(ddof=1)
+                curves.append(ndtr((np.log(self.measure) - logarithms.mean()) / deviation))
+        return curves
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Fragility(LimitsAnswer[LimitFragility]):
-    """Fraction of the suite's records under which limits are exceeded, over their measure.
+class Fragility(Answer):
+    """Fraction of the records of a suite under which limits are exceeded, over their intensity.
 
     Args:
-        alpha: Levels, shape (A,).
-        measure: Name of the measure of records.
+        alpha: Levels, shape (levels,).
+        measure: Name of the intensity measure of the records.
         unit: Its SI unit.
-        period_s: T1 at the nominal values.
-        damping_ratio: Damping ratio of that mode.
-        limits: The fragility of each limit, then of each event of several limits.
-        increments: Demands over the measure of each record, of a frame that yields.
+        period_s: First natural period T1 at the nominal inputs, in s.
+        damping_ratio: Damping ratio of the first mode.
+        limits: Fragility of each limit by its name, then of each event of several limits.
+        increments: Demands over the measure of each record by its name, for a frame that yields.
     """
 
     key = "fragility"
@@ -272,60 +323,92 @@ class Fragility(LimitsAnswer[LimitFragility]):
     limits: dict[str, LimitFragility]
     increments: dict[str, Increments] = field(default_factory=dict)
 
-    @property
-    def parts(self) -> dict[str, LimitFragility]:
-        """The fragilities by the names of limits and events."""
-        return self.limits
+    def table(self) -> Table:
+        """Return a row with medians, lognormal fit and guarantee for each limit and event."""
+        rows = []
+        for part in self.limits.values():
+            fit = f"median {_level_text(part.lognormal_median, 0, self.unit)}"
+            if part.dispersion is not None:
+                fit += f", dispersion {_level_text(part.dispersion, 0, '')}"
+            row = {
+                "limit": part.words,
+                "median at the lowest α": self._median_text(part, 0),
+                "nature": self.nature_text(part.nature),
+                "lognormal fit at the lowest α": fit,
+                "median at the highest α": self._median_text(part, -1),
+            }
+            if self.increments:
+                row["median at the lowest α"] += f"; over the records {self._crossings_text(part)}"
+            rows.append(row)
+        return table_of(rows)
 
-    def texts_of(self, part: LimitFragility) -> dict[str, str]:
-        """Return the median of the critical measures, and their lognormal fit."""
-        fit = f"median {_range_text(level_of(part.lognormal_median, 0), self.unit)}"
-        if part.dispersion is not None:
-            fit += f", dispersion {_range_text(level_of(part.dispersion, 0), '')}"
-        lowest = self._median_text(level_of(part.median, 0))
-        return {
-            "limit": part.words,
-            "median at the lowest α": lowest + self._ends_text(part),
-            "nature": self.nature_text(part.nature),
-            "lognormal fit at the lowest α": fit,
-            "median at the highest α": self._median_text(level_of(part.median, -1)),
-        }
-
-    def _median_text(self, ends: tuple[float, float]) -> str:
-        """Return the range of a median with its measure; of accelerations in g, too."""
-        text = f"median {self.measure} {_range_text(ends, self.unit)}"
+    def _median_text(self, part: LimitFragility, level: int) -> str:
+        """Return the text of a median with its measure; accelerations are given in g, too."""
+        text = f"median {self.measure} {_level_text(part.median, level, self.unit)}"
         if self.unit != "m/s^2":
             return text
-        low, high = (end / STANDARD_GRAVITY for end in ends)
-        return f"{text} ({_range_text((low, high), 'g')})"
+        in_g = _level_text(part.median, level, "g", unit_size=STANDARD_GRAVITY)
+        return f"{text} ({in_g})"
 
-    def _ends_text(self, part: LimitFragility) -> str:
-        """Return ranges over records of first crossing and last non-exceedance, if it yields."""
-        if not self.increments:
-            return ""
-        ends = {title: getattr(part.critical, name)[0] for title, name in TITLES.items()}
-        texts = (f"{x} {_range_text((y.min(), y.max()), self.unit)}" for x, y in ends.items())
-        return f"; over the records {', '.join(texts)}"
+    def _crossings_text(self, part: LimitFragility) -> str:
+        """Return the ranges over the records of first crossing and last non-exceedance as text."""
+        first, last = part.critical.low_reached[0], part.critical.high_reached[0]
+        return (
+            f"first crossing {_range_text(first.min(), first.max(), self.unit)},"
+            f" last non-exceedance {_range_text(last.min(), last.max(), self.unit)}"
+        )
+
+    def records(self) -> list[Record]:
+        """Return a row for each limit and level."""
+        rows = []
+        for name, part in self.limits.items():
+            numbers = {
+                f"median {self._measure_title}": part.median,
+                "dispersion": part.dispersion,
+                f"lognormal median {self._measure_title}": part.lognormal_median,
+            }
+            for level, alpha in enumerate(self.alpha):
+                row = part.columns(name) | {"α": float(alpha)}
+                for title, ends in numbers.items():
+                    row[f"least {title}"] = None if ends is None else float(ends.lower[level])
+                    row[f"greatest {title}"] = None if ends is None else float(ends.upper[level])
+                rows.append(row | {"nature": self.nature_text(part.nature)})
+        return rows
+
+    @property
+    def _measure_title(self) -> str:
+        """Title of a column of intensity measures."""
+        return f"{self.measure} [{self.unit}]" if self.unit else "scale"
 
     def crossings(self) -> list[Record]:
-        """Return a row for each limit, record and level of a frame that yields."""
-        unit, rows = f" [{self.unit}]" if self.unit else "", list[Record]()
+        """Return a row for each limit, record and level of a frame that yields.
+
+        It has the measures of the first crossing and the last non-exceedance, and the sets of
+        measures at which the limit is exceeded as texts.
+        """
+        unit = f" [{self.unit}]" if self.unit else ""
+        rows: list[Record] = []
         for name, part in self.limits.items():
-            for column, (record, increment) in enumerate(self.increments.items()):
+            for column, (record, increments) in enumerate(self.increments.items()):
+                measure, (greatest, least) = increments.measure, increments.demands[name]
                 for level, alpha in enumerate(self.alpha):
-                    some, all_found = increment.demands[name][:, level]
-                    sets = {"exceeded by some": some, "exceeded by all found": all_found}
-                    rows.append({"limit": part.words, "record": record, "α": float(alpha)})
-                    for title, end in TITLES.items():
-                        crossing = getattr(part.critical, end)[level, column]
-                        rows[-1][f"{title}{unit}"] = None if np.isinf(crossing) else crossing
-                    for title, demands in sets.items():
-                        rows[-1][f"{title}{unit}"] = _set_text(increment.measure, demands)
+                    row: Record = {
+                        "limit": part.words,
+                        "record": record,
+                        "α": float(alpha),
+                        f"first crossing{unit}": known(part.critical.low_reached[level, column]),
+                        f"last non-exceedance{unit}": known(
+                            part.critical.high_reached[level, column]
+                        ),
+                        f"exceeded by some{unit}": _set_text(measure, greatest[level]),
+                        f"exceeded by all found{unit}": _set_text(measure, least[level]),
+                    }
+                    rows.append(row)
         return rows
 
     @property
     def limits_by_demand(self) -> dict[str, list[str]]:
-        """Names of the limits of each peak of a frame that yields, by the name of the peak."""
+        """Names of the limits of each peak, by the name of the peak; without events."""
         found: dict[str, list[str]] = {}
         for name, part in self.limits.items():
             if not part.is_event:
@@ -333,43 +416,27 @@ class Fragility(LimitsAnswer[LimitFragility]):
         return found
 
     def demand_curve(self, name: str, record: str) -> Array:
-        """Return the greatest and the least peak found under a record, over its `measure`.
+        """Return the largest and the smallest peak found under a record, over its `measure`.
 
         Args:
             name: Name of a limit of the peak.
             record: Name of the record.
 
         Returns:
-            In the SI unit of the limit, shape (2, A, X); nan where structures collapse.
+            Peaks in the SI unit of the limit, shape (2, levels, measures); NaN for collapses.
         """
         return self.limits[name].limit * self.increments[record].demands[name]
 
     def curves(self) -> list[Record]:
         """Return a row for each peak, record, level and measure of a frame that yields."""
-        measure, rows = f"{self.measure} [{self.unit}]" if self.unit else "scale", list[Record]()
-        for peak, (first, *_) in self.limits_by_demand.items():
-            unit = self.limits[first].unit
-            for record, increment in self.increments.items():
-                greatest, least = self.demand_curve(first, record)
-                for level, alpha in enumerate(self.alpha):
-                    ends = zip(increment.measure, least[level], greatest[level], strict=True)
-                    for value, low, high in ends:
-                        row: Record = {"peak": peak, "unit": unit, "record": record}
-                        row |= {"α": float(alpha), measure: float(value)}
-                        rows.append(row | {"least": known(low), "greatest": known(high)})
+        rows: list[Record] = []
+        for peak, names in self.limits_by_demand.items():
+            for record, increments in self.increments.items():
+                head: Record = {"peak": peak, "unit": self.limits[names[0]].unit, "record": record}
+                demands = self.demand_curve(names[0], record)
+                measure = {self._measure_title: increments.measure}
+                rows += curve_rows(head, self.alpha, measure=measure, demands=demands)
         return rows
-
-    def numbers_of(self, part: LimitFragility) -> Iterator[Record]:
-        """Yield a record for each level."""
-        measure = f"{self.measure} [{self.unit}]" if self.unit else "scale"
-        for k, alpha in enumerate(self.alpha):
-            numbers: Record = {"α": float(alpha)}
-            columns = {f"median {measure}": part.median, "dispersion": part.dispersion}
-            columns[f"lognormal median {measure}"] = part.lognormal_median
-            for title, ends in columns.items():
-                low, high = (None, None) if ends is None else level_of(ends, k)
-                numbers |= {f"least {title}": low, f"greatest {title}": high}
-            yield {**numbers, "nature": self.nature_text(part.nature)}
 
     def words(self) -> str:
         """Return sentences on the measure, and on how to read the bands."""
@@ -390,8 +457,11 @@ class Fragility(LimitsAnswer[LimitFragility]):
                 " first crossings to those of last non-exceedances. Sets end with the largest"
                 " measure tried; fragility.most tries more."
             )
-            tried = self.increments.items()
-            collapses = [x for x, y in tried if not np.isfinite([*y.demands.values()]).all()]
+            collapses = [
+                record
+                for record, increments in self.increments.items()
+                if not np.isfinite([*increments.demands.values()]).all()
+            ]
             if collapses:
                 text += f" A collapse exceeds every limit: under {', '.join(collapses)}."
         else:
@@ -400,31 +470,37 @@ class Fragility(LimitsAnswer[LimitFragility]):
                 " records outside the band."
                 " This is damage limitation of a linear structure, not collapse."
             )
-        if any(limit.confidence for limit in self.limits.values()):
+        if any(part.confidence for part in self.limits.values()):
             text += " Dashed: pointwise 95 % limits if the records were independent draws."
         return text
 
 
-def level_of(ends: Ends, level: int) -> tuple[float, float]:
-    """Return both ends on a level."""
-    return float(ends.lower[level]), float(ends.upper[level])
+def _level_text(ends: Ends, level: int, unit: str, *, unit_size: float = 1.0) -> str:
+    """Return the range of a quantity on a level as text, in a unit of a size in SI units."""
+    low, high = float(ends.lower[level]), float(ends.upper[level])
+    return _range_text(low / unit_size, high / unit_size, unit)
 
 
-def _range_text(ends: tuple[float, float], unit: str) -> str:
-    """Return the text of a range; its ends may be infinite."""
-    if not np.isfinite(ends[0]):
+def _range_text(low: float, high: float, unit: str) -> str:
+    """Return a range of measures as text; its ends may be infinite."""
+    if not np.isfinite(low):
         return "beyond all measures tried"
-    if not np.isfinite(ends[1]):
-        return f"{engineering(ends[0], unit)} … no end"
-    return f"{range_text(*ends, Nature.GUARANTEED, 3)} {unit}".strip()
+    if not np.isfinite(high):
+        return f"{engineering(low, unit)} … no end"
+    return f"{range_text(low, high, Nature.GUARANTEED, 3)} {unit}".strip()
 
 
 def _set_text(measures: Array, demands: Array) -> str:
-    """Return the measures with a demand above 1 as intervals; demands of a collapse are nan."""
+    """Return the intervals of measures at which the demand exceeds 1, as text.
+
+    Args:
+        measures: Rising measures, shape (measures,).
+        demands: Peak over limit at these measures, same shape; NaN for a collapse.
+    """
     exceeds = np.concatenate([[False], ~(demands <= 1), [False]])
-    starts, stops = np.flatnonzero(np.diff(exceeds.astype(int))).reshape(-1, 2).T
-    ends = zip(measures[starts], measures[stops - 1], strict=True)
-    return ", ".join(f"{low:.4g} … {high:.4g}" for low, high in ends)
+    changes = np.flatnonzero(np.diff(exceeds.astype(int))).reshape(-1, 2)
+    texts = [f"{measures[start]:.4g} … {measures[stop - 1]:.4g}" for start, stop in changes]
+    return ", ".join(texts)
 
 
 def fragility(
@@ -441,22 +517,23 @@ def fragility(
     most: float = 2.0,
     progress: Progress | None = None,
 ) -> Fragility:
-    """Return under which fraction of a suite's records limits are exceeded, over their intensity.
+    """Return the fraction of the records of a suite under which limits are exceeded.
 
     Args:
         model: A linear structure or a frame that yields, at rest and without forces. Each record
-            takes the place of its own.
+            replaces its own record.
         inputs: Fuzzy parameters by name, in SI units.
-        suite: Records, as of `read_suite`.
-        limits: Limits of outputs, in SI units. Limits that share an `event` are answered together
-            as well: any of them is exceeded.
-        duration: Longest motion, in s; a motion ends five natural periods after its record.
-        step: Distance of the nodes, in s.
+        suite: Records, see `read_suite`.
+        limits: Limits of outputs, in SI units. Limits with the same `event` are also analysed
+            together, for the event that any of them is exceeded.
+        duration: Longest response, in s; a response ends five natural periods after its record.
+        step: Distance of the time nodes, in s.
         alpha: Levels.
-        intensity: Measure of a record: "Sa(T1)", "PGA", or "scale".
-        independent: Whether records count as independent draws, for 95 % limits.
-        most: Of a frame that yields: largest measure tried, over the one at which the nominal
-            structure would reach all limits under all records if it were elastic.
+        intensity: Intensity measure of a record: "Sa(T1)", "PGA" or "scale".
+        independent: Whether the records are independent draws, for 95 % limits.
+        most: For a frame that yields: largest measure that is tried, as a multiple of the measure
+            at which the nominal structure, if it were elastic, would reach all limits under all
+            records.
         progress: Called with the completed fraction.
 
     Raises:
@@ -465,45 +542,58 @@ def fragility(
     named = limits_by_name(limits, ())
     require_fragile(model, [*named.values()])
     require_choice("intensity", intensity, MEASURES)
-    if not yields(model):
-        names = [*dict.fromkeys(limit.peak for limit in named.values())]
-        peaks = over_records(
-            model, inputs, suite, duration=duration, step=step, alpha=alpha, names=names,
-            progress=progress,
-        )  # fmt: skip
-        return fragility_of(
-            model, named, intensity=intensity, independent=independent, alpha=alpha, suite=peaks
-        )
-    records = scaled_records(model, suite, duration=duration, step=step)
-    analyses = incremental_analyses(
-        model, inputs, records, named, intensity=intensity, most=most, step=step, alpha=alpha
-    )
+    peaks: SuitePeaks | None = None
     increments: dict[str, Increments] = {}
-    for k, (name, analysis) in enumerate(analyses.items()):
-        ends = k / len(analyses), (k + 1) / len(analyses)
-        tick = subprogress(progress, *ends) if progress else None
-        increments[name] = increments_of(analysis, named, tick)
+    if yields(model):
+        records = scaled_records(model, suite, duration=duration, step=step)
+        analyses = incremental_analyses(
+            model, inputs, records, named, intensity=intensity, most=most, step=step, alpha=alpha
+        )
+        for k, (name, analysis) in enumerate(analyses.items()):
+            ends = k / len(analyses), (k + 1) / len(analyses)
+            increments[name] = increments_of(analysis, named, subprogress(progress, *ends))
+    else:
+        peaks = over_records(
+            model,
+            inputs,
+            suite,
+            duration=duration,
+            step=step,
+            alpha=alpha,
+            names=[*dict.fromkeys(limit.peak for limit in named.values())],
+            progress=progress,
+        )
     return fragility_of(
-        model, named, intensity=intensity, independent=independent, alpha=alpha,
+        model,
+        named,
+        intensity=intensity,
+        independent=independent,
+        alpha=alpha,
+        suite=peaks,
         increments=increments,
-    )  # fmt: skip
+    )
 
 
 def require_fragile(model: StructureModel, limits: Sequence[Limit]) -> None:
-    """Refuse structures with forces or a start beside the record, and limits that do not fit."""
-    moves_by_record = has_matrices(model) and not model.loads and model.is_at_rest
+    """Raise RefusedError unless a structure and its limits permit a fragility analysis.
+
+    The structure must be at rest and without forces. It must keep each limit at rest, and if it
+    yields, all limits must be of magnitudes.
+    """
+    is_moved_by_record = has_matrices(model) and not model.loads and model.is_at_rest
     allowed = "linear structures and frames that yield, at rest and without forces"
-    require(moves_by_record, "fragility", value="of another motion", allowed=allowed)
+    require(is_moved_by_record, "fragility", value="of another motion", allowed=allowed)
     for limit in limits:
-        fits = limit.outwards > 0 and not limit.mean
-        allowed = "limits of each record that the structure at rest keeps"
         if yields(model):
             fits, allowed = limit.side == "", "limits of magnitudes, of columns that yield"
+        else:
+            fits = limit.outwards > 0 and not limit.mean
+            allowed = "limits of each record that the structure at rest keeps"
         require(fits, "limits", value=limit.text, allowed=allowed)
 
 
 def events_of(limits: Mapping[str, Limit]) -> dict[str, list[str]]:
-    """Return the names of the limits of each event of several, by the event's name."""
+    """Return the names of the limits of each event of several limits, by the event's name."""
     events: dict[str, list[str]] = {}
     for name, limit in limits.items():
         if limit.event:
@@ -522,28 +612,37 @@ def incremental_analyses(
     step: float,
     alpha: Sequence[float],
 ) -> dict[str, IncrementalAnalysis]:
-    """Return the analyses of a frame that yields by the record's name, over its intensity."""
-    names, pairs = [*limits], [(limit.output, limit.number) for limit in limits.values()]
-    events = [[names.index(name) for name in event] for event in events_of(limits).values()]
-    cuts, found = boxes(inputs, alpha), dict[str, IncrementalAnalysis]()
+    """Return the incremental dynamic analyses of a frame that yields, by the record's name.
+
+    The arguments are those of `fragility`, with the records in the place of the suite. Each record
+    is divided by its intensity, so that the scale of an analysis is the intensity measure.
+    """
+    names = [*limits]
+    pairs = [(limit.output, limit.number) for limit in limits.values()]
+    events = [[names.index(name) for name in members] for members in events_of(limits).values()]
+    cuts = boxes(inputs, alpha)
+    analyses = {}
     for record in records:
         unit_samples = np.asarray(record.ground.samples / record.measures[intensity])
         frame = replace(model, ground=Accelerogram(record.ground.step, unit_samples))
-        found[record.name] = IncrementalAnalysis(
+        analyses[record.name] = IncrementalAnalysis(
             frame, cuts, pairs, record.duration, step, events=events
         )
-    elastic = max(x.elastic_scales(cuts.nominal[None])[0, 1:].max() for x in found.values())
+    # All records are scaled up to the same measure. The first column of `elastic_scales` is the
+    # scale at which the frame yields; the others belong to the limits.
+    nominal = cuts.nominal[np.newaxis]
+    elastic = max(x.elastic_scales(nominal)[0, 1:].max() for x in analyses.values())
     greatest = most * float(elastic)
-    return {name: replace(x, greatest_scale=greatest) for name, x in found.items()}
+    return {name: replace(x, greatest_scale=greatest) for name, x in analyses.items()}
 
 
 def increments_of(
     analysis: IncrementalAnalysis, limits: Mapping[str, Limit], progress: Progress | None = None
 ) -> Increments:
     """Return the demands of limits and events by their names, over the measure of a record."""
-    measure, demands = analysis.run(progress)  # (2, A, E, X)
+    measure, demands = analysis.run(progress)  # (2, levels, limits and events, measures)
     names = [*limits, *events_of(limits)]
-    return Increments(measure, {x: demands[:, :, k] for k, x in enumerate(names)})
+    return Increments(measure, {name: demands[:, :, k] for k, name in enumerate(names)})
 
 
 def fragility_of(
@@ -556,72 +655,116 @@ def fragility_of(
     suite: SuitePeaks | None = None,
     increments: Mapping[str, Increments] | None = None,
 ) -> Fragility:
-    """Return the fragility from peaks over a suite or, of a frame that yields, from increments."""
-    mode, parts = nominal_mode(model), dict[str, LimitFragility]()
-    tried = {
-        name: [Tried.of(x, name) for x in (increments or {}).values()]
-        for name in [*limits, *events_of(limits)]
-    }
+    """Return the fragility from the peaks over a suite, or from the increments of a yielding frame.
+
+    Args:
+        model: The structure.
+        limits: One-sided limits by name.
+        intensity: Name of the intensity measure.
+        independent: Whether the records are independent draws.
+        alpha: Levels.
+        suite: Peaks under each record. They are not needed if increments are given.
+        increments: Demands over the measure of each record, for a frame that yields.
+    """
+    events = events_of(limits)
+    tried: dict[str, list[TriedMeasures]] = {}
     critical: dict[str, CriticalMeasures] = {}
     natures: dict[str, Nature] = {}
-    for name, limit in limits.items():
-        if suite is None or increments:
+    if increments:
+        for name in (*limits, *events):
+            tried[name] = [TriedMeasures.from_increments(x, name) for x in increments.values()]
+            critical[name] = CriticalMeasures.from_demands(tried[name])
             natures[name] = Nature.ESTIMATED
-            critical[name] = CriticalMeasures.from_demands(tried[name])
-            continue
-        peaks = [record.peak[limit.peak] for record in suite.by_record.values()]
-        natures[name] = Nature.weakest(peak.nature for peak in peaks)
-        measures = [record.measures[intensity] for record in suite.by_record.values()]
-        critical[name] = CriticalMeasures.from_peaks(peaks, measures, limit.outwards)
-    for name, members in events_of(limits).items():
-        natures[name] = Nature.weakest(natures[member] for member in members)
-        if suite is None or increments:
-            critical[name] = CriticalMeasures.from_demands(tried[name])
-        else:
-            critical[name] = any_exceeded([critical[member] for member in members])
-    event_by_limit = {x: event for event, names in events_of(limits).items() for x in names}
-    for name, ends in critical.items():
-        grid = _grid(ends, tried[name])
-        counts = counts_between(tried[name], grid) if tried[name] else ends.counts(grid)
-        n_records, miss = ends.low.shape[1], (1 - CONFIDENCE) / 2
-        about: dict[str, Any] = {"output": event_words(name), "is_event": True}
-        if name in limits:
-            about = {**facts_of(limits[name], model.unit_of(limits[name].output))}
-            about["event_name"] = event_by_limit.get(name, "")
-        parts[name] = LimitFragility(
-            **about,
-            nature=natures[name],
-            critical=ends,
-            measure=grid,
-            band=Ends(*(count / n_records for count in counts)),
-            median=ends.median,
-            lognormal_median=ends.lognormal_median,
-            dispersion=ends.dispersion if n_records > 1 else None,
-            confidence=clopper_pearson(*counts, n_records, miss) if independent else None,
+    elif suite is not None:
+        records = suite.by_record.values()
+        measures = [record.measures[intensity] for record in records]
+        for name, limit in limits.items():
+            peaks = [record.peak[limit.peak] for record in records]
+            critical[name] = CriticalMeasures.from_peaks(peaks, measures, limit.outwards)
+            natures[name] = Nature.weakest(peak.nature for peak in peaks)
+        for event, members in events.items():
+            critical[event] = CriticalMeasures.of_any([critical[member] for member in members])
+            natures[event] = Nature.weakest(natures[member] for member in members)
+
+    parts = {}
+    for name, limit in limits.items():
+        about = LimitResult(
+            **limit_fields(limit, model.unit_of(limit.output)),
+            event_name=limit.event if limit.event in events else "",
         )
-    first = next(iter(suite.by_record.values())).peak if suite else {}
+        parts[name] = about
+    for event in events:
+        parts[event] = LimitResult(output=event_words(event), is_event=True)
+    mode = nominal_mode(model)
     return Fragility(
-        encloses=next((peak.encloses for peak in first.values()), ""),
+        encloses="" if suite is None else suite.encloses,
         alpha=np.array(alpha, float),
         measure=intensity,
         unit=MEASURES[intensity],
         period_s=mode.period,
         damping_ratio=mode.ratio,
-        limits=parts,
+        limits={
+            name: _limit_fragility(
+                about, natures[name], critical[name], tried.get(name, []), independent=independent
+            )
+            for name, about in parts.items()
+        },
         increments=dict(increments or {}),
     )
 
 
+def _limit_fragility(
+    about: LimitResult,
+    nature: Nature,
+    critical: CriticalMeasures,
+    tried: Sequence[TriedMeasures],
+    *,
+    independent: bool,
+) -> LimitFragility:
+    """Return the fragility of one limit or event from its critical measures.
+
+    Args:
+        about: The limit or event.
+        nature: Guarantee of the critical measures.
+        critical: Critical measures of all records.
+        tried: Measures of each record that were tried, for a frame that yields; empty otherwise.
+        independent: Whether the records are independent draws.
+    """
+    n_records = critical.low.shape[1]
+    measure = _grid(critical, tried)
+    counts = counts_between(tried, measure) if tried else critical.counts(measure)
+    confidence = None
+    if independent:
+        tail = (1 - CONFIDENCE) / 2
+        confidence = clopper_pearson(counts.lower, counts.upper, n_records, tail)
+    return LimitFragility(
+        **vars(about),
+        nature=nature,
+        critical=critical,
+        measure=measure,
+        band=Ends(counts.lower / n_records, counts.upper / n_records),
+        median=critical.median,
+        lognormal_median=critical.lognormal_median,
+        dispersion=critical.dispersion if n_records > 1 else None,
+        confidence=confidence,
+    )
+
+
 def event_words(event: str) -> str:
-    """Return the limit of all storeys or floors in words: "drift ≤ 1 % everywhere"."""
+    """Return the text of an event of the limits of all storeys: "drift ≤ 1 % everywhere"."""
     return f"{event.replace('<=', '≤').replace('>=', '≥')} everywhere"
 
 
-def _grid(ends: CriticalMeasures, tried: Sequence[Tried]) -> Array:
-    """Return measures from below the least critical one to above the greatest that is finite."""
-    finite = ends.high[np.isfinite(ends.high)]
-    largest = 1.1 * float(finite.max() if finite.size else ends.low_reached.max())
+def _grid(critical: CriticalMeasures, tried: Sequence[TriedMeasures]) -> Array:
+    """Return measures that cover all finite critical ones, for bands and tables, shape (60,).
+
+    If measures were tried, the grid ends with the largest one at the latest, and with this one if
+    a critical measure lies beyond it.
+    """
+    is_finite = np.isfinite(critical.high)
+    largest = critical.high[is_finite].max() if is_finite.any() else critical.low_reached.max()
+    largest = 1.1 * float(largest)
     if tried:
-        most = float(tried[0].measure[-1])  # of all records
-        largest = min(largest, most) if np.isfinite(ends.high).all() else most
-    return np.linspace(0.8 * float(ends.low.min()), largest, POINTS, dtype=float)
+        last_tried = float(tried[0].measure[-1])  # the same for all records
+        largest = min(largest, last_tried) if is_finite.all() else last_tried
+    return np.linspace(0.8 * float(critical.low.min()), largest, 60, dtype=float)

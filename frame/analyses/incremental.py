@@ -1,11 +1,12 @@
 """Incremental dynamic analysis of a frame that yields, over the α-cuts of its inputs.
 
-The demand of a limit is the peak over the limit. Over the scale of a record it is neither
-proportional nor monotone (Vamvatsikos, Cornell 2002), so that a limit is exceeded on a set of
-scales. Structures of each cut are moved at a grid of scales, which is bisected where the answer
-changes. An exceedance is attained by the structure that shows it; that no structure exceeds the
-limit, or that all do, is estimated: a compass search (Kolda, Lewis, Torczon 2003) has tried to
-refute it at the last such scale. Sets of nested cuts are nested, as they are of the same motions.
+The demand of a limit is the peak of the limited output over the limit. Over the scale of a record
+it is neither proportional nor monotone (Vamvatsikos and Cornell, Earthquake Engng Struct. Dyn. 31,
+491, 2002), so that a limit is exceeded on a set of scales. Structures of each cut are moved at a
+grid of scales, which is bisected where the result changes. That a structure exceeds the limit is
+attained. That no structure does, or that all do, is estimated: a compass search (Kolda, Lewis and
+Torczon, SIAM Review 45, 385, 2003) has tried to refute it. The sets of nested cuts are nested,
+because they belong to the same responses.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from alphacut.base.arrays import Array
 from alphacut.base.errors import checked_number, require
 from alphacut.base.number_text import Table, range_text
 from alphacut.base.progress_bar import Progress
-from alphacut.frame.analyses.answer import Answer, Record
+from alphacut.frame.analyses.answer import Answer, Record, known, table_of
 from alphacut.frame.analyses.suites import scaled_records
 from alphacut.frame.boxes import ALPHA, Boxes, boxes
 from alphacut.frame.dynamics.yielding import YieldingFlow
@@ -32,34 +33,31 @@ from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.result import Nature
 
 GRID_RATIO = 1.1
-"""Ratio of neighbouring scales of the grid: what happens within a step of it may be missed."""
+"""Ratio of neighbouring scales of the grid (tuned: an exceedance that begins and ends between two
+neighbours may be missed; a larger ratio saves time in proportion to its logarithm)."""
 RESOLUTION = 0.01
-"""Relative width to which changes are bisected."""
-SPREAD = 16
-"""Structures of a kind on each level that are moved at every scale of the grid."""
-SEARCHES = 0.035
-"""Motions of searches over those on the grid, by inputs and events, roughly."""
-FIRST_STEP, LAST_STEP = 1 / 4, 1 / 32
-"""Steps of a compass search, as fractions of the width of the cut."""
-ELASTIC_SCALE = 1e-6
-"""Scale at which nothing yields, for what is proportional up to the first yielding."""
-UNYIELDING_DUCTILITY = 5.0
-"""Ductility that stands for a limit of what elastic motions lack, as residual drifts."""
-SOME, ALL = 0, 1  # sides: the greatest demand of a cut, and the least one
+"""Relative width to which changes are bisected (tuned: it is the error of critical measures)."""
+SOME, ALL = 0, 1
+"""Indices of the largest demand of a cut, which tells whether some structure exceeds the limit, and
+of the smallest demand, which tells whether all structures do."""
 
 
 @dataclass(eq=False)
 class IncrementalAnalysis:
-    """Motions of a frame that yields under a scaled record, and the loop that chooses them.
+    """Responses of a frame that yields under a scaled record, and the loop that chooses them.
 
     Args:
         model: The frame at rest, moved by the record alone.
         cuts: α-cuts of the fuzzy inputs.
-        limits: Outputs and limits of their magnitudes, in SI.
-        duration: Length of the motions, in s.
+        limits: Names of outputs and limits of their magnitudes, in SI units.
+        duration: Length of the responses, in s.
         step: Step at which outputs are read, in s.
-        greatest_scale: Scale up to which it goes.
-        events: Indices of the limits of each event that any of several is exceeded.
+        greatest_scale: Largest scale of the record.
+        events: For each event that any of several limits is exceeded, the indices of these limits.
+
+    Attributes:
+        moved: By scale, the inputs of the structures that were moved, shape (structures, inputs),
+            and their demands, shape (structures, limits and events).
     """
 
     model: StoreyFrame
@@ -72,50 +70,60 @@ class IncrementalAnalysis:
     moved: dict[float, tuple[Array, Array]] = field(init=False, default_factory=dict)
 
     def run(self, progress: Progress | None = None) -> tuple[Array, Array]:
-        """Return scales (X,), rising, and the demands found there, shape (2, A, E, X).
+        """Move structures until no search refutes what is known, and return their demands.
 
-        These are the greatest and the least one of the structures of each cut that were moved,
-        infinite where they collapse. The E demands are those of the limits, then of the events.
-        At the first scale all structures moved are elastic and keep every limit.
+        Returns:
+            The scales, rising, shape (scales,), and the largest and the smallest demand of the
+            structures of each cut that were moved, shape (2, levels, limits and events, scales).
+            They are infinite for collapses. At the first scale all structures that were moved are
+            elastic and keep every limit.
         """
-        structures, searched = self._spread_structures(), set[tuple[float, int, int, int]]()
+        structures = self._spread_structures()
         grid = self._grid(structures)
         for done, scale in enumerate(grid):
             self._move(scale, structures)
             if progress:
                 progress(done / len(grid) / 2)
+
+        searched: set[tuple[float, int, int, int]] = set()
         while True:
             scales = sorted(self.moved)
-            for pair in pairwise(scales):  # what is extreme at one scale is tried at the next ones
+            # Structures that are extreme at one scale are tried at the neighbouring ones.
+            for pair in pairwise(scales):
                 extremes = np.concatenate([self._extremes(scale)[1] for scale in pair])
                 for scale in pair:
                     self._move(scale, extremes)
             demands = np.stack([self._extremes(scale)[0] for scale in scales], axis=-1)
-            if np.any(demands[SOME, ..., 0] > 1):  # of a structure found since
+            if np.any(demands[SOME, ..., 0] > 1):
+                # A structure found since then exceeds a limit at the first scale.
                 self._move(scales[0] / GRID_RATIO, self.cuts.nominal)
                 continue
-            # by sides: a structure exceeds the limit, and one does not
+
+            # What has been found: a structure that exceeds the limit, and one that does not. Scales
+            # between which this changes are bisected.
             is_found = np.stack([demands[SOME] > 1, demands[ALL] <= 1])
-            changes = is_found[..., 1:] != is_found[..., :-1]  # (2, A, E, X − 1)
-            ratios = np.divide(scales[1:], scales[:-1])
-            wide = np.flatnonzero(changes.any(axis=(0, 1, 2)) & (ratios > 1 + RESOLUTION))
-            for k in wide:
+            is_change = (is_found[..., 1:] != is_found[..., :-1]).any(axis=(0, 1, 2))
+            is_wide = np.divide(scales[1:], scales[:-1]) > 1 + RESOLUTION
+            wide_changes = np.flatnonzero(is_change & is_wide)
+            for k in wide_changes:
                 self._move(float(np.sqrt(scales[k] * scales[k + 1])), self.cuts.nominal)
-            if len(wide):
+            if len(wide_changes):
                 continue
-            # search where none is found, but nearest to it among such neighbours
+
+            # Where nothing has been found, the scales nearest to it are searched: the local maxima
+            # over the scales of the largest demand, and of minus the smallest one.
             closeness = np.stack([demands[SOME], -demands[ALL]])
             closeness[is_found] = -np.inf
             padded = np.pad(closeness, [(0, 0)] * 3 + [(1, 1)], constant_values=-np.inf)
             is_peak = (closeness >= padded[..., :-2]) & (closeness >= padded[..., 2:])
             doubtful = np.argwhere(is_peak & ~is_found)
-            todo = {(scales[x], side, level, event) for side, level, event, x in doubtful}
-            todo -= searched
-            if not todo:
+            to_search = {(scales[k], side, level, event) for side, level, event, k in doubtful}
+            to_search -= searched
+            if not to_search:
                 return np.array(scales), demands
-            for scale, side, level, event in sorted(todo):
+            for scale, side, level, event in sorted(to_search):
                 self._search(scale, side, level, event)
-            searched |= todo
+            searched |= to_search
 
     @property
     def n_demands(self) -> int:
@@ -123,24 +131,33 @@ class IncrementalAnalysis:
         return len(self.limits) + len(self.events)
 
     def foresee(self) -> tuple[float, float]:
-        """Return about how many motions a run takes, and how many seconds.
+        """Return roughly how many responses a run computes, and how many seconds it takes.
 
-        Motions are timed in the middle and at the end of the scales, as they take longer the more
-        often columns yield.
+        Responses are timed in the middle and at the end of the scales, because they take longer the
+        more often columns yield. They are not kept.
         """
         structures = self._spread_structures()
         grid = self._grid(structures)
-        searched = SEARCHES * len(self.cuts.names) * self.n_demands
-        rounds = (1 + searched) * len(grid)  # of all structures
-        timed = replace(self)  # which keeps these motions to itself
-        timed._move(grid[0], structures)  # compiles, and may be the first motion of the process
+        # Responses of searches over those of the grid, by inputs and demands (measured).
+        searched_fraction = 0.035 * len(self.cuts.names) * self.n_demands
+        rounds = (1 + searched_fraction) * len(grid)
+        timed = replace(self)
+        timed._move(grid[0], structures)  # compiles the kernels
         start = time.perf_counter()
         for scale in (grid[len(grid) // 2], grid[-1]):
             timed._move(scale, structures)
-        return rounds * len(structures), rounds * (time.perf_counter() - start) / 2
+        seconds_of_round = (time.perf_counter() - start) / 2
+        return rounds * len(structures), rounds * seconds_of_round
 
     def peaks_at(self, scales: Array) -> Array:
-        """Return peaks over limits of spread structures, shape (L, 2, A, X), at scales (X,)."""
+        """Return the largest and smallest demand of structures spread over the cuts.
+
+        Args:
+            scales: Scales of the record, shape (scales,).
+
+        Returns:
+            Demands, shape (limits, 2, levels, scales).
+        """
         structures = self._spread_structures()
         for scale in map(float, scales):
             self._move(scale, structures)
@@ -148,74 +165,120 @@ class IncrementalAnalysis:
         return np.moveaxis(found, 2, 0)
 
     def elastic_scales(self, points: Array) -> Array:
-        """Return the scales at which structures (S, d) would reach limits if they were elastic.
+        """Return the scales at which structures would reach the limits if they were elastic.
 
-        Shape (S, 1 + L): the first column has the scale at which a storey yields.
+        Args:
+            points: Inputs of the structures, shape (structures, inputs).
+
+        Returns:
+            Scales, shape (structures, 1 + limits). The first column is the scale at which a storey
+            yields.
         """
+        # Nothing yields at this scale, so that peaks are proportional to the scale.
+        small_scale = 1e-6
         n_storeys = self.model.floors
         storeys = [(f"ductility{z}", 1.0) for z in range(1, n_storeys + 1)]
-        demands = self._peaks_over_limits(ELASTIC_SCALE, points, [*storeys, *self.limits])
-        ductility, demands = np.split(demands, [n_storeys], axis=1)
-        ductility = ductility.max(axis=1, keepdims=True)
-        demands = np.where(demands > 0, demands, ductility / UNYIELDING_DUCTILITY)
-        return np.asarray(ELASTIC_SCALE / np.hstack([ductility, demands]))
+        demands = self._peaks_over_limits(small_scale, points, [*storeys, *self.limits])
+        ductility = demands[:, :n_storeys].max(axis=1, keepdims=True)
+        demands = demands[:, n_storeys:]
+        # An elastic response has no residual drift, for example. Such a limit is taken to be
+        # reached at a ductility of 5 (tuned; it only determines the largest scale).
+        demands = np.where(demands > 0, demands, ductility / 5.0)
+        return np.asarray(small_scale / np.hstack([ductility, demands]))
 
     def _grid(self, structures: Array) -> list[float]:
         """Return the scales of the grid; at the first one all structures are elastic."""
-        first, last = self.elastic_scales(structures).min() / GRID_RATIO, self.greatest_scale
-        first = min(first, last / 2)
-        count = int(np.ceil(np.log(last / first) / np.log(GRID_RATIO))) + 1
-        return [*map(float, np.geomspace(first, last, count))]
+        first = self.elastic_scales(structures).min() / GRID_RATIO
+        first = min(first, self.greatest_scale / 2)
+        count = int(np.ceil(np.log(self.greatest_scale / first) / np.log(GRID_RATIO))) + 1
+        return [*map(float, np.geomspace(first, self.greatest_scale, count))]
 
     def _peaks_over_limits(
         self, scale: float, points: Array, limits: Sequence[tuple[str, float]]
     ) -> Array:
-        """Return peaks over limits (S, L) at points (S, d), infinite of motions that collapse."""
-        record, outputs = self.model.ground, tuple(dict.fromkeys(output for output, _ in limits))
+        """Return the peaks of structures over limits, infinite for collapses.
+
+        Args:
+            scale: Scale of the record.
+            points: Inputs of the structures, shape (structures, inputs).
+            limits: Names of outputs and their limits.
+
+        Returns:
+            Demands, shape (structures, limits).
+        """
+        record = self.model.ground
         assert record is not None
+        outputs = tuple(dict.fromkeys(output for output, _ in limits))
         ground = Accelerogram(record.step, scale * record.samples)
         model = replace(self.model, ground=ground, outputs=outputs)
         flow = YieldingFlow(model, self.cuts.names, self.duration, self.step)
         peaks = flow.values_and_peaks(points, takes_collapse=True)[1]
-        return np.column_stack([peaks[:, outputs.index(x)] / limit for x, limit in limits])
+        columns = [peaks[:, outputs.index(output)] / limit for output, limit in limits]
+        return np.column_stack(columns)
 
     def _spread_structures(self) -> Array:
-        """Return the nominal structure and others on each level, shape (S, d)."""
-        cuts, structures = self.cuts, [self.cuts.nominal[None]]
+        """Return inputs of the nominal structure and of others on each level, without repetitions.
+
+        The shape is (structures, inputs).
+        """
+        cuts, structures = self.cuts, [self.cuts.nominal[np.newaxis]]
         for level, (low, high) in enumerate(zip(cuts.lower, cuts.upper, strict=True)):
-            unit = spread_points(*cuts.unit_ends(level), SPREAD, SKIPPED * (level + 1))
+            # 16 points inside the cut, on its faces, and of its corners (tuned: more are slower and
+            # leave less to the searches).
+            unit = spread_points(*cuts.unit_ends(level), count=16, skip=SKIPPED * (level + 1))
             structures.append(np.clip(cuts.to_physical(unit), low, high))
         return np.asarray(np.unique(np.concatenate(structures), axis=0))
 
     def _move(self, scale: float, points: Array) -> None:
-        """Move those of the structures (…, d) that were not moved at this scale yet."""
-        d, n_events = len(self.cuts.names), self.n_demands
-        moved, demands = self.moved.get(scale, (np.empty((0, d)), np.empty((0, n_events))))
+        """Compute the demands of structures at a scale and add them to `moved`.
+
+        Args:
+            scale: Scale of the record.
+            points: Inputs, shape (…, inputs). Those that were moved at this scale are left out.
+        """
+        n_inputs = len(self.cuts.names)
+        nothing = np.empty((0, n_inputs)), np.empty((0, self.n_demands))
+        moved, demands = self.moved.get(scale, nothing)
         known_rows = {row.tobytes() for row in moved}
-        points = np.unique(points.reshape(-1, d), axis=0)
-        if len(points := points[[row.tobytes() not in known_rows for row in points]]):
+        points = np.unique(points.reshape(-1, n_inputs), axis=0)
+        points = points[[row.tobytes() not in known_rows for row in points]]
+        if len(points):
             new = self._peaks_over_limits(scale, points, self.limits)
             of_events = [new[:, [*event]].max(axis=1) for event in self.events]
             new = np.column_stack([new, *of_events])
             self.moved[scale] = np.vstack([moved, points]), np.vstack([demands, new])
 
     def _extremes(self, scale: float) -> tuple[Array, Array]:
-        """Return greatest and least demand (2, A, E) at a scale, and their inputs (2, A, E, d)."""
+        """Return the largest and the smallest demand in each cut at a scale, and their inputs.
+
+        The shapes are (2, levels, limits and events), and the same with a last axis of inputs.
+        """
         points, demands = self.moved[scale]
-        lower, upper = self.cuts.lower[:, None], self.cuts.upper[:, None]
+        lower, upper = self.cuts.lower[:, np.newaxis], self.cuts.upper[:, np.newaxis]
         is_inside = (points >= lower) & (points <= upper)
-        inside = np.all(is_inside, axis=-1, keepdims=True)  # (A, S, 1)
-        greatest = np.where(inside, demands, -1.0).argmax(axis=1)
-        finite = np.minimum(demands, np.finfo(float).max)  # of collapses, before those outside
-        rows = np.stack([greatest, np.where(inside, finite, np.inf).argmin(axis=1)])
+        inside = np.all(is_inside, axis=-1, keepdims=True)  # (levels, structures, 1)
+        largest = np.where(inside, demands, -1.0).argmax(axis=1)
+        # Collapses must come before structures outside the cut, which count as infinite.
+        finite = np.minimum(demands, np.finfo(float).max)
+        smallest = np.where(inside, finite, np.inf).argmin(axis=1)
+        rows = np.stack([largest, smallest])
         return demands[rows, np.arange(demands.shape[1])], points[rows]
 
     def _search(self, scale: float, side: int, level: int, event: int) -> None:
-        """Search the extreme demand of an event in a cut at a scale, by compass search."""
-        low, high, size = self.cuts.lower[level], self.cuts.upper[level], FIRST_STEP
+        """Search the largest or smallest demand in a cut at a scale by a compass search.
+
+        Args:
+            scale: Scale of the record.
+            side: `SOME` for the largest, `ALL` for the smallest demand.
+            level: Index of the cut.
+            event: Index of the limit or event.
+        """
+        low, high = self.cuts.lower[level], self.cuts.upper[level]
         directions = np.concatenate([np.diag(high - low), np.diag(low - high)])
         demands, points = self._extremes(scale)
-        while size >= LAST_STEP:
+        # Steps from 1/4 to 1/32 of the width of the cut (tuned: smaller ones gain little).
+        size = 1 / 4
+        while size >= 1 / 32:
             before, point = demands[side, level, event], points[side, level, event]
             self._move(scale, np.clip(point + size * directions, low, high))
             demands, points = self._extremes(scale)
@@ -225,13 +288,13 @@ class IncrementalAnalysis:
 
 @dataclass(frozen=True, eq=False)
 class Increments:
-    """Demands of a frame that yields over a measure of one record.
+    """Demands of a frame that yields over the intensity measure of one record.
 
     Args:
-        measure: Values of the measure at which structures were moved, rising, shape (X,); at the
-            first one all structures moved are elastic and keep every limit.
-        demands: Greatest and least peak over limit of the structures moved, by the limit's name,
-            shape (2, A, X); nan where they collapse.
+        measure: Measures at which structures were moved, rising, shape (measures,). At the first
+            one all structures that were moved are elastic and keep every limit.
+        demands: Largest and smallest peak over limit of the structures that were moved, by the name
+            of the limit or event, shape (2, levels, measures); NaN for collapses.
     """
 
     measure: Array
@@ -240,13 +303,13 @@ class Increments:
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class ScaledPeaks(Answer):
-    """Greatest and least peaks found over the scales of each record of a suite.
+    """Largest and smallest peaks found at scales of each record of a suite.
 
     Args:
-        alpha: Levels, shape (A,).
-        scales: Scales of the records, shape (X,).
-        peaks: Greatest and least peak of the structures moved by record and output, in SI, shape
-            (2, A, X); infinite where they collapse.
+        alpha: Levels, shape (levels,).
+        scales: Scales of the records, shape (scales,).
+        peaks: Largest and smallest peak of the structures moved, by record and output, in SI units,
+            shape (2, levels, scales); infinite for collapses.
         units: SI units of the outputs.
     """
 
@@ -258,35 +321,54 @@ class ScaledPeaks(Answer):
     units: dict[str, str]
 
     def table(self) -> Table:
-        """Return the peaks at the largest scale, on the lowest level."""
-        head = ("record", f"peaks at scale {self.scales[-1]:g}", "nature")
-        rows: list[tuple[str, ...]] = []
+        """Return the peaks at the largest scale on the lowest level, a row for each record."""
+        rows = []
         for record, by_output in self.peaks.items():
             texts = []
-            for output, (high, low) in by_output.items():
-                ends = range_text(float(low[0, -1]), float(high[0, -1]), Nature.ATTAINED)
+            for output, (largest, smallest) in by_output.items():
+                low, high = float(smallest[0, -1]), float(largest[0, -1])
+                ends = range_text(low, high, Nature.ATTAINED)
                 texts.append(f"{output} {ends} {self.units[output]}".strip())
-            rows.append((record, "; ".join(texts), Nature.ATTAINED))
-        return Table(head, rows)
+            title = f"peaks at scale {self.scales[-1]:g}"
+            rows.append({"record": record, title: "; ".join(texts), "nature": Nature.ATTAINED})
+        return table_of(rows)
 
     def records(self) -> list[Record]:
         """Return a row for each record, output, level and scale."""
         rows: list[Record] = []
         for record, by_output in self.peaks.items():
-            for output, (high, low) in by_output.items():
-                for level, column in np.ndindex(low.shape):
-                    rows.append({"record": record, "output": output, "unit": self.units[output]})
-                    rows[-1] |= {"α": self.alpha[level], "scale": self.scales[column]}
-                    rows[-1] |= {"least peak": low[level, column]}
-                    rows[-1] |= {"greatest peak": high[level, column]}
+            for output, peaks in by_output.items():
+                head: Record = {"record": record, "output": output, "unit": self.units[output]}
+                rows += curve_rows(head, self.alpha, measure={"scale": self.scales}, demands=peaks)
         return rows
 
     def words(self) -> str:
-        """Return what the peaks are of."""
+        """Return a sentence on what the peaks belong to."""
         return (
             "Peaks of the structures that were moved; others of the cut may have smaller or greater"
             " ones. A collapse has an infinite peak."
         )
+
+
+def curve_rows(
+    head: Record, alpha: Array, *, measure: Mapping[str, Array], demands: Array
+) -> list[Record]:
+    """Return rows of the largest and smallest peak over a measure, for each level.
+
+    Args:
+        head: First columns of each row.
+        alpha: Levels, shape (levels,).
+        measure: One column of measures by its title, shape (measures,).
+        demands: Largest and smallest peak, shape (2, levels, measures).
+    """
+    largest, smallest = demands
+    ((title, measures),) = measure.items()
+    rows = []
+    for level, k in np.ndindex(largest.shape):
+        row: Record = {"α": float(alpha[level]), title: float(measures[k])}
+        row |= {"least": known(smallest[level, k]), "greatest": known(largest[level, k])}
+        rows.append(head | row)
+    return rows
 
 
 def incremental(
@@ -302,11 +384,11 @@ def incremental(
     """Return the peaks of a frame that yields at scales of each record of a suite.
 
     Args:
-        model: A frame whose columns yield. Of others peaks are proportional to the scale.
+        model: A frame whose columns yield. The peaks of others are proportional to the scale.
         inputs: Fuzzy parameters by name, in SI units.
-        suite: Records, as of `read_suite`; each takes the place of the frame's own.
-        scales: Factors of the records, positive.
-        duration: Longest motion, in s; a motion ends five natural periods after its record.
+        suite: Records, see `read_suite`; each replaces the record of the frame.
+        scales: Positive factors of the records.
+        duration: Longest response, in s; a response ends five natural periods after its record.
         step: Step at which outputs are read, in s.
         alpha: Levels.
 
@@ -315,13 +397,13 @@ def incremental(
     """
     value, allowed = "of another structure", "columns that yield"
     require(yields(model), "incremental", value=value, allowed=allowed)
-    tried = np.unique(np.array([checked_number("scale", x, positive=True) for x in scales]))
-    records = scaled_records(model, suite, duration=duration, step=step)
-    outputs, peaks = [*map(str, model.outputs)], dict[str, dict[str, Array]]()
+    tried = np.unique([checked_number("scale", scale, positive=True) for scale in scales])
+    outputs = [*map(str, model.outputs)]
+    limits = [(output, 1.0) for output in outputs]
     cuts = boxes(inputs, alpha)
-    for record in records:
+    peaks: dict[str, dict[str, Array]] = {}
+    for record in scaled_records(model, suite, duration=duration, step=step):
         frame = replace(model, ground=record.ground)
-        limits = [(output, 1.0) for output in outputs]
         analysis = IncrementalAnalysis(frame, cuts, limits, record.duration, step)
         peaks[record.name] = dict(zip(outputs, analysis.peaks_at(tried), strict=True))
     units = {output: model.unit_of(output) for output in outputs}

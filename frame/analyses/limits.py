@@ -1,38 +1,38 @@
-"""Limits of outputs, and what the answers about them have in common."""
+"""Limits of outputs, and what the results about single limits have in common."""
 
 from __future__ import annotations
 
 import re
-from abc import abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Generic, Literal, TypedDict, TypeVar
+from typing import Literal, TypedDict
 
-from alphacut.base.arrays import Array
 from alphacut.base.errors import checked_number, require, require_choice
-from alphacut.base.number_text import MINUS, ShownUnit, Table, engineering
-from alphacut.frame.analyses.answer import Answer, Record
+from alphacut.base.number_text import MINUS, ShownUnit, engineering
+from alphacut.frame.analyses.answer import Record
 from alphacut.frame.structures.quantities import Output
 
 Side = Literal["", "max", "min", "mean"]
-"""Of a magnitude; of the largest or the least value; of the mean magnitude over records."""
+"""What is limited: the largest magnitude, the largest value or the smallest value of an output over
+time, or the mean over the records of a suite of its largest magnitude."""
 ANY = "any of them"
 """Name of the event that any of several limits is exceeded."""
 
 
 @dataclass(frozen=True)
 class Limit:
-    """Limit of an output, by default of its magnitude.
+    """Limit of an output over time, by default of its magnitude.
 
     Args:
-        output: Name of the output, as "drift1".
-        value: In the SI unit of the output. Two values are the ends between which it must stay.
-        largest: True for the largest value of the output in place of its magnitude, False for the
-            least one, which must not fall below `value`.
-        mean: Whether it is the mean of the magnitudes over the records of a suite.
-        stated: The value as whoever set it wrote it, as "1 %"; empty: with its SI unit.
-        event: Name that several limits share of which any is exceeded, as "drift <= 1 %" of those
-            of all storeys; empty of a limit that stands alone.
+        output: Name of the output, such as "drift1".
+        value: Limit in the SI unit of the output. Two values are the ends of a range that the
+            output must not leave.
+        largest: True to limit the largest value of the output instead of its magnitude, False to
+            limit its smallest value, which must not fall below `value`.
+        mean: Whether the mean of the largest magnitudes over the records of a suite is limited.
+        stated: Limit as its author wrote it, such as "1 %"; if empty, it is shown in its SI unit.
+        event: Name that several limits share if the event that any of them is exceeded is of
+            interest, such as "drift <= 1 %" for the drifts of all storeys; empty otherwise.
 
     Example:
         >>> [str(limit) for limit in Limit("q3", (-0.06, 0.08)).one_sided]
@@ -48,21 +48,23 @@ class Limit:
 
     @property
     def one_sided(self) -> tuple[Limit, ...]:
-        """The limit itself, or those of both ends."""
+        """The limit itself, or the limits of both ends of a range."""
         if not isinstance(self.value, Sequence):
             return (self,)
-        least, largest = self.value
+        lower, upper = self.value
         return (
-            replace(self, value=least, largest=False),
-            replace(self, value=largest, largest=True),
+            replace(self, value=lower, largest=False),
+            replace(self, value=upper, largest=True),
         )
 
     @property
     def side(self) -> Side:
-        """What is limited, in the word that a case has for it."""
+        """What is limited, by the word that a case file has for it."""
         if self.mean:
             return "mean"
-        return "" if self.largest is None else "max" if self.largest else "min"
+        if self.largest is None:
+            return ""
+        return "max" if self.largest else "min"
 
     @property
     def peak(self) -> str:
@@ -71,51 +73,59 @@ class Limit:
 
     @property
     def number(self) -> float:
-        """The value of a limit with one side."""
+        """The value of a one-sided limit."""
         return float(self.value)  # type: ignore[arg-type]
 
     @property
     def outwards(self) -> float:
-        """The value; of a least value its negative, which the peak of −q must not exceed."""
-        return 0.0 + (-self.number if self.side == "min" else self.number)  # no negative zero
+        """The number that a peak must not exceed: the limit, or its negative for smallest values.
+
+        A smallest value of q that falls below the limit L is a largest value of -q above -L.
+        """
+        outwards = -self.number if self.side == "min" else self.number
+        return outwards + 0.0  # -0.0 becomes 0.0
 
     @property
     def text(self) -> str:
-        """The limit as a case states it, such as "min q3 >= -0.06"."""
+        """The limit in the form of a case file, such as "min q3 >= -0.06"."""
         relation = ">=" if self.side == "min" else "<="
         return f"{self.peak} {relation} {self.stated or f'{self.number:g}'}"
 
     def __str__(self) -> str:
-        """Return the limit in words, with the unit of the storey frame's output of its kind."""
-        unit = Output(self.output).unit.replace("SI", "")  # of names that are no storey frame's
-        return About(**facts_of(self, unit)).words
+        """Return the limit as text, in the unit that a storey frame's output of this name has."""
+        unit = Output(self.output).unit.removeprefix("SI")  # "SI" stands for an unknown unit
+        return LimitResult(**limit_fields(self, unit)).words
 
 
 def limits_by_name(
     limits: Limit | Sequence[Limit], outputs: Sequence[str], *, magnitudes: bool = False
 ) -> dict[str, Limit]:
-    """Return limits of one side each by name: the peak, or the text where a peak has several.
+    """Return one-sided limits by name.
+
+    The name is that of the peak, such as "max q3", or the text of the limit where one peak has
+    several limits.
 
     Args:
         limits: One limit or several.
-        outputs: Names of the peaks that there are; empty to accept all.
-        magnitudes: Whether each output may have one limit, of its magnitude, alone.
+        outputs: Names of the available outputs; empty to accept all.
+        magnitudes: Whether each output may have only one limit, which must be of its magnitude.
 
     Raises:
-        RefusedError: There is no limit, one stands twice, names no output, is not finite, or is one
-            of a magnitude and not positive.
+        RefusedError: There is no limit; a limit is given twice, names no output or is not finite; a
+            limit of a magnitude is not positive; or `magnitudes` is violated.
     """
-    given = [limits] if isinstance(limits, Limit) else list(limits)
+    given = [limits] if isinstance(limits, Limit) else limits
     single = [side for limit in given for side in limit.one_sided]
-    texts = ", ".join(limit.text for limit in single)
     require(bool(single), "limits", value=None, allowed='one limit or more: Limit("q3", 0.1)')
     for limit in single:
         if outputs:
             require_choice("limits", limit.output, outputs)
         is_magnitude = limit.side in ("", "mean")
         checked_number(f"limit of {limit.peak}", limit.number, positive=is_magnitude)
+
     peaks = [limit.peak for limit in single]
     named = {x.peak if peaks.count(x.peak) == 1 else x.text: x for x in single}
+    texts = ", ".join(limit.text for limit in single)
     require(len(named) == len(single), "limits", value=texts, allowed="each limit once")
     if magnitudes:
         is_one_each = all(name == limit.output for name, limit in named.items())
@@ -125,17 +135,17 @@ def limits_by_name(
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class About:
-    """Part of an answer about one limit, or about an event of several.
+class LimitResult:
+    """Base class of results about one limit, or about the event that any of several is exceeded.
 
     Args:
         side: What is limited.
-        output: The output; of an event of several limits its name.
-        unit: SI unit of the output; empty of several limits.
-        limit: The limit, in that unit; 1 of several.
-        stated: The limit as it was given; empty for the number with its unit.
-        is_event: Whether it is about several limits.
-        event_name: Name of the event of several limits of which it is a part; empty of none.
+        output: Name of the output, or the text of the event.
+        unit: SI unit of the output; empty for an event.
+        limit: The limit in that unit; 1 for an event.
+        stated: The limit as its author wrote it; if empty, it is shown in its SI unit.
+        is_event: Whether the result is about the event that any of several limits is exceeded.
+        event_name: Name of the event to which the limit belongs; empty if there is none.
     """
 
     side: Side = ""
@@ -153,7 +163,7 @@ class About:
 
     @property
     def words(self) -> str:
-        """Text of the limit as it was given, as "|drift1| ≤ 1 % (30.00 mm)", or of the event."""
+        """The limit as text, such as "|drift1| ≤ 1 % (30.00 mm)", or the text of the event."""
         if self.is_event:
             return self.output
         output = f"|{self.output}|" if self.side in ("", "mean") else self.output
@@ -162,7 +172,7 @@ class About:
 
     @property
     def value_words(self) -> str:
-        """The value as it was given; beside a fraction stands what it means in SI."""
+        """The value of the limit as it was stated; a fraction is followed by its value in SI."""
         in_si = engineering(self.limit, self.unit)
         if not self.stated:
             return in_si
@@ -172,27 +182,31 @@ class About:
 
     @property
     def stated_unit(self) -> ShownUnit | None:
-        """The unit in which the limit was given; None of a fraction, and of a plain number."""
-        stated = self.stated.replace(MINUS, "-")
-        match = re.fullmatch(r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*([^\d\s%/].*)", stated)
+        """The unit in which the limit was stated; None for a fraction or a plain number."""
+        number_and_unit = r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*([^\d\s%/].*)"
+        match = re.fullmatch(number_and_unit, self.stated.replace(MINUS, "-"))
         if match is None or not self.limit or not float(match[1]):
             return None
         return ShownUnit(match[2], float(match[1]) / self.limit)
 
     def text_of_value(self, value: float) -> str:
-        """Text of a value of the output in SI, in the unit of the limit if that has one."""
+        """Return the text of a value of the output, given in SI, in the unit of the limit."""
         unit = self.stated_unit
         return engineering(value, self.unit) if unit is None else unit.text(value)
 
     @property
     def event(self) -> str:
-        """The event that it is exceeded: "|drift1| > 40.00 mm", or "any of them exceeded"."""
+        """Text of the event that the limit is exceeded, such as "|drift1| > 40.00 mm"."""
         words = f"{self.output} exceeded" if self.is_event else self.words
         return words.translate({ord("≤"): ">", ord("≥"): "<"})
 
+    def columns(self, name: str) -> Record:
+        """Return the first columns of a row of numbers about the limit with a name."""
+        return {"limited output": name, "unit": self.unit, "limit": self.limit}
 
-class LimitFacts(TypedDict):
-    """Fields of `About` that a limit gives."""
+
+class LimitFields(TypedDict):
+    """Fields of `LimitResult` that follow from a limit."""
 
     side: Side
     output: str
@@ -201,8 +215,8 @@ class LimitFacts(TypedDict):
     stated: str
 
 
-def facts_of(limit: Limit, unit: str) -> LimitFacts:
-    """Return the fields of `About` that a limit of an output in a unit gives."""
+def limit_fields(limit: Limit, unit: str) -> LimitFields:
+    """Return the fields of `LimitResult` for a one-sided limit of an output with an SI unit."""
     return {
         "side": limit.side,
         "output": limit.output,
@@ -210,38 +224,3 @@ def facts_of(limit: Limit, unit: str) -> LimitFacts:
         "limit": limit.number,
         "stated": limit.stated,
     }
-
-
-P = TypeVar("P", bound=About)
-
-
-class LimitsAnswer(Answer, Generic[P]):
-    """Answer with a part for each limit, and for events of several, by their names."""
-
-    alpha: Array
-
-    @property
-    @abstractmethod
-    def parts(self) -> dict[str, P]:
-        """The parts by the names of their limits."""
-
-    @abstractmethod
-    def texts_of(self, part: P) -> dict[str, str]:
-        """Return the texts of the row of a part by the titles of their columns."""
-
-    @abstractmethod
-    def numbers_of(self, part: P) -> Iterator[Record]:
-        """Yield the numbers of a part, a record a row; output, unit and limit stand before."""
-
-    def table(self) -> Table:
-        """Return a row of texts for each limit."""
-        rows = [self.texts_of(part) for part in self.parts.values()]
-        return Table(tuple(rows[0]), [tuple(row.values()) for row in rows])
-
-    def records(self) -> list[Record]:
-        """Return the rows of each limit."""
-        return [
-            {"limited output": name, "unit": part.unit, "limit": part.limit, **record}
-            for name, part in self.parts.items()
-            for record in self.numbers_of(part)
-        ]

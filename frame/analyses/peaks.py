@@ -1,7 +1,8 @@
-"""Fuzzy peaks: the largest magnitude of each output over the motion, as intervals by level.
+"""Fuzzy peaks: the largest magnitude of each output over time, as an interval on each level.
 
-At the nodes no motion peaks higher than its envelope, and each has at least the magnitude that its
-band is away from zero; what the steps between nodes may add counts as error.
+At the time nodes no response leaves the envelope, and each response has at least the magnitude by
+which the band of the envelope is away from zero. What responses may add within the time steps is
+part of the guaranteed bounds, and of the error of all others.
 """
 
 from __future__ import annotations
@@ -25,42 +26,43 @@ from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.result import Bounds, Ends, Nature
 
 PEAK_ERROR = 5e-3
-"""Error of the peaks of limited outputs that is aimed at, as a fraction of each."""
+"""Error of the peaks of limited outputs that is aimed at, as a fraction of each peak (tuned: a
+larger one saves time and leaves more limits undecided)."""
 WIDENING = 0.01
-"""Fraction of a peak from which on it is said that a smaller step would narrow its bound."""
-UNBOUNDED = {"lower": -np.inf, "upper": np.inf, "reached": -np.inf}
-UNBOUNDED |= {"least_lower": -np.inf, "least_upper": np.inf}
-"""What an unknown bound of a peak is, if the peak is no least value."""
+"""Fraction of a peak above which it is reported that a smaller step would narrow its bound (tuned:
+a larger one leaves wider bounds without a remark)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Peak:
-    """Bounds of the largest magnitude of an output over time, or of its largest or least value.
+    """Bounds of the largest magnitude of an output over time, or of its largest or smallest value.
 
-    A least value ("min q3") has its own sign: farther out is lower, and its peak over a cut that
-    is farthest out is bounded by `lower`.
+    All values have the sign of the output. For a smallest value ("min q3") a peak is the farther
+    out, the lower it is, and the farthest peak of a cut is bounded by `lower`. Values that are not
+    known may be given as NaN; they become infinite with the sign with which they say nothing.
 
     Args:
-        alpha: Levels, rising, shape (A,).
-        lower: Lower end of the peaks at the nodes over each cut, as the envelope bounds it, shape
-            (A,). A bound that is not known is nan when it is given, and infinite afterwards.
-        upper: Upper end of them, shape (A,).
-        error: Distance by which peaks may lie outside `lower` and `upper`: that of the envelope and
-            of the steps between nodes; 0 of guaranteed bounds, which contain it.
-        reached: Peak that some motion in the cut is known to reach, the farthest out; −∞ (of a
-            least value ∞) where none is known.
-        least_lower: Bound of the peaks of all motions in the cut, proved where the bounds are: none
-            is nearer to zero, or of values less far out.
-        least_upper: A peak that some motion in the cut is known not to exceed; infinite where none
-            is known.
+        alpha: Levels, rising, shape (levels,). All other arrays have this shape.
+        lower: Lower bound of the peaks in each cut: at the time nodes, or at all times if the
+            bounds are guaranteed.
+        upper: Upper bound of these peaks.
+        error: Distance by which peaks may lie outside `lower` and `upper`; 0 for guaranteed bounds.
+        reached: Attained value: the farthest peak that a response of the cut is known to have.
+        least_lower: Bound of the peaks of all responses of the cut that are the least far out,
+            guaranteed if the bounds are.
+        least_upper: A peak that some response of the cut is known not to exceed.
         nature: Guarantee of the bounds.
-        between_nodes: Part of the bound farthest out on the lowest level that motions may add
-            within the steps between nodes; it falls with the square of the step.
-        side: "" of a magnitude, "max" of the largest value and "min" of the least one.
-        reached_at: Inputs in SI, by name, of the motion that reaches the peak on the lowest level;
-            empty where none is known.
-        encloses: Name of a set of inputs that the box of their cuts encloses, as "the learned
-            set"; empty where all of the box counts. Then no motion is known to belong to the set.
+        between_nodes: What responses may add within the time steps to the farthest bound on the
+            lowest level. It falls with the square of the time step.
+        side: "" for a magnitude, "max" for the largest value, "min" for the smallest value.
+        reached_at: Inputs by name, in SI units, of the response that attains the peak on the lowest
+            level; empty if none is known.
+        encloses: Name of the set of inputs, such as "the learned set", that the box of the cuts
+            encloses. If it is given, no response is known to belong to the set.
+
+    Attributes:
+        proved: Guaranteed bound: the peak of no response of the cut lies farther out; infinite
+            where nothing is guaranteed.
     """
 
     alpha: Array
@@ -76,180 +78,241 @@ class Peak:
     reached_at: Mapping[str, float] = field(default_factory=dict)
     encloses: str = ""
     proved: Array = field(init=False)
-    """No motion's peak lies farther out, shape (A,); infinite where nothing is known."""
 
     def __post_init__(self) -> None:
-        """Take unknown bounds as infinite, on the side on which they say nothing."""
-        sign, swapped = (-1, ENDS_OF_LEAST) if self.is_least else (1, {})
-        for name, unknown in UNBOUNDED.items():
-            values = np.asarray(getattr(self, swapped.get(name, name)), float)
-            known = np.where(np.isnan(values), sign * unknown, values)
-            object.__setattr__(self, swapped.get(name, name), known)
-        object.__setattr__(self, "proved", 0.0 + sign * self.greatest_bounds.upper)
+        """Make unknown values infinite and compute `proved`."""
+        sign = -1.0 if self.is_least else 1.0  # of values that are far out
+        values_that_say_nothing = {
+            "lower": -np.inf,
+            "upper": np.inf,
+            "reached": -sign * np.inf,
+            "least_lower": -sign * np.inf,
+            "least_upper": sign * np.inf,
+        }
+        for name, unknown in values_that_say_nothing.items():
+            values = np.asarray(getattr(self, name), float)
+            object.__setattr__(self, name, np.where(np.isnan(values), unknown, values))
+        object.__setattr__(self, "proved", sign * self.max_peak_bounds.upper + 0.0)
 
     @property
     def is_least(self) -> bool:
-        """Whether it is the least value of an output."""
+        """Whether it is the smallest value of an output."""
         return self.side == "min"
 
     @property
-    def outwards(self) -> Peak:
-        """The peak; of a least value that of −q, which is its largest value."""
-        return mirrored(self) if self.is_least else self
+    def bound_side(self) -> Literal["lower", "upper"]:
+        """The name of the end that bounds the peaks that are farthest out."""
+        return "lower" if self.is_least else "upper"
 
     @property
     def far_end(self) -> Array:
-        """Bound on each level of the peaks farthest out: the upper one, or that of least values."""
+        """Bound of the peaks that are farthest out on each level, shape (levels,)."""
         return self.lower if self.is_least else self.upper
 
     @property
-    def greatest_bounds(self) -> Ends:
-        """A lower and an upper bound of the greatest peak, of `outwards`, shape (A,) each."""
-        if self.is_least:
-            return self.outwards.greatest_bounds
-        # where bounds are only attained other motions may peak higher
-        beyond = np.inf if self.nature is Nature.ATTAINED else self.error
-        return Ends(self.reached, self.upper + beyond)
+    def outwards(self) -> Peak:
+        """The peak itself; for a smallest value of q the largest value of -q."""
+        return mirrored(self) if self.is_least else self
 
     @property
-    def least_bounds(self) -> Ends:
-        """A lower and an upper bound of the least peak, of `outwards`, shape (A,) each."""
+    def _exclusion_error(self) -> Array | float:
+        """Distance beyond `upper`, or below `lower`, that excludes any peak.
+
+        It is infinite for attained bounds, which exclude nothing.
+        """
+        return np.inf if self.nature is Nature.ATTAINED else self.error
+
+    @property
+    def max_peak_bounds(self) -> Ends:
+        """Lower and upper bound of the largest peak of each cut, of `outwards`."""
         if self.is_least:
-            return self.outwards.least_bounds
-        smallest = -np.inf if self.side else 0.0  # of any peak
-        beyond = np.inf if self.nature is Nature.ATTAINED else self.error
-        lower_bound = np.maximum(np.maximum(self.lower - beyond, smallest), self.least_lower)
-        # each cut contains the narrowest one, whose greatest peak bounds the least one
-        return Ends(lower_bound, np.minimum(self.greatest_bounds.upper[-1:], self.least_upper))
+            return self.outwards.max_peak_bounds
+        return Ends(self.reached, self.upper + self._exclusion_error)
+
+    @property
+    def min_peak_bounds(self) -> Ends:
+        """Lower and upper bound of the smallest peak of each cut, of `outwards`."""
+        if self.is_least:
+            return self.outwards.min_peak_bounds
+        below = self.lower - self._exclusion_error
+        lower_bound = np.maximum(np.maximum(below, _smallest_peak(self.side)), self.least_lower)
+        # Each cut contains the narrowest one. The smallest peak of a cut is therefore at most the
+        # largest peak of the narrowest cut.
+        largest_of_narrowest = self.max_peak_bounds.upper[-1:]
+        return Ends(lower_bound, np.minimum(largest_of_narrowest, self.least_upper))
 
     @property
     def is_widened_by_step(self) -> bool:
-        """Whether what motions add between nodes is most of the gap or error, and much."""
-        bound, reached = float(self.far_end[0]), float(self.reached[0])
-        is_proved = self.nature is Nature.GUARANTEED and np.isfinite(reached)
-        width = abs(bound - reached) if is_proved else float(self.error[0])
+        """Whether a smaller time step would narrow the bound considerably.
+
+        This is so if more than half of the gap or error, and more than `WIDENING` of the peak, is
+        what responses may add between the time nodes.
+        """
+        bound, attained = float(self.far_end[0]), float(self.reached[0])
+        has_gap = self.nature is Nature.GUARANTEED and np.isfinite(attained)
+        width = abs(bound - attained) if has_gap else float(self.error[0])
         return self.between_nodes > max(width / 2, WIDENING * abs(bound))
 
     @property
     def gaps(self) -> Array:
-        """Gap between the bound farthest out and what is reached, over the bound, shape (A,).
+        """Distance between the farthest bound and the attained value as a fraction of the bound.
 
-        It is nan where nothing is known to be reached.
+        The shape is (levels,). It is NaN where no attained value is known, and 0 for a bound of 0.
         """
-        reached = np.where(np.isfinite(self.reached), self.reached, np.nan)
-        difference, size = np.abs(self.far_end - reached), np.abs(self.far_end)
+        attained = np.where(np.isfinite(self.reached), self.reached, np.nan)
+        difference, size = np.abs(self.far_end - attained), np.abs(self.far_end)
         ratio = np.divide(difference, size, out=np.zeros_like(size), where=size > 0)
         return np.asarray(ratio)
 
 
-ENDS_OF_LEAST = {"lower": "upper", "upper": "lower"}
-"""Ends that change places where the sign of a peak does."""
-
-
 def mirrored(peak: Peak) -> Peak:
-    """Return a peak with the signs of its values changed, as that of −q."""
-    ends = {name: 0.0 - getattr(peak, ENDS_OF_LEAST.get(name, name)) for name in UNBOUNDED}
-    return replace(peak, side="max" if peak.is_least else "min", **ends)
+    """Return the peak of -q from a peak of q: all values change their signs."""
+    return replace(
+        peak,
+        side="max" if peak.is_least else "min",
+        lower=0.0 - peak.upper,
+        upper=0.0 - peak.lower,
+        reached=0.0 - peak.reached,
+        least_lower=0.0 - peak.least_lower,
+        least_upper=0.0 - peak.least_upper,
+    )
+
+
+def _smallest_peak(side: str) -> float:
+    """Return a lower bound of any peak: 0 for a magnitude, -∞ for a largest value."""
+    return -np.inf if side else 0.0
 
 
 Peaks = Mapping[str, Peak]
-"""Peaks by name: "q3" of a magnitude, "max q3" and "min q3" of the largest and the least value."""
+"""Peaks by name: "q3" for a magnitude, "max q3" and "min q3" for the largest and smallest value."""
 
 
-def peaks(of: Envelope, names: Sequence[str] = ()) -> dict[str, Peak]:
-    """Return the fuzzy peaks of an envelope `of` outputs by name: intervals of the peak by level.
+def peaks(band: Envelope, names: Sequence[str] = ()) -> dict[str, Peak]:
+    """Return the fuzzy peaks of outputs of an envelope by name.
 
-    `names` are outputs, for the peaks of their magnitudes, or "max q3", "min q3"; all outputs if
-    empty.
+    Args:
+        band: The envelope.
+        names: Names of outputs for the peaks of their magnitudes, or names such as "max q3" and
+            "min q3"; if empty, all outputs are taken.
     """
-    return {name: _peak_of(of, name) for name in names or map(str, of.outputs)}
+    return {name: _peak_of(band, name) for name in names or map(str, band.outputs)}
 
 
 def _peak_of(band: Envelope, name: str) -> Peak:
-    k = [*map(str, band.outputs)].index(output_of(name))
-    nature = band.natures[k] if band.natures else band.nature
-    is_proved, is_signed = nature is Nature.GUARANTEED, name != output_of(name)
-    smallest = -np.inf if is_signed else 0.0  # of any peak
-    error = 0.0 if is_proved else band.error[..., k]  # which proved bounds contain
-    ends = [(x.lower[..., k], x.upper[..., k]) for x in (band, band.attained)]
-    ends_at_nodes, reached_at_nodes = (_oriented(*end, name) for end in ends)  # (A, T) each
-    upper, lower = ends_at_nodes.upper.max(1), ends_at_nodes.lower.max(1)
-    between = None if band.between is None else band.between[:, k]
-    bound_at_nodes = ends_at_nodes.upper + error
-    bound = within_steps(bound_at_nodes, between).max(1)
-    above = bound - upper
-    below = lower - np.maximum(ends_at_nodes.lower - error, smallest).max(1)
-    least_lower, least_upper = np.full_like(upper, smallest), np.full_like(upper, np.inf)
-    if band.least_peaks is not None and not is_signed:
-        least_lower, least_upper = (end[:, k] for end in band.least_peaks)
-    between_nodes = float(bound[0] - bound_at_nodes[0].max())
-    if band.searched_peaks is not None and not is_signed:
+    """Return the fuzzy peak with a name, such as "q3" or "min q3", of an envelope."""
+    output = output_of(name)
+    column = [*map(str, band.outputs)].index(output)
+    nature = band.natures[column] if band.natures else band.nature
+    is_guaranteed = nature is Nature.GUARANTEED
+    is_magnitude = name == output
+    smallest = _smallest_peak("" if is_magnitude else "max")
+
+    # Bounds of |q|, q or -q at the time nodes, shape (levels, times). Guaranteed bounds contain
+    # the error.
+    ends = _oriented(band.lower[..., column], band.upper[..., column], name)
+    attained = _oriented(band.attained.lower[..., column], band.attained.upper[..., column], name)
+    error = 0.0 if is_guaranteed else band.error[..., column]
+    between = None if band.between is None else band.between[:, column]
+
+    # The largest peak of each cut, and bounds of it at the nodes and within the steps.
+    upper, lower = ends.upper.max(axis=1), ends.lower.max(axis=1)
+    bound_at_nodes = ends.upper + error
+    bound = within_steps(bound_at_nodes, between).max(axis=1)
+    if band.searched_peaks is not None and is_magnitude:
         is_at_nodes = name.rstrip("0123456789") in AT_NODES
-        return _searched_peak(band.searched_peaks, k, is_at_nodes * (bound - bound_at_nodes.max(1)))
-    if is_proved:
+        added = bound - bound_at_nodes.max(axis=1) if is_at_nodes else np.zeros_like(bound)
+        return _searched_peak(band.searched_peaks, column, added)
+
+    # The smallest peak of each cut. A peak is no smaller than the magnitude at any node.
+    below = lower - np.maximum(ends.lower - error, smallest).max(axis=1)
+    least_lower = np.full_like(upper, smallest)
+    least_upper = np.full_like(upper, np.inf)
+    if band.least_peaks is not None and is_magnitude:
+        least_lower = band.least_peaks.lower[:, column]
+        least_upper = band.least_peaks.upper[:, column]
+
+    above = bound - upper
+    peak_error = np.maximum(above, below)
+    if is_guaranteed:
         lower, upper = np.maximum(lower, least_lower), upper + above
+        peak_error = np.zeros_like(upper)
     elif nature is Nature.ESTIMATED:
-        # a peak is no smaller than at the nodes, whatever is added between them
+        # The error within the steps raises the peaks only, so that it does not lower this bound.
         least_lower = np.maximum(least_lower, lower - below)
-    reached = np.fmax(reached_at_nodes.upper, smallest).max(1)  # NaN where none is known
-    if band.encloses:
-        reached = np.full_like(upper, -np.inf)
+
+    reached = np.fmax(attained.upper, smallest).max(axis=1)  # NaN where none is known
     peak = Peak(
         alpha=np.asarray(band.alpha),
         lower=lower,
         upper=upper,
-        error=np.zeros_like(upper) if is_proved else np.maximum(above, below),
-        reached=reached,
+        error=peak_error,
+        reached=np.full_like(upper, -np.inf) if band.encloses else reached,
         least_lower=least_lower,
         least_upper=least_upper,
         nature=nature,
-        between_nodes=between_nodes,
-        side="max" if is_signed else "",
-        reached_at=_inputs_at_peak(band, k, name),
+        between_nodes=float(bound[0] - bound_at_nodes[0].max()),
+        side="" if is_magnitude else "max",
+        reached_at=_inputs_at_peak(band, column, name),
         encloses=band.encloses,
     )
     return mirrored(peak) if name.startswith("min ") else peak
 
 
-def _searched_peak(found: Bounds, k: int, between: Array) -> Peak:
-    """Return the fuzzy peak of output k by a search; `between` (A,) may be added between nodes."""
-    lower, upper = found.lower[:, k], found.upper[:, k]
-    reached, least_upper = upper, lower + between
-    reached_at = dict(zip(found.inputs, found.upper_at[0, k].tolist(), strict=True))
+def _searched_peak(found: Bounds, column: int, between: Array) -> Peak:
+    """Return the fuzzy peak of the magnitude of an output that was found by a search of peaks.
+
+    Args:
+        found: Bounds of the peaks at the time nodes on all levels.
+        column: Index of the output.
+        between: What responses may add within the time steps, shape (levels,).
+    """
+    lower, upper = found.lower[:, column], found.upper[:, column]
+    attained, least_upper = upper, lower + between
+    attained_at = dict(zip(found.inputs, found.upper_at[0, column].tolist(), strict=True))
     if found.encloses:
-        reached, least_upper = np.full_like(upper, -np.inf), np.full_like(lower, np.inf)
-        reached_at = {}
+        attained, least_upper = np.full_like(upper, -np.inf), np.full_like(lower, np.inf)
+        attained_at = {}
     return Peak(
         alpha=found.alpha,
         lower=lower,
         upper=upper,
-        error=found.error[:, k] + between,
-        reached=reached,
+        error=found.error[:, column] + between,
+        reached=attained,
         least_lower=np.zeros_like(lower),
         least_upper=least_upper,
-        nature=found.natures[k],
+        nature=found.natures[column],
         between_nodes=float(between[0]),
-        reached_at=reached_at,
+        reached_at=attained_at,
         encloses=found.encloses,
     )
 
 
-def _inputs_at_peak(band: Envelope, k: int, name: str) -> dict[str, float]:
-    """Return inputs of the motion that reaches a peak of output k on the lowest level, if known."""
-    low, high = band.attained
-    by_side = {"max": (high, band.upper_at), "min": (-low, band.lower_at)}
-    ends = [by_side[name[:3]]] if name != output_of(name) else [*by_side.values()]
-    values = np.array([end[0, :, k] for end, _ in ends])  # (ends, T)
-    points = np.array([at[0, :, k] for _, at in ends])  # (ends, T, n)
-    values = np.where(np.isfinite(points).all(-1) & np.isfinite(values), values, -np.inf)
-    if not np.isfinite(values).any():
+def _inputs_at_peak(band: Envelope, column: int, name: str) -> dict[str, float]:
+    """Return the inputs of the response with the farthest attained peak on the lowest level.
+
+    Args:
+        band: The envelope.
+        column: Index of the output.
+        name: Name of the peak, such as "q3" or "max q3".
+
+    Returns:
+        Inputs by name, in SI units; empty if none are known.
+    """
+    upper_end = band.attained.upper[0, :, column], band.upper_at[0, :, column]
+    lower_end = -band.attained.lower[0, :, column], band.lower_at[0, :, column]
+    chosen = {"max": [upper_end], "min": [lower_end]}.get(name[:3], [upper_end, lower_end])
+    values = np.array([value for value, _ in chosen])  # (ends, times)
+    points = np.array([point for _, point in chosen])  # (ends, times, inputs)
+    is_known = np.isfinite(points).all(axis=-1) & np.isfinite(values)
+    if not is_known.any():
         return {}
+    values = np.where(is_known, values, -np.inf)
     farthest = np.unravel_index(values.argmax(), values.shape)
     return dict(zip(band.inputs, map(float, points[farthest]), strict=True))
 
 
 def _oriented(low: Array, high: Array, name: str) -> Ends:
-    """Return bounds of |q|, or of q ("max q") or −q ("min q"), from those of the output q."""
+    """Return bounds of |q|, of q ("max q") or of -q ("min q") from bounds of the output q."""
     if name.startswith("min "):
         return Ends(-high, -low)
     if name.startswith("max "):
@@ -258,10 +321,10 @@ def _oriented(low: Array, high: Array, name: str) -> Ends:
 
 
 def tightest(first: Peaks, second: Peaks) -> dict[str, Peak]:
-    """Return the tightest bounds of peaks by two analyses of the same response, by name.
+    """Return the tightest bounds of peaks from two analyses of the same response, by name.
 
-    Guaranteed bounds are intersected and attained ones united; else the bounds of the stronger
-    nature or of the smaller error are taken. Peaks that either analysis reaches are kept.
+    Guaranteed bounds are intersected, and attained bounds are united. Otherwise the bounds with the
+    stronger guarantee or with the smaller error are taken. Attained values of both are kept.
     """
     found = {**first, **second}
     for name in first.keys() & second.keys():
@@ -271,18 +334,26 @@ def tightest(first: Peaks, second: Peaks) -> dict[str, Peak]:
 
 
 def _tighter(first: Peak, second: Peak) -> Peak:
-    better = max(first, second, key=lambda x: (list(Nature).index(x.nature), -x.error.max()))
-    rules = {"reached": np.maximum, "least_lower": np.maximum, "least_upper": np.minimum}
-    if {first.nature, second.nature} == {Nature.GUARANTEED}:
+    """Return the combined bounds of two analyses of a peak that is no smallest value."""
+    strength = [*Nature]
+    better = max(first, second, key=lambda x: (strength.index(x.nature), -x.error.max()))
+    rules: dict[str, np.ufunc] = {
+        "reached": np.maximum,
+        "least_lower": np.maximum,
+        "least_upper": np.minimum,
+    }
+    natures = {first.nature, second.nature}
+    if natures == {Nature.GUARANTEED}:
         rules |= {"lower": np.maximum, "upper": np.minimum}
-    elif {first.nature, second.nature} == {Nature.ATTAINED}:
+    elif natures == {Nature.ATTAINED}:
         rules |= {"lower": np.minimum, "upper": np.maximum, "error": np.maximum}
-    ends: dict[str, Any]
-    ends = {name: rule(getattr(first, name), getattr(second, name)) for name, rule in rules.items()}
-    if "upper" in ends:
-        ends["between_nodes"] = min(first, second, key=lambda x: x.upper[0]).between_nodes
+    changes: dict[str, Any] = {}
+    for name, rule in rules.items():
+        changes[name] = rule(getattr(first, name), getattr(second, name))
+    if "upper" in changes:
+        changes["between_nodes"] = min(first, second, key=lambda x: x.upper[0]).between_nodes
     farther = first if first.reached[0] >= second.reached[0] else second
-    return replace(better, reached_at=farther.reached_at, **ends)
+    return replace(better, reached_at=farther.reached_at, **changes)
 
 
 def close_peaks(
@@ -295,23 +366,34 @@ def close_peaks(
     alpha: Sequence[float] = ALPHA,
     progress: Progress | bool | None = None,
 ) -> dict[str, Peak]:
-    """Return peaks by the method that bounds peaks most closely, to within `PEAK_ERROR` if it can.
+    """Return peaks by the method that bounds them most closely, within `PEAK_ERROR` if possible.
 
-    `names` are those of peaks, such as "q3" and "max q3"; the others are as of `envelope`.
+    The arguments are those of `envelope`, and `names` are the names of the peaks, such as "q3" and
+    "max q3".
     """
     outputs = tuple(dict.fromkeys(map(output_of, names)))
     magnitudes = all(name == output_of(name) for name in names)
-    method = Auto(PEAK_ERROR, peaks=True, magnitudes=magnitudes)
-    times: dict[str, Any] = {"duration": duration, "step": step, "alpha": alpha}
-    observed = model.with_outputs(outputs)
-    return peaks(envelope(observed, inputs, method, progress=progress, **times), names)
+    band = envelope(
+        model.with_outputs(outputs),
+        inputs,
+        Auto(PEAK_ERROR, peaks=True, magnitudes=magnitudes),
+        duration=duration,
+        step=step,
+        alpha=alpha,
+        progress=progress,
+    )
+    return peaks(band, names)
 
 
 def loose_peaks(peaks: Peaks, names: Sequence[str], gap: float) -> tuple[str, ...]:
-    """Return the names of those peaks that are not guaranteed to within a gap, or not there at all.
+    """Return the names of those peaks that are missing or not guaranteed within a gap.
 
-    The gap is that between the bound farthest out and the reached peak, over the bound. Where the
-    inputs enclose a set, no peak is known to be reached and any guaranteed one is taken.
+    Args:
+        peaks: Known peaks by name.
+        names: Names of the peaks of interest.
+        gap: Largest distance allowed between the farthest bound and the attained value, as a
+            fraction of the bound. It does not matter for inputs that enclose a set, since no
+            attained value is known then.
     """
 
     def is_close(peak: Peak) -> bool:

@@ -1,34 +1,29 @@
 """Fuzzy probability that limits are exceeded, with some inputs random and others fuzzy.
 
-The same independent draws serve every fuzzy point (common random numbers), so that differences
-between points are no noise. The points are the corners of each α-cut and a spread inside: another
-one may have a smaller or a greater probability. What the draws may miss is bounded by the interval
-of Clopper and Pearson (1934) at every fuzzy point, at the level of Bonferroni: with probability
-`CONFIDENCE` the intervals of all points hold their probabilities at once.
+The same independent draws of the random inputs serve all fuzzy points (common random numbers), so
+that differences between the points are not noise. The fuzzy points are the corners of each α-cut
+and points spread inside; other points may have a smaller or a larger probability. What the draws
+may miss is bounded at every fuzzy point by the interval of Clopper and Pearson (Biometrika 26, 404,
+1934) at the level of Bonferroni: with the probability `CONFIDENCE` the intervals of all points
+contain their probabilities at once.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from alphacut.base.arrays import Array
+from alphacut.base.arrays import Array, Ints
 from alphacut.base.errors import require
-from alphacut.base.number_text import MINUS, range_text
+from alphacut.base.number_text import MINUS, Table, range_text
 from alphacut.base.progress_bar import Progress
-from alphacut.frame.analyses.answer import Record
-from alphacut.frame.analyses.limits import (
-    ANY,
-    About,
-    Limit,
-    LimitsAnswer,
-    facts_of,
-    limits_by_name,
-)
+from alphacut.frame.analyses.answer import Answer, Record, table_of
+from alphacut.frame.analyses.limits import ANY, Limit, LimitResult, limit_fields, limits_by_name
 from alphacut.frame.boxes import ALPHA, Boxes, boxes
+from alphacut.frame.dynamics.flow import Flow
 from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.envelope import within_steps
 from alphacut.frame.structures.model import StructureModel
@@ -38,18 +33,22 @@ from alphacut.fuzzy.result import Ends, Nature
 from alphacut.fuzzy.sets.boxes import chebyshev_points, corners
 from alphacut.fuzzy.sets.numbers import enclosed_set
 
-LIMITS = 201  # limits for which the probability is computed besides
-SPREAD = 64  # points inside each α-cut
-LOOKED_AT = 4  # fuzzy points, and draws of each, whose motion between nodes is looked at
-MAX_CORNER_INPUTS = 8  # most inputs of which all corners are tried
-CONFIDENCE = 0.95  # probability with which the intervals of all fuzzy points of a limit hold
+CONFIDENCE = 0.95
+"""Probability with which the intervals of all fuzzy points of a limit contain their probabilities;
+conventional."""
 
 Sampler = Callable[[np.random.Generator, int], Array]
-"""A function from a generator and a count to as many values of a random parameter, in SI."""
+"""Function that returns a number of values of a random parameter, in SI units, by a generator."""
 
 
 class Curve(NamedTuple):
-    """Other limits, shape (L,), and bounds of the probability of exceeding each, shape (A, L)."""
+    """Probability of exceeding a limit as a function of the limit.
+
+    Args:
+        limit: Limits, shape (limits,); for an event of several limits, fractions of the limits.
+        lower: Lower bounds of the probability, shape (levels, limits).
+        upper: Upper bounds of the probability, shape (levels, limits).
+    """
 
     limit: Array
     lower: Array
@@ -57,17 +56,17 @@ class Curve(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class LimitProbability(About):
-    """Bounds of the probability that a limit is exceeded, by level.
+class LimitProbability(LimitResult):
+    """Bounds of the probability that a limit is exceeded, on each level.
 
     Args:
-        lower: Least probability over the fuzzy points tried, shape (A,).
-        upper: Greatest one, shape (A,).
-        error: What peaks between nodes may add to either, estimated, shape (A,).
-        interval: Ends of the interval that holds the probabilities of all fuzzy points of a level
-            with probability `CONFIDENCE` over the draws, shape (A,) each.
-        curve: The same bounds for other limits; of several limits as fractions of theirs.
-        nature: Attained: other points may have a smaller or a greater probability.
+        lower: Smallest probability of the fuzzy points that were tried, shape (levels,).
+        upper: Largest probability of these points, shape (levels,).
+        error: Estimated change of either bound by peaks between the time nodes, shape (levels,).
+        interval: Lower and upper end of the interval that contains the probabilities of all fuzzy
+            points of a level with the probability `CONFIDENCE`, shape (levels,) each.
+        curve: The same bounds for other limits.
+        nature: Guarantee, which is attained: other points may have other probabilities.
     """
 
     lower: Array
@@ -78,16 +77,22 @@ class LimitProbability(About):
     nature: Nature = Nature.ATTAINED
 
     def bounds_text(self, level: int) -> str:
-        """Return the bounds on a level as a text."""
+        """Return the bounds on the level with an index as text."""
         return range_text(float(self.lower[level]), float(self.upper[level]), self.nature, 3)
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Probability(LimitsAnswer[LimitProbability]):
-    """Fuzzy probability that limits are exceeded, on levels `alpha` (A,), by their names.
+class Probability(Answer):
+    """Fuzzy probability that limits are exceeded.
 
-    `fuzzy` and `random` are the inputs by their kind, `samples` the draws at each fuzzy point and
-    `step` the distance of the nodes, in s.
+    Args:
+        alpha: Levels, shape (levels,).
+        events: Probability of exceeding each limit by its name. If there are several limits, the
+            last one, with the name `ANY`, is the probability that any of them is exceeded.
+        fuzzy: Names of the fuzzy inputs.
+        random: Names of the random inputs.
+        samples: Number of draws at each fuzzy point.
+        step: Distance of the time nodes, in s.
     """
 
     key = "probability"
@@ -99,43 +104,43 @@ class Probability(LimitsAnswer[LimitProbability]):
     samples: int
     step: float
 
-    @property
-    def parts(self) -> dict[str, LimitProbability]:
-        """The probabilities by the names of their limits."""
-        return self.events
-
-    def texts_of(self, part: LimitProbability) -> dict[str, str]:
-        """Return bounds on the lowest and the highest level, and what they may miss."""
-        low, high = (float(end[0]) for end in part.interval)
-        return {
-            "limit": part.event,
-            "at the lowest α": part.bounds_text(0),
-            "nature": self.nature_text(part.nature),
-            "at the highest α": part.bounds_text(-1),
-            f"{CONFIDENCE:.0%} interval at the lowest α": range_text(
-                low,
-                high,
-                Nature.GUARANTEED,
-                3,  # rounded outwards
-            ),
-            "between nodes": f"{part.error.max():.2g}".replace("-", MINUS),
-        }
-
-    def numbers_of(self, part: LimitProbability) -> Iterator[Record]:
-        """Yield a record for each level."""
-        for k, alpha in enumerate(self.alpha):
-            yield {
-                "α": float(alpha),
-                "at least": float(part.lower[k]),
-                "at most": float(part.upper[k]),
+    def table(self) -> Table:
+        """Return a row for each limit, with bounds on the lowest and on the highest level."""
+        rows = []
+        for part in self.events.values():
+            low, high = float(part.interval.lower[0]), float(part.interval.upper[0])
+            # The interval is rounded outwards.
+            interval = range_text(low, high, Nature.GUARANTEED, 3)
+            row = {
+                "limit": part.event,
+                "at the lowest α": part.bounds_text(0),
                 "nature": self.nature_text(part.nature),
-                f"{CONFIDENCE:.0%} interval from": float(part.interval.lower[k]),
-                f"{CONFIDENCE:.0%} interval to": float(part.interval.upper[k]),
-                "between nodes": float(part.error[k]),
+                "at the highest α": part.bounds_text(-1),
+                f"{CONFIDENCE:.0%} interval at the lowest α": interval,
+                "between nodes": f"{part.error.max():.2g}".replace("-", MINUS),
             }
+            rows.append(row)
+        return table_of(rows)
+
+    def records(self) -> list[Record]:
+        """Return a row for each limit and level."""
+        rows = []
+        for name, part in self.events.items():
+            for level, alpha in enumerate(self.alpha):
+                row: Record = {
+                    "α": float(alpha),
+                    "at least": float(part.lower[level]),
+                    "at most": float(part.upper[level]),
+                    "nature": self.nature_text(part.nature),
+                    f"{CONFIDENCE:.0%} interval from": float(part.interval.lower[level]),
+                    f"{CONFIDENCE:.0%} interval to": float(part.interval.upper[level]),
+                    "between nodes": float(part.error[level]),
+                }
+                rows.append(part.columns(name) | row)
+        return rows
 
     def words(self) -> str:
-        """Return sentences on how the probability was computed, and what its interval holds."""
+        """Return sentences on how the probability was computed, and on its interval."""
         random = ", ".join(self.random) or "no input"
         return (
             f"Random: {random}, with {self.samples} independent draws at each fuzzy point."
@@ -159,20 +164,22 @@ def probability(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Probability:
-    """Return bounds of the probability of exceeding each limit, and `ANY` of several.
+    """Return bounds of the probability that each limit, and any of several limits, is exceeded.
 
-    All probabilities come from the same motions: those of all fuzzy points with all random draws.
+    All probabilities are computed from the same responses: those at all fuzzy points with all
+    random draws.
 
     Args:
-        model: A linear structure, moved by the exact propagator, or a general system, by the
-            midpoint rule.
+        model: A linear structure, whose response is exact at the time nodes, or a general system,
+            which is integrated by the midpoint rule.
         inputs: Fuzzy parameters by name, in SI units.
         limits: Limits of magnitudes, one for each output, in SI units.
-        random: Random parameters by name: a fuzzy number is drawn with a density of the shape of
-            its membership, a function takes (generator, count) and returns values (count,). Names
-            alone are those of `inputs` that are random.
-        duration: Length of the motion, in s.
-        step: Distance of nodes, in s.
+        random: Random parameters by name. A fuzzy number is drawn with a probability density of the
+            shape of its membership function; a function is called with a generator and a count and
+            returns values of shape (count,). Names without values are those of `inputs` that are
+            random.
+        duration: Length of the response, in s.
+        step: Distance of the time nodes, in s.
         alpha: Levels.
         samples: Number of random draws.
         seed: Seed of the draws.
@@ -187,48 +194,42 @@ def probability(
         inputs = {name: number for name, number in inputs.items() if name not in random}
     named = limits_by_name(limits, (), magnitudes=True)
     model = model.with_outputs(tuple(named))
-    sizes = np.array([x.number for x in named.values()])
-    shared, allowed = ", ".join(sorted(set(inputs) & set(random))), "inputs that are not fuzzy too"
-    require(not shared, "random", value=shared, allowed=allowed)
-    rng, drawn = np.random.default_rng(seed), list[Array]()
-    for name, number in random.items():
-        draw = shaped_like(number) if isinstance(number, FuzzyNumber) else number
-        values = np.asarray(draw(rng, samples), float)
-        is_sample = values.shape == (samples,) and bool(np.isfinite(values).all())
-        what, allowed = values.shape, f"{samples} finite numbers"
-        require(is_sample, f"values of {name}", value=what, allowed=allowed)
-        drawn.append(values)
-    draws = np.column_stack(drawn) if drawn else np.zeros((1, 0))
+    shared = ", ".join(sorted(set(inputs) & set(random)))
+    require(not shared, "random", value=shared, allowed="inputs that are not fuzzy too")
+    draws = _random_draws(random, samples, seed)
+
+    # Without fuzzy inputs, one parameter with its own value gives a box of one point.
     crisp = {name: Crisp(x) for name, x in model.parameters.items() if name not in random}
-    cuts = boxes(inputs or dict([*crisp.items()][:1]), alpha)  # which has one point
+    cuts = boxes(inputs or dict([*crisp.items()][:1]), alpha)
     flow = make_flow(model, (*cuts.names, *random), duration, step)
     points_of_levels = [_points_of_cut(cuts, level) for level in range(len(cuts.alpha))]
+    level_of_points = np.repeat(np.arange(len(cuts.alpha)), [len(x) for x in points_of_levels])
     points = np.concatenate(points_of_levels)
-    # errors between nodes and of time steps, from a few of the motions
-    looked_at = points_of_levels[0][:: -(-len(points_of_levels[0]) // LOOKED_AT)]
-    few = np.array([[*point, *draw] for point in looked_at for draw in draws[:LOOKED_AT]])
-    between = node_deviation(flow, few)
-    step_error = MARGIN * np.maximum.accumulate(flow.deviations(few)[1].max(0), axis=0)
-    columns = [[*map(str, model.outputs)].index(x) for x in named]
-    step_error, between = step_error.T[columns], between.T[columns]  # (limits, T)
-    ratios = []  # of peaks to limits: lower and upper bound at nodes, upper bound within steps
-    for count, point in enumerate(points, start=1):
-        values = flow.values(np.hstack([np.tile(point, (len(draws), 1)), draws]))
-        size = np.abs(np.moveaxis(values, 2, 0)[columns]).swapaxes(0, 1)  # (draws, limits, T)
-        low, high = np.maximum(size - step_error, 0.0), size + step_error
-        ratios.append([x.max(-1) / sizes for x in (low, high, within_steps(high, between))])
-        if progress:
-            progress(count / len(points))
-    by_limit = np.moveaxis(np.array(ratios), (3, 1), (0, 1))  # (limits, bounds, points, draws)
-    level = np.repeat(np.arange(len(cuts.alpha)), [len(x) for x in points_of_levels])
-    has_random, events = bool(random), dict[str, LimitProbability]()
-    for (name, limit), ratio in zip(named.items(), by_limit, strict=True):
-        bounds = _bounds_of_event(ratio, level, limit.number, has_random=has_random)
-        unit = model.unit_of(limit.output)
-        events[name] = LimitProbability(**facts_of(limit, unit), **bounds)
+
+    # 4 points of the lowest level with 4 draws each show the errors of the time steps (tuned).
+    some_points = points_of_levels[0][:: -(-len(points_of_levels[0]) // 4)]
+    some_inputs = np.array([[*point, *draw] for point in some_points for draw in draws[:4]])
+    columns = [[*map(str, model.outputs)].index(name) for name in named]
+    ratios = _peak_ratios(
+        flow,
+        points,
+        draws,
+        between=node_deviation(flow, some_inputs).T[columns],
+        step_error=_step_error(flow, some_inputs).T[columns],
+        columns=columns,
+        limits=np.array([limit.number for limit in named.values()]),
+        progress=progress,
+    )
+
+    events = {}
+    for k, (name, limit) in enumerate(named.items()):
+        about = LimitResult(**limit_fields(limit, model.unit_of(limit.output)))
+        of_limit = PeakRatios(*(bound[:, :, k] for bound in ratios))
+        events[name] = _limit_probability(about, of_limit, level_of_points, is_random=bool(random))
     if len(named) > 1:
-        bounds = _bounds_of_event(by_limit.max(0), level, 1.0, has_random=has_random)
-        events[ANY] = LimitProbability(output=ANY, is_event=True, **bounds)
+        about = LimitResult(output=ANY, is_event=True)
+        of_any = PeakRatios(*(bound.max(axis=2) for bound in ratios))
+        events[ANY] = _limit_probability(about, of_any, level_of_points, is_random=bool(random))
     return Probability(
         encloses=enclosed_set(inputs.values()),
         alpha=np.asarray(cuts.alpha),
@@ -240,8 +241,32 @@ def probability(
     )
 
 
+def _random_draws(random: Mapping[str, FuzzyNumber | Sampler], samples: int, seed: int) -> Array:
+    """Return independent draws of all random parameters, shape (samples, parameters).
+
+    Without random parameters there is one draw of no parameters, shape (1, 0).
+
+    Raises:
+        RefusedError: A parameter does not give `samples` finite values.
+    """
+    rng = np.random.default_rng(seed)
+    columns = []
+    for name, number in random.items():
+        draw = shaped_like(number) if isinstance(number, FuzzyNumber) else number
+        values = np.asarray(draw(rng, samples), float)
+        is_sample = values.shape == (samples,) and bool(np.isfinite(values).all())
+        allowed = f"{samples} finite numbers"
+        require(is_sample, f"values of {name}", value=values.shape, allowed=allowed)
+        columns.append(values)
+    return np.column_stack(columns) if columns else np.zeros((1, 0))
+
+
 def shaped_like(number: FuzzyNumber) -> Sampler:
-    """Return a function (generator, count) that draws values with a density like the membership."""
+    """Return a sampler whose probability density is proportional to a membership function.
+
+    The cumulative integral of the membership function is inverted by linear interpolation on a fine
+    grid.
+    """
     grid = np.unique(np.concatenate([np.linspace(*number.support, 4001), *number.cuts[1:]]))
     membership = number.membership(grid)
     areas = np.diff(grid) * (membership[1:] + membership[:-1]) / 2
@@ -254,50 +279,136 @@ def shaped_like(number: FuzzyNumber) -> Sampler:
 
 
 def _points_of_cut(cuts: Boxes, level: int) -> Array:
-    """Return corners of an α-cut and points inside it, shape (S, d), in SI units."""
+    """Return corners of an α-cut and points inside, shape (points, inputs), in SI units."""
     lower, upper = cuts.unit_ends(level)
     if not (upper > lower).any():
-        return cuts.nominal[None]
-    inner = (lower + upper) / 2 + (upper - lower) / 2 * chebyshev_points(len(lower), SPREAD)
-    ends = corners(lower, upper) if len(lower) <= MAX_CORNER_INPUTS else inner[:0]
-    return np.asarray(cuts.to_physical(np.vstack([ends, inner])))
+        return cuts.nominal[np.newaxis]
+    # 64 points inside, and all corners of up to 8 inputs (tuned: the time is in proportion).
+    inner = (lower + upper) / 2 + (upper - lower) / 2 * chebyshev_points(len(lower), 64)
+    if len(lower) <= 8:
+        inner = np.vstack([corners(lower, upper), inner])
+    return np.asarray(cuts.to_physical(inner))
 
 
-def _bounds_of_event(
-    event: Array, level: Array, limit: float, *, has_random: bool
-) -> dict[str, Any]:
-    """Return the bounds of `LimitProbability` that a ratio of peak to limit exceeds 1, by name."""
-    # bounds of the ratios, shape (points, draws): lower and upper ones at nodes, upper within steps
-    low_ratio, ratio, ratio_within_steps = event
-    # the last limit is the one in question, a ratio of 1
-    limits = np.append(np.linspace(0.95 * low_ratio.min(), 1.05 * ratio.max(), LIMITS), 1.0)
-    low = _bounds_over_points(_fractions_above(low_ratio, limits), level).lower
-    least, high = _bounds_over_points(_fractions_above(ratio, limits), level)
-    larger = _bounds_over_points(_fractions_above(ratio_within_steps, np.ones(1)), level)
-    interval = Ends(least[:, -1], high[:, -1])
-    if has_random:
-        tail = (1 - CONFIDENCE) / (2 * len(level))  # of either side at one point (Bonferroni)
-        surely, possibly = ((x > 1).sum(axis=1) for x in (low_ratio, ratio_within_steps))
-        ends = clopper_pearson(surely, possibly, ratio.shape[1], tail)
-        of_level = [_bounds_over_points(end, level) for end in ends]
-        interval = Ends(of_level[0].lower, of_level[1].upper)
-    error = np.maximum(larger.lower[:, 0] - least[:, -1], larger.upper[:, 0] - high[:, -1])
-    return {
-        "lower": low[:, -1],
-        "upper": high[:, -1],
-        "error": error,
-        "interval": interval,
-        "curve": Curve(limits[:-1] * limit, low[:, :-1], high[:, :-1]),
-    }
+def _step_error(flow: Flow, points: Array) -> Array:
+    """Return the estimated error of the time steps up to each time node, shape (times, outputs).
+
+    Args:
+        flow: Response as a function of all inputs.
+        points: Inputs whose responses are compared with more accurate ones, shape (points, inputs).
+    """
+    errors = flow.deviations(points)[1].max(axis=0)
+    return np.asarray(MARGIN * np.maximum.accumulate(errors, axis=0))
+
+
+class PeakRatios(NamedTuple):
+    """Bounds of the ratios of peaks to limits.
+
+    Args:
+        lower: Lower bounds of the peaks at the time nodes, shape (points, draws), or (points,
+            draws, limits) for several limits.
+        upper: Upper bounds of the peaks at the time nodes, same shape.
+        within_steps: Upper bounds of the peaks at all times, same shape.
+    """
+
+    lower: Array
+    upper: Array
+    within_steps: Array
+
+
+def _peak_ratios(
+    flow: Flow,
+    points: Array,
+    draws: Array,
+    *,
+    between: Array,
+    step_error: Array,
+    columns: Sequence[int],
+    limits: Array,
+    progress: Progress | None,
+) -> PeakRatios:
+    """Return the ratios of peaks to limits at all fuzzy points with all draws.
+
+    Args:
+        flow: Response as a function of the fuzzy and then the random inputs.
+        points: Fuzzy points, shape (points, fuzzy inputs).
+        draws: Draws, shape (draws, random inputs).
+        between: What outputs may add within the step to each node, shape (limits, times).
+        step_error: Error of outputs at the nodes, shape (limits, times).
+        columns: Indices of the limited outputs.
+        limits: Limits, shape (limits,).
+        progress: Called with the completed fraction.
+    """
+    of_points = []
+    for count, point in enumerate(points, start=1):
+        inputs = np.hstack([np.tile(point, (len(draws), 1)), draws])
+        magnitudes = np.abs(flow.values(inputs)[:, :, columns]).swapaxes(1, 2)
+        low = np.maximum(magnitudes - step_error, 0.0)  # (draws, limits, times)
+        high = magnitudes + step_error
+        bounds = (low, high, within_steps(high, between))
+        of_points.append([bound.max(axis=-1) / limits for bound in bounds])
+        if progress:
+            progress(count / len(points))
+    return PeakRatios(*np.moveaxis(np.array(of_points), 1, 0))
+
+
+def _limit_probability(
+    about: LimitResult, ratios: PeakRatios, level: Ints, *, is_random: bool
+) -> LimitProbability:
+    """Return the bounds of the probability that a ratio of peak to limit exceeds 1.
+
+    Args:
+        about: The limit or event.
+        ratios: Ratios of peaks to the limit, shape (points, draws) each.
+        level: Index of the level to which each fuzzy point belongs, shape (points,).
+        is_random: Whether there are random inputs.
+    """
+    # The bounds are computed for 201 further limits, and for the limit itself, a ratio of 1.
+    smallest, largest = ratios.lower.min(), ratios.upper.max()
+    limits = np.append(np.linspace(0.95 * smallest, 1.05 * largest, 201), 1.0)
+    low = _bounds_over_points(_fractions_above(ratios.lower, limits), level).lower
+    at_nodes = _bounds_over_points(_fractions_above(ratios.upper, limits), level)
+    lower_at_nodes, high = at_nodes.lower[:, -1], at_nodes.upper
+    fractions = _fractions_above(ratios.within_steps, np.ones(1))
+    within_steps = _bounds_over_points(fractions, level)
+    added = (
+        within_steps.lower[:, 0] - lower_at_nodes,
+        within_steps.upper[:, 0] - high[:, -1],
+    )
+    interval = Ends(lower_at_nodes, high[:, -1])
+    if is_random:
+        # Either limit at each point is missed with this probability; by the inequality of
+        # Bonferroni all of them hold with the probability `CONFIDENCE`.
+        tail = (1 - CONFIDENCE) / (2 * len(level))
+        surely = (ratios.lower > 1).sum(axis=1)
+        possibly = (ratios.within_steps > 1).sum(axis=1)
+        of_points = clopper_pearson(surely, possibly, ratios.upper.shape[1], tail)
+        interval = Ends(
+            _bounds_over_points(of_points.lower, level).lower,
+            _bounds_over_points(of_points.upper, level).upper,
+        )
+    return LimitProbability(
+        **vars(about),
+        lower=low[:, -1],
+        upper=high[:, -1],
+        error=np.maximum(*added),
+        interval=interval,
+        curve=Curve(limits[:-1] * about.limit, low[:, :-1], high[:, :-1]),
+    )
 
 
 def clopper_pearson(least: Array, most: Array, total: int, tail: float) -> Ends:
-    """Return exact limits of a probability from counts of events in independent draws.
+    """Return exact confidence limits of a probability from counts in independent draws.
 
-    Of `total` draws `least` are events for sure and `most` may be, of one shape; each limit may be
-    passed with probability `tail` (Clopper, Pearson 1934).
+    See Clopper and Pearson, Biometrika 26, 404 (1934).
+
+    Args:
+        least: Number of draws in which the event occurs for sure.
+        most: Number of draws in which it may occur, same shape.
+        total: Number of draws.
+        tail: Probability with which each limit may be missed.
     """
-    from scipy.special import betaincinv  # which takes time to import
+    from scipy.special import betaincinv  # takes time to import
 
     lower = betaincinv(np.maximum(least, 1), total - least + 1, tail)
     upper = betaincinv(most + 1, np.maximum(total - most, 1), 1 - tail)
@@ -305,12 +416,27 @@ def clopper_pearson(least: Array, most: Array, total: int, tail: float) -> Ends:
 
 
 def _fractions_above(peaks: Array, limits: Array) -> Array:
-    """Return the fraction of peaks (points, draws) above each limit (L,), shape (points, L)."""
+    """Return the fraction of peaks above each limit at each point, shape (points, limits).
+
+    Args:
+        peaks: Peaks, shape (points, draws).
+        limits: Limits, shape (limits,).
+    """
     rows = np.sort(peaks, axis=1)
     return np.array([1 - np.searchsorted(x, limits, side="right") / len(x) for x in rows])
 
 
-def _bounds_over_points(values: Array, level: Array) -> Ends:
-    """Return least and greatest values (A, …) over the points (points, …) of a level and higher."""
+def _bounds_over_points(values: Array, level: Ints) -> Ends:
+    """Return the smallest and largest value over the points of each level and all higher ones.
+
+    Args:
+        values: Values, shape (points, …).
+        level: Index of the level of each point, shape (points,).
+
+    Returns:
+        Both bounds, shape (levels, …).
+    """
     by_level = [values[level >= k] for k in range(level.max() + 1)]
-    return Ends(np.array([x.min(0) for x in by_level]), np.array([x.max(0) for x in by_level]))
+    return Ends(
+        np.array([x.min(axis=0) for x in by_level]), np.array([x.max(axis=0) for x in by_level])
+    )

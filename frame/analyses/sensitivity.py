@@ -1,7 +1,8 @@
-"""Sensitivity: by how much the width of a peak shrinks when one input alone is fixed.
+"""Sensitivity: by how much the width of a peak shrinks if one input alone is fixed.
 
-The width is that between the greatest and the least peak that steepest ascents over the ends and
-the nominal values of the inputs reach. Exact motions reach both, which needs no proof.
+The width is the distance between the largest and the smallest peak that steepest ascents over the
+ends and the nominal values of the inputs attain. Exact responses attain both, so that no proof is
+needed.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.base.number_text import Table, percent_text
-from alphacut.frame.analyses.answer import Answer, Record
+from alphacut.frame.analyses.answer import Answer, Record, table_of
 from alphacut.frame.dynamics.flow import Flow
 from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.structures.model import StructureModel
@@ -25,35 +26,41 @@ from alphacut.fuzzy.result import Nature
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Sensitivity(Answer):
-    """Fraction of the width of each result, such as "the peak of q2", by which an input widens it.
+    """Fraction of the width of results that is lost if an input is fixed.
 
-    The effects of inputs overlap, so that the fractions need not add up to 1.
+    The effects of the inputs overlap, so that the fractions need not add up to 1.
+
+    Args:
+        shares: Fraction of the width by result, such as "the peak of q2", and by input.
     """
 
     key = "shares"
     title = "What drives the width?"
     shares: dict[str, dict[str, float]]
 
-    def _rows(self) -> list[tuple[str, str, float]]:
-        """Return result, input and fraction, those of a result with the largest first."""
-        rows = []
-        for result, values in self.shares.items():
-            ordered = sorted(values.items(), key=lambda pair: -pair[1])
-            rows += [(result, name, share) for name, share in ordered]
-        return rows
-
     def table(self) -> Table:
-        """Return a row for each result and input."""
-        head = ("fixing", "narrows", "nature", "by")
-        rows = [(x, what, Nature.ATTAINED, percent_text(y)) for what, x, y in self._rows()]
-        return Table(head, [tuple(map(str, row)) for row in rows])
+        """Return a row for each result and input, with the largest fraction of a result first."""
+        rows = [
+            {
+                "fixing": str(row["input"]),
+                "narrows": str(row["width of"]),
+                "nature": str(Nature.ATTAINED),
+                "by": percent_text(self.shares[str(row["width of"])][str(row["input"])]),
+            }
+            for row in self.records()
+        ]
+        return table_of(rows)
 
     def records(self) -> list[Record]:
-        """Return a row for each result and input."""
-        return [{"width of": what, "input": x, "share": y} for what, x, y in self._rows()]
+        """Return a row for each result and input, with the largest fraction of a result first."""
+        rows: list[Record] = []
+        for result, fractions in self.shares.items():
+            for name in sorted(fractions, key=lambda name: -fractions[name]):
+                rows.append({"width of": result, "input": name, "share": fractions[name]})
+        return rows
 
     def words(self) -> str:
-        """Return what the fractions are."""
+        """Return a sentence that defines the fractions."""
         return (
             "Share of the width, of peaks between those that motions reach, that is lost when an"
             " input is fixed at its nominal value."
@@ -73,52 +80,61 @@ def sensitivity(
     """Return by how much each input widens the peak of each output on one level.
 
     Args:
-        model: The structure, whose outputs are looked at.
-        inputs: Fuzzy parameters by name, in SI units; two or more.
-        duration: Length of the motions, in s.
-        step: Distance of the nodes at which peaks are read, in s.
-        level: α of the cuts.
-        groups: Inputs that are fixed together, by the name of their group; each one by itself if
-            not given.
-        reached_at: Inputs by name at which the peak of an output is known to be large, by output:
-            where its search begins. It begins at the nominal values if not given.
+        model: The structure with the outputs of interest.
+        inputs: Two or more fuzzy parameters by name, in SI units.
+        duration: Length of the responses, in s.
+        step: Distance of the time nodes at which peaks are read, in s.
+        level: Level α of the cuts.
+        groups: Inputs that are fixed together, by the name of their group; by default each input is
+            a group.
+        reached_at: By output, inputs at which the peak of the output is known to be large. The
+            search begins there, or at the nominal values where nothing is given.
     """
-    outputs, known = [*map(str, model.outputs)], reached_at or {}
+    outputs = [*map(str, model.outputs)]
     flow = make_flow(model, tuple(inputs), duration, step)
-    greatest = np.array(
-        [[known.get(x, {}).get(y, number.nominal) for y, number in inputs.items()] for x in outputs]
-    )
-    found: list[Array] = []  # points of greatest and least peaks with all inputs fuzzy, (2, m, n)
+    start = np.empty((len(outputs), len(inputs)))
+    for row, output in zip(start, outputs, strict=True):
+        known = (reached_at or {}).get(output, {})
+        row[:] = [known.get(name, number.nominal) for name, number in inputs.items()]
+    # Inputs of the largest and the smallest peak of each output when all inputs are fuzzy, shape
+    # (2, outputs, inputs); filled by the first call of `bounds`.
+    found: list[Array] = []
 
     def bounds(numbers: Mapping[str, FuzzyNumber]) -> tuple[Array, Array]:
-        """Return the least and the greatest peak of each output, shape (outputs,) each."""
-        ends = np.array([x.cut(level) for x in numbers.values()], float)
-        values: Array = np.column_stack([ends, [x.nominal for x in numbers.values()]])
-        opposite = values[:, 0] + values[:, 1] - greatest
-        # with a group fixed: what was found with all inputs, moved to the group's nominal values
-        starts: Array = np.clip(found or [greatest, opposite], values[:, 0], values[:, 1])
-        reached: list[list[Reached]] = []
-        for side, sign in enumerate((1.0, -1.0)):
-            ascents = [
-                _steepest_ascent(flow, values, starts[side, k], output=k, sign=sign)
-                for k in range(len(outputs))
-            ]
-            reached.append(ascents)
-        if not found:
-            found.extend(np.array([x.point for x in row]) for row in reached)
-        largest, smallest = (np.array([x.peak for x in row]) for row in reached)
-        return smallest, largest
+        """Return the smallest and the largest peak of each output, shape (outputs,) each.
 
-    shares = width_shares(bounds, inputs, groups=groups)
+        `width_shares` calls this first with all inputs fuzzy, and then with one group fixed.
+        """
+        ends = np.array([number.cut(level) for number in numbers.values()], float)
+        nominal = [number.nominal for number in numbers.values()]
+        values: Array = np.column_stack([ends, nominal])
+        # The search of a largest peak begins at `start`, that of a smallest peak at the opposite
+        # point of the box. With a group fixed, both begin where they ended with all inputs, moved
+        # to the nominal values of the group.
+        opposite = ends.sum(axis=1) - start
+        starts: Array = np.clip(found or [start, opposite], ends[:, 0], ends[:, 1])
+        largest = [
+            _steepest_ascent(flow, values, point, output=k, sign=1.0)
+            for k, point in enumerate(starts[0])
+        ]
+        smallest = [
+            _steepest_ascent(flow, values, point, output=k, sign=-1.0)
+            for k, point in enumerate(starts[1])
+        ]
+        if not found:
+            found.extend(np.array([x.point for x in side]) for side in (largest, smallest))
+        return np.array([x.peak for x in smallest]), np.array([x.peak for x in largest])
+
+    fractions = width_shares(bounds, inputs, groups=groups)
     by_output = {}
     for k, output in enumerate(outputs):
-        column = map(float, shares.share[:, k])
-        by_output[f"the peak of {output}"] = dict(zip(shares.names, column, strict=True))
+        column = map(float, fractions.share[:, k])
+        by_output[f"the peak of {output}"] = dict(zip(fractions.names, column, strict=True))
     return Sensitivity(by_output)
 
 
-class Reached(NamedTuple):
-    """A peak, and the inputs (n,) of the motion that has it."""
+class AttainedPeak(NamedTuple):
+    """A peak, and the inputs of the response that has it, shape (inputs,)."""
 
     peak: float
     point: Array
@@ -126,18 +142,25 @@ class Reached(NamedTuple):
 
 def _steepest_ascent(
     flow: Flow, values: Array, point: Array, *, output: int, sign: float
-) -> Reached:
-    """Return the largest `sign` times the peak of an output that steepest ascent reaches.
+) -> AttainedPeak:
+    """Return the largest or smallest peak of an output that steepest ascent finds.
 
-    Each step moves one input to one of its `values` (inputs, 3); it begins at `point` (inputs,).
+    Each step changes one input to that of its values which raises or lowers the peak most.
+
+    Args:
+        flow: Response as a function of the inputs.
+        values: Values that an input may take: ends and nominal value, shape (inputs, 3).
+        point: Inputs at which the search begins, shape (inputs,).
+        output: Index of the output.
+        sign: 1 for the largest peak, -1 for the smallest peak.
     """
-    n_inputs, best = len(values), -np.inf
+    best = -np.inf
     while True:
         tried = np.tile(point, (1 + values.size, 1))
-        for k in range(n_inputs):
+        for k in range(len(values)):
             tried[1 + 3 * k : 4 + 3 * k, k] = values[k]
         tried = np.unique(tried, axis=0)
-        peaks = sign * np.abs(flow.values(tried)[..., output]).max(1)
+        peaks = sign * np.abs(flow.values(tried)[..., output]).max(axis=1)
         if peaks.max() <= best:
-            return Reached(sign * best, point)
+            return AttainedPeak(sign * best, point)
         best, point = float(peaks.max()), tried[peaks.argmax()]

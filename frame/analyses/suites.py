@@ -1,12 +1,12 @@
-"""Peaks over a suite of records of the ground, each of which moves the structure by itself."""
+"""Peaks over a suite of ground motion records, each of which moves the structure by itself."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice, product
 from math import ceil, pi
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, require, require_choice
 from alphacut.base.number_text import Table, engineering, percent_text, range_text
 from alphacut.base.progress_bar import Progress, subprogress
-from alphacut.frame.analyses.answer import Answer, Record, known
+from alphacut.frame.analyses.answer import Answer, Record, known, table_of
 from alphacut.frame.analyses.peaks import Peak, Peaks, close_peaks, mirrored
 from alphacut.frame.analyses.spectral import spectral_acceleration
 from alphacut.frame.boxes import ALPHA, boxes
@@ -27,61 +27,61 @@ from alphacut.frame.structures.quantities import output_of
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.result import Nature
 
-FREE_PERIODS = 5
-"""Natural periods of free motion after a record: by then 5 % damping leaves a fifth."""
-MAX_PERIOD = 1000.0
-"""Longest first natural period, in s; towers have 10 s, and a longer one is a mistake in a unit."""
-MAX_CORNERS = 64
-"""Corners of each cut whose means over records are computed; more take time, none is a bound."""
 NODES = 2
-"""Nodes in a step at which peaks are bounded; the error between nodes falls with its square."""
-MAX_OFFSET = 0.01
-"""Mean of a record over its peak that is said."""
-QUANTILES = {"median": 0.5, "84 %": 0.84}
-"""Of a suite's peaks; 84 % is one standard deviation of a normal law above the mean."""
+"""Time nodes in each step at which peaks are bounded (tuned: the error between the nodes falls with
+the square of this number, and the time rises in proportion to it)."""
 MEASURES = {"PGA": "m/s^2", "Sa(T1)": "m/s^2", "scale": ""}
 """SI units of the intensity measures of a record, by their names."""
 
 
 class NominalMode(NamedTuple):
-    """First mode at the nominal inputs: its period T1 in s, and damping ratio."""
+    """First mode of a structure at the nominal inputs: its period T1, in s, and damping ratio."""
 
     period: float
     ratio: float
 
 
 def nominal_mode(model: StructureModel) -> NominalMode:
-    """Return the first mode of a linear structure; RefusedError of another one."""
+    """Return the first mode of a structure at its nominal parameters.
+
+    Raises:
+        RefusedError: The structure is not linear.
+    """
     if not has_matrices(model):
         what = "with a system that is not linear"
         raise RefusedError("records", what, "linear structures")
     omega, ratios = modal_damping_ratios(model)
-    return NominalMode(2 * pi / float(omega[0]), float(ratios[0]))
+    return NominalMode(period=2 * pi / float(omega[0]), ratio=float(ratios[0]))
 
 
 @dataclass(frozen=True, eq=False)
 class RecordPeaks:
-    """Peaks under a record.
+    """Peaks of a structure under a record, with facts about the record.
 
     Args:
-        duration_s: Length of the motion.
-        cut_share: Fraction of the record's Arias intensity that lies after the motion's end.
-        measures: Intensity measures of the record: "PGA" and "Sa(T1)" in m/s², the latter the
-            pseudo-acceleration with the structure's own damping; and "scale", 1.
+        duration_s: Length of the response, in s.
+        truncated_fraction: Fraction of the Arias intensity of the record that lies after the end of
+            the response.
+        measures: Intensity measures of the scaled record: "PGA" and "Sa(T1)" in m/s², the latter
+            the pseudo-acceleration with the structure's own damping; and "scale", which is 1.
         peak: Peaks by name; empty before they are computed.
     """
 
     duration_s: float
-    cut_share: float
+    truncated_fraction: float
     measures: dict[str, float]
     peak: dict[str, Peak]
 
 
 @dataclass(frozen=True, eq=False)
 class ScaledRecord:
-    """A record as it moves the structure: scaled, with the facts about its motion.
+    """A record as it moves a structure.
 
-    `warnings` are sentences on what is unusual in it.
+    Args:
+        name: Name of the record.
+        ground: The scaled accelerogram.
+        facts: Length of the response and intensity measures, without peaks.
+        warnings: Sentences on what is unusual in the record.
     """
 
     name: str
@@ -91,7 +91,7 @@ class ScaledRecord:
 
     @property
     def duration(self) -> float:
-        """Length of the motion, in s."""
+        """Length of the response, in s."""
         return self.facts.duration_s
 
     @property
@@ -112,48 +112,64 @@ def scaled_records(
     """Return the records of a suite as they move a structure.
 
     Args:
-        model: The structure, whose first mode at its nominal values gives the measure "Sa(T1)".
-        suite: Records, corrected already.
-        duration: Longest motion, in s; a motion ends five natural periods after its record.
-        step: Distance of the nodes, in s.
-        scale: Factor of every record; with `measure` the value that its measure gets, in m/s².
-        measure: "PGA" or "Sa(T1)"; empty for a factor.
+        model: The structure. Its first mode at the nominal parameters determines "Sa(T1)".
+        suite: Records after baseline correction.
+        duration: Longest response, in s; a response ends five natural periods after its record.
+        step: Distance of the time nodes, in s.
+        scale: Factor of every record, or the value in m/s² to which `measure` is scaled.
+        measure: "PGA" or "Sa(T1)"; empty if `scale` is a factor.
 
     Raises:
         RefusedError: A record is zero throughout, or the structure is not linear.
     """
     require_choice("measure", measure, ["", "PGA", "Sa(T1)"])
-    mode, scaled = nominal_mode(model), list[ScaledRecord]()
+    mode = nominal_mode(model)
+    # Towers have periods of about 10 s. A longer one than 1000 s is a mistake in a unit.
     what = f"a first natural period of {mode.period:.4g} s"
     cure = "are the units of mass and stiffness right, as t and MN/m?"
-    allowed = f"periods up to {MAX_PERIOD:g} s"
-    require(mode.period <= MAX_PERIOD, "structure", what, allowed, cure)
+    require(mode.period <= 1000, "structure", what, "periods up to 1000 s", cure)
+    scaled = []
     for number, record in enumerate(suite, start=1):
         name = record.name or f"record {number}"
         response = spectral_acceleration(record, mode.period, min(mode.ratio, 0.999))
-        sizes = {"PGA": record.extremes[0], "Sa(T1)": response}
-        is_moving, allowed = min(sizes.values()) > 0, "a record that moves something"
+        measures = {"PGA": record.extremes[0], "Sa(T1)": response}
+        is_moving, allowed = min(measures.values()) > 0, "a record that moves something"
         require(is_moving, f"record {name}", value="zero throughout", allowed=allowed)
-        factor = scale / sizes.get(measure, 1.0)
-        length = (len(record.samples) - 1) * record.step
-        longest = min(duration, length + FREE_PERIODS * mode.period)
-        end_time = max(1, ceil(longest / step - 1e-9)) * step
-        intensity = arias_fractions(record.samples, record.step)
-        end = min(int(longest / record.step + 1e-9), len(intensity) - 1)
-        cut_share = 0.0 if longest >= length else float(1 - intensity[end])
-        offset = float(record.samples.mean()) / record.extremes[0]
-        warnings = [f"of record {name} {remark}" for remark in record.remarks]
-        if abs(offset) > MAX_OFFSET:
-            what = f"the mean of record {name} is {percent_text(offset)} of its peak"
-            warnings.append(f'{what}; records.baseline = "mean" subtracts it')
-        if cut_share > 0:
-            what = f"{cut_share:.1%} of the Arias intensity of record {name}"
-            warnings.append(f"{what} lies after the end of its motion, {end_time:g} s")
-        measures = {x: factor * size for x, size in sizes.items()} | {"scale": 1.0}
+
+        # The free vibration after the record is included for five natural periods, in which a
+        # damping ratio of 5 % reduces it to a fifth. The small number allows for rounding.
+        record_length = (len(record.samples) - 1) * record.step
+        length = min(duration, record_length + 5 * mode.period)
+        n_steps = max(1, ceil(length / step - 1e-9))
+        truncated_fraction = 0.0
+        if length < record_length:
+            intensity = arias_fractions(record.samples, record.step)
+            truncated_fraction = 1 - float(intensity[int(length / record.step + 1e-9)])
+
+        factor = scale / measures.get(measure, 1.0)
+        scaled_measures = {title: factor * value for title, value in measures.items()}
+        facts = RecordPeaks(
+            duration_s=n_steps * step,
+            truncated_fraction=truncated_fraction,
+            measures=scaled_measures | {"scale": 1.0},
+            peak={},
+        )
         ground = Accelerogram(record.step, factor * record.samples, name=name)
-        facts = RecordPeaks(end_time, cut_share, measures, {})
-        scaled.append(ScaledRecord(name, ground, facts, tuple(warnings)))
+        scaled.append(ScaledRecord(name, ground, facts, _warnings(name, record, facts)))
     return tuple(scaled)
+
+
+def _warnings(name: str, record: Accelerogram, facts: RecordPeaks) -> tuple[str, ...]:
+    """Return sentences on what is unusual in a record, as it was before scaling."""
+    warnings = [f"of record {name} {remark}" for remark in record.remarks]
+    mean_fraction = float(record.samples.mean()) / record.extremes[0]
+    if abs(mean_fraction) > 0.01:
+        what = f"the mean of record {name} is {percent_text(mean_fraction)} of its peak"
+        warnings.append(f'{what}; records.baseline = "mean" subtracts it')
+    if facts.truncated_fraction > 0:
+        what = f"{facts.truncated_fraction:.1%} of the Arias intensity of record {name}"
+        warnings.append(f"{what} lies after the end of its motion, {facts.duration_s:g} s")
+    return tuple(warnings)
 
 
 def record_peaks(
@@ -166,9 +182,16 @@ def record_peaks(
     alpha: Sequence[float],
     progress: Progress | bool | None = None,
 ) -> dict[str, Peak]:
-    """Return the peaks of a structure under a record, by the names of the peaks."""
-    times: dict[str, Any] = {"duration": record.duration, "step": step / NODES, "alpha": alpha}
-    return close_peaks(model.moved_by(record.ground), inputs, names, **times, progress=progress)
+    """Return the peaks with given names of a structure under a record, see `close_peaks`."""
+    return close_peaks(
+        model.moved_by(record.ground),
+        inputs,
+        names,
+        duration=record.duration,
+        step=step / NODES,
+        alpha=alpha,
+        progress=progress,
+    )
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -176,16 +199,16 @@ class SuitePeaks(Answer):
     """Peaks over a suite of records.
 
     Args:
-        period_s: T1 at the nominal values.
-        damping_ratio: Damping ratio of that mode.
-        alpha: Levels, shape (A,).
-        by_record: Measures and peaks of each record, by its name.
-        statistics: Mean and quantiles over the records of the bounds farthest out of their peaks,
-            by peak and statistic, shape (A,) each.
+        period_s: First natural period T1 at the nominal inputs, in s.
+        damping_ratio: Damping ratio of the first mode.
+        alpha: Levels, shape (levels,).
+        by_record: Intensity measures and peaks of each record by its name.
+        statistics: Mean and quantiles over the records of the guaranteed bounds of their peaks, by
+            peak and statistic, shape (levels,) each.
         units: SI units of the outputs.
-        peak: Bounds of the largest peak over the records, by name; and "mean q3" …, of the mean of
-            one structure's peaks.
-        farthest_record: Record under which each of the largest peaks is reached.
+        peak: Bounds of the largest peak over the records by name, and, with names such as "mean
+            q3", bounds of the mean over the records of the peaks of one structure.
+        farthest_record: Record under which each of the largest peaks is attained.
     """
 
     key = "records"
@@ -200,44 +223,55 @@ class SuitePeaks(Answer):
     farthest_record: dict[str, str]
 
     def table(self) -> Table:
-        """Return a row for each of the largest peaks over the records, then for each mean."""
-        head = ("peak of", f"at α = {self.alpha[0]:g}", "nature", "reached", "record")
-        rows: list[tuple[str, ...]] = []
+        """Return a row for each of the largest peaks over the records, and for each mean."""
+        rows = []
         for name, peak in self.peak.items():
             unit = self.units[output_of(name)]
-            low, high = float(peak.lower[0]), float(peak.upper[0])
-            range_words = f"{range_text(low, high, peak.nature)} {unit}".strip()
-            reached = "not known"
-            if np.isfinite(peak.reached[0]):
-                reached = engineering(float(peak.reached[0]), unit)
-            record = self.farthest_record.get(name, "")
-            rows.append((name, range_words, self.nature_text(peak.nature), reached, record))
-        return Table(head, rows)
+            ends = range_text(float(peak.lower[0]), float(peak.upper[0]), peak.nature)
+            attained = float(peak.reached[0])
+            row = {
+                "peak of": name,
+                f"at α = {self.alpha[0]:g}": f"{ends} {unit}".strip(),
+                "nature": self.nature_text(peak.nature),
+                "reached": engineering(attained, unit) if np.isfinite(attained) else "not known",
+                "record": self.farthest_record.get(name, ""),
+            }
+            rows.append(row)
+        return table_of(rows)
 
     def records(self) -> list[Record]:
-        """Return measures of each record and its peaks farthest out, then their statistics.
+        """Return a row for each record and peak, and for each peak and statistic.
 
-        All are those of the lowest level.
+        The peaks are the bounds that are farthest out on the lowest level.
         """
         rows: list[Record] = []
         for name, record in self.by_record.items():
-            sizes = {f"{x} [m/s^2]": record.measures[x] for x in ("PGA", "Sa(T1)")}
             for peak_name, peak in record.peak.items():
-                about: Record = {"output": peak_name, "unit": self.units[output_of(peak_name)]}
-                far: Record = {"farthest peak": known(peak.far_end[0])}
-                far |= {"peak reached": known(peak.reached[0])}
-                far["nature"] = self.nature_text(peak.nature)
-                rows.append({"record": name, **sizes, **about, **far})
-        for peak_name, statistics in self.statistics.items():
-            for name, bound in statistics.items():  # mean, median …
-                row = dict.fromkeys(rows[0])
-                row |= {"record": f"{name} of all", "output": peak_name}
-                row |= {"unit": self.units[output_of(peak_name)], "farthest peak": known(bound[0])}
+                row: Record = {
+                    "record": name,
+                    "PGA [m/s^2]": record.measures["PGA"],
+                    "Sa(T1) [m/s^2]": record.measures["Sa(T1)"],
+                    "output": peak_name,
+                    "unit": self.units[output_of(peak_name)],
+                    "farthest peak": known(peak.far_end[0]),
+                    "peak reached": known(peak.reached[0]),
+                    "nature": self.nature_text(peak.nature),
+                }
                 rows.append(row)
+        no_values = dict.fromkeys(rows[0])
+        for peak_name, statistics in self.statistics.items():
+            for statistic, bound in statistics.items():
+                row = {
+                    "record": f"{statistic} of all",
+                    "output": peak_name,
+                    "unit": self.units[output_of(peak_name)],
+                    "farthest peak": known(bound[0]),
+                }
+                rows.append(no_values | row)
         return rows
 
     def words(self) -> str:
-        """Return what the peaks are of."""
+        """Return sentences on what the peaks and the means belong to."""
         return (
             f"Peaks under {len(self.by_record)} records (T1 = {self.period_s:.4g} s,"
             f" ζ = {self.damping_ratio:.3g}, at the most plausible inputs). A mean is that of one"
@@ -258,31 +292,33 @@ def over_records(
     measure: str = "",
     progress: Progress | None = None,
 ) -> SuitePeaks:
-    """Return the peaks of a structure over a suite of records: of each, the worst and the mean.
+    """Return the peaks of a structure under each record of a suite, the largest and the mean.
 
     Args:
-        model: A linear structure, or a frame that yields; each record moves it in place of its own.
+        model: A linear structure, or a frame that yields. Each record replaces its own record.
         inputs: Fuzzy parameters by name, in SI units.
-        suite: Records, as of `read_suite`.
-        duration: Longest motion, in s; a motion ends five natural periods after its record.
-        step: Distance of the nodes, in s; peaks are bounded at `NODES` nodes in each.
+        suite: Records, see `read_suite`.
+        duration: Longest response, in s; a response ends five natural periods after its record.
+        step: Distance of the time nodes, in s; peaks are bounded at `NODES` nodes in each step.
         alpha: Levels.
-        names: Peaks, such as "drift1" or "max q3"; the magnitudes of all outputs unless given.
-        scale: Factor of every record; with `measure` the value that its measure gets, in m/s².
-        measure: "PGA" or "Sa(T1)"; empty for a factor.
+        names: Names of peaks, such as "drift1" or "max q3"; by default the magnitudes of all
+            outputs.
+        scale: Factor of every record, or the value in m/s² to which `measure` is scaled.
+        measure: "PGA" or "Sa(T1)"; empty if `scale` is a factor.
         progress: Called with the completed fraction.
 
     Raises:
         RefusedError: A record is zero throughout, or the structure is not linear.
     """
-    times: dict[str, Any] = {"duration": duration, "step": step}
-    records = scaled_records(model, suite, **times, scale=scale, measure=measure)
+    records = scaled_records(
+        model, suite, duration=duration, step=step, scale=scale, measure=measure
+    )
     names = tuple(names) or tuple(map(str, model.outputs))
-    found: dict[str, dict[str, Peak]] = {}
+    found = {}
     for k, record in enumerate(records):
-        tick = subprogress(progress, k / len(records), (k + 1) / len(records)) if progress else None
+        tick = subprogress(progress, k / len(records), (k + 1) / len(records))
         found[record.name] = record_peaks(
-            model, inputs, record, names, step=step, alpha=alpha, progress=tick or False
+            model, inputs, record, names, step=step, alpha=alpha, progress=tick
         )
     return summarised(model, inputs, records, found, step=step, alpha=alpha)
 
@@ -296,21 +332,30 @@ def summarised(
     step: float,
     alpha: Sequence[float],
 ) -> SuitePeaks:
-    """Return worst, mean and statistics over the records, from the peaks under each by its name."""
-    mode, worst = nominal_mode(model), worst_peaks(peaks)
-    encloses = next(iter(worst.values())).encloses
+    """Return the largest peaks, means and statistics over records.
+
+    The peaks under each record are given by the record's name and by the peak's name. The other
+    arguments are those of `over_records`.
+    """
+    largest = largest_peaks(peaks)
+    encloses = next(iter(largest.values())).encloses
     farthest: dict[str, str] = {}
-    for name in () if encloses else worst:
-        reached = {record: float(x[name].outwards.reached[0]) for record, x in peaks.items()}
-        farthest[name] = max(reached, key=reached.__getitem__)
-    statistics = {}
-    for name, peak in worst.items():
-        sign = -1.0 if peak.is_least else 1.0  # quantiles of least values are counted from above
+    statistics: dict[str, dict[str, Array]] = {}
+    for name, peak in largest.items():
+        if not encloses:
+            reached = {record: found[name].outwards.reached[0] for record, found in peaks.items()}
+            farthest[name] = max(reached, key=reached.__getitem__)
         bounds = np.stack([found[name].proved for found in peaks.values()])  # (records, levels)
-        statistics[name] = {"mean": bounds.mean(axis=0)}
-        for quantile, fraction in QUANTILES.items():
-            statistics[name][quantile] = sign * np.quantile(sign * bounds, fraction, axis=0)
+        # 84 % is one standard deviation of a normal distribution above the mean. The quantiles of
+        # smallest values are counted from above.
+        sign = -1.0 if peak.is_least else 1.0
+        statistics[name] = {
+            "mean": bounds.mean(axis=0),
+            "median": np.median(bounds, axis=0),
+            "84 %": sign * np.quantile(sign * bounds, 0.84, axis=0),
+        }
     means = mean_peaks(model, inputs, records, peaks, step=step, alpha=alpha)
+    mode = nominal_mode(model)
     return SuitePeaks(
         encloses=encloses,
         period_s=mode.period,
@@ -318,27 +363,37 @@ def summarised(
         alpha=np.array(alpha, float),
         by_record={x.name: replace(x.facts, peak=dict(peaks[x.name])) for x in records},
         statistics=statistics,
-        units={output_of(name): model.unit_of(output_of(name)) for name in worst},
-        peak={**worst, **means},
+        units={output_of(name): model.unit_of(output_of(name)) for name in largest},
+        peak=largest | means,
         farthest_record=farthest,
     )
 
 
-def worst_peaks(peaks: Mapping[str, Peaks]) -> dict[str, Peak]:
+def largest_peaks(peaks: Mapping[str, Peaks]) -> dict[str, Peak]:
     """Return bounds of the largest of a structure's peaks over all records, by the peak's name.
 
-    The largest peak rises with the peak under each record, so that its bounds are the largest ones.
+    The largest peak does not fall if the peak under some record rises. Its bounds are therefore the
+    largest of the bounds under the records.
+
+    Args:
+        peaks: Peaks by the record's name and by the peak's name.
     """
-    worst: dict[str, Peak] = {}
-    bounds = ("lower", "upper", "error", "reached", "least_lower", "least_upper")
+    largest: dict[str, Peak] = {}
     for name, first in next(iter(peaks.values())).items():
         of_records = [found[name].outwards for found in peaks.values()]
-        nature = Nature.weakest(peak.nature for peak in of_records)
-        largest = {x: np.max([getattr(peak, x) for peak in of_records], axis=0) for x in bounds}
         farthest = max(of_records, key=lambda peak: float(peak.reached[0]))
-        found = replace(farthest, nature=nature, **largest)
-        worst[name] = mirrored(found) if first.is_least else found
-    return worst
+        found = replace(
+            farthest,
+            nature=Nature.weakest(peak.nature for peak in of_records),
+            lower=np.max([peak.lower for peak in of_records], axis=0),
+            upper=np.max([peak.upper for peak in of_records], axis=0),
+            error=np.max([peak.error for peak in of_records], axis=0),
+            reached=np.max([peak.reached for peak in of_records], axis=0),
+            least_lower=np.max([peak.least_lower for peak in of_records], axis=0),
+            least_upper=np.max([peak.least_upper for peak in of_records], axis=0),
+        )
+        largest[name] = mirrored(found) if first.is_least else found
+    return largest
 
 
 def mean_peaks(
@@ -350,53 +405,60 @@ def mean_peaks(
     step: float,
     alpha: Sequence[float],
 ) -> dict[str, Peak]:
-    """Return bounds of the mean over the records of a structure's peaks: "mean q3" ….
+    """Return bounds of the mean over the records of a structure's peaks, as "mean q3" and so on.
 
-    The mean of each structure lies between the means of the least and of the greatest peaks. No
-    structure may reach the latter, as each record has its own worst one. What is reached is the
-    greatest mean of those tried: of the nominal structure and those at corners of each cut. Their
-    peaks are read at time nodes, so that the structure's own mean is no smaller.
+    The mean of each structure lies between the mean of the smallest and the mean of the largest
+    peaks of the cut. No structure may attain the latter, since each record has its own worst
+    structure. The attained value is the largest mean of the structures that are tried here: the
+    nominal one and corners of the cuts. Their peaks are read at the time nodes, so that the true
+    mean of such a structure is no smaller.
+
+    The peaks under each record are given by the record's name and by the peak's name; only those of
+    magnitudes have means. The other arguments are those of `over_records`.
     """
-    first = peaks[records[0].name]
-    magnitudes = tuple(name for name in first if name == output_of(name))
-    cuts, points = boxes(inputs, alpha), [*_corners(inputs, alpha)]
-    points_tried = np.unique(points, axis=0)
-    inside = (points_tried >= cuts.lower[:, None]) & (points_tried <= cuts.upper[:, None])
-    is_in_cut = inside.all(axis=-1)  # (levels, points)
-    tried_means: Array = np.zeros((len(points_tried), len(magnitudes)))
+    magnitudes = tuple(name for name in peaks[records[0].name] if name == output_of(name))
+    cuts = boxes(inputs, alpha)
+    points = [cuts.nominal]
+    for ends in zip(cuts.lower, cuts.upper, strict=True):
+        # At most 64 corners of each cut (tuned: more take time, and none is a bound).
+        points += map(np.array, islice(product(*np.transpose(ends)), 64))
+    tried = np.unique(points, axis=0)
+    is_inside = (tried >= cuts.lower[:, np.newaxis]) & (tried <= cuts.upper[:, np.newaxis])
+    is_in_cut = is_inside.all(axis=-1)  # (levels, structures)
+
+    tried_means: Array = np.zeros((len(tried), len(magnitudes)))
     for record in records:
         moved = model.moved_by(record.ground).with_outputs(magnitudes)
         flow = make_flow(moved, cuts.names, record.duration, step / NODES, "exact")
         columns = [[*map(str, flow.outputs)].index(output) for output in magnitudes]
-        tried_means += np.abs(flow.values(points_tried)).max(axis=1)[:, columns] / len(records)
+        tried_means += np.abs(flow.values(tried)).max(axis=1)[:, columns] / len(records)
+
     found: dict[str, Peak] = {}
-    for name, tried in zip(magnitudes, tried_means.T, strict=True):
-        of_records = [x[name] for x in peaks.values()]
-        means: dict[str, Any] = {
-            bound: np.mean([getattr(x, bound) for x in of_records], axis=0)
-            for bound in ("lower", "upper", "error", "least_lower")
-        }
-        in_cuts = np.where(is_in_cut, tried, -np.inf)
-        mean_minima = np.maximum(means["lower"] - means["error"], means["least_lower"])
-        # a structure of any higher cut has at least the mean of that cut's least peaks
-        minima_of_higher_cuts = np.maximum.accumulate(mean_minima[::-1])[::-1]
-        means["reached"] = np.maximum(minima_of_higher_cuts, in_cuts.max(axis=1))
-        means["least_upper"] = np.full_like(mean_minima, np.inf)  # nothing bounds one structure's
-        farthest_point = points_tried[in_cuts[0].argmax()].tolist()
-        reached_at = dict(zip(cuts.names, farthest_point, strict=True))
-        if of_records[0].encloses:  # no point of the box is known to belong to the enclosed set
-            means["reached"], reached_at = np.full_like(mean_minima, -np.inf), {}
-        nature = Nature.weakest(x.nature for x in of_records)
+    for name, means in zip(magnitudes, tried_means.T, strict=True):
+        of_records = [by_name[name] for by_name in peaks.values()]
+        lower = np.mean([peak.lower for peak in of_records], axis=0)
+        error = np.mean([peak.error for peak in of_records], axis=0)
+        least_lower = np.mean([peak.least_lower for peak in of_records], axis=0)
+        # Any structure of a cut has at least the mean of the smallest peaks of this cut. Each cut
+        # contains all higher ones.
+        mean_of_smallest = np.maximum(lower - error, least_lower)
+        of_higher_cuts = np.maximum.accumulate(mean_of_smallest[::-1])[::-1]
+        in_cuts = np.where(is_in_cut, means, -np.inf)
+        reached = np.maximum(of_higher_cuts, in_cuts.max(axis=1))
+        farthest = tried[in_cuts[0].argmax()].tolist()
+        reached_at = dict(zip(cuts.names, farthest, strict=True))
+        if of_records[0].encloses:
+            # No structure of the box is known to belong to the enclosed set.
+            reached, reached_at = np.full_like(lower, -np.inf), {}
         found[f"mean {name}"] = replace(
-            of_records[0], nature=nature, reached_at=reached_at, **means
+            of_records[0],
+            nature=Nature.weakest(peak.nature for peak in of_records),
+            lower=lower,
+            upper=np.mean([peak.upper for peak in of_records], axis=0),
+            error=error,
+            reached=reached,
+            least_lower=least_lower,
+            least_upper=np.full_like(lower, np.inf),  # no structure is known to have a small mean
+            reached_at=reached_at,
         )
     return found
-
-
-def _corners(inputs: Mapping[str, FuzzyNumber], alpha: Sequence[float]) -> Iterator[Array]:
-    """Yield the nominal inputs (d,), and `MAX_CORNERS` corners of each cut at most."""
-    cuts = boxes(inputs, alpha)
-    yield cuts.nominal
-    for low, high in zip(cuts.lower, cuts.upper, strict=True):
-        ends = zip(low, high, strict=True)
-        yield from map(np.array, islice(product(*ends), MAX_CORNERS))

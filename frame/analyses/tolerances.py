@@ -1,23 +1,22 @@
 """Tolerances: the largest scale of all supports at which no limit is exceeded.
 
-Supports are scaled about their nominal values. The scale is halved between one whose envelope
-excludes that a limit is exceeded and one whose envelope does not. Where these bounds leave a doubt,
-it is halved once more, between a scale at which no motion tried exceeds a limit and one at which a
-motion does. Each step is one call of `envelope` on the support alone, and as sure as its nature.
+The supports are scaled about their nominal values. One bisection finds the largest scale whose
+envelope excludes that a limit is exceeded. Where the bounds of the envelope leave a doubt, a second
+bisection separates scales at which no computed response exceeds a limit from scales at which one
+does. Each step computes one envelope on the supports alone.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from alphacut.base.errors import RefusedError, checked_number
 from alphacut.base.number_text import MINUS, Table, engineering, rounded_ends
 from alphacut.base.progress_bar import Progress
-from alphacut.frame.analyses.answer import Answer, Record
+from alphacut.frame.analyses.answer import Answer, Record, table_of
 from alphacut.frame.analyses.limits import Limit, limits_by_name
 from alphacut.frame.analyses.peaks import PEAK_ERROR, Peak, Peaks, peaks
 from alphacut.frame.boxes import boxes
@@ -31,9 +30,13 @@ from alphacut.fuzzy.sets.numbers import enclosed_set
 
 @dataclass(frozen=True)
 class Support:
-    """Nominal value of an input in its SI `unit`, its own support, and the one that is `kept`.
+    """Support of an input, as it is and scaled so that no limit is exceeded.
 
-    No limit is exceeded within the latter, which is that at the scale `Tolerances.kept`.
+    Args:
+        nominal: Nominal value, in `unit`.
+        unit: SI unit of the input.
+        own: Ends of its own support.
+        kept: Ends of its support at the scale `Tolerances.kept`.
     """
 
     nominal: float
@@ -44,19 +47,20 @@ class Support:
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Tolerances(Answer):
-    """Scales of all supports about the nominal values; 1 for those of the inputs.
+    """Scales of all supports about their nominal values; 1 is the scale of the inputs themselves.
 
     Args:
         limits: Largest magnitude allowed of each output, in SI units.
-        peaks: Peaks on the supports at scale 1, by output.
-        kept: Largest scale tried at which exceeding a limit is excluded; None where it is at none,
-            not even at scale 0.
-        clear: Largest scale tried at which no computed motion exceeds a limit; None where it is at
-            none, and of inputs that enclose a set, of which no motion is known.
-        passed: Least scale tried at which a computed motion exceeds a limit; None without one.
-        most: Largest scale that was to be tried.
-        nature: Weakest guarantee of the envelopes that `kept` rests on.
-        supports: Support of each input at scale 1 and at the scale `kept`.
+        peaks: Peaks on the supports at the scale 1, by output; empty if it was not tried.
+        kept: Largest scale tried at which exceeding a limit is excluded; None if this is so at no
+            scale, not even at 0.
+        clear: Largest scale tried at which no computed response exceeds a limit; None if there is
+            none, and for inputs that enclose a set, of which no response is known.
+        passed: Smallest scale tried at which a computed response exceeds a limit; None if there is
+            none.
+        most: Largest scale that was allowed.
+        nature: Weakest guarantee of the envelopes on which `kept` rests.
+        supports: Support of each input.
     """
 
     key = "tolerances"
@@ -71,44 +75,73 @@ class Tolerances(Answer):
     supports: dict[str, Support]
 
     def table(self) -> Table:
-        """Return the scale of all supports, then the one of each input; rounded inwards."""
-        scale, exceeded = "none", "none is exceeded"
+        """Return a row with the scale of all supports, then a row with the support of each input.
+
+        Numbers are rounded inwards.
+        """
+        scale = "none"
         if self.kept is not None:
             scale = f"up to {rounded(self.kept, 'upper', Nature.ATTAINED):.4g}"
-        if self.passed is not None:
-            clear = "" if self.clear is None else f"no exceedance found up to {self.clear:.4g}, "
-            exceeded = f"{clear}exceeded at {self.passed:.4g}"
-        nature = self.nature_text(self.nature)
-        if self.encloses:
-            exceeded = "not known"
-        rows: list[tuple[str, ...]] = [("scale of all ranges", scale, nature, exceeded)]
+        rows = [self._row("scale of all ranges", kept=scale, beside=self._exceeded_text())]
         for name, support in self.supports.items():
             text, relative = "–", ""
             if self.kept is not None:
-                inside = rounded_ends(*support.kept, Nature.ATTAINED)
-                text = " … ".join(dict.fromkeys(engineering(end, support.unit) for end in inside))
+                ends = rounded_ends(*support.kept, Nature.ATTAINED)
+                text = " … ".join(dict.fromkeys(engineering(end, support.unit) for end in ends))
                 relative = f"about {support.nominal:g}"
                 if support.nominal:
                     relative = ", ".join(f"{x / support.nominal - 1:+.2%}" for x in support.kept)
-            rows.append((f"tolerance of {name}", text, nature, relative.replace("-", MINUS)))
-        head = ("quantity", "no limit exceeded", "nature", "limit exceeded, or relative")
-        return Table(head, rows)
+            row = self._row(f"tolerance of {name}", kept=text, beside=relative.replace("-", MINUS))
+            rows.append(row)
+        return table_of(rows)
+
+    def _row(self, quantity: str, *, kept: str, beside: str) -> dict[str, str]:
+        """Return a row of the table by the titles of the columns."""
+        return {
+            "quantity": quantity,
+            "no limit exceeded": kept,
+            "nature": self.nature_text(self.nature),
+            "limit exceeded, or relative": beside,
+        }
+
+    def _exceeded_text(self) -> str:
+        """Return at which scale a limit is exceeded, as text."""
+        if self.encloses:
+            return "not known"
+        if self.passed is None:
+            return "none is exceeded"
+        clear = "" if self.clear is None else f"no exceedance found up to {self.clear:.4g}, "
+        return f"{clear}exceeded at {self.passed:.4g}"
 
     def records(self) -> list[Record]:
-        """Return a row of the scale, then one of the range of each input."""
-        titles = ["quantity", "unit", "from", "to", "from in the case", "to in the case"]
-        titles += ["most plausible", "nature"]
+        """Return a row with the scale, then a row with the support of each input."""
         nature = self.nature_text(self.nature)
-        rows: list[Sequence[str | float | None]]
-        rows = [("scale of all ranges", "", None, self.kept, None, 1.0, None, nature)]
+        scale: Record = {
+            "quantity": "scale of all ranges",
+            "unit": "",
+            "from": None,
+            "to": self.kept,
+            "from in the case": None,
+            "to in the case": 1.0,
+            "most plausible": None,
+            "nature": nature,
+        }
+        rows = [scale]
         for name, support in self.supports.items():
-            ends = (None, None) if self.kept is None else support.kept
-            numbers = (*ends, *support.own, support.nominal)
-            rows.append((name, support.unit, *numbers, nature))
-        return [dict(zip(titles, row, strict=True)) for row in rows]
+            row = scale | {
+                "quantity": name,
+                "unit": support.unit,
+                "from": None if self.kept is None else support.kept[0],
+                "to": None if self.kept is None else support.kept[1],
+                "from in the case": support.own[0],
+                "to in the case": support.own[1],
+                "most plausible": support.nominal,
+            }
+            rows.append(row)
+        return rows
 
     def words(self) -> str:
-        """Return how to read the scale."""
+        """Return sentences on how to read the scale."""
         return (
             "All supports are scaled together about nominal values; 1 is the case as it stands."
             f" Scales up to {self.most:g} were tried, each with an envelope of its own."
@@ -116,14 +149,18 @@ class Tolerances(Answer):
 
 
 def scale_supports(inputs: Mapping[str, FuzzyNumber], scale: float) -> dict[str, FuzzyNumber]:
-    """Return inputs as their supports, scaled about nominal values; crisp numbers at scale 0."""
-    middles = {name: (number.nominal, number.support) for name, number in inputs.items()}
-    return {
-        name: Interval(nominal - scale * (nominal - low), nominal + scale * (high - nominal))
-        if scale > 0 and high > low
-        else Crisp(nominal)
-        for name, (nominal, (low, high)) in middles.items()
-    }
+    """Return the supports of inputs as intervals, scaled about the nominal values.
+
+    A support without width, and each support at the scale 0, becomes a crisp number.
+    """
+    scaled: dict[str, FuzzyNumber] = {}
+    for name, number in inputs.items():
+        nominal, (low, high) = number.nominal, number.support
+        scaled[name] = Crisp(nominal)
+        if scale > 0 and high > low:
+            lower, upper = nominal - scale * (nominal - low), nominal + scale * (high - nominal)
+            scaled[name] = Interval(lower, upper)
+    return scaled
 
 
 def require_admissible_scale(
@@ -131,7 +168,7 @@ def require_admissible_scale(
     inputs: Mapping[str, FuzzyNumber],
     most: float,
 ) -> None:
-    """Refuse a largest scale of the supports at which an input is inadmissible."""
+    """Raise RefusedError if supports scaled by `most` contain inadmissible values of an input."""
     try:
         require_admissible(model, boxes(scale_supports(inputs, most), [0.0]))
     except RefusedError as error:
@@ -152,88 +189,113 @@ def tolerances(
     at_one: Peaks | None = None,
     progress: Progress | None = None,
 ) -> Tolerances:
-    """Return scales of the supports up to which no magnitude exceeds its limit.
+    """Return the scales of the supports up to which no magnitude exceeds its limit.
 
     Args:
-        model: The structure, whose outputs have the limits.
-        inputs: Fuzzy parameters, in SI units.
+        model: The structure with the limited outputs.
+        inputs: Fuzzy parameters by name, in SI units.
         limits: Limits of magnitudes, one for each output, in SI units.
-        duration: Length of the motion, in s.
-        step: Distance of nodes, in s.
+        duration: Length of the response, in s.
+        step: Distance of the time nodes, in s.
         most: Largest scale that is tried.
-        precision: Width of the interval of a scale at which its bisection ends, over `most`.
-        error: Error of the peaks that is aimed at, as a fraction of each.
-        at_one: Peaks on the supports at scale 1, on their first level, where these are known.
+        precision: Width of the interval of scales at which a bisection ends, as a fraction of
+            `most`.
+        error: Error of the peaks that is aimed at, as a fraction of each peak.
+        at_one: Known peaks at the scale 1; their first level must be that of the supports.
         progress: Called with the completed fraction.
 
     Raises:
-        RefusedError: A limit or a number is out of range, or supports at scale `most` reach values
-            that are not allowed.
+        RefusedError: A limit or a number is out of range, or supports scaled by `most` contain
+            inadmissible values.
     """
     checked_number("most", most, positive=True)
     checked_number("precision", precision, positive=True, most=1)
-    named = limits_by_name(limits, (), magnitudes=True)
-    sizes = {name: limit.number for name, limit in named.items()}
-    model = model.with_outputs(tuple(sizes))
+    largest_allowed = {
+        name: limit.number for name, limit in limits_by_name(limits, (), magnitudes=True).items()
+    }
+    model = model.with_outputs(tuple(largest_allowed))
     require_admissible_scale(model, inputs, most)
-    tried = {1.0: at_one} if at_one is not None and most >= 1 else {}  # peaks by scale
-
-    motion: dict[str, Any] = {"duration": duration, "step": step, "alpha": [0.0]}
+    # Peaks by the scales that were tried.
+    tried = {1.0: at_one} if at_one is not None and most >= 1 else {}
 
     def peaks_at(scale: float) -> Peaks:
         if scale not in tried:
-            scaled, method = scale_supports(inputs, scale), Auto(error, peaks=True)
-            tried[scale] = peaks(envelope(model, scaled, method, **motion, progress=False))
+            band = envelope(
+                model,
+                scale_supports(inputs, scale),
+                Auto(error, peaks=True),
+                duration=duration,
+                step=step,
+                alpha=[0.0],
+                progress=False,
+            )
+            tried[scale] = peaks(band)
             if progress:
                 progress(min(1.0, len(tried) / (2 + np.log2(1 / precision))))
         return tried[scale]
 
     def is_excluded(scale: float) -> bool:
+        """Whether no response exceeds a limit."""
         found = peaks_at(scale)
-        return all(found[x].greatest_bounds.upper[0] <= limit for x, limit in sizes.items())
+        return all(found[x].max_peak_bounds.upper[0] <= y for x, y in largest_allowed.items())
 
     def is_exceeded(scale: float) -> bool:
+        """Whether a known response exceeds a limit."""
         found = peaks_at(scale)
-        return any(found[x].greatest_bounds.lower[0] > limit for x, limit in sizes.items())
+        return any(found[x].max_peak_bounds.lower[0] > y for x, y in largest_allowed.items())
 
-    # the largest scale at which exceeding is excluded, from the largest one known
-    near, encloses = precision * most, enclosed_set(inputs.values())
-    low = next((scale for scale in (most, *tried, 0.0) if is_excluded(scale)), 0.0)
-    if low < most and is_excluded(low):
-        low = _bisected(is_excluded, low, min(scale for scale in tried if scale > low), near)
-    # the same for scales at which a computed motion exceeds a limit
-    passed, clear = np.inf, None
+    # The largest scale at which exceeding a limit is excluded, from the largest one that is known.
+    width = precision * most
+    kept = next((scale for scale in (most, *tried, 0.0) if is_excluded(scale)), 0.0)
+    if kept < most and is_excluded(kept):
+        not_excluded = min(scale for scale in tried if scale > kept)
+        kept = _bisected(is_excluded, kept, not_excluded, width)
+
+    # The largest scale at which no known response exceeds a limit, and the next one that was tried.
+    encloses = enclosed_set(inputs.values())
+    clear, passed = None, np.inf
     if not encloses:
         passed = min(filter(is_exceeded, tried), default=np.inf)
         clear = max((scale for scale in tried if scale < passed), default=None)
-    if clear is not None and passed < np.inf:
-        clear = _bisected(lambda scale: not is_exceeded(scale), clear, passed, near)
+    if clear is not None and np.isfinite(passed):
+        clear = _bisected(lambda scale: not is_exceeded(scale), clear, passed, width)
         passed = min(filter(is_exceeded, tried))
-    supports = {
-        name: Support(
+
+    supports = {}
+    for name, scaled in scale_supports(inputs, kept).items():
+        own = inputs[name].support
+        supports[name] = Support(
             nominal=inputs[name].nominal,
             unit=model.parameter(name).unit,
-            own=(inputs[name].support.lower, inputs[name].support.upper),
-            kept=(number.support.lower, number.support.upper),
+            own=(own.lower, own.upper),
+            kept=(scaled.support.lower, scaled.support.upper),
         )
-        for name, number in scale_supports(inputs, low).items()
-    }
     return Tolerances(
         encloses=encloses,
-        limits=sizes,
-        peaks={name: tried[1.0][name] for name in sizes} if 1.0 in tried else {},
-        kept=low if is_excluded(low) else None,
+        limits=largest_allowed,
+        peaks={name: tried[1.0][name] for name in largest_allowed} if 1.0 in tried else {},
+        kept=kept if is_excluded(kept) else None,
         clear=clear,
-        passed=None if np.isinf(passed) else passed,
+        passed=passed if np.isfinite(passed) else None,
         most=most,
-        nature=Nature.weakest(peaks_at(low)[name].nature for name in sizes),
+        nature=Nature.weakest(peaks_at(kept)[name].nature for name in largest_allowed),
         supports=supports,
     )
 
 
-def _bisected(holds: Callable[[float], bool], low: float, high: float, near: float) -> float:
-    """Return to within `near` the largest scale at which a condition that `low` fulfils holds."""
-    while high - low > near:
-        middle = (low + high) / 2
-        low, high = (middle, high) if holds(middle) else (low, middle)
-    return low
+def _bisected(holds: Callable[[float], bool], lower: float, upper: float, width: float) -> float:
+    """Return the largest scale at which a condition holds, to within a width.
+
+    Args:
+        holds: The condition, which holds at `lower` and does not hold at `upper`.
+        lower: Lower end of the interval of scales.
+        upper: Upper end of the interval.
+        width: Width of the interval at which the bisection ends.
+    """
+    while upper - lower > width:
+        middle = (lower + upper) / 2
+        if holds(middle):
+            lower = middle
+        else:
+            upper = middle
+    return lower

@@ -9,7 +9,7 @@ import pytest
 from alphacut.base.number_text import ShownUnit
 from alphacut.entry import main
 from alphacut.figures.style import figure_style, prefix_axis
-from alphacut.frame.analyses.limits import About
+from alphacut.frame.analyses.limits import LimitResult
 from alphacut.io.results import ResultsFolder
 from alphacut.report.page import render_page
 from alphacut.report.results import peak_table
@@ -50,7 +50,9 @@ def test_an_output_is_shown_in_the_unit_of_its_limit(folder):
     assert {"drift1, cm", "base_shear, MN", "q2, mm", "a2, g"} <= set(labels)
     by_output = {part.output: part for part in summary.decision.limits.values()}
     for name, unit in (("drift1", "cm"), ("base_shear", "MN"), ("q2", "mm")):
-        texts = summary.decision.texts_of(by_output[name])
+        head, rows = summary.decision.table()
+        (row,) = [row for row in rows if row[0] == by_output[name].words]
+        texts = dict(zip(head, row, strict=True))
         values = [text for text in texts.values() if re.search(r"\d (c|m|M|k)?[mN]\b", text)]
         assert values
         assert all(re.search(rf"\d {unit}\b", text) for text in values), values
@@ -81,7 +83,7 @@ def test_an_output_is_shown_in_the_unit_of_its_limit(folder):
     ],
 )
 def test_the_unit_of_a_limit_is_read_from_its_text(stated, limit, unit):
-    found = About(output="q1", unit="m", limit=limit, stated=stated).stated_unit
+    found = LimitResult(output="q1", unit="m", limit=limit, stated=stated).stated_unit
     assert found == (None if unit is None else (unit[0], pytest.approx(unit[1])))
 
 

@@ -75,7 +75,7 @@ def test_each_record_has_its_length_and_five_periods_unless_cut(tmp_path):
     assert [record.duration for record in records] == pytest.approx([free] * 2, abs=0.01)
     cut, _ = records_of(tmp_path, 'duration = "9 s"', 'duration = "0.5 s"')
     assert [record.duration for record in cut] == pytest.approx([0.5] * 2)
-    assert all(0.3 < record.facts.cut_share < 0.95 for record in cut)
+    assert all(0.3 < record.facts.truncated_fraction < 0.95 for record in cut)
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from scipy.stats import beta
 
 from alphacut.base.errors import RefusedError
 from alphacut.frame import Accelerogram, Limit, StoreyFrame, fragility
-from alphacut.frame.analyses.fragility import CriticalMeasures, any_exceeded
+from alphacut.frame.analyses.fragility import CriticalMeasures
 from alphacut.frame.analyses.probability import clopper_pearson
 from alphacut.fuzzy import Triangular
 from alphacut.fuzzy.result import Ends, Nature
@@ -70,7 +70,7 @@ def test_any_of_the_limits_is_the_least():
     _, each = suite()
     one = CriticalMeasures.from_peaks(each, np.ones(12), LIMIT)
     two = CriticalMeasures.from_peaks(each, np.linspace(0.5, 2, 12), LIMIT)
-    either = any_exceeded([one, two])
+    either = CriticalMeasures.of_any([one, two])
     assert either.low == pytest.approx(np.minimum(one.low, two.low))
     assert (either.high >= either.low_reached).all()
 

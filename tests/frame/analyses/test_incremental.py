@@ -15,7 +15,7 @@ from alphacut.frame import (
     incremental,
     over_records,
 )
-from alphacut.frame.analyses.fragility import CriticalMeasures, Tried, counts_between
+from alphacut.frame.analyses.fragility import CriticalMeasures, TriedMeasures, counts_between
 from alphacut.frame.analyses.incremental import (
     ALL,
     GRID_RATIO,
@@ -34,7 +34,7 @@ STEADY = Accelerogram(0.1, np.ones(60))
 def tried_in(*case):
     """What the structures that an analysis moves show of its first limit."""
     scales, demands = IncrementalAnalysis(*case).run()
-    return [Tried(scales, ~(demands[:, :, 0] <= 1))]
+    return [TriedMeasures(scales, ~(demands[:, :, 0] <= 1))]
 
 
 def sets_of(*case):
@@ -164,7 +164,7 @@ def test_peaks_over_scales_are_proportional_until_a_column_yields(rng, tmp_path)
     assert len(rows) == 2 * 2 * 2 * 3
     answer.to_csv(tmp_path / "peaks.csv")
     assert len((tmp_path / "peaks.csv").read_text(encoding="utf-8").splitlines()) == 1 + len(rows)
-    assert answer.to_dataset()["greatest peak"].shape == (len(rows),)
+    assert answer.to_dataset()["greatest"].shape == (len(rows),)
     assert "drift1" in str(answer)
     linear = StoreyFrame([1.0], stiffness=[200.0])
     with pytest.raises(RefusedError, match="columns that yield"):
