@@ -24,20 +24,39 @@ def subprogress(progress: Progress | None, first: float, last: float) -> Progres
 
 @contextmanager
 def progress_reporter(progress: Progress | bool | None) -> Iterator[Progress | None]:
-    """Context with a function that reports the completed fraction, 0 to 1.
+    """Context with a function that reports the completed fraction, 0 to 1, and never a smaller one.
+
+    Several computations in a row may each report from 0 on; what is below the largest fraction so
+    far is not passed on.
 
     Args:
         progress: The caller's function. None or True: a bar on a terminal, or a line every ten
             seconds where standard error is no terminal. False: nothing, and the value is None.
     """
-    if callable(progress) or progress is False:
-        yield progress if callable(progress) else None
+    if progress is False:
+        yield None
+        return
+    if callable(progress):
+        yield _rising(progress)
         return
     display = _Display()
     try:
-        yield display
+        yield _rising(display)
     finally:
         display.close()
+
+
+def _rising(progress: Progress) -> Progress:
+    """Return a function that passes on the fractions that are larger than all before."""
+    largest = -1.0
+
+    def report(fraction: float) -> None:
+        nonlocal largest
+        if fraction > largest:
+            largest = fraction
+            progress(fraction)
+
+    return report
 
 
 class _Display:

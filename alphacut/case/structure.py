@@ -309,7 +309,8 @@ class Frame(StructureSection):
                 rayleigh=(self.rayleigh_mass.nominal, self.rayleigh_stiffness.nominal),
                 rayleigh_of=self.rayleigh_of,
                 ground=self.accelerogram,
-                gravity=self.gravity,
+                # whether a storey buckles under its weight is not to be judged by a stand-in
+                gravity=0.0 if young is STAND_IN else self.gravity,
                 damping_ratio=nominal_ratios[0] if len(ratios) == 1 else nominal_ratios or None,
             )
         except RefusedError as error:

@@ -6,7 +6,6 @@ import argparse
 import json
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from math import pi
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
@@ -15,10 +14,9 @@ import numpy as np
 
 from alphacut.base.errors import require
 from alphacut.base.number_text import MINUS, STANDARD_GRAVITY, engineering, percent_text, text_table
-from alphacut.case.content import Content
 from alphacut.case.loads import ForceHistory, RecordsSection
 from alphacut.case.parse import quantity_of
-from alphacut.case.structure import MaterialDamping, Structure
+from alphacut.case.structure import MaterialDamping
 from alphacut.case.types import Section
 from alphacut.commands.options import Command, add_common, add_quiet, write_answer
 from alphacut.commands.pipeline import cut_record_warnings, read_case, require_runnable
@@ -39,8 +37,9 @@ from alphacut.io.quantity import QUANTITIES
 from alphacut.io.results import ResultsFolder
 from alphacut.report.results import agreement
 from alphacut.rve.cell.cell import VoigtPhase
-from alphacut.stages.cell import GPA, CellProblem
+from alphacut.stages.cell import GPA
 from alphacut.stages.envelope import tasks
+from alphacut.stages.foreseen import foreseen_structure
 from alphacut.stages.image import study_of
 from alphacut.stages.suite import analyses_of, suite_records
 
@@ -60,7 +59,9 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
     """Checks a case, and shows how it was read and its first period; returns exit status 0."""
     content = read_case(options).content
     study_of_image = require_runnable(content)
-    rows, linear = list(rows_of("", content)), nominal_structure(content)
+    rows = list(rows_of("", content))
+    structure = foreseen_structure(content) if "envelope" in content.stages else None
+    linear = None if structure is None else structure.linear
     modes = nominal_modes(linear) if linear else None
     period = 2 * pi / float(modes.frequencies[0]) if modes else None
     document = {
@@ -86,20 +87,20 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
                 "this is an unusual period: are units right, mass and stiffness not exchanged?\n"
             )
         text += modes_text(modes)
-    section, structure = content.structure_section, content.structure
+    section = content.structure_section
     if section is not None and structure is not None:
         text += "".join(f"warning: {line}\n" for line in section.warnings(structure))
-    if linear and (record := linear.ground):
+    if structure and linear and (record := linear.ground):
         peak = engineering(record.extremes[0], "m/s^2")
         in_g = f"{record.extremes[0] / STANDARD_GRAVITY:.3g} g"
         text += f"record: {len(record.samples)} samples of {record.step:g} s, peak {peak}, {in_g}\n"
-        warnings = cut_record_warnings(content, Structure(linear, {}))
+        warnings = cut_record_warnings(content, structure)
         text += "".join(f"{warning}\n" for warning in warnings)
     if linear and content.envelope is not None and content.records is None:
         times = content.envelope.duration, content.envelope.step
         text += "".join(f"warning: {line}\n" for line in long_steps(linear, *times))
-    if content.records is not None and content.envelope is not None and linear:
-        records = suite_records(content.records, content.envelope, Structure(linear, {}))
+    if content.records is not None and content.envelope is not None and structure and linear:
+        records = suite_records(content.records, content.envelope, structure)
         text += records_text(content.records, records, nominal_mode(linear))
         strongest = max(records, key=lambda record: record.measures["Sa(T1)"])
         if yields(linear):
@@ -107,8 +108,8 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
             duration = step * round(strongest.duration / step)
             moved = linear.moved_by(strongest.ground)
             text += "".join(f"warning: {line}\n" for line in long_steps(moved, duration, step))
-        question, structure = content.incremental_question, content.structure
-        if question is not None and structure is not None:
+        question = content.incremental_question
+        if question is not None:
             (task,) = tasks(content.envelope, ())
             analyses = analyses_of(question, structure, task, records)
             motions, seconds = np.sum([x.foresee() for x in analyses.values()], axis=0)
@@ -193,24 +194,6 @@ def records_text(
     )
     text += f" own damping ratio, {percent_text(mode.ratio)}\n"
     return text + "".join(f"warning: {x}\n" for record in records for x in record.warnings)
-
-
-def nominal_structure(content: Content) -> LinearSystem | None:
-    """The linear structure of the case at the nominal values; None where there is none.
-
-    A modulus to be computed is taken from the series; None also where that does not fit the cell.
-    """
-    if "envelope" not in content.stages or content.structure is None:
-        return None
-    if content.has_stated_modulus:
-        return content.structure.linear
-    cell = content.particle_cell
-    has_series = cell is not None and "series" in cell.methods
-    if cell is None or not has_series or not (content.radius_map or cell.fraction_map):
-        return None
-    section = content.modulus.model_copy(update={"method": "auto", "tolerance": 1e-4})
-    result = replace(CellProblem.of(content), modulus=section).solve()
-    return content.structure_of(Crisp(result.modulus)).linear
 
 
 def rows_of(prefix: str, section: Section) -> Iterator[Row]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import re
 from collections.abc import Iterator, Mapping
 from concurrent.futures import Executor
 from contextlib import contextmanager, nullcontext
@@ -12,7 +11,7 @@ from functools import partial
 from pathlib import Path
 
 from alphacut import frame
-from alphacut.base.errors import RefusedError, require
+from alphacut.base.errors import FailedError, RefusedError, require
 from alphacut.base.kept_files import locked
 from alphacut.base.progress_bar import progress_reporter
 from alphacut.case.content import Case, Content, load
@@ -24,7 +23,6 @@ from alphacut.case.structure import Structure
 from alphacut.commands.options import require_petsc
 from alphacut.frame.analyses.incremental import Increments
 from alphacut.frame.analyses.peaks import Peak, Peaks
-from alphacut.fuzzy import Crisp, Triangular
 from alphacut.io.files import Document, rank, require_writable, say
 from alphacut.io.results import MANIFEST, ResultsFolder
 from alphacut.rve.image.fields.grid import device_array
@@ -43,6 +41,7 @@ from alphacut.stages import (
 from alphacut.stages.answers import ANSWERS, Response
 from alphacut.stages.cell import CellProblem
 from alphacut.stages.envelope import EnvelopeTask
+from alphacut.stages.foreseen import possible_materials, structure_as_computed
 from alphacut.stages.modulus import fuzzy_loss, fuzzy_modulus, require_levels
 from alphacut.stages.store import (
     RunProgress,
@@ -278,39 +277,34 @@ def _require_material(content: Content) -> ImageStudy | None:
 
 
 def _require_motion(content: Content) -> None:
-    """Requires that identification, each study's envelope and each question can be computed."""
+    """Require that identification, each study's envelope and each question can be computed.
+
+    Where the modulus is not known before a stage has run, that must be so for a possible one.
+    """
     if content.structure is None or content.envelope is None:
         return
-    alpha, structure = content.envelope.alpha, _with_stand_ins(content, content.structure)
+    errors: list[RefusedError | FailedError] = []
+    for material in possible_materials(content):
+        try:
+            structure = structure_as_computed(content, material)
+            _require_motion_of(content, content.envelope, structure)
+            return
+        except (RefusedError, FailedError) as error:
+            errors.append(error)
+    raise errors[0]
+
+
+def _require_motion_of(content: Content, section: EnvelopeSection, structure: Structure) -> None:
     if content.identify is not None:
-        identify.require_learnable(content.identify, structure, alpha)
+        identify.require_learnable(content.identify, structure, section.alpha)
     if content.records is not None:
-        records = suite.suite_records(content.records, content.envelope, structure)
+        records = suite.suite_records(content.records, section, structure)
         structure = suite.moved_by(structure, records[0])  # which stands for all
-    for task in envelope.tasks(content.envelope, content.study):
+    for task in envelope.tasks(section, content.study):
         frame.require_envelope(**task.arguments(structure))
     if content.tolerances is not None:
-        (own_task,) = envelope.tasks(content.envelope, ())  # of [envelope], as questions are
+        (own_task,) = envelope.tasks(section, ())  # of [envelope], as questions are
         answers.require_tolerances(content.tolerances, Response(structure, own_task))
-
-
-def _with_stand_ins(content: Content, structure: Structure) -> Structure:
-    """The structure with numbers as fuzzy as those that stage modulus will compute."""
-    if "modulus" not in content.stages:
-        return structure
-    numbers, has_cuts = dict(structure.numbers), content.modulus.alpha != (1.0,)
-    is_fuzzy = content.image_cell is not None or "microstructure" in content.stages
-    inputs = () if is_fuzzy else CellProblem.of(content).inputs.values()
-    is_fuzzy = has_cuts and (is_fuzzy or any(number.support.width > 0 for number in inputs))
-    if "E" in numbers:
-        young = numbers["E"].nominal
-        numbers["E"] = Triangular(0.99 * young, young, 1.01 * young) if is_fuzzy else Crisp(young)
-    losses = content.cell.losses if content.cell else ()
-    has_fuzzy_losses = has_cuts and any(loss.support.width > 0 for loss in losses)
-    if content.has_material_damping and (is_fuzzy or has_fuzzy_losses):
-        ratios = {x: y.nominal for x, y in numbers.items() if re.fullmatch(r"zeta\d*", x)}
-        numbers |= {x: Triangular(0.9 * y, y, 1.1 * y) for x, y in ratios.items()}
-    return replace(structure, numbers=numbers)
 
 
 def cut_record_warnings(content: Content, structure: Structure) -> Iterator[str]:

@@ -137,7 +137,6 @@ class RunProgress:
     show: Progress = no_progress
     seconds_left: float = 1.0
     done: float = 0.0
-    shown: float = 0.0
 
     def foresee(self, names: Iterable[str]) -> None:
         """Foresees the stages of a run by their names."""
@@ -150,14 +149,10 @@ class RunProgress:
         if seconds:
             self.done += (1 - first) * seconds / max(seconds, self.seconds_left)
         self.seconds_left -= seconds
-        return subprogress(self._advance, first, self.done)
+        return subprogress(self.show, first, self.done)
 
     def _seconds_of(self, names: Iterable[str]) -> float:
         return sum(SECONDS.get(name.partition("_")[0], 1.0) for name in names)
-
-    def _advance(self, share: float) -> None:
-        self.shown = max(self.shown, share)  # a second analysis of a stage begins at 0
-        self.show(self.shown)
 
 
 @dataclass(frozen=True)

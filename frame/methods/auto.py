@@ -20,7 +20,7 @@ import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import checked_number
-from alphacut.base.progress_bar import Progress
+from alphacut.base.progress_bar import Progress, subprogress
 from alphacut.frame.bounds.box_proof import refusing
 from alphacut.frame.bounds.model_error import MAX_PARAMETERS
 from alphacut.frame.boxes import DEFAULT_TOLERANCE, UnitFlow
@@ -44,6 +44,8 @@ FINEST = 1e-4
 """Gap of peaks, as a fraction of each, below which the dual bound takes too long."""
 FOLLOWED = 0.15
 """Fraction of the tolerance that is worth a graph: a follower's error is up to seven times it."""
+SHOWN_OF_REST = 0.8
+"""Fraction of the progress left that the next method takes; one method is usually enough."""
 ROUNDING = 1e-9
 """Fraction of a peak by which a motion that is followed may be off."""
 
@@ -91,9 +93,9 @@ class Auto:
             return _noted(follower.run(flow, progress), f"{follower.name}: not linear")
         follower = ImprovedFollower(FOLLOWED * tolerance, seed=self.seed)
         reasons, proved = list[str](), list[Envelope]()
-        for proof in self._proofs(flow, reasons):
+        for attempt, proof in enumerate(self._proofs(flow, reasons)):
             try:
-                proved.append(proof.run(flow, progress))
+                proved.append(proof.run(flow, _of_attempt(progress, attempt)))
             except UnprovedError as error:
                 reasons.append(f"{proof.name}: {error}")
                 continue
@@ -106,9 +108,9 @@ class Auto:
                 return _noted(best, "; ".join([f"{best.method} succeeded", *reasons]))
             outer, inner = _sides(best)  # bounds above the reached peak are worth motions
             asked = outer > inner.max(1, keepdims=True)
-            followed = follower.run_pass(flow, progress, asked)
+            followed = follower.run_pass(flow, _of_attempt(progress, len(reasons)), asked)
             return _noted(_with_reached(best, flow, followed), f"{best.method} and {follower.name}")
-        found = follower.run(flow, progress)
+        found = follower.run(flow, _of_attempt(progress, len(reasons)))
         found = replace(found, outer=best.proved if best else None)
         return _noted(found, f"{follower.name}; unproved: {'; '.join(reasons)}")
 
@@ -150,6 +152,15 @@ class Auto:
         is_of_few_inputs = flow.relative and len(flow.boxes.names) <= FEW_INPUTS
         peak_gap = 2 * self.tolerance if self.tolerance and is_of_few_inputs else WIDE
         return _gap(proved, flow) <= peak_gap
+
+
+def _of_attempt(progress: Progress | None, number: int) -> Progress | None:
+    """Return the progress of a method that is tried after `number` others.
+
+    Whether more methods are needed is not known beforehand: each is shown as most of what is left.
+    """
+    left = 1 - SHOWN_OF_REST
+    return progress and subprogress(progress, 1 - left**number, 1 - left ** (number + 1))
 
 
 def _with_reached(proved: Envelope, flow: UnitFlow, followed: PassBounds) -> Envelope:

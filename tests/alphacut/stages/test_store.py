@@ -12,6 +12,7 @@ import xarray
 
 import alphacut
 from alphacut.base.errors import FailedError, RefusedError
+from alphacut.base.progress_bar import progress_reporter
 from alphacut.case.content import load
 from alphacut.entry import main
 from alphacut.frame.analyses.peaks import Peak, mirrored
@@ -71,12 +72,13 @@ def test_a_run_has_one_progress_that_ends_once(tmp_path):
         return StageResult({})
 
     stages = [Stage(f"stage_{k}", k, ("fuzzy",), dict, compute) for k in range(6)]
-    store = store_in(tmp_path, progress=RunProgress(told.append, seconds_left=5.0))
-    store.take(stages[0])
-    store.take_all(stages[1:4], None)
-    assert told[-1] == pytest.approx(0.8)
-    store.take(stages[4])
-    store.take(stages[5])
+    with progress_reporter(told.append) as show:
+        store = store_in(tmp_path, progress=RunProgress(show, seconds_left=5.0))
+        store.take(stages[0])
+        store.take_all(stages[1:4], None)
+        assert told[-1] == pytest.approx(0.8)
+        store.take(stages[4])
+        store.take(stages[5])
     assert told == sorted(told)
     assert told.count(1.0) == told[told.index(1.0) :].count(1.0) > 0
 

@@ -1,0 +1,106 @@
+"""The structure of a case before a stage has run, so that `check` judges no stand-in value."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from alphacut.case.content import Content
+from alphacut.case.structure import Structure
+from alphacut.fuzzy import Crisp, FuzzyNumber, Triangular
+from alphacut.rve.result.loss_factors import loss_factors
+from alphacut.stages.cell import CellProblem
+
+SERIES_TOLERANCE = 1e-4
+"""Relative error of E in a check, which is far below what a period or a step is judged by."""
+
+
+class Material(NamedTuple):
+    """What a structure takes from its cell; None of what the case states itself.
+
+    Args:
+        modulus: Young's modulus in Pa.
+        loss: Its loss factor.
+    """
+
+    modulus: FuzzyNumber | None = None
+    loss: FuzzyNumber | None = None
+
+
+POSSIBLE = (Material(Crisp(1e12), Crisp(1e-3)), Material(Crisp(1e9), Crisp(0.3)))
+"""Diamond with the losses of steel, and a soft polymer with those of rubber."""
+
+
+def foreseen_material(content: Content) -> Material | None:
+    """Return what the structure takes from the cell at the cell's nominal values.
+
+    It comes from the series, which takes milliseconds.
+
+    Returns:
+        The material; None where the series does not solve the cell.
+    """
+    if content.has_stated_modulus and not content.has_material_damping:
+        return Material()
+    cell = content.particle_cell
+    has_map = cell is not None and bool(content.radius_map or cell.fraction_map)
+    if cell is None or "series" not in cell.methods or not has_map:
+        return None
+    section = content.modulus.model_copy(update={"method": "auto", "tolerance": SERIES_TOLERANCE})
+    result = replace(CellProblem.of(content), modulus=section).solve()
+    loss = None
+    if content.has_material_damping:
+        # the loss factor of a phase's Young's modulus is that of its K and of its G
+        losses = np.array([[number.nominal] * 2 for number in cell.losses])
+        loss = Crisp(loss_factors(result, losses).values["E"])
+    modulus = None if content.has_stated_modulus else Crisp(result.modulus)
+    return Material(modulus, loss)
+
+
+def foreseen_structure(content: Content) -> Structure | None:
+    """Return the structure at the cell's nominal values; None where these, or it, are not known."""
+    material = None if content.structure is None else foreseen_material(content)
+    return None if material is None else content.structure_of(*material)
+
+
+def possible_materials(content: Content) -> tuple[Material, ...]:
+    """Return the foreseen material or, if it is not known, two extremes of what there can be.
+
+    What neither of the extremes admits is wrong whatever a stage will compute.
+    """
+    known = foreseen_material(content)
+    if known is not None:
+        return (known,)
+    if content.has_stated_modulus:
+        return tuple(Material(loss=material.loss) for material in POSSIBLE)
+    return POSSIBLE
+
+
+def structure_as_computed(content: Content, material: Material) -> Structure:
+    """Return the structure of a material, with numbers as fuzzy as stage modulus will make them.
+
+    Raises:
+        RefusedError: There is no such structure.
+    """
+    structure = content.structure_of(*material)
+    if "modulus" not in content.stages:
+        return structure
+    has_cuts = content.modulus.alpha != (1.0,)
+    is_fuzzy = has_cuts
+    if has_cuts and content.image_cell is None and "microstructure" not in content.stages:
+        inputs = CellProblem.of(content).inputs.values()
+        is_fuzzy = any(number.support.width > 0 for number in inputs)
+    numbers: dict[str, FuzzyNumber] = dict(structure.numbers)
+    if "E" in numbers:
+        young = numbers["E"].nominal
+        numbers["E"] = Triangular(0.99 * young, young, 1.01 * young) if is_fuzzy else Crisp(young)
+    losses = content.cell.losses if content.cell else ()
+    has_fuzzy_losses = has_cuts and any(loss.support.width > 0 for loss in losses)
+    if content.has_material_damping and (is_fuzzy or has_fuzzy_losses):
+        for name, number in structure.numbers.items():
+            if re.fullmatch(r"zeta\d*", name):
+                ratio = number.nominal
+                numbers[name] = Triangular(0.9 * ratio, ratio, 1.1 * ratio)
+    return replace(structure, numbers=numbers)

@@ -1,0 +1,73 @@
+"""`check` judges a structure by the material that its cell has, and not by a stand-in for it."""
+
+import json
+
+import numpy as np
+import pytest
+
+from alphacut.entry import main
+from tests.alphacut.small import CELL, summary_of_run, written
+
+FRAME = """
+[frame]
+masses = "10 t"
+lengths = "3 m"
+second_moment = "1.75e-6 m^4"
+damping_ratio = "material"
+displacements = "10 mm"
+GRAVITY
+[envelope]
+fuzzy = ["E"]
+alpha = [0, 1]
+duration = "0.4 s"
+step = "0.02 s"
+"""
+LOSSES = '[cell]\nmatrix_loss = "6 %"\ninclusion_loss = "1 %"\n'
+CASE = (CELL + FRAME).replace('["modulus"]', '["modulus", "envelope"]').replace("[cell]\n", LOSSES)
+GRAVITY = 'gravity = "1 g"'
+"""With it the storey stands from 21 GPa on. A stand-in of 20 GPa would buckle."""
+
+
+def checked(case, folder, capfd):
+    assert main(["check", str(case), f"--json={folder}/check.json"]) == 0, capfd.readouterr().err
+    return json.loads((folder / "check.json").read_text()), capfd.readouterr().out
+
+
+def test_a_storey_that_stands_with_the_cells_modulus_is_not_refused(tmp_path, capfd):
+    case = written(tmp_path, CASE, GRAVITY=GRAVITY)
+    found, _ = checked(case, tmp_path, capfd)
+    summary = summary_of_run(case)
+    assert found["period_s"] == pytest.approx(summary["structure"]["period_s"], rel=1e-3)
+    lower, nominal, upper = summary["damping"]["zeta"]
+    assert lower <= found["modes"]["damping_ratios"][0] * (1 + 1e-3)
+    assert found["modes"]["damping_ratios"][0] == pytest.approx(nominal, rel=1e-3)
+    assert upper < 0.03
+
+
+def test_a_weight_that_is_left_out_is_warned_of_by_the_cells_modulus(tmp_path, capfd):
+    case = written(tmp_path, CASE, GRAVITY="", **{"1.75e-6": "1.6e-5"})
+    _, text = checked(case, tmp_path, capfd)
+    assert "P-Delta" not in text  # with 20 GPa the coefficient would be 0.12
+
+
+def test_of_an_unknown_modulus_nothing_is_judged_that_depends_on_it(tmp_path, capfd):
+    y, x = np.mgrid[:24, :24]
+    np.save(tmp_path / "image.npy", np.where((x - 12) ** 2 + (y - 12) ** 2 < 49, 150.0, 50.0))
+    image = """[cell]
+image = "image.npy"
+pixel = "1 µm"
+threshold = [100]
+modulus = ["20 GPa", "80 GPa"]
+poisson = 0.3
+loss = ["6 %", "1 %"]
+"""
+    text = CASE[: CASE.index("[radius]")] + image + CASE[CASE.index("[modulus]") :]
+    text = text.replace('method = "series"\nplan = "reduced"\n', "").replace("tolerance = 1e-6", "")
+    case = written(tmp_path, text, GRAVITY=GRAVITY)
+    found, out = checked(case, tmp_path, capfd)
+    assert found["period_s"] is None
+    assert "P-Delta" not in out
+    assert main(["check", str(case), "--set", "envelope.tolerance=1 N"]) == 2
+    assert "envelope.tolerance" in capfd.readouterr().err
+    assert main(["check", str(case), "--set", "frame.masses=1e9 t"]) == 2  # no material holds it
+    assert "buckles" in capfd.readouterr().err
